@@ -1,0 +1,50 @@
+# add_lcm_types(<name> PACKAGE <package> TYPES a.lcm b.lcm ...)
+#
+# Generates from one .lcm file per struct:
+#   <name>          interface library: C++11 headers "<package>/<struct>.hpp", hardened against hostile lengths
+#   <name>_python   custom target: Python modules in <build>/lcmtypes/python/<package>
+#   <name>_java     custom target (where javac and lcm.jar are): <build>/lcmtypes/<name>.jar, for lcm-spy
+find_package(Java COMPONENTS Development QUIET)
+
+function(add_lcm_types name)
+  cmake_parse_arguments(ARG "" "PACKAGE" "TYPES" ${ARGN})
+  set(cpp ${CMAKE_CURRENT_BINARY_DIR}/cpp)
+  set(python ${CMAKE_CURRENT_BINARY_DIR}/python)
+  set(java ${CMAKE_CURRENT_BINARY_DIR}/java)
+  set(harden ${PROJECT_SOURCE_DIR}/cmake/harden_lcm_gen.sh)
+
+  foreach(type ${ARG_TYPES})
+    get_filename_component(struct ${type} NAME_WE)
+    set(source ${CMAKE_CURRENT_SOURCE_DIR}/${type})
+    set(header ${cpp}/${ARG_PACKAGE}/${struct}.hpp)
+    add_custom_command(OUTPUT ${header}
+      COMMAND ${LCM_GEN_EXECUTABLE} -x --cpp-std=c++11 --cpp-hpath ${cpp} ${source}
+      COMMAND ${harden} ${header}
+      DEPENDS ${source} ${harden} VERBATIM)
+    list(APPEND headers ${header})
+    set(module ${python}/${ARG_PACKAGE}/${struct}.py)
+    add_custom_command(OUTPUT ${module}
+      COMMAND ${LCM_GEN_EXECUTABLE} -p --ppath ${python} ${source} DEPENDS ${source} VERBATIM)
+    list(APPEND modules ${module})
+    list(APPEND java_sources ${java}/${ARG_PACKAGE}/${struct}.java)
+    list(APPEND sources ${source})
+  endforeach()
+
+  add_custom_target(${name}_headers DEPENDS ${headers})
+  add_library(${name} INTERFACE)
+  add_dependencies(${name} ${name}_headers)
+  # SYSTEM: generated code is not held to our warnings.
+  target_include_directories(${name} SYSTEM INTERFACE ${cpp})
+  target_link_libraries(${name} INTERFACE LCM::LCM)
+
+  add_custom_target(${name}_python DEPENDS ${modules})
+  if(Java_JAVAC_EXECUTABLE AND Java_JAR_EXECUTABLE AND LCM_JAR)
+    set(jar ${CMAKE_CURRENT_BINARY_DIR}/${name}.jar)
+    add_custom_command(OUTPUT ${jar}
+      COMMAND ${LCM_GEN_EXECUTABLE} -j --jpath ${java} ${sources}
+      COMMAND ${Java_JAVAC_EXECUTABLE} -cp ${LCM_JAR} -d ${java}/classes ${java_sources}
+      COMMAND ${Java_JAR_EXECUTABLE} cf ${jar} -C ${java}/classes .
+      DEPENDS ${sources} VERBATIM)
+    add_custom_target(${name}_java DEPENDS ${jar})
+  endif()
+endfunction()

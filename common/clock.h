@@ -1,0 +1,64 @@
+#pragma once
+
+#include <time.h>
+
+#include <cstdint>
+#include <string>
+
+namespace plumb {
+
+/// The time of a whole run. One scale factor lets a closed loop with a virtual robot run faster (or slower)
+/// than real time: scaled = epoch + (real - epoch) * scale. Every process of a run is given the same scale
+/// and epoch (flag `--clock SCALE@EPOCH`). All times are int64 microseconds. Thread-safe (immutable).
+class Clock {
+ public:
+  /// @param scale scaled seconds per real second, in (0, 1000].
+  /// @param epoch real CLOCK_REALTIME microseconds at which scaled and real time agree.
+  /// @throws std::invalid_argument if scale is out of range.
+  explicit Clock(double scale = 1, int64_t epoch = 0);
+
+  /// Reads the form "SCALE" or "SCALE@EPOCH". @throws std::invalid_argument naming the text.
+  static Clock Parse(const std::string& text);
+  std::string ToString() const;
+
+  double scale() const { return scale_; }
+
+  /// Scaled CLOCK_REALTIME: what messages carry as `utime`.
+  int64_t Utime() const;
+  /// Scaled CLOCK_MONOTONIC: for deadlines and staleness. Its origin is arbitrary.
+  int64_t Now() const;
+  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds).
+  int64_t UtimeFromRealtimeNs(int64_t ns) const;
+  /// Real time that corresponds to a scaled duration, for ppoll; negative durations give zero.
+  timespec RealDuration(int64_t scaled_us) const;
+
+ private:
+  double scale_;
+  int64_t epoch_;
+};
+
+/// Deadlines of a periodic loop, absolute, so that lateness does not accumulate. Not thread-safe.
+class Periodic {
+ public:
+  /// @param period scaled microseconds, > 0. @param now scaled monotonic time of the first deadline's start.
+  Periodic(int64_t period, int64_t now) : period_(period), deadline_(now + period) {}
+
+  /// Scaled microseconds until the deadline, 0 if it has passed.
+  int64_t Remaining(int64_t now) const { return deadline_ > now ? deadline_ - now : 0; }
+  bool Due(int64_t now) const { return now >= deadline_; }
+
+  /// Moves on to the next deadline after `now`. Deadlines that were missed altogether are skipped and
+  /// counted as overruns. @return how late this one was [us].
+  int64_t Advance(int64_t now);
+
+  int64_t cycles() const { return cycles_; }
+  int64_t overruns() const { return overruns_; }
+
+ private:
+  int64_t period_;
+  int64_t deadline_;
+  int64_t cycles_ = 0;
+  int64_t overruns_ = 0;
+};
+
+}  // namespace plumb

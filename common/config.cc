@@ -1,0 +1,210 @@
+#include "common/config.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#define TOML_HEADER_ONLY 1
+#include <toml++/toml.h>
+
+namespace plumb {
+namespace {
+
+std::string At(const std::string& file, const toml::source_region& source) {
+  if (source.begin.line == 0) return file + ": ";
+  return fmt::format("{}:{}:{}: ", file, source.begin.line, source.begin.column);
+}
+
+std::string Describe(Range range) {
+  const auto bounded = [](double x) { return std::abs(x) < std::numeric_limits<double>::max(); };
+  if (range.lower == std::numeric_limits<double>::min()) return "a positive finite number";
+  if (range.lower == 0 && !bounded(range.upper)) return "a finite number not below 0";
+  if (bounded(range.lower) && bounded(range.upper)) return fmt::format("in [{}, {}]", range.lower, range.upper);
+  if (bounded(range.lower)) return fmt::format("a finite number not below {}", range.lower);
+  if (bounded(range.upper)) return fmt::format("a finite number not above {}", range.upper);
+  return "a finite number";
+}
+
+bool Inside(double value, Range range) { return value >= range.lower && value <= range.upper; }
+
+}  // namespace
+
+size_t EditDistance(const std::string& a, const std::string& b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), size_t{0});
+  for (size_t i = 1; i <= a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = i;
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({substituted, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+Config::Config(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file, std::string path)
+    : root_(std::move(root)), table_(table), file_(std::move(file)), path_(std::move(path)) {}
+Config::Config(Config&&) noexcept = default;
+Config& Config::operator=(Config&&) noexcept = default;
+Config::~Config() = default;
+
+Config Config::Parse(const std::string& text, const std::string& name) {
+  try {
+    auto root = std::make_shared<const toml::table>(toml::parse(text, name));
+    const toml::table* table = root.get();
+    return Config(std::move(root), table, name, "");
+  } catch (const toml::parse_error& error) {
+    throw ConfigError(At(name, error.source()) + std::string(error.description()));
+  }
+}
+
+Config Config::Load(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw ConfigError(file + ": cannot be opened");
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  if (stream.bad()) throw ConfigError(file + ": cannot be read");
+  return Parse(text, file);
+}
+
+bool Config::Has(const std::string& key) const {
+  known_.insert(key);
+  return table().contains(key);
+}
+
+void Config::Fail(const std::string& key, const std::string& what) const {
+  const toml::node* node = table().get(key);
+  const toml::source_region& source = node ? node->source() : table().source();
+  const std::string full = path_.empty() ? key : path_ + "." + key;
+  throw ConfigError(fmt::format("{}{} {}", At(file_, source), full, what));
+}
+
+double Config::Number(const std::string& key, Range range, std::optional<double> fallback) {
+  if (!Has(key)) {
+    if (fallback) return *fallback;
+    Fail(key, "is missing");
+  }
+  const toml::node* node = table().get(key);
+  if (!node->is_number()) Fail(key, "is not a number");
+  const double value = *node->value<double>();
+  if (!Inside(value, range)) Fail(key, fmt::format("= {} is not {}", value, Describe(range)));
+  return value;
+}
+
+int Config::Integer(const std::string& key, Range range, std::optional<int> fallback) {
+  if (!Has(key)) {
+    if (fallback) return *fallback;
+    Fail(key, "is missing");
+  }
+  const toml::node* node = table().get(key);
+  if (!node->is_integer()) Fail(key, "is not an integer");
+  const int64_t value = *node->value<int64_t>();
+  range.lower = std::max(range.lower, -2147483648.0);
+  range.upper = std::min(range.upper, 2147483647.0);
+  if (!Inside(static_cast<double>(value), range)) Fail(key, fmt::format("= {} is not {}", value, Describe(range)));
+  return static_cast<int>(value);
+}
+
+bool Config::Boolean(const std::string& key, std::optional<bool> fallback) {
+  if (!Has(key)) {
+    if (fallback) return *fallback;
+    Fail(key, "is missing");
+  }
+  const toml::node* node = table().get(key);
+  if (!node->is_boolean()) Fail(key, "is not true or false");
+  return *node->value<bool>();
+}
+
+std::string Config::String(const std::string& key, std::optional<std::string> fallback) {
+  if (!Has(key)) {
+    if (fallback) return *fallback;
+    Fail(key, "is missing");
+  }
+  const toml::node* node = table().get(key);
+  if (!node->is_string()) Fail(key, "is not a string");
+  return *node->value<std::string>();
+}
+
+int Config::Choice(const std::string& key, const std::vector<std::string>& choices, std::optional<int> fallback) {
+  if (!Has(key) && fallback) return *fallback;
+  const std::string value = String(key);
+  const auto found = std::find(choices.begin(), choices.end(), value);
+  if (found == choices.end()) Fail(key, fmt::format("= \"{}\" is not one of {}", value, fmt::join(choices, ", ")));
+  return static_cast<int>(found - choices.begin());
+}
+
+std::vector<double> Config::Numbers(const std::string& key, size_t size, Range range,
+                                    std::optional<std::vector<double>> fallback) {
+  if (!Has(key)) {
+    if (fallback) return *fallback;
+    Fail(key, "is missing");
+  }
+  const toml::array* array = table().get(key)->as_array();
+  if (!array) Fail(key, "is not an array of numbers");
+  std::vector<double> values;
+  for (const toml::node& node : *array) {
+    if (!node.is_number()) Fail(key, "is not an array of numbers");
+    values.push_back(*node.value<double>());
+    if (!Inside(values.back(), range)) Fail(key, fmt::format("contains {}, not {}", values.back(), Describe(range)));
+  }
+  if (size != 0 && values.size() != size) Fail(key, fmt::format("has {} numbers, not {}", values.size(), size));
+  return values;
+}
+
+std::vector<int> Config::Integers(const std::string& key, Range range, std::optional<std::vector<int>> fallback) {
+  if (!Has(key) && fallback) return *fallback;
+  std::vector<int> values;
+  for (const double number : Numbers(key, 0, range)) {
+    if (number != std::floor(number) || std::abs(number) > 2147483647) Fail(key, "is not an array of integers");
+    values.push_back(static_cast<int>(number));
+  }
+  return values;
+}
+
+Config Config::Table(const std::string& key, bool required) {
+  static const toml::table kEmpty;
+  const std::string path = path_.empty() ? key : path_ + "." + key;
+  if (!Has(key)) {
+    if (required) Fail(key, "is missing: a table");
+    return Config(root_, &kEmpty, file_, path);
+  }
+  const toml::table* sub = table().get(key)->as_table();
+  if (!sub) Fail(key, "is not a table");
+  return Config(root_, sub, file_, path);
+}
+
+std::vector<Config> Config::Tables(const std::string& key) {
+  std::vector<Config> tables;
+  if (!Has(key)) return tables;
+  const toml::array* array = table().get(key)->as_array();
+  if (!array || !array->is_homogeneous<toml::table>()) Fail(key, "is not an array of tables: write [[" + key + "]]");
+  for (const toml::node& node : *array) {
+    tables.push_back(Config(root_, node.as_table(), file_,
+                            fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, tables.size())));
+  }
+  return tables;
+}
+
+std::vector<std::string> Config::Keys() const {
+  std::vector<std::pair<toml::source_position, std::string>> keys;
+  for (const auto& [key, node] : table()) keys.emplace_back(node.source().begin, std::string(key.str()));
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::string> names;
+  for (auto& [position, name] : keys) names.push_back(std::move(name));
+  return names;
+}
+
+void Config::Finish() const {
+  for (const std::string& key : Keys()) {
+    if (known_.count(key) != 0) continue;
+    const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
+      return EditDistance(a, key) < EditDistance(b, key);
+    });
+    Fail(key, "is not a known key" + (nearest == known_.end() ? "" : "; did you mean " + *nearest + "?"));
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <lcm/lcm-cpp.hpp>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace plumb {
+
+/// LCM by multicast on this machine only (TTL 0), with a receive buffer large enough for a policy.
+inline constexpr char kDefaultLcmUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
+
+/// One process's connection to LCM. Not thread-safe.
+class Messenger {
+ public:
+  /// @param url an LCM URL; udpm, memq or file.
+  /// @throws std::runtime_error that says how to cure it (no multicast route is the usual cause).
+  explicit Messenger(const std::string& url);
+
+  lcm::LCM& lcm() { return lcm_; }
+  /// For poll. Calling it starts LCM's receive thread.
+  int fd() { return lcm_.getFileno(); }
+  /// Handles every message that has arrived. @return how many, -1 at the end of a file or on failure.
+  int Drain();
+  /// Keeps malformed LCM datagrams from liblcm (see lcm_guard.h); call after the first subscription.
+  /// Subscriber does.
+  void Guard();
+
+ private:
+  std::string url_;
+  lcm::LCM lcm_;
+  bool guarded_ = false;
+};
+
+/// Receives messages of one type on one channel. Decodes them itself, because an exception must never cross
+/// liblcm's C frames: what does not decode is counted and forgotten. The queue is unbounded, since a bounded
+/// one keeps the oldest messages; Messenger::Drain empties it. Not thread-safe; must not outlive the Messenger.
+template <class Message>
+class Subscriber {
+ public:
+  using Callback = std::function<void(const Message&)>;
+
+  /// @param callback called for every message, in order of arrival; may be empty when newest() is enough.
+  /// It may throw: the exception is kept and thrown again by Rethrow().
+  Subscriber(Messenger& messenger, const std::string& channel, Callback callback = {})
+      : callback_(std::move(callback)) {
+    lcm::Subscription* subscription = messenger.lcm().subscribe(channel, &Subscriber::OnBuffer, this);
+    subscription->setQueueCapacity(0);
+    messenger.Guard();
+  }
+  Subscriber(const Subscriber&) = delete;
+  Subscriber& operator=(const Subscriber&) = delete;
+
+  /// The newest message that decoded; meaningless while received() is 0.
+  const Message& newest() const { return newest_; }
+  int64_t received() const { return received_; }
+  /// Messages that did not decode: wrong type, wrong length, hostile counts.
+  int64_t rejected() const { return rejected_; }
+  /// Throws what the callback threw, if it did.
+  void Rethrow() {
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  }
+
+ private:
+  void OnBuffer(const lcm::ReceiveBuffer* buffer, const std::string&) noexcept {
+    try {
+      // Into the member, whose vectors keep their capacity: no allocation for messages of equal size.
+      const int length = static_cast<int>(buffer->data_size);
+      if (newest_.decode(buffer->data, 0, length) != length) {
+        ++rejected_;
+        return;
+      }
+    } catch (...) {
+      ++rejected_;
+      return;
+    }
+    ++received_;
+    try {
+      if (callback_) callback_(newest_);
+    } catch (...) {
+      failure_ = std::current_exception();
+    }
+  }
+
+  Callback callback_;
+  Message newest_{};
+  int64_t received_ = 0;
+  int64_t rejected_ = 0;
+  std::exception_ptr failure_;
+};
+
+/// Publishes messages of one type on one channel, encoding into its own buffer: no allocation once the
+/// largest message has been sent. Not thread-safe; must not outlive the Messenger.
+template <class Message>
+class Publisher {
+ public:
+  Publisher(Messenger& messenger, std::string channel) : messenger_(&messenger), channel_(std::move(channel)) {}
+
+  /// @return false if the message was not sent (liblcm says no more).
+  bool Publish(const Message& message) {
+    const int size = message.getEncodedSize();
+    if (static_cast<size_t>(size) > buffer_.size()) buffer_.resize(static_cast<size_t>(size));
+    if (message.encode(buffer_.data(), 0, size) != size) return false;
+    return messenger_->lcm().publish(channel_, buffer_.data(), static_cast<unsigned>(size)) == 0;
+  }
+
+ private:
+  Messenger* messenger_;
+  std::string channel_;
+  std::vector<uint8_t> buffer_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,99 @@
+#include "common/process.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sys/prctl.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "common/version.h"
+
+namespace plumb {
+namespace {
+
+int BlockStopSignals() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, signal);
+  // Before any thread exists (LCM starts one), so that all of them inherit the mask.
+  sigprocmask(SIG_BLOCK, &set, nullptr);
+  ::signal(SIGPIPE, SIG_IGN);
+  const int fd = signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
+  if (fd < 0) throw std::runtime_error("signalfd failed");
+  return fd;
+}
+
+}  // namespace
+
+Process::Process(std::string name, std::string lcm_url, const std::string& clock)
+    : name_(std::move(name)), lcm_url_(std::move(lcm_url)), clock_(Clock::Parse(clock)), stop_fd_(BlockStopSignals()) {}
+
+Messenger& Process::messenger() {
+  if (!messenger_) messenger_ = std::make_unique<Messenger>(lcm_url_);
+  return *messenger_;
+}
+
+bool Process::stopping() {
+  signalfd_siginfo info;
+  if (read(stop_fd_, &info, sizeof info) == sizeof info) stopping_ = true;
+  return stopping_;
+}
+
+bool Process::Wait(int64_t timeout, int fd) {
+  std::array<pollfd, 3> polled{{{stop_fd_, POLLIN, 0}, {messenger().fd(), POLLIN, 0}, {fd, POLLIN, 0}}};
+  const timespec real = clock_.RealDuration(timeout);
+  ppoll(polled.data(), fd < 0 ? 2 : 3, &real, nullptr);
+  if (polled[1].revents != 0) messenger().Drain();
+  return !stopping();
+}
+
+std::string VersionLine(const std::string& name) {
+  return fmt::format("{} {} ({})", name, kVersion, kGitDescription);
+}
+
+int Run(const std::string& name, const std::string& description, int argc, char** argv,
+        const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body) {
+  CLI::App app{description, name};
+  const char* environment_url = std::getenv("LCM_DEFAULT_URL");
+  std::string lcm_url = environment_url && *environment_url ? environment_url : kDefaultLcmUrl;
+  std::string clock = "1";
+  std::string level = "info";
+  int parent = 0;
+  app.add_option("--lcm-url", lcm_url, "LCM provider; default: $LCM_DEFAULT_URL or this machine only")
+      ->capture_default_str();
+  app.add_option("--clock", clock, "clock scale, or SCALE@EPOCH as plumb launch passes it")->capture_default_str();
+  app.add_option("--log-level", level, "trace, debug, info, warning, error")->capture_default_str();
+  app.add_option("--parent", parent, "stop when this process, which started us, is gone");
+  app.set_version_flag("--version", VersionLine(name));
+  if (add_flags) add_flags(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int status = app.exit(error);
+    return status == 0 ? 0 : 2;
+  }
+  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
+  spdlog::set_pattern("%H:%M:%S.%e %n %^%l%$ %v");
+  spdlog::set_level(spdlog::level::from_str(level));
+  try {
+    if (parent != 0) {
+      prctl(PR_SET_PDEATHSIG, SIGTERM);
+      if (getppid() != parent) return 0;  // it died before we could ask to be told
+    }
+    Process process(name, lcm_url, clock);
+    spdlog::debug("{}", VersionLine(name));
+    return body(process);
+  } catch (const std::exception& error) {
+    spdlog::error("{}", error.what());
+    return 1;
+  }
+}
+
+}  // namespace plumb
