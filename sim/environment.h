@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "common/random.h"
+#include "robot/description.h"
+#include "sim/model.h"
+#include "sim/tasks/task.h"
+
+namespace plumb {
+
+/// A task on a simulated robot, in control steps. One per worker; not thread-safe. After construction nothing
+/// allocates. Equal parameters, state and actions give equal bits in any thread.
+class Environment {
+ public:
+  /// Has the prior means as parameters and the zero state until told otherwise.
+  /// @throws std::invalid_argument if the description names an unknown task or parameter.
+  explicit Environment(const RobotDescription& description);
+
+  int observation_size() const { return task_->observation_size(); }
+  int action_size() const { return task_->action_size(); }
+  int parameter_count() const { return simulator_.parameter_count(); }
+  /// Time limit: truncation, not termination. The environment itself does not count.
+  int steps_per_episode() const { return steps_per_episode_; }
+
+  /// @param physical in the order of description.parameters. @throws std::invalid_argument, see
+  /// Parameters::Apply.
+  void SetParameters(const Eigen::Ref<const Eigen::VectorXd>& physical) { simulator_.SetParameters(physical); }
+  /// Draws a state of the task's initial distribution. No effort has been applied yet.
+  void Reset(Random& random);
+  /// @throws std::invalid_argument if the state is not finite.
+  void SetState(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v);
+
+  struct StepResult {
+    double reward;    ///< of the state before the step and this action
+    bool terminated;  ///< by the task, or because the simulation is no longer finite
+  };
+  /// One control period. During its first description.simulation.latency seconds the previous action still
+  /// acts: on the robot, too, an effort arrives some time after the state it answers.
+  /// @param action policy units, [-1, 1] = effort limits; clipped here.
+  StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action);
+
+  /// Writes what the policy sees, observation_size() entries.
+  void Observe(Eigen::Ref<Eigen::VectorXf> observation) const;
+
+  const Eigen::VectorXd& q() const { return simulator_.q(); }
+  const Eigen::VectorXd& v() const { return simulator_.v(); }
+  const Task& task() const { return *task_; }
+
+ private:
+  std::unique_ptr<Task> task_;
+  Simulator simulator_;
+  int steps_per_episode_;
+  double period_;
+  double latency_;
+  Eigen::VectorXd start_q_, start_v_;  // work space of Reset
+  Eigen::VectorXd effort_;             // of the latest action: what acts at the beginning of the next step
+  Eigen::VectorXd next_effort_;
+};
+
+}  // namespace plumb

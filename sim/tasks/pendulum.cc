@@ -1,0 +1,42 @@
+#include "sim/tasks/pendulum.h"
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// The same angle in [-pi, pi).
+double Wrap(double angle) { return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi)); }
+
+}  // namespace
+
+PendulumTask::PendulumTask(const RobotDescription& description)
+    : Task(description, /*observation_size=*/3, Eigen::Vector2d(1, 8)) {
+  if (description.num_joints() != 1 || description.joints[0].type == JointDescription::Type::kPrismatic) {
+    throw std::invalid_argument("task 'pendulum' needs a robot with one turning joint; '" + description.name +
+                                "' is none");
+  }
+}
+
+void PendulumTask::Observe(const State& q, const State& v, std::span<float> observation) const {
+  observation[0] = static_cast<float>(std::cos(q[0]));
+  observation[1] = static_cast<float>(std::sin(q[0]));
+  observation[2] = static_cast<float>(v[0]);
+}
+
+double PendulumTask::Reward(const State& q, const State& v, const State& effort) const {
+  const double angle = Wrap(q[0]);
+  return -(angle * angle + 0.1 * v[0] * v[0] + 0.001 * effort[0] * effort[0]);
+}
+
+void PendulumTask::InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
+                                Eigen::Ref<Eigen::VectorXd> v) const {
+  q[0] = random.Uniform(-kPi, kPi);
+  v[0] = random.Uniform(-1, 1);
+}
+
+}  // namespace plumb

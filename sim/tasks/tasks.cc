@@ -1,0 +1,41 @@
+// The list of tasks. A new task is its file pair and one line here.
+#include <stdexcept>
+
+#include "common/config.h"
+#include "sim/tasks/pendulum.h"
+#include "sim/tasks/task.h"
+
+namespace plumb {
+namespace {
+
+template <class T>
+std::unique_ptr<Task> Make(const RobotDescription& description) {
+  return std::make_unique<T>(description);
+}
+
+constexpr struct {
+  const char* name;
+  std::unique_ptr<Task> (*make)(const RobotDescription&);
+} kTasks[] = {
+    {"pendulum", Make<PendulumTask>},
+};
+
+}  // namespace
+
+std::unique_ptr<Task> MakeTask(const RobotDescription& description) {
+  const std::string& name = description.task.name;
+  std::string nearest = kTasks[0].name;
+  for (const auto& task : kTasks) {
+    if (task.name == name) return task.make(description);
+    if (EditDistance(name, task.name) < EditDistance(name, nearest)) nearest = task.name;
+  }
+  throw std::invalid_argument("no task is named '" + name + "'; the nearest is '" + nearest + "'");
+}
+
+std::vector<std::string> TaskNames() {
+  std::vector<std::string> names;
+  for (const auto& task : kTasks) names.emplace_back(task.name);
+  return names;
+}
+
+}  // namespace plumb
