@@ -1,0 +1,195 @@
+#include "robot/parameter_distribution.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+using Coordinate = ParameterDescription::Coordinate;
+
+constexpr int kMaxComponents = 1000;
+// A covariance that has been through arithmetic: eigenvalues this far below zero, relative to the largest, are zero.
+constexpr double kRounding = 1e-9;
+
+int8_t ToCode(Coordinate coordinate) {
+  return coordinate == Coordinate::kLog ? parameter_distribution_t::LOG : parameter_distribution_t::LINEAR;
+}
+
+[[noreturn]] void Reject(const std::string& what) {
+  throw std::invalid_argument("parameter distribution: " + what);
+}
+
+void RequireSize(const char* what, int64_t announced, size_t actual, int64_t expected) {
+  if (announced != expected || actual != static_cast<size_t>(expected)) {
+    Reject(fmt::format("{} {}, expected {}", announced, what, expected));
+  }
+}
+
+void RequireSameParameters(const parameter_distribution_t& message, const RobotDescription& description) {
+  const auto count = static_cast<int64_t>(description.parameters.size());
+  RequireSize("parameters", message.num_parameters, message.name.size(), count);
+  RequireSize("coordinates", message.num_parameters, message.coordinate.size(), count);
+  for (size_t i = 0; i < description.parameters.size(); ++i) {
+    const ParameterDescription& expected = description.parameters[i];
+    if (message.name[i] != expected.name) {
+      Reject(fmt::format("parameter {} is '{}', {} has '{}' there", i, message.name[i].substr(0, 80),
+                         description.name, expected.name));
+    }
+    if (message.coordinate[i] != ToCode(expected.coordinate)) {
+      Reject(fmt::format("coordinate of '{}' is not that of {}", expected.name, description.name));
+    }
+  }
+}
+
+void RequireCovariance(const Eigen::MatrixXd& covariance) {
+  const double scale = covariance.cwiseAbs().maxCoeff();
+  if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > kRounding * scale) {
+    Reject("covariance is not symmetric");
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance, Eigen::EigenvaluesOnly);
+  if (eigen.info() != Eigen::Success || eigen.eigenvalues().minCoeff() < -kRounding * scale) {
+    Reject("covariance is not positive semidefinite");
+  }
+}
+
+/// First and second moment of one component, per parameter in physical units.
+struct Moments {
+  double mean, square;
+};
+
+Moments PhysicalMoments(const ParameterDistribution::Component& component, Eigen::Index i, Coordinate coordinate) {
+  const double mean = component.mean[i], variance = component.covariance(i, i);
+  if (coordinate == Coordinate::kLinear) return {mean, variance + mean * mean};
+  return {std::exp(mean + variance / 2), std::exp(2 * mean + 2 * variance)};
+}
+
+}  // namespace
+
+ParameterDistribution ParameterDistribution::Prior(const RobotDescription& description) {
+  ParameterDistribution prior;
+  prior.parameters = description.parameters;
+  const Eigen::Index size = prior.size();
+  Component component{1, Eigen::VectorXd(size), Eigen::MatrixXd::Zero(size, size)};
+  for (Eigen::Index i = 0; i < size; ++i) {
+    component.mean[i] = prior.parameters[static_cast<size_t>(i)].coordinate_mean();
+    component.covariance(i, i) = prior.parameters[static_cast<size_t>(i)].coordinate_variance();
+  }
+  prior.components.push_back(std::move(component));
+  return prior;
+}
+
+ParameterDistribution ParameterDistribution::FromMessage(const parameter_distribution_t& message,
+                                                         const RobotDescription& description) {
+  RequireSameParameters(message, description);
+  if (message.iteration < 0) Reject(fmt::format("iteration {}", message.iteration));
+  if (message.num_components < 1 || message.num_components > kMaxComponents) {
+    Reject(fmt::format("{} components", message.num_components));
+  }
+  const int64_t size = message.num_parameters, components = message.num_components;
+  RequireSize("weights", components, message.weight.size(), components);
+  RequireSize("means", message.num_means, message.mean.size(), components * size);
+  RequireSize("covariances", message.num_covariances, message.covariance.size(), components * size * size);
+
+  ParameterDistribution result;
+  result.iteration = message.iteration;
+  result.parameters = description.parameters;
+  double total = 0;
+  for (int64_t c = 0; c < components; ++c) {
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Component component;
+    component.weight = message.weight[static_cast<size_t>(c)];
+    component.mean = Eigen::Map<const Eigen::VectorXd>(message.mean.data() + c * size, size);
+    component.covariance = Eigen::Map<const RowMajor>(message.covariance.data() + c * size * size, size, size);
+    if (!(component.weight > 0) || !std::isfinite(component.weight) || !component.mean.allFinite() ||
+        !component.covariance.allFinite()) {
+      Reject(fmt::format("component {} is not finite or has no weight", c));
+    }
+    if (size > 0) RequireCovariance(component.covariance);
+    total += component.weight;
+    result.components.push_back(std::move(component));
+  }
+  if (std::abs(total - 1) > kRounding) Reject(fmt::format("weights sum to {}", total));
+  if (!result.Mean().allFinite() || !result.Sd().allFinite()) Reject("too wide: its moments overflow");
+  return result;
+}
+
+parameter_distribution_t ParameterDistribution::ToMessage() const {
+  parameter_distribution_t message;
+  message.utime = 0;
+  message.seed = 0;
+  message.iteration = iteration;
+  message.num_parameters = size();
+  for (const ParameterDescription& parameter : parameters) {
+    message.name.push_back(parameter.name);
+    message.coordinate.push_back(ToCode(parameter.coordinate));
+  }
+  message.num_components = static_cast<int32_t>(components.size());
+  for (const Component& component : components) {
+    message.weight.push_back(component.weight);
+    for (Eigen::Index i = 0; i < component.mean.size(); ++i) {
+      message.mean.push_back(component.mean[i]);
+      for (Eigen::Index j = 0; j < component.mean.size(); ++j) message.covariance.push_back(component.covariance(i, j));
+    }
+  }
+  message.num_means = static_cast<int32_t>(message.mean.size());
+  message.num_covariances = static_cast<int32_t>(message.covariance.size());
+  message.kl = message.ess = message.temperature = message.discrepancy = std::numeric_limits<double>::quiet_NaN();
+  return message;
+}
+
+Eigen::VectorXd ParameterDistribution::SampleCoordinates(Random& random) const {
+  double left = random.Uniform();
+  size_t chosen = 0;
+  while (chosen + 1 < components.size() && left >= components[chosen].weight) left -= components[chosen++].weight;
+  const Component& component = components[chosen];
+  if (size() == 0) return component.mean;
+
+  // Not Cholesky: a parameter known exactly, or exactly tied to another, makes the covariance singular.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(component.covariance);
+  Eigen::VectorXd normal(size());
+  for (double& value : normal) value = random.Normal();
+  return component.mean +
+         eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().cwiseProduct(normal);
+}
+
+Eigen::VectorXd ParameterDistribution::Sample(Random& random) const { return ToPhysical(SampleCoordinates(random)); }
+
+Eigen::VectorXd ParameterDistribution::ToPhysical(const Eigen::VectorXd& coordinates) const {
+  Eigen::VectorXd physical(coordinates.size());
+  for (Eigen::Index i = 0; i < physical.size(); ++i) {
+    physical[i] = parameters[static_cast<size_t>(i)].ToPhysical(coordinates[i]);
+  }
+  return physical;
+}
+
+Eigen::VectorXd ParameterDistribution::Mean() const {
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(size());
+  for (Eigen::Index i = 0; i < mean.size(); ++i) {
+    for (const Component& component : components) {
+      mean[i] += component.weight *
+                 PhysicalMoments(component, i, parameters[static_cast<size_t>(i)].coordinate).mean;
+    }
+  }
+  return mean;
+}
+
+Eigen::VectorXd ParameterDistribution::Sd() const {
+  const Eigen::VectorXd mean = Mean();
+  Eigen::VectorXd sd(size());
+  for (Eigen::Index i = 0; i < sd.size(); ++i) {
+    double square = 0;
+    for (const Component& component : components) {
+      square += component.weight *
+                PhysicalMoments(component, i, parameters[static_cast<size_t>(i)].coordinate).square;
+    }
+    sd[i] = std::sqrt(std::max(0., square - mean[i] * mean[i]));
+  }
+  return sd;
+}
+
+}  // namespace plumb

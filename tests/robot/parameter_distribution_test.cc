@@ -1,0 +1,123 @@
+#include "robot/parameter_distribution.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+
+namespace plumb {
+namespace {
+
+RobotDescription Robot() {
+  RobotDescription robot;
+  robot.name = "test robot";
+  robot.parameters = {{"gravity", "m/s^2", ParameterDescription::Coordinate::kLog, 10.4, .33},
+                      {"offset", "rad", ParameterDescription::Coordinate::kLinear, -.2, .01}};
+  return robot;
+}
+
+parameter_distribution_t TwoComponents() {
+  ParameterDistribution distribution = ParameterDistribution::Prior(Robot());
+  ParameterDistribution::Component second = distribution.components[0];
+  distribution.components[0].weight = .25;
+  second.weight = .75;
+  second.mean << std::log(9.), .3;
+  second.covariance << .04, .006, .006, .01;
+  distribution.components.push_back(second);
+  distribution.iteration = 3;
+  return distribution.ToMessage();
+}
+
+TEST_CASE("The prior has the description's mean and variance in physical units") {
+  const ParameterDistribution prior = ParameterDistribution::Prior(Robot());
+  CHECK(prior.iteration == 0);
+  CHECK(prior.Mean()[0] == Approx(10.4).epsilon(1e-12));
+  CHECK(prior.Sd()[0] == Approx(std::sqrt(.33)).epsilon(1e-9));
+  CHECK(prior.Mean()[1] == Approx(-.2));
+  CHECK(prior.Sd()[1] == Approx(.1));
+}
+
+TEST_CASE("Samples have the distribution's moments, also those of a correlated mixture") {
+  const ParameterDistribution distribution = ParameterDistribution::FromMessage(TwoComponents(), Robot());
+  const int count = 100000;
+  Random random(7, {1});
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(2), squares = Eigen::VectorXd::Zero(2);
+  double product = 0;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::VectorXd x = distribution.Sample(random);
+    sum += x;
+    squares += x.cwiseAbs2();
+    product += std::log(x[0]) * x[1];
+  }
+  const Eigen::VectorXd mean = sum / count;
+  const Eigen::VectorXd sd = (squares / count - mean.cwiseAbs2()).cwiseSqrt();
+  for (int i = 0; i < 2; ++i) {
+    CHECK(mean[i] == Approx(distribution.Mean()[i]).margin(4 * distribution.Sd()[i] / std::sqrt(count)));
+    CHECK(sd[i] == Approx(distribution.Sd()[i]).epsilon(.02));
+  }
+  // E[xy] = sum of weight * (covariance + product of means), in coordinates.
+  const double prior_mean = Robot().parameters[0].coordinate_mean();
+  CHECK(product / count == Approx(.25 * prior_mean * -.2 + .75 * (.006 + std::log(9.) * .3)).margin(.02));
+}
+
+TEST_CASE("Equal names of the generator give equal simulators") {
+  const ParameterDistribution prior = ParameterDistribution::Prior(Robot());
+  Random a(1, {2, 3}), b(1, {2, 3}), c(1, {2, 4});
+  const Eigen::VectorXd x = prior.Sample(a);
+  CHECK(x == prior.Sample(b));
+  CHECK(x != prior.Sample(c));
+}
+
+TEST_CASE("A singular covariance is sampled on its subspace") {
+  parameter_distribution_t message = ParameterDistribution::Prior(Robot()).ToMessage();
+  message.covariance = {.04, .02, .02, .01};
+  const ParameterDistribution distribution = ParameterDistribution::FromMessage(message, Robot());
+  Random random(5);
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::VectorXd offset = distribution.SampleCoordinates(random) - distribution.components[0].mean;
+    CHECK(offset[0] == Approx(2 * offset[1]).margin(1e-7));
+  }
+}
+
+TEST_CASE("A message survives the round trip bit by bit") {
+  const parameter_distribution_t message = TwoComponents();
+  const parameter_distribution_t again = ParameterDistribution::FromMessage(message, Robot()).ToMessage();
+  CHECK(again.iteration == 3);
+  CHECK(again.name == message.name);
+  CHECK(again.coordinate == message.coordinate);
+  CHECK(again.weight == message.weight);
+  CHECK(again.mean == message.mean);
+  CHECK(again.covariance == message.covariance);
+  CHECK(std::isnan(again.kl));
+}
+
+TEST_CASE("Hostile distributions are refused with a reason") {
+  parameter_distribution_t message = TwoComponents();
+  const auto refused_for = [&](const std::string& reason) {
+    CHECK_THROWS_WITH(ParameterDistribution::FromMessage(message, Robot()), Catch::Contains(reason));
+  };
+  ParameterDistribution::FromMessage(message, Robot());
+  SECTION("name") { message.name[1] = "ofset", refused_for("'ofset', test robot has 'offset'"); }
+  SECTION("coordinate") { message.coordinate[0] = parameter_distribution_t::LINEAR, refused_for("'gravity'"); }
+  SECTION("fewer parameters") { message.num_parameters = 1, refused_for("1 parameters, expected 2"); }
+  SECTION("shorter than announced") { message.name.pop_back(), refused_for("parameters"); }
+  SECTION("no components") { message.num_components = 0, refused_for("0 components"); }
+  SECTION("too many components") { message.num_components = 1 << 30, refused_for("components"); }
+  SECTION("weights missing") { message.weight.pop_back(), refused_for("weights"); }
+  SECTION("means") { message.num_means = 3, refused_for("means"); }
+  SECTION("covariances") { message.covariance.push_back(0), refused_for("covariances"); }
+  SECTION("iteration") { message.iteration = -1, refused_for("iteration -1"); }
+  SECTION("NaN mean") { message.mean[2] = std::nan(""), refused_for("component 1"); }
+  SECTION("infinite covariance") { message.covariance[0] = INFINITY, refused_for("component 0"); }
+  SECTION("NaN weight") { message.weight[0] = std::nan(""), refused_for("component 0"); }
+  SECTION("negative weight") { message.weight = {-1, 2}, refused_for("component 0"); }
+  SECTION("weights") { message.weight[0] = .5, refused_for("sum to 1.25"); }
+  SECTION("not symmetric") { message.covariance[5] = .005, refused_for("not symmetric"); }
+  SECTION("not positive semidefinite") {
+    message.covariance[5] = message.covariance[6] = .03, refused_for("not positive semidefinite");
+  }
+  SECTION("negative variance") { message.covariance[3] = -.01, refused_for("not positive semidefinite"); }
+  SECTION("overflow") { message.mean[0] = 1e5, refused_for("overflow"); }
+}
+
+}  // namespace
+}  // namespace plumb
