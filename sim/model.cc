@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -85,9 +87,30 @@ class Simulator::Impl {
     for (double i = 0; i < count && finite_; ++i) Substep(effort, h);
   }
 
-  /// Also leaves `acceleration_` non-finite if the state or effort is.
+  /// Leaves `acceleration_` non-finite where the state or the effort is, or Simbody gives up on huge numbers.
   void Accelerate(const Vector& effort) {
-    const std::vector<LinkMotion>& links = tree_.Update(q_, v_);
+    acceleration_.setConstant(std::numeric_limits<double>::quiet_NaN());
+    if (!q_.allFinite() || !v_.allFinite()) return;
+    try {
+      Solve(tree_.Update(q_, v_), effort);
+    } catch (const std::exception&) {
+      // Simbody's checks of its own intermediate results.
+    }
+  }
+
+  Parameters parameters_;
+  InertialModel inertias_;
+  Tree tree_;
+  SimulationSettings settings_;
+  std::vector<Composite> composites_;
+  Eigen::VectorXd q_, v_;
+  Eigen::VectorXd acceleration_;
+  Eigen::MatrixXd mass_matrix_;
+  Eigen::LLT<Eigen::MatrixXd> cholesky_;
+  bool finite_ = true;
+
+ private:
+  void Solve(const std::vector<LinkMotion>& links, const Vector& effort) {
     const std::vector<int>& parents = tree_.parents();
     for (size_t i = 0; i < links.size(); ++i) {
       composites_[i] = SeenFromOrigin(inertias_.bodies[i], links[i], inertias_.gravity);
@@ -110,18 +133,6 @@ class Simulator::Impl {
     cholesky_.solveInPlace(acceleration_);
   }
 
-  Parameters parameters_;
-  InertialModel inertias_;
-  Tree tree_;
-  SimulationSettings settings_;
-  std::vector<Composite> composites_;
-  Eigen::VectorXd q_, v_;
-  Eigen::VectorXd acceleration_;
-  Eigen::MatrixXd mass_matrix_;
-  Eigen::LLT<Eigen::MatrixXd> cholesky_;
-  bool finite_ = true;
-
- private:
   void Substep(const Vector& effort, double h) {
     const bool leapfrog = settings_.integrator == SimulationSettings::Integrator::kLeapfrog;
     if (leapfrog) q_ += h / 2 * v_;
@@ -130,7 +141,7 @@ class Simulator::Impl {
     if (!settings_.move_before_clip) Clip();
     q_ += (leapfrog ? h / 2 : h) * v_;
     if (settings_.move_before_clip) Clip();
-    finite_ = q_.allFinite() && v_.allFinite();  // Simbody must never see anything else
+    finite_ = q_.allFinite() && v_.allFinite();
   }
 
   void Clip() {

@@ -1,0 +1,111 @@
+#include "sim/environment.h"
+
+#include <catch2/catch.hpp>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tests/sim/allocations.h"
+#include "tests/sim/robots.h"
+
+namespace plumb {
+namespace {
+
+using Eigen::VectorXd;
+using Eigen::VectorXf;
+
+VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
+VectorXf Action(float x) { return VectorXf::Constant(1, x); }
+
+}  // namespace
+
+TEST_CASE("an episode of gym.toml is gym's") {
+  Environment environment(LoadPendulum("gym.toml"));
+  CHECK(environment.steps_per_episode() == 200);
+  CHECK(environment.observation_size() == 3);
+  CHECK(environment.action_size() == 1);
+  CHECK(environment.parameter_count() == 3);
+  environment.SetParameters(Eigen::Vector3d(10, 1, 1));
+  double q = 3, v = -0.5;
+  environment.SetState(Scalar(q), Scalar(v));
+  Random random(2);
+  for (int i = 0; i < 60; ++i) {
+    const auto action = static_cast<float>(random.Uniform(-1.5, 1.5));
+    const double u = 2 * std::clamp(static_cast<double>(action), -1.0, 1.0);
+    const double angle = std::remainder(q, 2 * M_PI);
+    const double reward = -(angle * angle + 0.1 * v * v + 0.001 * u * u);
+    v = std::clamp(v + 0.05 * (15 * std::sin(q) + 3 * u), -8.0, 8.0);
+    q += 0.05 * v;
+    const Environment::StepResult result = environment.Step(Action(action));
+    CHECK(result.reward == Approx(reward).epsilon(1e-9));
+    CHECK_FALSE(result.terminated);
+    REQUIRE(std::abs(environment.q()[0] - q) < 1e-9);
+  }
+  VectorXf observation(3);
+  environment.Observe(observation);
+  CHECK(observation[0] == Approx(std::cos(q)).epsilon(1e-6));
+  CHECK(observation[2] == Approx(v).epsilon(1e-6));
+}
+
+TEST_CASE("with latency the previous action acts first") {
+  RobotDescription description = LoadPendulum("robot.toml");
+  description.simulation.latency = 0.02;
+  Environment environment(description);
+  Simulator simulator(description);
+  environment.SetState(Scalar(1), Scalar(0));
+  simulator.SetState(Scalar(1), Scalar(0));
+  environment.Step(Action(1));  // nothing came before
+  environment.Step(Action(-0.5f));
+  simulator.Step(Scalar(0), 0.02);
+  simulator.Step(Scalar(2), 0.03);
+  simulator.Step(Scalar(2), 0.02);
+  simulator.Step(Scalar(-1), 0.03);
+  CHECK(environment.q()[0] == Approx(simulator.q()[0]).epsilon(1e-13));
+  CHECK(environment.v()[0] == Approx(simulator.v()[0]).epsilon(1e-13));
+
+  // A new state forgets the action before it.
+  environment.SetState(Scalar(1), Scalar(0));
+  environment.Step(Action(0));
+  Environment fresh(description);
+  fresh.SetState(Scalar(1), Scalar(0));
+  fresh.Step(Action(0));
+  CHECK(environment.v() == fresh.v());
+}
+
+TEST_CASE("resets are the generator's alone") {
+  Environment one(LoadPendulum("robot.toml")), other(LoadPendulum("robot.toml"));
+  other.Step(Action(1));
+  Random a(9, {1, 2}), b(9, {1, 2});
+  one.Reset(a);
+  other.Reset(b);
+  CHECK(one.q() == other.q());
+  one.Step(Action(0.3f));
+  other.Step(Action(0.3f));
+  CHECK(one.v() == other.v());
+}
+
+TEST_CASE("an episode that blows up terminates") {
+  RobotDescription description = LoadPendulum("robot.toml");
+  Environment environment(description);
+  const double most = std::numeric_limits<double>::max();
+  environment.SetState(Scalar(most), Scalar(most));
+  CHECK(environment.Step(Action(0)).terminated);
+  environment.SetState(Scalar(0), Scalar(0));
+  CHECK_FALSE(environment.Step(Action(0)).terminated);
+}
+
+TEST_CASE("environment steps do not allocate") {
+  Environment environment(LoadPendulum("robot.toml"));
+  const VectorXf action = Action(0.5f);
+  VectorXf observation(3);
+  Random random(1);
+  const Eigen::VectorXd physical = Eigen::Vector3d(10, 1, 1);
+  const int64_t before = Allocations();
+  environment.SetParameters(physical);
+  environment.Reset(random);
+  environment.Step(action);
+  environment.Observe(observation);
+  CHECK(Allocations() == before);
+}
+
+}  // namespace plumb
