@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "calibrator/simopt.h"
+#include "calibrator/transitions.h"
+#include "plumb/calibration_status_t.hpp"
+#include "plumb/controller_status_t.hpp"
+#include "plumb/parameter_distribution_t.hpp"
+#include "robot/parameter_distribution.h"
+
+namespace plumb {
+
+/// The calibrator without its sockets: takes the messages of a live run, of lcm-logplayer or of a log file, and
+/// says when an iteration's roll-outs are complete. What it computes depends on the messages' contents only:
+/// roll-outs are delimited by CONTROLLER_STATUS (phase COMPLETE, purpose CALIBRATE) and joined when every state
+/// they name has arrived, in whatever order the channels interleave. Not thread-safe.
+class Calibrator {
+ public:
+  Calibrator(const RobotDescription& robot, SimOpt& simopt) : robot_(robot), simopt_(simopt), joiner_(robot) {}
+
+  void OnState(const robot_state_t& smoothed) { joiner_.OnState(smoothed); }
+  void OnCommand(const joint_command_t& command) { joiner_.OnCommand(command); }
+  void OnControllerStatus(const controller_status_t& status);
+
+  /// True when the roll-outs of the next iteration have been received whole.
+  bool ready() const;
+  /// Takes them; begins the iteration in SimOpt. @return false if they hold no usable transition (the
+  /// distribution is then kept for another iteration's data).
+  bool Begin();
+
+  const DropCounts& drops() const { return joiner_.drops(); }
+
+ private:
+  const RobotDescription& robot_;
+  SimOpt& simopt_;
+  TransitionJoiner joiner_;
+  std::optional<controller_status_t> complete_;
+};
+
+/// SimOpt's distribution, as the trainer samples it.
+ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state);
+/// The same as a message. @param report of the iteration that led there; null for the prior.
+parameter_distribution_t DistributionMessage(const RobotDescription& robot, const SimOpt::State& state, uint64_t seed,
+                                             const CalibrationReport* report);
+/// Findings as a message.
+calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state, const DropCounts& drops,
+                                   const CalibrationReport* report, double seconds);
+
+}  // namespace plumb

@@ -1,0 +1,198 @@
+// plumb-calibrator: ROBOT_STATE_SMOOTHED, JOINT_COMMAND, CONTROLLER_STATUS -> PARAMETER_DISTRIBUTION.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "calibrator/calibrator.h"
+#include "calibrator/checkpoint.h"
+#include "calibrator/log_reader.h"
+#include "common/atomic_file.h"
+#include "common/process.h"
+
+namespace plumb {
+namespace {
+
+struct Flags {
+  std::string robot;
+  std::string log;
+  std::string checkpoint = "calibration";
+  uint64_t seed = 1;
+  int threads = 0;
+};
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// SimOpt fed with messages: common to the live run and to a log.
+class Session {
+ public:
+  Session(const RobotDescription& robot, const Flags& flags)
+      : robot_(robot),
+        seed_(flags.seed),
+        folder_(flags.checkpoint),
+        simopt_(robot, flags.seed, flags.threads > 0 ? flags.threads : static_cast<int>(std::thread::hardware_concurrency())),
+        calibrator(robot, simopt_),
+        checkpoint_(flags.checkpoint, robot, flags.seed) {
+    if (auto state = checkpoint_.Load()) {
+      simopt_.Resume(std::move(*state));
+      spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration, simopt_.state().update);
+      report_ = simopt_.Report();
+    }
+  }
+
+  bool busy() const { return simopt_.running() || calibrator.ready(); }
+
+  /// Does one update if there is something to do. @return true when an iteration has been completed.
+  bool Work() {
+    if (!simopt_.running() && calibrator.ready()) {
+      start_ = std::chrono::steady_clock::now();
+      if (!calibrator.Begin()) {
+        spdlog::warn("a roll-out held no usable transition; waiting for the next");
+        return false;
+      }
+      checkpoint_.Save(simopt_.state());
+    }
+    if (!simopt_.running()) return false;
+    auto report = simopt_.Update();
+    checkpoint_.Save(simopt_.state());
+    if (!report) return false;
+    report_ = std::move(report);
+    seconds_ = SecondsSince(start_);
+    WriteDistribution();
+    return true;
+  }
+
+  parameter_distribution_t Distribution() const {
+    return DistributionMessage(robot_, simopt_.state(), seed_, report_ ? &*report_ : nullptr);
+  }
+  calibration_status_t Status() const {
+    return StatusMessage(robot_, simopt_.state(), calibrator.drops(), report_ ? &*report_ : nullptr, seconds_);
+  }
+
+ private:
+  void WriteDistribution() const {
+    const parameter_distribution_t m = Distribution();
+    const nlohmann::json j{{"iteration", m.iteration}, {"seed", m.seed},          {"utime", m.utime},
+                           {"names", m.name},          {"mean", m.mean},          {"covariance", m.covariance},
+                           {"kl", m.kl},               {"ess", m.ess},            {"temperature", m.temperature},
+                           {"discrepancy", m.discrepancy},
+                           {"identifiability", report_->identifiability.words}};
+    WriteAtomically(folder_ / fmt::format("distribution_{}.json", m.iteration), j.dump(1) + "\n");
+  }
+
+  const RobotDescription& robot_;
+  uint64_t seed_;
+  std::filesystem::path folder_;
+  SimOpt simopt_;
+
+ public:
+  Calibrator calibrator;
+
+ private:
+  CalibrationCheckpoint checkpoint_;
+  std::optional<CalibrationReport> report_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double seconds_ = 0;
+};
+
+int RunLive(Process& process, Session& session) {
+  Messenger& messenger = process.messenger();
+  Publisher<parameter_distribution_t> distribution(messenger, "PARAMETER_DISTRIBUTION");
+  Publisher<calibration_status_t> status(messenger, "CALIBRATION_STATUS");
+  Subscriber<robot_state_t> states(messenger, "ROBOT_STATE_SMOOTHED",
+                                   [&](const robot_state_t& m) { session.calibrator.OnState(m); });
+  Subscriber<joint_command_t> commands(messenger, "JOINT_COMMAND",
+                                       [&](const joint_command_t& m) { session.calibrator.OnCommand(m); });
+  Subscriber<controller_status_t> controller(
+      messenger, "CONTROLLER_STATUS", [&](const controller_status_t& m) { session.calibrator.OnControllerStatus(m); });
+  const auto publish = [&] {
+    distribution.Publish(session.Distribution());
+    status.Publish(session.Status());
+  };
+  publish();
+  auto last = std::chrono::steady_clock::now();
+  while (process.Wait(session.busy() ? 0 : 50'000)) {
+    states.Rethrow(), commands.Rethrow(), controller.Rethrow();
+    if (session.Work() || SecondsSince(last) >= 1) {
+      publish();
+      last = std::chrono::steady_clock::now();
+    }
+  }
+  const int64_t rejected = states.rejected() + commands.rejected() + controller.rejected();
+  if (rejected > 0) spdlog::warn("{} messages did not decode", rejected);
+  return 0;
+}
+
+void PrintIteration(const calibration_status_t& m, const RobotDescription& robot) {
+  std::string line = fmt::format("{:3d} ", m.iteration);
+  for (size_t i = 0; i < m.mean.size(); ++i) {
+    line += fmt::format("  {} {:.4f} ± {:.4f}", robot.parameters[i].name, m.mean[i], m.sd[i]);
+  }
+  line += fmt::format("  discrepancy {:.3f}  KL {:.3f}  ESS {:.1f}", m.discrepancy, m.kl, m.ess);
+  std::cout << line << std::endl;
+}
+
+int RunLog(Process& process, Session& session, const RobotDescription& robot, const std::string& file) {
+  robot_state_t state{};
+  joint_command_t command{};
+  controller_status_t status{};
+  int64_t rejected = 0;
+  const auto decode = [&](auto& message, const void* data, int size) {
+    try {
+      if (message.decode(data, 0, size) == size) return true;
+    } catch (const std::exception&) {
+    }
+    ++rejected;
+    return false;
+  };
+  const int64_t events = ReadLog(file, [&](const std::string& channel, const void* data, int size, int64_t) {
+    if (channel == "ROBOT_STATE_SMOOTHED") {
+      if (decode(state, data, size)) session.calibrator.OnState(state);
+    } else if (channel == "JOINT_COMMAND") {
+      if (decode(command, data, size)) session.calibrator.OnCommand(command);
+    } else if (channel == "CONTROLLER_STATUS") {
+      if (decode(status, data, size)) session.calibrator.OnControllerStatus(status);
+    }
+    while (session.busy() && !process.stopping()) {
+      if (session.Work()) PrintIteration(session.Status(), robot);
+    }
+    return !process.stopping();
+  });
+  const calibration_status_t found = session.Status();
+  spdlog::info("{} events, {} undecodable; dropped transitions: {} gaps, {} late, {} not finite, {} across restarts",
+               events, rejected, found.dropped_gap, found.dropped_late, found.dropped_not_finite,
+               found.dropped_restart);
+  if (found.iteration == 0) throw std::runtime_error(file + ": holds no complete roll-out to calibrate with");
+  std::cout << found.identifiability << std::endl;
+  return 0;
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  plumb::Flags flags;
+  return plumb::Run(
+      "plumb-calibrator", "Learns which simulators could have produced the robot's motion.", argc, argv,
+      [&](CLI::App& app) {
+        app.add_option("robot", flags.robot, "robot folder or TOML file")->required();
+        app.add_option("--log", flags.log, "calibrate from this LCM log instead of live messages, and exit");
+        app.add_option("--seed", flags.seed, "of the random numbers")->capture_default_str();
+        app.add_option("--checkpoint", flags.checkpoint, "folder for checkpoints and distribution_<n>.json")
+            ->capture_default_str();
+        app.add_option("--threads", flags.threads, "0 = one per core; the result does not depend on it")
+            ->capture_default_str();
+      },
+      [&](plumb::Process& process) {
+        const plumb::RobotDescription robot = plumb::LoadRobot(flags.robot);
+        plumb::Session session(robot, flags);
+        return flags.log.empty() ? plumb::RunLive(process, session)
+                                 : plumb::RunLog(process, session, robot, flags.log);
+      });
+}

@@ -1,0 +1,165 @@
+#include "calibrator/simopt.h"
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <thread>
+
+#include "common/random.h"
+
+namespace plumb {
+namespace {
+
+// Where the paper's objectives end in costs mapped to [0, 1] (table of Cui & Hensel).
+constexpr double kScaledMinTemperature = 0.01;
+
+// Costs c -> -(c - min) / (max - min); infinitely costly samples stay so.
+Eigen::VectorXd ScaledReturns(const Eigen::VectorXd& costs) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double cost : costs) {
+    if (!std::isfinite(cost)) continue;
+    low = std::min(low, cost);
+    high = std::max(high, cost);
+  }
+  return -(costs.array() - low) / std::max(high - low, std::numeric_limits<double>::min());
+}
+
+}  // namespace
+
+Gaussian PriorGaussian(const RobotDescription& robot) {
+  const auto n = static_cast<Eigen::Index>(robot.parameters.size());
+  Gaussian prior{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    prior.mean(i) = robot.parameters[static_cast<size_t>(i)].coordinate_mean();
+    prior.covariance(i, i) = robot.parameters[static_cast<size_t>(i)].coordinate_variance();
+  }
+  return prior;
+}
+
+SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective)
+    : robot_(robot), seed_(seed), objective_(objective), prior_(PriorGaussian(robot)) {
+  state_.distribution = state_.before = prior_;
+  for (int i = 0; i < std::max(1, threads); ++i) workers_.emplace_back(robot);
+}
+
+SimOpt::~SimOpt() = default;
+
+void SimOpt::Resume(State state) {
+  if (state.distribution.mean.size() != prior_.mean.size() ||
+      state.distribution.covariance.rows() != prior_.mean.size()) {
+    throw std::invalid_argument("the checkpoint has another number of parameters than the robot");
+  }
+  state_ = std::move(state);
+}
+
+bool SimOpt::running() const {
+  return static_cast<int>(state_.rollouts_per_iteration.size()) > state_.iteration;
+}
+
+void SimOpt::Begin(std::vector<Rollout> rollouts) {
+  if (running()) throw std::invalid_argument("a calibration is running");
+  if (CountTransitions(rollouts) == 0) throw std::invalid_argument("the roll-outs hold no usable transition");
+  state_.rollouts_per_iteration.push_back(static_cast<int>(rollouts.size()));
+  for (Rollout& rollout : rollouts) state_.rollouts.push_back(std::move(rollout));
+  state_.before = state_.distribution;
+  state_.update = 0;
+  state_.kl = 0;
+}
+
+std::span<const Rollout> SimOpt::Newest() const {
+  const auto count = static_cast<size_t>(state_.rollouts_per_iteration.back());
+  return std::span(state_.rollouts).last(count);
+}
+
+Eigen::VectorXd SimOpt::ToPhysical(const Eigen::VectorXd& coordinates) const {
+  Eigen::VectorXd physical(coordinates.size());
+  for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
+    physical(i) = robot_.parameters[static_cast<size_t>(i)].ToPhysical(coordinates(i));
+  }
+  return physical;
+}
+
+Eigen::MatrixXd SimOpt::Samples(int iteration, int update) const {
+  Eigen::MatrixXd normals(prior_.mean.size(), robot_.calibration.samples);
+  for (Eigen::Index i = 0; i < normals.cols(); ++i) {
+    Random random(seed_, {static_cast<uint32_t>(iteration), static_cast<uint32_t>(update), static_cast<uint32_t>(i)});
+    for (Eigen::Index j = 0; j < normals.rows(); ++j) normals(j, i) = random.Normal();
+  }
+  return Transform(state_.distribution, normals);
+}
+
+Eigen::VectorXd SimOpt::Returns(const Eigen::MatrixXd& samples) {
+  // Each sample's value is computed by one thread from start to end: the same bits for any number of threads.
+  Eigen::VectorXd values(samples.cols());
+  std::atomic<Eigen::Index> next{0};
+  const auto work = [&](Discrepancy& discrepancy) {
+    for (Eigen::Index i; (i = next++) < samples.cols();) {
+      try {
+        const Eigen::VectorXd physical = ToPhysical(samples.col(i));
+        switch (objective_) {
+          case Objective::kPosterior: values(i) = discrepancy.LogLikelihood(physical, state_.rollouts); break;
+          case Objective::kStep: values(i) = discrepancy.StepError(physical, Newest()); break;
+          case Objective::kTrajectory: values(i) = discrepancy.TrajectoryError(physical, Newest()); break;
+        }
+      } catch (const std::invalid_argument&) {  // parameters no body can have: impossible
+        values(i) = objective_ == Objective::kPosterior ? -std::numeric_limits<double>::infinity()
+                                                        : std::numeric_limits<double>::infinity();
+      }
+    }
+  };
+  std::vector<std::thread> threads;
+  for (size_t i = 1; i < workers_.size(); ++i) threads.emplace_back(work, std::ref(workers_[i]));
+  work(workers_[0]);
+  for (std::thread& thread : threads) thread.join();
+
+  if (objective_ != Objective::kPosterior) return ScaledReturns(values);
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    values(i) += LogDensity(prior_, samples.col(i)) - LogDensity(state_.distribution, samples.col(i));
+  }
+  return values;
+}
+
+std::optional<CalibrationReport> SimOpt::Update() {
+  const int iteration = state_.iteration + 1;
+  const Eigen::MatrixXd samples = Samples(iteration, state_.update);
+  const Eigen::VectorXd returns = Returns(samples);
+  if (std::isfinite(returns.maxCoeff())) {  // otherwise no sample is possible: keep the distribution
+    const double coldest =
+        objective_ == Objective::kPosterior ? robot_.calibration.min_temperature : kScaledMinTemperature;
+    const RepsWeights weights = SolveReps(returns, robot_.calibration.kl, coldest);
+    const Gaussian fit = FitGaussian(samples, weights, state_.distribution);
+    const Gaussian limited = LimitKl(state_.distribution, fit, robot_.calibration.kl);
+    state_.kl += KlDivergence(limited, state_.distribution);
+    state_.ess = weights.ess;
+    state_.temperature = weights.temperature;
+    state_.distribution = limited;
+  }
+  if (++state_.update < robot_.calibration.updates) return {};
+  state_.iteration = iteration;
+  return Report();
+}
+
+std::optional<CalibrationReport> SimOpt::Report() {
+  if (state_.iteration == 0 || running()) return {};
+  Discrepancy& discrepancy = workers_[0];
+  const auto newest = Newest();
+  const Eigen::VectorXd before = ToPhysical(state_.before.mean), after = ToPhysical(state_.distribution.mean),
+                        prior = ToPhysical(prior_.mean);
+  CalibrationReport report;
+  report.iteration = state_.iteration;
+  report.kl = state_.kl;
+  report.ess = state_.ess;
+  report.temperature = state_.temperature;
+  report.discrepancy = discrepancy.StepError(after, newest);
+  report.prior_discrepancy = discrepancy.StepError(prior, newest);
+  for (const int horizon : robot_.calibration.horizons) {
+    report.errors.push_back({horizon, discrepancy.PredictionError(before, newest, horizon),
+                             discrepancy.PredictionError(after, newest, horizon),
+                             discrepancy.PredictionError(prior, newest, horizon)});
+  }
+  report.identifiability = FindIdentifiability(robot_, discrepancy, state_.rollouts, state_.distribution);
+  return report;
+}
+
+}  // namespace plumb

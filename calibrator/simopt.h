@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibrator/discrepancy.h"
+#include "calibrator/identifiability.h"
+#include "calibrator/reps.h"
+#include "calibrator/transitions.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// What an update of the distribution strives for.
+enum class Objective {
+  /// R = ln p(transitions | xi) + ln prior(xi) - ln p_phi(xi), temperature >= min_temperature. With temperature 1
+  /// the weighted samples are exactly the Bayesian posterior's, so the distribution comes to rest there: it
+  /// neither collapses nor forgets its prior where the data say nothing. A greater temperature (the KL bound)
+  /// is a step on the geometric path from p_phi to the posterior.
+  kPosterior,
+  /// R = - step error of the newest roll-out, costs mapped to [0, 1], temperature >= 0.01: the paper's.
+  kStep,
+  /// R = - trajectory error of the newest roll-out (SimOpt eq. 5), costs mapped to [0, 1], temperature >= 0.01.
+  kTrajectory,
+};
+
+/// Error of predicting n steps ahead with the mean parameters, in standard units.
+struct PredictionErrors {
+  int horizon;
+  double before;  ///< distribution that had not seen the newest roll-out
+  double after;   ///< distribution that has
+  double prior;   ///< the prior
+};
+
+/// What one iteration found.
+struct CalibrationReport {
+  int iteration = 0;
+  double kl = 0;           ///< D_KL(after || before), summed over the updates [nat]
+  double ess = 0;          ///< effective sample size of the last update
+  double temperature = 0;  ///< of the last update
+  double discrepancy = 0;  ///< step error of the mean on the newest roll-out; 1 = down to the noise
+  double prior_discrepancy = 0;
+  std::vector<PredictionErrors> errors;
+  Identifiability identifiability;
+};
+
+/// Step-based SimOpt: the distribution over simulators, updated from roll-outs by relative-entropy policy search.
+/// Random numbers are keyed by (seed, iteration, update), so an interrupted calibration resumes to the same bits,
+/// with any number of threads. Not thread-safe; uses `threads` threads inside.
+class SimOpt {
+ public:
+  /// Everything a resumed run needs, apart from the robot.
+  struct State {
+    int iteration = 0;  ///< completed iterations
+    int update = 0;     ///< completed updates of the running iteration
+    Gaussian distribution;
+    Gaussian before;  ///< distribution at the beginning of the running iteration
+    double kl = 0, ess = 0, temperature = 0;
+    std::vector<Rollout> rollouts;  ///< all so far; an iteration's are added when it begins
+    std::vector<int> rollouts_per_iteration;
+  };
+
+  SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective = Objective::kPosterior);
+  ~SimOpt();
+
+  const State& state() const { return state_; }
+  /// Takes up an earlier state. @throws std::invalid_argument if it is not of this robot.
+  void Resume(State state);
+
+  /// Begins an iteration with the roll-outs of the newest policy. @throws std::invalid_argument if one is running
+  /// or there is not a single transition.
+  void Begin(std::vector<Rollout> rollouts);
+  bool running() const;
+  /// One REPS update. @return the report when it was the iteration's last.
+  std::optional<CalibrationReport> Update();
+  /// The report of the iteration completed last, e.g. after Resume; empty for the prior.
+  std::optional<CalibrationReport> Report();
+
+  /// n x samples of the distribution's coordinates that update `update` of iteration `iteration` evaluates.
+  Eigen::MatrixXd Samples(int iteration, int update) const;
+
+ private:
+  Eigen::VectorXd Returns(const Eigen::MatrixXd& samples);
+  Eigen::VectorXd ToPhysical(const Eigen::VectorXd& coordinates) const;
+  std::span<const Rollout> Newest() const;
+
+  RobotDescription robot_;
+  uint64_t seed_;
+  Objective objective_;
+  Gaussian prior_;
+  State state_;
+  std::vector<Discrepancy> workers_;
+};
+
+/// The prior over the coordinates, as the description has it.
+Gaussian PriorGaussian(const RobotDescription& robot);
+
+}  // namespace plumb

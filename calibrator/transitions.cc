@@ -1,0 +1,110 @@
+#include "calibrator/transitions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace plumb {
+namespace {
+
+constexpr size_t kMostStates = 200'000;  // a quarter of an hour at 200 Hz
+constexpr size_t kMostEpisodes = 64;
+constexpr int kMostSteps = 1'000'000;
+
+Eigen::VectorXd ToEigen(const std::vector<double>& values) {
+  return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+}  // namespace
+
+double Transition::duration() const {
+  return std::accumulate(efforts.begin(), efforts.end(), 0.0,
+                         [](double sum, const EffortSegment& segment) { return sum + segment.duration; });
+}
+
+TransitionJoiner::TransitionJoiner(const RobotDescription& robot) : n_(robot.num_joints()), period_(robot.task.period) {}
+
+void TransitionJoiner::OnState(const robot_state_t& smoothed) {
+  if (smoothed.num_joints != n_) return;
+  // A restarted driver counts from 0 again; what was before cannot be joined with it.
+  if (smoothed.sequence < newest_state() - 1000) {
+    states_.clear();
+    commands_.clear();
+  }
+  states_.insert_or_assign(smoothed.sequence, smoothed);
+  if (states_.size() > kMostStates) states_.erase(states_.begin());
+}
+
+void TransitionJoiner::OnCommand(const joint_command_t& command) {
+  if (command.num_joints != n_ || command.episode < 0 || command.step < 0 || command.step >= kMostSteps) return;
+  commands_[command.episode].insert_or_assign(command.step, command);
+  if (commands_.size() > kMostEpisodes) commands_.erase(commands_.begin());
+}
+
+Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
+  Rollout rollout;
+  rollout.episode = episode;
+  const auto found = commands_.find(episode);
+  if (found == commands_.end()) return rollout;
+  const std::map<int, joint_command_t>& commands = found->second;
+  for (auto command = commands.begin(); command != commands.end(); ++command) {
+    rollout.policy_iteration = command->second.policy_iteration;
+    const auto next = std::next(command);
+    if (next != commands.end() && next->first != command->first + 1) {
+      ++drops_.gap;
+      continue;
+    }
+    Transition transition;
+    transition.step = command->first;
+    const int64_t to = next != commands.end() ? next->second.state_sequence : last_state;
+    if (JoinOne(command->second.state_sequence, to, &transition)) rollout.transitions.push_back(std::move(transition));
+  }
+  commands_.erase(found);
+  return rollout;
+}
+
+bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition) {
+  const auto first = states_.find(from), last = states_.find(to);
+  if (first == states_.end() || last == states_.end() || to <= from) {
+    ++drops_.gap;
+    return false;
+  }
+  const double duration = static_cast<double>(last->second.utime - first->second.utime) * 1e-6;
+  if (!(std::abs(duration - period_) <= 0.2 * period_)) {
+    ++drops_.late;
+    return false;
+  }
+  bool finite = true;
+  int64_t expected = from;
+  for (auto state = first; expected <= to; ++state, ++expected) {
+    if (state == states_.end() || state->first != expected) {
+      ++drops_.gap;
+      return false;
+    }
+    if (expected == from) continue;
+    const robot_state_t& now = state->second;
+    const robot_state_t& before = std::prev(state)->second;
+    if (now.restarted) {
+      ++drops_.restart;
+      return false;
+    }
+    EffortSegment segment{static_cast<double>(now.utime - before.utime) * 1e-6, ToEigen(now.effort)};
+    finite = finite && segment.duration > 0 && segment.effort.allFinite();
+    transition->efforts.push_back(std::move(segment));
+  }
+  const robot_state_t& s = first->second;
+  const robot_state_t& t = last->second;
+  transition->q = ToEigen(s.q), transition->v = ToEigen(s.v);
+  transition->next_q = ToEigen(t.q), transition->next_v = ToEigen(t.v);
+  transition->q_sd = ToEigen(s.q_sd), transition->v_sd = ToEigen(s.v_sd);
+  transition->next_q_sd = ToEigen(t.q_sd), transition->next_v_sd = ToEigen(t.v_sd);
+  for (const Eigen::VectorXd* x : {&transition->q, &transition->v, &transition->next_q, &transition->next_v,
+                                   &transition->q_sd, &transition->v_sd, &transition->next_q_sd,
+                                   &transition->next_v_sd}) {
+    finite = finite && x->allFinite();
+  }
+  if (!finite) ++drops_.not_finite;
+  return finite;
+}
+
+}  // namespace plumb

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "plumb/joint_command_t.hpp"
+#include "plumb/robot_state_t.hpp"
+#include "robot/description.h"
+#include "sim/model.h"
+
+namespace plumb {
+
+/// One control step of the robot: s -> s' under the effort that was actually applied, cycle by cycle. The first
+/// segments still carry the previous command: it takes milliseconds until a command reaches the motor, and a
+/// simulator that ignored that would be calibrated to be wrong.
+struct Transition {
+  int step;                                          ///< in the episode
+  Eigen::VectorXd q, v, next_q, next_v;              ///< smoothed states
+  Eigen::VectorXd q_sd, v_sd, next_q_sd, next_v_sd;  ///< their standard deviations
+  std::vector<EffortSegment> efforts;                ///< from s to s', gapless
+  double duration() const;
+};
+
+/// The usable transitions of one episode, in order of time.
+struct Rollout {
+  int64_t episode = 0;
+  int policy_iteration = 0;
+  std::vector<Transition> transitions;
+};
+
+/// Why transitions were left out, counted since the start. Nothing is ever guessed.
+struct DropCounts {
+  int64_t gap = 0;         ///< a state or a command is missing
+  int64_t late = 0;        ///< the interval is not one control period (within 20 %)
+  int64_t not_finite = 0;  ///< or an effort is unknown
+  int64_t restart = 0;     ///< the estimator's filter restarted within the interval
+};
+
+/// Joins ROBOT_STATE_SMOOTHED and JOINT_COMMAND by state_sequence: s is the state a command acted on, s' the
+/// state the next command acted on. The result depends on the messages' contents only, not on the order in
+/// which the two channels interleave. Memory is bounded. Not thread-safe.
+class TransitionJoiner {
+ public:
+  explicit TransitionJoiner(const RobotDescription& robot);
+
+  void OnState(const robot_state_t& smoothed);
+  void OnCommand(const joint_command_t& command);
+
+  /// Sequence number of the newest state, -1 before the first.
+  int64_t newest_state() const { return states_.empty() ? -1 : states_.rbegin()->first; }
+
+  /// Builds the roll-out of an episode from what has been received.
+  /// @param last_state sequence of the state that ended it.
+  Rollout Join(int64_t episode, int64_t last_state);
+
+  const DropCounts& drops() const { return drops_; }
+
+ private:
+  bool JoinOne(int64_t from, int64_t to, Transition* transition);
+
+  int n_;
+  double period_;
+  std::map<int64_t, robot_state_t> states_;                         // by sequence
+  std::map<int64_t, std::map<int, joint_command_t>> commands_;      // by episode, by step
+  DropCounts drops_;
+};
+
+}  // namespace plumb

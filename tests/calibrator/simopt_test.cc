@@ -1,0 +1,180 @@
+#include "calibrator/simopt.h"
+
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "calibrator/checkpoint.h"
+#include "tests/calibrator/synthetic.h"
+
+namespace plumb {
+namespace {
+
+const Eigen::Vector3d kTruth(9.3, 0.93, 1.07);
+const Eigen::Vector3d kNull(1, -2, 1);          // of (ln g, ln m, ln l), known in closed form
+const Eigen::Vector3d kGravityOverLength(1, 0, -1), kMassLengthSquared(0, 1, 2);
+
+double LogTruth(const Eigen::Vector3d& power) { return power.dot(kTruth.array().log().matrix()); }
+
+void Iterate(SimOpt& simopt, const RobotDescription& robot, int iterations, double v_sd = 0.01) {
+  for (int i = 0; i < iterations; ++i) {
+    simopt.Begin({SyntheticRollout(robot, kTruth, 100, 1e-4, v_sd, static_cast<uint32_t>(i))});
+    while (!simopt.Update()) {
+    }
+  }
+}
+
+TEST_CASE("the true parameters explain synthetic transitions down to the noise") {
+  const RobotDescription robot = Pendulum();
+  Discrepancy discrepancy(robot);
+  const std::vector<Rollout> rollouts{SyntheticRollout(robot, kTruth, 2000, 1e-4, 0.01, 1)};
+  // 4000 squared standard normals: 1 +- 0.0224
+  CHECK(discrepancy.StepError(kTruth, rollouts) == Approx(1).margin(0.07));
+  CHECK(discrepancy.StepError(Eigen::Vector3d(10, 1, 1), rollouts) > 1.5);
+  CHECK(discrepancy.LogLikelihood(kTruth, rollouts) == Approx(-0.5 * discrepancy.Residuals(kTruth, rollouts).squaredNorm()));
+}
+
+TEST_CASE("without noise every horizon is predicted exactly, and errors grow with the horizon otherwise") {
+  const RobotDescription robot = Pendulum();
+  Discrepancy discrepancy(robot);
+  std::vector<Rollout> rollouts{SyntheticRollout(robot, kTruth, 60, 0, 0, 1)};
+  for (const int n : {1, 5, 20}) CHECK(discrepancy.PredictionError(kTruth, rollouts, n) < 1e-9);
+  CHECK(discrepancy.TrajectoryError(kTruth, rollouts) < 1e-9);
+  const Eigen::Vector3d wrong(10, 1, 1);
+  CHECK(discrepancy.PredictionError(wrong, rollouts, 5) > 2 * discrepancy.PredictionError(wrong, rollouts, 1));
+  CHECK(discrepancy.TrajectoryError(wrong, rollouts) > 0.01);
+  CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 61)));
+  rollouts[0].transitions.erase(rollouts[0].transitions.begin() + 30);  // 30 + 29 remain, no window of 31
+  CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 31)));
+  CHECK(discrepancy.TrajectoryError(kTruth, rollouts) < 1e-9);
+}
+
+TEST_CASE("the distribution comes to rest on the posterior: neither collapsed nor forgetting its prior") {
+  RobotDescription robot = Pendulum();
+  robot.calibration.updates = 12;
+  SimOpt simopt(robot, 4, 2);
+  Iterate(simopt, robot, 6);
+  const Gaussian& found = simopt.state().distribution;
+
+  // Independent truth: the Laplace approximation of the same posterior, by Gauss-Newton from the true parameters.
+  const Gaussian prior = PriorGaussian(robot);
+  Discrepancy discrepancy(robot);
+  Eigen::VectorXd x = kTruth.array().log();
+  Eigen::MatrixXd precision;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::VectorXd r = discrepancy.Residuals(x.array().exp(), simopt.state().rollouts);
+    Eigen::MatrixXd jacobian(r.size(), 3);
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::VectorXd y = x + 1e-6 * Eigen::Vector3d::Unit(k);
+      jacobian.col(k) = (discrepancy.Residuals(y.array().exp(), simopt.state().rollouts) - r) / 1e-6;
+    }
+    precision = jacobian.transpose() * jacobian + Eigen::MatrixXd(prior.covariance.inverse());
+    x -= precision.ldlt().solve(jacobian.transpose() * r + prior.covariance.inverse() * (x - prior.mean));
+  }
+  const Eigen::MatrixXd covariance = precision.inverse();
+  for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
+    const double sd = std::sqrt(power.dot(covariance * power));
+    CHECK(std::abs(power.dot(found.mean - x)) < 1.2 * sd);
+    const double ratio = std::sqrt(power.dot(found.covariance * power)) / sd;
+    CHECK(ratio > 0.5);
+    CHECK(ratio < 2);
+    CHECK(std::abs(power.dot(found.mean) - LogTruth(power)) < 0.01);  // 1 %
+  }
+  // Where the data say nothing the prior stays.
+  const Eigen::Vector3d along = kNull.normalized();
+  const double null_ratio = along.dot(found.covariance * along) / along.dot(covariance * along);
+  CHECK(null_ratio > 0.3);
+  CHECK(null_ratio < 3);
+}
+
+TEST_CASE("what the motion determines is found and said in words") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 1, 1);
+  simopt.Begin({SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, 1)});
+  std::optional<CalibrationReport> report;
+  while (!(report = simopt.Update())) {
+  }
+  const Identifiability& found = report->identifiability;
+  REQUIRE(found.null.size() == 1);
+  CHECK((found.null[0] - kNull).norm() < 1e-3);
+  REQUIRE(found.combinations.size() == 2);
+  CHECK(found.combinations[0].name == "gravity / length");
+  CHECK(found.combinations[1].name == "mass length^2");
+  CHECK(found.words ==
+        "only gravity / length and mass length^2 can be known from this motion; gravity, mass, length are not "
+        "identifiable separately: (gravity +1 %, mass -2 %, length +1 %) changes nothing");
+}
+
+TEST_CASE("every update keeps to the KL bound") {
+  const RobotDescription robot = Pendulum();
+  for (const Objective objective : {Objective::kPosterior, Objective::kStep, Objective::kTrajectory}) {
+    SimOpt simopt(robot, 2, 1, objective);
+    simopt.Begin({SyntheticRollout(robot, kTruth, 50, 1e-4, 0.01, 1)});
+    Gaussian before = simopt.state().distribution;
+    bool last = false;
+    while (!last) {
+      last = simopt.Update().has_value();
+      CHECK(KlDivergence(simopt.state().distribution, before) <= robot.calibration.kl * (1 + 1e-9));
+      before = simopt.state().distribution;
+    }
+  }
+}
+
+bool SameBits(const Gaussian& a, const Gaussian& b) {
+  return a.mean == b.mean && a.covariance == b.covariance;
+}
+
+TEST_CASE("any number of threads and any interruption give the same bits") {
+  const RobotDescription robot = Pendulum();
+  SimOpt straight(robot, 9, 1);
+  Iterate(straight, robot, 2);
+
+  SimOpt threaded(robot, 9, 3);
+  Iterate(threaded, robot, 2);
+  CHECK(SameBits(straight.state().distribution, threaded.state().distribution));
+
+  const auto folder = std::filesystem::temp_directory_path() / "plumbline_simopt_test";
+  std::filesystem::remove_all(folder);
+  // A new process, as it were, after every single update.
+  for (int i = 0; i < 2; ++i) {
+    bool begun = false, done = false;
+    while (!done) {
+      CalibrationCheckpoint checkpoint(folder, robot, 9);
+      SimOpt simopt(robot, 9, 1);
+      if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
+      if (!begun) {
+        simopt.Begin({SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, static_cast<uint32_t>(i))});
+        begun = true;
+      } else {
+        done = simopt.Update().has_value();
+      }
+      checkpoint.Save(simopt.state());
+    }
+  }
+  CalibrationCheckpoint checkpoint(folder, robot, 9);
+  const auto resumed = checkpoint.Load();
+  REQUIRE(resumed);
+  CHECK(resumed->iteration == 2);
+  CHECK(SameBits(straight.state().distribution, resumed->distribution));
+
+  SECTION("another seed's checkpoint is refused") {
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder, robot, 10).Load(), Catch::Contains("another seed"));
+  }
+  SECTION("a damaged checkpoint is refused, naming the file") {
+    std::ofstream(folder / "rollout_1.json") << "{\"episode\": 3";
+    CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("rollout_1.json"));
+  }
+  std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("an iteration needs a transition") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 1, 1);
+  CHECK_THROWS_AS(simopt.Begin({Rollout{}}), std::invalid_argument);
+  CHECK_FALSE(simopt.Report());
+}
+
+}  // namespace
+}  // namespace plumb
