@@ -1,0 +1,236 @@
+#include "controller/controller.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kPlaceAgain = 1'000'000;    // [us] a robot not placed by then is asked to be placed anew
+constexpr int64_t kDriverTimeout = 1'000'000;  // [us] DRIVER_STATUS comes ten times a second
+constexpr double kPlaceSpeedFactor = 10;      // place_tolerance [rad] times this is the tolerance of speed [rad/s]
+
+int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
+
+Eigen::Map<const Eigen::VectorXd> Map(const std::vector<double>& values) {
+  return {values.data(), static_cast<Eigen::Index>(values.size())};
+}
+
+}  // namespace
+
+Controller::Controller(const RobotDescription& robot, uint64_t seed)
+    : robot_(robot),
+      task_(MakeTask(robot_)),
+      seed_(seed),
+      effort_(Eigen::VectorXd::Zero(robot.num_joints())),
+      observation_(task_->observation_size()) {
+  status_.policy_iteration = -1;
+  Enter(controller_status_t::WAITING, "no policy yet");
+}
+
+void Controller::Enter(int8_t phase, const std::string& reason) {
+  if (status_.phase != phase || status_.reason != reason) ++changes_;
+  status_.phase = phase;
+  status_.reason = reason;
+  if (phase != controller_status_t::PLACING) place_.reset();
+  if (phase != controller_status_t::RUNNING) episode_ = -1;
+}
+
+void Controller::OnPolicy(const policy_t& message) {
+  const policy_t& known = next_policy_ ? next_header_ : policy_header_;
+  if ((policy_ || next_policy_) && message.iteration == known.iteration && message.utime == known.utime) return;
+  auto policy = std::make_unique<GaussianPolicy>(GaussianPolicy::FromMessage(message));
+  if (policy->shape().observations != task_->observation_size() || policy->shape().actions != task_->action_size()) {
+    throw std::invalid_argument("the policy is for another robot: it has other numbers of observations or actions");
+  }
+  next_policy_ = std::move(policy);
+  next_header_ = message;
+  next_header_.weight.clear();
+  if (phase() != controller_status_t::RUNNING) TakePolicy();
+}
+
+void Controller::TakePolicy() {
+  policy_ = std::move(next_policy_);
+  policy_header_ = next_header_;
+  status_.policy_iteration = policy_header_.iteration;
+  status_.purpose = policy_header_.purpose;
+  status_.episodes_wanted = policy_header_.episodes;
+  status_.num_episodes = 0;
+  for (auto* list : {&status_.episode, &status_.first_state_sequence, &status_.last_state_sequence}) list->clear();
+  status_.returns.clear();
+  attempt_ = 0;
+  ++changes_;
+  if (phase() != controller_status_t::HALTED) {
+    Enter(controller_status_t::WAITING, Armed() ? "" : "the driver is not armed");
+  }
+}
+
+void Controller::OnDriverStatus(const driver_status_t& status, int64_t now) {
+  const bool was_armed = Armed();
+  driver_state_ = status.state;
+  driver_reason_ = status.reason;
+  driver_heard_ = now;
+  if (Armed() == was_armed) return;
+  if (Armed()) {
+    Enter(controller_status_t::WAITING, policy_ ? "" : "no policy yet");
+    state_heard_ = -1;
+  } else if (phase() != controller_status_t::COMPLETE) {
+    if (phase() == controller_status_t::RUNNING) ++status_.episodes_aborted;
+    if (phase() != controller_status_t::HALTED) {
+      Enter(controller_status_t::WAITING, "the driver is not armed" +
+                                              (driver_reason_.empty() ? "" : ": " + driver_reason_));
+    }
+  }
+}
+
+joint_command_t Controller::ZeroCommand(int64_t utime) {
+  const auto n = static_cast<size_t>(robot_.num_joints());
+  joint_command_t command{};
+  command.utime = utime;
+  command.sequence = sequence_++;
+  command.state_sequence = last_state_sequence_;
+  command.episode = -1;
+  command.step = -1;
+  command.policy_iteration = status_.policy_iteration;
+  command.num_joints = robot_.num_joints();
+  command.effort.assign(n, 0);
+  for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd}) values->assign(n, NAN);
+  return command;
+}
+
+joint_command_t Controller::Halt(const std::string& reason, int64_t utime) {
+  if (phase() == controller_status_t::RUNNING) ++status_.episodes_aborted;
+  Enter(controller_status_t::HALTED, reason);
+  return ZeroCommand(utime);
+}
+
+std::optional<joint_command_t> Controller::Tick(int64_t now, int64_t utime) {
+  if (now - driver_heard_ > kDriverTimeout && driver_state_ != driver_status_t::ABSENT) {
+    driver_status_t silent{};
+    silent.state = driver_status_t::ABSENT;
+    silent.reason = "it is silent";
+    OnDriverStatus(silent, driver_heard_);
+  }
+  const bool acting = phase() == controller_status_t::RUNNING || phase() == controller_status_t::PLACING;
+  if (acting && state_heard_ >= 0 && now - state_heard_ > Microseconds(robot_.controller.state_timeout) &&
+      // A robot that has just been placed gives the estimator a few states to settle.
+      !(phase() == controller_status_t::PLACING && now - placing_since_ < kPlaceAgain)) {
+    return Halt("no valid state for too long", utime);
+  }
+  return {};
+}
+
+void Controller::BeginPlacing(int64_t now, int64_t utime) {
+  place_robot_t place{};
+  place.utime = utime;
+  place.num_joints = robot_.num_joints();
+  Eigen::VectorXd q(robot_.num_joints()), v(robot_.num_joints());
+  Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_++)});
+  task_->InitialState(random, q, v);
+  place.q.assign(q.begin(), q.end());
+  place.v.assign(v.begin(), v.end());
+  status_.step = 0;
+  status_.episode_return = 0;
+  Enter(controller_status_t::PLACING);
+  place_ = std::move(place);
+  placing_since_ = now;
+}
+
+bool Controller::Placed(const robot_state_t& state) const {
+  const double tolerance = robot_.controller.place_tolerance;
+  if (state.utime <= place_->utime) return false;
+  for (size_t i = 0; i < state.q.size(); ++i) {
+    if (std::abs(state.q[i] - place_->q[i]) > tolerance) return false;
+    if (std::abs(state.v[i] - place_->v[i]) > kPlaceSpeedFactor * tolerance) return false;
+  }
+  return true;
+}
+
+std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, int64_t now, int64_t utime) {
+  if (state.num_joints != robot_.num_joints()) return {};
+  const bool finite = Map(state.q).allFinite() && Map(state.v).allFinite();
+  last_state_sequence_ = state.sequence;
+  if (finite && state.valid) state_heard_ = now;
+  const bool talking = driver_state_ == driver_status_t::ARMING || Armed();
+  if (!talking || phase() == controller_status_t::HALTED) return {};
+
+  if (phase() == controller_status_t::RUNNING) {
+    if (!finite) return Halt("the state is not finite", utime);
+    if (!state.valid) return Halt(state.restarted ? "the estimator restarted in an episode" : "the state is not valid", utime);
+    return Act(state, utime);
+  }
+  if (phase() == controller_status_t::PLACING && finite && state.valid && Placed(state)) {
+    episode_ = state.utime;
+    const int64_t identity = episode_;
+    Enter(controller_status_t::RUNNING);
+    episode_ = identity;
+    first_state_sequence_ = state.sequence;
+    next_decision_ = state.utime;
+    return Act(state, utime);
+  }
+  if (phase() == controller_status_t::WAITING && Armed() && policy_ && finite && state.valid) {
+    const bool more = status_.num_episodes < status_.episodes_wanted;
+    if (more) BeginPlacing(now, utime);
+    else Enter(controller_status_t::COMPLETE);
+  } else if (phase() == controller_status_t::PLACING && now - placing_since_ > kPlaceAgain) {
+    BeginPlacing(now, utime);
+  }
+  if (state.utime < next_decision_ && next_decision_ - state.utime < Microseconds(robot_.task.period)) return {};
+  next_decision_ = state.utime + Microseconds(robot_.task.period);
+  return ZeroCommand(utime);
+}
+
+std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64_t utime) {
+  const int64_t period = Microseconds(robot_.task.period);
+  // Measurements come at their own rate: answer the one nearest to the decision's time.
+  if (state.utime < next_decision_ - Microseconds(robot_.driver.measurement) / 2) return {};
+  if (state.utime > next_decision_ + period / 2) return Halt("a state came half a control period late", utime);
+  next_decision_ += period;
+  if (status_.step >= robot_.task.steps) {
+    FinishEpisode(state);
+    return ZeroCommand(utime);
+  }
+  const auto q = Map(state.q), v = Map(state.v);
+  if (task_->Terminated(q, v)) {
+    FinishEpisode(state);
+    return ZeroCommand(utime);
+  }
+  task_->Observe(q, v, {observation_.data(), static_cast<size_t>(observation_.size())});
+  Eigen::VectorXf action;
+  if (policy_header_.purpose == policy_t::EVALUATE) {
+    action = policy_->Mean(observation_);
+  } else {  // the policy's own noise excites what is to be learned
+    Random random(seed_ + 1, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_),
+                              static_cast<uint32_t>(status_.step)});
+    action = policy_->Sample(observation_, random);
+  }
+  if (!action.allFinite()) return Halt("the policy's action is not finite", utime);
+  task_->Effort({action.data(), static_cast<size_t>(action.size())}, effort_);
+
+  joint_command_t command = ZeroCommand(utime);
+  command.episode = episode_;
+  command.step = status_.step;
+  std::copy(effort_.begin(), effort_.end(), command.effort.begin());
+  status_.episode_return += task_->Reward(q, v, effort_);
+  ++status_.step;
+  return command;
+}
+
+void Controller::FinishEpisode(const robot_state_t& state) {
+  status_.episode.push_back(episode_);
+  status_.first_state_sequence.push_back(first_state_sequence_);
+  status_.last_state_sequence.push_back(state.sequence);
+  status_.returns.push_back(status_.episode_return);
+  ++status_.num_episodes;
+  if (next_policy_) {
+    TakePolicy();
+  } else if (status_.num_episodes >= status_.episodes_wanted) {
+    Enter(controller_status_t::COMPLETE);
+  } else {
+    Enter(controller_status_t::WAITING);
+  }
+  ++changes_;
+}
+
+}  // namespace plumb

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "controller/policy.h"
+#include "plumb/controller_status_t.hpp"
+#include "plumb/driver_status_t.hpp"
+#include "plumb/joint_command_t.hpp"
+#include "plumb/place_robot_t.hpp"
+#include "plumb/policy_t.hpp"
+#include "plumb/robot_state_t.hpp"
+#include "robot/description.h"
+#include "sim/tasks/task.h"
+
+namespace plumb {
+
+/// Runs a policy on the robot, episode by episode. Without sockets or clocks: time is an argument (`now` scaled
+/// monotonic, `utime` scaled real time, both [us]). Not thread-safe.
+///
+/// - A policy is exchanged only between episodes.
+/// - Between episodes it commands zero effort, which keeps an armed driver from disarming.
+/// - It is silent unless the driver is arming or armed, and after a halt: silence disarms.
+/// - A late, invalid or non-finite state or action halts it: one command of zero effort, then silence until the
+///   driver has been seen disarmed and armed anew, which takes a person.
+class Controller {
+ public:
+  Controller(const RobotDescription& robot, uint64_t seed);
+
+  /// A new policy. @throws std::invalid_argument if it does not fit the robot or is damaged.
+  void OnPolicy(const policy_t& message);
+  void OnDriverStatus(const driver_status_t& status, int64_t now);
+  /// A state. @return the command that answers it, if one is due.
+  std::optional<joint_command_t> OnState(const robot_state_t& state, int64_t now, int64_t utime);
+  /// Call at least every control period. @return a command of zero effort when it halts here.
+  std::optional<joint_command_t> Tick(int64_t now, int64_t utime);
+
+  /// The wish to place the robot, while phase() is PLACING.
+  const std::optional<place_robot_t>& place() const { return place_; }
+  const controller_status_t& status() const { return status_; }
+  int8_t phase() const { return status_.phase; }
+  /// Counts changes of phase: publish the status when it moves.
+  int64_t changes() const { return changes_; }
+
+ private:
+  bool Armed() const { return driver_state_ == driver_status_t::ARMED; }
+  void Enter(int8_t phase, const std::string& reason = {});
+  void TakePolicy();
+  void BeginPlacing(int64_t now, int64_t utime);
+  bool Placed(const robot_state_t& state) const;
+  void FinishEpisode(const robot_state_t& state);
+  joint_command_t Halt(const std::string& reason, int64_t utime);
+  joint_command_t ZeroCommand(int64_t utime);
+  std::optional<joint_command_t> Act(const robot_state_t& state, int64_t utime);
+
+  const RobotDescription robot_;
+  std::unique_ptr<Task> task_;
+  uint64_t seed_;
+  std::unique_ptr<GaussianPolicy> policy_, next_policy_;
+  policy_t policy_header_{}, next_header_{};  // without weights
+  controller_status_t status_{};
+  int64_t changes_ = 0;
+
+  int8_t driver_state_ = driver_status_t::ABSENT;
+  std::string driver_reason_;
+  int64_t driver_heard_ = 0;
+  int64_t state_heard_ = -1;  // now of the last valid state; -1 before the first
+  int64_t sequence_ = 0;
+  int64_t last_state_sequence_ = -1;
+
+  std::optional<place_robot_t> place_;
+  int64_t placing_since_ = 0;
+  int64_t attempt_ = 0;  // keys the initial state: a repeated episode begins differently
+
+  int64_t episode_ = -1;
+  int64_t first_state_sequence_ = 0;
+  int64_t next_decision_ = 0;  // utime of the state that is to be answered next
+  Eigen::VectorXd effort_;
+  Eigen::VectorXf observation_;
+};
+
+}  // namespace plumb
