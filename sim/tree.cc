@@ -65,7 +65,8 @@ class Tree::Impl {
       }
       const SimTK::Transform frame = ToSimbody(to_parent * joint.rotation * axes, to_parent * joint.origin);
       axes_.push_back(axes);
-      if (IsPrismatic(joint)) {
+      slides_.push_back(IsPrismatic(joint));
+      if (slides_.back()) {
         bodies_.push_back(SimTK::MobilizedBody::Slider(parent, frame, body, SimTK::Transform()));
       } else {
         bodies_.push_back(SimTK::MobilizedBody::Pin(parent, frame, body, SimTK::Transform()));
@@ -75,7 +76,7 @@ class Tree::Impl {
     system_.realizeModel(state_);
     system_.realize(state_, SimTK::Stage::Time);
     LinkMotion rest;
-    rest.angular_velocity = rest.angular_bias = rest.linear_bias = Eigen::Vector3d::Zero();
+    rest.axis = rest.angular_velocity = rest.angular_bias = rest.linear_bias = Eigen::Vector3d::Zero();
     links_.assign(bodies_.size(), rest);
   }
 
@@ -92,11 +93,15 @@ class Tree::Impl {
       const SimTK::MobilizedBody& body = bodies_[i];
       LinkMotion& link = links_[i];
       const SimTK::Transform& pose = body.getBodyTransform(state_);
-      const SimTK::SpatialVec column = body.getHCol(state_, SimTK::MobilizerUIndex(0));
-      link.rotation.noalias() = ToEigen(pose.R().asMat33()) * axes_[i].transpose();
+      const Eigen::Matrix3d frame = ToEigen(pose.R().asMat33());
+      link.rotation.noalias() = frame * axes_[i].transpose();
       link.position = ToEigen(pose.p());
-      link.axis = ToEigen(column[0]);
-      link.slide = ToEigen(column[1]) + link.position.cross(link.axis);
+      if (slides_[i]) {
+        link.slide = frame.col(0);
+      } else {
+        link.axis = frame.col(2);
+        link.slide = link.position.cross(link.axis);
+      }
       if (!velocities_matter_) continue;
       const SimTK::SpatialVec& bias = matter_.getTotalCoriolisAcceleration(state_, body.getMobilizedBodyIndex());
       link.angular_velocity = ToEigen(body.getBodyAngularVelocity(state_));
@@ -112,6 +117,7 @@ class Tree::Impl {
   SimTK::State state_;
   std::vector<SimTK::MobilizedBody> bodies_;
   std::vector<Eigen::Matrix3d> axes_;
+  std::vector<bool> slides_;
   bool velocities_matter_;
   std::vector<LinkMotion> links_;
 };
