@@ -77,12 +77,14 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
     }
     for (const Combination& c : report->identifiability.combinations) {
       m.combination.push_back(c.name);
+      m.combination_power.insert(m.combination_power.end(), c.power.begin(), c.power.end());
       m.combination_mean.push_back(c.mean);
       m.combination_sd.push_back(c.sd);
     }
     m.identifiability = report->identifiability.words;
   }
   m.num_horizons = static_cast<int32_t>(m.horizon.size());
+  m.num_powers = static_cast<int32_t>(m.combination_power.size());
   m.num_combinations = static_cast<int32_t>(m.combination.size());
   const ParameterDistribution distribution = Distribution(robot, state);
   const Eigen::VectorXd mean = distribution.Mean(), sd = distribution.Sd();

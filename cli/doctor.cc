@@ -1,0 +1,145 @@
+#include "cli/doctor.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+#include "common/messenger.h"
+#include "drivers/can/transport.h"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using Level = Finding::Level;
+
+constexpr int kCanHardwareType = 280;       // ARPHRD_CAN, linux/if_arp.h
+constexpr long kReceiveBuffer = 2097152;    // of the default LCM URL
+
+Finding Multicast(const std::string& lcm_url) {
+  try {
+    const Messenger messenger(lcm_url);
+    return {Level::kGood, "LCM opens at " + lcm_url, ""};
+  } catch (const std::exception&) {
+    return {Level::kBad, "LCM cannot open " + lcm_url + ": no route for multicast",
+            "ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"};
+  }
+}
+
+Finding UdpBuffers() {
+  long maximum = 0;
+  std::ifstream("/proc/sys/net/core/rmem_max") >> maximum;
+  if (maximum >= kReceiveBuffer) return {Level::kGood, fmt::format("UDP receive buffers up to {} bytes", maximum), ""};
+  return {Level::kAdvice, fmt::format("UDP receive buffers only up to {} bytes: policies may get lost", maximum),
+          fmt::format("sysctl -w net.core.rmem_max={}", 2 * kReceiveBuffer)};
+}
+
+std::vector<Finding> Can() {
+  const int fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, 1);
+  if (fd < 0) {
+    return {{Level::kAdvice, "this kernel has no CAN (the udp: bus needs none)",
+             "modprobe can_raw vcan   # on a kernel with CAN modules"}};
+  }
+  close(fd);
+  std::vector<Finding> findings;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator("/sys/class/net", error)) {
+    int type = 0;
+    std::ifstream(entry.path() / "type") >> type;
+    if (type != kCanHardwareType) continue;
+    const std::string name = entry.path().filename();
+    std::string flags;
+    std::ifstream(entry.path() / "flags") >> flags;
+    const bool up = (std::stoul(flags, nullptr, 16) & 1) != 0;
+    if (up) findings.push_back({Level::kGood, "CAN interface " + name + " is up", ""});
+    else
+      findings.push_back({Level::kAdvice, "CAN interface " + name + " is down",
+                          "ip link set " + name + " up type can bitrate 1000000 restart-ms 100"});
+  }
+  if (findings.empty()) {
+    findings.push_back({Level::kAdvice, "the kernel has CAN, but there is no CAN interface",
+                        "ip link add dev vcan0 type vcan && ip link set vcan0 up"});
+  }
+  return findings;
+}
+
+Finding Bus(const std::string& url) {
+  try {
+    OpenTransport(url);
+    return {Level::kGood, "the bus " + url + " opens", ""};
+  } catch (const std::exception& error) {
+    return {Level::kBad, error.what(), ""};
+  }
+}
+
+std::vector<Finding> RealTime() {
+  std::vector<Finding> findings;
+  rlimit limit{};
+  getrlimit(RLIMIT_RTPRIO, &limit);
+  if (geteuid() == 0 || limit.rlim_cur >= 80) findings.push_back({Level::kGood, "real-time priorities are allowed", ""});
+  else
+    findings.push_back({Level::kAdvice, "real-time priorities are not allowed: --realtime-priority will be refused",
+                        "echo '@realtime - rtprio 90' >> /etc/security/limits.d/plumbline.conf"});
+  getrlimit(RLIMIT_MEMLOCK, &limit);
+  if (geteuid() == 0 || limit.rlim_cur >= (64u << 20)) findings.push_back({Level::kGood, "memory may be locked", ""});
+  else
+    findings.push_back({Level::kAdvice, "memory may not be locked",
+                        "echo '@realtime - memlock unlimited' >> /etc/security/limits.d/plumbline.conf"});
+  return findings;
+}
+
+bool InPath(const std::string& program) {
+  const char* path = getenv("PATH");
+  std::istringstream folders(std::string(path ? path : "") + ":/usr/sbin:/sbin");
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    if (access((folder + "/" + program).c_str(), X_OK) == 0) return true;
+  }
+  return false;
+}
+
+std::vector<Finding> Packages() {
+  std::vector<Finding> findings;
+  const struct {
+    const char *program, *package, *purpose;
+  } programs[] = {{"lcm-logger", "liblcm-bin", "records runs"},
+                  {"candump", "can-utils", "shows SocketCAN frames"},
+                  {"can_viewer", "python3-can", "shows the udp: bus"},
+                  {"linux.uml", "user-mode-linux", "tests SocketCAN where the kernel has none"}};
+  for (const auto& p : programs) {
+    if (InPath(p.program)) findings.push_back({Level::kGood, fmt::format("{} is installed", p.program), ""});
+    else
+      findings.push_back({Level::kAdvice, fmt::format("{}, which {}, is missing", p.program, p.purpose),
+                          fmt::format("apt-get install {}", p.package)});
+  }
+  return findings;
+}
+
+}  // namespace
+
+std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus) {
+  std::vector<Finding> findings{Multicast(lcm_url), UdpBuffers()};
+  for (const auto& group : {Can(), std::vector<Finding>{Bus(bus)}, RealTime(), Packages()}) {
+    findings.insert(findings.end(), group.begin(), group.end());
+  }
+  return findings;
+}
+
+int Doctor(const std::string& lcm_url, const std::string& bus) {
+  int status = 0;
+  for (const Finding& finding : Examine(lcm_url, bus)) {
+    const char* mark = finding.level == Level::kGood ? "good  " : finding.level == Level::kAdvice ? "advice" : "BAD   ";
+    std::cout << mark << "  " << finding.what << "\n";
+    if (!finding.cure.empty()) std::cout << "        cure: " << finding.cure << "\n";
+    if (finding.level == Level::kBad) status = 1;
+  }
+  return status;
+}
+
+}  // namespace plumb

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace plumb {
+
+/// One thing `plumb doctor` looked at.
+struct Finding {
+  enum class Level { kGood, kAdvice, kBad };
+  Level level;
+  std::string what;
+  std::string cure;  ///< a command, empty if all is well
+};
+
+/// Looks at everything a run needs of this machine: multicast, UDP buffers, CAN, real-time limits, packages.
+/// Changes nothing. @param bus URL of the bus that is going to be used.
+std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus);
+
+/// Prints the findings. @return exit status: 1 if any is bad.
+int Doctor(const std::string& lcm_url, const std::string& bus);
+
+}  // namespace plumb

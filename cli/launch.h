@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "common/process.h"
+
+namespace plumb {
+
+struct LaunchFlags {
+  std::string robot = "robots/pendulum";
+  uint64_t seed = 1;
+  int iterations = 6;
+  int evaluation_episodes = 10;
+  std::string bus;      ///< empty = the robot's own
+  double speed = 1;     ///< scaled seconds per second
+  bool real = false;    ///< the robot is on the bus: start no virtual one, ask before arming
+  std::string log;      ///< record all messages here; empty = do not
+  std::string summary;  ///< JSON of the outcome; empty = do not
+  std::string output;   ///< folder for logs and checkpoints; empty = a new one
+};
+
+/// `plumb launch`: starts every process of a run, arms, shows progress, stops everything again whatever happens:
+/// motors first, the virtual robot last, within a second. @return exit status: 0 finished, 1 something failed,
+/// 130 interrupted.
+int Launch(Process& process, const LaunchFlags& flags);
+
+}  // namespace plumb

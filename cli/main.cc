@@ -1,0 +1,85 @@
+// plumb: the front door.
+
+#include <fmt/format.h>
+
+#include <iostream>
+
+#include "cli/doctor.h"
+#include "cli/launch.h"
+#include "common/process.h"
+#include "plumb/driver_request_t.hpp"
+#include "plumb/driver_status_t.hpp"
+
+namespace plumb {
+namespace {
+
+// Sends a request until the driver's status shows it fulfilled.
+int Request(Process& process, int8_t what) {
+  Publisher<driver_request_t> requests(process.messenger(), "DRIVER_REQUEST");
+  Subscriber<driver_status_t> statuses(process.messenger(), "DRIVER_STATUS");
+  process.Wait(300'000);
+  driver_request_t request{};
+  request.request = what;
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    // In a run with a scaled clock the driver's time is not ours.
+    request.utime = std::max(process.clock().Utime(), statuses.received() > 0 ? statuses.newest().utime + 1 : 0);
+    requests.Publish(request);
+    const int64_t deadline = process.clock().Now() + 600'000;
+    while (process.clock().Now() < deadline) {
+      if (!process.Wait(50'000)) return 130;
+      const int8_t state = statuses.newest().state;
+      const bool armed = state == driver_status_t::ARMED;
+      if (statuses.received() > 0 && armed == (what == driver_request_t::ARM) && state != driver_status_t::ARMING &&
+          statuses.newest().utime > request.utime) {
+        std::cout << (armed ? "armed" : "not armed: " + statuses.newest().reason) << std::endl;
+        return 0;
+      }
+    }
+  }
+  std::cerr << "plumb: "
+            << (statuses.received() == 0 ? "no driver answers on " + process.lcm_url()
+                                         : "the driver did not obey: " + statuses.newest().reason)
+            << std::endl;
+  return 1;
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  plumb::LaunchFlags flags;
+  std::string doctor_bus = "udp:239.74.163.2:43113";
+  CLI::App *launch = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
+  return plumb::Run(
+      "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
+      [&](CLI::App& app) {
+        app.require_subcommand(1);
+        launch = app.add_subcommand("launch", "run the whole loop: train, roll out, calibrate, train ...");
+        launch->add_option("robot", flags.robot, "robot folder or TOML file")->capture_default_str();
+        launch->add_option("--seed", flags.seed, "of all random numbers and of the hidden robot")->capture_default_str();
+        launch->add_option("--iterations", flags.iterations, "of calibration")
+            ->check(CLI::Range(1, 1000))->capture_default_str();
+        launch->add_option("--evaluation-episodes", flags.evaluation_episodes, "roll-outs of the final policy")
+            ->check(CLI::Range(1, 1000))->capture_default_str();
+        launch->add_option("--bus", flags.bus, "CAN bus, e.g. socketcan:can0; default: the robot's own");
+        launch->add_option("--speed", flags.speed, "clock scale; a virtual robot can run faster than real time")
+            ->check(CLI::Range(0.01, 100.0))->capture_default_str();
+        launch->add_flag("--real", flags.real, "the robot itself is on the bus: no virtual one, ask before arming");
+        launch->add_option("--log", flags.log, "record all messages to this LCM log");
+        launch->add_option("--summary", flags.summary, "write the outcome to this JSON file");
+        launch->add_option("--output", flags.output, "folder for logs and checkpoints; default: a new one in runs/");
+        doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
+        doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();
+        arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
+        disarm = app.add_subcommand("disarm", "switch the motors off");
+        estop = app.add_subcommand("estop", "emergency stop");
+        for (CLI::App* sub : {launch, doctor, arm, disarm, estop}) sub->fallthrough();
+      },
+      [&](plumb::Process& process) {
+        if (launch->parsed()) return plumb::Launch(process, flags);
+        if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus);
+        if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM);
+        if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM);
+        return plumb::Request(process, plumb::driver_request_t::ESTOP);
+      });
+}

@@ -1,0 +1,212 @@
+#include "cli/progress.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "plumb/policy_t.hpp"
+
+namespace plumb {
+namespace {
+
+double Mean(const std::vector<double>& values) {
+  return values.empty() ? NAN : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return NAN;
+  std::sort(values.begin(), values.end());
+  const size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
+
+const char* DriverState(int8_t state) {
+  switch (state) {
+    case driver_status_t::IDLE: return "idle";
+    case driver_status_t::ARMING: return "arming";
+    case driver_status_t::ARMED: return "armed";
+    case driver_status_t::FAULT: return "FAULT";
+    default: return "absent";
+  }
+}
+
+std::string PlusMinus(double mean, double sd) { return fmt::format("{:.3f} ± {:.3f}", mean, sd); }
+
+// Width in terminal cells: UTF-8 continuation bytes take none.
+std::string Pad(const std::string& text, size_t width) {
+  const auto cells = static_cast<size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+  return cells < width ? std::string(width - cells, ' ') + text : text;
+}
+
+}  // namespace
+
+void Progress::OnController(const controller_status_t& status) {
+  controller_ = status;
+  if (status.phase != controller_status_t::COMPLETE) return;
+  robot_return_[status.policy_iteration] = Mean(status.returns);
+  if (status.purpose == policy_t::EVALUATE && status.policy_iteration == iterations_) {
+    evaluation_ = status.returns;
+    finished_ = true;
+  }
+}
+
+void Progress::OnTraining(const training_status_t& status) {
+  training_ = status;
+  if (status.complete) simulated_return_[status.iteration] = status.evaluation_return;
+}
+
+void Progress::OnCalibration(const calibration_status_t& status) {
+  const int known = done_.empty() ? 0 : done_.back().calibration.iteration;
+  if (status.iteration <= known || status.num_parameters != static_cast<int>(robot_.parameters.size())) return;
+  const auto or_nan = [](const std::map<int, double>& values, int key) {
+    const auto found = values.find(key);
+    return found == values.end() ? NAN : found->second;
+  };
+  // Distribution k rests on the roll-out of policy k - 1.
+  done_.push_back({status, or_nan(simulated_return_, status.iteration - 1),
+                   or_nan(robot_return_, status.iteration - 1), last_account_ - last_row_});
+  last_row_ = last_account_;
+}
+
+void Progress::Account(double seconds) {
+  const double elapsed = seconds - std::exchange(last_account_, seconds);
+  const int8_t phase = controller_.phase;
+  if (phase == controller_status_t::RUNNING || phase == controller_status_t::PLACING) robot_seconds_ += elapsed;
+  else if (!training_.complete && training_.updates > 0) training_seconds_ += elapsed;
+  else other_seconds_ += elapsed;
+}
+
+std::string Progress::Header() const {
+  std::string header = "iter";
+  for (const ParameterDescription& p : robot_.parameters) header += Pad(p.name + " [" + p.unit + "]", 20);
+  header += Pad("discrepancy", 13);
+  for (const int n : robot_.calibration.horizons) header += Pad(fmt::format("{}-step", n), 9);
+  return header + "      KL   ESS  return sim  robot      s";
+}
+
+std::string Progress::Row(const Iteration& iteration) const {
+  const calibration_status_t& c = iteration.calibration;
+  std::string row = fmt::format("{:4d}", c.iteration);
+  for (size_t i = 0; i < c.mean.size(); ++i) row += Pad(PlusMinus(c.mean[i], c.sd[i]), 20);
+  row += fmt::format("{:13.2f}", c.discrepancy);
+  for (const double error : c.error_before) row += fmt::format("{:9.4f}", error);
+  return row + fmt::format("{:8.3f}{:6.1f}{:12.0f}{:7.0f}{:7.1f}", c.kl, c.ess, iteration.simulated_return,
+                           iteration.robot_return, iteration.seconds);
+}
+
+std::vector<std::string> Progress::TakeRows() {
+  std::vector<std::string> rows;
+  for (; taken_ < done_.size(); ++taken_) rows.push_back(Row(done_[taken_]));
+  return rows;
+}
+
+std::string Progress::StatusLine(double seconds) const {
+  std::string line = fmt::format("{:5.0f} s  driver {}", seconds, DriverState(driver_.state));
+  if (driver_.state == driver_status_t::FAULT) return line + ": " + driver_.reason;
+  const auto& c = controller_;
+  const char* purpose = c.purpose == policy_t::EVALUATE ? "evaluation" : "roll-out";
+  switch (c.phase) {
+    case controller_status_t::PLACING:
+    case controller_status_t::RUNNING:
+      return line + fmt::format("  policy {} {} {}/{}: step {}/{}, return {:.0f}", c.policy_iteration, purpose,
+                                c.num_episodes + 1, c.episodes_wanted, c.step, robot_.task.steps, c.episode_return);
+    case controller_status_t::HALTED: return line + "  controller halted: " + c.reason;
+    default: break;
+  }
+  if (training_.updates > 0 && !training_.complete) {
+    return line + fmt::format("  training policy {}: update {}/{}, return {:.0f}, {:.0f} k steps", training_.iteration,
+                              training_.update, training_.updates, training_.mean_return,
+                              static_cast<double>(training_.steps) / 1000);
+  }
+  if (c.phase == controller_status_t::COMPLETE) return line + "  calibrating";
+  return line + "  waiting" + (c.reason.empty() ? "" : ": " + c.reason);
+}
+
+double Progress::TrueCombination(size_t index, const Eigen::VectorXd& truth) const {
+  const calibration_status_t& c = done_.back().calibration;
+  double sum = 0;
+  bool log = true;
+  for (size_t i = 0; i < c.mean.size(); ++i) {
+    const double power = c.combination_power[index * c.mean.size() + i];
+    if (power == 0) continue;
+    sum += power * robot_.parameters[i].ToCoordinate(truth(static_cast<Eigen::Index>(i)));
+    log = log && robot_.parameters[i].coordinate == ParameterDescription::Coordinate::kLog;
+  }
+  return log ? std::exp(sum) : sum;
+}
+
+std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
+  std::string text;
+  if (!done_.empty()) {
+    const calibration_status_t& c = done_.back().calibration;
+    text += fmt::format("{:<24}{:>22}{:>12}{:>10}\n", "", "learned", "hidden", "error");
+    const auto line = [&](const std::string& name, double mean, double sd, double real) {
+      text += fmt::format("{:<24}", name) + Pad(PlusMinus(mean, sd), 22);
+      if (std::isfinite(real)) text += fmt::format("{:12.3f}{:9.2f} %", real, 100 * (mean / real - 1));
+      text += "\n";
+    };
+    for (size_t i = 0; i < c.combination.size(); ++i) {
+      line(c.combination[i], c.combination_mean[i], c.combination_sd[i],
+           truth.size() > 0 ? TrueCombination(i, truth) : NAN);
+    }
+    for (size_t i = 0; i < c.mean.size(); ++i) {
+      line("  " + robot_.parameters[i].name, c.mean[i], c.sd[i],
+           truth.size() > 0 ? truth(static_cast<Eigen::Index>(i)) : NAN);
+    }
+    text += c.identifiability + ".\n";
+  }
+  if (!evaluation_.empty()) {
+    text += fmt::format("final policy on the robot, {} roll-outs: mean return {:.0f}, median {:.0f}, worst {:.0f}\n",
+                        evaluation_.size(), Mean(evaluation_), Median(evaluation_),
+                        *std::min_element(evaluation_.begin(), evaluation_.end()));
+  }
+  text += fmt::format("time: {:.0f} s on the robot, {:.0f} s training, {:.0f} s for the rest\n", robot_seconds_,
+                      training_seconds_, other_seconds_);
+  return text;
+}
+
+nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
+  using nlohmann::json;
+  json summary;
+  std::vector<std::string> names;
+  for (const ParameterDescription& p : robot_.parameters) names.push_back(p.name);
+  summary["robot"] = robot_.name;
+  summary["parameters"] = names;
+  summary["hidden"] = truth.size() > 0 ? json(std::vector<double>(truth.begin(), truth.end())) : json();
+  summary["iterations"] = json::array();
+  for (const Iteration& iteration : done_) {
+    const calibration_status_t& c = iteration.calibration;
+    json combinations = json::array();
+    for (size_t i = 0; i < c.combination.size(); ++i) {
+      combinations.push_back({{"name", c.combination[i]},
+                              {"mean", c.combination_mean[i]},
+                              {"sd", c.combination_sd[i]},
+                              {"hidden", truth.size() > 0 ? json(TrueCombination(i, truth)) : json()}});
+    }
+    summary["iterations"].push_back({{"iteration", c.iteration},
+                                     {"mean", c.mean},
+                                     {"sd", c.sd},
+                                     {"combinations", combinations},
+                                     {"discrepancy", c.discrepancy},
+                                     {"prior_discrepancy", c.prior_discrepancy},
+                                     {"horizons", c.horizon},
+                                     {"error", c.error_before},
+                                     {"error_after", c.error_after},
+                                     {"error_prior", c.error_prior},
+                                     {"kl", c.kl},
+                                     {"ess", c.ess},
+                                     {"transitions", c.transitions},
+                                     {"simulated_return", iteration.simulated_return},
+                                     {"robot_return", iteration.robot_return},
+                                     {"seconds", iteration.seconds}});
+  }
+  if (!done_.empty()) summary["identifiability"] = done_.back().calibration.identifiability;
+  summary["evaluation_returns"] = evaluation_;
+  summary["seconds"] = {{"robot", robot_seconds_}, {"training", training_seconds_}, {"other", other_seconds_}};
+  return summary;
+}
+
+}  // namespace plumb

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "plumb/calibration_status_t.hpp"
+#include "plumb/controller_status_t.hpp"
+#include "plumb/driver_status_t.hpp"
+#include "plumb/training_status_t.hpp"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// What a run has shown so far, gathered from the status messages: the live line, the table, the summary.
+/// Time is an argument [s of wall time since the start]. Not thread-safe.
+class Progress {
+ public:
+  Progress(const RobotDescription& robot, int iterations) : robot_(robot), iterations_(iterations) {}
+
+  void OnDriver(const driver_status_t& status) { driver_ = status; }
+  void OnController(const controller_status_t& status);
+  void OnCalibration(const calibration_status_t& status);
+  void OnTraining(const training_status_t& status);
+  /// Attributes the time since the last call to what the loop is waiting for.
+  void Account(double seconds);
+
+  const driver_status_t& driver() const { return driver_; }
+  /// Table rows that have become complete since the last call.
+  std::vector<std::string> TakeRows();
+  std::string Header() const;
+  std::string StatusLine(double seconds) const;
+  /// True when the final policy's evaluation roll-outs are done.
+  bool finished() const { return finished_; }
+  const std::vector<double>& evaluation_returns() const { return evaluation_; }
+
+  /// "learned beside the hidden truth", for people. @param truth physical; empty if nobody knows.
+  std::string Conclusion(const Eigen::VectorXd& truth) const;
+  /// The same for programs; see docs/summary.md.
+  nlohmann::json Summary(const Eigen::VectorXd& truth) const;
+
+ private:
+  struct Iteration {
+    calibration_status_t calibration;
+    double simulated_return, robot_return, seconds;
+  };
+  std::string Row(const Iteration& iteration) const;
+  /// A determined combination's true value.
+  double TrueCombination(size_t index, const Eigen::VectorXd& truth) const;
+
+  const RobotDescription& robot_;
+  int iterations_;
+  driver_status_t driver_{};
+  controller_status_t controller_{};
+  training_status_t training_{};
+  std::map<int, double> simulated_return_, robot_return_;  // by policy iteration
+  std::vector<Iteration> done_;
+  size_t taken_ = 0;
+  std::vector<double> evaluation_;
+  bool finished_ = false;
+  double last_account_ = 0, last_row_ = 0;
+  double training_seconds_ = 0, robot_seconds_ = 0, other_seconds_ = 0;
+};
+
+}  // namespace plumb

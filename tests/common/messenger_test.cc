@@ -1,0 +1,145 @@
+#include "common/messenger.h"
+
+#include <arpa/inet.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+
+#include "common/random.h"
+#include "plumb/joint_state_t.hpp"
+#include "plumb/parameter_distribution_t.hpp"
+
+namespace plumb {
+namespace {
+
+joint_state_t Message(int64_t sequence) {
+  joint_state_t m{};
+  m.sequence = sequence;
+  m.num_joints = 2;
+  m.position = m.velocity = m.effort_measured = m.effort_sent = m.effort_applied = {1, 2};
+  m.valid = {1, 1};
+  return m;
+}
+
+TEST_CASE("messages arrive in order, and none is lost to a bounded queue") {
+  Messenger messenger("memq://");
+  std::vector<int64_t> got;
+  Subscriber<joint_state_t> subscriber(messenger, "JOINT_STATE",
+                                       [&](const joint_state_t& m) { got.push_back(m.sequence); });
+  Publisher<joint_state_t> publisher(messenger, "JOINT_STATE");
+  for (int i = 0; i < 100; ++i) REQUIRE(publisher.Publish(Message(i)));
+  while (got.size() < 100) messenger.Drain();
+  for (int i = 0; i < 100; ++i) CHECK(got[static_cast<size_t>(i)] == i);
+  CHECK(subscriber.newest().sequence == 99);
+}
+
+// Every message with up to four bytes changed, and lengths an attacker would choose: all of them may arrive.
+TEST_CASE("hostile messages are rejected, counted, and cost no memory") {
+  Messenger messenger("memq://");
+  Subscriber<parameter_distribution_t> subscriber(messenger, "X");
+  parameter_distribution_t m{};
+  m.num_parameters = 2, m.name = {"gravity", "mass"}, m.coordinate = {0, 1};
+  m.num_components = 1, m.weight = {1}, m.num_means = 2, m.mean = {1, 2};
+  m.num_covariances = 4, m.covariance = {1, 0, 0, 1};
+  std::vector<uint8_t> good(static_cast<size_t>(m.getEncodedSize()));
+  m.encode(good.data(), 0, static_cast<int>(good.size()));
+  Random random(1);
+  int sent = 0;
+  const auto send = [&](const std::vector<uint8_t>& bytes) {
+    messenger.lcm().publish("X", bytes.data(), static_cast<unsigned>(bytes.size()));
+    ++sent;
+    messenger.Drain();
+  };
+  for (int i = 0; i < 20000; ++i) {
+    std::vector<uint8_t> bad = good;
+    for (uint32_t k = 0; k <= i % 4u; ++k) bad[8 + random.Bits() % (bad.size() - 8)] = static_cast<uint8_t>(random.Bits());
+    send(bad);
+  }
+  // the count of parameters: negative, 2^27, 2^29, largest
+  for (const uint32_t count : {0xffffffffu, 1u << 27, 1u << 29, 0x7fffffffu, 0x80000000u}) {
+    std::vector<uint8_t> bad = good;
+    const uint32_t network = htonl(count);
+    std::memcpy(bad.data() + 8 + 8 + 4 + 8, &network, 4);
+    send(bad);
+  }
+  // cut off everywhere
+  for (size_t length = 0; length < good.size(); ++length) send({good.begin(), good.begin() + static_cast<long>(length)});
+  while (subscriber.received() + subscriber.rejected() < sent) messenger.Drain();
+  CHECK(subscriber.rejected() > static_cast<int64_t>(good.size()));
+  long pages = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> pages >> resident;
+  CHECK(resident * getpagesize() < 100'000'000);
+  send(good);
+  CHECK(subscriber.newest().name[0] == "gravity");
+}
+
+TEST_CASE("a callback's exception does not cross LCM's C frames") {
+  Messenger messenger("memq://");
+  Subscriber<joint_state_t> subscriber(messenger, "X", [](const joint_state_t&) { throw std::runtime_error("mine"); });
+  Publisher<joint_state_t> publisher(messenger, "X");
+  for (int i = 0; i < 3; ++i) {
+    publisher.Publish(Message(i));
+    messenger.Drain();
+  }
+  CHECK(subscriber.received() == 3);
+  CHECK_THROWS_WITH(subscriber.Rethrow(), "mine");
+  CHECK_NOTHROW(subscriber.Rethrow());
+}
+
+// Without the filter a single one of these datagrams makes liblcm 1.3.1 write 4 GB out of bounds.
+TEST_CASE("malformed LCM datagrams do not reach liblcm") {
+  constexpr int kPort = 17661;
+  const std::string url = "udpm://239.255.76.61:" + std::to_string(kPort) + "?ttl=0&recv_buf_size=2097152";
+  Messenger messenger(url);
+  Subscriber<joint_state_t> subscriber(messenger, "JOINT_STATE");
+  const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(kPort);
+  inet_pton(AF_INET, "239.255.76.61", &to.sin_addr);
+  const int ttl = 0;
+  setsockopt(fd, IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof ttl);
+  const auto send = [&](const std::vector<uint8_t>& bytes) {
+    sendto(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to);
+  };
+  const auto fragment = [](uint32_t size, uint32_t offset, uint16_t number, uint16_t count, size_t payload,
+                           bool named) {
+    std::vector<uint8_t> p(20);
+    const auto put = [&](size_t at, uint32_t x) { x = htonl(x); std::memcpy(&p[at], &x, 4); };
+    put(0, 0x4c433033), put(4, 7), put(8, size), put(12, offset), put(16, uint32_t{number} << 16 | count);
+    if (named) for (const char c : std::string("JOINT_STATE") + '\0') p.push_back(static_cast<uint8_t>(c));
+    p.resize(p.size() + payload, 0x55);
+    return p;
+  };
+  send(fragment(1000, 0, 0, 2, 500, true));
+  send(fragment(1000, 0xffffff00, 1, 2, 512, false));  // offset + length wraps
+  send(fragment(0xffffffff, 0, 0, 2, 500, true));
+  send(fragment(100, 0, 0, 1, 5000, true));            // longer than it says
+  send(fragment(100, 0, 0, 0, 10, true));
+  Random random(3);
+  for (int i = 0; i < 2000; ++i) {
+    std::vector<uint8_t> p(random.Bits() % 200);
+    for (uint8_t& byte : p) byte = static_cast<uint8_t>(random.Bits());
+    if (p.size() > 4 && i % 2 == 0) std::memcpy(p.data(), i % 4 == 0 ? "LC02" : "LC03", 4);
+    send(p);
+  }
+  Publisher<joint_state_t> publisher(messenger, "JOINT_STATE");
+  const auto start = std::chrono::steady_clock::now();
+  while (subscriber.received() == 0 && std::chrono::steady_clock::now() - start < std::chrono::seconds(10)) {
+    publisher.Publish(Message(1));
+    messenger.lcm().handleTimeout(10);
+  }
+  CHECK(subscriber.received() > 0);
+  close(fd);
+}
+
+TEST_CASE("an address that cannot be opened is an error with a cure") {
+  CHECK_THROWS_WITH(Messenger("nonsense://"), Catch::Contains("nonsense"));
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,206 @@
+#include "controller/controller.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+namespace plumb {
+namespace {
+
+/// The world around a controller, in steps of one measurement (5 ms).
+class World {
+ public:
+  World() : robot(LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum")), controller(robot, 1) {
+    robot_state.num_joints = 1;
+    robot_state.q = robot_state.v = robot_state.q_sd = robot_state.v_sd = robot_state.effort = {0};
+    robot_state.valid = 1;
+  }
+
+  void Driver(int8_t state) {
+    driver_status_t status{};
+    status.state = state;
+    controller.OnDriverStatus(status, now);
+  }
+
+  policy_t Policy(int iteration, int episodes = 1, float bias = 0, int8_t purpose = policy_t::EVALUATE) {
+    GaussianPolicy policy(PolicyShape{3, {4}, 1});
+    policy.parameters(policy.parameters.size() - 2) = bias;  // of the output
+    policy.action_scale.setConstant(2);
+    policy_t message = policy.ToMessage();
+    message.utime = 1000 + iteration;
+    message.iteration = iteration;
+    message.episodes = episodes;
+    message.purpose = purpose;
+    return message;
+  }
+
+  /// One measurement; the robot is wherever it was last asked to be placed. @return the command, if any.
+  std::optional<joint_command_t> Step() {
+    now += 5000, utime += 5000;
+    ++robot_state.sequence;
+    robot_state.utime = utime;
+    if (controller.place()) robot_state.q = controller.place()->q, robot_state.v = controller.place()->v;
+    auto command = controller.OnState(robot_state, now, utime + 300);
+    const auto halt = controller.Tick(now, utime);
+    if (halt) command = halt;
+    if (controller.phase() != 4 && now % 100'000 == 0) Driver(driver_state);
+    return command;
+  }
+  void StepUntil(int8_t phase, int most = 10000) {
+    for (int i = 0; i < most && controller.phase() != phase; ++i) Step();
+    REQUIRE(controller.phase() == phase);
+  }
+
+  RobotDescription robot;
+  Controller controller;
+  robot_state_t robot_state{};
+  int64_t now = 1'000'000, utime = 50'000'000;
+  int8_t driver_state = driver_status_t::ARMED;
+};
+
+using S = controller_status_t;
+
+TEST_CASE_METHOD(World, "it is silent until the driver is armed, then commands zero") {
+  for (int i = 0; i < 50; ++i) {
+    driver_state = driver_status_t::IDLE;
+    CHECK_FALSE(Step());
+  }
+  Driver(driver_state = driver_status_t::ARMED);
+  int commands = 0;
+  for (int i = 0; i < 100; ++i) {
+    if (const auto command = Step()) {
+      ++commands;
+      CHECK(command->effort[0] == 0);
+      CHECK(command->episode == -1);
+    }
+  }
+  CHECK(commands >= 9);  // one per control period of ten measurements
+  CHECK(commands <= 11);
+}
+
+TEST_CASE_METHOD(World, "an episode has its number of steps, one control period apart") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(3, 2, 0.25f));
+  std::vector<joint_command_t> commands;
+  while (controller.phase() != S::COMPLETE) {
+    const auto command = Step();
+    if (command && command->episode >= 0) commands.push_back(*command);
+    REQUIRE(commands.size() <= 400);
+  }
+  REQUIRE(commands.size() == 400);
+  for (size_t i = 0; i < commands.size(); ++i) {
+    CHECK(commands[i].step == static_cast<int>(i % 200));
+    CHECK(commands[i].effort[0] == Approx(0.5));  // action 0.25 of 2 Nm
+    CHECK(commands[i].policy_iteration == 3);
+    if (i % 200 > 0) CHECK(commands[i].state_sequence == commands[i - 1].state_sequence + 10);
+  }
+  const S& status = controller.status();
+  REQUIRE(status.num_episodes == 2);
+  CHECK(status.first_state_sequence[0] == commands[0].state_sequence);
+  CHECK(status.last_state_sequence[0] == commands[199].state_sequence + 10);
+  CHECK(status.episode[1] == commands[200].episode);
+  // gym's reward at a state held still: theta^2 + 0.1 w^2 + 0.001 u^2, summed
+  const double q = robot_state.q[0], v = robot_state.v[0];
+  CHECK(status.returns[1] == Approx(-200 * (q * q + 0.1 * v * v + 0.001 * 0.25)));
+}
+
+TEST_CASE_METHOD(World, "a new policy waits for the end of the episode") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0));
+  StepUntil(S::RUNNING);
+  controller.OnPolicy(Policy(1));
+  for (int i = 0; i < 100; ++i) Step();
+  CHECK(controller.status().policy_iteration == 0);
+  StepUntil(S::WAITING);
+  CHECK(controller.status().policy_iteration == 1);
+  CHECK(controller.status().num_episodes == 0);
+}
+
+TEST_CASE_METHOD(World, "a policy that does not fit is refused and the old one stays") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0));
+  policy_t wrong = GaussianPolicy(PolicyShape{5, {4}, 1}).ToMessage();
+  wrong.iteration = 1;
+  wrong.episodes = 1;
+  CHECK_THROWS_AS(controller.OnPolicy(wrong), std::invalid_argument);
+  policy_t poisoned = Policy(1);
+  poisoned.weight[0] = std::numeric_limits<float>::quiet_NaN();
+  CHECK_THROWS_AS(controller.OnPolicy(poisoned), std::invalid_argument);
+  CHECK(controller.status().policy_iteration == 0);
+}
+
+TEST_CASE_METHOD(World, "doubtful states halt it: zero effort, silence, and only a re-arming leads out") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 1, 0.5f));
+  StepUntil(S::RUNNING);
+  for (int i = 0; i < 33; ++i) Step();
+  std::optional<joint_command_t> command;
+  SECTION("late") {
+    now += 150'000, utime += 150'000;
+    command = controller.Tick(now, utime);
+  }
+  SECTION("not finite") {
+    robot_state.q[0] = std::numeric_limits<double>::quiet_NaN();
+    command = Step();
+    robot_state.q[0] = 0;
+  }
+  SECTION("not valid") {
+    robot_state.valid = 0;
+    command = Step();
+    robot_state.valid = 1;
+  }
+  SECTION("half a control period late") {
+    now += 60'000, utime += 60'000;
+    robot_state.sequence += 12;
+    command = Step();
+  }
+  REQUIRE(controller.phase() == S::HALTED);
+  REQUIRE(command);
+  CHECK(command->effort[0] == 0);
+  CHECK_FALSE(controller.status().reason.empty());
+  CHECK(controller.status().episodes_aborted == 1);
+  for (int i = 0; i < 100; ++i) CHECK_FALSE(Step());
+  Driver(driver_status_t::ARMED);
+  CHECK(controller.phase() == S::HALTED);
+  Driver(driver_status_t::FAULT);
+  CHECK(controller.phase() == S::HALTED);
+  Driver(driver_status_t::ARMED);
+  StepUntil(S::COMPLETE);  // the episode is run anew
+  CHECK(controller.status().num_episodes == 1);
+}
+
+TEST_CASE_METHOD(World, "a driver that disarms ends the episode; a silent driver counts as absent") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0));
+  StepUntil(S::RUNNING);
+  SECTION("disarms") { Driver(driver_state = driver_status_t::FAULT); }
+  SECTION("falls silent") {
+    for (int i = 0; i < 300; ++i) {
+      now += 5000, utime += 5000;
+      ++robot_state.sequence;
+      robot_state.utime = utime;
+      controller.OnState(robot_state, now, utime);
+      controller.Tick(now, utime);
+    }
+    driver_state = driver_status_t::ABSENT;
+  }
+  CHECK(controller.phase() == S::WAITING);
+  CHECK(controller.status().episodes_aborted == 1);
+  CHECK_FALSE(Step());
+}
+
+TEST_CASE_METHOD(World, "the same seed places the robot in the same states") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 3));
+  World other;
+  other.Driver(driver_status_t::ARMED);
+  other.controller.OnPolicy(Policy(0, 3));
+  StepUntil(S::RUNNING);
+  other.StepUntil(S::RUNNING);
+  CHECK(robot_state.q == other.robot_state.q);
+  CHECK(robot_state.v == other.robot_state.v);
+}
+
+}  // namespace
+}  // namespace plumb

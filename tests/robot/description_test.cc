@@ -1,0 +1,149 @@
+#include "robot/description.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "common/config.h"
+#include "robot/urdf.h"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using Catch::Contains;
+
+const std::string kPendulum = std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum";
+
+std::string Text(const std::string& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+// A copy of the pendulum with one text replaced in one file; removed again at the end.
+class Edited {
+ public:
+  Edited(const std::string& file, const std::string& from, const std::string& to) {
+    static int count = 0;
+    folder_ = fs::temp_directory_path() / ("plumbline_description_test_" + std::to_string(getpid()) + "_" + std::to_string(count++));
+    fs::copy(kPendulum, folder_);
+    std::string text = Text(kPendulum + "/" + file);
+    const auto at = text.find(from);
+    REQUIRE(at != std::string::npos);
+    text.replace(at, from.size(), to);
+    std::ofstream(folder_ / file) << text;
+  }
+  ~Edited() { fs::remove_all(folder_); }
+  std::string path() const { return folder_; }
+
+ private:
+  fs::path folder_;
+};
+
+TEST_CASE("the pendulum is read whole") {
+  const RobotDescription robot = LoadRobot(kPendulum);
+  CHECK(robot.name == "pendulum");
+  REQUIRE(robot.num_joints() == 1);
+  const JointDescription& joint = robot.joints[0];
+  CHECK(joint.type == JointDescription::Type::kContinuous);
+  CHECK(joint.axis == Eigen::Vector3d::UnitY());
+  CHECK(joint.effort_limit == 2);
+  CHECK(std::isinf(joint.upper));
+  CHECK(joint.motor.protocol == "cansimple");
+  REQUIRE(robot.links.size() == 2);
+  CHECK(robot.links[1].mass == 1);
+  CHECK(robot.links[1].center_of_mass == Eigen::Vector3d(0, 0, 0.5));
+  CHECK(robot.links[1].inertia(1, 1) == Approx(1.0 / 12));
+  CHECK(robot.FindParameter("length/pole") == 2);
+  CHECK(robot.FindParameter("nonsense") == -1);
+  CHECK(robot.training.hidden == std::vector<int>{128, 128});
+  CHECK(LoadRobot(kPendulum + "/robot.toml").name == "pendulum");
+}
+
+TEST_CASE("the log-normal prior has the mean and variance asked for") {
+  const ParameterDescription p = LoadRobot(kPendulum).parameters[1];
+  const double m = p.coordinate_mean(), s2 = p.coordinate_variance();
+  CHECK(std::exp(m + s2 / 2) == Approx(1.04));
+  CHECK(std::expm1(s2) * std::exp(2 * m + s2) == Approx(0.033));
+  CHECK(p.ToCoordinate(p.ToPhysical(0.3)) == Approx(0.3));
+}
+
+TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
+  const auto message = [](const std::string& from, const std::string& to) {
+    const Edited robot("robot.toml", from, to);
+    try {
+      LoadRobot(robot.path());
+    } catch (const ConfigError& error) {
+      const std::string text = error.what();
+      CHECK(text.find('\n') == std::string::npos);
+      CHECK_THAT(text, Contains("robot.toml:"));
+      return text;
+    }
+    return std::string("no error");
+  };
+  CHECK_THAT(message("expiry = 0.1", "expirey = 0.1"), Contains("driver.expiry is missing"));
+  CHECK_THAT(message("latency =", "latencey ="), Contains("latencey is not a known key; did you mean latency?"));
+  CHECK_THAT(message("node = 1", "node = \"1\""), Contains("joint[0].node is not an integer"));
+  CHECK_THAT(message("name = \"pivot\"", "name = \"pivto\""), Contains("\"pivto\" is not a moving joint of the URDF"));
+  CHECK_THAT(message("variance = 0.33", "variance = -0.33"), Contains("parameter[0].variance"));
+  CHECK_THAT(message("disarm_after = 0.25", "disarm_after = 0.05"), Contains("disarm_after must not be shorter"));
+  CHECK_THAT(message("coordinate = \"log\"", "coordinate = \"logg\""), Contains("is not one of linear, log"));
+  CHECK_THAT(message("gravity = [9.0, 11.0]", "gravty = [9.0, 11.0]"), Contains("gravty is not one of the parameters"));
+  CHECK_THAT(message("[task]", "[tsk]"), Contains("task is missing"));
+  CHECK_THAT(message("substep = 0.005", "substep = nan"), Contains("simulation.substep"));
+  CHECK_THAT(message("steps = 200", "steps = 1e99"), Contains("task.steps"));
+  CHECK_THAT(message("gear = 1.0", "gear = 0.0"), Contains("gear"));
+  CHECK_THAT(message("[robot]", "[robot"), Contains("robot.toml:3:"));
+}
+
+TEST_CASE("mistakes in robot.urdf name the file and the element") {
+  const auto message = [](const std::string& from, const std::string& to) {
+    const Edited robot("robot.urdf", from, to);
+    try {
+      LoadRobot(robot.path());
+    } catch (const ConfigError& error) {
+      CHECK_THAT(error.what(), Contains("robot.urdf: "));
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  CHECK_THAT(message("mass value=\"1.0\"", "mass value=\"-1\""), Contains("link pole: mass"));
+  CHECK_THAT(message("izz=\"0\"", "izz=\"1\""), Contains("no body can have this inertia"));
+  CHECK_THAT(message("effort=\"2.0\"", "effort=\"0\""), Contains("joint pivot: limit effort"));
+  CHECK_THAT(message("<parent link=\"base\"/>", "<parent link=\"bse\"/>"), Contains("bse"));
+  CHECK_THAT(message("type=\"continuous\"", "type=\"floating\""), Contains("joint pivot is not"));
+  CHECK_THAT(message("</robot>", ""), Contains("robot.urdf"));
+  CHECK_THROWS_WITH(LoadRobot("/nowhere"), Contains("there is no such robot"));
+}
+
+// Two 1 kg points 2 m apart, the second behind a fixed joint turned by 90 degrees: their common centre is in the
+// middle, the inertia about it is that of a dumbbell.
+TEST_CASE("links behind fixed joints are merged by the parallel axis theorem") {
+  const fs::path file = fs::temp_directory_path() / ("plumbline_dumbbell_" + std::to_string(getpid()) + ".urdf");
+  std::ofstream(file) << R"(<robot name="d"><link name="base"/>
+    <link name="a"><inertial><origin xyz="0 0 0"/><mass value="1"/>
+      <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+    <link name="b"><inertial><origin xyz="1 0 0" rpy="0 0 0"/><mass value="1"/>
+      <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.2"/></inertial></link>
+    <joint name="turn" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 2"/>
+      <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+    <joint name="weld" type="fixed"><parent link="a"/><child link="b"/>
+      <origin xyz="2 -1 0" rpy="0 0 1.5707963267948966"/></joint></robot>)";
+  const UrdfModel model = LoadUrdf(file);
+  fs::remove(file);
+  REQUIRE(model.links.size() == 2);
+  REQUIRE(model.joints.size() == 1);
+  CHECK(model.joints[0].axis == Eigen::Vector3d::UnitZ());
+  const LinkDescription& link = model.links[1];
+  CHECK(link.mass == 2);
+  CHECK((link.center_of_mass - Eigen::Vector3d(1, 0, 0)).norm() < 1e-12);
+  // b's own inertia turned: its x axis lies along y now
+  const Eigen::Vector3d expected(0.1 + 0.2, 0.1 + 0.1 + 2, 0.1 + 0.2 + 2);
+  CHECK((link.inertia.diagonal() - expected).norm() < 1e-12);
+}
+
+}  // namespace
+}  // namespace plumb
