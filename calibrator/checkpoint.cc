@@ -81,6 +81,19 @@ std::string RolloutFile(size_t index) { return fmt::format("rollout_{}.json", in
 
 }  // namespace
 
+std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
+  std::vector<Rollout> rollouts;
+  for (;;) {
+    const std::filesystem::path file = folder / RolloutFile(rollouts.size());
+    if (!std::filesystem::exists(file)) return rollouts;
+    try {
+      rollouts.push_back(RolloutFrom(ReadJson(file)));
+    } catch (const std::exception& error) {
+      throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+    }
+  }
+}
+
 CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder, const RobotDescription& robot, uint64_t seed)
     : folder_(std::move(folder)), robot_(robot.name), seed_(seed) {
   for (const ParameterDescription& p : robot.parameters) parameters_.push_back(p.name);

@@ -1,0 +1,24 @@
+#include "tests/process/stage.h"
+
+#include <cstring>
+
+namespace plumb {
+
+void Stage::Witness() {
+  // Independent of the driver's own tables: node 1's Set_Input_Torque is 0x02E, its Heartbeat 0x021.
+  std::array<Frame, 64> frames_now;
+  for (int n; (n = bus->Receive(frames_now)) > 0;) {
+    for (const Frame& frame : std::span(frames_now).first(static_cast<size_t>(n))) {
+      ++frames;
+      if (frame.remote || frame.error || frame.extended) continue;
+      if (frame.id == 0x02E && frame.length >= 4) {
+        std::memcpy(&torque, frame.data.data(), 4);
+        if (torque != 0) last_torque_time = frame.receive_ns / 1000;
+      } else if (frame.id == 0x021 && frame.length == 8) {
+        axis_state = frame.data[4];
+      }
+    }
+  }
+}
+
+}  // namespace plumb
