@@ -1,0 +1,54 @@
+#include "drivers/command_inbox.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace plumb {
+
+CommandInbox::CommandInbox(int num_joints, int64_t expiry) : num_joints_(num_joints), expiry_(expiry) {
+  const auto size = static_cast<size_t>(num_joints);
+  for (auto* values : {&command_.effort, &command_.position, &command_.velocity, &command_.kp, &command_.kd}) {
+    values->resize(size);
+  }
+}
+
+void CommandInbox::Clear() noexcept { empty_ = true; }
+
+bool CommandInbox::Offer(const joint_command_t& command, int64_t now, int64_t utime) noexcept {
+  const auto size = static_cast<size_t>(num_joints_);
+  if (command.num_joints != num_joints_) return false;
+  for (const auto* values : {&command.effort, &command.position, &command.velocity, &command.kp, &command.kd}) {
+    if (values->size() != size) return false;
+    if (std::ranges::any_of(*values, [](double x) { return std::isinf(x); })) return false;
+  }
+  const auto nan = [](double x) { return std::isnan(x); };
+  const auto negative = [](double x) { return x < 0; };
+  if (std::ranges::any_of(command.effort, nan) || std::ranges::any_of(command.kp, negative) ||
+      std::ranges::any_of(command.kd, negative)) {
+    return false;
+  }
+  // Not as a difference: a hostile utime must not overflow.
+  if (command.utime < utime - expiry_ || command.utime > utime + expiry_ || command.expiry < 0) return false;
+  if (!empty_ && command.sequence <= command_.sequence) return false;
+  command_ = command;
+  arrival_ = now;
+  empty_ = false;
+  return true;
+}
+
+bool CommandInbox::Expired(int64_t now) const noexcept {
+  const int64_t expiry = command_.expiry > 0 ? std::min(command_.expiry, expiry_) : expiry_;
+  return empty_ || now - arrival_ > expiry;
+}
+
+double CommandInbox::Effort(int joint, double position, double velocity) const noexcept {
+  const auto i = static_cast<size_t>(joint);
+  const auto pull = [](double gain, double target, double actual) {
+    return std::isnan(gain) || std::isnan(target) ? 0 : gain * (target - actual);
+  };
+  return command_.effort[i] + pull(command_.kp[i], command_.position[i], position) +
+         pull(command_.kd[i], command_.velocity[i], velocity);
+}
+
+}  // namespace plumb

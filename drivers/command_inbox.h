@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+
+#include "plumb/joint_command_t.hpp"
+
+namespace plumb {
+
+/// The newest valid command and nothing else: commands are never queued. Does not allocate after construction.
+/// Not thread-safe. Times: `now` scaled monotonic [us], `utime` scaled real time [us].
+class CommandInbox {
+ public:
+  /// @param expiry [us] after arrival a command is void; a command may shorten but not lengthen it.
+  CommandInbox(int num_joints, int64_t expiry);
+
+  /// Forgets everything: the next command may have any sequence number (a new controller).
+  void Clear() noexcept;
+
+  /// Takes a command if it has the right size, finite efforts, no infinite or negative gains, was computed no
+  /// longer than an expiry from `utime`, and has a greater sequence number than the last one taken.
+  /// @return false if not; the one before stays in force.
+  bool Offer(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
+
+  bool empty() const noexcept { return empty_; }
+  /// `now` of the last command taken. Meaningless while empty.
+  int64_t arrival() const noexcept { return arrival_; }
+  bool Expired(int64_t now) const noexcept;
+
+  /// Effort wished for a joint that is at a position and velocity (joint side): the feed-forward effort plus
+  /// kp (target - position) plus kd (target - velocity) where gains and targets are given.
+  double Effort(int joint, double position, double velocity) const noexcept;
+
+ private:
+  int num_joints_;
+  int64_t expiry_;
+  bool empty_ = true;
+  int64_t arrival_ = 0;
+  joint_command_t command_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,364 @@
+#include "drivers/driver.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+constexpr int kHistory = 2048;          // cycles of transmitted efforts: ten seconds
+constexpr int kRefusedCycles = 10;      // consecutive cycles whose frames were not accepted
+constexpr int kUnacknowledged = 16;     // consecutive no-acknowledge error frames: nobody is there
+constexpr size_t kBins = 20;            // of the lateness histogram, the last one open
+
+int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
+
+MotorTiming TimingOf(const DriverSettings& settings) { return {Microseconds(settings.heartbeat_timeout)}; }
+
+}  // namespace
+
+Driver::Joint::Joint(const JointDescription& joint, const MotorTiming& timing)
+    : name(joint.name), motor(MakeMotor(joint.motor, timing)), map(joint.motor), limits(LimitsOf(joint)) {}
+
+Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
+    : cycle_(Microseconds(robot.driver.cycle)),
+      disarm_after_(Microseconds(robot.driver.disarm_after)),
+      stale_after_(Microseconds(robot.driver.stale_after)),
+      start_guard_(Microseconds(robot.driver.start_guard)),
+      start_now_(now),
+      start_utime_(utime),
+      measurements_(robot.num_joints(), Microseconds(robot.driver.measurement)),
+      inbox_(robot.num_joints(), Microseconds(robot.driver.expiry)),
+      history_(robot.num_joints(), kHistory),
+      now_(now),
+      utime_(utime),
+      stopped_utime_(utime) {
+  joints_.reserve(robot.joints.size());
+  for (const JointDescription& joint : robot.joints) {
+    joints_.emplace_back(joint, TimingOf(robot.driver));
+    const Filter mine = joints_.back().motor->filter();
+    for (size_t i = 0; i + 1 < joints_.size(); ++i) {
+      const Filter other = joints_[i].motor->filter();
+      if (((mine.id ^ other.id) & mine.mask & other.mask) == 0) {
+        throw std::invalid_argument(fmt::format("joints '{}' and '{}' have CAN ids in common (nodes {} and {})",
+                                                joints_[i].name, joint.name, robot.joints[i].motor.node,
+                                                joint.motor.node));
+      }
+    }
+  }
+  const size_t size = joints_.size();
+  effort_sent_.assign(size, 0);
+  scratch_.resize(size);
+  state_message_.sequence = -1;
+  state_message_.num_joints = robot.num_joints();
+  for (auto* values : {&state_message_.position, &state_message_.velocity, &state_message_.effort_measured,
+                       &state_message_.effort_sent, &state_message_.effort_applied}) {
+    values->resize(size);
+  }
+  state_message_.valid.resize(size);
+
+  status_.frames_received = status_.frames_sent = status_.frames_rejected = status_.frames_dropped = 0;
+  status_.commands_accepted = status_.commands_rejected = status_.commands_expired = 0;
+  status_.messages_rejected = status_.cycles = status_.overruns = 0;
+  status_.num_joints = robot.num_joints();
+  for (const Joint& joint : joints_) status_.joint_name.push_back(joint.name);
+  status_.joint_state.resize(size);
+  status_.joint_reason.resize(size);
+  status_.num_bins = kBins;
+  status_.lateness.assign(kBins, 0);
+  reason_.Set("waiting for ARM");
+}
+
+std::vector<Filter> Driver::filters() const {
+  std::vector<Filter> filters;
+  for (const Joint& joint : joints_) filters.push_back(joint.motor->filter());
+  return filters;
+}
+
+template <class... Args>
+void Driver::Fault(fmt::format_string<Args...> format, Args&&... args) noexcept {
+  if (mode_ == Mode::kFault) return;  // the first reason is the cause
+  reason_.Set(format, std::forward<Args>(args)...);
+  Disarm();
+  mode_ = Mode::kFault;
+}
+
+void Driver::Disarm() noexcept {
+  stopped_utime_ = utime_;
+  inbox_.Clear();
+  for (Joint& joint : joints_) {
+    // One that has failed is being disarmed already, and remembers why.
+    if (joint.motor->state() != DriveState::kFault) joint.motor->Disarm(now_);
+  }
+  mode_ = Mode::kRest;
+}
+
+void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
+  now_ = now;
+  ++status_.frames_received;
+  switch (DecodeErrorFrame(frame)) {
+    case BusEvent::kBusOff:
+      bus_off_ = true;
+      if (Active()) Fault("the CAN controller went bus-off");
+      return;
+    case BusEvent::kRestarted: bus_off_ = false; return;
+    case BusEvent::kNoAck:
+      if (++unacknowledged_ > kUnacknowledged && Active()) Fault("nobody on the bus acknowledges frames");
+      return;
+    case BusEvent::kNone: break;
+  }
+  if (frame.error) return;
+  bus_off_ = false;
+  unacknowledged_ = 0;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[i];
+    switch (joint.motor->OnFrame(frame, now)) {
+      case FrameUse::kNotMine: continue;
+      case FrameUse::kRejected: ++frames_rejected_; return;
+      case FrameUse::kConsumed: return;
+      case FrameUse::kEstimate: {
+        const MotorEstimate& estimate = joint.motor->estimate();
+        joint.latest = {joint.map.JointPosition(estimate.position), joint.map.JointVelocity(estimate.velocity),
+                        joint.map.JointEffort(joint.motor->torque_estimate())};
+        joint.measured = true;
+        joint.measured_at = now;
+        measurements_.Add(static_cast<int>(i), joint.latest, utime);
+        return;
+      }
+    }
+  }
+  ++frames_rejected_;
+}
+
+const joint_state_t* Driver::NextState() noexcept {
+  int64_t utime;
+  if (!measurements_.Next(utime, scratch_)) return nullptr;
+  joint_state_t& message = state_message_;
+  message.utime = utime;
+  ++message.sequence;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    message.position[i] = scratch_[i].position;
+    message.velocity[i] = scratch_[i].velocity;
+    message.effort_measured[i] = scratch_[i].effort;
+    message.effort_sent[i] = effort_sent_[i];
+    message.effort_applied[i] = std::numeric_limits<double>::quiet_NaN();
+    message.valid[i] = joints_[i].motor->state() != DriveState::kAbsent;
+  }
+  if (has_previous_) history_.Average(previous_utime_, utime, message.effort_applied);
+  previous_utime_ = utime;
+  has_previous_ = true;
+  return &message;
+}
+
+void Driver::OnLink(LinkState link) noexcept {
+  link_ = link;
+  if (link != LinkState::kUp && Active()) {
+    Fault("{}", link == LinkState::kDown ? "the CAN interface is down" : "the CAN interface is gone");
+  }
+}
+
+void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept {
+  now_ = now;
+  utime_ = utime;
+  switch (request.request) {
+    case driver_request_t::ARM: return RequestArm(request.utime);
+    // Stopping is obeyed whatever the request's time.
+    case driver_request_t::DISARM:
+      if (mode_ == Mode::kFault) {
+        stopped_utime_ = utime;
+        return;
+      }
+      reason_.Set("disarmed on request");
+      return Disarm();
+    case driver_request_t::ESTOP:
+      Fault("emergency stop requested");
+      stopped_utime_ = utime;
+      for (Joint& joint : joints_) joint.motor->Estop(now);
+      return;
+    default: ++requests_rejected_; return;
+  }
+}
+
+void Driver::Refuse(std::string_view why) noexcept {
+  if (mode_ == Mode::kFault) return;  // what failed is worth more than what is refused
+  reason_.Set("ARM refused: {}", why);
+}
+
+void Driver::RequestArm(int64_t made) noexcept {
+  const int64_t now = now_;
+  // Of another run, or from before whatever stopped us; one from the future would outlive the next fault, too.
+  if (Active() || made < start_utime_ || made <= stopped_utime_ || made > utime_ + start_guard_) return;
+  if (now - start_now_ < start_guard_) return Refuse("the driver has only just started");
+  if (stray_controller_ && now - last_command_ < start_guard_) {
+    return Refuse("commands arrived when the driver started: stop the controller of an earlier run");
+  }
+  if (link_ != LinkState::kUp) return Refuse("the CAN interface is not up");
+  if (bus_off_) return Refuse("the CAN controller is bus-off");
+  for (const Joint& joint : joints_) {
+    Reason why;
+    if (joint.motor->state() == DriveState::kAbsent) {
+      why.Set("{}: {}", joint.name, joint.motor->reason());
+    } else if (!joint.measured || now - joint.measured_at > stale_after_) {
+      why.Set("{}: no encoder estimates", joint.name);
+    }
+    if (!why.text().empty()) return Refuse(why.text());
+  }
+  stray_controller_ = false;
+  refused_cycles_ = 0;
+  inbox_.Clear();
+  for (Joint& joint : joints_) joint.motor->Arm(now);
+  mode_ = Mode::kArming;
+  reason_.Set("arming");
+}
+
+void Driver::OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept {
+  now_ = now;
+  utime_ = utime;
+  last_command_ = now;
+  if (now - start_now_ < start_guard_) {
+    stray_controller_ = true;
+    ++status_.commands_rejected;
+    return;
+  }
+  if (mode_ != Mode::kArmed) return;
+  if (inbox_.Offer(command, now, utime)) {
+    ++status_.commands_accepted;
+    expiry_counted_ = false;
+  } else {
+    ++status_.commands_rejected;
+  }
+}
+
+std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
+  now_ = now;
+  utime_ = utime;
+  ++status_.cycles;
+  if (lateness >= cycle_) ++status_.overruns;
+  const auto bin = static_cast<size_t>(std::bit_width(static_cast<uint64_t>(std::max<int64_t>(lateness, 1)))) - 1;
+  ++status_.lateness[std::min(bin, kBins - 1)];
+
+  housekeeping_.Clear();
+  frames_.Clear();
+  CheckHealth();
+  CheckCommand();
+  CommandTorques();
+  // After the checks, so that a fault is answered in this cycle.
+  for (Joint& joint : joints_) joint.motor->Tick(now, housekeeping_);
+  for (const Frame& frame : housekeeping_.frames()) frames_.Push(frame);
+  NoteChanges();
+  return frames_.frames();
+}
+
+void Driver::CheckHealth() noexcept {
+  if (!Active()) return;
+  bool all_armed = true;
+  for (const Joint& joint : joints_) {
+    const DriveState state = joint.motor->state();
+    if (state != DriveState::kArming && state != DriveState::kArmed) {
+      return Fault("{}: {}", joint.name, joint.motor->reason());
+    }
+    if (now_ - joint.measured_at > stale_after_) {
+      return Fault("{}: no encoder estimate for {} ms", joint.name, (now_ - joint.measured_at) / 1000);
+    }
+    all_armed = all_armed && state == DriveState::kArmed;
+  }
+  if (mode_ == Mode::kArming && all_armed) {
+    mode_ = Mode::kArmed;
+    armed_at_ = now_;
+    reason_.Clear();
+  }
+}
+
+void Driver::CheckCommand() noexcept {
+  if (mode_ != Mode::kArmed) return;
+  const int64_t silence = now_ - (inbox_.empty() ? armed_at_ : inbox_.arrival());
+  if (silence > disarm_after_) return Fault("no command for {} ms", silence / 1000);
+  if (!inbox_.empty() && inbox_.Expired(now_) && !expiry_counted_) {
+    ++status_.commands_expired;
+    expiry_counted_ = true;
+  }
+}
+
+void Driver::CommandTorques() noexcept {
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[i];
+    joint.wish = 0;
+    if (!Active()) continue;
+    if (mode_ == Mode::kArmed && !inbox_.Expired(now_)) {
+      const double wished = inbox_.Effort(static_cast<int>(i), joint.latest.position, joint.latest.velocity);
+      joint.wish = LimitEffort(wished, joint.latest.position, joint.latest.velocity, joint.limits).value_or(0);
+    }
+    frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.wish)));
+  }
+  torque_frames_ = frames_.size();
+}
+
+void Driver::Transmitted(int accepted, int64_t utime) noexcept {
+  const auto taken = static_cast<size_t>(std::max(accepted, 0));
+  // A torque that was not accepted leaves the drive with the one before.
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (torque_frames_ == 0) effort_sent_[i] = 0;
+    if (i < torque_frames_ && i < taken) effort_sent_[i] = joints_[i].wish;
+  }
+  history_.Record(utime, effort_sent_);
+  refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;
+  if (refused_cycles_ >= kRefusedCycles && Active()) {
+    Fault("the bus has not accepted frames in {} cycles", refused_cycles_);
+  }
+}
+
+DriveState Driver::state() const noexcept {
+  switch (mode_) {
+    case Mode::kArming: return DriveState::kArming;
+    case Mode::kArmed: return DriveState::kArmed;
+    case Mode::kFault: return DriveState::kFault;
+    case Mode::kRest: break;
+  }
+  const bool absent = std::ranges::any_of(
+      joints_, [](const Joint& joint) { return joint.motor->state() == DriveState::kAbsent; });
+  return absent ? DriveState::kAbsent : DriveState::kIdle;
+}
+
+bool Driver::confirmed_idle() const noexcept {
+  return std::ranges::all_of(joints_, [](const Joint& joint) { return joint.motor->confirmed_idle(); });
+}
+
+void Driver::NoteChanges() noexcept {
+  const std::hash<std::string_view> hash;
+  uint64_t signature = static_cast<uint64_t>(state());
+  const auto mix = [&](uint64_t value) { signature = (signature ^ value) * 0x9E3779B97F4A7C15; };
+  mix(hash(reason()));
+  mix(link_ == LinkState::kUp && !bus_off_);
+  for (const Joint& joint : joints_) {
+    mix(static_cast<uint64_t>(joint.motor->state()));
+    mix(hash(joint.motor->reason()));
+  }
+  if (signature != signature_) ++revision_;
+  signature_ = signature;
+}
+
+const driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected) {
+  status_.utime = utime;
+  status_.state = static_cast<int8_t>(state());
+  status_.reason = reason();
+  status_.bus_up = link_ == LinkState::kUp && !bus_off_;
+  for (size_t i = joints_.size(); i-- > 0;) {
+    const Motor& motor = *joints_[i].motor;
+    status_.joint_state[i] = static_cast<int8_t>(motor.state());
+    status_.joint_reason[i] = motor.reason();
+    if (status_.state == driver_status_t::ABSENT && motor.state() == DriveState::kAbsent) {
+      status_.reason = joints_[i].name + ": " + status_.joint_reason[i];
+    }
+  }
+  status_.frames_rejected = frames_rejected_ + stats.malformed;
+  status_.frames_sent = stats.sent;
+  status_.frames_dropped = stats.refused + stats.lost;
+  status_.messages_rejected = requests_rejected_ + messages_rejected;
+  return status_;
+}
+
+}  // namespace plumb

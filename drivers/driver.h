@@ -1,0 +1,132 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/can/error_frame.h"
+#include "drivers/can/transport.h"
+#include "drivers/command_inbox.h"
+#include "drivers/effort_history.h"
+#include "drivers/joint_map.h"
+#include "drivers/limits.h"
+#include "drivers/measurements.h"
+#include "drivers/protocols/protocol.h"
+#include "plumb/driver_request_t.hpp"
+#include "plumb/driver_status_t.hpp"
+#include "plumb/joint_command_t.hpp"
+#include "plumb/joint_state_t.hpp"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// The driver without sockets and clock: frames and messages go in, frames and messages come out. One cycle:
+///
+///   for (received frame) driver.OnFrame(frame, now, utime of its arrival);
+///   while (const joint_state_t* state = driver.NextState()) publish(*state);
+///   driver.OnLink(...); driver.OnRequest(...); driver.OnCommand(...);   // what came since
+///   frames = driver.Tick(now, utime, lateness);                         // once per cycle
+///   driver.Transmitted(transport.Send(frames), utime right after it);
+///
+/// It arms only on a request, made after its start and after whatever stopped it last. Armed, it transmits a
+/// torque in every cycle: zero when the command has expired. It disarms and remembers why (FAULT) when commands
+/// stay away, a measurement or heartbeat is missing, a drive reports an error or falls idle, or the bus fails;
+/// only a new ARM leads out of FAULT.
+///
+/// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the constructor
+/// allocates (Status: when a text grows), blocks or throws. Not thread-safe.
+class Driver {
+ public:
+  /// @param now, utime time of the start.
+  /// @throws std::invalid_argument for an unknown protocol, or two joints with a CAN id in common.
+  Driver(const RobotDescription& robot, int64_t now, int64_t utime);
+
+  /// Filters that let in what the drives send.
+  std::vector<Filter> filters() const;
+  int64_t cycle() const { return cycle_; }  ///< [us] period in which Tick wants to be called
+
+  void OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept;
+  /// The next JOINT_STATE, null if there is none; valid until the next call.
+  const joint_state_t* NextState() noexcept;
+  void OnLink(LinkState link) noexcept;
+  void OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept;
+  void OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
+  /// @param lateness [us] after the cycle's deadline.
+  /// @return what to send now, torques first; valid until the next call.
+  std::span<const Frame> Tick(int64_t now, int64_t utime, int64_t lateness) noexcept;
+  /// @param accepted how many of Tick's frames the transport took. @param utime when.
+  void Transmitted(int accepted, int64_t utime) noexcept;
+
+  DriveState state() const noexcept;
+  /// Why it is not armed; empty when it is.
+  std::string_view reason() const noexcept { return reason_.text(); }
+  /// True once every drive that is there has confirmed that it is idle.
+  bool confirmed_idle() const noexcept;
+  /// Changes whenever a state or reason changes.
+  uint64_t revision() const noexcept { return revision_; }
+  /// The message to publish; valid until the next call.
+  /// @param messages_rejected LCM messages that did not decode.
+  const driver_status_t& Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected);
+  void set_bus(const std::string& url) { status_.bus = url; }
+
+ private:
+  enum class Mode { kRest, kArming, kArmed, kFault };
+  struct Joint {
+    Joint(const JointDescription& joint, const MotorTiming& timing);
+    std::string name;
+    std::unique_ptr<Motor> motor;
+    JointMap map;
+    JointLimits limits;
+    bool measured = false;
+    int64_t measured_at = 0;          // `now` of the last estimate
+    JointMeasurement latest;
+    double wish = 0;                  // effort in the torque frame of this cycle
+  };
+
+  template <class... Args>
+  void Fault(fmt::format_string<Args...> format, Args&&... args) noexcept;
+  void Refuse(std::string_view why) noexcept;
+  void Disarm() noexcept;
+  void RequestArm(int64_t made) noexcept;
+  void CheckHealth() noexcept;
+  void CheckCommand() noexcept;
+  void CommandTorques() noexcept;
+  void NoteChanges() noexcept;
+  bool Active() const noexcept { return mode_ == Mode::kArming || mode_ == Mode::kArmed; }
+
+  const int64_t cycle_, disarm_after_, stale_after_, start_guard_;
+  const int64_t start_now_, start_utime_;
+  std::vector<Joint> joints_;
+  Measurements measurements_;
+  CommandInbox inbox_;
+  EffortHistory history_;
+
+  Mode mode_ = Mode::kRest;
+  Reason reason_;
+  int64_t now_, utime_;           // latest times given
+  int64_t stopped_utime_;         // of the last disarming; older ARM requests are void
+  int64_t armed_at_ = 0;          // `now`
+  bool stray_controller_ = false; // commanded during the start guard
+  int64_t last_command_ = 0;      // `now` of any command, valid or not
+  bool expiry_counted_ = false;
+  LinkState link_ = LinkState::kUp;
+  bool bus_off_ = false;
+  int unacknowledged_ = 0;
+  int refused_cycles_ = 0;
+
+  FrameBatch frames_, housekeeping_;
+  size_t torque_frames_ = 0;
+  std::vector<double> effort_sent_;
+  std::vector<JointMeasurement> scratch_;
+  joint_state_t state_message_;
+  int64_t previous_utime_ = 0;
+  bool has_previous_ = false;
+  driver_status_t status_;
+  int64_t frames_rejected_ = 0, requests_rejected_ = 0;
+  uint64_t revision_ = 0;
+  uint64_t signature_ = 0;
+};
+
+}  // namespace plumb

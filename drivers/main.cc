@@ -1,0 +1,186 @@
+#include <fmt/format.h>
+#include <poll.h>
+#include <sched.h>
+#include <spdlog/spdlog.h>
+#include <sys/mman.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
+#include "common/messenger.h"
+#include "common/process.h"
+#include "drivers/driver.h"
+#include "robot/description.h"
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kStatusPeriod = 100'000;    // [us]
+constexpr int64_t kReopenPeriod = 100'000;    // [us]
+constexpr double kFarewell = 0.3;             // [s] real time that the drives have to confirm a disarm at the end
+constexpr int kFramesPerCycle = 512;          // a flood must not keep us from our deadlines
+
+/// From here on no page faults, and no other process before us. LCM's receive thread must exist already.
+void BecomeRealtime(int priority) {
+  if (priority == 0) return;
+  const sched_param parameter{.sched_priority = priority};
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &parameter) != 0) {
+    throw std::runtime_error(fmt::format(
+        "--realtime-priority {}: {}; cure: run as root, or allow it with ulimit -r {} and ulimit -l unlimited",
+        priority, std::strerror(errno), priority));
+  }
+}
+
+const char* StateName(int8_t state) {
+  constexpr std::array names = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
+  return names[static_cast<size_t>(state)];
+}
+
+class DriverProcess {
+ public:
+  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus)
+      : process_(process),
+        clock_(process.clock()),
+        driver_(robot, clock_.Now(), clock_.Utime()),
+        transport_(OpenTransport(bus, driver_.filters())),
+        cycle_(driver_.cycle(), clock_.Now()),
+        states_(process.messenger(), "JOINT_STATE"),
+        statuses_(process.messenger(), "DRIVER_STATUS"),
+        commands_(process.messenger(), "JOINT_COMMAND",
+                  [this](const joint_command_t& command) {
+                    driver_.OnCommand(command, clock_.Now(), clock_.Utime());
+                  }),
+        requests_(process.messenger(), "DRIVER_REQUEST", [this](const driver_request_t& request) {
+          driver_.OnRequest(request, clock_.Now(), clock_.Utime());
+        }) {
+    driver_.set_bus(bus);
+    spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
+                 robot.num_joints() == 1 ? "" : "s", driver_.cycle());
+  }
+
+  int Run() {
+    while (!process_.stopping()) Step();
+    return Farewell();
+  }
+
+ private:
+  /// Waits for input or the cycle's deadline, and deals with what there is.
+  void Step() {
+    std::array<pollfd, 3> polled{{{transport_->fd(), POLLIN, 0},
+                                  {process_.messenger().fd(), POLLIN, 0},
+                                  {process_.stop_fd(), POLLIN, 0}}};
+    const timespec wait = clock_.RealDuration(cycle_.Remaining(clock_.Now()));
+    // After a stop signal its descriptor stays quiet: stopping() has read it.
+    ppoll(polled.data(), polled.size(), &wait, nullptr);
+    ReceiveFrames();
+    while (const joint_state_t* state = driver_.NextState()) states_.Publish(*state);
+    process_.messenger().Drain();
+    if (cycle_.Due(clock_.Now())) Cycle();
+  }
+
+  void ReceiveFrames() {
+    for (int left = kFramesPerCycle; left > 0;) {
+      const int count = transport_->Receive(received_);
+      if (count <= 0) break;
+      const int64_t now = clock_.Now();
+      for (const Frame& frame : std::span(received_).first(static_cast<size_t>(count))) {
+        const int64_t utime =
+            frame.receive_ns != 0 ? clock_.UtimeFromRealtimeNs(frame.receive_ns) : clock_.Utime();
+        driver_.OnFrame(frame, now, utime);
+      }
+      left -= count;
+    }
+    driver_.OnLink(transport_->link());
+  }
+
+  void Cycle() {
+    const int64_t now = clock_.Now();
+    const int64_t lateness = cycle_.Advance(now);
+    const std::span<const Frame> frames = driver_.Tick(now, clock_.Utime(), lateness);
+    const int accepted = frames.empty() ? 0 : transport_->Send(frames);
+    driver_.Transmitted(accepted, clock_.Utime());
+
+    if (transport_->link() != LinkState::kUp && now >= next_reopen_) {
+      next_reopen_ = now + kReopenPeriod;
+      driver_.OnLink(transport_->Reopen());
+    }
+    if (driver_.revision() == revision_ && now < next_status_) return;
+    const driver_status_t& status =
+        driver_.Status(clock_.Utime(), transport_->stats(), commands_.rejected() + requests_.rejected());
+    statuses_.Publish(status);
+    if (driver_.revision() != revision_) Log(status);
+    revision_ = driver_.revision();
+    next_status_ = now + kStatusPeriod;
+  }
+
+  void Log(const driver_status_t& status) {
+    std::string line = StateName(status.state);
+    if (!status.reason.empty()) line += ": " + status.reason;
+    if (line == logged_) return;
+    if (status.state == driver_status_t::FAULT) {
+      spdlog::warn("{}", line);
+    } else {
+      spdlog::info("{}", line);
+    }
+    logged_ = std::move(line);
+  }
+
+  /// Zero torque and idle drives, confirmed by their heartbeats if they are there to confirm it.
+  int Farewell() {
+    driver_request_t disarm{};
+    disarm.utime = clock_.Utime();
+    disarm.request = driver_request_t::DISARM;
+    driver_.OnRequest(disarm, clock_.Now(), disarm.utime);
+    const auto patience = static_cast<int64_t>(kFarewell * 1e6 * clock_.scale());
+    const int64_t begin = clock_.Now();
+    do {
+      Step();
+    } while (!driver_.confirmed_idle() && clock_.Now() - begin < patience);
+    if (driver_.confirmed_idle()) {
+      spdlog::info("stopped, drives idle");
+    } else {
+      spdlog::error("stopped, but a drive has not confirmed that it is idle");
+    }
+    return 0;
+  }
+
+  Process& process_;
+  const Clock& clock_;
+  Driver driver_;
+  std::unique_ptr<Transport> transport_;
+  Periodic cycle_;
+  Publisher<joint_state_t> states_;
+  Publisher<driver_status_t> statuses_;
+  Subscriber<joint_command_t> commands_;
+  Subscriber<driver_request_t> requests_;
+  std::array<Frame, 64> received_;
+  int64_t next_reopen_ = 0;
+  int64_t next_status_ = 0;
+  uint64_t revision_ = 0;
+  std::string logged_;
+};
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  std::string robot_path, bus;
+  int priority = 0;
+  return plumb::Run(
+      "plumb-driver", "Drives a robot's motors on a CAN bus: JOINT_COMMAND in, JOINT_STATE out.", argc, argv,
+      [&](CLI::App& app) {
+        app.add_option("robot", robot_path, "robot folder, or its TOML file")->required();
+        app.add_option("--bus", bus, "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
+        app.add_option("--realtime-priority", priority, "SCHED_FIFO priority, 0 = off")
+            ->check(CLI::Range(0, 90))
+            ->capture_default_str();
+      },
+      [&](plumb::Process& process) {
+        const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
+        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus);
+        plumb::BecomeRealtime(priority);
+        return driver.Run();
+      });
+}

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "drivers/passive_sync.h"
+
+namespace plumb {
+
+/// One joint's estimates, joint side, SI units.
+struct JointMeasurement {
+  double position = 0;
+  double velocity = 0;
+  double effort = 0;  ///< NaN = not reported
+};
+
+/// Puts the estimates of all joints together into complete measurements with regular times. A joint whose frame
+/// was lost does not shift the others: estimates more than 0.6 of a period older than the newest wait for
+/// nobody and are dropped. Does not allocate after construction. Not thread-safe.
+class Measurements {
+ public:
+  /// @param period [us] at which every drive sends its estimates.
+  Measurements(int num_joints, int64_t period);
+
+  /// @param arrival [us] utime at which the joint's estimate was received.
+  void Add(int joint, const JointMeasurement& measurement, int64_t arrival) noexcept;
+
+  /// Takes the next complete measurement; call until false, after everything that has arrived was added.
+  /// @param utime its time: that of its latest estimate, freed of transport jitter, strictly increasing.
+  /// @param measurements one for each joint.
+  bool Next(int64_t& utime, std::span<JointMeasurement> measurements) noexcept;
+
+  /// Estimates that found no partners, or no room.
+  int64_t dropped() const { return dropped_; }
+
+ private:
+  static constexpr size_t kCapacity = 64;
+
+  struct Sample {
+    int64_t time = 0;  ///< of arrival until regularised, then of measurement
+    JointMeasurement measurement;
+  };
+  /// A queue of samples in a ring.
+  struct Joint {
+    explicit Joint(int64_t period) : sync(period) {}
+    Sample& At(size_t i) { return ring[(head + i) % kCapacity]; }
+    void Pop();
+    void Regularise();
+
+    PassiveSync sync;
+    std::array<Sample, kCapacity> ring;
+    size_t head = 0, count = 0, regular = 0;  ///< the first `regular` of `count` have times of measurement
+  };
+
+  int64_t tolerance_;
+  std::vector<Joint> joints_;
+  int64_t dropped_ = 0;
+};
+
+}  // namespace plumb

@@ -1,0 +1,249 @@
+#include "drivers/protocols/cansimple_host.h"
+
+#include <numbers>
+#include <stdexcept>
+
+#include "drivers/protocols/cansimple.h"
+
+namespace plumb {
+namespace {
+
+using namespace cansimple;
+
+constexpr double kRadiansPerTurn = 2 * std::numbers::pi;
+constexpr int64_t kRetry = 50'000;     // [us] between repetitions of an unanswered frame
+constexpr int kDisarmsBeforeEstop = 5;  // a drive that ignores these gets its emergency stop
+constexpr int kBeatsToArm = 4;         // heartbeats a drive has to enter closed loop; the first may be on its way
+
+class CanSimpleMotor : public Motor {
+ public:
+  CanSimpleMotor(int node, const MotorTiming& timing) : node_(node), timing_(timing) {}
+
+  Filter filter() const override { return {.id = static_cast<uint32_t>(node_) << 5, .mask = 0x7E0}; }
+
+  FrameUse OnFrame(const Frame& frame, int64_t now) noexcept override {
+    if (frame.extended || frame.remote || frame.error || frame.fd ||
+        frame.id >> 5 != static_cast<uint32_t>(node_)) {
+      return FrameUse::kNotMine;
+    }
+    switch (frame.id & 0x1F) {
+      case kHeartbeat.command: return OnHeartbeat(frame, now);
+      case kGetVersion.command: return OnVersion(frame);
+      case kGetError.command: return OnError(frame);
+      case kGetEncoderEstimates.command: return OnEstimates(frame);
+      case kGetTorques.command: return OnTorques(frame);
+      case kGetIq.command:
+      case kGetTemperature.command:
+      case kGetBusVoltageCurrent.command:
+      case kGetPowers.command: return frame.length == 8 ? FrameUse::kConsumed : FrameUse::kRejected;
+      default: return FrameUse::kRejected;
+    }
+  }
+
+  const MotorEstimate& estimate() const noexcept override { return estimate_; }
+  double torque_estimate() const noexcept override { return torque_estimate_; }
+
+  void Arm(int64_t now) noexcept override {
+    if (step_ == Step::kArmed) return;
+    fault_ = false;
+    reason_.Clear();
+    version_ = Version::kUnknown;
+    Enter(Step::kVersion, now);
+  }
+
+  void Disarm(int64_t now) noexcept override {
+    disarms_ = 0;
+    axis_state_known_ = false;  // an old heartbeat proves nothing
+    Enter(Step::kDisarming, now);
+  }
+
+  void Estop(int64_t now) noexcept override {
+    Fail(now, "emergency stop requested");
+    disarms_ = kDisarmsBeforeEstop;
+  }
+
+  void Tick(int64_t now, FrameBatch& out) noexcept override {
+    present_ = heard_ && now - heartbeat_ <= timing_.heartbeat_timeout;
+    if (!present_ && heard_ && (Arming() || step_ == Step::kArmed)) {
+      Fail(now, "no heartbeat for {} ms", (now - heartbeat_) / 1000);
+    }
+    const bool late = now - entered_ >= timing_.heartbeat_timeout;
+    switch (step_) {
+      case Step::kRest:
+        // Armed behind our back, or by a frame that was still on its way when we disarmed.
+        if (present_ && axis_state_ == kClosedLoopControl) Disarm(now);
+        break;
+      case Step::kVersion:
+        if (version_ == Version::kGood) {
+          out.Push(Make(kClearErrors, node_));
+          Enter(Step::kMode, now);
+        } else if (version_ == Version::kBad) {
+          Fail(now, "its firmware is {}.{}, this driver speaks 0.6", firmware_major_, firmware_minor_);
+        } else if (late) {
+          Fail(now, "it does not answer Get_Version (firmware older than 0.6?)");
+        } else if (Retry(now)) {
+          out.Push(MakeRequest(kGetVersion, node_));
+        }
+        break;
+      case Step::kMode:
+        out.Push(Make(kSetControllerMode, node_, {kTorqueControl, kPassthrough}));
+        Enter(Step::kState, now);
+        break;
+      case Step::kState:
+        out.Push(Make(kSetAxisState, node_, {kClosedLoopControl}));
+        beats_ = 0;
+        Enter(Step::kAwait, now);
+        break;
+      case Step::kAwait:
+        if (late || beats_ >= kBeatsToArm) {
+          std::array<char, 100> buffer;
+          Fail(now, "it stays in {} ({}; {})", DescribeAxisState(axis_state_),
+               DescribeErrors(axis_error_, buffer), DescribeProcedureResult(procedure_result_));
+        }
+        break;
+      case Step::kArmed: break;
+      case Step::kDisarming: TickDisarming(now, out); break;
+    }
+    if (ask_error_ && out.Push(MakeRequest(kGetError, node_))) ask_error_ = false;
+  }
+
+  Frame Torque(double torque) const noexcept override { return Make(kSetInputTorque, node_, {torque}); }
+
+  DriveState state() const noexcept override {
+    if (!present_) return DriveState::kAbsent;
+    if (fault_) return DriveState::kFault;
+    if (Arming()) return DriveState::kArming;
+    return step_ == Step::kArmed ? DriveState::kArmed : DriveState::kIdle;
+  }
+  std::string_view reason() const noexcept override {
+    if (reason_.text().empty() && !present_) return heard_ ? "no heartbeat any more" : "no heartbeat yet";
+    return reason_.text();
+  }
+  bool confirmed_idle() const noexcept override { return !present_ || step_ == Step::kRest; }
+
+ private:
+  enum class Step { kRest, kVersion, kMode, kState, kAwait, kArmed, kDisarming };
+  enum class Version { kUnknown, kGood, kBad };
+
+  bool Arming() const noexcept { return step_ >= Step::kVersion && step_ <= Step::kAwait; }
+
+  void Enter(Step step, int64_t now) noexcept {
+    step_ = step;
+    entered_ = now;
+    retry_ = now;
+  }
+
+  bool Retry(int64_t now) noexcept {
+    if (now < retry_) return false;
+    retry_ = now + kRetry;
+    return true;
+  }
+
+  template <class... Args>
+  void Fail(int64_t now, fmt::format_string<Args...> format, Args&&... args) noexcept {
+    reason_.Set(format, std::forward<Args>(args)...);
+    fault_ = true;
+    Disarm(now);
+  }
+
+  void TickDisarming(int64_t now, FrameBatch& out) noexcept {
+    if (axis_state_known_ && axis_state_ != kClosedLoopControl) return Enter(Step::kRest, now);
+    if (!Retry(now)) return;
+    out.Push(Make(kSetInputTorque, node_, {0}));
+    out.Push(Make(kSetAxisState, node_, {kIdle}));
+    if (disarms_ >= kDisarmsBeforeEstop) out.Push(Make(kEstop, node_));
+    ++disarms_;
+  }
+
+  FrameUse OnHeartbeat(const Frame& frame, int64_t now) noexcept {
+    const auto values = DecodePayload(kHeartbeat, frame);
+    if (!values) return FrameUse::kRejected;
+    heard_ = present_ = true;
+    heartbeat_ = now;
+    axis_error_ = static_cast<uint32_t>((*values)[0]);
+    axis_state_ = static_cast<int>((*values)[1]);
+    axis_state_known_ = true;
+    procedure_result_ = static_cast<int>((*values)[2]);
+    ++beats_;
+    const bool running = axis_state_ == kClosedLoopControl && axis_error_ == 0;
+    if (step_ == Step::kAwait && running) Enter(Step::kArmed, now);
+    // The state counts, not only the error: drives have been seen to fall to IDLE with error 0.
+    if (step_ == Step::kArmed && !running) {
+      std::array<char, 100> buffer;
+      Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_),
+           DescribeErrors(axis_error_, buffer), DescribeProcedureResult(procedure_result_));
+      ask_error_ = true;
+      axis_state_known_ = true;
+    }
+    return FrameUse::kConsumed;
+  }
+
+  FrameUse OnVersion(const Frame& frame) noexcept {
+    const auto values = DecodePayload(kGetVersion, frame);
+    if (!values) return FrameUse::kRejected;
+    firmware_major_ = static_cast<int>((*values)[4]);
+    firmware_minor_ = static_cast<int>((*values)[5]);
+    version_ = firmware_major_ == 0 && firmware_minor_ == 6 ? Version::kGood : Version::kBad;
+    return FrameUse::kConsumed;
+  }
+
+  FrameUse OnError(const Frame& frame) noexcept {
+    const auto values = DecodePayload(kGetError, frame);
+    if (!values) return FrameUse::kRejected;
+    const auto disarm_reason = static_cast<uint32_t>((*values)[1]);
+    if (fault_ && step_ != Step::kArmed && axis_error_ == 0 && disarm_reason != 0) {
+      std::array<char, 100> buffer;
+      reason_.Set("the drive disarmed itself: {}", DescribeErrors(disarm_reason, buffer));
+    }
+    return FrameUse::kConsumed;
+  }
+
+  FrameUse OnEstimates(const Frame& frame) noexcept {
+    const auto values = DecodePayload(kGetEncoderEstimates, frame);
+    if (!values || !AllFinite(kGetEncoderEstimates, *values)) return FrameUse::kRejected;
+    estimate_ = {(*values)[0] * kRadiansPerTurn, (*values)[1] * kRadiansPerTurn};
+    return FrameUse::kEstimate;
+  }
+
+  FrameUse OnTorques(const Frame& frame) noexcept {
+    const auto values = DecodePayload(kGetTorques, frame);
+    if (!values || !AllFinite(kGetTorques, *values)) return FrameUse::kRejected;
+    torque_estimate_ = (*values)[1];
+    return FrameUse::kConsumed;
+  }
+
+  const int node_;
+  const MotorTiming timing_;
+  MotorEstimate estimate_;
+  double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
+
+  bool heard_ = false;    // ever
+  bool present_ = false;  // lately
+  int64_t heartbeat_ = 0;
+  uint32_t axis_error_ = 0;
+  int axis_state_ = kUndefined;
+  bool axis_state_known_ = false;  // since the last disarm
+  int procedure_result_ = 0;
+  Version version_ = Version::kUnknown;
+  int firmware_major_ = 0, firmware_minor_ = 0;
+
+  Step step_ = Step::kRest;
+  int64_t entered_ = 0;
+  int64_t retry_ = 0;
+  int beats_ = 0;
+  int disarms_ = 0;
+  bool ask_error_ = false;
+  bool fault_ = false;
+  Reason reason_;
+};
+
+}  // namespace
+
+std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description, const MotorTiming& timing) {
+  if (description.node < 0 || description.node > kMaxNode) {
+    throw std::invalid_argument(fmt::format("CANSimple node {} is not in [0, {}]", description.node, kMaxNode));
+  }
+  return std::make_unique<CanSimpleMotor>(description.node, timing);
+}
+
+}  // namespace plumb

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "drivers/can/frame.h"
+#include "drivers/can/transport.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// Why something is as it is: one line in a fixed buffer, so that the driver's cycle can write it.
+class Reason {
+ public:
+  template <class... Args>
+  void Set(fmt::format_string<Args...> format, Args&&... args) noexcept {
+    const auto result = fmt::format_to_n(text_.data(), text_.size(), format, std::forward<Args>(args)...);
+    size_ = result.size < text_.size() ? result.size : text_.size();
+  }
+  void Clear() noexcept { size_ = 0; }
+  std::string_view text() const noexcept { return {text_.data(), size_}; }
+
+ private:
+  std::array<char, 192> text_;
+  size_t size_ = 0;
+};
+
+/// How a drive is. The numbers are those of driver_status_t.
+enum class DriveState : int8_t { kAbsent = 0, kIdle = 1, kArming = 2, kArmed = 3, kFault = 4 };
+
+/// Latest measurement, at the motor's shaft.
+struct MotorEstimate {
+  double position = 0;  ///< [rad]
+  double velocity = 0;  ///< [rad/s]
+};
+
+/// What a motor made of a frame.
+enum class FrameUse {
+  kNotMine,   ///< another id, or not a frame a drive sends: remote, extended, FD, error
+  kRejected,  ///< its id, but too short, not finite or of an unknown kind
+  kConsumed,
+  kEstimate,  ///< carried a new MotorEstimate
+};
+
+/// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All methods but
+/// the constructor are free of exceptions and allocation; times are scaled monotonic microseconds. Frames to
+/// send go into a batch. Units are SI at the motor's shaft; drives' own units end here. Not thread-safe.
+class Motor {
+ public:
+  virtual ~Motor() = default;
+
+  /// Ids of the frames this drive sends.
+  virtual Filter filter() const = 0;
+
+  virtual FrameUse OnFrame(const Frame& frame, int64_t now) noexcept = 0;
+  virtual const MotorEstimate& estimate() const noexcept = 0;
+  /// [Nm] the drive's torque estimate; NaN if it does not report one.
+  virtual double torque_estimate() const noexcept = 0;
+
+  /// Begins the arming sequence, from any state but armed. state() tells how it goes.
+  virtual void Arm(int64_t now) noexcept = 0;
+  /// Asks for zero torque and idle, again and again until the drive says so.
+  virtual void Disarm(int64_t now) noexcept = 0;
+  /// The drive's own emergency stop.
+  virtual void Estop(int64_t now) noexcept = 0;
+  /// Once per cycle: deadlines, and the next frames of the sequence under way.
+  virtual void Tick(int64_t now, FrameBatch& out) noexcept = 0;
+  /// The frame of a torque setpoint [Nm]. Sent in every cycle while arming (zero) and armed.
+  virtual Frame Torque(double torque) const noexcept = 0;
+
+  virtual DriveState state() const noexcept = 0;
+  /// Why it is not armed: decoded errors, the step at which arming failed. Empty if there is nothing to say.
+  virtual std::string_view reason() const noexcept = 0;
+  /// True once the drive has confirmed that it is not armed, or is absent.
+  virtual bool confirmed_idle() const noexcept = 0;
+};
+
+/// What a motor needs to know of the driver's settings.
+struct MotorTiming {
+  int64_t heartbeat_timeout;  ///< [us] silence after which a drive counts as absent; also for each arming step
+};
+
+/// A motor of the named protocol (MotorDescription::protocol).
+/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or a node it cannot have.
+std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const MotorTiming& timing);
+
+}  // namespace plumb
