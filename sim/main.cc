@@ -1,0 +1,117 @@
+// plumb-robot: a robot that is not there. Speaks its drives' side of the CAN bus and obeys PLACE_ROBOT.
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/process.h"
+#include "drivers/can/transport.h"
+#include "plumb/place_robot_t.hpp"
+#include "sim/parameters.h"
+#include "sim/virtual_robot.h"
+
+namespace plumb {
+namespace {
+
+/// "gravity=9.8" replaces one of the hidden parameters.
+void Set(const std::string& assignment, const RobotDescription& description, Eigen::VectorXd& physical) {
+  const size_t equals = assignment.find('=');
+  const std::string name = assignment.substr(0, equals);
+  const int index = description.FindParameter(name);
+  if (index < 0) throw std::invalid_argument("--set " + assignment + ": the robot has no parameter '" + name + "'");
+  double value = NAN;
+  if (equals != std::string::npos) {
+    const char* end = assignment.data() + assignment.size();
+    const auto [rest, error] = std::from_chars(assignment.data() + equals + 1, end, value);
+    if (error != std::errc() || rest != end) value = NAN;
+  }
+  if (!std::isfinite(value)) throw std::invalid_argument("--set " + assignment + ": expected NAME=NUMBER");
+  physical[index] = value;
+}
+
+void LogTruth(const RobotDescription& description, const Eigen::VectorXd& physical, uint64_t seed) {
+  std::string text;
+  for (size_t i = 0; i < description.parameters.size(); ++i) {
+    const ParameterDescription& parameter = description.parameters[i];
+    text += fmt::format(" {} = {:.5g} {}", parameter.name, physical[static_cast<Eigen::Index>(i)], parameter.unit);
+  }
+  spdlog::debug("seed {}:{}", seed, text);
+}
+
+int Serve(Process& process, const RobotDescription& description, const Eigen::VectorXd& physical,
+          const std::string& bus_url) {
+  constexpr int64_t kReopenPeriod = 200'000;  // [us]
+  constexpr int kBursts = 16;                 // of frames per wake, so that a flood cannot stop time
+  const Clock& clock = process.clock();
+  VirtualRobot robot(description, physical, clock.Utime());
+  const std::unique_ptr<Transport> transport = OpenTransport(bus_url, robot.filters());
+  Subscriber<place_robot_t> places(process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
+    const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(), static_cast<Eigen::Index>(wish.q.size()));
+    const Eigen::Map<const Eigen::VectorXd> v(wish.v.data(), static_cast<Eigen::Index>(wish.v.size()));
+    if (!robot.Place(wish.utime, q, v)) spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
+  });
+  spdlog::info("{} is on {}", description.name, bus_url);
+
+  std::array<Frame, 32> frames;
+  FrameBatch answers;
+  LinkState link = LinkState::kUp;
+  int64_t next_reopen = 0;
+  int64_t now = clock.Utime();
+  while (process.Wait(std::min(robot.NextEvent() - now, kReopenPeriod), transport->fd())) {
+    // First the time, then the frames: what arrives in between must not find the robot already past it.
+    now = clock.Utime();
+    for (int burst = 0; burst < kBursts; ++burst) {
+      const int count = transport->Receive(frames);
+      if (count == 0) break;
+      answers.Clear();
+      for (int i = 0; i < count; ++i) {
+        const Frame& frame = frames[static_cast<size_t>(i)];
+        const int64_t arrival = frame.receive_ns == 0 ? now : clock.UtimeFromRealtimeNs(frame.receive_ns);
+        robot.Receive(frame, std::min(arrival, now), answers);
+      }
+      transport->Send(answers.frames());
+    }
+    answers.Clear();
+    robot.Advance(now, answers);
+    transport->Send(answers.frames());
+    if (transport->link() != LinkState::kUp && now >= next_reopen) {
+      transport->Reopen();
+      next_reopen = now + kReopenPeriod;
+    }
+    if (transport->link() != link) {
+      link = transport->link();
+      spdlog::info("{} is {}", bus_url, link == LinkState::kUp ? "up again" : "down");
+    }
+    now = clock.Utime();
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  std::string robot_path, bus_url;
+  uint64_t seed = 1;
+  std::vector<std::string> assignments;
+  return plumb::Run(
+      "plumb-robot", "The virtual robot: hidden parameters, drives on a CAN bus", argc, argv,
+      [&](CLI::App& app) {
+        app.add_option("robot", robot_path, "folder or TOML file of the robot")->required();
+        app.add_option("--bus", bus_url, "CAN bus; default: the robot's");
+        app.add_option("--seed", seed, "draws the hidden parameters")->capture_default_str();
+        app.add_option("--set", assignments, "NAME=VALUE: this parameter is not drawn, may be repeated");
+      },
+      [&](plumb::Process& process) {
+        const plumb::RobotDescription description = plumb::LoadRobot(robot_path);
+        Eigen::VectorXd physical = plumb::HiddenParameters(description, seed);
+        for (const std::string& assignment : assignments) plumb::Set(assignment, description, physical);
+        plumb::LogTruth(description, physical, seed);
+        return plumb::Serve(process, description, physical, bus_url.empty() ? description.bus_url : bus_url);
+      });
+}
