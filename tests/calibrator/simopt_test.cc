@@ -59,21 +59,9 @@ TEST_CASE("the distribution comes to rest on the posterior: neither collapsed no
   const Gaussian& found = simopt.state().distribution;
 
   // Independent truth: the Laplace approximation of the same posterior, by Gauss-Newton from the true parameters.
-  const Gaussian prior = PriorGaussian(robot);
-  Discrepancy discrepancy(robot);
-  Eigen::VectorXd x = kTruth.array().log();
-  Eigen::MatrixXd precision;
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::VectorXd r = discrepancy.Residuals(x.array().exp(), simopt.state().rollouts);
-    Eigen::MatrixXd jacobian(r.size(), 3);
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::VectorXd y = x + 1e-6 * Eigen::Vector3d::Unit(k);
-      jacobian.col(k) = (discrepancy.Residuals(y.array().exp(), simopt.state().rollouts) - r) / 1e-6;
-    }
-    precision = jacobian.transpose() * jacobian + Eigen::MatrixXd(prior.covariance.inverse());
-    x -= precision.ldlt().solve(jacobian.transpose() * r + prior.covariance.inverse() * (x - prior.mean));
-  }
-  const Eigen::MatrixXd covariance = precision.inverse();
+  const Gaussian laplace = LaplacePosterior(robot, simopt.state().rollouts, kTruth.array().log());
+  const Eigen::VectorXd& x = laplace.mean;
+  const Eigen::MatrixXd& covariance = laplace.covariance;
   for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
     const double sd = std::sqrt(power.dot(covariance * power));
     CHECK(std::abs(power.dot(found.mean - x)) < 1.2 * sd);

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <Eigen/Dense>
 #include <cmath>
 #include <cstdlib>
 #include <string>
 
+#include "calibrator/discrepancy.h"
+#include "calibrator/simopt.h"
 #include "calibrator/transitions.h"
 #include "common/random.h"
 #include "robot/description.h"
@@ -41,6 +44,26 @@ inline Rollout SyntheticRollout(const RobotDescription& robot, const Eigen::Vect
     rollout.transitions.push_back(t);
   }
   return rollout;
+}
+
+/// The Laplace approximation of the posterior, by Gauss-Newton from `start` (coordinates): independent of REPS.
+inline Gaussian LaplacePosterior(const RobotDescription& robot, const std::vector<Rollout>& rollouts,
+                                 Eigen::VectorXd start) {
+  const Gaussian prior = PriorGaussian(robot);
+  Discrepancy discrepancy(robot);
+  Eigen::VectorXd x = std::move(start);
+  Eigen::MatrixXd precision;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::VectorXd r = discrepancy.Residuals(x.array().exp(), rollouts);
+    Eigen::MatrixXd jacobian(r.size(), x.size());
+    for (int k = 0; k < x.size(); ++k) {
+      const Eigen::VectorXd y = x + 1e-6 * Eigen::VectorXd::Unit(x.size(), k);
+      jacobian.col(k) = (discrepancy.Residuals(y.array().exp(), rollouts) - r) / 1e-6;
+    }
+    precision = jacobian.transpose() * jacobian + Eigen::MatrixXd(prior.covariance.inverse());
+    x -= precision.ldlt().solve(jacobian.transpose() * r + prior.covariance.inverse() * (x - prior.mean));
+  }
+  return {x, precision.inverse()};
 }
 
 }  // namespace plumb
