@@ -13,7 +13,9 @@
 namespace plumb {
 namespace {
 
-RobotDescription Load(const std::string& file) { return LoadRobot(PLUMBLINE_SOURCE "/robots/pendulum/" + file); }
+RobotDescription Load(const std::string& file) {
+  return LoadRobot(PLUMBLINE_SOURCE "/robots/pendulum/" + file);
+}
 
 const Eigen::VectorXd kOne = Eigen::VectorXd::Constant(1, 0.7);
 

@@ -13,12 +13,12 @@ struct ShaftMotion {
   double Position(int64_t time) const;
 };
 
-/// An incremental encoder as an ODrive reads it: the position is quantised to counts, the velocity is that of a
-/// tracking loop of second order on the quantised position, run at the drive's 8 kHz:
+/// An incremental encoder as an ODrive reads it: the position is quantised to counts, the velocity is that of
+/// a tracking loop of second order on the quantised position, run at the drive's 8 kHz:
 ///   p += dt v;  e = count - p;  p += dt kp e;  v += dt ki e;  kp = 2 b, ki = kp^2 / 4  (critically damped)
-/// with bandwidth b = 1000 rad/s, ODrive's default (odriverobotics/ODrive, Firmware/MotorControl/encoder.cpp). The
-/// velocity therefore lags by 2/b = 2 ms and carries quantisation noise of some percent of a radian per second at
-/// 14 bit. Not thread-safe.
+/// with bandwidth b = 1000 rad/s, ODrive's default (odriverobotics/ODrive,
+/// Firmware/MotorControl/encoder.cpp). The velocity therefore lags by 2/b = 2 ms and carries quantisation
+/// noise of some percent of a radian per second at 14 bit. Not thread-safe.
 class Encoder {
  public:
   static constexpr double kBandwidth = 1000;  ///< [rad/s]

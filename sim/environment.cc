@@ -21,7 +21,8 @@ void Environment::Reset(Random& random) {
   SetState(start_q_, start_v_);
 }
 
-void Environment::SetState(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v) {
+void Environment::SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
+                           const Eigen::Ref<const Eigen::VectorXd>& v) {
   simulator_.SetState(q, v);
   effort_.setZero();
 }

@@ -26,7 +26,9 @@ class Environment {
 
   /// @param physical in the order of description.parameters. @throws std::invalid_argument, see
   /// Parameters::Apply.
-  void SetParameters(const Eigen::Ref<const Eigen::VectorXd>& physical) { simulator_.SetParameters(physical); }
+  void SetParameters(const Eigen::Ref<const Eigen::VectorXd>& physical) {
+    simulator_.SetParameters(physical);
+  }
   /// Draws a state of the task's initial distribution. No effort has been applied yet.
   void Reset(Random& random);
   /// @throws std::invalid_argument if the state is not finite.

@@ -23,7 +23,12 @@ void Set(const std::string& assignment, const RobotDescription& description, Eig
   const size_t equals = assignment.find('=');
   const std::string name = assignment.substr(0, equals);
   const int index = description.FindParameter(name);
-  if (index < 0) throw std::invalid_argument("--set " + assignment + ": the robot has no parameter '" + name + "'");
+  if (index < 0) {
+    std::string known;
+    for (const ParameterDescription& parameter : description.parameters) known += " " + parameter.name;
+    throw std::invalid_argument("--set " + assignment + ": no parameter '" + name +
+                                "'; the robot's are:" + known);
+  }
   double value = NAN;
   if (equals != std::string::npos) {
     const char* end = assignment.data() + assignment.size();
@@ -38,7 +43,8 @@ void LogTruth(const RobotDescription& description, const Eigen::VectorXd& physic
   std::string text;
   for (size_t i = 0; i < description.parameters.size(); ++i) {
     const ParameterDescription& parameter = description.parameters[i];
-    text += fmt::format(" {} = {:.5g} {}", parameter.name, physical[static_cast<Eigen::Index>(i)], parameter.unit);
+    text += fmt::format(" {} = {:.5g} {}", parameter.name, physical[static_cast<Eigen::Index>(i)],
+                        parameter.unit);
   }
   spdlog::debug("seed {}:{}", seed, text);
 }
@@ -53,7 +59,8 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
   Subscriber<place_robot_t> places(process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
     const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(), static_cast<Eigen::Index>(wish.q.size()));
     const Eigen::Map<const Eigen::VectorXd> v(wish.v.data(), static_cast<Eigen::Index>(wish.v.size()));
-    if (!robot.Place(wish.utime, q, v)) spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
+    if (!robot.Place(wish.utime, q, v))
+      spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
   });
   spdlog::info("{} is on {}", description.name, bus_url);
 

@@ -41,7 +41,8 @@ Composite SeenFromOrigin(const InertialModel::Body& body, const LinkMotion& link
   const Vector3d center = link.position + arm;
   const Matrix3d inertia = link.rotation * body.inertia * link.rotation.transpose();
   const Vector3d& omega = link.angular_velocity;
-  const Vector3d acceleration = link.linear_bias + link.angular_bias.cross(arm) + omega.cross(omega.cross(arm));
+  const Vector3d acceleration =
+      link.linear_bias + link.angular_bias.cross(arm) + omega.cross(omega.cross(arm));
   c.mass = body.mass;
   c.first_moment = body.mass * center;
   c.inertia = inertia - body.mass * center * center.transpose();
@@ -159,7 +160,9 @@ Simulator::~Simulator() = default;
 int Simulator::num_joints() const { return static_cast<int>(impl_->q_.size()); }
 int Simulator::parameter_count() const { return impl_->parameters_.size(); }
 
-void Simulator::SetParameters(const Vector& physical) { impl_->parameters_.Apply(physical, impl_->inertias_); }
+void Simulator::SetParameters(const Vector& physical) {
+  impl_->parameters_.Apply(physical, impl_->inertias_);
+}
 void Simulator::SetState(const Vector& q, const Vector& v) { impl_->SetState(q, v); }
 void Simulator::Step(const Vector& effort, double duration) { impl_->Step(effort, duration); }
 

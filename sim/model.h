@@ -14,10 +14,10 @@ struct EffortSegment {
   Eigen::VectorXd effort;  ///< [Nm or N] per joint
 };
 
-/// The robot as a simulator with exchangeable parameters: a tree of one-degree-of-freedom joints, kinematics by
-/// Simbody, mass matrix by composite rigid bodies (Featherstone, "Rigid Body Dynamics Algorithms", 2008,
-/// section 6.2) over a mass table of its own, so that new parameters need no rebuild. Joint stops, friction and
-/// contact are not modelled.
+/// The robot as a simulator with exchangeable parameters: a tree of one-degree-of-freedom joints, kinematics
+/// by Simbody, mass matrix by composite rigid bodies (Featherstone, "Rigid Body Dynamics Algorithms", 2008,
+/// section 6.2) over a mass table of its own, so that new parameters need no rebuild. Joint stops, friction
+/// and contact are not modelled.
 ///
 /// One per worker; not thread-safe, but instances share nothing. Equal inputs give equal bits in any thread.
 /// Apart from construction nothing allocates.
@@ -56,7 +56,8 @@ class Simulator {
   /// False once the state has blown up, or an effort was not finite.
   bool finite() const;
 
-  /// Acceleration at the current state under `effort` [rad/s^2 or m/s^2]. Valid until the next call of anything.
+  /// Acceleration at the current state under `effort` [rad/s^2 or m/s^2]. Valid until the next call of
+  /// anything.
   const Eigen::VectorXd& Acceleration(const Vector& effort);
 
  private:

@@ -38,11 +38,13 @@ Parameters::Binding Parameters::Bind(const RobotDescription& description, const 
     if (path == "length/" + name) {
       const double length = 2 * urdf_.bodies[body].center_of_mass.norm();
       if (!(length > 0)) {
-        throw std::invalid_argument("parameter '" + path + "': the link's centre of mass is at its joint, so it has no length");
+        throw std::invalid_argument("parameter '" + path +
+                                    "': the link's centre of mass is at its joint, so it has no length");
       }
       if (std::any_of(description.joints.begin(), description.joints.end(),
                       [link](const JointDescription& joint) { return joint.parent == link; })) {
-        throw std::invalid_argument("parameter '" + path + "': only a link that carries no further joint can be stretched");
+        throw std::invalid_argument("parameter '" + path +
+                                    "': only a link that carries no further joint can be stretched");
       }
       return {Kind::kLength, body, length};
     }
@@ -50,7 +52,8 @@ Parameters::Binding Parameters::Bind(const RobotDescription& description, const 
       if (EditDistance(path, candidate) < EditDistance(path, nearest)) nearest = candidate;
     }
   }
-  throw std::invalid_argument("the simulator has no parameter '" + path + "'; the nearest is '" + nearest + "'");
+  throw std::invalid_argument("the simulator has no parameter '" + path + "'; the nearest is '" + nearest +
+                              "'");
 }
 
 InertialModel Parameters::Nominal() const {
@@ -99,7 +102,8 @@ Eigen::VectorXd HiddenParameters(const RobotDescription& description, uint64_t s
     const int index = description.FindParameter(hidden.name);
     if (index < 0) throw std::invalid_argument("hidden '" + hidden.name + "' is not one of the parameters");
     // One stream per parameter: hiding one more does not change the others.
-    physical[index] = Random(seed, {kHiddenStream, static_cast<uint32_t>(index)}).Uniform(hidden.lower, hidden.upper);
+    physical[index] =
+        Random(seed, {kHiddenStream, static_cast<uint32_t>(index)}).Uniform(hidden.lower, hidden.upper);
   }
   return physical;
 }

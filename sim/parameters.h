@@ -25,9 +25,10 @@ inline constexpr double kStandardGravity = 9.80665;
 /// Turns the description's uncertain parameters into inertias. The paths:
 ///   "gravity"        [m/s^2], >= 0
 ///   "mass/<link>"    [kg], > 0: scales mass and inertia; the shape stays
-///   "length/<link>"  [m], > 0: stretches the link along with its centre of mass at equal mass: centre of mass
-///                    times l/l0, inertia about it times (l/l0)^2. l0 is the length that the URDF implies for a
-///                    uniform rod hung at one end, twice the distance of the centre of mass from the joint.
+///   "length/<link>"  [m], > 0: stretches the link along with its centre of mass at equal mass: centre of
+///   mass
+///                    times l/l0, inertia about it times (l/l0)^2. l0 is the length that the URDF implies for
+///                    a uniform rod hung at one end, twice the distance of the centre of mass from the joint.
 ///                    Only for links that carry no further joint.
 /// The factors multiply, so the order of the parameters does not matter. Immutable, hence thread-safe.
 class Parameters {
@@ -44,8 +45,8 @@ class Parameters {
   /// Writes the model with these parameters. Well below 1 us; does not allocate.
   /// @param physical in the order of description.parameters, physical units.
   /// @param model one that Nominal returned.
-  /// @throws std::invalid_argument if a value is not finite or not physical, or the size is wrong; the model is
-  /// then unchanged.
+  /// @throws std::invalid_argument if a value is not finite or not physical, or the size is wrong; the model
+  /// is then unchanged.
   void Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, InertialModel& model) const;
 
  private:

@@ -18,7 +18,8 @@ using Eigen::VectorXd;
 SimTK::Vec3 ToSimbody(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
 SimTK::Rotation ToSimbody(const Eigen::Matrix3d& m) {
-  return SimTK::Rotation(SimTK::Mat33(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)));
+  return SimTK::Rotation(
+      SimTK::Mat33(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)));
 }
 
 SimTK::MassProperties ToSimbody(const InertialModel::Body& body) {
@@ -43,7 +44,9 @@ class Plant::Impl {
       }
       // Simbody turns about z and slides along x; body frames are the URDF's link frames.
       const bool slides = joint.type == JointDescription::Type::kPrismatic;
-      const SimTK::Rotation to_axis(SimTK::UnitVec3(ToSimbody(joint.axis)), slides ? SimTK::CoordinateAxis(SimTK::XAxis) : SimTK::CoordinateAxis(SimTK::ZAxis));
+      const SimTK::Rotation to_axis(
+          SimTK::UnitVec3(ToSimbody(joint.axis)),
+          slides ? SimTK::CoordinateAxis(SimTK::XAxis) : SimTK::CoordinateAxis(SimTK::ZAxis));
       const SimTK::Transform outboard(to_axis);
       const SimTK::Transform inboard(ToSimbody(joint.rotation) * to_axis, ToSimbody(joint.origin));
       const SimTK::Body::Rigid body(ToSimbody(inertias.bodies[i]));
@@ -133,7 +136,8 @@ Plant::~Plant() = default;
 
 void Plant::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& v) {
   if (q.size() != impl_->q_.size() || v.size() != impl_->v_.size()) {
-    throw std::invalid_argument("a state has " + std::to_string(impl_->q_.size()) + " positions and velocities");
+    throw std::invalid_argument("a state has " + std::to_string(impl_->q_.size()) +
+                                " positions and velocities");
   }
   if (!q.allFinite() || !v.allFinite()) throw std::invalid_argument("a plant's state must be finite");
   impl_->q_ = q;

@@ -9,9 +9,9 @@
 namespace plumb {
 
 /// The physics of the virtual robot: what stands for reality. It shares neither equations nor integrator with
-/// Simulator, so that the two agree only because both are right: Simbody the textbook way, with a gravity force and
-/// articulated bodies, masses fixed when built, integrated by the classical Runge-Kutta method of fourth order.
-/// Not thread-safe.
+/// Simulator, so that the two agree only because both are right: Simbody the textbook way, with a gravity
+/// force and articulated bodies, masses fixed when built, integrated by the classical Runge-Kutta method of
+/// fourth order. Not thread-safe.
 class Plant {
  public:
   /// @param max_step [s] upper bound of an integration step. At 5 ms a step of the pendulum errs by less than
@@ -20,7 +20,8 @@ class Plant {
   Plant(const RobotDescription& description, const InertialModel& inertias, double max_step = 0.005);
   ~Plant();
 
-  /// @throws std::invalid_argument if an entry is not finite or the size is wrong; the state is then unchanged.
+  /// @throws std::invalid_argument if an entry is not finite or the size is wrong; the state is then
+  /// unchanged.
   void SetState(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v);
   /// Holds `effort` [Nm or N] for `duration` [s] >= 0 in equal steps. A state that would not be finite is not
   /// taken on: the plant then stays where it was. @return false in that case.

@@ -43,13 +43,14 @@ std::vector<int> FindParents(const RobotDescription& description) {
 
 }  // namespace
 
-// Simbody's body frames are the joints' moving frames: z (x for a slide) along the axis, origin at the joint. For
-// such frames Simbody has shorter code. `axes` turns them into link axes.
+// Simbody's body frames are the joints' moving frames: z (x for a slide) along the axis, origin at the joint.
+// For such frames Simbody has shorter code. `axes` turns them into link axes.
 class Tree::Impl {
  public:
   Impl(const RobotDescription& description, const std::vector<int>& parents)
       : matter_(system_),
-        velocities_matter_(std::any_of(parents.begin(), parents.end(), [](int parent) { return parent >= 0; })) {
+        velocities_matter_(
+            std::any_of(parents.begin(), parents.end(), [](int parent) { return parent >= 0; })) {
     // Kinematics asks for no masses; any will do.
     const SimTK::Body::Rigid body(SimTK::MassProperties(1, SimTK::Vec3(0), SimTK::UnitInertia(1)));
     for (size_t i = 0; i < parents.size(); ++i) {
@@ -103,7 +104,8 @@ class Tree::Impl {
         link.slide = link.position.cross(link.axis);
       }
       if (!velocities_matter_) continue;
-      const SimTK::SpatialVec& bias = matter_.getTotalCoriolisAcceleration(state_, body.getMobilizedBodyIndex());
+      const SimTK::SpatialVec& bias =
+          matter_.getTotalCoriolisAcceleration(state_, body.getMobilizedBodyIndex());
       link.angular_velocity = ToEigen(body.getBodyAngularVelocity(state_));
       link.angular_bias = ToEigen(bias[0]);
       link.linear_bias = ToEigen(bias[1]);
@@ -122,8 +124,7 @@ class Tree::Impl {
   std::vector<LinkMotion> links_;
 };
 
-Tree::Tree(const RobotDescription& description)
-    : impl_(nullptr), parents_(FindParents(description)) {
+Tree::Tree(const RobotDescription& description) : impl_(nullptr), parents_(FindParents(description)) {
   impl_ = std::make_unique<Impl>(description, parents_);
 }
 

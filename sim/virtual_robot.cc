@@ -31,8 +31,8 @@ VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::Vec
       effort_(Eigen::VectorXd::Zero(description.num_joints())) {
   for (const JointDescription& joint : joints_) {
     if (joint.motor.protocol != "cansimple") {
-      throw std::invalid_argument("joint '" + joint.name + "': no virtual drive speaks '" + joint.motor.protocol +
-                                  "'; known: cansimple");
+      throw std::invalid_argument("joint '" + joint.name + "': no virtual drive speaks '" +
+                                  joint.motor.protocol + "'; known: cansimple");
     }
     CanSimpleDevice::Settings settings;
     settings.node = joint.motor.node;
@@ -46,7 +46,8 @@ VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::Vec
 }
 
 void VirtualRobot::Boot(int64_t now) {
-  time_ = now;
+  time_ = latest_ = now;
+  effort_.setZero();
   drives_.clear();
   for (size_t i = 0; i < joints_.size(); ++i) {
     drives_.emplace_back(settings_[i], now);
@@ -64,10 +65,15 @@ std::vector<Filter> VirtualRobot::filters() const {
 
 void VirtualRobot::Receive(const Frame& frame, int64_t arrival, FrameBatch& out) {
   Advance(arrival, out);
+  bool matters =
+      frame.remote || frame.length == 0;  // may be a request: its answer is of the shaft as it is now
   for (size_t i = 0; i < drives_.size(); ++i) {
-    drives_[i].OnFrame(frame, time_);
-    drives_[i].Tick(time_, Read(i), out);  // an answer is read from the shaft as it is now
+    drives_[i].OnFrame(frame, latest_);
+    matters = matters || Effort(i) != effort_[static_cast<Eigen::Index>(i)];
   }
+  if (!matters) return;
+  MoveTo(latest_);
+  Tick(out);
 }
 
 int64_t VirtualRobot::NextEvent() const {
@@ -77,24 +83,25 @@ int64_t VirtualRobot::NextEvent() const {
 }
 
 void VirtualRobot::Advance(int64_t now, FrameBatch& out) {
-  if (std::abs(now - time_) > kLongestGap) Boot(now);
-  for (int64_t next = NextEvent(); next <= now; next = NextEvent()) {
+  if (std::abs(now - latest_) > kLongestGap) Boot(now);
+  latest_ = std::max(latest_, now);
+  for (int64_t next = NextEvent(); next <= latest_; next = NextEvent()) {
     MoveTo(next);
     unsent_.Clear();
-    FrameBatch& outbox = now - next > kLatest ? unsent_ : out;
-    for (size_t i = 0; i < drives_.size(); ++i) drives_[i].Tick(time_, Read(i), outbox);
+    Tick(latest_ - next > kLatest ? unsent_ : out);
   }
-  MoveTo(now);
+}
+
+void VirtualRobot::Tick(FrameBatch& out) {
+  for (size_t i = 0; i < drives_.size(); ++i) {
+    drives_[i].Tick(time_, Read(i), out);
+    effort_[static_cast<Eigen::Index>(i)] = Effort(i);
+  }
 }
 
 void VirtualRobot::MoveTo(int64_t time) {
   if (time <= time_) return;
-  for (size_t i = 0; i < drives_.size(); ++i) {
-    const JointDescription& joint = joints_[i];
-    const double torque = joint.motor.sign * joint.motor.gear * drives_[i].Torque();
-    effort_[static_cast<Eigen::Index>(i)] = std::clamp(torque, -joint.effort_limit, joint.effort_limit);
-    motions_[i] = {time_, time, Turns(i), 0, TurnsPerSecond(i), 0};
-  }
+  for (size_t i = 0; i < drives_.size(); ++i) motions_[i] = {time_, time, Turns(i), 0, TurnsPerSecond(i), 0};
   // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a crash.
   if (!plant_.Advance(effort_, static_cast<double>(time - time_) * 1e-6)) plant_.SetState(0 * q(), 0 * v());
   time_ = time;
@@ -105,6 +112,12 @@ void VirtualRobot::MoveTo(int64_t time) {
   }
 }
 
+double VirtualRobot::Effort(size_t joint) const {
+  const JointDescription& description = joints_[joint];
+  const double effort = description.motor.sign * description.motor.gear * drives_[joint].Torque();
+  return std::clamp(effort, -description.effort_limit, description.effort_limit);
+}
+
 bool VirtualRobot::Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& q,
                          const Eigen::Ref<const Eigen::VectorXd>& v) {
   const auto within_reach = [this](const Eigen::Ref<const Eigen::VectorXd>& x) {
@@ -113,6 +126,7 @@ bool VirtualRobot::Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>&
   if (!within_reach(q) || !within_reach(v)) return false;
   if (utime == placed_) return true;
   placed_ = utime;
+  MoveTo(latest_);
   plant_.SetState(q, v);
   for (size_t i = 0; i < encoders_.size(); ++i) encoders_[i].Reset(Turns(i), TurnsPerSecond(i));
   return true;

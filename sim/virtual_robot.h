@@ -14,10 +14,11 @@
 
 namespace plumb {
 
-/// A robot that is not there: a Plant moved by virtual drives that listen to a CAN bus. Event-driven, with time as an
-/// argument, so that its motion does not depend on when the process gets to run: torques change when their frame
-/// arrived, encoders are read at multiples of the measurement period, watchdogs expire on time. Only the sending can
-/// be late. Times are microseconds. Does not throw after construction. Not thread-safe.
+/// A robot that is not there: a Plant moved by virtual drives that listen to a CAN bus. Event-driven, with
+/// time as an argument, so that its motion does not depend, to the bit, on when the process gets to run:
+/// torques change when their frame arrived, encoders are read at multiples of the measurement period,
+/// watchdogs expire on time. Only the sending can be late. Times are microseconds. Does not throw after
+/// construction. Not thread-safe.
 class VirtualRobot {
  public:
   /// @param physical the true parameters, order of description.parameters.
@@ -27,24 +28,27 @@ class VirtualRobot {
   /// What the bus must let in.
   std::vector<Filter> filters() const;
 
-  /// Moves on to the frame's arrival and obeys it. An arrival earlier than time() counts as time().
+  /// Obeys a frame that arrived at that time, after doing what was due before it. Frames must come in order
+  /// of arrival; one that seems older than the last counts as simultaneous.
   /// @param out frames to send.
   void Receive(const Frame& frame, int64_t arrival, FrameBatch& out);
-  /// Moves on to `now`, sending what falls due; what would be too late by kLatest is not sent, as a drive's outbox
-  /// holds the newest only. After a gap of more than kLongestGap, or a step back in time by as much, the robot carries
-  /// on at `now` where it was, its drives rebooted.
+  /// Does all that is due until `now`. What would be sent too late by kLatest is not sent, as a drive's
+  /// outbox holds the newest only. After a gap of more than kLongestGap, or a step back in time by as much,
+  /// the robot carries on at `now` where it was, its drives rebooted.
   void Advance(int64_t now, FrameBatch& out);
   /// When Advance next has something to do.
   int64_t NextEvent() const;
 
-  /// Puts the robot at q, v, unless the wish of this utime has been granted before.
-  /// @return false if the wish is of the wrong size, not finite or beyond kFarthest.
-  bool Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v);
+  /// Puts the robot at q, v at the time of the latest Advance or Receive, unless the wish of this utime has
+  /// been granted before. @return false if the wish is of the wrong size, not finite or beyond kFarthest.
+  bool Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& q,
+             const Eigen::Ref<const Eigen::VectorXd>& v);
 
   static constexpr int64_t kLatest = 50'000;         ///< [us]
   static constexpr int64_t kLongestGap = 5'000'000;  ///< [us]
   static constexpr double kFarthest = 1e4;           ///< [rad, m, rad/s, m/s]
 
+  /// Of q and v: the latest event, not the latest `now`.
   int64_t time() const { return time_; }
   const Eigen::VectorXd& q() const { return plant_.q(); }
   const Eigen::VectorXd& v() const { return plant_.v(); }
@@ -53,6 +57,8 @@ class VirtualRobot {
  private:
   void Boot(int64_t now);
   void MoveTo(int64_t time);
+  void Tick(FrameBatch& out);
+  double Effort(size_t joint) const;
   double Turns(size_t joint) const;
   double TurnsPerSecond(size_t joint) const;
   CanSimpleDevice::Sample Read(size_t joint) const;
@@ -63,9 +69,10 @@ class VirtualRobot {
   std::vector<CanSimpleDevice> drives_;
   std::vector<Encoder> encoders_;
   std::vector<ShaftMotion> motions_;
-  Eigen::VectorXd effort_;
-  FrameBatch unsent_;  // where frames go that would be too late
-  int64_t time_;
+  Eigen::VectorXd effort_;                                // acts from time_ on
+  FrameBatch unsent_;                                     // where frames go that would be too late
+  int64_t time_;                                          // of the plant
+  int64_t latest_;                                        // the latest that we have been told
   int64_t placed_ = std::numeric_limits<int64_t>::min();  // utime of the last wish granted
 };
 

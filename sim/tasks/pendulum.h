@@ -17,7 +17,8 @@ class PendulumTask : public Task {
 
   void Observe(const State& q, const State& v, std::span<float> observation) const override;
   double Reward(const State& q, const State& v, const State& effort) const override;
-  void InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q, Eigen::Ref<Eigen::VectorXd> v) const override;
+  void InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
+                    Eigen::Ref<Eigen::VectorXd> v) const override;
 };
 
 }  // namespace plumb

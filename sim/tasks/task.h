@@ -34,7 +34,8 @@ class Task {
   virtual bool Terminated(const State& q, const State& v) const;
 
   /// Draws the state in which an episode begins. Writes into vectors of the right size; no allocation.
-  virtual void InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q, Eigen::Ref<Eigen::VectorXd> v) const = 0;
+  virtual void InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
+                            Eigen::Ref<Eigen::VectorXd> v) const = 0;
 
   /// Units in which errors of predicted states are measured, so that angles and velocities can be added:
   /// (scale of q, scale of v), 2 * joints entries > 0.
@@ -54,7 +55,8 @@ class Task {
 };
 
 /// Makes the task that `description.task.name` names.
-/// @throws std::invalid_argument if there is none of that name (names the nearest) or it does not fit the robot.
+/// @throws std::invalid_argument if there is none of that name (names the nearest) or it does not fit the
+/// robot.
 std::unique_ptr<Task> MakeTask(const RobotDescription& description);
 
 /// Names of all tasks.

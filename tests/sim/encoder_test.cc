@@ -18,7 +18,8 @@ ShaftMotion Accelerating(double a, int64_t begin, int64_t end) {
 TEST_CASE("a shaft's motion between instants is the cubic") {
   const auto position = [](double t) { return 1 - 2 * t + 30 * t * t - 400 * t * t * t; };
   const auto velocity = [](double t) { return -2 + 60 * t - 1200 * t * t; };
-  const ShaftMotion motion{1'002'000, 1'007'000, position(0.002), position(0.007), velocity(0.002), velocity(0.007)};
+  const ShaftMotion motion{1'002'000,       1'007'000,       position(0.002),
+                           position(0.007), velocity(0.002), velocity(0.007)};
   for (const int64_t us : {2000, 3125, 5000, 6999, 7000}) {
     CHECK(motion.Position(1'000'000 + us) == Approx(position(static_cast<double>(us) * 1e-6)).epsilon(1e-13));
   }

@@ -23,7 +23,9 @@ struct Gym {
   double g, m, l;
   bool move_before_clip;
 
-  double Acceleration(double q, double u) const { return 3 * g / (2 * l) * std::sin(q) + 3 / (m * l * l) * u; }
+  double Acceleration(double q, double u) const {
+    return 3 * g / (2 * l) * std::sin(q) + 3 / (m * l * l) * u;
+  }
   void Step(double& q, double& v, double u) const {
     const double speed = v + 0.05 * Acceleration(q, u);
     v = std::clamp(speed, -8.0, 8.0);
@@ -77,7 +79,8 @@ TEST_CASE("mass and length act as in gym's formula") {
 
 TEST_CASE("leapfrog is of second order, semi-implicit of first") {
   using Integrator = SimulationSettings::Integrator;
-  for (const auto& [integrator, order] : {std::pair{Integrator::kLeapfrog, 2}, {Integrator::kSemiImplicit, 1}}) {
+  for (const auto& [integrator, order] :
+       {std::pair{Integrator::kLeapfrog, 2}, {Integrator::kSemiImplicit, 1}}) {
     RobotDescription description = LoadPendulum("robot.toml");
     description.simulation.integrator = integrator;
     const auto run = [&](double substep) {
@@ -122,7 +125,8 @@ TEST_CASE("a double pendulum meets the closed form") {
     const double c = m2 * l1 * l2 * std::cos(a - b), s = m2 * l1 * l2 * std::sin(a - b);
     CHECK((m1 + m2) * l1 * l1 * dda + c * ddb + s * db * db - (m1 + m2) * g * l1 * std::sin(a) ==
           Approx(u[0] - u[1]).margin(1e-6));
-    CHECK(m2 * l2 * l2 * ddb + c * dda - s * da * da - m2 * g * l2 * std::sin(b) == Approx(u[1]).margin(1e-6));
+    CHECK(m2 * l2 * l2 * ddb + c * dda - s * da * da - m2 * g * l2 * std::sin(b) ==
+          Approx(u[1]).margin(1e-6));
   }
 }
 
@@ -143,7 +147,8 @@ TEST_CASE("equal inputs give equal bits, whatever came before and in any thread"
     Simulator simulator(description);
     Random random(static_cast<uint64_t>(warm_up));
     for (int i = 0; i < warm_up; ++i) {
-      simulator.SetState(VectorXd::Constant(4, random.Uniform(-2, 2)), VectorXd::Constant(4, random.Uniform(-2, 2)));
+      simulator.SetState(VectorXd::Constant(4, random.Uniform(-2, 2)),
+                         VectorXd::Constant(4, random.Uniform(-2, 2)));
       simulator.Step(VectorXd::Constant(4, 1.0), 0.05);
     }
     simulator.SetState(Eigen::Vector4d(0.1, 2, -1, 0.5), Eigen::Vector4d(-0.3, 4, 1, 2));

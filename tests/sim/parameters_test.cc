@@ -35,7 +35,8 @@ TEST_CASE("parameters that are not physical are refused and change nothing") {
     CHECK(model.gravity == 10.4);
   }
   CHECK_THROWS_AS(parameters.Apply(Eigen::Vector2d(9, 1), model), std::invalid_argument);
-  CHECK_THROWS_WITH(parameters.Apply(Vector3d(9, -3, 1), model), Catch::Contains("mass/pole") && Catch::Contains("-3"));
+  CHECK_THROWS_WITH(parameters.Apply(Vector3d(9, -3, 1), model),
+                    Catch::Contains("mass/pole") && Catch::Contains("-3"));
   CHECK_NOTHROW(parameters.Apply(Vector3d(0, 1, 1), model));  // weightless is physical
 }
 

@@ -80,7 +80,8 @@ TEST_CASE("the plant's integrator is of fourth order and at its default far belo
   const double coarse = run(Plant(description, inertias, 0.02), 0.4) - reference;
   const double fine = run(Plant(description, inertias, 0.01), 0.4) - reference;
   CHECK(std::log2(coarse / fine) == Approx(4).margin(0.3));
-  const double step = run(Plant(description, inertias), 0.005) - run(Plant(description, inertias, 0.001), 0.005);
+  const double step =
+      run(Plant(description, inertias), 0.005) - run(Plant(description, inertias, 0.001), 0.005);
   CHECK(std::abs(step) < 1e-10);
 }
 
@@ -88,7 +89,8 @@ TEST_CASE("the simulator converges to the plant as its order says") {
   RobotDescription description = MakeTree();
   description.simulation.integrator = SimulationSettings::Integrator::kSemiImplicit;
   Plant plant(description, Parameters(description).Nominal(), 5e-4);
-  const VectorXd q = Eigen::Vector4d(0.1, 1, -1, 2), v = Eigen::Vector4d(0.5, -1, 2, 1), u = Eigen::Vector4d(1, 2, 0.5, -1);
+  const VectorXd q = Eigen::Vector4d(0.1, 1, -1, 2), v = Eigen::Vector4d(0.5, -1, 2, 1),
+                 u = Eigen::Vector4d(1, 2, 0.5, -1);
   plant.SetState(q, v);
   REQUIRE(plant.Advance(u, 0.2));
   const auto error = [&](double substep) {
@@ -112,7 +114,8 @@ TEST_CASE("at the pendulum's substep the simulator errs far less than the sensor
   Random random(13);
   double q_error = 0, v_error = 0, finer_q_error = 0, q_square = 0, v_square = 0;
   for (int i = 0; i < 500; ++i) {
-    const VectorXd q = Scalar(random.Uniform(-3.2, 3.2)), v = Scalar(random.Uniform(-8, 8)), u = Scalar(random.Uniform(-2, 2));
+    const VectorXd q = Scalar(random.Uniform(-3.2, 3.2)), v = Scalar(random.Uniform(-8, 8)),
+                   u = Scalar(random.Uniform(-2, 2));
     plant.SetState(q, v);
     REQUIRE(plant.Advance(u, description.task.period));
     for (Simulator* s : {&simulator, &finer}) {
@@ -125,8 +128,8 @@ TEST_CASE("at the pendulum's substep the simulator errs far less than the sensor
     v_square += std::pow(simulator.v()[0] - plant.v()[0], 2) / 500;
     finer_q_error = std::max(finer_q_error, std::abs(finer.q()[0] - plant.q()[0]));
   }
-  INFO("one-step errors: worst " << q_error << " rad, " << v_error << " rad/s, rms " << std::sqrt(q_square) << " rad, "
-                                 << std::sqrt(v_square) << " rad/s");
+  INFO("one-step errors: worst " << q_error << " rad, " << v_error << " rad/s, rms " << std::sqrt(q_square)
+                                 << " rad, " << std::sqrt(v_square) << " rad/s");
   CHECK(q_error < 1.2e-4 / 8);  // the encoder's sd
   CHECK(std::sqrt(q_square) < 1.2e-4 / 15);
   CHECK(v_error < 1e-2 / 100);  // what filtering makes of the drive's velocity

@@ -14,8 +14,8 @@ inline RobotDescription LoadPendulum(const std::string& file) {
   return LoadRobot(std::string(source ? source : ".") + "/robots/pendulum/" + file);
 }
 
-/// A two-armed tree in space: slide on the base, two links in series on it, and one more arm on the base; axes and
-/// frames askew, so that no term of the equations of motion vanishes. Settings from the pendulum.
+/// A two-armed tree in space: slide on the base, two links in series on it, and one more arm on the base;
+/// axes and frames askew, so that no term of the equations of motion vanishes. Settings from the pendulum.
 inline RobotDescription MakeTree() {
   RobotDescription tree = LoadPendulum("robot.toml");
   tree.parameters.clear();
@@ -25,7 +25,8 @@ inline RobotDescription MakeTree() {
             Eigen::AngleAxisd(x, Eigen::Vector3d::UnitX()))
         .toRotationMatrix();
   };
-  const auto link = [&](const std::string& name, double mass, Eigen::Vector3d center, Eigen::Vector3d moments) {
+  const auto link = [&](const std::string& name, double mass, Eigen::Vector3d center,
+                        Eigen::Vector3d moments) {
     const Eigen::Matrix3d axes = rotation(mass, 2 * mass, 3 * mass);
     return LinkDescription{name, mass, center, axes * moments.asDiagonal() * axes.transpose()};
   };
@@ -47,10 +48,11 @@ inline RobotDescription MakeTree() {
     return result;
   };
   using Type = JointDescription::Type;
-  tree.joints = {joint("rail", Type::kPrismatic, 0, 1, {0.3, 0.2, 1}, rotation(0.3, -0.2, 0.5), {1, 2, 3}),
-                 joint("shoulder", Type::kRevolute, 1, 2, {0.1, 0.3, 0.2}, rotation(-0.4, 0.6, 0.1), {0.2, 1, -0.3}),
-                 joint("elbow", Type::kContinuous, 2, 3, {0, 0.1, 0.6}, rotation(0.7, 0.1, -0.9), {-1, 0, 0}),
-                 joint("other", Type::kContinuous, 0, 4, {-0.5, 0, 0.8}, rotation(1.1, 0.4, 0), {0, 0.5, 1})};
+  tree.joints = {
+      joint("rail", Type::kPrismatic, 0, 1, {0.3, 0.2, 1}, rotation(0.3, -0.2, 0.5), {1, 2, 3}),
+      joint("shoulder", Type::kRevolute, 1, 2, {0.1, 0.3, 0.2}, rotation(-0.4, 0.6, 0.1), {0.2, 1, -0.3}),
+      joint("elbow", Type::kContinuous, 2, 3, {0, 0.1, 0.6}, rotation(0.7, 0.1, -0.9), {-1, 0, 0}),
+      joint("other", Type::kContinuous, 0, 4, {-0.5, 0, 0.8}, rotation(1.1, 0.4, 0), {0, 0.5, 1})};
   return tree;
 }
 
