@@ -1,0 +1,195 @@
+#include "trainer/checkpoint.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <boost/crc.hpp>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace plumb {
+namespace {
+
+// File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a checkpoint stays where
+// it was written.
+constexpr char kMagic[8] = {'P', 'L', 'U', 'M', 'B', 'T', 'R', 'N'};
+constexpr uint32_t kVersion = 1;
+constexpr size_t kHeader = sizeof kMagic + 2 * sizeof(uint32_t);
+
+class Writer {
+ public:
+  template <class T>
+  void operator()(const T& value) {
+    static_assert(std::is_arithmetic_v<T>);
+    Append(&value, sizeof value);
+  }
+  void operator()(const Eigen::VectorXf& values) {
+    (*this)(static_cast<uint64_t>(values.size()));
+    Append(values.data(), static_cast<size_t>(values.size()) * sizeof(float));
+  }
+  template <class Message>
+  void EncodedMessage(const Message& message) {
+    std::vector<char> encoded(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(encoded.data(), 0, static_cast<int>(encoded.size()));
+    (*this)(static_cast<uint64_t>(encoded.size()));
+    Append(encoded.data(), encoded.size());
+  }
+  const std::vector<char>& bytes() const { return bytes_; }
+
+ private:
+  void Append(const void* data, size_t size) {
+    const auto* begin = static_cast<const char*>(data);
+    bytes_.insert(bytes_.end(), begin, begin + size);
+  }
+  std::vector<char> bytes_;
+};
+
+class Reader {
+ public:
+  Reader(const char* data, size_t size) : next_(data), left_(size) {}
+
+  template <class T>
+  void operator()(T& value) {
+    static_assert(std::is_arithmetic_v<T>);
+    std::memcpy(&value, Take(sizeof value), sizeof value);
+  }
+  void operator()(Eigen::VectorXf& values) {
+    const size_t count = Count(sizeof(float));
+    values.resize(static_cast<Eigen::Index>(count));
+    std::memcpy(values.data(), Take(count * sizeof(float)), count * sizeof(float));
+  }
+  template <class Message>
+  void EncodedMessage(Message& message) {
+    const size_t size = Count(1);
+    if (message.decode(Take(size), 0, static_cast<int>(size)) != static_cast<int>(size)) {
+      throw CheckpointError("holds a message that cannot be decoded");
+    }
+  }
+  size_t left() const { return left_; }
+
+ private:
+  size_t Count(size_t element) {
+    uint64_t count = 0;
+    (*this)(count);
+    if (count > left_ / element) throw CheckpointError("is too short");
+    return count;
+  }
+  const char* Take(size_t size) {
+    if (size > left_) throw CheckpointError("is too short");
+    left_ -= size;
+    return std::exchange(next_, next_ + size);
+  }
+  const char* next_;
+  size_t left_;
+};
+
+/// The one list of what is in the file, for writing and reading.
+template <class Archive, class C>
+void Transfer(Archive& archive, C& checkpoint) {
+  archive(checkpoint.seed);
+  archive(checkpoint.updates);
+  archive(checkpoint.steps);
+  archive(checkpoint.dropped_episodes);
+  archive(checkpoint.iteration);
+  archive(checkpoint.iteration_updates);
+  archive(checkpoint.complete);
+  archive(checkpoint.evaluation_return);
+  archive.EncodedMessage(checkpoint.policy);
+  archive.EncodedMessage(checkpoint.distribution);
+  archive(checkpoint.critic.parameters);
+  archive(checkpoint.critic.first_moment);
+  archive(checkpoint.critic.second_moment);
+  archive(checkpoint.critic.adam_steps);
+  archive(checkpoint.critic.targets.count);
+  archive(checkpoint.critic.targets.mean);
+  archive(checkpoint.critic.targets.squares);
+}
+
+uint32_t Crc(const char* data, size_t size) {
+  boost::crc_32_type crc;
+  crc.process_bytes(data, size);
+  return crc.checksum();
+}
+
+[[noreturn]] void FailToWrite(const std::string& file) {
+  throw CheckpointError(fmt::format("cannot write checkpoint {}: {}", file, std::strerror(errno)));
+}
+
+/// Writes and flushes to the disk. The file is closed whatever happens.
+void WriteDurably(const std::string& file, const std::vector<char>& bytes) {
+  const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd < 0) FailToWrite(file);
+  size_t written = 0;
+  bool good = true;
+  while (good && written < bytes.size()) {
+    const ssize_t count = write(fd, bytes.data() + written, bytes.size() - written);
+    if (count > 0) written += static_cast<size_t>(count);
+    good = count > 0 || (count < 0 && errno == EINTR);
+  }
+  good = good && fsync(fd) == 0;
+  const int error = errno;
+  close(fd);
+  errno = error;
+  if (!good) FailToWrite(file);
+}
+
+}  // namespace
+
+void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
+  Writer body;
+  Transfer(body, checkpoint);
+  std::vector<char> bytes(kHeader);
+  const uint32_t crc = Crc(body.bytes().data(), body.bytes().size());
+  std::memcpy(bytes.data(), kMagic, sizeof kMagic);
+  std::memcpy(bytes.data() + sizeof kMagic, &kVersion, sizeof kVersion);
+  std::memcpy(bytes.data() + sizeof kMagic + sizeof kVersion, &crc, sizeof crc);
+  bytes.insert(bytes.end(), body.bytes().begin(), body.bytes().end());
+
+  const std::filesystem::path path = std::filesystem::absolute(file);
+  std::error_code ignored;  // whatever is wrong with the folder, opening the file tells
+  std::filesystem::create_directories(path.parent_path(), ignored);
+  const std::string temporary = path.string() + ".new";
+  WriteDurably(temporary, bytes);
+  if (std::rename(temporary.c_str(), path.c_str()) != 0) FailToWrite(file);
+  const int folder = open(path.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder >= 0) {
+    fsync(folder);
+    close(folder);
+  }
+}
+
+std::optional<Checkpoint> LoadCheckpoint(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) {
+    if (!std::filesystem::exists(file)) return {};
+    throw CheckpointError(fmt::format("cannot read checkpoint {}: {}", file, std::strerror(errno)));
+  }
+  const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  try {
+    if (bytes.size() < kHeader || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0) {
+      throw CheckpointError("is not a trainer's checkpoint");
+    }
+    uint32_t version = 0, crc = 0;
+    std::memcpy(&version, bytes.data() + sizeof kMagic, sizeof version);
+    std::memcpy(&crc, bytes.data() + sizeof kMagic + sizeof version, sizeof crc);
+    if (version != kVersion) throw CheckpointError(fmt::format("has version {}, not {}", version, kVersion));
+    if (crc != Crc(bytes.data() + kHeader, bytes.size() - kHeader)) throw CheckpointError("is damaged");
+    Reader body(bytes.data() + kHeader, bytes.size() - kHeader);
+    Checkpoint checkpoint;
+    Transfer(body, checkpoint);
+    if (body.left() != 0) throw CheckpointError("is too long");
+    return checkpoint;
+  } catch (const CheckpointError& error) {
+    throw CheckpointError(fmt::format("checkpoint {} {}", file, error.what()));
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/random.h"
+#include "robot/description.h"
+#include "trainer/batch_network.h"
+
+namespace plumb {
+
+/// Running mean and variance (Welford, 1962), in double.
+struct RunningMoments {
+  double count = 0, mean = 0, squares = 0;
+
+  void Add(double value);
+  /// Standard deviation; 1 until there is something to tell.
+  double sd() const;
+  bool operator==(const RunningMoments&) const = default;
+};
+
+/// All that a critic has learnt: what a checkpoint keeps.
+struct CriticState {
+  Eigen::VectorXf parameters, first_moment, second_moment;  ///< of the network, and Adam's
+  int32_t adam_steps = 0;
+  RunningMoments targets;  ///< of all value targets seen; the network's output is in their units
+};
+
+/// The value function: a tanh network fitted to value targets by Adam. The network predicts targets normalised by
+/// their running mean and standard deviation. When these move, its output layer is rescaled so that the predicted
+/// values stay (van Hasselt et al., 2016, "Pop-Art"). Not thread-safe.
+class Critic {
+ public:
+  /// @param observations length of an input. @param random for the initial weights. @param workers must outlive it.
+  Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers);
+
+  const CriticState& state() const { return state_; }
+  /// @throws std::invalid_argument if the sizes are another network's.
+  void Restore(CriticState state);
+
+  /// V of each observation. @param observations inputs x count, column-major.
+  std::vector<double> Values(std::span<const float> observations);
+
+  /// critic_epochs passes over the samples in random order, in minibatches; l2 * |parameters|^2 is added to the
+  /// mean squared error (in units of return). If the result is not finite, the old state is kept.
+  /// @return false in that case.
+  bool Fit(std::span<const float> observations, std::span<const double> targets, Random& random);
+
+ private:
+  void Rescale(std::span<const double> targets);
+
+  TrainingSettings settings_;
+  int observations_;
+  BatchNetwork network_;
+  CriticState state_;
+};
+
+/// 1 - var(target - value) / var(target); 0 if the targets do not vary.
+double ExplainedVariance(std::span<const double> values, std::span<const double> targets);
+
+}  // namespace plumb

@@ -1,0 +1,166 @@
+#include <spdlog/spdlog.h>
+
+#include <optional>
+#include <string>
+
+#include "common/process.h"
+#include "plumb/parameter_distribution_t.hpp"
+#include "trainer/kernels/network.h"
+#include "trainer/robot_simulation.h"
+#include "trainer/session.h"
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kRepeat = 1'000'000;       // [us]
+constexpr int kUpdatesPerCheckpoint = 10;
+
+struct Options {
+  std::string robot;
+  int iterations = 10;
+  uint64_t seed = 1;
+  std::string checkpoint;
+  int threads = 0;
+  int evaluation_episodes = 10;
+};
+
+/// plumb-trainer: turns each PARAMETER_DISTRIBUTION into a POLICY.
+class TrainerProcess {
+ public:
+  TrainerProcess(Process& process, const Options& options)
+      : process_(process),
+        options_(options),
+        robot_(LoadRobot(options.robot)),
+        session_(robot_, SimulateRobot(robot_), options.iterations, options.seed, options.threads),
+        policy_(process.messenger(), "POLICY"),
+        status_(process.messenger(), "TRAINING_STATUS"),
+        distribution_(process.messenger(), "PARAMETER_DISTRIBUTION",
+                      [this](const parameter_distribution_t& message) { OnDistribution(message); }),
+        repeat_(kRepeat, process.clock().Now()) {
+    if (!options.checkpoint.empty()) checkpoint_file_ = options.checkpoint + "/trainer.checkpoint";
+  }
+
+  int Run() {
+    Resume();
+    spdlog::info("{}: iterations 0 to {}, kernels for {}", robot_.name, options_.iterations,
+                 kernels::InstructionSet());
+    while (process_.Wait(session_.training() ? 0 : repeat_.Remaining(process_.clock().Now()))) {
+      distribution_.Rethrow();
+      if (session_.training()) Train();
+      if (repeat_.Due(process_.clock().Now())) {
+        repeat_.Advance(process_.clock().Now());
+        Publish();
+      }
+    }
+    if (session_.training()) Save();
+    return 0;
+  }
+
+ private:
+  void Resume() {
+    start_ = process_.clock().Now();
+    if (checkpoint_file_.empty()) return;
+    const std::optional<Checkpoint> checkpoint = LoadCheckpoint(checkpoint_file_);
+    if (!checkpoint) return;
+    session_.Restore(*checkpoint);
+    spdlog::info("resumed iteration {} after update {} of {}", session_.iteration(), session_.update(),
+                 session_.updates());
+    Publish();
+  }
+
+  void OnDistribution(const parameter_distribution_t& message) {
+    // Repeats of one that has been dealt with are the normal case.
+    if (message.iteration != session_.awaited()) return;
+    try {
+      session_.Begin(ParameterDistribution::FromMessage(message, robot_));
+    } catch (const std::invalid_argument& error) {
+      spdlog::warn("ignored: {}", error.what());
+      return;
+    }
+    start_ = process_.clock().Now();
+    seconds_ = 0;
+    spdlog::info("iteration {}: {} updates", session_.iteration(), session_.updates());
+  }
+
+  void Train() {
+    const UpdateReport report = session_.Advance();
+    seconds_ = Seconds();
+    spdlog::debug("update {}: return {:.1f}, KL {:.4f}, explained variance {:.3f}", session_.update(),
+                  report.mean_return, report.step.kl, report.explained_variance);
+    if (!report.step.accepted) spdlog::warn("update {} skipped: {}", session_.update(), report.step.failure);
+    if (!report.critic_fitted) spdlog::warn("update {}: the critic's fit was not finite", session_.update());
+    if (report.dropped_episodes > 0) {
+      spdlog::warn("update {}: {} episodes dropped, not finite", session_.update(), report.dropped_episodes);
+    }
+    if (session_.complete()) {
+      spdlog::info("iteration {} complete: return {:.1f} without exploration, {:.1f} s", session_.iteration(),
+                   session_.evaluation_return(), seconds_);
+      Save();
+      Publish();
+    } else {
+      if (session_.update() % kUpdatesPerCheckpoint == 0) Save();
+      PublishStatus();
+    }
+  }
+
+  void Save() {
+    if (!checkpoint_file_.empty()) SaveCheckpoint(checkpoint_file_, session_.MakeCheckpoint());
+  }
+
+  void Publish() {
+    PublishStatus();
+    if (!session_.complete()) return;
+    policy_t message = session_.Policy(options_.evaluation_episodes);
+    message.utime = process_.clock().Utime();
+    policy_.Publish(message);
+  }
+
+  void PublishStatus() {
+    training_status_t message = session_.Status();
+    message.utime = process_.clock().Utime();
+    message.seconds = seconds_;
+    status_.Publish(message);
+  }
+
+  /// Wall time of this iteration in this process.
+  double Seconds() const {
+    return static_cast<double>(process_.clock().Now() - start_) * 1e-6 / process_.clock().scale();
+  }
+
+  Process& process_;
+  Options options_;
+  RobotDescription robot_;
+  TrainingSession session_;
+  Publisher<policy_t> policy_;
+  Publisher<training_status_t> status_;
+  Subscriber<parameter_distribution_t> distribution_;
+  Periodic repeat_;
+  std::string checkpoint_file_;  // empty = none
+  int64_t start_ = 0;            // of the iteration, monotonic
+  double seconds_ = 0;           // spent on the iteration
+};
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  plumb::Options options;
+  return plumb::Run(
+      "plumb-trainer", "Trains a policy on simulators drawn from each PARAMETER_DISTRIBUTION and sends it as POLICY",
+      argc, argv,
+      [&](CLI::App& app) {
+        app.add_option("robot", options.robot, "robot folder or TOML file")->required();
+        app.add_option("--iterations", options.iterations, "calibrations; the policy after the last is evaluated")
+            ->check(CLI::Range(0, 10000))
+            ->capture_default_str();
+        app.add_option("--seed", options.seed, "of all random numbers")->capture_default_str();
+        app.add_option("--checkpoint", options.checkpoint, "folder to checkpoint in and to resume from");
+        app.add_option("--threads", options.threads, "0 = all processors")
+            ->check(CLI::Range(0, 1024))
+            ->capture_default_str();
+        app.add_option("--evaluation-episodes", options.evaluation_episodes, "roll-outs of the last policy")
+            ->check(CLI::Range(1, 1000000))
+            ->capture_default_str();
+      },
+      [&](plumb::Process& process) { return plumb::TrainerProcess(process, options).Run(); });
+}

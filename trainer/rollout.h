@@ -1,0 +1,87 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "common/random.h"
+#include "controller/policy.h"
+#include "trainer/kernels/network.h"
+#include "trainer/workers.h"
+
+namespace plumb {
+
+/// What the trainer needs of a simulated task. Used by one thread at a time.
+class Simulation {
+ public:
+  virtual ~Simulation() = default;
+  virtual int observation_size() const = 0;
+  virtual int action_size() const = 0;
+  /// Time limit of an episode.
+  virtual int steps_per_episode() const = 0;
+  /// Becomes the simulator with these parameters (physical units), in a random initial state.
+  /// @throws std::invalid_argument if there is no such simulator.
+  virtual void Reset(const Eigen::VectorXd& parameters, Random& random) = 0;
+  virtual void Observe(Eigen::Ref<Eigen::VectorXf> observation) const = 0;
+  struct Outcome {
+    double reward;
+    bool terminated;  ///< by the task itself, never by the time limit
+  };
+  /// @param action policy units; clipped by the simulation.
+  virtual Outcome Step(const Eigen::Ref<const Eigen::VectorXf>& action) = 0;
+};
+
+using SimulationFactory = std::function<std::unique_ptr<Simulation>()>;
+/// Draws a simulator's parameters.
+using ParameterSampler = std::function<Eigen::VectorXd(Random&)>;
+
+/// Complete episodes, one after the other.
+struct Batch {
+  std::vector<float> observations;  ///< as the network sees them (normalised), observations x N
+  std::vector<float> actions;       ///< as drawn, before clipping, actions x N
+  std::vector<double> rewards;      ///< N
+  struct Episode {
+    int begin, end;    ///< steps [begin, end)
+    bool terminated;   ///< false: cut off by the time limit
+    double sum;        ///< of the rewards, undiscounted
+  };
+  std::vector<Episode> episodes;
+  std::vector<float> final_observations;  ///< after the last step (before any reset), observations x episodes
+  int dropped = 0;  ///< episodes thrown away because something was not finite, or the simulator impossible
+
+  int size() const { return static_cast<int>(rewards.size()); }
+  double MeanReturn() const;
+};
+
+/// Rolls a policy out in simulators drawn one per episode, an episode a task. Random numbers are named by seed,
+/// stream and episode: the batch is the same for any number of threads. Not thread-safe itself.
+class Rollout {
+ public:
+  /// @param make called once per worker. @param workers must outlive this.
+  Rollout(const SimulationFactory& make, const PolicyShape& shape, Workers& workers);
+  ~Rollout();
+
+  /// Whole episodes of at least `steps` steps together.
+  /// @param stream,number name the random numbers, together with the episode's number.
+  /// @throws std::runtime_error if most episodes have to be dropped.
+  Batch Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps, uint64_t seed,
+                uint32_t stream, uint32_t number);
+  /// Mean return of the mean action's policy over some episodes; NaN if all had to be dropped.
+  double Evaluate(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes, uint64_t seed,
+                  uint32_t stream, uint32_t number);
+
+ private:
+  struct Worker;
+  struct Record;
+  std::vector<Record> Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first, int count,
+                          bool explore, uint64_t seed, uint32_t stream, uint32_t number);
+
+  Workers* workers_;
+  kernels::Network network_;
+  std::vector<std::unique_ptr<Worker>> state_;  // one per worker
+  int time_limit_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+
+#include "plumb/policy_t.hpp"
+#include "plumb/training_status_t.hpp"
+#include "robot/parameter_distribution.h"
+#include "trainer/checkpoint.h"
+#include "trainer/trainer.h"
+
+namespace plumb {
+
+/// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains from scratch,
+/// each later one from where the last ended. Knows neither messages nor clocks. Not thread-safe.
+class TrainingSession {
+ public:
+  /// @param iterations number N of distributions that follow the prior: the policy of iteration N is the last.
+  /// @param make makes simulations. @param threads 0 = as many as the machine has.
+  TrainingSession(const RobotDescription& description, const SimulationFactory& make, int iterations, uint64_t seed,
+                  int threads);
+
+  /// Goes on where a checkpoint stands. @throws CheckpointError if it is of another run: seed, robot or network.
+  void Restore(const Checkpoint& checkpoint);
+  Checkpoint MakeCheckpoint() const;
+
+  /// The iteration whose distribution is awaited; -1 while training and after the last.
+  int awaited() const;
+  /// Begins the iteration. @return false, and nothing happens, if it is not the one that is awaited.
+  bool Begin(const ParameterDistribution& distribution);
+
+  bool training() const { return begun_ && !complete_; }
+  /// One update; after the last of an iteration evaluates the policy and completes it.
+  /// Only while training. @throws std::runtime_error if the simulations cannot be used.
+  UpdateReport Advance();
+
+  /// There is a policy to be sent: that of the latest iteration, until the next one begins.
+  bool complete() const { return complete_; }
+  /// Of the last iteration.
+  bool finished() const { return complete_ && iteration_ == iterations_; }
+  int iteration() const { return iteration_; }
+  /// TRPO updates done and planned in this iteration.
+  int update() const { return update_; }
+  int updates() const;
+  double evaluation_return() const { return evaluation_return_; }
+
+  /// The complete iteration's policy, its purpose and how many roll-outs are wanted; utime is the sender's.
+  /// @param evaluation_episodes roll-outs of the last policy; of any other one is wanted.
+  policy_t Policy(int evaluation_episodes) const;
+  /// utime and seconds are the sender's.
+  training_status_t Status() const;
+
+ private:
+  RobotDescription description_;
+  int iterations_;
+  uint64_t seed_;
+  Trainer trainer_;
+  ParameterDistribution distribution_;
+  bool begun_ = false;     // iteration_ means something
+  bool complete_ = false;
+  int iteration_ = 0;
+  int update_ = 0;
+  double evaluation_return_;
+  UpdateReport last_;
+};
+
+}  // namespace plumb

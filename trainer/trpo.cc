@@ -1,0 +1,157 @@
+#include "trainer/trpo.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "trainer/conjugate_gradient.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kCgTolerance = 1e-10;
+constexpr int kLineSearchTries = 10;
+constexpr double kLineSearchFactor = 0.8;
+
+int Count(const PolicySamples& samples) { return static_cast<int>(samples.advantages.size()); }
+
+}  // namespace
+
+Trpo::Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers)
+    : settings_(settings), shape_(shape), network_(shape.sizes(), workers), fisher_network_(shape.sizes(), workers) {}
+
+Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples) {
+  const int actions = shape_.actions, count = Count(samples);
+  const Eigen::ArrayXf precision = (-2 * policy.log_std().array()).exp();
+  // ln p(a) = -((a - mu) / sd)^2 / 2 - log_std + const: d/dmu = (a - mu) / sd^2, d/dlog_std = ((a - mu) / sd)^2 - 1.
+  Eigen::MatrixXf means(actions, count);
+  Eigen::VectorXf gradient(shape_.parameter_count());
+  network_.Set(policy.parameters);
+  network_.Gradient(
+      samples.observations.data(), count,
+      [&](int first, int columns, const float* outputs, float* output_gradient) {
+        for (int i = 0; i < columns; ++i) {
+          const auto weight = static_cast<float>(samples.advantages[static_cast<size_t>(first + i)] / count);
+          for (int a = 0; a < actions; ++a) {
+            const float mean = outputs[i * actions + a];
+            means(a, first + i) = mean;
+            const float action = samples.actions[static_cast<size_t>((first + i) * actions + a)];
+            output_gradient[i * actions + a] = weight * (action - mean) * precision[a];
+          }
+        }
+      },
+      gradient.head(network_.parameter_count()));
+  Eigen::VectorXd log_std_gradient = Eigen::VectorXd::Zero(actions);
+  for (int i = 0; i < count; ++i) {
+    for (int a = 0; a < actions; ++a) {
+      const float offset = samples.actions[static_cast<size_t>(i * actions + a)] - means(a, i);
+      log_std_gradient[a] +=
+          samples.advantages[static_cast<size_t>(i)] / count * (double{offset * offset * precision[a]} - 1);
+    }
+  }
+  gradient.tail(actions) = log_std_gradient.cast<float>();
+  return gradient;
+}
+
+void Trpo::PrepareFisher(const GaussianPolicy& policy, const PolicySamples& samples) {
+  const int stride = std::max(1, static_cast<int>(std::lround(1 / settings_.fisher_fraction)));
+  fisher_inputs_.clear();
+  for (int i = 0; i < Count(samples); i += stride) {
+    const auto begin = samples.observations.begin() + ptrdiff_t{i} * shape_.observations;
+    fisher_inputs_.insert(fisher_inputs_.end(), begin, begin + shape_.observations);
+  }
+  const int count = static_cast<int>(fisher_inputs_.size()) / shape_.observations;
+  std::vector<float> means(static_cast<size_t>(count * shape_.actions));
+  fisher_network_.Set(policy.parameters);
+  fisher_network_.Forward(fisher_inputs_.data(), count, means.data());
+  fisher_metric_ = (-2 * policy.log_std().array()).exp() / static_cast<float>(count);
+}
+
+Eigen::VectorXf Trpo::FisherProduct(const Eigen::Ref<const Eigen::VectorXf>& v) {
+  Eigen::VectorXf product(v.size());
+  const Eigen::Index weights = v.size() - shape_.actions;
+  fisher_network_.GaussNewtonProduct(v.head(weights), fisher_metric_, product.head(weights));
+  product.tail(shape_.actions) = 2 * v.tail(shape_.actions);
+  return product;
+}
+
+Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const float> means,
+                               const GaussianPolicy& after, const PolicySamples& samples) {
+  const int actions = shape_.actions, count = Count(samples);
+  std::vector<float> new_means(means.size());
+  network_.Set(after.parameters);
+  network_.Forward(samples.observations.data(), count, new_means.data());
+
+  const Eigen::ArrayXd log_std = before.log_std().cast<double>(), new_log_std = after.log_std().cast<double>();
+  const Eigen::ArrayXd precision = (-2 * log_std).exp(), new_precision = (-2 * new_log_std).exp();
+  // KL of two Gaussians: ln(s'/s) + (s^2 + (mu - mu')^2) / (2 s'^2) - 1/2; the part that is the same for all samples:
+  const double spread = (new_log_std - log_std + (2 * (log_std - new_log_std)).exp() / 2 - .5).sum();
+  double kl = 0, gain = 0;
+  for (int i = 0; i < count; ++i) {
+    double log_ratio = (log_std - new_log_std).sum();
+    for (int a = 0; a < actions; ++a) {
+      const auto at = static_cast<size_t>(i * actions + a);
+      const double offset = double{samples.actions[at]} - means[at];
+      const double new_offset = double{samples.actions[at]} - new_means[at];
+      const double moved = double{new_means[at]} - means[at];
+      log_ratio += (offset * offset * precision[a] - new_offset * new_offset * new_precision[a]) / 2;
+      kl += moved * moved * new_precision[a] / 2;
+    }
+    gain += std::expm1(log_ratio) * samples.advantages[static_cast<size_t>(i)];
+  }
+  return {spread + kl / count, gain / count};
+}
+
+Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {
+  Step step;
+  const Eigen::VectorXd gradient = SurrogateGradient(policy, samples).cast<double>();
+  PrepareFisher(policy, samples);
+  const LinearSolution natural = ConjugateGradient(
+      [&](const Eigen::VectorXd& v, Eigen::VectorXd& fv) {
+        fv = FisherProduct(v.cast<float>()).cast<double>() + settings_.damping * v;
+      },
+      gradient, settings_.cg_iterations, kCgTolerance);
+  step.cg_iterations = natural.iterations;
+  if (!natural.failure.empty()) {
+    step.failure = "conjugate gradient: " + natural.failure;
+    return step;
+  }
+  // x'Ax = x'(b - r) costs no further product.
+  const double curvature = natural.x.dot(gradient - natural.residual);
+  if (!(curvature > 0) || !std::isfinite(curvature)) {
+    step.failure = "no direction of improvement";
+    return step;
+  }
+  const Eigen::VectorXd full_step = std::sqrt(2 * settings_.kl / curvature) * natural.x;
+
+  const GaussianPolicy before = policy;
+  std::vector<float> means(samples.actions.size());
+  network_.Set(before.parameters);
+  network_.Forward(samples.observations.data(), Count(samples), means.data());
+  double fraction = 1;
+  while (step.tries < kLineSearchTries) {
+    ++step.tries;
+    policy.parameters = before.parameters + (fraction * full_step).cast<float>();
+    policy.parameters.tail(shape_.actions) = policy.parameters.tail(shape_.actions).cwiseMax(kMinLogStd);
+    const Comparison comparison = Compare(before, means, policy, samples);
+    // Written so that NaN is refused.
+    if (comparison.kl <= settings_.kl && comparison.gain > 0 && std::isfinite(comparison.gain)) {
+      step.accepted = true;
+      step.kl = comparison.kl;
+      step.surrogate_gain = comparison.gain;
+      return step;
+    }
+    fraction *= kLineSearchFactor;
+  }
+  policy.parameters = before.parameters;
+  step.failure = fmt::format("line search: no improvement within the trust region in {} tries", step.tries);
+  return step;
+}
+
+double Entropy(const GaussianPolicy& policy) {
+  return policy.log_std().cast<double>().sum() +
+         policy.shape().actions * .5 * std::log(2 * M_PI * std::exp(1.));
+}
+
+}  // namespace plumb
