@@ -89,7 +89,7 @@ std::optional<Frame> FrameFromText(std::string_view text) {
   std::string_view rest = text.substr(hash + 1);
   if (rest.starts_with('#')) {
     const int flags = rest.size() > 1 ? HexDigit(rest[1]) : -1;
-    if (flags < 0 || flags > 3) return {};
+    if (flags < 0 || flags > 7) return {};  // bit 2 says FD once more
     frame.fd = true;
     frame.bit_rate_switch = (flags & 1) != 0;
     frame.error_state_indicator = (flags & 2) != 0;

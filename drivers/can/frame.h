@@ -35,8 +35,8 @@ bool SameOnWire(const Frame& a, const Frame& b);
 bool IsWellFormed(const Frame& frame);
 
 /// candump's form: `02E#0000C03F00000000`, remote `029#R` or `029#R8`, extended ids in 8 digits, FD
-/// `124##5112233` (flags nibble: 1 = bit rate switch, 2 = error state indicator), error frames with
-/// bit 29 set in 8 digits (`20000040#0000000000000000`).
+/// `124##1112233` (flags nibble: 1 = bit rate switch, 2 = error state indicator; 4 = FD, read but not written),
+/// error frames with bit 29 set in 8 digits (`20000040#0000000000000000`).
 std::string ToText(const Frame& frame);
 /// Reads that form. @return nothing if the text is not exactly one well-formed frame.
 std::optional<Frame> FrameFromText(std::string_view text);

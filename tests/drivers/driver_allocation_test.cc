@@ -1,0 +1,87 @@
+// No allocation in the driver's cycle, whatever happens in it. This binary counts what operator new is asked for.
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <new>
+
+#include "drivers/can/transport.h"
+#include "tests/drivers/rig.h"
+
+namespace {
+std::atomic<long> allocations = 0;
+}
+
+// GCC pairs the inlined malloc with delete and warns.
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size ? size : 1)) return memory;
+  throw std::bad_alloc();
+}
+void* operator new[](std::size_t size) { return operator new(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace plumb {
+namespace {
+
+TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothing") {
+  Rig rig(3);
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  // The wire is a real transport, so that its Send and Receive are counted, too.
+  const auto driver_end = OpenTransport("loop:allocation"), drive_end = OpenTransport("loop:allocation");
+  joint_command_t command = rig.MakeCommand(1);
+  driver_request_t arm;
+  arm.request = driver_request_t::ARM;
+  rig.Status();
+
+  std::array<Frame, 64> frames;
+  long counted = 0, states = 0, faults = 0, armed = 0;
+  for (int cycle = 0; cycle < 1000; ++cycle) {
+    rig.now += 5000;
+    FrameBatch batch;
+    for (CanSimpleDevice& drive : rig.drives) drive.Tick(rig.now, {0.1, 0.2}, batch);
+    drive_end->Send(batch.frames());
+    command.utime = arm.utime = rig.utime();
+    ++command.sequence;
+    command.effort[0] = cycle % 7 == 0 ? NAN : 0.5;
+    Frame event = *FrameFromText(cycle % 200 == 50 ? "021#0000000101030000" : "20000040#0000000000000000");
+
+    const long before = allocations;
+    while (const int count = driver_end->Receive(frames)) {
+      for (int i = 0; i < count; ++i) rig.driver->OnFrame(frames[static_cast<size_t>(i)], rig.now, rig.utime());
+    }
+    if (cycle % 100 == 50) rig.driver->OnFrame(event, rig.now, rig.utime());
+    while (rig.driver->NextState()) ++states;
+    rig.driver->OnLink(driver_end->link());
+    rig.driver->OnCommand(command, rig.now, rig.utime());
+    if (cycle % 100 == 80) rig.driver->OnRequest(arm, rig.now, rig.utime());
+    const auto out = rig.driver->Tick(rig.now, rig.utime(), 10);
+    rig.driver->Transmitted(driver_end->Send(out), rig.utime());
+    counted += allocations - before;
+
+    faults += rig.driver->state() == DriveState::kFault;
+    armed += rig.driver->state() == DriveState::kArmed;
+    while (const int count = drive_end->Receive(frames)) {
+      for (int i = 0; i < count; ++i) {
+        for (CanSimpleDevice& drive : rig.drives) drive.OnFrame(frames[static_cast<size_t>(i)], rig.now);
+      }
+    }
+  }
+  CHECK(counted == 0);
+  CHECK(states == 1000);
+  CHECK(faults > 100);
+  CHECK(armed > 300);
+  // The counter does count.
+  const long before = allocations;
+  ::operator delete(::operator new(1));
+  const long after = allocations;
+  CHECK(after == before + 1);
+}
+
+}  // namespace
+}  // namespace plumb
