@@ -62,9 +62,11 @@ std::vector<double> Critic::Values(std::span<const float> observations) {
 }
 
 void Critic::Rescale(std::span<const double> targets) {
+  const bool first = state_.targets.count == 0;
   const double old_mean = state_.targets.mean, old_sd = state_.targets.sd();
   for (const double target : targets) state_.targets.Add(target);
   const double mean = state_.targets.mean, sd = state_.targets.sd();
+  if (first) return;  // a fresh network's values are nothing worth keeping
   // The output layer is the tail: one weight per unit below it, then the bias.
   auto output = state_.parameters.tail(settings_.hidden.empty() ? observations_ + 1 : settings_.hidden.back() + 1);
   output *= static_cast<float>(old_sd / sd);
