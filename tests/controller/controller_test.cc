@@ -117,6 +117,18 @@ TEST_CASE_METHOD(World, "a new policy waits for the end of the episode") {
   CHECK(controller.status().num_episodes == 0);
 }
 
+TEST_CASE_METHOD(World, "a policy that is repeated is not run again") {
+  Driver(driver_status_t::ARMED);
+  policy_t policy = Policy(0);
+  controller.OnPolicy(policy);
+  StepUntil(S::COMPLETE);
+  policy.utime += 1'000'000;
+  controller.OnPolicy(policy);
+  CHECK(controller.phase() == S::COMPLETE);
+  controller.OnPolicy(Policy(1));
+  CHECK(controller.phase() == S::WAITING);
+}
+
 TEST_CASE_METHOD(World, "a policy that does not fit is refused and the old one stays") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0));
