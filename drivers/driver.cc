@@ -36,7 +36,8 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       history_(robot.num_joints(), kHistory),
       now_(now),
       utime_(utime),
-      stopped_utime_(utime) {
+      stopped_utime_(utime - 1),
+      armed_by_(utime - 1) {
   joints_.reserve(robot.joints.size());
   for (const JointDescription& joint : robot.joints) {
     joints_.emplace_back(joint, TimingOf(robot.driver));
@@ -190,8 +191,9 @@ void Driver::Refuse(std::string_view why) noexcept {
 
 void Driver::RequestArm(int64_t made) noexcept {
   const int64_t now = now_;
-  // Of another run, or from before whatever stopped us; one from the future would outlive the next fault, too.
-  if (Active() || made < start_utime_ || made <= stopped_utime_ || made > utime_ + start_guard_) return;
+  // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's clock may be
+  // ahead of ours, so that it looks newer than the stop).
+  if (Active() || made < start_utime_ || made <= stopped_utime_ || made <= armed_by_) return;
   if (now - start_now_ < start_guard_) return Refuse("the driver has only just started");
   if (stray_controller_ && now - last_command_ < start_guard_) {
     return Refuse("commands arrived when the driver started: stop the controller of an earlier run");
@@ -207,6 +209,7 @@ void Driver::RequestArm(int64_t made) noexcept {
     }
     if (!why.text().empty()) return Refuse(why.text());
   }
+  armed_by_ = made;
   stray_controller_ = false;
   refused_cycles_ = 0;
   inbox_.Clear();

@@ -107,6 +107,7 @@ class Driver {
   Reason reason_;
   int64_t now_, utime_;           // latest times given
   int64_t stopped_utime_;         // of the last disarming; older ARM requests are void
+  int64_t armed_by_;              // utime of the last ARM request that was obeyed
   int64_t armed_at_ = 0;          // `now`
   bool stray_controller_ = false; // commanded during the start guard
   int64_t last_command_ = 0;      // `now` of any command, valid or not
