@@ -82,10 +82,20 @@ void Config::Fail(const std::string& key, const std::string& what) const {
   throw ConfigError(fmt::format("{}{} {}", At(file_, source), full, what));
 }
 
+void Config::FailMissing(const std::string& key) const {
+  // A required key that is not there has usually been misspelt: then its line is the better place to point to.
+  for (const std::string& present : Keys()) {
+    if (known_.count(present) == 0 && EditDistance(present, key) <= std::min<size_t>(2, key.size() / 2)) {
+      Fail(present, "is not a known key; did you mean " + key + "?");
+    }
+  }
+  Fail(key, "is missing");
+}
+
 double Config::Number(const std::string& key, Range range, std::optional<double> fallback) {
   if (!Has(key)) {
     if (fallback) return *fallback;
-    Fail(key, "is missing");
+    FailMissing(key);
   }
   const toml::node* node = table().get(key);
   if (!node->is_number()) Fail(key, "is not a number");
@@ -97,7 +107,7 @@ double Config::Number(const std::string& key, Range range, std::optional<double>
 int Config::Integer(const std::string& key, Range range, std::optional<int> fallback) {
   if (!Has(key)) {
     if (fallback) return *fallback;
-    Fail(key, "is missing");
+    FailMissing(key);
   }
   const toml::node* node = table().get(key);
   if (!node->is_integer()) Fail(key, "is not an integer");
@@ -111,7 +121,7 @@ int Config::Integer(const std::string& key, Range range, std::optional<int> fall
 bool Config::Boolean(const std::string& key, std::optional<bool> fallback) {
   if (!Has(key)) {
     if (fallback) return *fallback;
-    Fail(key, "is missing");
+    FailMissing(key);
   }
   const toml::node* node = table().get(key);
   if (!node->is_boolean()) Fail(key, "is not true or false");
@@ -121,7 +131,7 @@ bool Config::Boolean(const std::string& key, std::optional<bool> fallback) {
 std::string Config::String(const std::string& key, std::optional<std::string> fallback) {
   if (!Has(key)) {
     if (fallback) return *fallback;
-    Fail(key, "is missing");
+    FailMissing(key);
   }
   const toml::node* node = table().get(key);
   if (!node->is_string()) Fail(key, "is not a string");
@@ -140,7 +150,7 @@ std::vector<double> Config::Numbers(const std::string& key, size_t size, Range r
                                     std::optional<std::vector<double>> fallback) {
   if (!Has(key)) {
     if (fallback) return *fallback;
-    Fail(key, "is missing");
+    FailMissing(key);
   }
   const toml::array* array = table().get(key)->as_array();
   if (!array) Fail(key, "is not an array of numbers");
@@ -168,7 +178,7 @@ Config Config::Table(const std::string& key, bool required) {
   static const toml::table kEmpty;
   const std::string path = path_.empty() ? key : path_ + "." + key;
   if (!Has(key)) {
-    if (required) Fail(key, "is missing: a table");
+    if (required) FailMissing(key);
     return Config(root_, &kEmpty, file_, path);
   }
   const toml::table* sub = table().get(key)->as_table();

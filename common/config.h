@@ -77,6 +77,7 @@ class Config {
  private:
   Config(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file, std::string path);
   const toml::table& table() const { return *table_; }
+  [[noreturn]] void FailMissing(const std::string& key) const;
 
   std::shared_ptr<const toml::table> root_;
   const toml::table* table_;

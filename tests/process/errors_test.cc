@@ -35,11 +35,11 @@ TEST_CASE("a typo in robot.toml stops every process with the same line") {
     INFO(name);
     const std::string output = FailureOf(stage.folder, {Stage::Binary(name), robot, "--lcm-url", stage.lcm_url});
     CHECK(Lines(output) == 1);
-    CHECK_THAT(output, Contains("robot.toml:12:1: driver.expiry is missing"));
+    CHECK_THAT(output, Contains("robot.toml:13:11: driver.expirey is not a known key; did you mean expiry?"));
   }
   const std::string output = FailureOf(stage.folder, {Stage::Binary("plumb"), "launch", robot, "--lcm-url", stage.lcm_url});
   CHECK(Lines(output) == 1);
-  CHECK_THAT(output, Contains("driver.expiry is missing"));
+  CHECK_THAT(output, Contains("did you mean expiry?"));
 }
 
 TEST_CASE("a CAN interface that is not there") {

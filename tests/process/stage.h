@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "cli/child.h"
+#include "common/clock.h"
 #include "common/messenger.h"
 #include "controller/policy.h"
 #include "drivers/can/transport.h"

@@ -84,7 +84,8 @@ TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
     }
     return std::string("no error");
   };
-  CHECK_THAT(message("expiry = 0.1", "expirey = 0.1"), Contains("driver.expiry is missing"));
+  CHECK_THAT(message("expiry = 0.1", "expirey = 0.1"), Contains("robot.toml:13:11: driver.expirey is not a known key; did you mean expiry?"));
+  CHECK_THAT(message("expiry = 0.1", ""), Contains("robot.toml:10:1: driver.expiry is missing"));
   CHECK_THAT(message("latency =", "latencey ="), Contains("latencey is not a known key; did you mean latency?"));
   CHECK_THAT(message("node = 1", "node = \"1\""), Contains("joint[0].node is not an integer"));
   CHECK_THAT(message("name = \"pivot\"", "name = \"pivto\""), Contains("\"pivto\" is not a moving joint of the URDF"));
@@ -92,7 +93,7 @@ TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
   CHECK_THAT(message("disarm_after = 0.25", "disarm_after = 0.05"), Contains("disarm_after must not be shorter"));
   CHECK_THAT(message("coordinate = \"log\"", "coordinate = \"logg\""), Contains("is not one of linear, log"));
   CHECK_THAT(message("gravity = [9.0, 11.0]", "gravty = [9.0, 11.0]"), Contains("gravty is not one of the parameters"));
-  CHECK_THAT(message("[task]", "[tsk]"), Contains("task is missing"));
+  CHECK_THAT(message("[task]", "[tsk]"), Contains("tsk is not a known key; did you mean task?"));
   CHECK_THAT(message("substep = 0.005", "substep = nan"), Contains("simulation.substep"));
   CHECK_THAT(message("steps = 200", "steps = 1e99"), Contains("task.steps"));
   CHECK_THAT(message("gear = 1.0", "gear = 0.0"), Contains("gear"));
