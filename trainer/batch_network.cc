@@ -6,8 +6,9 @@
 namespace plumb {
 namespace {
 
-// Wide enough that the kernels run at full speed, narrow enough that two threads share a critic's minibatch.
-constexpr int kGroupWidth = 100;
+// Wide enough that the kernels run at full speed and that handing work to another thread (tens of microseconds)
+// pays. A critic's minibatch is one group: shared by two threads it would take as long, and twice the processor.
+constexpr int kGroupWidth = 150;
 constexpr int kMaxGroups = 8;
 
 std::span<const float> AsSpan(const Eigen::Ref<const Eigen::VectorXf>& vector) {

@@ -1,6 +1,5 @@
 #include "trainer/workers.h"
 
-#include <sched.h>
 #include <signal.h>
 
 #include <algorithm>
@@ -9,8 +8,8 @@
 namespace plumb {
 namespace {
 
-// Jobs of some tens of microseconds follow each other within a few: falling asleep in between would cost more
-// than the second thread gains. This is some 30 us.
+// Jobs follow each other within microseconds: falling asleep in between would cost more. Some 10 us; for longer,
+// a spinning thread would only be in the way of other processes.
 constexpr int kSpins = 600;
 
 template <class T>
@@ -22,15 +21,6 @@ void WaitWhile(const std::atomic<T>& value, T old) {
 #endif
   }
   value.wait(old, std::memory_order_acquire);
-}
-
-/// Linux wakes a thread where its waker runs, and for short jobs may leave both on one processor for good while
-/// another idles (seen on virtual machines). Forbids this thread the processor `cpu`, if it is on it and has others.
-void KeepAwayFrom(int cpu, const cpu_set_t& allowed) {
-  if (cpu < 0 || sched_getcpu() != cpu || CPU_COUNT(&allowed) < 2) return;
-  cpu_set_t others = allowed;
-  CPU_CLR(cpu, &others);
-  sched_setaffinity(0, sizeof others, &others);
 }
 
 }  // namespace
@@ -53,7 +43,6 @@ void Workers::Run(int tasks, const std::function<void(int, int)>& work) {
   failure_ = nullptr;
   unfinished_ = tasks;
   const uint32_t job = job_ + 1;
-  caller_cpu_ = sched_getcpu();
   ticket_.store(uint64_t{job} << 32 | static_cast<uint32_t>(tasks), std::memory_order_release);
   job_.store(job, std::memory_order_release);
   if (tasks > 1) job_.notify_all();
@@ -68,11 +57,7 @@ void Workers::Serve(int worker) {
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
-  cpu_set_t allowed;
-  CPU_ZERO(&allowed);
-  sched_getaffinity(0, sizeof allowed, &allowed);
   for (uint32_t job = 0; !stopping_; job = job_) {
-    KeepAwayFrom(caller_cpu_, allowed);
     while (DoTask(worker)) {
     }
     WaitWhile(job_, job);

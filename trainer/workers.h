@@ -38,7 +38,6 @@ class Workers {
   std::atomic<uint64_t> ticket_{0};
   std::atomic<uint32_t> job_{0};       // the threads sleep until it changes
   std::atomic<int> unfinished_{0};     // tasks
-  std::atomic<int> caller_cpu_{-1};    // where Run was called
   std::atomic<bool> stopping_{false};
   // Of the job; a claimed, unfinished task keeps Run from returning and them from changing.
   const std::function<void(int, int)>* work_ = nullptr;
