@@ -63,16 +63,22 @@ double Discrepancy::StepOnce(const Transition& t, double* whitened) {
 
 double Discrepancy::LogLikelihood(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts) {
   simulator_.SetParameters(parameters);
+  double sum = 0;
+  for (const Rollout& rollout : rollouts) {
+    for (const Transition& transition : rollout.transitions) {
+      sum += std::log1p(StepOnce(transition, nullptr) / kDegreesOfFreedom);
+    }
+  }
+  return -0.5 * (kDegreesOfFreedom + 2 * n_) * sum;
+}
+
+double Discrepancy::StepError(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts) {
+  simulator_.SetParameters(parameters);
   double squared = 0;
   for (const Rollout& rollout : rollouts) {
     for (const Transition& transition : rollout.transitions) squared += StepOnce(transition, nullptr);
   }
-  return -0.5 * squared;
-}
-
-double Discrepancy::StepError(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts) {
-  const auto count = static_cast<double>(CountTransitions(rollouts) * 2 * static_cast<size_t>(n_));
-  return -2 * LogLikelihood(parameters, rollouts) / count;
+  return squared / static_cast<double>(CountTransitions(rollouts) * 2 * static_cast<size_t>(n_));
 }
 
 Eigen::VectorXd Discrepancy::Residuals(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts) {

@@ -14,6 +14,8 @@ namespace plumb {
 /// Parameters are physical, in the description's order. A simulation that is not finite is infinitely far.
 class Discrepancy {
  public:
+  static constexpr double kDegreesOfFreedom = 4;
+
   explicit Discrepancy(const RobotDescription& robot);
 
   /// Step-based (Cui & Hensel): reset to s, apply what was applied, compare with s'. The squared error of one
@@ -23,7 +25,11 @@ class Discrepancy {
   /// @return mean over transitions and coordinates of |W e|^2: 1 = explained down to the noise.
   double StepError(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts);
 
-  /// ln p(s' | s, a, parameters) summed over all transitions, up to a constant: -1/2 sum |W e|^2.
+  /// ln p(s' | s, a, parameters) summed over all transitions, up to a constant. Student's t distribution with
+  /// kDegreesOfFreedom in d = 2 * joints dimensions (Lange, Little, Taylor, JASA 84, 1989):
+  ///   -(nu + d) / 2 sum ln(1 + |W e|^2 / nu)
+  /// which is a Gaussian's for errors of the expected size, and hardly minds the few that a late frame or a knock
+  /// at the robot made a hundred times as large.
   double LogLikelihood(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts);
 
   /// All whitened errors, 2 * joints rows per transition: for Jacobians.

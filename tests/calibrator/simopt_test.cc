@@ -33,7 +33,11 @@ TEST_CASE("the true parameters explain synthetic transitions down to the noise")
   // 4000 squared standard normals: 1 +- 0.0224
   CHECK(discrepancy.StepError(kTruth, rollouts) == Approx(1).margin(0.07));
   CHECK(discrepancy.StepError(Eigen::Vector3d(10, 1, 1), rollouts) > 1.5);
-  CHECK(discrepancy.LogLikelihood(kTruth, rollouts) == Approx(-0.5 * discrepancy.Residuals(kTruth, rollouts).squaredNorm()));
+  const Eigen::VectorXd r = discrepancy.Residuals(kTruth, rollouts);
+  CHECK(discrepancy.StepError(kTruth, rollouts) == Approx(r.squaredNorm() / 4000));
+  double t = 0;  // the density of a two-dimensional Student's t distribution with four degrees of freedom
+  for (Eigen::Index i = 0; i < r.size(); i += 2) t += std::log(std::pow(1 + r.segment(i, 2).squaredNorm() / 4, -3));
+  CHECK(discrepancy.LogLikelihood(kTruth, rollouts) == Approx(t));
 }
 
 TEST_CASE("without noise every horizon is predicted exactly, and errors grow with the horizon otherwise") {
@@ -75,6 +79,21 @@ TEST_CASE("the distribution comes to rest on the posterior: neither collapsed no
   const double null_ratio = along.dot(found.covariance * along) / along.dot(covariance * along);
   CHECK(null_ratio > 0.3);
   CHECK(null_ratio < 3);
+}
+
+TEST_CASE("one wrecked transition in a hundred does not move the distribution") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 4, 2);
+  for (uint32_t i = 0; i < 10; ++i) {
+    Rollout rollout = SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, i);
+    rollout.transitions[40].next_v(0) += 2;  // 140 standard deviations
+    simopt.Begin({rollout});
+    while (!simopt.Update()) {
+    }
+  }
+  for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
+    CHECK(std::abs(power.dot(simopt.state().distribution.mean) - LogTruth(power)) < 0.01);
+  }
 }
 
 TEST_CASE("what the motion determines is found and said in words") {

@@ -1,0 +1,109 @@
+#include "cli/progress.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+
+#include "plumb/policy_t.hpp"
+
+namespace plumb {
+namespace {
+
+RobotDescription Pendulum() {
+  return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum");
+}
+
+calibration_status_t Calibration(int iteration) {
+  calibration_status_t c{};
+  c.iteration = iteration;
+  c.num_parameters = 3;
+  c.mean = {10.2, 1.1, 1.05}, c.sd = {0.4, 0.08, 0.04};
+  c.horizon = {1, 5, 20}, c.error_before = {0.003, 0.01, 0.2}, c.error_after = c.error_prior = c.error_before;
+  c.num_horizons = 3;
+  c.combination = {"gravity / length", "mass length^2"};
+  c.num_combinations = 2;
+  c.combination_power = {1, 0, -1, 0, 1, 2};
+  c.num_powers = 6;
+  c.combination_mean = {9.5, 1.3}, c.combination_sd = {0.01, 0.003};
+  c.discrepancy = 0.5, c.kl = 0.4, c.ess = 21;
+  c.identifiability = "only gravity / length and mass length^2 can be known";
+  return c;
+}
+
+struct Fixture {
+  RobotDescription robot = Pendulum();
+  Progress progress{robot, 2};
+
+  void Rollout(int iteration, int8_t purpose, std::vector<double> returns) {
+    controller_status_t s{};
+    s.phase = controller_status_t::COMPLETE;
+    s.policy_iteration = iteration;
+    s.purpose = purpose;
+    s.returns = std::move(returns);
+    s.num_episodes = static_cast<int>(s.returns.size());
+    progress.OnController(s);
+  }
+  void Trained(int iteration, double simulated) {
+    training_status_t t{};
+    t.iteration = iteration, t.updates = t.update = 60, t.complete = 1, t.evaluation_return = simulated;
+    progress.OnTraining(t);
+  }
+};
+
+TEST_CASE_METHOD(Fixture, "a row shows the distribution beside the returns of the policy it was learned from") {
+  Trained(0, -210);
+  Rollout(0, policy_t::CALIBRATE, {-300});
+  progress.Account(12.5);
+  progress.OnCalibration(Calibration(1));
+  progress.OnCalibration(Calibration(1));  // repeated at 1 Hz
+  const auto rows = progress.TakeRows();
+  REQUIRE(rows.size() == 1);
+  for (const char* text : {"   1", "10.200 ± 0.400", "0.50", "0.0030", "0.2000", "0.400", "21.0", "-210", "-300", "12.5"}) {
+    CHECK_THAT(rows[0], Catch::Contains(text));
+  }
+  CHECK(progress.TakeRows().empty());
+  CHECK_THAT(progress.Header(), Catch::Contains("gravity [m/s^2]") && Catch::Contains("20-step"));
+}
+
+TEST_CASE_METHOD(Fixture, "only the final policy's evaluation ends the run") {
+  Rollout(1, policy_t::CALIBRATE, {-200});
+  CHECK_FALSE(progress.finished());
+  Rollout(2, policy_t::EVALUATE, {-100, -200, -120});
+  CHECK(progress.finished());
+}
+
+TEST_CASE_METHOD(Fixture, "what was learned stands beside the truth, combinations first") {
+  Trained(0, -210);
+  Rollout(0, policy_t::CALIBRATE, {-300});
+  progress.OnCalibration(Calibration(1));
+  Rollout(2, policy_t::EVALUATE, {-100, -200, -120, -180});
+  const Eigen::Vector3d truth(10, 1, 1.1);
+  const std::string text = progress.Conclusion(truth);
+  // 10 / 1.1 = 9.0909, 1 * 1.1^2 = 1.21
+  for (const char* part : {"9.091", "4.50 %", "1.210", "7.44 %", "mean return -150, median -150, worst -200", "only gravity"}) {
+    CHECK_THAT(text, Catch::Contains(part));
+  }
+  const nlohmann::json summary = progress.Summary(truth);
+  CHECK(summary["hidden"] == nlohmann::json({10, 1, 1.1}));
+  CHECK(summary["iterations"][0]["combinations"][1]["hidden"].get<double>() == Approx(1.21));
+  CHECK(summary["iterations"][0]["robot_return"] == -300);
+  CHECK(summary["evaluation_returns"].size() == 4);
+  // with a real robot nobody knows the truth
+  CHECK(progress.Summary({})["hidden"].is_null());
+  CHECK(progress.Conclusion({}).find('%') == std::string::npos);
+}
+
+TEST_CASE_METHOD(Fixture, "the status line says what is waited for") {
+  training_status_t t{};
+  t.updates = 60, t.update = 7;
+  progress.OnTraining(t);
+  CHECK_THAT(progress.StatusLine(3), Catch::Contains("training policy 0: update 7/60"));
+  driver_status_t d{};
+  d.state = driver_status_t::FAULT;
+  d.reason = "no command for 250 ms";
+  progress.OnDriver(d);
+  CHECK_THAT(progress.StatusLine(3), Catch::Contains("FAULT: no command for 250 ms"));
+}
+
+}  // namespace
+}  // namespace plumb
