@@ -12,16 +12,16 @@ Measurements::Measurements(int num_joints, int64_t period)
 void Measurements::Joint::Pop() {
   head = (head + 1) % kCapacity;
   --count;
-  if (regular > 0) --regular;
+  --regular;
 }
 
 void Measurements::Joint::Regularise() {
   std::array<int64_t, kCapacity> arrivals, times;
   const size_t fresh = count - regular;
   for (size_t i = 0; i < fresh; ++i) arrivals[i] = At(regular + i).time;
-  sync.Regularise(std::span(arrivals).first(fresh), std::span(times).first(fresh));
-  for (size_t i = 0; i < fresh; ++i) At(regular + i).time = times[i];
-  regular = count;
+  const size_t timed = sync.Regularise(std::span(arrivals).first(fresh), std::span(times).first(fresh));
+  for (size_t i = 0; i < timed; ++i) At(regular + i).time = times[i];
+  regular += timed;
 }
 
 void Measurements::Add(int joint, const JointMeasurement& measurement, int64_t arrival) noexcept {
@@ -37,7 +37,7 @@ void Measurements::Add(int joint, const JointMeasurement& measurement, int64_t a
 
 bool Measurements::Next(int64_t& utime, std::span<JointMeasurement> measurements) noexcept {
   for (Joint& joint : joints_) joint.Regularise();
-  while (std::ranges::all_of(joints_, [](const Joint& joint) { return joint.count > 0; })) {
+  while (std::ranges::all_of(joints_, [](const Joint& joint) { return joint.regular > 0; })) {
     int64_t newest = std::numeric_limits<int64_t>::min();
     for (Joint& joint : joints_) newest = std::max(newest, joint.At(0).time);
     bool complete = true;

@@ -4,37 +4,52 @@
 #include <cmath>
 
 namespace plumb {
+namespace {
+
+constexpr double kEvidence = 3.5;  // periods of unpunctual samples that prove a loss: five samples
+
+}  // namespace
 
 PassiveSync::PassiveSync(int64_t period, double rate_error, int64_t max_gap)
-    : period_(static_cast<double>(period)), rate_error_(rate_error), max_gap_(max_gap) {}
+    : period_(static_cast<double>(period)),
+      step_(period_ * (1 + rate_error)),
+      max_gap_(static_cast<double>(max_gap)) {}
 
-void PassiveSync::Regularise(std::span<const int64_t> arrivals, std::span<int64_t> times) noexcept {
-  // A sample is late by anything from nothing to three quarters of a period: beyond, one before it was lost.
-  // The remaining quarter allows for an estimate that is itself late.
-  const double tolerance = period_ / 4;
-  const double step = period_ * (1 + rate_error_);
+size_t PassiveSync::Regularise(std::span<const int64_t> arrivals, std::span<int64_t> times) noexcept {
   for (size_t i = 0; i < arrivals.size(); ++i) {
-    const auto since_origin = [this](int64_t arrival) { return static_cast<double>(arrival - origin_); };
-    const double gap = started_ ? since_origin(arrivals[i]) - estimate_ : 0;
-    if (!started_ || std::abs(gap) > static_cast<double>(max_gap_)) {
-      const bool back = started_ && gap < 0;
-      if (started_) ++resets_;
+    const std::span<const int64_t> waiting = arrivals.subspan(i);
+    const bool undecided = waiting.size() < kMostWaiting &&
+                           static_cast<double>(waiting.back() - waiting.front()) < kEvidence * period_;
+    const double gap = SinceOrigin(waiting.front()) - estimate_;
+    const bool jump = started_ && std::abs(gap) > max_gap_;
+    if (!started_ || jump) {
+      if (jump && undecided) return i;
+      if (jump) ++resets_;
       started_ = true;
-      origin_ = arrivals[i];
-      estimate_ = 0;
-      last_ = times[i] = back || resets_ == 0 ? origin_ : std::max(origin_, last_ + 1);
+      origin_ = waiting.front();
+      estimate_ = Lateness(waiting, 0);
+      const int64_t time = origin_ + std::llround(estimate_);
+      last_ = times[i] = jump && gap > 0 ? std::max(time, last_ + 1) : time;
       continue;
     }
-    // How late this sample and those behind it can be at most, if no sample were lost.
-    double lateness = since_origin(arrivals[i]) - (estimate_ + step);
-    for (size_t j = i + 1; j < arrivals.size(); ++j) {
-      lateness = std::min(lateness, since_origin(arrivals[j]) - (estimate_ + static_cast<double>(j - i + 1) * step));
-    }
-    const double missed = std::max(0.0, std::floor((lateness + tolerance) / period_));
+    // Nearly a period late is a period late: the estimate may itself be late.
+    const double periods_late = std::floor(Lateness(waiting, estimate_ + step_) / period_ + 0.125);
+    if (periods_late > 0 && undecided) return i;
+    const double missed = std::max(0.0, periods_late);
     lost_ += static_cast<int64_t>(missed);
-    estimate_ = std::min(estimate_ + (1 + missed) * step, since_origin(arrivals[i]));
-    last_ = times[i] = std::max(origin_ + static_cast<int64_t>(std::llround(estimate_)), last_ + 1);
+    estimate_ = std::min(estimate_ + (1 + missed) * step_, SinceOrigin(waiting.front()));
+    const int64_t time = origin_ + std::llround(estimate_);
+    last_ = times[i] = std::max(time, last_ + 1);
   }
+  return arrivals.size();
+}
+
+double PassiveSync::Lateness(std::span<const int64_t> waiting, double first) const noexcept {
+  double lateness = SinceOrigin(waiting.front()) - first;
+  for (size_t i = 1; i < waiting.size(); ++i) {
+    lateness = std::min(lateness, SinceOrigin(waiting[i]) - (first + static_cast<double>(i) * step_));
+  }
+  return lateness;
 }
 
 }  // namespace plumb

@@ -13,8 +13,9 @@ namespace plumb {
 /// at once, and otherwise it drifts up by the largest plausible error of the sensor's rate, so that a sensor
 /// whose clock is slow is followed, too. The constant part of the delay cannot be known and remains.
 ///
-/// A sample that comes more than about a period late is taken for the sample after a lost one, unless later
-/// samples of the same batch show that it was only late. Does not allocate. Not thread-safe.
+/// A sample that comes a period late may have been held up, or the one before it was lost. Those behind it tell:
+/// samples that were held up arrive together, the last of them nearly punctual. It therefore waits until one behind
+/// it is, or until those of four periods agree that there was a loss. Does not allocate. Not thread-safe.
 class PassiveSync {
  public:
   /// @param period [us] between samples, > 0.
@@ -22,10 +23,13 @@ class PassiveSync {
   /// @param max_gap [us] of silence, or of a jump of the clock, after which it starts anew.
   explicit PassiveSync(int64_t period, double rate_error = 1e-4, int64_t max_gap = 1'000'000);
 
-  /// @param arrivals [us] of the samples received since the last call, in order.
-  /// @param times [us] of their measurement: as many, strictly increasing from call to call, except after a
-  /// jump back of the clock by more than max_gap.
-  void Regularise(std::span<const int64_t> arrivals, std::span<int64_t> times) noexcept;
+  static constexpr size_t kMostWaiting = 32;  ///< samples that may wait, whatever they are
+
+  /// @param arrivals [us] of the samples that have no time yet, in order.
+  /// @param times [us] of their measurement, room for as many: strictly increasing from call to call, except
+  /// after a jump back of the clock by more than max_gap.
+  /// @return how many times it gives: all, but for less than kMostWaiting at the end, to be passed again.
+  size_t Regularise(std::span<const int64_t> arrivals, std::span<int64_t> times) noexcept;
 
   /// How often it started anew after the first sample.
   int64_t resets() const { return resets_; }
@@ -33,8 +37,12 @@ class PassiveSync {
   int64_t lost() const { return lost_; }
 
  private:
-  double period_, rate_error_;
-  int64_t max_gap_;
+  double SinceOrigin(int64_t arrival) const noexcept { return static_cast<double>(arrival - origin_); }
+  /// The least lateness [us] of waiting samples, if none of them was lost and the first was measured at `first`
+  /// since origin.
+  double Lateness(std::span<const int64_t> waiting, double first) const noexcept;
+
+  double period_, step_, max_gap_;
   bool started_ = false;
   int64_t origin_ = 0;   ///< arrival at the last start; keeps the doubles small
   double estimate_ = 0;  ///< [us] since origin, of the last sample
