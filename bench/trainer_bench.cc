@@ -41,7 +41,10 @@ void FisherProduct(benchmark::State& state) {
   trpo.PrepareFisher(policy, samples.View());
   for (auto _ : state) benchmark::DoNotOptimize(trpo.FisherProduct(policy.parameters));
 }
-BENCHMARK(FisherProduct)->ArgsProduct({{1, 2}, {1, 5}})->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(FisherProduct)
+    ->ArgsProduct({{1, 2}, {1, 5}})
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
 
 void PolicyStep(benchmark::State& state) {
   Workers workers(static_cast<int>(state.range(0)));
@@ -69,7 +72,8 @@ void CollectBatch(benchmark::State& state) {
   const GaussianPolicy policy = FreshPolicy();
   uint32_t number = 0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(rollout.Collect(policy, GymParameters, PendulumSettings().batch, 1, 1, number++).size());
+    benchmark::DoNotOptimize(
+        rollout.Collect(policy, GymParameters, PendulumSettings().batch, 1, 1, number++).size());
   }
 }
 BENCHMARK(CollectBatch)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();

@@ -35,7 +35,8 @@ void RequireSane(const std::vector<int>& sizes) {
   }
 }
 
-Eigen::VectorXf Take(const char* what, const std::vector<float>& values, int64_t announced, int64_t expected) {
+Eigen::VectorXf Take(const char* what, const std::vector<float>& values, int64_t announced,
+                     int64_t expected) {
   if (announced != expected || values.size() != static_cast<size_t>(expected)) {
     Reject(fmt::format("{} {}, expected {}", announced, what, expected));
   }
@@ -48,7 +49,8 @@ Eigen::VectorXf TakePositive(const char* what, const std::vector<float>& values,
                              int64_t expected) {
   const Eigen::VectorXf result = Take(what, values, announced, expected);
   // A denormal scale would make infinities of ordinary observations.
-  if ((result.array() < std::numeric_limits<float>::min()).any()) Reject(fmt::format("{} are not positive", what));
+  if ((result.array() < std::numeric_limits<float>::min()).any())
+    Reject(fmt::format("{} are not positive", what));
   return result;
 }
 
@@ -78,7 +80,8 @@ GaussianPolicy GaussianPolicy::FromMessage(const policy_t& message) {
   if (message.purpose != policy_t::CALIBRATE && message.purpose != policy_t::EVALUATE) {
     Reject(fmt::format("purpose {}", static_cast<int>(message.purpose)));
   }
-  if (message.episodes < 0 || message.episodes > kMaxEpisodes) Reject(fmt::format("{} episodes", message.episodes));
+  if (message.episodes < 0 || message.episodes > kMaxEpisodes)
+    Reject(fmt::format("{} episodes", message.episodes));
   if (message.num_layers < 0 || message.size.size() != static_cast<size_t>(message.num_layers)) {
     Reject(fmt::format("{} layers, {} sizes", message.num_layers, message.size.size()));
   }
@@ -89,9 +92,10 @@ GaussianPolicy GaussianPolicy::FromMessage(const policy_t& message) {
   policy.parameters = Take("weights", message.weight, message.num_weights, shape.parameter_count());
   policy.observation_mean =
       Take("observation means", message.observation_mean, message.num_observations, shape.observations);
-  policy.observation_scale =
-      TakePositive("observation scales", message.observation_scale, message.num_observations, shape.observations);
-  policy.action_scale = TakePositive("action scales", message.action_scale, message.num_actions, shape.actions);
+  policy.observation_scale = TakePositive("observation scales", message.observation_scale,
+                                          message.num_observations, shape.observations);
+  policy.action_scale =
+      TakePositive("action scales", message.action_scale, message.num_actions, shape.actions);
   return policy;
 }
 
@@ -138,7 +142,8 @@ Eigen::VectorXf GaussianPolicy::Mean(const Eigen::Ref<const Eigen::VectorXf>& ob
   return activation;
 }
 
-Eigen::VectorXf GaussianPolicy::Sample(const Eigen::Ref<const Eigen::VectorXf>& observation, Random& random) const {
+Eigen::VectorXf GaussianPolicy::Sample(const Eigen::Ref<const Eigen::VectorXf>& observation,
+                                       Random& random) const {
   Eigen::VectorXf action = Mean(observation);
   for (Eigen::Index i = 0; i < action.size(); ++i) {
     action[i] += std::exp(log_std()[i]) * static_cast<float>(random.Normal());

@@ -13,7 +13,8 @@ namespace {
 using Coordinate = ParameterDescription::Coordinate;
 
 constexpr int kMaxComponents = 1000;
-// A covariance that has been through arithmetic: eigenvalues this far below zero, relative to the largest, are zero.
+// A covariance that has been through arithmetic: eigenvalues this far below zero, relative to the largest,
+// are zero.
 constexpr double kRounding = 1e-9;
 
 int8_t ToCode(Coordinate coordinate) {
@@ -62,7 +63,8 @@ struct Moments {
   double mean, square;
 };
 
-Moments PhysicalMoments(const ParameterDistribution::Component& component, Eigen::Index i, Coordinate coordinate) {
+Moments PhysicalMoments(const ParameterDistribution::Component& component, Eigen::Index i,
+                        Coordinate coordinate) {
   const double mean = component.mean[i], variance = component.covariance(i, i);
   if (coordinate == Coordinate::kLinear) return {mean, variance + mean * mean};
   return {std::exp(mean + variance / 2), std::exp(2 * mean + 2 * variance)};
@@ -104,7 +106,8 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
     Component component;
     component.weight = message.weight[static_cast<size_t>(c)];
     component.mean = Eigen::Map<const Eigen::VectorXd>(message.mean.data() + c * size, size);
-    component.covariance = Eigen::Map<const RowMajor>(message.covariance.data() + c * size * size, size, size);
+    component.covariance =
+        Eigen::Map<const RowMajor>(message.covariance.data() + c * size * size, size, size);
     if (!(component.weight > 0) || !std::isfinite(component.weight) || !component.mean.allFinite() ||
         !component.covariance.allFinite()) {
       Reject(fmt::format("component {} is not finite or has no weight", c));
@@ -133,19 +136,22 @@ parameter_distribution_t ParameterDistribution::ToMessage() const {
     message.weight.push_back(component.weight);
     for (Eigen::Index i = 0; i < component.mean.size(); ++i) {
       message.mean.push_back(component.mean[i]);
-      for (Eigen::Index j = 0; j < component.mean.size(); ++j) message.covariance.push_back(component.covariance(i, j));
+      for (Eigen::Index j = 0; j < component.mean.size(); ++j)
+        message.covariance.push_back(component.covariance(i, j));
     }
   }
   message.num_means = static_cast<int32_t>(message.mean.size());
   message.num_covariances = static_cast<int32_t>(message.covariance.size());
-  message.kl = message.ess = message.temperature = message.discrepancy = std::numeric_limits<double>::quiet_NaN();
+  message.kl = message.ess = message.temperature = message.discrepancy =
+      std::numeric_limits<double>::quiet_NaN();
   return message;
 }
 
 Eigen::VectorXd ParameterDistribution::SampleCoordinates(Random& random) const {
   double left = random.Uniform();
   size_t chosen = 0;
-  while (chosen + 1 < components.size() && left >= components[chosen].weight) left -= components[chosen++].weight;
+  while (chosen + 1 < components.size() && left >= components[chosen].weight)
+    left -= components[chosen++].weight;
   const Component& component = components[chosen];
   if (size() == 0) return component.mean;
 
@@ -157,7 +163,9 @@ Eigen::VectorXd ParameterDistribution::SampleCoordinates(Random& random) const {
          eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().cwiseProduct(normal);
 }
 
-Eigen::VectorXd ParameterDistribution::Sample(Random& random) const { return ToPhysical(SampleCoordinates(random)); }
+Eigen::VectorXd ParameterDistribution::Sample(Random& random) const {
+  return ToPhysical(SampleCoordinates(random));
+}
 
 Eigen::VectorXd ParameterDistribution::ToPhysical(const Eigen::VectorXd& coordinates) const {
   Eigen::VectorXd physical(coordinates.size());

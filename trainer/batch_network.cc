@@ -6,8 +6,9 @@
 namespace plumb {
 namespace {
 
-// Wide enough that the kernels run at full speed and that handing work to another thread (tens of microseconds)
-// pays. A critic's minibatch is one group: shared by two threads it would take as long, and twice the processor.
+// Wide enough that the kernels run at full speed and that handing work to another thread (tens of
+// microseconds) pays. A critic's minibatch is one group: shared by two threads it would take as long, and
+// twice the processor.
 constexpr int kGroupWidth = 150;
 constexpr int kMaxGroups = 8;
 
@@ -20,14 +21,17 @@ std::span<const float> AsSpan(const Eigen::Ref<const Eigen::VectorXf>& vector) {
 BatchNetwork::BatchNetwork(std::vector<int> sizes, Workers& workers)
     : sizes_(std::move(sizes)), workers_(&workers), network_(sizes_), direction_(sizes_) {}
 
-void BatchNetwork::Set(const Eigen::Ref<const Eigen::VectorXf>& parameters) { network_.Set(AsSpan(parameters)); }
+void BatchNetwork::Set(const Eigen::Ref<const Eigen::VectorXf>& parameters) {
+  network_.Set(AsSpan(parameters));
+}
 
 void BatchNetwork::Divide(int columns) {
   active_groups_ = std::clamp((columns + kGroupWidth - 1) / kGroupWidth, 1, kMaxGroups);
   for (int g = 0; g < active_groups_; ++g) {
     const int first = columns * g / active_groups_, count = columns * (g + 1) / active_groups_ - first;
     if (g == static_cast<int>(groups_.size())) {
-      groups_.push_back({first, count, kernels::Tape(sizes_, count), {}, {}, Eigen::VectorXf(parameter_count())});
+      groups_.push_back(
+          {first, count, kernels::Tape(sizes_, count), {}, {}, Eigen::VectorXf(parameter_count())});
     }
     Group& group = groups_[static_cast<size_t>(g)];
     group.first = first;

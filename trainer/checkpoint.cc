@@ -18,8 +18,8 @@
 namespace plumb {
 namespace {
 
-// File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a checkpoint stays where
-// it was written.
+// File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a checkpoint stays
+// where it was written.
 constexpr char kMagic[8] = {'P', 'L', 'U', 'M', 'B', 'T', 'R', 'N'};
 constexpr uint32_t kVersion = 1;
 constexpr size_t kHeader = sizeof kMagic + 2 * sizeof(uint32_t);

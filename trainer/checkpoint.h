@@ -11,26 +11,28 @@
 
 namespace plumb {
 
-/// A checkpoint that cannot be used: damaged, of another version, or not writable. The message names the file.
+/// A checkpoint that cannot be used: damaged, of another version, or not writable. The message names the
+/// file.
 struct CheckpointError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Where training stands. Everything that shapes its future is here, so that a resumed run gives the same bits.
+/// Where training stands. Everything that shapes its future is here, so that a resumed run gives the same
+/// bits.
 struct Checkpoint {
   uint64_t seed = 0;
   int64_t updates = 0, steps = 0, dropped_episodes = 0;  ///< as in TrainerState
   int32_t iteration = 0;          ///< of SimOpt; the one under way or, if complete, just done
   int32_t iteration_updates = 0;  ///< TRPO updates done in it
   bool complete = false;
-  double evaluation_return = 0;   ///< NaN before it is complete
+  double evaluation_return = 0;  ///< NaN before it is complete
   policy_t policy;
   parameter_distribution_t distribution;  ///< of the iteration
   CriticState critic;
 };
 
-/// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint or the new one:
-/// a temporary file, fsync, rename, fsync of the folder. @throws CheckpointError.
+/// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint or the new
+/// one: a temporary file, fsync, rename, fsync of the folder. @throws CheckpointError.
 void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint);
 
 /// @return nothing if there is no such file. @throws CheckpointError if it is not what was saved.

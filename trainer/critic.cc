@@ -44,7 +44,8 @@ Critic::Critic(const TrainingSettings& settings, int observations, Random random
 
 void Critic::Restore(CriticState state) {
   const Eigen::Index count = network_.parameter_count();
-  if (state.parameters.size() != count || state.first_moment.size() != count || state.second_moment.size() != count) {
+  if (state.parameters.size() != count || state.first_moment.size() != count ||
+      state.second_moment.size() != count) {
     throw std::invalid_argument("critic: state of another network");
   }
   state_ = std::move(state);
@@ -68,7 +69,8 @@ void Critic::Rescale(std::span<const double> targets) {
   const double mean = state_.targets.mean, sd = state_.targets.sd();
   if (first) return;  // a fresh network's values are nothing worth keeping
   // The output layer is the tail: one weight per unit below it, then the bias.
-  auto output = state_.parameters.tail(settings_.hidden.empty() ? observations_ + 1 : settings_.hidden.back() + 1);
+  auto output =
+      state_.parameters.tail(settings_.hidden.empty() ? observations_ + 1 : settings_.hidden.back() + 1);
   output *= static_cast<float>(old_sd / sd);
   state_.parameters.tail(1).array() += static_cast<float>((old_mean - mean) / sd);
 }
@@ -108,8 +110,8 @@ bool Critic::Fit(std::span<const float> observations, std::span<const double> ta
           },
           gradient);
       kernels::AdamStep(static_cast<int>(gradient.size()), ++state_.adam_steps,
-                        static_cast<float>(settings_.critic_rate), l2, gradient.data(), state_.parameters.data(),
-                        state_.first_moment.data(), state_.second_moment.data());
+                        static_cast<float>(settings_.critic_rate), l2, gradient.data(),
+                        state_.parameters.data(), state_.first_moment.data(), state_.second_moment.data());
     }
   }
   if (state_.parameters.allFinite() && state_.second_moment.allFinite()) return true;

@@ -28,12 +28,13 @@ struct CriticState {
   RunningMoments targets;  ///< of all value targets seen; the network's output is in their units
 };
 
-/// The value function: a tanh network fitted to value targets by Adam. The network predicts targets normalised by
-/// their running mean and standard deviation. When these move, its output layer is rescaled so that the predicted
-/// values stay (van Hasselt et al., 2016, "Pop-Art"). Not thread-safe.
+/// The value function: a tanh network fitted to value targets by Adam. The network predicts targets
+/// normalised by their running mean and standard deviation. When these move, its output layer is rescaled so
+/// that the predicted values stay (van Hasselt et al., 2016, "Pop-Art"). Not thread-safe.
 class Critic {
  public:
-  /// @param observations length of an input. @param random for the initial weights. @param workers must outlive it.
+  /// @param observations length of an input. @param random for the initial weights. @param workers must
+  /// outlive it.
   Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers);
 
   const CriticState& state() const { return state_; }
@@ -43,8 +44,8 @@ class Critic {
   /// V of each observation. @param observations inputs x count, column-major.
   std::vector<double> Values(std::span<const float> observations);
 
-  /// critic_epochs passes over the samples in random order, in minibatches; l2 * |parameters|^2 is added to the
-  /// mean squared error (in units of return). If the result is not finite, the old state is kept.
+  /// critic_epochs passes over the samples in random order, in minibatches; l2 * |parameters|^2 is added to
+  /// the mean squared error (in units of return). If the result is not finite, the old state is kept.
   /// @return false in that case.
   bool Fit(std::span<const float> observations, std::span<const double> targets, Random& random);
 

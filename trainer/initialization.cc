@@ -7,8 +7,8 @@
 namespace plumb {
 namespace {
 
-/// Q of the QR decomposition of a matrix of normal deviates, with signs such that R's diagonal is positive: then Q
-/// is uniformly distributed (Mezzadri, 2007).
+/// Q of the QR decomposition of a matrix of normal deviates, with signs such that R's diagonal is positive:
+/// then Q is uniformly distributed (Mezzadri, 2007).
 Eigen::MatrixXd RandomOrthogonal(Eigen::Index rows, Eigen::Index columns, Random& random) {
   const Eigen::Index tall = std::max(rows, columns), narrow = std::min(rows, columns);
   Eigen::MatrixXd normal(tall, narrow);

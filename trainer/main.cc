@@ -12,7 +12,7 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kRepeat = 1'000'000;       // [us]
+constexpr int64_t kRepeat = 1'000'000;  // [us]
 constexpr int kUpdatesPerCheckpoint = 10;
 
 struct Options {
@@ -146,11 +146,13 @@ class TrainerProcess {
 int main(int argc, char** argv) {
   plumb::Options options;
   return plumb::Run(
-      "plumb-trainer", "Trains a policy on simulators drawn from each PARAMETER_DISTRIBUTION and sends it as POLICY",
-      argc, argv,
+      "plumb-trainer",
+      "Trains a policy on simulators drawn from each PARAMETER_DISTRIBUTION and sends it as POLICY", argc,
+      argv,
       [&](CLI::App& app) {
         app.add_option("robot", options.robot, "robot folder or TOML file")->required();
-        app.add_option("--iterations", options.iterations, "calibrations; the policy after the last is evaluated")
+        app.add_option("--iterations", options.iterations,
+                       "calibrations; the policy after the last is evaluated")
             ->check(CLI::Range(0, 10000))
             ->capture_default_str();
         app.add_option("--seed", options.seed, "of all random numbers")->capture_default_str();

@@ -47,7 +47,8 @@ bool Rollout::Worker::Play(const GaussianPolicy& policy, const kernels::Network&
   for (int step = 0; step < simulation->steps_per_episode() && !record.terminated; ++step) {
     tape.Forward(network, observation.data(), 1, action.data());
     if (explore) {
-      for (Eigen::Index a = 0; a < action.size(); ++a) action[a] += sd[a] * static_cast<float>(random.Normal());
+      for (Eigen::Index a = 0; a < action.size(); ++a)
+        action[a] += sd[a] * static_cast<float>(random.Normal());
     }
     const Simulation::Outcome outcome = simulation->Step(action);
     record.observations.insert(record.observations.end(), observation.begin(), observation.end());
@@ -73,14 +74,16 @@ Rollout::Rollout(const SimulationFactory& make, const PolicyShape& shape, Worker
 
 Rollout::~Rollout() = default;
 
-std::vector<Rollout::Record> Rollout::Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first,
-                                          int count, bool explore, uint64_t seed, uint32_t stream, uint32_t number) {
+std::vector<Rollout::Record> Rollout::Run(const GaussianPolicy& policy, const ParameterSampler& sample,
+                                          int first, int count, bool explore, uint64_t seed, uint32_t stream,
+                                          uint32_t number) {
   network_.Set({policy.parameters.data(), static_cast<size_t>(policy.parameters.size())});
   std::vector<Record> records(static_cast<size_t>(count));
   workers_->Run(count, [&](int task, int worker) {
     Random random(seed, {stream, number, static_cast<uint32_t>(first + task)});
     Record& record = records[static_cast<size_t>(task)];
-    record.usable = state_[static_cast<size_t>(worker)]->Play(policy, network_, sample, explore, random, record);
+    record.usable =
+        state_[static_cast<size_t>(worker)]->Play(policy, network_, sample, explore, random, record);
   });
   return records;
 }
@@ -90,9 +93,10 @@ Batch Rollout::Collect(const GaussianPolicy& policy, const ParameterSampler& sam
   Batch batch;
   int played = 0;
   while (batch.size() < steps) {
-    // As many episodes as are missing if they last as long as those so far: known before they are played, so that
-    // the number of threads cannot matter.
-    const double length = batch.episodes.empty() ? time_limit_ : 1. * batch.size() / static_cast<double>(batch.episodes.size());
+    // As many episodes as are missing if they last as long as those so far: known before they are played, so
+    // that the number of threads cannot matter.
+    const double length =
+        batch.episodes.empty() ? time_limit_ : 1. * batch.size() / static_cast<double>(batch.episodes.size());
     const int wanted = static_cast<int>(std::ceil((steps - batch.size()) / length));
     for (const Record& record : Run(policy, sample, played, wanted, true, seed, stream, number)) {
       if (!record.usable) {
@@ -100,7 +104,8 @@ Batch Rollout::Collect(const GaussianPolicy& policy, const ParameterSampler& sam
         continue;
       }
       const int begin = batch.size();
-      batch.observations.insert(batch.observations.end(), record.observations.begin(), record.observations.end());
+      batch.observations.insert(batch.observations.end(), record.observations.begin(),
+                                record.observations.end());
       batch.actions.insert(batch.actions.end(), record.actions.begin(), record.actions.end());
       batch.rewards.insert(batch.rewards.end(), record.rewards.begin(), record.rewards.end());
       batch.final_observations.insert(batch.final_observations.end(), record.final_observation.begin(),
@@ -117,8 +122,8 @@ Batch Rollout::Collect(const GaussianPolicy& policy, const ParameterSampler& sam
   return batch;
 }
 
-double Rollout::Evaluate(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes, uint64_t seed,
-                         uint32_t stream, uint32_t number) {
+double Rollout::Evaluate(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes,
+                         uint64_t seed, uint32_t stream, uint32_t number) {
   double sum = 0;
   int usable = 0;
   for (const Record& record : Run(policy, sample, 0, episodes, false, seed, stream, number)) {

@@ -43,9 +43,9 @@ struct Batch {
   std::vector<float> actions;       ///< as drawn, before clipping, actions x N
   std::vector<double> rewards;      ///< N
   struct Episode {
-    int begin, end;    ///< steps [begin, end)
-    bool terminated;   ///< false: cut off by the time limit
-    double sum;        ///< of the rewards, undiscounted
+    int begin, end;   ///< steps [begin, end)
+    bool terminated;  ///< false: cut off by the time limit
+    double sum;       ///< of the rewards, undiscounted
   };
   std::vector<Episode> episodes;
   std::vector<float> final_observations;  ///< after the last step (before any reset), observations x episodes
@@ -55,8 +55,8 @@ struct Batch {
   double MeanReturn() const;
 };
 
-/// Rolls a policy out in simulators drawn one per episode, an episode a task. Random numbers are named by seed,
-/// stream and episode: the batch is the same for any number of threads. Not thread-safe itself.
+/// Rolls a policy out in simulators drawn one per episode, an episode a task. Random numbers are named by
+/// seed, stream and episode: the batch is the same for any number of threads. Not thread-safe itself.
 class Rollout {
  public:
   /// @param make called once per worker. @param workers must outlive this.

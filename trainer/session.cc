@@ -14,8 +14,8 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-TrainingSession::TrainingSession(const RobotDescription& description, const SimulationFactory& make, int iterations,
-                                 uint64_t seed, int threads)
+TrainingSession::TrainingSession(const RobotDescription& description, const SimulationFactory& make,
+                                 int iterations, uint64_t seed, int threads)
     : description_(description),
       iterations_(iterations),
       seed_(seed),
@@ -84,13 +84,15 @@ training_status_t TrainingSession::Status() const {
 
 Checkpoint TrainingSession::MakeCheckpoint() const {
   const TrainerState state = trainer_.state();
-  return {seed_, state.updates, state.steps, state.dropped_episodes, iteration_, update_, complete_,
-          evaluation_return_, state.policy.ToMessage(), distribution_.ToMessage(), state.critic};
+  return {seed_,       state.updates, state.steps,        state.dropped_episodes,   iteration_,
+          update_,     complete_,     evaluation_return_, state.policy.ToMessage(), distribution_.ToMessage(),
+          state.critic};
 }
 
 void TrainingSession::Restore(const Checkpoint& checkpoint) {
   if (checkpoint.seed != seed_) {
-    throw CheckpointError(fmt::format("the checkpoint is of a run with seed {}, not {}", checkpoint.seed, seed_));
+    throw CheckpointError(
+        fmt::format("the checkpoint is of a run with seed {}, not {}", checkpoint.seed, seed_));
   }
   if (checkpoint.iteration < 0 || checkpoint.iteration > iterations_) {
     throw CheckpointError(

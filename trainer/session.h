@@ -10,16 +10,18 @@
 
 namespace plumb {
 
-/// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains from scratch,
-/// each later one from where the last ended. Knows neither messages nor clocks. Not thread-safe.
+/// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains from
+/// scratch, each later one from where the last ended. Knows neither messages nor clocks. Not thread-safe.
 class TrainingSession {
  public:
-  /// @param iterations number N of distributions that follow the prior: the policy of iteration N is the last.
+  /// @param iterations number N of distributions that follow the prior: the policy of iteration N is the
+  /// last.
   /// @param make makes simulations. @param threads 0 = as many as the machine has.
-  TrainingSession(const RobotDescription& description, const SimulationFactory& make, int iterations, uint64_t seed,
-                  int threads);
+  TrainingSession(const RobotDescription& description, const SimulationFactory& make, int iterations,
+                  uint64_t seed, int threads);
 
-  /// Goes on where a checkpoint stands. @throws CheckpointError if it is of another run: seed, robot or network.
+  /// Goes on where a checkpoint stands. @throws CheckpointError if it is of another run: seed, robot or
+  /// network.
   void Restore(const Checkpoint& checkpoint);
   Checkpoint MakeCheckpoint() const;
 
@@ -55,7 +57,7 @@ class TrainingSession {
   uint64_t seed_;
   Trainer trainer_;
   ParameterDistribution distribution_;
-  bool begun_ = false;     // iteration_ means something
+  bool begun_ = false;  // iteration_ means something
   bool complete_ = false;
   int iteration_ = 0;
   int update_ = 0;

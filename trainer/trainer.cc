@@ -11,7 +11,13 @@ namespace plumb {
 namespace {
 
 /// Names of the trainer's streams of random numbers; the other words are the update and the episode.
-enum Stream : uint32_t { kPolicyStream = 0x7472'0000, kCriticStream, kRolloutStream, kFitStream, kEvaluationStream };
+enum Stream : uint32_t {
+  kPolicyStream = 0x7472'0000,
+  kCriticStream,
+  kRolloutStream,
+  kFitStream,
+  kEvaluationStream
+};
 
 constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
 
@@ -19,7 +25,8 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
                            const Eigen::VectorXd& action_scale, uint64_t seed) {
   const std::unique_ptr<Simulation> simulation = make();
   GaussianPolicy policy({simulation->observation_size(), settings.hidden, simulation->action_size()});
-  if (action_scale.size() != simulation->action_size()) throw std::invalid_argument("trainer: size of action scale");
+  if (action_scale.size() != simulation->action_size())
+    throw std::invalid_argument("trainer: size of action scale");
   policy.action_scale = action_scale.cast<float>();
   Random random(seed, {kPolicyStream});
   const Eigen::VectorXf weights = OrthogonalParameters(policy.shape().sizes(), kOutputGain, random);
@@ -29,8 +36,8 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 
 }  // namespace
 
-Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make, const Eigen::VectorXd& action_scale,
-                 uint64_t seed, int threads)
+Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make,
+                 const Eigen::VectorXd& action_scale, uint64_t seed, int threads)
     : settings_(settings),
       seed_(seed),
       workers_(threads),
@@ -39,10 +46,13 @@ Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make
       trpo_(settings, policy_.shape(), workers_),
       critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_) {}
 
-TrainerState Trainer::state() const { return {policy_, critic_.state(), updates_, steps_, dropped_episodes_}; }
+TrainerState Trainer::state() const {
+  return {policy_, critic_.state(), updates_, steps_, dropped_episodes_};
+}
 
 void Trainer::Restore(TrainerState state) {
-  if (state.policy.shape() != policy_.shape()) throw std::invalid_argument("trainer: state of another network");
+  if (state.policy.shape() != policy_.shape())
+    throw std::invalid_argument("trainer: state of another network");
   critic_.Restore(std::move(state.critic));
   policy_ = std::move(state.policy);
   updates_ = state.updates;
@@ -59,7 +69,8 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   for (const Batch::Episode& episode : batch.episodes) {
     episodes.push_back({episode.begin, episode.end, episode.terminated, final_values[episodes.size()]});
   }
-  Advantages advantages = EstimateAdvantages(batch.rewards, values, episodes, settings_.gamma, settings_.lambda);
+  Advantages advantages =
+      EstimateAdvantages(batch.rewards, values, episodes, settings_.gamma, settings_.lambda);
   Normalize(advantages.advantage);
 
   UpdateReport report;
@@ -78,7 +89,8 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
 }
 
 double Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
-  return rollout_.Evaluate(policy_, sample, episodes, seed_, kEvaluationStream, static_cast<uint32_t>(updates_));
+  return rollout_.Evaluate(policy_, sample, episodes, seed_, kEvaluationStream,
+                           static_cast<uint32_t>(updates_));
 }
 
 }  // namespace plumb

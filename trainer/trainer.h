@@ -24,7 +24,7 @@ struct TrainerState {
 /// One update in numbers.
 struct UpdateReport {
   Trpo::Step step;
-  int batch = 0;                  ///< steps it rests on
+  int batch = 0;  ///< steps it rests on
   int dropped_episodes = 0;
   double mean_return = 0;         ///< of the batch's episodes, undiscounted
   double explained_variance = 0;  ///< of the critic, before it was fitted to this batch
@@ -33,14 +33,15 @@ struct UpdateReport {
 };
 
 /// Trains a policy in simulation: roll out, estimate advantages, step the policy, fit the critic. Its random
-/// numbers are named by (seed, update, episode): the same bits for any number of threads, and for a run that was
-/// interrupted and resumed. Not thread-safe itself.
+/// numbers are named by (seed, update, episode): the same bits for any number of threads, and for a run that
+/// was interrupted and resumed. Not thread-safe itself.
 class Trainer {
  public:
-  /// @param make makes simulations; called once per thread. @param action_scale effort of action 1, per action.
+  /// @param make makes simulations; called once per thread. @param action_scale effort of action 1, per
+  /// action.
   /// @param threads 0 = as many as the machine has.
-  Trainer(const TrainingSettings& settings, const SimulationFactory& make, const Eigen::VectorXd& action_scale,
-          uint64_t seed, int threads);
+  Trainer(const TrainingSettings& settings, const SimulationFactory& make,
+          const Eigen::VectorXd& action_scale, uint64_t seed, int threads);
 
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.

@@ -19,12 +19,16 @@ int Count(const PolicySamples& samples) { return static_cast<int>(samples.advant
 }  // namespace
 
 Trpo::Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers)
-    : settings_(settings), shape_(shape), network_(shape.sizes(), workers), fisher_network_(shape.sizes(), workers) {}
+    : settings_(settings),
+      shape_(shape),
+      network_(shape.sizes(), workers),
+      fisher_network_(shape.sizes(), workers) {}
 
 Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples) {
   const int actions = shape_.actions, count = Count(samples);
   const Eigen::ArrayXf precision = (-2 * policy.log_std().array()).exp();
-  // ln p(a) = -((a - mu) / sd)^2 / 2 - log_std + const: d/dmu = (a - mu) / sd^2, d/dlog_std = ((a - mu) / sd)^2 - 1.
+  // ln p(a) = -((a - mu) / sd)^2 / 2 - log_std + const: d/dmu = (a - mu) / sd^2, d/dlog_std = ((a - mu) /
+  // sd)^2 - 1.
   Eigen::MatrixXf means(actions, count);
   Eigen::VectorXf gradient(shape_.parameter_count());
   network_.Set(policy.parameters);
@@ -83,9 +87,11 @@ Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const flo
   network_.Set(after.parameters);
   network_.Forward(samples.observations.data(), count, new_means.data());
 
-  const Eigen::ArrayXd log_std = before.log_std().cast<double>(), new_log_std = after.log_std().cast<double>();
+  const Eigen::ArrayXd log_std = before.log_std().cast<double>(),
+                       new_log_std = after.log_std().cast<double>();
   const Eigen::ArrayXd precision = (-2 * log_std).exp(), new_precision = (-2 * new_log_std).exp();
-  // KL of two Gaussians: ln(s'/s) + (s^2 + (mu - mu')^2) / (2 s'^2) - 1/2; the part that is the same for all samples:
+  // KL of two Gaussians: ln(s'/s) + (s^2 + (mu - mu')^2) / (2 s'^2) - 1/2; the part that is the same for all
+  // samples:
   const double spread = (new_log_std - log_std + (2 * (log_std - new_log_std)).exp() / 2 - .5).sum();
   double kl = 0, gain = 0;
   for (int i = 0; i < count; ++i) {

@@ -18,8 +18,8 @@ struct PolicySamples {
   std::span<const double> advantages;   ///< normalised, N
 };
 
-/// Trust region policy optimisation (Schulman et al., 2015) of a GaussianPolicy: one natural gradient step, its
-/// length bounded by the Kullback-Leibler divergence between old and new policy. Not thread-safe.
+/// Trust region policy optimisation (Schulman et al., 2015) of a GaussianPolicy: one natural gradient step,
+/// its length bounded by the Kullback-Leibler divergence between old and new policy. Not thread-safe.
 class Trpo {
  public:
   /// @param workers must outlive this.
@@ -28,8 +28,8 @@ class Trpo {
   /// The outcome of one step.
   struct Step {
     bool accepted = false;
-    std::string failure;        ///< why not; the policy is then what it was, bit by bit
-    int tries = 0;              ///< of the line search
+    std::string failure;  ///< why not; the policy is then what it was, bit by bit
+    int tries = 0;        ///< of the line search
     int cg_iterations = 0;
     double kl = 0;              ///< mean KL(old || new) over the samples [nat]
     double surrogate_gain = 0;  ///< mean of (ratio - 1) * advantage
@@ -43,9 +43,9 @@ class Trpo {
 
   /// Takes the samples at which FisherProduct averages: every n-th of these, n = 1 / fisher_fraction.
   void PrepareFisher(const GaussianPolicy& policy, const PolicySamples& samples);
-  /// F v, without damping. F is the Fisher information of the policy, which for a Gaussian is the Gauss-Newton
-  /// matrix of its mean, J' diag(1 / sd^2) J, averaged over the samples, and 2 for each log_std. It is also the
-  /// Hessian of the mean KL at the old policy.
+  /// F v, without damping. F is the Fisher information of the policy, which for a Gaussian is the
+  /// Gauss-Newton matrix of its mean, J' diag(1 / sd^2) J, averaged over the samples, and 2 for each log_std.
+  /// It is also the Hessian of the mean KL at the old policy.
   Eigen::VectorXf FisherProduct(const Eigen::Ref<const Eigen::VectorXf>& v);
 
   /// Mean KL(before || after) and mean of (ratio - 1) * advantage, given the means of `before`.

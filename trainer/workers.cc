@@ -8,8 +8,8 @@
 namespace plumb {
 namespace {
 
-// Jobs follow each other within microseconds: falling asleep in between would cost more. Some 10 us; for longer,
-// a spinning thread would only be in the way of other processes.
+// Jobs follow each other within microseconds: falling asleep in between would cost more. Some 10 us; for
+// longer, a spinning thread would only be in the way of other processes.
 constexpr int kSpins = 600;
 
 template <class T>

@@ -23,8 +23,8 @@ class Workers {
 
   int size() const { return static_cast<int>(threads_.size()) + 1; }
 
-  /// Calls work(task, worker) once for each task in [0, tasks), worker in [0, size()), and returns when all are
-  /// done. If some throw, the exception of the lowest task is thrown again.
+  /// Calls work(task, worker) once for each task in [0, tasks), worker in [0, size()), and returns when all
+  /// are done. If some throw, the exception of the lowest task is thrown again.
   void Run(int tasks, const std::function<void(int task, int worker)>& work);
 
  private:
@@ -33,11 +33,11 @@ class Workers {
   bool DoTask(int worker);
 
   std::vector<std::thread> threads_;
-  // The job's number in the upper half, the number of unclaimed tasks in the lower: one word, so that a thread
-  // that comes late can never claim a task of a job other than the one it reads of.
+  // The job's number in the upper half, the number of unclaimed tasks in the lower: one word, so that a
+  // thread that comes late can never claim a task of a job other than the one it reads of.
   std::atomic<uint64_t> ticket_{0};
-  std::atomic<uint32_t> job_{0};       // the threads sleep until it changes
-  std::atomic<int> unfinished_{0};     // tasks
+  std::atomic<uint32_t> job_{0};    // the threads sleep until it changes
+  std::atomic<int> unfinished_{0};  // tasks
   std::atomic<bool> stopping_{false};
   // Of the job; a claimed, unfinished task keeps Run from returning and them from changing.
   const std::function<void(int, int)>* work_ = nullptr;

@@ -30,7 +30,8 @@ std::vector<double> MeanByHand(const GaussianPolicy& policy, const Eigen::Vector
     std::vector<double> y(static_cast<size_t>(out));
     for (int i = 0; i < out; ++i) {
       double sum = policy.parameters[next + in * out + i];
-      for (int j = 0; j < in; ++j) sum += double{policy.parameters[next + j * out + i]} * x[static_cast<size_t>(j)];
+      for (int j = 0; j < in; ++j)
+        sum += double{policy.parameters[next + j * out + i]} * x[static_cast<size_t>(j)];
       y[static_cast<size_t>(i)] = layer + 1 < sizes.size() ? std::tanh(sum) : sum;
     }
     next += (in + 1) * out;
@@ -96,19 +97,21 @@ TEST_CASE("Hostile policies are refused with a reason") {
   SECTION("more episodes than anybody wants") { message.episodes = 1 << 30, refused_for("episodes"); }
   SECTION("layers announced") { message.num_layers = 3, refused_for("layers"); }
   SECTION("negative layers") { message.num_layers = -1, refused_for("layers"); }
-  SECTION("no hidden or output layer") { message.num_layers = 1, message.size = {3}, refused_for("1 layers"); }
+  SECTION("no hidden or output layer") {
+    message.num_layers = 1, message.size = {3}, refused_for("1 layers");
+  }
   SECTION("empty layer") { message.size[1] = 0, refused_for("a layer of 0"); }
   SECTION("negative layer") { message.size[1] = -5, refused_for("a layer of -5"); }
   SECTION("huge layer") { message.size[1] = 1 << 30, refused_for("a layer of"); }
-  SECTION("huge network") {
-    message.num_layers = 9, message.size.assign(9, 4096), refused_for("parameters");
-  }
+  SECTION("huge network") { message.num_layers = 9, message.size.assign(9, 4096), refused_for("parameters"); }
   SECTION("weights missing") { message.weight.pop_back(), refused_for("weights, expected 56"); }
   SECTION("weights announced") { message.num_weights = 1, refused_for("1 weights, expected 56"); }
   SECTION("NaN weight") { message.weight[7] = NAN, refused_for("weights are not finite"); }
   SECTION("observation means") { message.observation_mean[0] = INFINITY, refused_for("observation means"); }
   SECTION("observation count") { message.num_observations = 2, refused_for("2 observation means"); }
-  SECTION("zero scale") { message.observation_scale[2] = 0, refused_for("observation scales are not positive"); }
+  SECTION("zero scale") {
+    message.observation_scale[2] = 0, refused_for("observation scales are not positive");
+  }
   SECTION("denormal scale") { message.observation_scale[2] = 1e-40f, refused_for("not positive"); }
   SECTION("negative action scale") { message.action_scale[0] = -2, refused_for("action scales"); }
   SECTION("action count") { message.num_actions = 3, refused_for("3 action scales"); }

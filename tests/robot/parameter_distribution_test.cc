@@ -97,7 +97,9 @@ TEST_CASE("Hostile distributions are refused with a reason") {
   };
   ParameterDistribution::FromMessage(message, Robot());
   SECTION("name") { message.name[1] = "ofset", refused_for("'ofset', test robot has 'offset'"); }
-  SECTION("coordinate") { message.coordinate[0] = parameter_distribution_t::LINEAR, refused_for("'gravity'"); }
+  SECTION("coordinate") {
+    message.coordinate[0] = parameter_distribution_t::LINEAR, refused_for("'gravity'");
+  }
   SECTION("fewer parameters") { message.num_parameters = 1, refused_for("1 parameters, expected 2"); }
   SECTION("shorter than announced") { message.name.pop_back(), refused_for("parameters"); }
   SECTION("no components") { message.num_components = 0, refused_for("0 components"); }

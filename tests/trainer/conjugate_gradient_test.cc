@@ -44,7 +44,8 @@ TEST_CASE("A negative or non-finite curvature is a failure that says so") {
   CHECK_THAT(ConjugateGradient(Product(negative), Eigen::VectorXd::Ones(3), 5, 1e-10).failure,
              Catch::Contains("curvature"));
   const Eigen::MatrixXd broken = std::nan("") * Eigen::MatrixXd::Ones(3, 3);
-  CHECK_THAT(ConjugateGradient(Product(broken), Eigen::VectorXd::Ones(3), 5, 1e-10).failure, Catch::Contains("nan"));
+  CHECK_THAT(ConjugateGradient(Product(broken), Eigen::VectorXd::Ones(3), 5, 1e-10).failure,
+             Catch::Contains("nan"));
   const Eigen::VectorXd infinite = Eigen::VectorXd::Constant(3, std::numeric_limits<double>::infinity());
   CHECK_FALSE(ConjugateGradient(Product(negative), infinite, 5, 1e-10).failure.empty());
 }

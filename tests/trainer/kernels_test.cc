@@ -10,7 +10,8 @@ namespace plumb {
 namespace {
 
 // Sizes that fill whole registers, sizes that do not, and a network without hidden layers.
-const std::vector<std::vector<int>> kShapes = {{3, 128, 128, 1}, {11, 33, 17, 3}, {1, 5, 2}, {4, 2}, {2, 7, 64, 9, 1}};
+const std::vector<std::vector<int>> kShapes = {
+    {3, 128, 128, 1}, {11, 33, 17, 3}, {1, 5, 2}, {4, 2}, {2, 7, 64, 9, 1}};
 
 struct Case {
   explicit Case(std::vector<int> shape, int columns) : sizes(std::move(shape)), reference{sizes} {
@@ -20,7 +21,9 @@ struct Case {
     inputs = RandomMatrix(sizes.front(), columns, 1, random);
     output_gradient = RandomMatrix(sizes.back(), columns, 1, random);
   }
-  std::span<const float> Span(const Eigen::VectorXf& v) const { return {v.data(), static_cast<size_t>(v.size())}; }
+  std::span<const float> Span(const Eigen::VectorXf& v) const {
+    return {v.data(), static_cast<size_t>(v.size())};
+  }
 
   std::vector<int> sizes;
   ReferenceNetwork reference;
@@ -48,7 +51,8 @@ TEST_CASE("Outputs, gradients and tangents are those of the network in double") 
       const Eigen::VectorXd p = c.parameters.cast<double>(), v = c.direction.cast<double>();
       const Eigen::MatrixXd x = c.inputs.cast<double>();
       CHECK(RelativeError(outputs.cast<double>(), c.reference.Outputs(p, x)) < 3e-6);
-      CHECK(RelativeError(gradient.cast<double>(), c.reference.Backward(p, x, c.output_gradient.cast<double>())) < 1e-5);
+      CHECK(RelativeError(gradient.cast<double>(),
+                          c.reference.Backward(p, x, c.output_gradient.cast<double>())) < 1e-5);
       const double h = 1e-6;
       const Eigen::MatrixXd difference =
           (c.reference.Outputs(p + h * v, x) - c.reference.Outputs(p - h * v, x)) / (2 * h);
@@ -92,7 +96,8 @@ TEST_CASE("tanh is accurate to 2e-7 everywhere, saturates, and passes NaN on") {
     return y;
   };
   double worst = 0;
-  for (float x = -12; x <= 12; x += 1.7e-3f) worst = std::max(worst, std::abs(evaluate(x) - std::tanh(double{x})));
+  for (float x = -12; x <= 12; x += 1.7e-3f)
+    worst = std::max(worst, std::abs(evaluate(x) - std::tanh(double{x})));
   CHECK(worst < 2e-7);
   CHECK(evaluate(std::numeric_limits<float>::infinity()) == 1);
   CHECK(evaluate(-1e30f) == -1);

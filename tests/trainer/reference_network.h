@@ -18,7 +18,8 @@ struct ReferenceNetwork {
   }
 
   /// Activations of every layer, inputs first, outputs last.
-  std::vector<Eigen::MatrixXd> Forward(const Eigen::VectorXd& parameters, const Eigen::MatrixXd& inputs) const {
+  std::vector<Eigen::MatrixXd> Forward(const Eigen::VectorXd& parameters,
+                                       const Eigen::MatrixXd& inputs) const {
     std::vector<Eigen::MatrixXd> layers{inputs};
     const double* next = parameters.data();
     for (size_t l = 1; l < sizes.size(); ++l) {
@@ -48,7 +49,8 @@ struct ReferenceNetwork {
     for (size_t l = sizes.size() - 1; l > 0; --l) {
       const Eigen::Index weights = Eigen::Index{sizes[l]} * sizes[l - 1];
       const Eigen::Index begin = end - sizes[l] - weights;
-      Eigen::Map<Eigen::MatrixXd>(gradient.data() + begin, sizes[l], sizes[l - 1]) = d * layers[l - 1].transpose();
+      Eigen::Map<Eigen::MatrixXd>(gradient.data() + begin, sizes[l], sizes[l - 1]) =
+          d * layers[l - 1].transpose();
       gradient.segment(begin + weights, sizes[l]) = d.rowwise().sum();
       const Eigen::Map<const Eigen::MatrixXd> w(parameters.data() + begin, sizes[l], sizes[l - 1]);
       if (l > 1) {

@@ -87,14 +87,16 @@ TEST_CASE("Replaying the actions of an episode gives its observations, rewards a
     for (int i = 200 * e; i < 200 * (e + 1); ++i) {
       const auto at = static_cast<size_t>(i);
       pendulum.Observe(observation);
-      REQUIRE(policy.Normalize(observation) == Eigen::Map<const Eigen::Vector3f>(&batch.observations[3 * at]));
+      REQUIRE(policy.Normalize(observation) ==
+              Eigen::Map<const Eigen::Vector3f>(&batch.observations[3 * at]));
       const Simulation::Outcome outcome = pendulum.Step(Eigen::VectorXf::Constant(1, batch.actions[at]));
       REQUIRE(outcome.reward == batch.rewards[at]);
       sum += outcome.reward;
     }
     pendulum.Observe(observation);
     const auto episode = static_cast<size_t>(e);
-    CHECK(policy.Normalize(observation) == Eigen::Map<const Eigen::Vector3f>(&batch.final_observations[3 * episode]));
+    CHECK(policy.Normalize(observation) ==
+          Eigen::Map<const Eigen::Vector3f>(&batch.final_observations[3 * episode]));
     CHECK(batch.episodes[episode].sum == Approx(sum));
     CHECK_FALSE(batch.episodes[episode].terminated);  // the time limit is no termination
   }
@@ -153,7 +155,8 @@ TEST_CASE("A simulation that mostly breaks is an error, not an endless loop") {
   Workers workers(2);
   Rollout rollout([] { return std::make_unique<Fragile>(Fragile::Break::kReward); }, kShape, workers);
   const ParameterSampler broken = [](Random&) -> Eigen::VectorXd { return Eigen::VectorXd::Zero(1); };
-  CHECK_THROWS_WITH(rollout.Collect(SomePolicy(), broken, 1000, 7, 1, 2), Catch::Contains("nothing to learn from"));
+  CHECK_THROWS_WITH(rollout.Collect(SomePolicy(), broken, 1000, 7, 1, 2),
+                    Catch::Contains("nothing to learn from"));
   CHECK(std::isnan(rollout.Evaluate(SomePolicy(), broken, 5, 7, 1, 2)));
 }
 

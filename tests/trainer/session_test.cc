@@ -16,7 +16,8 @@ RobotDescription Robot() {
   RobotDescription robot;
   robot.name = "test robot";
   const auto log = ParameterDescription::Coordinate::kLog;
-  robot.parameters = {{"gravity", "m/s^2", log, 10, .3}, {"mass/pole", "kg", log, 1, .03}, {"length/pole", "m", log, 1, .03}};
+  robot.parameters = {
+      {"gravity", "m/s^2", log, 10, .3}, {"mass/pole", "kg", log, 1, .03}, {"length/pole", "m", log, 1, .03}};
   robot.joints.resize(1);
   robot.joints[0].effort_limit = 2;
   robot.training = PendulumSettings();
@@ -33,7 +34,9 @@ ParameterDistribution Distribution(int iteration) {
   return distribution;
 }
 
-TrainingSession NewSession(uint64_t seed = 4) { return TrainingSession(Robot(), MakeGymPendulum, 2, seed, 1); }
+TrainingSession NewSession(uint64_t seed = 4) {
+  return TrainingSession(Robot(), MakeGymPendulum, 2, seed, 1);
+}
 
 /// A folder of its own, gone afterwards.
 struct TemporaryFolder {
@@ -105,7 +108,8 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(second.Policy(1).weight == straight.Policy(1).weight);
   CHECK(second.evaluation_return() == straight.evaluation_return());
 
-  // And once more, between iterations: the policy is there to be sent again, the next distribution is awaited.
+  // And once more, between iterations: the policy is there to be sent again, the next distribution is
+  // awaited.
   SaveCheckpoint(folder.File(), second.MakeCheckpoint());
   TrainingSession third = NewSession();
   third.Restore(LoadCheckpoint(folder.File()).value());
@@ -164,7 +168,8 @@ TEST_CASE("A checkpoint that cannot be written says why and leaves the old one")
   TrainingSession session = NewSession();
   session.Begin(Distribution(0));
   WriteAll((folder.path / "sub").string(), "a file where the folder should be");
-  CHECK_THROWS_WITH(SaveCheckpoint(folder.File(), session.MakeCheckpoint()), Catch::Contains("Not a directory"));
+  CHECK_THROWS_WITH(SaveCheckpoint(folder.File(), session.MakeCheckpoint()),
+                    Catch::Contains("Not a directory"));
 }
 
 }  // namespace

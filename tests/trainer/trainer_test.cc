@@ -32,7 +32,8 @@ TEST_CASE("Training is the same bits for any number of threads") {
 }
 
 TEST_CASE("Another seed is another run") {
-  Trainer a(SmallSettings(), MakeGymPendulum, PendulumScale(), 5, 1), b(SmallSettings(), MakeGymPendulum, PendulumScale(), 6, 1);
+  Trainer a(SmallSettings(), MakeGymPendulum, PendulumScale(), 5, 1),
+      b(SmallSettings(), MakeGymPendulum, PendulumScale(), 6, 1);
   a.Update(GymParameters);
   b.Update(GymParameters);
   CHECK(a.policy().parameters != b.policy().parameters);
@@ -60,7 +61,9 @@ class Endless : public Simulation {
   int observation_size() const override { return 1; }
   int action_size() const override { return 1; }
   int steps_per_episode() const override { return 20; }
-  void Reset(const Eigen::VectorXd&, Random& random) override { observation_ = static_cast<float>(random.Normal()); }
+  void Reset(const Eigen::VectorXd&, Random& random) override {
+    observation_ = static_cast<float>(random.Normal());
+  }
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override { observation[0] = observation_; }
   Outcome Step(const Eigen::Ref<const Eigen::VectorXf>&) override { return {-1, false}; }
 

@@ -14,7 +14,8 @@ namespace {
 struct Fixture {
   explicit Fixture(int samples = 400) : settings(PendulumSettings()), policy({4, {24, 17}, 2}) {
     Random random(21);
-    policy.parameters.head(policy.parameters.size() - 2) = OrthogonalParameters(policy.shape().sizes(), .5, random);
+    policy.parameters.head(policy.parameters.size() - 2) =
+        OrthogonalParameters(policy.shape().sizes(), .5, random);
     policy.parameters.tail(2) << -.3f, .2f;
     observations = RandomMatrix(4, samples, 1, random);
     actions.resize(2, samples);
@@ -49,14 +50,16 @@ double Surrogate(const Fixture& f, const Eigen::VectorXd& parameters) {
     const Eigen::VectorXd log_std = p.tail(2);
     Eigen::ArrayXd result = Eigen::ArrayXd::Zero(means.cols());
     for (int a = 0; a < 2; ++a) {
-      const Eigen::ArrayXd z = (f.actions.row(a).cast<double>() - means.row(a)).array().transpose() / std::exp(log_std[a]);
+      const Eigen::ArrayXd z =
+          (f.actions.row(a).cast<double>() - means.row(a)).array().transpose() / std::exp(log_std[a]);
       result -= z.square() / 2 + log_std[a];
     }
     return result;
   };
   const Eigen::VectorXd old = f.policy.parameters.cast<double>();
   return ((log_density(parameters) - log_density(old)).exp() *
-          Eigen::Map<const Eigen::ArrayXd>(f.advantages.data(), static_cast<Eigen::Index>(f.advantages.size())))
+          Eigen::Map<const Eigen::ArrayXd>(f.advantages.data(),
+                                           static_cast<Eigen::Index>(f.advantages.size())))
       .mean();
 }
 
@@ -64,13 +67,17 @@ double Surrogate(const Fixture& f, const Eigen::VectorXd& parameters) {
 Eigen::VectorXd KlGradient(const Fixture& f, const Eigen::VectorXd& parameters) {
   const Eigen::VectorXd old = f.policy.parameters.cast<double>();
   const Eigen::MatrixXd x = f.observations.cast<double>();
-  const Eigen::MatrixXd moved = f.reference().Outputs(f.Weights(parameters), x) - f.reference().Outputs(f.Weights(old), x);
-  const Eigen::VectorXd variance = (2 * parameters.tail(2).array()).exp(), old_variance = (2 * old.tail(2).array()).exp();
-  const Eigen::MatrixXd output_gradient = variance.cwiseInverse().asDiagonal() * moved / static_cast<double>(x.cols());
+  const Eigen::MatrixXd moved =
+      f.reference().Outputs(f.Weights(parameters), x) - f.reference().Outputs(f.Weights(old), x);
+  const Eigen::VectorXd variance = (2 * parameters.tail(2).array()).exp(),
+                        old_variance = (2 * old.tail(2).array()).exp();
+  const Eigen::MatrixXd output_gradient =
+      variance.cwiseInverse().asDiagonal() * moved / static_cast<double>(x.cols());
   Eigen::VectorXd gradient(parameters.size());
   gradient.head(parameters.size() - 2) = f.reference().Backward(f.Weights(parameters), x, output_gradient);
   for (int a = 0; a < 2; ++a) {
-    gradient[parameters.size() - 2 + a] = 1 - (old_variance[a] + moved.row(a).array().square().mean()) / variance[a];
+    gradient[parameters.size() - 2 + a] =
+        1 - (old_variance[a] + moved.row(a).array().square().mean()) / variance[a];
   }
   return gradient;
 }
@@ -116,7 +123,8 @@ TEST_CASE("Fisher's matrix is symmetric and positive semidefinite, also on a fif
     trpo.PrepareFisher(f.policy, f.samples());
     for (uint32_t seed = 0; seed < 5; ++seed) {
       const Eigen::VectorXf u = f.RandomDirection(2 * seed), v = f.RandomDirection(2 * seed + 1);
-      const Eigen::VectorXd fu = trpo.FisherProduct(u).cast<double>(), fv = trpo.FisherProduct(v).cast<double>();
+      const Eigen::VectorXd fu = trpo.FisherProduct(u).cast<double>(),
+                            fv = trpo.FisherProduct(v).cast<double>();
       const double ufv = u.cast<double>().dot(fv), vfu = v.cast<double>().dot(fu);
       const double size = std::sqrt(u.cast<double>().dot(fu) * v.cast<double>().dot(fv));
       CHECK(std::abs(ufv - vfu) < 1e-5 * size);
@@ -161,7 +169,8 @@ TEST_CASE("The divergence reported is that of the Gaussians") {
 
 TEST_CASE("When the line search fails the policy is what it was, bit by bit") {
   Fixture f;
-  // The curvature is looked at where the network does nothing, every fifth sample: the step is then far too long.
+  // The curvature is looked at where the network does nothing, every fifth sample: the step is then far too
+  // long.
   f.settings.fisher_fraction = .2;
   f.settings.damping = 1e-9;
   for (int i = 0; i < f.observations.cols(); i += 5) f.observations.col(i).setZero();
@@ -192,7 +201,8 @@ TEST_CASE("Exploration does not die out") {
   Fixture f;
   f.policy.parameters.tail(2).setConstant(Trpo::kMinLogStd);
   for (int i = 0; i < f.actions.cols(); ++i) {
-    f.actions.col(i) = f.policy.Mean(f.observations.col(i));  // the mean was best: a smaller deviation is better
+    f.actions.col(i) =
+        f.policy.Mean(f.observations.col(i));  // the mean was best: a smaller deviation is better
     f.advantages[static_cast<size_t>(i)] = 1;
   }
   Workers workers(1);

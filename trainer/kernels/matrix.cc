@@ -34,7 +34,8 @@ struct Problem {
   Onto onto;
 };
 
-/// Not to be inlined: among the surrounding loops GCC 12 runs out of registers and keeps half of `sum` in memory.
+/// Not to be inlined: among the surrounding loops GCC 12 runs out of registers and keeps half of `sum` in
+/// memory.
 template <int kRows, int kColumns>
 __attribute__((noinline)) void Tile(const Problem& problem, const float* a, const float* b, float* c,
                                     const float* bias) {
@@ -70,7 +71,8 @@ __attribute__((noinline)) void Tile(const Problem& problem, const float* a, cons
 
 /// The columns that are left when no whole tile fits any more.
 template <int kRows, int kColumns>
-void Remainder(int columns, const Problem& problem, const float* a, const float* b, float* c, const float* bias) {
+void Remainder(int columns, const Problem& problem, const float* a, const float* b, float* c,
+               const float* bias) {
   if constexpr (kColumns > 0) {
     if (columns == kColumns) {
       Tile<kRows, kColumns>(problem, a, b, c, bias);
@@ -85,7 +87,8 @@ template <int kRows, int kColumns>
 void Band(int n, const Problem& problem, const float* a, float* c, const float* bias) {
   int j = 0;
   for (; j + kColumns <= n; j += kColumns) {
-    Tile<kRows, kColumns>(problem, a, problem.b.data + j * problem.b.column_stride, c + j * problem.c_stride, bias);
+    Tile<kRows, kColumns>(problem, a, problem.b.data + j * problem.b.column_stride, c + j * problem.c_stride,
+                          bias);
   }
   Remainder<kRows, kColumns - 1>(n - j, problem, a, problem.b.data + j * problem.b.column_stride,
                                  c + j * problem.c_stride, bias);
@@ -104,7 +107,8 @@ int Bands(int i, int m, int n, const Problem& problem, float* c, const float* bi
 Matrix::Matrix(int rows, int columns) : rows_(rows), columns_(columns) {
   const ptrdiff_t lines = (padded_rows() + kLineFloats - 1) / kLineFloats;
   stride_ = (lines | 1) * kLineFloats;
-  const size_t bytes = static_cast<size_t>(stride_) * static_cast<size_t>(std::max(columns, 1)) * sizeof(float);
+  const size_t bytes =
+      static_cast<size_t>(stride_) * static_cast<size_t>(std::max(columns, 1)) * sizeof(float);
   data_.reset(static_cast<float*>(std::aligned_alloc(kCacheLine, bytes)));
   if (!data_) throw std::bad_alloc();
   SetZero();

@@ -10,14 +10,18 @@
 namespace plumb::kernels {
 namespace {
 
-// Activations of a block and their derivatives stay in the second-level cache between layers. Blocks are whole
-// numbers of the products' tiles, at every level of instruction set.
+// Activations of a block and their derivatives stay in the second-level cache between layers. Blocks are
+// whole numbers of the products' tiles, at every level of instruction set.
 constexpr int kBlock = 192;
 constexpr int kTile = 12;
 
 LeftFactor AsLeft(const Matrix& matrix, int column = 0) { return {matrix.column(column), matrix.stride()}; }
-RightFactor AsRight(const Matrix& matrix, int column = 0) { return {matrix.column(column), 1, matrix.stride()}; }
-RightFactor Transposed(const RightFactor& factor) { return {factor.data, factor.column_stride, factor.row_stride}; }
+RightFactor AsRight(const Matrix& matrix, int column = 0) {
+  return {matrix.column(column), 1, matrix.stride()};
+}
+RightFactor Transposed(const RightFactor& factor) {
+  return {factor.data, factor.column_stride, factor.row_stride};
+}
 
 /// Calls f(first, count) for each block of the columns, in order.
 template <class F>
@@ -119,12 +123,12 @@ void Network::Set(std::span<const float> parameters) {
 }
 
 struct Tape::Storage {
-  std::vector<Matrix> hidden;       // activations of all columns, per hidden layer
-  std::vector<Matrix> block;        // per layer: outputs, tangents or gradients of one block
+  std::vector<Matrix> hidden;  // activations of all columns, per hidden layer
+  std::vector<Matrix> block;   // per layer: outputs, tangents or gradients of one block
   std::vector<Matrix> weight_gradient, bias_gradient;
   int capacity = 0;
-  int columns = 0;                  // of the last Forward
-  const float* inputs = nullptr;    // of the last Forward
+  int columns = 0;                // of the last Forward
+  const float* inputs = nullptr;  // of the last Forward
 };
 
 Tape::Tape(std::span<const int> sizes, int columns) : storage_(std::make_unique<Storage>()) {
@@ -156,8 +160,8 @@ void Tape::Forward(const Network& network, const float* inputs, int columns, flo
       const bool last = l + 1 == s.block.size();
       Matrix& above = last ? s.block[l] : s.hidden[l];
       float* to = above.column(last ? 0 : first);
-      Multiply(above.padded_rows(), count, layer.weight.columns(), AsLeft(layer.weight), below, to, above.stride(),
-               Onto::kBias, layer.bias.column(0));
+      Multiply(above.padded_rows(), count, layer.weight.columns(), AsLeft(layer.weight), below, to,
+               above.stride(), Onto::kBias, layer.bias.column(0));
       if (!last) ApplyTanh(to, above.stride(), above.padded_rows(), count);
       below = {to, 1, above.stride()};
     }
@@ -178,8 +182,8 @@ void Tape::Tangent(const Network& network, const Network& direction, float* tang
       Multiply(dz.padded_rows(), count, change.weight.columns(), AsLeft(change.weight), below, dz.column(0),
                dz.stride(), Onto::kBias, change.bias.column(0));
       if (l > 0) {
-        Multiply(dz.padded_rows(), count, layer.weight.columns(), AsLeft(layer.weight), AsRight(s.block[l - 1]),
-                 dz.column(0), dz.stride(), Onto::kItself);
+        Multiply(dz.padded_rows(), count, layer.weight.columns(), AsLeft(layer.weight),
+                 AsRight(s.block[l - 1]), dz.column(0), dz.stride(), Onto::kItself);
       }
       if (l + 1 < s.block.size()) {
         MultiplyByTanhDerivative(dz, s.hidden[l], first, count);
@@ -200,9 +204,9 @@ void Tape::Backward(const Network& network, const float* output_gradient, float*
     for (size_t l = s.block.size(); l-- > 0;) {
       // dW += d h_below', db += d 1, d_below = (W' d) (1 - h_below^2)
       Matrix& d = s.block[l];
-      const RightFactor below = l > 0 ? AsRight(s.hidden[l - 1], first)
-                                      : RightFactor{s.inputs + ptrdiff_t{first} * inputs_per_column, 1,
-                                                    inputs_per_column};
+      const RightFactor below =
+          l > 0 ? AsRight(s.hidden[l - 1], first)
+                : RightFactor{s.inputs + ptrdiff_t{first} * inputs_per_column, 1, inputs_per_column};
       Matrix& dw = s.weight_gradient[l];
       Multiply(dw.padded_rows(), dw.columns(), count, AsLeft(d), Transposed(below), dw.column(0), dw.stride(),
                Onto::kItself);

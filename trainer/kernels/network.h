@@ -3,9 +3,9 @@
 #include <memory>
 #include <span>
 
-/// The inner loops of training, in a shared library of their own that is built once per level of instruction set;
-/// the dynamic linker takes the best one the machine can run (glibc-hwcaps). Hence the plain interface: no Eigen
-/// types, whose layout would depend on the instruction set, cross it.
+/// The inner loops of training, in a shared library of their own that is built once per level of instruction
+/// set; the dynamic linker takes the best one the machine can run (glibc-hwcaps). Hence the plain interface:
+/// no Eigen types, whose layout would depend on the instruction set, cross it.
 #define PLUMB_KERNELS_EXPORT __attribute__((visibility("default")))
 
 namespace plumb::kernels {
@@ -33,9 +33,9 @@ class PLUMB_KERNELS_EXPORT Network {
   std::unique_ptr<Layers> layers_;
 };
 
-/// The activations of a network for a set of samples, remembered so that derivatives can be taken there. Everything
-/// is single precision. The samples are worked on in blocks that fit the second-level cache.
-/// One thread at a time; nothing allocates but the constructor. The bits of a result depend on the samples, their
+/// The activations of a network for a set of samples, remembered so that derivatives can be taken there.
+/// Everything is single precision. The samples are worked on in blocks that fit the second-level cache. One
+/// thread at a time; nothing allocates but the constructor. The bits of a result depend on the samples, their
 /// order and the instruction set, on nothing else.
 class PLUMB_KERNELS_EXPORT Tape {
  public:
@@ -52,8 +52,10 @@ class PLUMB_KERNELS_EXPORT Tape {
   /// @param outputs outputs x columns, written.
   void Forward(const Network& network, const float* inputs, int columns, float* outputs);
 
-  /// The derivative of the outputs of the last Forward along a direction in parameter space (forward mode): J v.
-  /// @param network as in Forward. @param direction v, as the parameters of another network of the same sizes.
+  /// The derivative of the outputs of the last Forward along a direction in parameter space (forward mode): J
+  /// v.
+  /// @param network as in Forward. @param direction v, as the parameters of another network of the same
+  /// sizes.
   /// @param tangent outputs x columns, written.
   void Tangent(const Network& network, const Network& direction, float* tangent);
 

@@ -27,8 +27,8 @@ inline Packet Load(const float* from) {
 
 inline void Store(float* to, Packet packet) { std::memcpy(to, &packet, sizeof packet); }
 
-/// tanh to 2e-7 absolute: 1 - 2 / (e^(2x) + 1), with e^(2x) = 2^n 2^f, n an integer, |f| <= 1/2, and 2^f by its
-/// Taylor polynomial of degree 6, whose error of 1.2e-7 is halved by the division. NaN gives NaN.
+/// tanh to 2e-7 absolute: 1 - 2 / (e^(2x) + 1), with e^(2x) = 2^n 2^f, n an integer, |f| <= 1/2, and 2^f by
+/// its Taylor polynomial of degree 6, whose error of 1.2e-7 is halved by the division. NaN gives NaN.
 inline Packet Tanh(Packet x) {
   constexpr float kSaturated = 10.0f;  // 1 - tanh(10) = 4e-9, nothing beside 1
   x = x > kSaturated ? kSaturated + Packet{} : x;
