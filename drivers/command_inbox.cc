@@ -8,7 +8,8 @@ namespace plumb {
 
 CommandInbox::CommandInbox(int num_joints, int64_t expiry) : num_joints_(num_joints), expiry_(expiry) {
   const auto size = static_cast<size_t>(num_joints);
-  for (auto* values : {&command_.effort, &command_.position, &command_.velocity, &command_.kp, &command_.kd}) {
+  for (auto* values :
+       {&command_.effort, &command_.position, &command_.velocity, &command_.kp, &command_.kd}) {
     values->resize(size);
   }
 }
@@ -18,7 +19,8 @@ void CommandInbox::Clear() noexcept { empty_ = true; }
 bool CommandInbox::Offer(const joint_command_t& command, int64_t now, int64_t utime) noexcept {
   const auto size = static_cast<size_t>(num_joints_);
   if (command.num_joints != num_joints_) return false;
-  for (const auto* values : {&command.effort, &command.position, &command.velocity, &command.kp, &command.kd}) {
+  for (const auto* values :
+       {&command.effort, &command.position, &command.velocity, &command.kp, &command.kd}) {
     if (values->size() != size) return false;
     if (std::ranges::any_of(*values, [](double x) { return std::isinf(x); })) return false;
   }

@@ -6,8 +6,8 @@
 
 namespace plumb {
 
-/// The newest valid command and nothing else: commands are never queued. Does not allocate after construction.
-/// Not thread-safe. Times: `now` scaled monotonic [us], `utime` scaled real time [us].
+/// The newest valid command and nothing else: commands are never queued. Does not allocate after
+/// construction. Not thread-safe. Times: `now` scaled monotonic [us], `utime` scaled real time [us].
 class CommandInbox {
  public:
   /// @param expiry [us] after arrival a command is void; a command may shorten but not lengthen it.

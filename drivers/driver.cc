@@ -1,19 +1,15 @@
 #include "drivers/driver.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <functional>
-#include <limits>
 #include <stdexcept>
 
 namespace plumb {
 namespace {
 
-constexpr int kHistory = 2048;          // cycles of transmitted efforts: ten seconds
-constexpr int kRefusedCycles = 10;      // consecutive cycles whose frames were not accepted
-constexpr int kUnacknowledged = 16;     // consecutive no-acknowledge error frames: nobody is there
-constexpr size_t kBins = 20;            // of the lateness histogram, the last one open
+constexpr int kHistory = 2048;       // cycles of transmitted efforts: ten seconds
+constexpr int kRefusedCycles = 10;   // consecutive cycles whose frames were not accepted
+constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
@@ -45,32 +41,15 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
     for (size_t i = 0; i + 1 < joints_.size(); ++i) {
       const Filter other = joints_[i].motor->filter();
       if (((mine.id ^ other.id) & mine.mask & other.mask) == 0) {
-        throw std::invalid_argument(fmt::format("joints '{}' and '{}' have CAN ids in common (nodes {} and {})",
-                                                joints_[i].name, joint.name, robot.joints[i].motor.node,
-                                                joint.motor.node));
+        throw std::invalid_argument(
+            fmt::format("joints '{}' and '{}' have CAN ids in common (nodes {} and {})", joints_[i].name,
+                        joint.name, robot.joints[i].motor.node, joint.motor.node));
       }
     }
   }
-  const size_t size = joints_.size();
-  effort_sent_.assign(size, 0);
-  scratch_.resize(size);
-  state_message_.sequence = -1;
-  state_message_.num_joints = robot.num_joints();
-  for (auto* values : {&state_message_.position, &state_message_.velocity, &state_message_.effort_measured,
-                       &state_message_.effort_sent, &state_message_.effort_applied}) {
-    values->resize(size);
-  }
-  state_message_.valid.resize(size);
-
-  status_.frames_received = status_.frames_sent = status_.frames_rejected = status_.frames_dropped = 0;
-  status_.commands_accepted = status_.commands_rejected = status_.commands_expired = 0;
-  status_.messages_rejected = status_.cycles = status_.overruns = 0;
-  status_.num_joints = robot.num_joints();
-  for (const Joint& joint : joints_) status_.joint_name.push_back(joint.name);
-  status_.joint_state.resize(size);
-  status_.joint_reason.resize(size);
-  status_.num_bins = kBins;
-  status_.lateness.assign(kBins, 0);
+  effort_sent_.assign(joints_.size(), 0);
+  scratch_.resize(joints_.size());
+  PrepareMessages();
   reason_.Set("waiting for ARM");
 }
 
@@ -106,11 +85,14 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
       bus_off_ = true;
       if (Active()) Fault("the CAN controller went bus-off");
       return;
-    case BusEvent::kRestarted: bus_off_ = false; return;
+    case BusEvent::kRestarted:
+      bus_off_ = false;
+      return;
     case BusEvent::kNoAck:
       if (++unacknowledged_ > kUnacknowledged && Active()) Fault("nobody on the bus acknowledges frames");
       return;
-    case BusEvent::kNone: break;
+    case BusEvent::kNone:
+      break;
   }
   if (frame.error) return;
   bus_off_ = false;
@@ -118,12 +100,17 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     switch (joint.motor->OnFrame(frame, now)) {
-      case FrameUse::kNotMine: continue;
-      case FrameUse::kRejected: ++frames_rejected_; return;
-      case FrameUse::kConsumed: return;
+      case FrameUse::kNotMine:
+        continue;
+      case FrameUse::kRejected:
+        ++frames_rejected_;
+        return;
+      case FrameUse::kConsumed:
+        return;
       case FrameUse::kEstimate: {
         const MotorEstimate& estimate = joint.motor->estimate();
-        joint.latest = {joint.map.JointPosition(estimate.position), joint.map.JointVelocity(estimate.velocity),
+        joint.latest = {joint.map.JointPosition(estimate.position),
+                        joint.map.JointVelocity(estimate.velocity),
                         joint.map.JointEffort(joint.motor->torque_estimate())};
         joint.measured = true;
         joint.measured_at = now;
@@ -133,26 +120,6 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
     }
   }
   ++frames_rejected_;
-}
-
-const joint_state_t* Driver::NextState() noexcept {
-  int64_t utime;
-  if (!measurements_.Next(utime, scratch_)) return nullptr;
-  joint_state_t& message = state_message_;
-  message.utime = utime;
-  ++message.sequence;
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    message.position[i] = scratch_[i].position;
-    message.velocity[i] = scratch_[i].velocity;
-    message.effort_measured[i] = scratch_[i].effort;
-    message.effort_sent[i] = effort_sent_[i];
-    message.effort_applied[i] = std::numeric_limits<double>::quiet_NaN();
-    message.valid[i] = joints_[i].motor->state() != DriveState::kAbsent;
-  }
-  if (has_previous_) history_.Average(previous_utime_, utime, message.effort_applied);
-  previous_utime_ = utime;
-  has_previous_ = true;
-  return &message;
 }
 
 void Driver::OnLink(LinkState link) noexcept {
@@ -166,7 +133,8 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
   now_ = now;
   utime_ = utime;
   switch (request.request) {
-    case driver_request_t::ARM: return RequestArm(request.utime);
+    case driver_request_t::ARM:
+      return RequestArm(request.utime);
     // Stopping is obeyed whatever the request's time.
     case driver_request_t::DISARM:
       if (mode_ == Mode::kFault) {
@@ -180,7 +148,9 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
       stopped_utime_ = utime;
       for (Joint& joint : joints_) joint.motor->Estop(now);
       return;
-    default: ++requests_rejected_; return;
+    default:
+      ++requests_rejected_;
+      return;
   }
 }
 
@@ -191,8 +161,8 @@ void Driver::Refuse(std::string_view why) noexcept {
 
 void Driver::RequestArm(int64_t made) noexcept {
   const int64_t now = now_;
-  // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's clock may be
-  // ahead of ours, so that it looks newer than the stop).
+  // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's clock may
+  // be ahead of ours, so that it looks newer than the stop).
   if (Active() || made < start_utime_ || made <= stopped_utime_ || made <= armed_by_) return;
   if (now - start_now_ < start_guard_) return Refuse("the driver has only just started");
   if (stray_controller_ && now - last_command_ < start_guard_) {
@@ -239,11 +209,7 @@ void Driver::OnCommand(const joint_command_t& command, int64_t now, int64_t utim
 std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
   now_ = now;
   utime_ = utime;
-  ++status_.cycles;
-  if (lateness >= cycle_) ++status_.overruns;
-  const auto bin = static_cast<size_t>(std::bit_width(static_cast<uint64_t>(std::max<int64_t>(lateness, 1)))) - 1;
-  ++status_.lateness[std::min(bin, kBins - 1)];
-
+  NoteLateness(lateness);
   housekeeping_.Clear();
   frames_.Clear();
   CheckHealth();
@@ -293,7 +259,8 @@ void Driver::CommandTorques() noexcept {
     if (!Active()) continue;
     if (mode_ == Mode::kArmed && !inbox_.Expired(now_)) {
       const double wished = inbox_.Effort(static_cast<int>(i), joint.latest.position, joint.latest.velocity);
-      joint.wish = LimitEffort(wished, joint.latest.position, joint.latest.velocity, joint.limits).value_or(0);
+      joint.wish =
+          LimitEffort(wished, joint.latest.position, joint.latest.velocity, joint.limits).value_or(0);
     }
     frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.wish)));
   }
@@ -316,10 +283,14 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
 
 DriveState Driver::state() const noexcept {
   switch (mode_) {
-    case Mode::kArming: return DriveState::kArming;
-    case Mode::kArmed: return DriveState::kArmed;
-    case Mode::kFault: return DriveState::kFault;
-    case Mode::kRest: break;
+    case Mode::kArming:
+      return DriveState::kArming;
+    case Mode::kArmed:
+      return DriveState::kArmed;
+    case Mode::kFault:
+      return DriveState::kFault;
+    case Mode::kRest:
+      break;
   }
   const bool absent = std::ranges::any_of(
       joints_, [](const Joint& joint) { return joint.motor->state() == DriveState::kAbsent; });
@@ -328,40 +299,6 @@ DriveState Driver::state() const noexcept {
 
 bool Driver::confirmed_idle() const noexcept {
   return std::ranges::all_of(joints_, [](const Joint& joint) { return joint.motor->confirmed_idle(); });
-}
-
-void Driver::NoteChanges() noexcept {
-  const std::hash<std::string_view> hash;
-  uint64_t signature = static_cast<uint64_t>(state());
-  const auto mix = [&](uint64_t value) { signature = (signature ^ value) * 0x9E3779B97F4A7C15; };
-  mix(hash(reason()));
-  mix(link_ == LinkState::kUp && !bus_off_);
-  for (const Joint& joint : joints_) {
-    mix(static_cast<uint64_t>(joint.motor->state()));
-    mix(hash(joint.motor->reason()));
-  }
-  if (signature != signature_) ++revision_;
-  signature_ = signature;
-}
-
-const driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected) {
-  status_.utime = utime;
-  status_.state = static_cast<int8_t>(state());
-  status_.reason = reason();
-  status_.bus_up = link_ == LinkState::kUp && !bus_off_;
-  for (size_t i = joints_.size(); i-- > 0;) {
-    const Motor& motor = *joints_[i].motor;
-    status_.joint_state[i] = static_cast<int8_t>(motor.state());
-    status_.joint_reason[i] = motor.reason();
-    if (status_.state == driver_status_t::ABSENT && motor.state() == DriveState::kAbsent) {
-      status_.reason = joints_[i].name + ": " + status_.joint_reason[i];
-    }
-  }
-  status_.frames_rejected = frames_rejected_ + stats.malformed;
-  status_.frames_sent = stats.sent;
-  status_.frames_dropped = stats.refused + stats.lost;
-  status_.messages_rejected = requests_rejected_ + messages_rejected;
-  return status_;
 }
 
 }  // namespace plumb

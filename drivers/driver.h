@@ -31,9 +31,9 @@ namespace plumb {
 ///   driver.Transmitted(transport.Send(frames), utime right after it);
 ///
 /// It arms only on a request, made after its start and after whatever stopped it last. Armed, it transmits a
-/// torque in every cycle: zero when the command has expired. It disarms and remembers why (FAULT) when commands
-/// stay away, a measurement or heartbeat is missing, a drive reports an error or falls idle, or the bus fails;
-/// only a new ARM leads out of FAULT.
+/// torque in every cycle: zero when the command has expired. It disarms and remembers why (FAULT) when
+/// commands stay away, a measurement or heartbeat is missing, a drive reports an error or falls idle, or the
+/// bus fails; only a new ARM leads out of FAULT.
 ///
 /// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the constructor
 /// allocates (Status: when a text grows), blocks or throws. Not thread-safe.
@@ -80,9 +80,9 @@ class Driver {
     JointMap map;
     JointLimits limits;
     bool measured = false;
-    int64_t measured_at = 0;          // `now` of the last estimate
+    int64_t measured_at = 0;  // `now` of the last estimate
     JointMeasurement latest;
-    double wish = 0;                  // effort in the torque frame of this cycle
+    double wish = 0;  // effort in the torque frame of this cycle
   };
 
   template <class... Args>
@@ -93,6 +93,8 @@ class Driver {
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;
   void CommandTorques() noexcept;
+  void PrepareMessages();
+  void NoteLateness(int64_t lateness) noexcept;
   void NoteChanges() noexcept;
   bool Active() const noexcept { return mode_ == Mode::kArming || mode_ == Mode::kArmed; }
 
@@ -105,12 +107,12 @@ class Driver {
 
   Mode mode_ = Mode::kRest;
   Reason reason_;
-  int64_t now_, utime_;           // latest times given
-  int64_t stopped_utime_;         // of the last disarming; older ARM requests are void
-  int64_t armed_by_;              // utime of the last ARM request that was obeyed
-  int64_t armed_at_ = 0;          // `now`
-  bool stray_controller_ = false; // commanded during the start guard
-  int64_t last_command_ = 0;      // `now` of any command, valid or not
+  int64_t now_, utime_;            // latest times given
+  int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
+  int64_t armed_by_;               // utime of the last ARM request that was obeyed
+  int64_t armed_at_ = 0;           // `now`
+  bool stray_controller_ = false;  // commanded during the start guard
+  int64_t last_command_ = 0;       // `now` of any command, valid or not
   bool expiry_counted_ = false;
   LinkState link_ = LinkState::kUp;
   bool bus_off_ = false;

@@ -29,7 +29,8 @@ void EffortHistory::Average(int64_t from, int64_t to, std::span<double> average)
     const int64_t begin = std::max(utime_[slot], from);
     if (begin >= end) continue;
     const double weight = static_cast<double>(end - begin) / static_cast<double>(to - from);
-    for (size_t joint = 0; joint < joints_; ++joint) average[joint] += weight * effort_[slot * joints_ + joint];
+    for (size_t joint = 0; joint < joints_; ++joint)
+      average[joint] += weight * effort_[slot * joints_ + joint];
     end = begin;
   }
 }

@@ -5,7 +5,8 @@
 
 namespace plumb {
 
-std::optional<double> LimitEffort(double effort, double position, double velocity, const JointLimits& limits) {
+std::optional<double> LimitEffort(double effort, double position, double velocity,
+                                  const JointLimits& limits) {
   if (!std::isfinite(effort) || !std::isfinite(position) || !std::isfinite(velocity)) return {};
   double lowest = -limits.effort, highest = limits.effort;
   if (position > limits.upper || velocity > limits.velocity) highest = 0;

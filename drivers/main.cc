@@ -17,19 +17,20 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kStatusPeriod = 100'000;    // [us]
-constexpr int64_t kReopenPeriod = 100'000;    // [us]
-constexpr double kFarewell = 0.3;             // [s] real time that the drives have to confirm a disarm at the end
-constexpr int kFramesPerCycle = 512;          // a flood must not keep us from our deadlines
+constexpr int64_t kStatusPeriod = 100'000;  // [us]
+constexpr int64_t kReopenPeriod = 100'000;  // [us]
+constexpr double kFarewell = 0.3;     // [s] real time that the drives have to confirm a disarm at the end
+constexpr int kFramesPerCycle = 512;  // a flood must not keep us from our deadlines
 
 /// From here on no page faults, and no other process before us. LCM's receive thread must exist already.
 void BecomeRealtime(int priority) {
   if (priority == 0) return;
   const sched_param parameter{.sched_priority = priority};
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &parameter) != 0) {
-    throw std::runtime_error(fmt::format(
-        "--realtime-priority {}: {}; cure: run as root, or allow it with ulimit -r {} and ulimit -l unlimited",
-        priority, std::strerror(errno), priority));
+    throw std::runtime_error(
+        fmt::format("--realtime-priority {}: {}; cure: run as root, or allow it with ulimit -r {} and ulimit "
+                    "-l unlimited",
+                    priority, std::strerror(errno), priority));
   }
 }
 

@@ -16,9 +16,9 @@ struct JointMeasurement {
   double effort = 0;  ///< NaN = not reported
 };
 
-/// Puts the estimates of all joints together into complete measurements with regular times. A joint whose frame
-/// was lost does not shift the others: estimates more than 0.6 of a period older than the newest wait for
-/// nobody and are dropped. Does not allocate after construction. Not thread-safe.
+/// Puts the estimates of all joints together into complete measurements with regular times. A joint whose
+/// frame was lost does not shift the others: estimates more than 0.6 of a period older than the newest wait
+/// for nobody and are dropped. Does not allocate after construction. Not thread-safe.
 class Measurements {
  public:
   /// @param period [us] at which every drive sends its estimates.

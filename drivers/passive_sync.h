@@ -8,14 +8,15 @@ namespace plumb {
 /// Times of measurement of a periodic sensor, from times of arrival that are always late, by a varying amount
 /// (E. Olson, "A passive solution to the sensor synchronization problem", IROS 2010).
 ///
-/// Nothing arrives before it was measured, so of all arrivals the one with the least delay says most about the
-/// sensor's clock. The estimate follows the period from there on; an arrival before the estimate pulls it down
-/// at once, and otherwise it drifts up by the largest plausible error of the sensor's rate, so that a sensor
-/// whose clock is slow is followed, too. The constant part of the delay cannot be known and remains.
+/// Nothing arrives before it was measured, so of all arrivals the one with the least delay says most about
+/// the sensor's clock. The estimate follows the period from there on; an arrival before the estimate pulls it
+/// down at once, and otherwise it drifts up by the largest plausible error of the sensor's rate, so that a
+/// sensor whose clock is slow is followed, too. The constant part of the delay cannot be known and remains.
 ///
-/// A sample that comes a period late may have been held up, or the one before it was lost. Those behind it tell:
-/// samples that were held up arrive together, the last of them nearly punctual. It therefore waits until one behind
-/// it is, or until those of four periods agree that there was a loss. Does not allocate. Not thread-safe.
+/// A sample that comes a period late may have been held up, or the one before it was lost. Those behind it
+/// tell: samples that were held up arrive together, the last of them nearly punctual. It therefore waits
+/// until one behind it is, or until those of four periods agree that there was a loss. Does not allocate. Not
+/// thread-safe.
 class PassiveSync {
  public:
   /// @param period [us] between samples, > 0.
@@ -38,8 +39,8 @@ class PassiveSync {
 
  private:
   double SinceOrigin(int64_t arrival) const noexcept { return static_cast<double>(arrival - origin_); }
-  /// The least lateness [us] of waiting samples, if none of them was lost and the first was measured at `first`
-  /// since origin.
+  /// The least lateness [us] of waiting samples, if none of them was lost and the first was measured at
+  /// `first` since origin.
   double Lateness(std::span<const int64_t> waiting, double first) const noexcept;
 
   double period_, step_, max_gap_;

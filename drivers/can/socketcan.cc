@@ -64,23 +64,28 @@ class SocketCan : public Transport {
     if (interface.empty() || interface.size() >= IFNAMSIZ) {
       throw std::runtime_error(fmt::format("socketcan:{}: not an interface name, such as can0", interface));
     }
-    // Remote frames of our ids, 29-bit ids with the same low bits: without the flag bits in the mask they pass.
+    // Remote frames of our ids, 29-bit ids with the same low bits: without the flag bits in the mask they
+    // pass.
     for (const Filter& filter : filters_) {
-      kernel_filters_.push_back({.can_id = filter.id,
-                                 .can_mask = filter.mask | CAN_EFF_FLAG | (filter.remote ? 0 : CAN_RTR_FLAG)});
+      kernel_filters_.push_back(
+          {.can_id = filter.id, .can_mask = filter.mask | CAN_EFF_FLAG | (filter.remote ? 0 : CAN_RTR_FLAG)});
     }
     socket_ = OpenSocket();
     switch (socket_.valid() ? 0 : errno) {
-      case 0: break;
+      case 0:
+        break;
       case EAFNOSUPPORT:
       case EPROTONOSUPPORT:
         Fail("this kernel has no CAN; cure: modprobe can_raw, or use udp:239.74.163.2:43113");
       case ENODEV:
-        Fail(fmt::format("no such interface; cure: ip link add {0} type vcan && ip link set {0} up for a virtual "
-                         "one, or use udp:239.74.163.2:43113",
-                         interface_));
-      case EPROTOTYPE: Fail("not a CAN interface");
-      default: Fail(std::strerror(errno));
+        Fail(fmt::format(
+            "no such interface; cure: ip link add {0} type vcan && ip link set {0} up for a virtual "
+            "one, or use udp:239.74.163.2:43113",
+            interface_));
+      case EPROTOTYPE:
+        Fail("not a CAN interface");
+      default:
+        Fail(std::strerror(errno));
     }
     link_ = InterfaceState();
     for (size_t i = 0; i < kBatch; ++i) {
@@ -170,7 +175,8 @@ class SocketCan : public Transport {
     const int fd = fresh.get();
     ifreq request = Request();
     // Index 0 would bind to every CAN interface there is.
-    if (ioctl(fd, SIOCGIFINDEX, &request) != 0 || request.ifr_ifindex == 0) return errno = ENODEV, FileDescriptor();
+    if (ioctl(fd, SIOCGIFINDEX, &request) != 0 || request.ifr_ifindex == 0)
+      return errno = ENODEV, FileDescriptor();
     const int index = request.ifr_ifindex;
     if (ioctl(fd, SIOCGIFHWADDR, &request) != 0 || request.ifr_hwaddr.sa_family != ARPHRD_CAN) {
       return errno = EPROTOTYPE, FileDescriptor();

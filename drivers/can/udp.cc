@@ -60,7 +60,8 @@ class Udp : public Transport {
     SetOption(in, SOL_SOCKET, SO_TIMESTAMPNS, 1);
     // Without this a socket hears every group that anybody on the machine has joined.
     SetOption(in, IPPROTO_IP, IP_MULTICAST_ALL, 0);
-    if (bind(in, reinterpret_cast<const sockaddr*>(&group_), sizeof group_) != 0) Fail("cannot bind the port");
+    if (bind(in, reinterpret_cast<const sockaddr*>(&group_), sizeof group_) != 0)
+      Fail("cannot bind the port");
 
     // The interface that the routes choose, as python-can does; where no route leads, the loopback.
     ip_mreqn membership{};

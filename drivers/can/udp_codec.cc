@@ -9,7 +9,20 @@ namespace plumb {
 namespace {
 
 // In the order in which python-can writes them.
-enum Key { kTimestamp, kId, kExtended, kRemote, kError, kChannel, kDlc, kData, kFd, kBitRateSwitch, kEsi, kKeys };
+enum Key {
+  kTimestamp,
+  kId,
+  kExtended,
+  kRemote,
+  kError,
+  kChannel,
+  kDlc,
+  kData,
+  kFd,
+  kBitRateSwitch,
+  kEsi,
+  kKeys
+};
 constexpr std::array<std::string_view, kKeys> kNames = {
     "timestamp", "arbitration_id", "is_extended_id", "is_remote_frame", "is_error_frame",       "channel",
     "dlc",       "data",           "is_fd",          "bitrate_switch",  "error_state_indicator"};
@@ -184,18 +197,41 @@ bool DecodeUdp(std::span<const uint8_t> datagram, Frame& frame) noexcept {
     seen |= 1u << key;
     bool read = false;
     switch (key) {
-      case kTimestamp: read = reader.Number(); break;
-      case kId: read = reader.Unsigned(id); break;
-      case kExtended: read = reader.Bool(frame.extended); break;
-      case kRemote: read = reader.Bool(frame.remote); break;
-      case kError: read = reader.Bool(frame.error); break;
-      case kChannel: read = reader.Channel(); break;
-      case kDlc: read = reader.Unsigned(length); break;
-      case kData: read = reader.Binary(data); break;
-      case kFd: read = reader.Bool(frame.fd); break;
-      case kBitRateSwitch: read = reader.Bool(frame.bit_rate_switch); break;
-      case kEsi: read = reader.Bool(frame.error_state_indicator); break;
-      case kKeys: break;
+      case kTimestamp:
+        read = reader.Number();
+        break;
+      case kId:
+        read = reader.Unsigned(id);
+        break;
+      case kExtended:
+        read = reader.Bool(frame.extended);
+        break;
+      case kRemote:
+        read = reader.Bool(frame.remote);
+        break;
+      case kError:
+        read = reader.Bool(frame.error);
+        break;
+      case kChannel:
+        read = reader.Channel();
+        break;
+      case kDlc:
+        read = reader.Unsigned(length);
+        break;
+      case kData:
+        read = reader.Binary(data);
+        break;
+      case kFd:
+        read = reader.Bool(frame.fd);
+        break;
+      case kBitRateSwitch:
+        read = reader.Bool(frame.bit_rate_switch);
+        break;
+      case kEsi:
+        read = reader.Bool(frame.error_state_indicator);
+        break;
+      case kKeys:
+        break;
     }
     if (!read) return false;
   }

@@ -63,14 +63,16 @@ void CanSimpleDevice::OnFrame(const Frame& frame, int64_t now) noexcept {
         ++rejected_;
       }
       return;
-    default: break;
+    default:
+      break;
   }
   if (frame.remote) {
     ++rejected_;
     return;
   }
   switch (command) {
-    case kEstop.command: return FallIdle(kEstopRequested);
+    case kEstop.command:
+      return FallIdle(kEstopRequested);
     case kSetAxisState.command:
       if (const auto values = DecodePayload(kSetAxisState, frame)) {
         return RequestState(static_cast<int>(std::min((*values)[0], 255.0)), now);
@@ -83,9 +85,12 @@ void CanSimpleDevice::OnFrame(const Frame& frame, int64_t now) noexcept {
         return;
       }
       break;
-    case kSetInputPos.command: return OnSetpoint(kSetInputPos, frame, now);
-    case kSetInputVel.command: return OnSetpoint(kSetInputVel, frame, now);
-    case kSetInputTorque.command: return OnSetpoint(kSetInputTorque, frame, now);
+    case kSetInputPos.command:
+      return OnSetpoint(kSetInputPos, frame, now);
+    case kSetInputVel.command:
+      return OnSetpoint(kSetInputVel, frame, now);
+    case kSetInputTorque.command:
+      return OnSetpoint(kSetInputTorque, frame, now);
     case kClearErrors.command:
       if (DecodePayload(kClearErrors, frame)) {
         active_errors_ = disarm_reason_ = 0;
@@ -93,7 +98,8 @@ void CanSimpleDevice::OnFrame(const Frame& frame, int64_t now) noexcept {
         return;
       }
       break;
-    default: break;
+    default:
+      break;
   }
   ++rejected_;
 }
@@ -160,20 +166,27 @@ Frame CanSimpleDevice::Report(uint8_t command, const Sample& sample) const noexc
   switch (command) {
     case kGetVersion.command: {
       const auto& v = settings_.version;
-      return Make(kGetVersion, node, {double(v[0]), double(v[1]), double(v[2]), double(v[3]), double(v[4]),
-                                      double(v[5]), double(v[6]), double(v[7])});
+      return Make(kGetVersion, node,
+                  {double(v[0]), double(v[1]), double(v[2]), double(v[3]), double(v[4]), double(v[5]),
+                   double(v[6]), double(v[7])});
     }
     case kHeartbeat.command:
-      return Make(kHeartbeat, node, {double(active_errors_ | disarm_reason_), double(state_),
-                                     double(procedure_result_)});
-    case kGetError.command: return Make(kGetError, node, {double(active_errors_), double(disarm_reason_)});
-    case kAddress.command: return Make(kAddress, kBroadcastNode, {double(node), double(settings_.serial_number)});
-    case kGetEncoderEstimates.command: return Make(kGetEncoderEstimates, node, {sample.position, sample.velocity});
+      return Make(kHeartbeat, node,
+                  {double(active_errors_ | disarm_reason_), double(state_), double(procedure_result_)});
+    case kGetError.command:
+      return Make(kGetError, node, {double(active_errors_), double(disarm_reason_)});
+    case kAddress.command:
+      return Make(kAddress, kBroadcastNode, {double(node), double(settings_.serial_number)});
+    case kGetEncoderEstimates.command:
+      return Make(kGetEncoderEstimates, node, {sample.position, sample.velocity});
     case kGetIq.command:
       return Make(kGetIq, node, {torque / settings_.torque_constant, torque / settings_.torque_constant});
-    case kGetTemperature.command: return Make(kGetTemperature, node, {25, 25});
-    case kGetBusVoltageCurrent.command: return Make(kGetBusVoltageCurrent, node, {settings_.bus_voltage, 0});
-    default: return Make(kGetTorques, node, {torque, torque});
+    case kGetTemperature.command:
+      return Make(kGetTemperature, node, {25, 25});
+    case kGetBusVoltageCurrent.command:
+      return Make(kGetBusVoltageCurrent, node, {settings_.bus_voltage, 0});
+    default:
+      return Make(kGetTorques, node, {torque, torque});
   }
 }
 

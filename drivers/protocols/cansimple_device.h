@@ -22,20 +22,20 @@ namespace plumb {
 ///     transport->Send(batch.frames());
 ///   }
 ///
-/// Simplifications of the real one: torque control only (position and velocity setpoints feed the watchdog and
-/// move nothing), no SDO, no calibration states. Not thread-safe. Does not allocate.
+/// Simplifications of the real one: torque control only (position and velocity setpoints feed the watchdog
+/// and move nothing), no SDO, no calibration states. Not thread-safe. Does not allocate.
 class CanSimpleDevice {
  public:
   struct Settings {
-    int node = 1;                       ///< [0, 0x3E]
-    int64_t heartbeat_period = 100'000; ///< [us], > 0
-    int64_t encoder_period = 10'000;    ///< [us]; 0 = on request only
-    int64_t torques_period = 0;         ///< [us] of Get_Torques; 0 = on request only
-    int64_t watchdog = 0;               ///< [us] without a setpoint after which the armed drive disarms; 0 = off
+    int node = 1;                        ///< [0, 0x3E]
+    int64_t heartbeat_period = 100'000;  ///< [us], > 0
+    int64_t encoder_period = 10'000;     ///< [us]; 0 = on request only
+    int64_t torques_period = 0;          ///< [us] of Get_Torques; 0 = on request only
+    int64_t watchdog = 0;  ///< [us] without a setpoint after which the armed drive disarms; 0 = off
     std::array<uint8_t, 8> version = {2, 4, 4, 58, 0, 6, 10, 0};  ///< protocol, hardware (3), firmware (4)
-    uint64_t serial_number = 0;         ///< 48 bits, for the Address message
-    double torque_constant = 0.0827;    ///< [Nm/A] for Get_Iq
-    double bus_voltage = 24;            ///< [V] for Get_Bus_Voltage_Current
+    uint64_t serial_number = 0;                                   ///< 48 bits, for the Address message
+    double torque_constant = 0.0827;                              ///< [Nm/A] for Get_Iq
+    double bus_voltage = 24;                                      ///< [V] for Get_Bus_Voltage_Current
   };
   struct Sample {
     double position = 0;  ///< [rev] at the motor's shaft
@@ -50,9 +50,9 @@ class CanSimpleDevice {
   /// Obeys a frame; others' are ignored. Answers wait for the next Tick.
   void OnFrame(const Frame& frame, int64_t now) noexcept;
 
-  /// Brings the drive to `now`: watchdog first, then answers, then what is due by the schedule. Cyclic messages
-  /// are due at exact multiples of their periods; one tick sends each of them at most once, so a tick that
-  /// comes late skips the instants it has missed.
+  /// Brings the drive to `now`: watchdog first, then answers, then what is due by the schedule. Cyclic
+  /// messages are due at exact multiples of their periods; one tick sends each of them at most once, so a
+  /// tick that comes late skips the instants it has missed.
   void Tick(int64_t now, const Sample& sample, FrameBatch& out) noexcept;
 
   /// The next instant at which Tick has something to do of its own accord.
@@ -79,12 +79,12 @@ class CanSimpleDevice {
   int control_mode_ = cansimple::kPositionControl;
   int input_mode_ = cansimple::kPassthrough;
   int procedure_result_ = cansimple::kSuccess;
-  uint32_t active_errors_ = 0;   ///< conditions that exist now
-  uint32_t disarm_reason_ = 0;   ///< what disarmed it, until Clear_Errors
-  double setpoint_ = 0;          ///< [Nm]
-  int64_t fed_;                  ///< time of the last setpoint
+  uint32_t active_errors_ = 0;  ///< conditions that exist now
+  uint32_t disarm_reason_ = 0;  ///< what disarmed it, until Clear_Errors
+  double setpoint_ = 0;         ///< [Nm]
+  int64_t fed_;                 ///< time of the last setpoint
   int64_t next_heartbeat_, next_encoder_, next_torques_;
-  uint32_t requested_ = 0;       ///< bit i: command i has been asked for
+  uint32_t requested_ = 0;  ///< bit i: command i has been asked for
   int64_t rejected_ = 0;
   int64_t setpoints_ = 0;
 };

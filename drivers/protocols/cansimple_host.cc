@@ -11,9 +11,9 @@ namespace {
 using namespace cansimple;
 
 constexpr double kRadiansPerTurn = 2 * std::numbers::pi;
-constexpr int64_t kRetry = 50'000;     // [us] between repetitions of an unanswered frame
+constexpr int64_t kRetry = 50'000;      // [us] between repetitions of an unanswered frame
 constexpr int kDisarmsBeforeEstop = 5;  // a drive that ignores these gets its emergency stop
-constexpr int kBeatsToArm = 4;         // heartbeats a drive has to enter closed loop; the first may be on its way
+constexpr int kBeatsToArm = 4;  // heartbeats a drive has to enter closed loop; the first may be on its way
 
 class CanSimpleMotor : public Motor {
  public:
@@ -27,16 +27,23 @@ class CanSimpleMotor : public Motor {
       return FrameUse::kNotMine;
     }
     switch (frame.id & 0x1F) {
-      case kHeartbeat.command: return OnHeartbeat(frame, now);
-      case kGetVersion.command: return OnVersion(frame);
-      case kGetError.command: return OnError(frame);
-      case kGetEncoderEstimates.command: return OnEstimates(frame);
-      case kGetTorques.command: return OnTorques(frame);
+      case kHeartbeat.command:
+        return OnHeartbeat(frame, now);
+      case kGetVersion.command:
+        return OnVersion(frame);
+      case kGetError.command:
+        return OnError(frame);
+      case kGetEncoderEstimates.command:
+        return OnEstimates(frame);
+      case kGetTorques.command:
+        return OnTorques(frame);
       case kGetIq.command:
       case kGetTemperature.command:
       case kGetBusVoltageCurrent.command:
-      case kGetPowers.command: return frame.length == 8 ? FrameUse::kConsumed : FrameUse::kRejected;
-      default: return FrameUse::kRejected;
+      case kGetPowers.command:
+        return frame.length == 8 ? FrameUse::kConsumed : FrameUse::kRejected;
+      default:
+        return FrameUse::kRejected;
     }
   }
 
@@ -101,8 +108,11 @@ class CanSimpleMotor : public Motor {
                DescribeErrors(axis_error_, buffer), DescribeProcedureResult(procedure_result_));
         }
         break;
-      case Step::kArmed: break;
-      case Step::kDisarming: TickDisarming(now, out); break;
+      case Step::kArmed:
+        break;
+      case Step::kDisarming:
+        TickDisarming(now, out);
+        break;
     }
     if (ask_error_ && out.Push(MakeRequest(kGetError, node_))) ask_error_ = false;
   }
@@ -241,7 +251,8 @@ class CanSimpleMotor : public Motor {
 
 std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description, const MotorTiming& timing) {
   if (description.node < 0 || description.node > kMaxNode) {
-    throw std::invalid_argument(fmt::format("CANSimple node {} is not in [0, {}]", description.node, kMaxNode));
+    throw std::invalid_argument(
+        fmt::format("CANSimple node {} is not in [0, {}]", description.node, kMaxNode));
   }
   return std::make_unique<CanSimpleMotor>(description.node, timing);
 }

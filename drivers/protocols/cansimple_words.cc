@@ -34,17 +34,40 @@ constexpr ErrorWord kErrorWords[] = {
     {30, "calibration error"},
 };
 
-constexpr std::array<std::string_view, 17> kStates = {
-    "UNDEFINED", "IDLE", "STARTUP_SEQUENCE", "FULL_CALIBRATION_SEQUENCE", "MOTOR_CALIBRATION", "state 5",
-    "ENCODER_INDEX_SEARCH", "ENCODER_OFFSET_CALIBRATION", "CLOSED_LOOP_CONTROL", "LOCKIN_SPIN",
-    "ENCODER_DIR_FIND", "HOMING", "HALL_POLARITY_CALIBRATION", "HALL_PHASE_CALIBRATION",
-    "ANTICOGGING_CALIBRATION", "HARMONIC_CALIBRATION", "HARMONIC_CALIBRATION_COMMUTATION"};
+constexpr std::array<std::string_view, 17> kStates = {"UNDEFINED",
+                                                      "IDLE",
+                                                      "STARTUP_SEQUENCE",
+                                                      "FULL_CALIBRATION_SEQUENCE",
+                                                      "MOTOR_CALIBRATION",
+                                                      "state 5",
+                                                      "ENCODER_INDEX_SEARCH",
+                                                      "ENCODER_OFFSET_CALIBRATION",
+                                                      "CLOSED_LOOP_CONTROL",
+                                                      "LOCKIN_SPIN",
+                                                      "ENCODER_DIR_FIND",
+                                                      "HOMING",
+                                                      "HALL_POLARITY_CALIBRATION",
+                                                      "HALL_PHASE_CALIBRATION",
+                                                      "ANTICOGGING_CALIBRATION",
+                                                      "HARMONIC_CALIBRATION",
+                                                      "HARMONIC_CALIBRATION_COMMUTATION"};
 
-constexpr std::array<std::string_view, 16> kResults = {
-    "success", "busy", "cancelled", "disarmed", "no response", "pole pair or CPR mismatch",
-    "phase resistance out of range", "phase inductance out of range", "unbalanced phases", "invalid motor type",
-    "illegal hall state", "timeout", "homing without endstop", "invalid state", "not calibrated",
-    "not converging"};
+constexpr std::array<std::string_view, 16> kResults = {"success",
+                                                       "busy",
+                                                       "cancelled",
+                                                       "disarmed",
+                                                       "no response",
+                                                       "pole pair or CPR mismatch",
+                                                       "phase resistance out of range",
+                                                       "phase inductance out of range",
+                                                       "unbalanced phases",
+                                                       "invalid motor type",
+                                                       "illegal hall state",
+                                                       "timeout",
+                                                       "homing without endstop",
+                                                       "invalid state",
+                                                       "not calibrated",
+                                                       "not converging"};
 
 }  // namespace
 

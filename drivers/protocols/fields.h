@@ -19,8 +19,9 @@ struct Field {
   enum class Kind : uint8_t { kUnsigned, kSigned, kFloat };
 
   std::string_view name;
-  uint8_t bit = 0;   ///< of the least significant bit, counted from bit 0 of byte 0
-  uint8_t bits = 0;  ///< width; 32 for kFloat (IEEE 754 binary32); at most 48, so that a double holds it exactly
+  uint8_t bit = 0;  ///< of the least significant bit, counted from bit 0 of byte 0
+  uint8_t bits =
+      0;  ///< width; 32 for kFloat (IEEE 754 binary32); at most 48, so that a double holds it exactly
   Kind kind = Kind::kUnsigned;
   double scale = 1;  ///< value = raw * scale
   std::string_view unit = "";
@@ -30,7 +31,8 @@ struct Field {
   /// @param payload the payload's bytes as a little-endian number.
   constexpr double Decode(uint64_t payload) const {
     const uint64_t raw = payload >> bit & mask();
-    if (kind == Kind::kFloat) return static_cast<double>(std::bit_cast<float>(static_cast<uint32_t>(raw))) * scale;
+    if (kind == Kind::kFloat)
+      return static_cast<double>(std::bit_cast<float>(static_cast<uint32_t>(raw))) * scale;
     if (kind == Kind::kSigned && (raw >> (bits - 1) & 1) != 0) {
       return (static_cast<double>(raw) - static_cast<double>(mask()) - 1) * scale;
     }
@@ -87,11 +89,12 @@ constexpr void EncodePayload(const Layout& layout, std::initializer_list<double>
   size_t i = 0;
   for (const double value : values) payload |= layout.fields[i++].Encode(value);
   frame.length = layout.length;
-  for (size_t byte = 0; byte < layout.length; ++byte) frame.data[byte] = static_cast<uint8_t>(payload >> (8 * byte));
+  for (size_t byte = 0; byte < layout.length; ++byte)
+    frame.data[byte] = static_cast<uint8_t>(payload >> (8 * byte));
 }
 
-/// Reads a frame's payload. @return nothing if it is too short or too long for a classic frame. The values may
-/// not be finite.
+/// Reads a frame's payload. @return nothing if it is too short or too long for a classic frame. The values
+/// may not be finite.
 constexpr std::optional<FieldValues> DecodePayload(const Layout& layout, const Frame& frame) {
   if (frame.remote || frame.length < layout.needed() || frame.length > 8) return {};
   uint64_t payload = 0;

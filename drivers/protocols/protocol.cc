@@ -25,7 +25,8 @@ std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const Moto
     if (description.protocol == protocol.name) return protocol.make(description, timing);
     known += (known.empty() ? "" : ", ") + std::string(protocol.name);
   }
-  throw std::invalid_argument(fmt::format("unknown motor protocol '{}'; known: {}", description.protocol, known));
+  throw std::invalid_argument(
+      fmt::format("unknown motor protocol '{}'; known: {}", description.protocol, known));
 }
 
 }  // namespace plumb

@@ -48,9 +48,9 @@ enum class FrameUse {
   kEstimate,  ///< carried a new MotorEstimate
 };
 
-/// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All methods but
-/// the constructor are free of exceptions and allocation; times are scaled monotonic microseconds. Frames to
-/// send go into a batch. Units are SI at the motor's shaft; drives' own units end here. Not thread-safe.
+/// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All methods
+/// but the constructor are free of exceptions and allocation; times are scaled monotonic microseconds. Frames
+/// to send go into a batch. Units are SI at the motor's shaft; drives' own units end here. Not thread-safe.
 class Motor {
  public:
   virtual ~Motor() = default;
@@ -83,11 +83,13 @@ class Motor {
 
 /// What a motor needs to know of the driver's settings.
 struct MotorTiming {
-  int64_t heartbeat_timeout;  ///< [us] silence after which a drive counts as absent; also for each arming step
+  int64_t
+      heartbeat_timeout;  ///< [us] silence after which a drive counts as absent; also for each arming step
 };
 
 /// A motor of the named protocol (MotorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or a node it cannot have.
+/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or a node it cannot
+/// have.
 std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const MotorTiming& timing);
 
 }  // namespace plumb

@@ -8,8 +8,8 @@
 namespace plumb::cansimple {
 namespace {
 
-// Frames of node 1, written by hand from the protocol's documentation and checked with python3-canmatrix: they
-// share nothing with our tables.
+// Frames of node 1, written by hand from the protocol's documentation and checked with python3-canmatrix:
+// they share nothing with our tables.
 struct Row {
   const Layout* layout;
   std::vector<double> values;
@@ -40,12 +40,18 @@ const Row kRows[] = {
 
 Frame MakeFromVector(const Layout& layout, int node, const std::vector<double>& v) {
   switch (v.size()) {
-    case 0: return Make(layout, node);
-    case 1: return Make(layout, node, {v[0]});
-    case 2: return Make(layout, node, {v[0], v[1]});
-    case 3: return Make(layout, node, {v[0], v[1], v[2]});
-    case 4: return Make(layout, node, {v[0], v[1], v[2], v[3]});
-    default: return Make(layout, node, {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7]});
+    case 0:
+      return Make(layout, node);
+    case 1:
+      return Make(layout, node, {v[0]});
+    case 2:
+      return Make(layout, node, {v[0], v[1]});
+    case 3:
+      return Make(layout, node, {v[0], v[1], v[2]});
+    case 4:
+      return Make(layout, node, {v[0], v[1], v[2], v[3]});
+    default:
+      return Make(layout, node, {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7]});
   }
 }
 
@@ -66,7 +72,8 @@ TEST_CASE("messages have the documented bytes, both ways") {
 TEST_CASE("requests are remote frames, the address is unaddressed, short setpoints are known") {
   CHECK(ToText(MakeRequest(kGetEncoderEstimates, 1)) == "029#R");
   CHECK(ToText(MakeRequest(kAddress, kBroadcastNode)) == "7E6#R");
-  CHECK(ToText(Make(kAddress, kBroadcastNode, {1, static_cast<double>(0x335E3D563432)})) == "7E6#013234563D5E33");
+  CHECK(ToText(Make(kAddress, kBroadcastNode, {1, static_cast<double>(0x335E3D563432)})) ==
+        "7E6#013234563D5E33");
   const auto values = DecodePayload(kAddress, *FrameFromText("7E6#013234563D5E3300"));
   REQUIRE(values);
   CHECK((*values)[0] == 1);
@@ -105,7 +112,8 @@ TEST_CASE("errors in words") {
   std::array<char, 64> buffer;
   CHECK(DescribeErrors(0, buffer) == "no error");
   CHECK(DescribeErrors(kWatchdogTimerExpired, buffer) == "watchdog timer expired");
-  CHECK(DescribeErrors(kWatchdogTimerExpired | kEstopRequested, buffer) == "watchdog timer expired, estop requested");
+  CHECK(DescribeErrors(kWatchdogTimerExpired | kEstopRequested, buffer) ==
+        "watchdog timer expired, estop requested");
   CHECK(DescribeErrors(1u << 31, buffer) == "unknown error");
   CHECK(DescribeErrors(~0u, buffer).size() == 64);  // cut, not overrun
   CHECK(DescribeAxisState(1) == "IDLE");

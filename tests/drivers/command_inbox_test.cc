@@ -18,7 +18,8 @@ joint_command_t Command(int64_t sequence, double effort, int joints = 2) {
   command.num_joints = joints;
   command.expiry = 0;
   command.effort.assign(size, effort);
-  for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd}) values->assign(size, kNan);
+  for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd})
+    values->assign(size, kNan);
   return command;
 }
 
@@ -39,7 +40,9 @@ TEST_CASE("the newest command counts") {
 
 TEST_CASE("what is no command") {
   CommandInbox inbox(2, 100'000);
-  const auto rejects = [&](const joint_command_t& command) { return !inbox.Offer(command, 0, kUtime) && inbox.empty(); };
+  const auto rejects = [&](const joint_command_t& command) {
+    return !inbox.Offer(command, 0, kUtime) && inbox.empty();
+  };
   CHECK(rejects(Command(1, 0, 1)));
   CHECK(rejects(Command(1, kNan)));
   CHECK(rejects(Command(1, INFINITY)));

@@ -1,4 +1,5 @@
-// No allocation in the driver's cycle, whatever happens in it. This binary counts what operator new is asked for.
+// No allocation in the driver's cycle, whatever happens in it. This binary counts what operator new is asked
+// for.
 
 #include <atomic>
 #include <catch2/catch.hpp>
@@ -58,7 +59,8 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
 
     const long before = allocations;
     while (const int count = driver_end->Receive(frames)) {
-      for (int i = 0; i < count; ++i) rig.driver->OnFrame(frames[static_cast<size_t>(i)], rig.now, rig.utime());
+      for (int i = 0; i < count; ++i)
+        rig.driver->OnFrame(frames[static_cast<size_t>(i)], rig.now, rig.utime());
     }
     if (cycle % 100 == 50) rig.driver->OnFrame(event, rig.now, rig.utime());
     while (rig.driver->NextState()) ++states;

@@ -65,7 +65,8 @@ TEST_CASE("lost estimates never pair what was measured more than 0.6 periods apa
     for (int k = 0; k < 5000; ++k) {
       if (random.Uniform() >= 0.05) measurements.Add(0, At(k, 0), kStart + kPeriod * k + random.Bits() % 200);
       take_all();
-      if (random.Uniform() >= 0.05) measurements.Add(1, At(k, 1), kStart + kPeriod * k + phase + random.Bits() % 200);
+      if (random.Uniform() >= 0.05)
+        measurements.Add(1, At(k, 1), kStart + kPeriod * k + phase + random.Bits() % 200);
       take_all();
     }
     INFO("phase " << phase);

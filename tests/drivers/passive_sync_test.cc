@@ -104,7 +104,8 @@ TEST_CASE("samples that were held up are told from lost ones by what comes behin
   // 17 ms late: the first of them waits, whether the others are read together with it or not.
   CHECK(feed.Add({kStart + 22'000}).empty());
   CHECK(feed.Add({kStart + 22'010, kStart + 22'020}).empty());
-  CHECK(feed.Add({kStart + 22'030}) == Times{kStart + 5000, kStart + 10'000, kStart + 15'000, kStart + 20'000});
+  CHECK(feed.Add({kStart + 22'030}) ==
+        Times{kStart + 5000, kStart + 10'000, kStart + 15'000, kStart + 20'000});
   CHECK(feed.Add({kStart + 29'800}).empty());  // alone, nearly a period late
   CHECK(feed.Add({kStart + 30'001}) == Times{kStart + 25'000, kStart + 30'000});
   CHECK(feed.sync.lost() == 0);
@@ -117,7 +118,8 @@ TEST_CASE("samples that were held up are told from lost ones by what comes behin
     CHECK(feed.sync.lost() == 1);
   }
   SECTION("several losses in a row") {
-    CHECK(feed.Add({kStart + 60'010, kStart + 65'020, kStart + 70'030, kStart + 75'020, kStart + 80'020}).size() == 5);
+    CHECK(feed.Add({kStart + 60'010, kStart + 65'020, kStart + 70'030, kStart + 75'020, kStart + 80'020})
+              .size() == 5);
     CHECK(feed.sync.lost() == 5);
   }
   SECTION("held up twice in a row, ever later") {
@@ -143,7 +145,8 @@ TEST_CASE("after a long gap and after a step of the clock it starts anew") {
   CHECK(feed.Add({later, later + 10, later + 20, later + 5100, later + 10'030}).empty());
   const Times times = feed.Add({later + 18'000});
   REQUIRE(times.size() == 6);
-  for (int k = 0; k < 6; ++k) CHECK(times[static_cast<size_t>(k)] == Approx(later + 20 + 5000 * (k - 2)).margin(10));
+  for (int k = 0; k < 6; ++k)
+    CHECK(times[static_cast<size_t>(k)] == Approx(later + 20 + 5000 * (k - 2)).margin(10));
   CHECK(feed.sync.resets() == 1);
 
   const int64_t back = kStart - 3'600'000'000;

@@ -12,8 +12,8 @@
 
 namespace plumb {
 
-/// A driver and its virtual drives in virtual time: milliseconds pass one by one, the driver cycles every five.
-/// Everything on the wire passes through the two taps, which may drop or change it.
+/// A driver and its virtual drives in virtual time: milliseconds pass one by one, the driver cycles every
+/// five. Everything on the wire passes through the two taps, which may drop or change it.
 struct Rig {
   static constexpr int64_t kEpoch = 1'700'000'000'000'000;  ///< utime - now
 
@@ -102,7 +102,8 @@ struct Rig {
     command.num_joints = static_cast<int32_t>(size);
     command.expiry = 0;
     command.effort.assign(size, value);
-    for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd}) values->assign(size, kNan);
+    for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd})
+      values->assign(size, kNan);
     return command;
   }
   void Command(double value) { driver->OnCommand(MakeCommand(value), now, utime()); }
@@ -132,7 +133,8 @@ struct Rig {
   }
 
   RobotDescription robot{};
-  CanSimpleDevice::Settings settings = {.heartbeat_period = 20'000, .encoder_period = 5'000, .watchdog = 100'000};
+  CanSimpleDevice::Settings settings = {
+      .heartbeat_period = 20'000, .encoder_period = 5'000, .watchdog = 100'000};
   std::unique_ptr<Driver> driver;
   std::vector<CanSimpleDevice> drives;
   std::vector<CanSimpleDevice::Sample> samples;

@@ -34,7 +34,8 @@ std::vector<Frame> ReceiveAll(Transport& transport, size_t enough) {
 }
 
 TEST_CASE("every transport of a loop hears the others and not itself") {
-  const auto a = OpenTransport("loop:three"), b = OpenTransport("loop:three"), c = OpenTransport("loop:three");
+  const auto a = OpenTransport("loop:three"), b = OpenTransport("loop:three"),
+             c = OpenTransport("loop:three");
   const auto elsewhere = OpenTransport("loop:other");
   const Frame frame = *FrameFromText("02E#0000C03F00000000");
   CHECK(a->Send({&frame, 1}) == 1);
@@ -79,8 +80,10 @@ TEST_CASE("a loop keeps the order and counts what it loses") {
 TEST_CASE("filters let in what they name") {
   const auto a = OpenTransport("loop:filters");
   const auto host = OpenTransport("loop:filters", {{.id = 0x20, .mask = 0x7E0}});
-  const auto device = OpenTransport("loop:filters", {{.id = 0x20, .mask = 0x7E0, .remote = true}, {.id = 0x7E6}});
-  for (const char* text : {"029#11", "029#R", "049#11", "00000029#11", "7E6#R", "7E6#01", "20000040#0000000000000000"}) {
+  const auto device =
+      OpenTransport("loop:filters", {{.id = 0x20, .mask = 0x7E0, .remote = true}, {.id = 0x7E6}});
+  for (const char* text :
+       {"029#11", "029#R", "049#11", "00000029#11", "7E6#R", "7E6#01", "20000040#0000000000000000"}) {
     const Frame frame = *FrameFromText(text);
     a->Send({&frame, 1});
   }
@@ -99,7 +102,8 @@ TEST_CASE("udp multicast carries frames, stamps their arrival and drops the send
   const auto a = OpenTransport(UdpUrl()), b = OpenTransport(UdpUrl());
   const auto other_group = OpenTransport("udp:239.74.163.78:" + std::to_string(Port()));
   std::vector<Frame> frames;
-  for (const char* text : {"02E#0000C03F00000000", "029#R", "1ABCDEF0#0011", "124##1000102030405060708090A0B"}) {
+  for (const char* text :
+       {"02E#0000C03F00000000", "029#R", "1ABCDEF0#0011", "124##1000102030405060708090A0B"}) {
     frames.push_back(*FrameFromText(text));
   }
   timespec before;

@@ -1,5 +1,6 @@
-// Against the kernel's own SocketCAN: run by tests/with-vcan as root of a network namespace, or of a guest, that has
-// vcan0 and ends with the test. Anywhere else every case fails or the whole is skipped; nothing passes untested.
+// Against the kernel's own SocketCAN: run by tests/with-vcan as root of a network namespace, or of a guest,
+// that has vcan0 and ends with the test. Anywhere else every case fails or the whole is skipped; nothing
+// passes untested.
 
 #include <poll.h>
 
@@ -59,8 +60,8 @@ TEST_CASE("frames of every kind cross vcan, stamped; the sender's echo is only c
   FreshVcan();
   const auto a = OpenTransport("socketcan:vcan0"), b = OpenTransport("socketcan:vcan0");
   CHECK(a->link() == LinkState::kUp);
-  const Texts texts = {"02E#0000C03F00000000", "029#R", "029#R8", "1ABCDEF0#0011", "124##1000102030405060708090A0B",
-                       "022#"};
+  const Texts texts = {"02E#0000C03F00000000",           "029#R", "029#R8", "1ABCDEF0#0011",
+                       "124##1000102030405060708090A0B", "022#"};
   CHECK(Send(*a, texts) == 6);
   std::array<Frame, 1> first;
   pollfd polled{b->fd(), POLLIN, 0};
@@ -84,8 +85,10 @@ TEST_CASE("can-utils hear us and we hear them") {
   CHECK(ReceiveAll(*bus) == Texts{"029#000080BE00006040", "029#R"});
   Shell("candump -n 1 -L vcan0 > /tmp/socketcan_test.log & echo $! > /tmp/socketcan_test.pid; sleep 1");
   CHECK(Send(*bus, {"02E#0000C03F00000000"}) == 1);
-  Shell("for i in 1 2 3 4 5 6 7 8 9 10; do kill -0 $(cat /tmp/socketcan_test.pid) 2>/dev/null || break; sleep 0.2; done; "
-        "grep -q '02E#0000C03F00000000' /tmp/socketcan_test.log");
+  Shell(
+      "for i in 1 2 3 4 5 6 7 8 9 10; do kill -0 $(cat /tmp/socketcan_test.pid) 2>/dev/null || break; sleep "
+      "0.2; done; "
+      "grep -q '02E#0000C03F00000000' /tmp/socketcan_test.log");
 }
 
 TEST_CASE("the kernel filters: other nodes, remote frames and 29-bit ids stay out, errors come in") {

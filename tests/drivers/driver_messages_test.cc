@@ -1,0 +1,134 @@
+#include "drivers/driver.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <numbers>
+
+#include "tests/drivers/rig.h"
+
+namespace plumb {
+namespace {
+
+using Catch::Matchers::Contains;
+
+constexpr double kTwoPi = 2 * std::numbers::pi;
+
+TEST_CASE("JOINT_STATE comes once per measurement, with regular times and the effort that acted") {
+  Rig rig(2);
+  rig.cycle_phase = 2000;
+  rig.Start();
+  int64_t step = 0;
+  rig.on_step = [&] {
+    ++step;
+    rig.effort = std::sin(0.013 * static_cast<double>(step));
+    for (size_t i = 0; i < 2; ++i) rig.samples[i] = {0.001 * static_cast<double>(step), 1.0 / kTwoPi};
+  };
+  REQUIRE(rig.Arm());
+  // What was sent when, noted by the receiver's side.
+  struct Setpoint {
+    int64_t utime;
+    double effort;
+  };
+  std::vector<Setpoint> setpoints;
+  rig.to_drive = [&](Frame& frame) {
+    const auto values = DecodePayload(cansimple::kSetInputTorque, frame);
+    if (frame.id == 0x4E) setpoints.push_back({rig.utime(), (*values)[0]});
+    return true;
+  };
+  rig.Run(50);
+  rig.states.clear();
+  rig.Run(1000);
+  REQUIRE(rig.states.size() == 200);
+  for (size_t i = 0; i < rig.states.size(); ++i) {
+    const joint_state_t& state = rig.states[i];
+    CHECK(state.num_joints == 2);
+    CHECK(state.valid[1]);
+    CHECK(state.velocity[1] == Approx(1));
+    CHECK(std::isnan(state.effort_measured[0]));
+    if (i == 0) continue;
+    CHECK(state.sequence == rig.states[i - 1].sequence + 1);
+    const int64_t from = rig.states[i - 1].utime, to = state.utime;
+    CHECK(to - from == Approx(5000).margin(2));
+    double integral = 0;
+    for (size_t k = 0; k < setpoints.size(); ++k) {
+      const int64_t begin = std::max(from, setpoints[k].utime);
+      const int64_t end = std::min(to, k + 1 < setpoints.size() ? setpoints[k + 1].utime : to);
+      if (end > begin) integral += setpoints[k].effort * static_cast<double>(end - begin);
+    }
+    CHECK(state.effort_applied[1] == Approx(integral / static_cast<double>(to - from)).margin(1e-6));
+  }
+}
+
+TEST_CASE("the first JOINT_STATE has no effort applied, idle ones have zero") {
+  Rig rig;
+  rig.Start();
+  rig.Run(50);
+  REQUIRE(rig.states.size() == 10);
+  CHECK(std::isnan(rig.states[0].effort_applied[0]));
+  CHECK(rig.states.back().effort_applied[0] == 0);
+  CHECK(rig.states.back().effort_sent[0] == 0);
+}
+
+TEST_CASE("an effort that the bus did not accept was not applied") {
+  Rig rig;
+  rig.settings.watchdog = 0;
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  rig.Run(50);
+  rig.bus_full = true;
+  rig.effort = -1;
+  rig.Run(20);
+  CHECK(rig.states.back().effort_sent[0] == 1);
+  CHECK(rig.states.back().effort_applied[0] == Approx(1));
+  rig.bus_full = false;
+  rig.Run(20);
+  CHECK(rig.states.back().effort_applied[0] == Approx(-1));
+}
+
+TEST_CASE("torques that the drive reports reach the message at the joint's side") {
+  Rig rig;
+  rig.settings.torques_period = 5'000;
+  rig.robot.joints[0].motor.gear = 2;
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  rig.Run(50);
+  CHECK(rig.states.back().effort_measured[0] == Approx(1));
+}
+
+TEST_CASE("the status message counts") {
+  Rig rig;
+  rig.Start();
+  rig.stats = {.received = 0, .sent = 70, .refused = 3, .malformed = 4, .lost = 5, .echoes = 6};
+  rig.lateness = 3;
+  rig.Run(50);
+  rig.lateness = 6000;
+  rig.Run(5);
+  const driver_status_t& status = rig.Status();
+  CHECK(status.state == driver_status_t::IDLE);
+  CHECK(status.joint_name == std::vector<std::string>{"pivot"});
+  CHECK(status.frames_sent == 70);
+  CHECK(status.frames_dropped == 8);
+  CHECK(status.frames_rejected == 4);
+  CHECK(status.frames_received == 11 + 2);  // estimates, heartbeats
+  CHECK(status.cycles == 11);
+  CHECK(status.overruns == 1);
+  CHECK(status.num_bins == static_cast<int32_t>(status.lateness.size()));
+  CHECK(status.lateness[1] == 10);
+  CHECK(status.lateness[12] == 1);
+  std::vector<uint8_t> buffer(static_cast<size_t>(status.getEncodedSize()));
+  CHECK(status.encode(buffer.data(), 0, static_cast<int>(buffer.size())) == static_cast<int>(buffer.size()));
+}
+
+TEST_CASE("robots it cannot drive") {
+  Rig rig(2);
+  rig.robot.joints[1].motor.node = 1;
+  CHECK_THROWS_WITH(rig.Start(), Contains("'pivot' and 'knee1'"));
+  rig.robot.joints[1].motor = {.protocol = "telepathy", .node = 2};
+  CHECK_THROWS_WITH(rig.Start(), Contains("telepathy") && Contains("cansimple"));
+  rig.robot.joints[1].motor = {.protocol = "cansimple", .node = 63};
+  CHECK_THROWS_WITH(rig.Start(), Contains("63"));
+}
+
+}  // namespace
+}  // namespace plumb
