@@ -139,10 +139,12 @@ class DriverProcess {
     do {
       Step();
     } while (!driver_.confirmed_idle() && clock_.Now() - begin < patience);
-    if (driver_.confirmed_idle()) {
-      spdlog::info("stopped, drives idle");
-    } else {
+    if (!driver_.confirmed_idle()) {
       spdlog::error("stopped, but a drive has not confirmed that it is idle");
+    } else if (driver_.state() == DriveState::kAbsent) {
+      spdlog::info("stopped; a drive is absent");
+    } else {
+      spdlog::info("stopped, drives idle");
     }
     return 0;
   }

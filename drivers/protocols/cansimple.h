@@ -31,59 +31,45 @@ using detail::F;
 using detail::I16;
 using detail::U;
 
-// clang-format off: these are tables.
+// clang-format off
 // From the drive: cyclic, or in answer to a remote frame of the same id.
-inline constexpr Layout kGetVersion{
-    0x00,
-    "Get_Version",
-    8,
+inline constexpr Layout kGetVersion{0x00, "Get_Version", 8,
     {{U("Protocol_Version", 0, 8), U("Hw_Version_Major", 8, 8), U("Hw_Version_Minor", 16, 8),
       U("Hw_Version_Variant", 24, 8), U("Fw_Version_Major", 32, 8), U("Fw_Version_Minor", 40, 8),
       U("Fw_Version_Revision", 48, 8), U("Fw_Version_Unreleased", 56, 8)}}};
-inline constexpr Layout kHeartbeat{0x01,
-                                   "Heartbeat",
-                                   8,
-                                   {{U("Axis_Error", 0, 32), U("Axis_State", 32, 8),
-                                     U("Procedure_Result", 40, 8), U("Trajectory_Done_Flag", 48, 1)}}};
-inline constexpr Layout kGetError{
-    0x03, "Get_Error", 8, {{U("Active_Errors", 0, 32), U("Disarm_Reason", 32, 32)}}};
-inline constexpr Layout kTxSdo{
-    0x05,
-    "TxSdo",
-    8,
+inline constexpr Layout kHeartbeat{0x01, "Heartbeat", 8,
+    {{U("Axis_Error", 0, 32), U("Axis_State", 32, 8), U("Procedure_Result", 40, 8),
+      U("Trajectory_Done_Flag", 48, 1)}}};
+inline constexpr Layout kGetError{0x03, "Get_Error", 8,
+    {{U("Active_Errors", 0, 32), U("Disarm_Reason", 32, 32)}}};
+inline constexpr Layout kTxSdo{0x05, "TxSdo", 8,
     {{U("Reserved0", 0, 8), U("Endpoint_ID", 8, 16), U("Reserved1", 24, 8), F("Value", 32, "")}}};
 inline constexpr Layout kAddress{0x06, "Address", 7, {{U("Node_ID", 0, 8), U("Serial_Number", 8, 48)}}};
-inline constexpr Layout kGetEncoderEstimates{
-    0x09, "Get_Encoder_Estimates", 8, {{F("Pos_Estimate", 0, "rev"), F("Vel_Estimate", 32, "rev/s")}}};
+inline constexpr Layout kGetEncoderEstimates{0x09, "Get_Encoder_Estimates", 8,
+    {{F("Pos_Estimate", 0, "rev"), F("Vel_Estimate", 32, "rev/s")}}};
 inline constexpr Layout kGetIq{0x14, "Get_Iq", 8, {{F("Iq_Setpoint", 0, "A"), F("Iq_Measured", 32, "A")}}};
-inline constexpr Layout kGetTemperature{
-    0x15, "Get_Temperature", 8, {{F("FET_Temperature", 0, "degC"), F("Motor_Temperature", 32, "degC")}}};
-inline constexpr Layout kGetBusVoltageCurrent{
-    0x17, "Get_Bus_Voltage_Current", 8, {{F("Bus_Voltage", 0, "V"), F("Bus_Current", 32, "A")}}};
-inline constexpr Layout kGetTorques{
-    0x1C, "Get_Torques", 8, {{F("Torque_Target", 0, "Nm"), F("Torque_Estimate", 32, "Nm")}}};
-inline constexpr Layout kGetPowers{
-    0x1D, "Get_Powers", 8, {{F("Electrical_Power", 0, "W"), F("Mechanical_Power", 32, "W")}}};
+inline constexpr Layout kGetTemperature{0x15, "Get_Temperature", 8,
+    {{F("FET_Temperature", 0, "degC"), F("Motor_Temperature", 32, "degC")}}};
+inline constexpr Layout kGetBusVoltageCurrent{0x17, "Get_Bus_Voltage_Current", 8,
+    {{F("Bus_Voltage", 0, "V"), F("Bus_Current", 32, "A")}}};
+inline constexpr Layout kGetTorques{0x1C, "Get_Torques", 8,
+    {{F("Torque_Target", 0, "Nm"), F("Torque_Estimate", 32, "Nm")}}};
+inline constexpr Layout kGetPowers{0x1D, "Get_Powers", 8,
+    {{F("Electrical_Power", 0, "W"), F("Mechanical_Power", 32, "W")}}};
 
 // To the drive: not acknowledged.
 inline constexpr Layout kEstop{0x02, "Estop", 0, {}};
-inline constexpr Layout kRxSdo{
-    0x04,
-    "RxSdo",
-    8,
+inline constexpr Layout kRxSdo{0x04, "RxSdo", 8,
     {{U("Opcode", 0, 8), U("Endpoint_ID", 8, 16), U("Reserved", 24, 8), F("Value", 32, "")}}};
-inline constexpr Layout kRxSdoRead{
-    0x04, "RxSdo", 4, {{U("Opcode", 0, 8), U("Endpoint_ID", 8, 16), U("Reserved", 24, 8)}}};
+inline constexpr Layout kRxSdoRead{0x04, "RxSdo", 4,
+    {{U("Opcode", 0, 8), U("Endpoint_ID", 8, 16), U("Reserved", 24, 8)}}};
 inline constexpr Layout kSetAxisState{0x07, "Set_Axis_State", 8, {{U("Axis_Requested_State", 0, 32)}}};
-inline constexpr Layout kSetControllerMode{
-    0x0B, "Set_Controller_Mode", 8, {{U("Control_Mode", 0, 32), U("Input_Mode", 32, 32)}}};
-inline constexpr Layout kSetInputPos{
-    0x0C,
-    "Set_Input_Pos",
-    8,
+inline constexpr Layout kSetControllerMode{0x0B, "Set_Controller_Mode", 8,
+    {{U("Control_Mode", 0, 32), U("Input_Mode", 32, 32)}}};
+inline constexpr Layout kSetInputPos{0x0C, "Set_Input_Pos", 8,
     {{F("Input_Pos", 0, "rev"), I16("Vel_FF", 32, 0.001, "rev/s"), I16("Torque_FF", 48, 0.001, "Nm")}}};
-inline constexpr Layout kSetInputVel{
-    0x0D, "Set_Input_Vel", 8, {{F("Input_Vel", 0, "rev/s"), F("Input_Torque_FF", 32, "Nm")}}};
+inline constexpr Layout kSetInputVel{0x0D, "Set_Input_Vel", 8,
+    {{F("Input_Vel", 0, "rev/s"), F("Input_Torque_FF", 32, "Nm")}}};
 inline constexpr Layout kSetInputTorque{0x0E, "Set_Input_Torque", 8, {{F("Input_Torque", 0, "Nm")}}};
 inline constexpr Layout kClearErrors{0x18, "Clear_Errors", 1, {{U("Identify", 0, 8)}}};
 // clang-format on
