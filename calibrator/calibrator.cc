@@ -21,15 +21,15 @@ bool Calibrator::ready() const {
                                                      complete_->last_state_sequence.end());
 }
 
-bool Calibrator::Begin() {
+size_t Calibrator::Begin() {
   std::vector<Rollout> rollouts;
   for (size_t i = 0; i < complete_->episode.size(); ++i) {
     rollouts.push_back(joiner_.Join(complete_->episode[i], complete_->last_state_sequence[i]));
   }
   complete_.reset();
-  if (CountTransitions(rollouts) == 0) return false;
+  const size_t usable = CountTransitions(rollouts);
   simopt_.Begin(std::move(rollouts));
-  return true;
+  return usable;
 }
 
 ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {

@@ -26,9 +26,8 @@ class Calibrator {
 
   /// True when the roll-outs of the next iteration have been received whole.
   bool ready() const;
-  /// Takes them; begins the iteration in SimOpt. @return false if they hold no usable transition (the
-  /// distribution is then kept for another iteration's data).
-  bool Begin();
+  /// Takes them and begins the iteration in SimOpt. @return the number of usable transitions.
+  size_t Begin();
 
   const DropCounts& drops() const { return joiner_.drops(); }
 

@@ -95,7 +95,7 @@ std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
 }
 
 CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder, const RobotDescription& robot, uint64_t seed)
-    : folder_(std::move(folder)), robot_(robot.name), seed_(seed) {
+    : folder_(std::move(folder)), robot_(robot.name), seed_(seed), fingerprint_(robot.fingerprint) {
   for (const ParameterDescription& p : robot.parameters) parameters_.push_back(p.name);
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
@@ -110,6 +110,7 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"robot", robot_},
                {"parameters", parameters_},
                {"seed", seed_},
+               {"fingerprint", fingerprint_},
                {"iteration", state.iteration},
                {"update", state.update},
                {"distribution", ToJson(state.distribution)},
@@ -129,6 +130,9 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     if (j.at("version") != kVersion) throw std::runtime_error("is of another version");
     if (j.at("robot") != robot_ || j.at("parameters") != parameters_) throw std::runtime_error("is another robot's");
     if (j.at("seed") != seed_) throw std::runtime_error("has another seed; choose another folder");
+    if (j.at("fingerprint") != fingerprint_) {
+      throw std::runtime_error("was made with another robot.toml or robot.urdf; choose another folder");
+    }
     SimOpt::State state;
     state.iteration = j.at("iteration");
     state.update = j.at("update");

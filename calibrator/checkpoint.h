@@ -23,7 +23,7 @@ class CalibrationCheckpoint {
   std::filesystem::path folder_;
   std::string robot_;
   std::vector<std::string> parameters_;
-  uint64_t seed_;
+  uint64_t seed_, fingerprint_;
   size_t saved_rollouts_ = 0;
 };
 

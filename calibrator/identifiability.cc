@@ -13,14 +13,6 @@ namespace {
 constexpr double kNull = 1e-6;
 constexpr int kLargestPower = 2;
 
-Eigen::VectorXd ToPhysical(const RobotDescription& robot, const Eigen::VectorXd& coordinates) {
-  Eigen::VectorXd physical(coordinates.size());
-  for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
-    physical(i) = robot.parameters[static_cast<size_t>(i)].ToPhysical(coordinates(i));
-  }
-  return physical;
-}
-
 // "length/pole" -> "length", unless another parameter would read the same.
 std::string ShortName(const RobotDescription& robot, size_t index) {
   const auto stem = [](const std::string& name) { return name.substr(0, name.find('/')); };
@@ -157,8 +149,8 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
     const double h = 1e-4 * prior_sd(i);
     const Eigen::VectorXd plus = distribution.mean + h * Eigen::VectorXd::Unit(n, i);
     const Eigen::VectorXd minus = distribution.mean - h * Eigen::VectorXd::Unit(n, i);
-    jacobian.col(i) = (discrepancy.Residuals(ToPhysical(robot, plus), rollouts) -
-                       discrepancy.Residuals(ToPhysical(robot, minus), rollouts)) /
+    jacobian.col(i) = (discrepancy.Residuals(robot.ToPhysical(plus), rollouts) -
+                       discrepancy.Residuals(robot.ToPhysical(minus), rollouts)) /
                       (2 * h);
   }
   found.information = jacobian.transpose() * jacobian;

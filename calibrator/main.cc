@@ -43,6 +43,7 @@ class Session {
       simopt_.Resume(std::move(*state));
       spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration, simopt_.state().update);
       report_ = simopt_.Report();
+      if (report_) WriteDistribution();  // a kill may have come before it
     }
   }
 
@@ -52,9 +53,9 @@ class Session {
   bool Work() {
     if (!simopt_.running() && calibrator.ready()) {
       start_ = std::chrono::steady_clock::now();
-      if (!calibrator.Begin()) {
-        spdlog::warn("a roll-out held no usable transition; waiting for the next");
-        return false;
+      if (calibrator.Begin() == 0) {
+        spdlog::warn("iteration {} has no usable transition: it goes by with the earlier ones",
+                     simopt_.state().iteration + 1);
       }
       checkpoint_.Save(simopt_.state());
     }

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "common/random.h"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
 namespace {
@@ -22,19 +23,15 @@ Eigen::VectorXd ScaledReturns(const Eigen::VectorXd& costs) {
     low = std::min(low, cost);
     high = std::max(high, cost);
   }
+  if (!std::isfinite(low)) return Eigen::VectorXd::Constant(costs.size(), low > 0 ? -low : low);
   return -(costs.array() - low) / std::max(high - low, std::numeric_limits<double>::min());
 }
 
 }  // namespace
 
 Gaussian PriorGaussian(const RobotDescription& robot) {
-  const auto n = static_cast<Eigen::Index>(robot.parameters.size());
-  Gaussian prior{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
-  for (Eigen::Index i = 0; i < n; ++i) {
-    prior.mean(i) = robot.parameters[static_cast<size_t>(i)].coordinate_mean();
-    prior.covariance(i, i) = robot.parameters[static_cast<size_t>(i)].coordinate_variance();
-  }
-  return prior;
+  const ParameterDistribution prior = ParameterDistribution::Prior(robot);
+  return {prior.components[0].mean, prior.components[0].covariance};
 }
 
 SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective)
@@ -59,7 +56,6 @@ bool SimOpt::running() const {
 
 void SimOpt::Begin(std::vector<Rollout> rollouts) {
   if (running()) throw std::invalid_argument("a calibration is running");
-  if (CountTransitions(rollouts) == 0) throw std::invalid_argument("the roll-outs hold no usable transition");
   state_.rollouts_per_iteration.push_back(static_cast<int>(rollouts.size()));
   for (Rollout& rollout : rollouts) state_.rollouts.push_back(std::move(rollout));
   state_.before = state_.distribution;
@@ -72,14 +68,6 @@ std::span<const Rollout> SimOpt::Newest() const {
   return std::span(state_.rollouts).last(count);
 }
 
-Eigen::VectorXd SimOpt::ToPhysical(const Eigen::VectorXd& coordinates) const {
-  Eigen::VectorXd physical(coordinates.size());
-  for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
-    physical(i) = robot_.parameters[static_cast<size_t>(i)].ToPhysical(coordinates(i));
-  }
-  return physical;
-}
-
 Eigen::MatrixXd SimOpt::Samples(int iteration, int update) const {
   Eigen::MatrixXd normals(prior_.mean.size(), robot_.calibration.samples);
   for (Eigen::Index i = 0; i < normals.cols(); ++i) {
@@ -90,19 +78,21 @@ Eigen::MatrixXd SimOpt::Samples(int iteration, int update) const {
 }
 
 Eigen::VectorXd SimOpt::Returns(const Eigen::MatrixXd& samples) {
+  // Without data the samples' own scatter must not move anything.
+  if (CountTransitions(state_.rollouts) == 0) return Eigen::VectorXd::Constant(samples.cols(), NAN);
   // Each sample's value is computed by one thread from start to end: the same bits for any number of threads.
   Eigen::VectorXd values(samples.cols());
   std::atomic<Eigen::Index> next{0};
   const auto work = [&](Discrepancy& discrepancy) {
     for (Eigen::Index i; (i = next++) < samples.cols();) {
       try {
-        const Eigen::VectorXd physical = ToPhysical(samples.col(i));
+        const Eigen::VectorXd physical = robot_.ToPhysical(samples.col(i));
         switch (objective_) {
           case Objective::kPosterior: values(i) = discrepancy.LogLikelihood(physical, state_.rollouts); break;
           case Objective::kStep: values(i) = discrepancy.StepError(physical, Newest()); break;
           case Objective::kTrajectory: values(i) = discrepancy.TrajectoryError(physical, Newest()); break;
         }
-      } catch (const std::invalid_argument&) {  // parameters no body can have: impossible
+      } catch (const std::exception&) {  // parameters no body can have: impossible
         values(i) = objective_ == Objective::kPosterior ? -std::numeric_limits<double>::infinity()
                                                         : std::numeric_limits<double>::infinity();
       }
@@ -124,7 +114,7 @@ std::optional<CalibrationReport> SimOpt::Update() {
   const int iteration = state_.iteration + 1;
   const Eigen::MatrixXd samples = Samples(iteration, state_.update);
   const Eigen::VectorXd returns = Returns(samples);
-  if (std::isfinite(returns.maxCoeff())) {  // otherwise no sample is possible: keep the distribution
+  if (!returns.array().isNaN().any() && std::isfinite(returns.maxCoeff())) {  // else nothing is known: keep it
     const double coldest =
         objective_ == Objective::kPosterior ? robot_.calibration.min_temperature : kScaledMinTemperature;
     const RepsWeights weights = SolveReps(returns, robot_.calibration.kl, coldest);
@@ -144,8 +134,8 @@ std::optional<CalibrationReport> SimOpt::Report() {
   if (state_.iteration == 0 || running()) return {};
   Discrepancy& discrepancy = workers_[0];
   const auto newest = Newest();
-  const Eigen::VectorXd before = ToPhysical(state_.before.mean), after = ToPhysical(state_.distribution.mean),
-                        prior = ToPhysical(prior_.mean);
+  const Eigen::VectorXd before = robot_.ToPhysical(state_.before.mean),
+                        after = robot_.ToPhysical(state_.distribution.mean), prior = robot_.ToPhysical(prior_.mean);
   CalibrationReport report;
   report.iteration = state_.iteration;
   report.kl = state_.kl;

@@ -69,8 +69,8 @@ class SimOpt {
   /// Takes up an earlier state. @throws std::invalid_argument if it is not of this robot.
   void Resume(State state);
 
-  /// Begins an iteration with the roll-outs of the newest policy. @throws std::invalid_argument if one is running
-  /// or there is not a single transition.
+  /// Begins an iteration with the roll-outs of the newest policy. They may hold no usable transition: the
+  /// iteration then goes by with what earlier ones have shown. @throws std::invalid_argument if one is running.
   void Begin(std::vector<Rollout> rollouts);
   bool running() const;
   /// One REPS update. @return the report when it was the iteration's last.
@@ -83,7 +83,6 @@ class SimOpt {
 
  private:
   Eigen::VectorXd Returns(const Eigen::MatrixXd& samples);
-  Eigen::VectorXd ToPhysical(const Eigen::VectorXd& coordinates) const;
   std::span<const Rollout> Newest() const;
 
   RobotDescription robot_;

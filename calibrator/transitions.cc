@@ -26,8 +26,8 @@ TransitionJoiner::TransitionJoiner(const RobotDescription& robot) : n_(robot.num
 
 void TransitionJoiner::OnState(const robot_state_t& smoothed) {
   if (smoothed.num_joints != n_) return;
-  // A restarted driver counts from 0 again; what was before cannot be joined with it.
-  if (smoothed.sequence < newest_state() - 1000) {
+  // A restarted driver counts from 0 again, at a later time; what was before cannot be joined with it.
+  if (!states_.empty() && smoothed.sequence <= newest_state() && smoothed.utime > states_.rbegin()->second.utime) {
     states_.clear();
     commands_.clear();
   }

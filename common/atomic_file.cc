@@ -3,22 +3,43 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <stdexcept>
 
 namespace plumb {
+namespace {
 
-void WriteAtomically(const std::filesystem::path& file, const std::string& content) {
+bool WriteAll(int fd, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = write(fd, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    content.remove_prefix(static_cast<size_t>(written));
+  }
+  return true;
+}
+
+// A rename is safe from a power cut only when the folder that holds the name is on the disk.
+bool SyncFolder(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool ok = fd >= 0 && fsync(fd) == 0;
+  if (fd >= 0) close(fd);
+  return ok;
+}
+
+}  // namespace
+
+void WriteAtomically(const std::filesystem::path& file, std::string_view content) {
   const std::string temporary = file.string() + ".part";
   const int fd = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  bool ok = fd >= 0;
-  for (size_t done = 0; ok && done < content.size();) {
-    const ssize_t written = write(fd, content.data() + done, content.size() - done);
-    ok = written > 0;
-    if (ok) done += static_cast<size_t>(written);
-  }
-  ok = ok && fsync(fd) == 0;
+  bool ok = fd >= 0 && WriteAll(fd, content) && fsync(fd) == 0;
+  const int error = errno;
   if (fd >= 0) close(fd);
-  if (!ok || rename(temporary.c_str(), file.c_str()) != 0) throw std::runtime_error(file.string() + ": cannot be written");
+  if (!ok) throw std::runtime_error(file.string() + ": cannot be written: " + std::strerror(error));
+  ok = rename(temporary.c_str(), file.c_str()) == 0 && SyncFolder(file);
+  if (!ok) throw std::runtime_error(file.string() + ": cannot be written: " + std::strerror(errno));
 }
 
 }  // namespace plumb

@@ -17,6 +17,6 @@ std::vector<sock_filter> LcmGuardProgram(uint32_t max_message);
 
 /// Attaches the program to every UDP socket of this process bound to `port`.
 /// @return the number of sockets guarded, -1 if they cannot be listed. Not thread-safe.
-int AttachLcmGuard(uint16_t port, uint32_t max_message = 16u << 20);
+int AttachLcmGuard(uint16_t port, uint32_t max_message = 4u << 20);
 
 }  // namespace plumb

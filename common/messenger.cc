@@ -18,14 +18,13 @@ Messenger::Messenger(const std::string& url) : url_(url), lcm_(url) {
   }
 }
 
-int Messenger::Drain() {
-  int handled = 0;
-  for (;;) {
+int Messenger::Drain(int most) {
+  for (int handled = 0; handled < most; ++handled) {
     const int result = lcm_.handleTimeout(0);
     if (result < 0) return handled > 0 ? handled : -1;
     if (result == 0) return handled;
-    ++handled;
   }
+  return most;
 }
 
 void Messenger::Guard() {

@@ -24,8 +24,9 @@ class Messenger {
   lcm::LCM& lcm() { return lcm_; }
   /// For poll. Calling it starts LCM's receive thread.
   int fd() { return lcm_.getFileno(); }
-  /// Handles every message that has arrived. @return how many, -1 at the end of a file or on failure.
-  int Drain();
+  /// Handles the messages that have arrived, but no more than `most`, so that a flood does not keep the caller from
+  /// its other duties; what is left keeps fd() readable. @return how many, -1 at the end of a file or on failure.
+  int Drain(int most = 1000);
   /// Keeps malformed LCM datagrams from liblcm (see lcm_guard.h); call after the first subscription.
   /// Subscriber does.
   void Guard();
@@ -55,7 +56,7 @@ class Subscriber {
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
 
-  /// The newest message that decoded; meaningless while received() is 0.
+  /// The newest message that decoded, untouched by later ones that did not; meaningless while received() is 0.
   const Message& newest() const { return newest_; }
   int64_t received() const { return received_; }
   /// Messages that did not decode: wrong type, wrong length, hostile counts.
@@ -68,12 +69,13 @@ class Subscriber {
  private:
   void OnBuffer(const lcm::ReceiveBuffer* buffer, const std::string&) noexcept {
     try {
-      // Into the member, whose vectors keep their capacity: no allocation for messages of equal size.
+      // The two members take turns and keep their vectors' capacity: no allocation for messages of equal size.
       const int length = static_cast<int>(buffer->data_size);
-      if (newest_.decode(buffer->data, 0, length) != length) {
+      if (arriving_.decode(buffer->data, 0, length) != length) {
         ++rejected_;
         return;
       }
+      std::swap(newest_, arriving_);
     } catch (...) {
       ++rejected_;
       return;
@@ -87,7 +89,7 @@ class Subscriber {
   }
 
   Callback callback_;
-  Message newest_{};
+  Message newest_{}, arriving_{};
   int64_t received_ = 0;
   int64_t rejected_ = 0;
   std::exception_ptr failure_;

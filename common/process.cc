@@ -6,6 +6,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
 
@@ -66,11 +67,13 @@ int Run(const std::string& name, const std::string& description, int argc, char*
   std::string clock = "1";
   std::string level = "info";
   int parent = 0;
+  int niceness = 0;
   app.add_option("--lcm-url", lcm_url, "LCM provider; default: $LCM_DEFAULT_URL or this machine only")
       ->capture_default_str();
   app.add_option("--clock", clock, "clock scale, or SCALE@EPOCH as plumb launch passes it")->capture_default_str();
   app.add_option("--log-level", level, "trace, debug, info, warning, error")->capture_default_str();
   app.add_option("--parent", parent, "stop when this process, which started us, is gone");
+  app.add_option("--nice", niceness, "give way to the others: 0 to 19")->check(CLI::Range(0, 19));
   app.set_version_flag("--version", VersionLine(name));
   if (add_flags) add_flags(app);
   try {
@@ -87,6 +90,7 @@ int Run(const std::string& name, const std::string& description, int argc, char*
       prctl(PR_SET_PDEATHSIG, SIGTERM);
       if (getppid() != parent) return 0;  // it died before we could ask to be told
     }
+    if (niceness != 0) setpriority(PRIO_PROCESS, 0, niceness);
     Process process(name, lcm_url, clock);
     spdlog::debug("{}", VersionLine(name));
     return body(process);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <stdexcept>
 
 namespace plumb {
@@ -11,6 +12,9 @@ constexpr int64_t kPlaceAgain = 1'000'000;    // [us] a robot not placed by then
 constexpr int64_t kDriverTimeout = 1'000'000;  // [us] DRIVER_STATUS comes ten times a second
 constexpr double kPlaceSpeedFactor = 10;      // place_tolerance [rad] times this is the tolerance of speed [rad/s]
 
+// Third words of the random streams, so that placement, exploration and the other processes' streams never meet.
+constexpr uint32_t kPlacementStream = 0xC0000000, kExplorationStream = 0x80000000;
+
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 Eigen::Map<const Eigen::VectorXd> Map(const std::vector<double>& values) {
@@ -19,10 +23,11 @@ Eigen::Map<const Eigen::VectorXd> Map(const std::vector<double>& values) {
 
 }  // namespace
 
-Controller::Controller(const RobotDescription& robot, uint64_t seed)
+Controller::Controller(const RobotDescription& robot, uint64_t seed, double rest)
     : robot_(robot),
       task_(MakeTask(robot_)),
       seed_(seed),
+      rest_(rest),
       effort_(Eigen::VectorXd::Zero(robot.num_joints())),
       observation_(task_->observation_size()) {
   status_.policy_iteration = -1;
@@ -131,15 +136,20 @@ void Controller::BeginPlacing(int64_t now, int64_t utime) {
   place.utime = utime;
   place.num_joints = robot_.num_joints();
   Eigen::VectorXd q(robot_.num_joints()), v(robot_.num_joints());
-  Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_++)});
+  Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_++),
+                        kPlacementStream});
   task_->InitialState(random, q, v);
   place.q.assign(q.begin(), q.end());
   place.v.assign(v.begin(), v.end());
   status_.step = 0;
   status_.episode_return = 0;
   Enter(controller_status_t::PLACING);
-  place_ = std::move(place);
+  if (rest_ < 0) place_ = std::move(place);
   placing_since_ = now;
+}
+
+bool Controller::ReadyToRun(const robot_state_t& state, int64_t now) const {
+  return rest_ < 0 ? Placed(state) : now - placing_since_ >= Microseconds(rest_);
 }
 
 bool Controller::Placed(const robot_state_t& state) const {
@@ -155,30 +165,32 @@ bool Controller::Placed(const robot_state_t& state) const {
 std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, int64_t now, int64_t utime) {
   if (state.num_joints != robot_.num_joints()) return {};
   const bool finite = Map(state.q).allFinite() && Map(state.v).allFinite();
+  // A backlog brings states in quick succession that are all old: their own time tells.
+  const bool late = std::abs(utime - state.utime) > Microseconds(robot_.controller.state_timeout);
   last_state_sequence_ = state.sequence;
-  if (finite && state.valid) state_heard_ = now;
+  if (finite && state.valid && !late) state_heard_ = now;
   const bool talking = driver_state_ == driver_status_t::ARMING || Armed();
   if (!talking || phase() == controller_status_t::HALTED) return {};
 
   if (phase() == controller_status_t::RUNNING) {
     if (!finite) return Halt("the state is not finite", utime);
+    if (late) return Halt("the state is late", utime);
     if (!state.valid) return Halt(state.restarted ? "the estimator restarted in an episode" : "the state is not valid", utime);
     return Act(state, utime);
   }
-  if (phase() == controller_status_t::PLACING && finite && state.valid && Placed(state)) {
-    episode_ = state.utime;
-    const int64_t identity = episode_;
+  const bool good = finite && state.valid && !late;
+  if (phase() == controller_status_t::PLACING && good && ReadyToRun(state, now)) {
     Enter(controller_status_t::RUNNING);
-    episode_ = identity;
+    episode_ = state.utime;
     first_state_sequence_ = state.sequence;
     next_decision_ = state.utime;
     return Act(state, utime);
   }
-  if (phase() == controller_status_t::WAITING && Armed() && policy_ && finite && state.valid) {
+  if (phase() == controller_status_t::WAITING && Armed() && policy_ && good) {
     const bool more = status_.num_episodes < status_.episodes_wanted;
     if (more) BeginPlacing(now, utime);
     else Enter(controller_status_t::COMPLETE);
-  } else if (phase() == controller_status_t::PLACING && now - placing_since_ > kPlaceAgain) {
+  } else if (phase() == controller_status_t::PLACING && rest_ < 0 && now - placing_since_ > kPlaceAgain) {
     BeginPlacing(now, utime);
   }
   if (state.utime < next_decision_ && next_decision_ - state.utime < Microseconds(robot_.task.period)) return {};
@@ -206,8 +218,8 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   if (policy_header_.purpose == policy_t::EVALUATE) {
     action = policy_->Mean(observation_);
   } else {  // the policy's own noise excites what is to be learned
-    Random random(seed_ + 1, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_),
-                              static_cast<uint32_t>(status_.step)});
+    Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_),
+                          kExplorationStream | static_cast<uint32_t>(status_.step)});
     action = policy_->Sample(observation_, random);
   }
   if (!action.allFinite()) return Halt("the policy's action is not finite", utime);

@@ -23,11 +23,14 @@ namespace plumb {
 /// - A policy is exchanged only between episodes.
 /// - Between episodes it commands zero effort, which keeps an armed driver from disarming.
 /// - It is silent unless the driver is arming or armed, and after a halt: silence disarms.
-/// - A late, invalid or non-finite state or action halts it: one command of zero effort, then silence until the
+/// - A late (by arrival or by its own time), invalid or non-finite state or action halts it: one command of zero effort, then silence until the
 ///   driver has been seen disarmed and armed anew, which takes a person.
 class Controller {
  public:
-  Controller(const RobotDescription& robot, uint64_t seed);
+  /// @param rest [s] negative: each episode begins in a state of the task's choice, where PLACE_ROBOT has the robot
+  /// put. Otherwise, for a robot that nobody can place: it is given zero effort for that long and the episode begins
+  /// wherever it then is.
+  Controller(const RobotDescription& robot, uint64_t seed, double rest = -1);
 
   /// A new policy. @throws std::invalid_argument if it does not fit the robot or is damaged.
   void OnPolicy(const policy_t& message);
@@ -49,6 +52,7 @@ class Controller {
   void Enter(int8_t phase, const std::string& reason = {});
   void TakePolicy();
   void BeginPlacing(int64_t now, int64_t utime);
+  bool ReadyToRun(const robot_state_t& state, int64_t now) const;
   bool Placed(const robot_state_t& state) const;
   void FinishEpisode(const robot_state_t& state);
   joint_command_t Halt(const std::string& reason, int64_t utime);
@@ -58,6 +62,7 @@ class Controller {
   const RobotDescription robot_;
   std::unique_ptr<Task> task_;
   uint64_t seed_;
+  double rest_;
   std::unique_ptr<GaussianPolicy> policy_, next_policy_;
   policy_t policy_header_{}, next_header_{};  // without weights
   controller_status_t status_{};

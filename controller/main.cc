@@ -8,16 +8,19 @@
 int main(int argc, char** argv) {
   std::string robot_path;
   uint64_t seed = 1;
+  double rest = -1;
   return plumb::Run(
       "plumb-controller", "Runs a policy on the robot, episode by episode.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder or TOML file")->required();
         app.add_option("--seed", seed, "of initial states and exploration")->capture_default_str();
+        app.add_option("--rest", rest,
+                       "[s] do not have the robot placed: let it rest that long, then begin where it is");
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
         const plumb::Clock& clock = process.clock();
-        plumb::Controller controller(robot, seed);
+        plumb::Controller controller(robot, seed, rest);
         plumb::Messenger& messenger = process.messenger();
         plumb::Publisher<plumb::joint_command_t> commands(messenger, "JOINT_COMMAND");
         plumb::Publisher<plumb::place_robot_t> places(messenger, "PLACE_ROBOT");

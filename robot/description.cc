@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "common/config.h"
 #include "robot/urdf.h"
@@ -146,6 +148,17 @@ VirtualRobotSettings ReadVirtualRobot(Config config, const std::vector<Parameter
   return s;
 }
 
+// FNV-1a, 64 bit (Fowler, Noll, Vo; RFC draft "The FNV Non-Cryptographic Hash Algorithm").
+constexpr uint64_t kFnvOffset = 0xcbf29ce484222325, kFnvPrime = 0x100000001b3;
+
+uint64_t Fingerprint(const std::string& file, uint64_t hash) {
+  std::ifstream stream(file, std::ios::binary);
+  for (std::istreambuf_iterator<char> c(stream), end; c != end; ++c) {
+    hash = (hash ^ static_cast<unsigned char>(*c)) * kFnvPrime;
+  }
+  return hash;
+}
+
 void ReadMotors(Config& root, std::vector<JointDescription>& joints) {
   std::vector<bool> seen(joints.size());
   for (Config& config : root.Tables("joint")) {
@@ -199,6 +212,14 @@ Eigen::VectorXd RobotDescription::effort_limits() const {
   return limits;
 }
 
+Eigen::VectorXd RobotDescription::ToPhysical(const Eigen::VectorXd& coordinates) const {
+  Eigen::VectorXd physical(coordinates.size());
+  for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
+    physical(i) = parameters[static_cast<size_t>(i)].ToPhysical(coordinates(i));
+  }
+  return physical;
+}
+
 int RobotDescription::FindParameter(const std::string& parameter) const {
   for (size_t i = 0; i < parameters.size(); ++i) {
     if (parameters[i].name == parameter) return static_cast<int>(i);
@@ -220,7 +241,9 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.name = header.String("name");
   const std::string urdf_file = header.String("urdf");
   header.Finish();
-  UrdfModel urdf = LoadUrdf((file.parent_path() / urdf_file).string());
+  const std::string urdf_path = (file.parent_path() / urdf_file).string();
+  UrdfModel urdf = LoadUrdf(urdf_path);
+  robot.fingerprint = Fingerprint(urdf_path, Fingerprint(robot.file, kFnvOffset));
   robot.links = std::move(urdf.links);
   robot.joints = std::move(urdf.joints);
   if (robot.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);

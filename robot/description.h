@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -125,6 +126,7 @@ struct VirtualRobotSettings {
 /// coordinates, one each: q[i], v[i] belong to joints[i].
 struct RobotDescription {
   std::string file;  ///< the TOML file
+  uint64_t fingerprint = 0;  ///< of the contents of both files (FNV-1a): a checkpoint of other contents is another's
   std::string name;
   std::vector<LinkDescription> links;
   std::vector<JointDescription> joints;
@@ -141,6 +143,8 @@ struct RobotDescription {
 
   int num_joints() const { return static_cast<int>(joints.size()); }
   Eigen::VectorXd effort_limits() const;
+  /// The parameters' coordinates -> physical units, one value per parameter.
+  Eigen::VectorXd ToPhysical(const Eigen::VectorXd& coordinates) const;
   /// Index of a parameter, -1 if there is none of that name.
   int FindParameter(const std::string& parameter) const;
 };

@@ -1,8 +1,6 @@
 #include "trainer/checkpoint.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <boost/crc.hpp>
 #include <cerrno>
@@ -14,6 +12,8 @@
 #include <type_traits>
 #include <utility>
 #include <vector>
+
+#include "common/atomic_file.h"
 
 namespace plumb {
 namespace {
@@ -119,28 +119,6 @@ uint32_t Crc(const char* data, size_t size) {
   return crc.checksum();
 }
 
-[[noreturn]] void FailToWrite(const std::string& file) {
-  throw CheckpointError(fmt::format("cannot write checkpoint {}: {}", file, std::strerror(errno)));
-}
-
-/// Writes and flushes to the disk. The file is closed whatever happens.
-void WriteDurably(const std::string& file, const std::vector<char>& bytes) {
-  const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) FailToWrite(file);
-  size_t written = 0;
-  bool good = true;
-  while (good && written < bytes.size()) {
-    const ssize_t count = write(fd, bytes.data() + written, bytes.size() - written);
-    if (count > 0) written += static_cast<size_t>(count);
-    good = count > 0 || (count < 0 && errno == EINTR);
-  }
-  good = good && fsync(fd) == 0;
-  const int error = errno;
-  close(fd);
-  errno = error;
-  if (!good) FailToWrite(file);
-}
-
 }  // namespace
 
 void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
@@ -156,13 +134,10 @@ void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
   const std::filesystem::path path = std::filesystem::absolute(file);
   std::error_code ignored;  // whatever is wrong with the folder, opening the file tells
   std::filesystem::create_directories(path.parent_path(), ignored);
-  const std::string temporary = path.string() + ".new";
-  WriteDurably(temporary, bytes);
-  if (std::rename(temporary.c_str(), path.c_str()) != 0) FailToWrite(file);
-  const int folder = open(path.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder >= 0) {
-    fsync(folder);
-    close(folder);
+  try {
+    WriteAtomically(path, {bytes.data(), bytes.size()});
+  } catch (const std::runtime_error& error) {
+    throw CheckpointError(error.what());
   }
 }
 

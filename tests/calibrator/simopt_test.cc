@@ -166,6 +166,11 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   CHECK(resumed->iteration == 2);
   CHECK(SameBits(straight.state().distribution, resumed->distribution));
 
+  SECTION("another description's checkpoint is refused") {
+    RobotDescription edited = robot;
+    edited.fingerprint ^= 1;
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder, edited, 9).Load(), Catch::Contains("another robot.toml"));
+  }
   SECTION("another seed's checkpoint is refused") {
     CHECK_THROWS_WITH(CalibrationCheckpoint(folder, robot, 10).Load(), Catch::Contains("another seed"));
   }
@@ -176,11 +181,21 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   std::filesystem::remove_all(folder);
 }
 
-TEST_CASE("an iteration needs a transition") {
+TEST_CASE("an iteration without a usable transition goes by and invents nothing") {
   const RobotDescription robot = Pendulum();
-  SimOpt simopt(robot, 1, 1);
-  CHECK_THROWS_AS(simopt.Begin({Rollout{}}), std::invalid_argument);
-  CHECK_FALSE(simopt.Report());
+  for (const Objective objective : {Objective::kPosterior, Objective::kStep, Objective::kTrajectory}) {
+    SimOpt simopt(robot, 1, 1, objective);
+    CHECK_FALSE(simopt.Report());
+    simopt.Begin({Rollout{}});
+    CHECK_THROWS_AS(simopt.Begin({Rollout{}}), std::invalid_argument);
+    std::optional<CalibrationReport> report;
+    while (!(report = simopt.Update())) {
+    }
+    CHECK(report->iteration == 1);
+    CHECK(std::isnan(report->discrepancy));
+    CHECK(report->identifiability.combinations.empty());
+    CHECK(KlDivergence(simopt.state().distribution, PriorGaussian(robot)) == Approx(0).margin(1e-12));
+  }
 }
 
 }  // namespace

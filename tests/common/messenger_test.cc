@@ -70,11 +70,25 @@ TEST_CASE("hostile messages are rejected, counted, and cost no memory") {
   for (size_t length = 0; length < good.size(); ++length) send({good.begin(), good.begin() + static_cast<long>(length)});
   while (subscriber.received() + subscriber.rejected() < sent) messenger.Drain();
   CHECK(subscriber.rejected() > static_cast<int64_t>(good.size()));
+  CHECK(subscriber.newest().num_components <= 1);
   long pages = 0, resident = 0;
   std::ifstream("/proc/self/statm") >> pages >> resident;
   CHECK(resident * getpagesize() < 100'000'000);
   send(good);
   CHECK(subscriber.newest().name[0] == "gravity");
+}
+
+TEST_CASE("a message that does not decode leaves the newest good one alone") {
+  Messenger messenger("memq://");
+  Subscriber<joint_state_t> subscriber(messenger, "X");
+  Publisher<joint_state_t> publisher(messenger, "X");
+  publisher.Publish(Message(7));
+  std::vector<uint8_t> cut(static_cast<size_t>(Message(8).getEncodedSize()));
+  Message(8).encode(cut.data(), 0, static_cast<int>(cut.size()));
+  messenger.lcm().publish("X", cut.data(), static_cast<unsigned>(cut.size() - 3));
+  while (subscriber.received() + subscriber.rejected() < 2) messenger.Drain();
+  CHECK(subscriber.rejected() == 1);
+  CHECK(subscriber.newest().sequence == 7);
 }
 
 TEST_CASE("a callback's exception does not cross LCM's C frames") {

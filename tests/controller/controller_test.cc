@@ -152,6 +152,12 @@ TEST_CASE_METHOD(World, "doubtful states halt it: zero effort, silence, and only
     now += 150'000, utime += 150'000;
     command = controller.Tick(now, utime);
   }
+  SECTION("old, in quick succession, as after a stop") {
+    utime += 150'000;  // the world has moved on, the states have not
+    robot_state.utime = utime - 150'000 + 5000;
+    ++robot_state.sequence;
+    command = controller.OnState(robot_state, now + 5000, utime);
+  }
   SECTION("not finite") {
     robot_state.q[0] = std::numeric_limits<double>::quiet_NaN();
     command = Step();
@@ -200,6 +206,28 @@ TEST_CASE_METHOD(World, "a driver that disarms ends the episode; a silent driver
   CHECK(controller.phase() == S::WAITING);
   CHECK(controller.status().episodes_aborted == 1);
   CHECK_FALSE(Step());
+}
+
+TEST_CASE_METHOD(World, "a robot that nobody can place rests, and begins where it is") {
+  Controller resting(robot, 1, 2.0);
+  driver_status_t armed{};
+  armed.state = driver_status_t::ARMED;
+  resting.OnDriverStatus(armed, now);
+  resting.OnPolicy(Policy(0, 1, 0.5f));
+  robot_state.q = {3.1};
+  int zeros = 0;
+  for (int64_t begin = now; resting.phase() != S::RUNNING;) {
+    now += 5000, utime += 5000;
+    ++robot_state.sequence;
+    robot_state.utime = utime;
+    resting.OnDriverStatus(armed, now);
+    const auto command = resting.OnState(robot_state, now, utime);
+    CHECK_FALSE(resting.place());
+    if (command && command->episode < 0) ++zeros;
+    REQUIRE(now - begin < 3'000'000);
+  }
+  CHECK(zeros >= 38);  // two seconds of zero effort, twenty times a second
+  CHECK(zeros <= 42);
 }
 
 TEST_CASE_METHOD(World, "the same seed places the robot in the same states") {
