@@ -3,11 +3,15 @@
 #include <sys/socket.h>
 #include <time.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <optional>
 
 namespace plumb {
+
+/// Datagrams that one call of Receive looks at, echoes, malformed and unwanted ones included.
+inline constexpr size_t kMostExamined = 128;
 
 /// Room for what the kernel says about a received datagram.
 struct ControlBuffer {

@@ -114,8 +114,9 @@ class SocketCan : public Transport {
 
   int Receive(std::span<Frame> frames) noexcept override {
     int count = 0;
-    while (static_cast<size_t>(count) < frames.size()) {
-      const size_t room = std::min(frames.size() - static_cast<size_t>(count), kBatch);
+    // What is not handed out counts, too: a flood of it must not keep us.
+    for (size_t left = kMostExamined; left > 0 && static_cast<size_t>(count) < frames.size();) {
+      const size_t room = std::min({frames.size() - static_cast<size_t>(count), kBatch, left});
       for (size_t i = 0; i < room; ++i) {
         msghdr& header = messages_[i].msg_hdr;
         header.msg_control = controls_[i].bytes;
@@ -127,6 +128,7 @@ class SocketCan : public Transport {
         OnError(errno);
         break;
       }
+      left -= static_cast<size_t>(got);
       for (int i = 0; i < got; ++i) {
         if (Take(static_cast<size_t>(i), frames[static_cast<size_t>(count)])) ++count;
       }

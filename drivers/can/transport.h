@@ -45,7 +45,8 @@ class Transport {
   /// Sends the frames in order. @return how many were accepted; the rest is dropped and counted, because a
   /// command that waits is a stale command.
   virtual int Send(std::span<const Frame> frames) noexcept = 0;
-  /// Takes up to frames.size() received frames. @return how many; 0 = none waits.
+  /// Takes up to frames.size() received frames. @return how many; 0 = none waits, or there is so much else
+  /// (own frames, malformed ones) that looking on would take too long: fd() is readable still.
   virtual int Receive(std::span<Frame> frames) noexcept = 0;
   /// Tries to bring the link back; call it now and then while link() is not kUp. @return link() afterwards.
   virtual LinkState Reopen() noexcept { return link_; }

@@ -145,6 +145,23 @@ TEST_CASE("garbage on the multicast group is counted and forgotten") {
   CHECK(transport->stats().malformed == 4);
 }
 
+TEST_CASE("a flood of what is not for us does not keep Receive from returning") {
+  const auto a = OpenTransport(UdpUrl());
+  const auto b = OpenTransport(UdpUrl(), {{.id = 0x7FF}});
+  const Frame frame = *FrameFromText("029#11");
+  constexpr int64_t kSent = 200;
+  for (int i = 0; i < kSent; ++i) REQUIRE(a->Send({&frame, 1}) == 1);
+  std::array<Frame, 64> frames;
+  REQUIRE(Readable(*a, 2000));
+  CHECK(a->Receive(frames) == 0);
+  CHECK(a->stats().echoes > 0);
+  CHECK(a->stats().echoes <= 128);
+  CHECK(b->Receive(frames) == 0);
+  CHECK(Readable(*b, 2000));  // the rest
+  while (a->stats().echoes < kSent && Readable(*a, 2000)) CHECK(a->Receive(frames) == 0);
+  CHECK(a->stats().echoes == kSent);
+}
+
 TEST_CASE("a bus that cannot be opened says why") {
   const auto error = [](const std::string& url) {
     try {
