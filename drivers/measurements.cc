@@ -35,8 +35,21 @@ void Measurements::Add(int joint, const JointMeasurement& measurement, int64_t a
   queue.At(queue.count++) = {arrival, measurement};
 }
 
+int64_t Measurements::lost() const noexcept {
+  int64_t lost = dropped_;
+  for (const Joint& joint : joints_) lost += joint.sync.lost() + joint.sync.resets();
+  return lost;
+}
+
 bool Measurements::Next(int64_t& utime, std::span<JointMeasurement> measurements) noexcept {
-  for (Joint& joint : joints_) joint.Regularise();
+  for (Joint& joint : joints_) {
+    joint.Regularise();
+    // The clock was set back in between: the others' new samples would wait for ever for this old one.
+    while (joint.regular > 1 && joint.At(1).time < joint.At(0).time) {
+      joint.Pop();
+      ++dropped_;
+    }
+  }
   while (std::ranges::all_of(joints_, [](const Joint& joint) { return joint.regular > 0; })) {
     int64_t newest = std::numeric_limits<int64_t>::min();
     for (Joint& joint : joints_) newest = std::max(newest, joint.At(0).time);

@@ -28,12 +28,16 @@ class Measurements {
   void Add(int joint, const JointMeasurement& measurement, int64_t arrival) noexcept;
 
   /// Takes the next complete measurement; call until false, after everything that has arrived was added.
-  /// @param utime its time: that of its latest estimate, freed of transport jitter, strictly increasing.
+  /// @param utime its time: that of its latest estimate, freed of transport jitter, strictly increasing
+  /// unless the clock was set back.
   /// @param measurements one for each joint.
   bool Next(int64_t& utime, std::span<JointMeasurement> measurements) noexcept;
 
   /// Estimates that found no partners, or no room.
   int64_t dropped() const { return dropped_; }
+  /// Those and the estimates that never came; a gap or a step of the clock, after which it began anew, counts
+  /// as one.
+  int64_t lost() const noexcept;
 
  private:
   static constexpr size_t kCapacity = 64;

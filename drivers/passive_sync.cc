@@ -21,7 +21,8 @@ size_t PassiveSync::Regularise(std::span<const int64_t> arrivals, std::span<int6
     const bool undecided = waiting.size() < kMostWaiting &&
                            static_cast<double>(waiting.back() - waiting.front()) < kEvidence * period_;
     const double gap = SinceOrigin(waiting.front()) - estimate_;
-    const bool jump = started_ && std::abs(gap) > max_gap_;
+    // The estimate is never later than the arrival, and arrivals are in order: the clock was set back.
+    const bool jump = started_ && (gap > max_gap_ || gap < -period_);
     if (!started_ || jump) {
       if (jump && undecided) return i;
       if (jump) ++resets_;

@@ -155,6 +155,21 @@ TEST_CASE("after a long gap and after a step of the clock it starts anew") {
   CHECK(feed.sync.resets() == 2);
 }
 
+TEST_CASE("a clock that is set back by little is followed, too") {
+  const int64_t step = GENERATE(-20'000, -300'000, -999'000);
+  Feed feed;
+  Times times;
+  for (int k = 0; k < 40; ++k) {
+    const Times more = feed.Add({kStart + 5000 * k + (k < 20 ? 0 : step)});
+    times.insert(times.end(), more.begin(), more.end());
+  }
+  REQUIRE(times.size() == 40);
+  for (int k = 0; k < 40; ++k) {
+    CHECK(times[static_cast<size_t>(k)] == Approx(kStart + 5000 * k + (k < 20 ? 0 : step)).margin(20));
+  }
+  CHECK(feed.sync.resets() == 1);
+}
+
 TEST_CASE("times increase strictly whatever arrives") {
   Random random(5, {2});
   Feed feed;
