@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "plumb/joint_command_t.hpp"
 
@@ -13,13 +14,16 @@ class CommandInbox {
   /// @param expiry [us] after arrival a command is void; a command may shorten but not lengthen it.
   CommandInbox(int num_joints, int64_t expiry);
 
-  /// Forgets everything: the next command may have any sequence number (a new controller).
+  /// Forgets everything: the next command may have any plausible sequence number (a new controller).
   void Clear() noexcept;
 
   /// Takes a command if it has the right size, finite efforts, no infinite or negative gains, was computed no
-  /// longer than an expiry from `utime`, and has a greater sequence number than the last one taken.
+  /// longer than an expiry from `utime`, and has a greater sequence number than the last one taken. One that
+  /// is too much greater is nobody's next and would make void what the real controller says.
   /// @return false if not; the one before stays in force.
   bool Offer(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
+  /// Why the last command was refused; empty if none was since the last one taken.
+  std::string_view refusal() const noexcept { return refusal_; }
 
   bool empty() const noexcept { return empty_; }
   /// `now` of the last command taken. Meaningless while empty.
@@ -31,10 +35,14 @@ class CommandInbox {
   double Effort(int joint, double position, double velocity) const noexcept;
 
  private:
+  /// Empty if the command may be taken.
+  std::string_view Judge(const joint_command_t& command, int64_t utime) const noexcept;
+
   int num_joints_;
   int64_t expiry_;
   bool empty_ = true;
   int64_t arrival_ = 0;
+  std::string_view refusal_;  ///< of a literal
   joint_command_t command_;
 };
 

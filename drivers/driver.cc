@@ -9,6 +9,7 @@ namespace {
 
 constexpr int kHistory = 2048;       // cycles of transmitted efforts: ten seconds
 constexpr int kRefusedCycles = 10;   // consecutive cycles whose frames were not accepted
+constexpr size_t kMostFrames = 8;    // in a cycle while arming: the kernel holds about ten in flight
 constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
@@ -57,14 +58,6 @@ std::vector<Filter> Driver::filters() const {
   std::vector<Filter> filters;
   for (const Joint& joint : joints_) filters.push_back(joint.motor->filter());
   return filters;
-}
-
-template <class... Args>
-void Driver::Fault(fmt::format_string<Args...> format, Args&&... args) noexcept {
-  if (mode_ == Mode::kFault) return;  // the first reason is the cause
-  reason_.Set(format, std::forward<Args>(args)...);
-  Disarm();
-  mode_ = Mode::kFault;
 }
 
 void Driver::Disarm() noexcept {
@@ -129,83 +122,6 @@ void Driver::OnLink(LinkState link) noexcept {
   }
 }
 
-void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept {
-  now_ = now;
-  utime_ = utime;
-  switch (request.request) {
-    case driver_request_t::ARM:
-      return RequestArm(request.utime);
-    // Stopping is obeyed whatever the request's time.
-    case driver_request_t::DISARM:
-      if (mode_ == Mode::kFault) {
-        stopped_utime_ = utime;
-        return;
-      }
-      reason_.Set("disarmed on request");
-      return Disarm();
-    case driver_request_t::ESTOP:
-      Fault("emergency stop requested");
-      stopped_utime_ = utime;
-      for (Joint& joint : joints_) joint.motor->Estop(now);
-      return;
-    default:
-      ++requests_rejected_;
-      return;
-  }
-}
-
-void Driver::Refuse(std::string_view why) noexcept {
-  if (mode_ == Mode::kFault) return;  // what failed is worth more than what is refused
-  reason_.Set("ARM refused: {}", why);
-}
-
-void Driver::RequestArm(int64_t made) noexcept {
-  const int64_t now = now_;
-  // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's clock may
-  // be ahead of ours, so that it looks newer than the stop).
-  if (Active() || made < start_utime_ || made <= stopped_utime_ || made <= armed_by_) return;
-  if (now - start_now_ < start_guard_) return Refuse("the driver has only just started");
-  if (stray_controller_ && now - last_command_ < start_guard_) {
-    return Refuse("commands arrived when the driver started: stop the controller of an earlier run");
-  }
-  if (link_ != LinkState::kUp) return Refuse("the CAN interface is not up");
-  if (bus_off_) return Refuse("the CAN controller is bus-off");
-  for (const Joint& joint : joints_) {
-    Reason why;
-    if (joint.motor->state() == DriveState::kAbsent) {
-      why.Set("{}: {}", joint.name, joint.motor->reason());
-    } else if (!joint.measured || now - joint.measured_at > stale_after_) {
-      why.Set("{}: no encoder estimates", joint.name);
-    }
-    if (!why.text().empty()) return Refuse(why.text());
-  }
-  armed_by_ = made;
-  stray_controller_ = false;
-  refused_cycles_ = 0;
-  inbox_.Clear();
-  for (Joint& joint : joints_) joint.motor->Arm(now);
-  mode_ = Mode::kArming;
-  reason_.Set("arming");
-}
-
-void Driver::OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept {
-  now_ = now;
-  utime_ = utime;
-  last_command_ = now;
-  if (now - start_now_ < start_guard_) {
-    stray_controller_ = true;
-    ++status_.commands_rejected;
-    return;
-  }
-  if (mode_ != Mode::kArmed) return;
-  if (inbox_.Offer(command, now, utime)) {
-    ++status_.commands_accepted;
-    expiry_counted_ = false;
-  } else {
-    ++status_.commands_rejected;
-  }
-}
-
 std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
   now_ = now;
   utime_ = utime;
@@ -215,8 +131,16 @@ std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness
   CheckHealth();
   CheckCommand();
   CommandTorques();
-  // After the checks, so that a fault is answered in this cycle.
-  for (Joint& joint : joints_) joint.motor->Tick(now, housekeeping_);
+  // After the checks, so that a fault is answered in this cycle. The joints take turns to be the first.
+  size_t arming = torque_frames_ < kMostFrames ? kMostFrames - torque_frames_ : 1;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[(turn_ + i) % joints_.size()];
+    const size_t before = housekeeping_.size();
+    joint.motor->Tick(now, arming > 0, housekeeping_);
+    arming -= std::min(arming, housekeeping_.size() - before);
+    joint.frames_end = torque_frames_ + housekeeping_.size();
+  }
+  turn_ = (turn_ + 1) % joints_.size();
   for (const Frame& frame : housekeeping_.frames()) frames_.Push(frame);
   NoteChanges();
   return frames_.frames();
@@ -245,7 +169,10 @@ void Driver::CheckHealth() noexcept {
 void Driver::CheckCommand() noexcept {
   if (mode_ != Mode::kArmed) return;
   const int64_t silence = now_ - (inbox_.empty() ? armed_at_ : inbox_.arrival());
-  if (silence > disarm_after_) return Fault("no command for {} ms", silence / 1000);
+  if (silence > disarm_after_) {
+    if (inbox_.refusal().empty()) return Fault("no command for {} ms", silence / 1000);
+    return Fault("commands refused: {} (none taken for {} ms)", inbox_.refusal(), silence / 1000);
+  }
   if (!inbox_.empty() && inbox_.Expired(now_) && !expiry_counted_) {
     ++status_.commands_expired;
     expiry_counted_ = true;
@@ -275,6 +202,7 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
     if (i < torque_frames_ && i < taken) effort_sent_[i] = joints_[i].wish;
   }
   history_.Record(utime, effort_sent_);
+  for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);
   refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;
   if (refused_cycles_ >= kRefusedCycles && Active()) {
     Fault("the bus has not accepted frames in {} cycles", refused_cycles_);

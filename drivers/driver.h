@@ -28,7 +28,8 @@ namespace plumb {
 ///   while (const joint_state_t* state = driver.NextState()) publish(*state);
 ///   driver.OnLink(...); driver.OnRequest(...); driver.OnCommand(...);   // what came since
 ///   frames = driver.Tick(now, utime, lateness);                         // once per cycle
-///   driver.Transmitted(transport.Send(frames), utime right after it);
+///   driver.Transmitted(transport.Send(frames), utime right after it);  // after every Tick: what was not
+///                                                                      // accepted is given again
 ///
 /// It arms only on a request, made after its start and after whatever stopped it last. Armed, it transmits a
 /// torque in every cycle: zero when the command has expired. It disarms and remembers why (FAULT) when
@@ -82,11 +83,18 @@ class Driver {
     bool measured = false;
     int64_t measured_at = 0;  // `now` of the last estimate
     JointMeasurement latest;
-    double wish = 0;  // effort in the torque frame of this cycle
+    double wish = 0;        // effort in the torque frame of this cycle
+    size_t frames_end = 0;  // the motor's own frames of this cycle are before this one
   };
 
   template <class... Args>
-  void Fault(fmt::format_string<Args...> format, Args&&... args) noexcept;
+  void Fault(fmt::format_string<Args...> format, Args&&... args) noexcept {
+    if (mode_ == Mode::kFault) return;  // the first reason is the cause
+    cause_.Set(format, std::forward<Args>(args)...);
+    reason_ = cause_;
+    Disarm();
+    mode_ = Mode::kFault;
+  }
   void Refuse(std::string_view why) noexcept;
   void Disarm() noexcept;
   void RequestArm(int64_t made) noexcept;
@@ -107,6 +115,8 @@ class Driver {
 
   Mode mode_ = Mode::kRest;
   Reason reason_;
+  Reason cause_;                   // what stopped it: a fault or a request; the beginning of the reason
+  int arms_refused_ = 0;           // since it was armed last
   int64_t now_, utime_;            // latest times given
   int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
   int64_t armed_by_;               // utime of the last ARM request that was obeyed
@@ -121,6 +131,7 @@ class Driver {
 
   FrameBatch frames_, housekeeping_;
   size_t torque_frames_ = 0;
+  size_t turn_ = 0;  // whose own frames come first
   std::vector<double> effort_sent_;
   std::vector<JointMeasurement> scratch_;
   joint_state_t state_message_;

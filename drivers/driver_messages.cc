@@ -26,7 +26,8 @@ void Driver::PrepareMessages() {
 
   status_.frames_received = status_.frames_sent = status_.frames_rejected = status_.frames_dropped = 0;
   status_.commands_accepted = status_.commands_rejected = status_.commands_expired = 0;
-  status_.messages_rejected = status_.cycles = status_.overruns = 0;
+  status_.messages_rejected = status_.cycles = status_.overruns = status_.measurements_lost = 0;
+  status_.stopped_by_request = false;
   status_.num_joints = static_cast<int32_t>(size);
   for (const Joint& joint : joints_) status_.joint_name.push_back(joint.name);
   status_.joint_state.resize(size);
@@ -68,6 +69,7 @@ void Driver::NoteChanges() noexcept {
   uint64_t signature = static_cast<uint64_t>(state());
   const auto mix = [&](uint64_t value) { signature = (signature ^ value) * 0x9E3779B97F4A7C15; };
   mix(hash(reason()));
+  mix(status_.stopped_by_request);
   mix(link_ == LinkState::kUp && !bus_off_);
   for (const Joint& joint : joints_) {
     mix(static_cast<uint64_t>(joint.motor->state()));
@@ -93,6 +95,7 @@ const driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats
   status_.frames_rejected = frames_rejected_ + stats.malformed;
   status_.frames_sent = stats.sent;
   status_.frames_dropped = stats.refused + stats.lost;
+  status_.measurements_lost = measurements_.lost();
   status_.messages_rejected = requests_rejected_ + messages_rejected;
   return status_;
 }

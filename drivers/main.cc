@@ -3,6 +3,7 @@
 #include <sched.h>
 #include <spdlog/spdlog.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -12,6 +13,7 @@
 #include "common/messenger.h"
 #include "common/process.h"
 #include "drivers/driver.h"
+#include "drivers/state_log.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -19,8 +21,8 @@ namespace {
 
 constexpr int64_t kStatusPeriod = 100'000;  // [us]
 constexpr int64_t kReopenPeriod = 100'000;  // [us]
-constexpr double kFarewell = 0.3;     // [s] real time that the drives have to confirm a disarm at the end
-constexpr int kFramesPerCycle = 512;  // a flood must not keep us from our deadlines
+constexpr double kFarewell = 0.3;  // [s] real time that the drives have to confirm a disarm at the end
+constexpr int kBursts = 8;         // of frames per wake: a flood must not keep us from our deadlines
 
 /// From here on no page faults, and no other process before us. LCM's receive thread must exist already.
 void BecomeRealtime(int priority) {
@@ -34,9 +36,10 @@ void BecomeRealtime(int priority) {
   }
 }
 
-const char* StateName(int8_t state) {
+void WriteState(int8_t state, std::string_view reason) {
   constexpr std::array names = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
-  return names[static_cast<size_t>(state)];
+  const auto level = state == driver_status_t::FAULT ? spdlog::level::warn : spdlog::level::info;
+  spdlog::log(level, "{}{}{}", names[static_cast<size_t>(state)], reason.empty() ? "" : ": ", reason);
 }
 
 class DriverProcess {
@@ -73,16 +76,20 @@ class DriverProcess {
                                   {process_.messenger().fd(), POLLIN, 0},
                                   {process_.stop_fd(), POLLIN, 0}}};
     const timespec wait = clock_.RealDuration(cycle_.Remaining(clock_.Now()));
-    // After a stop signal its descriptor stays quiet: stopping() has read it.
     ppoll(polled.data(), polled.size(), &wait, nullptr);
+    process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
     ReceiveFrames();
     while (const joint_state_t* state = driver_.NextState()) states_.Publish(*state);
     process_.messenger().Drain();
-    if (cycle_.Due(clock_.Now())) Cycle();
+    if (cycle_.Due(clock_.Now())) {
+      Cycle();
+    } else {
+      log_.Drain();
+    }
   }
 
   void ReceiveFrames() {
-    for (int left = kFramesPerCycle; left > 0;) {
+    for (int burst = 0; burst < kBursts; ++burst) {
       const int count = transport_->Receive(received_);
       if (count <= 0) break;
       const int64_t now = clock_.Now();
@@ -91,7 +98,6 @@ class DriverProcess {
             frame.receive_ns != 0 ? clock_.UtimeFromRealtimeNs(frame.receive_ns) : clock_.Utime();
         driver_.OnFrame(frame, now, utime);
       }
-      left -= count;
     }
     driver_.OnLink(transport_->link());
   }
@@ -111,24 +117,13 @@ class DriverProcess {
     const driver_status_t& status =
         driver_.Status(clock_.Utime(), transport_->stats(), commands_.rejected() + requests_.rejected());
     statuses_.Publish(status);
-    if (driver_.revision() != revision_) Log(status);
+    log_.Note(status.state, status.reason);
     revision_ = driver_.revision();
     next_status_ = now + kStatusPeriod;
   }
 
-  void Log(const driver_status_t& status) {
-    std::string line = StateName(status.state);
-    if (!status.reason.empty()) line += ": " + status.reason;
-    if (line == logged_) return;
-    if (status.state == driver_status_t::FAULT) {
-      spdlog::warn("{}", line);
-    } else {
-      spdlog::info("{}", line);
-    }
-    logged_ = std::move(line);
-  }
-
-  /// Zero torque and idle drives, confirmed by their heartbeats if they are there to confirm it.
+  /// Zero torque and idle drives, confirmed by their heartbeats. @return 1 if a drive that may be armed has
+  /// not confirmed it in time, else 0: one that was never there has nothing to confirm.
   int Farewell() {
     driver_request_t disarm{};
     disarm.utime = clock_.Utime();
@@ -139,14 +134,18 @@ class DriverProcess {
     do {
       Step();
     } while (!driver_.confirmed_idle() && clock_.Now() - begin < patience);
-    if (!driver_.confirmed_idle()) {
-      spdlog::error("stopped, but a drive has not confirmed that it is idle");
+    log_.Drain();
+    const bool idle = driver_.confirmed_idle();
+    if (!log_.ready()) return idle ? 0 : 1;
+    if (!idle) {
+      spdlog::error(
+          "stopped, but a drive that was armed has not confirmed that it is idle; cure: cut its power");
     } else if (driver_.state() == DriveState::kAbsent) {
       spdlog::info("stopped; a drive is absent");
     } else {
       spdlog::info("stopped, drives idle");
     }
-    return 0;
+    return idle ? 0 : 1;
   }
 
   Process& process_;
@@ -162,7 +161,7 @@ class DriverProcess {
   int64_t next_reopen_ = 0;
   int64_t next_status_ = 0;
   uint64_t revision_ = 0;
-  std::string logged_;
+  StateLog log_{STDERR_FILENO, WriteState};
 };
 
 }  // namespace

@@ -54,6 +54,7 @@ class FrameBatch {
   }
   void Clear() noexcept { count_ = 0; }
   size_t size() const noexcept { return count_; }
+  size_t room() const noexcept { return kCapacity - count_; }
   std::span<const Frame> frames() const noexcept { return {frames_.data(), count_}; }
 
  private:

@@ -62,6 +62,9 @@ class CanSimpleDevice {
   double Torque() const noexcept;
 
   bool armed() const noexcept { return state_ == cansimple::kClosedLoopControl; }
+  int control_mode() const noexcept {
+    return control_mode_;
+  }  ///< a cansimple::ControlMode, or what was asked
   uint32_t disarm_reason() const noexcept { return disarm_reason_; }
   /// Frames for this node that were too short, not finite or unknown.
   int64_t rejected() const noexcept { return rejected_; }

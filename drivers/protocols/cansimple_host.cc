@@ -2,6 +2,7 @@
 
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 #include "drivers/protocols/cansimple.h"
 
@@ -12,6 +13,7 @@ using namespace cansimple;
 
 constexpr double kRadiansPerTurn = 2 * std::numbers::pi;
 constexpr int64_t kRetry = 50'000;      // [us] between repetitions of an unanswered frame
+constexpr int kModes = 2;               // one of them may be lost on the bus
 constexpr int kDisarmsBeforeEstop = 5;  // a drive that ignores these gets its emergency stop
 constexpr int kBeatsToArm = 4;  // heartbeats a drive has to enter closed loop; the first may be on its way
 
@@ -52,7 +54,7 @@ class CanSimpleMotor : public Motor {
 
   void Arm(int64_t now) noexcept override {
     if (step_ == Step::kArmed) return;
-    fault_ = false;
+    fault_ = estop_due_ = false;
     reason_.Clear();
     version_ = Version::kUnknown;
     Enter(Step::kVersion, now);
@@ -61,19 +63,24 @@ class CanSimpleMotor : public Motor {
   void Disarm(int64_t now) noexcept override {
     disarms_ = 0;
     axis_state_known_ = false;  // an old heartbeat proves nothing
+    // Nor does a new one while our order to run may be on its way: first the order to stop.
+    order_due_ = may_run_;
     Enter(Step::kDisarming, now);
   }
 
   void Estop(int64_t now) noexcept override {
     Fail(now, "emergency stop requested");
     disarms_ = kDisarmsBeforeEstop;
+    estop_due_ = true;
   }
 
-  void Tick(int64_t now, FrameBatch& out) noexcept override {
+  void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept override {
+    const size_t before = out.size();
     present_ = heard_ && now - heartbeat_ <= timing_.heartbeat_timeout;
     if (!present_ && heard_ && (Arming() || step_ == Step::kArmed)) {
       Fail(now, "no heartbeat for {} ms", (now - heartbeat_) / 1000);
     }
+    if (step_ == Step::kVersion && version_ == Version::kGood) Enter(Step::kClear, now);
     const bool late = now - entered_ >= timing_.heartbeat_timeout;
     switch (step_) {
       case Step::kRest:
@@ -81,40 +88,61 @@ class CanSimpleMotor : public Motor {
         if (present_ && axis_state_ == kClosedLoopControl) Disarm(now);
         break;
       case Step::kVersion:
-        if (version_ == Version::kGood) {
-          out.Push(Make(kClearErrors, node_));
-          Enter(Step::kMode, now);
-        } else if (version_ == Version::kBad) {
+        if (version_ == Version::kBad) {
           Fail(now, "its firmware is {}.{}, this driver speaks 0.6", firmware_major_, firmware_minor_);
         } else if (late) {
           Fail(now, "it does not answer Get_Version (firmware older than 0.6?)");
-        } else if (Retry(now)) {
+        } else if (may_arm && Retry(now)) {
           out.Push(MakeRequest(kGetVersion, node_));
         }
         break;
+      case Step::kClear:
       case Step::kMode:
-        out.Push(Make(kSetControllerMode, node_, {kTorqueControl, kPassthrough}));
-        Enter(Step::kState, now);
-        break;
       case Step::kState:
-        out.Push(Make(kSetAxisState, node_, {kClosedLoopControl}));
-        beats_ = 0;
-        Enter(Step::kAwait, now);
+        if (late) {
+          Fail(now, "the bus has not taken its arming frames for {} ms", (now - entered_) / 1000);
+        } else if (may_arm) {
+          out.Push(ArmingFrame());
+          if (step_ == Step::kState) may_run_ = true;
+        }
         break;
       case Step::kAwait:
         if (late || beats_ >= kBeatsToArm) {
-          std::array<char, 100> buffer;
-          Fail(now, "it stays in {} ({}; {})", DescribeAxisState(axis_state_),
-               DescribeErrors(axis_error_, buffer), DescribeProcedureResult(procedure_result_));
+          Fail(now, "it stays in {} ({}; {})", DescribeAxisState(axis_state_), Words(axis_error_),
+               DescribeProcedureResult(procedure_result_));
         }
         break;
       case Step::kArmed:
         break;
       case Step::kDisarming:
         TickDisarming(now, out);
-        break;
     }
-    if (ask_error_ && out.Push(MakeRequest(kGetError, node_))) ask_error_ = false;
+    if (ask_error_) out.Push(MakeRequest(kGetError, node_));
+    given_ = out.size() > before;
+  }
+
+  void Transmitted(bool all, int64_t now) noexcept override {
+    if (!std::exchange(given_, false)) return;
+    if (!all) {
+      retry_ = now;
+      return;
+    }
+    ask_error_ = false;
+    switch (step_) {
+      case Step::kClear:
+        return Enter(Step::kMode, now);
+      case Step::kMode:
+        if (++modes_ >= kModes) Enter(Step::kState, now);
+        return;
+      case Step::kState:
+        return Enter(Step::kAwait, now);
+      case Step::kDisarming:
+        if (disarms_++ >= kDisarmsBeforeEstop) estop_due_ = false;
+        if (order_due_) order_due_ = axis_state_known_ = false;
+        return;
+      default:
+        return;
+    }
   }
 
   Frame Torque(double torque) const noexcept override { return Make(kSetInputTorque, node_, {torque}); }
@@ -129,18 +157,28 @@ class CanSimpleMotor : public Motor {
     if (reason_.text().empty() && !present_) return heard_ ? "no heartbeat any more" : "no heartbeat yet";
     return reason_.text();
   }
-  bool confirmed_idle() const noexcept override { return !present_ || step_ == Step::kRest; }
+  bool confirmed_idle() const noexcept override {
+    return step_ == Step::kRest || (!present_ && !may_run_ && !estop_due_);
+  }
 
  private:
-  enum class Step { kRest, kVersion, kMode, kState, kAwait, kArmed, kDisarming };
+  enum class Step { kRest, kVersion, kClear, kMode, kState, kAwait, kArmed, kDisarming };
   enum class Version { kUnknown, kGood, kBad };
 
   bool Arming() const noexcept { return step_ >= Step::kVersion && step_ <= Step::kAwait; }
 
   void Enter(Step step, int64_t now) noexcept {
     step_ = step;
-    entered_ = now;
-    retry_ = now;
+    entered_ = retry_ = now;
+    beats_ = modes_ = 0;
+  }
+
+  std::string_view Words(uint32_t errors) noexcept { return DescribeErrors(errors, words_); }
+
+  Frame ArmingFrame() const noexcept {
+    if (step_ == Step::kClear) return Make(kClearErrors, node_);
+    if (step_ == Step::kMode) return Make(kSetControllerMode, node_, {kTorqueControl, kPassthrough});
+    return Make(kSetAxisState, node_, {kClosedLoopControl});
   }
 
   bool Retry(int64_t now) noexcept {
@@ -157,12 +195,14 @@ class CanSimpleMotor : public Motor {
   }
 
   void TickDisarming(int64_t now, FrameBatch& out) noexcept {
-    if (axis_state_known_ && axis_state_ != kClosedLoopControl) return Enter(Step::kRest, now);
-    if (!Retry(now)) return;
+    if (axis_state_known_ && axis_state_ != kClosedLoopControl && !order_due_ && !estop_due_) {
+      may_run_ = false;
+      return Enter(Step::kRest, now);
+    }
+    if (out.room() < 3 || !Retry(now)) return;
     out.Push(Make(kSetInputTorque, node_, {0}));
     out.Push(Make(kSetAxisState, node_, {kIdle}));
     if (disarms_ >= kDisarmsBeforeEstop) out.Push(Make(kEstop, node_));
-    ++disarms_;
   }
 
   FrameUse OnHeartbeat(const Frame& frame, int64_t now) noexcept {
@@ -173,17 +213,18 @@ class CanSimpleMotor : public Motor {
     axis_error_ = static_cast<uint32_t>((*values)[0]);
     axis_state_ = static_cast<int>((*values)[1]);
     axis_state_known_ = true;
+    may_run_ = may_run_ || axis_state_ == kClosedLoopControl;
     procedure_result_ = static_cast<int>((*values)[2]);
     ++beats_;
     const bool running = axis_state_ == kClosedLoopControl && axis_error_ == 0;
     if (step_ == Step::kAwait && running) Enter(Step::kArmed, now);
     // The state counts, not only the error: drives have been seen to fall to IDLE with error 0.
     if (step_ == Step::kArmed && !running) {
-      std::array<char, 100> buffer;
-      Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_),
-           DescribeErrors(axis_error_, buffer), DescribeProcedureResult(procedure_result_));
+      Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_), Words(axis_error_),
+           DescribeProcedureResult(procedure_result_));
       ask_error_ = true;
-      axis_state_known_ = true;
+      axis_state_known_ = true;  // it was running, so no order of ours is on its way
+      order_due_ = false;
     }
     return FrameUse::kConsumed;
   }
@@ -202,8 +243,7 @@ class CanSimpleMotor : public Motor {
     if (!values) return FrameUse::kRejected;
     const auto disarm_reason = static_cast<uint32_t>((*values)[1]);
     if (fault_ && step_ != Step::kArmed && axis_error_ == 0 && disarm_reason != 0) {
-      std::array<char, 100> buffer;
-      reason_.Set("the drive disarmed itself: {}", DescribeErrors(disarm_reason, buffer));
+      reason_.Set("the drive disarmed itself: {}", Words(disarm_reason));
     }
     return FrameUse::kConsumed;
   }
@@ -226,24 +266,23 @@ class CanSimpleMotor : public Motor {
   const MotorTiming timing_;
   MotorEstimate estimate_;
   double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
-
-  bool heard_ = false;    // ever
-  bool present_ = false;  // lately
+  bool heard_ = false, present_ = false;  // ever, lately
   int64_t heartbeat_ = 0;
   uint32_t axis_error_ = 0;
-  int axis_state_ = kUndefined;
+  int axis_state_ = kUndefined, procedure_result_ = 0;
   bool axis_state_known_ = false;  // since the last disarm
-  int procedure_result_ = 0;
   Version version_ = Version::kUnknown;
+  std::array<char, 100> words_;
   int firmware_major_ = 0, firmware_minor_ = 0;
 
   Step step_ = Step::kRest;
-  int64_t entered_ = 0;
-  int64_t retry_ = 0;
-  int beats_ = 0;
-  int disarms_ = 0;
-  bool ask_error_ = false;
-  bool fault_ = false;
+  int64_t entered_ = 0, retry_ = 0;
+  int beats_ = 0, modes_ = 0, disarms_ = 0;  // heard in this step; accepted
+  bool given_ = false;                       // the last Tick gave frames
+  bool may_run_ = false;                     // told to run, or heard running, and not heard idle since
+  bool order_due_ = false;                   // no order to stop was accepted since the last order to run
+  bool estop_due_ = false;                   // no Estop was accepted since it was asked for
+  bool ask_error_ = false, fault_ = false;
   Reason reason_;
 };
 

@@ -27,7 +27,7 @@ class Reason {
   std::string_view text() const noexcept { return {text_.data(), size_}; }
 
  private:
-  std::array<char, 192> text_;
+  std::array<char, 256> text_;
   size_t size_ = 0;
 };
 
@@ -70,14 +70,18 @@ class Motor {
   /// The drive's own emergency stop.
   virtual void Estop(int64_t now) noexcept = 0;
   /// Once per cycle: deadlines, and the next frames of the sequence under way.
-  virtual void Tick(int64_t now, FrameBatch& out) noexcept = 0;
+  /// @param may_arm false: no room for arming frames in this cycle, the sequence waits.
+  virtual void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept = 0;
+  /// After each Tick. @param all whether the transport took all frames of that Tick. If not, they count as
+  /// not sent, and the next Tick gives them again: no step follows one that did not happen.
+  virtual void Transmitted(bool all, int64_t now) noexcept = 0;
   /// The frame of a torque setpoint [Nm]. Sent in every cycle while arming (zero) and armed.
   virtual Frame Torque(double torque) const noexcept = 0;
 
   virtual DriveState state() const noexcept = 0;
   /// Why it is not armed: decoded errors, the step at which arming failed. Empty if there is nothing to say.
   virtual std::string_view reason() const noexcept = 0;
-  /// True once the drive has confirmed that it is not armed, or is absent.
+  /// True once the drive has confirmed that it is not armed, or if it is absent and was never armed since.
   virtual bool confirmed_idle() const noexcept = 0;
 };
 

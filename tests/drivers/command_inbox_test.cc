@@ -38,6 +38,23 @@ TEST_CASE("the newest command counts") {
   CHECK(inbox.Offer(Command(0, 4), 4000, kUtime));  // a controller that started anew
 }
 
+TEST_CASE("a sequence number that nobody has does not lock out the controller") {
+  CommandInbox inbox(2, 100'000);
+  constexpr int64_t kGreatest = std::numeric_limits<int64_t>::max();
+  CHECK_FALSE(inbox.Offer(Command(kGreatest, 9), 0, kUtime));  // the first one
+  CHECK_FALSE(inbox.Offer(Command(-1, 9), 0, kUtime));
+  CHECK(inbox.empty());
+  CHECK_FALSE(inbox.refusal().empty());
+  REQUIRE(inbox.Offer(Command(7'000'000, 1), 1000, kUtime));
+  CHECK(inbox.refusal().empty());
+  CHECK_FALSE(inbox.Offer(Command(8'000'001, 9), 2000, kUtime));
+  CHECK(inbox.refusal() == "their sequence jumps");
+  CHECK_FALSE(inbox.Offer(Command(kGreatest, 9), 2000, kUtime));
+  CHECK(inbox.Offer(Command(7'000'001, 2), 3000, kUtime));
+  CHECK(inbox.Effort(0, 0, 0) == 2);
+  CHECK(inbox.Offer(Command(8'000'001, 3), 3000, kUtime));  // a million were lost
+}
+
 TEST_CASE("what is no command") {
   CommandInbox inbox(2, 100'000);
   const auto rejects = [&](const joint_command_t& command) {

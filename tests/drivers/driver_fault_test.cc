@@ -118,7 +118,23 @@ TEST_CASE("commands that are none change nothing and feed nobody") {
   rig.Run(20);
   CHECK(rig.drives[0].Torque() == 0);
   CHECK(rig.RunUntil(DriveState::kFault) >= 0);
-  CHECK_THAT(rig.Reason(), StartsWith("no command for"));
+  CHECK_THAT(rig.Reason(), StartsWith("commands refused: an effort is not a number (none taken for 25"));
+}
+
+TEST_CASE("a controller that began anew is taken up after the robot is armed again") {
+  Rig rig;
+  rig.Start();
+  rig.sequence = 5'000'000;
+  REQUIRE(rig.Arm(1));
+  rig.Run(20);
+  REQUIRE(rig.drives[0].Torque() == 1);
+  rig.sequence = -1;
+  CHECK(rig.RunUntil(DriveState::kFault) >= 0);
+  CHECK_THAT(rig.Reason(), StartsWith("commands refused: their sequence is behind"));
+  REQUIRE(rig.Arm(1));
+  rig.Run(500);
+  CHECK(rig.driver->state() == DriveState::kArmed);
+  CHECK(rig.drives[0].Torque() == 1);
 }
 
 TEST_CASE("a drive that does not obey gets its emergency stop") {

@@ -70,6 +70,42 @@ TEST_CASE("the first JOINT_STATE has no effort applied, idle ones have zero") {
   CHECK(rig.states.back().effort_sent[0] == 0);
 }
 
+TEST_CASE("when the clock is set back, measurements go on from there") {
+  Rig rig(2);
+  rig.cycle_phase = 2000;
+  rig.Start();
+  rig.Run(500);
+  REQUIRE(rig.states.size() == 100);
+  rig.states.clear();
+  rig.set_back = GENERATE(int64_t{20'000}, int64_t{400'000}, int64_t{3'600'000'000});
+  rig.Run(500);
+  CHECK(rig.states.size() >= 98);
+  int unknown = 0;
+  for (size_t i = 0; i < rig.states.size(); ++i) {
+    const joint_state_t& state = rig.states[i];
+    INFO("back " << rig.set_back << " i " << i << " utime " << state.utime - Rig::kEpoch);
+    if (std::isnan(state.effort_applied[0])) {
+      ++unknown;
+      continue;
+    }
+    CHECK(state.utime - rig.states[i - 1].utime == Approx(5000).margin(20));
+  }
+  CHECK(unknown >= 1);
+  CHECK(unknown <= 2);
+  CHECK(rig.Status().measurements_lost >= 1);
+}
+
+TEST_CASE("estimates that were lost are counted") {
+  Rig rig(2);
+  int count = 0;
+  rig.to_driver = [&](Frame& frame) { return frame.id != 0x49 || ++count % 20 != 0; };
+  rig.Start();
+  rig.Run(1000);
+  // Each lost one, and its partner that is left alone.
+  CHECK(rig.Status().measurements_lost >= 2 * 9);
+  CHECK(rig.Status().measurements_lost <= 2 * 10);
+}
+
 TEST_CASE("an effort that the bus did not accept was not applied") {
   Rig rig;
   rig.settings.watchdog = 0;

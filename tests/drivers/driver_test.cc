@@ -29,7 +29,8 @@ TEST_CASE("arming follows the protocol's sequence and ends in torque control") {
   CHECK(rig.driver->state() == DriveState::kArmed);
   CHECK(rig.Reason().empty());
   all.erase(std::remove(all.begin(), all.end(), "02E#0000000000000000"), all.end());
-  CHECK(all == std::vector<std::string>{"020#R", "038#00", "02B#0100000001000000", "027#0800000000000000"});
+  CHECK(all == std::vector<std::string>{"020#R", "038#00", "02B#0100000001000000", "02B#0100000001000000",
+                                        "027#0800000000000000"});
   CHECK(rig.drives[0].armed());
   CHECK(rig.drives[0].Torque() == 0);
 }
@@ -148,7 +149,7 @@ TEST_CASE("an ARM whose maker's clock is ahead counts once") {
   rig.Start();
   rig.Run(400);
   driver_request_t arm;
-  arm.utime = rig.utime() + 60'000'000;
+  arm.utime = rig.utime() + 1'000'000;
   arm.request = driver_request_t::ARM;
   rig.driver->OnRequest(arm, rig.now, rig.utime());
   REQUIRE(rig.RunUntil(DriveState::kArmed) >= 0);
@@ -156,6 +157,48 @@ TEST_CASE("an ARM whose maker's clock is ahead counts once") {
   rig.driver->OnRequest(arm, rig.now, rig.utime());
   rig.Run(10);
   CHECK(rig.driver->state() == DriveState::kFault);
+  CHECK_THAT(rig.Reason(),
+             StartsWith("no command for") && Contains("; ARM refused: it, or a newer one, was obeyed"));
+}
+
+TEST_CASE("an ARM from the far future is refused and does no harm") {
+  Rig rig;
+  rig.Start();
+  rig.Run(400);
+  for (const int64_t ahead : {int64_t{1'000'001}, std::numeric_limits<int64_t>::max() / 2}) {
+    rig.Request(driver_request_t::ARM, -ahead);
+    rig.Run(10);
+    CHECK(rig.driver->state() == DriveState::kIdle);
+    CHECK_THAT(rig.Reason(), Contains("dated in the future"));
+  }
+  CHECK_THAT(rig.Reason(), StartsWith("ARM refused (2 times): "));
+  CHECK(rig.Arm());
+  rig.Request(driver_request_t::DISARM);
+  rig.Run(200);
+  rig.Request(driver_request_t::ARM, 300'000);
+  CHECK_THAT(rig.Reason(), Equals("disarmed on request; ARM refused: it was made before the driver stopped"));
+}
+
+TEST_CASE("a person's stop is told from a fault") {
+  Rig rig;
+  rig.Start();
+  CHECK_FALSE(rig.Status().stopped_by_request);
+  REQUIRE(rig.Arm());
+  rig.commanding = false;
+  REQUIRE(rig.RunUntil(DriveState::kFault) >= 0);
+  CHECK_FALSE(rig.Status().stopped_by_request);
+  SECTION("DISARM after a fault") { rig.Request(driver_request_t::DISARM); }
+  SECTION("ESTOP after a fault") { rig.Request(driver_request_t::ESTOP); }
+  SECTION("DISARM while armed") {
+    REQUIRE(rig.Arm());
+    rig.Request(driver_request_t::DISARM);
+  }
+  rig.Run(100);
+  CHECK(rig.Status().stopped_by_request);
+  rig.Request(driver_request_t::ARM, 1'000'000'000);  // one that is refused changes nothing
+  CHECK(rig.Status().stopped_by_request);
+  REQUIRE(rig.Arm());
+  CHECK_FALSE(rig.Status().stopped_by_request);
 }
 
 TEST_CASE("an ARM from before the driver's start is not for it") {
@@ -165,6 +208,7 @@ TEST_CASE("an ARM from before the driver's start is not for it") {
   rig.Request(driver_request_t::ARM, 400'001);
   rig.Run(10);
   CHECK(rig.driver->state() == DriveState::kIdle);
+  CHECK(rig.Reason() == "ARM refused: it was made before the driver started");
 }
 
 TEST_CASE("the start guard") {
@@ -208,7 +252,7 @@ TEST_CASE("ARM is refused while something is missing, and says what") {
   heartbeat = true;
   rig.Run(30);
   rig.Request(driver_request_t::ARM);
-  CHECK_THAT(rig.Reason(), Equals("ARM refused: knee1: no encoder estimates"));
+  CHECK_THAT(rig.Reason(), Equals("ARM refused (2 times): knee1: no encoder estimates"));
   encoder = true;
   rig.driver->OnLink(LinkState::kDown);
   rig.Run(10);

@@ -49,7 +49,7 @@ struct Rig {
     samples.resize(drives.size());
   }
 
-  int64_t utime() const { return kEpoch + now; }
+  int64_t utime() const { return kEpoch + now - set_back; }
 
   /// One millisecond.
   void Step() {
@@ -67,7 +67,7 @@ struct Rig {
     if (commanding) Command(effort);
     sent.clear();
     for (const Frame& frame : driver->Tick(now, utime(), lateness)) sent.push_back(frame);
-    const int accepted = bus_full ? 0 : static_cast<int>(sent.size());
+    const int accepted = bus_full ? 0 : accept ? accept(sent) : static_cast<int>(sent.size());
     driver->Transmitted(accepted, utime());
     for (int i = 0; i < accepted; ++i) {
       Frame frame = sent[static_cast<size_t>(i)];
@@ -143,7 +143,10 @@ struct Rig {
   TransportStats stats;
   std::function<void()> on_step;
   std::function<bool(Frame&)> to_driver, to_drive;
+  std::function<int(const std::vector<Frame>&)>
+      accept;  ///< how many frames the transport takes; default: all
   int64_t now = 5'000'000;
+  int64_t set_back = 0;     ///< [us] by which the real-time clock was set back
   int64_t cycle_phase = 0;  ///< [us] of the driver's cycle behind the drives' samples
   int64_t lateness = 0;
   int64_t sequence = 0;

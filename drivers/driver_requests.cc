@@ -1,0 +1,104 @@
+// What the driver is asked: DRIVER_REQUEST and JOINT_COMMAND.
+
+#include "drivers/driver.h"
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kClockError = 1'000'000;  // [us] that the clock of a request's maker may be ahead of ours
+
+}  // namespace
+
+void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept {
+  now_ = now;
+  utime_ = utime;
+  switch (request.request) {
+    case driver_request_t::ARM:
+      return RequestArm(request.utime);
+    // Stopping is obeyed whatever the request's time.
+    case driver_request_t::DISARM:
+      status_.stopped_by_request = true;
+      if (mode_ == Mode::kFault) {
+        stopped_utime_ = utime;
+        return;
+      }
+      cause_.Set("disarmed on request");
+      reason_ = cause_;
+      return Disarm();
+    case driver_request_t::ESTOP:
+      status_.stopped_by_request = true;
+      Fault("emergency stop requested");
+      stopped_utime_ = utime;
+      for (Joint& joint : joints_) joint.motor->Estop(now);
+      return;
+    default:
+      ++requests_rejected_;
+      return;
+  }
+}
+
+void Driver::Refuse(std::string_view why) noexcept {
+  ++arms_refused_;
+  Reason count;
+  if (arms_refused_ > 1) count.Set(" ({} times)", arms_refused_);
+  // What stopped it is worth more than what is refused.
+  const std::string_view cause = cause_.text();
+  reason_.Set("{}{}ARM refused{}: {}", cause, cause.empty() ? "" : "; ", count.text(), why);
+}
+
+void Driver::RequestArm(int64_t made) noexcept {
+  if (Active()) return;  // obeyed already
+  const int64_t now = now_;
+  // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's clock may
+  // be ahead of ours, so that it looks newer than the stop). One from further ahead would make all void that
+  // come after it.
+  if (made > utime_ + kClockError) return Refuse("it is dated in the future: are the clocks the same?");
+  if (made < start_utime_) return Refuse("it was made before the driver started");
+  if (made <= stopped_utime_) return Refuse("it was made before the driver stopped");
+  if (made <= armed_by_) return Refuse("it, or a newer one, was obeyed already");
+  if (now - start_now_ < start_guard_) return Refuse("the driver has only just started");
+  if (stray_controller_ && now - last_command_ < start_guard_) {
+    return Refuse("commands arrived when the driver started: stop the controller of an earlier run");
+  }
+  if (link_ != LinkState::kUp) return Refuse("the CAN interface is not up");
+  if (bus_off_) return Refuse("the CAN controller is bus-off");
+  for (const Joint& joint : joints_) {
+    Reason why;
+    if (joint.motor->state() == DriveState::kAbsent) {
+      why.Set("{}: {}", joint.name, joint.motor->reason());
+    } else if (!joint.measured || now - joint.measured_at > stale_after_) {
+      why.Set("{}: no encoder estimates", joint.name);
+    }
+    if (!why.text().empty()) return Refuse(why.text());
+  }
+  armed_by_ = made;
+  arms_refused_ = 0;
+  stray_controller_ = false;
+  status_.stopped_by_request = false;
+  refused_cycles_ = 0;
+  inbox_.Clear();
+  cause_.Clear();
+  for (Joint& joint : joints_) joint.motor->Arm(now);
+  mode_ = Mode::kArming;
+  reason_.Set("arming");
+}
+
+void Driver::OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept {
+  now_ = now;
+  utime_ = utime;
+  last_command_ = now;
+  if (now - start_now_ < start_guard_) {
+    stray_controller_ = true;
+    ++status_.commands_rejected;
+    return;
+  }
+  if (mode_ != Mode::kArmed) return;
+  if (inbox_.Offer(command, now, utime)) {
+    ++status_.commands_accepted;
+    expiry_counted_ = false;
+  } else {
+    ++status_.commands_rejected;
+  }
+}
+
+}  // namespace plumb
