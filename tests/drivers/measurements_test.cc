@@ -30,6 +30,24 @@ TEST_CASE("a measurement is complete with every joint's estimate, and comes once
   CHECK_FALSE(measurements.Next(utime, set));
 }
 
+TEST_CASE("a clock that is set back between two joints' estimates does not part them for ever") {
+  Measurements measurements(2, kPeriod);
+  std::vector<JointMeasurement> set(2);
+  int64_t utime;
+  int complete = 0;
+  for (int k = 0; k < 60; ++k) {
+    const int64_t sent = kStart + 5000 * k;
+    measurements.Add(0, At(k, 0), sent - (k < 20 ? 0 : 500'000));
+    measurements.Add(1, At(k, 1), sent + 40 - (k < 21 ? 0 : 500'000));
+    while (measurements.Next(utime, set)) {
+      ++complete;
+      CHECK(set[1].position == Approx(set[0].position + 0.1));
+    }
+  }
+  CHECK(complete >= 55);
+  CHECK(measurements.lost() >= 2);
+}
+
 TEST_CASE("several measurements that arrive together come one after the other") {
   Measurements measurements(1, kPeriod);
   std::vector<JointMeasurement> set(1);
