@@ -5,7 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <cerrno>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -57,7 +57,7 @@ std::vector<Finding> Can() {
     const std::string name = entry.path().filename();
     std::string flags;
     std::ifstream(entry.path() / "flags") >> flags;
-    const bool up = (std::stoul(flags, nullptr, 16) & 1) != 0;
+    const bool up = (std::strtoul(flags.c_str(), nullptr, 16) & 1) != 0;
     if (up) findings.push_back({Level::kGood, "CAN interface " + name + " is up", ""});
     else
       findings.push_back({Level::kAdvice, "CAN interface " + name + " is down",

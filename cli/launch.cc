@@ -2,10 +2,13 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <signal.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
+#include <functional>
 #include <iostream>
 #include <stdexcept>
 
@@ -14,6 +17,7 @@
 #include "common/atomic_file.h"
 #include "drivers/can/transport.h"
 #include "plumb/driver_request_t.hpp"
+#include "plumb/policy_t.hpp"
 #include "robot/description.h"
 #include "sim/parameters.h"
 
@@ -24,6 +28,7 @@ namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr int kMostRearms = 5;  // of a virtual robot; a real one is armed by a person, every time
+constexpr double kListen = 0.5;  // [s] before anything is started: is somebody there already?
 
 double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
@@ -48,7 +53,10 @@ class ClosedLoop {
         trainings_(process.messenger(), "TRAINING_STATUS",
                    [&](const training_status_t& m) { progress_.OnTraining(m); }) {
     if (flags.real && flags.speed != 1) throw std::invalid_argument("a real robot runs at --speed 1");
-    OpenTransport(bus_);  // throws one clear line before anything has been started
+    if (!flags.real && bus_.rfind("udp:", 0) != 0 && bus_.rfind("socketcan:vcan", 0) != 0) {
+      throw std::invalid_argument(bus_ + " is neither udp: nor a vcan interface: if a robot is on it, say --real");
+    }
+    RequireQuiet();
     if (!flags.real) truth_ = HiddenParameters(robot_, flags.seed);
     output_ = flags.output.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}",
                                                                     fmt::localtime(std::time(nullptr)), getpid())
@@ -62,7 +70,10 @@ class ClosedLoop {
     std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << bus_ << ", seed " << flags_.seed
               << ", logs in " << output_.string() << std::endl;
     StartAll();
-    if (flags_.real && !PersonAgrees()) return 1;
+    if (flags_.real) {
+      const int status = ArmByPerson();
+      if (status != 0) return status;
+    }
     std::cout << progress_.Header() << std::endl;
     while (!progress_.finished()) {
       if (!process_.Wait(50'000)) {
@@ -101,26 +112,75 @@ class ClosedLoop {
   void StartAll() {
     const std::string seed = std::to_string(flags_.seed);
     if (!flags_.log.empty()) {
-      Start("lcm-logger", {"--lcm-url=" + process_.lcm_url(), "-q", "-f", flags_.log});
+      // It knows no --parent of ours.
+      Start("setpriv", {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + process_.lcm_url(), "-q", "-f", flags_.log});
     }
     if (!flags_.real) Start("plumb-robot", {flags_.robot, "--bus", bus_, "--seed", seed});
     Start("plumb-driver", {flags_.robot, "--bus", bus_});
     Start("plumb-estimator", {flags_.robot});
-    Start("plumb-controller", {flags_.robot, "--seed", seed});
-    Start("plumb-trainer", {flags_.robot, "--seed", seed, "--iterations", std::to_string(flags_.iterations),
+    std::vector<std::string> controller{flags_.robot, "--seed", seed};
+    if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});  // nobody throws a real robot about
+    Start("plumb-controller", controller);
+    // The slow loop gives way to the fast one.
+    Start("plumb-trainer", {flags_.robot, "--nice", "10", "--seed", seed, "--iterations", std::to_string(flags_.iterations),
                             "--evaluation-episodes", std::to_string(flags_.evaluation_episodes), "--checkpoint",
                             (output_ / "training").string()});
-    Start("plumb-calibrator", {flags_.robot, "--seed", seed, "--checkpoint", (output_ / "calibration").string()});
+    Start("plumb-calibrator", {flags_.robot, "--nice", "10", "--seed", seed, "--checkpoint", (output_ / "calibration").string()});
   }
 
-  bool PersonAgrees() {
+  // Two runs on one bus or one LCM would command each other's robots; and a robot that already talks on a bus meant for
+  // a virtual one is a real one.
+  void RequireQuiet() {
+    const auto bus = OpenTransport(bus_);  // throws one clear line before anything has been started
+    Subscriber<policy_t> policies(process_.messenger(), "POLICY");
+    const auto start = SteadyClock::now();
+    std::array<Frame, 64> frames;
+    while (SecondsSince(start) < kListen && !process_.stopping()) {
+      process_.Wait(10'000, bus->fd());
+      if (drivers_.received() > 0 || policies.received() > 0) {
+        throw std::runtime_error("another run is under way on " + process_.lcm_url() + ": stop it, or give --lcm-url");
+      }
+      if (bus->Receive(frames) > 0 && !flags_.real) {
+        throw std::runtime_error("somebody talks on " + bus_ + " already: give another --bus (or --real)");
+      }
+    }
+  }
+
+  // One consent is one attempt. @return 0 when armed, else the exit status.
+  int ArmByPerson() {
+    const auto until = [&](const std::function<bool()>& so, double seconds) {
+      const auto start = SteadyClock::now();
+      while (!so() && SecondsSince(start) < seconds && AllRunning()) {
+        if (!process_.Wait(50'000)) return false;
+      }
+      return so();
+    };
+    const auto state_is = [&](int8_t state) { return progress_.driver().state == state; };
+    if (!until([&] { return state_is(driver_status_t::IDLE); }, 5)) {
+      std::cerr << "plumb: the driver is not ready to arm: " << progress_.driver().reason << std::endl;
+      return process_.stopping() ? 130 : 1;
+    }
     std::cout << "The motors of " << robot_.name << " on " << bus_
               << " will be switched on.\nStand clear, keep the emergency stop at hand, and type 'arm': " << std::flush;
     std::string answer;
-    std::getline(std::cin, answer);
-    if (answer == "arm") return true;
-    std::cout << "not armed" << std::endl;
-    return false;
+    while (answer.empty() || answer.back() != '\n') {
+      if (!process_.Wait(1'000'000, STDIN_FILENO)) return 130;
+      pollfd input{STDIN_FILENO, POLLIN, 0};
+      char c = 0;
+      while (poll(&input, 1, 0) > 0 && answer.find('\n') == std::string::npos) {
+        if (read(STDIN_FILENO, &c, 1) != 1) c = '\n';
+        answer.push_back(c);
+      }
+      if (!AllRunning()) return 1;
+    }
+    if (answer != "arm\n") {
+      std::cout << "not armed" << std::endl;
+      return 1;
+    }
+    Request(driver_request_t::ARM);
+    if (until([&] { return state_is(driver_status_t::ARMED); }, 3)) return 0;
+    std::cerr << "plumb: not armed: " << progress_.driver().reason << std::endl;
+    return process_.stopping() ? 130 : 1;
   }
 
   bool AllRunning() {
@@ -135,22 +195,27 @@ class ClosedLoop {
     return true;
   }
 
-  // Asks for arming at the beginning; after a fault only for a virtual robot, and not for ever.
+  // A virtual robot is armed at the beginning, and again after a fault, though not for ever. What a person has
+  // stopped, and a real robot in any case, only a person starts.
   bool KeepArmed() {
     const driver_status_t& driver = progress_.driver();
+    if (driver.stopped_by_request != stopped_) {
+      stopped_ = driver.stopped_by_request;
+      if (stopped_) Print("stopped by request. To go on: plumb arm --lcm-url '" + process_.lcm_url() + "'");
+    }
+    if (stopped_) return true;
     if (driver.state == driver_status_t::FAULT && !fault_seen_) {
       fault_seen_ = true;
       Print("driver fault: " + driver.reason);
-      if (flags_.real) Print("Look at the robot. To go on: plumb arm");
+      if (flags_.real) Print("Look at the robot. To go on: plumb arm --lcm-url '" + process_.lcm_url() + "'");
       if (!flags_.real && ++rearms_ > kMostRearms) {
         std::cerr << "plumb: too many faults\n";
         return false;
       }
     }
-    if (driver.state == driver_status_t::ARMED) fault_seen_ = false, armed_once_ = true;
-    const bool idle = driver.state == driver_status_t::IDLE && (!armed_once_ || !flags_.real);
-    const bool fault = driver.state == driver_status_t::FAULT && !flags_.real;
-    if ((idle || fault) && SecondsSince(last_request_) * flags_.speed > 0.5) {
+    if (driver.state == driver_status_t::ARMED) fault_seen_ = false;
+    const bool down = driver.state == driver_status_t::IDLE || driver.state == driver_status_t::FAULT;
+    if (down && !flags_.real && SecondsSince(last_request_) * flags_.speed > 0.5) {
       Request(driver_request_t::ARM);
       last_request_ = SteadyClock::now();
     }
@@ -167,7 +232,7 @@ class ClosedLoop {
   void StopAll() {
     // Everything that could command goes at once; the driver disarms and confirms; the robot and the log go last.
     for (Child& child : children_) {
-      if (child.name() != "plumb-robot" && child.name() != "lcm-logger") child.Signal(SIGTERM);
+      if (child.name() != "plumb-robot" && child.name() != "setpriv") child.Signal(SIGTERM);
     }
     for (Child& child : children_) {
       if (child.name() == "plumb-driver") child.WaitFor(0.5);
@@ -229,7 +294,7 @@ class ClosedLoop {
   fs::path output_;
   std::vector<Child> children_;
   SteadyClock::time_point start_ = SteadyClock::now(), last_status_ = start_, last_request_ = start_;
-  bool line_open_ = false, fault_seen_ = false, armed_once_ = false;
+  bool line_open_ = false, fault_seen_ = false, stopped_ = false;
   int rearms_ = 0;
 };
 

@@ -13,29 +13,37 @@
 namespace plumb {
 namespace {
 
-// Sends a request until the driver's status shows it fulfilled.
+// Sends a request and says what the driver makes of it. A stop goes out at once and again and again; arming is asked for
+// once, when the driver has been heard, because one wish must not be granted later than it was made.
 int Request(Process& process, int8_t what) {
   Publisher<driver_request_t> requests(process.messenger(), "DRIVER_REQUEST");
   Subscriber<driver_status_t> statuses(process.messenger(), "DRIVER_STATUS");
-  process.Wait(300'000);
+  const bool arming = what == driver_request_t::ARM;
   driver_request_t request{};
   request.request = what;
-  for (int attempt = 0; attempt < 5; ++attempt) {
+  request.utime = process.clock().Utime();
+  bool asked = false;
+  const int64_t deadline = process.clock().Now() + 3'000'000;
+  do {
+    const bool heard = statuses.received() > 0;
     // In a run with a scaled clock the driver's time is not ours.
-    request.utime = std::max(process.clock().Utime(), statuses.received() > 0 ? statuses.newest().utime + 1 : 0);
-    requests.Publish(request);
-    const int64_t deadline = process.clock().Now() + 600'000;
-    while (process.clock().Now() < deadline) {
-      if (!process.Wait(50'000)) return 130;
-      const int8_t state = statuses.newest().state;
-      const bool armed = state == driver_status_t::ARMED;
-      if (statuses.received() > 0 && armed == (what == driver_request_t::ARM) && state != driver_status_t::ARMING &&
-          statuses.newest().utime > request.utime) {
-        std::cout << (armed ? "armed" : "not armed: " + statuses.newest().reason) << std::endl;
-        return 0;
-      }
+    if (heard) request.utime = statuses.newest().utime + 1;
+    if (!arming || (heard && !asked)) {
+      requests.Publish(request);
+      asked = true;
     }
-  }
+    if (!process.Wait(100'000)) return 130;
+    if (!heard) continue;
+    const driver_status_t& status = statuses.newest();
+    if (arming && status.state == driver_status_t::ARMED) {
+      std::cout << "armed" << std::endl;
+      return 0;
+    }
+    if (!arming && status.state != driver_status_t::ARMED && status.state != driver_status_t::ARMING) {
+      std::cout << "not armed: " << status.reason << std::endl;
+      return 0;
+    }
+  } while (process.clock().Now() < deadline);
   std::cerr << "plumb: "
             << (statuses.received() == 0 ? "no driver answers on " + process.lcm_url()
                                          : "the driver did not obey: " + statuses.newest().reason)

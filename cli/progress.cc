@@ -60,7 +60,12 @@ void Progress::OnTraining(const training_status_t& status) {
 
 void Progress::OnCalibration(const calibration_status_t& status) {
   const int known = done_.empty() ? 0 : done_.back().calibration.iteration;
-  if (status.iteration <= known || status.num_parameters != static_cast<int>(robot_.parameters.size())) return;
+  // Anybody can send anything: sizes that do not fit together are somebody else's message.
+  if (status.iteration <= known || status.iteration > iterations_ ||
+      status.num_parameters != static_cast<int>(robot_.parameters.size()) ||
+      status.num_powers != status.num_parameters * status.num_combinations) {
+    return;
+  }
   const auto or_nan = [](const std::map<int, double>& values, int key) {
     const auto found = values.find(key);
     return found == values.end() ? NAN : found->second;

@@ -48,11 +48,12 @@ class Subscriber {
   /// @param callback called for every message, in order of arrival; may be empty when newest() is enough.
   /// It may throw: the exception is kept and thrown again by Rethrow().
   Subscriber(Messenger& messenger, const std::string& channel, Callback callback = {})
-      : callback_(std::move(callback)) {
-    lcm::Subscription* subscription = messenger.lcm().subscribe(channel, &Subscriber::OnBuffer, this);
-    subscription->setQueueCapacity(0);
-    messenger.Guard();
+      : messenger_(messenger), callback_(std::move(callback)) {
+    subscription_ = messenger_.lcm().subscribe(channel, &Subscriber::OnBuffer, this);
+    subscription_->setQueueCapacity(0);
+    messenger_.Guard();
   }
+  ~Subscriber() { messenger_.lcm().unsubscribe(subscription_); }
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
 
@@ -88,6 +89,8 @@ class Subscriber {
     }
   }
 
+  Messenger& messenger_;
+  lcm::Subscription* subscription_;
   Callback callback_;
   Message newest_{}, arriving_{};
   int64_t received_ = 0;

@@ -1,6 +1,7 @@
-// Step-based against trajectory-based SimOpt on recorded roll-outs, with the same budget: the same number of
-// simulated transitions, samples, updates and KL bound, the same REPS. For each run folder of `plumb launch` all
-// roll-outs but the last two calibrate, one an iteration; the last two judge. Writes a table.
+// Step-based against trajectory-based SimOpt on recorded roll-outs. The two use the same roll-outs, samples, updates, KL
+// bound and REPS, hence the same number of simulated transitions: the newest roll-out's, for each sample of each update.
+// Plumbline's own objective (the posterior) uses all roll-outs so far, and is shown beside them with its greater number.
+// For each run folder of `plumb launch` all roll-outs but the last two calibrate, one an iteration; the last two judge.
 //
 //   plumb-step-vs-trajectory robots/pendulum runs/a runs/b ... --csv table.csv
 
@@ -28,59 +29,66 @@ constexpr Method kMethods[] = {{"prior", Objective::kStep, true},
                                {"step-based (paper's cost)", Objective::kStep, false},
                                {"step-based, posterior", Objective::kPosterior, false}};
 
-// Root mean square prediction errors on the held-out roll-outs, one per horizon.
-Eigen::VectorXd Judge(const RobotDescription& robot, const std::vector<Rollout>& rollouts, const Method& method,
-                      uint64_t seed) {
+struct Judgement {
+  Eigen::VectorXd errors;   // root mean square prediction errors on the held-out roll-outs, one per horizon
+  size_t transitions = 0;   // simulated for it
+};
+
+Judgement Judge(const RobotDescription& robot, const std::vector<Rollout>& rollouts, const Method& method,
+                uint64_t seed) {
+  Judgement judgement;
   SimOpt simopt(robot, seed, 2, method.objective);
   const size_t training = rollouts.size() - kHeldOut;
   for (size_t i = 0; i < training && !method.prior; ++i) {
+    const auto used = std::span(rollouts).first(i + 1).last(method.objective == Objective::kPosterior ? i + 1 : 1);
+    judgement.transitions += CountTransitions(used) * static_cast<size_t>(robot.calibration.samples) *
+                             static_cast<size_t>(robot.calibration.updates);
     simopt.Begin({rollouts[i]});
     while (!simopt.Update()) {
     }
   }
-  Eigen::VectorXd physical(simopt.state().distribution.mean.size());
-  for (Eigen::Index i = 0; i < physical.size(); ++i) {
-    physical(i) = robot.parameters[static_cast<size_t>(i)].ToPhysical(simopt.state().distribution.mean(i));
-  }
+  const Eigen::VectorXd physical = robot.ToPhysical(simopt.state().distribution.mean);
   Discrepancy discrepancy(robot);
   const auto held_out = std::span(rollouts).last(kHeldOut);
-  Eigen::VectorXd errors(static_cast<Eigen::Index>(robot.calibration.horizons.size()));
-  for (Eigen::Index h = 0; h < errors.size(); ++h) {
-    errors(h) = discrepancy.PredictionError(physical, held_out, robot.calibration.horizons[static_cast<size_t>(h)]);
+  judgement.errors.resize(static_cast<Eigen::Index>(robot.calibration.horizons.size()));
+  for (Eigen::Index h = 0; h < judgement.errors.size(); ++h) {
+    judgement.errors(h) = discrepancy.PredictionError(physical, held_out, robot.calibration.horizons[static_cast<size_t>(h)]);
   }
-  return errors;
+  return judgement;
 }
 
 int Compare(const std::string& robot_path, const std::vector<std::string>& folders, int seeds, const std::string& csv) {
   const RobotDescription robot = LoadRobot(robot_path);
   std::ofstream table;
   if (!csv.empty()) table.open(csv);
-  table << "method,run,seed";
+  table << "method,run,seed,transitions";
   std::cout << fmt::format("{:<34}", "root mean square error, held out");
   for (const int n : robot.calibration.horizons) {
     table << ",error_" << n;
     std::cout << fmt::format("{:>12}", fmt::format("{}-step", n));
   }
   table << "\n";
-  std::cout << std::endl;
+  std::cout << fmt::format("{:>24}", "transitions simulated") << std::endl;
   for (const Method& method : kMethods) {
     Eigen::VectorXd squared = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.calibration.horizons.size()));
     int count = 0;
+    size_t transitions = 0;
     for (const std::string& folder : folders) {
       const std::vector<Rollout> rollouts = LoadRollouts(std::filesystem::path(folder) / "calibration");
       if (rollouts.size() <= kHeldOut) throw std::runtime_error(folder + ": holds too few roll-outs");
       for (int seed = 1; seed <= (method.prior ? 1 : seeds); ++seed) {
-        const Eigen::VectorXd errors = Judge(robot, rollouts, method, static_cast<uint64_t>(seed));
-        squared += errors.cwiseAbs2();
+        const Judgement judgement = Judge(robot, rollouts, method, static_cast<uint64_t>(seed));
+        squared += judgement.errors.cwiseAbs2();
+        transitions += judgement.transitions;
         ++count;
-        table << method.name << "," << folder << "," << seed;
-        for (const double error : errors) table << "," << error;
+        table << method.name << "," << folder << "," << seed << "," << judgement.transitions;
+        for (const double error : judgement.errors) table << "," << error;
         table << "\n";
       }
     }
     std::cout << fmt::format("{:<34}", method.name);
     for (const double x : squared) std::cout << fmt::format("{:12.5f}", std::sqrt(x / count));
-    std::cout << std::endl;
+    std::cout << fmt::format("{:24}", transitions / static_cast<size_t>(count)) << std::endl;
   }
   return 0;
 }

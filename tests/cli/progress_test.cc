@@ -93,6 +93,17 @@ TEST_CASE_METHOD(Fixture, "what was learned stands beside the truth, combination
   CHECK(progress.Conclusion({}).find('%') == std::string::npos);
 }
 
+TEST_CASE_METHOD(Fixture, "messages whose sizes do not fit are ignored") {
+  calibration_status_t hostile = Calibration(1);
+  hostile.num_powers = 2, hostile.combination_power = {1, 2};
+  progress.OnCalibration(hostile);
+  hostile = Calibration(2'000'000'000);
+  progress.OnCalibration(hostile);
+  CHECK(progress.TakeRows().empty());
+  progress.OnCalibration(Calibration(1));
+  CHECK(progress.TakeRows().size() == 1);
+}
+
 TEST_CASE_METHOD(Fixture, "the status line says what is waited for") {
   training_status_t t{};
   t.updates = 60, t.update = 7;

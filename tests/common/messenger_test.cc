@@ -37,6 +37,17 @@ TEST_CASE("messages arrive in order, and none is lost to a bounded queue") {
   CHECK(subscriber.newest().sequence == 99);
 }
 
+TEST_CASE("a subscriber that is gone is not called") {
+  Messenger messenger("memq://");
+  int calls = 0;
+  { Subscriber<joint_state_t> subscriber(messenger, "X", [&](const joint_state_t&) { ++calls; }); }
+  Subscriber<joint_state_t> other(messenger, "X");
+  Publisher<joint_state_t> publisher(messenger, "X");
+  publisher.Publish(Message(1));
+  while (other.received() == 0) messenger.Drain();
+  CHECK(calls == 0);
+}
+
 // Every message with up to four bytes changed, and lengths an attacker would choose: all of them may arrive.
 TEST_CASE("hostile messages are rejected, counted, and cost no memory") {
   Messenger messenger("memq://");

@@ -1,6 +1,7 @@
 // The whole loop with the real processes: plumb launch from the prior to an evaluated policy, and the same
 // calibration again from its log.
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -61,13 +62,17 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
     CHECK(iteration.at("kl") <= 0.1 * 5 * 1.001);  // at most the bound, five times
     CHECK(iteration.at("transitions") >= 150);
   }
-  // Two iterations may not reach the truth, but they go towards it: at least halfway from the prior.
+  // Two iterations may not reach the truth, but they go towards it: more than halfway from the prior.
+  const auto& p = stage.robot.parameters;
+  const double prior[] = {std::exp(p[0].coordinate_mean() - p[2].coordinate_mean()),
+                          std::exp(p[1].coordinate_mean() + 2 * p[2].coordinate_mean())};
   const auto& combinations = summary.at("iterations")[1].at("combinations");
   REQUIRE(combinations.size() == 2);
   CHECK(combinations[0].at("name") == "gravity / length");
-  for (const auto& c : combinations) {
-    const double error = std::abs(c.at("mean").get<double>() / c.at("hidden").get<double>() - 1);
-    CHECK(error < 0.1);
+  for (size_t i = 0; i < 2; ++i) {
+    const double learned = combinations[i].at("mean"), hidden = combinations[i].at("hidden");
+    INFO(combinations[i].at("name") << ": prior " << prior[i] << ", learned " << learned << ", hidden " << hidden);
+    CHECK(std::abs(learned - hidden) < 0.5 * std::abs(prior[i] - hidden));
   }
   CHECK(summary.at("identifiability").get<std::string>().find("not identifiable separately") != std::string::npos);
 
@@ -95,7 +100,7 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
 
   // Played over LCM by lcm-logplayer.
   arguments = calibrator;
-  const std::string url = "udpm://239.255.76.67:17731?ttl=0&recv_buf_size=2097152";
+  const std::string url = "udpm://239.255.76.67:17750?ttl=0&recv_buf_size=2097152";
   for (const std::string& flag : {std::string("--lcm-url"), url, std::string("--checkpoint"),
                                   (stage.folder / "replayed").string()}) {
     arguments.push_back(flag);
@@ -133,7 +138,8 @@ TEST_CASE("Ctrl-C stops everything within a second, motors disarmed, nothing lef
   const auto start = std::chrono::steady_clock::now();
   CHECK(stage.WaitUntil([&] { return !launch.running(); }, 5));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  CHECK(seconds < 2);  // a second, and one more for a machine that is busy with other tests
+  INFO(seconds << " s");
+  CHECK(seconds < 1.2);  // a second, and what a noisy machine adds
   CHECK(stage.axis_state == 1);
   CHECK(stage.torque == 0);
   CHECK(Left(stage) == 0);
@@ -141,10 +147,55 @@ TEST_CASE("Ctrl-C stops everything within a second, motors disarmed, nothing lef
 
 TEST_CASE("a launcher that is killed takes everything with it") {
   Stage stage(32);
-  Child launch = Launch(stage, {});
+  Child launch = Launch(stage, {"--log", stage.folder / "run.lcmlog"});
   REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 30));
   launch.Signal(SIGKILL);
   CHECK(stage.WaitUntil([&] { return Left(stage) == 0; }, 5));
+}
+
+TEST_CASE("what a person stops, the launcher does not start again") {
+  Stage stage(33);
+  Child launch = Launch(stage, {});
+  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 30));
+  for (const char* stop : {"disarm", "estop"}) {
+    INFO(stop);
+    Child request("plumb", {Stage::Binary("plumb"), stop, "--lcm-url", stage.lcm_url}, stage.folder / "stop.log");
+    REQUIRE(stage.WaitUntil([&] { return !request.running(); }, 5));
+    CHECK_FALSE(request.failed());
+    stage.Listen(2);
+    CHECK(stage.axis_state == 1);
+    CHECK(stage.drivers.newest().state != driver_status_t::ARMED);
+    Child arm("plumb", {Stage::Binary("plumb"), "arm", "--lcm-url", stage.lcm_url}, stage.folder / "arm.log");
+    REQUIRE(stage.WaitUntil([&] { return !arm.running(); }, 5));
+    INFO(arm.Tail(5));
+    CHECK_FALSE(arm.failed());
+    CHECK(stage.WaitUntil([&] { return stage.axis_state == 8; }, 2));
+  }
+  launch.Signal(SIGINT);
+  CHECK(launch.WaitFor(5));
+}
+
+TEST_CASE("a second run beside the first, and a bus that may carry a real robot, are refused") {
+  Stage stage(34);
+  const auto refusal = [&](const std::string& lcm_url, const std::string& bus_url) {
+    Child second("plumb", {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", lcm_url, "--bus", bus_url,
+                           "--output", stage.folder / "second"},
+                 stage.folder / ("second" + std::to_string(stage.frames) + ".log"));
+    stage.WaitUntil([&] { return !second.running(); }, 5);
+    REQUIRE_FALSE(second.running());
+    CHECK(second.failed());
+    return second.Tail(5);
+  };
+  CHECK_THAT(refusal(stage.lcm_url, "socketcan:can0"), Catch::Contains("--real"));
+  Child launch = Launch(stage, {});
+  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 30));
+  stage.Listen(0.1);
+  CHECK_THAT(refusal(stage.lcm_url, "udp:239.74.163.2:43260"), Catch::Contains("another run is under way"));
+  stage.Listen(0.1);
+  CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", stage.bus_url), Catch::Contains("somebody talks on"));
+  CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
+  launch.Signal(SIGINT);
+  CHECK(launch.WaitFor(5));
 }
 
 }  // namespace

@@ -103,6 +103,10 @@ TEST_CASE("a drive that disappears") {
   INFO(stage.drivers.newest().reason);
   CHECK(stage.last_torque_time - gone <= Us(stage.robot.driver.stale_after + stage.robot.controller.state_timeout) + kSlack);
   CHECK_THAT(stage.drivers.newest().reason, Catch::Contains("pivot"));
+  stage.Start("plumb-robot", {"--bus", stage.bus_url, "--seed", "1"});
+  stage.Listen(1);
+  CHECK(stage.axis_state == kIdle);
+  ExpectComesBackByArming(stage);
 }
 
 TEST_CASE("garbage on the bus") {
