@@ -90,6 +90,28 @@ TEST_CASE("a drive that stops working stops the robot, with the reason") {
   CHECK_FALSE(rig.drives[1].armed());
 }
 
+TEST_CASE("a person's stop is told from a fault") {
+  Rig rig;
+  rig.Start();
+  CHECK_FALSE(rig.Status().stopped_by_request);
+  REQUIRE(rig.Arm());
+  rig.commanding = false;
+  REQUIRE(rig.RunUntil(DriveState::kFault) >= 0);
+  CHECK_FALSE(rig.Status().stopped_by_request);
+  SECTION("DISARM after a fault") { rig.Request(driver_request_t::DISARM); }
+  SECTION("ESTOP after a fault") { rig.Request(driver_request_t::ESTOP); }
+  SECTION("DISARM while armed") {
+    REQUIRE(rig.Arm());
+    rig.Request(driver_request_t::DISARM);
+  }
+  rig.Run(100);
+  CHECK(rig.Status().stopped_by_request);
+  rig.Request(driver_request_t::ARM, 1'000'000'000);  // one that is refused changes nothing
+  CHECK(rig.Status().stopped_by_request);
+  REQUIRE(rig.Arm());
+  CHECK_FALSE(rig.Status().stopped_by_request);
+}
+
 TEST_CASE("a drive that falls idle without an error is asked why") {
   Rig rig;
   rig.Start();
