@@ -6,18 +6,16 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <array>
 #include <chrono>
 #include <functional>
 #include <iostream>
 #include <stdexcept>
 
 #include "cli/child.h"
+#include "cli/preflight.h"
 #include "cli/progress.h"
 #include "common/atomic_file.h"
-#include "drivers/can/transport.h"
 #include "plumb/driver_request_t.hpp"
-#include "plumb/policy_t.hpp"
 #include "robot/description.h"
 #include "sim/parameters.h"
 
@@ -28,7 +26,6 @@ namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr int kMostRearms = 5;  // of a virtual robot; a real one is armed by a person, every time
-constexpr double kListen = 0.5;  // [s] before anything is started: is somebody there already?
 
 double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
@@ -53,10 +50,7 @@ class ClosedLoop {
         trainings_(process.messenger(), "TRAINING_STATUS",
                    [&](const training_status_t& m) { progress_.OnTraining(m); }) {
     if (flags.real && flags.speed != 1) throw std::invalid_argument("a real robot runs at --speed 1");
-    if (!flags.real && bus_.rfind("udp:", 0) != 0 && bus_.rfind("socketcan:vcan", 0) != 0) {
-      throw std::invalid_argument(bus_ + " is neither udp: nor a vcan interface: if a robot is on it, say --real");
-    }
-    RequireQuiet();
+    RequireFree(process, bus_, flags.real);
     if (!flags.real) truth_ = HiddenParameters(robot_, flags.seed);
     output_ = flags.output.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}",
                                                                     fmt::localtime(std::time(nullptr)), getpid())
@@ -126,24 +120,6 @@ class ClosedLoop {
                             "--evaluation-episodes", std::to_string(flags_.evaluation_episodes), "--checkpoint",
                             (output_ / "training").string()});
     Start("plumb-calibrator", {flags_.robot, "--nice", "10", "--seed", seed, "--checkpoint", (output_ / "calibration").string()});
-  }
-
-  // Two runs on one bus or one LCM would command each other's robots; and a robot that already talks on a bus meant for
-  // a virtual one is a real one.
-  void RequireQuiet() {
-    const auto bus = OpenTransport(bus_);  // throws one clear line before anything has been started
-    Subscriber<policy_t> policies(process_.messenger(), "POLICY");
-    const auto start = SteadyClock::now();
-    std::array<Frame, 64> frames;
-    while (SecondsSince(start) < kListen && !process_.stopping()) {
-      process_.Wait(10'000, bus->fd());
-      if (drivers_.received() > 0 || policies.received() > 0) {
-        throw std::runtime_error("another run is under way on " + process_.lcm_url() + ": stop it, or give --lcm-url");
-      }
-      if (bus->Receive(frames) > 0 && !flags_.real) {
-        throw std::runtime_error("somebody talks on " + bus_ + " already: give another --bus (or --real)");
-      }
-    }
   }
 
   // One consent is one attempt. @return 0 when armed, else the exit status.

@@ -10,7 +10,7 @@ namespace plumb {
 struct LaunchFlags {
   std::string robot = "robots/pendulum";
   uint64_t seed = 1;
-  int iterations = 6;
+  int iterations = 8;
   int evaluation_episodes = 10;
   std::string bus;      ///< empty = the robot's own
   double speed = 1;     ///< scaled seconds per second

@@ -2,7 +2,6 @@
 // calibration again from its log.
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "plumb/parameter_distribution_t.hpp"
@@ -12,11 +11,6 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string Read(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 // Processes whose command line names the stage's LCM URL.
 int Left(const Stage& stage) {

@@ -2,7 +2,6 @@
 // has none.
 
 #include <cstdlib>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -12,11 +11,6 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string Read(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 size_t Count(const std::string& text, const std::string& pattern) {
   const std::regex regex(pattern);

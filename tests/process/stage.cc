@@ -1,8 +1,15 @@
 #include "tests/process/stage.h"
 
 #include <cstring>
+#include <fstream>
+#include <iterator>
 
 namespace plumb {
+
+std::string Read(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
 
 void Stage::Witness() {
   // Independent of the driver's own tables: node 1's Set_Input_Torque is 0x02E, its Heartbeat 0x021.

@@ -26,6 +26,9 @@
 
 namespace plumb {
 
+/// A file's contents; empty if there is none.
+std::string Read(const std::filesystem::path& file);
+
 /// Real processes on a bus and an LCM port of their own, and a witness who listens to both. Every stage has a
 /// number of its own, so that tests run side by side. The bus is $PLUMBLINE_TEST_BUS where that is set.
 class Stage {

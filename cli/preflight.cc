@@ -1,0 +1,38 @@
+#include "cli/preflight.h"
+
+#include <array>
+#include <stdexcept>
+
+#include "drivers/can/transport.h"
+#include "plumb/driver_status_t.hpp"
+#include "plumb/policy_t.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kListen = 500'000;  // [us]; statuses come ten times a second, heartbeats at least as often
+
+bool StartsWith(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
+
+}  // namespace
+
+void RequireFree(Process& process, const std::string& bus_url, bool real) {
+  if (!real && !StartsWith(bus_url, "udp:") && !StartsWith(bus_url, "socketcan:vcan")) {
+    throw std::invalid_argument(bus_url + " is neither udp: nor a vcan interface: if a robot is on it, say --real");
+  }
+  const auto bus = OpenTransport(bus_url);
+  const Subscriber<driver_status_t> drivers(process.messenger(), "DRIVER_STATUS");
+  const Subscriber<policy_t> policies(process.messenger(), "POLICY");
+  std::array<Frame, 64> frames;
+  const int64_t deadline = process.clock().Now() + kListen;
+  while (process.clock().Now() < deadline && process.Wait(10'000, bus->fd())) {
+    if (drivers.received() > 0 || policies.received() > 0) {
+      throw std::runtime_error("another run is under way on " + process.lcm_url() + ": stop it, or give --lcm-url");
+    }
+    if (bus->Receive(frames) > 0 && !real) {
+      throw std::runtime_error("somebody talks on " + bus_url + " already: give another --bus (or --real)");
+    }
+  }
+}
+
+}  // namespace plumb
