@@ -1,4 +1,4 @@
-// Cost of the simulator beside that of gym's closed form: plumb-bench-sim [--benchmark_filter=...]
+// Cost of the simulator beside that of gym's closed form: build/bench/sim_bench [--benchmark_filter=...]
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
