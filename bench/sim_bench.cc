@@ -79,4 +79,3 @@ BENCHMARK(PlantFiveMilliseconds);
 }  // namespace
 }  // namespace plumb
 
-BENCHMARK_MAIN();
