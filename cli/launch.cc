@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr int kMostRearms = 5;  // of a virtual robot; a real one is armed by a person, every time
+constexpr int kMostRearms = 20; // of a virtual robot; a real one is armed by a person, every time
 
 double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
@@ -136,6 +136,7 @@ class ClosedLoop {
       std::cerr << "plumb: the driver is not ready to arm: " << progress_.driver().reason << std::endl;
       return process_.stopping() ? 130 : 1;
     }
+    until([] { return false; }, robot_.driver.start_guard + 0.1);  // the driver refuses any earlier wish
     std::cout << "The motors of " << robot_.name << " on " << bus_
               << " will be switched on.\nStand clear, keep the emergency stop at hand, and type 'arm': " << std::flush;
     std::string answer;
