@@ -7,6 +7,7 @@ namespace plumb {
 namespace {
 
 constexpr int64_t kLongestGap = 1'000'000;  // [us]; beyond it nothing is known of the motion in between
+constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
 constexpr int kSettled = 5;                 // measurements after a restart until velocity can be trusted
 
 bool Finite(const std::vector<double>& values) {
@@ -19,14 +20,16 @@ StateObserver::StateObserver(const RobotDescription& robot)
     : n_(robot.num_joints()),
       settings_(robot.estimator),
       filters_(static_cast<size_t>(n_), KinematicFilter(robot.estimator)),
-      effort_(static_cast<size_t>(n_), 0) {
+      effort_(static_cast<size_t>(n_), 0),
+      unknown_step_(2 * robot.effort_limits().maxCoeff()) {
   const auto n = static_cast<size_t>(n_);
   state_.num_joints = n_;
   for (auto* values : {&state_.q, &state_.v, &state_.q_sd, &state_.v_sd, &state_.effort}) values->resize(n, 0);
 }
 
 bool StateObserver::Acceptable(const joint_state_t& measured) const {
-  return measured.num_joints == n_ && Finite(measured.position) && Finite(measured.velocity) &&
+  // Times of this epoch only, so that differences cannot overflow.
+  return measured.num_joints == n_ && measured.utime >= 0 && measured.utime < kEndOfTime && Finite(measured.position) && Finite(measured.velocity) &&
          !(started_ && measured.utime == state_.utime);
 }
 
@@ -53,12 +56,11 @@ bool StateObserver::OnJointState(const joint_state_t& measured) {
   const int64_t elapsed = measured.utime - state_.utime;
   bool restarted = !started_ || elapsed <= 0 || elapsed > kLongestGap;
   if (!restarted) {
-    // A step of any joint's effort may step every joint's acceleration; an unknown effort may be anything
-    // within a step from full one way to full the other, which the wide prior covers with 1 Nm.
+    // A step of any joint's effort may step every joint's acceleration.
     double step = 0;
     for (size_t i = 0; i < filters_.size(); ++i) {
       const double change = measured.effort_applied[i] - effort_[i];
-      step = std::hypot(step, std::isfinite(change) ? change : 1.0);
+      step = std::hypot(step, std::isfinite(change) ? change : unknown_step_);
     }
     for (KinematicFilter& filter : filters_) filter.Predict(static_cast<double>(elapsed) * 1e-6, step);
     restarted = Displaced(measured);

@@ -48,6 +48,7 @@ class StateObserver {
   std::vector<double> effort_;  // mean applied effort of the previous interval
   int since_restart_ = 0;
   bool started_ = false;
+  double unknown_step_;  // [Nm] assumed change of an effort that is not known: from full one way to full the other
   int64_t refused_ = 0;
   int64_t restarts_ = 0;
 };

@@ -139,6 +139,9 @@ TEST_CASE_METHOD(World, "a policy that does not fit is refused and the old one s
   policy_t poisoned = Policy(1);
   poisoned.weight[0] = std::numeric_limits<float>::quiet_NaN();
   CHECK_THROWS_AS(controller.OnPolicy(poisoned), std::invalid_argument);
+  policy_t stronger = Policy(1);
+  stronger.action_scale = {3};
+  CHECK_THROWS_AS(controller.OnPolicy(stronger), std::invalid_argument);
   CHECK(controller.status().policy_iteration == 0);
 }
 

@@ -10,6 +10,7 @@ namespace {
 RobotDescription Robot() {
   RobotDescription robot;
   robot.joints.resize(1);
+  robot.joints[0].effort_limit = 2;
   robot.estimator = {.position_sd = 1.2e-4, .velocity_sd = 0.5, .jerk = 100, .effort_step = 30, .timing_sd = 0,
                      .lag = 4, .reset_after = 0.2};
   return robot;
@@ -81,6 +82,12 @@ TEST_CASE("jumps of time restart it, repeated times and rubbish are refused") {
   SECTION("not finite") {
     m.position[0] = std::numeric_limits<double>::quiet_NaN();
     CHECK_FALSE(observer.OnJointState(m));
+  }
+  SECTION("a time that no clock shows") {
+    for (const int64_t utime : {std::numeric_limits<int64_t>::min(), std::numeric_limits<int64_t>::max()}) {
+      m.utime = utime;
+      CHECK_FALSE(observer.OnJointState(m));
+    }
   }
   SECTION("another robot's") {
     m.num_joints = 2;
