@@ -34,6 +34,8 @@ const char* DriverState(int8_t state) {
 
 std::string PlusMinus(double mean, double sd) { return fmt::format("{:.3f} ± {:.3f}", mean, sd); }
 
+std::string OrDash(double value) { return std::isfinite(value) ? fmt::format("{:.0f}", value) : "-"; }
+
 // Width in terminal cells: UTF-8 continuation bytes take none.
 std::string Pad(const std::string& text, size_t width) {
   const auto cells = static_cast<size_t>(
@@ -98,8 +100,8 @@ std::string Progress::Row(const Iteration& iteration) const {
   for (size_t i = 0; i < c.mean.size(); ++i) row += Pad(PlusMinus(c.mean[i], c.sd[i]), 20);
   row += fmt::format("{:13.2f}", c.discrepancy);
   for (const double error : c.error_before) row += fmt::format("{:9.4f}", error);
-  return row + fmt::format("{:8.3f}{:6.1f}{:12.0f}{:7.0f}{:7.1f}", c.kl, c.ess, iteration.simulated_return,
-                           iteration.robot_return, iteration.seconds);
+  return row + fmt::format("{:8.3f}{:6.1f}{:>12}{:>7}{:7.1f}", c.kl, c.ess, OrDash(iteration.simulated_return),
+                           OrDash(iteration.robot_return), iteration.seconds);
 }
 
 std::vector<std::string> Progress::TakeRows() {
