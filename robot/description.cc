@@ -206,9 +206,32 @@ double ParameterDescription::ToCoordinate(double value) const {
   return coordinate == Coordinate::kLog ? std::log(value) : value;
 }
 
+int RobotDescription::num_positions() const {
+  int count = 0;
+  for (const JointDescription& joint : joints) count += joint.num_positions();
+  return count;
+}
+
+int RobotDescription::num_velocities() const {
+  int count = 0;
+  for (const JointDescription& joint : joints) count += joint.num_velocities();
+  return count;
+}
+
+std::vector<int> RobotDescription::driven() const {
+  std::vector<int> driven;
+  for (int i = 0; i < num_joints(); ++i) {
+    if (!joints[static_cast<size_t>(i)].passive) driven.push_back(i);
+  }
+  return driven;
+}
+
 Eigen::VectorXd RobotDescription::effort_limits() const {
-  Eigen::VectorXd limits(num_joints());
-  for (int i = 0; i < num_joints(); ++i) limits(i) = joints[static_cast<size_t>(i)].effort_limit;
+  const std::vector<int> all = driven();
+  Eigen::VectorXd limits(all.size());
+  for (size_t i = 0; i < all.size(); ++i) {
+    limits(static_cast<Eigen::Index>(i)) = joints[static_cast<size_t>(all[i])].effort_limit;
+  }
   return limits;
 }
 

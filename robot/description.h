@@ -2,17 +2,32 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace plumb {
 
-/// A rigid body. Shapes and frames as in URDF: the link frame is at the joint that moves it.
+/// A solid of URDF's <visual> or <collision>.
+struct Shape {
+  enum class Type { kSphere, kCapsule, kCylinder, kBox };
+  Type type = Type::kSphere;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< [m] of its centre, in the link frame
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< its axes in the link's
+  /// [m] sphere: (radius, 0, 0); box: edges along x, y, z; capsule and cylinder, which stand along z: (radius,
+  /// length, 0), a capsule's length without its caps.
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();
+};
+
+/// A rigid body. Frames as in URDF: the link frame is at the joint that moves it. What hangs on it by fixed
+/// joints belongs to it. A link may have no mass if links beyond it have.
 struct LinkDescription {
   std::string name;
   double mass = 0;                                             ///< [kg]
   Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();    ///< [m], in the link frame
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();           ///< [kg m^2], about the centre of mass, link axes
+  std::vector<Shape> visuals = {}, collisions = {};
 };
 
 /// How a joint's motor is reached.
@@ -24,9 +39,30 @@ struct MotorDescription {
   double offset = 0;     ///< [rad] or [m] joint position at motor position 0
 };
 
-/// A moving joint, connecting links[parent] to the link of the same index + 1... see RobotDescription.
+/// What moves a joint besides inertia and gravity. Zeros say that there is none of it.
+struct JointDynamics {
+  double armature = 0;      ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
+  double damping = 0;       ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
+  double friction = 0;      ///< [Nm] or [N] >= 0: Coulomb friction
+  double stiffness = 0;     ///< [Nm/rad] or [N/m] >= 0 of a spring
+  double rest = 0;          ///< [rad] or [m] where the spring is relaxed
+  double motor_gain = 1;    ///< effort at the joint per effort commanded, >= 0
+  double delay = 0;         ///< [s] >= 0 between an effort's command and its effect, beyond what was recorded
+  double sensor_delay = 0;  ///< [s] >= 0: a reading is of the state so long ago
+  double sensor_bias = 0;   ///< [rad] or [m]: what a reading of the position adds to it
+  /// [rad/s] or [m/s] > 0: speed at which the motor's back-EMF leaves it no effort. At speed w in the effort's own
+  /// direction the effort is at most effort_limit * (1 - w / no_load_speed), as of a DC motor at its full voltage.
+  double no_load_speed = std::numeric_limits<double>::infinity();
+};
+
+/// A moving joint, connecting links[parent] to links[child]. URDF's planar and floating joints are several of these:
+///   planar    <name>/x, <name>/y prismatic in the plane, <name>/angle continuous about its normal
+///   floating  <name>/x, <name>/y, <name>/z prismatic, <name>/rotation spherical
+/// with links without mass in between, named after their joints.
 struct JointDescription {
-  enum class Type { kRevolute, kContinuous, kPrismatic };
+  /// kSpherical: q is a unit quaternion (w, x, y, z) that turns link axes into joint axes, v the angular velocity
+  /// in link axes [rad/s], as MuJoCo's ball and free joints have them.
+  enum class Type { kRevolute, kContinuous, kPrismatic, kSpherical };
   std::string name;
   Type type = Type::kRevolute;
   int parent = 0;  ///< index into links
@@ -36,9 +72,14 @@ struct JointDescription {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();               ///< unit vector, in the joint frame
   double lower = 0;           ///< [rad] or [m]; -infinity for a continuous joint
   double upper = 0;           ///< [rad] or [m]; +infinity for a continuous joint
-  double effort_limit = 0;    ///< [Nm] or [N], > 0
-  double velocity_limit = 0;  ///< [rad/s] or [m/s], > 0
-  MotorDescription motor;
+  double effort_limit = 0;    ///< [Nm] or [N], > 0; 0 for a passive joint
+  double velocity_limit = 0;  ///< [rad/s] or [m/s], > 0; infinity where the URDF gives none
+  bool passive = false;       ///< has no motor
+  MotorDescription motor;     ///< of a joint that is not passive
+  JointDynamics dynamics;
+
+  int num_positions() const { return type == Type::kSpherical ? 4 : 1; }
+  int num_velocities() const { return type == Type::kSpherical ? 3 : 1; }
 };
 
 struct DriverSettings {  ///< all [s], scaled time
@@ -64,18 +105,38 @@ struct SimulationSettings {
   double speed_clip; ///< [rad/s] velocities are clipped to this after each substep; infinity = no clip
   /// gym v0 moves the position with the speed before clipping it; false = with the clipped one.
   bool move_before_clip;
+
+  /// Where the collision shapes meet the ground, the plane z = 0 of the base: a force
+  /// max(0, stiffness * depth + damping * depth') along z, and Coulomb friction.
+  struct Contact {
+    double stiffness;   ///< [N/m] > 0
+    double damping;     ///< [N s/m] >= 0
+    double friction;    ///< coefficient >= 0
+    double slip_speed;  ///< [m/s] > 0 below which friction is viscous
+  };
+  /// A joint beyond its position limits is pushed back by stiffness * depth + damping * depth'.
+  struct Stop {
+    double stiffness;  ///< [Nm/rad] or [N/m] > 0
+    double damping;    ///< [Nm s/rad] or [N s/m] >= 0
+  };
+  std::optional<Contact> contact;  ///< none: the robot does not touch the ground
+  std::optional<Stop> stop;        ///< none: joints move on beyond their limits
 };
 
-/// One uncertain simulator parameter, named by a path such as "gravity", "mass/pole", "length/pole".
+/// One uncertain simulator parameter, named by a path such as "gravity", "mass/pole", "delay/hip": see
+/// sim/parameters.h.
 struct ParameterDescription {
-  enum class Coordinate { kLinear, kLog };
+  enum class Coordinate { kLinear, kLog, kLogit };
   std::string name;
   std::string unit;
   Coordinate coordinate;
   double mean;      ///< prior mean, physical units
   double variance;  ///< prior variance, physical units squared
+  double lower = -std::numeric_limits<double>::infinity();  ///< kLogit: bounds, physical units; lower < mean < upper
+  double upper = std::numeric_limits<double>::infinity();
   /// Prior in the coordinate. For kLog the Gaussian whose log-normal has that mean and variance:
-  /// s^2 = ln(1 + variance/mean^2), m = ln(mean) - s^2/2.
+  /// s^2 = ln(1 + variance/mean^2), m = ln(mean) - s^2/2. For kLogit, x = ln((p - lower) / (upper - p)), the one
+  /// that has them to first order: m = x(mean), s^2 = variance * x'(mean)^2.
   double coordinate_mean() const;
   double coordinate_variance() const;
   double ToPhysical(double coordinate_value) const;
@@ -86,6 +147,14 @@ struct TaskSettings {
   std::string name;  ///< file name in sim/tasks/
   double period;     ///< [s] control period
   int steps;         ///< per episode
+  /// Tasks reach and hold: where to go and how far around it an episode may begin; one each per coordinate of q.
+  std::vector<double> target = {}, spread = {};
+};
+
+/// A parameter that is known: not inferred, but other than what the URDF and the TOML file's tables say.
+struct FrozenParameter {
+  std::string name;
+  double value;  ///< physical units
 };
 
 struct ControllerSettings {
@@ -122,8 +191,8 @@ struct VirtualRobotSettings {
 };
 
 /// Everything there is to know about a robot: robot.urdf and robot.toml, validated.
-/// links[0] is the fixed base; joints are in order of URDF depth-first traversal and are the generalised
-/// coordinates, one each: q[i], v[i] belong to joints[i].
+/// links[0] is the fixed base; joints are in order of URDF depth-first traversal and joint i moves link i + 1.
+/// The generalised coordinates q, v are the joints' one after the other: one each, but for spherical joints.
 struct RobotDescription {
   std::string file;  ///< the TOML file
   uint64_t fingerprint = 0;  ///< of the contents of both files (FNV-1a): a checkpoint of other contents is another's
@@ -134,7 +203,9 @@ struct RobotDescription {
   DriverSettings driver;
   EstimatorSettings estimator;
   SimulationSettings simulation;
-  std::vector<ParameterDescription> parameters;
+  std::vector<ParameterDescription> parameters;  ///< the uncertain ones
+  std::vector<FrozenParameter> frozen;           ///< the others
+  std::vector<std::string> warnings;  ///< what of the files has no effect, e.g. a collision mesh
   TaskSettings task;
   ControllerSettings controller;
   CalibrationSettings calibration;
@@ -142,6 +213,11 @@ struct RobotDescription {
   VirtualRobotSettings virtual_robot;
 
   int num_joints() const { return static_cast<int>(joints.size()); }
+  int num_positions() const;   ///< size of q
+  int num_velocities() const;  ///< size of v and of efforts
+  /// The joints with a motor, in order: an action has an entry for each.
+  std::vector<int> driven() const;
+  /// Of the driven joints, in order.
   Eigen::VectorXd effort_limits() const;
   /// The parameters' coordinates -> physical units, one value per parameter.
   Eigen::VectorXd ToPhysical(const Eigen::VectorXd& coordinates) const;
