@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <numeric>
 #define TOML_HEADER_ONLY 1
 #include <toml++/toml.h>
@@ -46,6 +48,20 @@ size_t EditDistance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
+std::string ReadFile(const std::string& file) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error)) throw ConfigError(file + ": is a folder");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw ConfigError(file + ": cannot be opened");
+  constexpr size_t kLimit = size_t{16} << 20;
+  std::string text(kLimit + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad()) throw ConfigError(file + ": cannot be read");
+  text.resize(static_cast<size_t>(stream.gcount()));
+  if (text.size() > kLimit) throw ConfigError(file + ": is longer than 16 MB");
+  return text;
+}
+
 Config::Config(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file, std::string path)
     : root_(std::move(root)), table_(table), file_(std::move(file)), path_(std::move(path)) {}
 Config::Config(Config&&) noexcept = default;
@@ -63,17 +79,15 @@ Config Config::Parse(const std::string& text, const std::string& name) {
 }
 
 Config Config::Load(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw ConfigError(file + ": cannot be opened");
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (stream.bad()) throw ConfigError(file + ": cannot be read");
-  return Parse(text, file);
+  return Parse(ReadFile(file), file);
 }
 
 bool Config::Has(const std::string& key) const {
   known_.insert(key);
   return table().contains(key);
 }
+
+bool Config::IsTable(const std::string& key) const { return Has(key) && table().get(key)->is_table(); }
 
 void Config::Fail(const std::string& key, const std::string& what) const {
   const toml::node* node = table().get(key);

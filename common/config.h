@@ -49,6 +49,8 @@ class Config {
 
   const std::string& file() const { return file_; }
   bool Has(const std::string& key) const;
+  /// A key that may hold a table or something else.
+  bool IsTable(const std::string& key) const;
 
   /// Values; without `fallback` the key is required.
   double Number(const std::string& key, Range range = kFinite, std::optional<double> fallback = {});
@@ -85,6 +87,9 @@ class Config {
   std::string path_;
   mutable std::set<std::string> known_;
 };
+
+/// The bytes of a file. @throws ConfigError if it cannot be read or is longer than 16 MB.
+std::string ReadFile(const std::string& file);
 
 /// Levenshtein's distance, for "did you mean".
 size_t EditDistance(const std::string& a, const std::string& b);

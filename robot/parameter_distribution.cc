@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -18,7 +19,14 @@ constexpr int kMaxComponents = 1000;
 constexpr double kRounding = 1e-9;
 
 int8_t ToCode(Coordinate coordinate) {
-  return coordinate == Coordinate::kLog ? parameter_distribution_t::LOG : parameter_distribution_t::LINEAR;
+  switch (coordinate) {
+    case Coordinate::kLog:
+      return parameter_distribution_t::LOG;
+    case Coordinate::kLogit:
+      return parameter_distribution_t::LOGIT;
+    default:
+      return parameter_distribution_t::LINEAR;
+  }
 }
 
 [[noreturn]] void Reject(const std::string& what) {
@@ -63,11 +71,33 @@ struct Moments {
   double mean, square;
 };
 
+// The moments of a logistic function of a normal variable have no closed form. The trapezoidal rule converges
+// exponentially, as the integrand is analytic and gone at the ends; beyond sd 8, where all is at the bounds,
+// slower.
+Moments LogitMoments(double mean, double sd, const ParameterDescription& parameter) {
+  constexpr double kEnd = 9, kSpacing = 1. / 16;
+  Moments sum{0, 0};
+  double total = 0;
+  for (double z = -kEnd; z <= kEnd; z += kSpacing) {
+    const double weight = std::exp(-z * z / 2), value = parameter.ToPhysical(mean + sd * z);
+    total += weight;
+    sum.mean += weight * value;
+    sum.square += weight * value * value;
+  }
+  return {sum.mean / total, sum.square / total};
+}
+
 Moments PhysicalMoments(const ParameterDistribution::Component& component, Eigen::Index i,
-                        Coordinate coordinate) {
+                        const ParameterDescription& parameter) {
   const double mean = component.mean[i], variance = component.covariance(i, i);
-  if (coordinate == Coordinate::kLinear) return {mean, variance + mean * mean};
-  return {std::exp(mean + variance / 2), std::exp(2 * mean + 2 * variance)};
+  switch (parameter.coordinate) {
+    case Coordinate::kLog:
+      return {std::exp(mean + variance / 2), std::exp(2 * mean + 2 * variance)};
+    case Coordinate::kLogit:
+      return LogitMoments(mean, std::sqrt(std::max(0., variance)), parameter);
+    default:
+      return {mean, variance + mean * mean};
+  }
 }
 
 }  // namespace
@@ -179,8 +209,7 @@ Eigen::VectorXd ParameterDistribution::Mean() const {
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(size());
   for (Eigen::Index i = 0; i < mean.size(); ++i) {
     for (const Component& component : components) {
-      mean[i] += component.weight *
-                 PhysicalMoments(component, i, parameters[static_cast<size_t>(i)].coordinate).mean;
+      mean[i] += component.weight * PhysicalMoments(component, i, parameters[static_cast<size_t>(i)]).mean;
     }
   }
   return mean;
@@ -192,8 +221,7 @@ Eigen::VectorXd ParameterDistribution::Sd() const {
   for (Eigen::Index i = 0; i < sd.size(); ++i) {
     double square = 0;
     for (const Component& component : components) {
-      square += component.weight *
-                PhysicalMoments(component, i, parameters[static_cast<size_t>(i)].coordinate).square;
+      square += component.weight * PhysicalMoments(component, i, parameters[static_cast<size_t>(i)]).square;
     }
     sd[i] = std::sqrt(std::max(0., square - mean[i] * mean[i]));
   }

@@ -1,0 +1,183 @@
+#include "robot/joints.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace plumb {
+namespace {
+
+constexpr Range kSane{-1e9, 1e9}, kSaneNotNegative{0, 1e9};
+constexpr double kLongestDelay = 10;  // [s]
+
+MotorDescription ReadMotor(Config& config) {
+  MotorDescription motor;
+  motor.protocol = config.String("protocol");
+  motor.node = config.Integer("node", {0, 0x3fffffff});
+  motor.gear = config.Number("gear", {1e-9, 1e9}, 1);
+  motor.sign = config.Integer("sign", {-1, 1}, 1);
+  if (motor.sign == 0) config.Fail("sign", "must be 1 or -1");
+  motor.offset = config.Number("offset", kSane, 0);
+  return motor;
+}
+
+// `dynamics` are the URDF's.
+JointDynamics ReadDynamics(Config config, JointDynamics dynamics, const JointDescription& joint) {
+  const auto refuse = [&](const char* key, const char* why) {
+    if (config.Has(key)) config.Fail(key, why);
+  };
+  if (joint.passive) {
+    for (const char* key : {"motor_gain", "delay", "no_load_speed"})
+      refuse(key, "needs a motor: the joint is passive");
+  }
+  if (joint.type == JointDescription::Type::kSpherical) {
+    for (const char* key : {"stiffness", "rest", "sensor_bias"})
+      refuse(key, "has no meaning for a spherical joint");
+  }
+  dynamics.armature = config.Number("armature", kSaneNotNegative, 0);
+  dynamics.damping = config.Number("damping", kSaneNotNegative, dynamics.damping);
+  dynamics.friction = config.Number("friction", kSaneNotNegative, dynamics.friction);
+  dynamics.stiffness = config.Number("stiffness", kSaneNotNegative, 0);
+  dynamics.rest = config.Number("rest", kSane, 0);
+  dynamics.motor_gain = config.Number("motor_gain", kSaneNotNegative, 1);
+  dynamics.delay = config.Number("delay", {0, kLongestDelay}, 0);
+  dynamics.sensor_delay = config.Number("sensor_delay", {0, kLongestDelay}, 0);
+  dynamics.sensor_bias = config.Number("sensor_bias", kSane, 0);
+  if (config.Has("no_load_speed")) dynamics.no_load_speed = config.Number("no_load_speed", {1e-9, HUGE_VAL});
+  config.Finish();
+  return dynamics;
+}
+
+void CheckMotor(const UrdfModel& urdf, size_t index) {
+  const JointDescription& joint = urdf.joints[index];
+  const std::string label = "joint " + joint.name;
+  if (!(joint.effort_limit > 0)) {
+    urdf.Fail(urdf.limit_lines[index], label + ": limit effort must be positive: it has a motor");
+  }
+  if (!std::isfinite(joint.velocity_limit)) {
+    urdf.Fail(urdf.limit_lines[index], label + ": limit velocity is missing: it has a motor");
+  }
+}
+
+// An acceleration is an effort divided by something.
+void CheckInertia(const UrdfModel& urdf) {
+  std::vector<double> beyond;  // [kg] of a link and all that it carries
+  for (const LinkDescription& link : urdf.links) beyond.push_back(link.mass);
+  for (size_t i = urdf.joints.size(); i-- > 0;) {
+    const JointDescription& joint = urdf.joints[i];
+    const auto child = static_cast<size_t>(joint.child);
+    if (!(beyond[child] > 0) && !(joint.dynamics.armature > 0)) {
+      urdf.Fail(urdf.link_lines[child],
+                fmt::format("link {} moves but has no mass, nor has anything it carries or the "
+                            "armature of joint {}",
+                            urdf.links[child].name, joint.name));
+    }
+    beyond[static_cast<size_t>(joint.parent)] += beyond[child];
+  }
+}
+
+// A table of joints: `read` is told the key and the joint, and where its coordinates begin.
+template <typename Read>
+void ReadByJoint(Config config, const std::vector<JointDescription>& joints, const Read& read) {
+  size_t at = 0;
+  for (const JointDescription& joint : joints) {
+    if (config.Has(joint.name)) read(config, joint, at);
+    at += static_cast<size_t>(joint.num_positions());
+  }
+  config.Finish();
+}
+
+void ReadTarget(Config& config, const JointDescription& joint, double* target) {
+  if (joint.type != JointDescription::Type::kSpherical) {
+    *target = config.Number(joint.name, kSane);
+    if (*target < joint.lower || *target > joint.upper) {
+      config.Fail(joint.name, fmt::format("= {} is beyond the joint's limits [{}, {}]", *target, joint.lower,
+                                          joint.upper));
+    }
+    return;
+  }
+  const std::vector<double> q = config.Numbers(joint.name, 4, {-1.001, 1.001});
+  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (std::abs(norm - 1) > 1e-3) config.Fail(joint.name, "is not a unit quaternion [w, x, y, z]");
+  for (size_t i = 0; i < 4; ++i) target[i] = q[i] / norm;
+}
+
+}  // namespace
+
+void ReadJoints(Config& root, UrdfModel& urdf) {
+  std::vector<JointDescription>& joints = urdf.joints;
+  std::vector<bool> seen(joints.size());
+  for (Config& config : root.Tables("joint")) {
+    const std::string name = config.String("name");
+    const auto joint =
+        std::find_if(joints.begin(), joints.end(), [&](const auto& j) { return j.name == name; });
+    if (joint == joints.end())
+      config.Fail("name", fmt::format("= \"{}\" is not a moving joint of the URDF", name));
+    const auto index = static_cast<size_t>(joint - joints.begin());
+    if (seen[index]) config.Fail("name", fmt::format("= \"{}\" occurs twice", name));
+    joint->passive = config.Boolean("passive", false);
+    if (joint->passive) {
+      for (const char* key : {"protocol", "node", "gear", "sign", "offset"}) {
+        if (config.Has(key)) config.Fail(key, "is of a motor, but the joint is passive");
+      }
+    } else {
+      if (joint->type == JointDescription::Type::kSpherical) {
+        config.Fail(
+            "name",
+            fmt::format("= \"{}\" is a spherical joint, which no motor drives: passive = true", name));
+      }
+      joint->motor = ReadMotor(config);
+      CheckMotor(urdf, index);
+      for (size_t other = 0; other < joints.size(); ++other) {
+        if (seen[other] && !joints[other].passive && joints[other].motor.protocol == joint->motor.protocol &&
+            joints[other].motor.node == joint->motor.node) {
+          config.Fail("node", fmt::format("= {} is also joint {}'s", joint->motor.node, joints[other].name));
+        }
+      }
+    }
+    seen[index] = true;
+    joint->dynamics = ReadDynamics(config.Table("dynamics", false), joint->dynamics, *joint);
+    config.Finish();
+  }
+  for (size_t i = 0; i < joints.size(); ++i) {
+    if (!seen[i]) joints[i].passive = urdf.part[i];
+    if (!seen[i] && !joints[i].passive) {
+      root.Fail("joint", fmt::format("does not say how joint \"{}\" of the URDF is driven, or passive = true",
+                                     joints[i].name));
+    }
+    if (joints[i].passive) joints[i].effort_limit = 0;
+  }
+  if (std::all_of(joints.begin(), joints.end(), [](const auto& joint) { return joint.passive; })) {
+    root.Fail("joint", "drives no joint: all are passive");
+  }
+  CheckInertia(urdf);
+}
+
+TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints) {
+  TaskSettings s;
+  s.name = config.String("name");
+  s.period = config.Number("period", {1e-3, 10});
+  s.steps = config.Integer("steps", {1, 1e6});
+  for (const JointDescription& joint : joints) {
+    s.target.push_back(joint.num_positions() == 4 ? 1 : 0);
+    s.target.resize(s.target.size() + static_cast<size_t>(joint.num_positions()) - 1);
+  }
+  s.spread.resize(s.target.size());
+  ReadByJoint(config.Table("target", false), joints,
+              [&](Config& table, const JointDescription& joint, size_t at) {
+                ReadTarget(table, joint, &s.target[at]);
+              });
+  if (config.IsTable("spread")) {
+    ReadByJoint(config.Table("spread"), joints, [&](Config& table, const JointDescription& joint, size_t at) {
+      std::fill_n(&s.spread[at], joint.num_positions(), table.Number(joint.name, kSaneNotNegative));
+    });
+  } else {
+    std::fill(s.spread.begin(), s.spread.end(), config.Number("spread", kSaneNotNegative, 0));
+  }
+  config.Finish();
+  return s;
+}
+
+}  // namespace plumb

@@ -1,0 +1,137 @@
+#include "robot/settings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace plumb {
+namespace {
+
+constexpr Range kAtLeastOne{1, 1e9};
+
+SimulationSettings::Contact ReadContact(Config config) {
+  SimulationSettings::Contact s;
+  s.stiffness = config.Number("stiffness", {1e-9, 1e12});
+  s.damping = config.Number("damping", {0, 1e12});
+  s.friction = config.Number("friction", {0, 1e6});
+  s.slip_speed = config.Number("slip_speed", {1e-9, 1e6});
+  config.Finish();
+  return s;
+}
+
+SimulationSettings::Stop ReadStop(Config config) {
+  SimulationSettings::Stop s;
+  s.stiffness = config.Number("stiffness", {1e-9, 1e12});
+  s.damping = config.Number("damping", {0, 1e12});
+  config.Finish();
+  return s;
+}
+
+}  // namespace
+
+DriverSettings ReadDriver(Config config) {
+  DriverSettings s;
+  s.cycle = config.Number("cycle", {1e-4, 1});
+  s.measurement = config.Number("measurement", {1e-4, 1});
+  s.expiry = config.Number("expiry", {1e-3, 1});
+  s.disarm_after = config.Number("disarm_after", {1e-3, 10});
+  s.stale_after = config.Number("stale_after", {1e-3, 1});
+  s.heartbeat_timeout = config.Number("heartbeat_timeout", {1e-3, 10});
+  s.start_guard = config.Number("start_guard", {0, 10});
+  if (s.expiry < 2 * s.cycle) config.Fail("expiry", "must be at least two cycles");
+  if (s.disarm_after < s.expiry) config.Fail("disarm_after", "must not be shorter than expiry");
+  if (s.stale_after < 2 * s.measurement)
+    config.Fail("stale_after", "must be at least two measurement periods");
+  config.Finish();
+  return s;
+}
+
+EstimatorSettings ReadEstimator(Config config) {
+  EstimatorSettings s;
+  s.position_sd = config.Number("position_sd", kPositive);
+  s.velocity_sd = config.Number("velocity_sd", kPositive);
+  s.jerk = config.Number("jerk", kPositive);
+  s.effort_step = config.Number("effort_step", kNotNegative);
+  s.timing_sd = config.Number("timing_sd", kNotNegative);
+  s.lag = config.Integer("lag", {1, 1000});
+  s.reset_after = config.Number("reset_after", kPositive);
+  config.Finish();
+  return s;
+}
+
+SimulationSettings ReadSimulation(Config config, double period) {
+  SimulationSettings s;
+  s.integrator = config.Choice("integrator", {"semi-implicit", "leapfrog"}) == 0
+                     ? SimulationSettings::Integrator::kSemiImplicit
+                     : SimulationSettings::Integrator::kLeapfrog;
+  s.substep = config.Number("substep", {1e-6, 1});
+  s.latency = config.Number("latency", kNotNegative, 0);
+  s.speed_clip = config.Number("speed_clip", {std::numeric_limits<double>::min()}, HUGE_VAL);
+  s.move_before_clip = config.Boolean("move_before_clip", false);
+  if (s.substep > period * (1 + 1e-9)) config.Fail("substep", "must not be longer than task.period");
+  if (s.latency >= period) config.Fail("latency", "must be shorter than task.period");
+  if (config.Has("contact")) s.contact = ReadContact(config.Table("contact"));
+  if (config.Has("limit")) s.stop = ReadStop(config.Table("limit"));
+  config.Finish();
+  return s;
+}
+
+ControllerSettings ReadController(Config config) {
+  ControllerSettings s;
+  s.state_timeout = config.Number("state_timeout", {1e-3, 10});
+  s.place_tolerance = config.Number("place_tolerance", kPositive);
+  config.Finish();
+  return s;
+}
+
+CalibrationSettings ReadCalibration(Config config) {
+  CalibrationSettings s;
+  s.samples = config.Integer("samples", {4, 1e6});
+  s.updates = config.Integer("updates", {1, 1000});
+  s.kl = config.Number("kl", kPositive);
+  s.min_temperature = config.Number("min_temperature", kPositive);
+  s.horizons = config.Integers("horizons", {1, 10000});
+  if (s.horizons.empty()) config.Fail("horizons", "is empty");
+  config.Finish();
+  return s;
+}
+
+TrainingSettings ReadTraining(Config config) {
+  TrainingSettings s;
+  s.batch = config.Integer("batch", {10, 1e7});
+  s.updates = config.Integer("updates", kAtLeastOne);
+  s.updates_again = config.Integer("updates_again", {0, 1e9});
+  s.hidden = config.Integers("hidden", {1, 4096});
+  s.gamma = config.Number("gamma", {0, 1});
+  s.lambda = config.Number("lambda", {0, 1});
+  s.kl = config.Number("kl", kPositive);
+  s.damping = config.Number("damping", kNotNegative);
+  s.cg_iterations = config.Integer("cg_iterations", {1, 1000});
+  s.fisher_fraction = config.Number("fisher_fraction", {1e-3, 1});
+  s.critic_l2 = config.Number("critic_l2", kNotNegative);
+  s.critic_rate = config.Number("critic_rate", kPositive);
+  s.critic_epochs = config.Integer("critic_epochs", {1, 10000});
+  s.critic_minibatch = config.Integer("critic_minibatch", {1, 1e7});
+  config.Finish();
+  return s;
+}
+
+VirtualRobotSettings ReadVirtualRobot(Config config, const std::vector<ParameterDescription>& parameters) {
+  VirtualRobotSettings s;
+  s.watchdog = config.Number("watchdog", {0, 10});
+  s.heartbeat = config.Number("heartbeat", {1e-3, 10});
+  s.encoder_bits = config.Integer("encoder_bits", {4, 32});
+  Config hidden = config.Table("hidden", false);
+  for (const std::string& name : hidden.Keys()) {
+    const std::vector<double> bounds = hidden.Numbers(name, 2);
+    if (!(bounds[0] <= bounds[1])) hidden.Fail(name, "must be [lower, upper]");
+    if (std::none_of(parameters.begin(), parameters.end(), [&](const auto& p) { return p.name == name; })) {
+      hidden.Fail(name, "is not one of the parameters");
+    }
+    s.hidden.push_back({name, bounds[0], bounds[1]});
+  }
+  config.Finish();
+  return s;
+}
+
+}  // namespace plumb

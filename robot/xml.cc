@@ -1,0 +1,160 @@
+#include "robot/xml.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "common/config.h"
+
+namespace plumb {
+namespace {
+
+bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
+bool IsName(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || c < 0 || c == 127;
+}
+
+// TinyXML descends into elements by recursion: how deep is known before. @return the line where it gets too
+// deep, or 0.
+int LineTooDeep(const std::string& text, int limit) {
+  int depth = 0;
+  size_t at = 0;
+  while ((at = text.find('<', at)) != std::string::npos) {
+    const auto skip_to = [&](const char* end) { at = std::min(text.find(end, at), text.size()); };
+    if (text.compare(at, 4, "<!--") == 0) {
+      skip_to("-->");
+    } else if (text.compare(at, 9, "<![CDATA[") == 0) {
+      skip_to("]]>");
+    } else if (text.compare(at, 2, "</") == 0) {
+      --depth;
+      ++at;
+    } else if (at + 1 < text.size() && IsName(text[at + 1])) {
+      if (++depth > limit)
+        return 1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<long>(at), '\n'));
+      for (char quote = 0; at < text.size() && (quote != 0 || text[at] != '>'); ++at) {
+        if (quote != 0 ? text[at] == quote : text[at] == '"' || text[at] == '\'')
+          quote = quote ? '\0' : text[at];
+      }
+      if (at < text.size() && text[at - 1] == '/') --depth;
+    } else {
+      ++at;
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+Xml::Xml(const std::string& text, std::string file) : file_(std::move(file)) {
+  const auto odd =
+      std::find_if(text.begin(), text.end(), [](char c) { return c >= 0 && c < ' ' && !IsSpace(c); });
+  if (odd != text.end()) {
+    Fail(1 + static_cast<int>(std::count(text.begin(), odd, '\n')),
+         fmt::format("contains the byte {:#04x}", *odd));
+  }
+  if (const int line = LineTooDeep(text, kMaxDepth)) {
+    Fail(line, fmt::format("nests more than {} elements", kMaxDepth));
+  }
+  document_.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
+  if (document_.Error()) {
+    const auto lines = 1 + static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+    Fail(document_.ErrorRow() > 0 ? document_.ErrorRow() : lines, document_.ErrorDesc());
+  }
+  if (!document_.FirstChildElement()) Fail(1, "contains no element");
+  if (const TiXmlElement* second = document_.FirstChildElement()->NextSiblingElement()) {
+    Fail(*second, "a second outermost element");
+  }
+}
+
+std::string Xml::Print() const {
+  TiXmlPrinter printer;
+  printer.SetStreamPrinting();
+  document_.Accept(&printer);
+  return printer.Str();
+}
+
+void Xml::Fail(int line, const std::string& what) const {
+  throw ConfigError(fmt::format("{}:{}: {}", file_, line, what));
+}
+
+TiXmlElement* Xml::Child(TiXmlElement& parent, const char* name) const {
+  TiXmlElement* child = parent.FirstChildElement(name);
+  if (child) {
+    if (const TiXmlElement* second = child->NextSiblingElement(name)) {
+      Fail(*second, fmt::format("a second <{}> in <{}>", name, parent.Value()));
+    }
+  }
+  return child;
+}
+
+TiXmlElement& Xml::RequiredChild(TiXmlElement& parent, const char* name) const {
+  TiXmlElement* child = Child(parent, name);
+  if (!child) Fail(parent, fmt::format("<{}> has no <{}>", parent.Value(), name));
+  return *child;
+}
+
+std::string Xml::Name(const TiXmlElement& element, const char* attribute) const {
+  const char* value = element.Attribute(attribute);
+  if (!value || !*value) Fail(element, fmt::format("<{}> has no {}=\"...\"", element.Value(), attribute));
+  const std::string name = value;
+  if (name.size() > 200 ||
+      std::any_of(name.begin(), name.end(), [](char c) { return c >= 0 && (c < ' ' || c == 127); })) {
+    Fail(element,
+         fmt::format("{} of <{}> is longer than 200 bytes or not printable", attribute, element.Value()));
+  }
+  return name;
+}
+
+std::vector<double> Xml::Numbers(TiXmlElement& element, const char* attribute, size_t count,
+                                 double magnitude) const {
+  const char* value = element.Attribute(attribute);
+  if (!value) Fail(element, fmt::format("<{}> has no {}=\"...\"", element.Value(), attribute));
+  const std::string text = value;
+  const auto fail = [&] {
+    Fail(element, fmt::format("{}=\"{}\" of <{}> is not {}", attribute, text.substr(0, 80), element.Value(),
+                              count == 1 ? "a number" : fmt::format("{} numbers", count)));
+  };
+  std::vector<double> numbers;
+  for (const char *at = text.data(), *end = at + text.size();;) {
+    while (at != end && IsSpace(*at)) ++at;
+    if (at == end) break;
+    if (*at == '+' && at + 1 != end && at[1] != '-') ++at;
+    double number = 0;
+    const auto [after, error] = std::from_chars(at, end, number);
+    if (error != std::errc() || (after != end && !IsSpace(*after)) || numbers.size() == count) fail();
+    if (!(std::abs(number) <= magnitude)) {
+      Fail(element, fmt::format("{}=\"{}\" of <{}> is not finite or beyond {:g}", attribute,
+                                text.substr(0, 80), element.Value(), magnitude));
+    }
+    numbers.push_back(number);
+    at = after;
+  }
+  if (numbers.size() != count) fail();
+  element.SetAttribute(attribute, fmt::format("{}", fmt::join(numbers, " ")));
+  return numbers;
+}
+
+std::vector<std::string> Xml::RemoveOthers(TiXmlElement& parent,
+                                           std::initializer_list<const char*> known) const {
+  std::vector<std::string> removed;
+  for (TiXmlNode* node = parent.FirstChild(); node;) {
+    TiXmlNode* next = node->NextSibling();
+    const TiXmlElement* element = node->ToElement();
+    if (!element) {
+      parent.RemoveChild(node);  // text and comments
+    } else if (std::none_of(known.begin(), known.end(),
+                            [&](const char* name) { return element->ValueStr() == name; })) {
+      removed.push_back(fmt::format("{}:{}: <{}> in <{}>", file_, element->Row(),
+                                    element->ValueStr().substr(0, 80), parent.Value()));
+      parent.RemoveChild(node);
+    }
+    node = next;
+  }
+  return removed;
+}
+
+}  // namespace plumb
