@@ -28,8 +28,13 @@ Controller::Controller(const RobotDescription& robot, uint64_t seed, double rest
       task_(MakeTask(robot_)),
       seed_(seed),
       rest_(rest),
-      effort_(Eigen::VectorXd::Zero(robot.num_joints())),
+      step_q_(Eigen::VectorXd::Zero(robot.num_positions())),
+      step_v_(Eigen::VectorXd::Zero(robot.num_velocities())),
+      effort_(step_v_),
       observation_(task_->observation_size()) {
+  if (robot.num_positions() != robot.num_joints()) {
+    throw std::invalid_argument("robot '" + robot.name + "' has a spherical joint: it can only be simulated");
+  }
   status_.policy_iteration = -1;
   Enter(controller_status_t::WAITING, "no policy yet");
 }
@@ -139,7 +144,7 @@ void Controller::BeginPlacing(int64_t now, int64_t utime) {
   place_robot_t place{};
   place.utime = utime;
   place.num_joints = robot_.num_joints();
-  Eigen::VectorXd q(robot_.num_joints()), v(robot_.num_joints());
+  Eigen::VectorXd q(robot_.num_positions()), v(robot_.num_velocities());
   Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_++),
                         kPlacementStream});
   task_->InitialState(random, q, v);
@@ -208,12 +213,9 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   if (state.utime < next_decision_ - Microseconds(robot_.driver.measurement) / 2) return {};
   if (state.utime > next_decision_ + period / 2) return Halt("a state came half a control period late", utime);
   next_decision_ += period;
-  if (status_.step >= robot_.task.steps) {
-    FinishEpisode(state);
-    return ZeroCommand(utime);
-  }
   const auto q = Map(state.q), v = Map(state.v);
-  if (task_->Terminated(q, v)) {
+  if (status_.step > 0) status_.episode_return += task_->Reward(step_q_, step_v_, effort_, q, v);
+  if (status_.step >= robot_.task.steps || task_->Terminated(q, v)) {
     FinishEpisode(state);
     return ZeroCommand(utime);
   }
@@ -232,8 +234,12 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   joint_command_t command = ZeroCommand(utime);
   command.episode = episode_;
   command.step = status_.step;
-  std::copy(effort_.begin(), effort_.end(), command.effort.begin());
-  status_.episode_return += task_->Reward(q, v, effort_);
+  const std::vector<int> driven = robot_.driven();
+  for (size_t i = 0; i < driven.size(); ++i) {
+    command.effort[static_cast<size_t>(driven[i])] = effort_[task_->action_indices()[i]];
+  }
+  step_q_ = q;
+  step_v_ = v;
   ++status_.step;
   return command;
 }

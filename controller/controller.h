@@ -82,7 +82,8 @@ class Controller {
   int64_t episode_ = -1;
   int64_t first_state_sequence_ = 0;
   int64_t next_decision_ = 0;  // utime of the state that is to be answered next
-  Eigen::VectorXd effort_;
+  // Of the step under way, whose reward is known when it ends.
+  Eigen::VectorXd step_q_, step_v_, effort_;
   Eigen::VectorXf observation_;
 };
 

@@ -11,10 +11,10 @@ Environment::Environment(const RobotDescription& description)
       steps_per_episode_(description.task.steps),
       period_(description.task.period),
       latency_(std::clamp(description.simulation.latency, 0.0, description.task.period)),
-      start_q_(Eigen::VectorXd::Zero(description.num_joints())),
-      start_v_(start_q_),
-      effort_(start_q_),
-      next_effort_(start_q_) {}
+      start_q_(Eigen::VectorXd::Zero(description.num_positions())),
+      start_v_(Eigen::VectorXd::Zero(description.num_velocities())),
+      effort_(start_v_),
+      next_effort_(start_v_) {}
 
 void Environment::Reset(Random& random) {
   task_->InitialState(random, start_q_, start_v_);
@@ -29,11 +29,12 @@ void Environment::SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
 
 Environment::StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
   task_->Effort(std::span(action.data(), static_cast<size_t>(action.size())), next_effort_);
-  const double reward = task_->Reward(q(), v(), next_effort_);
+  start_q_ = q();
+  start_v_ = v();
   simulator_.Step(effort_, latency_);
   simulator_.Step(next_effort_, period_ - latency_);
   effort_.swap(next_effort_);
-  return {reward, !simulator_.finite() || task_->Terminated(q(), v())};
+  return {task_->Reward(start_q_, start_v_, effort_, q(), v()), !simulator_.finite() || task_->Terminated(q(), v())};
 }
 
 void Environment::Observe(Eigen::Ref<Eigen::VectorXf> observation) const {

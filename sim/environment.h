@@ -35,7 +35,7 @@ class Environment {
   void SetState(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v);
 
   struct StepResult {
-    double reward;    ///< of the state before the step and this action
+    double reward;    ///< of this step
     bool terminated;  ///< by the task, or because the simulation is no longer finite
   };
   /// One control period. During its first description.simulation.latency seconds the previous action still
@@ -48,6 +48,8 @@ class Environment {
 
   const Eigen::VectorXd& q() const { return simulator_.q(); }
   const Eigen::VectorXd& v() const { return simulator_.v(); }
+  /// What the latest action asked the motors for [Nm or N], one per velocity.
+  const Eigen::VectorXd& effort() const { return effort_; }
   const Task& task() const { return *task_; }
 
  private:
@@ -56,7 +58,7 @@ class Environment {
   int steps_per_episode_;
   double period_;
   double latency_;
-  Eigen::VectorXd start_q_, start_v_;  // work space of Reset
+  Eigen::VectorXd start_q_, start_v_;  // work space of Reset and Step: where an episode or a step begins
   Eigen::VectorXd effort_;             // of the latest action: what acts at the beginning of the next step
   Eigen::VectorXd next_effort_;
 };

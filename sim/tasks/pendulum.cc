@@ -5,19 +5,13 @@
 #include <stdexcept>
 
 namespace plumb {
-namespace {
-
-constexpr double kPi = std::numbers::pi;
-
-/// The same angle in [-pi, pi).
-double Wrap(double angle) { return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi)); }
-
-}  // namespace
 
 PendulumTask::PendulumTask(const RobotDescription& description)
     : Task(description, /*observation_size=*/3, Eigen::Vector2d(1, 8)) {
-  if (description.num_joints() != 1 || description.joints[0].type == JointDescription::Type::kPrismatic) {
-    throw std::invalid_argument("task 'pendulum' needs a robot with one turning joint; '" + description.name +
+  using Type = JointDescription::Type;
+  if (description.num_joints() != 1 || description.joints[0].type == Type::kPrismatic ||
+      description.joints[0].type == Type::kSpherical || description.joints[0].passive) {
+    throw std::invalid_argument("task 'pendulum' needs a robot with one turning joint and its motor; '" + description.name +
                                 "' is none");
   }
 }
@@ -28,14 +22,15 @@ void PendulumTask::Observe(const State& q, const State& v, std::span<float> obse
   observation[2] = static_cast<float>(v[0]);
 }
 
-double PendulumTask::Reward(const State& q, const State& v, const State& effort) const {
-  const double angle = Wrap(q[0]);
+double PendulumTask::Reward(const State& q, const State& v, const State& effort, const State&,
+                            const State&) const {
+  const double angle = WrapAngle(q[0]);
   return -(angle * angle + 0.1 * v[0] * v[0] + 0.001 * effort[0] * effort[0]);
 }
 
 void PendulumTask::InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
                                 Eigen::Ref<Eigen::VectorXd> v) const {
-  q[0] = random.Uniform(-kPi, kPi);
+  q[0] = random.Uniform(-std::numbers::pi, std::numbers::pi);
   v[0] = random.Uniform(-1, 1);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -10,18 +11,38 @@ namespace plumb {
 Task::Task(const RobotDescription& description, int observation_size, Eigen::VectorXd state_scale)
     : observation_size_(observation_size),
       state_scale_(std::move(state_scale)),
-      effort_limits_(description.effort_limits()) {}
+      effort_limits_(description.effort_limits()) {
+  for (const JointDescription& joint : description.joints) {
+    if (!joint.passive) {
+      if (joint.num_velocities() != 1) {
+        throw std::invalid_argument("joint '" + joint.name + "' cannot be driven: one motor turns about one axis");
+      }
+      action_names_.push_back(joint.name);
+      action_indices_.push_back(num_efforts_);
+    }
+    num_efforts_ += joint.num_velocities();
+  }
+}
+
+double Task::action_unit(int) const { return 1; }
 
 bool Task::Terminated(const State&, const State&) const { return false; }
 
 void Task::Effort(std::span<const float> action, Eigen::Ref<Eigen::VectorXd> effort) const {
-  if (static_cast<int>(action.size()) != action_size() || effort.size() != action_size()) {
-    throw std::invalid_argument("an action has one entry per joint: " + std::to_string(action_size()));
+  if (static_cast<int>(action.size()) != action_size() || effort.size() != num_efforts_) {
+    throw std::invalid_argument("an action has one entry per driven joint: " + std::to_string(action_size()));
   }
+  effort.setZero();
   for (int i = 0; i < action_size(); ++i) {
     const double a = action[static_cast<size_t>(i)];
-    effort[i] = std::isnan(a) ? 0 : std::clamp(a, -1.0, 1.0) * effort_limits_[i];
+    if (std::isnan(a)) continue;
+    effort[action_indices_[static_cast<size_t>(i)]] = std::clamp(a, -1.0, 1.0) * effort_limits_[i];
   }
+}
+
+double WrapAngle(double angle) {
+  constexpr double kPi = std::numbers::pi;
+  return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi));
 }
 
 }  // namespace plumb

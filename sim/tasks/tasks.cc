@@ -1,8 +1,10 @@
-// The list of tasks. A new task is its file pair and one line here.
+// The list of tasks. A new task is its file pair, its line here, and its name in CMakeLists.txt.
 #include <stdexcept>
 
 #include "common/config.h"
+#include "sim/tasks/hopper.h"
 #include "sim/tasks/pendulum.h"
+#include "sim/tasks/reach.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -18,6 +20,9 @@ constexpr struct {
   std::unique_ptr<Task> (*make)(const RobotDescription&);
 } kTasks[] = {
     {"pendulum", Make<PendulumTask>},
+    {"hopper", Make<HopperTask>},
+    {"reach", Make<ReachTask>},
+    {"hold", Make<HoldTask>},
 };
 
 }  // namespace

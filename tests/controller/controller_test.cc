@@ -105,6 +105,30 @@ TEST_CASE_METHOD(World, "an episode has its number of steps, one control period 
   CHECK(status.returns[1] == Approx(-200 * (q * q + 0.1 * v * v + 0.001 * 0.25)));
 }
 
+TEST_CASE_METHOD(World, "a return is that of the steps taken: each is paid when the state after it is there") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 1, 0.25f));
+  StepUntil(S::RUNNING);
+  double expected = 0;
+  int steps = 0;
+  const auto task = MakeTask(robot);
+  Eigen::VectorXd q, v, effort, next_q, next_v;
+  const auto map = [](const std::vector<double>& values) { return Eigen::Map<const Eigen::VectorXd>(values.data(), 1); };
+  q = map(robot_state.q), v = map(robot_state.v), effort = Eigen::VectorXd::Constant(1, 0.5);
+  for (int i = 1; controller.phase() == S::RUNNING; ++i) {
+    robot_state.q[0] += 0.01, robot_state.v[0] -= 0.02;
+    Step();
+    if (i % 10 != 0) continue;
+    next_q = map(robot_state.q), next_v = map(robot_state.v);
+    expected += task->Reward(q, v, effort, next_q, next_v);
+    q = next_q, v = next_v;
+    CHECK(controller.status().episode_return == Approx(expected));
+    ++steps;
+  }
+  CHECK(steps == 200);
+  CHECK(controller.status().returns.at(0) == Approx(expected));
+}
+
 TEST_CASE_METHOD(World, "a new policy waits for the end of the episode") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0));
