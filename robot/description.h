@@ -96,6 +96,9 @@ struct EstimatorSettings {
   double reset_after;  ///< [rad]
 };
 
+/// Standard acceleration of free fall, ISO 80000-3 [m/s^2].
+inline constexpr double kStandardGravity = 9.80665;
+
 struct SimulationSettings {
   /// kSemiImplicit: v += h a(q, v); q += h v, as gym does. kLeapfrog: q += h/2 v; v += h a; q += h/2 v.
   enum class Integrator { kSemiImplicit, kLeapfrog };
@@ -105,6 +108,7 @@ struct SimulationSettings {
   double speed_clip; ///< [rad/s] velocities are clipped to this after each substep; infinity = no clip
   /// gym v0 moves the position with the speed before clipping it; false = with the clipped one.
   bool move_before_clip;
+  double gravity = kStandardGravity;  ///< [m/s^2] >= 0, along -z of the base
 
   /// Where the collision shapes meet the ground, the plane z = 0 of the base: a force
   /// max(0, stiffness * depth + damping * depth') along z, and Coulomb friction.

@@ -68,6 +68,7 @@ SimulationSettings ReadSimulation(Config config, double period) {
   s.latency = config.Number("latency", kNotNegative, 0);
   s.speed_clip = config.Number("speed_clip", {std::numeric_limits<double>::min()}, HUGE_VAL);
   s.move_before_clip = config.Boolean("move_before_clip", false);
+  s.gravity = config.Number("gravity", {0, 1000}, kStandardGravity);
   if (s.substep > period * (1 + 1e-9)) config.Fail("substep", "must not be longer than task.period");
   if (s.latency >= period) config.Fail("latency", "must be shorter than task.period");
   if (config.Has("contact")) s.contact = ReadContact(config.Table("contact"));
