@@ -67,6 +67,38 @@ TEST_CASE("Equal names of the generator give equal simulators") {
   CHECK(x != prior.Sample(c));
 }
 
+// Against integrals over the density of the parameter itself, p = lower + width y:
+// p(y) = N(logit y; m, s) / (y (1 - y)).
+TEST_CASE("A logit parameter's moments, samples and code") {
+  RobotDescription robot = Robot();
+  robot.parameters[1] = {"friction", "", ParameterDescription::Coordinate::kLogit, .7, .02, .2, 1.2};
+  ParameterDistribution distribution = ParameterDistribution::Prior(robot);
+  CHECK(distribution.ToMessage().coordinate[1] == 2);
+  for (const double sd : {.01, .5, 2.}) {
+    distribution.components[0].mean[1] = .4;
+    distribution.components[0].covariance(1, 1) = sd * sd;
+    double mean = 0, square = 0, total = 0;
+    constexpr int kCells = 200000;
+    for (int i = 0; i < kCells; ++i) {
+      const double y = (i + .5) / kCells, z = (std::log(y / (1 - y)) - .4) / sd;
+      const double weight = std::exp(-z * z / 2) / (y * (1 - y)), p = .2 + y;
+      total += weight, mean += weight * p, square += weight * p * p;
+    }
+    mean /= total;
+    CHECK(distribution.Mean()[1] == Approx(mean).epsilon(1e-7));
+    CHECK(distribution.Sd()[1] == Approx(std::sqrt(square / total - mean * mean)).epsilon(1e-5));
+  }
+  Random random(3);
+  for (int i = 0; i < 1000; ++i) {
+    const double p = distribution.Sample(random)[1];
+    CHECK((p > .2 && p < 1.2));
+  }
+  const parameter_distribution_t message = distribution.ToMessage();
+  CHECK(ParameterDistribution::FromMessage(message, robot).Mean()[1] == distribution.Mean()[1]);
+  robot.parameters[1].coordinate = ParameterDescription::Coordinate::kLinear;
+  CHECK_THROWS_WITH(ParameterDistribution::FromMessage(message, robot), Catch::Contains("coordinate of 'friction'"));
+}
+
 TEST_CASE("A singular covariance is sampled on its subspace") {
   parameter_distribution_t message = ParameterDistribution::Prior(Robot()).ToMessage();
   message.covariance = {.04, .02, .02, .01};
