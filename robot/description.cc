@@ -1,5 +1,7 @@
 #include "robot/description.h"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 
 #include "common/config.h"
@@ -78,8 +80,9 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   Config header = root.Table("robot");
   robot.name = header.String("name");
   const std::string urdf_file = header.String("urdf");
-  header.Finish();
   const std::string urdf_path = (file.parent_path() / urdf_file).string();
+  if (!fs::exists(urdf_path, error)) header.Fail("urdf", fmt::format("= \"{}\": there is no such file", urdf_file));
+  header.Finish();
   UrdfModel urdf = LoadUrdf(urdf_path);
   robot.fingerprint = Fingerprint(urdf_path, Fingerprint(robot.file, kFnvOffset));
   if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);

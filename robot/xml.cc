@@ -12,11 +12,13 @@
 namespace plumb {
 namespace {
 
+bool IsControl(char c) { return static_cast<unsigned char>(c) < ' '; }
+
+bool IsAscii(char c) { return static_cast<unsigned char>(c) < 127; }
+
 bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-bool IsName(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || c < 0 || c == 127;
-}
+bool IsName(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || !IsAscii(c); }
 
 // TinyXML descends into elements by recursion: how deep is known before. @return the line where it gets too
 // deep, or 0.
@@ -50,8 +52,7 @@ int LineTooDeep(const std::string& text, int limit) {
 }  // namespace
 
 Xml::Xml(const std::string& text, std::string file) : file_(std::move(file)) {
-  const auto odd =
-      std::find_if(text.begin(), text.end(), [](char c) { return c >= 0 && c < ' ' && !IsSpace(c); });
+  const auto odd = std::find_if(text.begin(), text.end(), [](char c) { return IsControl(c) && !IsSpace(c); });
   if (odd != text.end()) {
     Fail(1 + static_cast<int>(std::count(text.begin(), odd, '\n')),
          fmt::format("contains the byte {:#04x}", *odd));
@@ -102,9 +103,9 @@ std::string Xml::Name(const TiXmlElement& element, const char* attribute) const 
   if (!value || !*value) Fail(element, fmt::format("<{}> has no {}=\"...\"", element.Value(), attribute));
   const std::string name = value;
   if (name.size() > 200 ||
-      std::any_of(name.begin(), name.end(), [](char c) { return c >= 0 && (c < ' ' || c == 127); })) {
-    Fail(element,
-         fmt::format("{} of <{}> is longer than 200 bytes or not printable", attribute, element.Value()));
+      std::any_of(name.begin(), name.end(), [](char c) { return IsControl(c) || !IsAscii(c); })) {
+    Fail(element, fmt::format("{} of <{}> is longer than 200 bytes or not printable ASCII", attribute,
+                              element.Value()));
   }
   return name;
 }

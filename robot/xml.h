@@ -29,7 +29,7 @@ class Xml {
   /// The child of that name, null if there is none. @throws ConfigError if there are several.
   TiXmlElement* Child(TiXmlElement& parent, const char* name) const;
   TiXmlElement& RequiredChild(TiXmlElement& parent, const char* name) const;
-  /// A printable text of at most 200 bytes, not empty.
+  /// Printable ASCII, 1 to 200 bytes: names go to logs, messages and web pages.
   std::string Name(const TiXmlElement& element, const char* attribute) const;
   /// `count` numbers of at most `magnitude`; writes them back so that other readers cannot read others.
   std::vector<double> Numbers(TiXmlElement& element, const char* attribute, size_t count,

@@ -98,6 +98,7 @@ TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
   CHECK_THAT(message("steps = 200", "steps = 1e99"), Contains("task.steps"));
   CHECK_THAT(message("gear = 1.0", "gear = 0.0"), Contains("gear"));
   CHECK_THAT(message("[robot]", "[robot"), Contains("robot.toml:3:"));
+  CHECK_THAT(message("robot.urdf\"", "robot.xml\""), Contains("robot.toml:5:8: robot.urdf = \"robot.xml\": there is no such file"));
 }
 
 TEST_CASE("mistakes in robot.urdf name the file and the element") {
