@@ -53,12 +53,13 @@ std::string ReadFile(const std::string& file) {
   if (std::filesystem::is_directory(file, error)) throw ConfigError(file + ": is a folder");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw ConfigError(file + ": cannot be opened");
-  constexpr size_t kLimit = size_t{16} << 20;
-  std::string text(kLimit + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  std::string text, piece(size_t{1} << 16, '\0');
+  do {
+    stream.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    text.append(piece, 0, static_cast<size_t>(stream.gcount()));
+    if (text.size() > size_t{16} << 20) throw ConfigError(file + ": is longer than 16 MB");
+  } while (stream);
   if (stream.bad()) throw ConfigError(file + ": cannot be read");
-  text.resize(static_cast<size_t>(stream.gcount()));
-  if (text.size() > kLimit) throw ConfigError(file + ": is longer than 16 MB");
   return text;
 }
 

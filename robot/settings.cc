@@ -8,6 +8,8 @@ namespace plumb {
 namespace {
 
 constexpr Range kAtLeastOne{1, 1e9};
+// Orders of magnitude beyond sense: what would overflow elsewhere is a mistake here.
+constexpr Range kSanePositive{1e-12, 1e12}, kSaneNotNegative{0, 1e12};
 
 SimulationSettings::Contact ReadContact(Config config) {
   SimulationSettings::Contact s;
@@ -48,13 +50,13 @@ DriverSettings ReadDriver(Config config) {
 
 EstimatorSettings ReadEstimator(Config config) {
   EstimatorSettings s;
-  s.position_sd = config.Number("position_sd", kPositive);
-  s.velocity_sd = config.Number("velocity_sd", kPositive);
-  s.jerk = config.Number("jerk", kPositive);
-  s.effort_step = config.Number("effort_step", kNotNegative);
-  s.timing_sd = config.Number("timing_sd", kNotNegative);
+  s.position_sd = config.Number("position_sd", kSanePositive);
+  s.velocity_sd = config.Number("velocity_sd", kSanePositive);
+  s.jerk = config.Number("jerk", kSanePositive);
+  s.effort_step = config.Number("effort_step", kSaneNotNegative);
+  s.timing_sd = config.Number("timing_sd", kSaneNotNegative);
   s.lag = config.Integer("lag", {1, 1000});
-  s.reset_after = config.Number("reset_after", kPositive);
+  s.reset_after = config.Number("reset_after", kSanePositive);
   config.Finish();
   return s;
 }
@@ -65,7 +67,7 @@ SimulationSettings ReadSimulation(Config config, double period) {
                      ? SimulationSettings::Integrator::kSemiImplicit
                      : SimulationSettings::Integrator::kLeapfrog;
   s.substep = config.Number("substep", {1e-6, 1});
-  s.latency = config.Number("latency", kNotNegative, 0);
+  s.latency = config.Number("latency", kSaneNotNegative, 0);
   s.speed_clip = config.Number("speed_clip", {std::numeric_limits<double>::min()}, HUGE_VAL);
   s.move_before_clip = config.Boolean("move_before_clip", false);
   s.gravity = config.Number("gravity", {0, 1000}, kStandardGravity);
@@ -80,7 +82,7 @@ SimulationSettings ReadSimulation(Config config, double period) {
 ControllerSettings ReadController(Config config) {
   ControllerSettings s;
   s.state_timeout = config.Number("state_timeout", {1e-3, 10});
-  s.place_tolerance = config.Number("place_tolerance", kPositive);
+  s.place_tolerance = config.Number("place_tolerance", kSanePositive);
   config.Finish();
   return s;
 }
@@ -89,8 +91,8 @@ CalibrationSettings ReadCalibration(Config config) {
   CalibrationSettings s;
   s.samples = config.Integer("samples", {4, 1e6});
   s.updates = config.Integer("updates", {1, 1000});
-  s.kl = config.Number("kl", kPositive);
-  s.min_temperature = config.Number("min_temperature", kPositive);
+  s.kl = config.Number("kl", kSanePositive);
+  s.min_temperature = config.Number("min_temperature", kSanePositive);
   s.horizons = config.Integers("horizons", {1, 10000});
   if (s.horizons.empty()) config.Fail("horizons", "is empty");
   config.Finish();
@@ -105,12 +107,12 @@ TrainingSettings ReadTraining(Config config) {
   s.hidden = config.Integers("hidden", {1, 4096});
   s.gamma = config.Number("gamma", {0, 1});
   s.lambda = config.Number("lambda", {0, 1});
-  s.kl = config.Number("kl", kPositive);
-  s.damping = config.Number("damping", kNotNegative);
+  s.kl = config.Number("kl", kSanePositive);
+  s.damping = config.Number("damping", kSaneNotNegative);
   s.cg_iterations = config.Integer("cg_iterations", {1, 1000});
   s.fisher_fraction = config.Number("fisher_fraction", {1e-3, 1});
-  s.critic_l2 = config.Number("critic_l2", kNotNegative);
-  s.critic_rate = config.Number("critic_rate", kPositive);
+  s.critic_l2 = config.Number("critic_l2", kSaneNotNegative);
+  s.critic_rate = config.Number("critic_rate", kSanePositive);
   s.critic_epochs = config.Integer("critic_epochs", {1, 10000});
   s.critic_minibatch = config.Integer("critic_minibatch", {1, 1e7});
   config.Finish();
@@ -124,7 +126,7 @@ VirtualRobotSettings ReadVirtualRobot(Config config, const std::vector<Parameter
   s.encoder_bits = config.Integer("encoder_bits", {4, 32});
   Config hidden = config.Table("hidden", false);
   for (const std::string& name : hidden.Keys()) {
-    const std::vector<double> bounds = hidden.Numbers(name, 2);
+    const std::vector<double> bounds = hidden.Numbers(name, 2, {-1e12, 1e12});
     if (!(bounds[0] <= bounds[1])) hidden.Fail(name, "must be [lower, upper]");
     if (std::none_of(parameters.begin(), parameters.end(), [&](const auto& p) { return p.name == name; })) {
       hidden.Fail(name, "is not one of the parameters");

@@ -97,7 +97,7 @@ void Simulate(const RobotDescription& robot, Counts& counts) {
   const Eigen::VectorXd q =
       Eigen::Map<const Eigen::VectorXd>(robot.task.target.data(), robot.num_positions());
   simulator->SetState(q, v);
-  // A minute of microseconds is allowed, but not waited for.
+  // Ten seconds in substeps of a microsecond are allowed, but not waited for.
   const double duration = std::min(robot.task.period, 5 * robot.simulation.substep);
   for (int i = 0; i < 3; ++i)
     simulator->Step(Eigen::VectorXd::Constant(robot.num_velocities(), 0.5), duration);
