@@ -50,6 +50,20 @@ TEST_CASE("what is not TOML is located") {
   CHECK_THROWS_WITH(Config::Load("/nowhere/robot.toml"), Equals("/nowhere/robot.toml: cannot be opened"));
 }
 
+TEST_CASE("what is no file of text is refused, however long") {
+  CHECK_THROWS_WITH(ReadFile("/"), Equals("/: is a folder"));
+  CHECK_THROWS_WITH(ReadFile("/dev/zero"), Equals("/dev/zero: is longer than 16 MB"));
+  CHECK(ReadFile("/dev/null").empty());
+}
+
+TEST_CASE("a key may hold a table or something else") {
+  const Config config = Read("a = 1\nb = {c = 1}\n");
+  CHECK_FALSE(config.IsTable("a"));
+  CHECK(config.IsTable("b"));
+  CHECK_FALSE(config.IsTable("c"));
+  config.Finish();
+}
+
 TEST_CASE("edit distance") {
   CHECK(EditDistance("kitten", "sitting") == 3);
   CHECK(EditDistance("", "abc") == 3);
