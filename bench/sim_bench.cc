@@ -7,7 +7,7 @@
 
 #include "common/random.h"
 #include "sim/environment.h"
-#include "sim/model.h"
+#include "sim/simulator.h"
 #include "sim/plant.h"
 
 namespace plumb {
@@ -64,8 +64,8 @@ BENCHMARK(SetState);
 
 /// The virtual robot's dynamics, asked every 5 ms; items/s is the multiple of real time.
 void PlantFiveMilliseconds(benchmark::State& state) {
-  const RobotDescription description = Load("robot.toml");
-  Plant plant(description, Parameters(description).Nominal());
+  const Model model(Load("robot.toml"));
+  Plant plant(model.Describe(model.parameters().means()));
   plant.SetState(kOne, kOne);
   double seconds = 0;
   for (auto _ : state) {

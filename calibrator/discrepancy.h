@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calibrator/transitions.h"
-#include "sim/model.h"
+#include "sim/simulator.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {

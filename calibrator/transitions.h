@@ -8,7 +8,7 @@
 #include "plumb/joint_command_t.hpp"
 #include "plumb/robot_state_t.hpp"
 #include "robot/description.h"
-#include "sim/model.h"
+#include "sim/simulator.h"
 
 namespace plumb {
 

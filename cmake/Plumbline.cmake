@@ -34,3 +34,33 @@ function(plumb_test folder)
   add_test(NAME ${folder} COMMAND ${folder}_test)
   set_tests_properties(${folder} PROPERTIES TIMEOUT 120 ENVIRONMENT "PLUMBLINE_SOURCE=${PROJECT_SOURCE_DIR};PLUMBLINE_BUILD=${PROJECT_BINARY_DIR}")
 endfunction()
+
+# plumb_levels(<name> SOURCES a.cc ... OPTIONS -O3 ...) -> shared library plumb_<name>, built once per level of instruction
+# set under the same name: glibc's dynamic linker looks for the best one the machine can run in glibc-hwcaps/ beside the
+# baseline, which is the one programs are linked to. Its functions are hidden unless they say otherwise: one compiled for
+# one level must never stand in for that of another.
+function(plumb_levels name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;OPTIONS" ${ARGN})
+  foreach(level x86-64 x86-64-v3 x86-64-v4)
+    set(target plumb_${name})
+    set(directory "")
+    if(NOT level STREQUAL x86-64)
+      set(target plumb_${name}_${level})
+      set(directory /glibc-hwcaps/${level})
+    endif()
+    add_library(${target} SHARED ${ARG_SOURCES})
+    set_target_properties(${target} PROPERTIES
+      OUTPUT_NAME plumb_${name}
+      LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib${directory}
+      CXX_VISIBILITY_PRESET hidden
+      VISIBILITY_INLINES_HIDDEN ON)
+    target_include_directories(${target} PUBLIC ${PROJECT_SOURCE_DIR})
+    target_compile_definitions(${target} PRIVATE PLUMB_INSTRUCTION_SET="${level}")
+    # -march without -mtune: GCC 12's tuning for particular processors costs a fifth of the speed.
+    target_compile_options(${target} PRIVATE -march=${level} -mtune=generic ${ARG_OPTIONS})
+    target_link_libraries(${target} PRIVATE plumb_warnings)
+    if(NOT level STREQUAL x86-64)
+      add_dependencies(plumb_${name} ${target})
+    endif()
+  endforeach()
+endfunction()

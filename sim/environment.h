@@ -5,7 +5,7 @@
 
 #include "common/random.h"
 #include "robot/description.h"
-#include "sim/model.h"
+#include "sim/simulator.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {

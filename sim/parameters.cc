@@ -3,93 +3,310 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string>
 
 #include "common/config.h"
 
 namespace plumb {
 namespace {
 
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
 // Stream words of the generators used here, so that no two purposes share numbers.
 constexpr uint32_t kHiddenStream = 0x48494444;  // "HIDD"
 
+// Beyond e^20 an inertia's shape is no parameter any more, and far from overflow.
+constexpr double kLargestExponent = 20;
+
+// Numbers of Physics::Axis and Physics::Globals in their order.
+constexpr const char* kAxisNames[] = {"armature", "damping", "friction", "stiffness", "rest", "gain", "no_load_speed",
+                                      "delay",    "sensor_delay", "sensor_bias"};
+constexpr size_t kSlowing = 6;
+constexpr const char* kGlobalNames[] = {"gravity",          "contact/stiffness", "contact/damping",
+                                        "contact/friction", "limit/stiffness",   "limit/damping"};
+static_assert(sizeof(Physics<double>::Axis) == std::size(kAxisNames) * sizeof(double));
+static_assert(sizeof(Physics<double>::Globals) == std::size(kGlobalNames) * sizeof(double));
+
+// xx, yy, zz, xy, xz, yz of a matrix.
+constexpr struct {
+  const char* name;
+  int row, column;
+} kEntries[] = {{"xx", 0, 0}, {"yy", 1, 1}, {"zz", 2, 2}, {"xy", 1, 0}, {"xz", 2, 0}, {"yz", 2, 1}};
+
+void Write(const Matrix3d& inertia, double* entries) {
+  for (size_t i = 0; i < 6; ++i) entries[i] = inertia(kEntries[i].row, kEntries[i].column);
+}
+
+// Lower triangular L with L L^T = s, of a matrix that may have zero eigenvalues.
+Matrix3d Root(const Matrix3d& s) {
+  Matrix3d l = Matrix3d::Zero();
+  const double nothing = 1e-14 * s.trace();
+  for (int j = 0; j < 3; ++j) {
+    const double pivot = s(j, j) - l.row(j).head(j).squaredNorm();
+    if (!(pivot > nothing)) continue;
+    l(j, j) = std::sqrt(pivot);
+    for (int i = j + 1; i < 3; ++i) l(i, j) = (s(i, j) - l.row(i).head(j).dot(l.row(j).head(j))) / l(j, j);
+  }
+  return l;
+}
+
+// The inertia of second moments of mass s, and back.
+Matrix3d FromMoments(const Matrix3d& s) { return s.trace() * Matrix3d::Identity() - s; }
+Matrix3d ToMoments(const Matrix3d& inertia) { return inertia.trace() / 2 * Matrix3d::Identity() - inertia; }
+
 }  // namespace
 
-Parameters::Parameters(const RobotDescription& description) : means_(description.parameters.size()) {
-  urdf_.gravity = kStandardGravity;
-  for (const JointDescription& joint : description.joints) {
-    const LinkDescription& link = description.links.at(static_cast<size_t>(joint.child));
-    urdf_.bodies.push_back({link.mass, link.center_of_mass, link.inertia});
+Parameters::Parameters(const RobotDescription& description, const Topology& topology)
+    : means_(description.parameters.size()) {
+  for (size_t i = 0; i < description.joints.size(); ++i) {
+    const JointDescription& joint = description.joints[i];
+    const LinkDescription& link = description.links.at(i + 1);
+    const Matrix3d& axes = topology.link_axes[i + 1];
+    parents_.push_back(joint.parent);
+    link_axes_.push_back(axes);
+    centers_.push_back(link.center_of_mass);
+    roots_.push_back(axes * Root(ToMoments(link.inertia)));
+    Physics<double>::Link physics{};
+    physics.mass = link.mass;
+    Vector3d::Map(physics.center) = axes * link.center_of_mass;
+    Write(axes * link.inertia * axes.transpose(), physics.inertia);
+    Vector3d::Map(physics.origin) = topology.link_axes[static_cast<size_t>(joint.parent)] * joint.origin;
+    base_.links.push_back(physics);
+    const JointDynamics& d = joint.dynamics;
+    const Physics<double>::Axis axis{d.armature, d.damping,      d.friction, d.stiffness,   d.rest, d.motor_gain,
+                                     1 / d.no_load_speed, d.delay, d.sensor_delay, d.sensor_bias};
+    base_.axes.insert(base_.axes.end(), static_cast<size_t>(joint.num_velocities()), axis);
   }
+  const SimulationSettings& settings = description.simulation;
+  base_.globals = {settings.gravity, 0, 0, 0, 0, 0};
+  if (settings.contact) {
+    base_.globals.contact_stiffness = settings.contact->stiffness;
+    base_.globals.contact_damping = settings.contact->damping;
+    base_.globals.contact_friction = settings.contact->friction;
+    for (size_t link = 1; link < description.links.size(); ++link) {
+      for (const Shape& shape : description.links[link].collisions) {
+        for (const auto& [position, radius] : ContactSpheres(shape)) {
+          Physics<double>::Point point{};
+          Vector3d::Map(point.position) = topology.link_axes[link] * position;
+          point.radius = radius;
+          base_.points.push_back(point);
+          point_links_.push_back(static_cast<int>(link));
+        }
+      }
+    }
+  }
+  if (settings.stop) {
+    base_.globals.stop_stiffness = settings.stop->stiffness;
+    base_.globals.stop_damping = settings.stop->damping;
+  }
+
+  const Paths paths = AllPaths(description);
   for (const ParameterDescription& parameter : description.parameters) {
-    means_[static_cast<Eigen::Index>(names_.size())] = parameter.mean;
+    const auto index = static_cast<int>(bindings_.size());
+    bindings_.push_back(Find(paths, parameter.name));
     names_.push_back(parameter.name);
-    bindings_.push_back(Bind(description, parameter.name));
+    means_[index] = parameter.mean;
+    if (bindings_.back().effect == Effect::kCholesky) AddCholesky(bindings_.back(), index, 0);
+  }
+  for (const FrozenParameter& parameter : description.frozen) {
+    const Binding binding = Find(paths, parameter.name);
+    Check(parameter.name, binding.domain, parameter.value);
+    Freeze(binding, parameter.value);
+  }
+  FindTerms(description);
+}
+
+Parameters::Paths Parameters::AllPaths(const RobotDescription& description) const {
+  Paths paths;
+  const auto domain = [](const std::string& name) {
+    if (name == "rest" || name == "sensor_bias") return Domain::kAny;
+    if (name == "delay" || name == "sensor_delay") return Domain::kDelay;
+    if (name == "no_load_speed" || name.ends_with("stiffness")) return Domain::kPositive;
+    return Domain::kNotNegative;
+  };
+  for (size_t slot = 0; slot < std::size(kGlobalNames); ++slot) {
+    const std::string name = kGlobalNames[slot];
+    if (name.starts_with("contact/") && !description.simulation.contact) continue;
+    if (name.starts_with("limit/") && !description.simulation.stop) continue;
+    paths.push_back({name, {.effect = Effect::kGlobal, .domain = domain(name), .slot = slot}});
+  }
+  paths.push_back({"mass/" + description.links[0].name, {.effect = Effect::kNone, .domain = Domain::kPositive}});
+  size_t velocity = 0;
+  for (size_t i = 0; i < description.joints.size(); ++i) {
+    const std::string& link = description.links[i + 1].name;
+    const auto add = [&](const std::string& path, Effect effect, Domain in, size_t slot = 0, double reference = 1) {
+      paths.push_back({path, {.effect = effect, .domain = in, .index = i, .slot = slot, .reference = reference}});
+    };
+    if (base_.links[i].mass > 0) {
+      add("mass/" + link, Effect::kMass, Domain::kPositive, 0, base_.links[i].mass);
+      add("inertia/" + link, Effect::kInertia, Domain::kPositive);
+      for (size_t k = 0; k < 3; ++k) add("com/" + link + "/" + "xyz"[k], Effect::kCenter, Domain::kAny, k);
+      for (size_t k = 0; k < 6; ++k) {
+        add("inertia/" + link + "/" + kEntries[k].name, Effect::kCholesky, Domain::kExponent, k);
+      }
+    }
+    const auto child = std::find_if(parents_.begin(), parents_.end(), [&](int p) { return p == static_cast<int>(i) + 1; });
+    const double length = child == parents_.end()
+                              ? 2 * centers_[i].norm()
+                              : Vector3d::Map(base_.links[static_cast<size_t>(child - parents_.begin())].origin).norm();
+    if (length > 0) add("length/" + link, Effect::kLength, Domain::kPositive, 0, length);
+    const JointDescription& joint = description.joints[i];
+    for (size_t slot = 0; slot < std::size(kAxisNames); ++slot) {
+      const std::string name = kAxisNames[slot];
+      // Springs, sensors and speed limits of a spherical joint are not modelled.
+      if (joint.type == JointDescription::Type::kSpherical && slot >= 2) continue;
+      paths.push_back({name + "/" + joint.name,
+                       {.effect = slot == kSlowing ? Effect::kSlowing : Effect::kAxis,
+                        .domain = domain(name),
+                        .index = velocity,
+                        .slot = slot,
+                        .count = static_cast<size_t>(joint.num_velocities())}});
+    }
+    velocity += static_cast<size_t>(joint.num_velocities());
+  }
+  return paths;
+}
+
+Parameters::Binding Parameters::Find(const Paths& paths, const std::string& path) {
+  const std::pair<std::string, Binding>* nearest = &paths[0];
+  for (const auto& candidate : paths) {
+    if (candidate.first == path) return candidate.second;
+    if (EditDistance(path, candidate.first) < EditDistance(path, nearest->first)) nearest = &candidate;
+  }
+  std::string why;
+  if (path.starts_with("contact/")) why = " (contact needs [simulation.contact] and collision shapes)";
+  if (path.starts_with("limit/")) why = " (stops need [simulation.limit])";
+  if (path.starts_with("length/")) why = " (a link whose joints and centre of mass coincide has no length)";
+  throw std::invalid_argument("the simulator has no parameter '" + path + "'" + why + "; the nearest is '" +
+                              nearest->first + "'");
+}
+
+void Parameters::Check(const std::string& name, Domain domain, double value) {
+  bool fits = std::isfinite(value);
+  switch (domain) {
+    case Domain::kAny: break;
+    case Domain::kNotNegative: fits = fits && value >= 0; break;
+    case Domain::kPositive: fits = fits && value > 0; break;
+    case Domain::kDelay: fits = fits && value >= 0 && value <= kLongestDelay; break;
+    case Domain::kExponent: fits = fits && std::abs(value) <= kLargestExponent; break;
+  }
+  if (!fits) throw std::invalid_argument("parameter '" + name + "' cannot be " + std::to_string(value));
+}
+
+void Parameters::Freeze(const Binding& binding, double value) {
+  switch (binding.effect) {
+    case Effect::kNone: break;
+    case Effect::kCholesky: AddCholesky(binding, -1, value); break;
+    case Effect::kMass:
+    case Effect::kInertia:
+    case Effect::kLength: factors_.push_back({binding, value}); break;
+    default: Set(binding, value, &base_);
   }
 }
 
-Parameters::Binding Parameters::Bind(const RobotDescription& description, const std::string& path) const {
-  if (path == "gravity") return {Kind::kGravity, 0, kStandardGravity};
-  std::string nearest = "gravity";
-  for (size_t body = 0; body < description.joints.size(); ++body) {
-    const int link = description.joints[body].child;
-    const std::string& name = description.links[static_cast<size_t>(link)].name;
-    if (path == "mass/" + name) return {Kind::kMass, body, urdf_.bodies[body].mass};
-    if (path == "length/" + name) {
-      const double length = 2 * urdf_.bodies[body].center_of_mass.norm();
-      if (!(length > 0)) {
-        throw std::invalid_argument("parameter '" + path +
-                                    "': the link's centre of mass is at its joint, so it has no length");
-      }
-      if (std::any_of(description.joints.begin(), description.joints.end(),
-                      [link](const JointDescription& joint) { return joint.parent == link; })) {
-        throw std::invalid_argument("parameter '" + path +
-                                    "': only a link that carries no further joint can be stretched");
-      }
-      return {Kind::kLength, body, length};
-    }
-    for (const std::string& candidate : {"mass/" + name, "length/" + name}) {
-      if (EditDistance(path, candidate) < EditDistance(path, nearest)) nearest = candidate;
-    }
+void Parameters::AddCholesky(const Binding& binding, int parameter, double value) {
+  auto found = std::find_if(inertias_.begin(), inertias_.end(), [&](const Inertia& i) { return i.link == binding.index; });
+  if (found == inertias_.end()) {
+    inertias_.push_back({binding.index, {-1, -1, -1, -1, -1, -1}, {}});
+    found = std::prev(inertias_.end());
   }
-  throw std::invalid_argument("the simulator has no parameter '" + path + "'; the nearest is '" + nearest +
-                              "'");
+  found->parameter[binding.slot] = parameter;
+  found->value[binding.slot] = value;
 }
 
-InertialModel Parameters::Nominal() const {
-  InertialModel model = urdf_;
-  Apply(means_, model);
-  return model;
+void Parameters::FindTerms(const RobotDescription& description) {
+  const auto has = [&](size_t slot) {
+    for (const auto& axis : base_.axes) {
+      if (reinterpret_cast<const double*>(&axis)[slot] != 0) return true;
+    }
+    return std::any_of(bindings_.begin(), bindings_.end(), [&](const Binding& b) {
+      return (b.effect == Effect::kAxis || b.effect == Effect::kSlowing) && b.slot == slot;
+    });
+  };
+  terms_.friction = has(2);
+  terms_.springs = has(3);
+  terms_.slowing = has(kSlowing);
+  delays_ = has(7);
+  terms_.sensors = has(8) || has(9);
+  terms_.stops = description.simulation.stop.has_value();
 }
 
-void Parameters::Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, InertialModel& model) const {
+Physics<double> Parameters::Nominal() const {
+  Physics<double> physics = base_;
+  Apply(means_, &physics);
+  return physics;
+}
+
+void Parameters::Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, Physics<double>* physics) const {
   if (physical.size() != size()) {
     throw std::invalid_argument("the simulator has " + std::to_string(size()) + " parameters, not " +
                                 std::to_string(physical.size()));
   }
   for (int i = 0; i < size(); ++i) {
-    const bool zero_allowed = bindings_[static_cast<size_t>(i)].kind == Kind::kGravity;
-    if (!std::isfinite(physical[i]) || physical[i] < 0 || (physical[i] == 0 && !zero_allowed)) {
-      throw std::invalid_argument("parameter '" + names_[static_cast<size_t>(i)] + "' cannot be " +
-                                  std::to_string(physical[i]));
-    }
+    Check(names_[static_cast<size_t>(i)], bindings_[static_cast<size_t>(i)].domain, physical[i]);
   }
-  model = urdf_;  // equal sizes: copies values, does not allocate
-  for (int i = 0; i < size(); ++i) {
-    const Binding& binding = bindings_[static_cast<size_t>(i)];
-    if (binding.kind == Kind::kGravity) {
-      model.gravity = physical[i];
-      continue;
+  *physics = base_;  // equal sizes: copies values, does not allocate
+  for (int i = 0; i < size(); ++i) Set(bindings_[static_cast<size_t>(i)], physical[i], physics);
+  for (const Inertia& inertia : inertias_) SetInertia(inertia, physical, physics);
+  for (const Fixed& fixed : factors_) Scale(fixed.binding, fixed.value, physics);
+  for (int i = 0; i < size(); ++i) Scale(bindings_[static_cast<size_t>(i)], physical[i], physics);
+}
+
+void Parameters::Set(const Binding& binding, double value, Physics<double>* physics) const {
+  switch (binding.effect) {
+    case Effect::kGlobal: reinterpret_cast<double*>(&physics->globals)[binding.slot] = value; break;
+    case Effect::kAxis:
+    case Effect::kSlowing:
+      for (size_t k = 0; k < binding.count; ++k) {
+        auto* axis = reinterpret_cast<double*>(&physics->axes[binding.index + k]);
+        axis[binding.slot] = binding.effect == Effect::kSlowing ? 1 / value : value;
+      }
+      break;
+    case Effect::kCenter: {
+      const auto slot = static_cast<Eigen::Index>(binding.slot);
+      Vector3d::Map(physics->links[binding.index].center) +=
+          (value - centers_[binding.index][slot]) * link_axes_[binding.index].col(slot);
+      break;
     }
-    InertialModel::Body& body = model.bodies[binding.body];
-    const double factor = physical[i] / binding.reference;
-    if (binding.kind == Kind::kMass) {
-      body.mass *= factor;
-      body.inertia *= factor;
-    } else {
-      body.center_of_mass *= factor;
-      body.inertia *= factor * factor;
+    default: break;
+  }
+}
+
+void Parameters::SetInertia(const Inertia& inertia, const Eigen::Ref<const Eigen::VectorXd>& physical,
+                            Physics<double>* physics) const {
+  Matrix3d c = Matrix3d::Zero();
+  for (size_t k = 0; k < 6; ++k) {
+    const double value = inertia.parameter[k] >= 0 ? physical[inertia.parameter[k]] : inertia.value[k];
+    c(kEntries[k].row, kEntries[k].column) = k < 3 ? std::exp(value) : value;
+  }
+  const Matrix3d root = roots_[inertia.link] * c;
+  Write(FromMoments(root * root.transpose()), physics->links[inertia.link].inertia);
+}
+
+void Parameters::Scale(const Binding& binding, double value, Physics<double>* physics) const {
+  const double factor = value / binding.reference;
+  const auto scale = [](double* numbers, size_t count, double by) {
+    for (size_t k = 0; k < count; ++k) numbers[k] *= by;
+  };
+  switch (binding.effect) {
+    case Effect::kMass:
+      physics->links[binding.index].mass *= factor;
+      scale(physics->links[binding.index].inertia, 6, factor);
+      break;
+    case Effect::kInertia: scale(physics->links[binding.index].inertia, 6, factor); break;
+    case Effect::kLength: {
+      const int link = static_cast<int>(binding.index) + 1;
+      scale(physics->links[binding.index].center, 3, factor);
+      scale(physics->links[binding.index].inertia, 6, factor * factor);
+      for (size_t i = 0; i < parents_.size(); ++i) {
+        if (parents_[i] == link) scale(physics->links[i].origin, 3, factor);
+      }
+      for (size_t i = 0; i < point_links_.size(); ++i) {
+        if (point_links_[i] == link) scale(physics->points[i].position, 3, factor);
+      }
+      break;
     }
+    default: break;
   }
 }
 

@@ -1,67 +1,112 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "common/random.h"
 #include "robot/description.h"
+#include "sim/dynamics/physics.h"
+#include "sim/dynamics/stepper.h"
+#include "sim/dynamics/topology.h"
 
 namespace plumb {
 
-/// What the equations of motion know of a robot apart from its joints.
-struct InertialModel {
-  struct Body {
-    double mass;                     ///< [kg]
-    Eigen::Vector3d center_of_mass;  ///< [m], in the link frame
-    Eigen::Matrix3d inertia;         ///< [kg m^2], about the centre of mass, link axes
-  };
-  double gravity;            ///< [m/s^2], along -z of the base
-  std::vector<Body> bodies;  ///< one per joint: the link that the joint moves
-};
-
-/// Gravity where it is not a parameter: the standard acceleration of free fall, ISO 80000-3 [m/s^2].
-inline constexpr double kStandardGravity = 9.80665;
-
-/// Turns the description's uncertain parameters into inertias. The paths:
-///   "gravity"        [m/s^2], >= 0
-///   "mass/<link>"    [kg], > 0: scales mass and inertia; the shape stays
-///   "length/<link>"  [m], > 0: stretches the link along with its centre of mass at equal mass: centre of
-///   mass
-///                    times l/l0, inertia about it times (l/l0)^2. l0 is the length that the URDF implies for
-///                    a uniform rod hung at one end, twice the distance of the centre of mass from the joint.
-///                    Only for links that carry no further joint.
-/// The factors multiply, so the order of the parameters does not matter. Immutable, hence thread-safe.
+/// Turns a description's uncertain and frozen parameters into a robot's physics. The paths:
+///   gravity                 [m/s^2] >= 0
+///   mass/<link>             [kg] > 0: scales mass and inertia; the shape stays. The base's has no effect.
+///   com/<link>/{x,y,z}      [m] centre of mass in the link frame
+///   inertia/<link>          > 0: scales the inertia about the centre of mass; 1 = as the URDF has it
+///   inertia/<link>/{xx,yy,zz,xy,xz,yz}  log-Cholesky coordinates of it, 0 = as the URDF has it: see below
+///   length/<link>           [m] > 0: stretches the link with all that is on it, its further joints too, at equal
+///                           mass: positions times l/l0, inertia about the centre of mass times (l/l0)^2. l0 is the
+///                           distance to the first further joint, or, of a link that carries none, the length that
+///                           the URDF implies for a uniform rod: twice that of the centre of mass.
+///   {armature,damping,friction,stiffness,rest,gain,delay,sensor_delay,sensor_bias,no_load_speed}/<joint>
+///                           as in JointDynamics; of a spherical joint for all of its axes
+///   contact/{stiffness,damping,friction}, limit/{stiffness,damping}   as in SimulationSettings
+///
+/// Only inertias that a body can have can be expressed: with S = tr(I)/2 - I, the second moment of mass about the
+/// centre (I is physical exactly where S is positive semidefinite: Wensing, Kim, Slotine, RA-L 3, 2018), and L L^T
+/// that of the URDF's inertia in link axes,
+///   S = L C C^T L^T,  C lower triangular with exp(xx), exp(yy), exp(zz) on its diagonal and xy, xz, yz below it:
+/// log-Cholesky coordinates (Rucker, Wensing, RA-L 7, 2022) of the deviation from the URDF.
+///
+/// Values set absolutely come first, then what scales, so the order of the parameters does not matter. Immutable, hence
+/// thread-safe.
 class Parameters {
  public:
-  /// @throws std::invalid_argument for a path that is not one of the above; names the nearest that is.
-  explicit Parameters(const RobotDescription& description);
+  static constexpr double kLongestDelay = 0.5;  ///< [s]
+
+  /// @throws std::invalid_argument for a path that is none of the above, naming the nearest that is, or a value that
+  /// is not physical.
+  Parameters(const RobotDescription& description, const Topology& topology);
 
   int size() const { return static_cast<int>(bindings_.size()); }
-  /// The robot as its URDF has it, with the prior means for its parameters.
-  InertialModel Nominal() const;
   /// Prior means, physical units.
   const Eigen::VectorXd& means() const { return means_; }
+  /// The robot with its frozen parameters and the prior means of the uncertain ones.
+  Physics<double> Nominal() const;
+  /// What any values of the parameters may bring into play.
+  const Terms& terms() const { return terms_; }
+  bool delays() const { return delays_; }
 
-  /// Writes the model with these parameters. Well below 1 us; does not allocate.
+  /// Writes the physics with these parameters. Does not allocate.
   /// @param physical in the order of description.parameters, physical units.
-  /// @param model one that Nominal returned.
-  /// @throws std::invalid_argument if a value is not finite or not physical, or the size is wrong; the model
-  /// is then unchanged.
-  void Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, InertialModel& model) const;
+  /// @param physics one that Nominal returned, whatever was written to it since.
+  /// @throws std::invalid_argument if a value is not finite or not physical, or the size is wrong; `physics` is then
+  /// unchanged.
+  void Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, Physics<double>* physics) const;
 
  private:
-  enum class Kind { kGravity, kMass, kLength };
+  enum class Domain { kAny, kNotNegative, kPositive, kDelay, kExponent };
+  enum class Effect { kNone, kGlobal, kAxis, kSlowing, kCenter, kCholesky, kMass, kInertia, kLength };
   struct Binding {
-    Kind kind;
-    size_t body;       // index into InertialModel::bodies
-    double reference;  // what the URDF implies
+    Effect effect;
+    Domain domain;
+    size_t index = 0;      // of the link's joint, or the first velocity
+    size_t slot = 0;       // which of the globals, of the axis' numbers, of the centre's or the factor's entries
+    size_t count = 1;      // of velocities
+    double reference = 1;  // what the files imply
   };
-  Binding Bind(const RobotDescription& description, const std::string& path) const;
+  struct Fixed {
+    Binding binding;
+    double value;
+  };
+  // Cholesky coordinates of a link's inertia: where they come from.
+  struct Inertia {
+    size_t link;
+    std::array<int, 6> parameter;  // index of the uncertain parameter, or -1: the value holds
+    std::array<double, 6> value;
+  };
+  using Paths = std::vector<std::pair<std::string, Binding>>;
 
+  Paths AllPaths(const RobotDescription& description) const;
+  static Binding Find(const Paths& paths, const std::string& path);
+  static void Check(const std::string& name, Domain domain, double value);
+  void Freeze(const Binding& binding, double value);
+  void AddCholesky(const Binding& binding, int parameter, double value);
+  void FindTerms(const RobotDescription& description);
+  void Set(const Binding& binding, double value, Physics<double>* physics) const;
+  void Scale(const Binding& binding, double value, Physics<double>* physics) const;
+  void SetInertia(const Inertia& inertia, const Eigen::Ref<const Eigen::VectorXd>& physical,
+                  Physics<double>* physics) const;
+
+  std::vector<int> parents_;                  // link that carries each joint
+  std::vector<int> point_links_;              // link of each contact point
+  std::vector<Eigen::Matrix3d> link_axes_;    // of the link of each joint, in working axes
+  std::vector<Eigen::Vector3d> centers_;      // of mass, in the link frame
+  std::vector<Eigen::Matrix3d> roots_;        // L of each link, in working axes
+  Physics<double> base_;                      // the files, and what is frozen and not a factor
   std::vector<std::string> names_;
-  std::vector<Binding> bindings_;
+  std::vector<Binding> bindings_;             // of the uncertain parameters
+  std::vector<Fixed> factors_;                // frozen
+  std::vector<Inertia> inertias_;
   Eigen::VectorXd means_;
-  InertialModel urdf_;
+  Terms terms_;
+  bool delays_ = false;
 };
 
 /// The truth behind a virtual robot: the prior means, with description.virtual_robot.hidden drawn uniformly

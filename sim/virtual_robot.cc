@@ -5,7 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "sim/parameters.h"
+#include "sim/model.h"
 
 namespace plumb {
 namespace {
@@ -14,18 +14,18 @@ constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
-InertialModel TrueModel(const RobotDescription& description, const Eigen::VectorXd& physical) {
-  const Parameters parameters(description);
-  InertialModel model = parameters.Nominal();
-  parameters.Apply(physical, model);
-  return model;
+RobotDescription TrueRobot(const RobotDescription& description, const Eigen::VectorXd& physical) {
+  const RobotDescription robot = Model(description).Describe(physical);
+  const std::string lacks = Plant::Lacks(robot);
+  if (!lacks.empty()) throw std::invalid_argument("the virtual robot has no such thing as " + lacks);
+  return robot;
 }
 
 }  // namespace
 
 VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical, int64_t now)
     : joints_(description.joints),
-      plant_(description, TrueModel(description, physical)),
+      plant_(TrueRobot(description, physical)),
       encoders_(joints_.size(), Encoder(description.virtual_robot.encoder_bits)),
       motions_(joints_.size()),
       effort_(Eigen::VectorXd::Zero(description.num_joints())) {

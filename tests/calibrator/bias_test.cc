@@ -22,10 +22,7 @@ struct Recording {
 };
 
 Recording Record(const RobotDescription& robot, uint32_t episode) {
-  const Parameters parameters(robot);
-  InertialModel inertias = parameters.Nominal();
-  parameters.Apply(kTruth, inertias);
-  Plant plant(robot, inertias);
+  Plant plant(Model(robot).Describe(kTruth));
   Encoder encoder(robot.virtual_robot.encoder_bits);
   StateObserver observer(robot);
   Random random(23, {episode});

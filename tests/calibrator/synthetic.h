@@ -10,7 +10,7 @@
 #include "calibrator/transitions.h"
 #include "common/random.h"
 #include "robot/description.h"
-#include "sim/model.h"
+#include "sim/simulator.h"
 
 namespace plumb {
 

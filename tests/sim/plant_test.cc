@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "common/random.h"
-#include "sim/model.h"
+#include "sim/simulator.h"
 #include "tests/sim/robots.h"
 
 namespace plumb {
@@ -22,11 +22,16 @@ VectorXd Draw(Random& random, int size, double bound) {
   return result;
 }
 
+RobotDescription WithPriorMeans(const RobotDescription& description) {
+  const Model model(description);
+  return model.Describe(model.parameters().means());
+}
+
 }  // namespace
 
 TEST_CASE("plant and simulator have the same accelerations by different equations") {
   const RobotDescription description = MakeTree();
-  Plant plant(description, Parameters(description).Nominal());
+  Plant plant(description);
   Simulator simulator(description);
   Random random(11);
   for (int i = 0; i < 300; ++i) {
@@ -40,13 +45,11 @@ TEST_CASE("plant and simulator have the same accelerations by different equation
 
 TEST_CASE("the plant's pendulum is gym's in continuous time") {
   const RobotDescription description = LoadPendulum("robot.toml");
-  const Parameters parameters(description);
+  const Model model(description);
   Random random(12);
   for (int i = 0; i < 20; ++i) {
     const double g = random.Uniform(5, 15), m = random.Uniform(0.3, 3), l = random.Uniform(0.3, 3);
-    InertialModel inertias = parameters.Nominal();
-    parameters.Apply(Eigen::Vector3d(g, m, l), inertias);
-    Plant plant(description, inertias);
+    Plant plant(model.Describe(Eigen::Vector3d(g, m, l)));
     const double q = random.Uniform(-4, 4), u = random.Uniform(-2, 2);
     plant.SetState(Scalar(q), Scalar(random.Uniform(-10, 10)));
     const double expected = 3 * g / (2 * l) * std::sin(q) + 3 / (m * l * l) * u;
@@ -56,7 +59,7 @@ TEST_CASE("the plant's pendulum is gym's in continuous time") {
 
 TEST_CASE("the plant keeps its energy") {
   const RobotDescription description = LoadPendulum("robot.toml");
-  Plant plant(description, Parameters(description).Nominal());
+  Plant plant(WithPriorMeans(description));
   const double g = 10.4, m = 1.04, l = 1.04;
   const auto energy = [&] {
     return m * l * l / 6 * plant.v()[0] * plant.v()[0] + m * g * l / 2 * std::cos(plant.q()[0]);
@@ -70,25 +73,25 @@ TEST_CASE("the plant keeps its energy") {
 
 TEST_CASE("the plant's integrator is of fourth order and at its default far below an encoder's count") {
   const RobotDescription description = LoadPendulum("robot.toml");
-  const InertialModel inertias = Parameters(description).Nominal();
+  const RobotDescription robot = WithPriorMeans(description);
   const auto run = [&](Plant&& plant, double duration) {
     plant.SetState(Scalar(-2), Scalar(8));
     REQUIRE(plant.Advance(Scalar(1), duration));
     return plant.q()[0];
   };
-  const double reference = run(Plant(description, inertias, 0.001), 0.4);
-  const double coarse = run(Plant(description, inertias, 0.02), 0.4) - reference;
-  const double fine = run(Plant(description, inertias, 0.01), 0.4) - reference;
+  const double reference = run(Plant(robot, 0.001), 0.4);
+  const double coarse = run(Plant(robot, 0.02), 0.4) - reference;
+  const double fine = run(Plant(robot, 0.01), 0.4) - reference;
   CHECK(std::log2(coarse / fine) == Approx(4).margin(0.3));
   const double step =
-      run(Plant(description, inertias), 0.005) - run(Plant(description, inertias, 0.001), 0.005);
+      run(Plant(robot), 0.005) - run(Plant(robot, 0.001), 0.005);
   CHECK(std::abs(step) < 1e-10);
 }
 
 TEST_CASE("the simulator converges to the plant as its order says") {
   RobotDescription description = MakeTree();
   description.simulation.integrator = SimulationSettings::Integrator::kSemiImplicit;
-  Plant plant(description, Parameters(description).Nominal(), 5e-4);
+  Plant plant(description, 5e-4);
   const VectorXd q = Eigen::Vector4d(0.1, 1, -1, 2), v = Eigen::Vector4d(0.5, -1, 2, 1),
                  u = Eigen::Vector4d(1, 2, 0.5, -1);
   plant.SetState(q, v);
@@ -107,7 +110,7 @@ TEST_CASE("the simulator converges to the plant as its order says") {
 
 TEST_CASE("at the pendulum's substep the simulator errs far less than the sensors") {
   RobotDescription description = LoadPendulum("robot.toml");
-  Plant plant(description, Parameters(description).Nominal());
+  Plant plant(WithPriorMeans(description));
   Simulator simulator(description);
   description.simulation.substep /= 2;
   Simulator finer(description);
@@ -138,7 +141,7 @@ TEST_CASE("at the pendulum's substep the simulator errs far less than the sensor
 
 TEST_CASE("the plant stays where it is rather than leave the finite") {
   const RobotDescription description = LoadPendulum("robot.toml");
-  Plant plant(description, Parameters(description).Nominal());
+  Plant plant(WithPriorMeans(description));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_AS(plant.SetState(Scalar(nan), Scalar(0)), std::invalid_argument);
   CHECK_THROWS_AS(plant.SetState(Scalar(0), VectorXd::Zero(2)), std::invalid_argument);
@@ -148,9 +151,9 @@ TEST_CASE("the plant stays where it is rather than leave the finite") {
   CHECK(std::isfinite(plant.v()[0]));
   plant.SetState(Scalar(1), Scalar(2));
   CHECK(plant.Advance(Scalar(0), 0.01));
-  InertialModel broken = Parameters(description).Nominal();
-  broken.bodies[0].mass = -1;
-  CHECK_THROWS_AS(Plant(description, broken), std::invalid_argument);
+  RobotDescription broken = description;
+  broken.links[1].mass = -1;
+  CHECK_THROWS_AS(Plant(broken), std::invalid_argument);
 }
 
 }  // namespace plumb

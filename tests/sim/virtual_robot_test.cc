@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "common/random.h"
-#include "sim/model.h"
+#include "sim/simulator.h"
 #include "sim/parameters.h"
 #include "tests/sim/robots.h"
 
@@ -104,12 +104,7 @@ TEST_CASE("the encoder is read at multiples of its period, and sent whenever the
   const auto estimates = late.Sent(cansimple::kGetEncoderEstimates);
   REQUIRE(expected.size() == 8);
   REQUIRE(estimates.size() == 8);
-  Plant plant(Pendulum(), [&] {
-    const Parameters parameters(Pendulum());
-    InertialModel model = parameters.Nominal();
-    parameters.Apply(late.truth, model);
-    return model;
-  }());
+  Plant plant(Model(Pendulum()).Describe(late.truth));
   plant.SetState(Scalar(0.5), Scalar(3));
   for (size_t i = 0; i < 8; ++i) {
     REQUIRE(plant.Advance(Scalar(0), 0.005));

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "sim/dynamics/real.h"
+
+namespace plumb {
+
+/// The numbers of a robot that may differ from one simulator to the next. All vectors are in working axes: those
+/// that every link's axes are parallel to where q = 0 (see Topology), hence constant in the link.
+/// Real is double, or a pack with one robot per lane.
+template <class Real>
+struct Physics {
+  struct Link {
+    Real mass;        ///< [kg]
+    Real center[3];   ///< [m] of mass, from the link's origin
+    Real inertia[6];  ///< [kg m^2] about the centre of mass: xx, yy, zz, xy, xz, yz
+    Real origin[3];   ///< [m] of the link's joint, from its parent's origin
+  };
+  struct Axis {        ///< one degree of freedom; units of the joint or its angle. See JointDynamics.
+    Real armature, damping, friction, stiffness, rest;
+    Real gain;
+    Real slowing;      ///< 1 / no_load_speed
+    Real delay, sensor_delay, sensor_bias;  ///< not the equations' of motion, but their surroundings'
+  };
+  struct Point {       ///< a sphere that may touch the ground
+    Real position[3];  ///< [m] from its link's origin
+    Real radius;       ///< [m]
+  };
+  struct Globals {
+    Real gravity;                                                     ///< [m/s^2], downwards
+    Real contact_stiffness, contact_damping, contact_friction;        ///< see SimulationSettings::Contact
+    Real stop_stiffness, stop_damping;                                ///< see SimulationSettings::Stop
+  };
+
+  std::vector<Link> links;    ///< one per joint: the link that it moves
+  std::vector<Axis> axes;     ///< one per velocity
+  std::vector<Point> points;
+  Globals globals;
+};
+
+namespace internal {
+template <class Wide, class Narrow>
+void SetLane(Wide* wide, const Narrow* narrow, size_t count, int lane) {
+  static_assert(sizeof(Wide) % sizeof(Narrow) == 0);
+  constexpr size_t kLaneCount = sizeof(Wide) / sizeof(Narrow);
+  auto* to = reinterpret_cast<double*>(wide) + lane;
+  const auto* from = reinterpret_cast<const double*>(narrow);
+  for (size_t i = 0; i < count * (sizeof(Narrow) / sizeof(double)); ++i) to[i * kLaneCount] = from[i];
+}
+}  // namespace internal
+
+/// Makes one lane of `wide` the robot `narrow`. Sizes must agree.
+template <class Real>
+void SetLane(const Physics<double>& narrow, int lane, Physics<Real>* wide) {
+  internal::SetLane(wide->links.data(), narrow.links.data(), narrow.links.size(), lane);
+  internal::SetLane(wide->axes.data(), narrow.axes.data(), narrow.axes.size(), lane);
+  internal::SetLane(wide->points.data(), narrow.points.data(), narrow.points.size(), lane);
+  internal::SetLane(&wide->globals, &narrow.globals, 1, lane);
+}
+
+}  // namespace plumb

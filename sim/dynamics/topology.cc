@@ -1,0 +1,147 @@
+#include "sim/dynamics/topology.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Type = JointDescription::Type;
+
+constexpr double kParallel = 1e-12;  // what rounding makes of exact angles
+
+// Link axes in world axes at q = 0, the base first.
+std::vector<Matrix3d> AxesAtZero(const RobotDescription& robot) {
+  std::vector<Matrix3d> axes{Matrix3d::Identity()};
+  for (const JointDescription& joint : robot.joints) {
+    axes.push_back(axes[static_cast<size_t>(joint.parent)] * joint.rotation);
+  }
+  return axes;
+}
+
+// Normal of the plane in which all joints move; zero if there is none.
+Vector3d FindNormal(const RobotDescription& robot, const std::vector<Matrix3d>& axes) {
+  Vector3d normal = Vector3d::Zero(), slide = Vector3d::Zero();
+  for (size_t i = 0; i < robot.joints.size(); ++i) {
+    const JointDescription& joint = robot.joints[i];
+    if (joint.type == Type::kSpherical) return Vector3d::Zero();
+    const Vector3d axis = axes[i + 1] * joint.axis;
+    if (joint.type != Type::kPrismatic) {
+      if (normal.isZero()) normal = axis;
+    } else if (slide.isZero()) {
+      slide = axis;
+    } else if (normal.isZero() && slide.cross(axis).norm() > kParallel) {
+      normal = slide.cross(axis).normalized();
+    }
+  }
+  if (normal.isZero()) {  // one direction only: an upright plane through it
+    const Vector3d level = slide.cross(Vector3d::UnitZ());
+    normal = level.norm() > kParallel ? level.normalized() : Vector3d::UnitY();
+  }
+  for (size_t i = 0; i < robot.joints.size(); ++i) {
+    const Vector3d axis = axes[i + 1] * robot.joints[i].axis;
+    const bool fits = robot.joints[i].type == Type::kPrismatic ? std::abs(axis.dot(normal)) < kParallel
+                                                               : axis.cross(normal).norm() < kParallel;
+    if (!fits) return Vector3d::Zero();
+  }
+  return normal;
+}
+
+// Rows: working axes in world axes.
+Matrix3d PlaneAxes(const Vector3d& normal) {
+  Vector3d y = Vector3d::UnitZ() - normal.z() * normal;
+  y = y.norm() > kParallel ? y.normalized() : Vector3d::UnitY();
+  Matrix3d axes;
+  axes << y.cross(normal).transpose(), y.transpose(), normal.transpose();
+  return axes;
+}
+
+}  // namespace
+
+std::vector<std::pair<Vector3d, double>> ContactSpheres(const Shape& shape) {
+  const Vector3d half = shape.rotation * Vector3d(0, 0, shape.size(1) / 2);
+  switch (shape.type) {
+    case Shape::Type::kSphere: return {{shape.position, shape.size(0)}};
+    case Shape::Type::kCapsule: return {{shape.position - half, shape.size(0)}, {shape.position + half, shape.size(0)}};
+    case Shape::Type::kBox: {
+      std::vector<std::pair<Vector3d, double>> corners;
+      for (int corner = 0; corner < 8; ++corner) {
+        const Vector3d signs(corner & 1 ? .5 : -.5, corner & 2 ? .5 : -.5, corner & 4 ? .5 : -.5);
+        corners.emplace_back(shape.position + shape.rotation * signs.cwiseProduct(shape.size), 0);
+      }
+      return corners;
+    }
+    case Shape::Type::kCylinder: break;
+  }
+  return {};
+}
+
+Topology::Topology(const RobotDescription& robot) {
+  const size_t n = robot.joints.size();
+  for (size_t i = 0; i < n; ++i) {
+    const JointDescription& joint = robot.joints[i];
+    if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 || joint.parent > static_cast<int>(i)) {
+      throw std::invalid_argument("joint '" + joint.name + "' is not in depth-first order of a tree");
+    }
+  }
+  link_axes = AxesAtZero(robot);
+  if (robot.simulation.contact) {
+    for (size_t link = 1; link < robot.links.size(); ++link) {
+      for (const Shape& shape : robot.links[link].collisions) {
+        points.insert(points.end(), ContactSpheres(shape).size(), {static_cast<int>(link)});
+      }
+    }
+  }
+  const Vector3d normal = FindNormal(robot, link_axes);
+  planar = !normal.isZero() && (points.empty() || std::abs(normal.z()) < kParallel);
+  if (planar) {
+    world_axes = PlaneAxes(normal);
+    for (Matrix3d& axes : link_axes) axes = world_axes * axes;
+  }
+  Vector3d::Map(up) = world_axes.col(2);
+
+  std::vector<int> last(n + 1, -1);  // velocity of the link's own joint
+  for (size_t i = 0; i < n; ++i) {
+    const JointDescription& described = robot.joints[i];
+    Joint joint{};
+    joint.type = described.type;
+    joint.parent = described.parent;
+    joint.position = positions;
+    joint.velocity = velocities;
+    Vector3d axis = link_axes[i + 1] * described.axis;
+    if (planar) {  // exactly so
+      if (described.type == Type::kPrismatic) axis.z() = 0;
+      if (described.type != Type::kPrismatic) axis = Vector3d(0, 0, axis.z() > 0 ? 1 : -1);
+    }
+    Vector3d::Map(joint.axis) = axis;
+    Matrix3d::Map(joint.link_axes) = link_axes[i + 1];
+    joint.lower = described.lower;
+    joint.upper = described.upper;
+    joint.effort_limit = described.effort_limit;
+    int ancestor = last[static_cast<size_t>(described.parent)];
+    for (int k = 0; k < described.num_velocities(); ++k) {
+      ancestors.push_back(ancestor);
+      ancestor = velocities + k;
+    }
+    last[i + 1] = ancestor;
+    positions += described.num_positions();
+    velocities += described.num_velocities();
+    coriolis = coriolis || joint.parent != 0 || described.type == Type::kSpherical;
+    joints.push_back(joint);
+  }
+  // The chain of slides that the robot as a whole hangs on.
+  const auto children = [&](int link) {
+    return std::count_if(joints.begin(), joints.end(), [link](const Joint& joint) { return joint.parent == link; });
+  };
+  while (anchor < static_cast<int>(n) && children(anchor) == 1 &&
+         joints[static_cast<size_t>(anchor)].type == Type::kPrismatic) {
+    ++anchor;
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sim/effort_track.h"
+#include "sim/model.h"
+
+namespace plumb {
+
+/// A robot as a simulator with exchangeable parameters: reset to any state, apply an effort, step.
+///
+/// Trees of revolute, continuous, prismatic and spherical joints with armature, damping, Coulomb friction, springs,
+/// stops, contact with the ground, delays and sensors (see RobotDescription); composite rigid bodies and linearly
+/// implicit integration (see Stepper). New parameters need no rebuild, not even new lengths.
+///
+/// One per worker; not thread-safe. Equal inputs give equal bits, in any thread, on any x86-64 processor. Apart from
+/// construction nothing allocates, but a first profile longer than all before it.
+class Simulator {
+ public:
+  using Vector = Eigen::Ref<const Eigen::VectorXd>;
+
+  /// Starts at the zero state with the prior means as parameters.
+  explicit Simulator(std::shared_ptr<const Model> model);
+  /// @throws std::invalid_argument, see Model.
+  explicit Simulator(const RobotDescription& description);
+  Simulator(Simulator&&) noexcept;
+  Simulator& operator=(Simulator&&) noexcept;
+  ~Simulator();
+
+  const Model& model() const { return *model_; }
+  int num_positions() const { return model_->num_positions(); }
+  int num_velocities() const { return model_->num_velocities(); }
+  int parameter_count() const { return model_->parameters().size(); }
+
+  /// @param physical in the order of description.parameters, physical units. Takes effect at once; the state
+  /// stays. @throws std::invalid_argument, see Parameters::Apply.
+  void SetParameters(const Vector& physical);
+  /// Forgets what was commanded before. Quaternions need not have length one, but more than zero.
+  /// @throws std::invalid_argument if an entry is not finite or the size is wrong.
+  void SetState(const Vector& q, const Vector& v);
+  /// The same for the readings of the robot's sensors, of which some may be late or biased: JointDynamics.
+  /// @param effort that acts at that time.
+  void SetReading(const Vector& q, const Vector& v, const Vector& effort);
+  /// What had been commanded before the present: where an effort is delayed, it is still to come.
+  void Recall(std::span<const EffortSegment> before);
+
+  /// Holds `effort` (num_velocities) for `duration` [s] >= 0, in equal substeps of at most settings.substep:
+  ///   semi-implicit  v += h a(q, v), q += h v: of first order, as gym and MuJoCo's Euler do
+  ///   leapfrog       q += h/2 v, v += h a(q, v), q += h/2 v: of second order but for stops, contacts and friction
+  /// Velocities are clipped to settings.speed_clip after each substep (settings.move_before_clip: after the
+  /// move). If the state ceases to be finite it stays so until the next SetState, without any exception.
+  void Step(const Vector& effort, double duration);
+  /// The same for efforts one after the other: the profile that was really applied to a robot.
+  void Step(std::span<const EffortSegment> profile);
+
+  const Eigen::VectorXd& q() const { return q_; }  ///< [rad or m]
+  const Eigen::VectorXd& v() const { return v_; }  ///< [rad/s or m/s]
+  /// What the sensors say. Valid until the next call. @param effort that acts now.
+  struct State {
+    const Eigen::VectorXd& q;
+    const Eigen::VectorXd& v;
+  };
+  State Reading(const Vector& effort);
+  /// False once the state has blown up, or an effort was not finite.
+  bool finite() const { return finite_; }
+
+  /// At the current state under `effort` [rad/s^2 or m/s^2], without stops, contacts and Coulomb friction.
+  Eigen::VectorXd Acceleration(const Vector& effort);
+  /// With armature [kg m^2 or kg].
+  Eigen::MatrixXd MassMatrix();
+  /// Efforts that gravity and inertia exert at zero accelerations.
+  Eigen::VectorXd Bias();
+
+ private:
+  void Run(double duration);
+  void Take();
+
+  std::shared_ptr<const Model> model_;
+  std::unique_ptr<Engine> engine_;
+  Physics<double> physics_;
+  EffortTrack track_;
+  std::vector<double> mean_, moment_;
+  Eigen::VectorXd q_, v_, reading_q_, reading_v_;
+  bool finite_ = true;
+};
+
+}  // namespace plumb
