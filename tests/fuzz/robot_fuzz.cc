@@ -15,8 +15,8 @@
 #include "common/config.h"
 #include "robot/description.h"
 #include "robot/parameter_distribution.h"
-#include "sim/model.h"
 #include "tests/fuzz/mutator.h"
+#include "tests/fuzz/simulate.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {
@@ -82,27 +82,14 @@ void RequireValid(const RobotDescription& robot) {
           "prior cannot be sent");
 }
 
-void Simulate(const RobotDescription& robot, Counts& counts) {
-  std::unique_ptr<Simulator> simulator;
-  try {
-    simulator = std::make_unique<Simulator>(robot);
-  } catch (const std::invalid_argument& error) {
-    if (!*error.what()) throw std::logic_error("the simulator does not say what is wrong");
-    ++counts.refused_simulator;
-    ++counts.simulator[std::regex_replace(std::string(error.what()).substr(0, 60), std::regex("[-0-9.e+]+"),
-                                          "#")];
+void Count(const SimulatorOutcome& outcome, Counts& counts) {
+  if (outcome.refusal.empty()) {
+    ++counts.simulated;
+    if (!outcome.finite) ++counts.not_finite;
     return;
   }
-  const Eigen::VectorXd v = Eigen::VectorXd::Constant(robot.num_velocities(), 0.1);
-  const Eigen::VectorXd q =
-      Eigen::Map<const Eigen::VectorXd>(robot.task.target.data(), robot.num_positions());
-  simulator->SetState(q, v);
-  // Ten seconds in substeps of a microsecond are allowed, but not waited for.
-  const double duration = std::min(robot.task.period, 5 * robot.simulation.substep);
-  for (int i = 0; i < 3; ++i)
-    simulator->Step(Eigen::VectorXd::Constant(robot.num_velocities(), 0.5), duration);
-  ++counts.simulated;
-  if (!simulator->finite()) ++counts.not_finite;
+  ++counts.refused_simulator;
+  ++counts.simulator[std::regex_replace(outcome.refusal.substr(0, 90), std::regex("[0-9]+"), "#")];
 }
 
 // @return false for an outcome that must not be.
@@ -110,7 +97,7 @@ bool Try(const RobotFolder& folder, Counts& counts) {
   try {
     const RobotDescription robot = LoadRobot(folder.path());
     RequireValid(robot);
-    Simulate(robot, counts);
+    Count(Simulate(robot), counts);
     return true;
   } catch (const ConfigError& error) {
     const std::string text = error.what();
