@@ -47,9 +47,9 @@ ReachTask::ReachTask(const RobotDescription& description, const std::string& nam
     };
     if (joint.type == Type::kSpherical) fail("is spherical, which this task cannot aim at");
     const double target = i < settings.target.size() ? settings.target[i] : 0;
-    const double spread = i < settings.spread.size() ? settings.spread[i] : NAN;
+    const double spread = i < settings.spread.size() ? settings.spread[i] : 0;
     Coordinate c{Endless(joint), target, Scale(joint), joint.lower, joint.upper};
-    if (!std::isnan(spread)) {
+    if (spread > 0) {
       c.lower = std::max(joint.lower, target - spread);
       c.upper = std::min(joint.upper, target + spread);
     } else if (name == "hold") {

@@ -10,8 +10,8 @@ namespace plumb {
 ///   reward       -(sum (e/s)^2 + 0.01 sum (v/s)^2 + 0.01 sum (u/limit)^2) of the state before the step;
 ///                s = 1 rad for turning joints, for a slide half its range (1 m where that is unlimited),
 ///                v/s per second, u of the driven joints
-///   start        at rest; target +- task.spread, and where a joint has no spread, anywhere: uniformly between its
-///                limits, -pi to pi for a continuous one
+///   start        at rest; target +- task.spread, and where a joint has no spread or 0, anywhere: uniformly between
+///                its limits, -pi to pi for a continuous one
 /// Never terminates. Errors of predicted states are measured in units of s and 8 s per second: a falling rod of 1 m
 /// reaches 7.7 rad/s.
 class ReachTask : public Task {

@@ -259,7 +259,7 @@ TEST_CASE("reach starts anywhere, hold near the target, a spread rules both") {
   reach.task.target = hold.task.target = {0.5, 3};
   CHECK((extremes(reach) - Eigen::Vector4d(-2, 2, -kPi, kPi)).norm() < 0.02);
   CHECK(extremes(hold) == Eigen::Vector4d(0.5, 0.5, 3, 3));
-  reach.task.spread = {NAN, 0.1};
+  reach.task.spread = {0, 0.1};
   CHECK((extremes(reach) - Eigen::Vector4d(-2, 2, 2.9, 3.1)).norm() < 0.02);
   hold.task.spread = {1.75, 0.2};
   CHECK((extremes(hold) - Eigen::Vector4d(-1.25, 2, 2.8, 3.2)).norm() < 0.02);  // not beyond the limit
@@ -269,7 +269,7 @@ TEST_CASE("reach refuses what it cannot aim at or start from") {
   RobotDescription description = CartAndPole("reach");
   description.joints[0].lower = -kInfinity;
   CHECK_THROWS_WITH(MakeTask(description), Catch::Contains("'slide'") && Catch::Contains("task.spread"));
-  description.task.spread = {0.1, NAN};
+  description.task.spread = {0.1, 0};
   CHECK_NOTHROW(MakeTask(description));
   description.joints[1].type = Type::kSpherical;
   CHECK_THROWS_WITH(MakeTask(description), Catch::Contains("'hinge'") && Catch::Contains("spherical"));
