@@ -6,6 +6,7 @@
 
 #include "cli/doctor.h"
 #include "cli/launch.h"
+#include "cli/sim.h"
 #include "common/process.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
@@ -56,8 +57,9 @@ int Request(Process& process, int8_t what) {
 
 int main(int argc, char** argv) {
   plumb::LaunchFlags flags;
+  plumb::SimFlags sim_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  CLI::App *launch = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
+  CLI::App *launch = nullptr, *sim = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -76,15 +78,28 @@ int main(int argc, char** argv) {
         launch->add_option("--log", flags.log, "record all messages to this LCM log");
         launch->add_option("--summary", flags.summary, "write the outcome to this JSON file");
         launch->add_option("--output", flags.output, "folder for logs and checkpoints; default: a new one in runs/");
+        sim = app.add_subcommand("sim", "simulate the robot's task here and now, without any other process");
+        sim->add_option("robot", sim_flags.robot, "robot folder or TOML file")->required();
+        auto* policy = sim->add_option("--policy", sim_flags.policy, "a trainer's checkpoint; its mean action is taken");
+        sim->add_flag("--random", sim_flags.random, "random actions; default: none")->excludes(policy);
+        sim->add_option("--seed", sim_flags.seed, "of all random numbers")->capture_default_str();
+        sim->add_option("--episodes", sim_flags.episodes, "how many")
+            ->check(CLI::Range(1, 1000000))->capture_default_str();
+        sim->add_option("--set", sim_flags.set, "parameters other than their prior means, e.g. mass/thigh=4");
+        sim->add_option("--csv", sim_flags.csv, "write every step to this file");
+        sim->add_option("--png", sim_flags.png, "draw the first episode as a strip of snapshots");
+        sim->add_option("--gif", sim_flags.gif, "draw the first episode as a film");
+        sim->add_flag("--view", sim_flags.view, "show it in a window, in real time");
         doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* sub : {launch, doctor, arm, disarm, estop}) sub->fallthrough();
+        for (CLI::App* sub : {launch, sim, doctor, arm, disarm, estop}) sub->fallthrough();
       },
       [&](plumb::Process& process) {
         if (launch->parsed()) return plumb::Launch(process, flags);
+        if (sim->parsed()) return plumb::Simulate(process, sim_flags);
         if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus);
         if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM);
         if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM);

@@ -18,7 +18,7 @@ BELOW = {
     "sim": {"common", "robot", "sim/tasks"},
     "calibrator": {"common", "robot", "sim", "sim/tasks"},
     "trainer": {"common", "robot", "sim", "sim/tasks", "controller"},
-    "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "calibrator", "trainer"},
+    "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "controller", "calibrator", "trainer"},
     "experiments": {"common", "robot", "sim", "sim/tasks", "calibrator", "trainer", "controller"},
 }
 # The virtual robot speaks the protocols' device side.

@@ -1,0 +1,85 @@
+#include "cli/roll_out.h"
+
+#include <fmt/format.h>
+
+#include <iterator>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+// Second words of the random streams: where an episode begins, and what its actor draws.
+constexpr uint32_t kStartStream = 0x53544152, kActorStream = 0x4143544f;  // "STAR", "ACTO"
+constexpr int64_t kStepsPerLook = 256;                                    // whether to stop
+
+void AppendNumbers(const Eigen::VectorXd& numbers, std::string& csv) {
+  for (const double number : numbers) fmt::format_to(std::back_inserter(csv), ",{:.17g}", number);
+}
+
+}  // namespace
+
+SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& robot, const Actor& actor, uint64_t seed,
+                             uint32_t number, const std::function<void(const SimulatedStep&)>& see,
+                             const std::function<bool()>& stop) {
+  const Task& task = environment.task();
+  Random start(seed, {number, kStartStream}), random(seed, {number, kActorStream});
+  environment.Reset(start);
+  SimulatedEpisode episode;
+  Eigen::VectorXf observation(environment.observation_size());
+  SimulatedStep step;
+  step.action.resize(environment.action_size());
+  const int limit = environment.steps_per_episode();
+  do {
+    environment.Observe(observation);
+    const Eigen::VectorXf action = actor(observation, random);
+    if (!action.allFinite()) throw std::runtime_error("the policy's action is not finite");
+    step.time = static_cast<double>(episode.steps) * robot.task.period;
+    step.q = environment.q();
+    step.v = environment.v();
+    const Environment::StepResult result = environment.Step(action);
+    for (int i = 0; i < environment.action_size(); ++i) {
+      step.action[i] = environment.effort()[task.action_indices()[static_cast<size_t>(i)]] / task.action_unit(i);
+    }
+    ++episode.steps;
+    episode.sum += result.reward;
+    step.reward = result.reward;
+    step.terminated = result.terminated;
+    step.truncated = !result.terminated && episode.steps >= limit;
+    see(step);
+    if (result.terminated) {
+      const bool finite = environment.q().allFinite() && environment.v().allFinite();
+      episode.end = finite ? SimulatedEpisode::End::kTerminated : SimulatedEpisode::End::kNotFinite;
+      return episode;
+    }
+    if (episode.steps % kStepsPerLook == 0 && stop()) {
+      episode.end = SimulatedEpisode::End::kInterrupted;
+      return episode;
+    }
+  } while (episode.steps < limit);
+  return episode;
+}
+
+std::string CsvHeader(const RobotDescription& robot) {
+  std::string header = "t", velocities, actions;
+  for (const JointDescription& joint : robot.joints) {
+    if (joint.type == JointDescription::Type::kSpherical) {
+      for (const char* part : {"w", "x", "y", "z"}) header += ",q/" + joint.name + "/" + part;
+      for (const char* part : {"x", "y", "z"}) velocities += ",v/" + joint.name + "/" + part;
+    } else {
+      header += ",q/" + joint.name;
+      velocities += ",v/" + joint.name;
+    }
+    if (!joint.passive) actions += ",u/" + joint.name;
+  }
+  return header + velocities + actions + ",reward,terminated,truncated\n";
+}
+
+void AppendCsv(const SimulatedStep& step, std::string& csv) {
+  fmt::format_to(std::back_inserter(csv), "{:.17g}", step.time);
+  AppendNumbers(step.q, csv);
+  AppendNumbers(step.v, csv);
+  AppendNumbers(step.action, csv);
+  fmt::format_to(std::back_inserter(csv), ",{:.17g},{:d},{:d}\n", step.reward, step.terminated, step.truncated);
+}
+
+}  // namespace plumb

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "robot/description.h"
+#include "sim/environment.h"
+
+namespace plumb {
+
+/// Action in policy units for an observation. @param random of the episode.
+using Actor = std::function<Eigen::VectorXf(const Eigen::VectorXf& observation, Random& random)>;
+
+/// One control step: the state before it and what was done in it.
+struct SimulatedStep {
+  double time;  ///< [s] since the episode began
+  Eigen::VectorXd q, v;
+  Eigen::VectorXd action;  ///< of the driven joints, in the task's own units
+  double reward;
+  bool terminated, truncated;
+};
+
+struct SimulatedEpisode {
+  int64_t steps = 0;
+  double sum = 0;  ///< of the rewards
+  enum class End { kTimeLimit, kTerminated, kNotFinite, kInterrupted };
+  End end = End::kTimeLimit;
+};
+
+/// Plays one episode of the environment. Equal seeds and numbers give equal episodes.
+/// @param see is shown every step, in order. @param stop is asked now and then.
+/// @throws std::runtime_error if an action is not finite.
+SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& robot, const Actor& actor, uint64_t seed,
+                             uint32_t number, const std::function<void(const SimulatedStep&)>& see,
+                             const std::function<bool()>& stop);
+
+/// The table's head: t, q/<joint>, v/<joint>, u/<driven joint>, reward, terminated, truncated. A spherical joint has
+/// /w, /x, /y, /z in q and /x, /y, /z in v.
+std::string CsvHeader(const RobotDescription& robot);
+/// A row of it, 17 significant digits. Appends.
+void AppendCsv(const SimulatedStep& step, std::string& csv);
+
+}  // namespace plumb

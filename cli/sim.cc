@@ -1,0 +1,151 @@
+#include "cli/sim.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "cli/roll_out.h"
+#include "common/atomic_file.h"
+#include "sim/picture.h"
+#include "sim/viewer.h"
+#include "trainer/policy_file.h"
+
+namespace plumb {
+namespace {
+
+/// Before a long simulation rather than after it.
+void RequireWritable(const std::string& file) {
+  if (file.empty()) return;
+  const std::filesystem::path parent = std::filesystem::path(file).parent_path();
+  if (access(parent.empty() ? "." : parent.c_str(), W_OK | X_OK) != 0) {
+    throw std::runtime_error(file + ": cannot be written: " + std::strerror(errno));
+  }
+  if (std::filesystem::is_directory(file)) throw std::runtime_error(file + ": cannot be written: it is a folder");
+}
+
+/// "mass/thigh=4": gives the parameter that value. One that is not among the uncertain ones joins them, for the
+/// simulator to know or to refuse.
+void Set(const std::string& assignment, RobotDescription& robot) {
+  const size_t equals = assignment.find('=');
+  double value = NAN;
+  const char* end = assignment.data() + assignment.size();
+  if (equals != std::string::npos) {
+    const auto [rest, error] = std::from_chars(assignment.data() + equals + 1, end, value);
+    if (error != std::errc() || rest != end) value = NAN;
+  }
+  if (!std::isfinite(value) || equals == 0) {
+    throw std::invalid_argument("--set " + assignment + ": not of the form mass/thigh=4");
+  }
+  const std::string name = assignment.substr(0, equals);
+  std::erase_if(robot.frozen, [&](const FrozenParameter& frozen) { return frozen.name == name; });
+  const int index = robot.FindParameter(name);
+  if (index >= 0) {
+    robot.parameters[static_cast<size_t>(index)].mean = value;
+  } else {
+    robot.parameters.push_back({name, "", ParameterDescription::Coordinate::kLinear, value, 1});
+  }
+}
+
+Eigen::VectorXd Means(const RobotDescription& robot) {
+  Eigen::VectorXd means(robot.parameters.size());
+  std::transform(robot.parameters.begin(), robot.parameters.end(), means.begin(),
+                 [](const ParameterDescription& parameter) { return parameter.mean; });
+  return means;
+}
+
+Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task& task) {
+  if (!flags.policy.empty()) {
+    return [policy = LoadPolicy(flags.policy, robot, task)](const Eigen::VectorXf& observation, Random&) {
+      return policy.Mean(observation);
+    };
+  }
+  const int size = task.action_size();
+  if (!flags.random) return [size](const Eigen::VectorXf&, Random&) { return Eigen::VectorXf::Zero(size).eval(); };
+  return [size](const Eigen::VectorXf&, Random& random) {
+    Eigen::VectorXf action(size);
+    for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
+    return action;
+  };
+}
+
+const char* Describe(SimulatedEpisode::End end) {
+  switch (end) {
+    case SimulatedEpisode::End::kTimeLimit: return "time limit";
+    case SimulatedEpisode::End::kTerminated: return "terminated by the task";
+    case SimulatedEpisode::End::kNotFinite: return "the simulation is no longer finite";
+    case SimulatedEpisode::End::kInterrupted: return "interrupted";
+  }
+  return "";
+}
+
+void PrintTotals(const std::vector<SimulatedEpisode>& episodes, double period, double seconds) {
+  double sum = 0, squares = 0;
+  int64_t steps = 0;
+  for (const SimulatedEpisode& episode : episodes) sum += episode.sum, steps += episode.steps;
+  const auto count = static_cast<double>(episodes.size());
+  for (const SimulatedEpisode& episode : episodes) squares += std::pow(episode.sum - sum / count, 2);
+  std::cout << fmt::format("{} episode{}, {} steps, mean return {:.1f}", episodes.size(), episodes.size() == 1 ? "" : "s",
+                           steps, sum / count);
+  if (episodes.size() > 1) std::cout << fmt::format(", standard deviation {:.1f}", std::sqrt(squares / (count - 1)));
+  std::cout << fmt::format("\n{:.1f} s simulated in {:.2f} s, {:.0f} steps per second\n",
+                           static_cast<double>(steps) * period, seconds, static_cast<double>(steps) / seconds);
+}
+
+}  // namespace
+
+int Simulate(Process& process, const SimFlags& flags) {
+  if (flags.random && !flags.policy.empty()) throw std::invalid_argument("--policy and --random exclude each other");
+  RobotDescription robot = LoadRobot(flags.robot);
+  for (const std::string& assignment : flags.set) Set(assignment, robot);
+  for (const std::string& file : {flags.csv, flags.png, flags.gif}) RequireWritable(file);
+  const Eigen::VectorXd means = Means(robot);
+  Environment environment(robot);
+  environment.SetParameters(means);
+  const Actor actor = MakeActor(flags, robot, environment.task());
+  std::unique_ptr<Viewer> viewer;
+  if (flags.view) viewer = std::make_unique<Viewer>(robot);
+
+  std::cout << fmt::format("{}, task {}, {}, seed {}\n", robot.name, robot.task.name,
+                           flags.random           ? "random actions"
+                           : flags.policy.empty() ? "no action"
+                                                  : flags.policy,
+                           flags.seed)
+            << fmt::format("{:>7}  {:>6}  {:>10}  ended by\n", "episode", "steps", "return");
+  std::string csv = CsvHeader(robot);
+  std::vector<Snapshot> film;  // of the first episode
+  std::vector<SimulatedEpisode> episodes;
+  const int64_t begin = process.clock().Now();
+  for (int number = 0; number < flags.episodes; ++number) {
+    const auto see = [&](const SimulatedStep& step) {
+      if (!flags.csv.empty()) AppendCsv(step, csv);
+      if (number == 0) film.push_back({step.time, step.q});
+      if (viewer) viewer->Show(step.time, step.q);
+    };
+    episodes.push_back(PlayEpisode(environment, robot, actor, flags.seed, static_cast<uint32_t>(number), see,
+                                   [&] { return process.stopping(); }));
+    const SimulatedEpisode& episode = episodes.back();
+    std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum, Describe(episode.end))
+              << std::endl;
+    if (episode.end == SimulatedEpisode::End::kInterrupted) return 130;
+    if (number == 0 && environment.q().allFinite()) {
+      film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
+    }
+  }
+  const double seconds = static_cast<double>(process.clock().Now() - begin) * 1e-6 / process.clock().scale();
+  PrintTotals(episodes, robot.task.period, std::max(seconds, 1e-6));
+  if (!flags.csv.empty()) WriteAtomically(flags.csv, csv);
+  if (!flags.png.empty()) WriteAtomically(flags.png, DrawStrip(robot, film));
+  if (!flags.gif.empty()) WriteAtomically(flags.gif, DrawFilm(robot, film));
+  return 0;
+}
+
+}  // namespace plumb

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/process.h"
+
+namespace plumb {
+
+struct SimFlags {
+  std::string robot;
+  std::string policy;  ///< file; empty = none
+  bool random = false;
+  uint64_t seed = 1;
+  int episodes = 1;
+  std::string csv, png, gif;     ///< files; empty = none
+  std::vector<std::string> set;  ///< "mass/thigh=4"
+  bool view = false;
+};
+
+/// `plumb sim`: rolls a policy, random actions or no action out in the simulator, without messages or buses, and says
+/// how it went. @return exit status: 0, or 130 if it was interrupted; then it writes no files.
+int Simulate(Process& process, const SimFlags& flags);
+
+}  // namespace plumb

@@ -1,0 +1,235 @@
+// `plumb sim`, run as a person would.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "cli/roll_out.h"
+#include "controller/policy.h"
+#include "robot/description.h"
+#include "trainer/checkpoint.h"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int status;
+  std::string text;  ///< both streams
+};
+
+class Folder {
+ public:
+  Folder() : path_(fs::temp_directory_path() / ("plumbline_sim_test_" + std::to_string(getpid()))) {
+    fs::create_directories(path_);
+  }
+  ~Folder() { fs::remove_all(path_); }
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  fs::path path_;
+};
+
+std::string Robot(const std::string& name) { return std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name; }
+
+Outcome Sim(const std::string& arguments) {
+  const std::string command =
+      "DISPLAY= " + std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb sim " + arguments + " 2>&1";
+  FILE* pipe = popen(command.c_str(), "r");
+  REQUIRE(pipe);
+  std::string text;
+  std::array<char, 4096> buffer;
+  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
+  const int status = pclose(pipe);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text};
+}
+
+std::string Read(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+struct Table {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> rows;
+  double at(size_t row, const std::string& name) const {
+    const auto column = std::find(names.begin(), names.end(), name);
+    REQUIRE(column != names.end());
+    return rows.at(row).at(static_cast<size_t>(column - names.begin()));
+  }
+};
+
+Table ReadCsv(const std::string& file) {
+  Table table;
+  std::ifstream stream(file);
+  std::string line, field;
+  std::getline(stream, line);
+  for (std::istringstream fields(line); std::getline(fields, field, ',');) table.names.push_back(field);
+  while (std::getline(stream, line)) {
+    table.rows.emplace_back();
+    for (std::istringstream fields(line); std::getline(fields, field, ',');) {
+      table.rows.back().push_back(std::stod(field));
+    }
+    REQUIRE(table.rows.back().size() == table.names.size());
+  }
+  return table;
+}
+
+}  // namespace
+
+TEST_CASE("sim: the pendulum's table, number by number") {
+  const Folder folder;
+  const Outcome outcome = Sim(Robot("pendulum") + " --random --episodes 2 --seed 7 --csv " + folder / "a.csv");
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  CHECK(outcome.text.find("time limit") != std::string::npos);
+  CHECK(outcome.text.find("2 episodes, 400 steps") != std::string::npos);
+  CHECK(Read(folder / "a.csv").rfind("t,q/pivot,v/pivot,u/pivot,reward,terminated,truncated\n", 0) == 0);
+  const Table table = ReadCsv(folder / "a.csv");
+  REQUIRE(table.rows.size() == 400);
+  for (size_t row = 0; row < 400; ++row) {
+    CHECK(table.at(row, "t") == Approx(0.05 * static_cast<double>(row % 200)));
+    const double angle = std::remainder(table.at(row, "q/pivot"), 2 * M_PI), v = table.at(row, "v/pivot");
+    const double u = table.at(row, "u/pivot");
+    CHECK(std::abs(u) <= 2);  // Nm
+    CHECK(table.at(row, "reward") == Approx(-(angle * angle + 0.1 * v * v + 0.001 * u * u)).epsilon(1e-12));
+    CHECK(table.at(row, "terminated") == 0);
+    CHECK(table.at(row, "truncated") == (row % 200 == 199 ? 1 : 0));
+  }
+  CHECK(table.at(0, "q/pivot") != table.at(200, "q/pivot"));
+}
+
+TEST_CASE("sim: the hopper's table") {
+  const Folder folder;
+  const Outcome outcome = Sim(Robot("hopper") + " --random --episodes 3 --csv " + folder / "a.csv");
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  CHECK(outcome.text.find("terminated by the task") != std::string::npos);
+  CHECK(Read(folder / "a.csv")
+            .rfind("t,q/rootx,q/rootz,q/rooty,q/thigh,q/leg,q/foot,v/rootx,v/rootz,v/rooty,v/thigh,v/leg,v/foot,"
+                   "u/thigh,u/leg,u/foot,reward,terminated,truncated\n",
+                   0) == 0);
+  const Table table = ReadCsv(folder / "a.csv");
+  int episodes = 0;
+  for (size_t row = 0; row < table.rows.size(); ++row) {
+    double cost = 0;
+    for (const char* u : {"u/thigh", "u/leg", "u/foot"}) {
+      CHECK(std::abs(table.at(row, u)) <= 1);
+      cost += 1e-3 * std::pow(table.at(row, u), 2);
+    }
+    if (table.at(row, "t") == 0) {
+      CHECK(table.at(row, "q/rootz") == Approx(1.25).margin(0.005));
+      ++episodes;
+    } else {
+      CHECK(table.at(row, "t") == Approx(table.at(row - 1, "t") + 0.008));
+    }
+    if (table.at(row, "terminated") == 0) {
+      const double way = table.at(row + 1, "q/rootx") - table.at(row, "q/rootx");
+      CHECK(table.at(row, "reward") == Approx(way / 0.008 + 1 - cost).epsilon(1e-12));
+    }
+  }
+  CHECK(episodes == 3);
+  CHECK(table.rows.size() > 9);
+}
+
+TEST_CASE("sim: equal seeds give equal bytes, other seeds and parameters others") {
+  const Folder folder;
+  const auto table = [&](const std::string& flags) {
+    const Outcome outcome = Sim(Robot("pendulum") + " --csv " + folder / "a.csv" + " " + flags);
+    INFO(outcome.text);
+    REQUIRE(outcome.status == 0);
+    return Read(folder / "a.csv");
+  };
+  const std::string one = table("--random --seed 1");
+  CHECK(table("--random --seed 1") == one);
+  CHECK(table("--random --seed 2") != one);
+  CHECK(table("--random --seed 1 --set gravity=9 --set mass/pole=1.2") != one);
+  CHECK(table("--random --seed 1 --set gravity=10.4") == one);  // its prior mean
+  CHECK(table("--random --seed 1 --episodes 2").rfind(one, 0) == 0);
+  CHECK(table("--seed 1").find(",0,") != std::string::npos);  // no action
+  CHECK_FALSE(fs::exists(folder / "a.csv.part"));
+}
+
+TEST_CASE("sim: a trainer's policy, and whatever is not one") {
+  const Folder folder;
+  GaussianPolicy policy(PolicyShape{3, {4}, 1});
+  policy.parameters(policy.parameters.size() - 2) = 0.5f;
+  policy.action_scale.setConstant(2);
+  Checkpoint checkpoint{};
+  checkpoint.policy = policy.ToMessage();
+  SaveCheckpoint(folder / "good", checkpoint);
+  const Outcome good = Sim(Robot("pendulum") + " --csv " + folder / "a.csv" + " --policy " + folder / "good");
+  INFO(good.text);
+  REQUIRE(good.status == 0);
+  CHECK(ReadCsv(folder / "a.csv").at(17, "u/pivot") == 1);  // half of 2 Nm
+
+  const auto complaint = [&](const std::string& arguments) {
+    const Outcome outcome = Sim(arguments);
+    CHECK(outcome.status == 1);
+    return outcome.text;
+  };
+  using Catch::Contains;
+  CHECK_THAT(complaint(Robot("hopper") + " --policy " + folder / "good"),
+             Contains("3 observations into 1 actions") && Contains("has 11 and 3"));
+  policy.action_scale.setConstant(3);
+  checkpoint.policy = policy.ToMessage();
+  SaveCheckpoint(folder / "stronger", checkpoint);
+  CHECK_THAT(complaint(Robot("pendulum") + " --policy " + folder / "stronger"), Contains("effort limits"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --policy " + folder / "none"), Contains("there is no such policy"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --policy " + Robot("pendulum/robot.toml")),
+             Contains("robot.toml") && Contains("not a trainer's checkpoint"));
+}
+
+TEST_CASE("sim: errors say what to do") {
+  const auto complaint = [&](const std::string& arguments) {
+    const Outcome outcome = Sim(arguments);
+    CHECK(outcome.status == 1);
+    return outcome.text;
+  };
+  using Catch::Contains;
+  CHECK_THAT(complaint(Robot("hopper") + " --set mass/tigh=4"), Contains("'mass/tigh'") && Contains("'mass/thigh'"));
+  CHECK_THAT(complaint(Robot("hopper") + " --set mass/thigh=-1"), Contains("mass/thigh"));
+  CHECK_THAT(complaint(Robot("hopper") + " --set mass/thigh"), Contains("mass/thigh=4"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --set gravity=nine"), Contains("gravity=nine"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --csv /nonexistent/a.csv"), Contains("/nonexistent/a.csv"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --png /"), Contains("folder"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --view"), Contains("DISPLAY") && Contains("--png") && Contains("--gif"));
+  CHECK_THAT(complaint(Robot("nonesuch")), Contains("no such robot"));
+  CHECK(Sim(Robot("pendulum") + " --random --policy x").status != 0);
+  CHECK(Sim(Robot("pendulum") + " --episodes 0").status != 0);
+}
+
+TEST_CASE("sim: pictures") {
+  const Folder folder;
+  const Outcome outcome =
+      Sim(Robot("hopper") + " --random --png " + folder / "a.png" + " --gif " + folder / "a.gif");
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  CHECK(Read(folder / "a.png").substr(1, 3) == "PNG");
+  CHECK(Read(folder / "a.gif").substr(0, 6) == "GIF89a");
+}
+
+TEST_CASE("sim: a spherical joint has four columns in q and three in v") {
+  RobotDescription robot = LoadRobot(Robot("pendulum"));
+  robot.joints.insert(robot.joints.begin(), robot.joints[0]);
+  robot.joints[0].name = "body/rotation";
+  robot.joints[0].type = JointDescription::Type::kSpherical;
+  robot.joints[0].passive = true;
+  CHECK(CsvHeader(robot) ==
+        "t,q/body/rotation/w,q/body/rotation/x,q/body/rotation/y,q/body/rotation/z,q/pivot,"
+        "v/body/rotation/x,v/body/rotation/y,v/body/rotation/z,v/pivot,u/pivot,reward,terminated,truncated\n");
+}
+
+}  // namespace plumb

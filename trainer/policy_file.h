@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "controller/policy.h"
+#include "robot/description.h"
+#include "sim/tasks/task.h"
+
+namespace plumb {
+
+/// Reads a policy from a file: a trainer's checkpoint.
+/// @throws std::invalid_argument or CheckpointError, naming the file, if there is none, it is damaged, or the policy is
+/// another robot's or another task's.
+GaussianPolicy LoadPolicy(const std::string& file, const RobotDescription& robot, const Task& task);
+
+}  // namespace plumb
