@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -11,6 +13,12 @@ struct EffortSegment {
   double duration;         ///< [s], >= 0
   Eigen::VectorXd effort;  ///< [Nm or N] per velocity; zero at passive joints
 };
+
+/// In how many equal substeps of at most `substep` seconds a duration > 0 is divided. Some slack keeps 0.05 / 0.005 at ten
+/// whatever the rounding.
+inline double SubstepCount(double duration, double substep) {
+  return std::max(1.0, std::ceil(duration / substep - 1e-6));
+}
 
 /// Efforts as they were commanded over time, piecewise constant, seen through a delay that need not be a whole number of
 /// steps: the delayed effort's mean over a substep, and its first moment about the middle, which together move the

@@ -19,7 +19,7 @@ std::string JointOfVelocity(const Model& model, Eigen::Index velocity) {
 }
 
 std::unique_ptr<Engine> WithPhysics(std::unique_ptr<Engine> engine, const Physics<double>& physics) {
-  for (int lane = 0; lane < engine->lanes(); ++lane) engine->SetPhysics(lane, physics);
+  engine->SetPhysics(physics);
   return engine;
 }
 

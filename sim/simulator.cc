@@ -55,16 +55,18 @@ void Simulator::Recall(std::span<const EffortSegment> before) {
 }
 
 void Simulator::Step(const Vector& effort, double duration) {
+  if (effort.size() != num_velocities()) {
+    throw std::invalid_argument("an effort has " + std::to_string(num_velocities()) + " entries");
+  }
   if (!(duration > 0) || !finite_) return;
   if (model_->parameters().delays()) {
     track_.Append(effort.data(), duration);
     Run(duration);
     return;
   }
-  // The slack keeps 0.05 / 0.005 at ten substeps whatever the rounding.
-  const double count = std::max(1.0, std::ceil(duration / model_->description().simulation.substep - 1e-6));
+  const double count = SubstepCount(duration, model_->description().simulation.substep);
   const double h = duration / count;
-  for (double i = 0; i < count; ++i) engine_->Substep(h, effort.data(), nullptr);
+  for (double i = 0; i < count; ++i) engine_->Substep(&h, effort.data(), nullptr);
   Take();
 }
 
@@ -81,7 +83,7 @@ void Simulator::Step(std::span<const EffortSegment> profile) {
 
 // Time 0 is the present; the track goes on to `duration`.
 void Simulator::Run(double duration) {
-  const double count = std::max(1.0, std::ceil(duration / model_->description().simulation.substep - 1e-6));
+  const double count = SubstepCount(duration, model_->description().simulation.substep);
   const double h = duration / count;
   for (double i = 0; i < count; ++i) {
     bool steady = true;
@@ -91,7 +93,7 @@ void Simulator::Run(double duration) {
       moment_[k] = moments.first;
       steady = steady && moments.first == 0;
     }
-    engine_->Substep(h, mean_.data(), steady ? nullptr : moment_.data());
+    engine_->Substep(&h, mean_.data(), steady ? nullptr : moment_.data());
   }
   track_.Advance();
   Take();

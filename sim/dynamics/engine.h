@@ -18,11 +18,13 @@ class Engine {
   virtual int lanes() const = 0;
   /// @param physics of sizes that fit the topology.
   virtual void SetPhysics(int lane, const Physics<double>& physics) = 0;
+  /// The same in all lanes.
+  virtual void SetPhysics(const Physics<double>& physics) = 0;
   virtual double* q() = 0;
   virtual double* v() = 0;
 
-  // As in Stepper.
-  virtual void Substep(double h, const double* effort, const double* moment) = 0;
+  // As in Stepper. h: one per lane.
+  virtual void Substep(const double* h, const double* effort, const double* moment) = 0;
   virtual const double* Acceleration(const double* effort) = 0;
   virtual const double* MassMatrix() = 0;
   virtual const double* Bias() = 0;

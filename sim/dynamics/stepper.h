@@ -51,12 +51,12 @@ class Stepper {
         rows_(topology.points.size() * kRows * n_),
         cholesky_(n_) {}
 
-  /// One substep of h > 0 seconds. Arrays of one per velocity:
+  /// One substep of h > 0 seconds, which may differ from lane to lane. Arrays of one per velocity:
   /// @param effort mean over the substep of what is commanded.
   /// @param moment integral over the substep of (h/2 - t) effort(t) dt, or null where effort is constant: it moves
   /// the joints as an effort early in the substep moves them farther than a late one. [Nm s^2]
-  void Substep(double h, const Real* effort, const Real* moment) {
-    if (leapfrog_) Move(h / 2, v.data());
+  void Substep(const Real& h, const Real* effort, const Real* moment) {
+    if (leapfrog_) Move(Real(h / 2), v.data());
     tree_.MoveTo(physics, q.data());
     AssembleSmooth(h, effort);
     matrix_ = smooth_;
@@ -81,11 +81,11 @@ class Stepper {
     }
     for (size_t i = 0; i < n_; ++i) v[i] += change_[i];
     if (!settings_.move_before_clip) Clip();
-    Move(leapfrog_ ? h / 2 : h, v.data());
+    Move(Ahead(h), v.data());
     if (moment) {
       for (size_t i = 0; i < n_; ++i) shift_[i] = physics.axes[i].gain * moment[i];
       cholesky_.Solve(topology_.ancestors, matrix_.data(), shift_.data());
-      Move(1, shift_.data());
+      Move(Real{} + 1, shift_.data());
     }
     if (settings_.move_before_clip) Clip();
   }
@@ -93,17 +93,17 @@ class Stepper {
   /// Accelerations at q, v without stops, contacts and Coulomb friction: one per velocity.
   const Real* Acceleration(const Real* effort) {
     tree_.MoveTo(physics, q.data());
-    AssembleSmooth(0, effort);
+    AssembleSmooth(Real{}, effort);
     matrix_ = smooth_;
     cholesky_.Factorize(topology_.ancestors, matrix_.data());
-    Solve(1);
+    Solve(Real{} + 1);
     return change_.data();
   }
 
   /// Lower triangle with armature, row by row, and the bias at q, v.
   const Real* MassMatrix() {
     tree_.MoveTo(physics, q.data());
-    AssembleSmooth(0, bias_.data());
+    AssembleSmooth(Real{}, bias_.data());
     return smooth_.data();
   }
   const Real* Bias() {
@@ -173,7 +173,7 @@ class Stepper {
     return Clamp(effort, Real(-backwards), forwards);
   }
 
-  void AssembleSmooth(double h, const Real* effort) {
+  void AssembleSmooth(const Real& h, const Real* effort) {
     tree_.MoveAt(v.data());
     tree_.MassMatrix(physics, smooth_.data());
     tree_.Bias(physics, bias_.data());
@@ -186,7 +186,7 @@ class Stepper {
     if (terms_.slowing || terms_.springs) AssembleJoints(h, effort);
   }
 
-  void AssembleJoints(double h, const Real* effort) {
+  void AssembleJoints(const Real& h, const Real* effort) {
     for (const Topology::Joint& joint : topology_.joints) {
       if (joint.type == JointDescription::Type::kSpherical) continue;
       const auto i = static_cast<size_t>(joint.velocity);
@@ -198,17 +198,17 @@ class Stepper {
         // At the end of the substep; for the leapfrog at the mean of both ends (implicit midpoint).
         const Real stretch = q[static_cast<size_t>(joint.position)] - axis.rest;
         drive_[i] -= axis.stiffness * (leapfrog_ ? stretch : Real(stretch + h * v[i]));
-        smooth_[i * n_ + i] += (leapfrog_ ? h * h / 4 : h * h) * axis.stiffness;
+        smooth_[i * n_ + i] += (leapfrog_ ? 0.25 : 1.0) * h * h * axis.stiffness;
       }
     }
   }
 
-  void Solve(double h) {
+  void Solve(const Real& h) {
     for (size_t i = 0; i < n_; ++i) change_[i] = h * drive_[i];
     cholesky_.Solve(topology_.ancestors, matrix_.data(), change_.data());
   }
 
-  double Ahead(double h) const { return leapfrog_ ? h / 2 : h; }  // to the substep's end, from where q is
+  Real Ahead(const Real& h) const { return leapfrog_ ? Real(h / 2) : h; }  // to the substep's end, from where q is
 
   // Joint positions beyond a limit are so by this much; the sign says which way it pushes.
   void StopDepth(const Topology::Joint& joint, Real* depth, Real* sign) const {
@@ -225,7 +225,7 @@ class Stepper {
   }
 
   // Looks with the free motion which constraints act. False: none does.
-  bool FindConstraints(double h) {
+  bool FindConstraints(const Real& h) {
     bool any = terms_.friction;
     for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
     for (const Topology::Joint& joint : topology_.joints) {
@@ -262,7 +262,7 @@ class Stepper {
   }
 
   // force = at_rest - slope * row . (v + dv), acting along the row
-  void AddForce(double h, size_t point, const Real* row, const Real& at_rest, const Real& slope) {
+  void AddForce(const Real& h, size_t point, const Real* row, const Real& at_rest, const Real& slope) {
     const Real now = h * (at_rest - slope * Along(point, row, v.data()));
     for (int i = Last(point); i >= 0; i = topology_.ancestors[static_cast<size_t>(i)]) {
       const auto at = static_cast<size_t>(i);
@@ -274,7 +274,7 @@ class Stepper {
     }
   }
 
-  void AssembleConstraints(double h) {
+  void AssembleConstraints(const Real& h) {
     matrix_ = smooth_;
     for (size_t i = 0; i < n_; ++i) change_[i] = h * drive_[i];
     const auto& globals = physics.globals;
@@ -310,7 +310,7 @@ class Stepper {
   }
 
   // What the trial made of the constraints: the next one starts from there.
-  void Judge(double h) {
+  void Judge(const Real& h) {
     for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
     const auto& globals = physics.globals;
     for (size_t p = 0; p < contacts_.size(); ++p) {
@@ -336,7 +336,7 @@ class Stepper {
   }
 
   // q += h velocity
-  void Move(double h, const Real* velocity) {
+  void Move(const Real& h, const Real* velocity) {
     if (topology_.positions == topology_.velocities) {
       for (size_t i = 0; i < n_; ++i) q[i] += h * velocity[i];
       return;
@@ -353,7 +353,7 @@ class Stepper {
   }
 
   // Quaternion times the exponential of half the angle turned: exact for constant angular velocity in link axes.
-  static void Turn(double h, const Real* spin, Real* quaternion) {
+  static void Turn(const Real& h, const Real* spin, Real* quaternion) {
     const Real speed = Sqrt(Real(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2]));
     const Real half = 0.5 * h * speed;
     Real sine, cosine;

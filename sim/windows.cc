@@ -1,0 +1,250 @@
+#include "sim/windows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+#include <thread>
+
+namespace plumb {
+namespace {
+
+// Groups whose efforts are worked out together, once for all samples.
+constexpr size_t kLargestBlock = 16;
+
+double Duration(std::span<const EffortSegment> step) {
+  return std::accumulate(step.begin(), step.end(), 0.0,
+                         [](double sum, const EffortSegment& segment) { return sum + std::max(0.0, segment.duration); });
+}
+
+void Require(const Window& window, const Model& model) {
+  const auto sized = [&](std::span<const EffortSegment> segments) {
+    return std::all_of(segments.begin(), segments.end(),
+                       [&](const EffortSegment& segment) { return segment.effort.size() == model.num_velocities(); });
+  };
+  bool good = window.q.size() == model.num_positions() && window.v.size() == model.num_velocities() &&
+              window.q.allFinite() && window.v.allFinite() && !window.steps.empty() && sized(window.before);
+  for (const auto& step : window.steps) {
+    const double duration = Duration(step);
+    good = good && sized(step) && duration > 0 && std::isfinite(duration);
+  }
+  if (!good) throw std::invalid_argument("a window needs a finite state, and steps of some duration with efforts for all joints");
+}
+
+}  // namespace
+
+// As many windows as there are lanes, all with the same numbers of substeps; the last group of a kind may repeat one.
+struct Windows::Group {
+  std::vector<size_t> windows;
+  std::vector<int> counts;  // substeps of each step
+  size_t used = 0;          // lanes with a window of their own
+};
+
+// One thread's engine, and the efforts of some groups, substep by substep.
+struct Windows::Worker {
+  struct Plan {
+    std::vector<double> lengths;  // [step][lane]: of a substep
+    std::vector<double> means, moments;  // [substep][velocity][lane]
+    std::vector<char> steady;            // [substep]: all moments are zero
+    std::vector<double> first;           // [velocity][lane]: effort at the beginning
+  };
+
+  explicit Worker(const Model& its_model)
+      : model(its_model),
+        engine(model.NewWideEngine()),
+        lanes(static_cast<size_t>(engine->lanes())),
+        physics(model.parameters().Nominal()),
+        track(model.num_velocities(), Parameters::kLongestDelay),
+        plans(kLargestBlock),
+        q(model.num_positions()),
+        v(model.num_velocities()) {}
+
+  void MakePlan(const Group& group, std::span<const Window> windows, Plan* plan) {
+    const auto n = static_cast<size_t>(model.num_velocities());
+    const auto substeps = static_cast<size_t>(std::accumulate(group.counts.begin(), group.counts.end(), 0));
+    plan->lengths.resize(group.counts.size() * lanes);
+    plan->means.resize(substeps * n * lanes);
+    plan->moments.resize(plan->means.size());
+    plan->steady.assign(substeps, 1);
+    plan->first.resize(n * lanes);
+    for (size_t lane = 0; lane < lanes; ++lane) {
+      const Window& window = windows[group.windows[lane]];
+      track.Clear();
+      if (model.parameters().delays()) Append(window.before);
+      track.Advance();
+      size_t substep = 0;
+      for (size_t step = 0; step < window.steps.size(); ++step) {
+        if (!model.parameters().delays()) track.Clear();
+        Append(window.steps[step]);
+        const double h = Duration(window.steps[step]) / group.counts[step];
+        plan->lengths[step * lanes + lane] = h;
+        for (int k = 0; k < group.counts[step]; ++k, ++substep) {
+          for (size_t i = 0; i < n; ++i) {
+            const EffortTrack::Moments moments = track.Over(i, k * h, (k + 1) * h, physics.axes[i].delay);
+            const size_t at = (substep * n + i) * lanes + lane;
+            plan->means[at] = moments.mean;
+            plan->moments[at] = moments.first;
+            if (moments.first != 0) plan->steady[substep] = 0;
+            if (substep == 0) plan->first[i * lanes + lane] = track.At(i, 0, physics.axes[i].delay);
+          }
+        }
+        track.Advance();
+      }
+    }
+  }
+
+  void Append(std::span<const EffortSegment> segments) {
+    for (const EffortSegment& segment : segments) track.Append(segment.effort.data(), segment.duration);
+  }
+
+  void Simulate(Eigen::Index sample, const Group& group, std::span<const Window> windows, const Plan& plan,
+                const Visit& visit, bool last_only) {
+    const auto n = static_cast<size_t>(model.num_velocities());
+    const bool sensors = model.parameters().terms().sensors;
+    for (size_t lane = 0; lane < lanes; ++lane) {
+      const Window& window = windows[group.windows[lane]];
+      for (Eigen::Index i = 0; i < q.size(); ++i) engine->q()[static_cast<size_t>(i) * lanes + lane] = window.q[i];
+      for (Eigen::Index i = 0; i < v.size(); ++i) engine->v()[static_cast<size_t>(i) * lanes + lane] = window.v[i];
+    }
+    if (sensors) engine->FromReading(plan.first.data());
+    size_t substep = 0;
+    for (size_t step = 0; step < group.counts.size(); ++step) {
+      for (int k = 0; k < group.counts[step]; ++k, ++substep) {
+        const double* moment = plan.steady[substep] ? nullptr : &plan.moments[substep * n * lanes];
+        engine->Substep(&plan.lengths[step * lanes], &plan.means[substep * n * lanes], moment);
+      }
+      const bool last = step + 1 == group.counts.size();
+      if (last_only && !last) continue;
+      if (sensors) Read(plan, substep - 1);
+      for (size_t lane = 0; lane < group.used; ++lane) {
+        for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = engine->q()[static_cast<size_t>(i) * lanes + lane];
+        for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = engine->v()[static_cast<size_t>(i) * lanes + lane];
+        const bool good = q.cwiseAbs().maxCoeff() < kFarthest && v.cwiseAbs().maxCoeff() < kFarthest &&
+                          q.allFinite() && v.allFinite();
+        if (!good) Fail();
+        if (!good && last) ++failures.diverged;
+        visit(sample, group.windows[lane], step, q, v);
+      }
+      if (sensors && !last) Restore();
+    }
+  }
+
+  // Readings in place of the state, which is kept.
+  void Read(const Plan& plan, size_t substep) {
+    const auto n = static_cast<size_t>(model.num_velocities());
+    state.assign(engine->q(), engine->q() + static_cast<size_t>(q.size()) * lanes);
+    state.insert(state.end(), engine->v(), engine->v() + n * lanes);
+    engine->ToReading(&plan.means[substep * n * lanes]);
+  }
+  void Restore() {
+    const auto positions = static_cast<std::ptrdiff_t>(static_cast<size_t>(q.size()) * lanes);
+    std::copy(state.begin(), state.begin() + positions, engine->q());
+    std::copy(state.begin() + positions, state.end(), engine->v());
+  }
+
+  void Fail() {
+    q.setConstant(std::numeric_limits<double>::quiet_NaN());
+    v.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+
+  void Run(const Eigen::MatrixXd& parameters, std::span<const Window> windows, std::span<const Group> groups,
+           const Visit& visit, bool last_only) {
+    failures = {};
+    const bool delays = model.parameters().delays();
+    for (size_t begin = 0; begin < groups.size(); begin += kLargestBlock) {
+      const size_t size = std::min(kLargestBlock, groups.size() - begin);
+      for (size_t i = 0; i < size && !delays; ++i) MakePlan(groups[begin + i], windows, &plans[i]);
+      for (Eigen::Index sample = 0; sample < parameters.cols(); ++sample) {
+        try {
+          model.parameters().Apply(parameters.col(sample), &physics);
+        } catch (const std::invalid_argument&) {
+          Fail();
+          for (size_t i = 0; i < size; ++i) Refuse(sample, groups[begin + i], visit, last_only);
+          continue;
+        }
+        engine->SetPhysics(physics);
+        for (size_t i = 0; i < size; ++i) {
+          if (delays) MakePlan(groups[begin + i], windows, &plans[i]);
+          Simulate(sample, groups[begin + i], windows, plans[i], visit, last_only);
+        }
+      }
+    }
+  }
+
+  void Refuse(Eigen::Index sample, const Group& group, const Visit& visit, bool last_only) {
+    for (size_t lane = 0; lane < group.used; ++lane) {
+      ++failures.impossible;
+      for (size_t step = last_only ? group.counts.size() - 1 : 0; step < group.counts.size(); ++step) {
+        visit(sample, group.windows[lane], step, q, v);
+      }
+    }
+  }
+
+  const Model& model;
+  std::unique_ptr<Engine> engine;
+  size_t lanes;
+  Physics<double> physics;
+  EffortTrack track;
+  std::vector<Plan> plans;
+  std::vector<double> state;
+  Eigen::VectorXd q, v;
+  Failures failures;
+};
+
+Windows::Windows(std::shared_ptr<const Model> model, int threads) : model_(std::move(model)) {
+  for (int i = 0; i < std::max(1, threads); ++i) workers_.push_back(std::make_unique<Worker>(*model_));
+}
+
+Windows::~Windows() = default;
+
+std::vector<Windows::Group> Windows::Arrange(std::span<const Window> windows) const {
+  const size_t lanes = workers_[0]->lanes;
+  std::map<std::vector<int>, std::vector<size_t>> kinds;
+  for (size_t i = 0; i < windows.size(); ++i) {
+    Require(windows[i], *model_);
+    std::vector<int> counts;
+    for (const auto& step : windows[i].steps) {
+      counts.push_back(static_cast<int>(SubstepCount(Duration(step), model_->description().simulation.substep)));
+    }
+    kinds[counts].push_back(i);
+  }
+  std::vector<Group> groups;
+  for (const auto& [counts, members] : kinds) {
+    for (size_t begin = 0; begin < members.size(); begin += lanes) {
+      Group group;
+      group.counts = counts;
+      group.used = std::min(lanes, members.size() - begin);
+      for (size_t lane = 0; lane < lanes; ++lane) {
+        group.windows.push_back(members[begin + std::min(lane, group.used - 1)]);
+      }
+      groups.push_back(std::move(group));
+    }
+  }
+  return groups;
+}
+
+Windows::Failures Windows::Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
+                                   const Visit& visit, bool last_only) {
+  const std::vector<Group> groups = Arrange(windows);
+  const size_t count = workers_.size();
+  const auto share = [&](size_t worker) {
+    const size_t begin = worker * groups.size() / count, end = (worker + 1) * groups.size() / count;
+    return std::span(groups).subspan(begin, end - begin);
+  };
+  std::vector<std::thread> threads;
+  for (size_t i = 1; i < count; ++i) {
+    threads.emplace_back([&, i] { workers_[i]->Run(parameters, windows, share(i), visit, last_only); });
+  }
+  workers_[0]->Run(parameters, windows, share(0), visit, last_only);
+  for (std::thread& thread : threads) thread.join();
+  Failures failures;
+  for (const auto& worker : workers_) {
+    failures.impossible += worker->failures.impossible;
+    failures.diverged += worker->failures.diverged;
+  }
+  return failures;
+}
+
+}  // namespace plumb
