@@ -1,7 +1,10 @@
 #include "calibrator/discrepancy.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <stdexcept>
 
 namespace plumb {
 namespace {
@@ -34,17 +37,55 @@ size_t CountTransitions(std::span<const Rollout> rollouts) {
   return count;
 }
 
-Discrepancy::Discrepancy(const RobotDescription& robot)
-    : n_(robot.num_joints()), simulator_(robot), scale_(MakeTask(robot)->state_scale()) {}
+Discrepancy::Discrepancy(const RobotDescription& robot, int threads)
+    : n_(robot.num_velocities()),
+      windows_(std::make_shared<Model>(robot), threads),
+      scale_(MakeTask(robot)->state_scale()) {
+  if (robot.num_positions() != robot.num_velocities()) {
+    throw std::invalid_argument("calibration does not know spherical joints yet");
+  }
+}
 
-double Discrepancy::StepOnce(const Transition& t, double* whitened) {
-  simulator_.SetState(t.q, t.v);
-  simulator_.Step(t.efforts);
-  if (!simulator_.finite()) return kInfinity;
+// Some recorded steps from one transition's state on.
+Window Discrepancy::WindowOf(const Rollout& rollout, size_t first, size_t length) const {
+  const auto& transitions = rollout.transitions;
+  Window window;
+  window.q = transitions[first].q;
+  window.v = transitions[first].v;
+  for (size_t i = first; i < first + length; ++i) window.steps.emplace_back(transitions[i].efforts);
+  if (!windows_.model().parameters().delays()) return window;
+  double known = 0;
+  for (size_t i = first; i > 0 && known < Parameters::kLongestDelay; --i) {
+    if (transitions[i - 1].step != transitions[i].step - 1) break;
+    window.before.insert(window.before.begin(), transitions[i - 1].efforts);
+    known += transitions[i - 1].duration();
+  }
+  return window;
+}
+
+void Discrepancy::OneStep(std::span<const Rollout> rollouts, std::vector<Window>* windows, Ends* ends) const {
+  for (const Rollout& rollout : rollouts) {
+    for (size_t i = 0; i < rollout.transitions.size(); ++i) {
+      windows->push_back(WindowOf(rollout, i, 1));
+      ends->push_back(&rollout.transitions[i]);
+    }
+  }
+}
+
+void Discrepancy::Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
+                          const Windows::Visit& visit, bool last_only) {
+  const Windows::Failures failures = windows_.Predict(parameters, windows, visit, last_only);
+  failures_.impossible += failures.impossible;
+  failures_.diverged += failures.diverged;
+}
+
+// Squared whitened error of one transition; writes the errors themselves unless null.
+double Discrepancy::Whiten(const Transition& t, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                           double* whitened) const {
   const double period = t.duration();
   double squared = 0;
-  for (int i = 0; i < n_; ++i) {
-    const double error_q = simulator_.q()(i) - t.next_q(i), error_v = simulator_.v()(i) - t.next_v(i);
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double error_q = q(i) - t.next_q(i), error_v = v(i) - t.next_v(i);
     const double v_variance = t.v_sd(i) * t.v_sd(i);
     const double qq = t.next_q_sd(i) * t.next_q_sd(i) + t.q_sd(i) * t.q_sd(i) + period * period * v_variance;
     const double vv = t.next_v_sd(i) * t.next_v_sd(i) + v_variance, qv = period * v_variance;
@@ -61,87 +102,98 @@ double Discrepancy::StepOnce(const Transition& t, double* whitened) {
   return std::isfinite(squared) ? squared : kInfinity;
 }
 
-double Discrepancy::LogLikelihood(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts) {
-  simulator_.SetParameters(parameters);
-  double sum = 0;
-  for (const Rollout& rollout : rollouts) {
-    for (const Transition& transition : rollout.transitions) {
-      sum += std::log1p(StepOnce(transition, nullptr) / kDegreesOfFreedom);
-    }
-  }
-  return -0.5 * (kDegreesOfFreedom + 2 * n_) * sum;
+// One row per transition, one column per sample.
+Eigen::MatrixXd Discrepancy::SquaredStepErrors(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts) {
+  std::vector<Window> windows;
+  Ends ends;
+  OneStep(rollouts, &windows, &ends);
+  Eigen::MatrixXd squared(static_cast<Eigen::Index>(windows.size()), parameters.cols());
+  Predict(parameters, windows, [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
+    squared(static_cast<Eigen::Index>(window), sample) = Whiten(*ends[window], q, v, nullptr);
+  });
+  return squared;
 }
 
-double Discrepancy::StepError(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts) {
-  simulator_.SetParameters(parameters);
-  double squared = 0;
-  for (const Rollout& rollout : rollouts) {
-    for (const Transition& transition : rollout.transitions) squared += StepOnce(transition, nullptr);
-  }
-  return squared / static_cast<double>(CountTransitions(rollouts) * 2 * static_cast<size_t>(n_));
+Eigen::VectorXd Discrepancy::LogLikelihood(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts) {
+  const Eigen::MatrixXd squared = SquaredStepErrors(parameters, rollouts);
+  const double weight = -0.5 * (kDegreesOfFreedom + 2 * static_cast<double>(n_));
+  return weight * (squared / kDegreesOfFreedom).array().log1p().matrix().colwise().sum().transpose();
 }
 
-Eigen::VectorXd Discrepancy::Residuals(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts) {
-  simulator_.SetParameters(parameters);
-  Eigen::VectorXd residuals(static_cast<Eigen::Index>(CountTransitions(rollouts)) * 2 * n_);
-  double* next = residuals.data();
-  for (const Rollout& rollout : rollouts) {
-    for (const Transition& transition : rollout.transitions) {
-      if (StepOnce(transition, next) == kInfinity) std::fill_n(next, 2 * n_, kInfinity);
-      next += 2 * n_;
-    }
-  }
+Eigen::VectorXd Discrepancy::StepError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts) {
+  const Eigen::MatrixXd squared = SquaredStepErrors(parameters, rollouts);
+  return squared.colwise().sum().transpose() / static_cast<double>(squared.rows() * 2 * n_);
+}
+
+Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts) {
+  std::vector<Window> windows;
+  Ends ends;
+  OneStep(rollouts, &windows, &ends);
+  Eigen::MatrixXd residuals(static_cast<Eigen::Index>(windows.size()) * 2 * n_, parameters.cols());
+  Predict(parameters, windows, [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
+    double* errors = &residuals(static_cast<Eigen::Index>(window) * 2 * n_, sample);
+    if (Whiten(*ends[window], q, v, errors) == kInfinity) std::fill_n(errors, 2 * n_, kInfinity);
+  });
   return residuals;
 }
 
-double Discrepancy::TrajectoryError(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts,
-                                    double smoothing) {
-  simulator_.SetParameters(parameters);
-  double total = 0;
+Eigen::VectorXd Discrepancy::TrajectoryError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts,
+                                             double smoothing) {
+  Eigen::VectorXd total = Eigen::VectorXd::Zero(parameters.cols());
   size_t steps = 0;
   for (const Rollout& rollout : rollouts) {
-    if (rollout.transitions.empty()) continue;
     const auto& transitions = rollout.transitions;
-    Eigen::MatrixXd errors(static_cast<Eigen::Index>(transitions.size()), 2 * n_);
-    simulator_.SetState(transitions[0].q, transitions[0].v);
-    Eigen::Index row = 0;
-    for (const Transition& t : transitions) {
-      // Over a gap nothing is known of the efforts: the simulation sets off again where the record does.
-      if (row > 0 && t.step != transitions[static_cast<size_t>(row - 1)].step + 1) simulator_.SetState(t.q, t.v);
-      simulator_.Step(t.efforts);
-      if (!simulator_.finite()) return kInfinity;
-      errors.row(row) << (simulator_.q() - t.next_q).transpose(), (simulator_.v() - t.next_v).transpose();
-      errors.row(row).array() /= scale_.transpose().array();
-      ++row;
+    if (transitions.empty()) continue;
+    // Over a gap nothing is known of the efforts: the simulation sets off again where the record does.
+    std::vector<Window> windows;
+    std::vector<size_t> first;
+    for (size_t begin = 0, end = 1; begin < transitions.size(); begin = end++) {
+      while (end < transitions.size() && transitions[end].step == transitions[end - 1].step + 1) ++end;
+      windows.push_back(WindowOf(rollout, begin, end - begin));
+      first.push_back(begin);
     }
-    errors = SmoothOverTime(errors, smoothing / transitions[0].duration());
-    total += errors.cwiseAbs().sum() + errors.squaredNorm();
+    std::vector<Eigen::MatrixXd> errors(static_cast<size_t>(parameters.cols()),
+                                        Eigen::MatrixXd(static_cast<Eigen::Index>(transitions.size()), 2 * n_));
+    const auto visit = [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto& v) {
+      const size_t at = first[window] + step;
+      auto row = errors[static_cast<size_t>(sample)].row(static_cast<Eigen::Index>(at));
+      row << (q - transitions[at].next_q).transpose(), (v - transitions[at].next_v).transpose();
+      row.array() /= scale_.transpose().array();
+    };
+    Predict(parameters, windows, visit, /*last_only=*/false);
+    for (Eigen::Index sample = 0; sample < parameters.cols(); ++sample) {
+      const Eigen::MatrixXd smooth =
+          SmoothOverTime(errors[static_cast<size_t>(sample)], smoothing / transitions[0].duration());
+      const double error = smooth.cwiseAbs().sum() + smooth.squaredNorm();
+      total(sample) += std::isfinite(error) ? error : kInfinity;
+    }
     steps += transitions.size();
   }
   return total / static_cast<double>(steps);
 }
 
-double Discrepancy::PredictionError(const Eigen::VectorXd& parameters, std::span<const Rollout> rollouts,
-                                    int horizon) {
-  simulator_.SetParameters(parameters);
-  double squared = 0;
-  size_t windows = 0;
+Eigen::VectorXd Discrepancy::PredictionError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts,
+                                             int horizon) {
+  std::vector<Window> windows;
+  Ends ends;
   const auto length = static_cast<size_t>(horizon);
   for (const Rollout& rollout : rollouts) {
     const auto& t = rollout.transitions;
     for (size_t start = 0; start + length <= t.size(); ++start) {
       if (t[start + length - 1].step != t[start].step + horizon - 1) continue;
-      simulator_.SetState(t[start].q, t[start].v);
-      for (size_t i = start; i < start + length; ++i) simulator_.Step(t[i].efforts);
-      const Transition& end = t[start + length - 1];
-      Eigen::VectorXd error(2 * n_);
-      error << simulator_.q() - end.next_q, simulator_.v() - end.next_v;
-      squared += (error.array() / scale_.array()).square().mean();
-      ++windows;
+      windows.push_back(WindowOf(rollout, start, length));
+      ends.push_back(&t[start + length - 1]);
     }
   }
-  if (windows == 0) return std::numeric_limits<double>::quiet_NaN();
-  return std::sqrt(squared / static_cast<double>(windows));
+  if (windows.empty()) return Eigen::VectorXd::Constant(parameters.cols(), std::numeric_limits<double>::quiet_NaN());
+  Eigen::MatrixXd squared(static_cast<Eigen::Index>(windows.size()), parameters.cols());
+  Predict(parameters, windows, [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
+    Eigen::VectorXd error(2 * n_);
+    error << q - ends[window]->next_q, v - ends[window]->next_v;
+    const double mean = (error.array() / scale_.array()).square().mean();
+    squared(static_cast<Eigen::Index>(window), sample) = std::isfinite(mean) ? mean : kInfinity;
+  });
+  return squared.colwise().mean().transpose().cwiseSqrt();
 }
 
 }  // namespace plumb

@@ -144,14 +144,17 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
     prior_sd(i) = std::sqrt(robot.parameters[static_cast<size_t>(i)].coordinate_variance());
   }
   Identifiability found;
-  Eigen::MatrixXd jacobian(static_cast<Eigen::Index>(CountTransitions(rollouts)) * 2 * robot.num_joints(), n);
+  // Both ends of each central difference, all in one batch.
+  const Eigen::VectorXd h = 1e-4 * prior_sd;
+  Eigen::MatrixXd physical(n, 2 * n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double h = 1e-4 * prior_sd(i);
-    const Eigen::VectorXd plus = distribution.mean + h * Eigen::VectorXd::Unit(n, i);
-    const Eigen::VectorXd minus = distribution.mean - h * Eigen::VectorXd::Unit(n, i);
-    jacobian.col(i) = (discrepancy.Residuals(robot.ToPhysical(plus), rollouts) -
-                       discrepancy.Residuals(robot.ToPhysical(minus), rollouts)) /
-                      (2 * h);
+    physical.col(2 * i) = robot.ToPhysical(distribution.mean + h(i) * Eigen::VectorXd::Unit(n, i));
+    physical.col(2 * i + 1) = robot.ToPhysical(distribution.mean - h(i) * Eigen::VectorXd::Unit(n, i));
+  }
+  const Eigen::MatrixXd residuals = discrepancy.Residuals(physical, rollouts);
+  Eigen::MatrixXd jacobian(residuals.rows(), n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    jacobian.col(i) = (residuals.col(2 * i) - residuals.col(2 * i + 1)) / (2 * h(i));
   }
   found.information = jacobian.transpose() * jacobian;
 

@@ -63,6 +63,8 @@ class Session {
     auto report = simopt_.Update();
     checkpoint_.Save(simopt_.state());
     if (!report) return false;
+    const int64_t failed = report->failures.total() - (report_ ? report_->failures.total() : 0);
+    if (failed > 0) spdlog::warn("{} simulations failed in this iteration: they count as infinitely far", failed);
     report_ = std::move(report);
     seconds_ = SecondsSince(start_);
     WriteDistribution();

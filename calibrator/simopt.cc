@@ -1,10 +1,8 @@
 #include "calibrator/simopt.h"
 
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <thread>
 
 #include "common/random.h"
 #include "robot/parameter_distribution.h"
@@ -35,9 +33,8 @@ Gaussian PriorGaussian(const RobotDescription& robot) {
 }
 
 SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective)
-    : robot_(robot), seed_(seed), objective_(objective), prior_(PriorGaussian(robot)) {
+    : robot_(robot), seed_(seed), objective_(objective), prior_(PriorGaussian(robot)), discrepancy_(robot, threads) {
   state_.distribution = state_.before = prior_;
-  for (int i = 0; i < std::max(1, threads); ++i) workers_.emplace_back(robot);
 }
 
 SimOpt::~SimOpt() = default;
@@ -80,29 +77,14 @@ Eigen::MatrixXd SimOpt::Samples(int iteration, int update) const {
 Eigen::VectorXd SimOpt::Returns(const Eigen::MatrixXd& samples) {
   // Without data the samples' own scatter must not move anything.
   if (CountTransitions(state_.rollouts) == 0) return Eigen::VectorXd::Constant(samples.cols(), NAN);
-  // Each sample's value is computed by one thread from start to end: the same bits for any number of threads.
-  Eigen::VectorXd values(samples.cols());
-  std::atomic<Eigen::Index> next{0};
-  const auto work = [&](Discrepancy& discrepancy) {
-    for (Eigen::Index i; (i = next++) < samples.cols();) {
-      try {
-        const Eigen::VectorXd physical = robot_.ToPhysical(samples.col(i));
-        switch (objective_) {
-          case Objective::kPosterior: values(i) = discrepancy.LogLikelihood(physical, state_.rollouts); break;
-          case Objective::kStep: values(i) = discrepancy.StepError(physical, Newest()); break;
-          case Objective::kTrajectory: values(i) = discrepancy.TrajectoryError(physical, Newest()); break;
-        }
-      } catch (const std::exception&) {  // parameters no body can have: impossible
-        values(i) = objective_ == Objective::kPosterior ? -std::numeric_limits<double>::infinity()
-                                                        : std::numeric_limits<double>::infinity();
-      }
-    }
-  };
-  std::vector<std::thread> threads;
-  for (size_t i = 1; i < workers_.size(); ++i) threads.emplace_back(work, std::ref(workers_[i]));
-  work(workers_[0]);
-  for (std::thread& thread : threads) thread.join();
-
+  Eigen::MatrixXd physical(samples.rows(), samples.cols());
+  for (Eigen::Index i = 0; i < samples.cols(); ++i) physical.col(i) = robot_.ToPhysical(samples.col(i));
+  Eigen::VectorXd values;
+  switch (objective_) {
+    case Objective::kPosterior: values = discrepancy_.LogLikelihood(physical, state_.rollouts); break;
+    case Objective::kStep: values = discrepancy_.StepError(physical, Newest()); break;
+    case Objective::kTrajectory: values = discrepancy_.TrajectoryError(physical, Newest()); break;
+  }
   if (objective_ != Objective::kPosterior) return ScaledReturns(values);
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     values(i) += LogDensity(prior_, samples.col(i)) - LogDensity(state_.distribution, samples.col(i));
@@ -132,23 +114,24 @@ std::optional<CalibrationReport> SimOpt::Update() {
 
 std::optional<CalibrationReport> SimOpt::Report() {
   if (state_.iteration == 0 || running()) return {};
-  Discrepancy& discrepancy = workers_[0];
   const auto newest = Newest();
-  const Eigen::VectorXd before = robot_.ToPhysical(state_.before.mean),
-                        after = robot_.ToPhysical(state_.distribution.mean), prior = robot_.ToPhysical(prior_.mean);
+  Eigen::MatrixXd physical(prior_.mean.size(), 3);
+  physical << robot_.ToPhysical(state_.before.mean), robot_.ToPhysical(state_.distribution.mean),
+      robot_.ToPhysical(prior_.mean);
   CalibrationReport report;
   report.iteration = state_.iteration;
   report.kl = state_.kl;
   report.ess = state_.ess;
   report.temperature = state_.temperature;
-  report.discrepancy = discrepancy.StepError(after, newest);
-  report.prior_discrepancy = discrepancy.StepError(prior, newest);
+  const Eigen::VectorXd discrepancy = discrepancy_.StepError(physical, newest);
+  report.discrepancy = discrepancy(1);
+  report.prior_discrepancy = discrepancy(2);
   for (const int horizon : robot_.calibration.horizons) {
-    report.errors.push_back({horizon, discrepancy.PredictionError(before, newest, horizon),
-                             discrepancy.PredictionError(after, newest, horizon),
-                             discrepancy.PredictionError(prior, newest, horizon)});
+    const Eigen::VectorXd errors = discrepancy_.PredictionError(physical, newest, horizon);
+    report.errors.push_back({horizon, errors(0), errors(1), errors(2)});
   }
-  report.identifiability = FindIdentifiability(robot_, discrepancy, state_.rollouts, state_.distribution);
+  report.identifiability = FindIdentifiability(robot_, discrepancy_, state_.rollouts, state_.distribution);
+  report.failures = discrepancy_.failures();
   return report;
 }
 

@@ -42,6 +42,7 @@ struct CalibrationReport {
   double temperature = 0;  ///< of the last update
   double discrepancy = 0;  ///< step error of the mean on the newest roll-out; 1 = down to the noise
   double prior_discrepancy = 0;
+  Windows::Failures failures;  ///< simulations that failed, of all since the start of the process
   std::vector<PredictionErrors> errors;
   Identifiability identifiability;
 };
@@ -90,7 +91,7 @@ class SimOpt {
   Objective objective_;
   Gaussian prior_;
   State state_;
-  std::vector<Discrepancy> workers_;
+  Discrepancy discrepancy_;
 };
 
 /// The prior over the coordinates, as the description has it.

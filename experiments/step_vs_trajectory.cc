@@ -52,7 +52,7 @@ Judgement Judge(const RobotDescription& robot, const std::vector<Rollout>& rollo
   const auto held_out = std::span(rollouts).last(kHeldOut);
   judgement.errors.resize(static_cast<Eigen::Index>(robot.calibration.horizons.size()));
   for (Eigen::Index h = 0; h < judgement.errors.size(); ++h) {
-    judgement.errors(h) = discrepancy.PredictionError(physical, held_out, robot.calibration.horizons[static_cast<size_t>(h)]);
+    judgement.errors(h) = discrepancy.PredictionError(physical, held_out, robot.calibration.horizons[static_cast<size_t>(h)])(0);
   }
   return judgement;
 }

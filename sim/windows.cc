@@ -25,7 +25,8 @@ void Require(const Window& window, const Model& model) {
                        [&](const EffortSegment& segment) { return segment.effort.size() == model.num_velocities(); });
   };
   bool good = window.q.size() == model.num_positions() && window.v.size() == model.num_velocities() &&
-              window.q.allFinite() && window.v.allFinite() && !window.steps.empty() && sized(window.before);
+              window.q.allFinite() && window.v.allFinite() && !window.steps.empty();
+  for (const auto& step : window.before) good = good && sized(step);
   for (const auto& step : window.steps) {
     const double duration = Duration(step);
     good = good && sized(step) && duration > 0 && std::isfinite(duration);
@@ -72,7 +73,9 @@ struct Windows::Worker {
     for (size_t lane = 0; lane < lanes; ++lane) {
       const Window& window = windows[group.windows[lane]];
       track.Clear();
-      if (model.parameters().delays()) Append(window.before);
+      if (model.parameters().delays()) {
+        for (const auto& step : window.before) Append(step);
+      }
       track.Advance();
       size_t substep = 0;
       for (size_t step = 0; step < window.steps.size(); ++step) {

@@ -17,8 +17,9 @@ struct Window {
   Eigen::VectorXd q, v;  ///< readings with which it begins; finite
   /// Control step by control step, at least one; efforts of num_velocities entries, of positive duration together.
   std::vector<std::span<const EffortSegment>> steps;
-  /// What had been commanded before, the latest last: where efforts are delayed, some of it is still to come. May be empty.
-  std::span<const EffortSegment> before = {};
+  /// What had been commanded before, the latest last: where efforts are delayed, some of it is still to come. Before all
+  /// that is known there was no effort.
+  std::vector<std::span<const EffortSegment>> before = {};
 };
 
 /// Predicts windows with simulators of many parameters: f_xi over n steps, the inner loop of inference. Windows are

@@ -31,28 +31,28 @@ TEST_CASE("the true parameters explain synthetic transitions down to the noise")
   Discrepancy discrepancy(robot);
   const std::vector<Rollout> rollouts{SyntheticRollout(robot, kTruth, 2000, 1e-4, 0.01, 1)};
   // 4000 squared standard normals: 1 +- 0.0224
-  CHECK(discrepancy.StepError(kTruth, rollouts) == Approx(1).margin(0.07));
-  CHECK(discrepancy.StepError(Eigen::Vector3d(10, 1, 1), rollouts) > 1.5);
+  CHECK(discrepancy.StepError(kTruth, rollouts)(0) == Approx(1).margin(0.07));
+  CHECK(discrepancy.StepError(Eigen::Vector3d(10, 1, 1), rollouts)(0) > 1.5);
   const Eigen::VectorXd r = discrepancy.Residuals(kTruth, rollouts);
-  CHECK(discrepancy.StepError(kTruth, rollouts) == Approx(r.squaredNorm() / 4000));
+  CHECK(discrepancy.StepError(kTruth, rollouts)(0) == Approx(r.squaredNorm() / 4000));
   double t = 0;  // the density of a two-dimensional Student's t distribution with four degrees of freedom
   for (Eigen::Index i = 0; i < r.size(); i += 2) t += std::log(std::pow(1 + r.segment(i, 2).squaredNorm() / 4, -3));
-  CHECK(discrepancy.LogLikelihood(kTruth, rollouts) == Approx(t));
+  CHECK(discrepancy.LogLikelihood(kTruth, rollouts)(0) == Approx(t));
 }
 
 TEST_CASE("without noise every horizon is predicted exactly, and errors grow with the horizon otherwise") {
   const RobotDescription robot = Pendulum();
   Discrepancy discrepancy(robot);
   std::vector<Rollout> rollouts{SyntheticRollout(robot, kTruth, 60, 0, 0, 1)};
-  for (const int n : {1, 5, 20}) CHECK(discrepancy.PredictionError(kTruth, rollouts, n) < 1e-9);
-  CHECK(discrepancy.TrajectoryError(kTruth, rollouts) < 1e-9);
+  for (const int n : {1, 5, 20}) CHECK(discrepancy.PredictionError(kTruth, rollouts, n)(0) < 1e-9);
+  CHECK(discrepancy.TrajectoryError(kTruth, rollouts)(0) < 1e-9);
   const Eigen::Vector3d wrong(10, 1, 1);
-  CHECK(discrepancy.PredictionError(wrong, rollouts, 5) > 2 * discrepancy.PredictionError(wrong, rollouts, 1));
-  CHECK(discrepancy.TrajectoryError(wrong, rollouts) > 0.01);
-  CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 61)));
+  CHECK(discrepancy.PredictionError(wrong, rollouts, 5)(0) > 2 * discrepancy.PredictionError(wrong, rollouts, 1)(0));
+  CHECK(discrepancy.TrajectoryError(wrong, rollouts)(0) > 0.01);
+  CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 61)(0)));
   rollouts[0].transitions.erase(rollouts[0].transitions.begin() + 30);  // 30 + 29 remain, no window of 31
-  CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 31)));
-  CHECK(discrepancy.TrajectoryError(kTruth, rollouts) < 1e-9);
+  CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 31)(0)));
+  CHECK(discrepancy.TrajectoryError(kTruth, rollouts)(0) < 1e-9);
 }
 
 TEST_CASE("the distribution comes to rest on the posterior: neither collapsed nor forgetting its prior") {
