@@ -1,4 +1,6 @@
-// Cost of the simulator beside that of gym's closed form: build/bench/sim_bench [--benchmark_filter=...]
+// Cost of the simulator beside its peers', in one run: build/bench/sim_bench [--benchmark_filter=...]
+//   gym's closed form, MuJoCo 2.2.2 (where libmujoco-dev is installed) and Simbody the textbook way.
+// "allocations" is how often an iteration asks for memory.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -7,15 +9,33 @@
 
 #include "common/random.h"
 #include "sim/environment.h"
-#include "sim/simulator.h"
 #include "sim/plant.h"
+#include "sim/simulator.h"
+#include "sim/windows.h"
+#include "tests/sim/allocations.h"
+#ifdef PLUMB_MUJOCO
+#include "tests/sim/mujoco_hopper.h"
+#endif
 
 namespace plumb {
 namespace {
 
-RobotDescription Load(const std::string& file) {
-  return LoadRobot(PLUMBLINE_SOURCE "/robots/pendulum/" + file);
-}
+RobotDescription Load(const std::string& robot) { return LoadRobot(PLUMBLINE_SOURCE "/robots/" + robot); }
+
+class CountAllocations {
+ public:
+  explicit CountAllocations(benchmark::State& state) : state_(state), before_(Allocations()) {}
+  ~CountAllocations() {
+    state_.counters["allocations"] =
+        static_cast<double>(Allocations() - before_) / static_cast<double>(state_.iterations());
+  }
+
+ private:
+  benchmark::State& state_;
+  int64_t before_;
+};
+
+// --- The pendulum --------------------------------------------------------------------------------------------------
 
 const Eigen::VectorXd kOne = Eigen::VectorXd::Constant(1, 0.7);
 
@@ -31,40 +51,20 @@ void GymFormula(benchmark::State& state) {
 }
 BENCHMARK(GymFormula);
 
-void OneSubstep(benchmark::State& state) {
-  const RobotDescription description = Load("robot.toml");
-  Simulator simulator(description);
-  simulator.SetState(kOne, kOne);
-  for (auto _ : state) simulator.Step(kOne, description.simulation.substep);
-}
-BENCHMARK(OneSubstep);
-
-void ControlStep(benchmark::State& state, const char* file) {
+void PendulumStep(benchmark::State& state, const char* file) {
   Environment environment(Load(file));
   Random random(1);
   environment.Reset(random);
   const Eigen::VectorXf action = Eigen::VectorXf::Constant(1, 0.3f);
+  const CountAllocations count(state);
   for (auto _ : state) benchmark::DoNotOptimize(environment.Step(action));
 }
-BENCHMARK_CAPTURE(ControlStep, gym, "gym.toml");
-BENCHMARK_CAPTURE(ControlStep, robot, "robot.toml");
+BENCHMARK_CAPTURE(PendulumStep, gym, "pendulum/gym.toml");
+BENCHMARK_CAPTURE(PendulumStep, robot, "pendulum");
 
-void SetParameters(benchmark::State& state) {
-  Simulator simulator(Load("robot.toml"));
-  const Eigen::VectorXd physical = Eigen::Vector3d(10, 1, 1);
-  for (auto _ : state) simulator.SetParameters(physical);
-}
-BENCHMARK(SetParameters);
-
-void SetState(benchmark::State& state) {
-  Simulator simulator(Load("robot.toml"));
-  for (auto _ : state) simulator.SetState(kOne, kOne);
-}
-BENCHMARK(SetState);
-
-/// The virtual robot's dynamics, asked every 5 ms; items/s is the multiple of real time.
-void PlantFiveMilliseconds(benchmark::State& state) {
-  const Model model(Load("robot.toml"));
+/// The virtual robot's dynamics, asked every 5 ms: Simbody the textbook way.
+void SimbodyPendulumFiveMilliseconds(benchmark::State& state) {
+  const Model model(Load("pendulum"));
   Plant plant(model.Describe(model.parameters().means()));
   plant.SetState(kOne, kOne);
   double seconds = 0;
@@ -74,8 +74,169 @@ void PlantFiveMilliseconds(benchmark::State& state) {
   }
   state.counters["x_real_time"] = benchmark::Counter(seconds, benchmark::Counter::kIsRate);
 }
-BENCHMARK(PlantFiveMilliseconds);
+BENCHMARK(SimbodyPendulumFiveMilliseconds);
+
+// --- The hopper: from the states of random roll-outs, falls and all, one control step of 8 ms ----------------------
+
+struct Hops {
+  std::vector<Eigen::VectorXd> q, v, effort;
+  size_t size() const { return q.size(); }
+};
+
+const Hops& RandomHops() {
+  static const Hops hops = [] {
+    Hops made;
+    Environment hopper(Load("hopper"));
+    Random random(5);
+    hopper.Reset(random);
+    while (made.size() < 1000) {
+      Eigen::VectorXf action(3);
+      for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
+      made.q.push_back(hopper.q());
+      made.v.push_back(hopper.v());
+      made.effort.push_back(Eigen::VectorXd::Zero(6));
+      made.effort.back().tail(3) = 200 * action.cast<double>();
+      if (hopper.Step(action).terminated) hopper.Reset(random);
+    }
+    return made;
+  }();
+  return hops;
+}
+
+template <class Step>
+void ForEachHop(benchmark::State& state, Step step) {
+  const Hops& hops = RandomHops();
+  size_t i = 0;
+  const CountAllocations count(state);
+  for (auto _ : state) {
+    step(hops.q[i], hops.v[i], hops.effort[i]);
+    i = (i + 1) % hops.size();
+  }
+}
+
+void Hopper(benchmark::State& state) {
+  Simulator simulator(Load("hopper"));
+  ForEachHop(state, [&](const auto& q, const auto& v, const auto& effort) {
+    simulator.SetState(q, v);
+    simulator.Step(effort, 0.008);
+  });
+}
+BENCHMARK(Hopper);
+
+void HopperInFlight(benchmark::State& state) {
+  Simulator simulator(Load("hopper"));
+  const Eigen::VectorXd high = (Eigen::VectorXd(6) << 0, 5, 0, -0.5, -0.5, 0).finished();
+  ForEachHop(state, [&](const auto&, const auto& v, const auto& effort) {
+    simulator.SetState(high, v);
+    simulator.Step(effort, 0.008);
+  });
+}
+BENCHMARK(HopperInFlight);
+
+/// As if it did not move in a plane.
+void HopperInSpace(benchmark::State& state) {
+  const Model model(Load("hopper"));
+  Topology topology = model.topology();
+  topology.planar = false;
+  const auto engine = MakeEngine(topology, model.description().simulation, model.parameters().terms());
+  engine->SetPhysics(model.parameters().Nominal());
+  const double h = 0.002;
+  ForEachHop(state, [&](const auto& q, const auto& v, const auto& effort) {
+    std::copy(q.begin(), q.end(), engine->q());
+    std::copy(v.begin(), v.end(), engine->v());
+    for (int i = 0; i < 4; ++i) engine->Substep(&h, effort.data(), nullptr);
+  });
+}
+BENCHMARK(HopperInSpace);
+
+void HopperParameters(benchmark::State& state) {
+  Simulator simulator(Load("hopper"));
+  const Eigen::VectorXd masses = Eigen::Vector4d(3.6, 4.1, 2.7, 5.3);
+  const CountAllocations count(state);
+  for (auto _ : state) simulator.SetParameters(masses);
+}
+BENCHMARK(HopperParameters);
+
+/// 25 simulators x 1000 transitions; items/s are control steps.
+void HopperWindows(benchmark::State& state) {
+  const Hops& hops = RandomHops();
+  std::vector<std::vector<EffortSegment>> efforts;
+  for (const Eigen::VectorXd& effort : hops.effort) efforts.push_back({{0.008, effort}});
+  std::vector<Window> recorded;
+  for (size_t i = 0; i < hops.size(); ++i) recorded.push_back({hops.q[i], hops.v[i], {efforts[i]}});
+  Windows windows(std::make_shared<Model>(Load("hopper")), static_cast<int>(state.range(0)));
+  Eigen::MatrixXd masses(4, 25);
+  Random random(1);
+  for (double& mass : masses.reshaped()) mass = random.Uniform(3, 5);
+  for (auto _ : state) {
+    windows.Predict(masses, recorded, [](Eigen::Index, size_t, size_t, const Eigen::VectorXd& q, const auto&) {
+      benchmark::DoNotOptimize(q.data());
+    });
+  }
+  state.SetItemsProcessed(state.iterations() * 25 * static_cast<int64_t>(hops.size()));
+}
+BENCHMARK(HopperWindows)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+/// What a step cost if Simbody's own mass matrix and bias were all there is to it: once instead of four times.
+void SimbodyHopperMassAndBias(benchmark::State& state) {
+  RobotDescription robot = Load("hopper");
+  Plant plant(Model(robot).Describe(Model(robot).parameters().means()));
+  ForEachHop(state, [&](const auto& q, const auto& v, const auto&) {
+    plant.SetState(q, v);
+    benchmark::DoNotOptimize(plant.MassMatrix().data());
+    benchmark::DoNotOptimize(plant.Bias().data());
+  });
+}
+BENCHMARK(SimbodyHopperMassAndBias);
+
+#ifdef PLUMB_MUJOCO
+void MujocoHopperStep(benchmark::State& state, MujocoHopper::Integrator integrator) {
+  MujocoHopper mujoco(integrator);
+  ForEachHop(state, [&](const auto& q, const auto& v, const auto& effort) {
+    std::copy_n(q.data(), 6, mujoco.data()->qpos);
+    std::copy_n(v.data(), 6, mujoco.data()->qvel);
+    mujoco.ControlStep(effort.tail(3) / 200);
+  });
+}
+BENCHMARK_CAPTURE(MujocoHopperStep, RK4, MujocoHopper::Integrator::kRungeKutta);
+BENCHMARK_CAPTURE(MujocoHopperStep, Euler, MujocoHopper::Integrator::kEuler);
+
+void MujocoHopperMasses(benchmark::State& state) {
+  MujocoHopper mujoco;
+  for (auto _ : state) mujoco.SetMasses({3.6, 4.1, 2.7, 5.3});
+}
+BENCHMARK(MujocoHopperMasses);
+
+/// One step of 0.05 s of a rod on a hinge, by Euler's method.
+void MujocoPendulumStep(benchmark::State& state) {
+  constexpr char kXml[] = R"(
+    <mujoco>
+      <option timestep="0.05" gravity="0 0 -10" integrator="Euler"/>
+      <worldbody>
+        <body>
+          <joint name="pivot" type="hinge" axis="0 1 0"/>
+          <inertial pos="0 0 .5" mass="1" diaginertia=".083333333 .083333333 1e-9"/>
+        </body>
+      </worldbody>
+      <actuator><motor joint="pivot" gear="2"/></actuator>
+    </mujoco>)";
+  const auto files = std::make_unique<mjVFS>();
+  mj_defaultVFS(files.get());
+  mj_makeEmptyFileVFS(files.get(), "rod.xml", sizeof(kXml) - 1);
+  std::copy_n(kXml, sizeof(kXml) - 1, static_cast<char*>(files->filedata[0]));
+  char error[1000] = "";
+  mjModel* model = mj_loadXML("rod.xml", files.get(), error, sizeof(error));
+  if (!model) return state.SkipWithError(error);
+  mjData* data = mj_makeData(model);
+  data->qpos[0] = 1;
+  data->ctrl[0] = 0.15;
+  for (auto _ : state) mj_step(model, data);
+  mj_deleteData(data);
+  mj_deleteModel(model);
+  mj_deleteVFS(files.get());
+}
+BENCHMARK(MujocoPendulumStep);
+#endif
 
 }  // namespace
 }  // namespace plumb
-

@@ -178,6 +178,13 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
     if (AllLog(robot, power)) {
       c.mean = std::exp(c.mean);
       c.sd *= c.mean;
+    } else if ((power.array() != 0).count() == 1 && power.sum() == 1) {  // a parameter on its own: in its own units
+      Eigen::Index index;
+      power.maxCoeff(&index);
+      const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(index)];
+      const double coordinate = c.mean, h = 1e-4 * prior_sd(index);
+      c.mean = parameter.ToPhysical(coordinate);
+      c.sd *= (parameter.ToPhysical(coordinate + h) - parameter.ToPhysical(coordinate - h)) / (2 * h);
     }
     found.combinations.push_back(std::move(c));
   }

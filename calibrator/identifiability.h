@@ -15,7 +15,7 @@ namespace plumb {
 struct Combination {
   std::string name;       ///< "gravity / length", "mass length^2"
   Eigen::VectorXd power;  ///< one per parameter, small integers where the data allow
-  double mean;            ///< exp(power . mean) for logarithmic coordinates, else power . mean
+  double mean;  ///< exp(power . mean) for logarithmic coordinates, physical for a parameter on its own, else power . mean
   double sd;              ///< of the same, to first order
 };
 

@@ -134,15 +134,19 @@ std::string Progress::StatusLine(double seconds) const {
 
 double Progress::TrueCombination(size_t index, const Eigen::VectorXd& truth) const {
   const calibration_status_t& c = done_.back().calibration;
-  double sum = 0;
+  double sum = 0, alone = 0;
   bool log = true;
+  int involved = 0;
   for (size_t i = 0; i < c.mean.size(); ++i) {
     const double power = c.combination_power[index * c.mean.size() + i];
     if (power == 0) continue;
+    ++involved;
+    alone = power == 1 ? truth(static_cast<Eigen::Index>(i)) : NAN;
     sum += power * robot_.parameters[i].ToCoordinate(truth(static_cast<Eigen::Index>(i)));
     log = log && robot_.parameters[i].coordinate == ParameterDescription::Coordinate::kLog;
   }
-  return log ? std::exp(sum) : sum;
+  if (log) return std::exp(sum);
+  return involved == 1 && std::isfinite(alone) ? alone : sum;  // as calibrator/identifiability.h has it
 }
 
 std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {

@@ -5,16 +5,20 @@
 
 namespace plumb {
 
-Environment::Environment(const RobotDescription& description)
-    : task_(MakeTask(description)),
-      simulator_(description),
-      steps_per_episode_(description.task.steps),
-      period_(description.task.period),
-      latency_(std::clamp(description.simulation.latency, 0.0, description.task.period)),
-      start_q_(Eigen::VectorXd::Zero(description.num_positions())),
-      start_v_(Eigen::VectorXd::Zero(description.num_velocities())),
+Environment::Environment(const RobotDescription& description) : Environment(std::make_shared<Model>(description)) {}
+
+Environment::Environment(std::shared_ptr<const Model> model)
+    : task_(MakeTask(model->description())),
+      simulator_(model),
+      steps_per_episode_(model->description().task.steps),
+      period_(model->description().task.period),
+      latency_(std::clamp(model->description().simulation.latency, 0.0, period_)),
+      start_q_(Eigen::VectorXd::Zero(model->num_positions())),
+      start_v_(Eigen::VectorXd::Zero(model->num_velocities())),
       effort_(start_v_),
-      next_effort_(start_v_) {}
+      next_effort_(start_v_),
+      reading_q_(simulator_.q()),
+      reading_v_(simulator_.v()) {}
 
 void Environment::Reset(Random& random) {
   task_->InitialState(random, start_q_, start_v_);
@@ -25,6 +29,7 @@ void Environment::SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
                            const Eigen::Ref<const Eigen::VectorXd>& v) {
   simulator_.SetState(q, v);
   effort_.setZero();
+  Read();
 }
 
 Environment::StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
@@ -34,11 +39,18 @@ Environment::StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf
   simulator_.Step(effort_, latency_);
   simulator_.Step(next_effort_, period_ - latency_);
   effort_.swap(next_effort_);
+  Read();
   return {task_->Reward(start_q_, start_v_, effort_, q(), v()), !simulator_.finite() || task_->Terminated(q(), v())};
 }
 
+void Environment::Read() {
+  const Simulator::State reading = simulator_.Reading(effort_);
+  reading_q_ = reading.q;
+  reading_v_ = reading.v;
+}
+
 void Environment::Observe(Eigen::Ref<Eigen::VectorXf> observation) const {
-  task_->Observe(q(), v(), std::span(observation.data(), static_cast<size_t>(observation.size())));
+  task_->Observe(reading_q_, reading_v_, std::span(observation.data(), static_cast<size_t>(observation.size())));
 }
 
 }  // namespace plumb

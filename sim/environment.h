@@ -17,6 +17,8 @@ class Environment {
   /// Has the prior means as parameters and the zero state until told otherwise.
   /// @throws std::invalid_argument if the description names an unknown task or parameter.
   explicit Environment(const RobotDescription& description);
+  /// The same for a model that workers share.
+  explicit Environment(std::shared_ptr<const Model> model);
 
   int observation_size() const { return task_->observation_size(); }
   int action_size() const { return task_->action_size(); }
@@ -43,7 +45,7 @@ class Environment {
   /// @param action policy units, [-1, 1] = effort limits; clipped here.
   StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action);
 
-  /// Writes what the policy sees, observation_size() entries.
+  /// Writes what the policy sees of the sensors' readings (JointDynamics), observation_size() entries.
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const;
 
   const Eigen::VectorXd& q() const { return simulator_.q(); }
@@ -53,6 +55,8 @@ class Environment {
   const Task& task() const { return *task_; }
 
  private:
+  void Read();
+
   std::unique_ptr<Task> task_;
   Simulator simulator_;
   int steps_per_episode_;
@@ -61,6 +65,7 @@ class Environment {
   Eigen::VectorXd start_q_, start_v_;  // work space of Reset and Step: where an episode or a step begins
   Eigen::VectorXd effort_;             // of the latest action: what acts at the beginning of the next step
   Eigen::VectorXd next_effort_;
+  Eigen::VectorXd reading_q_, reading_v_;
 };
 
 }  // namespace plumb

@@ -9,7 +9,7 @@ namespace {
 
 class RobotSimulation : public Simulation {
  public:
-  explicit RobotSimulation(const RobotDescription& description) : environment_(description) {}
+  explicit RobotSimulation(std::shared_ptr<const Model> model) : environment_(std::move(model)) {}
 
   int observation_size() const override { return environment_.observation_size(); }
   int action_size() const override { return environment_.action_size(); }
@@ -31,7 +31,7 @@ class RobotSimulation : public Simulation {
 }  // namespace
 
 SimulationFactory SimulateRobot(const RobotDescription& description) {
-  return [description] { return std::make_unique<RobotSimulation>(description); };
+  return [model = std::make_shared<const Model>(description)] { return std::make_unique<RobotSimulation>(model); };
 }
 
 }  // namespace plumb

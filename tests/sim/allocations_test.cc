@@ -2,33 +2,9 @@
 
 #include <Eigen/Core>
 #include <catch2/catch.hpp>
-#include <cstdlib>
 #include <memory>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define PLUMB_COUNTS_ALLOCATIONS 0
-#else
-#define PLUMB_COUNTS_ALLOCATIONS 1
-#endif
-
-namespace {
-thread_local int64_t allocations = 0;
-}
-
-#if PLUMB_COUNTS_ALLOCATIONS
-extern "C" {
-void* __libc_malloc(size_t size);  // glibc's own, beneath what this file replaces
-
-void* malloc(size_t size) noexcept {
-  ++allocations;
-  return __libc_malloc(size);
-}
-}
-#endif
-
 namespace plumb {
-
-int64_t Allocations() { return allocations; }
 
 #if PLUMB_COUNTS_ALLOCATIONS
 TEST_CASE("allocations are counted, whether by new or by Eigen") {
