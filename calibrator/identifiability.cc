@@ -182,9 +182,9 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
       Eigen::Index index;
       power.maxCoeff(&index);
       const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(index)];
-      const double coordinate = c.mean, h = 1e-4 * prior_sd(index);
+      const double coordinate = c.mean, small = 1e-4 * prior_sd(index);
       c.mean = parameter.ToPhysical(coordinate);
-      c.sd *= (parameter.ToPhysical(coordinate + h) - parameter.ToPhysical(coordinate - h)) / (2 * h);
+      c.sd *= (parameter.ToPhysical(coordinate + small) - parameter.ToPhysical(coordinate - small)) / (2 * small);
     }
     found.combinations.push_back(std::move(c));
   }

@@ -5,7 +5,7 @@
 namespace plumb {
 namespace {
 
-// Segments that are kept at most: a 1 kHz command for as long as any delay.
+// Segments that are kept at most of the past: a 1 kHz command for as long as any delay.
 constexpr size_t kMostSegments = 1024;
 
 }  // namespace
@@ -28,10 +28,6 @@ void EffortTrack::Append(const double* effort, double duration) {
     ends_.back() = end;
     return;
   }
-  if (ends_.size() > kMostSegments) {  // the oldest gives way
-    ends_.erase(ends_.begin());
-    efforts_.erase(efforts_.begin(), efforts_.begin() + static_cast<std::ptrdiff_t>(n_));
-  }
   ends_.push_back(end);
   efforts_.insert(efforts_.end(), effort, effort + n_);
 }
@@ -40,7 +36,7 @@ void EffortTrack::Advance() {
   const double now = ends_.back();
   for (double& end : ends_) end -= now;
   size_t old = 0;
-  while (old + 1 < ends_.size() && ends_[old] < -remembered_) ++old;
+  while (old + 1 < ends_.size() && (ends_[old] < -remembered_ || ends_.size() - old > kMostSegments)) ++old;
   ends_.erase(ends_.begin(), ends_.begin() + static_cast<std::ptrdiff_t>(old));
   efforts_.erase(efforts_.begin(), efforts_.begin() + static_cast<std::ptrdiff_t>(old * n_));
 }

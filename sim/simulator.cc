@@ -2,9 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace plumb {
+namespace {
+
+void RequireEnd(double duration) {
+  if (duration == std::numeric_limits<double>::infinity()) throw std::invalid_argument("a step must come to an end");
+}
+
+}  // namespace
 
 Simulator::Simulator(std::shared_ptr<const Model> model)
     : model_(std::move(model)),
@@ -58,6 +66,7 @@ void Simulator::Step(const Vector& effort, double duration) {
   if (effort.size() != num_velocities()) {
     throw std::invalid_argument("an effort has " + std::to_string(num_velocities()) + " entries");
   }
+  RequireEnd(duration);
   if (!(duration > 0) || !finite_) return;
   if (model_->parameters().delays()) {
     track_.Append(effort.data(), duration);
@@ -71,13 +80,12 @@ void Simulator::Step(const Vector& effort, double duration) {
 }
 
 void Simulator::Step(std::span<const EffortSegment> profile) {
+  double duration = 0;
+  for (const EffortSegment& segment : profile) duration += std::max(0.0, segment.duration);
+  RequireEnd(duration);
   if (!finite_) return;
   if (!model_->parameters().delays()) track_.Clear();
-  double duration = 0;
-  for (const EffortSegment& segment : profile) {
-    track_.Append(segment.effort.data(), segment.duration);
-    duration += std::max(0.0, segment.duration);
-  }
+  for (const EffortSegment& segment : profile) track_.Append(segment.effort.data(), segment.duration);
   if (duration > 0) Run(duration);
 }
 

@@ -52,6 +52,7 @@ class Simulator {
   ///   leapfrog       q += h/2 v, v += h a(q, v), q += h/2 v: of second order but for stops, contacts and friction
   /// Velocities are clipped to settings.speed_clip after each substep (settings.move_before_clip: after the
   /// move). If the state ceases to be finite it stays so until the next SetState, without any exception.
+  /// @throws std::invalid_argument if the duration is infinite or the size is wrong.
   void Step(const Vector& effort, double duration);
   /// The same for efforts one after the other: the profile that was really applied to a robot.
   void Step(std::span<const EffortSegment> profile);
