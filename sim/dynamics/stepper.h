@@ -367,7 +367,11 @@ class Stepper {
     const Real y1 = a * y - b * z + c * cosine + d * x;
     const Real z1 = a * z + b * y - c * x + d * cosine;
     const Real length = Sqrt(Real(w1 * w1 + x1 * x1 + y1 * y1 + z1 * z1));
-    quaternion[0] = w1 / length, quaternion[1] = x1 / length, quaternion[2] = y1 / length, quaternion[3] = z1 / length;
+    // What does not turn keeps its bits: another lane may have made us look.
+    quaternion[0] = moves ? Real(w1 / length) : a;
+    quaternion[1] = moves ? Real(x1 / length) : b;
+    quaternion[2] = moves ? Real(y1 / length) : c;
+    quaternion[3] = moves ? Real(z1 / length) : d;
   }
 
   template <class Change>
