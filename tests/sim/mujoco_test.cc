@@ -1,0 +1,111 @@
+// Our Hopper against MuJoCo's, where the two solve the same equations: in free flight.
+#include <catch2/catch.hpp>
+
+#include "sim/simulator.h"
+#include "tests/sim/mujoco_hopper.h"
+#include "tests/sim/trees.h"
+
+namespace plumb {
+namespace {
+
+using State = MujocoHopper::State;
+
+RobotDescription Hopper() {
+  RobotDescription hopper = LoadExample("hopper");
+  for (JointDescription& joint : hopper.joints) joint.dynamics.delay = 0;
+  return hopper;
+}
+
+}  // namespace
+
+TEST_CASE("mujoco: the hopper's bodies weigh what MuJoCo makes of their shapes") {
+  const MujocoHopper theirs;
+  const RobotDescription ours = Hopper();
+  for (int i = 0; i < 4; ++i) {
+    const LinkDescription& link = ours.links[static_cast<size_t>(i) + 3];
+    INFO(link.name);
+    CHECK(link.mass == Approx(theirs.published_masses()[i]).epsilon(1e-13).margin(0));
+    CHECK((link.center_of_mass - theirs.center_of_mass(i)).norm() < 1e-15);
+    const Eigen::Matrix3d axes = theirs.principal_axes(i);
+    const Eigen::Matrix3d inertia = axes * theirs.inertias().col(i).asDiagonal() * axes.transpose();
+    CHECK((link.inertia - inertia).norm() < 1e-13 * inertia.norm());
+  }
+  CHECK(ours.simulation.gravity == theirs.gravity());
+}
+
+TEST_CASE("mujoco: in flight a time step is MuJoCo's own") {
+  MujocoHopper theirs(MujocoHopper::Integrator::kEuler);
+  RobotDescription description = Hopper();
+  REQUIRE(description.simulation.integrator == SimulationSettings::Integrator::kSemiImplicit);
+  description.simulation.substep = MujocoHopper::kTimeStep;
+  REQUIRE(description.parameters.size() == 4);  // torso, thigh, leg, foot
+  Simulator ours(description);
+  Random random(1);
+  double worst = 0;
+  int flights = 0;
+  for (int i = 0; i < 2000; ++i) {
+    Eigen::Vector4d masses;
+    for (double& mass : masses) mass = random.Uniform(1, 9);
+    State q = State::Zero(), v;
+    q << random.Uniform(-5, 5), random.Uniform(5, 9), random.Uniform(-3, 3), random.Uniform(-2.5, -0.1),
+        random.Uniform(-2.5, -0.1), random.Uniform(-0.7, 0.7);
+    for (double& speed : v) speed = random.Uniform(-10, 10);
+    Eigen::Vector3d action;
+    for (double& entry : action) entry = random.Uniform(-1, 1);
+    theirs.SetMasses(masses);
+    theirs.SetState(q, v);
+    theirs.Step(action);
+    if (theirs.active_constraints() > 0) continue;  // folded up so far that it hits itself
+    ++flights;
+    Eigen::VectorXd effort = Eigen::VectorXd::Zero(6);
+    effort.tail<3>() = 200 * action;
+    ours.SetParameters(masses);
+    ours.SetState(q, v);
+    ours.Step(effort, MujocoHopper::kTimeStep);
+    worst = std::max({worst, (ours.q() - theirs.q()).cwiseAbs().maxCoeff(), (ours.v() - theirs.v()).cwiseAbs().maxCoeff()});
+  }
+  CHECK(flights > 1500);
+  CHECK(worst < 1e-12);
+}
+
+TEST_CASE("mujoco: a flight of a second is MuJoCo's") {
+  MujocoHopper theirs(MujocoHopper::Integrator::kEuler);
+  RobotDescription description = Hopper();
+  description.simulation.substep = MujocoHopper::kTimeStep;
+  Simulator ours(description);
+  ours.SetParameters(theirs.published_masses());
+  State q, v;
+  q << 0, 20, 0.3, -1, -1, 0.1;
+  v << 1, 5, -2, 0.5, -0.5, 1;
+  theirs.SetState(q, v);
+  ours.SetState(q, v);
+  Random random(2);
+  Eigen::VectorXd effort = Eigen::VectorXd::Zero(6);
+  int steps = 0;
+  for (; steps < 500; ++steps) {
+    Eigen::Vector3d action;
+    for (int k = 0; k < 3; ++k) action[k] = 0.2 * (std::array{-1.2, -1.2, 0.0}[static_cast<size_t>(k)] - ours.q()[3 + k]) + random.Uniform(-0.2, 0.2);
+    effort.tail<3>() = 200 * action;
+    theirs.Step(action);
+    ours.Step(effort, MujocoHopper::kTimeStep);
+    if (theirs.active_constraints() > 0) break;
+  }
+  CHECK(steps == 500);
+  CHECK((ours.q() - theirs.q()).norm() < 1e-9);
+}
+
+TEST_CASE("mujoco: a hopper at rest on the ground is held by it") {
+  MujocoHopper theirs;
+  State q, v = State::Zero();
+  q << 0, 1.2, 0, 0, 0, 0;  // 1 cm deep
+  theirs.SetState(q, v);
+  theirs.Step(Eigen::Vector3d::Zero());
+  CHECK(theirs.active_constraints() > 0);
+  CHECK(theirs.contacts() == 2);  // both ends of the foot
+  CHECK_FALSE(theirs.reset_itself());
+  theirs.SetState(State::Constant(1e300), v);
+  theirs.Step(Eigen::Vector3d::Zero());
+  CHECK(theirs.reset_itself());
+}
+
+}  // namespace plumb
