@@ -157,6 +157,39 @@ void HopperParameters(benchmark::State& state) {
 }
 BENCHMARK(HopperParameters);
 
+/// Every parameter that the hopper has, geometry and inertias by Cholesky coordinates included.
+void HopperAllParameters(benchmark::State& state) {
+  RobotDescription robot = Load("hopper");
+  robot.parameters.clear();
+  Eigen::VectorXd values(0);
+  const auto add = [&](const std::string& path, double value) {
+    robot.parameters.push_back({path, "", ParameterDescription::Coordinate::kLinear, value, 1});
+    values.conservativeResize(values.size() + 1);
+    values.tail(1)[0] = value;
+  };
+  add("gravity", 9.7);
+  for (const char* link : {"torso", "thigh", "leg", "foot"}) {
+    const std::string of = link;
+    add("mass/" + of, 3.5), add("length/" + of, 0.4);
+    for (const char* axis : {"/x", "/y", "/z"}) add("com/" + of + axis, 0.1);
+    for (const char* entry : {"/xx", "/yy", "/zz", "/xy", "/xz", "/yz"}) add("inertia/" + of + entry, 0.1);
+  }
+  for (const char* joint : {"thigh", "leg", "foot"}) {
+    for (const char* kind : {"armature/", "damping/", "friction/", "stiffness/", "rest/", "gain/", "delay/",
+                             "sensor_delay/", "sensor_bias/", "no_load_speed/"}) {
+      add(std::string(kind) + joint, 0.01);
+    }
+  }
+  for (const char* path : {"contact/stiffness", "contact/damping", "contact/friction", "limit/stiffness", "limit/damping"}) {
+    add(path, 100);
+  }
+  Simulator simulator(robot);
+  state.counters["parameters"] = static_cast<double>(values.size());
+  const CountAllocations count(state);
+  for (auto _ : state) simulator.SetParameters(values);
+}
+BENCHMARK(HopperAllParameters);
+
 /// 25 simulators x 1000 transitions; items/s are control steps.
 void HopperWindows(benchmark::State& state) {
   const Hops& hops = RandomHops();
