@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -47,6 +48,8 @@ class Stepper {
         change_(n_),
         trial_(n_),
         shift_(n_),
+        rubbed_(n_),
+        outcome_(n_),
         contacts_(topology.points.size()),
         rows_(topology.points.size() * kRows * n_),
         cholesky_(n_) {}
@@ -73,6 +76,7 @@ class Stepper {
     }
     if (FindConstraints(h)) {
       for (int pass = 0; pass < kPasses; ++pass) {
+        Foresee(h);
         AssembleConstraints(h);
         cholesky_.Factorize(topology_.ancestors, matrix_.data());
         cholesky_.Solve(topology_.ancestors, matrix_.data(), change_.data());
@@ -141,6 +145,9 @@ class Stepper {
     Real depth;     // where forces are evaluated
     Real pressure;  // normal force of the latest trial
     Real speed;     // along the ground, then
+    Real along[kRows];  // and which way: of length one, behind an unused entry
+    Real gripped;   // force of friction in that trial
+    Real outcome;   // speed that friction will leave
     bool any;
   };
 
@@ -162,6 +169,7 @@ class Stepper {
   std::vector<Real> matrix_;  // with them; then its factors
   std::vector<Real> drive_;   // forces without them
   std::vector<Real> bias_, rhs_, change_, trial_, shift_;
+  std::vector<Real> rubbed_, outcome_;  // joint friction per speed in the latest trial; speed that it will leave
   std::vector<Contact> contacts_;
   std::vector<Real> rows_;  // Jacobians of the contacts
   SparseCholesky<Real> cholesky_;
@@ -227,6 +235,7 @@ class Stepper {
   // Looks with the free motion which constraints act. False: none does.
   bool FindConstraints(const Real& h) {
     bool any = terms_.friction;
+    std::fill(rubbed_.begin(), rubbed_.end(), Real{});
     for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
     for (const Topology::Joint& joint : topology_.joints) {
       if (any || !HasStop(joint)) continue;
@@ -241,6 +250,8 @@ class Stepper {
       tree_.Jacobian(physics, p, rows);
       contact.pressure = Real{};
       contact.speed = Real{};
+      contact.gripped = Real{};
+      std::fill(contact.along, contact.along + kRows, Real{});
       contact.active = contact.depth - Ahead(h) * Along(p, rows, trial_.data()) > 0;
       contact.any = Any(contact.active);
       any = any || contact.any;
@@ -274,6 +285,45 @@ class Stepper {
     }
   }
 
+  // Friction divides by the speed that it will leave, so that what slides slows evenly and what sticks sticks at once:
+  // the trial's, changed by what friction at its full force takes beyond what it took in the trial.
+  void Foresee(const Real& h) {
+    const Real stick = Real{} + kStickSpeed;
+    std::fill(shift_.begin(), shift_.end(), Real{});
+    if (terms_.friction) {
+      for (const Topology::Joint& joint : topology_.joints) {
+        if (joint.type == JointDescription::Type::kSpherical) continue;
+        const auto i = static_cast<size_t>(joint.velocity);
+        const Real full = trial_[i] < 0 ? Real(-physics.axes[i].friction) : physics.axes[i].friction;
+        shift_[i] = h * (full - rubbed_[i] * trial_[i]);
+      }
+    }
+    for (size_t p = 0; p < contacts_.size(); ++p) {
+      const Contact& contact = contacts_[p];
+      if (!contact.any) continue;
+      const Real more = physics.globals.contact_friction * contact.pressure - contact.gripped;
+      for (size_t t = 1; t < kRows; ++t) {
+        const Real force = contact.active ? Real(h * more * contact.along[t]) : Real{};
+        const Real* row = &rows_[(p * kRows + t) * n_];
+        for (int i = Last(p); i >= 0; i = topology_.ancestors[static_cast<size_t>(i)]) shift_[static_cast<size_t>(i)] += row[i] * force;
+      }
+    }
+    cholesky_.Solve(topology_.ancestors, matrix_.data(), shift_.data());
+    if (terms_.friction) {
+      for (size_t i = 0; i < n_; ++i) {
+        const Real taken = trial_[i] < 0 ? Real(-shift_[i]) : shift_[i];
+        outcome_[i] = Max(Real(Abs(trial_[i]) - taken), stick);
+      }
+    }
+    for (size_t p = 0; p < contacts_.size(); ++p) {
+      Contact& contact = contacts_[p];
+      if (!contact.any) continue;
+      Real taken{};
+      for (size_t t = 1; t < kRows; ++t) taken += contact.along[t] * Along(p, &rows_[(p * kRows + t) * n_], shift_.data());
+      contact.outcome = Max(Real(contact.speed - taken), Real{} + settings_.contact->slip_speed);
+    }
+  }
+
   void AssembleConstraints(const Real& h) {
     matrix_ = smooth_;
     for (size_t i = 0; i < n_; ++i) change_[i] = h * drive_[i];
@@ -282,7 +332,8 @@ class Stepper {
       if (joint.type == JointDescription::Type::kSpherical) continue;
       const auto i = static_cast<size_t>(joint.velocity);
       if (terms_.friction) {
-        const Real slope = physics.axes[i].friction / Max(Abs(trial_[i]), Real{} + kStickSpeed);
+        const Real slope = physics.axes[i].friction / outcome_[i];
+        rubbed_[i] = slope;
         matrix_[i * n_ + i] += h * slope;
         change_[i] -= h * slope * v[i];
       }
@@ -303,8 +354,8 @@ class Stepper {
       const Real slope = globals.contact_stiffness * Ahead(h) + globals.contact_damping;
       AddForce(h, p, rows, contact.active ? globals.contact_stiffness * contact.depth : Real{},
                contact.active ? slope : Real{});
-      const Real grip = globals.contact_friction * contact.pressure /
-                        Max(contact.speed, Real{} + settings_.contact->slip_speed);
+      const Real grip = globals.contact_friction * contact.pressure / contact.outcome;
+      contact.gripped = grip;
       for (size_t t = 1; t < kRows; ++t) AddForce(h, p, rows + t * n_, Real{}, contact.active ? grip : Real{});
     }
   }
@@ -323,10 +374,12 @@ class Stepper {
       contact.pressure = Max(force, Real{});
       Real squared{};
       for (size_t t = 1; t < kRows; ++t) {
-        const Real along = Along(p, rows + t * n_, trial_.data());
-        squared += along * along;
+        contact.along[t] = Along(p, rows + t * n_, trial_.data());
+        squared += contact.along[t] * contact.along[t];
       }
       contact.speed = Sqrt(squared);
+      for (size_t t = 1; t < kRows; ++t) contact.along[t] = contact.speed > 0 ? Real(contact.along[t] / contact.speed) : Real{};
+      contact.gripped = contact.active ? Real(contact.gripped * contact.speed) : Real{};
     }
   }
 
