@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -31,6 +32,16 @@ double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
 }
 
+// What the driver would say in its log, said before anything starts.
+void RequireMeasured(const RobotDescription& robot) {
+  for (const JointDescription& joint : robot.joints) {
+    if (!joint.passive) continue;
+    throw std::invalid_argument(fmt::format(
+        "{} cannot be launched: joint '{}' has no motor, and nothing else on the bus measures it (plumb sim simulates it)",
+        robot.name, joint.name));
+  }
+}
+
 /// One run: its processes and what they say.
 class ClosedLoop {
  public:
@@ -49,6 +60,8 @@ class ClosedLoop {
                       [&](const calibration_status_t& m) { progress_.OnCalibration(m); }),
         trainings_(process.messenger(), "TRAINING_STATUS",
                    [&](const training_status_t& m) { progress_.OnTraining(m); }) {
+    for (const std::string& warning : robot_.warnings) spdlog::warn("{}", warning);
+    RequireMeasured(robot_);
     if (flags.real && flags.speed != 1) throw std::invalid_argument("a real robot runs at --speed 1");
     RequireFree(process, bus_, flags.real);
     if (!flags.real) truth_ = HiddenParameters(robot_, flags.seed);

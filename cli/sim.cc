@@ -1,6 +1,7 @@
 #include "cli/sim.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -105,6 +106,7 @@ void PrintTotals(const std::vector<SimulatedEpisode>& episodes, double period, d
 int Simulate(Process& process, const SimFlags& flags) {
   if (flags.random && !flags.policy.empty()) throw std::invalid_argument("--policy and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
+  for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
   for (const std::string& assignment : flags.set) Set(assignment, robot);
   for (const std::string& file : {flags.csv, flags.png, flags.gif}) RequireWritable(file);
   const Eigen::VectorXd means = Means(robot);

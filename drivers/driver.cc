@@ -37,6 +37,9 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       armed_by_(utime - 1) {
   joints_.reserve(robot.joints.size());
   for (const JointDescription& joint : robot.joints) {
+    if (joint.passive) {
+      throw std::invalid_argument(fmt::format("joint '{}' has no motor, and nothing else measures it", joint.name));
+    }
     joints_.emplace_back(joint, TimingOf(robot.driver));
     const Filter mine = joints_.back().motor->filter();
     for (size_t i = 0; i + 1 < joints_.size(); ++i) {
