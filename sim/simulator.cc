@@ -51,6 +51,7 @@ void Simulator::SetState(const Vector& q, const Vector& v) {
 }
 
 void Simulator::SetReading(const Vector& q, const Vector& v, const Vector& effort) {
+  RequireSize(effort.size());
   SetState(q, v);
   if (!model_->parameters().terms().sensors) return;
   engine_->FromReading(effort.data());
@@ -58,14 +59,13 @@ void Simulator::SetReading(const Vector& q, const Vector& v, const Vector& effor
 }
 
 void Simulator::Recall(std::span<const EffortSegment> before) {
+  for (const EffortSegment& segment : before) RequireSize(segment.effort.size());
   for (const EffortSegment& segment : before) track_.Append(segment.effort.data(), segment.duration);
   track_.Advance();
 }
 
 void Simulator::Step(const Vector& effort, double duration) {
-  if (effort.size() != num_velocities()) {
-    throw std::invalid_argument("an effort has " + std::to_string(num_velocities()) + " entries");
-  }
+  RequireSize(effort.size());
   RequireEnd(duration);
   if (!(duration > 0) || !finite_) return;
   if (model_->parameters().delays()) {
@@ -81,12 +81,22 @@ void Simulator::Step(const Vector& effort, double duration) {
 
 void Simulator::Step(std::span<const EffortSegment> profile) {
   double duration = 0;
-  for (const EffortSegment& segment : profile) duration += std::max(0.0, segment.duration);
+  for (const EffortSegment& segment : profile) {
+    RequireSize(segment.effort.size());
+    duration += std::max(0.0, segment.duration);
+  }
   RequireEnd(duration);
   if (!finite_) return;
   if (!model_->parameters().delays()) track_.Clear();
   for (const EffortSegment& segment : profile) track_.Append(segment.effort.data(), segment.duration);
   if (duration > 0) Run(duration);
+}
+
+void Simulator::RequireSize(Eigen::Index size) const {
+  if (size != num_velocities()) {
+    throw std::invalid_argument("an effort has " + std::to_string(num_velocities()) + " entries, not " +
+                                std::to_string(size));
+  }
 }
 
 // Time 0 is the present; the track goes on to `duration`.
@@ -114,6 +124,7 @@ void Simulator::Take() {
 }
 
 Simulator::State Simulator::Reading(const Vector& effort) {
+  RequireSize(effort.size());
   if (!model_->parameters().terms().sensors) return {q_, v_};
   engine_->ToReading(effort.data());
   std::copy_n(engine_->q(), q_.size(), reading_q_.begin());
@@ -124,6 +135,7 @@ Simulator::State Simulator::Reading(const Vector& effort) {
 }
 
 Eigen::VectorXd Simulator::Acceleration(const Vector& effort) {
+  RequireSize(effort.size());
   return Eigen::VectorXd::Map(engine_->Acceleration(effort.data()), num_velocities());
 }
 

@@ -76,6 +76,7 @@ class Simulator {
   Eigen::VectorXd Bias();
 
  private:
+  void RequireSize(Eigen::Index size) const;
   void Run(double duration);
   void Take();
 

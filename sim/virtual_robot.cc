@@ -15,17 +15,14 @@ constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 RobotDescription TrueRobot(const RobotDescription& description, const Eigen::VectorXd& physical) {
-  const RobotDescription robot = Model(description).Describe(physical);
-  const std::string lacks = Plant::Lacks(robot);
-  if (!lacks.empty()) throw std::invalid_argument("the virtual robot has no such thing as " + lacks);
-  return robot;
+  return Model(description).Describe(physical);
 }
 
 }  // namespace
 
 VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical, int64_t now)
     : joints_(description.joints),
-      plant_(TrueRobot(description, physical)),
+      mechanism_(TrueRobot(description, physical)),
       encoders_(joints_.size(), Encoder(description.virtual_robot.encoder_bits)),
       motions_(joints_.size()),
       effort_(Eigen::VectorXd::Zero(description.num_joints())) {
@@ -103,7 +100,7 @@ void VirtualRobot::MoveTo(int64_t time) {
   if (time <= time_) return;
   for (size_t i = 0; i < drives_.size(); ++i) motions_[i] = {time_, time, Turns(i), 0, TurnsPerSecond(i), 0};
   // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a crash.
-  if (!plant_.Advance(effort_, static_cast<double>(time - time_) * 1e-6)) plant_.SetState(0 * q(), 0 * v());
+  if (!mechanism_.Advance(effort_, static_cast<double>(time - time_) * 1e-6)) mechanism_.SetState(0 * q(), 0 * v());
   time_ = time;
   for (size_t i = 0; i < drives_.size(); ++i) {
     motions_[i].end_position = Turns(i);
@@ -127,7 +124,7 @@ bool VirtualRobot::Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>&
   if (utime == placed_) return true;
   placed_ = utime;
   MoveTo(latest_);
-  plant_.SetState(q, v);
+  mechanism_.SetState(q, v);
   for (size_t i = 0; i < encoders_.size(); ++i) encoders_[i].Reset(Turns(i), TurnsPerSecond(i));
   return true;
 }

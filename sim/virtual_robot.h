@@ -10,11 +10,11 @@
 #include "drivers/protocols/cansimple_device.h"
 #include "robot/description.h"
 #include "sim/encoder.h"
-#include "sim/plant.h"
+#include "sim/mechanism.h"
 
 namespace plumb {
 
-/// A robot that is not there: a Plant moved by virtual drives that listen to a CAN bus. Event-driven, with
+/// A robot that is not there: a Mechanism moved by virtual drives that listen to a CAN bus. Event-driven, with
 /// time as an argument, so that its motion does not depend, to the bit, on when the process gets to run:
 /// torques change when their frame arrived, encoders are read at multiples of the measurement period,
 /// watchdogs expire on time. Only the sending can be late. Times are microseconds. Does not throw after
@@ -50,8 +50,8 @@ class VirtualRobot {
 
   /// Of q and v: the latest event, not the latest `now`.
   int64_t time() const { return time_; }
-  const Eigen::VectorXd& q() const { return plant_.q(); }
-  const Eigen::VectorXd& v() const { return plant_.v(); }
+  const Eigen::VectorXd& q() const { return mechanism_.q(); }
+  const Eigen::VectorXd& v() const { return mechanism_.v(); }
   const std::vector<CanSimpleDevice>& drives() const { return drives_; }
 
  private:
@@ -65,13 +65,13 @@ class VirtualRobot {
 
   std::vector<JointDescription> joints_;
   std::vector<CanSimpleDevice::Settings> settings_;
-  Plant plant_;
+  Mechanism mechanism_;
   std::vector<CanSimpleDevice> drives_;
   std::vector<Encoder> encoders_;
   std::vector<ShaftMotion> motions_;
   Eigen::VectorXd effort_;                                // acts from time_ on
   FrameBatch unsent_;                                     // where frames go that would be too late
-  int64_t time_;                                          // of the plant
+  int64_t time_;                                          // of the mechanism
   int64_t latest_;                                        // the latest that we have been told
   int64_t placed_ = std::numeric_limits<int64_t>::min();  // utime of the last wish granted
 };
