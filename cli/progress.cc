@@ -43,6 +43,11 @@ std::string Pad(const std::string& text, size_t width) {
   return cells < width ? std::string(width - cells, ' ') + text : text;
 }
 
+std::string Title(const ParameterDescription& parameter) { return parameter.name + " [" + parameter.unit + "]"; }
+
+// Of a parameter's column: as wide as mean and sd, and two blanks before a longer title.
+size_t Width(const ParameterDescription& parameter) { return std::max<size_t>(20, Title(parameter).size() + 2); }
+
 }  // namespace
 
 void Progress::OnController(const controller_status_t& status) {
@@ -88,7 +93,7 @@ void Progress::Account(double seconds) {
 
 std::string Progress::Header() const {
   std::string header = "iter";
-  for (const ParameterDescription& p : robot_.parameters) header += Pad(p.name + " [" + p.unit + "]", 20);
+  for (const ParameterDescription& p : robot_.parameters) header += Pad(Title(p), Width(p));
   header += Pad("discrepancy", 13);
   for (const int n : robot_.calibration.horizons) header += Pad(fmt::format("{}-step", n), 9);
   return header + "      KL   ESS  return sim  robot      s";
@@ -97,7 +102,7 @@ std::string Progress::Header() const {
 std::string Progress::Row(const Iteration& iteration) const {
   const calibration_status_t& c = iteration.calibration;
   std::string row = fmt::format("{:4d}", c.iteration);
-  for (size_t i = 0; i < c.mean.size(); ++i) row += Pad(PlusMinus(c.mean[i], c.sd[i]), 20);
+  for (size_t i = 0; i < c.mean.size(); ++i) row += Pad(PlusMinus(c.mean[i], c.sd[i]), Width(robot_.parameters[i]));
   row += fmt::format("{:13.2f}", c.discrepancy);
   for (const double error : c.error_before) row += fmt::format("{:9.4f}", error);
   return row + fmt::format("{:8.3f}{:6.1f}{:>12}{:>7}{:7.1f}", c.kl, c.ess, OrDash(iteration.simulated_return),
@@ -159,7 +164,8 @@ std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
       if (std::isfinite(real)) text += fmt::format("{:12.3f}{:9.2f} %", real, 100 * (mean / real - 1));
       text += "\n";
     };
-    for (size_t i = 0; i < c.combination.size(); ++i) {
+    // Where every parameter is determined, each is a combination of its own, which need not be told twice.
+    for (size_t i = 0; i < c.combination.size() && c.combination.size() < c.mean.size(); ++i) {
       line(c.combination[i], c.combination_mean[i], c.combination_sd[i],
            truth.size() > 0 ? TrueCombination(i, truth) : NAN);
     }
