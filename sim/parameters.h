@@ -9,7 +9,6 @@
 #include "common/random.h"
 #include "robot/description.h"
 #include "sim/dynamics/physics.h"
-#include "sim/dynamics/stepper.h"
 #include "sim/dynamics/topology.h"
 
 namespace plumb {

@@ -5,6 +5,7 @@
 
 #include "sim/dynamics/planar_tree.h"
 #include "sim/dynamics/spatial_tree.h"
+#include "sim/dynamics/stepper.h"
 
 namespace plumb {
 namespace {

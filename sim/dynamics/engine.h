@@ -3,7 +3,6 @@
 #include <memory>
 
 #include "sim/dynamics/physics.h"
-#include "sim/dynamics/stepper.h"
 #include "sim/dynamics/topology.h"
 
 namespace plumb {

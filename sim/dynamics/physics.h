@@ -7,6 +7,11 @@
 
 namespace plumb {
 
+/// Which terms of the equations a robot has at all: what is false costs nothing.
+struct Terms {
+  bool springs = false, friction = false, slowing = false, stops = false, sensors = false;
+};
+
 /// The numbers of a robot that may differ from one simulator to the next. All vectors are in working axes: those
 /// that every link's axes are parallel to where q = 0 (see Topology), hence constant in the link.
 /// Real is double, or a pack with one robot per lane.

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "sim/dynamics/planar_tree.h"
-#include "sim/dynamics/stepper.h"
+#include "sim/dynamics/constraints.h"
 #include "sim/simulator.h"
 #include "tests/sim/trees.h"
 
@@ -18,7 +18,7 @@ using Integrator = SimulationSettings::Integrator;
 using Type = JointDescription::Type;
 
 constexpr double kGravity = 9.81;
-constexpr double kStickSpeed = Stepper<double, PlanarTree>::kStickSpeed;
+constexpr double kStickSpeed = Constraints<double, PlanarTree>::kStickSpeed;
 
 // One body of 2 kg on a joint (or, with a floating joint, free), its frame at its centre of mass.
 RobotDescription Body(const std::string& type, const std::string& axis, double substep, Integrator integrator) {
