@@ -10,7 +10,8 @@ constexpr size_t kMostSegments = 1024;
 
 }  // namespace
 
-EffortTrack::EffortTrack(int velocities, double remembered) : n_(static_cast<size_t>(velocities)), remembered_(remembered) {
+EffortTrack::EffortTrack(int velocities, double remembered)
+    : n_(static_cast<size_t>(velocities)), remembered_(remembered) {
   ends_.reserve(kMostSegments + 1);
   efforts_.reserve((kMostSegments + 1) * n_);
   Clear();

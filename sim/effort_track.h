@@ -14,15 +14,16 @@ struct EffortSegment {
   Eigen::VectorXd effort;  ///< [Nm or N] per velocity; zero at passive joints
 };
 
-/// In how many equal substeps of at most `substep` seconds a duration > 0 is divided. Some slack keeps 0.05 / 0.005 at ten
-/// whatever the rounding.
+/// In how many equal substeps of at most `substep` seconds a duration > 0 is divided. Some slack keeps 0.05 /
+/// 0.005 at ten whatever the rounding.
 inline double SubstepCount(double duration, double substep) {
   return std::max(1.0, std::ceil(duration / substep - 1e-6));
 }
 
-/// Efforts as they were commanded over time, piecewise constant, seen through a delay that need not be a whole number of
-/// steps: the delayed effort's mean over a substep, and its first moment about the middle, which together move the
-/// joints as the steps within it do, to second order. Not thread-safe. Apart from construction nothing allocates.
+/// Efforts as they were commanded over time, piecewise constant, seen through a delay that need not be a
+/// whole number of steps: the delayed effort's mean over a substep, and its first moment about the middle,
+/// which together move the joints as the steps within it do, to second order. Not thread-safe. Apart from
+/// construction nothing allocates.
 class EffortTrack {
  public:
   /// @param remembered [s] how far back efforts are known after Advance.

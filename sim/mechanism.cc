@@ -8,8 +8,8 @@ namespace plumb {
 Mechanism::Mechanism(const RobotDescription& robot) {
   for (const JointDescription& joint : robot.joints) {
     if (joint.dynamics.sensor_delay != 0 || joint.dynamics.sensor_bias != 0) {
-      throw std::invalid_argument("the virtual robot's encoders are right and on time, not like joint '" + joint.name +
-                                  "' of the simulator's");
+      throw std::invalid_argument("the virtual robot's encoders are right and on time, not like joint '" +
+                                  joint.name + "' of the simulator's");
     }
   }
   if (Plant::Lacks(robot).empty()) {
@@ -23,7 +23,8 @@ Mechanism::Mechanism(const RobotDescription& robot) {
   simulator_ = std::make_unique<Simulator>(fine);
 }
 
-void Mechanism::SetState(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v) {
+void Mechanism::SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
+                         const Eigen::Ref<const Eigen::VectorXd>& v) {
   if (plant_) {
     plant_->SetState(q, v);
   } else {

@@ -9,9 +9,9 @@
 
 namespace plumb {
 
-/// What moves in a virtual robot: a Plant, or, where the robot has something that a Plant has not (armature, stops, contact),
-/// a Simulator with substeps a tenth as long as calibration's and at most kLongestSubstep: then reality has the
-/// simulator's equations, but not its integration errors. Not thread-safe.
+/// What moves in a virtual robot: a Plant, or, where the robot has something that a Plant has not (armature,
+/// stops, contact), a Simulator with substeps a tenth as long as calibration's and at most kLongestSubstep:
+/// then reality has the simulator's equations, but not its integration errors. Not thread-safe.
 class Mechanism {
  public:
   static constexpr double kLongestSubstep = 1e-4;  ///< [s]
@@ -22,7 +22,8 @@ class Mechanism {
 
   /// @throws std::invalid_argument if an entry is not finite or the size is wrong.
   void SetState(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v);
-  /// Holds `effort` for `duration` [s] >= 0. A state that would not be finite is not taken on. @return false then.
+  /// Holds `effort` for `duration` [s] >= 0. A state that would not be finite is not taken on. @return false
+  /// then.
   bool Advance(const Eigen::Ref<const Eigen::VectorXd>& effort, double duration);
 
   const Eigen::VectorXd& q() const { return plant_ ? plant_->q() : simulator_->q(); }

@@ -31,11 +31,13 @@ Model::Model(const RobotDescription& description)
 }
 
 std::unique_ptr<Engine> Model::NewEngine() const {
-  return WithPhysics(MakeEngine(topology_, description_.simulation, parameters_.terms()), parameters_.Nominal());
+  return WithPhysics(MakeEngine(topology_, description_.simulation, parameters_.terms()),
+                     parameters_.Nominal());
 }
 
 std::unique_ptr<Engine> Model::NewWideEngine() const {
-  return WithPhysics(MakeWideEngine(topology_, description_.simulation, parameters_.terms()), parameters_.Nominal());
+  return WithPhysics(MakeWideEngine(topology_, description_.simulation, parameters_.terms()),
+                     parameters_.Nominal());
 }
 
 // A mass matrix that can be inverted at a generic position can be at almost all of them.
@@ -48,7 +50,8 @@ void Model::RequireInertia() const {
   mass = mass.selfadjointView<Eigen::Lower>();
   for (int i = 0; i < n; ++i) {
     if (!(mass(i, i) > 0) || !std::isfinite(mass(i, i))) {
-      throw std::invalid_argument("joint '" + JointOfVelocity(*this, i) + "' moves neither mass nor armature");
+      throw std::invalid_argument("joint '" + JointOfVelocity(*this, i) +
+                                  "' moves neither mass nor armature");
     }
   }
   // In units of the diagonal, so that metres and radians compare.
@@ -57,8 +60,9 @@ void Model::RequireInertia() const {
   if (modes.info() != Eigen::Success || !(modes.eigenvalues()(0) > 1e-12)) {
     Eigen::Index worst = 0;
     if (modes.info() == Eigen::Success) modes.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);
-    throw std::invalid_argument("joint '" + JointOfVelocity(*this, worst) +
-                                "' and those it is in line with move no mass of their own: their mass matrix is singular");
+    throw std::invalid_argument(
+        "joint '" + JointOfVelocity(*this, worst) +
+        "' and those it is in line with move no mass of their own: their mass matrix is singular");
   }
 }
 
@@ -85,7 +89,7 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
     JointDescription& joint = robot.joints[i];
     joint.origin = topology_.link_axes[static_cast<size_t>(joint.parent)].transpose() * vector(now.origin);
     const Physics<double>::Axis& axis = physics.axes[velocity];
-    joint.dynamics = {axis.armature, axis.damping, axis.friction, axis.stiffness,    axis.rest,
+    joint.dynamics = {axis.armature, axis.damping, axis.friction,     axis.stiffness,   axis.rest,
                       axis.gain,     axis.delay,   axis.sensor_delay, axis.sensor_bias, 1 / axis.slowing};
     velocity += static_cast<size_t>(joint.num_velocities());
   }

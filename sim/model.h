@@ -14,8 +14,8 @@ namespace plumb {
 /// thread-safe: one for all workers.
 class Model {
  public:
-  /// @throws std::invalid_argument if the joints do not form a tree, a parameter is unknown or not physical, or a
-  /// joint moves neither mass nor armature.
+  /// @throws std::invalid_argument if the joints do not form a tree, a parameter is unknown or not physical,
+  /// or a joint moves neither mass nor armature.
   explicit Model(const RobotDescription& description);
 
   const RobotDescription& description() const { return description_; }

@@ -19,8 +19,8 @@ constexpr uint32_t kHiddenStream = 0x48494444;  // "HIDD"
 constexpr double kLargestExponent = 20;
 
 // Numbers of Physics::Axis and Physics::Globals in their order.
-constexpr const char* kAxisNames[] = {"armature", "damping", "friction", "stiffness", "rest", "gain", "no_load_speed",
-                                      "delay",    "sensor_delay", "sensor_bias"};
+constexpr const char* kAxisNames[] = {"armature", "damping",       "friction", "stiffness",    "rest",
+                                      "gain",     "no_load_speed", "delay",    "sensor_delay", "sensor_bias"};
 constexpr size_t kSlowing = 6;
 constexpr const char* kGlobalNames[] = {"gravity",          "contact/stiffness", "contact/damping",
                                         "contact/friction", "limit/stiffness",   "limit/damping"};
@@ -73,8 +73,9 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
     Vector3d::Map(physics.origin) = topology.link_axes[static_cast<size_t>(joint.parent)] * joint.origin;
     base_.links.push_back(physics);
     const JointDynamics& d = joint.dynamics;
-    const Physics<double>::Axis axis{d.armature, d.damping,      d.friction, d.stiffness,   d.rest, d.motor_gain,
-                                     1 / d.no_load_speed, d.delay, d.sensor_delay, d.sensor_bias};
+    const Physics<double>::Axis axis{d.armature,     d.damping,    d.friction,          d.stiffness,
+                                     d.rest,         d.motor_gain, 1 / d.no_load_speed, d.delay,
+                                     d.sensor_delay, d.sensor_bias};
     base_.axes.insert(base_.axes.end(), static_cast<size_t>(joint.num_velocities()), axis);
   }
   const SimulationSettings& settings = description.simulation;
@@ -130,12 +131,15 @@ Parameters::Paths Parameters::AllPaths(const RobotDescription& description) cons
     if (name.starts_with("limit/") && !description.simulation.stop) continue;
     paths.push_back({name, {.effect = Effect::kGlobal, .domain = domain(name), .slot = slot}});
   }
-  paths.push_back({"mass/" + description.links[0].name, {.effect = Effect::kNone, .domain = Domain::kPositive}});
+  paths.push_back(
+      {"mass/" + description.links[0].name, {.effect = Effect::kNone, .domain = Domain::kPositive}});
   size_t velocity = 0;
   for (size_t i = 0; i < description.joints.size(); ++i) {
     const std::string& link = description.links[i + 1].name;
-    const auto add = [&](const std::string& path, Effect effect, Domain in, size_t slot = 0, double reference = 1) {
-      paths.push_back({path, {.effect = effect, .domain = in, .index = i, .slot = slot, .reference = reference}});
+    const auto add = [&](const std::string& path, Effect effect, Domain in, size_t slot = 0,
+                         double reference = 1) {
+      paths.push_back(
+          {path, {.effect = effect, .domain = in, .index = i, .slot = slot, .reference = reference}});
     };
     if (base_.links[i].mass > 0) {
       add("mass/" + link, Effect::kMass, Domain::kPositive, 0, base_.links[i].mass);
@@ -145,10 +149,12 @@ Parameters::Paths Parameters::AllPaths(const RobotDescription& description) cons
         add("inertia/" + link + "/" + kEntries[k].name, Effect::kCholesky, Domain::kExponent, k);
       }
     }
-    const auto child = std::find_if(parents_.begin(), parents_.end(), [&](int p) { return p == static_cast<int>(i) + 1; });
-    const double length = child == parents_.end()
-                              ? 2 * centers_[i].norm()
-                              : Vector3d::Map(base_.links[static_cast<size_t>(child - parents_.begin())].origin).norm();
+    const auto child =
+        std::find_if(parents_.begin(), parents_.end(), [&](int p) { return p == static_cast<int>(i) + 1; });
+    const double length =
+        child == parents_.end()
+            ? 2 * centers_[i].norm()
+            : Vector3d::Map(base_.links[static_cast<size_t>(child - parents_.begin())].origin).norm();
     if (length > 0) add("length/" + link, Effect::kLength, Domain::kPositive, 0, length);
     const JointDescription& joint = description.joints[i];
     for (size_t slot = 0; slot < std::size(kAxisNames); ++slot) {
@@ -184,28 +190,44 @@ Parameters::Binding Parameters::Find(const Paths& paths, const std::string& path
 void Parameters::Check(const std::string& name, Domain domain, double value) {
   bool fits = std::isfinite(value);
   switch (domain) {
-    case Domain::kAny: break;
-    case Domain::kNotNegative: fits = fits && value >= 0; break;
-    case Domain::kPositive: fits = fits && value > 0; break;
-    case Domain::kDelay: fits = fits && value >= 0 && value <= kLongestDelay; break;
-    case Domain::kExponent: fits = fits && std::abs(value) <= kLargestExponent; break;
+    case Domain::kAny:
+      break;
+    case Domain::kNotNegative:
+      fits = fits && value >= 0;
+      break;
+    case Domain::kPositive:
+      fits = fits && value > 0;
+      break;
+    case Domain::kDelay:
+      fits = fits && value >= 0 && value <= kLongestDelay;
+      break;
+    case Domain::kExponent:
+      fits = fits && std::abs(value) <= kLargestExponent;
+      break;
   }
   if (!fits) throw std::invalid_argument("parameter '" + name + "' cannot be " + std::to_string(value));
 }
 
 void Parameters::Freeze(const Binding& binding, double value) {
   switch (binding.effect) {
-    case Effect::kNone: break;
-    case Effect::kCholesky: AddCholesky(binding, -1, value); break;
+    case Effect::kNone:
+      break;
+    case Effect::kCholesky:
+      AddCholesky(binding, -1, value);
+      break;
     case Effect::kMass:
     case Effect::kInertia:
-    case Effect::kLength: factors_.push_back({binding, value}); break;
-    default: Set(binding, value, &base_);
+    case Effect::kLength:
+      factors_.push_back({binding, value});
+      break;
+    default:
+      Set(binding, value, &base_);
   }
 }
 
 void Parameters::AddCholesky(const Binding& binding, int parameter, double value) {
-  auto found = std::find_if(inertias_.begin(), inertias_.end(), [&](const Inertia& i) { return i.link == binding.index; });
+  auto found = std::find_if(inertias_.begin(), inertias_.end(),
+                            [&](const Inertia& i) { return i.link == binding.index; });
   if (found == inertias_.end()) {
     inertias_.push_back({binding.index, {-1, -1, -1, -1, -1, -1}, {}});
     found = std::prev(inertias_.end());
@@ -254,7 +276,9 @@ void Parameters::Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, Physic
 
 void Parameters::Set(const Binding& binding, double value, Physics<double>* physics) const {
   switch (binding.effect) {
-    case Effect::kGlobal: reinterpret_cast<double*>(&physics->globals)[binding.slot] = value; break;
+    case Effect::kGlobal:
+      reinterpret_cast<double*>(&physics->globals)[binding.slot] = value;
+      break;
     case Effect::kAxis:
     case Effect::kSlowing:
       for (size_t k = 0; k < binding.count; ++k) {
@@ -268,7 +292,8 @@ void Parameters::Set(const Binding& binding, double value, Physics<double>* phys
           (value - centers_[binding.index][slot]) * link_axes_[binding.index].col(slot);
       break;
     }
-    default: break;
+    default:
+      break;
   }
 }
 
@@ -293,7 +318,9 @@ void Parameters::Scale(const Binding& binding, double value, Physics<double>* ph
       physics->links[binding.index].mass *= factor;
       scale(physics->links[binding.index].inertia, 6, factor);
       break;
-    case Effect::kInertia: scale(physics->links[binding.index].inertia, 6, factor); break;
+    case Effect::kInertia:
+      scale(physics->links[binding.index].inertia, 6, factor);
+      break;
     case Effect::kLength: {
       const int link = static_cast<int>(binding.index) + 1;
       scale(physics->links[binding.index].center, 3, factor);
@@ -306,7 +333,8 @@ void Parameters::Scale(const Binding& binding, double value, Physics<double>* ph
       }
       break;
     }
-    default: break;
+    default:
+      break;
   }
 }
 

@@ -121,9 +121,8 @@ class Plant::Impl {
     system_.realize(state_, SimTK::Stage::Dynamics);
     SimTK::Vector residual;
     const SimTK::Vector none(static_cast<int>(v_.size()), 0.0);
-    matter_.calcResidualForceIgnoringConstraints(state_, none,
-                                                 system_.getRigidBodyForces(state_, SimTK::Stage::Dynamics), none,
-                                                 residual);
+    matter_.calcResidualForceIgnoringConstraints(
+        state_, none, system_.getRigidBodyForces(state_, SimTK::Stage::Dynamics), none, residual);
     VectorXd result(v_.size());
     for (int i = 0; i < residual.size(); ++i) result[i] = residual[i];
     return Turn(q_).transpose() * result;
@@ -188,7 +187,8 @@ class Plant::Impl {
       const JointDynamics& d = joint.dynamics;
       if (joint.type != Type::kSpherical) {
         const double speed = v[velocity];
-        all[velocity] = d.motor_gain * effort[velocity] - d.damping * speed - d.stiffness * (q[position] - d.rest) -
+        all[velocity] = d.motor_gain * effort[velocity] - d.damping * speed -
+                        d.stiffness * (q[position] - d.rest) -
                         d.friction * speed / std::max(std::abs(speed), kStickSpeed);
       }
       position += joint.num_positions();

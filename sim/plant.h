@@ -10,9 +10,9 @@ namespace plumb {
 
 /// The physics of the virtual robot: what stands for reality. It shares neither equations nor integrator with
 /// Simulator, so that the two agree only because both are right: Simbody the textbook way, with a gravity
-/// force and articulated bodies, integrated by the classical Runge-Kutta method of fourth order. Of JointDynamics
-/// it knows damping, friction, springs and motor gains; armature, stops and contact it does not have.
-/// Not thread-safe.
+/// force and articulated bodies, integrated by the classical Runge-Kutta method of fourth order. Of
+/// JointDynamics it knows damping, friction, springs and motor gains; armature, stops and contact it does not
+/// have. Not thread-safe.
 class Plant {
  public:
   static constexpr double kStickSpeed = 0.01;  ///< [rad/s] or [m/s] below which friction is viscous

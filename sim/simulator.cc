@@ -9,7 +9,8 @@ namespace plumb {
 namespace {
 
 void RequireEnd(double duration) {
-  if (duration == std::numeric_limits<double>::infinity()) throw std::invalid_argument("a step must come to an end");
+  if (duration == std::numeric_limits<double>::infinity())
+    throw std::invalid_argument("a step must come to an end");
 }
 
 }  // namespace

@@ -12,12 +12,12 @@ namespace plumb {
 
 /// A robot as a simulator with exchangeable parameters: reset to any state, apply an effort, step.
 ///
-/// Trees of revolute, continuous, prismatic and spherical joints with armature, damping, Coulomb friction, springs,
-/// stops, contact with the ground, delays and sensors (see RobotDescription); composite rigid bodies and linearly
-/// implicit integration (see Stepper). New parameters need no rebuild, not even new lengths.
+/// Trees of revolute, continuous, prismatic and spherical joints with armature, damping, Coulomb friction,
+/// springs, stops, contact with the ground, delays and sensors (see RobotDescription); composite rigid bodies
+/// and linearly implicit integration (see Stepper). New parameters need no rebuild, not even new lengths.
 ///
-/// One per worker; not thread-safe. Equal inputs give equal bits, in any thread, on any x86-64 processor. Apart from
-/// construction nothing allocates, but a first profile longer than all before it.
+/// One per worker; not thread-safe. Equal inputs give equal bits, in any thread, on any x86-64 processor.
+/// Apart from construction nothing allocates, but a first profile longer than all before it.
 class Simulator {
  public:
   using Vector = Eigen::Ref<const Eigen::VectorXd>;
@@ -49,7 +49,8 @@ class Simulator {
 
   /// Holds `effort` (num_velocities) for `duration` [s] >= 0, in equal substeps of at most settings.substep:
   ///   semi-implicit  v += h a(q, v), q += h v: of first order, as gym and MuJoCo's Euler do
-  ///   leapfrog       q += h/2 v, v += h a(q, v), q += h/2 v: of second order but for stops, contacts and friction
+  ///   leapfrog       q += h/2 v, v += h a(q, v), q += h/2 v: of second order but for stops, contacts and
+  ///   friction
   /// Velocities are clipped to settings.speed_clip after each substep (settings.move_before_clip: after the
   /// move). If the state ceases to be finite it stays so until the next SetState, without any exception.
   /// @throws std::invalid_argument if the duration is infinite or the size is wrong.

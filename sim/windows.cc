@@ -15,14 +15,16 @@ namespace {
 constexpr size_t kLargestBlock = 16;
 
 double Duration(std::span<const EffortSegment> step) {
-  return std::accumulate(step.begin(), step.end(), 0.0,
-                         [](double sum, const EffortSegment& segment) { return sum + std::max(0.0, segment.duration); });
+  return std::accumulate(step.begin(), step.end(), 0.0, [](double sum, const EffortSegment& segment) {
+    return sum + std::max(0.0, segment.duration);
+  });
 }
 
 void Require(const Window& window, const Model& model) {
   const auto sized = [&](std::span<const EffortSegment> segments) {
-    return std::all_of(segments.begin(), segments.end(),
-                       [&](const EffortSegment& segment) { return segment.effort.size() == model.num_velocities(); });
+    return std::all_of(segments.begin(), segments.end(), [&](const EffortSegment& segment) {
+      return segment.effort.size() == model.num_velocities();
+    });
   };
   bool good = window.q.size() == model.num_positions() && window.v.size() == model.num_velocities() &&
               window.q.allFinite() && window.v.allFinite() && !window.steps.empty();
@@ -31,12 +33,15 @@ void Require(const Window& window, const Model& model) {
     const double duration = Duration(step);
     good = good && sized(step) && duration > 0 && std::isfinite(duration);
   }
-  if (!good) throw std::invalid_argument("a window needs a finite state, and steps of some duration with efforts for all joints");
+  if (!good)
+    throw std::invalid_argument(
+        "a window needs a finite state, and steps of some duration with efforts for all joints");
 }
 
 }  // namespace
 
-// As many windows as there are lanes, all with the same numbers of substeps; the last group of a kind may repeat one.
+// As many windows as there are lanes, all with the same numbers of substeps; the last group of a kind may
+// repeat one.
 struct Windows::Group {
   std::vector<size_t> windows;
   std::vector<int> counts;  // substeps of each step
@@ -46,7 +51,7 @@ struct Windows::Group {
 // One thread's engine, and the efforts of some groups, substep by substep.
 struct Windows::Worker {
   struct Plan {
-    std::vector<double> lengths;  // [step][lane]: of a substep
+    std::vector<double> lengths;         // [step][lane]: of a substep
     std::vector<double> means, moments;  // [substep][velocity][lane]
     std::vector<char> steady;            // [substep]: all moments are zero
     std::vector<double> first;           // [velocity][lane]: effort at the beginning
@@ -108,8 +113,10 @@ struct Windows::Worker {
     const bool sensors = model.parameters().terms().sensors;
     for (size_t lane = 0; lane < lanes; ++lane) {
       const Window& window = windows[group.windows[lane]];
-      for (Eigen::Index i = 0; i < q.size(); ++i) engine->q()[static_cast<size_t>(i) * lanes + lane] = window.q[i];
-      for (Eigen::Index i = 0; i < v.size(); ++i) engine->v()[static_cast<size_t>(i) * lanes + lane] = window.v[i];
+      for (Eigen::Index i = 0; i < q.size(); ++i)
+        engine->q()[static_cast<size_t>(i) * lanes + lane] = window.q[i];
+      for (Eigen::Index i = 0; i < v.size(); ++i)
+        engine->v()[static_cast<size_t>(i) * lanes + lane] = window.v[i];
     }
     if (sensors) engine->FromReading(plan.first.data());
     size_t substep = 0;
@@ -209,7 +216,8 @@ std::vector<Windows::Group> Windows::Arrange(std::span<const Window> windows) co
     Require(windows[i], *model_);
     std::vector<int> counts;
     for (const auto& step : windows[i].steps) {
-      counts.push_back(static_cast<int>(SubstepCount(Duration(step), model_->description().simulation.substep)));
+      counts.push_back(
+          static_cast<int>(SubstepCount(Duration(step), model_->description().simulation.substep)));
     }
     kinds[counts].push_back(i);
   }

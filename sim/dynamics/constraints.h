@@ -11,13 +11,13 @@
 
 namespace plumb {
 
-/// What acts on a robot only sometimes, or not in proportion: joint stops, Coulomb friction, contact with the ground.
-/// All of it is taken at the end of a substep of h seconds, linear in the velocity v + dv there: force = f - b (v + dv)
-/// adds h b to the matrix and h (f - b v) to the right-hand side of  matrix dv = rhs.
+/// What acts on a robot only sometimes, or not in proportion: joint stops, Coulomb friction, contact with the
+/// ground. All of it is taken at the end of a substep of h seconds, linear in the velocity v + dv there:
+/// force = f - b (v + dv) adds h b to the matrix and h (f - b v) to the right-hand side of  matrix dv = rhs.
 ///
-/// Whether something pushes, and by which speed friction is to be divided (Coulomb's force is mu f_n v / |v|, viscous
-/// below a small speed), is found by trial: Find with the free motion; then, as often as wanted, Foresee, Assemble,
-/// solve, Judge. Work space of one Stepper; not thread-safe. The topology must outlive it.
+/// Whether something pushes, and by which speed friction is to be divided (Coulomb's force is mu f_n v / |v|,
+/// viscous below a small speed), is found by trial: Find with the free motion; then, as often as wanted,
+/// Foresee, Assemble, solve, Judge. Work space of one Stepper; not thread-safe. The topology must outlive it.
 template <class Real, template <class> class Tree>
 class Constraints {
  public:
@@ -34,7 +34,8 @@ class Constraints {
         contacts_(topology.points.size()),
         rows_(topology.points.size() * kRows * n_) {}
 
-  /// Where the substep stands. Positions are those at which forces are evaluated, `ahead` seconds before its end.
+  /// Where the substep stands. Positions are those at which forces are evaluated, `ahead` seconds before its
+  /// end.
   struct Substep {
     const Physics<Real>& physics;
     const Real* q;
@@ -42,7 +43,8 @@ class Constraints {
     Real h, ahead;
   };
 
-  /// Looks which constraints act if the velocities become `trial`. False: none does, and nothing need be assembled.
+  /// Looks which constraints act if the velocities become `trial`. False: none does, and nothing need be
+  /// assembled.
   bool Find(const Substep& now, const Tree<Real>& tree, const Real* trial) {
     bool any = terms_.friction;
     std::fill(rubbed_.begin(), rubbed_.end(), Real{});
@@ -64,10 +66,12 @@ class Constraints {
     return any;
   }
 
-  /// Friction divides by the speed that it will leave, so that what slides slows evenly and what sticks sticks at once:
-  /// the trial's, changed by what friction at its full force takes beyond what it took in the trial.
+  /// Friction divides by the speed that it will leave, so that what slides slows evenly and what sticks
+  /// sticks at once: the trial's, changed by what friction at its full force takes beyond what it took in the
+  /// trial.
   /// @param factors of the trial's matrix.
-  void Foresee(const Substep& now, const Real* trial, const SparseCholesky<Real>& cholesky, const Real* factors) {
+  void Foresee(const Substep& now, const Real* trial, const SparseCholesky<Real>& cholesky,
+               const Real* factors) {
     std::fill(shift_.begin(), shift_.end(), Real{});
     for (size_t i = 0; terms_.friction && i < n_; ++i) {
       const Real full = trial[i] < 0 ? Real(-now.physics.axes[i].friction) : now.physics.axes[i].friction;
@@ -134,7 +138,8 @@ class Constraints {
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
       if (!contact.any) continue;
-      const Real force = now.physics.globals.contact_stiffness * contact.depth - Slope(now) * Along(p, 0, trial);
+      const Real force =
+          now.physics.globals.contact_stiffness * contact.depth - Slope(now) * Along(p, 0, trial);
       contact.active = contact.active & (force > 0);
       contact.pressure = Max(force, Real{});
       Real squared{};
@@ -202,8 +207,8 @@ class Constraints {
   }
 
   // force = at_rest - slope * row . (v + dv), acting along the row
-  void AddForce(const Substep& now, size_t point, size_t direction, const Real& at_rest, const Real& slope, Real* matrix,
-                Real* rhs) const {
+  void AddForce(const Substep& now, size_t point, size_t direction, const Real& at_rest, const Real& slope,
+                Real* matrix, Real* rhs) const {
     const Real* row = Row(point, direction);
     const Real force = now.h * (at_rest - slope * Along(point, direction, now.v));
     for (int i = Last(point); i >= 0; i = Ancestor(i)) {
@@ -218,8 +223,9 @@ class Constraints {
   double slip_speed_;
   Terms terms_;
   size_t n_;
-  std::vector<Real> shift_;             // of the velocities, by friction
-  std::vector<Real> rubbed_, outcome_;  // joint friction per speed in the latest trial; speed that it will leave
+  std::vector<Real> shift_;  // of the velocities, by friction
+  std::vector<Real> rubbed_,
+      outcome_;  // joint friction per speed in the latest trial; speed that it will leave
   std::vector<Contact> contacts_;
   std::vector<Real> rows_;  // the contacts' Jacobians
 };

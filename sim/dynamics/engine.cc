@@ -60,7 +60,9 @@ class EngineOf : public Engine {
   }
 
   int lanes() const override { return kLanes<Real>; }
-  void SetPhysics(int lane, const Physics<double>& physics) override { SetLane(physics, lane, &stepper_.physics); }
+  void SetPhysics(int lane, const Physics<double>& physics) override {
+    SetLane(physics, lane, &stepper_.physics);
+  }
   void SetPhysics(const Physics<double>& physics) override {
     for (int lane = 0; lane < kLanes<Real>; ++lane) SetLane(physics, lane, &stepper_.physics);
   }
@@ -84,7 +86,8 @@ class EngineOf : public Engine {
 };
 
 template <class Real>
-std::unique_ptr<Engine> Make(const Topology& topology, const SimulationSettings& settings, const Terms& terms) {
+std::unique_ptr<Engine> Make(const Topology& topology, const SimulationSettings& settings,
+                             const Terms& terms) {
   if (topology.planar) return std::make_unique<EngineOf<Real, PlanarTree>>(topology, settings, terms);
   return std::make_unique<EngineOf<Real, SpatialTree>>(topology, settings, terms);
 }
@@ -97,9 +100,8 @@ __attribute__((visibility("default"))) std::unique_ptr<Engine> MakeEngine(const 
   return Make<double>(topology, settings, terms);
 }
 
-__attribute__((visibility("default"))) std::unique_ptr<Engine> MakeWideEngine(const Topology& topology,
-                                                                              const SimulationSettings& settings,
-                                                                              const Terms& terms) {
+__attribute__((visibility("default"))) std::unique_ptr<Engine> MakeWideEngine(
+    const Topology& topology, const SimulationSettings& settings, const Terms& terms) {
   return Make<Wide>(topology, settings, terms);
 }
 

@@ -12,9 +12,9 @@ struct Terms {
   bool springs = false, friction = false, slowing = false, stops = false, sensors = false;
 };
 
-/// The numbers of a robot that may differ from one simulator to the next. All vectors are in working axes: those
-/// that every link's axes are parallel to where q = 0 (see Topology), hence constant in the link.
-/// Real is double, or a pack with one robot per lane.
+/// The numbers of a robot that may differ from one simulator to the next. All vectors are in working axes:
+/// those that every link's axes are parallel to where q = 0 (see Topology), hence constant in the link. Real
+/// is double, or a pack with one robot per lane.
 template <class Real>
 struct Physics {
   struct Link {
@@ -23,10 +23,10 @@ struct Physics {
     Real inertia[6];  ///< [kg m^2] about the centre of mass: xx, yy, zz, xy, xz, yz
     Real origin[3];   ///< [m] of the link's joint, from its parent's origin
   };
-  struct Axis {        ///< one degree of freedom; units of the joint or its angle. See JointDynamics.
+  struct Axis {  ///< one degree of freedom; units of the joint or its angle. See JointDynamics.
     Real armature, damping, friction, stiffness, rest;
     Real gain;
-    Real slowing;      ///< 1 / no_load_speed
+    Real slowing;                           ///< 1 / no_load_speed
     Real delay, sensor_delay, sensor_bias;  ///< not the equations' of motion, but their surroundings'
   };
   struct Point {       ///< a sphere that may touch the ground
@@ -34,13 +34,13 @@ struct Physics {
     Real radius;       ///< [m]
   };
   struct Globals {
-    Real gravity;                                                     ///< [m/s^2], downwards
-    Real contact_stiffness, contact_damping, contact_friction;        ///< see SimulationSettings::Contact
-    Real stop_stiffness, stop_damping;                                ///< see SimulationSettings::Stop
+    Real gravity;                                               ///< [m/s^2], downwards
+    Real contact_stiffness, contact_damping, contact_friction;  ///< see SimulationSettings::Contact
+    Real stop_stiffness, stop_damping;                          ///< see SimulationSettings::Stop
   };
 
-  std::vector<Link> links;    ///< one per joint: the link that it moves
-  std::vector<Axis> axes;     ///< one per velocity
+  std::vector<Link> links;  ///< one per joint: the link that it moves
+  std::vector<Axis> axes;   ///< one per velocity
   std::vector<Point> points;
   Globals globals;
 };

@@ -7,10 +7,10 @@
 
 namespace plumb {
 
-/// Equations of motion of a tree whose joints all move in one plane: composite rigid bodies for the mass matrix,
-/// recursive Newton-Euler for the bias (Featherstone, "Rigid Body Dynamics Algorithms", 2008, sections 6.2 and
-/// 5.3) with three-dimensional instead of six-dimensional vectors, all in working axes about the anchor.
-/// Not thread-safe. The topology must outlive it.
+/// Equations of motion of a tree whose joints all move in one plane: composite rigid bodies for the mass
+/// matrix, recursive Newton-Euler for the bias (Featherstone, "Rigid Body Dynamics Algorithms", 2008,
+/// sections 6.2 and 5.3) with three-dimensional instead of six-dimensional vectors, all in working axes about
+/// the anchor. Not thread-safe. The topology must outlive it.
 template <class Real>
 class PlanarTree {
  public:
@@ -153,7 +153,8 @@ class PlanarTree {
     return link.y + (link.sine * sphere.position[0] + link.cosine * sphere.position[1]) - sphere.radius;
   }
 
-  /// Jacobian of that spot: rows of n, upwards and along the ground. Writes only the joints that carry the point.
+  /// Jacobian of that spot: rows of n, upwards and along the ground. Writes only the joints that carry the
+  /// point.
   void Jacobian(const Physics<Real>& physics, size_t point, Real* rows) const {
     const size_t n = topology_.joints.size();
     const int carrier = topology_.points[point].link;
@@ -178,13 +179,13 @@ class PlanarTree {
  private:
   struct Link {
     Real angle, sine, cosine;
-    Real rx, ry;    // from the parent's origin to this one's
-    Real x, y;      // of the origin
-    Real ax, ay;    // from the origin to the centre of mass
-    Real cx, cy;    // centre of mass, from the anchor
-    Real lx, ly;    // velocity at the anchor per unit of joint velocity
-    Real spin;      // [rad/s]
-    Real bx, by;    // acceleration of the origin at zero joint accelerations
+    Real rx, ry;  // from the parent's origin to this one's
+    Real x, y;    // of the origin
+    Real ax, ay;  // from the origin to the centre of mass
+    Real cx, cy;  // centre of mass, from the anchor
+    Real lx, ly;  // velocity at the anchor per unit of joint velocity
+    Real spin;    // [rad/s]
+    Real bx, by;  // acceleration of the origin at zero joint accelerations
   };
   struct Composite {  // of a link and all beyond it, about the anchor
     Real mass, x, y, inertia;

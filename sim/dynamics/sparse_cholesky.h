@@ -7,9 +7,10 @@
 
 namespace plumb {
 
-/// L^T D L factorisation of a symmetric positive definite matrix whose rows differ from zero only at a coordinate's
-/// ancestors: nothing fills in (Featherstone, "Rigid Body Dynamics Algorithms", 2008, section 6.5). In place, lower
-/// triangle, row by row. A matrix that is not positive definite gives a solution that is not one.
+/// L^T D L factorisation of a symmetric positive definite matrix whose rows differ from zero only at a
+/// coordinate's ancestors: nothing fills in (Featherstone, "Rigid Body Dynamics Algorithms", 2008,
+/// section 6.5). In place, lower triangle, row by row. A matrix that is not positive definite gives a
+/// solution that is not one.
 template <class Real>
 class SparseCholesky {
  public:
@@ -34,11 +35,13 @@ class SparseCholesky {
   void Solve(const std::vector<int>& ancestors, const Real* factors, Real* b) const {
     const size_t n = ancestors.size();
     for (size_t i = n; i-- > 0;) {
-      for (int j = ancestors[i]; j >= 0; j = ancestors[static_cast<size_t>(j)]) b[j] -= factors[i * n + static_cast<size_t>(j)] * b[i];
+      for (int j = ancestors[i]; j >= 0; j = ancestors[static_cast<size_t>(j)])
+        b[j] -= factors[i * n + static_cast<size_t>(j)] * b[i];
     }
     for (size_t i = 0; i < n; ++i) {
       b[i] *= inverse_[i];
-      for (int j = ancestors[i]; j >= 0; j = ancestors[static_cast<size_t>(j)]) b[i] -= factors[i * n + static_cast<size_t>(j)] * b[j];
+      for (int j = ancestors[i]; j >= 0; j = ancestors[static_cast<size_t>(j)])
+        b[i] -= factors[i * n + static_cast<size_t>(j)] * b[j];
     }
   }
 

@@ -48,8 +48,8 @@ struct Symmetric {
   }
 };
 
-/// Equations of motion of a tree in space: as PlanarTree, in three dimensions. Not thread-safe. The topology must
-/// outlive it.
+/// Equations of motion of a tree in space: as PlanarTree, in three dimensions. Not thread-safe. The topology
+/// must outlive it.
 template <class Real>
 class SpatialTree {
  public:
@@ -229,15 +229,15 @@ class SpatialTree {
 
  private:
   struct Link {
-    Rotation<Real> rotation;       // of working axes
-    Vector<Real> offset;           // from the parent's origin to this one's
-    Vector<Real> position;         // of the origin
-    Vector<Real> arm;              // from the origin to the centre of mass
-    Vector<Real> center;           // centre of mass, from the anchor
-    Symmetric<Real> inertia;       // about the centre of mass
-    Vector<Real> spin;             // [rad/s]
-    Vector<Real> angular_bias;     // angular acceleration at zero joint accelerations
-    Vector<Real> linear_bias;      // and that of the origin
+    Rotation<Real> rotation;    // of working axes
+    Vector<Real> offset;        // from the parent's origin to this one's
+    Vector<Real> position;      // of the origin
+    Vector<Real> arm;           // from the origin to the centre of mass
+    Vector<Real> center;        // centre of mass, from the anchor
+    Symmetric<Real> inertia;    // about the centre of mass
+    Vector<Real> spin;          // [rad/s]
+    Vector<Real> angular_bias;  // angular acceleration at zero joint accelerations
+    Vector<Real> linear_bias;   // and that of the origin
   };
   struct Column {  // motion per unit of a joint velocity, as seen at the anchor
     Vector<Real> angular, linear;

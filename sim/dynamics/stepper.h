@@ -11,12 +11,12 @@
 
 namespace plumb {
 
-/// Integrates a robot over substeps of given length, with joint damping, springs, friction, stops and contacts taken
-/// at the end of the substep and linearised in the velocity there ("linearly implicit"), so that stiff ones need no
-/// shorter substeps:
+/// Integrates a robot over substeps of given length, with joint damping, springs, friction, stops and
+/// contacts taken at the end of the substep and linearised in the velocity there ("linearly implicit"), so
+/// that stiff ones need no shorter substeps:
 ///   (M + h D + ...) dv = h (effort - bias - D v + ...)
-/// Stops, friction and contacts are settled in kPasses trials after the free motion, see Constraints. Not thread-safe.
-/// The topology must outlive it.
+/// Stops, friction and contacts are settled in kPasses trials after the free motion, see Constraints. Not
+/// thread-safe. The topology must outlive it.
 ///
 /// Real is double or a pack. Every lane has the bits it would have alone.
 template <class Real, template <class> class Tree>
@@ -45,8 +45,8 @@ class Stepper {
 
   /// One substep of h > 0 seconds, which may differ from lane to lane. Arrays of one per velocity:
   /// @param effort mean over the substep of what is commanded.
-  /// @param moment integral over the substep of (h/2 - t) effort(t) dt, or null where effort is constant: it moves
-  /// the joints as an effort early in the substep moves them farther than a late one. [Nm s^2]
+  /// @param moment integral over the substep of (h/2 - t) effort(t) dt, or null where effort is constant: it
+  /// moves the joints as an effort early in the substep moves them farther than a late one. [Nm s^2]
   void Substep(const Real& h, const Real* effort, const Real* moment) {
     if (leapfrog_) Move(Real(h / 2), v.data());
     tree_.MoveTo(physics, q.data());
@@ -98,8 +98,8 @@ class Stepper {
     return bias_.data();
   }
 
-  /// q, v are readings of sensors (JointDynamics): makes them the state that these are of, to second order in the
-  /// delay, and back.
+  /// q, v are readings of sensors (JointDynamics): makes them the state that these are of, to second order in
+  /// the delay, and back.
   void FromReading(const Real* effort) {
     const Real* acceleration = Acceleration(effort);
     ForEachReading([&](Real& position, Real& velocity, const auto& axis, size_t i) {
@@ -144,7 +144,8 @@ class Stepper {
   // A torque along the speed is limited by it: see JointDynamics::no_load_speed.
   Real Slowed(size_t i, const Real& effort, const Real& speed, double limit) const {
     const Real share = speed * physics.axes[i].slowing;
-    const Real forwards = limit * Max(Real(1 - share), Real{}), backwards = limit * Max(Real(1 + share), Real{});
+    const Real forwards = limit * Max(Real(1 - share), Real{}),
+               backwards = limit * Max(Real(1 + share), Real{});
     return Clamp(effort, Real(-backwards), forwards);
   }
 
@@ -200,7 +201,9 @@ class Stepper {
     }
   }
 
-  Real Ahead(const Real& h) const { return leapfrog_ ? Real(h / 2) : h; }  // to the substep's end, from where q is
+  Real Ahead(const Real& h) const {
+    return leapfrog_ ? Real(h / 2) : h;
+  }  // to the substep's end, from where q is
 
   void Clip() {
     if (!(settings_.speed_clip < std::numeric_limits<double>::infinity())) return;
@@ -224,7 +227,8 @@ class Stepper {
     }
   }
 
-  // Quaternion times the exponential of half the angle turned: exact for constant angular velocity in link axes.
+  // Quaternion times the exponential of half the angle turned: exact for constant angular velocity in link
+  // axes.
   static void Turn(const Real& h, const Real* spin, Real* quaternion) {
     const Real speed = Sqrt(Real(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2]));
     const Real half = 0.5 * h * speed;

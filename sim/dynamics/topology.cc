@@ -66,8 +66,10 @@ Matrix3d PlaneAxes(const Vector3d& normal) {
 std::vector<std::pair<Vector3d, double>> ContactSpheres(const Shape& shape) {
   const Vector3d half = shape.rotation * Vector3d(0, 0, shape.size(1) / 2);
   switch (shape.type) {
-    case Shape::Type::kSphere: return {{shape.position, shape.size(0)}};
-    case Shape::Type::kCapsule: return {{shape.position - half, shape.size(0)}, {shape.position + half, shape.size(0)}};
+    case Shape::Type::kSphere:
+      return {{shape.position, shape.size(0)}};
+    case Shape::Type::kCapsule:
+      return {{shape.position - half, shape.size(0)}, {shape.position + half, shape.size(0)}};
     case Shape::Type::kBox: {
       std::vector<std::pair<Vector3d, double>> corners;
       for (int corner = 0; corner < 8; ++corner) {
@@ -76,7 +78,8 @@ std::vector<std::pair<Vector3d, double>> ContactSpheres(const Shape& shape) {
       }
       return corners;
     }
-    case Shape::Type::kCylinder: break;
+    case Shape::Type::kCylinder:
+      break;
   }
   return {};
 }
@@ -136,7 +139,8 @@ Topology::Topology(const RobotDescription& robot) {
   }
   // The chain of slides that the robot as a whole hangs on.
   const auto children = [&](int link) {
-    return std::count_if(joints.begin(), joints.end(), [link](const Joint& joint) { return joint.parent == link; });
+    return std::count_if(joints.begin(), joints.end(),
+                         [link](const Joint& joint) { return joint.parent == link; });
   };
   while (anchor < static_cast<int>(n) && children(anchor) == 1 &&
          joints[static_cast<size_t>(anchor)].type == Type::kPrismatic) {
