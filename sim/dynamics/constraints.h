@@ -73,13 +73,16 @@ class Constraints {
   void Foresee(const Substep& now, const Real* trial, const SparseCholesky<Real>& cholesky,
                const Real* factors) {
     std::fill(shift_.begin(), shift_.end(), Real{});
+    bool rubs = terms_.friction;
     for (size_t i = 0; terms_.friction && i < n_; ++i) {
       const Real full = trial[i] < 0 ? Real(-now.physics.axes[i].friction) : now.physics.axes[i].friction;
       shift_[i] = now.h * (full - rubbed_[i] * trial[i]);
     }
     for (size_t p = 0; p < contacts_.size(); ++p) {
-      const Contact& contact = contacts_[p];
-      if (!contact.any) continue;
+      Contact& contact = contacts_[p];
+      contact.outcome = Max(contact.speed, Real{} + slip_speed_);
+      if (!contact.any || !Any(contact.pressure > 0)) continue;  // as in the first trial
+      rubs = true;
       const Real more = now.physics.globals.contact_friction * contact.pressure - contact.gripped;
       for (size_t t = 1; t < kRows; ++t) {
         const Real force = contact.active ? Real(now.h * more * contact.along[t]) : Real{};
@@ -87,6 +90,7 @@ class Constraints {
         for (int i = Last(p); i >= 0; i = Ancestor(i)) shift_[static_cast<size_t>(i)] += row[i] * force;
       }
     }
+    if (!rubs) return;
     cholesky.Solve(topology_.ancestors, factors, shift_.data());
     for (size_t i = 0; terms_.friction && i < n_; ++i) {
       const Real taken = trial[i] < 0 ? Real(-shift_[i]) : shift_[i];
@@ -127,6 +131,7 @@ class Constraints {
       AddForce(now, p, 0, push, contact.active ? Slope(now) : Real{}, matrix, rhs);
       const Real grip = globals.contact_friction * contact.pressure / contact.outcome;
       contact.gripped = grip;
+      if (!Any(grip > 0)) continue;
       for (size_t t = 1; t < kRows; ++t) {
         AddForce(now, p, t, Real{}, contact.active ? grip : Real{}, matrix, rhs);
       }
