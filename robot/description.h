@@ -41,14 +41,16 @@ struct MotorDescription {
 
 /// What moves a joint besides inertia and gravity. Zeros say that there is none of it.
 struct JointDynamics {
+  static constexpr double kLongestDelay = 0.5;  ///< [s]
+
   double armature = 0;      ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
   double damping = 0;       ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
   double friction = 0;      ///< [Nm] or [N] >= 0: Coulomb friction
   double stiffness = 0;     ///< [Nm/rad] or [N/m] >= 0 of a spring
   double rest = 0;          ///< [rad] or [m] where the spring is relaxed
   double motor_gain = 1;    ///< effort at the joint per effort commanded, >= 0
-  double delay = 0;         ///< [s] >= 0 between an effort's command and its effect, beyond what was recorded
-  double sensor_delay = 0;  ///< [s] >= 0: a reading is of the state so long ago
+  double delay = 0;         ///< [s] 0 to kLongestDelay between an effort's command and its effect, beyond what was recorded
+  double sensor_delay = 0;  ///< [s] 0 to kLongestDelay: a reading is of the state so long ago
   double sensor_bias = 0;   ///< [rad] or [m]: what a reading of the position adds to it
   /// [rad/s] or [m/s] > 0: speed at which the motor's back-EMF leaves it no effort. At speed w in the effort's own
   /// direction the effort is at most effort_limit * (1 - w / no_load_speed), as of a DC motor at its full voltage.
