@@ -10,7 +10,6 @@ namespace plumb {
 namespace {
 
 constexpr Range kSane{-1e9, 1e9}, kSaneNotNegative{0, 1e9};
-constexpr double kLongestDelay = 10;  // [s]
 
 MotorDescription ReadMotor(Config& config) {
   MotorDescription motor;
@@ -33,7 +32,7 @@ JointDynamics ReadDynamics(Config config, JointDynamics dynamics, const JointDes
       refuse(key, "needs a motor: the joint is passive");
   }
   if (joint.type == JointDescription::Type::kSpherical) {
-    for (const char* key : {"stiffness", "rest", "sensor_bias"})
+    for (const char* key : {"stiffness", "rest", "sensor_delay", "sensor_bias"})
       refuse(key, "has no meaning for a spherical joint");
   }
   dynamics.armature = config.Number("armature", kSaneNotNegative, 0);
@@ -42,8 +41,8 @@ JointDynamics ReadDynamics(Config config, JointDynamics dynamics, const JointDes
   dynamics.stiffness = config.Number("stiffness", kSaneNotNegative, 0);
   dynamics.rest = config.Number("rest", kSane, 0);
   dynamics.motor_gain = config.Number("motor_gain", kSaneNotNegative, 1);
-  dynamics.delay = config.Number("delay", {0, kLongestDelay}, 0);
-  dynamics.sensor_delay = config.Number("sensor_delay", {0, kLongestDelay}, 0);
+  dynamics.delay = config.Number("delay", {0, JointDynamics::kLongestDelay}, 0);
+  dynamics.sensor_delay = config.Number("sensor_delay", {0, JointDynamics::kLongestDelay}, 0);
   dynamics.sensor_bias = config.Number("sensor_bias", kSane, 0);
   if (config.Has("no_load_speed")) dynamics.no_load_speed = config.Number("no_load_speed", {1e-9, HUGE_VAL});
   config.Finish();

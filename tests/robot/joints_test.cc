@@ -114,6 +114,20 @@ TEST_CASE("mistakes about joints are at their lines") {
   Refused("[estimator]",
           "[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\nrest = 1.0\n[estimator]",
           "rest has no meaning for a spherical joint");
+  for (const char* key : {"stiffness", "sensor_delay", "sensor_bias"}) {
+    Refused("[estimator]",
+            std::string("[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\n") + key + " = 0.1\n[estimator]",
+            std::string(key) + " has no meaning for a spherical joint");
+  }
+  for (const char* key : {"motor_gain", "delay", "no_load_speed"}) {
+    Refused("[estimator]",
+            std::string("[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\n") + key + " = 0.1\n[estimator]",
+            std::string(key) + " needs a motor");
+  }
+  // The simulator remembers no further back.
+  Refused("delay = 0.004", "delay = 0.51", "delay = 0.51 is not in [0, 0.5]");
+  Refused("sensor_delay = 0.002", "sensor_delay = 0.51", "sensor_delay = 0.51 is not in [0, 0.5]");
+  CHECK_NOTHROW(Load(Replaced(kZooToml, "sensor_delay = 0.002", "sensor_delay = 0.5")));
   Refused("name = \"disc\"", "name = \"free\"", "\"free\" is not a moving joint");
   Refused("armature = 0.01", "armature = -0.01", "20:12: joint[0].dynamics.armature");
   Refused("rest = 0.1", "rset = 0.1", "rset is not a known key; did you mean rest?");
