@@ -50,7 +50,11 @@ size_t EditDistance(const std::string& a, const std::string& b) {
 
 std::string ReadFile(const std::string& file) {
   std::error_code error;
-  if (std::filesystem::is_directory(file, error)) throw ConfigError(file + ": is a folder");
+  const std::filesystem::file_status status = std::filesystem::status(file, error);
+  if (std::filesystem::is_directory(status)) throw ConfigError(file + ": is a folder");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw ConfigError(file + ": is not a regular file");  // opening a pipe would wait for who writes to it
+  }
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw ConfigError(file + ": cannot be opened");
   std::string text, piece(size_t{1} << 16, '\0');

@@ -88,7 +88,7 @@ class Config {
   mutable std::set<std::string> known_;
 };
 
-/// The bytes of a file. @throws ConfigError if it cannot be read or is longer than 16 MB.
+/// The bytes of a regular file. @throws ConfigError if it is none, cannot be read or is longer than 16 MB.
 std::string ReadFile(const std::string& file);
 
 /// Levenshtein's distance, for "did you mean".

@@ -142,9 +142,14 @@ void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
 }
 
 std::optional<Checkpoint> LoadCheckpoint(const std::string& file) {
+  std::error_code ignored;  // whatever is wrong, opening the file tells
+  const std::filesystem::file_status status = std::filesystem::status(file, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw CheckpointError(fmt::format("checkpoint {} is not a regular file", file));  // a pipe would keep us waiting
+  }
   std::ifstream stream(file, std::ios::binary);
   if (!stream) {
-    if (!std::filesystem::exists(file)) return {};
+    if (status.type() == std::filesystem::file_type::not_found) return {};
     throw CheckpointError(fmt::format("cannot read checkpoint {}: {}", file, std::strerror(errno)));
   }
   const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());

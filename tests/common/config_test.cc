@@ -1,6 +1,11 @@
 #include "common/config.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
 
 namespace plumb {
 namespace {
@@ -51,9 +56,19 @@ TEST_CASE("what is not TOML is located") {
 }
 
 TEST_CASE("what is no file of text is refused, however long") {
+  namespace fs = std::filesystem;
   CHECK_THROWS_WITH(ReadFile("/"), Equals("/: is a folder"));
-  CHECK_THROWS_WITH(ReadFile("/dev/zero"), Equals("/dev/zero: is longer than 16 MB"));
-  CHECK(ReadFile("/dev/null").empty());
+  CHECK_THROWS_WITH(ReadFile("/dev/zero"), Equals("/dev/zero: is not a regular file"));
+  const std::string file = (fs::temp_directory_path() / ("plumbline_config_test_" + std::to_string(getpid()))).string();
+  REQUIRE(mkfifo(file.c_str(), 0600) == 0);
+  CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": is not a regular file"));  // nor does it wait for a writer
+  fs::remove(file);
+  CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": cannot be opened"));
+  std::ofstream(file).close();
+  CHECK(ReadFile(file).empty());
+  fs::resize_file(file, (size_t{16} << 20) + 1);
+  CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": is longer than 16 MB"));
+  fs::remove(file);
 }
 
 TEST_CASE("a key may hold a table or something else") {

@@ -1,5 +1,7 @@
 #include "trainer/session.h"
 
+#include <sys/stat.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
@@ -141,6 +143,14 @@ TEST_CASE("No checkpoint is nothing; one of another run is an error") {
   robot.parameters[0].name = "wind";
   TrainingSession other_robot(robot, MakeGymPendulum, 2, 4, 1);
   CHECK_THROWS_WITH(other_robot.Restore(checkpoint), Catch::Contains("another robot or network"));
+}
+
+TEST_CASE("What is not a regular file is no checkpoint, and is named") {
+  const TemporaryFolder folder;
+  const std::string pipe = (folder.path / "pipe").string();
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK_THROWS_WITH(LoadCheckpoint(pipe), Catch::Contains(pipe + " is not a regular file"));
+  CHECK_THROWS_WITH(LoadCheckpoint("/tmp"), Catch::Contains("/tmp is not a regular file"));
 }
 
 TEST_CASE("A damaged checkpoint is refused, wherever the damage") {
