@@ -21,18 +21,45 @@ double Scale(const JointDescription& joint) {
 }
 
 int ObservationSize(const RobotDescription& description) {
-  return 2 * description.num_joints() +
-         static_cast<int>(std::count_if(description.joints.begin(), description.joints.end(), Endless));
+  int size = description.num_velocities();
+  for (const JointDescription& joint : description.joints) size += Endless(joint) ? 2 : joint.num_velocities();
+  return size;
 }
 
 Eigen::VectorXd StateScale(const RobotDescription& description) {
-  const int n = description.num_joints();
-  Eigen::VectorXd scale(2 * n);
-  for (int i = 0; i < n; ++i) {
-    scale[i] = Scale(description.joints[static_cast<size_t>(i)]);
-    scale[n + i] = kSpeedScale * scale[i];
+  Eigen::VectorXd scale(description.num_positions() + description.num_velocities());
+  Eigen::Index q = 0, v = description.num_positions();
+  for (const JointDescription& joint : description.joints) {
+    scale.segment(q, joint.num_positions()).setConstant(Scale(joint));
+    scale.segment(v, joint.num_velocities()).setConstant(kSpeedScale * Scale(joint));
+    q += joint.num_positions();
+    v += joint.num_velocities();
   }
   return scale;
+}
+
+Eigen::Quaterniond Quaternion(const double* wxyz) { return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]}; }
+
+/// The shortest of the rotation vectors of a quaternion, which need not be normalised.
+Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
+  const double sine = q.vec().norm(), cosine = std::abs(q.w());
+  const double factor = sine > 0 ? 2 * std::atan2(sine, cosine) / sine : 0;
+  return std::copysign(factor, q.w()) * q.vec();
+}
+
+Eigen::Quaterniond Rotation(const Eigen::Vector3d& vector) {
+  const double angle = vector.norm();
+  if (!(angle > 0)) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, vector / angle));
+}
+
+/// Any orientation, all as likely: Shoemake, "Uniform random rotations", Graphics Gems III, 1992.
+Eigen::Quaterniond AnyOrientation(Random& random) {
+  const double part = random.Uniform();
+  const double one = random.Uniform(-std::numbers::pi, std::numbers::pi);
+  const double other = random.Uniform(-std::numbers::pi, std::numbers::pi);
+  const double a = std::sqrt(1 - part), b = std::sqrt(part);
+  return {a * std::cos(one), a * std::sin(one), b * std::cos(other), b * std::sin(other)};
 }
 
 }  // namespace
@@ -40,40 +67,56 @@ Eigen::VectorXd StateScale(const RobotDescription& description) {
 ReachTask::ReachTask(const RobotDescription& description, const std::string& name)
     : Task(description, ObservationSize(description), StateScale(description)) {
   const TaskSettings& settings = description.task;
-  for (size_t i = 0; i < description.joints.size(); ++i) {
-    const JointDescription& joint = description.joints[i];
-    const auto fail = [&](const std::string& what) {
-      throw std::invalid_argument("task '" + name + "': joint '" + joint.name + "' " + what);
-    };
-    if (joint.type == Type::kSpherical) fail("is spherical, which this task cannot aim at");
-    const double target = i < settings.target.size() ? settings.target[i] : 0;
-    const double spread = i < settings.spread.size() ? settings.spread[i] : 0;
-    Coordinate c{Endless(joint), target, Scale(joint), joint.lower, joint.upper};
-    if (spread > 0) {
-      c.lower = std::max(joint.lower, target - spread);
-      c.upper = std::min(joint.upper, target + spread);
-    } else if (name == "hold") {
-      c.lower = c.upper = target;
-    } else if (c.endless) {
-      c.lower = -std::numbers::pi;
-      c.upper = std::numbers::pi;
-    } else if (!std::isfinite(c.upper - c.lower)) {
-      fail("has no limits to start between: give it a task.spread");
+  Eigen::Index q = 0, v = 0;
+  for (const JointDescription& joint : description.joints) {
+    const auto at = static_cast<size_t>(q);
+    const double spread = at < settings.spread.size() ? settings.spread[at] : 0;
+    Joint j;
+    j.type = joint.type;
+    j.q = q;
+    j.v = v;
+    j.scale = Scale(joint);
+    if (joint.type == Type::kSpherical) {
+      if (at + 4 <= settings.target.size()) j.orientation = Quaternion(&settings.target[at]);
+      j.lower = -spread;
+      j.upper = spread;
+      j.anywhere = !(spread > 0) && name != "hold";
+    } else {
+      j.target = at < settings.target.size() ? settings.target[at] : 0;
+      j.lower = joint.lower;
+      j.upper = joint.upper;
+      if (spread > 0) {
+        j.lower = std::max(joint.lower, j.target - spread);
+        j.upper = std::min(joint.upper, j.target + spread);
+      } else if (name == "hold") {
+        j.lower = j.upper = j.target;
+      } else if (Endless(joint)) {
+        j.lower = -std::numbers::pi;
+        j.upper = std::numbers::pi;
+      } else if (!std::isfinite(j.upper - j.lower)) {
+        throw std::invalid_argument("task '" + name + "': joint '" + joint.name +
+                                    "' has no limits to start between: give it a task.spread");
+      }
     }
-    coordinates_.push_back(c);
+    joints_.push_back(j);
+    q += joint.num_positions();
+    v += joint.num_velocities();
   }
 }
 
-double ReachTask::Error(size_t i, double q) const {
-  const Coordinate& c = coordinates_[i];
-  return c.endless ? WrapAngle(q - c.target) : q - c.target;
+Eigen::Vector3d ReachTask::Turn(const Joint& joint, const State& q) {
+  return RotationVector(joint.orientation.conjugate() * Quaternion(q.data() + joint.q));
 }
 
 void ReachTask::Observe(const State& q, const State& v, std::span<float> observation) const {
   size_t next = 0;
-  for (size_t i = 0; i < coordinates_.size(); ++i) {
-    const double error = q[static_cast<Eigen::Index>(i)] - coordinates_[i].target;
-    if (coordinates_[i].endless) {
+  for (const Joint& joint : joints_) {
+    if (joint.type == Type::kSpherical) {
+      for (const double entry : Turn(joint, q)) observation[next++] = static_cast<float>(entry);
+      continue;
+    }
+    const double error = q[joint.q] - joint.target;
+    if (joint.type == Type::kContinuous) {
       observation[next++] = static_cast<float>(std::sin(error));
       observation[next++] = static_cast<float>(std::cos(error));
     } else {
@@ -85,10 +128,14 @@ void ReachTask::Observe(const State& q, const State& v, std::span<float> observa
 
 double ReachTask::Reward(const State& q, const State& v, const State& effort, const State&, const State&) const {
   double cost = 0;
-  for (size_t i = 0; i < coordinates_.size(); ++i) {
-    const auto index = static_cast<Eigen::Index>(i);
-    const double error = Error(i, q[index]) / coordinates_[i].scale;
-    const double speed = v[index] / coordinates_[i].scale;
+  for (const Joint& joint : joints_) {
+    if (joint.type == Type::kSpherical) {
+      cost += Turn(joint, q).squaredNorm() + kSpeedWeight * v.segment<3>(joint.v).squaredNorm();
+      continue;
+    }
+    const double difference = q[joint.q] - joint.target;
+    const double error = (joint.type == Type::kContinuous ? WrapAngle(difference) : difference) / joint.scale;
+    const double speed = v[joint.v] / joint.scale;
     cost += error * error + kSpeedWeight * speed * speed;
   }
   for (int i = 0; i < action_size(); ++i) {
@@ -100,8 +147,20 @@ double ReachTask::Reward(const State& q, const State& v, const State& effort, co
 
 void ReachTask::InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
                              Eigen::Ref<Eigen::VectorXd> v) const {
-  for (size_t i = 0; i < coordinates_.size(); ++i) {
-    q[static_cast<Eigen::Index>(i)] = random.Uniform(coordinates_[i].lower, coordinates_[i].upper);
+  for (const Joint& joint : joints_) {
+    if (joint.type != Type::kSpherical) {
+      q[joint.q] = random.Uniform(joint.lower, joint.upper);
+      continue;
+    }
+    Eigen::Quaterniond start;
+    if (joint.anywhere) {
+      start = AnyOrientation(random);
+    } else {
+      Eigen::Vector3d turn;
+      for (double& entry : turn) entry = random.Uniform(joint.lower, joint.upper);
+      start = joint.orientation * Rotation(turn);
+    }
+    q.segment<4>(joint.q) << start.w(), start.x(), start.y(), start.z();
   }
   v.setZero();
 }
