@@ -27,6 +27,10 @@ VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::Vec
       motions_(joints_.size()),
       effort_(Eigen::VectorXd::Zero(description.num_joints())) {
   for (const JointDescription& joint : joints_) {
+    if (joint.passive) {
+      throw std::invalid_argument("joint '" + joint.name +
+                                  "' has no motor, and nothing else on the bus measures it (plumb sim simulates it)");
+    }
     if (joint.motor.protocol != "cansimple") {
       throw std::invalid_argument("joint '" + joint.name + "': no virtual drive speaks '" +
                                   joint.motor.protocol + "'; known: cansimple");

@@ -162,6 +162,13 @@ TEST_CASE("without setpoints the watchdog stops the torque on time, though the p
   CHECK(sleeping.robot.q()[0] != 0);
 }
 
+TEST_CASE("a joint without a motor is refused by its name: nothing would measure it") {
+  RobotDescription description = Pendulum();
+  description.joints[0].passive = true;
+  description.joints[0].motor = {};
+  CHECK_THROWS_WITH(Bench(description), Catch::Contains("'pivot' has no motor") && Catch::Contains("measures it"));
+}
+
 TEST_CASE("a placing wish is granted once, and only a sane one") {
   Bench bench;
   const double nan = std::numeric_limits<double>::quiet_NaN();
