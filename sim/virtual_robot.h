@@ -22,7 +22,8 @@ namespace plumb {
 class VirtualRobot {
  public:
   /// @param physical the true parameters, order of description.parameters.
-  /// @throws std::invalid_argument if a joint has no motor, a motor does not speak CANSimple, or a parameter is not physical.
+  /// @throws std::invalid_argument if a joint has no motor, a motor does not speak CANSimple, or a parameter
+  /// is not physical.
   VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical, int64_t now);
 
   /// What the bus must let in.
