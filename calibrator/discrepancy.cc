@@ -55,7 +55,7 @@ Window Discrepancy::WindowOf(const Rollout& rollout, size_t first, size_t length
   for (size_t i = first; i < first + length; ++i) window.steps.emplace_back(transitions[i].efforts);
   if (!windows_.model().parameters().delays()) return window;
   double known = 0;
-  for (size_t i = first; i > 0 && known < Parameters::kLongestDelay; --i) {
+  for (size_t i = first; i > 0 && known < JointDynamics::kLongestDelay; --i) {
     if (transitions[i - 1].step != transitions[i].step - 1) break;
     window.before.insert(window.before.begin(), transitions[i - 1].efforts);
     known += transitions[i - 1].duration();
@@ -139,35 +139,41 @@ Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters, std::s
 
 Eigen::VectorXd Discrepancy::TrajectoryError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts,
                                              double smoothing) {
-  Eigen::VectorXd total = Eigen::VectorXd::Zero(parameters.cols());
-  size_t steps = 0;
+  // Over a gap nothing is known of the efforts: the simulation sets off again where the record does.
+  std::vector<Window> windows;
+  std::vector<const Transition*> first;      // of each window
+  std::vector<Eigen::Index> rows, begins;    // where each window's errors go, and where each roll-out's begin
+  Eigen::Index steps = 0;
   for (const Rollout& rollout : rollouts) {
     const auto& transitions = rollout.transitions;
-    if (transitions.empty()) continue;
-    // Over a gap nothing is known of the efforts: the simulation sets off again where the record does.
-    std::vector<Window> windows;
-    std::vector<size_t> first;
+    begins.push_back(steps);
     for (size_t begin = 0, end = 1; begin < transitions.size(); begin = end++) {
       while (end < transitions.size() && transitions[end].step == transitions[end - 1].step + 1) ++end;
       windows.push_back(WindowOf(rollout, begin, end - begin));
-      first.push_back(begin);
+      first.push_back(&transitions[begin]);
+      rows.push_back(steps + static_cast<Eigen::Index>(begin));
     }
-    std::vector<Eigen::MatrixXd> errors(static_cast<size_t>(parameters.cols()),
-                                        Eigen::MatrixXd(static_cast<Eigen::Index>(transitions.size()), 2 * n_));
-    const auto visit = [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto& v) {
-      const size_t at = first[window] + step;
-      auto row = errors[static_cast<size_t>(sample)].row(static_cast<Eigen::Index>(at));
-      row << (q - transitions[at].next_q).transpose(), (v - transitions[at].next_v).transpose();
-      row.array() /= scale_.transpose().array();
-    };
-    Predict(parameters, windows, visit, /*last_only=*/false);
-    for (Eigen::Index sample = 0; sample < parameters.cols(); ++sample) {
-      const Eigen::MatrixXd smooth =
-          SmoothOverTime(errors[static_cast<size_t>(sample)], smoothing / transitions[0].duration());
+    steps += static_cast<Eigen::Index>(transitions.size());
+  }
+  begins.push_back(steps);
+  std::vector<Eigen::MatrixXd> errors(static_cast<size_t>(parameters.cols()), Eigen::MatrixXd(steps, 2 * n_));
+  const auto visit = [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto& v) {
+    const Transition& transition = first[window][step];
+    auto row = errors[static_cast<size_t>(sample)].row(rows[window] + static_cast<Eigen::Index>(step));
+    row << (q - transition.next_q).transpose(), (v - transition.next_v).transpose();
+    row.array() /= scale_.transpose().array();
+  };
+  Predict(parameters, windows, visit, /*last_only=*/false);
+  Eigen::VectorXd total = Eigen::VectorXd::Zero(parameters.cols());
+  for (Eigen::Index sample = 0; sample < parameters.cols(); ++sample) {
+    for (size_t i = 0; i < rollouts.size(); ++i) {
+      if (rollouts[i].transitions.empty()) continue;
+      const Eigen::MatrixXd own =
+          errors[static_cast<size_t>(sample)].middleRows(begins[i], begins[i + 1] - begins[i]);
+      const Eigen::MatrixXd smooth = SmoothOverTime(own, smoothing / rollouts[i].transitions[0].duration());
       const double error = smooth.cwiseAbs().sum() + smooth.squaredNorm();
       total(sample) += std::isfinite(error) ? error : kInfinity;
     }
-    steps += transitions.size();
   }
   return total / static_cast<double>(steps);
 }

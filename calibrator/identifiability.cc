@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 namespace plumb {
@@ -144,17 +145,31 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
     prior_sd(i) = std::sqrt(robot.parameters[static_cast<size_t>(i)].coordinate_variance());
   }
   Identifiability found;
-  // Both ends of each central difference, all in one batch.
+  // The middle and both ends of each difference, all in one batch. Where one end is no simulator, as beyond friction 0,
+  // the other one has to do.
   const Eigen::VectorXd h = 1e-4 * prior_sd;
-  Eigen::MatrixXd physical(n, 2 * n);
+  Eigen::MatrixXd physical(n, 2 * n + 1);
   for (Eigen::Index i = 0; i < n; ++i) {
     physical.col(2 * i) = robot.ToPhysical(distribution.mean + h(i) * Eigen::VectorXd::Unit(n, i));
     physical.col(2 * i + 1) = robot.ToPhysical(distribution.mean - h(i) * Eigen::VectorXd::Unit(n, i));
   }
+  physical.col(2 * n) = robot.ToPhysical(distribution.mean);
   const Eigen::MatrixXd residuals = discrepancy.Residuals(physical, rollouts);
   Eigen::MatrixXd jacobian(residuals.rows(), n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    jacobian.col(i) = (residuals.col(2 * i) - residuals.col(2 * i + 1)) / (2 * h(i));
+    const auto above = residuals.col(2 * i), below = residuals.col(2 * i + 1), middle = residuals.col(2 * n);
+    if (above.allFinite() && below.allFinite()) {
+      jacobian.col(i) = (above - below) / (2 * h(i));
+    } else if (above.allFinite()) {
+      jacobian.col(i) = (above - middle) / h(i);
+    } else {
+      jacobian.col(i) = (middle - below) / h(i);
+    }
+  }
+  if (!jacobian.allFinite()) {
+    found.information = Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::quiet_NaN());
+    found.words = "the simulation fails at the mean parameters, so nothing is known of what can be known";
+    return found;
   }
   found.information = jacobian.transpose() * jacobian;
 

@@ -105,7 +105,7 @@ struct SimulationSettings {
   /// kSemiImplicit: v += h a(q, v); q += h v, as gym does. kLeapfrog: q += h/2 v; v += h a; q += h/2 v.
   enum class Integrator { kSemiImplicit, kLeapfrog };
   Integrator integrator;
-  double substep;    ///< [s] upper bound; a step is divided evenly
+  double substep;    ///< [s] a step is divided evenly into such, or up to a tenth longer ones
   double latency;    ///< [s] in training: the previous action acts that long into a step
   double speed_clip; ///< [rad/s] velocities are clipped to this after each substep; infinity = no clip
   /// gym v0 moves the position with the speed before clipping it; false = with the clipped one.

@@ -44,7 +44,7 @@ Environment::StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf
 }
 
 void Environment::Read() {
-  const Simulator::State reading = simulator_.Reading(effort_);
+  const Simulator::State reading = simulator_.Reading();
   reading_q_ = reading.q;
   reading_v_ = reading.v;
 }

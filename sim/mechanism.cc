@@ -1,6 +1,7 @@
 #include "sim/mechanism.h"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 namespace plumb {
@@ -19,6 +20,7 @@ Mechanism::Mechanism(const RobotDescription& robot) {
   RobotDescription fine = robot;
   fine.parameters.clear();
   fine.simulation.integrator = SimulationSettings::Integrator::kLeapfrog;
+  fine.simulation.speed_clip = std::numeric_limits<double>::infinity();
   fine.simulation.substep = std::min(robot.simulation.substep / 10, kLongestSubstep);
   simulator_ = std::make_unique<Simulator>(fine);
 }

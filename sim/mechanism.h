@@ -11,7 +11,8 @@ namespace plumb {
 
 /// What moves in a virtual robot: a Plant, or, where the robot has something that a Plant has not (armature,
 /// stops, contact), a Simulator with substeps a tenth as long as calibration's and at most kLongestSubstep:
-/// then reality has the simulator's equations, but not its integration errors. Not thread-safe.
+/// then reality has the simulator's equations, but not its integration errors: what a model of contact gets
+/// wrong does not show there. Not thread-safe.
 class Mechanism {
  public:
   static constexpr double kLongestSubstep = 1e-4;  ///< [s]

@@ -49,7 +49,11 @@ void Model::RequireInertia() const {
   Eigen::MatrixXd mass = RowMajor::Map(engine->MassMatrix(), n, n);
   mass = mass.selfadjointView<Eigen::Lower>();
   for (int i = 0; i < n; ++i) {
-    if (!(mass(i, i) > 0) || !std::isfinite(mass(i, i))) {
+    if (!(mass(i, i) < 1e100)) {
+      throw std::invalid_argument("what joint '" + JointOfVelocity(*this, i) +
+                                  "' moves is too heavy or too long to be simulated");
+    }
+    if (!(mass(i, i) > 0)) {
       throw std::invalid_argument("joint '" + JointOfVelocity(*this, i) +
                                   "' moves neither mass nor armature");
     }

@@ -73,6 +73,8 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
     Vector3d::Map(physics.origin) = topology.link_axes[static_cast<size_t>(joint.parent)] * joint.origin;
     base_.links.push_back(physics);
     const JointDynamics& d = joint.dynamics;
+    Check("delay/" + joint.name, Domain::kDelay, d.delay);
+    Check("sensor_delay/" + joint.name, Domain::kDelay, d.sensor_delay);
     const Physics<double>::Axis axis{d.armature,     d.damping,    d.friction,          d.stiffness,
                                      d.rest,         d.motor_gain, 1 / d.no_load_speed, d.delay,
                                      d.sensor_delay, d.sensor_bias};
@@ -159,8 +161,10 @@ Parameters::Paths Parameters::AllPaths(const RobotDescription& description) cons
     const JointDescription& joint = description.joints[i];
     for (size_t slot = 0; slot < std::size(kAxisNames); ++slot) {
       const std::string name = kAxisNames[slot];
-      // Springs, sensors and speed limits of a spherical joint are not modelled.
-      if (joint.type == JointDescription::Type::kSpherical && slot >= 2) continue;
+      // Springs, sensors and speed limits of a spherical joint are not modelled; motors' numbers need a
+      // motor.
+      if (joint.type == JointDescription::Type::kSpherical && slot > 2) continue;
+      if (joint.passive && (name == "gain" || name == "delay" || name == "no_load_speed")) continue;
       paths.push_back({name + "/" + joint.name,
                        {.effect = slot == kSlowing ? Effect::kSlowing : Effect::kAxis,
                         .domain = domain(name),
@@ -199,7 +203,7 @@ void Parameters::Check(const std::string& name, Domain domain, double value) {
       fits = fits && value > 0;
       break;
     case Domain::kDelay:
-      fits = fits && value >= 0 && value <= kLongestDelay;
+      fits = fits && value >= 0 && value <= JointDynamics::kLongestDelay;
       break;
     case Domain::kExponent:
       fits = fits && std::abs(value) <= kLargestExponent;

@@ -26,7 +26,8 @@ namespace plumb {
 ///                           length that the URDF implies for a uniform rod: twice that of the centre of
 ///                           mass.
 ///   {armature,damping,friction,stiffness,rest,gain,delay,sensor_delay,sensor_bias,no_load_speed}/<joint>
-///                           as in JointDynamics; of a spherical joint for all of its axes
+///                           as in JointDynamics; a spherical joint has the first three, for all of
+///                           its axes, and a passive one no gain, delay and no_load_speed
 ///   contact/{stiffness,damping,friction}, limit/{stiffness,damping}   as in SimulationSettings
 ///
 /// Only inertias that a body can have can be expressed: with S = tr(I)/2 - I, the second moment of mass about
@@ -40,8 +41,6 @@ namespace plumb {
 /// Immutable, hence thread-safe.
 class Parameters {
  public:
-  static constexpr double kLongestDelay = 0.5;  ///< [s]
-
   /// @throws std::invalid_argument for a path that is none of the above, naming the nearest that is, or a
   /// value that is not physical.
   Parameters(const RobotDescription& description, const Topology& topology);

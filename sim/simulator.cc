@@ -8,10 +8,8 @@
 namespace plumb {
 namespace {
 
-void RequireEnd(double duration) {
-  if (duration == std::numeric_limits<double>::infinity())
-    throw std::invalid_argument("a step must come to an end");
-}
+// Beyond which nobody waits for a step.
+constexpr double kMostSubsteps = 1e9;
 
 }  // namespace
 
@@ -19,9 +17,10 @@ Simulator::Simulator(std::shared_ptr<const Model> model)
     : model_(std::move(model)),
       engine_(model_->NewEngine()),
       physics_(model_->parameters().Nominal()),
-      track_(model_->num_velocities(), Parameters::kLongestDelay),
+      track_(model_->num_velocities(), JointDynamics::kLongestDelay),
       mean_(static_cast<size_t>(model_->num_velocities())),
       moment_(mean_.size()),
+      arriving_(mean_.size()),
       q_(model_->num_positions()),
       v_(model_->num_velocities()),
       reading_q_(q_),
@@ -48,12 +47,14 @@ void Simulator::SetState(const Vector& q, const Vector& v) {
   std::copy(q.begin(), q.end(), engine_->q());
   std::copy(v.begin(), v.end(), engine_->v());
   track_.Clear();
+  std::fill(arriving_.begin(), arriving_.end(), 0.0);
   Take();
 }
 
 void Simulator::SetReading(const Vector& q, const Vector& v, const Vector& effort) {
   RequireSize(effort.size());
   SetState(q, v);
+  std::copy(effort.begin(), effort.end(), arriving_.begin());
   if (!model_->parameters().terms().sensors) return;
   engine_->FromReading(effort.data());
   Take();
@@ -74,6 +75,7 @@ void Simulator::Step(const Vector& effort, double duration) {
     Run(duration);
     return;
   }
+  std::copy(effort.begin(), effort.end(), arriving_.begin());
   const double count = SubstepCount(duration, model_->description().simulation.substep);
   const double h = duration / count;
   for (double i = 0; i < count; ++i) engine_->Substep(&h, effort.data(), nullptr);
@@ -91,6 +93,12 @@ void Simulator::Step(std::span<const EffortSegment> profile) {
   if (!model_->parameters().delays()) track_.Clear();
   for (const EffortSegment& segment : profile) track_.Append(segment.effort.data(), segment.duration);
   if (duration > 0) Run(duration);
+}
+
+void Simulator::RequireEnd(double duration) const {
+  if (duration > kMostSubsteps * model_->description().simulation.substep) {
+    throw std::invalid_argument("a step of " + std::to_string(duration) + " s would never come to an end");
+  }
 }
 
 void Simulator::RequireSize(Eigen::Index size) const {
@@ -115,6 +123,7 @@ void Simulator::Run(double duration) {
     engine_->Substep(&h, mean_.data(), steady ? nullptr : moment_.data());
   }
   track_.Advance();
+  for (size_t k = 0; k < arriving_.size(); ++k) arriving_[k] = track_.At(k, 0, physics_.axes[k].delay);
   Take();
 }
 
@@ -124,10 +133,9 @@ void Simulator::Take() {
   finite_ = q_.allFinite() && v_.allFinite();
 }
 
-Simulator::State Simulator::Reading(const Vector& effort) {
-  RequireSize(effort.size());
+Simulator::State Simulator::Reading() {
   if (!model_->parameters().terms().sensors) return {q_, v_};
-  engine_->ToReading(effort.data());
+  engine_->ToReading(arriving_.data());
   std::copy_n(engine_->q(), q_.size(), reading_q_.begin());
   std::copy_n(engine_->v(), v_.size(), reading_v_.begin());
   std::copy(q_.begin(), q_.end(), engine_->q());

@@ -44,7 +44,8 @@ class Simulator {
   /// The same for the readings of the robot's sensors, of which some may be late or biased: JointDynamics.
   /// @param effort that acts at that time.
   void SetReading(const Vector& q, const Vector& v, const Vector& effort);
-  /// What had been commanded before the present: where an effort is delayed, it is still to come.
+  /// What had been commanded before the present, in order of time: where an effort is delayed, it is still to
+  /// come.
   void Recall(std::span<const EffortSegment> before);
 
   /// Holds `effort` (num_velocities) for `duration` [s] >= 0, in equal substeps of at most settings.substep:
@@ -60,12 +61,13 @@ class Simulator {
 
   const Eigen::VectorXd& q() const { return q_; }  ///< [rad or m]
   const Eigen::VectorXd& v() const { return v_; }  ///< [rad/s or m/s]
-  /// What the sensors say. Valid until the next call. @param effort that acts now.
+  /// What the sensors say: of the past, extrapolated to second order in their delay by the accelerations that
+  /// the efforts arriving now and all stops and contacts would give. Valid until the next call.
   struct State {
     const Eigen::VectorXd& q;
     const Eigen::VectorXd& v;
   };
-  State Reading(const Vector& effort);
+  State Reading();
   /// False once the state has blown up, or an effort was not finite.
   bool finite() const { return finite_; }
 
@@ -78,6 +80,7 @@ class Simulator {
 
  private:
   void RequireSize(Eigen::Index size) const;
+  void RequireEnd(double duration) const;
   void Run(double duration);
   void Take();
 
@@ -86,6 +89,7 @@ class Simulator {
   Physics<double> physics_;
   EffortTrack track_;
   std::vector<double> mean_, moment_;
+  std::vector<double> arriving_;  // efforts that act now
   Eigen::VectorXd q_, v_, reading_q_, reading_v_;
   bool finite_ = true;
 };

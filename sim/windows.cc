@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -13,6 +14,9 @@ namespace {
 
 // Groups whose efforts are worked out together, once for all samples.
 constexpr size_t kLargestBlock = 16;
+
+// Of a window: 80 MB of efforts for six joints.
+constexpr double kMostSubsteps = 1e5;
 
 double Duration(std::span<const EffortSegment> step) {
   return std::accumulate(step.begin(), step.end(), 0.0, [](double sum, const EffortSegment& segment) {
@@ -29,13 +33,17 @@ void Require(const Window& window, const Model& model) {
   bool good = window.q.size() == model.num_positions() && window.v.size() == model.num_velocities() &&
               window.q.allFinite() && window.v.allFinite() && !window.steps.empty();
   for (const auto& step : window.before) good = good && sized(step);
+  double substeps = 0;
   for (const auto& step : window.steps) {
     const double duration = Duration(step);
-    good = good && sized(step) && duration > 0 && std::isfinite(duration);
+    good = good && sized(step) && duration > 0;
+    substeps += SubstepCount(duration, model.description().simulation.substep);
   }
-  if (!good)
+  if (!good) {
     throw std::invalid_argument(
         "a window needs a finite state, and steps of some duration with efforts for all joints");
+  }
+  if (!(substeps <= kMostSubsteps)) throw std::invalid_argument("a window is too long to be simulated");
 }
 
 }  // namespace
@@ -54,6 +62,7 @@ struct Windows::Worker {
     std::vector<double> lengths;         // [step][lane]: of a substep
     std::vector<double> means, moments;  // [substep][velocity][lane]
     std::vector<char> steady;            // [substep]: all moments are zero
+    std::vector<double> arriving;        // [step][velocity][lane]: effort that acts at its end
     std::vector<double> first;           // [velocity][lane]: effort at the beginning
   };
 
@@ -62,7 +71,7 @@ struct Windows::Worker {
         engine(model.NewWideEngine()),
         lanes(static_cast<size_t>(engine->lanes())),
         physics(model.parameters().Nominal()),
-        track(model.num_velocities(), Parameters::kLongestDelay),
+        track(model.num_velocities(), JointDynamics::kLongestDelay),
         plans(kLargestBlock),
         q(model.num_positions()),
         v(model.num_velocities()) {}
@@ -74,6 +83,7 @@ struct Windows::Worker {
     plan->means.resize(substeps * n * lanes);
     plan->moments.resize(plan->means.size());
     plan->steady.assign(substeps, 1);
+    plan->arriving.resize(group.counts.size() * n * lanes);
     plan->first.resize(n * lanes);
     for (size_t lane = 0; lane < lanes; ++lane) {
       const Window& window = windows[group.windows[lane]];
@@ -99,6 +109,9 @@ struct Windows::Worker {
           }
         }
         track.Advance();
+        for (size_t i = 0; i < n; ++i) {
+          plan->arriving[(step * n + i) * lanes + lane] = track.At(i, 0, physics.axes[i].delay);
+        }
       }
     }
   }
@@ -119,6 +132,7 @@ struct Windows::Worker {
         engine->v()[static_cast<size_t>(i) * lanes + lane] = window.v[i];
     }
     if (sensors) engine->FromReading(plan.first.data());
+    failed.assign(lanes, 0);
     size_t substep = 0;
     for (size_t step = 0; step < group.counts.size(); ++step) {
       for (int k = 0; k < group.counts[step]; ++k, ++substep) {
@@ -127,14 +141,15 @@ struct Windows::Worker {
       }
       const bool last = step + 1 == group.counts.size();
       if (last_only && !last) continue;
-      if (sensors) Read(plan, substep - 1);
+      if (sensors) Read(plan, step);
       for (size_t lane = 0; lane < group.used; ++lane) {
         for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = engine->q()[static_cast<size_t>(i) * lanes + lane];
         for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = engine->v()[static_cast<size_t>(i) * lanes + lane];
         const bool good = q.cwiseAbs().maxCoeff() < kFarthest && v.cwiseAbs().maxCoeff() < kFarthest &&
                           q.allFinite() && v.allFinite();
-        if (!good) Fail();
-        if (!good && last) ++failures.diverged;
+        if (!good) failed[lane] = 1;  // and remains so
+        if (failed[lane]) Fail();
+        failures.diverged += last && failed[lane];
         visit(sample, group.windows[lane], step, q, v);
       }
       if (sensors && !last) Restore();
@@ -142,11 +157,11 @@ struct Windows::Worker {
   }
 
   // Readings in place of the state, which is kept.
-  void Read(const Plan& plan, size_t substep) {
+  void Read(const Plan& plan, size_t step) {
     const auto n = static_cast<size_t>(model.num_velocities());
     state.assign(engine->q(), engine->q() + static_cast<size_t>(q.size()) * lanes);
     state.insert(state.end(), engine->v(), engine->v() + n * lanes);
-    engine->ToReading(&plan.means[substep * n * lanes]);
+    engine->ToReading(&plan.arriving[step * n * lanes]);
   }
   void Restore() {
     const auto positions = static_cast<std::ptrdiff_t>(static_cast<size_t>(q.size()) * lanes);
@@ -159,25 +174,26 @@ struct Windows::Worker {
     v.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
 
-  void Run(const Eigen::MatrixXd& parameters, std::span<const Window> windows, std::span<const Group> groups,
-           const Visit& visit, bool last_only) {
-    failures = {};
+  // Samples [first, end) of these groups.
+  void Run(const Eigen::MatrixXd& parameters, Eigen::Index first, Eigen::Index end,
+           std::span<const Window> windows, std::span<const Group* const> groups, const Visit& visit,
+           bool last_only) {
     const bool delays = model.parameters().delays();
     for (size_t begin = 0; begin < groups.size(); begin += kLargestBlock) {
       const size_t size = std::min(kLargestBlock, groups.size() - begin);
-      for (size_t i = 0; i < size && !delays; ++i) MakePlan(groups[begin + i], windows, &plans[i]);
-      for (Eigen::Index sample = 0; sample < parameters.cols(); ++sample) {
+      for (size_t i = 0; i < size && !delays; ++i) MakePlan(*groups[begin + i], windows, &plans[i]);
+      for (Eigen::Index sample = first; sample < end; ++sample) {
         try {
           model.parameters().Apply(parameters.col(sample), &physics);
         } catch (const std::invalid_argument&) {
           Fail();
-          for (size_t i = 0; i < size; ++i) Refuse(sample, groups[begin + i], visit, last_only);
+          for (size_t i = 0; i < size; ++i) Refuse(sample, *groups[begin + i], visit, last_only);
           continue;
         }
         engine->SetPhysics(physics);
         for (size_t i = 0; i < size; ++i) {
-          if (delays) MakePlan(groups[begin + i], windows, &plans[i]);
-          Simulate(sample, groups[begin + i], windows, plans[i], visit, last_only);
+          if (delays) MakePlan(*groups[begin + i], windows, &plans[i]);
+          Simulate(sample, *groups[begin + i], windows, plans[i], visit, last_only);
         }
       }
     }
@@ -199,6 +215,7 @@ struct Windows::Worker {
   EffortTrack track;
   std::vector<Plan> plans;
   std::vector<double> state;
+  std::vector<char> failed;  // in each lane
   Eigen::VectorXd q, v;
   Failures failures;
 };
@@ -238,18 +255,39 @@ std::vector<Windows::Group> Windows::Arrange(std::span<const Window> windows) co
 
 Windows::Failures Windows::Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
                                    const Visit& visit, bool last_only) {
+  if (parameters.rows() != model_->parameters().size()) {
+    throw std::invalid_argument("the simulator has " + std::to_string(model_->parameters().size()) +
+                                " parameters, not " + std::to_string(parameters.rows()));
+  }
   const std::vector<Group> groups = Arrange(windows);
   const size_t count = workers_.size();
-  const auto share = [&](size_t worker) {
-    const size_t begin = worker * groups.size() / count, end = (worker + 1) * groups.size() / count;
-    return std::span(groups).subspan(begin, end - begin);
+  // Every count-th group, as the long ones come last; or, where there are too few, some of the samples.
+  const bool by_group = groups.size() >= count;
+  std::vector<std::exception_ptr> errors(count);
+  const auto work = [&](size_t worker) {
+    workers_[worker]->failures = {};
+    try {
+      std::vector<const Group*> mine;
+      for (size_t i = by_group ? worker : 0; i < groups.size(); i += by_group ? count : 1)
+        mine.push_back(&groups[i]);
+      const auto share = [&](size_t i) {
+        return by_group ? 0
+                        : static_cast<Eigen::Index>(i) * parameters.cols() / static_cast<Eigen::Index>(count);
+      };
+      workers_[worker]->Run(parameters, share(worker), by_group ? parameters.cols() : share(worker + 1),
+                            windows, mine, visit, last_only);
+    } catch (...) {
+      errors[worker] = std::current_exception();
+    }
   };
-  std::vector<std::thread> threads;
-  for (size_t i = 1; i < count; ++i) {
-    threads.emplace_back([&, i] { workers_[i]->Run(parameters, windows, share(i), visit, last_only); });
+  {
+    std::vector<std::jthread> threads;
+    for (size_t i = 1; i < count; ++i) threads.emplace_back(work, i);
+    work(0);
   }
-  workers_[0]->Run(parameters, windows, share(0), visit, last_only);
-  for (std::thread& thread : threads) thread.join();
+  for (const std::exception_ptr& error : errors) {
+    if (error) std::rethrow_exception(error);
+  }
   Failures failures;
   for (const auto& worker : workers_) {
     failures.impossible += worker->failures.impossible;

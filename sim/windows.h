@@ -33,6 +33,7 @@ class Windows {
   /// Beyond this many rad, m, rad/s or m/s a simulation has failed.
   static constexpr double kFarthest = 1e6;
 
+  /// @param threads fewer than one count as one.
   Windows(std::shared_ptr<const Model> model, int threads);
   ~Windows();
 
@@ -50,7 +51,8 @@ class Windows {
 
   /// @param parameters one column per sample, physical units. @param last_only visit the end of each window
   /// only.
-  /// @throws std::invalid_argument if a window is not as it should be.
+  /// @throws std::invalid_argument if a window is not as it should be, or a column not of the model's
+  /// parameters; and what a visit throws, when all threads have ended.
   Failures Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows, const Visit& visit,
                    bool last_only = true);
 

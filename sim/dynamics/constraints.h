@@ -130,7 +130,7 @@ class Constraints {
       const Real push = contact.active ? globals.contact_stiffness * contact.depth : Real{};
       AddForce(now, p, 0, push, contact.active ? Slope(now) : Real{}, matrix, rhs);
       const Real grip = globals.contact_friction * contact.pressure / contact.outcome;
-      contact.gripped = grip;
+      contact.gripped = contact.active ? grip : Real{};
       if (!Any(grip > 0)) continue;
       for (size_t t = 1; t < kRows; ++t) {
         AddForce(now, p, t, Real{}, contact.active ? grip : Real{}, matrix, rhs);
@@ -156,7 +156,7 @@ class Constraints {
       for (size_t t = 1; t < kRows; ++t) {
         contact.along[t] = contact.speed > 0 ? Real(contact.along[t] / contact.speed) : Real{};
       }
-      contact.gripped = contact.active ? Real(contact.gripped * contact.speed) : Real{};
+      contact.gripped *= contact.speed;
     }
   }
 

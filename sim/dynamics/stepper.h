@@ -22,7 +22,7 @@ namespace plumb {
 template <class Real, template <class> class Tree>
 class Stepper {
  public:
-  static constexpr int kPasses = 2;
+  static constexpr int kPasses = 3;
 
   Stepper(const Topology& topology, const SimulationSettings& settings, const Terms& terms)
       : topology_(topology),
@@ -101,7 +101,7 @@ class Stepper {
   /// q, v are readings of sensors (JointDynamics): makes them the state that these are of, to second order in
   /// the delay, and back.
   void FromReading(const Real* effort) {
-    const Real* acceleration = Acceleration(effort);
+    const Real* acceleration = Felt(effort);
     ForEachReading([&](Real& position, Real& velocity, const auto& axis, size_t i) {
       const Real t = axis.sensor_delay;
       position += -axis.sensor_bias + t * velocity + 0.5 * t * t * acceleration[i];
@@ -109,7 +109,7 @@ class Stepper {
     });
   }
   void ToReading(const Real* effort) {
-    const Real* acceleration = Acceleration(effort);
+    const Real* acceleration = Felt(effort);
     ForEachReading([&](Real& position, Real& velocity, const auto& axis, size_t i) {
       const Real t = axis.sensor_delay;
       position += axis.sensor_bias - t * velocity + 0.5 * t * t * acceleration[i];
@@ -184,6 +184,19 @@ class Stepper {
     cholesky_.Solve(topology_.ancestors, matrix_.data(), change_.data());
   }
 
+  // Accelerations with all that acts, over one substep from here.
+  const Real* Felt(const Real* effort) {
+    const Real h = Real{} + settings_.substep;
+    tree_.MoveTo(physics, q.data());
+    AssembleSmooth(h, effort);
+    matrix_ = smooth_;
+    cholesky_.Factorize(topology_.ancestors, matrix_.data());
+    Solve(h);
+    Constrain(h);
+    for (Real& change : change_) change /= h;
+    return change_.data();
+  }
+
   // Changes the free motion into that with stops, friction and contacts, if any of them acts.
   void Constrain(const Real& h) {
     const typename Constraints<Real, Tree>::Substep now{physics, q.data(), v.data(), h, Ahead(h)};
@@ -207,7 +220,10 @@ class Stepper {
 
   void Clip() {
     if (!(settings_.speed_clip < std::numeric_limits<double>::infinity())) return;
-    for (Real& speed : v) speed = Clamp(speed, Real{} - settings_.speed_clip, Real{} + settings_.speed_clip);
+    for (Real& speed : v) {
+      // What has become infinite must not look like a bounded speed again: inf - inf is NaN.
+      speed = Clamp(speed, Real{} - settings_.speed_clip, Real{} + settings_.speed_clip) + (speed - speed);
+    }
   }
 
   // q += h velocity

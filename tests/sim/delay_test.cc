@@ -215,13 +215,13 @@ TEST_CASE("delay: sensors tell of the state as it was, and of their bias") {
     simulator.Step(effort, delay);
     const Vector4d near = Whole(simulator);
     simulator.Step(effort, delay);
-    const Simulator::State reading = simulator.Reading(effort);
+    const Simulator::State reading = simulator.Reading();
     const double position = std::hypot(reading.q[0] - 0.02 - near[0], reading.q[1] - far[1]);
     const double speed = std::hypot(reading.v[0] - near[2], reading.v[1] - far[3]);
     // Reading does not move the robot; setting what was read does, by next to nothing.
     const Vector4d state = Whole(simulator);
     const Vector2d q = reading.q, v = reading.v;
-    CHECK(simulator.Reading(effort).q == q);
+    CHECK(simulator.Reading().q == q);
     CHECK(Whole(simulator) == state);
     simulator.SetReading(q, v, effort);
     const Vector4d guess = Whole(simulator);
@@ -236,6 +236,28 @@ TEST_CASE("delay: sensors tell of the state as it was, and of their bias") {
   }
   CHECK(coarse[0] < 1e-4);
   CHECK(coarse[1] < 2e-2);
+}
+
+TEST_CASE("delay: sensors that are late see efforts when these arrive") {
+  RobotDescription robot = Arm(0, 0, 0.001);
+  robot.simulation.gravity = 0;
+  for (JointDescription& joint : robot.joints) joint.dynamics.delay = 0.1, joint.dynamics.sensor_delay = 0.02;
+  Simulator simulator(robot);
+  simulator.SetState(Vector2d(0.3, 0.2), Vector2d::Zero());
+  simulator.Step(Vector2d(2, 1), 0.05);
+  CHECK(simulator.v() == Vector2d::Zero());
+  CHECK(simulator.Reading().v == Vector2d::Zero());
+  simulator.Step(Vector2d(2, 1), 0.1);
+  CHECK(simulator.Reading().v[0] != 0);
+}
+
+TEST_CASE("delay: beyond what is remembered there is none") {
+  RobotDescription robot = Arm(0, 0, 0.001);
+  robot.joints[0].dynamics.delay = 0.6;
+  CHECK_THROWS_WITH(Simulator(robot), Catch::Contains("delay/"));
+  robot.joints[0].dynamics.delay = 0;
+  robot.joints[1].dynamics.sensor_delay = -0.1;
+  CHECK_THROWS_WITH(Simulator(robot), Catch::Contains("sensor_delay/"));
 }
 
 }  // namespace plumb

@@ -103,7 +103,7 @@ TEST_CASE("hostile: states and efforts beyond sense leave no trace") {
         REQUIRE_NOTHROW(simulator.SetState(q, v));
         for (int k = 0; k < 5; ++k) REQUIRE_NOTHROW(simulator.Step(effort, 0.008));
         CHECK(simulator.finite() == (simulator.q().allFinite() && simulator.v().allFinite()));
-        REQUIRE_NOTHROW(simulator.Reading(effort));
+        REQUIRE_NOTHROW(simulator.Reading());
         REQUIRE_NOTHROW(simulator.MassMatrix());
         REQUIRE_NOTHROW(simulator.Bias());
         REQUIRE(Episode(simulator) == expected);
@@ -182,7 +182,7 @@ TEST_CASE("hostile: nothing allocates while the robot moves") {
       simulator.Step(effort, 0.008);
       simulator.Step(profile);
       simulator.SetParameters(means);
-      simulator.Reading(effort);
+      simulator.Reading();
     }
     CHECK(Allocations() == before);
     CHECK(simulator.finite());

@@ -204,6 +204,18 @@ TEST_CASE("the simulator refuses what is not finite and survives blowing up") {
   CHECK(simulator.v() == fresh.v());
 }
 
+TEST_CASE("a clip of speeds does not hide that the simulation has blown up") {
+  Simulator simulator(LoadPendulum("gym.toml"));
+  const double infinity = std::numeric_limits<double>::infinity();
+  simulator.Step(Scalar(infinity), 0.05);
+  CHECK_FALSE(simulator.finite());
+  simulator.SetState(Scalar(1), Scalar(1));
+  simulator.Step(Scalar(1e300), 0.05);
+  CHECK(simulator.finite());
+  CHECK(simulator.v()[0] == 8);
+  CHECK_THROWS_AS(simulator.Step(Scalar(0), 1e18), std::invalid_argument);
+}
+
 TEST_CASE("stepping and setting parameters do not allocate") {
   Simulator tree(MakeTree());
   Simulator pendulum(LoadPendulum("robot.toml"));
