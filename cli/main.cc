@@ -64,9 +64,11 @@ int main(int argc, char** argv) {
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
         app.require_subcommand(1);
+        const CLI::Range seed(0.0, 18446744073709551615.0);  // else -1 would be the greatest of them
         launch = app.add_subcommand("launch", "run the whole loop: train, roll out, calibrate, train ...");
         launch->add_option("robot", flags.robot, "robot folder or TOML file")->capture_default_str();
-        launch->add_option("--seed", flags.seed, "of all random numbers and of the hidden robot")->capture_default_str();
+        launch->add_option("--seed", flags.seed, "of all random numbers and of the hidden robot")
+            ->check(seed)->capture_default_str();
         launch->add_option("--iterations", flags.iterations, "of calibration")
             ->check(CLI::Range(1, 1000))->capture_default_str();
         launch->add_option("--evaluation-episodes", flags.evaluation_episodes, "roll-outs of the final policy")
@@ -82,10 +84,11 @@ int main(int argc, char** argv) {
         sim->add_option("robot", sim_flags.robot, "robot folder or TOML file")->required();
         auto* policy = sim->add_option("--policy", sim_flags.policy, "a trainer's checkpoint; its mean action is taken");
         sim->add_flag("--random", sim_flags.random, "random actions; default: none")->excludes(policy);
-        sim->add_option("--seed", sim_flags.seed, "of all random numbers")->capture_default_str();
+        sim->add_option("--seed", sim_flags.seed, "of all random numbers")->check(seed)->capture_default_str();
         sim->add_option("--episodes", sim_flags.episodes, "how many")
             ->check(CLI::Range(1, 1000000))->capture_default_str();
         sim->add_option("--set", sim_flags.set, "parameters other than their prior means, e.g. mass/thigh=4");
+        sim->add_flag("--urdf", sim_flags.urdf, "the robot as its URDF and TOML tables have it, without the prior's means");
         sim->add_option("--csv", sim_flags.csv, "write every step to this file");
         sim->add_option("--png", sim_flags.png, "draw the first episode as a strip of snapshots");
         sim->add_option("--gif", sim_flags.gif, "draw the first episode as a film");

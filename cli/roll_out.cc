@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <iterator>
 #include <stdexcept>
 
@@ -10,7 +11,6 @@ namespace {
 
 // Second words of the random streams: where an episode begins, and what its actor draws.
 constexpr uint32_t kStartStream = 0x53544152, kActorStream = 0x4143544f;  // "STAR", "ACTO"
-constexpr int64_t kStepsPerLook = 256;                                    // whether to stop
 
 void AppendNumbers(const Eigen::VectorXd& numbers, std::string& csv) {
   for (const double number : numbers) fmt::format_to(std::back_inserter(csv), ",{:.17g}", number);
@@ -51,12 +51,37 @@ SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& r
       episode.end = finite ? SimulatedEpisode::End::kTerminated : SimulatedEpisode::End::kNotFinite;
       return episode;
     }
-    if (episode.steps % kStepsPerLook == 0 && stop()) {
+    if (stop()) {
       episode.end = SimulatedEpisode::End::kInterrupted;
       return episode;
     }
   } while (episode.steps < limit);
   return episode;
+}
+
+std::string Totals(const std::vector<SimulatedEpisode>& episodes) {
+  const auto failed = [](const SimulatedEpisode& episode) {
+    return episode.end == SimulatedEpisode::End::kNotFinite;
+  };
+  double sum = 0, squares = 0, count = 0;
+  int64_t steps = 0;
+  for (const SimulatedEpisode& episode : episodes) {
+    steps += episode.steps;
+    if (!failed(episode)) sum += episode.sum, ++count;
+  }
+  for (const SimulatedEpisode& episode : episodes) {
+    if (!failed(episode)) squares += std::pow(episode.sum - sum / count, 2);
+  }
+  std::string text =
+      fmt::format("{} episode{}, {} steps", episodes.size(), episodes.size() == 1 ? "" : "s", steps);
+  if (count > 0) text += fmt::format(", mean return {:.1f}", sum / count);
+  if (count > 1) text += fmt::format(", standard deviation {:.1f}", std::sqrt(squares / (count - 1)));
+  const size_t failures = episodes.size() - static_cast<size_t>(count);
+  if (failures > 0) {
+    text +=
+        fmt::format("; {} failed: no longer finite{}", failures, count > 0 ? ", left out of the mean" : "");
+  }
+  return text;
 }
 
 std::string CsvHeader(const RobotDescription& robot) {

@@ -2,14 +2,10 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -23,14 +19,25 @@
 namespace plumb {
 namespace {
 
+constexpr int kStepsPerLook = 256;  // whether to stop
+constexpr size_t kLineLength = 110;
+
 /// Before a long simulation rather than after it.
-void RequireWritable(const std::string& file) {
-  if (file.empty()) return;
-  const std::filesystem::path parent = std::filesystem::path(file).parent_path();
-  if (access(parent.empty() ? "." : parent.c_str(), W_OK | X_OK) != 0) {
-    throw std::runtime_error(file + ": cannot be written: " + std::strerror(errno));
+void RequireOutputs(const SimFlags& flags) {
+  namespace fs = std::filesystem;
+  std::vector<fs::path> taken;
+  for (const std::string& file : {flags.csv, flags.png, flags.gif}) {
+    if (file.empty()) continue;
+    RequireWritable(file);
+    // Its temporary file is in the way, too.
+    for (const std::string& name : {file, file + ".part"}) {
+      const fs::path path = fs::weakly_canonical(fs::absolute(name));
+      if (std::find(taken.begin(), taken.end(), path) != taken.end()) {
+        throw std::invalid_argument(file + ": --csv, --png and --gif need a file each");
+      }
+      taken.push_back(path);
+    }
   }
-  if (std::filesystem::is_directory(file)) throw std::runtime_error(file + ": cannot be written: it is a folder");
 }
 
 /// "mass/thigh=4": gives the parameter that value. One that is not among the uncertain ones joins them, for the
@@ -88,17 +95,22 @@ const char* Describe(SimulatedEpisode::End end) {
   return "";
 }
 
-void PrintTotals(const std::vector<SimulatedEpisode>& episodes, double period, double seconds) {
-  double sum = 0, squares = 0;
-  int64_t steps = 0;
-  for (const SimulatedEpisode& episode : episodes) sum += episode.sum, steps += episode.steps;
-  const auto count = static_cast<double>(episodes.size());
-  for (const SimulatedEpisode& episode : episodes) squares += std::pow(episode.sum - sum / count, 2);
-  std::cout << fmt::format("{} episode{}, {} steps, mean return {:.1f}", episodes.size(), episodes.size() == 1 ? "" : "s",
-                           steps, sum / count);
-  if (episodes.size() > 1) std::cout << fmt::format(", standard deviation {:.1f}", std::sqrt(squares / (count - 1)));
-  std::cout << fmt::format("\n{:.1f} s simulated in {:.2f} s, {:.0f} steps per second\n",
-                           static_cast<double>(steps) * period, seconds, static_cast<double>(steps) / seconds);
+/// "parameters: mass/torso 3.8, ...", in lines of bearable length.
+std::string DescribeParameters(const RobotDescription& robot) {
+  std::string text = "parameters:", line = text;
+  if (robot.parameters.empty()) return text + " none, the robot is as its URDF and TOML tables have it\n";
+  text.clear();
+  for (size_t i = 0; i < robot.parameters.size(); ++i) {
+    const ParameterDescription& parameter = robot.parameters[i];
+    const std::string item =
+        fmt::format(" {} {}{}", parameter.name, parameter.mean, i + 1 < robot.parameters.size() ? "," : "");
+    if (line.size() + item.size() > kLineLength) {
+      text += line + "\n";
+      line = " ";
+    }
+    line += item;
+  }
+  return text + line + "\n";
 }
 
 }  // namespace
@@ -107,8 +119,9 @@ int Simulate(Process& process, const SimFlags& flags) {
   if (flags.random && !flags.policy.empty()) throw std::invalid_argument("--policy and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
+  if (flags.urdf) robot.parameters.clear();
   for (const std::string& assignment : flags.set) Set(assignment, robot);
-  for (const std::string& file : {flags.csv, flags.png, flags.gif}) RequireWritable(file);
+  RequireOutputs(flags);
   const Eigen::VectorXd means = Means(robot);
   Environment environment(robot);
   environment.SetParameters(means);
@@ -121,19 +134,26 @@ int Simulate(Process& process, const SimFlags& flags) {
                            : flags.policy.empty() ? "no action"
                                                   : flags.policy,
                            flags.seed)
+            << DescribeParameters(robot)
             << fmt::format("{:>7}  {:>6}  {:>10}  ended by\n", "episode", "steps", "return");
   std::string csv = CsvHeader(robot);
   std::vector<Snapshot> film;  // of the first episode
   std::vector<SimulatedEpisode> episodes;
+  int64_t asked = 0;
+  const auto stop = [&] { return (flags.view || ++asked % kStepsPerLook == 0) && process.stopping(); };
   const int64_t begin = process.clock().Now();
   for (int number = 0; number < flags.episodes; ++number) {
+    if (process.stopping()) {
+      std::cout << "interrupted" << std::endl;
+      return 130;
+    }
     const auto see = [&](const SimulatedStep& step) {
       if (!flags.csv.empty()) AppendCsv(step, csv);
       if (number == 0) film.push_back({step.time, step.q});
       if (viewer) viewer->Show(step.time, step.q);
     };
-    episodes.push_back(PlayEpisode(environment, robot, actor, flags.seed, static_cast<uint32_t>(number), see,
-                                   [&] { return process.stopping(); }));
+    episodes.push_back(
+        PlayEpisode(environment, robot, actor, flags.seed, static_cast<uint32_t>(number), see, stop));
     const SimulatedEpisode& episode = episodes.back();
     std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum, Describe(episode.end))
               << std::endl;
@@ -142,8 +162,13 @@ int Simulate(Process& process, const SimFlags& flags) {
       film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
     }
   }
-  const double seconds = static_cast<double>(process.clock().Now() - begin) * 1e-6 / process.clock().scale();
-  PrintTotals(episodes, robot.task.period, std::max(seconds, 1e-6));
+  const double seconds =
+      std::max(static_cast<double>(process.clock().Now() - begin) * 1e-6 / process.clock().scale(), 1e-6);
+  double steps = 0;
+  for (const SimulatedEpisode& episode : episodes) steps += static_cast<double>(episode.steps);
+  std::cout << Totals(episodes)
+            << fmt::format("\n{:.1f} s simulated in {:.2f} s, {:.0f} steps per second\n",
+                           steps * robot.task.period, seconds, steps / seconds);
   if (!flags.csv.empty()) WriteAtomically(flags.csv, csv);
   if (!flags.png.empty()) WriteAtomically(flags.png, DrawStrip(robot, film));
   if (!flags.gif.empty()) WriteAtomically(flags.gif, DrawFilm(robot, film));

@@ -16,6 +16,7 @@ struct SimFlags {
   int episodes = 1;
   std::string csv, png, gif;     ///< files; empty = none
   std::vector<std::string> set;  ///< "mass/thigh=4"
+  bool urdf = false;             ///< forget the uncertain parameters' prior means
   bool view = false;
 };
 

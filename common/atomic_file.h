@@ -9,4 +9,9 @@ namespace plumb {
 /// machine dies: temporary file beside it, fsync, rename. @throws std::runtime_error naming the file and the cause.
 void WriteAtomically(const std::filesystem::path& file, std::string_view content);
 
+/// Looks whether WriteAtomically could write the file, before a long computation rather than after it: makes the
+/// temporary file and removes it. A device or a pipe is refused, too: the rename would replace it.
+/// @throws std::runtime_error naming the file and the cause.
+void RequireWritable(const std::filesystem::path& file);
+
 }  // namespace plumb

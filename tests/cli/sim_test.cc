@@ -1,10 +1,12 @@
 // `plumb sim`, run as a person would.
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -209,6 +211,121 @@ TEST_CASE("sim: errors say what to do") {
   CHECK_THAT(complaint(Robot("nonesuch")), Contains("no such robot"));
   CHECK(Sim(Robot("pendulum") + " --random --policy x").status != 0);
   CHECK(Sim(Robot("pendulum") + " --episodes 0").status != 0);
+}
+
+TEST_CASE("sim: outputs that could not be written are refused before anything is simulated") {
+  const Folder folder;
+  using Catch::Contains;
+  const auto complaint = [&](const std::string& arguments) {
+    const Outcome outcome = Sim(Robot("pendulum") + " " + arguments);
+    CHECK(outcome.status == 1);
+    CHECK_THAT(outcome.text, !Contains("episode"));
+    return outcome.text;
+  };
+  CHECK_THAT(complaint("--csv " + folder / "a --png " + folder / "a"),
+             Contains(folder / "a") && Contains("a file each"));
+  CHECK_THAT(complaint("--png " + folder / "a --gif " + folder / "./a"), Contains("a file each"));
+  CHECK_THAT(complaint("--csv " + folder / "a --gif " + folder / "a.part"), Contains("a file each"));
+  CHECK_THAT(complaint("--csv /dev/null"),
+             Contains("/dev/null: cannot be written: it is not a regular file"));
+  CHECK(fs::is_character_file("/dev/null"));
+  REQUIRE(mkfifo((folder / "pipe").c_str(), 0600) == 0);
+  CHECK_THAT(complaint("--gif " + folder / "pipe"), Contains("not a regular file"));
+  CHECK_THAT(complaint("--csv /proc/x.csv"), Contains("/proc/x.csv: cannot be written"));
+  std::ofstream(folder / "old") << "old";
+  CHECK_THAT(complaint("--csv " + folder / "old --set gravity=-1"), Contains("gravity"));
+  CHECK(Read(folder / "old") == "old");
+  CHECK_FALSE(fs::exists(folder / "old.part"));
+}
+
+TEST_CASE("sim: what is not a regular file is no robot and no policy") {
+  const Folder folder;
+  using Catch::Contains;
+  const std::string pipe = folder / "pipe";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK_THAT(Sim(pipe).text, Contains(pipe + ": is not a regular file"));
+  CHECK_THAT(Sim(Robot("pendulum") + " --policy " + pipe).text, Contains(pipe + " is not a regular file"));
+  CHECK_THAT(Sim(Robot("pendulum") + " --policy /tmp").text, Contains("/tmp is not a regular file"));
+}
+
+TEST_CASE("sim: can be interrupted between short episodes") {
+  // Each of the pendulum's has 200 steps. timeout's status is the command's own.
+  const std::string command = "timeout --preserve-status -s INT 1 " +
+                              std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb sim " +
+                              Robot("pendulum") + " --random --episodes 1000000 2>&1 | tail -n 1";
+  const auto begin = std::chrono::steady_clock::now();
+  FILE* pipe = popen(("bash -o pipefail -c '" + command + "'").c_str(), "r");
+  REQUIRE(pipe);
+  std::array<char, 4096> buffer{};
+  const std::string last(buffer.data(), fread(buffer.data(), 1, buffer.size(), pipe));
+  const int status = pclose(pipe);
+  CHECK(WEXITSTATUS(status) == 130);
+  CHECK_THAT(last, Catch::Contains("interrupted"));
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
+}
+
+TEST_CASE("sim: stop is asked at every step") {
+  Environment environment(LoadRobot(Robot("pendulum")));
+  const Actor actor = [](const Eigen::VectorXf&, Random&) { return Eigen::VectorXf::Zero(1).eval(); };
+  int asked = 0;
+  const SimulatedEpisode episode = PlayEpisode(
+      environment, LoadRobot(Robot("pendulum")), actor, 1, 0, [](const SimulatedStep&) {},
+      [&] { return ++asked == 3; });
+  CHECK(episode.end == SimulatedEpisode::End::kInterrupted);
+  CHECK(episode.steps == 3);
+}
+
+TEST_CASE("sim: episodes that failed have no return") {
+  using End = SimulatedEpisode::End;
+  const SimulatedEpisode good{10, 1, End::kTimeLimit}, better{20, 3, End::kTerminated},
+      failed{5, NAN, End::kNotFinite};
+  CHECK(Totals({good, failed, better}) ==
+        "3 episodes, 35 steps, mean return 2.0, standard deviation 1.4; 1 failed: no longer finite, left out "
+        "of the mean");
+  CHECK(Totals({good}) == "1 episode, 10 steps, mean return 1.0");
+  CHECK(Totals({failed, failed}) == "2 episodes, 10 steps; 2 failed: no longer finite");
+}
+
+TEST_CASE("sim: a seed is a number from 0") {
+  const Outcome outcome = Sim(Robot("pendulum") + " --seed -1");
+  CHECK(outcome.status == 2);
+  CHECK_THAT(outcome.text, Catch::Contains("--seed"));
+  CHECK(Sim(Robot("pendulum") + " --seed 100000000000000000000").status == 2);
+  CHECK(Sim(Robot("pendulum") + " --seed 0").status == 0);
+  CHECK(Sim(Robot("pendulum") + " --seed 18446744073709551615").status == 0);
+}
+
+TEST_CASE("sim: says which parameters are in use") {
+  using Catch::Contains;
+  const Folder folder;
+  const std::string hopper = Robot("hopper"), csv = " --csv " + folder / "a.csv";
+  const std::string prior = Sim(hopper + csv).text;
+  const std::string priors_table = Read(folder / "a.csv");
+  CHECK_THAT(prior, Contains("\nparameters: mass/torso 3.8, mass/thigh 3.8, mass/leg 3.8, mass/foot 3.8\n"));
+  CHECK_THAT(Sim(hopper + " --set mass/leg=2.5 --set damping/leg=0.7").text,
+             Contains("mass/leg 2.5, mass/foot 3.8, damping/leg 0.7\n"));
+  // As the URDF has it: not the prior's means.
+  CHECK_THAT(Sim(hopper + csv + " --urdf").text, Contains("parameters: none"));
+  const std::string table = Read(folder / "a.csv");
+  CHECK(table != priors_table);
+  std::string set;
+  for (const LinkDescription& link : LoadRobot(hopper).links) {
+    if (link.mass > 0 && link.name != LoadRobot(hopper).links[0].name) {
+      std::ostringstream flag;
+      flag.precision(17);
+      flag << " --set mass/" << link.name << "=" << link.mass;
+      set += flag.str();
+    }
+  }
+  const Outcome explicitly = Sim(hopper + csv + set);
+  INFO(explicitly.text);
+  CHECK(Read(folder / "a.csv") == table);
+  CHECK_THAT(Sim(hopper + " --urdf --set gravity=3").text, Contains("parameters: gravity 3\n"));
+  for (std::istringstream lines(
+           Sim(hopper + set + " --set damping/leg=0.123456789 --set damping/foot=0.123456789").text);
+       std::getline(lines, set);) {
+    CHECK(set.size() <= 120);
+  }
 }
 
 TEST_CASE("sim: pictures") {
