@@ -111,7 +111,9 @@ int main(int argc, char** argv) {
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "folder or TOML file of the robot")->required();
         app.add_option("--bus", bus_url, "CAN bus; default: the robot's");
-        app.add_option("--seed", seed, "draws the hidden parameters")->capture_default_str();
+        app.add_option("--seed", seed, "draws the hidden parameters")
+            ->check(CLI::Range(0.0, 18446744073709551615.0))  // else -1 would be the greatest of them
+            ->capture_default_str();
         app.add_option("--set", assignments, "NAME=VALUE: this parameter is not drawn, may be repeated");
       },
       [&](plumb::Process& process) {
