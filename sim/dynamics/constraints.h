@@ -16,8 +16,9 @@ namespace plumb {
 /// force = f - b (v + dv) adds h b to the matrix and h (f - b v) to the right-hand side of  matrix dv = rhs.
 ///
 /// Whether something pushes, and by which speed friction is to be divided (Coulomb's force is mu f_n v / |v|,
-/// viscous below a small speed), is found by trial: Find with the free motion; then, as often as wanted,
-/// Foresee, Assemble, solve, Judge. Work space of one Stepper; not thread-safe. The topology must outlive it.
+/// viscous below a small speed), is found by trial: Find with the free motion; then Foresee, Assemble, solve
+/// and Judge until that has settled. Work space of one Stepper; not thread-safe. The topology must outlive
+/// it.
 template <class Real, template <class> class Tree>
 class Constraints {
  public:
@@ -138,14 +139,22 @@ class Constraints {
     }
   }
 
-  /// What became of the contacts at the velocities `trial`: the next trial starts from there.
-  void Judge(const Substep& now, const Real* trial) {
+  /// What became of the contacts at the velocities `trial`: the next trial starts from there. True where it
+  /// may be the last, because the same contacts act as in it and none of their forces is outside the cone of
+  /// friction.
+  Mask<Real> Judge(const Substep& now, const Real* trial) {
+    constexpr double kSlack = 1.02;
+    Truth settled = Real{} < 1;
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
+      // One that was far may be pushed into the ground by another, one that pushed may have been pushed out.
+      const Real rising = Along(p, 0, trial);
+      const Real force = now.physics.globals.contact_stiffness * contact.depth - Slope(now) * rising;
+      const Truth acts = (contact.depth - now.ahead * rising > 0) & (force > 0);
+      settled = settled & (acts == contact.active);
+      contact.active = acts;
+      contact.any = contact.any || Any(acts);
       if (!contact.any) continue;
-      const Real force =
-          now.physics.globals.contact_stiffness * contact.depth - Slope(now) * Along(p, 0, trial);
-      contact.active = contact.active & (force > 0);
       contact.pressure = Max(force, Real{});
       Real squared{};
       for (size_t t = 1; t < kRows; ++t) {
@@ -157,7 +166,11 @@ class Constraints {
         contact.along[t] = contact.speed > 0 ? Real(contact.along[t] / contact.speed) : Real{};
       }
       contact.gripped *= contact.speed;
+      // Not: is inside. What is not finite will not settle, and must not look unsettled only beside others.
+      const Truth beyond = contact.gripped > kSlack * now.physics.globals.contact_friction * contact.pressure;
+      settled = settled & (beyond == 0);
     }
+    return settled;
   }
 
  private:

@@ -15,14 +15,14 @@ namespace plumb {
 /// contacts taken at the end of the substep and linearised in the velocity there ("linearly implicit"), so
 /// that stiff ones need no shorter substeps:
 ///   (M + h D + ...) dv = h (effort - bias - D v + ...)
-/// Stops, friction and contacts are settled in kPasses trials after the free motion, see Constraints. Not
+/// Stops, friction and contacts are settled in two to four trials after the free motion, see Constraints. Not
 /// thread-safe. The topology must outlive it.
 ///
 /// Real is double or a pack. Every lane has the bits it would have alone.
 template <class Real, template <class> class Tree>
 class Stepper {
  public:
-  static constexpr int kPasses = 3;
+  static constexpr int kFewestTrials = 2, kMostTrials = 4;  ///< of stops, friction and contacts
 
   Stepper(const Topology& topology, const SimulationSettings& settings, const Terms& terms)
       : topology_(topology),
@@ -39,6 +39,7 @@ class Stepper {
         bias_(n_),
         change_(n_),
         trial_(n_),
+        tried_(n_),
         shift_(n_),
         cholesky_(n_),
         constraints_(topology, settings, terms) {}
@@ -63,15 +64,15 @@ class Stepper {
       for (size_t i = 0; i < n_; ++i) drive_[i] -= bias_[i];
       Solve(h);
     }
+    if (moment) {
+      for (size_t i = 0; i < n_; ++i) shift_[i] = physics.axes[i].gain * moment[i];
+      cholesky_.Solve(topology_.ancestors, matrix_.data(), shift_.data());
+    }
     Constrain(h);
     for (size_t i = 0; i < n_; ++i) v[i] += change_[i];
     if (!settings_.move_before_clip) Clip();
     Move(Ahead(h), v.data());
-    if (moment) {
-      for (size_t i = 0; i < n_; ++i) shift_[i] = physics.axes[i].gain * moment[i];
-      cholesky_.Solve(topology_.ancestors, matrix_.data(), shift_.data());
-      Move(Real{} + 1, shift_.data());
-    }
+    if (moment) Move(Real{} + 1, shift_.data());
     if (settings_.move_before_clip) Clip();
   }
 
@@ -137,7 +138,7 @@ class Stepper {
   std::vector<Real> smooth_;  // matrix without stops, contacts and friction
   std::vector<Real> matrix_;  // with them; then its factors
   std::vector<Real> drive_;   // forces without them
-  std::vector<Real> bias_, change_, trial_, shift_;
+  std::vector<Real> bias_, change_, trial_, tried_, shift_;
   SparseCholesky<Real> cholesky_;
   Constraints<Real, Tree> constraints_;
 
@@ -197,20 +198,25 @@ class Stepper {
     return change_.data();
   }
 
-  // Changes the free motion into that with stops, friction and contacts, if any of them acts.
+  // Changes the free motion into that with stops, friction and contacts, if any of them acts. A lane whose
+  // trial has settled keeps it, however long others try.
   void Constrain(const Real& h) {
     const typename Constraints<Real, Tree>::Substep now{physics, q.data(), v.data(), h, Ahead(h)};
     for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
     if (!constraints_.Find(now, tree_, trial_.data())) return;
-    for (int pass = 0; pass < kPasses; ++pass) {
+    Mask<Real> open = Real{} < 1;
+    for (int trial = 1; trial <= kMostTrials; ++trial) {
       constraints_.Foresee(now, trial_.data(), cholesky_, matrix_.data());
       matrix_ = smooth_;
-      for (size_t i = 0; i < n_; ++i) change_[i] = h * drive_[i];
-      constraints_.Assemble(now, trial_.data(), matrix_.data(), change_.data());
+      for (size_t i = 0; i < n_; ++i) tried_[i] = h * drive_[i];
+      constraints_.Assemble(now, trial_.data(), matrix_.data(), tried_.data());
       cholesky_.Factorize(topology_.ancestors, matrix_.data());
-      cholesky_.Solve(topology_.ancestors, matrix_.data(), change_.data());
-      for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
-      constraints_.Judge(now, trial_.data());
+      cholesky_.Solve(topology_.ancestors, matrix_.data(), tried_.data());
+      for (size_t i = 0; i < n_; ++i) change_[i] = open ? tried_[i] : change_[i];
+      for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + tried_[i];
+      const Mask<Real> settled = constraints_.Judge(now, trial_.data());
+      if (trial >= kFewestTrials) open = open & (settled == 0);
+      if (!Any(open)) return;
     }
   }
 
