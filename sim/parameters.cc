@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "common/config.h"
+#include "sim/parameter_names.h"
 
 namespace plumb {
 namespace {
@@ -17,21 +17,6 @@ constexpr uint32_t kHiddenStream = 0x48494444;  // "HIDD"
 
 // Beyond e^20 an inertia's shape is no parameter any more, and far from overflow.
 constexpr double kLargestExponent = 20;
-
-// Numbers of Physics::Axis and Physics::Globals in their order.
-constexpr const char* kAxisNames[] = {"armature", "damping",       "friction", "stiffness",    "rest",
-                                      "gain",     "no_load_speed", "delay",    "sensor_delay", "sensor_bias"};
-constexpr size_t kSlowing = 6;
-constexpr const char* kGlobalNames[] = {"gravity",          "contact/stiffness", "contact/damping",
-                                        "contact/friction", "limit/stiffness",   "limit/damping"};
-static_assert(sizeof(Physics<double>::Axis) == std::size(kAxisNames) * sizeof(double));
-static_assert(sizeof(Physics<double>::Globals) == std::size(kGlobalNames) * sizeof(double));
-
-// xx, yy, zz, xy, xz, yz of a matrix.
-constexpr struct {
-  const char* name;
-  int row, column;
-} kEntries[] = {{"xx", 0, 0}, {"yy", 1, 1}, {"zz", 2, 2}, {"xy", 1, 0}, {"xz", 2, 0}, {"yz", 2, 1}};
 
 void Write(const Matrix3d& inertia, double* entries) {
   for (size_t i = 0; i < 6; ++i) entries[i] = inertia(kEntries[i].row, kEntries[i].column);
@@ -119,87 +104,15 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
   FindTerms(description);
 }
 
-Parameters::Paths Parameters::AllPaths(const RobotDescription& description) const {
-  Paths paths;
-  const auto domain = [](const std::string& name) {
-    if (name == "rest" || name == "sensor_bias") return Domain::kAny;
-    if (name == "delay" || name == "sensor_delay") return Domain::kDelay;
-    if (name == "no_load_speed" || name.ends_with("stiffness")) return Domain::kPositive;
-    return Domain::kNotNegative;
-  };
-  for (size_t slot = 0; slot < std::size(kGlobalNames); ++slot) {
-    const std::string name = kGlobalNames[slot];
-    if (name.starts_with("contact/") && !description.simulation.contact) continue;
-    if (name.starts_with("limit/") && !description.simulation.stop) continue;
-    paths.push_back({name, {.effect = Effect::kGlobal, .domain = domain(name), .slot = slot}});
-  }
-  paths.push_back(
-      {"mass/" + description.links[0].name, {.effect = Effect::kNone, .domain = Domain::kPositive}});
-  size_t velocity = 0;
-  for (size_t i = 0; i < description.joints.size(); ++i) {
-    const std::string& link = description.links[i + 1].name;
-    const auto add = [&](const std::string& path, Effect effect, Domain in, size_t slot = 0,
-                         double reference = 1) {
-      paths.push_back(
-          {path, {.effect = effect, .domain = in, .index = i, .slot = slot, .reference = reference}});
-    };
-    if (base_.links[i].mass > 0) {
-      add("mass/" + link, Effect::kMass, Domain::kPositive, 0, base_.links[i].mass);
-      add("inertia/" + link, Effect::kInertia, Domain::kPositive);
-      for (size_t k = 0; k < 3; ++k) add("com/" + link + "/" + "xyz"[k], Effect::kCenter, Domain::kAny, k);
-      for (size_t k = 0; k < 6; ++k) {
-        add("inertia/" + link + "/" + kEntries[k].name, Effect::kCholesky, Domain::kExponent, k);
-      }
-    }
-    const auto child =
-        std::find_if(parents_.begin(), parents_.end(), [&](int p) { return p == static_cast<int>(i) + 1; });
-    const double length =
-        child == parents_.end()
-            ? 2 * centers_[i].norm()
-            : Vector3d::Map(base_.links[static_cast<size_t>(child - parents_.begin())].origin).norm();
-    if (length > 0) add("length/" + link, Effect::kLength, Domain::kPositive, 0, length);
-    const JointDescription& joint = description.joints[i];
-    for (size_t slot = 0; slot < std::size(kAxisNames); ++slot) {
-      const std::string name = kAxisNames[slot];
-      // Springs, sensors and speed limits of a spherical joint are not modelled; motors' numbers need a
-      // motor.
-      if (joint.type == JointDescription::Type::kSpherical && slot > 2) continue;
-      if (joint.passive && (name == "gain" || name == "delay" || name == "no_load_speed")) continue;
-      paths.push_back({name + "/" + joint.name,
-                       {.effect = slot == kSlowing ? Effect::kSlowing : Effect::kAxis,
-                        .domain = domain(name),
-                        .index = velocity,
-                        .slot = slot,
-                        .count = static_cast<size_t>(joint.num_velocities())}});
-    }
-    velocity += static_cast<size_t>(joint.num_velocities());
-  }
-  return paths;
-}
-
-Parameters::Binding Parameters::Find(const Paths& paths, const std::string& path) {
-  const std::pair<std::string, Binding>* nearest = &paths[0];
-  for (const auto& candidate : paths) {
-    if (candidate.first == path) return candidate.second;
-    if (EditDistance(path, candidate.first) < EditDistance(path, nearest->first)) nearest = &candidate;
-  }
-  std::string why;
-  if (path.starts_with("contact/")) why = " (contact needs [simulation.contact] and collision shapes)";
-  if (path.starts_with("limit/")) why = " (stops need [simulation.limit])";
-  if (path.starts_with("length/")) why = " (a link whose joints and centre of mass coincide has no length)";
-  throw std::invalid_argument("the simulator has no parameter '" + path + "'" + why + "; the nearest is '" +
-                              nearest->first + "'");
-}
-
 void Parameters::Check(const std::string& name, Domain domain, double value) {
   bool fits = std::isfinite(value);
   switch (domain) {
     case Domain::kAny:
       break;
-    case Domain::kNotNegative:
+    case Domain::kZeroOrMore:
       fits = fits && value >= 0;
       break;
-    case Domain::kPositive:
+    case Domain::kMoreThanZero:
       fits = fits && value > 0;
       break;
     case Domain::kDelay:
@@ -246,7 +159,7 @@ void Parameters::FindTerms(const RobotDescription& description) {
       if (reinterpret_cast<const double*>(&axis)[slot] != 0) return true;
     }
     return std::any_of(bindings_.begin(), bindings_.end(), [&](const Binding& b) {
-      return (b.effect == Effect::kAxis || b.effect == Effect::kSlowing) && b.slot == slot;
+      return (b.effect == Effect::kAxis || b.effect == Effect::kSpeedLimit) && b.slot == slot;
     });
   };
   terms_.friction = has(2);
@@ -284,10 +197,10 @@ void Parameters::Set(const Binding& binding, double value, Physics<double>* phys
       reinterpret_cast<double*>(&physics->globals)[binding.slot] = value;
       break;
     case Effect::kAxis:
-    case Effect::kSlowing:
+    case Effect::kSpeedLimit:
       for (size_t k = 0; k < binding.count; ++k) {
         auto* axis = reinterpret_cast<double*>(&physics->axes[binding.index + k]);
-        axis[binding.slot] = binding.effect == Effect::kSlowing ? 1 / value : value;
+        axis[binding.slot] = binding.effect == Effect::kSpeedLimit ? 1 / value : value;
       }
       break;
     case Effect::kCenter: {

@@ -62,8 +62,8 @@ class Parameters {
   void Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, Physics<double>* physics) const;
 
  private:
-  enum class Domain { kAny, kNotNegative, kPositive, kDelay, kExponent };
-  enum class Effect { kNone, kGlobal, kAxis, kSlowing, kCenter, kCholesky, kMass, kInertia, kLength };
+  enum class Domain { kAny, kZeroOrMore, kMoreThanZero, kDelay, kExponent };
+  enum class Effect { kNone, kGlobal, kAxis, kSpeedLimit, kCenter, kCholesky, kMass, kInertia, kLength };
   struct Binding {
     Effect effect;
     Domain domain;
