@@ -8,7 +8,7 @@
 // What the numbers of a robot's physics are called in the paths of parameters: see parameters.h.
 namespace plumb {
 
-// Numbers of Physics::Axis and Physics::Globals in their order.
+/// Numbers of Physics::Axis and Physics::Globals in their order.
 inline constexpr const char* kAxisNames[] = {"armature",     "damping",    "friction",      "stiffness",
                                              "rest",         "gain",       "no_load_speed", "delay",
                                              "sensor_delay", "sensor_bias"};
@@ -18,7 +18,7 @@ inline constexpr const char* kGlobalNames[] = {"gravity",          "contact/stif
 static_assert(sizeof(Physics<double>::Axis) == std::size(kAxisNames) * sizeof(double));
 static_assert(sizeof(Physics<double>::Globals) == std::size(kGlobalNames) * sizeof(double));
 
-// xx, yy, zz, xy, xz, yz of a matrix.
+/// xx, yy, zz, xy, xz, yz of a matrix.
 inline constexpr struct {
   const char* name;
   int row, column;
