@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "calibrator/discrepancy.h"
-#include "calibrator/reps.h"
+#include "calibrator/inference/reps.h"
 
 namespace plumb {
 

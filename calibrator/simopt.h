@@ -7,7 +7,7 @@
 
 #include "calibrator/discrepancy.h"
 #include "calibrator/identifiability.h"
-#include "calibrator/reps.h"
+#include "calibrator/inference/reps.h"
 #include "calibrator/transitions.h"
 #include "robot/description.h"
 

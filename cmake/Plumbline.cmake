@@ -22,10 +22,13 @@ function(plumb_process name)
   target_link_libraries(plumb-${name} PRIVATE ${ARG_LINKS} plumb_warnings)
 endfunction()
 
-# plumb_test(<folder> LINKS ...) -> one Catch2 binary of tests/<folder>/*_test.cc, one CTest entry
+# plumb_test(<name> [FOLDER folder] LINKS ...) -> one Catch2 binary of tests/<folder>/*_test.cc, one CTest entry
 function(plumb_test folder)
-  cmake_parse_arguments(ARG "" "" "LINKS" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${folder}/*_test.cc)
+  cmake_parse_arguments(ARG "" "FOLDER" "LINKS" ${ARGN})
+  if(NOT ARG_FOLDER)
+    set(ARG_FOLDER ${folder})
+  endif()
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${ARG_FOLDER}/*_test.cc)
   if(NOT sources)
     return()
   endif()

@@ -16,10 +16,11 @@ BELOW = {
     "estimator": {"common", "robot"},
     "controller": {"common", "robot", "sim/tasks"},
     "sim": {"common", "robot", "sim/tasks"},
-    "calibrator": {"common", "robot", "sim", "sim/tasks"},
+    "calibrator/inference": {"common"},
+    "calibrator": {"common", "robot", "sim", "sim/tasks", "calibrator/inference"},
     "trainer": {"common", "robot", "sim", "sim/tasks", "controller"},
-    "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "controller", "calibrator", "trainer"},
-    "experiments": {"common", "robot", "sim", "sim/tasks", "calibrator", "trainer", "controller"},
+    "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "controller", "calibrator", "calibrator/inference", "trainer"},
+    "experiments": {"common", "robot", "sim", "sim/tasks", "calibrator", "calibrator/inference", "trainer", "controller"},
 }
 # The virtual robot speaks the protocols' device side.
 EXCEPTIONS = {("sim/main.cc", "drivers"), ("sim/virtual_robot.h", "drivers"), ("sim/virtual_robot.cc", "drivers")}
@@ -32,7 +33,8 @@ SYSTEM = {
 
 
 def folder(path):
-    return "sim/tasks" if path.startswith("sim/tasks/") else path.split("/")[0]
+    nested = [f for f in BELOW if "/" in f and path.startswith(f + "/")]
+    return nested[0] if nested else path.split("/")[0]
 
 
 def main():

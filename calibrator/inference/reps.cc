@@ -1,4 +1,4 @@
-#include "calibrator/reps.h"
+#include "calibrator/inference/reps.h"
 
 #include <Eigen/Dense>
 #include <boost/math/tools/roots.hpp>
@@ -8,16 +8,6 @@
 
 namespace plumb {
 namespace {
-
-Eigen::LLT<Eigen::MatrixXd> Factor(const Gaussian& p) {
-  Eigen::LLT<Eigen::MatrixXd> factor(p.covariance);
-  if (factor.info() != Eigen::Success) throw std::invalid_argument("covariance is not positive definite");
-  return factor;
-}
-
-double LogDeterminant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
-  return 2 * factor.matrixLLT().diagonal().array().log().sum();
-}
 
 // Weights at one temperature; `shifted` = R - max R.
 RepsWeights AtTemperature(const Eigen::ArrayXd& shifted, double temperature) {
@@ -34,24 +24,6 @@ RepsWeights AtTemperature(const Eigen::ArrayXd& shifted, double temperature) {
 }
 
 }  // namespace
-
-double LogDensity(const Gaussian& p, const Eigen::VectorXd& x) {
-  const auto factor = Factor(p);
-  const double n = static_cast<double>(x.size());
-  return -0.5 * (factor.matrixL().solve(x - p.mean).squaredNorm() + LogDeterminant(factor) + n * std::log(2 * M_PI));
-}
-
-double KlDivergence(const Gaussian& p, const Gaussian& q) {
-  const auto p_factor = Factor(p), q_factor = Factor(q);
-  const double n = static_cast<double>(p.mean.size());
-  const Eigen::VectorXd difference = q.mean - p.mean;
-  return 0.5 * (q_factor.solve(p.covariance).trace() + difference.dot(q_factor.solve(difference)) - n +
-                LogDeterminant(q_factor) - LogDeterminant(p_factor));
-}
-
-Eigen::MatrixXd Transform(const Gaussian& p, const Eigen::MatrixXd& normals) {
-  return (Factor(p).matrixL() * normals).colwise() + p.mean;
-}
 
 RepsWeights SolveReps(const Eigen::VectorXd& returns, double kl_bound, double min_temperature) {
   if (returns.size() == 0 || returns.array().isNaN().any() || !std::isfinite(returns.maxCoeff())) {
@@ -94,7 +66,7 @@ Gaussian LimitKl(const Gaussian& old, const Gaussian& target, double kl_bound) {
   if (KlDivergence(target, old) <= kl_bound) return target;
   const Eigen::Index n = old.mean.size();
   const auto identity = Eigen::MatrixXd::Identity(n, n);
-  const Eigen::MatrixXd old_precision = Factor(old).solve(identity), target_precision = Factor(target).solve(identity);
+  const Eigen::MatrixXd old_precision = Precision(old), target_precision = Precision(target);
   const auto between = [&](double a) {
     const Eigen::MatrixXd precision = a * target_precision + (1 - a) * old_precision;
     const Eigen::LLT<Eigen::MatrixXd> factor(precision);

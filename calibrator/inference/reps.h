@@ -2,22 +2,9 @@
 
 #include <Eigen/Core>
 
+#include "calibrator/inference/gaussian.h"
+
 namespace plumb {
-
-/// A normal distribution over the parameters' coordinates.
-struct Gaussian {
-  Eigen::VectorXd mean;        ///< n
-  Eigen::MatrixXd covariance;  ///< n x n, positive definite
-};
-
-/// ln p(x). @throws std::invalid_argument if the covariance is not positive definite (also below).
-double LogDensity(const Gaussian& p, const Eigen::VectorXd& x);
-
-/// D_KL(p || q) [nat] = (tr(S_q^-1 S_p) + d' S_q^-1 d - n + ln det S_q - ln det S_p) / 2, d = m_q - m_p.
-double KlDivergence(const Gaussian& p, const Gaussian& q);
-
-/// n x N matrix of samples from a matrix of standard normal deviates: mean + chol(covariance) * normals.
-Eigen::MatrixXd Transform(const Gaussian& p, const Eigen::MatrixXd& normals);
 
 /// Weights of episodic relative-entropy policy search (Peters, Muelling, Altun, AAAI 2010):
 ///   w_i = exp((R_i - max R) / eta) / sum

@@ -1,4 +1,4 @@
-#include "calibrator/reps.h"
+#include "calibrator/inference/reps.h"
 
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
