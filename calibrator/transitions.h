@@ -16,9 +16,11 @@ namespace plumb {
 /// segments still carry the previous command: it takes milliseconds until a command reaches the motor, and a
 /// simulator that ignored that would be calibrated to be wrong.
 struct Transition {
-  int step;                                          ///< in the episode
-  Eigen::VectorXd q, v, next_q, next_v;              ///< smoothed states
-  Eigen::VectorXd q_sd, v_sd, next_q_sd, next_v_sd;  ///< their standard deviations
+  int step;                              ///< in the episode
+  Eigen::VectorXd q, v;                  ///< smoothed state, finite
+  Eigen::VectorXd next_q, next_v;        ///< smoothed state; NaN = not observed
+  /// Their standard deviations. 0 = exact; NaN = not known, to be estimated from the errors.
+  Eigen::VectorXd q_sd, v_sd, next_q_sd, next_v_sd;
   std::vector<EffortSegment> efforts;                ///< from s to s', gapless
   double duration() const;
 };
@@ -36,6 +38,7 @@ struct DropCounts {
   int64_t late = 0;        ///< the interval is not one control period (within 20 %)
   int64_t not_finite = 0;  ///< or an effort is unknown
   int64_t restart = 0;     ///< the estimator's filter restarted within the interval
+  int64_t total() const { return gap + late + not_finite + restart; }
 };
 
 /// Joins ROBOT_STATE_SMOOTHED and JOINT_COMMAND by state_sequence: s is the state a command acted on, s' the

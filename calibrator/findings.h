@@ -1,0 +1,96 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "calibrator/identifiability.h"
+#include "calibrator/inference/gaussian.h"
+#include "calibrator/transitions.h"
+
+namespace plumb {
+
+/// Error of predicting n steps ahead on transitions that the fit has not seen, root mean square over states and windows,
+/// in standard units (Task::state_scale).
+struct HorizonError {
+  int horizon;       ///< n
+  int64_t windows;   ///< predicted; with 0 the errors are NaN
+  double posterior;  ///< of the posterior's mean
+  double prior;      ///< of the prior's mean
+};
+
+struct Holdout {
+  int64_t fitted = 0, held_out = 0;  ///< transitions
+  std::vector<HorizonError> errors;
+  bool better = false;  ///< the posterior predicts better than the prior, at every horizon that could be tried
+  std::string words;
+};
+
+/// One way in which the model does not explain the robot.
+struct Misfit {
+  std::string what;       ///< "knee, at ground contact", for people
+  std::string joint;      ///< empty = of all joints
+  std::string condition;  ///< "contact", "free" or empty = both
+  std::string test;       ///< "scale", "whiteness", "bias", "structure", "outliers"
+  double statistic;       ///< of the test
+  double p;               ///< of such a statistic if the model were right, corrected for the number of tests
+  double effect;          ///< share of the errors' variance that it makes, 0 to 1; NaN where there is no such share
+};
+
+/// Whether the model can explain the robot at all.
+struct Misspecification {
+  bool alarm = false;
+  std::vector<Misfit> misfits;  ///< those that count, worst first
+  std::string words;
+};
+
+/// One log's own answer against that of all.
+struct LogAgreement {
+  std::string log;
+  Eigen::VectorXd mean, sd;  ///< of its own posterior, physical units
+  double distance;           ///< Mahalanobis' from the others' together, in what the log can tell
+  double p;                  ///< of such a distance if all logs were of one robot, corrected for the number of logs
+};
+
+struct Agreement {
+  bool agree = true;
+  std::vector<LogAgreement> logs;  ///< empty for a single log
+  std::string words;
+};
+
+/// One stage of a fit: windows of so many steps.
+struct Stage {
+  int horizon;
+  int64_t windows;
+  int64_t simulated_steps;
+  double discrepancy;   ///< mean squared whitened error at its end
+  Eigen::VectorXd mean, sd;  ///< coordinates
+};
+
+/// All that a calibration has found.
+struct Findings {
+  std::string method;         ///< that was asked for
+  std::string used;           ///< that gave the answer, e.g. "laplace" where "auto" was asked for
+  uint64_t seed = 0;
+  Gaussian prior;             ///< coordinates
+  GaussianMixture posterior;  ///< coordinates
+  Eigen::MatrixXd samples;    ///< of the posterior, physical units, n x N, equally weighted
+  int64_t transitions = 0;
+  int64_t simulated_steps = 0;   ///< transitions simulated for the fit
+  int64_t diagnostic_steps = 0;  ///< and for the diagnostics
+  int64_t failures = 0;          ///< simulations that failed
+  double discrepancy = 0;        ///< mean squared whitened one-step error of the mean; 1 = down to the noise
+  Eigen::VectorXd noise_sd;      ///< of each entry of (q, v), estimated or as recorded, physical units
+  std::vector<Stage> stages;
+  Identifiability identifiability;
+  Eigen::VectorXd cramer_rao;    ///< sd of each parameter's coordinate if nothing but the data told, infinite where they do not
+  Holdout holdout;
+  Misspecification misspecification;
+  Agreement agreement;
+  std::string check;             ///< how the posterior's shape was verified, in words
+  std::vector<std::string> warnings;
+  double seconds = 0;            ///< wall time
+};
+
+}  // namespace plumb
