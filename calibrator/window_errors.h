@@ -30,9 +30,10 @@ class WindowErrors {
     int coordinate;           ///< 0 ... n - 1: q, n ... 2 n - 1: v
   };
 
-  /// @param rollouts must outlive this. @throws std::invalid_argument if the robot has spherical joints or there is no
+  /// @param rollouts must outlive this. @param every keeps only each so-manieth window, >= 1. @throws std::invalid_argument if the robot has spherical joints or there is no
   /// transition with an observed end.
-  WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon, int threads);
+  WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon, int threads,
+               int every = 1);
 
   const std::vector<Row>& rows() const { return rows_; }
   int windows() const { return static_cast<int>(windows_.size()); }
@@ -43,6 +44,9 @@ class WindowErrors {
   /// Noise of each entry of (q, v), physical units, where the record does not say.
   const Eigen::VectorXd& noise_sd() const { return noise_sd_; }
   void set_noise_sd(const Eigen::VectorXd& sd);
+  /// Whether the record says what the noise at the windows' ends is, and that their beginnings are exact.
+  bool noise_known() const;
+  bool starts_known() const;
   /// Takes the sensitivity to the initial state, by finite differences, from the simulator with these parameters. It has
   /// to be called before Whitened if any initial state is uncertain, and costs 2 n + 1 simulators then, nothing else.
   /// @return false if that simulator fails: the sensitivity is then that of free motion, q + v t.
@@ -60,9 +64,12 @@ class WindowErrors {
  private:
   struct Start {
     Eigen::VectorXd sd;           // of (q, v)
-    Eigen::MatrixXd sensitivity;  // rows of the window x 2 n, physical units; empty where the start is known
+    Eigen::MatrixXd sensitivity;  // rows of the window x 2 n, physical units; empty until Linearise
   };
-  void Whiten(Eigen::MatrixXd* errors) const;
+  void AddWindow(size_t rollout, size_t first, size_t length);
+  Eigen::MatrixXd Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows);
+  Eigen::MatrixXd FreeMotion() const;
+  void WhitenWindow(size_t window, Eigen::MatrixXd* errors) const;
   double EndSd(const Row& row) const;
 
   Eigen::Index n_;
@@ -71,8 +78,8 @@ class WindowErrors {
   std::vector<Window> windows_;
   std::vector<Start> starts_;
   std::vector<Row> rows_;
-  std::vector<Eigen::Index> first_row_;  // of each window, and the end
-  std::vector<std::vector<Eigen::Index>> step_row_;  // of each window's steps, and the end
+  std::vector<Eigen::Index> first_row_;               // of each window, and the end
+  std::vector<std::vector<Eigen::Index>> step_rows_;  // first of each step of each window, and the end
   Eigen::VectorXd noise_sd_;
   int64_t steps_ = 0, simulated_steps_ = 0;
   Windows::Failures failures_;

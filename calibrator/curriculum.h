@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "calibrator/findings.h"
+#include "calibrator/inference/laplace.h"
+#include "calibrator/window_errors.h"
+
+namespace plumb {
+
+/// The prior of a robot's parameters, in their coordinates.
+Prior PriorOf(const RobotDescription& robot);
+
+/// Errors of windows as a least-squares problem: a noise scale for each entry of (q, v), a block for each recorded state, a
+/// cluster for each stretch of at least 25 control steps. `errors` must outlive it.
+LeastSquares ProblemOf(const RobotDescription& robot, WindowErrors& errors);
+
+struct CurriculumOptions {
+  std::vector<int> horizons{1, 5, 10, 50};  ///< control steps of each stage's windows, increasing
+  int starts = 4;                           ///< first guesses: the prior's mean, and draws of the prior
+  uint64_t seed = 1;
+  int threads = 1;
+  /// Told what has just been done, and which share of the work, roughly; may throw to break off.
+  std::function<void(const std::string& what, double share)> progress = [](const std::string&, double) {};
+};
+
+struct CurriculumFit {
+  LaplaceFit fit;                   ///< of the longest windows that the model explains
+  std::vector<LaplaceFit> others;   ///< further modes that explain the shortest windows about as well
+  std::vector<Stage> stages;        ///< those that count
+  int horizon = 1;                  ///< of the last of them
+  Eigen::VectorXd noise_sd;         ///< of each entry of (q, v), physical units
+  LaplaceFit one_step;              ///< errors of one step at the final mode; its curvature is that of the first stage
+  std::vector<WindowErrors::Row> rows;  ///< of one_step's errors
+  bool noise_known = false;
+  int64_t simulated_steps = 0;
+  int64_t failures = 0;
+  std::vector<std::string> warnings;
+};
+
+/// Laplace's approximation from windows of one step, where the mode is found from anywhere, then of more and more steps,
+/// each stage from the mode of the one before: the accuracy of long windows with the convergence of short ones. Several first
+/// guesses are tried on a part of the transitions.
+///
+/// A stage whose errors are larger than the noise of the first one by more than half says that the model is not the robot over
+/// so many steps, or that they are too many for the linearisation: it does not count, nor do longer ones.
+///
+/// @param start first guess instead of the prior's mean, in coordinates; empty = the prior's mean.
+/// @throws std::invalid_argument, see WindowErrors and FitLaplace; also if no first guess can be simulated.
+CurriculumFit FitCurriculum(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
+                            const CurriculumOptions& options, const Eigen::VectorXd& start = {});
+
+}  // namespace plumb

@@ -1,0 +1,137 @@
+#include "calibrator/inference/noise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace plumb {
+namespace {
+
+constexpr double kFewRows = 20;    // of a group, for a scale of its own
+constexpr double kPriorRows = 20;  // that a known scale is worth
+constexpr int kTailIterations = 20;
+constexpr double kWorthwhile = 4;  // [nat] that heavier tails must gain
+constexpr std::array<double, 5> kDegreesOfFreedom{2, 4, 8, 16, 32};
+
+}  // namespace
+
+Noise::Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known)
+    : group_(group), block_(block), scale_known_(scale_known) {
+  groups_ = group.empty() ? 0 : *std::max_element(group.begin(), group.end()) + 1;
+  Eigen::VectorXd own = Eigen::VectorXd::Zero(groups_);
+  block_size_ = Eigen::VectorXd::Zero(block.empty() ? 0 : block.back() + 1);
+  for (size_t i = 0; i < group.size(); ++i) {
+    own(group[i]) += 1;
+    block_size_(block[i]) += 1;
+  }
+  // The first of the small groups stands for all of them.
+  int pool = -1;
+  shares_.resize(static_cast<size_t>(groups_));
+  rows_ = Eigen::VectorXd::Zero(groups_);
+  for (int g = 0; g < groups_; ++g) {
+    const bool small = own(g) < kFewRows;
+    if (small && pool < 0) pool = g;
+    shares_[static_cast<size_t>(g)] = small ? pool : g;
+    rows_(shares_[static_cast<size_t>(g)]) += own(g);
+  }
+  scale_ = Eigen::VectorXd::Ones(groups_);
+}
+
+void Noise::Estimate(const Eigen::VectorXd& errors, double effective) {
+  const auto update = [&] {
+    const Eigen::VectorXd robust = RobustWeights(errors);
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(groups_);
+    for (Eigen::Index i = 0; i < errors.size(); ++i) {
+      squares(shares_[static_cast<size_t>(group_[static_cast<size_t>(i)])]) += robust(i) * errors(i) * errors(i);
+    }
+    const double left = std::max(1 - effective / static_cast<double>(errors.size()), 0.1);
+    for (int g = 0; g < groups_; ++g) {
+      const int from = shares_[static_cast<size_t>(g)];
+      if (rows_(from) == 0) continue;  // nothing of it was observed
+      const double variance = scale_known_ ? (squares(from) + kPriorRows) / (rows_(from) * left + kPriorRows)
+                                           : squares(from) / (rows_(from) * left);
+      scale_(g) = std::max(std::sqrt(variance), kLeastScale);
+    }
+  };
+  if (std::isinf(degrees_of_freedom_)) return update();
+  for (int i = 0; i < kTailIterations; ++i) update();  // expectation-maximisation: weights depend on scales
+}
+
+bool Noise::ChooseTails(const Eigen::VectorXd& errors, double effective) {
+  const double before = degrees_of_freedom_;
+  if ((scale_.array() <= kLeastScale).any()) return false;  // rounding has no distribution
+  degrees_of_freedom_ = std::numeric_limits<double>::infinity();
+  Estimate(errors, effective);
+  Noise best = *this;
+  double best_likelihood = LogLikelihood(errors) + kWorthwhile;
+  for (const double f : kDegreesOfFreedom) {
+    Noise candidate = *this;
+    candidate.degrees_of_freedom_ = f;
+    candidate.Estimate(errors, effective);
+    const double likelihood = candidate.LogLikelihood(errors);
+    if (likelihood <= best_likelihood) continue;
+    best_likelihood = likelihood;
+    best.degrees_of_freedom_ = f, best.scale_ = candidate.scale_;
+  }
+  degrees_of_freedom_ = best.degrees_of_freedom_, scale_ = best.scale_;
+  return degrees_of_freedom_ != before;
+}
+
+Eigen::VectorXd Noise::RowScale() const {
+  Eigen::VectorXd scale(static_cast<Eigen::Index>(group_.size()));
+  for (size_t i = 0; i < group_.size(); ++i) scale(static_cast<Eigen::Index>(i)) = scale_(group_[i]);
+  return scale;
+}
+
+Eigen::VectorXd Noise::BlockSquares(const Eigen::VectorXd& errors) const {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(block_size_.size());
+  for (Eigen::Index i = 0; i < errors.size(); ++i) {
+    const double scaled = errors(i) / scale_(group_[static_cast<size_t>(i)]);
+    squares(block_[static_cast<size_t>(i)]) += scaled * scaled;
+  }
+  return squares;
+}
+
+Eigen::VectorXd Noise::RobustWeights(const Eigen::VectorXd& errors) const {
+  if (std::isinf(degrees_of_freedom_)) return Eigen::VectorXd::Ones(errors.size());
+  const Eigen::VectorXd squares = BlockSquares(errors);
+  const Eigen::ArrayXd of_block = (degrees_of_freedom_ + block_size_.array()) / (degrees_of_freedom_ + squares.array());
+  Eigen::VectorXd weights(errors.size());
+  for (Eigen::Index i = 0; i < errors.size(); ++i) weights(i) = of_block(block_[static_cast<size_t>(i)]);
+  return weights;
+}
+
+Eigen::VectorXd Noise::Weights(const Eigen::VectorXd& errors) const {
+  return RobustWeights(errors).cwiseQuotient(RowScale().array().square().matrix());
+}
+
+Eigen::MatrixXd Noise::Information(const Eigen::MatrixXd& jacobian) const {
+  Eigen::VectorXd weights = RowScale().array().square().inverse();
+  if (std::isfinite(degrees_of_freedom_)) {
+    for (Eigen::Index i = 0; i < weights.size(); ++i) {
+      const double k = block_size_(block_[static_cast<size_t>(i)]);
+      weights(i) *= (degrees_of_freedom_ + k) / (degrees_of_freedom_ + k + 2);
+    }
+  }
+  return jacobian.transpose() * weights.asDiagonal() * jacobian;
+}
+
+double Noise::LogLikelihood(const Eigen::VectorXd& errors) const {
+  const Eigen::VectorXd squares = BlockSquares(errors);
+  double sum = 0;
+  for (size_t i = 0; i < group_.size(); ++i) sum -= std::log(scale_(group_[i]));
+  if (scale_known_) {  // the scale's own prior, as if kPriorRows errors of variance one had been seen
+    for (int g = 0; g < groups_; ++g) {
+      if (shares_[static_cast<size_t>(g)] == g) sum -= kPriorRows * (std::log(scale_(g)) + 0.5 / (scale_(g) * scale_(g)));
+    }
+  }
+  if (std::isinf(degrees_of_freedom_)) return sum - 0.5 * squares.sum();
+  const double f = degrees_of_freedom_;
+  for (Eigen::Index b = 0; b < squares.size(); ++b) {
+    const double k = block_size_(b);
+    sum += std::lgamma((f + k) / 2) - std::lgamma(f / 2) - k / 2 * std::log(f / 2) - (f + k) / 2 * std::log1p(squares(b) / f);
+  }
+  return sum;
+}
+
+}  // namespace plumb

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+namespace plumb {
+
+/// The distribution of errors around zero: each row of a group has the same scale, and each block of k rows is normal or
+/// Student's t in k dimensions. See FitLaplace. Not thread-safe.
+class Noise {
+ public:
+  static constexpr double kLeastScale = 1e-9;  ///< smaller errors are a simulation's rounding
+
+  /// @param group, block of each row, see LeastSquares.
+  Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known);
+
+  /// Scales that maximise the likelihood, or nearly so. @param effective number of parameters that the errors were fitted with.
+  void Estimate(const Eigen::VectorXd& errors, double effective);
+  /// Chooses the degrees of freedom by likelihood. @return true if they have changed.
+  bool ChooseTails(const Eigen::VectorXd& errors, double effective);
+
+  /// Sum over blocks of ln p, the constant that depends on neither scale nor tails left out.
+  double LogLikelihood(const Eigen::VectorXd& errors) const;
+  /// Of each row in a weighted least-squares step: robust weight / scale^2.
+  Eigen::VectorXd Weights(const Eigen::VectorXd& errors) const;
+  /// Expected Fisher information of parameters with this Jacobian: J' J / s^2, times (f + k) / (f + k + 2) for Student's t.
+  Eigen::MatrixXd Information(const Eigen::MatrixXd& jacobian) const;
+
+  const Eigen::VectorXd& scale() const { return scale_; }  ///< of each group
+  Eigen::VectorXd RowScale() const;                        ///< of each row
+  double degrees_of_freedom() const { return degrees_of_freedom_; }
+
+ private:
+  Eigen::VectorXd BlockSquares(const Eigen::VectorXd& errors) const;
+  Eigen::VectorXd RobustWeights(const Eigen::VectorXd& errors) const;
+
+  const std::vector<int>& group_;
+  const std::vector<int>& block_;
+  bool scale_known_;
+  int groups_ = 0;
+  std::vector<int> shares_;       // group whose scale each group uses
+  Eigen::VectorXd rows_;          // of each group, those that share its scale included
+  Eigen::VectorXd block_size_;
+  Eigen::VectorXd scale_;
+  double degrees_of_freedom_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace plumb
