@@ -187,6 +187,7 @@ Eigen::VectorXd Discrepancy::PredictionError(const Eigen::MatrixXd& parameters, 
     const auto& t = rollout.transitions;
     for (size_t start = 0; start + length <= t.size(); ++start) {
       if (t[start + length - 1].step != t[start].step + horizon - 1) continue;
+      if (!t[start + length - 1].next_q.array().isFinite().any() && !t[start + length - 1].next_v.array().isFinite().any()) continue;
       windows.push_back(WindowOf(rollout, start, length));
       ends.push_back(&t[start + length - 1]);
     }
@@ -196,7 +197,10 @@ Eigen::VectorXd Discrepancy::PredictionError(const Eigen::MatrixXd& parameters, 
   Predict(parameters, windows, [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
     Eigen::VectorXd error(2 * n_);
     error << q - ends[window]->next_q, v - ends[window]->next_v;
-    const double mean = (error.array() / scale_.array()).square().mean();
+    const Eigen::ArrayXd recorded = (Eigen::ArrayXd(2 * n_) << ends[window]->next_q, ends[window]->next_v).finished();
+    const auto observed = recorded.isFinite();
+    const double mean = observed.select((error.array() / scale_.array()).square(), 0.0).sum() /
+                        static_cast<double>(observed.count());
     squared(static_cast<Eigen::Index>(window), sample) = std::isfinite(mean) ? mean : kInfinity;
   });
   return squared.colwise().mean().transpose().cwiseSqrt();

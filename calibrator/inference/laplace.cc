@@ -174,6 +174,21 @@ LaplaceFit FitLaplace(const LeastSquares& problem, const Eigen::VectorXd& start,
   return Fit(problem, options).Run(start);
 }
 
+Eigen::VectorXd LogLikelihood(const LeastSquares& problem, const Eigen::MatrixXd& parameters, double degrees_of_freedom) {
+  const Eigen::MatrixXd errors = problem.errors(parameters);
+  Noise noise(problem.group, problem.block, problem.scale_known, degrees_of_freedom);
+  Eigen::VectorXd values(errors.cols());
+  for (Eigen::Index i = 0; i < errors.cols(); ++i) {
+    if (!errors.col(i).allFinite()) {
+      values(i) = -std::numeric_limits<double>::infinity();
+      continue;
+    }
+    noise.Estimate(errors.col(i), 0);
+    values(i) = noise.LogLikelihood(errors.col(i));
+  }
+  return values;
+}
+
 Eigen::MatrixXd Draw(const LaplaceFit& fit, const Prior& prior, Eigen::Index count, Random& random) {
   return prior.FromStandard(Transform(fit.standard, StandardNormals(prior.size(), count, random)));
 }

@@ -64,6 +64,12 @@ struct LaplaceFit {
 /// errors to tell noise from parameters: n + 3 at least, where the scale is not known.
 LaplaceFit FitLaplace(const LeastSquares& problem, const Eigen::VectorXd& start, const LaplaceOptions& options = {});
 
+/// ln likelihood of N parameters with the noise's scale at its maximum for each, up to a constant; -infinity where the simulation
+/// fails. Where the record knows the scale, it counts as in FitLaplace.
+/// @param degrees_of_freedom of Student's t; infinite = normal. @param parameters n x N, in the prior's coordinates.
+Eigen::VectorXd LogLikelihood(const LeastSquares& problem, const Eigen::MatrixXd& parameters,
+                              double degrees_of_freedom = std::numeric_limits<double>::infinity());
+
 /// Draws from the posterior, n x count in the prior's coordinates.
 Eigen::MatrixXd Draw(const LaplaceFit& fit, const Prior& prior, Eigen::Index count, Random& random);
 

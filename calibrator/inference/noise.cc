@@ -15,8 +15,9 @@ constexpr std::array<double, 5> kDegreesOfFreedom{2, 4, 8, 16, 32};
 
 }  // namespace
 
-Noise::Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known)
-    : group_(group), block_(block), scale_known_(scale_known) {
+Noise::Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known,
+             double degrees_of_freedom)
+    : group_(group), block_(block), scale_known_(scale_known), degrees_of_freedom_(degrees_of_freedom) {
   groups_ = group.empty() ? 0 : *std::max_element(group.begin(), group.end()) + 1;
   Eigen::VectorXd own = Eigen::VectorXd::Zero(groups_);
   block_size_ = Eigen::VectorXd::Zero(block.empty() ? 0 : block.back() + 1);

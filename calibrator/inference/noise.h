@@ -13,7 +13,8 @@ class Noise {
   static constexpr double kLeastScale = 1e-9;  ///< smaller errors are a simulation's rounding
 
   /// @param group, block of each row, see LeastSquares.
-  Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known);
+  Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known,
+        double degrees_of_freedom = std::numeric_limits<double>::infinity());
 
   /// Scales that maximise the likelihood, or nearly so. @param effective number of parameters that the errors were fitted with.
   void Estimate(const Eigen::VectorXd& errors, double effective);
@@ -43,7 +44,7 @@ class Noise {
   Eigen::VectorXd rows_;          // of each group, those that share its scale included
   Eigen::VectorXd block_size_;
   Eigen::VectorXd scale_;
-  double degrees_of_freedom_ = std::numeric_limits<double>::infinity();
+  double degrees_of_freedom_;
 };
 
 }  // namespace plumb

@@ -1,0 +1,132 @@
+#include "calibrator/inference/importance.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+namespace plumb {
+namespace {
+
+constexpr double kWide = 4;         // variance of the wide half, relative to the narrow one
+constexpr double kLeastWeight = 1e-3;
+
+// Each component as it is, and wide.
+GaussianMixture Proposal(const GaussianMixture& mixture) {
+  GaussianMixture proposal;
+  for (size_t i = 0; i < mixture.components.size(); ++i) {
+    for (const double factor : {1.0, kWide}) {
+      proposal.weights.push_back(mixture.weights[i] / 2);
+      proposal.components.push_back({mixture.components[i].mean, factor * mixture.components[i].covariance});
+    }
+  }
+  return proposal;
+}
+
+// ln p of each component, N x K.
+Eigen::MatrixXd ComponentDensities(const GaussianMixture& mixture, const Eigen::MatrixXd& x) {
+  Eigen::MatrixXd densities(x.cols(), static_cast<Eigen::Index>(mixture.components.size()));
+  for (size_t k = 0; k < mixture.components.size(); ++k) {
+    const Gaussian& p = mixture.components[k];
+    const Eigen::LLT<Eigen::MatrixXd> factor(p.covariance);
+    const double constant = -0.5 * static_cast<double>(x.rows()) * std::log(2 * M_PI) - factor.matrixLLT().diagonal().array().log().sum();
+    const Eigen::MatrixXd white = factor.matrixL().solve(x.colwise() - p.mean);
+    densities.col(static_cast<Eigen::Index>(k)) = constant - 0.5 * white.colwise().squaredNorm().array();
+  }
+  return densities;
+}
+
+Eigen::VectorXd LogSumExp(const Eigen::MatrixXd& rows) {
+  const Eigen::VectorXd top = rows.rowwise().maxCoeff();
+  return top.array() + (rows.colwise() - top).array().exp().rowwise().sum().log();
+}
+
+Eigen::MatrixXd Weighted(const GaussianMixture& mixture, Eigen::MatrixXd densities) {
+  for (Eigen::Index k = 0; k < densities.cols(); ++k) densities.col(k).array() += std::log(mixture.weights[static_cast<size_t>(k)]);
+  return densities;
+}
+
+// One step of expectation-maximisation on weighted samples.
+GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x, const Eigen::VectorXd& weights) {
+  const Eigen::MatrixXd joint = Weighted(mixture, ComponentDensities(mixture, x));
+  const Eigen::MatrixXd share = (joint.colwise() - LogSumExp(joint)).array().exp();
+  const Eigen::Index n = x.rows();
+  GaussianMixture adapted;
+  for (Eigen::Index k = 0; k < share.cols(); ++k) {
+    const Gaussian& old = mixture.components[static_cast<size_t>(k)];
+    const Eigen::VectorXd w = weights.cwiseProduct(share.col(k));
+    const double total = w.sum();
+    if (!(total > kLeastWeight)) continue;
+    Gaussian p;
+    p.mean = x * w / total;
+    const Eigen::MatrixXd centred = x.colwise() - p.mean;
+    const double ess = total * total / w.squaredNorm();
+    const double d = static_cast<double>(n);
+    p.covariance = (ess * (centred * (w / total).asDiagonal() * centred.transpose()) + d * old.covariance) / (ess + d);
+    adapted.weights.push_back(total);
+    adapted.components.push_back(std::move(p));
+  }
+  double sum = 0;
+  for (const double w : adapted.weights) sum += w;
+  for (double& w : adapted.weights) w /= sum;
+  return adapted;
+}
+
+Eigen::VectorXd Normalised(const Eigen::VectorXd& log_weights) {
+  const double top = log_weights.maxCoeff();
+  if (!std::isfinite(top)) throw std::invalid_argument("no sample of the proposal can be explained at all");
+  // Eigen's vectorised exp(-infinity) is tiny, not zero.
+  const Eigen::VectorXd weights = log_weights.array().isFinite().select((log_weights.array() - top).exp(), 0.0);
+  return weights / weights.sum();
+}
+
+}  // namespace
+
+ImportanceFit FitByImportance(const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& log_density,
+                              const GaussianMixture& guess, const ImportanceOptions& options) {
+  ImportanceFit fit;
+  fit.mixture = guess;
+  const Eigen::Index n = guess.components.at(0).mean.size();
+  std::vector<GaussianMixture> proposals;
+  Eigen::VectorXd target(0);
+  fit.samples.resize(n, 0);
+  for (int round = 0; round < options.rounds; ++round) {
+    proposals.push_back(Proposal(fit.mixture));
+    Random random(options.seed, {0x1390, static_cast<uint32_t>(round)});
+    Eigen::MatrixXd fresh(n, options.samples);
+    for (Eigen::Index i = 0; i < fresh.cols(); ++i) fresh.col(i) = Sample(proposals.back(), random);
+    Eigen::VectorXd density = log_density(fresh);
+    for (double& d : density) {
+      if (!std::isfinite(d)) d = -std::numeric_limits<double>::infinity();
+    }
+    fit.simulations += options.samples;
+    fit.samples.conservativeResize(n, fit.samples.cols() + fresh.cols());
+    fit.samples.rightCols(fresh.cols()) = fresh;
+    target.conservativeResize(target.size() + density.size());
+    target.tail(density.size()) = density;
+    Eigen::MatrixXd proposed(fit.samples.cols(), static_cast<Eigen::Index>(proposals.size()));
+    for (size_t p = 0; p < proposals.size(); ++p) {
+      proposed.col(static_cast<Eigen::Index>(p)) = LogSumExp(Weighted(proposals[p], ComponentDensities(proposals[p], fit.samples)));
+    }
+    fit.weights = Normalised(target - LogSumExp(proposed));
+    fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights);
+  }
+  fit.ess = 1 / fit.weights.squaredNorm();
+  fit.heaviest = fit.weights.maxCoeff();
+  return fit;
+}
+
+Eigen::MatrixXd Resample(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, Eigen::Index count, Random& random) {
+  Eigen::MatrixXd drawn(samples.rows(), count);
+  double at = random.Uniform() / static_cast<double>(count), below = weights(0);
+  Eigen::Index from = 0;
+  for (Eigen::Index i = 0; i < count; ++i, at += 1 / static_cast<double>(count)) {
+    while (at > below && from + 1 < samples.cols()) below += weights(++from);
+    drawn.col(i) = samples.col(from);
+  }
+  return drawn;
+}
+
+}  // namespace plumb
