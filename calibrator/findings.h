@@ -8,6 +8,7 @@
 #include "calibrator/identifiability.h"
 #include "calibrator/inference/gaussian.h"
 #include "calibrator/transitions.h"
+#include "calibrator/window_errors.h"
 
 namespace plumb {
 
@@ -82,6 +83,8 @@ struct Findings {
   int64_t failures = 0;          ///< simulations that failed
   double discrepancy = 0;        ///< mean squared whitened one-step error of the mean; 1 = down to the noise
   Eigen::VectorXd noise_sd;      ///< of each entry of (q, v), estimated or as recorded, physical units
+  Eigen::VectorXd errors;        ///< one-step errors of the mean, whitened, divided by their estimated scale
+  std::vector<WindowErrors::Row> rows;  ///< what each is about
   std::vector<Stage> stages;
   Identifiability identifiability;
   Eigen::VectorXd cramer_rao;    ///< sd of each parameter's coordinate if nothing but the data told, infinite where they do not

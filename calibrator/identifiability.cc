@@ -171,8 +171,14 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
     found.words = "the simulation fails at the mean parameters, so nothing is known of what can be known";
     return found;
   }
-  found.information = jacobian.transpose() * jacobian;
+  return FindIdentifiability(robot, jacobian.transpose() * jacobian, prior_sd, distribution);
+}
 
+Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::MatrixXd& information,
+                                    const Eigen::VectorXd& prior_sd, const Gaussian& distribution) {
+  const Eigen::Index n = distribution.mean.size();
+  Identifiability found;
+  found.information = information;
   const Eigen::MatrixXd scaled = prior_sd.asDiagonal() * found.information * prior_sd.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
   const double threshold = kNull * eigen.eigenvalues()(n - 1);

@@ -32,4 +32,8 @@ struct Identifiability {
 Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& discrepancy,
                                     std::span<const Rollout> rollouts, const Gaussian& distribution);
 
+/// The same from the information that data have about the coordinates, n x n. @param prior_sd of the coordinates.
+Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::MatrixXd& information,
+                                    const Eigen::VectorXd& prior_sd, const Gaussian& distribution);
+
 }  // namespace plumb

@@ -38,6 +38,7 @@ class WindowErrors {
   const std::vector<Row>& rows() const { return rows_; }
   int windows() const { return static_cast<int>(windows_.size()); }
   int num_velocities() const { return static_cast<int>(n_); }
+  int parameter_count() const { return simulate_.model().parameters().size(); }
   /// Control steps that one simulator makes.
   int64_t steps() const { return steps_; }
 

@@ -224,6 +224,7 @@ Windows::Windows(std::shared_ptr<const Model> model, int threads) : model_(std::
   for (int i = 0; i < std::max(1, threads); ++i) workers_.push_back(std::make_unique<Worker>(*model_));
 }
 
+Windows::Windows(Windows&&) noexcept = default;
 Windows::~Windows() = default;
 
 std::vector<Windows::Group> Windows::Arrange(std::span<const Window> windows) const {

@@ -35,6 +35,7 @@ class Windows {
 
   /// @param threads fewer than one count as one.
   Windows(std::shared_ptr<const Model> model, int threads);
+  Windows(Windows&&) noexcept;
   ~Windows();
 
   /// Told of the readings at the end of each control step, in their order for each sample and window; from

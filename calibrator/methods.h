@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calibrator/calibration.h"
+#include "calibrator/curriculum.h"
+
+namespace plumb {
+
+/// What a method has to work with.
+struct MethodInput {
+  std::shared_ptr<const Model> model;
+  std::span<const Rollout> rollouts;
+  const CalibrationOptions& options;
+  const Eigen::VectorXd start = {};  ///< a first guess, coordinates; empty = the prior's mean
+};
+
+/// What it has made of that.
+struct MethodResult {
+  std::string used;           ///< name of the method that gave the answer
+  GaussianMixture posterior;  ///< coordinates
+  Eigen::MatrixXd samples;    ///< coordinates, n x N, equally weighted
+  Eigen::VectorXd noise_sd;   ///< of each entry of (q, v), physical units; empty = not estimated
+  std::optional<CurriculumFit> curriculum;  ///< of laplace, and of what begins with it
+  std::string check;          ///< how the shape was verified, in words
+  std::vector<std::string> warnings;
+  int64_t simulated_steps = 0, failures = 0;
+};
+
+/// Runs the method that input.options names. @throws std::invalid_argument if there is none of that name, or the data cannot be used.
+MethodResult RunMethod(const MethodInput& input);
+
+}  // namespace plumb
