@@ -71,7 +71,7 @@ class Run {
       findings_.stages = result.curriculum->stages;
       information_ = result.curriculum->fit.information;
     } else {
-      WindowErrors errors(model_, rollouts_, 1, options_.threads);
+      WindowErrors errors(model_, rollouts_, 1, options_.workforce);
       LaplaceOptions still;
       still.most_iterations = 0;
       errors.Linearise(robot_.ToPhysical(mean_));
@@ -90,7 +90,7 @@ class Run {
   // Fits again without a part of the data, which then judges.
   void Check(const MethodResult& result) {
     const Split split = HoldOut(rollouts_);
-    Discrepancy discrepancy(robot_, options_.threads);
+    Discrepancy discrepancy(robot_, options_.workforce);
     Eigen::VectorXd mean = mean_;
     if (!split.held_out.empty()) {
       CalibrationOptions again = options_;
@@ -120,7 +120,7 @@ class Run {
     for (const Log& log : logs_) {
       try {
         CurriculumOptions options;
-        options.horizons = options_.horizons, options.threads = options_.threads, options.starts = 1;
+        options.horizons = options_.horizons, options.workforce = options_.workforce, options.starts = 1;
         const CurriculumFit own = FitCurriculum(model_, log.rollouts, options, mean_);
         findings_.diagnostic_steps += own.simulated_steps;
         fits.push_back(own.fit);

@@ -18,7 +18,7 @@ struct CalibrationOptions {
   std::vector<int> horizons{1, 5, 10, 50};  ///< laplace: control steps of the windows, stage by stage
   int64_t budget = 100'000;                ///< transitions that reps, simopt, the abc's and mixture may simulate
   uint64_t seed = 1;
-  int threads = 1;
+  Workforce workforce;
   std::function<void(const std::string& what, double share)> progress = [](const std::string&, double) {};
 };
 

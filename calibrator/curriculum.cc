@@ -30,7 +30,7 @@ class Curriculum {
         options_(options) {}
 
   CurriculumFit Run(const Eigen::VectorXd& start) {
-    WindowErrors one_step(model_, rollouts_, 1, options_.threads);
+    WindowErrors one_step(model_, rollouts_, 1, options_.workforce);
     result_.noise_known = one_step.noise_known();
     result_.rows = one_step.rows();
     std::vector<Eigen::VectorXd> guesses = Search(FirstGuesses(start), one_step);
@@ -80,7 +80,7 @@ class Curriculum {
     int impossible = 0;
     std::string last_error = "no first guess can be simulated";
     for (const Eigen::VectorXd& guess : guesses) {
-      WindowErrors part(model_, rollouts_, 1, options_.threads, every);
+      WindowErrors part(model_, rollouts_, 1, options_.workforce, every);
       try {
         part.Linearise(robot_.ToPhysical(guess));
         found.push_back(FitLaplace(ProblemOf(robot_, part), guess, quick));
@@ -152,7 +152,7 @@ class Curriculum {
 
   // @return false if windows of that length do not count.
   bool Lengthen(int horizon) {
-    WindowErrors errors(model_, rollouts_, horizon, options_.threads);
+    WindowErrors errors(model_, rollouts_, horizon, options_.workforce);
     if (errors.windows() == static_cast<int>(errors.steps())) return false;  // no two transitions follow each other
     if (!result_.noise_known) errors.set_noise_sd(result_.noise_sd);
     LaplaceFit fit;
@@ -187,7 +187,7 @@ class Curriculum {
 
   void Account(const WindowErrors& errors) {
     result_.simulated_steps += errors.simulated_steps();
-    result_.failures += errors.failures().total();
+    result_.failures += errors.failures();
   }
 
   std::shared_ptr<const Model> model_;

@@ -24,7 +24,7 @@ struct CurriculumOptions {
   std::vector<int> horizons{1, 5, 10, 50};  ///< control steps of each stage's windows, increasing
   int starts = 4;                           ///< first guesses: the prior's mean, and draws of the prior
   uint64_t seed = 1;
-  int threads = 1;
+  Workforce workforce;
   /// Told what has just been done, and which share of the work, roughly; may throw to break off.
   std::function<void(const std::string& what, double share)> progress = [](const std::string&, double) {};
 };

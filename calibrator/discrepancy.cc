@@ -37,10 +37,11 @@ size_t CountTransitions(std::span<const Rollout> rollouts) {
   return count;
 }
 
-Discrepancy::Discrepancy(const RobotDescription& robot, int threads)
+Discrepancy::Discrepancy(const RobotDescription& robot, Workforce workforce)
     : n_(robot.num_velocities()),
-      windows_(std::make_shared<Model>(robot), threads),
-      scale_(MakeTask(robot)->state_scale()) {
+      windows_(std::make_shared<Model>(robot), workforce.threads),
+      scale_(MakeTask(robot)->state_scale()),
+      batches_(workforce.batches) {
   if (robot.num_positions() != robot.num_velocities()) {
     throw std::invalid_argument("calibration does not know spherical joints yet");
   }
@@ -137,8 +138,27 @@ Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters, std::s
   return residuals;
 }
 
+template <class Compute>
+Eigen::VectorXd Discrepancy::Batch(uint64_t identity, const Eigen::MatrixXd& parameters, const Compute& compute) {
+  Batches here;
+  return (batches_ ? *batches_ : here)
+      .Run(Hash(parameters, identity), 1, parameters.cols(),
+           [&](Eigen::Index first, Eigen::Index count) -> Eigen::MatrixXd { return compute(parameters.middleCols(first, count)).transpose(); })
+      .transpose();
+}
+
 Eigen::VectorXd Discrepancy::TrajectoryError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts,
                                              double smoothing) {
+  return Batch(0, parameters, [&](const Eigen::MatrixXd& columns) { return TrajectoryErrorHere(columns, rollouts, smoothing); });
+}
+
+Eigen::VectorXd Discrepancy::PredictionError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts, int horizon) {
+  return Batch(static_cast<uint64_t>(horizon), parameters,
+               [&](const Eigen::MatrixXd& columns) { return PredictionErrorHere(columns, rollouts, horizon); });
+}
+
+Eigen::VectorXd Discrepancy::TrajectoryErrorHere(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts,
+                                                 double smoothing) {
   // Over a gap nothing is known of the efforts: the simulation sets off again where the record does.
   std::vector<Window> windows;
   std::vector<const Transition*> first;      // of each window
@@ -162,6 +182,10 @@ Eigen::VectorXd Discrepancy::TrajectoryError(const Eigen::MatrixXd& parameters, 
     auto row = errors[static_cast<size_t>(sample)].row(rows[window] + static_cast<Eigen::Index>(step));
     row << (q - transition.next_q).transpose(), (v - transition.next_v).transpose();
     row.array() /= scale_.transpose().array();
+    for (Eigen::Index i = 0; i < n_; ++i) {  // what was not observed is not compared
+      if (std::isnan(transition.next_q(i))) row(i) = 0;
+      if (std::isnan(transition.next_v(i))) row(n_ + i) = 0;
+    }
   };
   Predict(parameters, windows, visit, /*last_only=*/false);
   Eigen::VectorXd total = Eigen::VectorXd::Zero(parameters.cols());
@@ -178,8 +202,8 @@ Eigen::VectorXd Discrepancy::TrajectoryError(const Eigen::MatrixXd& parameters, 
   return total / static_cast<double>(steps);
 }
 
-Eigen::VectorXd Discrepancy::PredictionError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts,
-                                             int horizon) {
+Eigen::VectorXd Discrepancy::PredictionErrorHere(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts,
+                                                 int horizon) {
   std::vector<Window> windows;
   Ends ends;
   const auto length = static_cast<size_t>(horizon);

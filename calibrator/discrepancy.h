@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "calibrator/batches.h"
 #include "calibrator/transitions.h"
 #include "sim/windows.h"
 #include "sim/tasks/task.h"
@@ -18,7 +19,7 @@ class Discrepancy {
   static constexpr double kDegreesOfFreedom = 4;
 
   /// @throws std::invalid_argument if there is no simulator of the robot, or it has spherical joints.
-  explicit Discrepancy(const RobotDescription& robot, int threads = 1);
+  explicit Discrepancy(const RobotDescription& robot, Workforce workforce = {});
 
   /// Step-based (Cui & Hensel): reset to s, apply what was applied, compare with s'. The squared error of one
   /// transition is whitened by the uncertainty of both states, joint by joint:
@@ -57,12 +58,17 @@ class Discrepancy {
   void Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows, const Windows::Visit& visit,
                bool last_only = true);
   double Whiten(const Transition& transition, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double* whitened) const;
+  Eigen::VectorXd TrajectoryErrorHere(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts, double smoothing);
+  Eigen::VectorXd PredictionErrorHere(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts, int horizon);
+  template <class Compute>
+  Eigen::VectorXd Batch(uint64_t identity, const Eigen::MatrixXd& parameters, const Compute& compute);
   Eigen::MatrixXd SquaredStepErrors(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts);
 
   Eigen::Index n_;
   Windows windows_;
   Eigen::VectorXd scale_;
   Windows::Failures failures_;
+  Batches* batches_;
 };
 
 /// How many transitions there are.

@@ -28,7 +28,7 @@ CurriculumOptions OptionsOf(const MethodInput& input) {
   CurriculumOptions options;
   options.horizons = input.options.horizons;
   options.seed = input.options.seed;
-  options.threads = input.options.threads;
+  options.workforce = input.options.workforce;
   options.progress = input.options.progress;
   if (input.start.size() > 0) options.starts = 1;
   return options;
@@ -54,7 +54,7 @@ MethodResult Laplace(const MethodInput& input) {
 
 // The windows that a stage of the curriculum was fitted to, as it left them.
 WindowErrors WindowsOf(const MethodInput& input, const CurriculumFit& curriculum, int horizon) {
-  WindowErrors errors(input.model, input.rollouts, horizon, input.options.threads);
+  WindowErrors errors(input.model, input.rollouts, horizon, input.options.workforce);
   errors.set_noise_sd(curriculum.noise_sd);
   errors.Linearise(input.model->description().ToPhysical(curriculum.fit.mode));
   return errors;
@@ -126,7 +126,7 @@ MethodResult MixtureFrom(const MethodInput& input, MethodResult laplace) {
   Random random = SampleStream(input);
   result.samples = Resample(fit.samples, fit.weights, kSamples, random);
   result.simulated_steps += errors.simulated_steps();
-  result.failures += errors.failures().total();
+  result.failures += errors.failures();
   result.check = fmt::format("importance sampling of {} mode{}: {:.0f} of {} samples count, the heaviest for {:.1f} %",
                              fit.mixture.components.size(), fit.mixture.components.size() == 1 ? "" : "s", fit.ess,
                              fit.samples.cols(), 100 * fit.heaviest);
@@ -170,7 +170,7 @@ MethodResult Reps(const MethodInput& input) {
   const auto transitions = static_cast<int64_t>(CountTransitions(input.rollouts));
   const int64_t per_update = input.options.budget / (options.samples * kFewestUpdates);
   const auto every = static_cast<int>(std::max<int64_t>(1, (transitions + per_update - 1) / std::max<int64_t>(1, per_update)));
-  WindowErrors errors(input.model, input.rollouts, 1, input.options.threads, every);
+  WindowErrors errors(input.model, input.rollouts, 1, input.options.workforce, every);
   errors.Linearise(input.model->description().ToPhysical(PriorOf(input.model->description()).FromStandard(Eigen::VectorXd::Zero(errors.parameter_count()))));
   const LeastSquares problem = ProblemOf(input.model->description(), errors);
   const int affordable = static_cast<int>(input.options.budget / std::max<int64_t>(1, options.samples * errors.steps()));
@@ -194,7 +194,7 @@ MethodResult Simopt(const MethodInput& input) {
   const auto transitions = static_cast<int64_t>(CountTransitions(input.rollouts));
   options.updates = static_cast<int>(std::max<int64_t>(1, input.options.budget / (options.samples * std::max<int64_t>(1, transitions))));
   const RobotDescription& robot = input.model->description();
-  Discrepancy discrepancy(robot, input.options.threads);
+  Discrepancy discrepancy(robot, input.options.workforce);
   const RepsRun run = RepsSearch(
       PriorOf(robot),
       [&](const Eigen::MatrixXd& x) {

@@ -30,9 +30,9 @@ size_t StretchLength(const Rollout& rollout, size_t first) {
 
 }  // namespace
 
-WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon, int threads,
-                           int every)
-    : n_(model->num_velocities()), rollouts_(rollouts), simulate_(std::move(model), threads) {
+WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
+                           Workforce workforce, int every)
+    : n_(model->num_velocities()), rollouts_(rollouts), simulate_(std::move(model), workforce.threads), batches_(workforce.batches) {
   if (simulate_.model().num_positions() != n_) throw std::invalid_argument("calibration does not know spherical joints yet");
   noise_sd_ = kGuess * MakeTask(simulate_.model().description())->state_scale();
   const auto longest = static_cast<size_t>(std::max(1, horizon));
@@ -50,6 +50,7 @@ WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const R
   }
   first_row_.push_back(static_cast<Eigen::Index>(rows_.size()));
   if (rows_.empty()) throw std::invalid_argument("there is no transition whose end was observed");
+  identity_ = Hash(rows_.data(), rows_.size() * sizeof(Row));
 }
 
 void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
@@ -111,9 +112,9 @@ bool WindowErrors::starts_known() const {
   return std::all_of(starts_.begin(), starts_.end(), [](const Start& start) { return (start.sd.array() == 0).all(); });
 }
 
-Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows) {
+Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows) {
   Eigen::MatrixXd errors(static_cast<Eigen::Index>(rows_.size()), physical.cols());
-  const Windows::Failures failures = simulate_.Predict(
+  simulate_.Predict(
       physical, windows,
       [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto& v) {
         const auto& step_rows = step_rows_[window];
@@ -125,9 +126,22 @@ Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical, std::span
         }
       },
       /*last_only=*/false);
-  failures_.impossible += failures.impossible;
-  failures_.diverged += failures.diverged;
+  return errors;
+}
+
+// @param which initial states: 0 = the recorded ones.
+Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows, uint64_t which) {
+  const auto compute = [&](Eigen::Index first, Eigen::Index count) { return Simulate(physical.middleCols(first, count), windows); };
+  Batches here;
+  const Eigen::MatrixXd errors = (batches_ ? *batches_ : here)
+      .Run(Hash(physical, Hash(&which, sizeof which, identity_)), static_cast<Eigen::Index>(rows_.size()), physical.cols(), compute);
   simulated_steps_ += steps_ * physical.cols();
+  for (Eigen::Index j = 0; j < errors.cols(); ++j) {
+    if (errors.col(j).allFinite()) continue;
+    for (size_t w = 0; w < windows_.size(); ++w) {
+      failures_ += !errors.col(j).segment(first_row_[w], first_row_[w + 1] - first_row_[w]).allFinite();
+    }
+  }
   return errors;
 }
 
@@ -142,7 +156,7 @@ bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
     std::vector<Window> moved = windows_;
     const double h = kDifference * std::max(1.0, scale(c));
     for (Window& window : moved) (c < n_ ? window.q(c) : window.v(c - n_)) += h;
-    sensitivity.col(c) = (Predict(physical, moved) - middle) / h;
+    sensitivity.col(c) = (Predict(physical, moved, static_cast<uint64_t>(c) + 1) - middle) / h;
   }
   const bool good = sensitivity.allFinite();
   if (!good) sensitivity = FreeMotion();

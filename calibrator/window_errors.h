@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "calibrator/batches.h"
 #include "calibrator/transitions.h"
 #include "sim/windows.h"
 
@@ -20,7 +21,7 @@ namespace plumb {
 /// taken into account (a Kalman filter of the initial state; errors-in-variables). For the right simulator whitened errors
 /// are independent, with mean zero and variance one; where the noise is not known (sd NaN) it is `noise_sd`.
 ///
-/// Uses `threads` threads inside; not thread-safe itself. The same bits for any number of threads.
+/// Not thread-safe. The same bits for any number of threads and whoever does the work.
 class WindowErrors {
  public:
   /// What one row of the errors is about.
@@ -32,8 +33,8 @@ class WindowErrors {
 
   /// @param rollouts must outlive this. @param every keeps only each so-manieth window, >= 1. @throws std::invalid_argument if the robot has spherical joints or there is no
   /// transition with an observed end.
-  WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon, int threads,
-               int every = 1);
+  WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
+               Workforce workforce, int every = 1);
 
   const std::vector<Row>& rows() const { return rows_; }
   int windows() const { return static_cast<int>(windows_.size()); }
@@ -60,7 +61,7 @@ class WindowErrors {
 
   /// Of all calls.
   int64_t simulated_steps() const { return simulated_steps_; }
-  const Windows::Failures& failures() const { return failures_; }
+  int64_t failures() const { return failures_; }  ///< windows whose simulation failed
 
  private:
   struct Start {
@@ -68,7 +69,8 @@ class WindowErrors {
     Eigen::MatrixXd sensitivity;  // rows of the window x 2 n, physical units; empty until Linearise
   };
   void AddWindow(size_t rollout, size_t first, size_t length);
-  Eigen::MatrixXd Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows);
+  Eigen::MatrixXd Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows, uint64_t which = 0);
+  Eigen::MatrixXd Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows);
   Eigen::MatrixXd FreeMotion() const;
   void WhitenWindow(size_t window, Eigen::MatrixXd* errors) const;
   double EndSd(const Row& row) const;
@@ -82,8 +84,9 @@ class WindowErrors {
   std::vector<Eigen::Index> first_row_;               // of each window, and the end
   std::vector<std::vector<Eigen::Index>> step_rows_;  // first of each step of each window, and the end
   Eigen::VectorXd noise_sd_;
-  int64_t steps_ = 0, simulated_steps_ = 0;
-  Windows::Failures failures_;
+  int64_t steps_ = 0, simulated_steps_ = 0, failures_ = 0;
+  Batches* batches_;
+  uint64_t identity_ = 0;  // of the windows
 };
 
 }  // namespace plumb
