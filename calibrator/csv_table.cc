@@ -59,7 +59,8 @@ bool CsvTable::Next() {
   if (!ReadLine()) return false;
   Split();
   if (fields_.size() != names_.size()) {
-    Fail(fmt::format("has {} field{} where the head has {}", fields_.size(), fields_.size() == 1 ? "" : "s", names_.size()));
+    Fail(fmt::format("has {} field{} where the head has {}", fields_.size(), fields_.size() == 1 ? "" : "s",
+                     names_.size()));
   }
   return true;
 }
@@ -75,7 +76,8 @@ double CsvTable::Number(int column) const {
   double value = 0;
   const auto [rest, error] = std::from_chars(begin, end, value);
   if (error == std::errc::result_out_of_range) fail("a number too large or too small for a double");
-  if (error != std::errc() || rest != end || (begin != text.data() && *begin == '-')) fail("that is no number");
+  if (error != std::errc() || rest != end || (begin != text.data() && *begin == '-'))
+    fail("that is no number");
   if (std::isinf(value)) fail("it must be finite, or nan where nothing was observed");
   return value;
 }
@@ -84,7 +86,8 @@ void CsvTable::Fail(const std::string& what) const {
   throw std::runtime_error(fmt::format("{}:{}: {}", file_, line_number_, what));
 }
 
-// The next line that says something, without its end. A file that is no text may have no line ends: it is not swallowed whole.
+// The next line that says something, without its end. A file that is no text may have no line ends: it is not
+// swallowed whole.
 bool CsvTable::ReadLine() {
   std::streambuf& bytes = *stream_.rdbuf();
   constexpr int kEnd = std::char_traits<char>::eof();
@@ -121,7 +124,8 @@ void CsvTable::Split() {
       }
       fields_.push_back(std::string_view(line_).substr(begin, end - begin));
       comma = std::min(line_.find(',', at), line_.size());
-      if (!Trimmed(std::string_view(line_).substr(at + 1, comma - at - 1)).empty()) Fail("something follows a quotation");
+      if (!Trimmed(std::string_view(line_).substr(at + 1, comma - at - 1)).empty())
+        Fail("something follows a quotation");
     } else {
       comma = std::min(line_.find(',', at), line_.size());
       fields_.push_back(Trimmed(std::string_view(line_).substr(at, comma - at)));

@@ -15,12 +15,13 @@ namespace {
 
 // [states] A message may be in the log that much later than one of another channel that came after it.
 constexpr int64_t kPatience = 5000;
-// [states] The same within a channel, where messages keep their order but for a few: further back is another run.
+// [states] The same within a channel, where messages keep their order but for a few: further back is another
+// run.
 constexpr int64_t kReordered = 1000;
 constexpr int64_t kLargestSequence = int64_t{1} << 53;
 
-/// Joins the episodes of a log one after the other as soon as each is complete, so that no more than one or two need
-/// be remembered however long the log is.
+/// Joins the episodes of a log one after the other as soon as each is complete, so that no more than one or
+/// two need be remembered however long the log is.
 class EpisodeJoiner {
  public:
   EpisodeJoiner(const RobotDescription& robot, std::vector<Rollout>* rollouts)
@@ -35,7 +36,8 @@ class EpisodeJoiner {
     }
     joiner_.OnState(state);
     while (!episodes_.empty() && IsComplete(episodes_.front())) JoinFirst();
-    const int64_t needed = episodes_.empty() ? std::numeric_limits<int64_t>::max() : episodes_.front().first_state;
+    const int64_t needed =
+        episodes_.empty() ? std::numeric_limits<int64_t>::max() : episodes_.front().first_state;
     joiner_.Forget(std::min(needed, joiner_.newest_state() - kPatience));
   }
 
@@ -46,8 +48,8 @@ class EpisodeJoiner {
       if (!episode.next_state && episode.id != command.episode) episode.next_state = command.state_sequence;
     }
     if (command.episode < 0) return;
-    const auto found =
-        std::find_if(episodes_.begin(), episodes_.end(), [&](const Episode& e) { return e.id == command.episode; });
+    const auto found = std::find_if(episodes_.begin(), episodes_.end(),
+                                    [&](const Episode& e) { return e.id == command.episode; });
     if (found == episodes_.end()) {
       episodes_.push_back({command.episode, command.state_sequence, command.state_sequence, {}, {}});
     } else {
@@ -83,9 +85,9 @@ class EpisodeJoiner {
  private:
   struct Episode {
     int64_t id;
-    int64_t first_state, last_command;    // states that its first and last command answer
-    std::optional<int64_t> next_state;    // that the command after it answers
-    std::optional<int64_t> named_state;   // that ended it, says CONTROLLER_STATUS
+    int64_t first_state, last_command;   // states that its first and last command answer
+    std::optional<int64_t> next_state;   // that the command after it answers
+    std::optional<int64_t> named_state;  // that ended it, says CONTROLLER_STATUS
   };
 
   bool Fits(int joints) {
@@ -104,7 +106,8 @@ class EpisodeJoiner {
 
   bool IsComplete(const Episode& episode) const {
     if (episode.named_state) return joiner_.newest_state() >= *episode.named_state;
-    return joiner_.newest_state() - kPatience >= std::max(episode.last_command, episode.next_state.value_or(0));
+    return joiner_.newest_state() - kPatience >=
+           std::max(episode.last_command, episode.next_state.value_or(0));
   }
 
   int64_t LastState(const Episode& episode) const {
@@ -143,15 +146,18 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
   const MotionCounts counts = ReadMotion(file, joiner, [] { return true; });
   joiner.Finish();
   log.drops = joiner.drops();
-  if (counts.undecodable > 0) log.warnings.push_back(fmt::format("{} messages do not decode", counts.undecodable));
+  if (counts.undecodable > 0)
+    log.warnings.push_back(fmt::format("{} messages do not decode", counts.undecodable));
   if (joiner.foreign() > 0) {
-    log.warnings.push_back(fmt::format("{} messages are of a robot with {} joints, '{}' has {}", joiner.foreign(),
-                                       joiner.foreign_joints(), robot.name, robot.num_joints()));
+    log.warnings.push_back(fmt::format("{} messages are of a robot with {} joints, '{}' has {}",
+                                       joiner.foreign(), joiner.foreign_joints(), robot.name,
+                                       robot.num_joints()));
   }
   if (!log.rollouts.empty()) return log;
   std::string why;
   if (counts.messages == 0) {
-    why = fmt::format("none of its {} messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS", counts.events);
+    why = fmt::format("none of its {} messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS",
+                      counts.events);
   } else if (joiner.fitting() == 0 && !log.warnings.empty()) {
     why = log.warnings.back();
   } else if (log.drops.total() == 0) {

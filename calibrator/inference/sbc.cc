@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMostBins = 20;
-constexpr int kFewestPerBin = 5;     // expected; fewer, and the statistic is not chi-squared distributed
-constexpr int kMostPoints = 100;     // at which distribution functions are compared
+constexpr int kFewestPerBin = 5;       // expected; fewer, and the statistic is not chi-squared distributed
+constexpr int kMostPoints = 100;       // at which distribution functions are compared
 constexpr double kNegligible = 1e-20;  // a probability
 constexpr double kSignificant = 0.01;
 constexpr uint32_t kTieStream = 0x54494553;  // "TIES"
@@ -88,7 +88,8 @@ int Rank(double truth, const Eigen::VectorXd& draws, Random& ties) {
 // What is most wrong, in standard errors of uniform ranks' mean and variance.
 std::string Verdict(const SbcUniformity& quantity, double runs, size_t tests) {
   if (std::isnan(quantity.chi2_p)) return "unknown";
-  if (std::min(quantity.chi2_p, quantity.ecdf_p) * static_cast<double>(tests) >= kSignificant) return "calibrated";
+  if (std::min(quantity.chi2_p, quantity.ecdf_p) * static_cast<double>(tests) >= kSignificant)
+    return "calibrated";
   const double shift = (quantity.mean - 0.5) * std::sqrt(12 * runs);
   const double width = (12 * quantity.variance - 1) * std::sqrt(runs / 0.8);
   if (std::abs(shift) > std::abs(width)) return shift > 0 ? "too low" : "too high";
@@ -112,7 +113,9 @@ double UniformityByChi2(const std::vector<int>& ranks, int draws) {
   const int bins = std::min({kMostBins, n / kFewestPerBin, draws + 1});
   if (bins < 2) return 1;
   // Bins of whole ranks; not all of them have as many.
-  const auto bin = [&](int rank) { return static_cast<size_t>(static_cast<int64_t>(rank) * bins / (draws + 1)); };
+  const auto bin = [&](int rank) {
+    return static_cast<size_t>(static_cast<int64_t>(rank) * bins / (draws + 1));
+  };
   std::vector<double> expected(static_cast<size_t>(bins)), observed(expected);
   for (int rank = 0; rank <= draws; ++rank) expected[bin(rank)] += static_cast<double>(n) / (draws + 1);
   for (const int rank : ranks) observed[bin(rank)] += 1;
@@ -121,16 +124,18 @@ double UniformityByChi2(const std::vector<int>& ranks, int draws) {
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(bins - 1), chi2));
 }
 
-// At each point the number of ranks below it is binomial. The statistic is the least tail probability of these numbers; its
-// own distribution follows from the probability of a path of counts that nowhere has so small a one. Counts are a Markov chain:
-// of those not below one point, each is below the next with the same probability.
+// At each point the number of ranks below it is binomial. The statistic is the least tail probability of
+// these numbers; its own distribution follows from the probability of a path of counts that nowhere has so
+// small a one. Counts are a Markov chain: of those not below one point, each is below the next with the same
+// probability.
 double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
   std::vector<int> sorted = ranks;
   std::sort(sorted.begin(), sorted.end());
   const auto n = static_cast<int>(ranks.size());
   std::vector<int> points;
   const int count = std::min(kMostPoints, draws);
-  for (int i = 1; i <= count; ++i) points.push_back(static_cast<int>(static_cast<int64_t>(i) * (draws + 1) / (count + 1)));
+  for (int i = 1; i <= count; ++i)
+    points.push_back(static_cast<int>(static_cast<int64_t>(i) * (draws + 1) / (count + 1)));
 
   const BinomialPmf pmf(n);
   double least = 1;
@@ -139,7 +144,8 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
     least = std::min(least, TailProbabilities(n, point / (draws + 1.0), pmf)[below]);
   }
 
-  std::vector<double> inside(static_cast<size_t>(n) + 1);  // probability of each count and of no excursion so far
+  std::vector<double> inside(static_cast<size_t>(n) +
+                             1);  // probability of each count and of no excursion so far
   inside[0] = 1;
   double before = 0;  // share of ranks below the point before
   for (const int point : points) {
@@ -164,9 +170,11 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
   return std::clamp(1 - stays, 0.0, 1.0);
 }
 
-SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQuantity>& quantities, int runs, uint64_t seed) {
+SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQuantity>& quantities, int runs,
+                 uint64_t seed) {
   if (runs < 1) throw std::invalid_argument("simulation-based calibration needs at least one run");
-  if (quantities.empty()) throw std::invalid_argument("simulation-based calibration needs a quantity to rank");
+  if (quantities.empty())
+    throw std::invalid_argument("simulation-based calibration needs a quantity to rank");
   const auto k = static_cast<Eigen::Index>(quantities.size());
   SbcResult result;
   result.runs = runs;
@@ -181,17 +189,22 @@ SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQua
     }
     const auto draws = static_cast<int>(posterior->cols());
     if (posterior->rows() != prior.size() || draws < 1 || (result.draws > 0 && draws != result.draws)) {
-      throw std::invalid_argument(fmt::format("a posterior of {} parameters with {} draws: {} were expected",
-                                              posterior->rows(), draws,
-                                              result.draws > 0 ? fmt::format("{} with {}", prior.size(), result.draws)
-                                                               : fmt::format("{} with one at least", prior.size())));
+      throw std::invalid_argument(fmt::format(
+          "a posterior of {} parameters with {} draws: {} were expected", posterior->rows(), draws,
+          result.draws > 0 ? fmt::format("{} with {}", prior.size(), result.draws)
+                           : fmt::format("{} with one at least", prior.size())));
     }
     result.draws = draws;
     for (Eigen::Index i = 0; i < k; ++i) {
       const auto& of = quantities[static_cast<size_t>(i)].of;
       Eigen::VectorXd values(draws);
       for (Eigen::Index j = 0; j < draws; ++j) values(j) = of(posterior->col(j));
-      result.ranks(run, i) = Rank(of(truth), values, ties);
+      const double true_value = of(truth);
+      if (std::isnan(true_value) || values.array().isNaN().any()) {
+        throw std::invalid_argument("quantity '" + quantities[static_cast<size_t>(i)].name +
+                                    "' is not a number");
+      }
+      result.ranks(run, i) = Rank(true_value, values, ties);
     }
   }
   for (Eigen::Index i = 0; i < k; ++i) {
@@ -208,10 +221,11 @@ std::string Words(const SbcResult& result) {
   const int posteriors = result.runs - result.failures;
   size_t width = 8;
   for (const SbcUniformity& quantity : result.quantities) width = std::max(width, quantity.name.size());
-  std::string text = fmt::format("{} posteriors of {} draws each; {} of {} runs failed ({:.1f} %)\n", posteriors, result.draws,
-                                 result.failures, result.runs, 100.0 * result.failures / result.runs);
-  text += fmt::format("{:<{}}  {:>8}  {:>8}  {:>6}  {:>6}  {:>6}  posterior\n", "quantity", width, "chi2 p", "ECDF p", "50 %",
-                      "80 %", "95 %");
+  std::string text =
+      fmt::format("{} posteriors of {} draws each; {} of {} runs failed ({:.1f} %)\n", posteriors,
+                  result.draws, result.failures, result.runs, 100.0 * result.failures / result.runs);
+  text += fmt::format("{:<{}}  {:>8}  {:>8}  {:>6}  {:>6}  {:>6}  posterior\n", "quantity", width, "chi2 p",
+                      "ECDF p", "50 %", "80 %", "95 %");
   for (const SbcUniformity& quantity : result.quantities) {
     text += fmt::format("{:<{}}  {:>8.2g}  {:>8.2g}", quantity.name, width, quantity.chi2_p, quantity.ecdf_p);
     for (const double coverage : quantity.coverage) text += fmt::format("  {:>6.1f}", 100 * coverage);

@@ -69,14 +69,16 @@ std::string SimulatedTable(const RobotDescription& robot, int episodes, int step
 double WorstPrediction(const Log& log, const RobotDescription& robot) {
   Simulator simulator(robot);
   Eigen::VectorXd means(robot.parameters.size());
-  for (size_t i = 0; i < robot.parameters.size(); ++i) means(static_cast<Eigen::Index>(i)) = robot.parameters[i].mean;
+  for (size_t i = 0; i < robot.parameters.size(); ++i)
+    means(static_cast<Eigen::Index>(i)) = robot.parameters[i].mean;
   simulator.SetParameters(means);
   double worst = 0;
   for (const Rollout& rollout : log.rollouts) {
     for (const Transition& t : rollout.transitions) {
       simulator.SetState(t.q, t.v);
       simulator.Step(t.efforts);
-      worst = std::max({worst, (simulator.q() - t.next_q).cwiseAbs().maxCoeff(), (simulator.v() - t.next_v).cwiseAbs().maxCoeff()});
+      worst = std::max({worst, (simulator.q() - t.next_q).cwiseAbs().maxCoeff(),
+                        (simulator.v() - t.next_v).cwiseAbs().maxCoeff()});
     }
   }
   return worst;
@@ -99,7 +101,8 @@ TEST_CASE("a table recorded in the simulator leads, transition by transition, to
     CHECK(t.efforts[0].duration == robot.task.period);
     CHECK(t.efforts[0].effort.size() == robot.num_velocities());
     CHECK(t.q == log.rollouts[0].transitions[4].next_q);
-    for (const Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd}) CHECK(sd->array().isNaN().all());
+    for (const Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
+      CHECK(sd->array().isNaN().all());
     CHECK(WorstPrediction(log, robot) == 0);
   }
 }
@@ -121,11 +124,12 @@ TEST_CASE("an action acts as late as in the simulator that recorded it") {
 }
 
 TEST_CASE("columns may be in any order, quoted, with further ones beside them") {
-  const Log log = Read("\xef\xbb\xbf\"u/pivot\",\"next \"\"best\"\", or so\",v/pivot,next_v/pivot, q/pivot ,t,next_q/pivot\r\n"
-                       "# recorded on a Tuesday\r\n"
-                       "+1,x,0.5,\"0.6\",0.1,0,0.125\r\n"
-                       "-5,\"a,b\",0.9, 1 ,1e-1,0.4,nan\r\n"
-                       "\r\n");
+  const Log log = Read(
+      "\xef\xbb\xbf\"u/pivot\",\"next \"\"best\"\", or so\",v/pivot,next_v/pivot, q/pivot ,t,next_q/pivot\r\n"
+      "# recorded on a Tuesday\r\n"
+      "+1,x,0.5,\"0.6\",0.1,0,0.125\r\n"
+      "-5,\"a,b\",0.9, 1 ,1e-1,0.4,nan\r\n"
+      "\r\n");
   REQUIRE(log.rollouts.size() == 2);
   const Transition& a = log.rollouts[0].transitions[0];
   const Transition& b = log.rollouts[1].transitions[0];
@@ -150,21 +154,25 @@ TEST_CASE("numbers have a decimal point in every locale") {
   for (const char* locale : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8"}) {
     if (std::setlocale(LC_ALL, locale)) break;
   }
-  CHECK(Read("t,q/pivot,v/pivot,u/pivot\n0,1.5,0,0\n0.05,1.25,0,0\n").rollouts[0].transitions[0].next_q(0) == 1.25);
+  CHECK(Read("t,q/pivot,v/pivot,u/pivot\n0,1.5,0,0\n0.05,1.25,0,0\n").rollouts[0].transitions[0].next_q(0) ==
+        1.25);
   std::setlocale(LC_ALL, old.c_str());
 }
 
-/// A table with next_ columns of a robot that is seen with noise, from `rows` of t; each row ends near where the next begins.
+/// A table with next_ columns of a robot that is seen with noise, from `rows` of t; each row ends near where
+/// the next begins.
 std::string NextTable(double interval, int rows, double noise, bool random_starts = false) {
   Random random(3);
   std::string csv = "t,q/pivot,v/pivot,u/pivot,next_q/pivot,next_v/pivot\n";
   const auto q = [](int i) { return std::sin(0.3 * i); };
   const auto v = [](int i) { return 6 * std::cos(0.3 * i); };
   for (int i = 0; i < rows; ++i) {
-    const double start_q = random_starts ? random.Uniform(-3, 3) : q(i), start_v = random_starts ? random.Uniform(-8, 8) : v(i);
+    const double start_q = random_starts ? random.Uniform(-3, 3) : q(i),
+                 start_v = random_starts ? random.Uniform(-8, 8) : v(i);
     const double end_q = random_starts ? start_q + 0.1 : q(i + 1) + noise * random.Normal();
     const double end_v = random_starts ? start_v - 0.1 : v(i + 1) + noise * random.Normal();
-    csv += fmt::format("{},{},{},{},{},{}\n", i * interval, start_q, start_v, random.Uniform(-2, 2), end_q, end_v);
+    csv += fmt::format("{},{},{},{},{},{}\n", i * interval, start_q, start_v, random.Uniform(-2, 2), end_q,
+                       end_v);
   }
   return csv;
 }
@@ -205,7 +213,8 @@ TEST_CASE("rows follow each other if a state is what the row before led to, nois
 TEST_CASE("what cannot be used is dropped and counted, and splits an episode or leaves a gap in its steps") {
   const std::string head = "t,q/pivot,v/pivot,u/pivot\n";
   SECTION("states and actions that are not known") {
-    const Log log = Read(head + "0,0.1,0,1\n0.05,0.2,nan,1\n0.1,0.3,0,1\n0.15,0.4,0,\n0.2,0.5,0,0\n0.25,,,0\n0.3,1,0,0\n");
+    const Log log = Read(
+        head + "0,0.1,0,1\n0.05,0.2,nan,1\n0.1,0.3,0,1\n0.15,0.4,0,\n0.2,0.5,0,0\n0.25,,,0\n0.3,1,0,0\n");
     REQUIRE(log.rollouts.size() == 1);
     REQUIRE(log.rollouts[0].transitions.size() == 2);
     CHECK(log.rollouts[0].transitions[0].step == 0);
@@ -221,14 +230,24 @@ TEST_CASE("what cannot be used is dropped and counted, and splits an episode or 
     CHECK(log.rollouts[1].transitions[0].step == 0);
     CHECK(log.drops.late == 1);
   }
+  SECTION("what was applied before a gap in time, where actions act late") {
+    const Log log =
+        Read(head + "0,0.1,0,1\n0.05,0.2,0,1\n0.25,0.3,0,1\n0.3,0.4,0,0\n0.35,0.5,0,0\n", Pendulum());
+    REQUIRE(log.rollouts.size() == 2);
+    CHECK(log.rollouts[1].transitions[0].step == 1);
+    CHECK(log.rollouts[1].transitions[0].efforts[0].effort(0) == 1);
+    CHECK(log.drops.late == 1);
+    CHECK(log.drops.gap == 1);
+  }
   SECTION("a part at another rate") {
     const Log log = Read(head + "0,0.1,0,1\n0.05,0.2,0,1\n0.06,0.3,0,1\n0.07,0.4,0,0\n0.12,0.5,0,0\n");
     CHECK(log.rollouts.size() == 2);
     CHECK(log.drops.late == 2);
   }
   SECTION("ends of episodes") {
-    const Log log = Read("t,q/pivot,v/pivot,u/pivot,terminated,truncated\n0,1,0,1,0,0\n0.05,2,0,1,1,0\n0.1,3,0,1,0,0\n"
-                         "0.15,4,0,0,False,True\n0.15,5,0,0,,0\n0.2,6,0,0,0,0\n");
+    const Log log = Read(
+        "t,q/pivot,v/pivot,u/pivot,terminated,truncated\n0,1,0,1,0,0\n0.05,2,0,1,1,0\n0.1,3,0,1,0,0\n"
+        "0.15,4,0,0,False,True\n0.15,5,0,0,,0\n0.2,6,0,0,0,0\n");
     REQUIRE(log.rollouts.size() == 3);
     CHECK(log.rollouts[2].transitions[0].next_q(0) == 6);
     CHECK(log.drops.total() == 0);
@@ -237,7 +256,9 @@ TEST_CASE("what cannot be used is dropped and counted, and splits an episode or 
 
 TEST_CASE("a table of one transition") {
   CHECK(Read("t,q/pivot,v/pivot,u/pivot\n0,1,0,1\n0.05,2,0,1").rollouts[0].transitions.size() == 1);
-  CHECK(Read("t,q/pivot,v/pivot,u/pivot,next_q/pivot,next_v/pivot\n7,1,0,1,2,nan\n").rollouts[0].transitions.size() == 1);
+  CHECK(Read("t,q/pivot,v/pivot,u/pivot,next_q/pivot,next_v/pivot\n7,1,0,1,2,nan\n")
+            .rollouts[0]
+            .transitions.size() == 1);
 }
 
 TEST_CASE("constant signals are worth a warning") {
@@ -246,13 +267,28 @@ TEST_CASE("constant signals are worth a warning") {
   CHECK(log.warnings == std::vector<std::string>{"the same in all rows: q/pivot, v/pivot"});
 }
 
-TEST_CASE("a spherical joint has its columns, and a joint without a motor no action") {
+TEST_CASE("a joint without a motor has no action, and a spherical one a quaternion") {
   RobotDescription robot = Robot("hopper");
-  const std::string table = SimulatedTable(robot, 1, 5);
-  std::string with_root = table;
+  std::string with_root = SimulatedTable(robot, 1, 5);
   with_root.replace(with_root.find("reward"), 6, "u/rootx");
   CHECK(Refusal(with_root, robot) ==
         ":1: column 'u/rootx' is of no joint with a motor of robot 'hopper'; the nearest is 'q/rootx'");
+
+  robot = GymPendulum();
+  JointDescription ball = robot.joints[0];
+  ball.name = "ball";
+  ball.type = JointDescription::Type::kSpherical;
+  ball.passive = true;
+  robot.joints.push_back(ball);
+  robot.task.name = "reach";
+  robot.task.target = {0, 1, 0, 0, 0};
+  const Log log = Read(
+      "t,q/pivot,q/ball/w,q/ball/x,q/ball/y,q/ball/z,v/pivot,v/ball/x,v/ball/y,v/ball/z,u/pivot\n"
+      "0,1,2,3,4,5,6,7,8,9,1\n0.05,0,1,0,0,0,0,0,0,0,0\n",
+      robot);
+  CHECK(log.rollouts[0].transitions[0].q == (Eigen::VectorXd(5) << 1, 2, 3, 4, 5).finished());
+  CHECK(log.rollouts[0].transitions[0].v == Eigen::Vector4d(6, 7, 8, 9));
+  CHECK(log.rollouts[0].transitions[0].efforts[0].effort == Eigen::Vector4d(1, 0, 0, 0));
 }
 
 TEST_CASE("a table that cannot be right is refused with its line and the reason") {
@@ -267,7 +303,8 @@ TEST_CASE("a table that cannot be right is refused with its line and the reason"
       {"only blank lines", "\n\n  \n# nothing\n", ": is empty"},
       {"header only", head, ": has a head but no rows"},
       {"one row", head + "0,1,0,0\n",
-       ": no transition can be used: no row is followed by another of its episode, and there are no next_ columns"},
+       ": no transition can be used: no row is followed by another of its episode, and there are no next_ "
+       "columns"},
       {"truncated line", two + "0.1,1", ":4: has 2 fields where the head has 4"},
       {"too many fields", two + "0.1,1,2,3,4\n", ":4: has 5 fields where the head has 4"},
       {"semicolons", "t;q/pivot;v/pivot;u/pivot\n0;1;0;0\n", ":1: columns must be separated by commas"},
@@ -277,11 +314,14 @@ TEST_CASE("a table that cannot be right is refused with its line and the reason"
       {"half a number", head + "0,1,0,1.5.2\n", ":2: 'u/pivot' is '1.5.2': that is no number"},
       {"hexadecimal", head + "0,1,0,0x10\n", ":2: 'u/pivot' is '0x10': that is no number"},
       {"two signs", head + "0,1,0,+-1\n", ":2: 'u/pivot' is '+-1': that is no number"},
-      {"infinite", two + "0.1,inf,0,0\n", ":4: 'q/pivot' is 'inf': it must be finite, or nan where nothing was observed"},
-      {"too large", two + "0.1,1e999,0,0\n", ":4: 'q/pivot' is '1e999': a number too large or too small for a double"},
+      {"infinite", two + "0.1,inf,0,0\n",
+       ":4: 'q/pivot' is 'inf': it must be finite, or nan where nothing was observed"},
+      {"too large", two + "0.1,1e999,0,0\n",
+       ":4: 'q/pivot' is '1e999': a number too large or too small for a double"},
       {"no time", head + "nan,1,0,0\n", ":2: t must be known"},
       {"duplicate time", two + "# a comment\n0.05,1,0,0\n", ":5: t is 0.05, as in the row before"},
-      {"missing column", "t,q/pivot,w/pivot,u/pivot\n0,1,0,0\n", ":1: has no column 'v/pivot'; the nearest is 'q/pivot'"},
+      {"missing column", "t,q/pivot,w/pivot,u/pivot\n0,1,0,0\n",
+       ":1: has no column 'v/pivot'; the nearest is 'q/pivot'"},
       {"missing next_v", "t,q/pivot,v/pivot,u/pivot,next_q/pivot\n0,1,0,0,1\n",
        ":1: has no column 'next_v/pivot'; the nearest is 'next_q/pivot'"},
       {"wrong robot", "t,q/thigh,v/thigh,u/thigh\n0,1,0,0\n",
@@ -298,8 +338,14 @@ TEST_CASE("a table that cannot be right is refused with its line and the reason"
       {"nothing observed", head + "0,nan,0,0\n0.05,nan,0,0\n",
        ": no transition can be used: 0 gaps, 0 late, 1 not finite, 0 across restarts"},
       {"a zero byte", zero, ":1: is no text: it has a zero byte"},
-      {"binary", std::string("\x7f" "ELF\x02\x01\x01\0\0\0", 10), ":1: is no text: it has a zero byte"},
-      {"garbage", "\x93\xff\xfe\x81,\xd0\x01\n\x80,\x90\n", ":1: has no column 't'; the nearest is '?" "?'"},
+      {"binary",
+       std::string("\x7f"
+                   "ELF\x02\x01\x01\0\0\0",
+                   10),
+       ":1: is no text: it has a zero byte"},
+      {"garbage", "\x93\xff\xfe\x81,\xd0\x01\n\x80,\x90\n",
+       ":1: has no column 't'; the nearest is '?"
+       "?'"},
       {"one endless line", std::string((size_t{1} << 20) + 1, 'x'), ":1: is longer than a megabyte"},
   };
   for (const Case& c : cases) {
@@ -313,19 +359,29 @@ TEST_CASE("a table that cannot be right is refused with its line and the reason"
 
 /// Mistakes that people, editors and disks make.
 std::string Mutant(std::string text, Random& random) {
-  static const std::string kTokens[] = {"nan", "",     "inf", "1e999", "-", ",",  "\n", "\"", "0.05", "1e308", "-1e308",
-                                        "#",   "\r\n", "t",   "q/",    "0", "\t", ";",  "1",  "5e-324"};
+  static const std::string kTokens[] = {"nan", "",     "inf",   "1e999",  "-", ",",     "\n",
+                                        "\"",  "0.05", "1e308", "-1e308", "#", "\r\n",  "t",
+                                        "q/",  "0",    "\t",    ";",      "1", "5e-324"};
   const auto below = [&](size_t n) { return n == 0 ? size_t{0} : random.Bits() % n; };
   for (size_t mistakes = 1 + below(4); mistakes > 0; --mistakes) {
     const size_t at = below(text.size()), length = below(40);
     switch (below(6)) {
-      case 0: text.erase(at, length); break;
-      case 1: text.insert(at, text.substr(below(text.size()), length)); break;
-      case 2: text.insert(at, kTokens[below(std::size(kTokens))]); break;
-      case 3: text.resize(at); break;
+      case 0:
+        text.erase(at, length);
+        break;
+      case 1:
+        text.insert(at, text.substr(below(text.size()), length));
+        break;
+      case 2:
+        text.insert(at, kTokens[below(std::size(kTokens))]);
+        break;
+      case 3:
+        text.resize(at);
+        break;
       case 4: {  // another value for a field
         const size_t begin = text.find_last_of(",\n", at) + 1, end = text.find_first_of(",\n", at);
-        text.replace(std::min(begin, text.size()), end == std::string::npos ? end : end - std::min(begin, end),
+        text.replace(std::min(begin, text.size()),
+                     end == std::string::npos ? end : end - std::min(begin, end),
                      kTokens[below(std::size(kTokens))]);
         break;
       }

@@ -64,11 +64,12 @@ class Recording {
     s.returns = {0};
     Add("CONTROLLER_STATUS", s);
   }
-  /// An episode of so many steps from a state on, states coming 20 later than the commands that answer them, and the command
-  /// of no episode after it.
+  /// An episode of so many steps from a state on, states coming 20 later than the commands that answer them,
+  /// and the command of no episode after it.
   void Episode(int64_t id, int64_t first_state, int steps) {
     for (int64_t i = 0; i <= 10 * steps; ++i) {
-      if (i % 10 == 0) Command(first_state + i, i < 10 * steps ? id : -1, i < 10 * steps ? static_cast<int>(i / 10) : -1);
+      if (i % 10 == 0)
+        Command(first_state + i, i < 10 * steps ? id : -1, i < 10 * steps ? static_cast<int>(i / 10) : -1);
       if (first_state + i >= 20) State(first_state + i - 20);
     }
   }
@@ -257,7 +258,8 @@ TEST_CASE("a log that is of no use is refused with the reason") {
   };
   const std::string none = ": no transition can be used: ";
   const std::vector<Case> cases{
-      {"empty", "", none + "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
+      {"empty", "",
+       none + "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
       {"cut off in the first head", damaged.bytes.substr(0, 20),
        none + "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
       {"other channels", other.bytes,
@@ -274,7 +276,8 @@ TEST_CASE("a log that is of no use is refused with the reason") {
     INFO(c.name);
     CHECK(Refusal(c.bytes) == c.refusal);
   }
-  CHECK_THROWS_WITH(ReadLcmLog("/nonexistent/run.lcmlog", Pendulum()), "/nonexistent/run.lcmlog: cannot be opened");
+  CHECK_THROWS_WITH(ReadLcmLog("/nonexistent/run.lcmlog", Pendulum()),
+                    "/nonexistent/run.lcmlog: cannot be opened");
   CHECK_THROWS_WITH(ReadLcmLog("/tmp", Pendulum()), "/tmp: is a folder");
 }
 

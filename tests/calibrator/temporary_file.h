@@ -13,7 +13,9 @@ namespace plumb {
 class TemporaryFile {
  public:
   explicit TemporaryFile(std::string_view contents, const std::string& suffix = "")
-      : path_((std::filesystem::temp_directory_path() / ("plumbline_log_test_" + std::to_string(getpid()) + suffix)).string()) {
+      : path_((std::filesystem::temp_directory_path() /
+               ("plumbline_log_test_" + std::to_string(getpid()) + suffix))
+                  .string()) {
     Write(contents);
   }
   ~TemporaryFile() { std::filesystem::remove(path_); }
@@ -21,7 +23,8 @@ class TemporaryFile {
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
   void Write(std::string_view contents) const {
-    std::ofstream(path_, std::ios::binary).write(contents.data(), static_cast<std::streamsize>(contents.size()));
+    std::ofstream(path_, std::ios::binary)
+        .write(contents.data(), static_cast<std::streamsize>(contents.size()));
   }
   const std::string& path() const { return path_; }
 

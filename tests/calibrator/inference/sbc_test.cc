@@ -12,8 +12,8 @@ namespace {
 
 constexpr int kRuns = 500, kDraws = 99;
 
-// y = A x + noise with sd 1/2, of a normal x: the posterior is known exactly. A does not see x_0 - x_1: there the posterior is
-// the prior's.
+// y = A x + noise with sd 1/2, of a normal x: the posterior is known exactly. A does not see x_0 - x_1: there
+// the posterior is the prior's.
 struct LinearGaussian {
   Prior prior{{Prior::Normal(1, 2), Prior::Normal(-3, 2)}};
   Eigen::MatrixXd a = (Eigen::MatrixXd(3, 2) << 1, 1, -0.5, -0.5, 2, 2).finished();
@@ -167,11 +167,20 @@ TEST_CASE("runs do not depend on how many there are, and equal seeds give equal 
 TEST_CASE("what is no calibration is refused") {
   const Prior prior({Prior::Normal(0, 1)});
   int columns = 9;
-  const auto growing = [&](const Eigen::VectorXd&, Random&) { return std::optional(Eigen::MatrixXd::Zero(1, columns++).eval()); };
+  const auto growing = [&](const Eigen::VectorXd&, Random&) {
+    return std::optional(Eigen::MatrixXd::Zero(1, columns++).eval());
+  };
   CHECK_THROWS_AS(RunSbc(prior, growing, Marginals({"x"}), 2, 1), std::invalid_argument);
   CHECK_THROWS_AS(RunSbc(prior, growing, Marginals({"x"}), 0, 1), std::invalid_argument);
   CHECK_THROWS_AS(RunSbc(prior, growing, {}, 1, 1), std::invalid_argument);
-  const auto tall = [](const Eigen::VectorXd&, Random&) { return std::optional(Eigen::MatrixXd::Zero(2, 3).eval()); };
+  const auto one = [](const Eigen::VectorXd&, Random&) {
+    return std::optional(Eigen::MatrixXd::Zero(1, 9).eval());
+  };
+  const SbcQuantity undefined{"ln x", [](const Eigen::VectorXd& x) { return std::log(-1 - x(0) * x(0)); }};
+  CHECK_THROWS_AS(RunSbc(prior, one, {undefined}, 2, 1), std::invalid_argument);
+  const auto tall = [](const Eigen::VectorXd&, Random&) {
+    return std::optional(Eigen::MatrixXd::Zero(2, 3).eval());
+  };
   CHECK_THROWS_AS(RunSbc(prior, tall, Marginals({"x"}), 1, 1), std::invalid_argument);
 }
 
