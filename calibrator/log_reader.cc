@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <vector>
@@ -28,6 +29,8 @@ T BigEndian(const char* at) {
 
 int64_t ReadLog(const std::string& file,
                 const std::function<bool(const std::string&, const void*, int, int64_t)>& on_event) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error)) throw std::runtime_error(file + ": is a folder");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw std::runtime_error(file + ": cannot be opened");
   char header[kHeader];
@@ -40,6 +43,7 @@ int64_t ReadLog(const std::string& file,
     const auto channel_length = BigEndian<uint32_t>(header + 20), data_length = BigEndian<uint32_t>(header + 24);
     if (BigEndian<uint32_t>(header) != kSync || channel_length == 0 || channel_length > kLongestChannel ||
         data_length > kLongestData) {
+      if (events == 0) throw std::runtime_error(file + ": is no LCM log");
       throw std::runtime_error(fmt::format("{}: damaged at byte {}", file, static_cast<int64_t>(at)));
     }
     channel.resize(channel_length);

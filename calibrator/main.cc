@@ -10,7 +10,7 @@
 
 #include "calibrator/calibrator.h"
 #include "calibrator/checkpoint.h"
-#include "calibrator/log_reader.h"
+#include "calibrator/motion_log.h"
 #include "common/atomic_file.h"
 #include "common/process.h"
 
@@ -142,35 +142,15 @@ void PrintIteration(const calibration_status_t& m, const RobotDescription& robot
 }
 
 int RunLog(Process& process, Session& session, const RobotDescription& robot, const std::string& file) {
-  robot_state_t state{};
-  joint_command_t command{};
-  controller_status_t status{};
-  int64_t rejected = 0;
-  const auto decode = [&](auto& message, const void* data, int size) {
-    try {
-      if (message.decode(data, 0, size) == size) return true;
-    } catch (const std::exception&) {
-    }
-    ++rejected;
-    return false;
-  };
-  const int64_t events = ReadLog(file, [&](const std::string& channel, const void* data, int size, int64_t) {
-    if (channel == "ROBOT_STATE_SMOOTHED") {
-      if (decode(state, data, size)) session.calibrator.OnState(state);
-    } else if (channel == "JOINT_COMMAND") {
-      if (decode(command, data, size)) session.calibrator.OnCommand(command);
-    } else if (channel == "CONTROLLER_STATUS") {
-      if (decode(status, data, size)) session.calibrator.OnControllerStatus(status);
-    }
+  const MotionCounts counts = ReadMotion(file, session.calibrator, [&] {
     while (session.busy() && !process.stopping()) {
       if (session.Work()) PrintIteration(session.Status(), robot);
     }
     return !process.stopping();
   });
   const calibration_status_t found = session.Status();
-  spdlog::info("{} events, {} undecodable; dropped transitions: {} gaps, {} late, {} not finite, {} across restarts",
-               events, rejected, found.dropped_gap, found.dropped_late, found.dropped_not_finite,
-               found.dropped_restart);
+  spdlog::info("{} events, {} undecodable; dropped transitions: {}", counts.events, counts.undecodable,
+               session.calibrator.drops().words());
   if (found.iteration == 0) throw std::runtime_error(file + ": holds no complete roll-out to calibrate with");
   std::cout << found.identifiability << std::endl;
   return 0;

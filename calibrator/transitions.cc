@@ -1,7 +1,10 @@
 #include "calibrator/transitions.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace plumb {
@@ -22,7 +25,23 @@ double Transition::duration() const {
                          [](double sum, const EffortSegment& segment) { return sum + segment.duration; });
 }
 
-TransitionJoiner::TransitionJoiner(const RobotDescription& robot) : n_(robot.num_joints()), period_(robot.task.period) {}
+std::string DropCounts::words() const {
+  return fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap, gap == 1 ? "" : "s", late, not_finite, restart);
+}
+
+TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
+    : n_(robot.num_joints()), period_(robot.task.period), most_states_(kMostStates), most_episodes_(kMostEpisodes) {}
+
+TransitionJoiner TransitionJoiner::Unbounded(const RobotDescription& robot) {
+  TransitionJoiner joiner(robot);
+  joiner.most_states_ = joiner.most_episodes_ = std::numeric_limits<size_t>::max();
+  return joiner;
+}
+
+const robot_state_t* TransitionJoiner::FindState(int64_t sequence) const {
+  const auto found = states_.find(sequence);
+  return found == states_.end() ? nullptr : &found->second;
+}
 
 void TransitionJoiner::OnState(const robot_state_t& smoothed) {
   if (smoothed.num_joints != n_) return;
@@ -32,13 +51,13 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
     commands_.clear();
   }
   states_.insert_or_assign(smoothed.sequence, smoothed);
-  if (states_.size() > kMostStates) states_.erase(states_.begin());
+  if (states_.size() > most_states_) states_.erase(states_.begin());
 }
 
 void TransitionJoiner::OnCommand(const joint_command_t& command) {
   if (command.num_joints != n_ || command.episode < 0 || command.step < 0 || command.step >= kMostSteps) return;
   commands_[command.episode].insert_or_assign(command.step, command);
-  if (commands_.size() > kMostEpisodes) commands_.erase(commands_.begin());
+  if (commands_.size() > most_episodes_) commands_.erase(commands_.begin());
 }
 
 Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "plumb/joint_command_t.hpp"
@@ -39,14 +40,19 @@ struct DropCounts {
   int64_t not_finite = 0;  ///< or an effort is unknown
   int64_t restart = 0;     ///< the estimator's filter restarted within the interval
   int64_t total() const { return gap + late + not_finite + restart; }
+  /// "1 gap, 2 late, 0 not finite, 3 across restarts"
+  std::string words() const;
 };
 
 /// Joins ROBOT_STATE_SMOOTHED and JOINT_COMMAND by state_sequence: s is the state a command acted on, s' the
 /// state the next command acted on. The result depends on the messages' contents only, not on the order in
-/// which the two channels interleave. Memory is bounded. Not thread-safe.
+/// which the two channels interleave. Not thread-safe.
 class TransitionJoiner {
  public:
+  /// Memory is bounded: the oldest states and episodes are forgotten, as a process that runs for days must.
   explicit TransitionJoiner(const RobotDescription& robot);
+  /// Nothing is forgotten but by Forget.
+  static TransitionJoiner Unbounded(const RobotDescription& robot);
 
   void OnState(const robot_state_t& smoothed);
   void OnCommand(const joint_command_t& command);
@@ -54,9 +60,15 @@ class TransitionJoiner {
   /// Sequence number of the newest state, -1 before the first.
   int64_t newest_state() const { return states_.empty() ? -1 : states_.rbegin()->first; }
 
-  /// Builds the roll-out of an episode from what has been received.
+  /// The state of that sequence number, null if it was not received or has been forgotten. Valid until the next call.
+  const robot_state_t* FindState(int64_t sequence) const;
+
+  /// Builds the roll-out of an episode from what has been received, and forgets its commands.
   /// @param last_state sequence of the state that ended it.
   Rollout Join(int64_t episode, int64_t last_state);
+
+  /// Forgets the states before that sequence number.
+  void Forget(int64_t sequence) { states_.erase(states_.begin(), states_.lower_bound(sequence)); }
 
   const DropCounts& drops() const { return drops_; }
 
@@ -65,6 +77,7 @@ class TransitionJoiner {
 
   int n_;
   double period_;
+  size_t most_states_, most_episodes_;
   std::map<int64_t, robot_state_t> states_;                         // by sequence
   std::map<int64_t, std::map<int, joint_command_t>> commands_;      // by episode, by step
   DropCounts drops_;
