@@ -82,7 +82,9 @@ std::string CheckPhysics(const std::string& urdf, const std::string& toml, const
     CHECK(is.effort_limit == should.effort_limit);
     // What robot.toml says instead is in the comment, for robot.toml.
     const auto check_dynamics = [&](const std::string& kind, double now, double expected_now, double before) {
-      if (text.find("name = \"" + kind + "/" + is.name + "\"") != std::string::npos) {
+      const bool frozen = std::any_of(robot.frozen.begin(), robot.frozen.end(),
+                                      [&](const auto& f) { return f.name == kind + "/" + is.name; });
+      if (frozen || text.find("name = \"" + kind + "/" + is.name + "\"") != std::string::npos) {
         CHECK(now == before);
       } else {
         CHECK(now == expected_now);
@@ -137,10 +139,10 @@ TEST_CASE("the URDF of an identified robot has the physics of the simulator that
 TEST_CASE("in any order and alone, parameters give the same") {
   CheckPhysics("hopper", {{"inertia/leg", 0.8}, {"length/leg", 0.45}, {"com/leg/z", -0.2}, {"mass/leg", 3}});
   CheckPhysics("hopper", {{"mass/leg", 3}, {"com/leg/z", -0.2}, {"length/leg", 0.45}, {"inertia/leg", 0.8}});
-  // The cart's URDF has no <dynamics>, the hinge's damping is robot.toml's.
-  const std::string text = CheckPhysics("cartpole", {{"friction/hinge", 0.01}, {"damping/hinge", 0.02}, {"damping/cart", 0.2},
-                                                     {"friction/cart", 0.1}});
-  CHECK_THAT(text, Contains("\n    <dynamics damping=\"0.2\" friction=\"0.1\"/>\n"));
+  CHECK_THAT(CheckPhysics("pendulum", {{"friction/pivot", 0.1}, {"damping/pivot", 0.2}}),
+             Contains("\n    <dynamics friction=\"0.1\" damping=\"0.2\"/>\n"));
+  // The hinge's damping is robot.toml's.
+  const std::string text = CheckPhysics("cartpole", {{"friction/hinge", 0.01}, {"damping/hinge", 0.02}});
   CHECK_THAT(text, Contains("\n    <dynamics friction=\"0.01\"/>\n") && Contains("name = \"damping/hinge\""));
 }
 
