@@ -1,0 +1,82 @@
+#include "calibrator/physics_fingerprint.h"
+
+#include <cstring>
+
+namespace plumb {
+namespace {
+
+// FNV-1a, 64 bit (Fowler, Noll, Vo; RFC draft "The FNV Non-Cryptographic Hash Algorithm").
+class Hash {
+ public:
+  void Add(double number) {
+    char bytes[sizeof number];
+    if (number == 0) number = 0;  // -0 is the same physics
+    std::memcpy(bytes, &number, sizeof number);
+    AddBytes(bytes, sizeof bytes);
+  }
+  void Add(const std::string& text) {
+    Add(static_cast<double>(text.size()));
+    AddBytes(text.data(), text.size());
+  }
+  template <class Derived>
+  void Add(const Eigen::DenseBase<Derived>& numbers) {
+    for (Eigen::Index j = 0; j < numbers.cols(); ++j) {
+      for (Eigen::Index i = 0; i < numbers.rows(); ++i) Add(static_cast<double>(numbers(i, j)));
+    }
+  }
+  uint64_t value() const { return value_; }
+
+ private:
+  void AddBytes(const char* bytes, size_t count) {
+    for (size_t i = 0; i < count; ++i) value_ = (value_ ^ static_cast<unsigned char>(bytes[i])) * 0x100000001b3;
+  }
+  uint64_t value_ = 0xcbf29ce484222325;
+};
+
+void AddLink(const LinkDescription& link, Hash* hash) {
+  hash->Add(link.name), hash->Add(link.mass), hash->Add(link.center_of_mass), hash->Add(link.inertia);
+  for (const Shape& shape : link.collisions) {
+    hash->Add(static_cast<double>(shape.type));
+    hash->Add(shape.position), hash->Add(shape.rotation), hash->Add(shape.size);
+  }
+}
+
+void AddJoint(const JointDescription& joint, Hash* hash) {
+  hash->Add(joint.name);
+  hash->Add(joint.origin), hash->Add(joint.rotation), hash->Add(joint.axis);
+  const JointDynamics& d = joint.dynamics;
+  for (const double number :
+       {static_cast<double>(joint.type), static_cast<double>(joint.parent), joint.lower, joint.upper, joint.effort_limit,
+        d.armature, d.damping, d.friction, d.stiffness, d.rest, d.motor_gain, d.delay, d.sensor_delay, d.sensor_bias,
+        d.no_load_speed}) {
+    hash->Add(number);
+  }
+}
+
+void AddSimulation(const SimulationSettings& s, Hash* hash) {
+  for (const double number : {static_cast<double>(s.integrator), s.substep, s.speed_clip,
+                              static_cast<double>(s.move_before_clip), s.gravity}) {
+    hash->Add(number);
+  }
+  hash->Add(s.contact ? "contact" : "");
+  if (s.contact) {
+    for (const double number : {s.contact->stiffness, s.contact->damping, s.contact->friction, s.contact->slip_speed}) {
+      hash->Add(number);
+    }
+  }
+  hash->Add(s.stop ? "stop" : "");
+  if (s.stop) hash->Add(s.stop->stiffness), hash->Add(s.stop->damping);
+}
+
+}  // namespace
+
+uint64_t PhysicsFingerprint(const RobotDescription& robot) {
+  Hash hash;
+  for (const LinkDescription& link : robot.links) AddLink(link, &hash);
+  for (const JointDescription& joint : robot.joints) AddJoint(joint, &hash);
+  for (const FrozenParameter& frozen : robot.frozen) hash.Add(frozen.name), hash.Add(frozen.value);
+  AddSimulation(robot.simulation, &hash);
+  return hash.value();
+}
+
+}  // namespace plumb

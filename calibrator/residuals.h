@@ -1,0 +1,18 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calibrator/window_errors.h"
+
+namespace plumb {
+
+/// Whitened residuals of the posterior's mean, for a look at what the model leaves unexplained.
+struct Residuals {
+  Eigen::VectorXd whitened;              ///< NaN where there is none
+  std::vector<WindowErrors::Row> rows;   ///< what each is of; coordinate is an index of `coordinates`
+  std::vector<std::string> coordinates;  ///< names: "q knee", "v knee"
+};
+
+}  // namespace plumb
