@@ -40,8 +40,7 @@ Eigen::MatrixXd Batches::Run(uint64_t, Eigen::Index rows, Eigen::Index columns, 
   return batch;
 }
 
-JournaledBatches::JournaledBatches(std::filesystem::path file, uint64_t identity, Batches& inner)
-    : file_(std::move(file)), inner_(inner) {
+Journal::Journal(std::filesystem::path file, uint64_t identity) : file_(std::move(file)) {
   std::array<uint64_t, 2> head{};
   stream_.open(file_, std::ios::in | std::ios::out | std::ios::binary);
   const bool same = stream_ && stream_.read(reinterpret_cast<char*>(head.data()), sizeof head) && head[0] == kMagic && head[1] == identity;
@@ -54,7 +53,8 @@ JournaledBatches::JournaledBatches(std::filesystem::path file, uint64_t identity
   if (!stream_) throw std::runtime_error(file_.string() + ": cannot be written");
 }
 
-bool JournaledBatches::Read(uint64_t identity, Eigen::MatrixXd* batch) {
+bool Journal::Read(uint64_t identity, Eigen::MatrixXd* batch) {
+  if (!reading_) return false;
   const auto begin = stream_.tellg();
   Header header{};
   const bool expected = stream_.read(reinterpret_cast<char*>(&header), sizeof header) && header.identity == identity &&
@@ -71,20 +71,16 @@ bool JournaledBatches::Read(uint64_t identity, Eigen::MatrixXd* batch) {
   return false;
 }
 
-Eigen::MatrixXd JournaledBatches::Run(uint64_t identity, Eigen::Index rows, Eigen::Index columns, const Columns& compute) {
-  Eigen::MatrixXd batch(rows, columns);
-  if (reading_ && Read(identity, &batch)) return batch;
-  batch = inner_.Run(identity, rows, columns, compute);
-  Header header{identity, rows, columns, 0};
+void Journal::Append(uint64_t identity, const Eigen::MatrixXd& batch) {
+  Header header{identity, batch.rows(), batch.cols(), 0};
   header.check = CheckOf(header, batch);
   stream_.write(reinterpret_cast<const char*>(&header), sizeof header);
   stream_.write(reinterpret_cast<const char*>(batch.data()), static_cast<std::streamsize>(static_cast<size_t>(batch.size()) * sizeof(double)));
   stream_.flush();
   if (!stream_) throw std::runtime_error(file_.string() + ": cannot be written");
-  return batch;
 }
 
-void JournaledBatches::Finish() {
+void Journal::Finish() {
   stream_.close();
   std::filesystem::remove(file_);
 }

@@ -22,27 +22,26 @@ class Batches {
   virtual Eigen::MatrixXd Run(uint64_t identity, Eigen::Index rows, Eigen::Index columns, const Columns& compute);
 };
 
-/// Whatever has been computed is kept in a file, and read back instead of being computed again: an inference that was killed
-/// at any time, begun anew, goes through the same batches to the same bits. What follows the first batch that is not the
-/// expected one, or is cut off, or damaged, is forgotten.
-class JournaledBatches : public Batches {
+/// Batches that have been computed, in a file: an inference that was killed at any time, begun anew, goes through the same
+/// batches to the same bits, and needs not compute those again. What follows the first batch that is not the expected one,
+/// or is cut off, or damaged, is forgotten. Not thread-safe.
+class Journal {
  public:
-  /// @param identity of the whole inference: a journal of another one is begun anew. @param inner computes; must outlive this.
+  /// @param identity of the whole inference: a journal of another one is begun anew.
   /// @throws std::runtime_error naming the file if it cannot be written.
-  JournaledBatches(std::filesystem::path file, uint64_t identity, Batches& inner);
+  Journal(std::filesystem::path file, uint64_t identity);
 
-  Eigen::MatrixXd Run(uint64_t identity, Eigen::Index rows, Eigen::Index columns, const Columns& compute) override;
-
+  /// The next batch, if it has been computed before: `batch` has its size. @return false if it has not.
+  bool Read(uint64_t identity, Eigen::MatrixXd* batch);
+  /// @throws std::runtime_error naming the file if it cannot be written.
+  void Append(uint64_t identity, const Eigen::MatrixXd& batch);
   /// Batches that had been computed before.
   int64_t resumed() const { return resumed_; }
   /// The inference is complete: removes the file.
   void Finish();
 
  private:
-  bool Read(uint64_t identity, Eigen::MatrixXd* batch);
-
   std::filesystem::path file_;
-  Batches& inner_;
   std::fstream stream_;
   bool reading_ = true;
   int64_t resumed_ = 0;

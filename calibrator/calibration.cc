@@ -11,10 +11,12 @@
 
 #include "calibrator/holdout.h"
 #include "calibrator/methods.h"
+#include "calibrator/misspecification.h"
 
 namespace plumb {
 namespace {
 
+constexpr double kNoInformation = 1e-6;  // relative to the best-known direction, in the prior's units
 constexpr double kDisagreement = 1e-3;  // p below which logs are of different robots, or the model is wrong
 
 Eigen::MatrixXd ToPhysical(const RobotDescription& robot, const Eigen::MatrixXd& coordinates) {
@@ -84,7 +86,50 @@ class Run {
     findings_.discrepancy = view.errors.cwiseAbs2().mean();
     findings_.errors = view.errors;
     findings_.rows = rows;
+    findings_.cramer_rao = CramerRao();
+    Suspect(view, result.curriculum ? result.curriculum->noise_known : false);
     findings_.identifiability = FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
+  }
+
+  // What the model has wrong, whatever its parameters.
+  void Suspect(const LaplaceFit& view, bool noise_known) {
+    const Eigen::VectorXd physical = robot_.ToPhysical(mean_);
+    const std::vector<Candidate> candidates = FindCandidates(robot_);
+    auto extended = std::make_shared<Model>(WithCandidates(robot_, candidates));
+    WindowErrors errors(extended, rollouts_, 1, options_.workforce);
+    errors.set_noise_sd(findings_.noise_sd);
+    Eigen::VectorXd nominal = extended->parameters().means();
+    nominal.head(physical.size()) = physical;
+    errors.Linearise(nominal);
+    Leftover leftover{rollouts_, findings_.rows, findings_.errors, view.jacobian,
+                      std::vector<bool>(static_cast<size_t>(findings_.noise_sd.size()), noise_known), candidates, {}};
+    leftover.columns = CandidateColumns([&](const Eigen::MatrixXd& x) { return errors.Whitened(x); }, physical, candidates);
+    // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of it, as the errors are.
+    if (noise_known) {
+      for (size_t i = 0; i < findings_.rows.size(); ++i) {
+        leftover.columns.row(static_cast<Eigen::Index>(i)) /= view.scale(findings_.rows[i].coordinate);
+      }
+    }
+    findings_.misspecification = FindMisspecification(model_->Describe(physical), leftover);
+    findings_.diagnostic_steps += errors.simulated_steps();
+  }
+
+  // Along a direction that nothing is known of, the bound is infinite for all parameters involved.
+  Eigen::VectorXd CramerRao() const {
+    const Eigen::VectorXd sd = prior_sd();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sd.asDiagonal() * information_ * sd.asDiagonal());
+    const double least = kNoInformation * std::max(eigen.eigenvalues().maxCoeff(), 1.0);
+    Eigen::VectorXd bound(sd.size());
+    for (Eigen::Index i = 0; i < sd.size(); ++i) {
+      double variance = 0;
+      for (Eigen::Index k = 0; k < sd.size(); ++k) {
+        const double part = std::abs(eigen.eigenvectors()(i, k));
+        if (eigen.eigenvalues()(k) > least) variance += part * part / eigen.eigenvalues()(k);
+        else if (part > 1e-3) variance = std::numeric_limits<double>::infinity();
+      }
+      bound(i) = sd(i) * std::sqrt(variance);
+    }
+    return bound;
   }
 
   // Fits again without a part of the data, which then judges.

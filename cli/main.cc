@@ -4,6 +4,7 @@
 
 #include <iostream>
 
+#include "cli/calibrate.h"
 #include "cli/doctor.h"
 #include "cli/launch.h"
 #include "cli/sim.h"
@@ -58,8 +59,11 @@ int Request(Process& process, int8_t what) {
 int main(int argc, char** argv) {
   plumb::LaunchFlags flags;
   plumb::SimFlags sim_flags;
+  plumb::CalibrateFlags calibrate_flags;
+  std::string command = "plumb";
+  for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  CLI::App *launch = nullptr, *sim = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
+  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -93,16 +97,37 @@ int main(int argc, char** argv) {
         sim->add_option("--png", sim_flags.png, "draw the first episode as a strip of snapshots");
         sim->add_option("--gif", sim_flags.gif, "draw the first episode as a film");
         sim->add_flag("--view", sim_flags.view, "show it in a window, in real time");
+        calibrate = app.add_subcommand("calibrate", "learn from logs which simulators could have produced the robot's motion");
+        calibrate->add_option("robot", calibrate_flags.robot, "robot folder or TOML file")->required();
+        calibrate->add_option("--log", calibrate_flags.logs, "LCM log; may be given several times")->allow_extra_args(false);
+        calibrate->add_option("--csv", calibrate_flags.tables, "table of transitions, as docs/calibrate.md has it")->allow_extra_args(false);
+        calibrate->add_option("--method", calibrate_flags.options.method, "of inference")
+            ->check(CLI::IsMember(plumb::CalibrationMethods()))->capture_default_str();
+        calibrate->add_option("--seed", calibrate_flags.options.seed, "of all random numbers")->check(seed)->capture_default_str();
+        calibrate->add_option("--output", calibrate_flags.output, "what was found, for programs")->capture_default_str();
+        calibrate->add_option("--report", calibrate_flags.report, "what was found, for people: an HTML page");
+        calibrate->add_option("--urdf", calibrate_flags.urdf, "the robot's URDF with what was found");
+        calibrate->add_option("--horizons", calibrate_flags.options.horizons, "control steps of the windows, stage by stage")
+            ->check(CLI::Range(1, 1000))->delimiter(',')->capture_default_str();
+        calibrate->add_option("--budget", calibrate_flags.options.budget, "transitions that sampling methods may simulate")
+            ->check(CLI::Range(100.0, 1e12))->capture_default_str();
+        calibrate->add_option("--discrepancy", calibrate_flags.options.discrepancy, "of abc-rejection and abc-smc")->capture_default_str();
+        calibrate->add_option("--threads", calibrate_flags.threads, "0 = one per core; the result does not depend on it")
+            ->check(CLI::Range(0, 1024))->capture_default_str();
+        calibrate->add_option("--sbc", calibrate_flags.sbc, "instead: that many runs of simulation-based calibration on motions like these")
+            ->check(CLI::Range(0, 1000000))->capture_default_str();
+        calibrate->add_flag("--strict", calibrate_flags.strict, "exit status 3 if what was found should not be trusted");
         doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* sub : {launch, sim, doctor, arm, disarm, estop}) sub->fallthrough();
+        for (CLI::App* sub : {launch, sim, calibrate, doctor, arm, disarm, estop}) sub->fallthrough();
       },
       [&](plumb::Process& process) {
         if (launch->parsed()) return plumb::Launch(process, flags);
         if (sim->parsed()) return plumb::Simulate(process, sim_flags);
+        if (calibrate->parsed()) return plumb::CalibrateLogs(process, calibrate_flags, command);
         if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus);
         if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM);
         if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM);
