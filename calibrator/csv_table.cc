@@ -76,8 +76,9 @@ double CsvTable::Number(int column) const {
   double value = 0;
   const auto [rest, error] = std::from_chars(begin, end, value);
   if (error == std::errc::result_out_of_range) fail("a number too large or too small for a double");
-  if (error != std::errc() || rest != end || (begin != text.data() && *begin == '-'))
+  if (error != std::errc() || rest != end || (begin != text.data() && *begin == '-')) {
     fail("that is no number");
+  }
   if (std::isinf(value)) fail("it must be finite, or nan where nothing was observed");
   return value;
 }
@@ -124,8 +125,9 @@ void CsvTable::Split() {
       }
       fields_.push_back(std::string_view(line_).substr(begin, end - begin));
       comma = std::min(line_.find(',', at), line_.size());
-      if (!Trimmed(std::string_view(line_).substr(at + 1, comma - at - 1)).empty())
+      if (!Trimmed(std::string_view(line_).substr(at + 1, comma - at - 1)).empty()) {
         Fail("something follows a quotation");
+      }
     } else {
       comma = std::min(line_.find(',', at), line_.size());
       fields_.push_back(Trimmed(std::string_view(line_).substr(at, comma - at)));

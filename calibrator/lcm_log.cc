@@ -18,7 +18,8 @@ constexpr int64_t kPatience = 5000;
 // [states] The same within a channel, where messages keep their order but for a few: further back is another
 // run.
 constexpr int64_t kReordered = 1000;
-constexpr int64_t kLargestSequence = int64_t{1} << 53;
+// No counter and no clock gets there; beyond it, sums and differences overflow.
+constexpr int64_t kLargest = int64_t{1} << 53;
 
 /// Joins the episodes of a log one after the other as soon as each is complete, so that no more than one or
 /// two need be remembered however long the log is.
@@ -28,7 +29,8 @@ class EpisodeJoiner {
       : robot_(robot), rollouts_(*rollouts), joiner_(TransitionJoiner::Unbounded(robot)) {}
 
   void OnState(const robot_state_t& state) {
-    if (!Fits(state.num_joints) || state.sequence < 0 || state.sequence > kLargestSequence) return;
+    if (!Fits(state.num_joints) || state.sequence < 0 || state.sequence > kLargest) return;
+    if (state.utime < -kLargest || state.utime > kLargest) return;
     const robot_state_t* newest = joiner_.FindState(joiner_.newest_state());
     if (newest && (state.sequence < newest->sequence - kReordered ||
                    (state.sequence <= newest->sequence && state.utime > newest->utime))) {
@@ -146,8 +148,9 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
   const MotionCounts counts = ReadMotion(file, joiner, [] { return true; });
   joiner.Finish();
   log.drops = joiner.drops();
-  if (counts.undecodable > 0)
+  if (counts.undecodable > 0) {
     log.warnings.push_back(fmt::format("{} messages do not decode", counts.undecodable));
+  }
   if (joiner.foreign() > 0) {
     log.warnings.push_back(fmt::format("{} messages are of a robot with {} joints, '{}' has {}",
                                        joiner.foreign(), joiner.foreign_joints(), robot.name,

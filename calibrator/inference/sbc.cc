@@ -88,8 +88,8 @@ int Rank(double truth, const Eigen::VectorXd& draws, Random& ties) {
 // What is most wrong, in standard errors of uniform ranks' mean and variance.
 std::string Verdict(const SbcUniformity& quantity, double runs, size_t tests) {
   if (std::isnan(quantity.chi2_p)) return "unknown";
-  if (std::min(quantity.chi2_p, quantity.ecdf_p) * static_cast<double>(tests) >= kSignificant)
-    return "calibrated";
+  const double p = std::min(quantity.chi2_p, quantity.ecdf_p);
+  if (p * static_cast<double>(tests) >= kSignificant) return "calibrated";
   const double shift = (quantity.mean - 0.5) * std::sqrt(12 * runs);
   const double width = (12 * quantity.variance - 1) * std::sqrt(runs / 0.8);
   if (std::abs(shift) > std::abs(width)) return shift > 0 ? "too low" : "too high";
@@ -134,8 +134,9 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
   const auto n = static_cast<int>(ranks.size());
   std::vector<int> points;
   const int count = std::min(kMostPoints, draws);
-  for (int i = 1; i <= count; ++i)
+  for (int i = 1; i <= count; ++i) {
     points.push_back(static_cast<int>(static_cast<int64_t>(i) * (draws + 1) / (count + 1)));
+  }
 
   const BinomialPmf pmf(n);
   double least = 1;
@@ -144,8 +145,8 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
     least = std::min(least, TailProbabilities(n, point / (draws + 1.0), pmf)[below]);
   }
 
-  std::vector<double> inside(static_cast<size_t>(n) +
-                             1);  // probability of each count and of no excursion so far
+  // Probability of each count and of no excursion so far.
+  std::vector<double> inside(static_cast<size_t>(n) + 1);
   inside[0] = 1;
   double before = 0;  // share of ranks below the point before
   for (const int point : points) {
@@ -173,8 +174,7 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
 SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQuantity>& quantities, int runs,
                  uint64_t seed) {
   if (runs < 1) throw std::invalid_argument("simulation-based calibration needs at least one run");
-  if (quantities.empty())
-    throw std::invalid_argument("simulation-based calibration needs a quantity to rank");
+  if (quantities.empty()) throw std::invalid_argument("simulation-based calibration needs a quantity");
   const auto k = static_cast<Eigen::Index>(quantities.size());
   SbcResult result;
   result.runs = runs;
@@ -222,8 +222,9 @@ std::string Words(const SbcResult& result) {
   size_t width = 8;
   for (const SbcUniformity& quantity : result.quantities) width = std::max(width, quantity.name.size());
   std::string text =
-      fmt::format("{} posteriors of {} draws each; {} of {} runs failed ({:.1f} %)\n", posteriors,
-                  result.draws, result.failures, result.runs, 100.0 * result.failures / result.runs);
+      fmt::format("{} posteriors of {} draws each; {} of {} runs failed ({:.1f} %){}\n", posteriors,
+                  result.draws, result.failures, result.runs, 100.0 * result.failures / result.runs,
+                  result.failures > 0 ? ": of these nothing is known" : "");
   text += fmt::format("{:<{}}  {:>8}  {:>8}  {:>6}  {:>6}  {:>6}  posterior\n", "quantity", width, "chi2 p",
                       "ECDF p", "50 %", "80 %", "95 %");
   for (const SbcUniformity& quantity : result.quantities) {

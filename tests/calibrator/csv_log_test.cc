@@ -69,8 +69,9 @@ std::string SimulatedTable(const RobotDescription& robot, int episodes, int step
 double WorstPrediction(const Log& log, const RobotDescription& robot) {
   Simulator simulator(robot);
   Eigen::VectorXd means(robot.parameters.size());
-  for (size_t i = 0; i < robot.parameters.size(); ++i)
+  for (size_t i = 0; i < robot.parameters.size(); ++i) {
     means(static_cast<Eigen::Index>(i)) = robot.parameters[i].mean;
+  }
   simulator.SetParameters(means);
   double worst = 0;
   for (const Rollout& rollout : log.rollouts) {
@@ -101,8 +102,9 @@ TEST_CASE("a table recorded in the simulator leads, transition by transition, to
     CHECK(t.efforts[0].duration == robot.task.period);
     CHECK(t.efforts[0].effort.size() == robot.num_velocities());
     CHECK(t.q == log.rollouts[0].transitions[4].next_q);
-    for (const Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
+    for (const Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd}) {
       CHECK(sd->array().isNaN().all());
+    }
     CHECK(WorstPrediction(log, robot) == 0);
   }
 }

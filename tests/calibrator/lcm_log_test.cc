@@ -33,7 +33,7 @@ class Recording {
   void State(int64_t sequence, int joints = 1) {
     robot_state_t s{};
     s.sequence = sequence;
-    s.utime = start + 5000 * sequence;
+    s.utime = start + 5000 * (sequence % 1'000'000);
     s.num_joints = joints;
     const auto n = static_cast<size_t>(joints);
     s.q.assign(n, 1e-3 * static_cast<double>(sequence));
@@ -68,8 +68,9 @@ class Recording {
   /// and the command of no episode after it.
   void Episode(int64_t id, int64_t first_state, int steps) {
     for (int64_t i = 0; i <= 10 * steps; ++i) {
-      if (i % 10 == 0)
+      if (i % 10 == 0) {
         Command(first_state + i, i < 10 * steps ? id : -1, i < 10 * steps ? static_cast<int>(i / 10) : -1);
+      }
       if (first_state + i >= 20) State(first_state + i - 20);
     }
   }
