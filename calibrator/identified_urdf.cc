@@ -122,13 +122,16 @@ class Writer {
   template <class Function>
   void ForEachJoint(const TiXmlElement& parent, const Function& function) const {
     const std::string name = parent.Attribute("name");
-    for (const TiXmlElement* j = edits_.root().FirstChildElement("joint"); j; j = j->NextSiblingElement("joint")) {
+    for (const TiXmlElement* j = edits_.root().FirstChildElement("joint"); j;
+         j = j->NextSiblingElement("joint")) {
       if (name == j->FirstChildElement("parent")->Attribute("link")) function(*j);
     }
   }
 
-  // Numbers of an attribute; those that the text has already, up to rounding in units of `scale`, stay as they are.
-  void Set(const TiXmlElement& element, const char* attribute, const std::vector<double>& values, double scale) {
+  // Numbers of an attribute; those that the text has already, up to rounding in units of `scale`, stay as
+  // they are.
+  void Set(const TiXmlElement& element, const char* attribute, const std::vector<double>& values,
+           double scale) {
     std::vector<double> numbers = Numbers(&element, attribute, values.size());
     bool changed = false;
     for (size_t i = 0; i < values.size(); ++i) {
@@ -144,11 +147,13 @@ class Writer {
     if (const TiXmlElement* origin = parent.FirstChildElement("origin")) {
       Set(*origin, "xyz", {position.x(), position.y(), position.z()}, scale);
     } else if (scale > 0) {
-      edits_.AddChild(parent, fmt::format("<origin xyz=\"{} {} {}\"/>", position.x(), position.y(), position.z()));
+      edits_.AddChild(parent,
+                      fmt::format("<origin xyz=\"{} {} {}\"/>", position.x(), position.y(), position.z()));
     }
   }
 
-  // All positions in the link, of what is fixed to it and of the joints that it carries; and the sizes of its solids.
+  // All positions in the link, of what is fixed to it and of the joints that it carries; and the sizes of its
+  // solids.
   void Stretch(double factor) {
     const auto move = [&](const TiXmlElement& parent) {
       SetPosition(parent, factor * Vector(parent.FirstChildElement("origin"), "xyz"));
@@ -256,8 +261,8 @@ class Placement {
   // The parts of a planar or floating joint share one <dynamics>.
   bool InDynamics(const std::string& name) const {
     const std::string joint = name.substr(name.find('/') + 1);
-    const auto found =
-        std::find_if(file_.joints.begin(), file_.joints.end(), [&](const auto& j) { return j.name == joint; });
+    const auto found = std::find_if(file_.joints.begin(), file_.joints.end(),
+                                    [&](const auto& j) { return j.name == joint; });
     return found != file_.joints.end() && !file_.part[static_cast<size_t>(found - file_.joints.begin())] &&
            toml_.dynamics.count(name) == 0;
   }
@@ -266,22 +271,24 @@ class Placement {
   const UrdfModel& file_;
 };
 
-std::vector<Value> AllValues(const RobotDescription& robot, const Eigen::VectorXd& mean, const Eigen::VectorXd& sd,
-                             const Placement& placement) {
+std::vector<Value> AllValues(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                             const Eigen::VectorXd& sd, const Placement& placement) {
   std::vector<Value> values;
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
     const ParameterDescription& p = robot.parameters[i];
     const auto k = static_cast<Eigen::Index>(i);
     values.push_back({p.name, p.unit, mean(k), sd(k), placement.InUrdf(p.name)});
   }
-  for (const FrozenParameter& f : robot.frozen) values.push_back({f.name, "", f.value, NAN, placement.InUrdf(f.name)});
+  for (const FrozenParameter& f : robot.frozen)
+    values.push_back({f.name, "", f.value, NAN, placement.InUrdf(f.name)});
   return values;
 }
 
 // How much longer a link gets: see length/ in sim/parameters.h.
 double StretchOf(const UrdfModel& file, size_t link, const std::vector<Value>& values) {
-  const auto value = std::find_if(values.begin(), values.end(),
-                                  [&](const Value& v) { return v.name == "length/" + file.links[link].name; });
+  const auto value = std::find_if(values.begin(), values.end(), [&](const Value& v) {
+    return v.name == "length/" + file.links[link].name;
+  });
   if (value == values.end()) return 1;
   const auto child = std::find_if(file.joints.begin(), file.joints.end(),
                                   [&](const auto& joint) { return joint.parent == static_cast<int>(link); });
@@ -304,23 +311,27 @@ std::string Comment(const RobotDescription& robot, const std::vector<Value>& val
     if (v.in_urdf) {
       here += fmt::format("\n       {} = {:.6g}{}, {}", v.name, v.mean, unit, sd);
     } else if (!std::isnan(v.sd)) {  // robot.toml has the frozen ones already
-      elsewhere += fmt::format("\n       [[parameter]]  # {}\n       name = {}\n       frozen = true\n       mean = {}", sd,
-                               Quoted(v.name), v.mean);
+      elsewhere += fmt::format(
+          "\n       [[parameter]]  # {}\n       name = {}\n       frozen = true\n       mean = {}", sd,
+          Quoted(v.name), v.mean);
     }
   }
   std::string words = "Identified by Plumbline from the motion of " + robot.name + ".";
   words += here.empty() ? "\n     Nothing of it is in this file." : "\n     In this file:" + here;
   if (!here.empty()) words += "\n     robot.toml needs no [[parameter]] of these names any more.";
   if (!elsewhere.empty()) {
-    words += "\n     Not in this file, but for robot.toml in place of its [[parameter]] of the same name:" + elsewhere;
+    words += "\n     Not in this file, but for robot.toml in place of its [[parameter]] of the same name:" +
+             elsewhere;
   }
   return words + "\n    ";
 }
 
 }  // namespace
 
-std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd& mean, const Eigen::VectorXd& sd) {
-  if (sd.size() != mean.size()) throw std::invalid_argument("as many standard deviations as means are needed");
+std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                           const Eigen::VectorXd& sd) {
+  if (sd.size() != mean.size())
+    throw std::invalid_argument("as many standard deviations as means are needed");
   const RobotDescription now = Model(robot).Describe(mean);
   if (LoadRobot(robot.file).fingerprint != robot.fingerprint) {
     throw ConfigError(robot.file + ": it or its URDF has changed since the robot was read");
@@ -341,8 +352,8 @@ std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd&
   return writer.Print();
 }
 
-void WriteIdentifiedUrdf(const std::filesystem::path& file, const RobotDescription& robot, const Eigen::VectorXd& mean,
-                         const Eigen::VectorXd& sd) {
+void WriteIdentifiedUrdf(const std::filesystem::path& file, const RobotDescription& robot,
+                         const Eigen::VectorXd& mean, const Eigen::VectorXd& sd) {
   WriteAtomically(file, IdentifiedUrdf(robot, mean, sd));
 }
 
