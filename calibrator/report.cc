@@ -9,6 +9,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "calibrator/report_html.h"
 #include "calibrator/report_plots.h"
 #include "calibrator/report_residuals.h"
 #include "calibrator/report_style.h"
@@ -27,48 +28,6 @@ constexpr Index kMostPairs = 8;
 constexpr double kNull = 1e-6;  // as FindIdentifiability has it
 constexpr double kInvolved = 1e-3;
 constexpr double kHardly = 0.22;  // nat: the data made the sd smaller by less than a fifth
-
-// Digits after the point such that the standard deviation has two significant ones.
-int Digits(double sd) { return std::clamp(1 - static_cast<int>(std::floor(std::log10(sd))), 0, 9); }
-
-std::string Number(double value, double sd) {
-  if (std::isnan(value)) return "\xe2\x80\x93";  // en dash
-  if (std::isinf(value)) return value > 0 ? "\xe2\x88\x9e" : "-\xe2\x88\x9e";
-  if (!(sd > 0) || !std::isfinite(sd) || std::abs(value) >= 1e6 || sd < 1e-7)
-    return fmt::format("{:.4g}", value);
-  return fmt::format("{:.{}f}", value, Digits(sd));
-}
-
-std::string PlusMinus(double value, double sd) { return Number(value, sd) + " \xc2\xb1 " + Number(sd, sd); }
-
-/// A table; cells are HTML.
-class Table {
- public:
-  explicit Table(const std::vector<std::string>& header) {
-    for (const std::string& cell : header) rows_ += "<th>" + cell + "</th>";
-    rows_ = "<tr>" + rows_ + "</tr>\n";
-  }
-  void Add(const std::vector<std::string>& cells) {
-    rows_ += "<tr>";
-    // Numbers stay on a line, words may wrap.
-    for (const std::string& cell : cells)
-      rows_ += (cell.size() < 40 ? "<td class=\"n\">" : "<td class=\"words\">") + cell + "</td>";
-    rows_ += "</tr>\n";
-  }
-  std::string Print() const { return "<div class=\"scroll\"><table>\n" + rows_ + "</table></div>\n"; }
-
- private:
-  std::string rows_;
-};
-
-std::string Paragraph(const std::string& text) { return text.empty() ? "" : "<p>" + Escape(text) + "</p>\n"; }
-
-std::string Figure(const std::string& drawing, const std::string& caption) {
-  return "<figure>" + drawing + "<figcaption>" + caption + "</figcaption></figure>\n";
-}
-
-// For what would be illegible if it shrank to a phone's width.
-std::string Scrolling(const std::string& drawing) { return "<div class=\"scroll\">" + drawing + "</div>"; }
 
 constexpr char kKeys[] =
     "<span class=\"key prior\"></span>prior (dashed) &#160; <span class=\"key posterior\"></span>posterior. ";

@@ -12,6 +12,11 @@
 // The report's drawings: each returns an <svg> element. Classes "prior" and "posterior" have their colours.
 namespace plumb {
 
+/// "mass/pole [kg]"
+inline std::string WithUnit(const ParameterDescription& p) {
+  return p.unit.empty() ? p.name : p.name + " [" + p.unit + "]";
+}
+
 /// Pairs of parameters below the diagonal: 1 and 2 sigma of prior (of the coordinates: exact contours) and of
 /// each of the posterior's components, and samples. On the diagonal: the prior's density and a histogram of
 /// the samples. Above it: the posterior's correlation of the coordinates.

@@ -77,6 +77,12 @@ std::string Escape(const std::string& text) {
   return escaped;
 }
 
+std::string Shorten(const std::string& text, size_t length) {
+  if (text.size() <= length) return text;
+  const size_t tail = 2 * (length - 1) / 3;
+  return text.substr(0, length - 1 - tail) + "\xe2\x80\xa6" + text.substr(text.size() - tail);
+}
+
 Axis::Axis(double lower, double upper, double from, double to, bool logarithmic)
     : lower_(lower), upper_(upper), from_(from), to_(to), logarithmic_(logarithmic) {
   if (!std::isfinite(lower_) || (logarithmic_ && lower_ <= 0)) lower_ = logarithmic_ ? 0.1 : 0;

@@ -10,6 +10,9 @@ namespace plumb {
 /// are not UTF-8 replaced, so that a page stays well-formed XML whatever a file called itself.
 std::string Escape(const std::string& text);
 
+/// At most `length` bytes and an ellipsis in their middle: of a path the end tells most. For ASCII.
+std::string Shorten(const std::string& text, size_t length);
+
 /// An axis of a plot: values to pixels, linear or logarithmic.
 class Axis {
  public:
