@@ -25,9 +25,10 @@ std::pair<double, double> Extent(const Findings& findings, const Summary& summar
   const double prior_low = p.ToPhysical(findings.prior.mean(i) - 2.3 * sd);
   const double prior_high = p.ToPhysical(findings.prior.mean(i) + 2.3 * sd);
   // Of a posterior much narrower than its prior only the surroundings: a dot would show nothing.
-  constexpr double kWidest = 4;
-  return {std::max(std::min(low, prior_low), low - kWidest * width),
-          std::min(std::max(high, prior_high), high + kWidest * width)};
+  constexpr double kNarrow = 8, kSurroundings = 0.8;
+  if (prior_high - prior_low > kNarrow * width)
+    return {low - kSurroundings * width, high + kSurroundings * width};
+  return {std::min(low, prior_low), std::max(high, prior_high)};
 }
 
 class Pairs {

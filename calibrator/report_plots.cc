@@ -205,7 +205,7 @@ std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& 
   const Axis x(low, high, 30, kRight), y(0, 1, bottom, kTop);
   svg.Frame(x, y, Shorten(WithUnit(robot.parameters[static_cast<size_t>(parameter)]), 36), "", 4);
   const double from = x.Pixel(summary.lower(parameter)), to = x.Pixel(summary.upper(parameter));
-  svg.Rectangle(from, kTop, to - from, bottom - kTop, "band");
+  svg.Rectangle(from, kTop, std::max(2., to - from), bottom - kTop, "band");
   for (size_t k = 0; k < logs.size(); ++k) {
     const double at = kTop + 3 + kRow * (static_cast<double>(k) + 0.5);
     svg.Text(22, at + 4, std::to_string(k + 1), "tick", Svg::Anchor::kEnd);

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
+#include <sstream>
 
 #include "calibrator/report_residuals.h"
 #include "calibrator/svg.h"
@@ -175,6 +176,27 @@ TEST_CASE("numbers that are none are left out of the drawings") {
   CHECK_THROWS_AS(ReportHtml(findings, robot, SampleProvenance(), residuals), std::invalid_argument);
   residuals.rows.pop_back();
   CHECK_THROWS_AS(ReportHtml(findings, robot, SampleProvenance(), residuals), std::invalid_argument);
+}
+
+TEST_CASE("a posterior much narrower than its prior is drawn with its surroundings, not as a dot") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  findings.posterior = {{1}, {{findings.prior.mean, 1e-6 * findings.prior.covariance}}};
+  findings.samples.resize(0, 0);
+  findings.identifiability.null.clear();
+  const std::string html = ReportHtml(findings, robot, SampleProvenance(), SampleResiduals(robot));
+  Keep("narrow.html", html);
+  CheckPage(html);
+  // The first pair of posterior contours: as wide as a good part of a cell.
+  const size_t path = html.find("posterior line\" d=\"M");
+  REQUIRE(path != std::string::npos);
+  std::istringstream numbers(html.substr(path + 20, html.find('Z', path) - path - 20));
+  double low = 1e9, high = -1e9, x = 0, y = 0;
+  for (char separator; numbers >> x >> y; numbers >> separator)
+    low = std::min(low, x), high = std::max(high, x);
+  CHECK(high - low > 25);
+  CHECK(high - low < 250);
+  CHECK_THAT(html, Contains("<td class=\"n\">yes</td>"));
 }
 
 TEST_CASE("the report of a robot with every coordinate there is") {
