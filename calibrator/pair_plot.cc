@@ -58,7 +58,7 @@ class Pairs {
   }
 
  private:
-  static constexpr double kLeft = 74, kTop = 8, kBottom = 44, kGap = 8;
+  static constexpr double kLeft = 90, kTop = 8, kBottom = 44, kGap = 8;
 
   const ParameterDescription& parameter(Eigen::Index i) const {
     return robot_.parameters[static_cast<size_t>(i)];
@@ -164,12 +164,21 @@ class Pairs {
               fmt::format("{:+.2f}", correlation), strong ? "large" : "large muted");
   }
 
-  // Not so near to an end that its label meets the next cell's.
+  // As many as there is room for: labels keep clear of each other and of the next cell's.
   std::vector<Axis::Tick> Ticks(const Axis& axis) const {
-    std::vector<Axis::Tick> ticks = axis.Ticks(cell_ < 150 ? 3 : cell_ < 200 ? 4 : 6);
-    const double low = std::min(axis.from(), axis.to()) + 14, high = std::max(axis.from(), axis.to()) - 14;
-    std::erase_if(ticks,
-                  [&](const auto& t) { return axis.Pixel(t.value) < low || axis.Pixel(t.value) > high; });
+    const double begin = std::min(axis.from(), axis.to()), end = std::max(axis.from(), axis.to());
+    std::vector<Axis::Tick> ticks;
+    for (int count = cell_ < 150 ? 3 : 6; count >= 2; --count) {
+      ticks = axis.Ticks(count);
+      double width = 22;  // also of what is as high as a line
+      for (const auto& tick : ticks) width = std::max(width, 6.5 * static_cast<double>(tick.label.size()));
+      std::erase_if(ticks, [&](const auto& t) {
+        const double at = axis.Pixel(t.value);
+        return at < begin + width / 2 - kGap / 2 || at > end - width / 2 + kGap / 2;
+      });
+      if (ticks.size() < 2 || std::abs(axis.Pixel(ticks[1].value) - axis.Pixel(ticks[0].value)) > width + 8)
+        break;
+    }
     return ticks;
   }
 
