@@ -192,6 +192,13 @@ TEST_CASE("links welded together, planar and floating joints: the physics is rig
   CheckPhysics(welded, kZooToml, {{"mass/slider", 0.5}, {"inertia/slider", 1.2}, {"com/slider/y", 0.02}});
 }
 
+TEST_CASE("a link that gets longer takes its contact shapes along") {
+  std::string boxed = kZooUrdf;
+  const std::string cylinder = R"(<cylinder radius="0.05" length="0.2"/>)";
+  boxed.replace(boxed.find(cylinder), cylinder.size(), R"(<box size="0.1 0.08 0.2"/>)");
+  CheckPhysics(boxed, kZooToml, {{"length/thigh", 0.5}});
+}
+
 TEST_CASE("only the numbers that have changed change") {
   const std::string before = Text(Source("hopper") + "/robot.urdf");
   const RobotDescription robot = LoadRobot(Source("hopper"));
