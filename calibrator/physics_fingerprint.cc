@@ -28,7 +28,8 @@ class Hash {
 
  private:
   void AddBytes(const char* bytes, size_t count) {
-    for (size_t i = 0; i < count; ++i) value_ = (value_ ^ static_cast<unsigned char>(bytes[i])) * 0x100000001b3;
+    for (size_t i = 0; i < count; ++i)
+      value_ = (value_ ^ static_cast<unsigned char>(bytes[i])) * 0x100000001b3;
   }
   uint64_t value_ = 0xcbf29ce484222325;
 };
@@ -46,9 +47,9 @@ void AddJoint(const JointDescription& joint, Hash* hash) {
   hash->Add(joint.origin), hash->Add(joint.rotation), hash->Add(joint.axis);
   const JointDynamics& d = joint.dynamics;
   for (const double number :
-       {static_cast<double>(joint.type), static_cast<double>(joint.parent), joint.lower, joint.upper, joint.effort_limit,
-        d.armature, d.damping, d.friction, d.stiffness, d.rest, d.motor_gain, d.delay, d.sensor_delay, d.sensor_bias,
-        d.no_load_speed}) {
+       {static_cast<double>(joint.type), static_cast<double>(joint.parent), joint.lower, joint.upper,
+        joint.effort_limit, d.armature, d.damping, d.friction, d.stiffness, d.rest, d.motor_gain, d.delay,
+        d.sensor_delay, d.sensor_bias, d.no_load_speed}) {
     hash->Add(number);
   }
 }
@@ -60,7 +61,8 @@ void AddSimulation(const SimulationSettings& s, Hash* hash) {
   }
   hash->Add(s.contact ? "contact" : "");
   if (s.contact) {
-    for (const double number : {s.contact->stiffness, s.contact->damping, s.contact->friction, s.contact->slip_speed}) {
+    for (const double number :
+         {s.contact->stiffness, s.contact->damping, s.contact->friction, s.contact->slip_speed}) {
       hash->Add(number);
     }
   }

@@ -37,7 +37,8 @@ json List(const std::vector<Item>& items, const Function& to_json) {
 
 json ToJson(const ParameterDescription& p) {
   json coordinate{{"kind", CoordinateName(p.coordinate)}};
-  if (p.coordinate == ParameterDescription::Coordinate::kLogit) coordinate["lower"] = p.lower, coordinate["upper"] = p.upper;
+  if (p.coordinate == ParameterDescription::Coordinate::kLogit)
+    coordinate["lower"] = p.lower, coordinate["upper"] = p.upper;
   return coordinate;
 }
 
@@ -51,18 +52,23 @@ json ToJson(const GaussianMixture& mixture) {
 json Samples(const Eigen::MatrixXd& samples) {
   const Eigen::Index count = std::min(samples.cols(), kMaxSamples);
   json rows = json::array();
-  for (Eigen::Index i = 0; i < count; ++i) rows.push_back(ToJson(Eigen::VectorXd(samples.col(i * samples.cols() / count))));
+  for (Eigen::Index i = 0; i < count; ++i)
+    rows.push_back(ToJson(Eigen::VectorXd(samples.col(i * samples.cols() / count))));
   return rows;
 }
 
 json ToJson(const Misspecification& found) {
-  return {{"raised", found.alarm}, {"words", found.words}, {"misfits", List(found.misfits, [](const Misfit& m) {
-            return json{{"what", m.what}, {"joint", m.joint},         {"condition", m.condition}, {"test", m.test},
-                        {"statistic", m.statistic}, {"p", m.p}, {"effect", m.effect}};
-          })}};
+  return {{"raised", found.alarm},
+          {"words", found.words},
+          {"misfits", List(found.misfits, [](const Misfit& m) {
+             return json{{"what", m.what},    {"joint", m.joint},         {"condition", m.condition},
+                         {"test", m.test},    {"statistic", m.statistic}, {"p", m.p},
+                         {"effect", m.effect}};
+           })}};
 }
 
-json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao, const std::vector<std::string>& names) {
+json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao,
+            const std::vector<std::string>& names) {
   const auto combination = [](const Combination& c) {
     return json{{"name", c.name}, {"power", ToJson(c.power)}, {"mean", c.mean}, {"sd", c.sd}};
   };
@@ -82,30 +88,38 @@ json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao, con
 }
 
 json ToJson(const Holdout& holdout) {
-  return {{"words", holdout.words},
-          {"better", holdout.better},
-          {"fitted", holdout.fitted},
-          {"held_out", holdout.held_out},
-          {"errors", List(holdout.errors, [](const HorizonError& e) {
-             return json{{"horizon", e.horizon}, {"windows", e.windows}, {"posterior", e.posterior}, {"prior", e.prior}};
-           })}};
+  return {
+      {"words", holdout.words},
+      {"better", holdout.better},
+      {"fitted", holdout.fitted},
+      {"held_out", holdout.held_out},
+      {"errors", List(holdout.errors, [](const HorizonError& e) {
+         return json{
+             {"horizon", e.horizon}, {"windows", e.windows}, {"posterior", e.posterior}, {"prior", e.prior}};
+       })}};
 }
 
 json ToJson(const Agreement& agreement) {
-  return {{"agree", agreement.agree}, {"words", agreement.words}, {"logs", List(agreement.logs, [](const LogAgreement& l) {
-            return json{{"log", l.log}, {"mean", ToJson(l.mean)}, {"sd", ToJson(l.sd)},
-                        {"distance", l.distance}, {"p", l.p}};
-          })}};
+  return {{"agree", agreement.agree},
+          {"words", agreement.words},
+          {"logs", List(agreement.logs, [](const LogAgreement& l) {
+             return json{{"log", l.log},
+                         {"mean", ToJson(l.mean)},
+                         {"sd", ToJson(l.sd)},
+                         {"distance", l.distance},
+                         {"p", l.p}};
+           })}};
 }
 
 json ToJson(const Stage& s) {
-  return {{"horizon", s.horizon},         {"windows", s.windows},    {"simulated_steps", s.simulated_steps},
+  return {{"horizon", s.horizon},         {"windows", s.windows},   {"simulated_steps", s.simulated_steps},
           {"discrepancy", s.discrepancy}, {"mean", ToJson(s.mean)}, {"sd", ToJson(s.sd)}};
 }
 
 json Interval(const Summary& summary) {
   json interval = json::array();
-  for (Eigen::Index i = 0; i < summary.lower.size(); ++i) interval.push_back({summary.lower(i), summary.upper(i)});
+  for (Eigen::Index i = 0; i < summary.lower.size(); ++i)
+    interval.push_back({summary.lower(i), summary.upper(i)});
   return interval;
 }
 
@@ -126,7 +140,8 @@ std::string Print(const json& j, const std::string& indent) {
 
 }  // namespace
 
-std::string PosteriorJson(const Findings& findings, const RobotDescription& robot, const Provenance& provenance) {
+std::string PosteriorJson(const Findings& findings, const RobotDescription& robot,
+                          const Provenance& provenance) {
   const Summary summary = Summarise(findings, robot);
   const std::vector<ParameterDescription>& parameters = robot.parameters;
   std::vector<std::string> names;
@@ -181,8 +196,8 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
   return Print(j, "") + "\n";
 }
 
-void WritePosterior(const std::filesystem::path& file, const Findings& findings, const RobotDescription& robot,
-                    const Provenance& provenance) {
+void WritePosterior(const std::filesystem::path& file, const Findings& findings,
+                    const RobotDescription& robot, const Provenance& provenance) {
   WriteAtomically(file, PosteriorJson(findings, robot, provenance));
 }
 

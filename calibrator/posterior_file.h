@@ -19,20 +19,24 @@ struct Provenance {
   std::string date;                            ///< ISO 8601, UTC
 };
 
-/// The contents of posterior.json; docs/posterior.md has its schema. What may differ between two runs of the same
-/// calibration is in its last object, "run": all that comes before it is the same to the byte. Numbers read back to the
-/// same bits; those that are not finite are null, and bytes that are not UTF-8 are replaced.
+/// The contents of posterior.json; docs/posterior.md has its schema. What may differ between two runs of the
+/// same calibration is in its last object, "run": all that comes before it is the same to the byte. Numbers
+/// read back to the same bits; those that are not finite are null, and bytes that are not UTF-8 are replaced.
 /// @throws std::invalid_argument as Summarise does. Thread-safe.
-std::string PosteriorJson(const Findings& findings, const RobotDescription& robot, const Provenance& provenance);
+std::string PosteriorJson(const Findings& findings, const RobotDescription& robot,
+                          const Provenance& provenance);
 
-/// The same into a file, atomically. @throws std::runtime_error too, naming the file, if it cannot be written.
-void WritePosterior(const std::filesystem::path& file, const Findings& findings, const RobotDescription& robot,
-                    const Provenance& provenance);
+/// The same into a file, atomically. @throws std::runtime_error too, naming the file, if it cannot be
+/// written.
+void WritePosterior(const std::filesystem::path& file, const Findings& findings,
+                    const RobotDescription& robot, const Provenance& provenance);
 
-/// The mixture of a posterior.json, for this robot: physics (see PhysicsFingerprint) and parameters must be those that
-/// the posterior was made with; priors and settings of tasks or training may have changed since. Thread-safe.
-/// @throws std::runtime_error "file: field: what is wrong" for anything missing, of the wrong type or size, not finite,
-/// another robot's or another version's, weights that do not sum to one, or a covariance that is not positive definite.
+/// The mixture of a posterior.json, for this robot: physics (see PhysicsFingerprint) and parameters must be
+/// those that the posterior was made with; priors and settings of tasks or training may have changed since.
+/// Thread-safe.
+/// @throws std::runtime_error "file: field: what is wrong" for anything missing, of the wrong type or size,
+/// not finite, another robot's or another version's, weights that do not sum to one, or a covariance that is
+/// not positive definite.
 ParameterDistribution ReadPosterior(const std::filesystem::path& file, const RobotDescription& robot);
 
 }  // namespace plumb

@@ -60,7 +60,8 @@ class Field {
     return value_.get<std::string>();
   }
   void RequireText(const std::string& expected, const std::string& otherwise) const {
-    Require(Text() == expected, fmt::format("{}: it is \"{}\", expected \"{}\"", otherwise, Text().substr(0, 80), expected));
+    Require(Text() == expected,
+            fmt::format("{}: it is \"{}\", expected \"{}\"", otherwise, Text().substr(0, 80), expected));
   }
   Eigen::VectorXd Vector(size_t size) const {
     Eigen::VectorXd vector(size);
@@ -106,19 +107,23 @@ void RequireRobot(const Field& root, const RobotDescription& robot) {
     if (p.coordinate != ParameterDescription::Coordinate::kLogit) continue;
     for (const auto& [key, bound] : {std::pair{"lower", p.lower}, {"upper", p.upper}}) {
       const double found = coordinates[i][key].Number();
-      coordinates[i][key].Require(found == bound, fmt::format("is {}, {} has the bound {} now", found, p.name, bound));
+      coordinates[i][key].Require(found == bound,
+                                  fmt::format("is {}, {} has the bound {} now", found, p.name, bound));
     }
   }
-  root["physics"].RequireText(Hexadecimal(PhysicsFingerprint(robot)),
-                              "the robot's links, joints, frozen parameters or [simulation] have changed since; "
-                              "calibrate again");
+  root["physics"].RequireText(
+      Hexadecimal(PhysicsFingerprint(robot)),
+      "the robot's links, joints, frozen parameters or [simulation] have changed since; "
+      "calibrate again");
 }
 
-ParameterDistribution::Component ReadComponent(const Field& weight, const Field& mean, const Field& covariance, size_t n) {
+ParameterDistribution::Component ReadComponent(const Field& weight, const Field& mean,
+                                               const Field& covariance, size_t n) {
   ParameterDistribution::Component component{weight.Number(), mean.Vector(n), covariance.Matrix(n)};
   weight.Require(component.weight > 0, "is not positive");
   const Eigen::MatrixXd& c = component.covariance;
-  covariance.Require((c - c.transpose()).cwiseAbs().maxCoeff() <= kRounding * c.cwiseAbs().maxCoeff(), "is not symmetric");
+  covariance.Require((c - c.transpose()).cwiseAbs().maxCoeff() <= kRounding * c.cwiseAbs().maxCoeff(),
+                     "is not symmetric");
   covariance.Require(Eigen::LLT<Eigen::MatrixXd>(c).info() == Eigen::Success, "is not positive definite");
   return component;
 }
@@ -126,7 +131,8 @@ ParameterDistribution::Component ReadComponent(const Field& weight, const Field&
 ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& robot) {
   const size_t count = mixture["weights"].size(), n = robot.parameters.size();
   mixture["weights"].Require(count >= 1 && count <= kMaxComponents, fmt::format("has {} entries", count));
-  const std::vector<Field> weights = mixture["weights"].Entries(count), means = mixture["means"].Entries(count),
+  const std::vector<Field> weights = mixture["weights"].Entries(count),
+                           means = mixture["means"].Entries(count),
                            covariances = mixture["covariances"].Entries(count);
   ParameterDistribution distribution;
   distribution.iteration = 1;
@@ -137,7 +143,8 @@ ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& 
     total += distribution.components.back().weight;
   }
   mixture["weights"].Require(std::abs(total - 1) <= kRounding, fmt::format("sum to {}, not to 1", total));
-  mixture.Require(distribution.Mean().allFinite() && distribution.Sd().allFinite(), "is too wide: its moments overflow");
+  mixture.Require(distribution.Mean().allFinite() && distribution.Sd().allFinite(),
+                  "is too wide: its moments overflow");
   return distribution;
 }
 

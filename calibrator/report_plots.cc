@@ -6,211 +6,22 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include "calibrator/svg.h"
 
 namespace plumb {
 namespace {
 
-using Coordinate = ParameterDescription::Coordinate;
 using Points = std::vector<Eigen::Vector2d>;
 
 constexpr double kNormal95 = 1.959963984540054;
 
 double Density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * M_PI); }
 
-// At most `length` characters, without the middle: of a path the end tells most. Counts bytes: names of parameters
-// are ASCII but for rare units.
-std::string Shorten(const std::string& text, size_t length) {
-  if (text.size() <= length) return text;
-  const size_t tail = 2 * (length - 1) / 3;
-  return text.substr(0, length - 1 - tail) + "\xe2\x80\xa6" + text.substr(text.size() - tail);
-}
-
-std::string WithUnit(const ParameterDescription& p) { return p.unit.empty() ? p.name : p.name + " [" + p.unit + "]"; }
-
-/// The numbers between which all of a parameter that matters lies.
-std::pair<double, double> Extent(const Findings& findings, const Summary& summary, const ParameterDescription& p,
-                                 Eigen::Index i) {
-  std::vector<double> sorted(summary.samples.row(i).begin(), summary.samples.row(i).end());
-  std::sort(sorted.begin(), sorted.end());
-  const double low = Quantile(sorted, 0.002), high = Quantile(sorted, 0.998), width = std::max(high - low, 1e-12);
-  const double sd = std::sqrt(findings.prior.covariance(i, i));
-  const double prior_low = p.ToPhysical(findings.prior.mean(i) - 2.3 * sd);
-  const double prior_high = p.ToPhysical(findings.prior.mean(i) + 2.3 * sd);
-  // Of a posterior much narrower than its prior only the surroundings: a dot would show nothing.
-  constexpr double kWidest = 4;
-  return {std::max(std::min(low, prior_low), low - kWidest * width),
-          std::min(std::max(high, prior_high), high + kWidest * width)};
-}
-
-class Pairs {
- public:
-  Pairs(const Findings& findings, const Summary& summary, const RobotDescription& robot,
-        const std::vector<Eigen::Index>& shown)
-      : findings_(findings),
-        summary_(summary),
-        robot_(robot),
-        shown_(shown),
-        cell_(std::clamp(860. / static_cast<double>(shown.size()), 104., 286.)),
-        svg_(Left(shown.size()) + 4, cell_ * static_cast<double>(shown.size()) + kTop + kBottom,
-             "prior and posterior, parameter by parameter") {
-    for (const Eigen::Index i : shown_) extents_.push_back(Extent(findings_, summary_, parameter(i), i));
-  }
-
-  std::string Draw() {
-    for (size_t row = 0; row < shown_.size(); ++row) {
-      for (size_t column = 0; column < shown_.size(); ++column) {
-        if (column < row) DrawPair(row, column);
-        if (column == row) DrawMarginal(row);
-        if (column > row) DrawCorrelation(row, column);
-      }
-      DrawLabels(row);
-    }
-    return svg_.Print();
-  }
-
- private:
-  static constexpr double kLeft = 74, kTop = 8, kBottom = 44, kGap = 8;
-
-  const ParameterDescription& parameter(Eigen::Index i) const { return robot_.parameters[static_cast<size_t>(i)]; }
-  double Left(size_t column) const { return kLeft + cell_ * static_cast<double>(column); }
-  double Top(size_t row) const { return kTop + cell_ * static_cast<double>(row); }
-  Axis X(size_t column) const {
-    return {extents_[column].first, extents_[column].second, Left(column), Left(column) + cell_ - kGap};
-  }
-  Axis Y(size_t row) const {
-    return {extents_[row].first, extents_[row].second, Top(row) + cell_ - kGap, Top(row)};
-  }
-  void BeginCell(size_t row, size_t column) {
-    svg_.BeginClip(Left(column), Top(row), cell_ - kGap, cell_ - kGap);
-  }
-  void EndCell(size_t row, size_t column) {
-    svg_.EndClip();
-    svg_.Rectangle(Left(column), Top(row), cell_ - kGap, cell_ - kGap, "frame");
-  }
-
-  // Contours of a Gaussian of the coordinates, in the physical units of the axes.
-  void DrawContours(const Gaussian& p, size_t row, size_t column, const std::string& css) {
-    const Eigen::Index i = shown_[column], j = shown_[row];
-    Eigen::Matrix2d covariance;
-    covariance << p.covariance(i, i), p.covariance(i, j), p.covariance(j, i), p.covariance(j, j);
-    const Axis x = X(column), y = Y(row);
-    for (const double sigma : {1., 2.}) {
-      Points points = Ellipse({p.mean(i), p.mean(j)}, covariance, sigma);
-      for (Eigen::Vector2d& point : points) {
-        point = {x.Pixel(parameter(i).ToPhysical(point.x())), y.Pixel(parameter(j).ToPhysical(point.y()))};
-      }
-      svg_.Path(points, css, true);
-    }
-  }
-
-  void DrawPair(size_t row, size_t column) {
-    BeginCell(row, column);
-    const Axis x = X(column), y = Y(row);
-    for (const auto& tick : Ticks(x)) svg_.Line(x.Pixel(tick.value), y.from(), x.Pixel(tick.value), y.to(), "grid");
-    for (const auto& tick : Ticks(y)) svg_.Line(x.from(), y.Pixel(tick.value), x.to(), y.Pixel(tick.value), "grid");
-    const Eigen::Index count = std::min<Eigen::Index>(summary_.samples.cols(), 400);
-    Points dots;
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const auto sample = summary_.samples.col(k * summary_.samples.cols() / count);
-      dots.emplace_back(x.Pixel(sample(shown_[column])), y.Pixel(sample(shown_[row])));
-    }
-    svg_.Dots(dots, "dots");
-    DrawContours(findings_.prior, row, column, "prior line");
-    for (const Gaussian& component : findings_.posterior.components) DrawContours(component, row, column, "posterior line");
-    EndCell(row, column);
-  }
-
-  void DrawMarginal(size_t row) {
-    const Eigen::Index i = shown_[row];
-    const ParameterDescription& p = parameter(i);
-    const Axis x = X(row);
-    // Histogram: bins of the samples' own width.
-    std::vector<double> sorted(summary_.samples.row(i).begin(), summary_.samples.row(i).end());
-    std::sort(sorted.begin(), sorted.end());
-    const double low = Quantile(sorted, 0.002), high = Quantile(sorted, 0.998);
-    constexpr size_t kBins = 24;
-    const double width = std::max((high - low) / kBins, 1e-12 * std::max(1e-12, std::abs(high)));
-    std::vector<double> bins(kBins, 0);
-    for (const double value : sorted) {
-      if (value >= low && value <= high) ++bins[std::min(kBins - 1, static_cast<size_t>((value - low) / width))];
-    }
-    for (double& bin : bins) bin /= static_cast<double>(sorted.size()) * width;
-    // The prior's density, in physical units.
-    const double mean = findings_.prior.mean(i), sd = std::sqrt(findings_.prior.covariance(i, i));
-    std::vector<Eigen::Vector2d> prior;
-    for (double z = -5; z <= 5; z += 0.05) {
-      const double step = 1e-4 * sd;
-      const double slope = (p.ToPhysical(mean + z * sd + step) - p.ToPhysical(mean + z * sd - step)) / (2 * step);
-      prior.emplace_back(p.ToPhysical(mean + z * sd), Density(z) / sd / slope);
-    }
-    double highest = *std::max_element(bins.begin(), bins.end());
-    for (const auto& point : prior) {
-      if (std::isfinite(point.y())) highest = std::max(highest, point.y());
-    }
-    const Axis y(0, highest * 1.08, Top(row) + cell_ - kGap, Top(row));
-    BeginCell(row, row);
-    for (size_t k = 0; k < kBins; ++k) {
-      const double from = x.Pixel(low + width * static_cast<double>(k));
-      svg_.Rectangle(from, y.Pixel(bins[k]), x.Pixel(low + width * static_cast<double>(k + 1)) - from,
-                     y.from() - y.Pixel(bins[k]), "posterior bar");
-    }
-    for (auto& point : prior) point = {x.Pixel(point.x()), y.Pixel(point.y())};
-    svg_.Path(prior, "prior line");
-    EndCell(row, row);
-  }
-
-  void DrawCorrelation(size_t row, size_t column) {
-    const Eigen::MatrixXd& c = summary_.coordinates.covariance;
-    const Eigen::Index i = shown_[row], j = shown_[column];
-    const double correlation = c(i, j) / std::sqrt(c(i, i) * c(j, j));
-    const bool strong = std::abs(correlation) >= 0.5;
-    svg_.Text(Left(column) + (cell_ - kGap) / 2, Top(row) + (cell_ - kGap) / 2 + 5, fmt::format("{:+.2f}", correlation),
-              strong ? "large" : "large muted");
-  }
-
-  // Not so near to an end that its label meets the next cell's.
-  std::vector<Axis::Tick> Ticks(const Axis& axis) const {
-    std::vector<Axis::Tick> ticks = axis.Ticks(cell_ < 150 ? 3 : cell_ < 200 ? 4 : 6);
-    const double low = std::min(axis.from(), axis.to()) + 14, high = std::max(axis.from(), axis.to()) - 14;
-    std::erase_if(ticks, [&](const auto& t) { return axis.Pixel(t.value) < low || axis.Pixel(t.value) > high; });
-    return ticks;
-  }
-
-  void DrawLabels(size_t k) {
-    const Axis x = X(k), y = Y(k);
-    const double bottom = Top(shown_.size()) - kGap;
-    const auto length = static_cast<size_t>((cell_ - 2 * kGap) / 7);
-    const std::string full = WithUnit(parameter(shown_[k]));
-    const std::string name = full.size() <= length ? full : Shorten(parameter(shown_[k]).name, length);
-    for (const auto& tick : Ticks(x)) svg_.Text(x.Pixel(tick.value), bottom + 15, tick.label, "tick");
-    svg_.Text((x.from() + x.to()) / 2, bottom + 35, name);
-    if (k > 0) {
-      for (const auto& tick : Ticks(y)) svg_.Text(kLeft - 6, y.Pixel(tick.value) + 4, tick.label, "tick", Svg::Anchor::kEnd);
-    }
-    svg_.Text(14, (y.from() + y.to()) / 2, name, "label", Svg::Anchor::kMiddle, -90);
-  }
-
-  const Findings& findings_;
-  const Summary& summary_;
-  const RobotDescription& robot_;
-  const std::vector<Eigen::Index>& shown_;
-  double cell_;
-  Svg svg_;
-  std::vector<std::pair<double, double>> extents_;
-};
-
 // The small plots: where they are drawn.
 constexpr double kWidth = 304, kHeight = 210, kLeft = 66, kRight = 294, kTop = 10, kBottom = 166;
 
 }  // namespace
-
-std::string PairPlot(const Findings& findings, const Summary& summary, const RobotDescription& robot,
-                     const std::vector<Eigen::Index>& shown) {
-  return Pairs(findings, summary, robot, shown).Draw();
-}
 
 std::string ErrorPlot(const std::vector<HorizonError>& errors) {
   double low = INFINITY, high = 0, first = INFINITY, last = 0;
@@ -218,12 +29,13 @@ std::string ErrorPlot(const std::vector<HorizonError>& errors) {
     for (const double error : {e.posterior, e.prior}) {
       if (!(error > 0) || !std::isfinite(error) || e.horizon < 1) continue;
       low = std::min(low, error), high = std::max(high, error);
-      first = std::min(first, static_cast<double>(e.horizon)), last = std::max(last, static_cast<double>(e.horizon));
+      first = std::min(first, static_cast<double>(e.horizon)),
+      last = std::max(last, static_cast<double>(e.horizon));
     }
   }
   if (!(high > 0)) return "";
-  Svg svg(500, 320, "error of prediction against the number of steps");
-  const Axis x(first / 1.15, last * 1.15, 70, 488, true), y(low / 1.4, high * 1.4, 274, 12, true);
+  Svg svg(440, 310, "error of prediction against the number of steps");
+  const Axis x(first / 1.15, last * 1.15, 70, 428, true), y(low / 1.4, high * 1.4, 264, 12, true);
   svg.Frame(x, y, "steps ahead", "error, standard units", 6, 6);
   for (const bool prior : {true, false}) {
     const std::string css = prior ? "prior" : "posterior";
@@ -248,18 +60,14 @@ std::string ScreePlot(const std::vector<double>& eigenvalues, double null) {
   }
   lowest = std::max(lowest, highest * 1e-15);  // rounding
   const auto count = static_cast<double>(eigenvalues.size());
-  Svg svg(560, 280, "eigenvalues of the Fisher information in units of the prior");
+  Svg svg(440, 280, "eigenvalues of the Fisher information in units of the prior");
   const double range = std::max(1., highest) / lowest;
-  const Axis x(0.5, count + 0.5, 70, 420);
-  const Axis y(lowest / std::pow(range, 0.04), std::max(1., highest) * std::max(2., std::pow(range, 0.05)), 246, 12, true);
+  const Axis x(0.5, count + 0.5, 70, 428);
+  const Axis y(lowest / std::pow(range, 0.04), std::max(1., highest) * std::max(2., std::pow(range, 0.05)),
+               246, 12, true);
   svg.Frame(x, y, "", "information", 1, 8);
-  const auto mark = [&](double value, const std::string& words, const std::string& css) {
-    svg.Line(x.from(), y.Pixel(value), x.to(), y.Pixel(value), css);
-    svg.Text(x.to() + 6, y.Pixel(value) + 4, words, "tick", Svg::Anchor::kStart);
-  };
-  mark(1, "as much as the prior", "prior line");
-  // Two labels on top of each other say nothing.
-  if (std::abs(y.Pixel(highest * null) - y.Pixel(1)) > 18) mark(highest * null, "not identifiable below", "limit");
+  svg.Line(x.from(), y.Pixel(1), x.to(), y.Pixel(1), "prior line");
+  svg.Line(x.from(), y.Pixel(highest * null), x.to(), y.Pixel(highest * null), "limit");
   const double width = std::min(46., 0.6 * (x.to() - x.from()) / count);
   for (size_t i = 0; i < eigenvalues.size(); ++i) {
     const double at = x.Pixel(static_cast<double>(i + 1)), top = y.Pixel(std::max(eigenvalues[i], y.lower()));
@@ -274,7 +82,8 @@ std::string ResidualHistogram(const std::vector<double>& residuals) {
   constexpr double kEnd = 5, kBin = 2 * kEnd / kBins;
   std::vector<double> bins(kBins, 0);
   for (const double r : residuals) {  // what is beyond the ends is in the last bins
-    ++bins[static_cast<size_t>(std::clamp(static_cast<int>(std::floor((std::clamp(r, -kEnd, kEnd) + kEnd) / kBin)), 0, kBins - 1))];
+    ++bins[static_cast<size_t>(
+        std::clamp(static_cast<int>(std::floor((std::clamp(r, -kEnd, kEnd) + kEnd) / kBin)), 0, kBins - 1))];
   }
   for (double& bin : bins) bin /= kBin * std::max<double>(1, static_cast<double>(residuals.size()));
   Svg svg(kWidth, kHeight, "histogram of residuals");
@@ -306,7 +115,8 @@ std::string ResidualQuantiles(const std::vector<double>& sorted) {
   for (size_t k = 0; k < count; ++k) {
     const size_t i = count < 2 ? 0 : k * (sorted.size() - 1) / (count - 1);
     const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(sorted.size());
-    dots.emplace_back(x.Pixel(boost::math::quantile(boost::math::normal(), share)), y.Pixel(std::clamp(sorted[i], -end, end)));
+    dots.emplace_back(x.Pixel(boost::math::quantile(boost::math::normal(), share)),
+                      y.Pixel(std::clamp(sorted[i], -end, end)));
   }
   svg.Dots(dots, "dots strong");
   svg.EndClip();
@@ -323,8 +133,8 @@ std::string ResidualCorrelation(const std::vector<double>& correlation, size_t c
   end = std::min(end, 1.05);
   const Axis x(0, static_cast<double>(correlation.size()) + 1, kLeft, kRight), y(-end, end, kBottom, kTop);
   svg.Frame(x, y, "lag [steps]", "autocorrelation", 5, 5);
-  svg.Rectangle(kLeft, y.Pixel(std::min(band, end)), kRight - kLeft, y.Pixel(-std::min(band, end)) - y.Pixel(std::min(band, end)),
-                "band");
+  svg.Rectangle(kLeft, y.Pixel(std::min(band, end)), kRight - kLeft,
+                y.Pixel(-std::min(band, end)) - y.Pixel(std::min(band, end)), "band");
   svg.Line(kLeft, y.Pixel(0), kRight, y.Pixel(0), "axis");
   for (size_t k = 0; k < correlation.size(); ++k) {
     const double at = x.Pixel(static_cast<double>(k + 1));
@@ -368,15 +178,16 @@ std::string ResidualsOverTime(const Eigen::VectorXd& residuals, const std::vecto
   svg.Line(x.from(), y.Pixel(1), x.to(), y.Pixel(1), "reference line");
   Points points;
   for (size_t k = 0; k < bins; ++k) {
-    const double middle = (static_cast<double>(k) + 0.5) * static_cast<double>(total) / static_cast<double>(bins);
+    const double middle =
+        (static_cast<double>(k) + 0.5) * static_cast<double>(total) / static_cast<double>(bins);
     points.emplace_back(x.Pixel(middle), y.Pixel(std::sqrt(binned[k].squares / binned[k].count)));
   }
   svg.Path(points, "posterior line thick");
   return svg.Print();
 }
 
-std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary, const RobotDescription& robot,
-                          Eigen::Index parameter) {
+std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary,
+                          const RobotDescription& robot, Eigen::Index parameter) {
   const auto fits = [&](const LogAgreement& l) {
     return parameter < l.mean.size() && parameter < l.sd.size() && std::isfinite(l.mean(parameter)) &&
            std::isfinite(l.sd(parameter));
@@ -389,11 +200,12 @@ std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& 
   }
   constexpr double kRow = 20;
   const double bottom = kTop + kRow * static_cast<double>(logs.size()) + 6;
-  Svg svg(kWidth, bottom + 44, "what each log says of " + robot.parameters[static_cast<size_t>(parameter)].name);
+  Svg svg(kWidth, bottom + 44,
+          "what each log says of " + robot.parameters[static_cast<size_t>(parameter)].name);
   const Axis x(low, high, 30, kRight), y(0, 1, bottom, kTop);
   svg.Frame(x, y, Shorten(WithUnit(robot.parameters[static_cast<size_t>(parameter)]), 36), "", 4);
   const double from = x.Pixel(summary.lower(parameter)), to = x.Pixel(summary.upper(parameter));
-  svg.Rectangle(from, kTop, to - from, bottom - kTop, "band");
+  svg.Rectangle(from, kTop, std::max(2., to - from), bottom - kTop, "band");
   for (size_t k = 0; k < logs.size(); ++k) {
     const double at = kTop + 3 + kRow * (static_cast<double>(k) + 0.5);
     svg.Text(22, at + 4, std::to_string(k + 1), "tick", Svg::Anchor::kEnd);

@@ -19,7 +19,8 @@ constexpr int kLags = 20;
 
 void RequireFit(const Residuals& residuals) {
   if (static_cast<size_t>(residuals.whitened.size()) != residuals.rows.size()) {
-    throw std::invalid_argument(fmt::format("{} residuals of {} rows", residuals.whitened.size(), residuals.rows.size()));
+    throw std::invalid_argument(
+        fmt::format("{} residuals of {} rows", residuals.whitened.size(), residuals.rows.size()));
   }
   for (const WindowErrors::Row& row : residuals.rows) {
     if (row.coordinate < 0 || static_cast<size_t>(row.coordinate) >= residuals.coordinates.size()) {
@@ -41,7 +42,8 @@ std::vector<std::vector<double>> ByCoordinate(const Residuals& residuals) {
 
 double MeanSquare(const std::vector<double>& values) {
   if (values.empty()) return 0;
-  return std::inner_product(values.begin(), values.end(), values.begin(), 0.) / static_cast<double>(values.size());
+  return std::inner_product(values.begin(), values.end(), values.begin(), 0.) /
+         static_cast<double>(values.size());
 }
 
 }  // namespace
@@ -56,7 +58,8 @@ std::vector<double> Autocorrelation(const Residuals& residuals, int coordinate, 
     values[{row.rollout, row.transition}] = r;
   }
   for (const auto& [where, r] : values) sum += r, squares += r * r;
-  const double count = static_cast<double>(values.size()), mean = sum / count, variance = squares / count - mean * mean;
+  const double count = static_cast<double>(values.size()), mean = sum / count,
+               variance = squares / count - mean * mean;
   std::vector<double> correlation;
   for (int lag = 1; lag <= lags; ++lag) {
     double product = 0, pairs = 0;
@@ -81,10 +84,13 @@ std::string ResidualSection(const Residuals& residuals) {
     if (!sorted[i].empty()) shown.push_back(i);
   }
   if (total == 0) return html + "<p>There are none.</p>\n";
-  html += "<p>Whitened one-step errors of the posterior's mean. Of a model that explains the robot they are independent, with the standard "
-          "normal distribution. ";
+  html +=
+      "<p>Whitened one-step errors of the posterior's mean. Of a model that explains the robot they are "
+      "independent, with the standard "
+      "normal distribution. ";
   html += fmt::format("{} residuals", total);
-  if (total < residuals.rows.size()) html += fmt::format(", and {} without a number", residuals.rows.size() - total);
+  if (total < residuals.rows.size())
+    html += fmt::format(", and {} without a number", residuals.rows.size() - total);
   if (shown.size() > kMostCoordinates) {
     const size_t all = shown.size();
     std::stable_sort(shown.begin(), shown.end(),
@@ -94,17 +100,23 @@ std::string ResidualSection(const Residuals& residuals) {
     html += fmt::format("; of {} coordinates the {} with the greatest", all, kMostCoordinates);
   }
   html += ".</p>\n<figure><div class=\"scroll\">" + ResidualsOverTime(residuals.whitened, residuals.rows) +
-          "</div><figcaption>Root mean square over the record; dashed lines begin a roll-out.</figcaption></figure>\n";
+          "</div><figcaption>Root mean square over the record; dashed lines begin a "
+          "roll-out.</figcaption></figure>\n";
   for (const size_t i : shown) {
-    html += fmt::format("<h3>{}</h3><p class=\"note\">root mean square {:.3g}, mean {:.2g}, {} residuals</p>\n<div class=\"panels\">\n",
-                        Escape(residuals.coordinates[i]), std::sqrt(MeanSquare(sorted[i])),
-                        std::accumulate(sorted[i].begin(), sorted[i].end(), 0.) / static_cast<double>(sorted[i].size()),
-                        sorted[i].size());
+    html += fmt::format(
+        "<h3>{}</h3><p class=\"note\">root mean square {:.3g}, mean {:.2g}, {} residuals</p>\n<div "
+        "class=\"panels\">\n",
+        Escape(residuals.coordinates[i]), std::sqrt(MeanSquare(sorted[i])),
+        std::accumulate(sorted[i].begin(), sorted[i].end(), 0.) / static_cast<double>(sorted[i].size()),
+        sorted[i].size());
     html += ResidualHistogram(sorted[i]) + ResidualQuantiles(sorted[i]) +
-            ResidualCorrelation(Autocorrelation(residuals, static_cast<int>(i), kLags), sorted[i].size()) + "</div>\n";
+            ResidualCorrelation(Autocorrelation(residuals, static_cast<int>(i), kLags), sorted[i].size()) +
+            "</div>\n";
   }
-  return html + "<p class=\"note\">Left: histogram and the standard normal density. Middle: quantiles. Right: autocorrelation and the "
-                "band of 95 % of white noise.</p>\n";
+  return html +
+         "<p class=\"note\">Left: histogram and the standard normal density. Middle: quantiles. Right: "
+         "autocorrelation and the "
+         "band of 95 % of white noise.</p>\n";
 }
 
 }  // namespace plumb

@@ -31,7 +31,8 @@ void RequireFit(const Findings& findings, Eigen::Index n) {
   RequireGaussian(findings.prior, n, "the prior");
   const GaussianMixture& mixture = findings.posterior;
   Require(!mixture.components.empty() && mixture.weights.size() == mixture.components.size(),
-          fmt::format("the posterior has {} weights of {} components", mixture.weights.size(), mixture.components.size()));
+          fmt::format("the posterior has {} weights of {} components", mixture.weights.size(),
+                      mixture.components.size()));
   double total = 0;
   for (size_t i = 0; i < mixture.components.size(); ++i) {
     Require(mixture.weights[i] > 0, fmt::format("weight {} of the posterior is not positive", i));
@@ -93,7 +94,10 @@ Summary Summarise(const Findings& findings, const RobotDescription& robot) {
   }
 
   summary.coordinates = Moments(findings.posterior);
-  summary.gain = (findings.prior.covariance.diagonal().array() / summary.coordinates.covariance.diagonal().array()).log() / 2;
+  summary.gain =
+      (findings.prior.covariance.diagonal().array() / summary.coordinates.covariance.diagonal().array())
+          .log() /
+      2;
   return summary;
 }
 

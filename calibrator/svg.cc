@@ -11,7 +11,9 @@ namespace {
 
 // Length of the UTF-8 character that begins here, 0 if none does (RFC 3629).
 size_t CharacterLength(const std::string& text, size_t at) {
-  const auto byte = [&](size_t i) { return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u; };
+  const auto byte = [&](size_t i) {
+    return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u;
+  };
   const unsigned first = byte(0);
   const auto continues = [&](size_t count) {
     for (size_t i = 1; i <= count; ++i) {
@@ -75,6 +77,12 @@ std::string Escape(const std::string& text) {
   return escaped;
 }
 
+std::string Shorten(const std::string& text, size_t length) {
+  if (text.size() <= length) return text;
+  const size_t tail = 2 * (length - 1) / 3;
+  return text.substr(0, length - 1 - tail) + "\xe2\x80\xa6" + text.substr(text.size() - tail);
+}
+
 Axis::Axis(double lower, double upper, double from, double to, bool logarithmic)
     : lower_(lower), upper_(upper), from_(from), to_(to), logarithmic_(logarithmic) {
   if (!std::isfinite(lower_) || (logarithmic_ && lower_ <= 0)) lower_ = logarithmic_ ? 0.1 : 0;
@@ -110,11 +118,13 @@ std::vector<Axis::Tick> Axis::Ticks(int count) const {
   }
   const double decades = std::log10(upper_ / lower_);
   const int every = std::max(1, static_cast<int>(std::ceil(decades / count)));
-  const int first = static_cast<int>(std::floor(std::log10(lower_))), last = static_cast<int>(std::ceil(std::log10(upper_)));
+  const int first = static_cast<int>(std::floor(std::log10(lower_))),
+            last = static_cast<int>(std::ceil(std::log10(upper_)));
   for (int exponent = first; exponent <= last; ++exponent) {
     const auto add = [&](double factor) {
       const double value = factor * std::pow(10, exponent);
-      if (value >= lower_ * (1 - 1e-9) && value <= upper_ * (1 + 1e-9)) ticks.push_back({value, General(value)});
+      if (value >= lower_ * (1 - 1e-9) && value <= upper_ * (1 + 1e-9))
+        ticks.push_back({value, General(value)});
     };
     if (exponent % every == 0) add(1);
     if (decades < 2) add(2), add(5);
@@ -122,9 +132,12 @@ std::vector<Axis::Tick> Axis::Ticks(int count) const {
   return ticks;
 }
 
-Svg::Svg(double width, double height, const std::string& title) : width_(width), height_(height), title_(Escape(title)) {}
+Svg::Svg(double width, double height, const std::string& title)
+    : width_(width), height_(height), title_(Escape(title)) {}
 
-void Svg::Line(double x1, double y1, double x2, double y2, const std::string& css) { Path({{x1, y1}, {x2, y2}}, css); }
+void Svg::Line(double x1, double y1, double x2, double y2, const std::string& css) {
+  Path({{x1, y1}, {x2, y2}}, css);
+}
 
 void Svg::Path(const std::vector<Eigen::Vector2d>& points, const std::string& css, bool closed) {
   std::string d;
@@ -155,27 +168,30 @@ void Svg::Dots(const std::vector<Eigen::Vector2d>& points, const std::string& cs
 
 void Svg::Rectangle(double x, double y, double width, double height, const std::string& css) {
   if (!std::isfinite(x + y + width + height)) return;
-  body_ += fmt::format("<rect class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n", css, x, y,
-                       std::max(0., width), std::max(0., height));
+  body_ += fmt::format("<rect class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n",
+                       css, x, y, std::max(0., width), std::max(0., height));
 }
 
-void Svg::Text(double x, double y, const std::string& text, const std::string& css, Anchor anchor, double angle) {
+void Svg::Text(double x, double y, const std::string& text, const std::string& css, Anchor anchor,
+               double angle) {
   if (!std::isfinite(x) || !std::isfinite(y)) return;
   constexpr const char* kAnchors[] = {"start", "middle", "end"};
-  const std::string turn = angle == 0 ? "" : fmt::format(" transform=\"rotate({} {:.1f} {:.1f})\"", angle, x, y);
-  body_ += fmt::format("<text class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", css, x, y,
-                       kAnchors[static_cast<int>(anchor)], turn, Escape(text));
+  const std::string turn =
+      angle == 0 ? "" : fmt::format(" transform=\"rotate({} {:.1f} {:.1f})\"", angle, x, y);
+  body_ += fmt::format("<text class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", css,
+                       x, y, kAnchors[static_cast<int>(anchor)], turn, Escape(text));
 }
 
 // A nested <svg> clips without an id that would have to be unique in the page.
 void Svg::BeginClip(double x, double y, double width, double height) {
   body_ += fmt::format(
-      "<svg x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{3:.1f}\" viewBox=\"{0:.1f} {1:.1f} {2:.1f} {3:.1f}\">\n", x,
-      y, width, height);
+      "<svg x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{3:.1f}\" viewBox=\"{0:.1f} {1:.1f} "
+      "{2:.1f} {3:.1f}\">\n",
+      x, y, width, height);
 }
 
-void Svg::Frame(const Axis& x, const Axis& y, const std::string& x_label, const std::string& y_label, int x_ticks,
-                int y_ticks) {
+void Svg::Frame(const Axis& x, const Axis& y, const std::string& x_label, const std::string& y_label,
+                int x_ticks, int y_ticks) {
   const double left = x.from(), right = x.to(), bottom = y.from(), top = y.to();
   if (!x_label.empty()) {
     for (const auto& [value, label] : x.Ticks(x_ticks)) {
@@ -196,16 +212,19 @@ void Svg::Frame(const Axis& x, const Axis& y, const std::string& x_label, const 
 
 std::string Svg::Print() const {
   return fmt::format(
-      "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
+      "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" "
+      "width=\"{0:.0f}\" "
       "height=\"{1:.0f}\" role=\"img\"><title>{2}</title>\n{3}</svg>\n",
       width_, height_, title_, body_);
 }
 
-std::vector<Eigen::Vector2d> Ellipse(const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance, double sigma) {
+std::vector<Eigen::Vector2d> Ellipse(const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance,
+                                     double sigma) {
   std::vector<Eigen::Vector2d> points;
   if (!mean.allFinite() || !covariance.allFinite()) return points;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance);
-  const Eigen::Matrix2d root = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const Eigen::Matrix2d root =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
   constexpr int kPoints = 64;
   for (int i = 0; i < kPoints; ++i) {
     const double angle = 2 * M_PI * i / kPoints;

@@ -6,9 +6,12 @@
 
 namespace plumb {
 
-/// For text and attribute values of HTML and SVG: & < > " ' are escaped, control characters and bytes that are not UTF-8
-/// replaced, so that a page stays well-formed XML whatever a file called itself.
+/// For text and attribute values of HTML and SVG: & < > " ' are escaped, control characters and bytes that
+/// are not UTF-8 replaced, so that a page stays well-formed XML whatever a file called itself.
 std::string Escape(const std::string& text);
+
+/// At most `length` bytes and an ellipsis in their middle: of a path the end tells most. For ASCII.
+std::string Shorten(const std::string& text, size_t length);
 
 /// An axis of a plot: values to pixels, linear or logarithmic.
 class Axis {
@@ -36,8 +39,8 @@ class Axis {
   bool logarithmic_;
 };
 
-/// A drawing under construction. Everything has a CSS class, which gives it its colours: dark and light in one drawing.
-/// Coordinates are pixels, y downwards; what is not finite is left out.
+/// A drawing under construction. Everything has a CSS class, which gives it its colours: dark and light in
+/// one drawing. Coordinates are pixels, y downwards; what is not finite is left out.
 class Svg {
  public:
   /// @param title is read out to those who cannot see the drawing.
@@ -52,15 +55,15 @@ class Svg {
   void Rectangle(double x, double y, double width, double height, const std::string& css);
   enum class Anchor { kStart, kMiddle, kEnd };
   /// @param angle [deg] clockwise, about (x, y).
-  void Text(double x, double y, const std::string& text, const std::string& css = "label", Anchor anchor = Anchor::kMiddle,
-            double angle = 0);
+  void Text(double x, double y, const std::string& text, const std::string& css = "label",
+            Anchor anchor = Anchor::kMiddle, double angle = 0);
   /// What follows is not drawn outside of that rectangle, until EndClip.
   void BeginClip(double x, double y, double width, double height);
   void EndClip() { body_ += "</svg>\n"; }
 
   /// A frame with ticks below and to the left; grid lines across. Empty labels leave the ticks out.
-  void Frame(const Axis& x, const Axis& y, const std::string& x_label, const std::string& y_label, int x_ticks = 5,
-             int y_ticks = 5);
+  void Frame(const Axis& x, const Axis& y, const std::string& x_label, const std::string& y_label,
+             int x_ticks = 5, int y_ticks = 5);
 
   std::string Print() const;
 
@@ -71,6 +74,7 @@ class Svg {
 
 /// The ellipse of points with Mahalanobis distance `sigma` from the mean, closed, 64 of them.
 /// @param covariance 2 x 2, positive semidefinite. @return empty if it is not finite.
-std::vector<Eigen::Vector2d> Ellipse(const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance, double sigma);
+std::vector<Eigen::Vector2d> Ellipse(const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance,
+                                     double sigma);
 
 }  // namespace plumb

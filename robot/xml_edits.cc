@@ -58,7 +58,8 @@ void XmlEdits::SetAttribute(const TiXmlElement& element, const char* attribute, 
   for (const TiXmlAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
     if (a->NameTStr() != attribute) continue;
     const size_t name = Offset(*a);
-    if (text_.compare(name, a->NameTStr().size(), attribute) != 0) throw std::logic_error("an attribute is elsewhere");
+    if (text_.compare(name, a->NameTStr().size(), attribute) != 0)
+      throw std::logic_error("an attribute is elsewhere");
     size_t from = text_.find('=', name) + 1;
     while (IsSpace(text_[from])) ++from;
     const char quote = text_[from];
@@ -79,13 +80,15 @@ void XmlEdits::AddChild(const TiXmlElement& element, const std::string& child) {
   const size_t begin = Offset(*first);
   const size_t line = text_.find_last_not_of(" \t", begin - 1) + 1;
   const bool own_line = line > 0 && (text_[line - 1] == '\n' || text_[line - 1] == '\r');
-  edits_[EndOfOpeningTag(element) + 1].text += own_line ? "\n" + text_.substr(line, begin - line) + child : child;
+  edits_[EndOfOpeningTag(element) + 1].text +=
+      own_line ? "\n" + text_.substr(line, begin - line) + child : child;
 }
 
 void XmlEdits::AddComment(const std::string& words) {
   std::string plain = words;
   for (size_t at = 0; (at = plain.find("--", at)) != std::string::npos;) plain.replace(at, 2, "- -");
-  std::replace_if(plain.begin(), plain.end(), [](char c) { return static_cast<unsigned char>(c) > 126; }, '?');
+  std::replace_if(
+      plain.begin(), plain.end(), [](char c) { return static_cast<unsigned char>(c) > 126; }, '?');
   size_t at = text_.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
   const bool declared = text_.compare(at, 5, "<?xml") == 0;
   if (declared) at = text_.find("?>", at) + 2;

@@ -15,14 +15,15 @@
 namespace plumb {
 namespace {
 
-using nlohmann::json;
 using Catch::Contains;
+using nlohmann::json;
 
 /// A file with some text, gone at the end.
 class TextFile {
  public:
   explicit TextFile(const std::string& text = "") {
-    path_ = std::filesystem::temp_directory_path() / ("plumbline_posterior_" + std::to_string(getpid()) + ".json");
+    path_ = std::filesystem::temp_directory_path() /
+            ("plumbline_posterior_" + std::to_string(getpid()) + ".json");
     Write(text);
   }
   ~TextFile() { std::filesystem::remove(path_); }
@@ -151,15 +152,18 @@ TEST_CASE("findings that are none are not written") {
     }
     return "";
   };
-  CHECK_THAT(why([](Findings& f) { f.posterior.components[1].covariance.resize(0, 0); }), Contains("component 1"));
-  CHECK_THAT(why([](Findings& f) { f.posterior.components[0].covariance(1, 1) *= -1; }), Contains("positive definite"));
+  CHECK_THAT(why([](Findings& f) { f.posterior.components[1].covariance.resize(0, 0); }),
+             Contains("component 1"));
+  CHECK_THAT(why([](Findings& f) { f.posterior.components[0].covariance(1, 1) *= -1; }),
+             Contains("positive definite"));
   CHECK_THAT(why([](Findings& f) { f.posterior.components[0].mean(2) = NAN; }), Contains("not finite"));
   CHECK_THAT(why([](Findings& f) { f.posterior.weights[0] = 0.8; }), Contains("sum to 1.1"));
   CHECK_THAT(why([](Findings& f) { f.posterior.weights.pop_back(); }), Contains("1 weights of 2"));
   CHECK_THAT(why([](Findings& f) { f.posterior = {}; }), Contains("0 components"));
   CHECK_THAT(why([](Findings& f) { f.prior.mean.resize(2); }), Contains("the prior"));
   CHECK_THAT(why([](Findings& f) { f.samples(1, 7) = INFINITY; }), Contains("samples are not finite"));
-  CHECK_THAT(why([](Findings& f) { f.samples = Eigen::MatrixXd::Ones(2, 9); }), Contains("samples are not of 3"));
+  CHECK_THAT(why([](Findings& f) { f.samples = Eigen::MatrixXd::Ones(2, 9); }),
+             Contains("samples are not of 3"));
   CHECK(why([](Findings& f) { f.discrepancy = NAN, f.cramer_rao.setConstant(INFINITY); }) == "");
 }
 
@@ -167,7 +171,8 @@ TEST_CASE("diagnostics without numbers, and names that are not UTF-8, still make
   const RobotDescription robot = Pendulum();
   Findings findings = SampleFindings(robot);
   findings.discrepancy = NAN;
-  findings.identifiability = {}, findings.holdout = {}, findings.misspecification = {}, findings.agreement = {};
+  findings.identifiability = {}, findings.holdout = {}, findings.misspecification = {},
+  findings.agreement = {};
   findings.cramer_rao.resize(0), findings.noise_sd.resize(0), findings.stages.clear();
   findings.warnings = {"quote \" backslash \\ newline \n and \xff"};
   const json j = json::parse(PosteriorJson(findings, robot, {{"\xc3\x28.lcm"}, {}, "", ""}));
@@ -197,7 +202,8 @@ TEST_CASE("a posterior that is not this robot's is refused, with the reason") {
   other = robot, other.links[1].mass *= 1 + 1e-15;
   CHECK_THAT(Error(text, other), Contains(": physics: "));
   CHECK_THAT(Error("", robot), Contains("parse error"));
-  CHECK_THROWS_WITH(ReadPosterior("/nowhere/posterior.json", robot), Contains("/nowhere/posterior.json: there is no such file"));
+  CHECK_THROWS_WITH(ReadPosterior("/nowhere/posterior.json", robot),
+                    Contains("/nowhere/posterior.json: there is no such file"));
   CHECK_THROWS_WITH(ReadPosterior("/dev/zero", robot), Contains("no such file"));
 }
 
@@ -207,18 +213,24 @@ TEST_CASE("bounds of a logit coordinate are part of the posterior") {
   const std::string text = PosteriorJson(SampleFindings(robot), robot, {});
   CHECK(Error(text, robot) == "");
   robot.parameters[1].upper = 1.3;
-  CHECK_THAT(Error(text, robot), Contains("coordinates[1].upper: is 1.2, contact/friction has the bound 1.3 now"));
+  CHECK_THAT(Error(text, robot),
+             Contains("coordinates[1].upper: is 1.2, contact/friction has the bound 1.3 now"));
 }
 
 TEST_CASE("everything that matters to the motion is in the fingerprint of the physics") {
   const RobotFolder folder(kZooUrdf, kZooToml);
   const RobotDescription robot = LoadRobot(folder.path());
   const std::vector<std::function<void(RobotDescription&)>> changes{
-      [](auto& r) { r.links[3].center_of_mass.x() += 1e-9; }, [](auto& r) { r.links[3].inertia(0, 0) *= 1.0000001; },
-      [](auto& r) { r.links[4].collisions.pop_back(); },      [](auto& r) { r.joints[3].axis = -r.joints[3].axis; },
-      [](auto& r) { r.joints[3].dynamics.delay = 0; },        [](auto& r) { r.joints[3].dynamics.no_load_speed += 1; },
-      [](auto& r) { r.frozen[0].value = 0.3; },               [](auto& r) { r.simulation.substep /= 2; },
-      [](auto& r) { r.simulation.contact->friction = 0.9; },  [](auto& r) { r.simulation.stop.reset(); }};
+      [](auto& r) { r.links[3].center_of_mass.x() += 1e-9; },
+      [](auto& r) { r.links[3].inertia(0, 0) *= 1.0000001; },
+      [](auto& r) { r.links[4].collisions.pop_back(); },
+      [](auto& r) { r.joints[3].axis = -r.joints[3].axis; },
+      [](auto& r) { r.joints[3].dynamics.delay = 0; },
+      [](auto& r) { r.joints[3].dynamics.no_load_speed += 1; },
+      [](auto& r) { r.frozen[0].value = 0.3; },
+      [](auto& r) { r.simulation.substep /= 2; },
+      [](auto& r) { r.simulation.contact->friction = 0.9; },
+      [](auto& r) { r.simulation.stop.reset(); }};
   for (size_t i = 0; i < changes.size(); ++i) {
     INFO("change " << i);
     RobotDescription other = robot;
@@ -243,7 +255,8 @@ TEST_CASE("hostile posteriors are refused with file and field") {
   CHECK_THAT(spoilt("/names/0", 7), Contains(": names[0]: is not a string"));
   CHECK_THAT(spoilt("/mixture", 7), Contains(": mixture: is not an object"));
   CHECK_THAT(spoilt("/mixture/weights", json::array()), Contains(": mixture.weights: has 0 entries"));
-  CHECK_THAT(spoilt("/mixture/weights", std::vector<double>(100000, 1e-5)), Contains(": mixture.weights: has 100000"));
+  CHECK_THAT(spoilt("/mixture/weights", std::vector<double>(100000, 1e-5)),
+             Contains(": mixture.weights: has 100000"));
   CHECK_THAT(spoilt("/mixture/weights", {0.7, 0.2}), Contains(": mixture.weights: sum to"));
   CHECK_THAT(spoilt("/mixture/weights", {1.5, -0.5}), Contains(": mixture.weights[1]: is not positive"));
   CHECK_THAT(spoilt("/mixture/weights/0", nullptr), Contains(": mixture.weights[0]: is not a number"));
@@ -251,13 +264,17 @@ TEST_CASE("hostile posteriors are refused with file and field") {
   CHECK_THAT(spoilt("/mixture/means/0", {1, 2}), Contains(": mixture.means[0]: has 2 entries, expected 3"));
   CHECK_THAT(spoilt("/mixture/means/0/1", "1"), Contains(": mixture.means[0][1]: is not a number"));
   CHECK_THAT(spoilt("/mixture/means/0/0", 1e9), Contains(": mixture: is too wide"));
-  CHECK_THAT(spoilt("/mixture/covariances", json::array()), Contains(": mixture.covariances: has 0 entries, expected 2"));
-  CHECK_THAT(spoilt("/mixture/covariances/1/2", {1}), Contains(": mixture.covariances[1][2]: has 1 entries, expected 3"));
+  CHECK_THAT(spoilt("/mixture/covariances", json::array()),
+             Contains(": mixture.covariances: has 0 entries, expected 2"));
+  CHECK_THAT(spoilt("/mixture/covariances/1/2", {1}),
+             Contains(": mixture.covariances[1][2]: has 1 entries, expected 3"));
   CHECK_THAT(spoilt("/mixture/covariances/1/0/1", 5), Contains(": mixture.covariances[1]: is not symmetric"));
-  CHECK_THAT(spoilt("/mixture/covariances/1/0/0", -1), Contains(": mixture.covariances[1]: is not positive definite"));
+  CHECK_THAT(spoilt("/mixture/covariances/1/0/0", -1),
+             Contains(": mixture.covariances[1]: is not positive definite"));
   CHECK_THAT(Error("[1]", robot), Contains("is not a posterior"));
   CHECK_THAT(Error(std::string(1000000, '['), robot), Contains("parse error"));
-  for (const char* key : {"format", "version", "robot", "physics", "names", "units", "coordinates", "mixture"}) {
+  for (const char* key :
+       {"format", "version", "robot", "physics", "names", "units", "coordinates", "mixture"}) {
     json j = good;
     j.erase(key);
     CHECK_THAT(Error(j.dump(), robot), Contains(std::string(": ") + key + ": is missing"));
@@ -269,7 +286,8 @@ TEST_CASE("a posterior that was cut off or has rotten bytes is refused or read, 
   Findings findings = SampleFindings(robot);
   findings.samples.conservativeResize(3, 2);
   const std::string text = PosteriorJson(findings, robot, {});
-  for (size_t length = 0; length + 2 < text.size(); length += 97) CHECK(Error(text.substr(0, length), robot) != "");
+  for (size_t length = 0; length + 2 < text.size(); length += 97)
+    CHECK(Error(text.substr(0, length), robot) != "");
   Random random(3, {1});
   int refused = 0;
   for (int i = 0; i < 400; ++i) {

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
+#include <sstream>
 
 #include "calibrator/report_residuals.h"
 #include "calibrator/svg.h"
@@ -51,13 +52,16 @@ RobotDescription ManyParameters(int count) {
 /// A page that is XML, needs nothing from elsewhere, and draws with numbers.
 void CheckPage(const std::string& html) {
   CHECK_NOTHROW(Xml(html, "report.html"));
-  for (const char* elsewhere : {"src=", "href=", "url(", "@import", "<script"}) CHECK_THAT(html, !Contains(elsewhere));
-  for (const char* nothing : {"\"nan", "\"inf", "\"-nan", " nan", "Mnan", "Lnan", "-inf"}) CHECK_THAT(html, !Contains(nothing));
+  for (const char* elsewhere : {"src=", "href=", "url(", "@import", "<script"})
+    CHECK_THAT(html, !Contains(elsewhere));
+  for (const char* nothing : {"\"nan", "\"inf", "\"-nan", " nan", "Mnan", "Lnan", "-inf"})
+    CHECK_THAT(html, !Contains(nothing));
 }
 
 // PLUMBLINE_REPORTS=<folder> keeps the pages, to look at them.
 void Keep(const std::string& name, const std::string& html) {
-  if (const char* folder = std::getenv("PLUMBLINE_REPORTS")) std::ofstream(std::string(folder) + "/" + name) << html;
+  if (const char* folder = std::getenv("PLUMBLINE_REPORTS"))
+    std::ofstream(std::string(folder) + "/" + name) << html;
 }
 
 size_t Count(const std::string& text, const std::string& part) {
@@ -73,13 +77,15 @@ TEST_CASE("the report says in words and drawings what was found") {
   Keep("pendulum.html", html);
   CheckPage(html);
   for (const char* words :
-       {"Calibration of pendulum", "only gravity / length can be known", "The model does not explain the robot",
-        "Predicts better than the prior", "The logs agree", "Warning:</b> 12 transitions were late", "10.40 \xc2\xb1 0.57",
+       {"Calibration of pendulum", "only gravity / length can be known",
+        "The model does not explain the robot", "Predicts better than the prior", "The logs agree",
+        "Warning:</b> 12 transitions were late", "10.40 \xc2\xb1 0.57",
         "only in combination with mass/pole, length/pole", "pivot, at ground contact", "31 %", "tuesday.lcm",
         "robots/pendulum monday.lcm tuesday.lcm --seed 3", "18364758544493064720", "importance weights"}) {
     CHECK_THAT(html, Contains(words));
   }
-  CHECK(Count(html, "<svg class=\"plot\"") == 1 + 1 + 1 + 1 + 2 * 3 + 3);  // pairs, scree, errors, time, residuals, logs
+  CHECK(Count(html, "<svg class=\"plot\"") ==
+        1 + 1 + 1 + 1 + 2 * 3 + 3);  // pairs, scree, errors, time, residuals, logs
   // Two contours each of the prior and two components, in three pairs.
   CHECK(Count(html, "Z\"/>") == 3 * 2 * 3);
   CHECK(html.size() < 1'000'000);
@@ -98,9 +104,12 @@ TEST_CASE("of many parameters the eight are drawn that the data have told most a
   Keep("many.html", html);
   CheckPage(html);
   CHECK_THAT(html, Contains("Of 12 parameters these are the 8 that the data have told most about."));
-  const std::string pairs = html.substr(html.find("<h2>Prior and posterior"), html.find("<h2>What can") - html.find("<h2>Prior and posterior"));
-  for (const char* there : {">mass/torso", "mass/thigh", "inertia/body_4/xx", "inertia/body_6/xx"}) CHECK_THAT(html, Contains(there));
-  CHECK_THAT(pairs, !Contains("mass/leg") && !Contains("mass/foot") && !Contains("y_5/xx") && !Contains("y_7/xx"));
+  const std::string pairs = html.substr(html.find("<h2>Prior and posterior"),
+                                        html.find("<h2>What can") - html.find("<h2>Prior and posterior"));
+  for (const char* there : {">mass/torso", "mass/thigh", "inertia/body_4/xx", "inertia/body_6/xx"})
+    CHECK_THAT(html, Contains(there));
+  CHECK_THAT(pairs,
+             !Contains("mass/leg") && !Contains("mass/foot") && !Contains("y_5/xx") && !Contains("y_7/xx"));
   CHECK(Count(pairs, "Z\"/>") == 28 * 2 * 3);
 }
 
@@ -113,7 +122,8 @@ TEST_CASE("whatever files call things, the page stays a page") {
   Findings findings = SampleFindings(robot);
   findings.method = findings.used = findings.check = findings.warnings[0] = evil;
   findings.identifiability.words = findings.identifiability.combinations[0].name = evil;
-  findings.misspecification.words = findings.misspecification.misfits[0].what = findings.misspecification.misfits[0].test = evil;
+  findings.misspecification.words = findings.misspecification.misfits[0].what =
+      findings.misspecification.misfits[0].test = evil;
   findings.holdout.words = findings.agreement.words = findings.agreement.logs[0].log = evil;
   Residuals residuals = SampleResiduals(robot);
   residuals.coordinates[0] = evil;
@@ -121,7 +131,8 @@ TEST_CASE("whatever files call things, the page stays a page") {
   CheckPage(html);
   CHECK_THAT(html, !Contains("alert('") && !Contains("\xff") && !Contains("\x01"));
   CHECK(Escape("a<b>&\"'\xc3\xa9\n") == "a&lt;b&gt;&amp;&quot;&#39;\xc3\xa9\n");
-  for (const char* broken : {"\xff", "\xc3", "\xe0\x80\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xef\xbf\xbf", "\x01", "\x7f"}) {
+  for (const char* broken :
+       {"\xff", "\xc3", "\xe0\x80\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xef\xbf\xbf", "\x01", "\x7f"}) {
     CHECK(Escape(broken).starts_with("\xef\xbf\xbd"));
   }
 }
@@ -136,9 +147,12 @@ TEST_CASE("findings with little in them still make a report") {
   const std::string html = ReportHtml(findings, robot, {}, {});
   Keep("little.html", html);
   CheckPage(html);
-  CHECK_THAT(html, Contains("Predictions were not tested") && Contains("hardly: the motion adds little to the prior") &&
+  CHECK_THAT(html, Contains("Predictions were not tested") &&
+                       Contains("hardly: the motion adds little to the prior") &&
                        Contains("There are none."));
-  CHECK_THAT(html, !Contains("The logs"));
+  // What was not examined is not good news.
+  CHECK_THAT(html, Contains("The model was not tested") && Contains("Identifiability was not examined"));
+  CHECK_THAT(html, !Contains("The logs") && !Contains("verdict good") && !Contains("verdict bad"));
 }
 
 TEST_CASE("numbers that are none are left out of the drawings") {
@@ -164,6 +178,27 @@ TEST_CASE("numbers that are none are left out of the drawings") {
   CHECK_THROWS_AS(ReportHtml(findings, robot, SampleProvenance(), residuals), std::invalid_argument);
 }
 
+TEST_CASE("a posterior much narrower than its prior is drawn with its surroundings, not as a dot") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  findings.posterior = {{1}, {{findings.prior.mean, 1e-6 * findings.prior.covariance}}};
+  findings.samples.resize(0, 0);
+  findings.identifiability.null.clear();
+  const std::string html = ReportHtml(findings, robot, SampleProvenance(), SampleResiduals(robot));
+  Keep("narrow.html", html);
+  CheckPage(html);
+  // The first pair of posterior contours: as wide as a good part of a cell.
+  const size_t path = html.find("posterior line\" d=\"M");
+  REQUIRE(path != std::string::npos);
+  std::istringstream numbers(html.substr(path + 20, html.find('Z', path) - path - 20));
+  double low = 1e9, high = -1e9, x = 0, y = 0;
+  for (char separator; numbers >> x >> y; numbers >> separator)
+    low = std::min(low, x), high = std::max(high, x);
+  CHECK(high - low > 25);
+  CHECK(high - low < 250);
+  CHECK_THAT(html, Contains("<td class=\"n\">yes</td>"));
+}
+
 TEST_CASE("the report of a robot with every coordinate there is") {
   const RobotFolder folder(kZooUrdf, kZooToml);
   const RobotDescription robot = LoadRobot(folder.path());
@@ -184,7 +219,8 @@ TEST_CASE("autocorrelation is that of an autoregressive process, within roll-out
     residuals.whitened(2 * i) = a, residuals.whitened(2 * i + 1) = random.Normal();
     residuals.rows.push_back({i, 0, i, 0}), residuals.rows.push_back({i, 0, i, 1});
   }
-  const std::vector<double> correlated = Autocorrelation(residuals, 0, 3), white = Autocorrelation(residuals, 1, 3);
+  const std::vector<double> correlated = Autocorrelation(residuals, 0, 3),
+                            white = Autocorrelation(residuals, 1, 3);
   for (int lag = 1; lag <= 3; ++lag) {
     CHECK(correlated[static_cast<size_t>(lag - 1)] == Approx(std::pow(0.6, lag)).margin(0.04));
     CHECK(white[static_cast<size_t>(lag - 1)] == Approx(0).margin(0.03));

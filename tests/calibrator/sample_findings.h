@@ -11,8 +11,8 @@
 
 namespace plumb {
 
-/// Findings of a robot that nobody has calibrated: every field holds something, two components, and some numbers that are
-/// not finite where they may be so.
+/// Findings of a robot that nobody has calibrated: every field holds something, two components, and some
+/// numbers that are not finite where they may be so.
 inline Findings SampleFindings(const RobotDescription& robot) {
   const auto n = static_cast<Eigen::Index>(robot.parameters.size());
   Random random(5, {1});
@@ -28,8 +28,9 @@ inline Findings SampleFindings(const RobotDescription& robot) {
   Eigen::VectorXd null = prior_sd.normalized();
   for (Eigen::Index i = 1; i < n; i += 2) null(i) *= -1;
   for (const double shift : {-0.15, 0.25}) {
-    const Eigen::MatrixXd covariance = 0.02 * f.prior.covariance +
-                                       0.3 * prior_sd.squaredNorm() / static_cast<double>(n) * null * null.transpose();
+    const Eigen::MatrixXd covariance = 0.02 * f.prior.covariance + 0.3 * prior_sd.squaredNorm() /
+                                                                       static_cast<double>(n) * null *
+                                                                       null.transpose();
     f.posterior.components.push_back({f.prior.mean + shift * prior_sd, covariance});
   }
   f.posterior.weights = {0.7, 0.3};
@@ -39,7 +40,8 @@ inline Findings SampleFindings(const RobotDescription& robot) {
   f.discrepancy = 1.02;
   f.noise_sd = Eigen::VectorXd::Constant(2 * robot.num_velocities(), 1e-3);
   for (const int horizon : {1, 5, 20}) {
-    f.stages.push_back({horizon, 995 / horizon, 40000, 1 + 0.5 / horizon, f.prior.mean, prior_sd / (2. + horizon)});
+    f.stages.push_back(
+        {horizon, 995 / horizon, 40000, 1 + 0.5 / horizon, f.prior.mean, prior_sd / (2. + horizon)});
   }
   f.identifiability.information = Eigen::MatrixXd::Identity(n, n) - null * null.transpose() * (1 - 1e-9);
   f.identifiability.null = {null / null.cwiseAbs().maxCoeff()};
@@ -47,14 +49,18 @@ inline Findings SampleFindings(const RobotDescription& robot) {
   f.identifiability.words = "only gravity / length can be known from this motion";
   f.cramer_rao = 0.05 * prior_sd;
   f.cramer_rao(0) = std::numeric_limits<double>::infinity();
-  f.holdout = {800, 195, {{1, 195, 1e-3, 4e-3}, {5, 39, 4e-3, 2e-2}, {20, 9, 9e-3, 0.12}, {100, 0, NAN, NAN}}, true,
+  f.holdout = {800,
+               195,
+               {{1, 195, 1e-3, 4e-3}, {5, 39, 4e-3, 2e-2}, {20, 9, 9e-3, 0.12}, {100, 0, NAN, NAN}},
+               true,
                "predicts better than the prior at every horizon that could be tried (1, 5 and 20 steps)"};
   f.misspecification = {true,
                         {{"pivot, at ground contact", "pivot", "contact", "structure", 12.5, 1e-6, 0.31},
                          {"all joints", "", "", "whiteness", 3.1, 0.004, NAN}},
                         "the model does not explain the robot: pivot, at ground contact"};
-  f.agreement = {true, {{"monday.lcm", f.samples.col(0), 0.05 * f.samples.col(0).cwiseAbs(), 1.2, 0.4},
-                        {"tuesday.lcm", f.samples.col(1), 0.05 * f.samples.col(1).cwiseAbs(), 0.8, 0.7}},
+  f.agreement = {true,
+                 {{"monday.lcm", f.samples.col(0), 0.05 * f.samples.col(0).cwiseAbs(), 1.2, 0.4},
+                  {"tuesday.lcm", f.samples.col(1), 0.05 * f.samples.col(1).cwiseAbs(), 0.8, 0.7}},
                  "both logs can be of one robot"};
   f.check = "importance weights of 1000 samples: effective share 0.93";
   f.warnings = {"12 transitions were late"};
@@ -63,8 +69,10 @@ inline Findings SampleFindings(const RobotDescription& robot) {
 }
 
 inline Provenance SampleProvenance() {
-  return {{"monday.lcm", "tuesday.lcm"}, {{"method", "auto"}, {"horizons", "1,5,20"}},
-          "plumb calibrate robots/pendulum monday.lcm tuesday.lcm --seed 3", "2026-01-02T03:04:05Z"};
+  return {{"monday.lcm", "tuesday.lcm"},
+          {{"method", "auto"}, {"horizons", "1,5,20"}},
+          "plumb calibrate robots/pendulum monday.lcm tuesday.lcm --seed 3",
+          "2026-01-02T03:04:05Z"};
 }
 
 }  // namespace plumb

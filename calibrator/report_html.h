@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+// What the report is made of, beside its drawings.
+namespace plumb {
+
+/// A value with as many digits as its standard deviation allows: two significant ones of that. Four
+/// significant ones where the sd is not positive or not finite; a dash for NaN.
+std::string Number(double value, double sd);
+/// "9.81 +- 0.02", with the proper sign.
+std::string PlusMinus(double value, double sd);
+
+/// A table that scrolls where it is too wide. Cells and header are HTML.
+class Table {
+ public:
+  explicit Table(const std::vector<std::string>& header);
+  void Add(const std::vector<std::string>& cells);
+  std::string Print() const;
+
+ private:
+  std::string rows_;
+};
+
+/// Text, which is escaped; nothing of nothing.
+std::string Paragraph(const std::string& text);
+/// Both HTML.
+std::string Figure(const std::string& drawing, const std::string& caption);
+/// For what would be illegible if it shrank to a phone's width. HTML.
+std::string Scrolling(const std::string& drawing);
+
+}  // namespace plumb
