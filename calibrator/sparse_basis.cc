@@ -3,7 +3,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
+#include <utility>
+
+#include "common/random.h"
 
 namespace plumb {
 namespace {
@@ -11,23 +15,36 @@ namespace {
 using Belongs = std::function<bool(const Eigen::VectorXd&)>;
 
 constexpr double kEntry = 1e-3;  // of the largest: smaller ones are zero
-constexpr int kIterations = 40;
+constexpr double kIndependent = 0.02;  // of orthonormal columns' rows: what less is left of one does not count
+constexpr int kTrials = 100;
 
 Eigen::Index Entries(const Eigen::VectorXd& x) { return (x.array() != 0).count(); }
 
-// The vector of the space with x_j = 1 and the smallest sum of |x_i|^p, p towards 0.
-Eigen::VectorXd Sparse(const Eigen::MatrixXd& space, Eigen::Index j) {
-  Eigen::VectorXd x = space * space.row(j).transpose() / space.row(j).squaredNorm();
-  double epsilon = 1;
-  for (int iteration = 0; iteration < kIterations; ++iteration, epsilon = std::max(0.5 * epsilon, 1e-6)) {
-    const Eigen::VectorXd weight = (x.array().square() + epsilon * epsilon).inverse();
-    const Eigen::MatrixXd gram = space.transpose() * weight.asDiagonal() * space;
-    const Eigen::VectorXd z = gram.ldlt().solve(space.row(j).transpose());
-    const double at_j = space.row(j) * z;
-    if (!(std::abs(at_j) > 0) || !z.allFinite()) break;
-    x = space * z / at_j;
+// Where the first of them is.
+Eigen::Index First(const Eigen::VectorXd& x) {
+  Eigen::Index first = 0;
+  while (x(first) == 0) ++first;
+  return first;
+}
+
+// k independent rows of a matrix of k columns, the first such in an order drawn at random.
+std::vector<Eigen::Index> IndependentRows(const Eigen::MatrixXd& space, Random& random) {
+  std::vector<Eigen::Index> order(static_cast<size_t>(space.rows())), chosen;
+  std::iota(order.begin(), order.end(), 0);
+  for (size_t i = order.size(); i > 1; --i) {
+    std::swap(order[i - 1], order[static_cast<size_t>(random.Uniform() * static_cast<double>(i))]);
   }
-  return x;
+  Eigen::MatrixXd basis(space.cols(), 0);
+  for (const Eigen::Index row : order) {
+    const Eigen::VectorXd entries = space.row(row).transpose();
+    const Eigen::VectorXd rest = entries - basis * (basis.transpose() * entries).eval();
+    if (rest.norm() < kIndependent) continue;
+    basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
+    basis.col(basis.cols() - 1) = rest.normalized();
+    chosen.push_back(row);
+    if (basis.cols() == space.cols()) break;
+  }
+  return chosen;
 }
 
 // Without entries that are next to zero.
@@ -38,8 +55,7 @@ Eigen::VectorXd Prune(const Eigen::VectorXd& x) {
 // Integers in proportion to x, if there are small ones that belong; else x with 1 as its first entry.
 Eigen::VectorXd Round(const Eigen::VectorXd& x, const Belongs& belongs) {
   double smallest = x.cwiseAbs().maxCoeff();
-  Eigen::Index first = 0;
-  while (x(first) == 0) ++first;
+  const Eigen::Index first = First(x);
   for (const double entry : x) {
     if (entry != 0) smallest = std::min(smallest, std::abs(entry));
   }
@@ -62,15 +78,21 @@ std::vector<Eigen::VectorXd> SparseBasis(const Eigen::MatrixXd& space, const Eig
   const Eigen::MatrixXd orthonormal =
       Eigen::HouseholderQR<Eigen::MatrixXd>(unit.cwiseInverse().asDiagonal() * space).householderQ() *
       Eigen::MatrixXd::Identity(n, k);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    if (orthonormal.row(j).norm() < kEntry) continue;
-    candidates.push_back(Round(unit.cwiseProduct(Prune(Sparse(orthonormal, j))), belongs));
+  Random random(0);
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const std::vector<Eigen::Index> pivots = IndependentRows(orthonormal, random);
+    if (static_cast<Eigen::Index>(pivots.size()) < k) continue;
+    const Eigen::MatrixXd reduced = orthonormal * orthonormal(pivots, Eigen::all).inverse();
+    for (const auto column : reduced.colwise()) {
+      candidates.push_back(Round(unit.cwiseProduct(Prune(column)), belongs));
+    }
   }
   for (const auto column : orthonormal.colwise()) {  // at worst
     candidates.push_back(Round(unit.cwiseProduct(Prune(column)), belongs));
   }
   std::stable_sort(candidates.begin(), candidates.end(), [](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-    return std::make_tuple(Entries(a), a.cwiseAbs().sum()) < std::make_tuple(Entries(b), b.cwiseAbs().sum());
+    const auto key = [](const Eigen::VectorXd& x) { return std::make_tuple(Entries(x), x.cwiseAbs().sum(), First(x)); };
+    return key(a) < key(b);
   });
   Eigen::MatrixXd basis(n, 0);  // orthonormal, of those chosen
   for (const Eigen::VectorXd& candidate : candidates) {

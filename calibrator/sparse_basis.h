@@ -9,10 +9,11 @@ namespace plumb {
 /// A basis of a linear space in the plainest form: each vector with as few entries as can be found, small integers where
 /// they do.
 ///
-/// The sparsest basis of a space is NP-hard to find (Coleman, Pothen, SIAM J. Alg. Disc. Meth. 7, 1986, section 2), but a
-/// greedy choice from sparse vectors is the sparsest that these allow (the vectors of a space form a matroid). Sparse vectors
-/// are those that minimise sum |x_i|^p, p < 1, among those with x_j = 1, for each j in turn, by iteratively reweighted least
-/// squares (Chartrand, Yin, ICASSP 2008); their support is made exact, and their entries integers if `belongs` agrees.
+/// The sparsest basis of a space is NP-hard to find (Coleman, Pothen, SIAM J. Alg. Disc. Meth. 7, 1986, section 2). It
+/// consists of elementary vectors, whose entries' places no other vector's are a part of (Rockafellar, 1969), and a greedy
+/// choice from a set of them is the sparsest that the set allows (they form a matroid). The set is that of many reduced
+/// echelon forms, whose columns are elementary, with pivots in orders drawn from a fixed seed. Entries are integers in the
+/// end if `belongs` agrees.
 ///
 /// @param space n x k, its columns span the space.
 /// @param unit n, > 0: what counts as a change of one of each coordinate, for telling entries from zeros.

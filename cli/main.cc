@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "cli/doctor.h"
+#include "cli/excite.h"
 #include "cli/launch.h"
 #include "cli/sim.h"
 #include "common/process.h"
@@ -58,8 +59,9 @@ int Request(Process& process, int8_t what) {
 int main(int argc, char** argv) {
   plumb::LaunchFlags flags;
   plumb::SimFlags sim_flags;
+  plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  CLI::App *launch = nullptr, *sim = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
+  CLI::App *launch = nullptr, *sim = nullptr, *excite = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -93,16 +95,27 @@ int main(int argc, char** argv) {
         sim->add_option("--png", sim_flags.png, "draw the first episode as a strip of snapshots");
         sim->add_option("--gif", sim_flags.gif, "draw the first episode as a film");
         sim->add_flag("--view", sim_flags.view, "show it in a window, in real time");
+        excite = app.add_subcommand("excite", "find the efforts that would tell most of the robot's parameters");
+        excite->add_option("robot", excite_flags.robot, "robot folder or TOML file")->required();
+        excite->add_option("--seed", excite_flags.seed, "of all random numbers, and of where the robot begins")
+            ->check(seed)->capture_default_str();
+        excite->add_option("--output", excite_flags.output, "write the best efforts to this table")->capture_default_str();
+        excite->add_option("--candidates", excite_flags.candidates, "how many are tried")
+            ->check(CLI::Range(1, 10000))->capture_default_str();
+        excite->add_option("--seconds", excite_flags.seconds, "of each")
+            ->check(CLI::Range(0.01, 600.0))->capture_default_str();
+        excite->add_option("--png", excite_flags.png, "draw the best one as a strip of snapshots");
         doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* sub : {launch, sim, doctor, arm, disarm, estop}) sub->fallthrough();
+        for (CLI::App* sub : {launch, sim, excite, doctor, arm, disarm, estop}) sub->fallthrough();
       },
       [&](plumb::Process& process) {
         if (launch->parsed()) return plumb::Launch(process, flags);
         if (sim->parsed()) return plumb::Simulate(process, sim_flags);
+        if (excite->parsed()) return plumb::Excite(process, excite_flags);
         if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus);
         if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM);
         if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM);
