@@ -16,7 +16,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kNoInformation = 1e-6;  // relative to the best-known direction, in the prior's units
 constexpr double kDisagreement = 1e-3;  // p below which logs are of different robots, or the model is wrong
 
 Eigen::MatrixXd ToPhysical(const RobotDescription& robot, const Eigen::MatrixXd& coordinates) {
@@ -86,9 +85,9 @@ class Run {
     findings_.discrepancy = view.errors.cwiseAbs2().mean();
     findings_.errors = view.errors;
     findings_.rows = rows;
-    findings_.cramer_rao = CramerRao();
     Suspect(view, result.curriculum ? result.curriculum->noise_known : false);
     findings_.identifiability = FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
+    findings_.cramer_rao = findings_.identifiability.cramer_rao;
   }
 
   // What the model has wrong, whatever its parameters.
@@ -112,24 +111,6 @@ class Run {
     }
     findings_.misspecification = FindMisspecification(model_->Describe(physical), leftover);
     findings_.diagnostic_steps += errors.simulated_steps();
-  }
-
-  // Along a direction that nothing is known of, the bound is infinite for all parameters involved.
-  Eigen::VectorXd CramerRao() const {
-    const Eigen::VectorXd sd = prior_sd();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sd.asDiagonal() * information_ * sd.asDiagonal());
-    const double least = kNoInformation * std::max(eigen.eigenvalues().maxCoeff(), 1.0);
-    Eigen::VectorXd bound(sd.size());
-    for (Eigen::Index i = 0; i < sd.size(); ++i) {
-      double variance = 0;
-      for (Eigen::Index k = 0; k < sd.size(); ++k) {
-        const double part = std::abs(eigen.eigenvectors()(i, k));
-        if (eigen.eigenvalues()(k) > least) variance += part * part / eigen.eigenvalues()(k);
-        else if (part > 1e-3) variance = std::numeric_limits<double>::infinity();
-      }
-      bound(i) = sd(i) * std::sqrt(variance);
-    }
-    return bound;
   }
 
   // Fits again without a part of the data, which then judges.

@@ -1,55 +1,27 @@
 #include "calibrator/identifiability.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <tuple>
+
+#include "calibrator/identifiability_words.h"
+#include "calibrator/sparse_basis.h"
 
 namespace plumb {
 namespace {
 
-constexpr double kNull = 1e-6;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNull = 1e-6;             // of the largest information, in units of the prior
+constexpr double kNullInformation = 1e-2;  // and of the prior's
+constexpr double kWeakInformation = 1;     // of the prior's
+constexpr double kWeakEntry = 0.2;         // of the largest in a weak direction: smaller ones are not told
 constexpr int kLargestPower = 2;
+constexpr Eigen::Index kMostTried = 6;  // parameters of which all small powers are tried
 
-// "length/pole" -> "length", unless another parameter would read the same.
-std::string ShortName(const RobotDescription& robot, size_t index) {
-  const auto stem = [](const std::string& name) { return name.substr(0, name.find('/')); };
-  const std::string& name = robot.parameters[index].name;
-  const auto same = std::count_if(robot.parameters.begin(), robot.parameters.end(),
-                                  [&](const auto& p) { return stem(p.name) == stem(name); });
-  return same == 1 ? stem(name) : "(" + name + ")";
-}
-
-bool IsLog(const RobotDescription& robot, size_t index) {
-  return robot.parameters[index].coordinate == ParameterDescription::Coordinate::kLog;
-}
-
-bool AllLog(const RobotDescription& robot, const Eigen::VectorXd& power) {
-  for (Eigen::Index i = 0; i < power.size(); ++i) {
-    if (power(i) != 0 && !IsLog(robot, static_cast<size_t>(i))) return false;
-  }
-  return true;
-}
-
-std::string Name(const RobotDescription& robot, const Eigen::VectorXd& power) {
-  std::string above, below;
-  for (Eigen::Index i = 0; i < power.size(); ++i) {
-    if (power(i) == 0) continue;
-    const std::string name = ShortName(robot, static_cast<size_t>(i));
-    if (!AllLog(robot, power)) {
-      above += fmt::format("{}{:.3g} {}", above.empty() ? "" : " + ", power(i), name);
-      continue;
-    }
-    std::string& side = power(i) > 0 ? above : below;
-    side += (side.empty() ? "" : " ") + name;
-    if (std::abs(power(i)) != 1) side += fmt::format("^{:.3g}", std::abs(power(i)));
-  }
-  if (below.empty()) return above;
-  return (above.empty() ? "1" : above) + " / " + below;
-}
+using Vectors = std::vector<Eigen::VectorXd>;
 
 // Every vector of small integer powers with its first entry positive, fewest and smallest powers first.
 std::vector<Eigen::VectorXd> SmallPowers(Eigen::Index n) {
@@ -70,72 +42,185 @@ std::vector<Eigen::VectorXd> SmallPowers(Eigen::Index n) {
   return powers;
 }
 
-// Linearly independent combinations that span the complement of the null directions, in the simplest form:
-// integer powers where there are some, the eigenvectors themselves otherwise.
-std::vector<Eigen::VectorXd> SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& determined,
-                                          const Eigen::MatrixXd& covariance) {
-  const Eigen::Index n = determined.rows(), rank = determined.cols();
-  std::vector<Eigen::VectorXd> chosen;
-  if (rank == n) {
-    for (Eigen::Index i = 0; i < n; ++i) chosen.push_back(Eigen::VectorXd::Unit(n, i));
-    return chosen;
-  }
-  std::vector<Eigen::VectorXd> candidates;
-  if (n <= 6) {
-    for (Eigen::VectorXd& power : SmallPowers(n)) {
-      if ((null.transpose() * power).norm() < 1e-3 * power.norm()) candidates.push_back(std::move(power));
-    }
-  }
-  std::stable_sort(candidates.begin(), candidates.end(), [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+// Fewest and smallest powers first.
+void SortBySimplicity(const Eigen::MatrixXd& covariance, Vectors* powers) {
+  std::stable_sort(powers->begin(), powers->end(), [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
     const auto key = [&](const Eigen::VectorXd& p) {
       return std::make_tuple((p.array() != 0).count(), p.cwiseAbs().sum(), p.dot(covariance * p));
     };
     return key(a) < key(b);
   });
-  Eigen::MatrixXd basis(n, 0);
-  for (const Eigen::VectorXd& candidate : candidates) {
-    Eigen::MatrixXd extended(n, basis.cols() + 1);
-    extended << basis, candidate;
-    if (extended.fullPivHouseholderQr().rank() == extended.cols()) {
-      basis = extended;
-      chosen.push_back(candidate);
-    }
-    if (basis.cols() == rank) return chosen;
-  }
-  chosen.clear();
-  for (Eigen::Index i = 0; i < rank; ++i) chosen.push_back(determined.col(i));
-  return chosen;
 }
 
-std::string Words(const RobotDescription& robot, const Identifiability& found) {
-  if (found.null.empty()) return "every parameter is determined by this motion";
-  std::string words = found.combinations.empty() ? "nothing" : "only ";
-  std::string names;
-  for (size_t i = 0; i < found.combinations.size(); ++i) {
-    words += (i == 0 ? "" : " and ") + found.combinations[i].name;
-  }
-  words += " can be known from this motion; ";
-  for (size_t i = 0; i < robot.parameters.size(); ++i) {
-    const bool involved = std::any_of(found.null.begin(), found.null.end(), [&](const Eigen::VectorXd& direction) {
-      return std::abs(direction(static_cast<Eigen::Index>(i))) > 1e-3;
-    });
-    if (involved) names += (names.empty() ? "" : ", ") + ShortName(robot, i);
-  }
-  words += names + " are not identifiable separately:";
-  for (const Eigen::VectorXd& direction : found.null) {
-    std::string moves;
-    for (Eigen::Index i = 0; i < direction.size(); ++i) {
-      if (std::abs(direction(i)) <= 1e-3) continue;
-      const auto index = static_cast<size_t>(i);
-      moves += fmt::format("{}{} {:+.3g}{}", moves.empty() ? "" : ", ", ShortName(robot, index), direction(i),
-                           IsLog(robot, index) ? " %" : "");
+// Parameters that null directions couple, in groups. Those that none involves are none's.
+std::vector<std::vector<Eigen::Index>> CoupledGroups(const Vectors& null, Eigen::Index n) {
+  std::vector<Eigen::Index> group(static_cast<size_t>(n));
+  std::iota(group.begin(), group.end(), 0);
+  std::vector<bool> involved(static_cast<size_t>(n), false);
+  for (const Eigen::VectorXd& direction : null) {
+    Eigen::Index first = -1;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (direction(i) == 0) continue;
+      involved[static_cast<size_t>(i)] = true;
+      if (first < 0) first = group[static_cast<size_t>(i)];
+      std::replace(group.begin(), group.end(), Eigen::Index{group[static_cast<size_t>(i)]}, first);
     }
-    words += " (" + moves + ") changes nothing";
   }
-  return words;
+  std::vector<std::vector<Eigen::Index>> groups(static_cast<size_t>(n));
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (involved[static_cast<size_t>(i)]) groups[static_cast<size_t>(group[static_cast<size_t>(i)])].push_back(i);
+  }
+  std::erase_if(groups, [](const auto& members) { return members.empty(); });
+  return groups;
+}
+
+// Combinations of a group's parameters that no null direction changes: a basis of all of them, of the simplest form.
+Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior_sd) {
+  const Eigen::Index n = null.rows(), rank = n - null.cols();
+  if (rank == 0) return {};
+  const auto unchanged = [&](const Eigen::VectorXd& power) {
+    return (null.transpose() * power).norm() < 1e-3 * power.norm();
+  };
+  Vectors chosen;
+  if (n <= kMostTried) {
+    Vectors candidates = SmallPowers(n);
+    std::erase_if(candidates, [&](const Eigen::VectorXd& power) { return !unchanged(power); });
+    SortBySimplicity(covariance, &candidates);
+    Eigen::MatrixXd basis(n, 0);
+    for (const Eigen::VectorXd& candidate : candidates) {
+      Eigen::MatrixXd extended(n, basis.cols() + 1);
+      extended << basis, candidate;
+      if (extended.fullPivHouseholderQr().rank() < extended.cols()) continue;
+      basis = extended;
+      chosen.push_back(candidate);
+      if (basis.cols() == rank) return chosen;
+    }
+  }
+  // Combinations are covariant: what counts as one is the inverse of a parameter's unit.
+  const Eigen::MatrixXd complement =
+      (Eigen::HouseholderQR<Eigen::MatrixXd>(null).householderQ() * Eigen::MatrixXd::Identity(n, n)).rightCols(rank);
+  return SparseBasis(complement, prior_sd.cwiseInverse(), unchanged);
+}
+
+// Of all parameters.
+Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior_sd) {
+  const Eigen::Index n = prior_sd.size();
+  Vectors powers;
+  std::vector<bool> involved(static_cast<size_t>(n), false);
+  for (const auto& members : CoupledGroups(null, n)) {
+    const auto size = static_cast<Eigen::Index>(members.size());
+    for (const Eigen::Index member : members) involved[static_cast<size_t>(member)] = true;
+    Eigen::MatrixXd own(size, 0);
+    for (const Eigen::VectorXd& direction : null) {
+      if (direction(members).isZero(0)) continue;
+      own.conservativeResize(Eigen::NoChange, own.cols() + 1);
+      own.col(own.cols() - 1) = direction(members).normalized();
+    }
+    for (const Eigen::VectorXd& power : SimplePowers(own, covariance(members, members), prior_sd(members))) {
+      powers.push_back(Eigen::VectorXd::Zero(n));
+      powers.back()(members) = power;
+    }
+  }
+  if (null.empty()) {
+    for (Eigen::Index i = 0; i < n; ++i) powers.push_back(Eigen::VectorXd::Unit(n, i));
+    return powers;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!involved[static_cast<size_t>(i)]) powers.push_back(Eigen::VectorXd::Unit(n, i));
+  }
+  SortBySimplicity(covariance, &powers);
+  return powers;
+}
+
+Combination Describe(const RobotDescription& robot, const Eigen::VectorXd& power, const Eigen::VectorXd& prior_sd,
+                     const Gaussian& distribution) {
+  Combination c{CombinationName(robot, power), power, power.dot(distribution.mean),
+                std::sqrt(power.dot(distribution.covariance * power))};
+  if (AllLog(robot, power)) {
+    c.mean = std::exp(c.mean);
+    c.sd *= c.mean;
+  } else if ((power.array() != 0).count() == 1 && power.sum() == 1) {  // a parameter on its own: in its own units
+    Eigen::Index index;
+    power.maxCoeff(&index);
+    const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(index)];
+    const double coordinate = c.mean, small = 1e-4 * prior_sd(index);
+    c.mean = parameter.ToPhysical(coordinate);
+    c.sd *= (parameter.ToPhysical(coordinate + small) - parameter.ToPhysical(coordinate - small)) / (2 * small);
+  }
+  return c;
+}
+
+// Directions between null and determined. Parameters of which the data would say little even if all others were known
+// come on their own; what else is weak in what is left.
+std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information, const Eigen::VectorXd& prior_sd,
+                                    const Eigen::MatrixXd& scaled_weak, const Vectors& null) {
+  const Eigen::Index n = prior_sd.size();
+  std::vector<WeakDirection> weak;
+  const Eigen::MatrixXd precision = information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
+  const Eigen::MatrixXd covariance = precision.inverse();
+  Eigen::MatrixXd told(n, 0);  // scaled, orthonormal
+  for (Eigen::Index i = 0; i < n && static_cast<Eigen::Index>(weak.size()) < scaled_weak.cols(); ++i) {
+    const bool involved = std::any_of(null.begin(), null.end(), [&](const auto& direction) { return direction(i) != 0; });
+    if (involved || information(i, i) * prior_sd(i) * prior_sd(i) >= kWeakInformation) continue;
+    weak.push_back({Eigen::VectorXd::Unit(n, i), std::sqrt(covariance(i, i)) / prior_sd(i)});
+    told.conservativeResize(Eigen::NoChange, told.cols() + 1);
+    told.col(told.cols() - 1) = Eigen::VectorXd::Unit(n, i);
+  }
+  const Eigen::Index rest = scaled_weak.cols() - told.cols();
+  if (rest == 0) return weak;
+  const Eigen::MatrixXd left = scaled_weak - told * (told.transpose() * scaled_weak);
+  const Eigen::MatrixXd directions = Eigen::JacobiSVD<Eigen::MatrixXd>(left, Eigen::ComputeThinU).matrixU().leftCols(rest);
+  for (const auto scaled : directions.colwise()) {
+    const double along = scaled.dot(prior_sd.asDiagonal() * information * prior_sd.asDiagonal() * scaled);
+    Eigen::VectorXd direction = (scaled.array().abs() < kWeakEntry * scaled.cwiseAbs().maxCoeff()).select(0, scaled);
+    direction = direction.cwiseProduct(prior_sd);
+    Eigen::Index largest;
+    direction.cwiseAbs().maxCoeff(&largest);
+    weak.push_back({direction / direction(largest), 1 / std::sqrt(1 + along)});
+  }
+  return weak;
 }
 
 }  // namespace
+
+Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::MatrixXd& information,
+                                    const Eigen::VectorXd& prior_sd, const Gaussian& distribution) {
+  const Eigen::Index n = distribution.mean.size();
+  Identifiability found;
+  found.information = information;
+  found.cramer_rao = Eigen::VectorXd::Constant(n, kInfinity);
+  if (!information.allFinite()) {
+    found.information.setConstant(std::numeric_limits<double>::quiet_NaN());
+    found.words = "the simulation fails at the mean parameters, so nothing is known of what can be known";
+    return found;
+  }
+  // In units of the prior. Directions are contravariant, combinations covariant: they scale inversely.
+  const Eigen::MatrixXd scaled = prior_sd.asDiagonal() * information * prior_sd.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const Eigen::ArrayXd along = eigen.eigenvalues();
+  const double threshold = std::min(kNull * along(n - 1), kNullInformation);
+  const Eigen::Index nulls = (along <= threshold).count();
+  const Eigen::Index weak = std::max<Eigen::Index>(0, (along < kWeakInformation).count() - nulls);
+  found.null = SparseBasis(prior_sd.asDiagonal() * eigen.eigenvectors().leftCols(nulls), prior_sd,
+                           [&](const Eigen::VectorXd& direction) {
+                             const Eigen::VectorXd unit = direction.cwiseQuotient(prior_sd).normalized();
+                             return unit.dot(scaled * unit) <= 3 * threshold;
+                           });
+  const Eigen::MatrixXd determined = prior_sd.asDiagonal() * eigen.eigenvectors().rightCols(n - nulls);
+  const Eigen::MatrixXd bound =
+      determined * along.tail(n - nulls).inverse().matrix().asDiagonal() * determined.transpose();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const bool involved = std::any_of(found.null.begin(), found.null.end(), [&](const auto& d) { return d(i) != 0; });
+    if (!involved) found.cramer_rao(i) = std::sqrt(bound(i, i));
+  }
+  const Eigen::MatrixXd precision = information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
+  for (const Eigen::VectorXd& power : AllPowers(found.null, precision.inverse(), prior_sd)) {
+    found.combinations.push_back(Describe(robot, power, prior_sd, distribution));
+  }
+  found.weak = FindWeak(information, prior_sd, eigen.eigenvectors().middleCols(nulls, weak), found.null);
+  found.words = IdentifiabilityWords(robot, distribution.mean, found);
+  return found;
+}
 
 Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& discrepancy,
                                     std::span<const Rollout> rollouts, const Gaussian& distribution) {
@@ -144,7 +229,6 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
   for (Eigen::Index i = 0; i < n; ++i) {
     prior_sd(i) = std::sqrt(robot.parameters[static_cast<size_t>(i)].coordinate_variance());
   }
-  Identifiability found;
   // The middle and both ends of each difference, all in one batch. Where one end is no simulator, as beyond friction 0,
   // the other one has to do.
   const Eigen::VectorXd h = 1e-4 * prior_sd;
@@ -166,51 +250,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
       jacobian.col(i) = (middle - below) / h(i);
     }
   }
-  if (!jacobian.allFinite()) {
-    found.information = Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::quiet_NaN());
-    found.words = "the simulation fails at the mean parameters, so nothing is known of what can be known";
-    return found;
-  }
   return FindIdentifiability(robot, jacobian.transpose() * jacobian, prior_sd, distribution);
-}
-
-Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::MatrixXd& information,
-                                    const Eigen::VectorXd& prior_sd, const Gaussian& distribution) {
-  const Eigen::Index n = distribution.mean.size();
-  Identifiability found;
-  found.information = information;
-  const Eigen::MatrixXd scaled = prior_sd.asDiagonal() * found.information * prior_sd.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  const double threshold = kNull * eigen.eigenvalues()(n - 1);
-  const Eigen::Index nulls = (eigen.eigenvalues().array() <= threshold).count();
-  // Null directions are contravariant, combinations covariant: they scale inversely.
-  const Eigen::MatrixXd null = prior_sd.asDiagonal() * eigen.eigenvectors().leftCols(nulls);
-  const Eigen::MatrixXd determined = prior_sd.cwiseInverse().asDiagonal() * eigen.eigenvectors().rightCols(n - nulls);
-  for (Eigen::Index i = 0; i < nulls; ++i) {
-    Eigen::Index first = 0;
-    while (std::abs(null(first, i)) < 1e-3 * null.col(i).cwiseAbs().maxCoeff()) ++first;
-    found.null.push_back(null.col(i) / null(first, i));
-  }
-  const Eigen::MatrixXd precision =
-      found.information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
-  for (const Eigen::VectorXd& power : SimplePowers(null.colwise().normalized(), determined, precision.inverse())) {
-    Combination c{Name(robot, power), power, power.dot(distribution.mean),
-                  std::sqrt(power.dot(distribution.covariance * power))};
-    if (AllLog(robot, power)) {
-      c.mean = std::exp(c.mean);
-      c.sd *= c.mean;
-    } else if ((power.array() != 0).count() == 1 && power.sum() == 1) {  // a parameter on its own: in its own units
-      Eigen::Index index;
-      power.maxCoeff(&index);
-      const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(index)];
-      const double coordinate = c.mean, small = 1e-4 * prior_sd(index);
-      c.mean = parameter.ToPhysical(coordinate);
-      c.sd *= (parameter.ToPhysical(coordinate + small) - parameter.ToPhysical(coordinate - small)) / (2 * small);
-    }
-    found.combinations.push_back(std::move(c));
-  }
-  found.words = Words(robot, found);
-  return found;
 }
 
 }  // namespace plumb

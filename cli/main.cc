@@ -6,6 +6,7 @@
 
 #include "cli/calibrate.h"
 #include "cli/doctor.h"
+#include "cli/excite.h"
 #include "cli/launch.h"
 #include "cli/sim.h"
 #include "common/process.h"
@@ -62,8 +63,9 @@ int main(int argc, char** argv) {
   plumb::CalibrateFlags calibrate_flags;
   std::string command = "plumb";
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
+  plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
+  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -117,17 +119,28 @@ int main(int argc, char** argv) {
         calibrate->add_option("--sbc", calibrate_flags.sbc, "instead: that many runs of simulation-based calibration on motions like these")
             ->check(CLI::Range(0, 1000000))->capture_default_str();
         calibrate->add_flag("--strict", calibrate_flags.strict, "exit status 3 if what was found should not be trusted");
+        excite = app.add_subcommand("excite", "find the efforts that would tell most of the robot's parameters");
+        excite->add_option("robot", excite_flags.robot, "robot folder or TOML file")->required();
+        excite->add_option("--seed", excite_flags.seed, "of all random numbers, and of where the robot begins")
+            ->check(seed)->capture_default_str();
+        excite->add_option("--output", excite_flags.output, "write the best efforts to this table")->capture_default_str();
+        excite->add_option("--candidates", excite_flags.candidates, "how many are tried")
+            ->check(CLI::Range(1, 10000))->capture_default_str();
+        excite->add_option("--seconds", excite_flags.seconds, "of each")
+            ->check(CLI::Range(0.01, 600.0))->capture_default_str();
+        excite->add_option("--png", excite_flags.png, "draw the best one as a strip of snapshots");
         doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* sub : {launch, sim, calibrate, doctor, arm, disarm, estop}) sub->fallthrough();
+        for (CLI::App* sub : {launch, sim, calibrate, excite, doctor, arm, disarm, estop}) sub->fallthrough();
       },
       [&](plumb::Process& process) {
         if (launch->parsed()) return plumb::Launch(process, flags);
         if (sim->parsed()) return plumb::Simulate(process, sim_flags);
         if (calibrate->parsed()) return plumb::CalibrateLogs(process, calibrate_flags, command);
+        if (excite->parsed()) return plumb::Excite(process, excite_flags);
         if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus);
         if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM);
         if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM);

@@ -1,0 +1,112 @@
+// `plumb excite`, run as a person would.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <string>
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int status;
+  std::string text;  ///< both streams
+};
+
+class Folder {
+ public:
+  Folder() : path_(fs::temp_directory_path() / ("plumbline_excite_test_" + std::to_string(getpid()))) {
+    fs::create_directories(path_);
+  }
+  ~Folder() { fs::remove_all(path_); }
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  fs::path path_;
+};
+
+Outcome Excite(const std::string& robot, const std::string& arguments) {
+  const std::string command = std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb excite " +
+                              std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + robot + " " + arguments + " 2>&1";
+  FILE* pipe = popen(command.c_str(), "r");
+  REQUIRE(pipe);
+  std::string text;
+  std::array<char, 4096> buffer;
+  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
+  const int status = pclose(pipe);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text};
+}
+
+std::string Read(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+}  // namespace
+
+TEST_CASE("excite: a table of efforts within the limits, one row per control step, the same for the same seed") {
+  const Folder folder;
+  const std::string few = " --candidates 11 --seconds 3 --output ";
+  const Outcome outcome = Excite("pendulum", "--seed 3" + few + folder / "a.csv" + " --png " + folder / "a.png");
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  for (const char* word : {"gain [nat]", "prior sd", "expected sd", "margin", "helps with", "gravity", "it begins at"}) {
+    CHECK_THAT(outcome.text, Catch::Contains(word));
+  }
+  std::istringstream csv(Read(folder / "a.csv"));
+  std::string line;
+  std::getline(csv, line);
+  CHECK(line == "t,u/pivot");
+  int rows = 0;
+  double largest = 0;
+  for (; std::getline(csv, line); ++rows) {
+    double t, u;
+    REQUIRE(std::sscanf(line.c_str(), "%lf,%lf", &t, &u) == 2);
+    CHECK(t == Approx(0.05 * rows));
+    largest = std::max(largest, std::abs(u));
+  }
+  CHECK(rows == 60);
+  CHECK(largest <= 2);  // Nm
+  CHECK(largest > 0.1);
+  CHECK(Read(folder / "a.png").rfind("\x89PNG", 0) == 0);
+  CHECK(Excite("pendulum", "--seed 3" + few + folder / "b.csv").status == 0);
+  CHECK(Read(folder / "a.csv") == Read(folder / "b.csv"));
+  CHECK(Excite("pendulum", "--seed 4" + few + folder / "b.csv").status == 0);
+  CHECK(Read(folder / "a.csv") != Read(folder / "b.csv"));
+}
+
+TEST_CASE("excite: of the falling hopper only what comes before the fall, in gym's units") {
+  const Folder folder;
+  const Outcome outcome = Excite("hopper", "--candidates 6 --seconds 4 --output " + folder / "a.csv");
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  const std::string csv = Read(folder / "a.csv");
+  CHECK(csv.rfind("t,u/thigh,u/leg,u/foot\n", 0) == 0);
+  CHECK(std::count(csv.begin(), csv.end(), '\n') < 250);  // of 500
+}
+
+TEST_CASE("excite: what cannot be done is said before anything is computed") {
+  const Folder folder;
+  CHECK(Excite("pendulum", "--candidates 0").status != 0);
+  CHECK(Excite("pendulum", "--seconds 0").status != 0);
+  CHECK(Excite("nowhere", "").status != 0);
+  const Outcome nowhere = Excite("pendulum", "--candidates 2 --output /nonexistent/a.csv");
+  CHECK(nowhere.status != 0);
+  CHECK_THAT(nowhere.text, Catch::Contains("/nonexistent/a.csv"));
+  const Outcome same = Excite("pendulum", "--candidates 2 --output " + folder / "a" + " --png " + folder / "a");
+  CHECK(same.status != 0);
+  CHECK_THAT(same.text, Catch::Contains("a file each"));
+}
+
+}  // namespace plumb
