@@ -11,6 +11,8 @@
 #include <functional>
 #include <iostream>
 
+#include "calibrator/inference/abc_rejection.h"
+#include "calibrator/inference/abc_smc.h"
 #include "calibrator/inference/conditional_mixture.h"
 
 namespace plumb {
@@ -124,13 +126,19 @@ Posterior Infer(const std::string& method, const Problem& problem, int64_t simul
     ConditionalMixtureOptions options;
     options.simulations = simulations;
     options.samples = samples;
-    ConditionalMixtureDiagnostics d;
-    const Posterior r = InferConditionalMixture(problem, options, seed, &d);
-    for (auto& x : d.rounds) std::cerr << x.simulations << ' ' << x.inside << ' ' << x.effective << ' ' << x.components << '\n';
-    std::cerr << "scores";
-    for (double x : d.held_out) std::cerr << ' ' << x;
-    std::cerr << '\n';
-    return r;
+    return InferConditionalMixture(problem, options, seed);
+  }
+  if (method == "abc-smc") {
+    SmcOptions options;
+    options.simulations = simulations;
+    options.samples = samples;
+    return InferBySmc(problem, options, seed);
+  }
+  if (method == "rejection") {
+    RejectionOptions options;
+    options.simulations = simulations;
+    options.samples = samples;
+    return InferByRejection(problem, options, seed);
   }
   throw std::invalid_argument("no method \"" + method + "\"; there are mixture, abc-smc and rejection");
 }
