@@ -25,7 +25,8 @@ Posterior InferByRejection(const Problem& problem, const RejectionOptions& optio
                            RejectionDiagnostics* diagnostics) {
   if (options.simulations < 1 || options.batch < 1 || options.samples < 1 ||
       !(options.fraction > 0 && options.fraction <= 1) || problem.observed.array().isNaN().all()) {
-    throw std::invalid_argument("rejection needs simulations, samples, a fraction in (0, 1] and an observation");
+    throw std::invalid_argument(
+        "rejection needs simulations, samples, a fraction in (0, 1] and an observation");
   }
   Posterior posterior;
   const Index n = problem.prior.size(), total = options.simulations;
@@ -34,7 +35,8 @@ Posterior InferByRejection(const Problem& problem, const RejectionOptions& optio
   MatrixXd outcomes(problem.observed.size(), total);
   for (Index first = 0; first < total; first += options.batch) {
     const Index count = std::min<Index>(options.batch, total - first);
-    outcomes.middleCols(first, count) = problem.simulate(problem.prior.FromStandard(u.middleCols(first, count)), first);
+    outcomes.middleCols(first, count) =
+        problem.simulate(problem.prior.FromStandard(u.middleCols(first, count)), first);
   }
   const VectorXd distances =
       Distances(options.distance, outcomes, problem.observed, RobustScale(outcomes, problem.observed));
@@ -52,7 +54,8 @@ Posterior InferByRejection(const Problem& problem, const RejectionOptions& optio
   } else {
     AdjustedSamples kept{u(Eigen::all, order), equal};
     if (options.adjust) {
-      kept = AdjustByRegression(kept.samples, outcomes(Eigen::all, order), problem.observed, distances(order), equal);
+      kept = AdjustByRegression(kept.samples, outcomes(Eigen::all, order), problem.observed, distances(order),
+                                equal);
     }
     const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMostKernels, random);
     posterior.samples = problem.prior.FromStandard(Sample(density, options.samples, random));

@@ -80,10 +80,12 @@ double Quantile(VectorXd values, double share) {
 
 }  // namespace
 
-Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t seed, SmcDiagnostics* diagnostics) {
+Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t seed,
+                     SmcDiagnostics* diagnostics) {
   if (options.simulations < 1 || options.population < 2 || options.samples < 1 ||
       !(options.quantile > 0 && options.quantile < 1) || problem.observed.array().isNaN().all()) {
-    throw std::invalid_argument("SMC needs simulations, a population, samples, a quantile in (0, 1), an observation");
+    throw std::invalid_argument(
+        "SMC needs simulations, a population, samples, a quantile in (0, 1), an observation");
   }
   const Index n = problem.prior.size();
   const VectorXd& observed = problem.observed;
@@ -130,9 +132,11 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
     scale = RobustScale(generation.outcomes, observed);
     distances = Distances(options.distance, population.outcomes, observed, scale);
     const double next = Quantile(distances, options.quantile);
-    // A change of scale changes the unit of epsilon, too: compared is the quantile with the largest distance now.
+    // A change of scale changes the unit of epsilon, too: compared is the quantile with the largest distance
+    // now.
     const double acceptance = static_cast<double>(accepted) / static_cast<double>(generation.u.cols());
-    if (acceptance < options.min_acceptance || !(next < (1 - options.min_change) * distances.maxCoeff())) break;
+    if (acceptance < options.min_acceptance || !(next < (1 - options.min_change) * distances.maxCoeff()))
+      break;
     epsilon = next;
     kernels = Kernels(population, options.local_kernels);
   }

@@ -47,7 +47,8 @@ double MedianDistance(const MatrixXd& x) {
   for (Index i = 0; i < x.cols(); i += stride) {
     for (Index j = 0; j < i; j += stride) distances.push_back((x.col(i) - x.col(j)).norm());
   }
-  const double median = Median(Eigen::Map<const VectorXd>(distances.data(), static_cast<Index>(distances.size())));
+  const double median =
+      Median(Eigen::Map<const VectorXd>(distances.data(), static_cast<Index>(distances.size())));
   return median > 0 ? median : 1;
 }
 
@@ -128,18 +129,23 @@ SetDistance MakeDistance(const std::string& name, const MatrixXd& recorded, uint
   }
   if (name == "mmd") {
     const double scale = MedianDistance(y);
-    return [=](const MatrixXd& x) { return comparable(x) ? MaximumMeanDiscrepancy(whiten(x), y, scale) : kInfinity; };
+    return [=](const MatrixXd& x) {
+      return comparable(x) ? MaximumMeanDiscrepancy(whiten(x), y, scale) : kInfinity;
+    };
   }
   if (name == "sliced-wasserstein") {
     constexpr Index kDirections = 64;
     Random random(seed);
     const MatrixXd directions = StandardNormals(recorded.rows(), kDirections, random).colwise().normalized();
-    return [=](const MatrixXd& x) { return comparable(x) ? SlicedWasserstein(whiten(x), y, directions) : kInfinity; };
+    return [=](const MatrixXd& x) {
+      return comparable(x) ? SlicedWasserstein(whiten(x), y, directions) : kInfinity;
+    };
   }
   throw std::invalid_argument("no distance \"" + name + "\"; there are energy, mmd and sliced-wasserstein");
 }
 
-VectorXd Distances(const std::string& name, const MatrixXd& outcomes, const VectorXd& observed, const VectorXd& scale) {
+VectorXd Distances(const std::string& name, const MatrixXd& outcomes, const VectorXd& observed,
+                   const VectorXd& scale) {
   if (name != "squared" && name != "absolute" && name != "mahalanobis") {
     throw std::invalid_argument("no distance \"" + name + "\"; there are squared, absolute and mahalanobis");
   }
@@ -180,7 +186,8 @@ VectorXd RobustScale(const MatrixXd& outcomes, const VectorXd& observed) {
       if (outcomes.col(j).allFinite()) finite.push_back(outcomes(i, j));
     }
     if (finite.empty()) continue;
-    offset(i) = std::abs(Median(Eigen::Map<const VectorXd>(finite.data(), static_cast<Index>(finite.size()))) - observed(i));
+    offset(i) = std::abs(
+        Median(Eigen::Map<const VectorXd>(finite.data(), static_cast<Index>(finite.size()))) - observed(i));
     far += offset(i) > 2 * deviation(i);
     ++compared;
   }

@@ -17,7 +17,8 @@ VectorXd SystematicCounts(const VectorXd& weights, int draws, Random& random) {
   double reached = 0, drawn = 0;
   for (Index i = 0; i < weights.size(); ++i) {
     reached += weights(i) * draws;
-    const double until = i + 1 == weights.size() ? draws : std::clamp(std::ceil(reached - offset), drawn, draws + 0.);
+    const double until =
+        i + 1 == weights.size() ? draws : std::clamp(std::ceil(reached - offset), drawn, draws + 0.);
     counts(i) = weights(i) > 0 ? until - drawn : 0;
     drawn += counts(i);
   }
@@ -32,8 +33,8 @@ double Bandwidth(double effective, Index n, BandwidthRule rule) {
   return rule == BandwidthRule::kScott ? scott : std::pow(4 / (d + 2), 1 / (d + 4)) * scott;
 }
 
-GaussianMixture KernelDensity(const MatrixXd& samples, const VectorXd& weights, int max_components, Random& random,
-                              BandwidthRule rule) {
+GaussianMixture KernelDensity(const MatrixXd& samples, const VectorXd& weights, int max_components,
+                              Random& random, BandwidthRule rule) {
   const double sum = weights.sum();
   if (samples.cols() == 0 || samples.cols() != weights.size() || !(weights.minCoeff() >= 0) || !(sum > 0) ||
       !std::isfinite(sum) || max_components < 1) {

@@ -30,8 +30,10 @@ Quadratic MeanDistances(const std::vector<MatrixXd>& predictions, const MatrixXd
 
 }  // namespace
 
-PopulationWeights FitPopulation(const std::vector<MatrixXd>& predictions, const MatrixXd& outcomes, double tolerance) {
-  if (predictions.empty() || static_cast<Index>(predictions.size()) != outcomes.cols() || !outcomes.allFinite()) {
+PopulationWeights FitPopulation(const std::vector<MatrixXd>& predictions, const MatrixXd& outcomes,
+                                double tolerance) {
+  if (predictions.empty() || static_cast<Index>(predictions.size()) != outcomes.cols() ||
+      !outcomes.allFinite()) {
     throw std::invalid_argument("a population needs a finite outcome for every transition, and one at least");
   }
   const Index count = predictions[0].cols();
@@ -39,7 +41,8 @@ PopulationWeights FitPopulation(const std::vector<MatrixXd>& predictions, const 
   for (Index n = 0; n < count; ++n) {
     bool finite = true;
     for (const MatrixXd& x : predictions) {
-      if (x.cols() != count || x.rows() != outcomes.rows()) throw std::invalid_argument("predictions differ in size");
+      if (x.cols() != count || x.rows() != outcomes.rows())
+        throw std::invalid_argument("predictions differ in size");
       finite = finite && x.col(n).allFinite();
     }
     if (finite) simulators.push_back(n);

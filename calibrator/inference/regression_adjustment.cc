@@ -26,7 +26,8 @@ VectorXd KernelWeights(const VectorXd& distances, const VectorXd& weights) {
   if (!(w.sum() > 0)) {
     for (Index i = 0; i < w.size(); ++i) w(i) = std::isfinite(distances(i)) ? weights(i) : 0;
   }
-  if (!(w.sum() > 0)) throw std::invalid_argument("no simulation is both weighted and a finite distance away");
+  if (!(w.sum() > 0))
+    throw std::invalid_argument("no simulation is both weighted and a finite distance away");
   return w / w.sum();
 }
 
@@ -40,8 +41,9 @@ MatrixXd Regress(const MatrixXd& design, const MatrixXd& targets, const VectorXd
 
 }  // namespace
 
-AdjustedSamples AdjustByRegression(const MatrixXd& parameters, const MatrixXd& outcomes, const VectorXd& observed,
-                                   const VectorXd& distances, const VectorXd& weights, bool heteroscedastic) {
+AdjustedSamples AdjustByRegression(const MatrixXd& parameters, const MatrixXd& outcomes,
+                                   const VectorXd& observed, const VectorXd& distances,
+                                   const VectorXd& weights, bool heteroscedastic) {
   const Index count = parameters.cols();
   if (outcomes.cols() != count || distances.size() != count || weights.size() != count ||
       outcomes.rows() != observed.size()) {
