@@ -1,7 +1,8 @@
-// Tasks of simulation-based inference whose posteriors are known exactly, as Lueckmann, Boelts, Greenberg, Goncalves
-// and Macke define them ("Benchmarking simulation-based inference", AISTATS 2021, appendix T; gaussian_mixture as
-// corrected in version 1.1 of their package). For ten observations drawn from the prior predictive distribution,
-// writes posterior samples of a method and of the reference. bench/c2st.py compares them.
+// Tasks of simulation-based inference whose posteriors are known exactly, as Lueckmann, Boelts, Greenberg,
+// Goncalves and Macke define them ("Benchmarking simulation-based inference", AISTATS 2021, appendix T;
+// gaussian_mixture as corrected in version 1.1 of their package). For ten observations drawn from the prior
+// predictive distribution, writes posterior samples of a method and of the reference. bench/c2st.py compares
+// them.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
@@ -11,6 +12,8 @@
 #include <functional>
 #include <iostream>
 
+#include "calibrator/inference/abc_rejection.h"
+#include "calibrator/inference/abc_smc.h"
 #include "calibrator/inference/conditional_mixture.h"
 
 namespace plumb {
@@ -23,9 +26,12 @@ struct Task {
   std::function<Eigen::VectorXd(const Eigen::VectorXd& observed, Random& random)> reference;
 };
 
-bool Possible(const Prior& prior, const Eigen::VectorXd& parameters) { return std::isfinite(prior.LogDensity(parameters)); }
+bool Possible(const Prior& prior, const Eigen::VectorXd& parameters) {
+  return std::isfinite(prior.LogDensity(parameters));
+}
 
-/// x = p + (-|a + b|, b - a) / sqrt 2, p on a crescent: radius N(0.1, 0.01) about (0.25, 0), angle U(-pi/2, pi/2).
+/// x = p + (-|a + b|, b - a) / sqrt 2, p on a crescent: radius N(0.1, 0.01) about (0.25, 0), angle U(-pi/2,
+/// pi/2).
 Task TwoMoons() {
   const Prior prior({Prior::Uniform(-1, 1), Prior::Uniform(-1, 1)});
   const auto crescent = [](Random& random) {
@@ -83,7 +89,8 @@ Task MakeTask(const std::string& name) {
   if (name == "two_moons") return TwoMoons();
   if (name == "gaussian_mixture") return TwoScales();
   if (name == "gaussian_linear") return GaussianLinear();
-  throw std::invalid_argument("no task \"" + name + "\"; there are two_moons, gaussian_mixture and gaussian_linear");
+  throw std::invalid_argument("no task \"" + name +
+                              "\"; there are two_moons, gaussian_mixture and gaussian_linear");
 }
 
 // Streams of random numbers, apart from those of the methods by their seed.
@@ -105,7 +112,8 @@ Problem MakeProblem(const Task& task, uint32_t observation) {
   return {task.prior, task.simulate(truth, random), simulate};
 }
 
-Eigen::MatrixXd Reference(const Task& task, const Eigen::VectorXd& observed, Eigen::Index count, uint32_t observation) {
+Eigen::MatrixXd Reference(const Task& task, const Eigen::VectorXd& observed, Eigen::Index count,
+                          uint32_t observation) {
   Random random(kReferenceSeed, {observation});
   Eigen::MatrixXd samples(task.prior.size(), count);
   for (auto column : samples.colwise()) column = task.reference(observed, random);
@@ -119,18 +127,25 @@ void Write(const std::filesystem::path& path, const Eigen::MatrixXd& samples) {
   if (!file) throw std::runtime_error("cannot write " + path.string());
 }
 
-Posterior Infer(const std::string& method, const Problem& problem, int64_t simulations, int samples, uint64_t seed) {
+Posterior Infer(const std::string& method, const Problem& problem, int64_t simulations, int samples,
+                uint64_t seed) {
   if (method == "mixture") {
     ConditionalMixtureOptions options;
     options.simulations = simulations;
     options.samples = samples;
-    ConditionalMixtureDiagnostics d;
-    const Posterior r = InferConditionalMixture(problem, options, seed, &d);
-    for (auto& x : d.rounds) std::cerr << x.simulations << ' ' << x.inside << ' ' << x.effective << ' ' << x.components << '\n';
-    std::cerr << "scores";
-    for (double x : d.held_out) std::cerr << ' ' << x;
-    std::cerr << '\n';
-    return r;
+    return InferConditionalMixture(problem, options, seed);
+  }
+  if (method == "abc-smc") {
+    SmcOptions options;
+    options.simulations = simulations;
+    options.samples = samples;
+    return InferBySmc(problem, options, seed);
+  }
+  if (method == "rejection") {
+    RejectionOptions options;
+    options.simulations = simulations;
+    options.samples = samples;
+    return InferByRejection(problem, options, seed);
   }
   throw std::invalid_argument("no method \"" + method + "\"; there are mixture, abc-smc and rejection");
 }
@@ -142,7 +157,9 @@ int main(int argc, char** argv) {
   std::string task_name = "two_moons", method = "mixture", directory = ".";
   int64_t simulations = 10'000;
   int samples = 10'000, observations = 10;
-  CLI::App app("Posterior samples of tasks whose posteriors are known, into <directory>/<observation>.{method,reference}");
+  CLI::App app(
+      "Posterior samples of tasks whose posteriors are known, into "
+      "<directory>/<observation>.{method,reference}");
   app.add_option("task", task_name, "two_moons, gaussian_mixture or gaussian_linear");
   app.add_option("method", method, "mixture, abc-smc or rejection");
   app.add_option("simulations", simulations, "budget");

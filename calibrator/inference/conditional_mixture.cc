@@ -49,11 +49,13 @@ MatrixXd RobustCovariance(MatrixXd outcomes) {
   }
   outcomes.colwise() -= outcomes.rowwise().mean().eval();
   MatrixXd covariance = outcomes * outcomes.transpose() / static_cast<double>(count);
-  covariance.diagonal().array() += 1e-9 * covariance.diagonal().maxCoeff() + std::numeric_limits<double>::min();
+  covariance.diagonal().array() +=
+      1e-9 * covariance.diagonal().maxCoeff() + std::numeric_limits<double>::min();
   return covariance;
 }
 
-// Gaussian kernel of the width that gives an effective number of `target`, or equal weights if that cannot be.
+// Gaussian kernel of the width that gives an effective number of `target`, or equal weights if that cannot
+// be.
 VectorXd KernelWeights(const VectorXd& squared, double target) {
   if (target >= static_cast<double>(squared.size())) return VectorXd::Ones(squared.size());
   const double nearest = squared.minCoeff();
@@ -75,14 +77,15 @@ std::vector<Index> Weighty(const VectorXd& weights) {
     if (weights(j) > kNegligible * weights.maxCoeff()) columns.push_back(j);
   }
   if (static_cast<Index>(columns.size()) > kMostFitted) {
-    std::stable_sort(columns.begin(), columns.end(), [&](Index a, Index b) { return weights(a) > weights(b); });
+    std::stable_sort(columns.begin(), columns.end(),
+                     [&](Index a, Index b) { return weights(a) > weights(b); });
     columns.resize(kMostFitted);
   }
   return columns;
 }
 
-// Linear pool, in equal parts, of the estimates that are hardly worse than the best: their errors differ, and the
-// scores cannot tell them apart.
+// Linear pool, in equal parts, of the estimates that are hardly worse than the best: their errors differ, and
+// the scores cannot tell them apart.
 GaussianMixture Pool(const std::vector<GaussianMixture>& estimates, const std::vector<double>& scores) {
   constexpr double kHardlyWorse = 0.06;  // nat
   const double best = *std::max_element(scores.begin(), scores.end());
@@ -93,7 +96,8 @@ GaussianMixture Pool(const std::vector<GaussianMixture>& estimates, const std::v
   for (size_t i = 0; i < estimates.size(); ++i) {
     if (!good(i)) continue;
     for (const double w : estimates[i].weights) pool.weights.push_back(w / count);
-    pool.components.insert(pool.components.end(), estimates[i].components.begin(), estimates[i].components.end());
+    pool.components.insert(pool.components.end(), estimates[i].components.begin(),
+                           estimates[i].components.end());
   }
   return pool;
 }
@@ -107,7 +111,8 @@ class Inference {
     }
     if (compared_.empty() || options.simulations < 1 || options.rounds < 1 || options.max_components < 1 ||
         options.samples < 1 || !(options.local_share > 0 && options.local_share <= 1)) {
-      throw std::invalid_argument("nothing was observed, or a budget, round, component or sample is less than one");
+      throw std::invalid_argument(
+          "nothing was observed, or a budget, round, component or sample is less than one");
     }
     m_ = static_cast<Index>(compared_.size());
     observed_ = problem.observed(compared_);
@@ -121,8 +126,10 @@ class Inference {
     const Index more = until - made_;
     if (region_) {
       const auto draws = region_->Sample(more, random);
-      if (!draws) region_.reset();  // too small to be found: back to the whole prior
-      else parameters_.middleCols(made_, more) = *draws;
+      if (!draws)
+        region_.reset();  // too small to be found: back to the whole prior
+      else
+        parameters_.middleCols(made_, more) = *draws;
     }
     if (!region_) parameters_.middleCols(made_, more) = StandardNormals(n_, more, random);
     const MatrixXd outcomes =
@@ -139,7 +146,8 @@ class Inference {
   Simulations Inside() const {
     std::vector<Index> columns;
     for (Index j = 0; j < made_; ++j) {
-      if (outcomes_.col(j).allFinite() && (!region_ || region_->Contains(parameters_.col(j)))) columns.push_back(j);
+      if (outcomes_.col(j).allFinite() && (!region_ || region_->Contains(parameters_.col(j))))
+        columns.push_back(j);
     }
     Simulations inside{MatrixXd(n_ + m_, static_cast<Index>(columns.size())), {}};
     inside.joint << parameters_(Eigen::all, columns), outcomes_(Eigen::all, columns);
@@ -167,8 +175,8 @@ class Inference {
     Random random(seed_, {kEstimate, static_cast<uint32_t>(round)});
     MixtureOptions rough;
     rough.tolerance = 1e-3;
-    const MixtureFit fit =
-        SelectMixture(inside.joint(Eigen::all, columns), weights(columns), options_.max_components, random, rough);
+    const MixtureFit fit = SelectMixture(inside.joint(Eigen::all, columns), weights(columns),
+                                         options_.max_components, random, rough);
     report.components = static_cast<int>(fit.mixture.components.size());
     std::vector<Index> parameters(static_cast<size_t>(n_));
     std::iota(parameters.begin(), parameters.end(), 0);
@@ -202,8 +210,8 @@ class Inference {
       const MixtureFit fit = SelectMixture(samples, w, options_.max_components, random, fine);
       double score = 0;
       for (int fold = 0; fold < kFolds; ++fold) {
-        score += HeldOutScore(samples, w, score_weights, static_cast<int>(fit.mixture.components.size()), fold, kFolds,
-                              random, fine);
+        score += HeldOutScore(samples, w, score_weights, static_cast<int>(fit.mixture.components.size()),
+                              fold, kFolds, random, fine);
       }
       diagnostics.held_out.push_back(score / judged.sum());
       estimates.push_back(Condition(fit.mixture, observed_));
@@ -216,7 +224,8 @@ class Inference {
     Posterior posterior;
     posterior.samples = problem_.prior.FromStandard(Sample(standard, options_.samples, random));
     const Index some = std::min<Index>(posterior.samples.cols(), 2'000);
-    posterior.mixture = SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), 16, random).mixture;
+    posterior.mixture =
+        SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), 16, random).mixture;
     posterior.simulations = made_;
     posterior.failures = failures_;
     return posterior;
@@ -224,8 +233,9 @@ class Inference {
 
  private:
   // Sum over the simulations of one fold of ln p(parameters | outcome) by a mixture fitted to the others.
-  double HeldOutScore(const MatrixXd& samples, const VectorXd& weights, const VectorXd& score_weights, int components,
-                      int fold, int folds, Random& random, const MixtureOptions& options) const {
+  double HeldOutScore(const MatrixXd& samples, const VectorXd& weights, const VectorXd& score_weights,
+                      int components, int fold, int folds, Random& random,
+                      const MixtureOptions& options) const {
     std::vector<Index> train, test;
     for (Index j = 0; j < samples.cols(); ++j) (j % folds == fold ? test : train).push_back(j);
     const MatrixXd left_out = samples(Eigen::all, test);
@@ -233,7 +243,8 @@ class Inference {
         FitMixture(samples(Eigen::all, train), weights(train), components, random, options).mixture;
     std::vector<Index> outcome(static_cast<size_t>(m_));
     std::iota(outcome.begin(), outcome.end(), n_);
-    const VectorXd logs = LogDensities(joint, left_out) - LogDensities(Marginal(joint, outcome), left_out.bottomRows(m_));
+    const VectorXd logs =
+        LogDensities(joint, left_out) - LogDensities(Marginal(joint, outcome), left_out.bottomRows(m_));
     return score_weights(test).dot(logs);
   }
 
@@ -252,8 +263,8 @@ class Inference {
 
 }  // namespace
 
-Posterior InferConditionalMixture(const Problem& problem, const ConditionalMixtureOptions& options, uint64_t seed,
-                                  ConditionalMixtureDiagnostics* diagnostics) {
+Posterior InferConditionalMixture(const Problem& problem, const ConditionalMixtureOptions& options,
+                                  uint64_t seed, ConditionalMixtureDiagnostics* diagnostics) {
   Inference inference(problem, options, seed);
   ConditionalMixtureDiagnostics unwanted;
   ConditionalMixtureDiagnostics& report = diagnostics ? *diagnostics : unwanted;

@@ -15,8 +15,8 @@ Eigen::VectorXd ComponentLogDensities(const Gaussian& p, const Eigen::MatrixXd& 
   const Eigen::LLT<Eigen::MatrixXd> factor(p.covariance);
   if (factor.info() != Eigen::Success) throw std::invalid_argument("covariance is not positive definite");
   const Eigen::Index n = p.mean.size();
-  const double log_normaliser = factor.matrixLLT().diagonal().array().log().sum() +
-                                0.5 * static_cast<double>(n) * std::log(2 * M_PI);
+  const double log_normaliser =
+      factor.matrixLLT().diagonal().array().log().sum() + 0.5 * static_cast<double>(n) * std::log(2 * M_PI);
   const Eigen::MatrixXd inverse_root = factor.matrixL().solve(Eigen::MatrixXd::Identity(n, n));
   const Eigen::MatrixXd whitened = inverse_root * (points.colwise() - p.mean);
   return -0.5 * whitened.colwise().squaredNorm().transpose().array() - log_normaliser;
@@ -50,7 +50,8 @@ Eigen::Index Draw(const Eigen::ArrayXd& weights, Random& random) {
 }
 
 // k-means++ and Lloyd's steps in coordinates scaled to unit variance; N x K memberships, 0 or 1.
-Eigen::MatrixXd Cluster(const Eigen::MatrixXd& scaled, const Eigen::VectorXd& weights, int clusters, Random& random) {
+Eigen::MatrixXd Cluster(const Eigen::MatrixXd& scaled, const Eigen::VectorXd& weights, int clusters,
+                        Random& random) {
   constexpr int kLloydSteps = 5;
   const Eigen::Index count = scaled.cols();
   Eigen::MatrixXd centres(scaled.rows(), clusters);
@@ -81,7 +82,8 @@ Eigen::MatrixXd Cluster(const Eigen::MatrixXd& scaled, const Eigen::VectorXd& we
 
 // The M step. Weights sum to 1; the smallest share a component may live on is `least`.
 GaussianMixture Maximise(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights,
-                         const Eigen::MatrixXd& responsibilities, const Eigen::VectorXd& floor, double least) {
+                         const Eigen::MatrixXd& responsibilities, const Eigen::VectorXd& floor,
+                         double least) {
   GaussianMixture mixture;
   double kept = 0;
   for (Eigen::Index k = 0; k < responsibilities.cols(); ++k) {
@@ -108,7 +110,9 @@ Eigen::VectorXd LogDensities(const GaussianMixture& mixture, const Eigen::Matrix
   return NormaliseRows(log_densities);
 }
 
-double LogDensity(const GaussianMixture& mixture, const Eigen::VectorXd& x) { return LogDensities(mixture, x)(0); }
+double LogDensity(const GaussianMixture& mixture, const Eigen::VectorXd& x) {
+  return LogDensities(mixture, x)(0);
+}
 
 Eigen::MatrixXd Sample(const GaussianMixture& mixture, Eigen::Index count, Random& random) {
   std::vector<Eigen::MatrixXd> roots;
@@ -165,12 +169,13 @@ GaussianMixture Condition(const GaussianMixture& joint, const Eigen::VectorXd& y
   return result;
 }
 
-MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, int components, Random& random,
-                      const MixtureOptions& options) {
+MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, int components,
+                      Random& random, const MixtureOptions& options) {
   const double sum = weights.sum();
   if (samples.cols() == 0 || samples.cols() != weights.size() || !(weights.minCoeff() >= 0) || !(sum > 0) ||
       !std::isfinite(sum) || !samples.allFinite() || components < 1) {
-    throw std::invalid_argument("a mixture is fitted to finite samples with weights >= 0 and has a component at least");
+    throw std::invalid_argument(
+        "a mixture is fitted to finite samples with weights >= 0 and has a component at least");
   }
   const Eigen::VectorXd w = weights / sum;
   const double effective = 1 / w.squaredNorm();
@@ -185,8 +190,8 @@ MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& wei
   const double least = (n + 1) / effective;
 
   const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * (samples.colwise() - mean);
-  Eigen::MatrixXd responsibilities = components == 1 ? Eigen::MatrixXd::Ones(samples.cols(), 1)
-                                                     : Cluster(scaled, w, components, random);
+  Eigen::MatrixXd responsibilities =
+      components == 1 ? Eigen::MatrixXd::Ones(samples.cols(), 1) : Cluster(scaled, w, components, random);
   MixtureFit fit;
   fit.mixture = Maximise(samples, w, responsibilities, floor, components == 1 ? 0 : least);
   if (fit.mixture.components.empty()) {  // too few samples for any cluster
@@ -215,7 +220,8 @@ MixtureFit SelectMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& 
   int failures = 0;
   for (int base = 2; base <= max_components && failures < 2; base *= 2) {
     for (const int components : {base, base + base / 2}) {
-      if ((components == base + base / 2 && base < 2) || components > max_components || failures == 2) continue;
+      if ((components == base + base / 2 && base < 2) || components > max_components || failures == 2)
+        continue;
       MixtureFit fit = FitMixture(samples, weights, components, random, options);
       failures = fit.bic < best.bic ? 0 : failures + 1;
       if (fit.bic < best.bic) best = std::move(fit);

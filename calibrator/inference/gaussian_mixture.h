@@ -8,7 +8,8 @@
 
 namespace plumb {
 
-/// ln p(x) of every column of `points`. @throws std::invalid_argument if a covariance is not positive definite.
+/// ln p(x) of every column of `points`. @throws std::invalid_argument if a covariance is not positive
+/// definite.
 Eigen::VectorXd LogDensities(const GaussianMixture& mixture, const Eigen::MatrixXd& points);
 double LogDensity(const GaussianMixture& mixture, const Eigen::VectorXd& x);
 
@@ -18,11 +19,11 @@ Eigen::MatrixXd Sample(const GaussianMixture& mixture, Eigen::Index count, Rando
 /// The distribution of the given coordinates alone, in the order given.
 GaussianMixture Marginal(const GaussianMixture& mixture, const std::vector<Eigen::Index>& coordinates);
 
-/// p(x | y) of a mixture over (x, y), y being the last y.size() coordinates (Bishop, "Pattern recognition and machine
-/// learning", 2006, eq. 2.81-2.82 for each component): weights w_k N(y; m_k, S_k), normalised, means
-/// m_x + S_xy S_yy^-1 (y - m_y), covariances S_xx - S_xy S_yy^-1 S_yx. Components of a weight below `negligible` of
-/// the largest are left out. Where y is so far away that every density underflows, the nearest component (by
-/// density) is what remains.
+/// p(x | y) of a mixture over (x, y), y being the last y.size() coordinates (Bishop, "Pattern recognition and
+/// machine learning", 2006, eq. 2.81-2.82 for each component): weights w_k N(y; m_k, S_k), normalised, means
+/// m_x + S_xy S_yy^-1 (y - m_y), covariances S_xx - S_xy S_yy^-1 S_yx. Components of a weight below
+/// `negligible` of the largest are left out. Where y is so far away that every density underflows, the
+/// nearest component (by density) is what remains.
 GaussianMixture Condition(const GaussianMixture& joint, const Eigen::VectorXd& y, double negligible = 1e-6);
 
 struct MixtureOptions {
@@ -37,20 +38,20 @@ struct MixtureOptions {
 struct MixtureFit {
   GaussianMixture mixture;
   std::vector<double> log_likelihood;  ///< mean of a sample [nat], at the start of every iteration
-  double bic;                          ///< Bayesian information criterion, Schwarz 1978: p ln N - 2 N ln L; lower is better
+  double bic;  ///< Bayesian information criterion, Schwarz 1978: p ln N - 2 N ln L; lower is better
 };
 
-/// Expectation maximisation (Dempster, Laird, Rubin 1977) of weighted samples with full covariances, begun by k-means++
-/// (Arthur & Vassilvitskii, SODA 2007) and a few steps of Lloyd's k-means. Components that lose their samples (fewer
-/// than n + 1 by effective number) are removed, so there may be fewer than asked for.
-/// @param samples n x N, finite; @param weights N, >= 0, of any positive sum. The effective number of samples,
-/// (sum w)^2 / sum w^2, is what BIC calls N.
+/// Expectation maximisation (Dempster, Laird, Rubin 1977) of weighted samples with full covariances, begun by
+/// k-means++ (Arthur & Vassilvitskii, SODA 2007) and a few steps of Lloyd's k-means. Components that lose
+/// their samples (fewer than n + 1 by effective number) are removed, so there may be fewer than asked for.
+/// @param samples n x N, finite; @param weights N, >= 0, of any positive sum. The effective number of
+/// samples, (sum w)^2 / sum w^2, is what BIC calls N.
 /// @throws std::invalid_argument for no samples, weights that are no weights, or fewer than one component.
-MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, int components, Random& random,
-                      const MixtureOptions& options = {});
+MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, int components,
+                      Random& random, const MixtureOptions& options = {});
 
-/// The number of components (1, 2, 3, 4, 6, 8, 12, 16, ... up to max_components) with the lowest BIC; the search
-/// ends once two numbers in a row were no better.
+/// The number of components (1, 2, 3, 4, 6, 8, 12, 16, ... up to max_components) with the lowest BIC; the
+/// search ends once two numbers in a row were no better.
 MixtureFit SelectMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, int max_components,
                          Random& random, const MixtureOptions& options = {});
 

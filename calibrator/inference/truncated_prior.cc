@@ -11,7 +11,8 @@ namespace plumb {
 
 TruncatedPrior::TruncatedPrior(const GaussianMixture& region, double outside) {
   if (region.components.empty() || !(outside > 0 && outside < 1)) {
-    throw std::invalid_argument("a truncated prior needs a region, and a share outside of it between 0 and 1");
+    throw std::invalid_argument(
+        "a truncated prior needs a region, and a share outside of it between 0 and 1");
   }
   const Eigen::Index n = region.components[0].mean.size();
   const boost::math::chi_squared squared_radius(static_cast<double>(n));
@@ -47,7 +48,8 @@ Eigen::VectorXd TruncatedPrior::Uniform(Random& random) const {
     Eigen::VectorXd in_ball = StandardNormals(n, 1, random);
     in_ball *= std::pow(random.Uniform(), 1 / static_cast<double>(n)) / in_ball.norm();
     const Eigen::VectorXd u = ellipsoids_[k].root * in_ball + ellipsoids_[k].centre;
-    // Where ellipsoids overlap, each would count its points. (At least 1: rounding can put u just outside of its own.)
+    // Where ellipsoids overlap, each would count its points. (At least 1: rounding can put u just outside of
+    // its own.)
     if (random.Uniform() * std::max(Multiplicity(u), 1) < 1) return u;
   }
 }
