@@ -9,8 +9,11 @@
 #include <stdexcept>
 
 #include "calibrator/discrepancy.h"
+#include "calibrator/inference/abc_rejection.h"
+#include "calibrator/inference/abc_smc.h"
 #include "calibrator/inference/importance.h"
 #include "calibrator/inference/reps_search.h"
+#include "calibrator/robot_problem.h"
 #include "common/config.h"
 
 namespace plumb {
@@ -20,6 +23,7 @@ constexpr Eigen::Index kSamples = 1000;  // of a posterior
 constexpr double kAxis = 2;              // [sd] at which the shape is checked
 constexpr double kFlattest = 0.5, kSteepest = 2;  // drop of the log posterior there, relative to a Gaussian's
 constexpr double kInformed = 0.9;        // of the prior's variance: above, an axis is the prior's own
+constexpr int64_t kFewestSimulators = 3000;  // of approximate Bayesian computation
 constexpr int kFewestUpdates = 40;       // of reps: so that the KL bound lets it get anywhere
 
 Random SampleStream(const MethodInput& input) { return Random(input.options.seed, {0x5a3b1e}); }
@@ -164,12 +168,17 @@ MethodResult FromSearch(const MethodInput& input, const RepsRun& run, const std:
   return result;
 }
 
+// Each so-manieth transition only, so that a search within the budget gets as many simulators as it needs.
+int EveryFor(const MethodInput& input, int64_t simulators) {
+  const auto transitions = static_cast<int64_t>(CountTransitions(input.rollouts));
+  const int64_t affordable = std::max<int64_t>(1, input.options.budget / simulators);
+  return static_cast<int>((transitions + affordable - 1) / affordable);
+}
+
 MethodResult Reps(const MethodInput& input) {
   RepsOptions options;
   options.seed = input.options.seed;
-  const auto transitions = static_cast<int64_t>(CountTransitions(input.rollouts));
-  const int64_t per_update = input.options.budget / (options.samples * kFewestUpdates);
-  const auto every = static_cast<int>(std::max<int64_t>(1, (transitions + per_update - 1) / std::max<int64_t>(1, per_update)));
+  const int every = EveryFor(input, options.samples * kFewestUpdates);
   WindowErrors errors(input.model, input.rollouts, 1, input.options.workforce, every);
   errors.Linearise(input.model->description().ToPhysical(PriorOf(input.model->description()).FromStandard(Eigen::VectorXd::Zero(errors.parameter_count()))));
   const LeastSquares problem = ProblemOf(input.model->description(), errors);
@@ -209,10 +218,65 @@ MethodResult Simopt(const MethodInput& input) {
   return result;
 }
 
+template <class Infer>
+MethodResult ByApproximation(const MethodInput& input, const std::string& name, const Infer& infer) {
+  const RobotDescription& robot = input.model->description();
+  CurriculumOptions options = OptionsOf(input);
+  options.horizons = {1};
+  MethodResult result = FromCurriculum(input, FitCurriculum(input.model, input.rollouts, options, input.start));
+  const int every = EveryFor(input, kFewestSimulators);
+  WindowErrors errors(input.model, input.rollouts, 1, input.options.workforce, every);
+  errors.set_noise_sd(result.noise_sd);
+  errors.Linearise(robot.ToPhysical(result.curriculum->fit.mode));
+  LaplaceOptions still;
+  still.most_iterations = 0;
+  const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), result.curriculum->fit.mode, still);
+  Problem problem = RobotProblem(robot, errors, view, input.options.discrepancy, input.options.seed);
+  const int64_t simulations = std::max<int64_t>(1, input.options.budget / errors.steps());
+  const Simulate simulate = problem.simulate;
+  problem.simulate = [&](const Eigen::MatrixXd& parameters, int64_t first) {
+    input.options.progress(name, std::min(1.0, static_cast<double>(first) / static_cast<double>(simulations)));
+    return simulate(parameters, first);
+  };
+  const Posterior posterior = infer(problem, simulations);
+  result.curriculum.reset();  // the first fit is not the answer
+  result.used = name;
+  result.posterior = posterior.mixture;
+  Random random = SampleStream(input);
+  result.samples = posterior.samples;
+  if (result.samples.cols() > kSamples) {
+    result.samples = Resample(posterior.samples, Eigen::VectorXd::Constant(posterior.samples.cols(), 1.0 / static_cast<double>(posterior.samples.cols())), kSamples, random);
+  }
+  result.simulated_steps += errors.simulated_steps();
+  result.failures += posterior.failures;
+  result.check = fmt::format("approximate Bayesian computation with {} simulators, discrepancy {}", posterior.simulations, input.options.discrepancy);
+  if (every > 1) result.warnings.push_back(fmt::format("{} looks at each {}th transition only, to try enough simulators within its budget", name, every));
+  return result;
+}
+
+MethodResult AbcRejection(const MethodInput& input) {
+  return ByApproximation(input, "abc-rejection", [&](const Problem& problem, int64_t simulations) {
+    RejectionOptions options;
+    options.simulations = simulations;
+    options.fraction = 0.05;
+    return InferByRejection(problem, options, input.options.seed);
+  });
+}
+
+MethodResult AbcSmc(const MethodInput& input) {
+  return ByApproximation(input, "abc-smc", [&](const Problem& problem, int64_t simulations) {
+    SmcOptions options;
+    options.simulations = simulations;
+    options.population = static_cast<int>(std::clamp<int64_t>(simulations / 10, 20, 500));
+    return InferBySmc(problem, options, input.options.seed);
+  });
+}
+
 using Method = MethodResult (*)(const MethodInput&);
 const std::vector<std::pair<std::string, Method>>& Methods() {
   static const std::vector<std::pair<std::string, Method>> methods{
-      {"auto", Auto}, {"laplace", Laplace}, {"mixture", Mixture}, {"reps", Reps}, {"simopt", Simopt}};
+      {"auto", Auto}, {"laplace", Laplace}, {"mixture", Mixture}, {"reps", Reps}, {"simopt", Simopt},
+      {"abc-rejection", AbcRejection}, {"abc-smc", AbcSmc}};
   return methods;
 }
 
