@@ -12,6 +12,7 @@
 #include "calibrator/holdout.h"
 #include "calibrator/methods.h"
 #include "calibrator/misspecification.h"
+#include "sim/tasks/task.h"
 
 namespace plumb {
 namespace {
@@ -93,6 +94,10 @@ class Run {
   // What the model has wrong, whatever its parameters.
   void Suspect(const LaplaceFit& view, bool noise_known) {
     const Eigen::VectorXd physical = robot_.ToPhysical(mean_);
+    if ((findings_.noise_sd.array() <= kNegligible * MakeTask(robot_)->state_scale().array()).all()) {
+      findings_.misspecification.words = "the model reproduces this log to five digits";
+      return;
+    }
     const std::vector<Candidate> candidates = FindCandidates(robot_);
     auto extended = std::make_shared<Model>(WithCandidates(robot_, candidates));
     WindowErrors errors(extended, rollouts_, 1, options_.workforce);

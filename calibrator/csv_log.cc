@@ -16,6 +16,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPeriodTolerance = 0.2;  // as TransitionJoiner's
 constexpr double kSamePeriod = 1e-6;      // decimal fractions in binary: the period itself was meant
 constexpr double kNearlyTheSame = 0.2;    // of the spread of s: no further from what the row before led to
+constexpr double kFarthestNoise = 7;      // [sd] of the noise that most rows show
 
 Eigen::VectorXd Start(const MotionRow& row) {
   return (Eigen::VectorXd(row.transition.q.size() + row.transition.v.size()) << row.transition.q,
@@ -46,22 +47,45 @@ bool Near(const MotionRow& row, const MotionRow& next, const Eigen::VectorXd& wi
   return compared;
 }
 
-// Links of rows that have an end of their own. That a state happens to be near what the row before led to
-// says nothing in a table of unconnected transitions: most of the rows must be like that.
+double Median(std::vector<double> values) {
+  if (values.empty()) return kNaN;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// How far from what the row before led to a state may be, coordinate by coordinate; empty if the rows of the table do not follow
+// each other: that a state happens to be near says nothing among unconnected transitions, so in most coordinates most of the rows
+// must be near. Then what keeps them apart is noise, and may be larger than the spread of a joint that hardly moves.
+Eigen::VectorXd Tolerance(const std::vector<MotionRow>& rows) {
+  const Eigen::VectorXd near = kNearlyTheSame * Spread(rows);
+  Eigen::VectorXd within = near;
+  int64_t connected = 0, compared = 0;
+  for (Eigen::Index c = 0; c < near.size(); ++c) {
+    std::vector<double> distances;
+    for (size_t i = 0; i + 1 < rows.size(); ++i) {
+      if (rows[i].ends || rows[i + 1].t < rows[i].t) continue;
+      const double distance = std::abs(End(rows[i])(c) - Start(rows[i + 1])(c));
+      if (std::isfinite(distance)) distances.push_back(distance);
+    }
+    const double median = Median(std::move(distances));
+    if (std::isnan(median)) continue;
+    ++compared;
+    connected += median <= near(c);
+    within(c) = std::max(near(c), kFarthestNoise * 1.4826 * median);  // of a normal distribution
+  }
+  if (2 * connected < compared) return {};
+  return within;
+}
+
+// Links of rows that have an end of their own.
 std::vector<Link> LinksByState(const std::vector<MotionRow>& rows) {
-  const Eigen::VectorXd within = kNearlyTheSame * Spread(rows),
-                        nothing = Eigen::VectorXd::Zero(within.size());
+  const Eigen::VectorXd within = Tolerance(rows);
   std::vector<Link> links(rows.size());
-  int64_t successive = 0, near = 0;
   for (size_t i = 0; i + 1 < rows.size(); ++i) {
     if (rows[i].ends || rows[i + 1].t < rows[i].t) continue;
-    ++successive;
-    const bool same = Near(rows[i], rows[i + 1], nothing);
-    links[i] = {same || Near(rows[i], rows[i + 1], within), same, rows[i + 1].t - rows[i].t};
-    near += links[i].linked;
-  }
-  if (2 * near < successive) {
-    for (Link& link : links) link.linked = link.shared;
+    const bool same = Near(rows[i], rows[i + 1], Eigen::VectorXd::Zero(Start(rows[i]).size()));
+    links[i] = {same || (within.size() > 0 && Near(rows[i], rows[i + 1], within)), same, rows[i + 1].t - rows[i].t};
   }
   return links;
 }

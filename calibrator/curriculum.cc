@@ -165,7 +165,7 @@ class Curriculum {
     }
     Account(errors);
     const Eigen::VectorXd noise = NoiseOf(errors, fit);
-    const double grown = (noise.array() / result_.noise_sd.array()).maxCoeff();
+    const double grown = (noise.array() / result_.noise_sd.array().max(kNegligible * errors.state_scale().array())).maxCoeff();
     if (!fit.converged || !(grown < kGrownNoise)) {
       result_.warnings.push_back(fmt::format("windows of {} steps are not used: {}", horizon,
           fit.converged ? fmt::format("their errors are {:.2g} times the noise of one step", grown) : "the fit does not converge"));

@@ -13,6 +13,9 @@
 
 namespace plumb {
 
+/// Of the units of the state (Task::state_scale): an error that nobody needs to explain.
+inline constexpr double kNegligible = 1e-5;
+
 /// The prior of a robot's parameters, in their coordinates.
 Prior PriorOf(const RobotDescription& robot);
 

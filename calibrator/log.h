@@ -39,8 +39,9 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot);
 /// nan, or nothing, stands for what was not observed: in s' it is not compared.
 ///
 /// An episode ends where a row says so, where t does not go on by one control period, within 20 %, or where s
-/// is not what the row before led to. That is s' itself; or, in a table most of whose rows follow each other
-/// like that, what is within 20 % of the spread that s has over the table, in every coordinate observed. A
+/// is not what the row before led to. That is s' itself; or, in a table whose rows follow each other in most
+/// coordinates like that, what is within 20 % of the spread that s has over the table, or within what noise
+/// makes of most rows, in every coordinate observed. A
 /// row that is followed like that, but at another time, is dropped as late. One that is not lasts a control
 /// period.
 ///

@@ -15,6 +15,7 @@
 #include "calibrator/inference/reps_search.h"
 #include "calibrator/robot_problem.h"
 #include "common/config.h"
+#include "sim/tasks/task.h"
 
 namespace plumb {
 namespace {
@@ -144,6 +145,10 @@ MethodResult Auto(const MethodInput& input) {
   MethodResult result = Laplace(input);
   const CurriculumFit& curriculum = *result.curriculum;
   if (!curriculum.others.empty()) return MixtureFrom(input, std::move(result));
+  if ((curriculum.noise_sd.array() <= kNegligible * MakeTask(input.model->description())->state_scale().array()).all()) {
+    result.check = "the log is explained to five digits: what is left is rounding, whose likelihood has no shape to check";
+    return result;
+  }
   WindowErrors errors = WindowsOf(input, curriculum, curriculum.horizon);
   const auto [flattest, steepest] = AxisDrops(ProblemOf(input.model->description(), errors), curriculum.fit);
   result.check = fmt::format("two standard deviations away, the log posterior drops {:.2f} to {:.2f} times as far as a Gaussian's",

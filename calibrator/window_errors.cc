@@ -34,7 +34,8 @@ WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const R
                            Workforce workforce, int every)
     : n_(model->num_velocities()), rollouts_(rollouts), simulate_(std::move(model), workforce.threads), batches_(workforce.batches) {
   if (simulate_.model().num_positions() != n_) throw std::invalid_argument("calibration does not know spherical joints yet");
-  noise_sd_ = kGuess * MakeTask(simulate_.model().description())->state_scale();
+  scale_ = MakeTask(simulate_.model().description())->state_scale();
+  noise_sd_ = kGuess * scale_;
   const auto longest = static_cast<size_t>(std::max(1, horizon));
   size_t count = 0;
   for (size_t r = 0; r < rollouts.size(); ++r) {
@@ -150,11 +151,10 @@ Eigen::MatrixXd WindowErrors::Raw(const Eigen::MatrixXd& physical) { return Pred
 bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
   if (starts_known()) return true;
   const Eigen::MatrixXd middle = Predict(physical, windows_);
-  const Eigen::VectorXd scale = noise_sd_ / kGuess;
   Eigen::MatrixXd sensitivity(middle.rows(), 2 * n_);
   for (Eigen::Index c = 0; c < 2 * n_; ++c) {
     std::vector<Window> moved = windows_;
-    const double h = kDifference * std::max(1.0, scale(c));
+    const double h = kDifference * std::max(1.0, scale_(c));
     for (Window& window : moved) (c < n_ ? window.q(c) : window.v(c - n_)) += h;
     sensitivity.col(c) = (Predict(physical, moved, static_cast<uint64_t>(c) + 1) - middle) / h;
   }

@@ -45,6 +45,8 @@ class WindowErrors {
 
   /// Noise of each entry of (q, v), physical units, where the record does not say.
   const Eigen::VectorXd& noise_sd() const { return noise_sd_; }
+  /// Units of (q, v): Task::state_scale.
+  const Eigen::VectorXd& state_scale() const { return scale_; }
   void set_noise_sd(const Eigen::VectorXd& sd);
   /// Whether the record says what the noise at the windows' ends is, and that their beginnings are exact.
   bool noise_known() const;
@@ -83,7 +85,7 @@ class WindowErrors {
   std::vector<Row> rows_;
   std::vector<Eigen::Index> first_row_;               // of each window, and the end
   std::vector<std::vector<Eigen::Index>> step_rows_;  // first of each step of each window, and the end
-  Eigen::VectorXd noise_sd_;
+  Eigen::VectorXd scale_, noise_sd_;
   int64_t steps_ = 0, simulated_steps_ = 0, failures_ = 0;
   Batches* batches_;
   uint64_t identity_ = 0;  // of the windows

@@ -66,7 +66,7 @@ void PrintFindings(const Findings& findings, const RobotDescription& robot) {
     const auto at = static_cast<Eigen::Index>(i);
     const auto number = [](double mean, double sd) {
       const int digits = std::clamp(static_cast<int>(1 - std::floor(std::log10(std::max(sd, 1e-12)))), 0, 12);
-      return fmt::format("{:.{}f} ± {:.{}f}", mean, digits, sd, digits);
+      return fmt::format("{:.{}f} ± {:.2g}", mean, digits, sd);
     };
     std::cout << fmt::format("{:24} {:>22} {:>24} {:>12.6g} {:>12.6g}\n",
                              robot.parameters[i].name + " [" + robot.parameters[i].unit + "]",

@@ -15,6 +15,8 @@ namespace {
 
 // In standard coordinates: far above the simulations' rounding, far below any prior's width.
 constexpr double kDifference = 1e-5;
+// Of the best-known direction's information in the least known one: below, forward differences will not do, or rounding has made it.
+constexpr double kLopsided = 1e-6, kRounding = 1e-15;
 // No step leads further than that many of the prior's standard deviations.
 constexpr double kLongestStep = 2;
 // Within that many posterior standard deviations the slope changes little.
@@ -38,7 +40,10 @@ class Fit {
     noise_.Estimate(errors_, 0);
     Climb();
     if (options_.robust && noise_.ChooseTails(errors_, EffectiveParameters())) Climb();
-    if (options_.jacobian_at_end && !fresh_) Differentiate();
+    if (options_.jacobian_at_end) {
+      if (!fresh_) Differentiate();
+      Symmetrise();
+    }
     return Result();
   }
 
@@ -58,6 +63,26 @@ class Fit {
       if (!jacobian_.col(i).allFinite()) jacobian_.col(i).setZero();  // nothing can be told of it
     }
     fresh_ = near_ = true;
+  }
+
+  // Forward differences err by the curvature, relative to the slope by about kDifference. Where some directions are known
+  // much less well than others this would pass for knowledge; central differences err by its square only.
+  void Symmetrise() {
+    const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Curvature(), Eigen::EigenvaluesOnly).eigenvalues();
+    if (values(0) > kLopsided * values(n_ - 1)) return;
+    const Eigen::MatrixXd at = u_.replicate(1, n_) - kDifference * Eigen::MatrixXd::Identity(n_, n_);
+    const Eigen::MatrixXd backward = -(Evaluate(at).colwise() - errors_) / kDifference;
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      if (backward.col(i).allFinite()) jacobian_.col(i) = (jacobian_.col(i) + backward.col(i)) / 2;
+    }
+  }
+
+  // What rounding makes of nothing is no knowledge either.
+  static Eigen::MatrixXd WithoutRounding(const Eigen::MatrixXd& information) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+    const Eigen::ArrayXd values = eigen.eigenvalues().array();
+    const Eigen::VectorXd kept = (values > kRounding * values.maxCoeff()).select(values, 0.0);
+    return eigen.eigenvectors() * kept.asDiagonal() * eigen.eigenvectors().transpose();
   }
 
   double EffectiveParameters() const {
@@ -126,7 +151,7 @@ class Fit {
     LaplaceFit fit;
     fit.mode = problem_.prior.FromStandard(u_);
     const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(n_, n_);
-    const Eigen::MatrixXd information = noise_.Information(jacobian_);
+    const Eigen::MatrixXd information = WithoutRounding(noise_.Information(jacobian_));
     Eigen::MatrixXd honest = information;
     if (options_.sandwich) {
       const Eigen::VectorXd weighted = noise_.Weights(errors_).cwiseProduct(errors_);
