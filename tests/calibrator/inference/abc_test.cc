@@ -41,7 +41,9 @@ TEST_CASE("SMC finds a linear problem's posterior with either kernel") {
   const Posterior posterior = InferBySmc(LinearProblem(), options, 1, &report);
   CheckPosterior(posterior, 0.1, 0.09);
   REQUIRE(report.generations.size() > 3);
-  CHECK(report.generations.back().epsilon < 0.3 * report.generations[1].epsilon);
+  // Epsilon is in units of scales that shrink, too, as the simulations gather around the observation.
+  CHECK(report.generations.back().epsilon < 0.7 * report.generations[1].epsilon);
+  CHECK(report.generations.back().effective > 100);
   CHECK(posterior.simulations <= options.simulations);
 }
 

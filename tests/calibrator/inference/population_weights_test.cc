@@ -4,8 +4,6 @@
 #include <cmath>
 
 #include "calibrator/inference/gaussian.h"
-#include "calibrator/inference/kernel_density.h"
-#include "tests/calibrator/inference/linear_problem.h"
 
 namespace plumb {
 namespace {
@@ -85,33 +83,6 @@ TEST_CASE("failed simulators have no weight; all failed is an error") {
   robot.predictions[3].setConstant(std::nan(""));
   CHECK_THROWS_AS(FitPopulation(robot.predictions, robot.outcomes), std::invalid_argument);
   CHECK_THROWS_AS(FitPopulation({}, Eigen::MatrixXd(1, 0)), std::invalid_argument);
-}
-
-TEST_CASE("a kernel density has the samples' moments, wider by the bandwidth, thinned or not") {
-  CHECK(Bandwidth(100, 1, BandwidthRule::kSilverman) == Approx(std::pow(4. / 300, 0.2)));
-  CHECK(Bandwidth(100, 1, BandwidthRule::kScott) == Approx(std::pow(100, -0.2)));
-  Random random(3);
-  const Eigen::MatrixXd samples = StandardNormals(2, 2'000, random);
-  // Importance weights that move the mean of N(0, I) to (0.5, 0).
-  const Eigen::VectorXd weights = (0.5 * samples.row(0).transpose().array()).exp();
-  const double effective = weights.sum() * weights.sum() / weights.squaredNorm();
-  for (const int most : {5'000, 300}) {
-    const GaussianMixture density = KernelDensity(samples, weights, most, random);
-    CHECK(static_cast<int>(density.components.size()) <= most);
-    const double h = Bandwidth(std::min<double>(effective, most), 2, BandwidthRule::kSilverman);
-    const Gaussian moments = Moments(density);
-    CHECK((moments.mean - Eigen::Vector2d(0.5, 0)).norm() < 0.08);
-    CHECK((moments.covariance - (1 + h * h) * Eigen::Matrix2d::Identity()).norm() < 0.14);
-    double sum = 0;
-    for (const double w : density.weights) sum += w;
-    CHECK(sum == Approx(1));
-  }
-  // Systematic: a sample of half the weight is drawn half of the times.
-  Eigen::VectorXd heavy = Eigen::VectorXd::Ones(2'000);
-  heavy(7) = 1'999;
-  const GaussianMixture thinned = KernelDensity(samples, heavy, 100, random);
-  CHECK(*std::max_element(thinned.weights.begin(), thinned.weights.end()) == Approx(0.5).margin(0.011));
-  CHECK_THROWS_AS(KernelDensity(samples, Eigen::VectorXd::Zero(2'000), 10, random), std::invalid_argument);
 }
 
 }  // namespace
