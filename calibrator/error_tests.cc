@@ -24,7 +24,6 @@ using boost::math::complement;
 
 constexpr int kFewestRows = 10;
 constexpr int kLastLag = 6;
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // Conditions that can be told apart, else the one there is.
 std::vector<std::string> Conditions(const ProjectedErrors& errors) {
@@ -163,6 +162,7 @@ Eigen::MatrixXd LagCovariance(Eigen::Index lags, double rho) {
 std::vector<Misfit> TestWhiteness(const ProjectedErrors& errors) {
   std::vector<Misfit> tests;
   for (int c = 0; c < 2 * errors.n; ++c) {
+    if (errors.quiet[static_cast<size_t>(c)]) continue;
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(kLastLag), squares = sum, pairs = sum;
     double variance = 0, count = 0;
     bool shared = false;
@@ -212,6 +212,7 @@ std::vector<Misfit> TestWhiteness(const ProjectedErrors& errors) {
 std::vector<Misfit> TestBias(const ProjectedErrors& errors) {
   std::vector<Misfit> tests;
   for (int c = 0; c < 2 * errors.n; ++c) {
+    if (errors.quiet[static_cast<size_t>(c)]) continue;
     for (const std::string& condition : Conditions(errors)) {
       const Rows rows = Where(
           errors, [&](int other) { return other == c; }, condition);
@@ -249,6 +250,7 @@ Eigen::RowVectorXd Features(const Transition& t) {
 std::vector<Misfit> TestRegression(const ProjectedErrors& errors) {
   std::vector<Misfit> tests;
   for (int c = 0; c < 2 * errors.n; ++c) {
+    if (errors.quiet[static_cast<size_t>(c)]) continue;
     const Rows rows = Where(
         errors, [&](int other) { return other == c; }, "");
     if (rows.empty()) continue;

@@ -38,7 +38,8 @@ double Margin(const RobotDescription& robot, const Eigen::VectorXd& q, const Eig
   double margin = 1;
   Eigen::Index i = 0;
   for (const JointDescription& joint : robot.joints) {
-    if (std::isfinite(joint.velocity_limit)) margin = std::min(margin, 1 - std::abs(v(i)) / joint.velocity_limit);
+    if (std::isfinite(joint.velocity_limit))
+      margin = std::min(margin, 1 - std::abs(v(i)) / joint.velocity_limit);
     if (!robot.simulation.stop && std::isfinite(joint.lower) && std::isfinite(joint.upper)) {
       const double range = joint.upper - joint.lower;
       margin = std::min({margin, (q(i) - joint.lower) / range, (joint.upper - q(i)) / range});
@@ -126,20 +127,30 @@ class Rater {
     Eigen::MatrixXd jacobian(errors.rows(), d);
     for (Eigen::Index i = 0; i < d; ++i) {
       const auto above = errors.col(2 * i), below = errors.col(2 * i + 1), middle = errors.col(2 * d);
-      if (above.allFinite() && below.allFinite()) jacobian.col(i) = (above - below) / (2 * h(i));
-      else jacobian.col(i) = (above.allFinite() ? above - middle : middle - below) / h(i);
+      if (above.allFinite() && below.allFinite())
+        jacobian.col(i) = (above - below) / (2 * h(i));
+      else
+        jacobian.col(i) = (above.allFinite() ? above - middle : middle - below) / h(i);
     }
-    if (!jacobian.allFinite()) return Eigen::MatrixXd::Zero(d, d);  // of a simulation that fails nothing is learned
+    if (!jacobian.allFinite())
+      return Eigen::MatrixXd::Zero(d, d);  // of a simulation that fails nothing is learned
     return jacobian.transpose() * jacobian;
   }
 
   RatedExcitation Weigh(Excitation excitation, const std::vector<Motion>& motions) {
     const Eigen::Index d = belief_.mean.size();
-    RatedExcitation rated{std::move(excitation), std::numeric_limits<double>::infinity(), {}, {}, 1,
-                          std::numeric_limits<int>::max(), motions[0].q};
+    RatedExcitation rated{std::move(excitation),
+                          std::numeric_limits<double>::infinity(),
+                          {},
+                          {},
+                          1,
+                          std::numeric_limits<int>::max(),
+                          motions[0].q};
     for (size_t i = 0; i < motions.size(); ++i) {
-      const Eigen::MatrixXd information = Information(motions[i].rollout, draws_.col(static_cast<Eigen::Index>(i)));
-      const Eigen::MatrixXd scaled = Eigen::MatrixXd::Identity(d, d) + root_.transpose() * information * root_;
+      const Eigen::MatrixXd information =
+          Information(motions[i].rollout, draws_.col(static_cast<Eigen::Index>(i)));
+      const Eigen::MatrixXd scaled =
+          Eigen::MatrixXd::Identity(d, d) + root_.transpose() * information * root_;
       const double gain = scaled.llt().matrixL().toDenseMatrix().diagonal().array().log().sum();
       rated.margin = std::min(rated.margin, motions[i].margin);
       rated.steps = std::min(rated.steps, static_cast<int>(motions[i].rollout.transitions.size()));
@@ -165,7 +176,8 @@ class Rater {
 
 // The covectors that measure movement along the weak directions.
 Eigen::MatrixXd Measures(const RobotDescription& robot, const std::vector<WeakDirection>& weak) {
-  Eigen::MatrixXd measures(static_cast<Eigen::Index>(robot.parameters.size()), static_cast<Eigen::Index>(weak.size()));
+  Eigen::MatrixXd measures(static_cast<Eigen::Index>(robot.parameters.size()),
+                           static_cast<Eigen::Index>(weak.size()));
   for (Eigen::Index i = 0; i < measures.rows(); ++i) {
     for (Eigen::Index k = 0; k < measures.cols(); ++k) {
       measures(i, k) = weak[static_cast<size_t>(k)].direction(i) /
@@ -198,7 +210,8 @@ std::vector<RatedExcitation> RateExcitations(const RobotDescription& robot, cons
   return rated;
 }
 
-Eigen::VectorXd PhysicalSd(const RobotDescription& robot, const Eigen::VectorXd& mean, const Eigen::VectorXd& sd) {
+Eigen::VectorXd PhysicalSd(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                           const Eigen::VectorXd& sd) {
   Eigen::VectorXd physical(sd.size());
   for (Eigen::Index i = 0; i < sd.size(); ++i) {
     const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
@@ -208,7 +221,8 @@ Eigen::VectorXd PhysicalSd(const RobotDescription& robot, const Eigen::VectorXd&
   return physical;
 }
 
-std::string DescribeGain(const RobotDescription& robot, const Gaussian& belief, const RatedExcitation& rated) {
+std::string DescribeGain(const RobotDescription& robot, const Gaussian& belief,
+                         const RatedExcitation& rated) {
   const Eigen::VectorXd before = belief.covariance.diagonal().cwiseSqrt();
   const Eigen::VectorXd before_physical = PhysicalSd(robot, belief.mean, before);
   const Eigen::VectorXd after_physical = PhysicalSd(robot, belief.mean, rated.sd);
@@ -218,7 +232,8 @@ std::string DescribeGain(const RobotDescription& robot, const Gaussian& belief, 
     const double ratio = rated.sd(i) / before(i);
     if (ratio <= kHelps) {
       helps += fmt::format("{}{} (sd {:.2g} -> {:.2g}{}{})", helps.empty() ? "" : ", ", parameter.name,
-                           before_physical(i), after_physical(i), parameter.unit.empty() ? "" : " ", parameter.unit);
+                           before_physical(i), after_physical(i), parameter.unit.empty() ? "" : " ",
+                           parameter.unit);
     }
     if (ratio >= kHardlyHelps) hardly += (hardly.empty() ? "" : ", ") + parameter.name;
   }
@@ -226,8 +241,8 @@ std::string DescribeGain(const RobotDescription& robot, const Gaussian& belief, 
   return "helps with " + helps + (hardly.empty() ? "" : "; hardly with " + hardly);
 }
 
-MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posterior, const Identifiability& found,
-                          const ExcitationSettings& settings) {
+MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posterior,
+                          const Identifiability& found, const ExcitationSettings& settings) {
   MotionAdvice advice{RateExcitations(robot, posterior, settings), ""};
   if (advice.rated.empty()) {
     advice.words = "no excitation that was tried keeps within the robot's limits";
@@ -239,9 +254,9 @@ MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posteri
       const Eigen::MatrixXd covariance = (precision + rated.information).inverse();
       return (measures.transpose() * covariance * measures).determinant();
     };
-    std::stable_sort(advice.rated.begin(), advice.rated.end(), [&](const RatedExcitation& a, const RatedExcitation& b) {
-      return left_open(a) < left_open(b);
-    });
+    std::stable_sort(
+        advice.rated.begin(), advice.rated.end(),
+        [&](const RatedExcitation& a, const RatedExcitation& b) { return left_open(a) < left_open(b); });
   }
   advice.words = fmt::format("{} for {:.3g} s would tell most{}: {}", advice.rated[0].excitation.name,
                              advice.rated[0].steps * robot.task.period,

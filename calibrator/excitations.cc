@@ -72,11 +72,16 @@ Signal Impulses(int steps, double bandwidth, Random& random) {
 
 Signal Make(Wave shape, int steps, double bandwidth, Random& random) {
   switch (shape) {
-    case Wave::kSteps: return Held(steps, bandwidth, /*bang_bang=*/false, random);
-    case Wave::kBangBang: return Held(steps, bandwidth, /*bang_bang=*/true, random);
-    case Wave::kMultisine: return Multisine(steps, bandwidth, random);
-    case Wave::kChirp: return Chirp(steps, bandwidth, random);
-    case Wave::kImpulses: return Impulses(steps, bandwidth, random);
+    case Wave::kSteps:
+      return Held(steps, bandwidth, /*bang_bang=*/false, random);
+    case Wave::kBangBang:
+      return Held(steps, bandwidth, /*bang_bang=*/true, random);
+    case Wave::kMultisine:
+      return Multisine(steps, bandwidth, random);
+    case Wave::kChirp:
+      return Chirp(steps, bandwidth, random);
+    case Wave::kImpulses:
+      return Impulses(steps, bandwidth, random);
   }
   return {};
 }
@@ -108,9 +113,10 @@ std::vector<Excitation> MakeExcitations(const RobotDescription& robot, const Exc
       const double own_bandwidth = i == 0 ? bandwidth : bandwidth * random.Uniform(0.5, 1);
       action.col(i) = own_amplitude * Make(shape, steps, own_bandwidth, random);
     }
-    excitations.push_back({fmt::format("{} up to {:.2g} Hz, {:.0f} % effort", kNames[static_cast<size_t>(shape)],
-                                       bandwidth / robot.task.period, 100 * amplitude),
-                           std::move(action)});
+    excitations.push_back(
+        {fmt::format("{} up to {:.2g} Hz, {:.0f} % effort", kNames[static_cast<size_t>(shape)],
+                     bandwidth / robot.task.period, 100 * amplitude),
+         std::move(action)});
   }
   return excitations;
 }

@@ -68,14 +68,17 @@ std::vector<std::vector<Eigen::Index>> CoupledGroups(const Vectors& null, Eigen:
   }
   std::vector<std::vector<Eigen::Index>> groups(static_cast<size_t>(n));
   for (Eigen::Index i = 0; i < n; ++i) {
-    if (involved[static_cast<size_t>(i)]) groups[static_cast<size_t>(group[static_cast<size_t>(i)])].push_back(i);
+    if (involved[static_cast<size_t>(i)])
+      groups[static_cast<size_t>(group[static_cast<size_t>(i)])].push_back(i);
   }
   std::erase_if(groups, [](const auto& members) { return members.empty(); });
   return groups;
 }
 
-// Combinations of a group's parameters that no null direction changes: a basis of all of them, of the simplest form.
-Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior_sd) {
+// Combinations of a group's parameters that no null direction changes: a basis of all of them, of the
+// simplest form.
+Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covariance,
+                     const Eigen::VectorXd& prior_sd) {
   const Eigen::Index n = null.rows(), rank = n - null.cols();
   if (rank == 0) return {};
   const auto unchanged = [&](const Eigen::VectorXd& power) {
@@ -98,7 +101,8 @@ Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covaria
   }
   // Combinations are covariant: what counts as one is the inverse of a parameter's unit.
   const Eigen::MatrixXd complement =
-      (Eigen::HouseholderQR<Eigen::MatrixXd>(null).householderQ() * Eigen::MatrixXd::Identity(n, n)).rightCols(rank);
+      (Eigen::HouseholderQR<Eigen::MatrixXd>(null).householderQ() * Eigen::MatrixXd::Identity(n, n))
+          .rightCols(rank);
   return SparseBasis(complement, prior_sd.cwiseInverse(), unchanged);
 }
 
@@ -132,35 +136,39 @@ Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance, const 
   return powers;
 }
 
-Combination Describe(const RobotDescription& robot, const Eigen::VectorXd& power, const Eigen::VectorXd& prior_sd,
-                     const Gaussian& distribution) {
+Combination Describe(const RobotDescription& robot, const Eigen::VectorXd& power,
+                     const Eigen::VectorXd& prior_sd, const Gaussian& distribution) {
   Combination c{CombinationName(robot, power), power, power.dot(distribution.mean),
                 std::sqrt(power.dot(distribution.covariance * power))};
   if (AllLog(robot, power)) {
     c.mean = std::exp(c.mean);
     c.sd *= c.mean;
-  } else if ((power.array() != 0).count() == 1 && power.sum() == 1) {  // a parameter on its own: in its own units
+  } else if ((power.array() != 0).count() == 1 &&
+             power.sum() == 1) {  // a parameter on its own: in its own units
     Eigen::Index index;
     power.maxCoeff(&index);
     const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(index)];
     const double coordinate = c.mean, small = 1e-4 * prior_sd(index);
     c.mean = parameter.ToPhysical(coordinate);
-    c.sd *= (parameter.ToPhysical(coordinate + small) - parameter.ToPhysical(coordinate - small)) / (2 * small);
+    c.sd *=
+        (parameter.ToPhysical(coordinate + small) - parameter.ToPhysical(coordinate - small)) / (2 * small);
   }
   return c;
 }
 
-// Directions between null and determined. Parameters of which the data would say little even if all others were known
-// come on their own; what else is weak in what is left.
+// Directions between null and determined. Parameters of which the data would say little even if all others
+// were known come on their own; what else is weak in what is left.
 std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information, const Eigen::VectorXd& prior_sd,
                                     const Eigen::MatrixXd& scaled_weak, const Vectors& null) {
   const Eigen::Index n = prior_sd.size();
   std::vector<WeakDirection> weak;
-  const Eigen::MatrixXd precision = information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
+  const Eigen::MatrixXd precision =
+      information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
   const Eigen::MatrixXd covariance = precision.inverse();
   Eigen::MatrixXd told(n, 0);  // scaled, orthonormal
   for (Eigen::Index i = 0; i < n && static_cast<Eigen::Index>(weak.size()) < scaled_weak.cols(); ++i) {
-    const bool involved = std::any_of(null.begin(), null.end(), [&](const auto& direction) { return direction(i) != 0; });
+    const bool involved =
+        std::any_of(null.begin(), null.end(), [&](const auto& direction) { return direction(i) != 0; });
     if (involved || information(i, i) * prior_sd(i) * prior_sd(i) >= kWeakInformation) continue;
     weak.push_back({Eigen::VectorXd::Unit(n, i), std::sqrt(covariance(i, i)) / prior_sd(i)});
     told.conservativeResize(Eigen::NoChange, told.cols() + 1);
@@ -169,10 +177,12 @@ std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information, const Ei
   const Eigen::Index rest = scaled_weak.cols() - told.cols();
   if (rest == 0) return weak;
   const Eigen::MatrixXd left = scaled_weak - told * (told.transpose() * scaled_weak);
-  const Eigen::MatrixXd directions = Eigen::JacobiSVD<Eigen::MatrixXd>(left, Eigen::ComputeThinU).matrixU().leftCols(rest);
+  const Eigen::MatrixXd directions =
+      Eigen::JacobiSVD<Eigen::MatrixXd>(left, Eigen::ComputeThinU).matrixU().leftCols(rest);
   for (const auto scaled : directions.colwise()) {
     const double along = scaled.dot(prior_sd.asDiagonal() * information * prior_sd.asDiagonal() * scaled);
-    Eigen::VectorXd direction = (scaled.array().abs() < kWeakEntry * scaled.cwiseAbs().maxCoeff()).select(0, scaled);
+    Eigen::VectorXd direction =
+        (scaled.array().abs() < kWeakEntry * scaled.cwiseAbs().maxCoeff()).select(0, scaled);
     direction = direction.cwiseProduct(prior_sd);
     Eigen::Index largest;
     direction.cwiseAbs().maxCoeff(&largest);
@@ -210,10 +220,12 @@ Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::
   const Eigen::MatrixXd bound =
       determined * along.tail(n - nulls).inverse().matrix().asDiagonal() * determined.transpose();
   for (Eigen::Index i = 0; i < n; ++i) {
-    const bool involved = std::any_of(found.null.begin(), found.null.end(), [&](const auto& d) { return d(i) != 0; });
+    const bool involved =
+        std::any_of(found.null.begin(), found.null.end(), [&](const auto& d) { return d(i) != 0; });
     if (!involved) found.cramer_rao(i) = std::sqrt(bound(i, i));
   }
-  const Eigen::MatrixXd precision = information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
+  const Eigen::MatrixXd precision =
+      information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
   for (const Eigen::VectorXd& power : AllPowers(found.null, precision.inverse(), prior_sd)) {
     found.combinations.push_back(Describe(robot, power, prior_sd, distribution));
   }
@@ -229,8 +241,8 @@ Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& 
   for (Eigen::Index i = 0; i < n; ++i) {
     prior_sd(i) = std::sqrt(robot.parameters[static_cast<size_t>(i)].coordinate_variance());
   }
-  // The middle and both ends of each difference, all in one batch. Where one end is no simulator, as beyond friction 0,
-  // the other one has to do.
+  // The middle and both ends of each difference, all in one batch. Where one end is no simulator, as beyond
+  // friction 0, the other one has to do.
   const Eigen::VectorXd h = 1e-4 * prior_sd;
   Eigen::MatrixXd physical(n, 2 * n + 1);
   for (Eigen::Index i = 0; i < n; ++i) {

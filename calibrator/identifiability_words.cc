@@ -44,8 +44,8 @@ std::string Join(const std::vector<std::string>& parts, const std::string& by) {
 // "gravity / length and mass length^2", of many parameters on their own only how many.
 std::string Known(const std::vector<Combination>& combinations) {
   std::vector<std::string> names;
-  const auto alone =
-      std::count_if(combinations.begin(), combinations.end(), [](const auto& c) { return Single(c.power) >= 0; });
+  const auto alone = std::count_if(combinations.begin(), combinations.end(),
+                                   [](const auto& c) { return Single(c.power) >= 0; });
   if (alone > kMostNames) names.push_back(fmt::format("{} parameters on their own", alone));
   for (const Combination& combination : combinations) {
     if (alone <= kMostNames || Single(combination.power) < 0) names.push_back(combination.name);
@@ -54,12 +54,14 @@ std::string Known(const std::vector<Combination>& combinations) {
 }
 
 // Directions of several parameters that change nothing.
-std::string Coupled(const RobotDescription& robot, const Eigen::VectorXd& mean, const Identifiability& found) {
+std::string Coupled(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                    const Identifiability& found) {
   std::vector<std::string> names;
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
-    const bool involved = std::any_of(found.null.begin(), found.null.end(), [&](const Eigen::VectorXd& direction) {
-      return Single(direction) < 0 && direction(static_cast<Eigen::Index>(i)) != 0;
-    });
+    const bool involved =
+        std::any_of(found.null.begin(), found.null.end(), [&](const Eigen::VectorXd& direction) {
+          return Single(direction) < 0 && direction(static_cast<Eigen::Index>(i)) != 0;
+        });
     if (involved) names.push_back(ShortName(robot, i));
   }
   if (names.empty()) return "";
@@ -117,7 +119,8 @@ std::string CombinationName(const RobotDescription& robot, const Eigen::VectorXd
   return (above.empty() ? "1" : above) + " / " + below;
 }
 
-std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& mean, const Eigen::VectorXd& direction) {
+std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                          const Eigen::VectorXd& direction) {
   bool any_log = false;
   for (Eigen::Index i = 0; i < direction.size(); ++i) {
     any_log = any_log || (direction(i) != 0 && IsLog(robot, static_cast<size_t>(i)));
@@ -133,7 +136,8 @@ std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& 
       continue;
     }
     const double small = 1e-4 * std::sqrt(parameter.coordinate_variance());
-    const double slope = (parameter.ToPhysical(mean(i) + small) - parameter.ToPhysical(mean(i) - small)) / (2 * small);
+    const double slope =
+        (parameter.ToPhysical(mean(i) + small) - parameter.ToPhysical(mean(i) - small)) / (2 * small);
     moves.push_back(fmt::format("{} {:+.3g}{}{}", ShortName(robot, index), step * slope * direction(i),
                                 parameter.unit.empty() ? "" : " ", parameter.unit));
   }
@@ -143,7 +147,8 @@ std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& 
 std::string IdentifiabilityWords(const RobotDescription& robot, const Eigen::VectorXd& mean,
                                  const Identifiability& found) {
   std::string words = "every parameter is determined by this motion";
-  const bool coupled = std::any_of(found.null.begin(), found.null.end(), [](const auto& d) { return Single(d) < 0; });
+  const bool coupled =
+      std::any_of(found.null.begin(), found.null.end(), [](const auto& d) { return Single(d) < 0; });
   if (coupled) {
     words = Known(found.combinations) + " can be known from this motion";
   } else if (!found.null.empty()) {

@@ -48,6 +48,10 @@ struct Leftover {
 /// themselves show, transitions as clusters and neighbours correlated (White, Econometrica 48, 1980; Newey,
 /// West, Econometrica 55, 1987): a knock at the robot does not pass for a structure.
 ///
+/// Where the noise is said to be known and the errors are significantly smaller than that, it is a bound: it
+/// has room for the estimator's own errors, which do correlate and do depend on the motion. Whiteness, bias
+/// and regression are not tested then.
+///
 /// There is an alarm if for any test p times the number of tests is below kFalseAlarm, and the effect is not
 /// negligible: with enough data any model is wrong. Thresholds: kLeastShare of the errors' variance for bias
 /// and structure, kLeastCorrelation for whiteness (smoothed states make some), kLeastExcess for scale (noise

@@ -63,7 +63,7 @@ bool Exact(const Transition& t) { return (t.q_sd.array() == 0).all() && (t.v_sd.
 }  // namespace
 
 ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const Leftover& leftover)
-    : n(robot.num_velocities()) {
+    : n(robot.num_velocities()), noise_known_(leftover.noise_known) {
   RequireSizes(leftover, n);
   for (const JointDescription& joint : robot.joints) {
     joint_of.insert(joint_of.end(), static_cast<size_t>(joint.num_velocities()), joint.name);
@@ -115,6 +115,16 @@ void ProjectedErrors::Explain(const Eigen::VectorXd& column) {
 void ProjectedErrors::Take(const Eigen::VectorXd& weighted) {
   r = Project(weighted);
   freedom = 1 - basis.rowwise().squaredNorm().array();
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * n), expected = squares;
+  for (Eigen::Index i = 0; i < r.size(); ++i) {
+    squares(coordinate[static_cast<size_t>(i)]) += r(i) * r(i);
+    expected(coordinate[static_cast<size_t>(i)]) += freedom(i);
+  }
+  quiet.clear();
+  for (Eigen::Index c = 0; c < 2 * n; ++c) {
+    const double spread = std::sqrt(2 * std::max(0.0, expected(c)));
+    quiet.push_back(noise_known_[static_cast<size_t>(c)] && squares(c) < expected(c) - 3 * spread);
+  }
 }
 
 // Against the robust sd of the same coordinate in the same condition, but no less than the noise.

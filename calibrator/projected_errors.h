@@ -36,7 +36,9 @@ struct ProjectedErrors {
   std::vector<int> step_of;     ///< of each row
   std::vector<int> coordinate;  ///< of each row
   std::vector<bool> outlying;   ///< of each row: beyond kOutlier robust sd of its coordinate and condition
-  bool few_outliers = false;    ///< fewer than kLeastOutliers of all rows: the other tests leave them out
+  /// Of each coordinate: its noise is said to be known, and the errors are significantly smaller than that.
+  std::vector<bool> quiet;
+  bool few_outliers = false;  ///< fewer than kLeastOutliers of all rows: the other tests leave them out
   std::vector<std::string> joint_of;  ///< of each velocity
   std::string contact_words;          ///< "at ground contact", "at a stop", ...
   bool conditions = false;            ///< there are enough transitions in contact and free to tell them apart
@@ -49,6 +51,7 @@ struct ProjectedErrors {
   std::string Place(const std::string& joint, const std::string& condition) const;
 
  private:
+  std::vector<bool> noise_known_;
   void Weigh(const Eigen::VectorXd& errors);
   void Take(const Eigen::VectorXd& weighted);
 };

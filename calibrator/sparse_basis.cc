@@ -15,7 +15,8 @@ namespace {
 using Belongs = std::function<bool(const Eigen::VectorXd&)>;
 
 constexpr double kEntry = 1e-3;  // of the largest: smaller ones are zero
-constexpr double kIndependent = 0.02;  // of orthonormal columns' rows: what less is left of one does not count
+constexpr double kIndependent =
+    0.02;  // of orthonormal columns' rows: what less is left of one does not count
 constexpr int kTrials = 100;
 
 Eigen::Index Entries(const Eigen::VectorXd& x) { return (x.array() != 0).count(); }
@@ -90,10 +91,13 @@ std::vector<Eigen::VectorXd> SparseBasis(const Eigen::MatrixXd& space, const Eig
   for (const auto column : orthonormal.colwise()) {  // at worst
     candidates.push_back(Round(unit.cwiseProduct(Prune(column)), belongs));
   }
-  std::stable_sort(candidates.begin(), candidates.end(), [](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-    const auto key = [](const Eigen::VectorXd& x) { return std::make_tuple(Entries(x), x.cwiseAbs().sum(), First(x)); };
-    return key(a) < key(b);
-  });
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+                     const auto key = [](const Eigen::VectorXd& x) {
+                       return std::make_tuple(Entries(x), x.cwiseAbs().sum(), First(x));
+                     };
+                     return key(a) < key(b);
+                   });
   Eigen::MatrixXd basis(n, 0);  // orthonormal, of those chosen
   for (const Eigen::VectorXd& candidate : candidates) {
     const Eigen::VectorXd scaled = candidate.cwiseQuotient(unit);

@@ -12,7 +12,8 @@ constexpr int kPeriods = 30;  // of control, until the filter has settled
 constexpr double kUnknown = 1e6;
 
 // (sd of q, sd of v) where the acceleration steps by an unknown amount of this sd once per control step.
-Eigen::Vector2d Smoothed(const EstimatorSettings& settings, double dt, int per_control_step, double acceleration_step) {
+Eigen::Vector2d Smoothed(const EstimatorSettings& settings, double dt, int per_control_step,
+                         double acceleration_step) {
   Eigen::Matrix3d transition, process;
   transition << 1, dt, dt * dt / 2, 0, 1, dt, 0, 0, 1;
   const double s = settings.jerk * settings.jerk;

@@ -26,7 +26,8 @@ std::string DescribeStart(const RobotDescription& robot, uint64_t seed) {
   const auto [q, v] = ExcitationStart(robot, seed);
   std::string text = "it begins at";
   for (Eigen::Index i = 0; i < q.size(); ++i) {
-    text += fmt::format("{} {} {:.4g} (speed {:.3g})", i == 0 ? "" : ",", robot.joints[static_cast<size_t>(i)].name, q(i), v(i));
+    text += fmt::format("{} {} {:.4g} (speed {:.3g})", i == 0 ? "" : ",",
+                        robot.joints[static_cast<size_t>(i)].name, q(i), v(i));
   }
   return text;
 }
@@ -60,7 +61,8 @@ std::string Csv(const RobotDescription& robot, const RatedExcitation& best) {
   for (Eigen::Index k = 0; k < best.steps; ++k) {
     fmt::format_to(std::back_inserter(csv), "{:.17g}", static_cast<double>(k) * robot.task.period);
     for (int i = 0; i < task->action_size(); ++i) {
-      fmt::format_to(std::back_inserter(csv), ",{:.17g}", best.excitation.action(k, i) * limits(i) / task->action_unit(i));
+      fmt::format_to(std::back_inserter(csv), ",{:.17g}",
+                     best.excitation.action(k, i) * limits(i) / task->action_unit(i));
     }
     csv += "\n";
   }
@@ -82,7 +84,8 @@ int Excite(Process& process, const ExciteFlags& flags) {
   for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
   RequireWritable(flags.output);
   if (!flags.png.empty()) {
-    if (flags.png == flags.output) throw std::invalid_argument(flags.png + ": --output and --png need a file each");
+    if (flags.png == flags.output)
+      throw std::invalid_argument(flags.png + ": --output and --png need a file each");
     RequireWritable(flags.png);
   }
   ExcitationSettings settings;

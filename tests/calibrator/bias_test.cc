@@ -8,6 +8,7 @@
 #include "estimator/state_observer.h"
 #include "sim/encoder.h"
 #include "sim/plant.h"
+#include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/synthetic.h"
 
 namespace plumb {
@@ -153,6 +154,17 @@ TEST_CASE("with corners rounded off by the filter, or lagging states, the effort
     INFO("g/l " << found.gravity_over_length << ", m l^2 " << found.mass_length_squared);
     CHECK(std::max(std::abs(found.gravity_over_length), std::abs(found.mass_length_squared)) > 0.005);
   }
+}
+
+TEST_CASE("through encoder, latency and estimator a right model raises no alarm, and one without the latency does") {
+  const RobotDescription robot = Pendulum();
+  const Misspecification right = FittedLog(robot, Rollouts(robot)).Find();
+  INFO(right.words);
+  CHECK_FALSE(right.alarm);
+  const Misspecification wrong = FittedLog(robot, Rollouts(robot, {.latency = true})).Find();
+  INFO(wrong.words);
+  CHECK(wrong.alarm);
+  CHECK_THAT(wrong.words, Catch::Contains("delay/pivot 0.007"));
 }
 
 }  // namespace

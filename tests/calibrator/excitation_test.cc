@@ -22,7 +22,8 @@ ExcitationSettings Few(int candidates, double seconds) {
 
 }  // namespace
 
-TEST_CASE("excitations keep to the effort limits, differ from joint to joint, and come again with their seed") {
+TEST_CASE(
+    "excitations keep to the effort limits, differ from joint to joint, and come again with their seed") {
   const RobotDescription robot = Robot("double_pendulum");
   const auto a = MakeExcitations(robot, Few(61, 1)), b = MakeExcitations(robot, Few(61, 1));
   REQUIRE(a.size() == 61);
@@ -42,18 +43,21 @@ TEST_CASE("excitations keep to the effort limits, differ from joint to joint, an
   CHECK(MakeExcitations(robot, other)[5].action != a[5].action);
 }
 
-TEST_CASE("the best excitation tells more than random actions, and what it tells of the pendulum is two numbers") {
+TEST_CASE(
+    "the best excitation tells more than random actions, and what it tells of the pendulum is two numbers") {
   const RobotDescription robot = Robot("pendulum");
   const Gaussian prior = PriorGaussian(robot);
   const auto rated = RateExcitations(robot, prior, Few(16, 5));
   REQUIRE(rated.size() > 8);
-  const auto random = std::find_if(rated.begin(), rated.end(),
-                                   [](const auto& r) { return r.excitation.name == "the task's random actions"; });
+  const auto random = std::find_if(rated.begin(), rated.end(), [](const auto& r) {
+    return r.excitation.name == "the task's random actions";
+  });
   REQUIRE(random != rated.end());
   CHECK(rated[0].gain > random->gain + 0.5);
   for (size_t i = 1; i < rated.size(); ++i) CHECK(rated[i - 1].gain >= rated[i].gain);
   const RatedExcitation& best = rated[0];
-  // gravity, mass and length along (1, -2, 1) are not told: a third of the prior's variance stays with each at least.
+  // gravity, mass and length along (1, -2, 1) are not told: a third of the prior's variance stays with each
+  // at least.
   const Eigen::Vector3d null = Eigen::Vector3d(1, -2, 1).normalized();
   CHECK(null.dot(best.information * null) < 1e-6 * best.information.trace());
   const Eigen::Vector3d sd = prior.covariance.diagonal().cwiseSqrt();
@@ -83,8 +87,9 @@ TEST_CASE("limits are kept by every simulator of the prior, or the excitation is
   REQUIRE(!rated.empty());
   CHECK(rated[0].gain <= unlimited[0].gain);
   const auto unscaled = [](const std::vector<RatedExcitation>& all) {
-    return std::count_if(all.begin(), all.end(),
-                         [](const auto& one) { return one.excitation.name.find("times") == std::string::npos; });
+    return std::count_if(all.begin(), all.end(), [](const auto& one) {
+      return one.excitation.name.find("times") == std::string::npos;
+    });
   };
   CHECK(unscaled(rated) < unscaled(unlimited));
   // Replayed in a simulator of its own: that of the mean.

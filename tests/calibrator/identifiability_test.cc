@@ -13,7 +13,8 @@ namespace {
 
 using Coordinate = ParameterDescription::Coordinate;
 
-/// Of the pendulum's gravity, mass and length, and one more parameter whose mean is on its border or beyond sense.
+/// Of the pendulum's gravity, mass and length, and one more parameter whose mean is on its border or beyond
+/// sense.
 Identifiability Find(const ParameterDescription& extra, const Eigen::VectorXd& truth) {
   RobotDescription robot = Pendulum();
   robot.parameters.push_back(extra);
@@ -26,7 +27,8 @@ Identifiability Find(const ParameterDescription& extra, const Eigen::VectorXd& t
 /// A robot of n parameters a0, a1, ... with logarithmic coordinates: only their description matters.
 RobotDescription WithParameters(int n) {
   RobotDescription robot;
-  for (int i = 0; i < n; ++i) robot.parameters.push_back({"a" + std::to_string(i), "", Coordinate::kLog, 1, 0.01});
+  for (int i = 0; i < n; ++i)
+    robot.parameters.push_back({"a" + std::to_string(i), "", Coordinate::kLog, 1, 0.01});
   return robot;
 }
 
@@ -55,7 +57,8 @@ bool Has(const std::vector<Eigen::VectorXd>& vectors, const Eigen::VectorXd& vec
 }  // namespace
 
 TEST_CASE("of forty parameters those coupled are found, and nothing else is said of them") {
-  // a3 has no effect; a5 a7^2 and a7 / a11 are all of three; eight from a20 on act as seven products of neighbours.
+  // a3 has no effect; a5 a7^2 and a7 / a11 are all of three; eight from a20 on act as seven products of
+  // neighbours.
   const Eigen::Index n = 40;
   std::vector<Eigen::VectorXd> rows = {Powers(n, {{5, 1}, {7, 2}}), Powers(n, {{7, 1}, {11, -1}})};
   for (int i = 20; i < 27; ++i) rows.push_back(Powers(n, {{i, 1}, {i + 1, 1}}));
@@ -69,18 +72,21 @@ TEST_CASE("of forty parameters those coupled are found, and nothing else is said
   REQUIRE(found.null.size() == 3);
   CHECK(Has(found.null, Powers(n, {{3, 1}})));
   CHECK(Has(found.null, Powers(n, {{5, 2}, {7, -1}, {11, -1}})));
-  CHECK(Has(found.null, Powers(n, {{20, 1}, {21, -1}, {22, 1}, {23, -1}, {24, 1}, {25, -1}, {26, 1}, {27, -1}})));
+  CHECK(Has(found.null,
+            Powers(n, {{20, 1}, {21, -1}, {22, 1}, {23, -1}, {24, 1}, {25, -1}, {26, 1}, {27, -1}})));
   CHECK(found.combinations.size() == 37);
   CHECK(found.weak.empty());
   for (const Combination& combination : found.combinations) {
     CHECK(std::abs(combination.power(3)) == 0);
     CHECK((combination.power.array() != 0).count() <= 2);  // neighbours' products
-    for (const Eigen::VectorXd& direction : found.null) CHECK(std::abs(direction.dot(combination.power)) < 1e-9);
+    for (const Eigen::VectorXd& direction : found.null)
+      CHECK(std::abs(direction.dot(combination.power)) < 1e-9);
   }
   CHECK_THAT(found.words, Catch::StartsWith("only 28 parameters on their own and "));
   CHECK_THAT(found.words, Catch::Contains("; a3 has no effect on this motion"));
   CHECK_THAT(found.words, Catch::Contains("(a5 +2 %, a7 -1 %, a11 -1 %) changes nothing"));
-  for (const int i : {3, 5, 7, 11, 20, 27}) CHECK(found.cramer_rao(i) == std::numeric_limits<double>::infinity());
+  for (const int i : {3, 5, 7, 11, 20, 27})
+    CHECK(found.cramer_rao(i) == std::numeric_limits<double>::infinity());
   const Eigen::MatrixXd information = InformationOf(combinations, 100);
   CHECK(found.cramer_rao(0) >= 1 / std::sqrt(information(0, 0)));
   CHECK(found.cramer_rao(0) < 2 / std::sqrt(information(0, 0)));
@@ -118,7 +124,8 @@ TEST_CASE("what is hardly determined is told, with what is left of the prior's s
   SECTION("a direction") {
     Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
     axes.bottomRightCorner(2, 2) << std::sqrt(0.5), std::sqrt(0.5), std::sqrt(0.5), -std::sqrt(0.5);
-    const Identifiability found = FindFrom(robot, axes * (information / variance).asDiagonal() * axes.transpose());
+    const Identifiability found =
+        FindFrom(robot, axes * (information / variance).asDiagonal() * axes.transpose());
     INFO(found.words);
     REQUIRE(found.weak.size() == 1);
     CHECK(std::abs(found.weak[0].direction(0)) < 1e-9);
@@ -141,8 +148,8 @@ TEST_CASE("what is hardly determined is told, with what is left of the prior's s
 
 TEST_CASE("a little information is no null direction for being small beside much") {
   const double variance = WithParameters(2).parameters[0].coordinate_variance();
-  const Identifiability found =
-      FindFrom(WithParameters(2), (Eigen::Vector2d(1e9, 50) / variance).asDiagonal());  // 50 times the prior's
+  const Identifiability found = FindFrom(
+      WithParameters(2), (Eigen::Vector2d(1e9, 50) / variance).asDiagonal());  // 50 times the prior's
   CHECK(found.null.empty());
   CHECK(found.weak.empty());
 }
@@ -160,13 +167,15 @@ TEST_CASE("linear parameters move in their unit") {
 }
 
 TEST_CASE("the base's mass has no effect on the hopper, and all others are known") {
-  const RobotDescription robot = LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/hopper/paper.toml");
+  const RobotDescription robot =
+      LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/hopper/paper.toml");
   const int world = robot.FindParameter("mass/world");
   REQUIRE(world >= 0);
   Discrepancy discrepancy(robot);
   const std::vector<Rollout> rollouts = RandomLog(robot, {}, 60, 4);
   const Identifiability found = FindIdentifiability(robot, discrepancy, rollouts, PriorGaussian(robot));
-  CHECK(found.words == "every other parameter is determined by this motion; mass/world has no effect on this motion");
+  CHECK(found.words ==
+        "every other parameter is determined by this motion; mass/world has no effect on this motion");
   REQUIRE(found.null.size() == 1);
   CHECK(found.null[0] == Powers(5, {{world, 1}}));
   CHECK(found.combinations.size() == 4);
@@ -200,7 +209,8 @@ TEST_CASE("a logit parameter on its own is told in its own units") {
 }
 
 TEST_CASE("where simulation fails nothing is said to be known") {
-  const Identifiability found = Find({"rest/pivot", "", Coordinate::kLinear, 0, 1}, Eigen::Vector4d(10, 1, 1, 0));
+  const Identifiability found =
+      Find({"rest/pivot", "", Coordinate::kLinear, 0, 1}, Eigen::Vector4d(10, 1, 1, 0));
   CHECK(found.null.size() >= 1);  // a spring without stiffness rests anywhere
   RobotDescription robot = Pendulum();
   std::vector<Rollout> rollouts = {SyntheticRollout(robot, Eigen::Vector3d(10, 1, 1), 20, 1e-4, 1e-3, 1)};

@@ -38,7 +38,8 @@ class Folder {
 
 Outcome Excite(const std::string& robot, const std::string& arguments) {
   const std::string command = std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb excite " +
-                              std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + robot + " " + arguments + " 2>&1";
+                              std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + robot + " " +
+                              arguments + " 2>&1";
   FILE* pipe = popen(command.c_str(), "r");
   REQUIRE(pipe);
   std::string text;
@@ -55,13 +56,16 @@ std::string Read(const std::string& file) {
 
 }  // namespace
 
-TEST_CASE("excite: a table of efforts within the limits, one row per control step, the same for the same seed") {
+TEST_CASE(
+    "excite: a table of efforts within the limits, one row per control step, the same for the same seed") {
   const Folder folder;
   const std::string few = " --candidates 11 --seconds 3 --output ";
-  const Outcome outcome = Excite("pendulum", "--seed 3" + few + folder / "a.csv" + " --png " + folder / "a.png");
+  const Outcome outcome =
+      Excite("pendulum", "--seed 3" + few + folder / "a.csv" + " --png " + folder / "a.png");
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
-  for (const char* word : {"gain [nat]", "prior sd", "expected sd", "margin", "helps with", "gravity", "it begins at"}) {
+  for (const char* word :
+       {"gain [nat]", "prior sd", "expected sd", "margin", "helps with", "gravity", "it begins at"}) {
     CHECK_THAT(outcome.text, Catch::Contains(word));
   }
   std::istringstream csv(Read(folder / "a.csv"));
@@ -104,7 +108,8 @@ TEST_CASE("excite: what cannot be done is said before anything is computed") {
   const Outcome nowhere = Excite("pendulum", "--candidates 2 --output /nonexistent/a.csv");
   CHECK(nowhere.status != 0);
   CHECK_THAT(nowhere.text, Catch::Contains("/nonexistent/a.csv"));
-  const Outcome same = Excite("pendulum", "--candidates 2 --output " + folder / "a" + " --png " + folder / "a");
+  const Outcome same =
+      Excite("pendulum", "--candidates 2 --output " + folder / "a" + " --png " + folder / "a");
   CHECK(same.status != 0);
   CHECK_THAT(same.text, Catch::Contains("a file each"));
 }
