@@ -9,6 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "calibrator/excitation.h"
 #include "calibrator/holdout.h"
 #include "calibrator/methods.h"
 #include "calibrator/misspecification.h"
@@ -89,6 +90,10 @@ class Run {
     Suspect(view, result.curriculum ? result.curriculum->noise_known : false);
     findings_.identifiability = FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
     findings_.cramer_rao = findings_.identifiability.cramer_rao;
+    ExcitationSettings settings;
+    settings.seed = options_.seed;
+    settings.seconds = std::min(settings.seconds, robot_.task.steps * robot_.task.period);
+    findings_.advice = AdviseMotion(robot_, Moments(findings_.posterior), findings_.identifiability, settings).words;
   }
 
   // What the model has wrong, whatever its parameters.

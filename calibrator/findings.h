@@ -88,6 +88,7 @@ struct Findings {
   std::vector<Stage> stages;
   Identifiability identifiability;
   Eigen::VectorXd cramer_rao;    ///< sd of each parameter's coordinate if nothing but the data told, infinite where they do not
+  std::string advice;  ///< which further motion would tell most of what is left open, in words
   Holdout holdout;
   Misspecification misspecification;
   Agreement agreement;

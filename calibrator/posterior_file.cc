@@ -176,6 +176,7 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
       {"check", findings.check},
       {"alarm", ToJson(findings.misspecification)},
       {"identifiability", ToJson(findings.identifiability, findings.cramer_rao, names)},
+      {"advice", findings.advice},
       {"holdout", ToJson(findings.holdout)},
       {"agreement", ToJson(findings.agreement)},
       {"discrepancy", findings.discrepancy},

@@ -192,6 +192,7 @@ class Report {
         table.Add({std::to_string(k + 1), Direction(found.null[k])});
       html += table.Print();
     }
+    if (!findings_.advice.empty()) html += Paragraph(findings_.advice);
     const std::string scree = ScreePlot(InformationEigenvalues(), kNull);
     if (scree.empty()) return html;
     return html + Figure(scree,

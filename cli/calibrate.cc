@@ -73,7 +73,7 @@ void PrintFindings(const Findings& findings, const RobotDescription& robot) {
                              number(summary.prior_mean(at), summary.prior_sd(at)), number(summary.mean(at), summary.sd(at)),
                              summary.lower(at), summary.upper(at));
   }
-  for (const std::string* words : {&findings.identifiability.words, &findings.misspecification.words, &findings.holdout.words,
+  for (const std::string* words : {&findings.identifiability.words, &findings.advice, &findings.misspecification.words, &findings.holdout.words,
                                    &findings.agreement.words, &findings.check}) {
     if (!words->empty()) std::cout << "- " << *words << "\n";
   }

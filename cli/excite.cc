@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "calibrator/excitation.h"
+#include "calibrator/posterior_file.h"
 #include "calibrator/simopt.h"
 #include "common/atomic_file.h"
 #include "robot/description.h"
@@ -44,7 +45,7 @@ std::string Table(const RobotDescription& robot, const std::vector<RatedExcitati
 std::string Expected(const RobotDescription& robot, const Gaussian& prior, const RatedExcitation& best) {
   const Eigen::VectorXd before = PhysicalSd(robot, prior.mean, prior.covariance.diagonal().cwiseSqrt());
   const Eigen::VectorXd after = PhysicalSd(robot, prior.mean, best.sd);
-  std::string text = fmt::format("{:<28}{:>12}{:>14}\n", "parameter", "prior sd", "expected sd");
+  std::string text = fmt::format("{:<28}{:>12}{:>14}\n", "parameter", "present sd", "expected sd");
   for (Eigen::Index i = 0; i < before.size(); ++i) {
     const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
     text += fmt::format("{:<28}{:>12.3g}{:>14.3g} {}\n", parameter.name, before(i), after(i), parameter.unit);
@@ -77,6 +78,15 @@ std::vector<Snapshot> Film(const RobotDescription& robot, const RatedExcitation&
   return film;
 }
 
+Gaussian Known(const std::string& file, const RobotDescription& robot) {
+  GaussianMixture mixture;
+  for (const auto& component : ReadPosterior(file, robot).components) {
+    mixture.weights.push_back(component.weight);
+    mixture.components.push_back({component.mean, component.covariance});
+  }
+  return Moments(mixture);
+}
+
 }  // namespace
 
 int Excite(Process& process, const ExciteFlags& flags) {
@@ -92,7 +102,7 @@ int Excite(Process& process, const ExciteFlags& flags) {
   settings.candidates = flags.candidates;
   settings.seconds = flags.seconds;
   settings.seed = flags.seed;
-  const Gaussian prior = PriorGaussian(robot);
+  const Gaussian prior = flags.posterior.empty() ? PriorGaussian(robot) : Known(flags.posterior, robot);
   const std::vector<RatedExcitation> rated = RateExcitations(robot, prior, settings);
   if (process.stopping()) return 130;
   std::cout << fmt::format("{}, task {}, seed {}: {} of {} excitations keep within the limits\n", robot.name,

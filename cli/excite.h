@@ -13,7 +13,8 @@ struct ExciteFlags {
   uint64_t seed = 1;
   int candidates = 61;
   double seconds = 10;
-  std::string png;  ///< file; empty = none
+  std::string posterior;  ///< posterior.json with what is known already; empty = the prior
+  std::string png;        ///< file; empty = none
 };
 
 /// `plumb excite`: looks for the efforts that would tell most of the robot's parameters and stay within its

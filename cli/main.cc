@@ -128,6 +128,7 @@ int main(int argc, char** argv) {
             ->check(CLI::Range(1, 10000))->capture_default_str();
         excite->add_option("--seconds", excite_flags.seconds, "of each")
             ->check(CLI::Range(0.01, 600.0))->capture_default_str();
+        excite->add_option("--posterior", excite_flags.posterior, "what is known already: a posterior.json; default: the prior");
         excite->add_option("--png", excite_flags.png, "draw the best one as a strip of snapshots");
         doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();

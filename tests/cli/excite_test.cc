@@ -65,7 +65,7 @@ TEST_CASE(
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
   for (const char* word :
-       {"gain [nat]", "prior sd", "expected sd", "margin", "helps with", "gravity", "it begins at"}) {
+       {"gain [nat]", "present sd", "expected sd", "margin", "helps with", "gravity", "it begins at"}) {
     CHECK_THAT(outcome.text, Catch::Contains(word));
   }
   std::istringstream csv(Read(folder / "a.csv"));

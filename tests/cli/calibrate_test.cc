@@ -1,0 +1,173 @@
+// `plumb calibrate`, run as a person would.
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+struct Outcome {
+  int status;
+  std::string text;  ///< both streams
+};
+
+class Folder {
+ public:
+  Folder() : path_(fs::temp_directory_path() / ("plumbline_calibrate_test_" + std::to_string(getpid()))) {
+    fs::create_directories(path_);
+  }
+  ~Folder() { fs::remove_all(path_); }
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  fs::path path_;
+};
+
+std::string Plumb() { return std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb "; }
+std::string Robot(const std::string& name) { return std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name; }
+
+Outcome Shell(const std::string& command) {
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+  REQUIRE(pipe);
+  std::string text;
+  std::array<char, 4096> buffer;
+  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
+  const int status = pclose(pipe);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text};
+}
+
+// Without what may differ between two runs of the same calibration.
+json Posterior(const std::string& file) {
+  std::ifstream stream(file);
+  REQUIRE(stream);
+  json j = json::parse(stream);
+  REQUIRE(j.contains("run"));
+  j.erase("run");
+  return j;
+}
+
+std::string HopperTable(const Folder& folder) {
+  const std::string file = folder / "hopper.csv";
+  REQUIRE(Shell(Plumb() + "sim " + Robot("hopper") + " --random --episodes 20 --seed 3 --set mass/torso=3.6 mass/thigh=4.1 "
+                "mass/leg=2.8 mass/foot=5.2 --csv " + file).status == 0);
+  return file;
+}
+
+TEST_CASE("plumb calibrate finds the masses of a hopper from plumb sim's own table, and says so everywhere") {
+  const Folder folder;
+  const std::string table = HopperTable(folder);
+  const Outcome outcome = Shell(Plumb() + "calibrate " + Robot("hopper") + " --csv " + table + " --output " + (folder / "p.json") +
+                                " --report " + (folder / "r.html") + " --urdf " + (folder / "identified.urdf") + " --strict");
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  for (const char* words : {"every parameter is determined", "the posterior predicts better than the prior", "mass/foot"}) {
+    CHECK(outcome.text.find(words) != std::string::npos);
+  }
+  const json found = Posterior(folder / "p.json");
+  const std::vector<double> truth{3.6, 4.1, 2.8, 5.2};
+  for (size_t i = 0; i < truth.size(); ++i) CHECK(found["mean"][i].get<double>() == Approx(truth[i]).epsilon(1e-8));
+  CHECK_FALSE(found["alarm"]["raised"].get<bool>());
+  CHECK(found["holdout"]["better"].get<bool>());
+  CHECK_FALSE(fs::exists(folder / "p.json.journal"));
+  CHECK(fs::file_size(folder / "r.html") > 10'000);
+  CHECK(fs::exists(folder / "identified.urdf"));
+}
+
+TEST_CASE("a calibration that was killed at any time goes on to the same bits, with any number of threads") {
+  const Folder folder;
+  const std::string table = HopperTable(folder);
+  const std::string command = Plumb() + "calibrate " + Robot("hopper") + " --csv " + table + " --method reps --budget 200000 --output ";
+  REQUIRE(Shell(command + (folder / "whole.json") + " --threads 1").status == 0);
+  const json whole = Posterior(folder / "whole.json");
+  const std::string journal = folder / "killed.json.journal";
+  int killed = 0;
+  for (int i = 0; i < 6; ++i) {
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      const int nowhere = open("/dev/null", O_WRONLY);
+      dup2(nowhere, 1), dup2(nowhere, 2);
+      execl("/bin/sh", "sh", "-c", ("exec " + command + (folder / "killed.json") + " --threads " + std::to_string(1 + i % 2)).c_str(), nullptr);
+      _exit(127);
+    }
+    // Killed when the journal has grown, wherever that is.
+    const auto before = fs::exists(journal) ? fs::file_size(journal) : 0;
+    int status = 0;
+    while (waitpid(child, &status, WNOHANG) == 0) {
+      std::error_code gone;
+      const auto now = fs::exists(journal) ? fs::file_size(journal, gone) : 0;
+      if (!gone && now > before + 300'000u * static_cast<unsigned>(i + 1)) {
+        kill(child, SIGKILL);
+        waitpid(child, &status, 0);
+        break;
+      }
+      usleep(200);
+    }
+    if (WIFSIGNALED(status)) ++killed;
+    else break;
+  }
+  CHECK(killed > 0);
+  const Outcome last = Shell(command + (folder / "killed.json") + " --threads 2");
+  REQUIRE(last.status == 0);
+  CHECK(last.text.find("went on from") != std::string::npos);
+  CHECK(Posterior(folder / "killed.json") == whole);
+}
+
+TEST_CASE("ranks that share the work come to the same bits") {
+  if (Shell("command -v mpirun").status != 0) {
+    WARN("skipped: mpirun (openmpi-bin) is not installed");
+    return;
+  }
+  const Folder folder;
+  const std::string table = HopperTable(folder);
+  const std::string arguments = "calibrate " + Robot("hopper") + " --csv " + table + " --threads 1 --output ";
+  REQUIRE(Shell(Plumb() + arguments + (folder / "one.json")).status == 0);
+  const Outcome three = Shell("OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n 3 " + Plumb() + arguments +
+                              (folder / "three.json"));
+  INFO(three.text);
+  REQUIRE(three.status == 0);
+  CHECK(Posterior(folder / "three.json") == Posterior(folder / "one.json"));
+}
+
+TEST_CASE("what cannot be calibrated with is refused in one clear line") {
+  const Folder folder;
+  const auto refused = [&](const std::string& arguments, const std::string& words) {
+    const Outcome outcome = Shell(Plumb() + "calibrate " + arguments + " --output " + (folder / "x.json"));
+    INFO(arguments << ": " << outcome.text);
+    CHECK(outcome.status != 0);
+    CHECK(outcome.status != -1);
+    CHECK(outcome.text.find(words) != std::string::npos);
+    CHECK_FALSE(fs::exists(folder / "x.json"));
+  };
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::ofstream(folder / name) << text;
+    return folder / name;
+  };
+  refused(Robot("pendulum"), "there is nothing to calibrate with");
+  refused(Robot("pendulum") + " --csv " + (folder / "missing.csv"), "missing.csv");
+  refused(Robot("pendulum") + " --log " + (folder / "missing.lcmlog"), "missing.lcmlog");
+  refused(Robot("pendulum") + " --csv " + write("empty.csv", ""), "empty.csv");
+  refused(Robot("pendulum") + " --csv " + write("head.csv", "t,q/pivot,v/pivot,u/pivot\n"), "head.csv");
+  refused(Robot("hopper") + " --csv " + write("other.csv", "t,q/pivot,v/pivot,u/pivot\n0,0,0,0\n0.05,0,0,0\n"), "other.csv");
+  refused(Robot("pendulum") + " --csv " + write("one.csv", "t,q/pivot,v/pivot,u/pivot,next_q/pivot,next_v/pivot\n0,1,0,1,1.01,0.4\n"),
+          "too few");
+  refused(Robot("pendulum") + " --csv " + write("x.csv", "t\n") + " --method laplas", "laplas");
+}
+
+}  // namespace
+}  // namespace plumb
