@@ -18,7 +18,8 @@ constexpr int64_t kSearchSteps = 40;  // transitions that are enough to find a m
 constexpr double kSameMode = 4;       // [sd] between two answers that count as one
 constexpr double kWorthless = 12;     // [nat] by which another mode may explain the transitions worse
 constexpr int kNoiseRounds = 4;       // until the noise of beginnings and ends agrees
-constexpr double kGrownNoise = 1.5;   // of a stage, relative to the first one's
+constexpr double kGrownNoise = 1.15;  // of a stage, relative to the first one's
+constexpr double kLargestShift = 3.5;  // [sd] of a mode from one stage to the next
 
 class Curriculum {
  public:
@@ -164,16 +165,41 @@ class Curriculum {
       return false;
     }
     Account(errors);
-    const Eigen::VectorXd noise = NoiseOf(errors, fit);
-    const double grown = (noise.array() / result_.noise_sd.array().max(kNegligible * errors.state_scale().array())).maxCoeff();
-    if (!fit.converged || !(grown < kGrownNoise)) {
-      result_.warnings.push_back(fmt::format("windows of {} steps are not used: {}", horizon,
-          fit.converged ? fmt::format("their errors are {:.2g} times the noise of one step", grown) : "the fit does not converge"));
+    const double grown = GrownNoise(errors, fit);
+    const double shift = Shift(result_.fit, fit);
+    std::string why;
+    if (!fit.converged) why = "the fit does not converge";
+    else if (!(grown < kGrownNoise)) why = fmt::format("their errors are {:.2g} times the noise of one step", grown);
+    else if (!(shift < kLargestShift)) why = fmt::format("they lead {:.2g} standard deviations away from what shorter ones say", shift);
+    if (!why.empty()) {
+      result_.warnings.push_back(fmt::format("windows of {} steps are not used: {}", horizon, why));
       return false;
     }
     Record(errors, fit, horizon);
     result_.fit = std::move(fit);
     return true;
+  }
+
+  // Largest ratio of an entry's noise to what it was at first, less what chance may have made of it.
+  double GrownNoise(const WindowErrors& errors, const LaplaceFit& fit) const {
+    const Eigen::VectorXd noise = NoiseOf(errors, fit);
+    Eigen::VectorXd rows = Eigen::VectorXd::Zero(noise.size());
+    for (const WindowErrors::Row& row : errors.rows()) rows(row.coordinate) += 1;
+    double grown = 0;
+    for (Eigen::Index c = 0; c < noise.size(); ++c) {
+      if (rows(c) == 0) continue;
+      const double before = std::max(result_.noise_sd(c), kNegligible * errors.state_scale()(c));
+      grown = std::max(grown, noise(c) / before - 3 / std::sqrt(2 * rows(c)));
+    }
+    return grown;
+  }
+
+  // How far a mode has moved, in standard deviations of where it was known before, along the direction where that is most. If both
+  // stages are right the difference varies less than the earlier mode does (Hausman, Econometrica 46, 1978).
+  static double Shift(const LaplaceFit& before, const LaplaceFit& after) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(before.standard.covariance);
+    const Eigen::VectorXd along = axes.eigenvectors().transpose() * (after.standard.mean - before.standard.mean);
+    return (along.array().abs() / axes.eigenvalues().array().max(1e-300).sqrt()).maxCoeff();
   }
 
   void Record(const WindowErrors& errors, const LaplaceFit& fit, int horizon) {
