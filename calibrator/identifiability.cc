@@ -42,11 +42,20 @@ std::vector<Eigen::VectorXd> SmallPowers(Eigen::Index n) {
   return powers;
 }
 
-// Fewest and smallest powers first.
-void SortBySimplicity(const Eigen::MatrixXd& covariance, Vectors* powers) {
+// A power of a parameter of the whole robot, such as gravity, is less telling than one of a link's or joint's own.
+Eigen::VectorXd CostOfPowers(const RobotDescription& robot) {
+  Eigen::VectorXd cost(static_cast<Eigen::Index>(robot.parameters.size()));
+  for (size_t i = 0; i < robot.parameters.size(); ++i) {
+    cost(static_cast<Eigen::Index>(i)) = robot.parameters[i].name.find('/') == std::string::npos ? 2 : 1;
+  }
+  return cost;
+}
+
+// Fewest and cheapest powers first.
+void SortBySimplicity(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& cost, Vectors* powers) {
   std::stable_sort(powers->begin(), powers->end(), [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
     const auto key = [&](const Eigen::VectorXd& p) {
-      return std::make_tuple((p.array() != 0).count(), p.cwiseAbs().sum(), p.dot(covariance * p));
+      return std::make_tuple((p.array() != 0).count(), p.cwiseAbs().dot(cost), p.dot(covariance * p));
     };
     return key(a) < key(b);
   });
@@ -78,7 +87,7 @@ std::vector<std::vector<Eigen::Index>> CoupledGroups(const Vectors& null, Eigen:
 // Combinations of a group's parameters that no null direction changes: a basis of all of them, of the
 // simplest form.
 Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covariance,
-                     const Eigen::VectorXd& prior_sd) {
+                     const Eigen::VectorXd& prior_sd, const Eigen::VectorXd& cost) {
   const Eigen::Index n = null.rows(), rank = n - null.cols();
   if (rank == 0) return {};
   const auto unchanged = [&](const Eigen::VectorXd& power) {
@@ -88,7 +97,7 @@ Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covaria
   if (n <= kMostTried) {
     Vectors candidates = SmallPowers(n);
     std::erase_if(candidates, [&](const Eigen::VectorXd& power) { return !unchanged(power); });
-    SortBySimplicity(covariance, &candidates);
+    SortBySimplicity(covariance, cost, &candidates);
     Eigen::MatrixXd basis(n, 0);
     for (const Eigen::VectorXd& candidate : candidates) {
       Eigen::MatrixXd extended(n, basis.cols() + 1);
@@ -107,7 +116,8 @@ Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covaria
 }
 
 // Of all parameters.
-Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior_sd) {
+Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior_sd,
+                  const Eigen::VectorXd& cost) {
   const Eigen::Index n = prior_sd.size();
   Vectors powers;
   std::vector<bool> involved(static_cast<size_t>(n), false);
@@ -120,7 +130,7 @@ Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance, const 
       own.conservativeResize(Eigen::NoChange, own.cols() + 1);
       own.col(own.cols() - 1) = direction(members).normalized();
     }
-    for (const Eigen::VectorXd& power : SimplePowers(own, covariance(members, members), prior_sd(members))) {
+    for (const Eigen::VectorXd& power : SimplePowers(own, covariance(members, members), prior_sd(members), cost(members))) {
       powers.push_back(Eigen::VectorXd::Zero(n));
       powers.back()(members) = power;
     }
@@ -132,7 +142,7 @@ Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance, const 
   for (Eigen::Index i = 0; i < n; ++i) {
     if (!involved[static_cast<size_t>(i)]) powers.push_back(Eigen::VectorXd::Unit(n, i));
   }
-  SortBySimplicity(covariance, &powers);
+  SortBySimplicity(covariance, cost, &powers);
   return powers;
 }
 
@@ -226,7 +236,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::
   }
   const Eigen::MatrixXd precision =
       information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
-  for (const Eigen::VectorXd& power : AllPowers(found.null, precision.inverse(), prior_sd)) {
+  for (const Eigen::VectorXd& power : AllPowers(found.null, precision.inverse(), prior_sd, CostOfPowers(robot))) {
     found.combinations.push_back(Describe(robot, power, prior_sd, distribution));
   }
   found.weak = FindWeak(information, prior_sd, eigen.eigenvectors().middleCols(nulls, weak), found.null);
