@@ -238,7 +238,7 @@ class Run {
     const Eigen::VectorXd right = Precision(fit.posterior) * fit.mode - findings_.prior.mean.cwiseQuotient(sd.cwiseAbs2());
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sd.asDiagonal() * Data(fit) * sd.asDiagonal());
     const Eigen::ArrayXd values = eigen.eigenvalues().array();
-    const Eigen::VectorXd inverse = (values > 1e-9).select(1 / values.max(1e-300), 0.0);
+    const Eigen::VectorXd inverse = (values > 1).select(1 / values.max(1e-300), 0.0);  // as in Against
     return sd.asDiagonal() * (eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose()) * sd.asDiagonal() * right;
   }
 

@@ -24,7 +24,7 @@ struct HorizonError {
 struct Holdout {
   int64_t fitted = 0, held_out = 0;  ///< transitions
   std::vector<HorizonError> errors;
-  bool better = false;  ///< the posterior predicts better than the prior, at every horizon that could be tried
+  bool better = false;  ///< the posterior predicts better than the prior at some horizons, and at none worse, chance apart
   std::string words;
 };
 
