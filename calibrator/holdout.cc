@@ -90,9 +90,9 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
     for (const HorizonError& error : result.errors) {
       if (error.windows > 0) last = &error;
     }
-    result.words = fmt::format("on {} transitions that it has not seen, the posterior predicts better than the prior: {:.3g} times "
-                               "smaller errors after 1 step, {:.3g} times after {}",
-                               result.held_out, result.errors[0].prior / result.errors[0].posterior, last->prior / last->posterior,
+    result.words = fmt::format("on {} transitions that it has not seen, the posterior predicts better than the prior: errors are {:.3g} times "
+                               "the prior's after 1 step, {:.3g} times after {}",
+                               result.held_out, result.errors[0].posterior / result.errors[0].prior, last->posterior / last->prior,
                                last->horizon);
   } else if (worse.empty()) {
     result.words = fmt::format("on {} transitions that it has not seen, the posterior predicts no better than the prior: do not train with it",
