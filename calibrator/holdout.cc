@@ -10,6 +10,7 @@ namespace {
 
 constexpr size_t kFew = 5;  // roll-outs
 constexpr size_t kLeast = 10;
+constexpr double kRounding = 1e-9;  // of a simulation, standard units: who is better by less is not
 constexpr std::array<int, 6> kHorizons{1, 2, 5, 10, 20, 50};
 
 int64_t CountWindows(std::span<const Rollout> rollouts, int horizon) {
@@ -60,7 +61,7 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
       const Eigen::VectorXd errors = discrepancy.PredictionError(both, split.held_out, horizon);
       error.posterior = errors(0), error.prior = errors(1);
       ++tried;
-      if (error.posterior < error.prior) ++better;
+      if (error.posterior + kRounding < error.prior) ++better;
       else worse += fmt::format("{}{}", worse.empty() ? "" : ", ", horizon);
     }
     result.errors.push_back(error);
