@@ -261,6 +261,12 @@ TEST_CASE("without a simulator to linearise, motion is taken to be free") {
   for (Eigen::Index i = 0; i < raw.size(); i += 2) {
     REQUIRE((root * whitened.segment<2>(i) - raw.segment<2>(i)).norm() < 1e-12);
   }
+  CHECK(errors.LogSpread() == Approx(60 * std::log(root.determinant())));
+  // Without any linearisation only the ends' noise counts.
+  WindowErrors plain(std::make_shared<Model>(Pendulum()), rollouts, 1, 1);
+  CHECK(plain.LogSpread() == Approx(60 * (std::log(1e-3) + std::log(5e-3))));
+  CHECK(plain.EndNoise()(0) == Approx(1e-3));
+  CHECK(plain.EndNoise()(1) == Approx(5e-3));
 }
 
 }  // namespace

@@ -73,7 +73,7 @@ TEST_CASE("two modes get the weights, the places and the widths that they have")
 }
 
 TEST_CASE("a mode that the guess thinks little of is found out") {
-  const double left = GENERATE(0.98, 0.02, 0.005);
+  const double left = GENERATE(0.98, 0.02, 0.005, 0.001);
   CAPTURE(left);
   const ImportanceFit fit = FitByImportance(Bimodal, Guess(left));
   REQUIRE(fit.mixture.components.size() == 2);
