@@ -67,7 +67,9 @@ class Run {
   void Look(const MethodResult& result) {
     LaplaceFit view;
     std::vector<WindowErrors::Row> rows;
+    bool noise_known = false;
     if (result.curriculum) {
+      noise_known = result.curriculum->noise_known;
       view = result.curriculum->one_step;
       rows = result.curriculum->rows;
       findings_.noise_sd = result.noise_sd;
@@ -80,14 +82,16 @@ class Run {
       errors.Linearise(robot_.ToPhysical(mean_));
       view = FitLaplace(ProblemOf(robot_, errors), mean_, still);
       rows = errors.rows();
-      findings_.noise_sd = errors.noise_sd().cwiseProduct(view.scale);
+      findings_.noise_sd = errors.EndNoise();
+      findings_.noise_sd.head(view.scale.size()).array() *= view.scale.array();  // there is none of what was never observed
+      noise_known = errors.noise_known();
       findings_.diagnostic_steps += errors.simulated_steps();
       information_ = view.information;
     }
     findings_.discrepancy = view.errors.cwiseAbs2().mean();
     findings_.errors = view.errors;
     findings_.rows = rows;
-    Suspect(view, result.curriculum ? result.curriculum->noise_known : false);
+    Suspect(view, noise_known);
     findings_.identifiability = FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
     findings_.cramer_rao = findings_.identifiability.cramer_rao;
     ExcitationSettings settings;
@@ -125,7 +129,7 @@ class Run {
 
   // Fits again without a part of the data, which then judges.
   void Check(const MethodResult& result) {
-    const Split split = HoldOut(rollouts_);
+    Split split = HoldOut(rollouts_);
     Discrepancy discrepancy(robot_, options_.workforce);
     Eigen::VectorXd mean = mean_;
     if (!split.held_out.empty()) {
@@ -138,6 +142,7 @@ class Run {
         findings_.diagnostic_steps += part.simulated_steps;
       } catch (const std::invalid_argument& error) {
         findings_.warnings.push_back(fmt::format("nothing could be held out: {}", error.what()));
+        split = {rollouts_, {}};
       }
     }
     findings_.holdout = Judge(discrepancy, split, robot_.ToPhysical(mean), robot_.ToPhysical(findings_.prior.mean));
@@ -166,6 +171,10 @@ class Run {
       }
     }
     for (size_t i = 0; i < fits.size(); ++i) agreement.logs.push_back(Against(names[i], fits, i));
+    if (fits.size() < 2) {
+      agreement.words = "fewer than two of the logs can be fitted on their own: nothing to compare";
+      return;
+    }
     std::string against;
     for (const LogAgreement& log : agreement.logs) {
       if (log.p >= kDisagreement) continue;

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "calibrator/inference/noise.h"
@@ -36,7 +37,16 @@ class Curriculum {
     result_.rows = one_step.rows();
     std::vector<Eigen::VectorXd> guesses = Search(FirstGuesses(start), one_step);
     std::vector<LaplaceFit> modes;
-    for (const Eigen::VectorXd& guess : guesses) modes.push_back(FitStage(one_step, guess, kNoiseRounds));
+    Eigen::VectorXd noise;  // that the best mode's errors are whitened by
+    double best = -std::numeric_limits<double>::infinity();
+    for (const Eigen::VectorXd& guess : guesses) {
+      modes.push_back(FitStage(one_step, guess, kNoiseRounds));
+      if (modes.back().log_posterior <= best) continue;
+      best = modes.back().log_posterior;
+      noise = one_step.noise_sd();
+      result_.noise_sd = NoiseOf(one_step, modes.back());
+    }
+    if (modes.size() > 1) one_step.set_noise_sd(noise);
     std::stable_sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) { return a.log_posterior > b.log_posterior; });
     for (size_t i = 1; i < modes.size(); ++i) {
       if (modes[i].log_posterior > modes[0].log_posterior - kWorthless && Differs(modes[i], modes[0])) {
@@ -45,12 +55,14 @@ class Curriculum {
     }
     result_.fit = std::move(modes[0]);
     result_.one_step = result_.fit;
-    result_.noise_sd = NoiseOf(one_step, result_.fit);
     Record(one_step, result_.fit, 1);
+    // Where one step leaves nothing to explain, more can teach nothing.
+    const bool exact = (result_.fit.scale.array() <= Noise::kLeastScale).all();
     for (const int horizon : options_.horizons) {
+      if (exact) break;
       if (horizon > 1 && !Lengthen(horizon)) break;
     }
-    if (result_.horizon > 1) {  // how the one-step errors are at the final mode
+    if (result_.horizon > 1 || modes.size() > 1) {  // how the one-step errors are at the final mode
       one_step.Linearise(robot_.ToPhysical(result_.fit.mode));
       const Eigen::VectorXd errors = ProblemOf(robot_, one_step).errors(result_.fit.mode);
       result_.one_step.errors = errors.array() / RowScale(one_step, result_.one_step).array();
@@ -85,6 +97,7 @@ class Curriculum {
       try {
         part.Linearise(robot_.ToPhysical(guess));
         found.push_back(FitLaplace(ProblemOf(robot_, part), guess, quick));
+        found.back().log_posterior -= part.LogSpread();
         simulations_ += found.back().simulations;
       } catch (const std::invalid_argument& error) {
         last_error = error.what();
@@ -132,15 +145,18 @@ class Curriculum {
       if (exact) break;
       const bool settled = (offset.array() / fit.posterior.covariance.diagonal().array().sqrt()).abs().maxCoeff() < 0.1 &&
                            (errors.noise_known() || (fit.scale.array().log().abs() < 0.05).all());
-      if (settled) break;
-      if (!errors.noise_known()) errors.set_noise_sd(NoiseOf(errors, fit));
+      if (settled || round + 1 == rounds) break;
+      if (!errors.noise_known()) errors.set_noise_sd(Scaled(errors.noise_sd(), fit));
     }
+    fit.log_posterior -= errors.LogSpread();  // of the errors themselves, whatever they were whitened by
     return fit;
   }
 
-  // Where the record does not say, the noise is what the errors' scale makes of the assumption.
-  static Eigen::VectorXd NoiseOf(const WindowErrors& errors, const LaplaceFit& fit) {
-    Eigen::VectorXd noise = errors.noise_sd();
+  // What the errors' scale makes of the record, or of the assumption.
+  static Eigen::VectorXd NoiseOf(const WindowErrors& errors, const LaplaceFit& fit) { return Scaled(errors.EndNoise(), fit); }
+
+  // There is no scale of what was never observed.
+  static Eigen::VectorXd Scaled(Eigen::VectorXd noise, const LaplaceFit& fit) {
     for (Eigen::Index c = 0; c < std::min(noise.size(), fit.scale.size()); ++c) noise(c) *= std::max(fit.scale(c), 1e-150);
     return noise;
   }
@@ -203,8 +219,13 @@ class Curriculum {
   }
 
   void Record(const WindowErrors& errors, const LaplaceFit& fit, int horizon) {
-    result_.stages.push_back({horizon, errors.windows(), errors.simulated_steps(),
-                              fit.errors.cwiseProduct(RowScale(errors, fit)).squaredNorm() / static_cast<double>(fit.errors.size()),
+    // Relative to the noise as recorded or, where nobody knows it, to that of one step.
+    const Eigen::VectorXd relative = NoiseOf(errors, fit).cwiseQuotient(result_.noise_known ? errors.EndNoise() : result_.noise_sd);
+    double squares = 0;
+    for (Eigen::Index i = 0; i < fit.errors.size(); ++i) {
+      squares += std::pow(fit.errors(i) * relative(errors.rows()[static_cast<size_t>(i)].coordinate), 2);
+    }
+    result_.stages.push_back({horizon, errors.windows(), errors.simulated_steps(), squares / static_cast<double>(fit.errors.size()),
                               fit.mode, fit.posterior.covariance.diagonal().cwiseSqrt()});
     result_.horizon = horizon;
     const double last = options_.horizons.empty() ? 1 : options_.horizons.back();

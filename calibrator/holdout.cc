@@ -11,6 +11,7 @@ namespace {
 
 constexpr size_t kFew = 5;  // roll-outs
 constexpr size_t kLeast = 10;
+constexpr double kRounding = 1e-9;  // of a simulation, standard units: who is better by less is not
 constexpr std::array<int, 6> kHorizons{1, 2, 5, 10, 20, 50};
 
 int64_t CountWindows(std::span<const Rollout> rollouts, int horizon) {
@@ -76,8 +77,8 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
       ++tried;
       // A root mean square of so many errors is known that well; where noise is most of it the two are alike.
       const double chance = 1 / std::sqrt(2.0 * static_cast<double>(error.windows) * entries);
-      if (error.posterior < error.prior * (1 - chance)) ++better;
-      else if (error.posterior <= error.prior * (1 + chance)) alike += fmt::format("{}{}", alike.empty() ? "" : ", ", horizon);
+      if (error.posterior + kRounding < error.prior * (1 - chance)) ++better;
+      else if (error.posterior <= error.prior * (1 + chance) + kRounding) alike += fmt::format("{}{}", alike.empty() ? "" : ", ", horizon);
       else worse += fmt::format("{}{}", worse.empty() ? "" : ", ", horizon);
     }
     result.errors.push_back(error);

@@ -114,7 +114,7 @@ MethodResult MixtureFrom(const MethodInput& input, MethodResult laplace) {
   const LeastSquares problem = ProblemOf(input.model->description(), errors);
   ImportanceOptions options;
   options.seed = input.options.seed;
-  const auto affordable = input.options.budget / std::max<int64_t>(1, errors.steps() * options.rounds);
+  const auto affordable = (input.options.budget - laplace.simulated_steps - errors.simulated_steps()) / std::max<int64_t>(1, errors.steps() * options.rounds);
   options.samples = static_cast<int>(std::clamp<int64_t>(affordable, 50, 2000));
   int round = 0;
   const ImportanceFit fit = FitByImportance(

@@ -102,6 +102,12 @@ double WindowErrors::EndSd(const Row& row) const {
   return sd > 0 ? sd : noise_sd_(row.coordinate);  // no reading is exact
 }
 
+Eigen::VectorXd WindowErrors::EndNoise() const {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * n_), count = squares;
+  for (const Row& row : rows_) squares(row.coordinate) += std::pow(EndSd(row), 2), count(row.coordinate) += 1;
+  return (count.array() > 0).select((squares.array() / count.array().max(1)).sqrt(), noise_sd_.array());
+}
+
 bool WindowErrors::noise_known() const {
   return std::all_of(rows_.begin(), rows_.end(), [&](const Row& row) {
     const Transition& t = rollouts_[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
@@ -190,15 +196,26 @@ Eigen::MatrixXd WindowErrors::Whitened(const Eigen::MatrixXd& physical) {
   return errors;
 }
 
+double WindowErrors::LogSpread() const {
+  Eigen::MatrixXd none = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_.size()), 1);
+  double sum = 0;
+  for (size_t w = 0; w < windows_.size(); ++w) sum += WhitenWindow(w, &none);
+  return sum;
+}
+
 // A Kalman filter of what the recorded initial state was off by, a constant: its innovations, divided by their spread.
-void WindowErrors::WhitenWindow(size_t w, Eigen::MatrixXd* errors) const {
+// @return ln det of that.
+double WindowErrors::WhitenWindow(size_t w, Eigen::MatrixXd* errors) const {
   const auto& step_rows = step_rows_[w];
   const Start& start = starts_[w];
+  double log_spread = 0;
   if (start.sensitivity.size() == 0) {
     for (Eigen::Index i = step_rows.front(); i < step_rows.back(); ++i) {
-      errors->row(i) /= EndSd(rows_[static_cast<size_t>(i)]);
+      const double sd = EndSd(rows_[static_cast<size_t>(i)]);
+      errors->row(i) /= sd;
+      log_spread += std::log(sd);
     }
-    return;
+    return log_spread;
   }
   const Eigen::VectorXd sd = start.sd.array().isNaN().select(noise_sd_, start.sd);
   Eigen::MatrixXd offset = Eigen::MatrixXd::Zero(2 * n_, errors->cols());
@@ -216,12 +233,14 @@ void WindowErrors::WhitenWindow(size_t w, Eigen::MatrixXd* errors) const {
     auto rows = errors->middleRows(first, count);
     rows -= h * offset;
     factor.matrixL().solveInPlace(rows);
+    log_spread += factor.matrixLLT().diagonal().array().log().sum();
     const Eigen::MatrixXd whitened_h = factor.matrixL().solve(h);
     if (step + 2 == step_rows.size()) break;
     const Eigen::MatrixXd gain = covariance * whitened_h.transpose();
     offset += gain * rows;
     covariance -= gain * gain.transpose();
   }
+  return log_spread;
 }
 
 }  // namespace plumb

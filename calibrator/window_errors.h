@@ -48,6 +48,8 @@ class WindowErrors {
   /// Units of (q, v): Task::state_scale.
   const Eigen::VectorXd& state_scale() const { return scale_; }
   void set_noise_sd(const Eigen::VectorXd& sd);
+  /// Noise of each entry of (q, v) at the windows' ends, root mean square: as recorded or, where not, noise_sd().
+  Eigen::VectorXd EndNoise() const;
   /// Whether the record says what the noise at the windows' ends is, and that their beginnings are exact.
   bool noise_known() const;
   bool starts_known() const;
@@ -60,6 +62,8 @@ class WindowErrors {
   Eigen::MatrixXd Raw(const Eigen::MatrixXd& physical);
   /// The same whitened. A simulator that fails anywhere has NaN all over.
   Eigen::MatrixXd Whitened(const Eigen::MatrixXd& physical);
+  /// ln det of what Whitened divides by: likelihoods whose noise or linearisation differ compare less this.
+  double LogSpread() const;
 
   /// Of all calls.
   int64_t simulated_steps() const { return simulated_steps_; }
@@ -74,7 +78,7 @@ class WindowErrors {
   Eigen::MatrixXd Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows, uint64_t which = 0);
   Eigen::MatrixXd Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows);
   Eigen::MatrixXd FreeMotion() const;
-  void WhitenWindow(size_t window, Eigen::MatrixXd* errors) const;
+  double WhitenWindow(size_t window, Eigen::MatrixXd* errors) const;
   double EndSd(const Row& row) const;
 
   Eigen::Index n_;

@@ -12,13 +12,15 @@ namespace {
 
 constexpr double kWide = 4;         // variance of the wide half, relative to the narrow one
 constexpr double kLeastWeight = 1e-3;
+constexpr double kDoubt = 0.5;      // about the guess's weights
 
-// Each component as it is, and wide.
-GaussianMixture Proposal(const GaussianMixture& mixture) {
+// Each component as it is, and wide. @param doubt share of the draws that go to all components alike.
+GaussianMixture Proposal(const GaussianMixture& mixture, double doubt) {
   GaussianMixture proposal;
+  const double alike = doubt / static_cast<double>(mixture.components.size());
   for (size_t i = 0; i < mixture.components.size(); ++i) {
     for (const double factor : {1.0, kWide}) {
-      proposal.weights.push_back(mixture.weights[i] / 2);
+      proposal.weights.push_back(((1 - doubt) * mixture.weights[i] + alike) / 2);
       proposal.components.push_back({mixture.components[i].mean, factor * mixture.components[i].covariance});
     }
   }
@@ -93,7 +95,7 @@ ImportanceFit FitByImportance(const std::function<Eigen::VectorXd(const Eigen::M
   Eigen::VectorXd target(0);
   fit.samples.resize(n, 0);
   for (int round = 0; round < options.rounds; ++round) {
-    proposals.push_back(Proposal(fit.mixture));
+    proposals.push_back(Proposal(fit.mixture, round == 0 ? kDoubt : 0));
     Random random(options.seed, {0x1390, static_cast<uint32_t>(round)});
     Eigen::MatrixXd fresh(n, options.samples);
     for (Eigen::Index i = 0; i < fresh.cols(); ++i) fresh.col(i) = Sample(proposals.back(), random);

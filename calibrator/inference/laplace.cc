@@ -29,6 +29,7 @@ class Fit {
 
   LaplaceFit Run(const Eigen::VectorXd& start) {
     u_ = problem_.prior.ToStandard(start);
+    if (!u_.allFinite()) throw std::invalid_argument("the fit begins on or beyond a bound of the prior");
     errors_ = Evaluate(u_);
     const auto rows = static_cast<Eigen::Index>(problem_.group.size());
     if (errors_.rows() != rows) throw std::invalid_argument("errors, groups, blocks and clusters must be equally many");
@@ -101,6 +102,7 @@ class Fit {
   void Climb() {
     double damping = 0;
     converged_ = false;
+    if (!near_) Differentiate();  // even if there is no iteration
     for (int iteration = 0; iteration < options_.most_iterations && !converged_; ++iteration) {
       if (!near_) Differentiate();
       const double effective = EffectiveParameters();

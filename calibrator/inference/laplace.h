@@ -60,7 +60,7 @@ struct LaplaceFit {
 /// Zeger, Biometrika 73, 1986), never narrowed.
 ///
 /// @param start in the prior's coordinates.
-/// @throws std::invalid_argument if the sizes of the problem do not fit, the simulation fails at the start, or there are too few
+/// @throws std::invalid_argument if the sizes of the problem do not fit, the start is not within the prior's bounds or its simulation fails, or there are too few
 /// errors to tell noise from parameters: n + 3 at least, where the scale is not known.
 LaplaceFit FitLaplace(const LeastSquares& problem, const Eigen::VectorXd& start, const LaplaceOptions& options = {});
 

@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kFewRows = 20;    // of a group, for a scale of its own
 constexpr double kPriorRows = 20;  // that a known scale is worth
-constexpr int kTailIterations = 20;
+constexpr int kTailIterations = 500;     // at most
+constexpr double kTailTolerance = 1e-7;  // of a scale
 constexpr double kWorthwhile = 4;  // [nat] that heavier tails must gain
 constexpr std::array<double, 5> kDegreesOfFreedom{2, 4, 8, 16, 32};
 
@@ -39,8 +40,7 @@ Noise::Noise(const std::vector<int>& group, const std::vector<int>& block, bool 
 }
 
 void Noise::Estimate(const Eigen::VectorXd& errors, double effective) {
-  const auto update = [&] {
-    const Eigen::VectorXd robust = RobustWeights(errors);
+  const auto update = [&](const Eigen::VectorXd& robust, double surplus) {
     Eigen::VectorXd squares = Eigen::VectorXd::Zero(groups_);
     for (Eigen::Index i = 0; i < errors.size(); ++i) {
       squares(shares_[static_cast<size_t>(group_[static_cast<size_t>(i)])]) += robust(i) * errors(i) * errors(i);
@@ -50,12 +50,21 @@ void Noise::Estimate(const Eigen::VectorXd& errors, double effective) {
       const int from = shares_[static_cast<size_t>(g)];
       if (rows_(from) == 0) continue;  // nothing of it was observed
       const double variance = scale_known_ ? (squares(from) + kPriorRows) / (rows_(from) * left + kPriorRows)
-                                           : squares(from) / (rows_(from) * left);
+                                           : squares(from) / (rows_(from) * left * surplus);
       scale_(g) = std::max(std::sqrt(variance), kLeastScale);
     }
   };
-  if (std::isinf(degrees_of_freedom_)) return update();
-  for (int i = 0; i < kTailIterations; ++i) update();  // expectation-maximisation: weights depend on scales
+  // From the same beginning whatever the scales were before.
+  update(Eigen::VectorXd::Ones(errors.size()), 1);
+  if (std::isinf(degrees_of_freedom_)) return;
+  // Expectation-maximisation, as weights depend on scales; that of Liu, Rubin & Wu (Biometrika 85, 1998), whose weights have mean
+  // one, is many times faster where nothing else is known of the scales.
+  for (int i = 0; i < kTailIterations; ++i) {
+    const Eigen::VectorXd before = scale_;
+    const Eigen::ArrayXd of_block = BlockWeights(errors);
+    update(OfRows(of_block), of_block.mean());
+    if ((scale_ - before).cwiseAbs().cwiseQuotient(scale_).maxCoeff() < kTailTolerance) break;
+  }
 }
 
 bool Noise::ChooseTails(const Eigen::VectorXd& errors, double effective) {
@@ -93,17 +102,19 @@ Eigen::VectorXd Noise::BlockSquares(const Eigen::VectorXd& errors) const {
   return squares;
 }
 
-Eigen::VectorXd Noise::RobustWeights(const Eigen::VectorXd& errors) const {
-  if (std::isinf(degrees_of_freedom_)) return Eigen::VectorXd::Ones(errors.size());
-  const Eigen::VectorXd squares = BlockSquares(errors);
-  const Eigen::ArrayXd of_block = (degrees_of_freedom_ + block_size_.array()) / (degrees_of_freedom_ + squares.array());
-  Eigen::VectorXd weights(errors.size());
-  for (Eigen::Index i = 0; i < errors.size(); ++i) weights(i) = of_block(block_[static_cast<size_t>(i)]);
+Eigen::ArrayXd Noise::BlockWeights(const Eigen::VectorXd& errors) const {
+  return (degrees_of_freedom_ + block_size_.array()) / (degrees_of_freedom_ + BlockSquares(errors).array());
+}
+
+Eigen::VectorXd Noise::OfRows(const Eigen::ArrayXd& of_block) const {
+  Eigen::VectorXd weights(static_cast<Eigen::Index>(block_.size()));
+  for (Eigen::Index i = 0; i < weights.size(); ++i) weights(i) = of_block(block_[static_cast<size_t>(i)]);
   return weights;
 }
 
 Eigen::VectorXd Noise::Weights(const Eigen::VectorXd& errors) const {
-  return RobustWeights(errors).cwiseQuotient(RowScale().array().square().matrix());
+  const Eigen::VectorXd plain = RowScale().array().square().inverse();
+  return std::isinf(degrees_of_freedom_) ? plain : plain.cwiseProduct(OfRows(BlockWeights(errors)));
 }
 
 Eigen::MatrixXd Noise::Information(const Eigen::MatrixXd& jacobian) const {

@@ -34,7 +34,8 @@ class Noise {
 
  private:
   Eigen::VectorXd BlockSquares(const Eigen::VectorXd& errors) const;
-  Eigen::VectorXd RobustWeights(const Eigen::VectorXd& errors) const;
+  Eigen::ArrayXd BlockWeights(const Eigen::VectorXd& errors) const;  // (f + k) / (f + |r / s|^2)
+  Eigen::VectorXd OfRows(const Eigen::ArrayXd& of_block) const;
 
   const std::vector<int>& group_;
   const std::vector<int>& block_;

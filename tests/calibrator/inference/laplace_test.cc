@@ -1,0 +1,414 @@
+#include "calibrator/inference/laplace.h"
+
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <stdexcept>
+
+#include "calibrator/inference/sandwich.h"
+#include "statistics.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::vector<int> Numbers(Eigen::Index count, int divisor = 1) {
+  std::vector<int> numbers;
+  for (int i = 0; i < count; ++i) numbers.push_back(i / divisor);
+  return numbers;
+}
+
+// Errors f(x) - y, one noise scale, each row an observation and a cluster of its own.
+template <typename Model>
+LeastSquares Fitting(const Prior& prior, const Eigen::VectorXd& y, const Model& model) {
+  return {prior,
+          [=](const Eigen::MatrixXd& x) {
+            Eigen::MatrixXd errors(y.size(), x.cols());
+            for (Eigen::Index j = 0; j < x.cols(); ++j) errors.col(j) = model(Eigen::VectorXd(x.col(j))) - y;
+            return errors;
+          },
+          std::vector<int>(static_cast<size_t>(y.size()), 0), Numbers(y.size()), Numbers(y.size())};
+}
+
+LeastSquares Line(const Prior& prior, const Eigen::VectorXd& y, const Eigen::MatrixXd& a) {
+  return Fitting(prior, y, [a](const Eigen::VectorXd& x) -> Eigen::VectorXd { return a * x; });
+}
+
+Eigen::MatrixXd Normals(Eigen::Index rows, Eigen::Index columns, uint32_t stream) {
+  Random random(29, {stream});
+  return StandardNormals(rows, columns, random);
+}
+
+Prior SomePrior() { return Prior({Prior::Normal(1, 2), Prior::Normal(-1, 0.5), Prior::Normal(0, 1)}); }
+
+// Of a normal prior and a normal likelihood with that noise.
+Gaussian Conjugate(const Prior& prior, const Eigen::MatrixXd& a, const Eigen::VectorXd& y, double s) {
+  const Eigen::Index n = prior.size();
+  Eigen::VectorXd mean(n), precision(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto& m = prior.marginals()[static_cast<size_t>(i)];
+    mean(i) = m.a, precision(i) = 1 / (m.b * m.b);
+  }
+  const Eigen::MatrixXd posterior = a.transpose() * a / (s * s) + Eigen::MatrixXd(precision.asDiagonal());
+  return {posterior.inverse() * (a.transpose() * y / (s * s) + precision.cwiseProduct(mean)), posterior.inverse()};
+}
+
+TEST_CASE("a line with normal noise has the posterior of the textbook") {
+  const bool known = GENERATE(false, true);
+  const Prior prior = SomePrior();
+  const Eigen::MatrixXd a = Normals(200, 3, 1);
+  const double noise = known ? 1 : 0.3;
+  const Eigen::VectorXd y = a * Eigen::Vector3d(2, -0.5, 0.7) + noise * Normals(200, 1, 2);
+  LeastSquares problem = Line(prior, y, a);
+  problem.scale_known = known;
+  LaplaceOptions options;
+  options.tolerance = 1e-9;
+  options.sandwich = options.robust = false;
+  const LaplaceFit fit = FitLaplace(problem, Eigen::Vector3d(-3, 1, 2), options);
+  CHECK(fit.converged);
+  const double s = fit.scale(0);
+  const Gaussian truth = Conjugate(prior, a, y, s);
+  CHECK((fit.mode - truth.mean).norm() < 1e-6);
+  CHECK((fit.posterior.covariance - truth.covariance).norm() < 1e-6 * truth.covariance.norm());
+  CHECK((fit.information - a.transpose() * a / (s * s)).norm() < 1e-6 * fit.information.norm());
+  CHECK((fit.errors * s - (a * truth.mean - y)).norm() < 1e-5);
+  CHECK((fit.jacobian * s - a).norm() < 1e-5);
+  // The scale, from its definition: effective parameters are what the data tell of n.
+  const double squares = (a * truth.mean - y).squaredNorm();
+  const double effective = (truth.covariance * a.transpose() * a / (s * s)).trace();
+  CHECK(effective < 3);
+  const double variance = known ? (squares + 20) / (200 - effective + 20) : squares / (200 - effective);
+  CHECK(s * s == Approx(variance).epsilon(1e-6));
+  CHECK(s == Approx(noise).epsilon(0.15));
+  // Draws have these moments.
+  Random random(3);
+  const Eigen::MatrixXd draws = Draw(fit, prior, 20'000, random);
+  const Eigen::MatrixXd centred = draws.colwise() - truth.mean;
+  CHECK((centred.rowwise().mean().array() / truth.covariance.diagonal().array().sqrt()).abs().maxCoeff() < 0.03);
+  CHECK((centred * centred.transpose() / 20'000 - truth.covariance).norm() < 0.03 * truth.covariance.norm());
+}
+
+// Mean and covariance of the posterior with an unknown scale s of prior 1 / s, by a sum over a grid in u.
+template <typename Model>
+Gaussian OnGrid(const Prior& prior, const Eigen::VectorXd& y, const Model& model, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
+  constexpr int kPoints = 300;
+  const Eigen::Index n = prior.size();
+  const int count = n == 1 ? kPoints : kPoints * kPoints;
+  Eigen::MatrixXd x(n, count);
+  Eigen::VectorXd log_density(count);
+  for (int i = 0; i < count; ++i) {
+    Eigen::VectorXd u(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const int at = k == 0 ? i % kPoints : i / kPoints;
+      u(k) = lower(k) + (upper(k) - lower(k)) * (at + 0.5) / kPoints;
+    }
+    x.col(i) = prior.FromStandard(u);
+    log_density(i) = -0.5 * u.squaredNorm() - 0.5 * static_cast<double>(y.size()) * std::log((model(Eigen::VectorXd(x.col(i))) - y).squaredNorm());
+  }
+  Eigen::VectorXd w = (log_density.array() - log_density.maxCoeff()).exp();
+  w /= w.sum();
+  const Eigen::VectorXd mean = x * w;
+  const Eigen::MatrixXd centred = x.colwise() - mean;
+  return {mean, centred * w.asDiagonal() * centred.transpose()};
+}
+
+TEST_CASE("a curve's posterior is that of a sum over a grid") {
+  SECTION("one parameter") {
+    const Prior prior({Prior::Normal(0.5, 1)});
+    const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+      return Eigen::ArrayXd::LinSpaced(50, 0, 3).unaryExpr([&](double t) { return std::exp(-std::exp(x(0)) * t); });
+    };
+    const Eigen::VectorXd y = model(Eigen::VectorXd::Constant(1, -0.4)) + 0.1 * Normals(50, 1, 5);
+    LaplaceOptions options;
+    options.sandwich = false;
+    const LaplaceFit fit = FitLaplace(Fitting(prior, y, model), Eigen::VectorXd::Constant(1, 2.5), options);
+    const Gaussian truth = OnGrid(prior, y, model, Eigen::VectorXd::Constant(1, -2), Eigen::VectorXd::Constant(1, 1));
+    const double sd = std::sqrt(truth.covariance(0, 0));
+    CHECK(std::abs(fit.mode(0) - truth.mean(0)) < 0.1 * sd);
+    CHECK(std::sqrt(fit.posterior.covariance(0, 0)) == Approx(sd).epsilon(0.06));
+  }
+  SECTION("two parameters, one of them between bounds") {
+    const Prior prior({Prior::Normal(0, 1), Prior::Uniform(0, 2)});
+    const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+      return Eigen::ArrayXd::LinSpaced(80, 0, 4).unaryExpr([&](double t) { return std::exp(x(0)) * std::sin(x(1) * t); });
+    };
+    const Eigen::VectorXd y = model(Eigen::Vector2d(0.3, 1.3)) + 0.2 * Normals(80, 1, 6);
+    LaplaceOptions options;
+    options.sandwich = false;
+    const LaplaceFit fit = FitLaplace(Fitting(prior, y, model), Eigen::Vector2d(-0.5, 0.9), options);
+    const Gaussian truth = OnGrid(prior, y, model, Eigen::Vector2d(0, 0.2), Eigen::Vector2d(0.6, 0.6));
+    const Eigen::Vector2d sd = truth.covariance.diagonal().cwiseSqrt();
+    CHECK(((fit.mode - truth.mean).array() / sd.array()).abs().maxCoeff() < 0.2);
+    CHECK((fit.posterior.covariance - truth.covariance).norm() < 0.1 * truth.covariance.norm());
+  }
+}
+
+TEST_CASE("where the data lie beyond a uniform prior's bound the posterior leans on it") {
+  const Prior prior({Prior::Uniform(0, 1)});
+  const Eigen::VectorXd y = Eigen::VectorXd::Constant(40, 1.02) + 0.1 * Normals(40, 1, 7);
+  const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd { return Eigen::VectorXd::Constant(40, x(0)); };
+  const LaplaceFit fit = FitLaplace(Fitting(prior, y, model), Eigen::VectorXd::Constant(1, 0.2));
+  CHECK(fit.converged);
+  Random random(3);
+  const Eigen::MatrixXd draws = Draw(fit, prior, 20'000, random);
+  CHECK(draws.maxCoeff() <= 1);
+  CHECK(draws.minCoeff() > 0.7);
+  const Gaussian truth = OnGrid(prior, y, model, Eigen::VectorXd::Constant(1, 0), Eigen::VectorXd::Constant(1, 5));
+  CHECK(1 - draws.mean() == Approx(1 - truth.mean(0)).epsilon(0.5));
+  // On the bound itself there is no way to tell in which direction to go.
+  CHECK_THROWS_AS(FitLaplace(Fitting(prior, y, model), Eigen::VectorXd::Ones(1)), std::invalid_argument);
+}
+
+TEST_CASE("a direction that changes nothing keeps the prior") {
+  const Prior prior({Prior::Normal(2, 1), Prior::Normal(0, 1), Prior::Normal(1, 3)});
+  Eigen::MatrixXd a = Normals(100, 3, 8);
+  a.col(1) = a.col(0);  // only x0 + x1 counts
+  a.col(2).setZero();
+  const Eigen::VectorXd y = a * Eigen::Vector3d(1, 2, 5) + 0.01 * Normals(100, 1, 9);
+  const LaplaceFit fit = FitLaplace(Line(prior, y, a), Eigen::Vector3d::Zero());
+  Random random(4);
+  const Eigen::MatrixXd draws = Draw(fit, prior, 3000, random);
+  CHECK(KolmogorovSmirnov((draws.row(0) - draws.row(1)).transpose(), 2, std::sqrt(2)) > 0.01);
+  CHECK(KolmogorovSmirnov(draws.row(2).transpose(), 1, 3) > 0.01);
+  CHECK(KolmogorovSmirnov((draws.row(0) + draws.row(1)).transpose(), 3, 1) < 1e-6);  // of which the data do tell
+  CHECK(fit.mode(2) == Approx(1).margin(1e-9));
+  CHECK(fit.posterior.covariance(2, 2) == Approx(9).epsilon(1e-9));
+  CHECK(fit.mode(0) - fit.mode(1) == Approx(2).margin(1e-6));
+}
+
+TEST_CASE("outliers do little harm, and normal errors are taken as such") {
+  const Prior prior = SomePrior();
+  const Eigen::MatrixXd a = Normals(300, 3, 10);
+  const Eigen::Vector3d truth(2, -0.5, 0.7);
+  const Eigen::VectorXd clean = a * truth + 0.1 * Normals(300, 1, 11);
+  Eigen::VectorXd spoilt = clean;
+  for (int i = 0; i < 300; i += 10) spoilt(i) += i % 20 ? 3 : 4;
+  LaplaceOptions trusting;
+  trusting.robust = false;
+  const LaplaceFit from_clean = FitLaplace(Line(prior, clean, a), Eigen::Vector3d::Zero());
+  const LaplaceFit robust = FitLaplace(Line(prior, spoilt, a), Eigen::Vector3d::Zero());
+  const LaplaceFit fooled = FitLaplace(Line(prior, spoilt, a), Eigen::Vector3d::Zero(), trusting);
+  const Eigen::ArrayXd sd = from_clean.posterior.covariance.diagonal().array().sqrt();
+  const auto distance = [&](const LaplaceFit& fit) { return ((fit.mode - from_clean.mode).array() / sd).abs().maxCoeff(); };
+  CHECK(from_clean.degrees_of_freedom == kInfinity);
+  CHECK(robust.degrees_of_freedom == 2);
+  CHECK(fooled.degrees_of_freedom == kInfinity);
+  CHECK(distance(robust) < 0.7);
+  CHECK(distance(fooled) > 3);
+  CHECK(robust.scale(0) == Approx(0.1).epsilon(0.25));
+  int heavy = 0;
+  for (uint32_t i = 0; i < 100; ++i) {
+    heavy += std::isfinite(FitLaplace(Line(prior, a * truth + 0.1 * Normals(300, 1, 1000 + i), a), truth).degrees_of_freedom);
+  }
+  CHECK(heavy <= 1);
+}
+
+// Of t with f degrees of freedom.
+double StudentT(double f, Random& random) {
+  double chi_squared = 0;
+  for (int i = 0; i < f; ++i) chi_squared += std::pow(random.Normal(), 2);
+  return random.Normal() / std::sqrt(chi_squared / f);
+}
+
+// Share of the 95 % intervals of all parameters that hold the truth.
+template <typename MakeNoise>
+double Coverage(const LeastSquares& form, const Eigen::MatrixXd& a, int sets, const LaplaceOptions& options, const MakeNoise& noise,
+                int* widened = nullptr) {
+  const Eigen::VectorXd truth = Eigen::VectorXd::Ones(a.cols());
+  int inside = 0;
+  for (int set = 0; set < sets; ++set) {
+    LeastSquares problem = Line(form.prior, a * truth + noise(static_cast<uint32_t>(set)), a);
+    problem.block = form.block, problem.cluster = form.cluster;
+    const LaplaceFit fit = FitLaplace(problem, truth, options);
+    for (Eigen::Index k = 0; k < a.cols(); ++k) {
+      inside += std::abs(fit.mode(k) - 1) < 1.96 * std::sqrt(fit.posterior.covariance(k, k));
+    }
+    if (widened) *widened += fit.inflation > 1;
+  }
+  return inside / static_cast<double>(sets * a.cols());
+}
+
+TEST_CASE("with heavy tails, intervals hold the truth as often as they say") {
+  const Prior prior({Prior::Normal(0, 100), Prior::Normal(0, 100)});
+  const Eigen::MatrixXd a = Normals(200, 2, 12);
+  const LeastSquares form = Line(prior, Eigen::VectorXd::Zero(200), a);
+  LaplaceOptions options;
+  options.sandwich = false;
+  const auto noise = [](uint32_t set) {
+    Random random(5, {set});
+    Eigen::VectorXd e(200);
+    for (double& x : e) x = 0.1 * StudentT(3, random);
+    return e;
+  };
+  CHECK(Coverage(form, a, 300, options, noise) == Approx(0.95).margin(0.025));  // 2.8 sd
+}
+
+TEST_CASE("errors that depend on each other widen the posterior as they must") {
+  constexpr int kRows = 2000, kCluster = 25;
+  const Prior prior({Prior::Normal(0, 100), Prior::Normal(0, 100)});
+  Eigen::MatrixXd a(kRows, 2);
+  for (int i = 0; i < kRows; ++i) a.row(i) << 1, std::sin(0.01 * i);
+  LeastSquares form = Line(prior, Eigen::VectorXd::Zero(kRows), a);
+  form.cluster = Numbers(kRows, kCluster);
+  LaplaceOptions plain;
+  plain.robust = false;
+  LaplaceOptions honest = plain;
+  plain.sandwich = false;
+  // Autoregressive of first order within each cluster, of variance 1.
+  const auto dependent = [=](uint32_t set) {
+    Random random(6, {set});
+    Eigen::VectorXd e(kRows);
+    for (int i = 0; i < kRows; ++i) e(i) = i % kCluster == 0 ? random.Normal() : 0.8 * e(i - 1) + 0.6 * random.Normal();
+    return e;
+  };
+  CHECK(Coverage(form, a, 600, honest, dependent) == Approx(0.95).margin(0.02));
+  CHECK(Coverage(form, a, 300, plain, dependent) < 0.65);
+  const auto independent = [=](uint32_t set) -> Eigen::VectorXd { return Normals(kRows, 1, 50'000 + set); };
+  int widened = 0;
+  CHECK(Coverage(form, a, 600, honest, independent, &widened) == Approx(0.95).margin(0.02));
+  CHECK(widened <= 15);
+}
+
+TEST_CASE("the sandwich takes information away where scores scatter, and nowhere else") {
+  // Of a cluster's four rows one tells something along e0, all four tell the same along e1.
+  constexpr int kClusters = 2000;
+  Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(kClusters * 4, 2);
+  for (int c = 0; c < kClusters; ++c) {
+    const double sign = c % 2 ? 1 : -1;
+    for (int i = 0; i < 4; ++i) scores.row(4 * c + i) << (i == c % 4 ? 2 * sign : 0), (c % 4 < 2 ? 1 : -1);
+  }
+  const Eigen::Matrix2d information = scores.transpose() * scores;
+  const Sandwich wider = WidenBySandwich(information, scores, Numbers(kClusters * 4, 4));
+  CHECK(wider.inflation == Approx(4).epsilon(0.01));  // sum_c (4)^2 / sum_i 1
+  CHECK(wider.information(0, 0) == Approx(information(0, 0)).epsilon(0.01));
+  CHECK(wider.information(1, 1) == Approx(information(1, 1) / 4).epsilon(0.01));
+  // Too few clusters, no information at all: nothing changes.
+  CHECK(WidenBySandwich(information, scores.topRows(28), Numbers(28, 4)).inflation == 1);
+  const Eigen::Matrix2d none = Eigen::Matrix2d::Zero();
+  CHECK(WidenBySandwich(none, Eigen::MatrixXd::Zero(scores.rows(), 2), Numbers(scores.rows(), 4)).information == none);
+}
+
+TEST_CASE("data without noise are explained exactly, and the end is found") {
+  const Prior prior({Prior::Normal(0, 1), Prior::Normal(0, 1)});
+  const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    return Eigen::ArrayXd::LinSpaced(60, 0, 3).unaryExpr([&](double t) { return std::exp(x(0)) * std::sin(std::exp(x(1)) * t); });
+  };
+  const Eigen::Vector2d truth(0.4, 0.3);
+  const LaplaceFit fit = FitLaplace(Fitting(prior, model(truth), model), Eigen::Vector2d::Zero());
+  CHECK(fit.converged);
+  CHECK((fit.mode - truth).norm() < 1e-8);
+  CHECK(fit.scale(0) == Approx(1e-9));
+  CHECK(fit.simulations < 60);
+  CHECK(fit.posterior.covariance.diagonal().maxCoeff() < 1e-18);
+}
+
+TEST_CASE("a border beyond which simulations fail does not stop the fit") {
+  const Prior prior({Prior::Normal(0, 2), Prior::Normal(0, 2)});
+  const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(60, 0, 3);
+    if (x(0) > 1.05 || x(1) < -1) return Eigen::VectorXd::Constant(60, kNaN);
+    return (x(0) * t).exp() + x(1) * t;
+  };
+  const Eigen::VectorXd y = model(Eigen::Vector2d(1, 0.5)) + 0.1 * Normals(60, 1, 13);
+  LaplaceOptions options;
+  options.tolerance = 1e-6;
+  const LaplaceFit near = FitLaplace(Fitting(prior, y, model), Eigen::Vector2d(1, 0.5), options);
+  CHECK(near.mode(0) == Approx(1).margin(0.02));
+  // From below, the first steps lead across the border; from the border itself, the only slope is the backward one.
+  for (const Eigen::Vector2d& start : {Eigen::Vector2d(0.2, 0), Eigen::Vector2d(1.05, -1)}) {
+    const LaplaceFit fit = FitLaplace(Fitting(prior, y, model), start, options);
+    CHECK(fit.converged);
+    CHECK((fit.mode - near.mode).norm() < 1e-5);
+  }
+  // Right on the border lies the best that can be had.
+  const Eigen::VectorXd beyond = (1.2 * Eigen::ArrayXd::LinSpaced(60, 0, 3)).exp();
+  CHECK(FitLaplace(Fitting(prior, beyond, model), Eigen::Vector2d(0, 0)).mode(0) == Approx(1.05).margin(0.1));
+}
+
+TEST_CASE("what cannot be fitted is refused") {
+  const Prior prior = SomePrior();
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  const Eigen::MatrixXd a = Normals(6, 3, 14);
+  CHECK_NOTHROW(FitLaplace(Line(prior, Eigen::VectorXd::Ones(6), a), zero));
+  CHECK_THROWS_AS(FitLaplace(Line(prior, Eigen::VectorXd::Ones(5), a.topRows(5)), zero), std::invalid_argument);
+  LeastSquares known = Line(prior, Eigen::VectorXd::Ones(5), a.topRows(5));
+  known.scale_known = true;
+  CHECK_NOTHROW(FitLaplace(known, zero));
+  CHECK_THROWS_AS(FitLaplace(Line(prior, Eigen::VectorXd::Ones(6), a), Eigen::Vector2d::Zero()), std::invalid_argument);
+  LeastSquares uneven = Line(prior, Eigen::VectorXd::Ones(6), a);
+  uneven.block.pop_back();
+  CHECK_THROWS_AS(FitLaplace(uneven, zero), std::invalid_argument);
+  uneven.block = uneven.cluster = uneven.group = Numbers(5);
+  CHECK_THROWS_AS(FitLaplace(uneven, zero), std::invalid_argument);
+  LeastSquares failing = Line(prior, Eigen::VectorXd::Constant(6, kNaN), a);
+  CHECK_THROWS_AS(FitLaplace(failing, zero), std::invalid_argument);
+}
+
+TEST_CASE("no iteration at all looks at the start as it is") {
+  const Prior prior = SomePrior();
+  const Eigen::MatrixXd a = Normals(100, 3, 15);
+  const Eigen::Vector3d at(1, -1, 0.5);
+  const Eigen::VectorXd y = a * Eigen::Vector3d(2, -0.5, 0.7) + Normals(100, 1, 16);
+  LaplaceOptions still;
+  still.most_iterations = 0;
+  still.robust = still.sandwich = false;
+  const LaplaceFit fit = FitLaplace(Line(prior, y, a), at, still);
+  CHECK((fit.mode - at).norm() < 1e-12);
+  const Eigen::VectorXd errors = a * at - y;
+  const double s = fit.scale(0);
+  CHECK((fit.jacobian * s - a).norm() < 1e-5);
+  CHECK((fit.errors * s - errors).norm() < 1e-9);
+  const double effective = (Conjugate(prior, a, y, s).covariance * a.transpose() * a / (s * s)).trace();
+  CHECK(s * s == Approx(errors.squaredNorm() / (100 - effective)).epsilon(0.002));
+}
+
+// ln p of blocks of k rows, normal or Student's t, the scale at its maximum by search, up to a constant of data and tails.
+double Profile(const Eigen::VectorXd& errors, int k, double f) {
+  const auto at = [&](double log_s) {
+    const double s = std::exp(log_s);
+    double sum = -static_cast<double>(errors.size()) * log_s;
+    for (Eigen::Index i = 0; i < errors.size(); i += k) {
+      const double squared = errors.segment(i, k).squaredNorm() / (s * s);
+      sum += std::isinf(f) ? -0.5 * squared
+                           : std::lgamma((f + k) / 2) - std::lgamma(f / 2) - 0.5 * k * std::log(f / 2) - 0.5 * (f + k) * std::log1p(squared / f);
+    }
+    return sum;
+  };
+  double best = -12;
+  for (const double step : {0.05, 1e-3}) {
+    const double middle = best;
+    for (double log_s = step == 0.05 ? -12 : middle - 0.05; log_s < (step == 0.05 ? 15 : middle + 0.05); log_s += step) {
+      if (at(log_s) > at(best)) best = log_s;
+    }
+  }
+  return at(best);
+}
+
+TEST_CASE("the likelihood's scale is at its maximum, whatever else is asked in the same batch") {
+  const int k = GENERATE(1, 12);
+  const double f = GENERATE(2.0, 8.0, std::numeric_limits<double>::infinity());
+  const Prior prior({Prior::Normal(0, 1)});
+  const Eigen::VectorXd y = Normals(240, 1, 17);
+  LeastSquares problem = Fitting(prior, y, [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    return x(0) > 50 ? Eigen::VectorXd::Constant(240, kNaN) : Eigen::VectorXd::Constant(240, x(0) * x(0) * x(0));
+  });
+  problem.block = Numbers(240, k);
+  const Eigen::VectorXd x = Eigen::VectorXd{{0, 30, 0.1, -2, 60, 12}};
+  const Eigen::VectorXd together = LogLikelihood(problem, x.transpose(), f);
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const double alone = LogLikelihood(problem, x.segment(i, 1), f)(0);
+    if (i == 4) {
+      CHECK(together(i) == -kInfinity);
+      CHECK(alone == -kInfinity);
+      continue;
+    }
+    CAPTURE(k, f, x(i));
+    CHECK(together(i) == alone);
+    CHECK(alone == Approx(Profile((x(i) * x(i) * x(i) - y.array()).matrix(), k, f)).margin(0.02));
+  }
+}
+
+}  // namespace
+}  // namespace plumb
