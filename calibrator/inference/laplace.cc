@@ -13,8 +13,7 @@
 namespace plumb {
 namespace {
 
-// In standard coordinates: far above the simulations' rounding, far below any prior's width.
-constexpr double kDifference = 1e-5;
+constexpr double kDifference = kSlopeDifference;
 // No step leads further than that many of the prior's standard deviations.
 constexpr double kLongestStep = 2;
 // Within that many posterior standard deviations the slope changes little.
