@@ -74,7 +74,7 @@ BENCHMARK(StreamingSettle)->Unit(benchmark::kMillisecond)->Iterations(5);
 void OneStepFit(benchmark::State& state) {
   const HopperLog log(0);
   for (auto _ : state) {
-    WindowErrors errors(log.model, log.rollouts, 1);
+    WindowErrors errors(log.model, log.rollouts, 1, 1);
     const Eigen::VectorXd start = PriorOf(log.robot).FromStandard(Eigen::VectorXd::Zero(errors.parameter_count()));
     benchmark::DoNotOptimize(FitLaplace(ProblemOf(log.robot, errors), start).mode.data());
   }

@@ -13,10 +13,10 @@
 namespace plumb {
 namespace {
 
-// With each new transition: seven more fill the lanes of an engine, and looking costs little.
-constexpr size_t kLinearisedAgain = 7, kLookedAt = 64;
+// With each new transition: together they fill the lanes of three engines of eight, and looking costs little.
+constexpr size_t kLinearisedAgain = 23, kLookedAt = 128;
 constexpr double kStill = 0.01;      // [sd] of the posterior: a mode so near is where it was
-constexpr double kSettled = 1e-8;    // in standard coordinates
+constexpr double kSettled = 1e-6;    // [sd]
 constexpr int kRounds = 30;          // until it has settled
 constexpr size_t kSettledAtOnce = 64;
 constexpr double kLongestStep = 2;   // of the mode, in standard coordinates: slopes are not to be trusted further away
@@ -93,15 +93,17 @@ std::vector<size_t> StreamingLaplace::NextInTurn() {
   for (size_t looked = 0; looked < kLookedAt && turns.size() < kLinearisedAgain && next_ < pieces_.size(); ++looked, ++next_) {
     const Piece& piece = pieces_[next_];
     if (piece.coordinates.empty()) continue;
-    bool stale = piece.at.size() == 0 || piece.noise_version != noise_version_;
-    if (!stale) {
-      const Eigen::VectorXd offset = mode_ - piece.at;
-      stale = offset.dot(precision_ * offset) > kStill * kStill;
-    }
-    if (stale) turns.push_back(next_);
+    const bool stale = piece.at.size() == 0 || piece.noise_version != noise_version_;
+    if (stale || DistanceFrom(piece.at) > kStill) turns.push_back(next_);
     else next_sums_.Add(piece.coordinates, piece.errors, piece.at);
   }
   return turns;
+}
+
+// Of the mode, in posterior standard deviations.
+double StreamingLaplace::DistanceFrom(const Eigen::VectorXd& at) const {
+  const Eigen::VectorXd offset = mode_ - at;
+  return std::sqrt(offset.dot(precision_ * offset));
 }
 
 Window StreamingLaplace::WindowOf(size_t index) const {
@@ -254,11 +256,12 @@ bool StreamingLaplace::AdaptNoise() {
 
 bool StreamingLaplace::Settle() {
   if (pieces_.empty()) return true;
+  double last_step = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kRounds; ++round) {
     std::vector<size_t> some;
     for (size_t i = 0; i < pieces_.size(); ++i) {
       const Piece& piece = pieces_[i];
-      const bool settled = piece.at.size() > 0 && piece.noise_version == noise_version_ && (mode_ - piece.at).cwiseAbs().maxCoeff() <= kSettled;
+      const bool settled = piece.at.size() > 0 && piece.noise_version == noise_version_ && DistanceFrom(piece.at) <= kSettled;
       if (!settled) some.push_back(i);
       if (some.size() == kSettledAtOnce || (i + 1 == pieces_.size() && !some.empty())) {
         Linearise(some);
@@ -273,7 +276,11 @@ bool StreamingLaplace::Settle() {
     next_ = 0;
     const Eigen::VectorXd before = mode_;
     Solve();
-    if (!AdaptNoise() && (mode_ - before).cwiseAbs().maxCoeff() <= kSettled) return true;
+    const double step = DistanceFrom(before);
+    // A short step that is no shorter than the last one is rounding, in a direction that next to nothing is known of.
+    const bool rests = step <= kSettled || (step <= kStill && step > last_step / 2);
+    last_step = step;
+    if (!AdaptNoise() && rests) return true;
   }
   return false;
 }

@@ -68,6 +68,7 @@ class StreamingLaplace {
   };
 
   Window WindowOf(size_t index) const;
+  double DistanceFrom(const Eigen::VectorXd& at) const;
   std::vector<size_t> NextInTurn();
   void Linearise(const std::vector<size_t>& indices);
   Eigen::MatrixXd Predict(const Eigen::MatrixXd& standard, const std::vector<Window>& windows);
