@@ -13,8 +13,8 @@
 namespace plumb {
 namespace {
 
-// With each new transition: together they fill the lanes of three engines of eight, and looking costs little.
-constexpr size_t kLinearisedAgain = 23, kLookedAt = 128;
+// With each new transition: together they fill eight lanes twice; and looking costs little.
+constexpr size_t kLinearisedAgain = 15, kLookedAt = 128;
 constexpr double kStill = 0.01;      // [sd] of the posterior: a mode so near is where it was
 constexpr double kSettled = 1e-6;    // [sd]
 constexpr int kRounds = 30;          // until it has settled
@@ -74,6 +74,7 @@ bool StreamingLaplace::Add(const Transition& transition, int64_t episode) {
     count_turns();
     throw;
   }
+  if (next_ + 1 == pieces_.size()) turns.push_back(next_++);  // with the newest all have had their turn
   count_turns();
   unknown_rows_ += unknown;
   uncertain_starts_ += pieces_.back().start_uncertain;

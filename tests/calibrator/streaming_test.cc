@@ -63,8 +63,8 @@ TEST_CASE("a streamed log of the hopper gives the batch's answer") {
   CHECK(stream.left_out() == 0);
   SECTION("nearly at once") {
     const Gaussian found = stream.standard();
-    CHECK(((found.mean - batch.standard.mean).array() / batch.standard.covariance.diagonal().array().sqrt()).abs().maxCoeff() < 0.1);
-    CHECK((found.covariance.diagonal().array() / batch.standard.covariance.diagonal().array() - 1).abs().maxCoeff() < 0.1);
+    CHECK(((found.mean - batch.standard.mean).array() / batch.standard.covariance.diagonal().array().sqrt()).abs().maxCoeff() < 0.02);
+    CHECK((found.covariance.diagonal().array() / batch.standard.covariance.diagonal().array() - 1).abs().maxCoeff() < 0.02);
   }
   REQUIRE(stream.Settle());
   CheckEqual(stream, batch, 1e-6);
@@ -109,7 +109,7 @@ TEST_CASE("uncertain starts, entries that nobody saw and noise that nobody knows
   StreamingLaplace stream = Stream(robot, rollouts);
   REQUIRE(stream.Settle());
   // Of few rows the batch's cost, which takes no account of parameters, refuses the last bit of its own steps.
-  CheckEqual(stream, Batch(robot, rollouts, stream.noise_sd()), rollouts.size() == 1 ? 1e-3 : 1e-6, 2e-3);
+  CheckEqual(stream, Batch(robot, rollouts, stream.noise_sd()), rollouts.size() == 1 ? 1e-3 : 1e-5, 2e-3);
   if (rollouts.size() > 1) {
     // (ln g, ln m, ln l) along (1, -2, 1) cannot be told: as wide as the prior there.
     const Gaussian found = stream.posterior();
@@ -161,7 +161,7 @@ TEST_CASE("a transition that cannot be simulated is counted and left out; one th
   CHECK(stream.left_out() == 2);
   REQUIRE(stream.Settle());
   CHECK(stream.left_out() == 2);
-  CheckEqual(stream, batch, 1e-5, 2e-3);
+  CheckEqual(stream, batch, 1e-4, 2e-3);
 }
 
 }  // namespace
