@@ -8,7 +8,22 @@
 
 namespace plumb {
 
+void Calibrator::OnCommand(const joint_command_t& command) {
+  joiner_.OnCommand(command);
+  if (command.episode > newest_episode_) newest_episode_ = command.episode, next_step_ = 0;
+}
+
+Rollout Calibrator::TakeArrived() {
+  Rollout rollout;
+  rollout.episode = newest_episode_;
+  rollout.policy_iteration = simopt_.state().iteration;
+  if (rolling_out_) rollout.transitions = joiner_.Arrived(newest_episode_, &next_step_);
+  return rollout;
+}
+
 void Calibrator::OnControllerStatus(const controller_status_t& status) {
+  rolling_out_ = status.phase == controller_status_t::RUNNING && status.purpose == policy_t::CALIBRATE &&
+                 status.policy_iteration == simopt_.state().iteration;
   if (status.phase != controller_status_t::COMPLETE || status.purpose != policy_t::CALIBRATE) return;
   // The policy of iteration k is rolled out to compute the distribution of iteration k + 1.
   if (status.policy_iteration != simopt_.state().iteration || status.num_episodes == 0) return;
@@ -33,7 +48,12 @@ size_t Calibrator::Begin() {
 }
 
 ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {
-  return {state.iteration, robot.parameters, {{1.0, state.distribution.mean, state.distribution.covariance}}};
+  ParameterDistribution distribution{state.iteration, robot.parameters, {}};
+  for (size_t i = 0; i < state.distribution.components.size(); ++i) {
+    const Gaussian& component = state.distribution.components[i];
+    distribution.components.push_back({state.distribution.weights[i], component.mean, component.covariance});
+  }
+  return distribution;
 }
 
 parameter_distribution_t DistributionMessage(const RobotDescription& robot, const SimOpt::State& state, uint64_t seed,
@@ -52,7 +72,8 @@ parameter_distribution_t DistributionMessage(const RobotDescription& robot, cons
 }
 
 calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state, const DropCounts& drops,
-                                   const CalibrationReport* report, double seconds) {
+                                   const CalibrationReport* report, double seconds,
+                                   const StreamingLaplace* stream) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   calibration_status_t m{};
   m.utime = state.rollouts.empty() ? 0 : state.rollouts.back().episode;
@@ -92,6 +113,15 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
   m.sd.assign(sd.begin(), sd.end());
   m.num_parameters = static_cast<int32_t>(m.mean.size());
   m.seconds = seconds;
+  if (stream && stream->determined()) {
+    const Gaussian interim = stream->posterior();
+    const ParameterDistribution streamed{state.iteration, robot.parameters, {{1, interim.mean, interim.covariance}}};
+    const Eigen::VectorXd streamed_mean = streamed.Mean(), streamed_sd = streamed.Sd();
+    m.streamed_transitions = static_cast<int32_t>(stream->transitions() - stream->left_out());
+    m.streamed_mean.assign(streamed_mean.begin(), streamed_mean.end());
+    m.streamed_sd.assign(streamed_sd.begin(), streamed_sd.end());
+  }
+  m.num_streamed = static_cast<int32_t>(m.streamed_mean.size());
   return m;
 }
 

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -13,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;  // 1: the distribution was one Gaussian
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -37,6 +39,29 @@ Gaussian GaussianFrom(const json& j) {
   LogDensity(p, p.mean);  // throws unless it is positive definite
   return p;
 }
+
+json ToJson(const GaussianMixture& mixture) {
+  json components = json::array();
+  for (size_t i = 0; i < mixture.components.size(); ++i) {
+    components.push_back(ToJson(mixture.components[i]));
+    components.back()["weight"] = mixture.weights[i];
+  }
+  return components;
+}
+
+GaussianMixture MixtureFrom(const json& j) {
+  GaussianMixture mixture;
+  for (const json& component : j) {
+    mixture.components.push_back(GaussianFrom(component));
+    mixture.weights.push_back(component.at("weight"));
+  }
+  const bool good = !mixture.weights.empty() && std::all_of(mixture.weights.begin(), mixture.weights.end(), [](double w) { return w > 0 && w <= 1; });
+  if (!good) throw std::runtime_error("the distribution's weights are none");
+  return mixture;
+}
+
+// JSON has no NaN.
+double NumberOrNaN(const json& j) { return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>(); }
 
 const std::vector<std::pair<const char*, Eigen::VectorXd Transition::*>> kVectors{
     {"q", &Transition::q},           {"v", &Transition::v},           {"next_q", &Transition::next_q},
@@ -136,9 +161,9 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     SimOpt::State state;
     state.iteration = j.at("iteration");
     state.update = j.at("update");
-    state.distribution = GaussianFrom(j.at("distribution"));
-    state.before = GaussianFrom(j.at("before"));
-    state.kl = j.at("kl"), state.ess = j.at("ess"), state.temperature = j.at("temperature");
+    state.distribution = MixtureFrom(j.at("distribution"));
+    state.before = MixtureFrom(j.at("before"));
+    state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")), state.temperature = j.at("temperature");
     state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
     size_t count = 0;
     for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);

@@ -21,6 +21,7 @@ struct Flags {
   std::string robot;
   std::string log;
   std::string checkpoint = "calibration";
+  std::string method;
   uint64_t seed = 1;
   int threads = 0;
 };
@@ -36,7 +37,8 @@ class Session {
       : robot_(robot),
         seed_(flags.seed),
         folder_(flags.checkpoint),
-        simopt_(robot, flags.seed, flags.threads > 0 ? flags.threads : static_cast<int>(std::thread::hardware_concurrency())),
+        simopt_(robot, flags.seed, flags.threads > 0 ? flags.threads : static_cast<int>(std::thread::hardware_concurrency()),
+                flags.method.empty() ? robot.calibration.method : flags.method),
         calibrator(robot, simopt_),
         checkpoint_(flags.checkpoint, robot, flags.seed) {
     if (auto state = checkpoint_.Load()) {
@@ -65,24 +67,43 @@ class Session {
     if (!report) return false;
     const int64_t failed = report->failures.total() - (report_ ? report_->failures.total() : 0);
     if (failed > 0) spdlog::warn("{} simulations failed in this iteration: they count as infinitely far", failed);
+    for (const std::string& warning : report->warnings) spdlog::warn("iteration {}: {}", report->iteration, warning);
     report_ = std::move(report);
     seconds_ = SecondsSince(start_);
     WriteDistribution();
     return true;
   }
 
+  /// Takes account of what has arrived of a roll-out under way: for the status only.
+  void Stream() {
+    const Rollout arrived = calibrator.TakeArrived();
+    if (arrived.transitions.empty()) return;
+    if (!stream_ || streamed_iteration_ != simopt_.state().iteration) {  // the complete roll-outs, as they were joined
+      stream_.emplace(std::make_shared<Model>(robot_));
+      streamed_iteration_ = simopt_.state().iteration;
+      for (const Rollout& rollout : simopt_.state().rollouts) Assimilate(rollout);
+    }
+    Assimilate(arrived);
+  }
+
   parameter_distribution_t Distribution() const {
     return DistributionMessage(robot_, simopt_.state(), seed_, report_ ? &*report_ : nullptr);
   }
   calibration_status_t Status() const {
-    return StatusMessage(robot_, simopt_.state(), calibrator.drops(), report_ ? &*report_ : nullptr, seconds_);
+    return StatusMessage(robot_, simopt_.state(), calibrator.drops(), report_ ? &*report_ : nullptr, seconds_,
+                         stream_ && streamed_iteration_ == simopt_.state().iteration ? &*stream_ : nullptr);
   }
 
  private:
+  void Assimilate(const Rollout& rollout) {
+    for (const Transition& transition : rollout.transitions) stream_->Add(transition, rollout.episode);
+  }
+
   void WriteDistribution() const {
     const parameter_distribution_t m = Distribution();
     const nlohmann::json j{{"iteration", m.iteration}, {"seed", m.seed},          {"utime", m.utime},
-                           {"names", m.name},          {"mean", m.mean},          {"covariance", m.covariance},
+                           {"names", m.name},          {"weight", m.weight},      {"mean", m.mean},
+                           {"covariance", m.covariance},
                            {"kl", m.kl},               {"ess", m.ess},            {"temperature", m.temperature},
                            {"discrepancy", m.discrepancy},
                            {"identifiability", report_->identifiability.words}};
@@ -100,6 +121,8 @@ class Session {
  private:
   CalibrationCheckpoint checkpoint_;
   std::optional<CalibrationReport> report_;
+  std::optional<StreamingLaplace> stream_;
+  int streamed_iteration_ = 0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double seconds_ = 0;
 };
@@ -122,6 +145,7 @@ int RunLive(Process& process, Session& session) {
   auto last = std::chrono::steady_clock::now();
   while (process.Wait(session.busy() ? 0 : 50'000)) {
     states.Rethrow(), commands.Rethrow(), controller.Rethrow();
+    session.Stream();
     if (session.Work() || SecondsSince(last) >= 1) {
       publish();
       last = std::chrono::steady_clock::now();
@@ -166,6 +190,8 @@ int main(int argc, char** argv) {
       [&](CLI::App& app) {
         app.add_option("robot", flags.robot, "robot folder or TOML file")->required();
         app.add_option("--log", flags.log, "calibrate from this LCM log instead of live messages, and exit");
+        app.add_option("--method", flags.method,
+                       "auto, laplace, mixture, reps or simopt; without it the one that robot.toml says");
         app.add_option("--seed", flags.seed, "of the random numbers")->capture_default_str();
         app.add_option("--checkpoint", flags.checkpoint, "folder for checkpoints and distribution_<n>.json")
             ->capture_default_str();

@@ -128,6 +128,7 @@ MethodResult MixtureFrom(const MethodInput& input, MethodResult laplace) {
   MethodResult result = std::move(laplace);
   result.used = "mixture";
   result.posterior = fit.mixture;
+  result.ess = fit.ess;
   Random random = SampleStream(input);
   result.samples = Resample(fit.samples, fit.weights, kSamples, random);
   result.simulated_steps += errors.simulated_steps();
@@ -168,6 +169,7 @@ MethodResult FromSearch(const MethodInput& input, const RepsRun& run, const std:
   Random random = SampleStream(input);
   result.samples = Transform(run.distribution, StandardNormals(run.distribution.mean.size(), kSamples, random));
   result.failures = run.failures;
+  result.ess = run.ess;
   result.check = fmt::format("effective sample size of the last update {:.1f}, temperature {:.3g}, {:.2f} nat from the prior", run.ess,
                              run.temperature, run.kl);
   return result;
@@ -296,15 +298,20 @@ const std::vector<std::string>& CalibrationMethods() {
   return names;
 }
 
-MethodResult RunMethod(const MethodInput& input) {
-  for (const auto& [name, method] : Methods()) {
-    if (name == input.options.method) return method(input);
-  }
+void RequireMethod(const std::string& wanted) {
   const auto& names = CalibrationMethods();
+  if (std::find(names.begin(), names.end(), wanted) != names.end()) return;
   const std::string nearest = *std::min_element(names.begin(), names.end(), [&](const auto& a, const auto& b) {
-    return EditDistance(a, input.options.method) < EditDistance(b, input.options.method);
+    return EditDistance(a, wanted) < EditDistance(b, wanted);
   });
-  throw std::invalid_argument("there is no method '" + input.options.method + "'; did you mean '" + nearest + "'?");
+  throw std::invalid_argument("there is no method '" + wanted + "'; did you mean '" + nearest + "'?");
+}
+
+MethodResult RunMethod(const MethodInput& input) {
+  RequireMethod(input.options.method);
+  const auto& methods = Methods();
+  const auto is_wanted = [&](const auto& method) { return method.first == input.options.method; };
+  return std::find_if(methods.begin(), methods.end(), is_wanted)->second(input);
 }
 
 }  // namespace plumb

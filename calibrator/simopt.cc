@@ -1,9 +1,11 @@
 #include "calibrator/simopt.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "calibrator/inference/reps.h"
 #include "common/random.h"
 #include "robot/parameter_distribution.h"
 
@@ -12,6 +14,14 @@ namespace {
 
 // Where the paper's objectives end in costs mapped to [0, 1] (table of Cui & Hensel).
 constexpr double kScaledMinTemperature = 0.01;
+
+constexpr int kLongestWindow = 50;  // [control steps] beyond which one-step models of robots do not hold
+
+std::optional<Objective> SearchOf(const std::string& method) {
+  if (method == "reps") return Objective::kPosterior;
+  if (method == "simopt") return Objective::kTrajectory;
+  return {};
+}
 
 // Costs c -> -(c - min) / (max - min); infinitely costly samples stay so.
 Eigen::VectorXd ScaledReturns(const Eigen::VectorXd& costs) {
@@ -33,16 +43,31 @@ Gaussian PriorGaussian(const RobotDescription& robot) {
 }
 
 SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective)
-    : robot_(robot), seed_(seed), objective_(objective), prior_(PriorGaussian(robot)), discrepancy_(robot, threads) {
-  state_.distribution = state_.before = prior_;
+    : SimOpt(robot, seed, threads, "reps") {
+  objective_ = objective;
+}
+
+SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, const std::string& method)
+    : robot_(robot),
+      seed_(seed),
+      threads_(threads),
+      method_(method),
+      objective_(SearchOf(method)),
+      model_(std::make_shared<Model>(robot)),
+      prior_(PriorGaussian(robot)),
+      discrepancy_(robot, threads) {
+  RequireMethod(method);
+  state_.distribution = state_.before = {{1}, {prior_}};
 }
 
 SimOpt::~SimOpt() = default;
 
 void SimOpt::Resume(State state) {
-  if (state.distribution.mean.size() != prior_.mean.size() ||
-      state.distribution.covariance.rows() != prior_.mean.size()) {
-    throw std::invalid_argument("the checkpoint has another number of parameters than the robot");
+  for (const GaussianMixture* mixture : {&state.distribution, &state.before}) {
+    for (const Gaussian& component : mixture->components) {
+      if (component.mean.size() == prior_.mean.size() && component.covariance.rows() == prior_.mean.size()) continue;
+      throw std::invalid_argument("the checkpoint has another number of parameters than the robot");
+    }
   }
   state_ = std::move(state);
 }
@@ -71,7 +96,7 @@ Eigen::MatrixXd SimOpt::Samples(int iteration, int update) const {
     Random random(seed_, {static_cast<uint32_t>(iteration), static_cast<uint32_t>(update), static_cast<uint32_t>(i)});
     for (Eigen::Index j = 0; j < normals.rows(); ++j) normals(j, i) = random.Normal();
   }
-  return Transform(state_.distribution, normals);
+  return Transform(Moments(state_.distribution), normals);
 }
 
 Eigen::VectorXd SimOpt::Returns(const Eigen::MatrixXd& samples) {
@@ -80,43 +105,82 @@ Eigen::VectorXd SimOpt::Returns(const Eigen::MatrixXd& samples) {
   Eigen::MatrixXd physical(samples.rows(), samples.cols());
   for (Eigen::Index i = 0; i < samples.cols(); ++i) physical.col(i) = robot_.ToPhysical(samples.col(i));
   Eigen::VectorXd values;
-  switch (objective_) {
+  switch (*objective_) {
     case Objective::kPosterior: values = discrepancy_.LogLikelihood(physical, state_.rollouts); break;
     case Objective::kStep: values = discrepancy_.StepError(physical, Newest()); break;
     case Objective::kTrajectory: values = discrepancy_.TrajectoryError(physical, Newest()); break;
   }
   if (objective_ != Objective::kPosterior) return ScaledReturns(values);
+  const Gaussian present = Moments(state_.distribution);
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    values(i) += LogDensity(prior_, samples.col(i)) - LogDensity(state_.distribution, samples.col(i));
+    values(i) += LogDensity(prior_, samples.col(i)) - LogDensity(present, samples.col(i));
   }
   return values;
 }
 
 std::optional<CalibrationReport> SimOpt::Update() {
-  const int iteration = state_.iteration + 1;
-  const Eigen::MatrixXd samples = Samples(iteration, state_.update);
-  const Eigen::VectorXd returns = Returns(samples);
-  if (!returns.array().isNaN().any() && std::isfinite(returns.maxCoeff())) {  // else nothing is known: keep it
-    const double coldest =
-        objective_ == Objective::kPosterior ? robot_.calibration.min_temperature : kScaledMinTemperature;
-    const RepsWeights weights = SolveReps(returns, robot_.calibration.kl, coldest);
-    const Gaussian fit = FitGaussian(samples, weights, state_.distribution);
-    const Gaussian limited = LimitKl(state_.distribution, fit, robot_.calibration.kl);
-    state_.kl += KlDivergence(limited, state_.distribution);
-    state_.ess = weights.ess;
-    state_.temperature = weights.temperature;
-    state_.distribution = limited;
-  }
-  if (++state_.update < robot_.calibration.updates) return {};
-  state_.iteration = iteration;
+  warnings_.clear();
+  objective_ ? Search() : Infer();
+  if (++state_.update < (objective_ ? robot_.calibration.updates : 1)) return {};
+  ++state_.iteration;
   return Report();
+}
+
+void SimOpt::Search() {
+  const Eigen::MatrixXd samples = Samples(state_.iteration + 1, state_.update);
+  const Eigen::VectorXd returns = Returns(samples);
+  if (returns.array().isNaN().any() || !std::isfinite(returns.maxCoeff())) return;  // nothing is known: keep it
+  const double coldest = objective_ == Objective::kPosterior ? robot_.calibration.min_temperature : kScaledMinTemperature;
+  const RepsWeights weights = SolveReps(returns, robot_.calibration.kl, coldest);
+  const Gaussian present = Moments(state_.distribution);
+  const Gaussian limited = LimitKl(present, FitGaussian(samples, weights, present), robot_.calibration.kl);
+  state_.kl += KlDivergence(limited, present);
+  state_.ess = weights.ess;
+  state_.temperature = weights.temperature;
+  state_.distribution = {{1}, {limited}};
+}
+
+void SimOpt::Infer() {
+  if (CountTransitions(state_.rollouts) == 0) return;  // nothing is known: keep it
+  try {
+    const MethodResult result = RunFromWhereItIs();
+    state_.kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
+    state_.ess = result.ess;
+    state_.temperature = 1;
+    state_.distribution = result.posterior;
+    failures_ += result.failures;
+    warnings_ = result.warnings;
+  } catch (const std::invalid_argument& error) {
+    warnings_ = {std::string("the distribution stays as it is: ") + error.what()};
+  }
+}
+
+// One mode leads to the next iteration's. Of several none may be given up, and in the beginning there is none: the
+// search is then one from many places, the prior's mean first.
+MethodResult SimOpt::RunFromWhereItIs() const {
+  CalibrationOptions options;
+  options.method = method_;
+  options.horizons = {1};
+  for (const int horizon : robot_.calibration.horizons) options.horizons.push_back(std::min(horizon, kLongestWindow));
+  std::sort(options.horizons.begin(), options.horizons.end());
+  options.horizons.erase(std::unique(options.horizons.begin(), options.horizons.end()), options.horizons.end());
+  options.seed = seed_;
+  options.workforce = threads_;
+  const bool one_mode = state_.iteration > 0 && state_.before.components.size() == 1;
+  if (one_mode) {
+    try {
+      return RunMethod({model_, state_.rollouts, options, state_.before.components[0].mean});
+    } catch (const std::invalid_argument&) {  // perhaps it cannot be simulated where the new roll-outs went
+    }
+  }
+  return RunMethod({model_, state_.rollouts, options});
 }
 
 std::optional<CalibrationReport> SimOpt::Report() {
   if (state_.iteration == 0 || running()) return {};
   const auto newest = Newest();
   Eigen::MatrixXd physical(prior_.mean.size(), 3);
-  physical << robot_.ToPhysical(state_.before.mean), robot_.ToPhysical(state_.distribution.mean),
+  physical << robot_.ToPhysical(Moments(state_.before).mean), robot_.ToPhysical(Moments(state_.distribution).mean),
       robot_.ToPhysical(prior_.mean);
   CalibrationReport report;
   report.iteration = state_.iteration;
@@ -130,8 +194,10 @@ std::optional<CalibrationReport> SimOpt::Report() {
     const Eigen::VectorXd errors = discrepancy_.PredictionError(physical, newest, horizon);
     report.errors.push_back({horizon, errors(0), errors(1), errors(2)});
   }
-  report.identifiability = FindIdentifiability(robot_, discrepancy_, state_.rollouts, state_.distribution);
+  report.identifiability = FindIdentifiability(robot_, discrepancy_, state_.rollouts, Moments(state_.distribution));
   report.failures = discrepancy_.failures();
+  report.failures.diverged += failures_;
+  report.warnings = warnings_;
   return report;
 }
 

@@ -1,19 +1,21 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "calibrator/discrepancy.h"
 #include "calibrator/identifiability.h"
-#include "calibrator/inference/reps.h"
+#include "calibrator/inference/gaussian.h"
+#include "calibrator/methods.h"
 #include "calibrator/transitions.h"
 #include "robot/description.h"
 
 namespace plumb {
 
-/// What an update of the distribution strives for.
+/// What an update by relative-entropy policy search strives for.
 enum class Objective {
   /// R = ln p(transitions | xi) + ln prior(xi) - ln p_phi(xi), temperature >= min_temperature. With temperature 1
   /// the weighted samples are exactly the Bayesian posterior's, so the distribution comes to rest there: it
@@ -37,17 +39,22 @@ struct PredictionErrors {
 /// What one iteration found.
 struct CalibrationReport {
   int iteration = 0;
-  double kl = 0;           ///< D_KL(after || before), summed over the updates [nat]
-  double ess = 0;          ///< effective sample size of the last update
-  double temperature = 0;  ///< of the last update
+  double kl = 0;           ///< D_KL(after || before) of their moments, summed over the updates [nat]
+  double ess = 0;          ///< effective sample size of the last update; NaN = the method draws no samples
+  double temperature = 0;  ///< of the last update; 1 = Bayes' rule
   double discrepancy = 0;  ///< step error of the mean on the newest roll-out; 1 = down to the noise
   double prior_discrepancy = 0;
   Windows::Failures failures;  ///< simulations that failed, of all since the start of the process
   std::vector<PredictionErrors> errors;
   Identifiability identifiability;
+  std::vector<std::string> warnings;  ///< of the method; empty after Resume
 };
 
-/// Step-based SimOpt: the distribution over simulators, updated from roll-outs by relative-entropy policy search.
+/// The loop's inference: the distribution over simulators, from roll-outs that come iteration by iteration.
+///   auto, laplace, mixture   one update an iteration: the posterior given all roll-outs so far (RunMethod). Windows grow up to
+///                            the robot's calibration horizons, or 50 steps; the search begins at the present mean
+///   reps                     some updates an iteration by step-based SimOpt (Cui & Hensel), Objective::kPosterior
+///   simopt                   the same with Objective::kTrajectory
 /// Random numbers are keyed by (seed, iteration, update), so an interrupted calibration resumes to the same bits,
 /// with any number of threads. Not thread-safe; uses `threads` threads inside.
 class SimOpt {
@@ -56,14 +63,17 @@ class SimOpt {
   struct State {
     int iteration = 0;  ///< completed iterations
     int update = 0;     ///< completed updates of the running iteration
-    Gaussian distribution;
-    Gaussian before;  ///< distribution at the beginning of the running iteration
+    GaussianMixture distribution;
+    GaussianMixture before;  ///< distribution at the beginning of the running iteration
     double kl = 0, ess = 0, temperature = 0;
     std::vector<Rollout> rollouts;  ///< all so far; an iteration's are added when it begins
     std::vector<int> rollouts_per_iteration;
   };
 
+  /// By relative-entropy policy search.
   SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective = Objective::kPosterior);
+  /// By the method of that name. @throws std::invalid_argument naming the nearest if there is none.
+  SimOpt(const RobotDescription& robot, uint64_t seed, int threads, const std::string& method);
   ~SimOpt();
 
   const State& state() const { return state_; }
@@ -74,24 +84,32 @@ class SimOpt {
   /// iteration then goes by with what earlier ones have shown. @throws std::invalid_argument if one is running.
   void Begin(std::vector<Rollout> rollouts);
   bool running() const;
-  /// One REPS update. @return the report when it was the iteration's last.
+  /// One update. Data that cannot be used leave the distribution as it is. @return the report when it was the iteration's last.
   std::optional<CalibrationReport> Update();
   /// The report of the iteration completed last, e.g. after Resume; empty for the prior.
   std::optional<CalibrationReport> Report();
 
-  /// n x samples of the distribution's coordinates that update `update` of iteration `iteration` evaluates.
+  /// n x samples of the distribution's coordinates that update `update` of iteration `iteration` evaluates, of reps and simopt.
   Eigen::MatrixXd Samples(int iteration, int update) const;
 
  private:
+  void Search();
   Eigen::VectorXd Returns(const Eigen::MatrixXd& samples);
+  void Infer();
+  MethodResult RunFromWhereItIs() const;
   std::span<const Rollout> Newest() const;
 
   RobotDescription robot_;
   uint64_t seed_;
-  Objective objective_;
+  int threads_;
+  std::string method_;
+  std::optional<Objective> objective_;  // of a search
+  std::shared_ptr<const Model> model_;
   Gaussian prior_;
   State state_;
   Discrepancy discrepancy_;
+  int64_t failures_ = 0;  // simulations of RunMethod that have failed
+  std::vector<std::string> warnings_;
 };
 
 /// The prior over the coordinates, as the description has it.

@@ -76,35 +76,54 @@ Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
     Transition transition;
     transition.step = command->first;
     const int64_t to = next != commands.end() ? next->second.state_sequence : last_state;
-    if (JoinOne(command->second.state_sequence, to, &transition)) rollout.transitions.push_back(std::move(transition));
+    if (JoinOne(command->second.state_sequence, to, &transition, &drops_)) rollout.transitions.push_back(std::move(transition));
   }
   commands_.erase(found);
   return rollout;
 }
 
-bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition) {
+std::vector<Transition> TransitionJoiner::Arrived(int64_t episode, int* from) const {
+  std::vector<Transition> arrived;
+  const auto found = commands_.find(episode);
+  if (found == commands_.end()) return arrived;
+  DropCounts uncounted;
+  for (auto command = found->second.lower_bound(*from); command != found->second.end(); ++command) {
+    const auto next = std::next(command);
+    if (next == found->second.end() || newest_state() < next->second.state_sequence) break;
+    *from = next->first;
+    Transition transition;
+    transition.step = command->first;
+    const bool follows = next->first == command->first + 1;
+    if (follows && JoinOne(command->second.state_sequence, next->second.state_sequence, &transition, &uncounted)) {
+      arrived.push_back(std::move(transition));
+    }
+  }
+  return arrived;
+}
+
+bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition, DropCounts* drops) const {
   const auto first = states_.find(from), last = states_.find(to);
   if (first == states_.end() || last == states_.end() || to <= from) {
-    ++drops_.gap;
+    ++drops->gap;
     return false;
   }
   const double duration = static_cast<double>(last->second.utime - first->second.utime) * 1e-6;
   if (!(std::abs(duration - period_) <= 0.2 * period_)) {
-    ++drops_.late;
+    ++drops->late;
     return false;
   }
   bool finite = true;
   int64_t expected = from;
   for (auto state = first; expected <= to; ++state, ++expected) {
     if (state == states_.end() || state->first != expected) {
-      ++drops_.gap;
+      ++drops->gap;
       return false;
     }
     if (expected == from) continue;
     const robot_state_t& now = state->second;
     const robot_state_t& before = std::prev(state)->second;
     if (now.restarted) {
-      ++drops_.restart;
+      ++drops->restart;
       return false;
     }
     EffortSegment segment{static_cast<double>(now.utime - before.utime) * 1e-6, ToEigen(now.effort)};
@@ -122,7 +141,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition)
                                    &transition->next_v_sd}) {
     finite = finite && x->allFinite();
   }
-  if (!finite) ++drops_.not_finite;
+  if (!finite) ++drops->not_finite;
   return finite;
 }
 

@@ -67,13 +67,18 @@ class TransitionJoiner {
   /// @param last_state sequence of the state that ended it.
   Rollout Join(int64_t episode, int64_t last_state);
 
+  /// The transitions of an episode under way from step `*from` on that have been received whole, their successor's command
+  /// included: what Join will say of them, unless a message comes late. Forgets and counts nothing.
+  /// @param from becomes the first step that has not been looked at.
+  std::vector<Transition> Arrived(int64_t episode, int* from) const;
+
   /// Forgets the states before that sequence number.
   void Forget(int64_t sequence) { states_.erase(states_.begin(), states_.lower_bound(sequence)); }
 
   const DropCounts& drops() const { return drops_; }
 
  private:
-  bool JoinOne(int64_t from, int64_t to, Transition* transition);
+  bool JoinOne(int64_t from, int64_t to, Transition* transition, DropCounts* drops) const;
 
   int n_;
   double period_;

@@ -16,9 +16,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // Relative to the units of the state; large against the rounding of a simulation, small against its curvature.
 constexpr double kDifference = 1e-6;
 
-// What a sensor might well be off by where nobody says, relative to the units of the state. Only a beginning: the scale
-// of the errors is estimated.
-constexpr double kGuess = 1e-3;
+constexpr double kGuess = 1e-3;  // relative to the units of the state
 
 // How many transitions from `first` on follow each other without a gap.
 size_t StretchLength(const Rollout& rollout, size_t first) {
@@ -30,12 +28,16 @@ size_t StretchLength(const Rollout& rollout, size_t first) {
 
 }  // namespace
 
+Eigen::VectorXd GuessedNoise(const RobotDescription& robot) { return kGuess * MakeTask(robot)->state_scale(); }
+
+Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd) { return kDifference * (noise_sd / kGuess).cwiseMax(1.0); }
+
 WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
                            Workforce workforce, int every)
     : n_(model->num_velocities()), rollouts_(rollouts), simulate_(std::move(model), workforce.threads), batches_(workforce.batches) {
   if (simulate_.model().num_positions() != n_) throw std::invalid_argument("calibration does not know spherical joints yet");
   scale_ = MakeTask(simulate_.model().description())->state_scale();
-  noise_sd_ = kGuess * scale_;
+  noise_sd_ = GuessedNoise(simulate_.model().description());
   const auto longest = static_cast<size_t>(std::max(1, horizon));
   size_t count = 0;
   for (size_t r = 0; r < rollouts.size(); ++r) {
@@ -157,10 +159,11 @@ Eigen::MatrixXd WindowErrors::Raw(const Eigen::MatrixXd& physical) { return Pred
 bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
   if (starts_known()) return true;
   const Eigen::MatrixXd middle = Predict(physical, windows_);
+  const Eigen::VectorXd differences = StartDifferences(noise_sd_);
   Eigen::MatrixXd sensitivity(middle.rows(), 2 * n_);
   for (Eigen::Index c = 0; c < 2 * n_; ++c) {
     std::vector<Window> moved = windows_;
-    const double h = kDifference * std::max(1.0, scale_(c));
+    const double h = differences(c);
     for (Window& window : moved) (c < n_ ? window.q(c) : window.v(c - n_)) += h;
     sensitivity.col(c) = (Predict(physical, moved, static_cast<uint64_t>(c) + 1) - middle) / h;
   }

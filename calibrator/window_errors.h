@@ -12,6 +12,14 @@
 
 namespace plumb {
 
+/// What a sensor might well be off by where nobody says, for each entry of (q, v), physical units: a thousandth of the task's
+/// units of the state. Only a beginning: the scale of the errors is estimated.
+Eigen::VectorXd GuessedNoise(const RobotDescription& robot);
+
+/// By how much each entry of (q, v) is moved to see what the initial state does: large against the rounding of a simulation,
+/// small against its curvature.
+Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd);
+
 /// How far simulators are from what a robot did, window by window: reset to a recorded state, apply what was applied
 /// for up to `horizon` steps, compare with every recorded state on the way. Windows follow each other without overlap
 /// over all gapless stretches of the record; the last of a stretch may be shorter. With horizon 1 a window is a transition.

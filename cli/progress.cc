@@ -105,7 +105,7 @@ std::string Progress::Row(const Iteration& iteration) const {
   for (size_t i = 0; i < c.mean.size(); ++i) row += Pad(PlusMinus(c.mean[i], c.sd[i]), Width(robot_.parameters[i]));
   row += fmt::format("{:13.2f}", c.discrepancy);
   for (const double error : c.error_before) row += fmt::format("{:9.4f}", error);
-  return row + fmt::format("{:8.3f}{:6.1f}{:>12}{:>7}{:7.1f}", c.kl, c.ess, OrDash(iteration.simulated_return),
+  return row + fmt::format("{:8.3f}{:>6}{:>12}{:>7}{:7.1f}", c.kl, std::isnan(c.ess) ? "-" : fmt::format("{:.1f}", c.ess), OrDash(iteration.simulated_return),
                            OrDash(iteration.robot_return), iteration.seconds);
 }
 

@@ -47,7 +47,7 @@ Judgement Judge(const RobotDescription& robot, const std::vector<Rollout>& rollo
     while (!simopt.Update()) {
     }
   }
-  const Eigen::VectorXd physical = robot.ToPhysical(simopt.state().distribution.mean);
+  const Eigen::VectorXd physical = robot.ToPhysical(Moments(simopt.state().distribution).mean);
   Discrepancy discrepancy(robot);
   const auto held_out = std::span(rollouts).last(kHeldOut);
   judgement.errors.resize(static_cast<Eigen::Index>(robot.calibration.horizons.size()));

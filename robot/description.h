@@ -169,6 +169,7 @@ struct ControllerSettings {
 };
 
 struct CalibrationSettings {
+  std::string method;  ///< of the live calibrator, see SimOpt
   int samples, updates;
   double kl, min_temperature;
   std::vector<int> horizons;

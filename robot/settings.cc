@@ -11,6 +11,8 @@ constexpr Range kAtLeastOne{1, 1e9};
 // Orders of magnitude beyond sense: what would overflow elsewhere is a mistake here.
 constexpr Range kSanePositive{1e-12, 1e12}, kSaneNotNegative{0, 1e12};
 
+const std::vector<std::string> kLiveMethods{"auto", "laplace", "mixture", "reps", "simopt"};
+
 SimulationSettings::Contact ReadContact(Config config) {
   SimulationSettings::Contact s;
   s.stiffness = config.Number("stiffness", {1e-9, 1e12});
@@ -89,6 +91,7 @@ ControllerSettings ReadController(Config config) {
 
 CalibrationSettings ReadCalibration(Config config) {
   CalibrationSettings s;
+  s.method = kLiveMethods[static_cast<size_t>(config.Choice("method", kLiveMethods, 0))];
   s.samples = config.Integer("samples", {4, 1e6});
   s.updates = config.Integer("updates", {1, 1000});
   s.kl = config.Number("kl", kSanePositive);

@@ -13,8 +13,7 @@
 namespace plumb {
 namespace {
 
-// In standard coordinates: far above the simulations' rounding, far below any prior's width.
-constexpr double kDifference = 1e-5;
+constexpr double kDifference = kSlopeDifference;
 // Of the best-known direction's information in the least known one: below, forward differences will not do, or rounding has made it.
 constexpr double kLopsided = 1e-6, kRounding = 1e-15;
 // No step leads further than that many of the prior's standard deviations.

@@ -23,6 +23,9 @@ struct LeastSquares {
   bool scale_known = false;  ///< errors are whitened already: their variance is one, unless the data insist
 };
 
+/// Of forward-difference Jacobians, in standard coordinates: far above the simulations' rounding, far below any prior's width.
+inline constexpr double kSlopeDifference = 1e-5;
+
 struct LaplaceOptions {
   int most_iterations = 50;
   double tolerance = 0.02;   ///< ends when a step is below that many posterior standard deviations

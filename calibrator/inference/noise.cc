@@ -16,26 +16,46 @@ constexpr std::array<double, 5> kDegreesOfFreedom{2, 4, 8, 16, 32};
 
 }  // namespace
 
-Noise::Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known,
-             double degrees_of_freedom)
-    : group_(group), block_(block), scale_known_(scale_known), degrees_of_freedom_(degrees_of_freedom) {
-  groups_ = group.empty() ? 0 : *std::max_element(group.begin(), group.end()) + 1;
-  Eigen::VectorXd own = Eigen::VectorXd::Zero(groups_);
-  block_size_ = Eigen::VectorXd::Zero(block.empty() ? 0 : block.back() + 1);
-  for (size_t i = 0; i < group.size(); ++i) {
-    own(group[i]) += 1;
-    block_size_(block[i]) += 1;
-  }
+NoiseScale::NoiseScale(const Eigen::VectorXd& rows, bool known)
+    : known_(known), all_rows_(rows.sum()), shared_(static_cast<size_t>(rows.size())), rows_(Eigen::VectorXd::Zero(rows.size())) {
   // The first of the small groups stands for all of them.
   int pool = -1;
-  shares_.resize(static_cast<size_t>(groups_));
-  rows_ = Eigen::VectorXd::Zero(groups_);
-  for (int g = 0; g < groups_; ++g) {
-    const bool small = own(g) < kFewRows;
+  for (int g = 0; g < static_cast<int>(rows.size()); ++g) {
+    const bool small = rows(g) < kFewRows;
     if (small && pool < 0) pool = g;
-    shares_[static_cast<size_t>(g)] = small ? pool : g;
-    rows_(shares_[static_cast<size_t>(g)]) += own(g);
+    shared_[static_cast<size_t>(g)] = small ? pool : g;
+    rows_(shared(g)) += rows(g);
   }
+}
+
+Eigen::VectorXd NoiseScale::Estimate(const Eigen::VectorXd& squares, double effective, double surplus) const {
+  const double left = std::max(1 - effective / all_rows_, 0.1);
+  Eigen::VectorXd scale = Eigen::VectorXd::Ones(rows_.size());
+  for (int g = 0; g < static_cast<int>(rows_.size()); ++g) {
+    const int from = shared(g);
+    if (rows_(from) == 0) continue;  // nothing of it was observed
+    const double variance = known_ ? (squares(from) + kPriorRows) / (rows_(from) * left + kPriorRows) : squares(from) / (rows_(from) * left * surplus);
+    scale(g) = std::max(std::sqrt(variance), kLeast);
+  }
+  return scale;
+}
+
+namespace {
+
+Eigen::VectorXd RowsOf(const std::vector<int>& group) {
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(group.empty() ? 0 : *std::max_element(group.begin(), group.end()) + 1);
+  for (const int g : group) rows(g) += 1;
+  return rows;
+}
+
+}  // namespace
+
+Noise::Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known,
+             double degrees_of_freedom)
+    : group_(group), block_(block), scale_known_(scale_known), rule_(RowsOf(group), scale_known), degrees_of_freedom_(degrees_of_freedom) {
+  groups_ = group.empty() ? 0 : *std::max_element(group.begin(), group.end()) + 1;
+  block_size_ = Eigen::VectorXd::Zero(block.empty() ? 0 : block.back() + 1);
+  for (const int b : block) block_size_(b) += 1;
   scale_ = Eigen::VectorXd::Ones(groups_);
 }
 
@@ -43,16 +63,9 @@ void Noise::Estimate(const Eigen::VectorXd& errors, double effective) {
   const auto update = [&](const Eigen::VectorXd& robust, double surplus) {
     Eigen::VectorXd squares = Eigen::VectorXd::Zero(groups_);
     for (Eigen::Index i = 0; i < errors.size(); ++i) {
-      squares(shares_[static_cast<size_t>(group_[static_cast<size_t>(i)])]) += robust(i) * errors(i) * errors(i);
+      squares(rule_.shared(group_[static_cast<size_t>(i)])) += robust(i) * errors(i) * errors(i);
     }
-    const double left = std::max(1 - effective / static_cast<double>(errors.size()), 0.1);
-    for (int g = 0; g < groups_; ++g) {
-      const int from = shares_[static_cast<size_t>(g)];
-      if (rows_(from) == 0) continue;  // nothing of it was observed
-      const double variance = scale_known_ ? (squares(from) + kPriorRows) / (rows_(from) * left + kPriorRows)
-                                           : squares(from) / (rows_(from) * left * surplus);
-      scale_(g) = std::max(std::sqrt(variance), kLeastScale);
-    }
+    scale_ = rule_.Estimate(squares, effective, surplus);
   };
   // From the same beginning whatever the scales were before.
   update(Eigen::VectorXd::Ones(errors.size()), 1);
@@ -134,7 +147,7 @@ double Noise::LogLikelihood(const Eigen::VectorXd& errors) const {
   for (size_t i = 0; i < group_.size(); ++i) sum -= std::log(scale_(group_[i]));
   if (scale_known_) {  // the scale's own prior, as if kPriorRows errors of variance one had been seen
     for (int g = 0; g < groups_; ++g) {
-      if (shares_[static_cast<size_t>(g)] == g) sum -= kPriorRows * (std::log(scale_(g)) + 0.5 / (scale_(g) * scale_(g)));
+      if (rule_.shared(g) == g) sum -= kPriorRows * (std::log(scale_(g)) + 0.5 / (scale_(g) * scale_(g)));
     }
   }
   if (std::isinf(degrees_of_freedom_)) return sum - 0.5 * squares.sum();

@@ -121,6 +121,24 @@ TEST_CASE("through encoder, latency and estimator the parameters are found withi
   CHECK(std::abs(found.mass_length_squared) < 3 * found.sd_mass);
 }
 
+TEST_CASE("what the live calibrator claims to know of smoothed states is true") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 1, 2, "auto");
+  const Eigen::Vector3d truth = kTruth.array().log();
+  for (Rollout& rollout : Rollouts(robot)) {
+    simopt.Begin({std::move(rollout)});
+    const auto report = simopt.Update();
+    REQUIRE(report);
+    const Gaussian found = Moments(simopt.state().distribution);
+    for (const Eigen::Vector3d& power : {Eigen::Vector3d(1, 0, -1), Eigen::Vector3d(0, 1, 2)}) {
+      const double error = power.dot(found.mean - truth), sd = std::sqrt(power.dot(found.covariance * power));
+      INFO("after " << report->iteration << " roll-outs: " << error << " +- " << sd);
+      CHECK(std::abs(error) < 2.5 * sd);
+      CHECK(sd < 0.01);
+    }
+  }
+}
+
 TEST_CASE("without the applied effort, latency becomes mass") {
   const RobotDescription robot = Pendulum();
   const Errors found = Calibrate(robot, Rollouts(robot, {.latency = true}));

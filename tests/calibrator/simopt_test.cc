@@ -5,7 +5,9 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
+#include "calibrator/calibrator.h"
 #include "calibrator/checkpoint.h"
 #include "tests/calibrator/synthetic.h"
 
@@ -60,7 +62,7 @@ TEST_CASE("the distribution comes to rest on the posterior: neither collapsed no
   robot.calibration.updates = 12;
   SimOpt simopt(robot, 4, 2);
   Iterate(simopt, robot, 6);
-  const Gaussian& found = simopt.state().distribution;
+  const Gaussian found = Moments(simopt.state().distribution);
 
   // Independent truth: the Laplace approximation of the same posterior, by Gauss-Newton from the true parameters.
   const Gaussian laplace = LaplacePosterior(robot, simopt.state().rollouts, kTruth.array().log());
@@ -92,7 +94,7 @@ TEST_CASE("one wrecked transition in a hundred does not move the distribution") 
     }
   }
   for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
-    CHECK(std::abs(power.dot(simopt.state().distribution.mean) - LogTruth(power)) < 0.01);
+    CHECK(std::abs(power.dot(Moments(simopt.state().distribution).mean) - LogTruth(power)) < 0.01);
   }
 }
 
@@ -119,18 +121,19 @@ TEST_CASE("every update keeps to the KL bound") {
   for (const Objective objective : {Objective::kPosterior, Objective::kStep, Objective::kTrajectory}) {
     SimOpt simopt(robot, 2, 1, objective);
     simopt.Begin({SyntheticRollout(robot, kTruth, 50, 1e-4, 0.01, 1)});
-    Gaussian before = simopt.state().distribution;
+    Gaussian before = Moments(simopt.state().distribution);
     bool last = false;
     while (!last) {
       last = simopt.Update().has_value();
-      CHECK(KlDivergence(simopt.state().distribution, before) <= robot.calibration.kl * (1 + 1e-9));
-      before = simopt.state().distribution;
+      CHECK(KlDivergence(Moments(simopt.state().distribution), before) <= robot.calibration.kl * (1 + 1e-9));
+      before = Moments(simopt.state().distribution);
     }
   }
 }
 
-bool SameBits(const Gaussian& a, const Gaussian& b) {
-  return a.mean == b.mean && a.covariance == b.covariance;
+bool SameBits(const GaussianMixture& a, const GaussianMixture& b) {
+  const auto same = [](const Gaussian& x, const Gaussian& y) { return x.mean == y.mean && x.covariance == y.covariance; };
+  return a.weights == b.weights && std::equal(a.components.begin(), a.components.end(), b.components.begin(), b.components.end(), same);
 }
 
 TEST_CASE("any number of threads and any interruption give the same bits") {
@@ -194,8 +197,98 @@ TEST_CASE("an iteration without a usable transition goes by and invents nothing"
     CHECK(report->iteration == 1);
     CHECK(std::isnan(report->discrepancy));
     CHECK(report->identifiability.combinations.empty());
-    CHECK(KlDivergence(simopt.state().distribution, PriorGaussian(robot)) == Approx(0).margin(1e-12));
+    CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) == Approx(0).margin(1e-12));
   }
+}
+
+Rollout Synthetic(const RobotDescription& robot, uint32_t i) { return SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, i); }
+
+TEST_CASE("an inference makes one update of all roll-outs, the same bits with any threads and after any interruption") {
+  const RobotDescription robot = Pendulum();
+  const std::string method = GENERATE("auto", "laplace", "mixture");
+  INFO(method);
+  SimOpt straight(robot, 9, 1, method), threaded(robot, 9, 3, method);
+  for (uint32_t i = 0; i < 3; ++i) {
+    for (SimOpt* simopt : {&straight, &threaded}) {
+      simopt->Begin({Synthetic(robot, i)});
+      const auto report = simopt->Update();
+      REQUIRE(report);
+      CHECK(report->iteration == static_cast<int>(i) + 1);
+      CHECK(report->kl > 0);
+      CHECK(report->errors.size() == robot.calibration.horizons.size());
+    }
+  }
+  CHECK(SameBits(straight.state().distribution, threaded.state().distribution));
+  const Gaussian found = Moments(straight.state().distribution);
+  for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
+    const double error = power.dot(found.mean) - LogTruth(power), sd = std::sqrt(power.dot(found.covariance * power));
+    INFO(error << " +- " << sd);
+    CHECK(std::abs(error) < 3 * sd);
+    CHECK(sd < 0.01);
+  }
+
+  const auto folder = std::filesystem::temp_directory_path() / ("plumbline_inference_test_" + method);
+  std::filesystem::remove_all(folder);
+  for (uint32_t i = 0; i < 3; ++i) {
+    for (const bool begins : {true, false}) {  // a new process each time, as it were
+      CalibrationCheckpoint checkpoint(folder, robot, 9);
+      SimOpt simopt(robot, 9, 2, method);
+      if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
+      if (begins) simopt.Begin({Synthetic(robot, i)});
+      else CHECK(simopt.Update());
+      checkpoint.Save(simopt.state());
+    }
+  }
+  CHECK(SameBits(straight.state().distribution, CalibrationCheckpoint(folder, robot, 9).Load()->distribution));
+  std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("an inference lets an iteration without usable transitions go by, and an unknown method is refused") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 1, 1, "auto");
+  simopt.Begin({Rollout{}});
+  auto report = simopt.Update();
+  REQUIRE(report);
+  CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) == Approx(0).margin(1e-12));
+  Rollout unseen = Synthetic(robot, 1);
+  for (Transition& t : unseen.transitions) t.next_q(0) = t.next_v(0) = NAN;
+  simopt.Begin({unseen});
+  report = simopt.Update();
+  REQUIRE(report);
+  REQUIRE(report->warnings.size() == 1);
+  CHECK_THAT(report->warnings[0], Catch::Contains("stays as it is"));
+  simopt.Begin({Synthetic(robot, 2)});
+  CHECK(simopt.Update());
+  CHECK(simopt.state().iteration == 3);
+  CHECK(simopt.state().kl > 1);
+  CHECK_THROWS_WITH(SimOpt(robot, 1, 1, "laplas"), Catch::Contains("did you mean 'laplace'"));
+}
+
+TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trainer") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 1, 1);
+  SimOpt::State state = simopt.state();
+  Gaussian second = PriorGaussian(robot);
+  second.mean(0) += 0.5;
+  state.distribution = {{0.25, 0.75}, {PriorGaussian(robot), second}};
+  state.ess = NAN;
+  const ParameterDistribution told = ParameterDistribution::FromMessage(DistributionMessage(robot, state, 1, nullptr), robot);
+  REQUIRE(told.components.size() == 2);
+  CHECK(told.components[1].weight == 0.75);
+  CHECK(told.components[1].mean == second.mean);
+  const auto folder = std::filesystem::temp_directory_path() / "plumbline_mixture_test";
+  std::filesystem::remove_all(folder);
+  CalibrationCheckpoint checkpoint(folder, robot, 1);
+  checkpoint.Save(state);
+  const auto loaded = checkpoint.Load();
+  REQUIRE(loaded);
+  CHECK(SameBits(loaded->distribution, state.distribution));
+  CHECK(std::isnan(loaded->ess));
+  std::string text = (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
+  text.replace(text.find("\"version\": 2"), 12, "\"version\": 1");
+  std::ofstream(folder / "calibration.json") << text;
+  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
