@@ -55,6 +55,7 @@ class Curriculum {
     }
     result_.fit = std::move(modes[0]);
     result_.one_step = result_.fit;
+    first_errors_ = Whitened(one_step, result_.fit).cwiseProduct(one_step.EndNoise());
     Record(one_step, result_.fit, 1);
     // Where one step leaves nothing to explain, more can teach nothing.
     const bool exact = (result_.fit.scale.array() <= Noise::kLeastScale).all();
@@ -196,15 +197,26 @@ class Curriculum {
     return true;
   }
 
-  // Largest ratio of an entry's noise to what it was at first, less what chance may have made of it.
+  // Root mean square error of each entry of (q, v), in units of the noise as it is assumed.
+  static Eigen::VectorXd Whitened(const WindowErrors& errors, const LaplaceFit& fit) {
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * errors.num_velocities()), rows = squares;
+    for (Eigen::Index i = 0; i < fit.errors.size(); ++i) {
+      const int c = errors.rows()[static_cast<size_t>(i)].coordinate;
+      squares(c) += std::pow(fit.errors(i) * fit.scale(c), 2);
+      rows(c) += 1;
+    }
+    return squares.cwiseQuotient(rows.cwiseMax(1)).cwiseSqrt();
+  }
+
+  // Largest ratio of an entry's errors to what they were at first, less what chance may have made of it.
   double GrownNoise(const WindowErrors& errors, const LaplaceFit& fit) const {
-    const Eigen::VectorXd noise = NoiseOf(errors, fit);
+    const Eigen::VectorXd noise = Whitened(errors, fit).cwiseProduct(errors.EndNoise());
     Eigen::VectorXd rows = Eigen::VectorXd::Zero(noise.size());
     for (const WindowErrors::Row& row : errors.rows()) rows(row.coordinate) += 1;
     double grown = 0;
     for (Eigen::Index c = 0; c < noise.size(); ++c) {
       if (rows(c) == 0) continue;
-      const double before = std::max(result_.noise_sd(c), kNegligible * errors.state_scale()(c));
+      const double before = std::max(first_errors_(c), kNegligible * errors.state_scale()(c));
       grown = std::max(grown, noise(c) / before - 3 / std::sqrt(2 * rows(c)));
     }
     return grown;
@@ -243,6 +255,7 @@ class Curriculum {
   std::span<const Rollout> rollouts_;
   const CurriculumOptions& options_;
   CurriculumFit result_;
+  Eigen::VectorXd first_errors_;  // of one step, root mean square of each entry of (q, v), physical units
   int64_t simulations_ = 0;
 };
 

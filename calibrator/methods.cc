@@ -239,7 +239,8 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name, 
   still.most_iterations = 0;
   const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), result.curriculum->fit.mode, still);
   Problem problem = RobotProblem(robot, errors, view, input.options.discrepancy, input.options.seed);
-  const int64_t simulations = std::max<int64_t>(1, input.options.budget / errors.steps());
+  const int64_t left = input.options.budget - result.simulated_steps - errors.simulated_steps();  // the first fit counts, too
+  const int64_t simulations = std::max<int64_t>(1, left / errors.steps());
   const Simulate simulate = problem.simulate;
   problem.simulate = [&](const Eigen::MatrixXd& parameters, int64_t first) {
     input.options.progress(name, std::min(1.0, static_cast<double>(first) / static_cast<double>(simulations)));

@@ -20,7 +20,7 @@ struct LeastSquares {
   std::vector<int> group;    ///< of each row, from 0: rows that share a noise scale
   std::vector<int> block;    ///< of each row, ascending from 0: rows of one observation, outliers together or not at all
   std::vector<int> cluster;  ///< of each row, ascending from 0: rows that may depend on each other
-  bool scale_known = false;  ///< errors are whitened already: their variance is one, unless the data insist
+  bool scale_known = false;  ///< errors are whitened already: their variance is one, or more if the data insist
 };
 
 /// Of forward-difference Jacobians, in standard coordinates: far above the simulations' rounding, far below any prior's width.
@@ -55,7 +55,7 @@ struct LaplaceFit {
 ///
 /// The scale s of each group's noise is estimated along the way, s^2 = sum r^2 / (N - d_eff N / N_all), which also damps the first
 /// steps: far from the mode noise seems large. It is never taken for less than 1e-9: choose units accordingly. Groups of fewer than 20 rows share one scale. Where the scale is known,
-/// it counts as 20 errors of variance one.
+/// it counts as 20 errors of variance one, and is one at least.
 ///
 /// robust: blocks of k errors are Student's t, weight (f + k) / (f + |r/s|^2) (Lange, Little, Taylor, JASA 84, 1989), with f chosen
 /// by likelihood among {2, 4, 8, 16, 32, infinity}. sandwich: where the scores of clusters scatter more than the curvature says,

@@ -34,7 +34,8 @@ Eigen::VectorXd NoiseScale::Estimate(const Eigen::VectorXd& squares, double effe
   for (int g = 0; g < static_cast<int>(rows_.size()); ++g) {
     const int from = shared(g);
     if (rows_(from) == 0) continue;  // nothing of it was observed
-    const double variance = known_ ? (squares(from) + kPriorRows) / (rows_(from) * left + kPriorRows) : squares(from) / (rows_(from) * left * surplus);
+    // Whoever knows the noise does not know it to be less: smaller errors are correlated ones.
+    const double variance = known_ ? std::max(1.0, (squares(from) + kPriorRows) / (rows_(from) * left + kPriorRows)) : squares(from) / (rows_(from) * left * surplus);
     scale(g) = std::max(std::sqrt(variance), kLeast);
   }
   return scale;

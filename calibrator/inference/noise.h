@@ -18,7 +18,7 @@ class NoiseScale {
   /// The group that stands for those that share the scale of group g.
   int shared(int g) const { return shared_[static_cast<size_t>(g)]; }
   /// The scale s of each group, s^2 = sum r^2 / (N - effective N / N_all); where it is known, it counts as 20 errors of variance
-  /// one. 1 for groups that nothing was observed of. @param squares sum of r^2, in the entries that stand for others: of all that
+  /// one, and is one at least. 1 for groups that nothing was observed of. @param squares sum of r^2, in the entries that stand for others: of all that
   /// share it. @param effective number of parameters that the errors were fitted with. @param surplus by which robust
   /// weights exceed one on average; counts only where the scale is not known.
   Eigen::VectorXd Estimate(const Eigen::VectorXd& squares, double effective, double surplus = 1) const;
