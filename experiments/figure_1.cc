@@ -1,9 +1,9 @@
 // Figure 1 of "step-based SimOpt": which simulators explain a robot that is not one simulator but two.
 //
 // The robot is one joint under gravity with an arm, J = 0.05 kg m^2, and a payload at 0.5 m that is sometimes
-// light and sometimes heavy: 0.8 exp(xi / 2) kg, xi = -1 in four trials of ten and +1 in six. A transition is
-// (s, a, s'): any angle, a velocity up to 2 rad/s, 3 N m either way for 50 ms, states read with noise. Given
-// (s, a), s' is bimodal. Prior of xi: N(0, 1).
+// light and sometimes heavy: 0.8 exp(xi / 2) kg, xi = -1 in four transitions of ten and +1 in six. A
+// transition is (s, a, s'): any angle, a velocity up to 2 rad/s, 3 N m either way for 50 ms, states read with
+// noise. Given (s, a), s' is bimodal. Prior of xi: N(0, 1).
 //
 //   plumb-figure-1 --output figure --seed 1
 #include <fmt/format.h>
@@ -58,7 +58,7 @@ std::vector<Transition> Record(int count, uint64_t seed) {
   for (int t = 0; t < count; ++t) {
     const Vector2d state(random.Uniform(-M_PI, M_PI), random.Uniform(-2, 2));
     const double effort = random.Uniform() < 0.5 ? 3 : -3;
-    const double xi = random.Uniform() < kHeavyShare ? kHeavy : kLight;
+    const double xi = t % 5 < 2 ? kLight : kHeavy;
     transitions.push_back({state, Read(Step(state, effort, xi), random), effort});
   }
   return transitions;
@@ -161,14 +161,14 @@ text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600; } te
 
 // A panel for each method, one above the other: their heights differ too much for one.
 std::string Draw(const VectorXd& grid, const std::vector<Curve>& curves) {
-  constexpr double kWidth = 640, kLeft = 70, kRight = 626, kTop = 40, kHeight = 118, kGap = 20;
-  const double height = kTop + static_cast<double>(curves.size()) * (kHeight + kGap) + 30;
+  constexpr double kWidth = 640, kLeft = 70, kRight = 626, kTop = 64, kHeight = 110, kGap = 40;
+  const double height = kTop + static_cast<double>(curves.size()) * (kHeight + kGap) + 4;
   Svg svg(kWidth, height, "densities over simulators that three methods find for a robot that is two");
   svg.Rectangle(0, 0, kWidth, height, "paper");
   const Axis x(grid(0), grid(grid.size() - 1), kLeft, kRight);
   svg.Line(kLeft, 20, kLeft + 26, 20, "truth");
   svg.Text(kLeft + 33, 24,
-           fmt::format("the robot: light (ξ = -1) in {:.0f} % of the trials, heavy (ξ = 1) in {:.0f} %",
+           fmt::format("the robot: light, ξ = -1, in {:.0f} % of the transitions, heavy, ξ = 1, in {:.0f} %",
                        100 * (1 - kHeavyShare), 100 * kHeavyShare),
            "label", Svg::Anchor::kStart);
   for (size_t i = 0; i < curves.size(); ++i) {
@@ -176,7 +176,10 @@ std::string Draw(const VectorXd& grid, const std::vector<Curve>& curves) {
     const double top = kTop + static_cast<double>(i) * (kHeight + kGap), bottom = top + kHeight;
     const Axis y(0, 1.1 * curve.density.maxCoeff(), bottom, top);
     const bool last = i + 1 == curves.size();
-    svg.Frame(x, y, last ? "simulator ξ: payload 0.8 exp(ξ / 2) kg" : "", "density", 10, 4);
+    svg.Frame(x, y, last ? "simulator ξ: payload 0.8 exp(ξ / 2) kg" : "", "density", 8, 4);
+    for (const Axis::Tick& tick : x.Ticks(8)) {
+      svg.Line(x.Pixel(tick.value), bottom, x.Pixel(tick.value), top, "grid");
+    }
     for (const double mode : {kLight, kHeavy}) svg.Line(x.Pixel(mode), bottom, x.Pixel(mode), top, "truth");
     std::vector<Vector2d> points;
     for (Index k = 0; k < grid.size(); ++k) points.emplace_back(x.Pixel(grid(k)), y.Pixel(curve.density(k)));
@@ -184,9 +187,9 @@ std::string Draw(const VectorXd& grid, const std::vector<Curve>& curves) {
     points.emplace_back(kRight, bottom);
     points.emplace_back(kLeft, bottom);
     svg.Path(points, curve.css + " area", true);
-    svg.Line(kLeft + 10, top + 15, kLeft + 28, top + 15, curve.css + " line");
-    svg.Text(kLeft + 34, top + 19, curve.name, "name", Svg::Anchor::kStart);
-    svg.Text(kRight - 8, top + 19, curve.words, "muted", Svg::Anchor::kEnd);
+    svg.Line(kLeft, top - 12, kLeft + 26, top - 12, curve.css + " line");
+    svg.Text(kLeft + 33, top - 8, curve.name, "name", Svg::Anchor::kStart);
+    svg.Text(kRight, top - 8, curve.words, "muted", Svg::Anchor::kEnd);
   }
   std::string text = svg.Print();
   return text.insert(text.find("</title>") + 9, kStyle);
@@ -217,8 +220,8 @@ int MakeFigure(const std::filesystem::path& output, uint64_t seed, bool quick) {
                     by_energy = Percent(population.Near(kLight), population.Near(kHeavy)),
                     by_mixture = Percent(mixture.Near(kLight), mixture.Near(kHeavy));
 
-  const VectorXd grid = VectorXd::LinSpaced(501, -2.5, 2.5);
-  const std::string words = "near the two: ";
+  const VectorXd grid = VectorXd::LinSpaced(321, -2, 2);
+  const std::string words = fmt::format("within {} of the two: ", kNear);
   std::vector<Curve> curves = {{"squared error, Gaussian search", "squared", words + by_squares, grid},
                                {"energy distance, population", "population", words + by_energy, grid},
                                {"mixture, transition by transition", "mixture", words + by_mixture, grid}};
@@ -227,7 +230,7 @@ int MakeFigure(const std::filesystem::path& output, uint64_t seed, bool quick) {
     curves[0].density(k) = gaussian.Density(grid(k));
     curves[1].density(k) = population.Density(grid(k));
     curves[2].density(k) = mixture.Density(grid(k));
-    csv += fmt::format("{:.2f},{:.6g},{:.6g},{:.6g}\n", grid(k), curves[0].density(k), curves[1].density(k),
+    csv += fmt::format("{:.4f},{:.6g},{:.6g},{:.6g}\n", grid(k), curves[0].density(k), curves[1].density(k),
                        curves[2].density(k));
   }
   Write(output / "figure_1.csv", csv);
