@@ -193,7 +193,9 @@ class Inference {
       return {{1}, {{VectorXd::Zero(n_), MatrixXd::Identity(n_, n_)}}};
     }
     const std::vector<double> shares = {1, 0.5, 0.25, 0.125, 0.0625};
-    const VectorXd judged = KernelWeights(inside.squared, Effective(inside, shares.back()));
+    // Simulations that judge have weight in all kernels, or widths would be judged by different ones.
+    VectorXd judged = KernelWeights(inside.squared, Effective(inside, shares.back()));
+    judged = (judged.array() > kNegligible * judged.maxCoeff()).select(judged, 0).eval();
     std::vector<GaussianMixture> estimates;
     double last_effective = 0;
     for (size_t i = 0; i < shares.size(); ++i) {
@@ -213,7 +215,7 @@ class Inference {
         score += HeldOutScore(samples, w, score_weights, static_cast<int>(fit.mixture.components.size()),
                               fold, kFolds, random, fine);
       }
-      diagnostics.held_out.push_back(score / judged.sum());
+      diagnostics.held_out.push_back(score / score_weights.sum());
       estimates.push_back(Condition(fit.mixture, observed_));
     }
     return Pool(estimates, diagnostics.held_out);

@@ -1,0 +1,263 @@
+// Figure 1 of "step-based SimOpt": which simulators explain a robot that is not one simulator but two.
+//
+// The robot is one joint under gravity with an arm, J = 0.05 kg m^2, and a payload at 0.5 m that is sometimes
+// light and sometimes heavy: 0.8 exp(xi / 2) kg, xi = -1 in four transitions of ten and +1 in six. A
+// transition is (s, a, s'): any angle, a velocity up to 2 rad/s, 3 N m either way for 50 ms, states read with
+// noise. Given (s, a), s' is bimodal. Prior of xi: N(0, 1).
+//
+//   plumb-figure-1 --output figure --seed 1
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "calibrator/inference/conditional_mixture.h"
+#include "calibrator/inference/population_weights.h"
+#include "calibrator/inference/reps_search.h"
+#include "calibrator/svg.h"
+#include "common/process.h"
+
+namespace plumb {
+namespace {
+
+using Eigen::Index, Eigen::Vector2d, Eigen::VectorXd;
+
+constexpr double kLight = -1, kHeavy = 1, kHeavyShare = 0.6;
+constexpr double kNear = 0.2;          // of a mode
+const Vector2d kNoise(0.0005, 0.015);  // sd of a next state that was read [rad, rad/s]
+
+// First stream words.
+constexpr uint32_t kRobot = 1, kSimulators = 2, kSimulation = 3;
+
+struct Transition {
+  Vector2d state, next;
+  double effort;
+};
+
+// Angle from upright down [rad] and velocity [rad/s] after 50 ms.
+Vector2d Step(Vector2d state, double effort, double xi) {
+  constexpr double kGravity = 9.81, kLength = 0.5, kArm = 0.05, kTime = 0.05;
+  constexpr int kSubsteps = 10;
+  const double mass = 0.8 * std::exp(xi / 2), inertia = kArm + mass * kLength * kLength;
+  for (int i = 0; i < kSubsteps; ++i) {
+    state(1) += kTime / kSubsteps * (effort - mass * kGravity * kLength * std::sin(state(0))) / inertia;
+    state(0) += kTime / kSubsteps * state(1);
+  }
+  return state;
+}
+
+Vector2d Read(const Vector2d& state, Random& random) {
+  return state + kNoise.cwiseProduct(StandardNormals(2, 1, random));
+}
+
+std::vector<Transition> Record(int count, uint64_t seed) {
+  std::vector<Transition> transitions;
+  Random random(seed, {kRobot});
+  for (int t = 0; t < count; ++t) {
+    const Vector2d state(random.Uniform(-M_PI, M_PI), random.Uniform(-2, 2));
+    const double effort = random.Uniform() < 0.5 ? 3 : -3;
+    const double xi = t % 5 < 2 ? kLight : kHeavy;
+    transitions.push_back({state, Read(Step(state, effort, xi), random), effort});
+  }
+  return transitions;
+}
+
+/// A distribution over simulators: weighted xi.
+struct Found {
+  VectorXd xi, weights;  // sum to 1
+  double width;          // of the kernel that it is drawn with
+
+  double Near(double mode) const { return ((xi.array() - mode).abs() < kNear).select(weights, 0).sum(); }
+  double Density(double x) const {
+    const auto kernel = (-0.5 * ((xi.array() - x) / width).square()).exp();
+    return (weights.array() * kernel).sum() / (width * std::sqrt(2 * M_PI));
+  }
+};
+
+Prior OfXi() { return Prior({Prior::Normal(0, 1)}); }
+
+// What SimOpt does: the mean squared error, and a Gaussian that searches where it is small.
+Gaussian BySquaredError(const std::vector<Transition>& transitions, uint64_t seed) {
+  RepsOptions options;
+  options.returns = RepsReturns::kUnitRange;
+  options.min_temperature = 0.01;
+  options.seed = seed;
+  const auto cost = [&](const Eigen::MatrixXd& xi) {
+    VectorXd costs = VectorXd::Zero(xi.cols());
+    for (const Transition& t : transitions) {
+      for (Index j = 0; j < xi.cols(); ++j) {
+        const Vector2d error = Step(t.state, t.effort, xi(0, j)) - t.next;
+        costs(j) += error.cwiseQuotient(kNoise).squaredNorm() / static_cast<double>(transitions.size());
+      }
+    }
+    return costs;
+  };
+  return RepsSearch(OfXi(), cost, options).distribution;
+}
+
+// Weights of draws of the prior that together predict best, in energy distance.
+Found AsPopulation(const std::vector<Transition>& transitions, uint64_t seed) {
+  constexpr Index kCount = 200;
+  Random random(seed, {kSimulators});
+  const Eigen::MatrixXd xi = OfXi().Sample(kCount, random);
+  std::vector<Eigen::MatrixXd> predictions;
+  Eigen::MatrixXd outcomes(2, static_cast<Index>(transitions.size()));
+  for (const Transition& t : transitions) {
+    outcomes.col(static_cast<Index>(predictions.size())) = t.next.cwiseQuotient(kNoise);
+    Eigen::MatrixXd prediction(2, kCount);
+    for (Index j = 0; j < kCount; ++j)
+      prediction.col(j) = Step(t.state, t.effort, xi(0, j)).cwiseQuotient(kNoise);
+    predictions.push_back(std::move(prediction));
+  }
+  return {xi.row(0), FitPopulation(predictions, outcomes).weights, 0.05};
+}
+
+// The posterior of every transition alone, and all of them together.
+Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t seed) {
+  ConditionalMixtureOptions options;
+  options.simulations = 600;
+  options.rounds = 3;
+  options.max_components = 8;
+  options.samples = 100;
+  const auto count = static_cast<Index>(transitions.size());
+  Found found{VectorXd(count * options.samples), {}, 0.03};
+  for (Index i = 0; i < count; ++i) {
+    const Transition& t = transitions[static_cast<size_t>(i)];
+    const auto simulate = [&](const Eigen::MatrixXd& xi, int64_t first) {
+      Eigen::MatrixXd outcomes(2, xi.cols());
+      for (Index j = 0; j < xi.cols(); ++j) {
+        Random noise(seed, {kSimulation, static_cast<uint32_t>(i), static_cast<uint32_t>(first + j)});
+        outcomes.col(j) = Read(Step(t.state, t.effort, xi(0, j)), noise);
+      }
+      return outcomes;
+    };
+    const Problem problem{OfXi(), t.next, simulate};
+    const Posterior posterior = InferConditionalMixture(problem, options, seed + static_cast<uint64_t>(i));
+    found.xi.segment(i * options.samples, options.samples) = posterior.samples.row(0).transpose();
+  }
+  found.weights = VectorXd::Constant(found.xi.size(), 1 / static_cast<double>(found.xi.size()));
+  return found;
+}
+
+struct Curve {
+  std::string name, css;
+  std::string words;
+  VectorXd density;
+};
+
+constexpr char kStyle[] = R"(<style>
+text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }
+text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600; } text.muted { fill: #5b6676; }
+.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; } .grid { fill: none; stroke: #e8ecf1; }
+.truth { fill: none; stroke: #1b2330; stroke-width: 1.2; stroke-dasharray: 4 3; }
+.line { stroke-width: 1.8; } .area { stroke: none; fill-opacity: 0.18; }
+.squared.line { fill: none; stroke: #b3261e; } .squared.area { fill: #b3261e; }
+.population.line { fill: none; stroke: #1f5fbf; } .population.area { fill: #1f5fbf; }
+.mixture.line { fill: none; stroke: #1a7f47; } .mixture.area { fill: #1a7f47; }
+</style>
+)";
+
+// A panel for each method, one above the other: their heights differ too much for one.
+std::string Draw(const VectorXd& grid, const std::vector<Curve>& curves) {
+  constexpr double kWidth = 640, kLeft = 70, kRight = 626, kTop = 64, kHeight = 110, kGap = 40;
+  const double height = kTop + static_cast<double>(curves.size()) * (kHeight + kGap) + 4;
+  Svg svg(kWidth, height, "densities over simulators that three methods find for a robot that is two");
+  svg.Rectangle(0, 0, kWidth, height, "paper");
+  const Axis x(grid(0), grid(grid.size() - 1), kLeft, kRight);
+  svg.Line(kLeft, 20, kLeft + 26, 20, "truth");
+  svg.Text(kLeft + 33, 24,
+           fmt::format("the robot: light, ξ = -1, in {:.0f} % of the transitions, heavy, ξ = 1, in {:.0f} %",
+                       100 * (1 - kHeavyShare), 100 * kHeavyShare),
+           "label", Svg::Anchor::kStart);
+  for (size_t i = 0; i < curves.size(); ++i) {
+    const Curve& curve = curves[i];
+    const double top = kTop + static_cast<double>(i) * (kHeight + kGap), bottom = top + kHeight;
+    const Axis y(0, 1.1 * curve.density.maxCoeff(), bottom, top);
+    const bool last = i + 1 == curves.size();
+    svg.Frame(x, y, last ? "simulator ξ: payload 0.8 exp(ξ / 2) kg" : "", "density", 8, 4);
+    for (const Axis::Tick& tick : x.Ticks(8)) {
+      svg.Line(x.Pixel(tick.value), bottom, x.Pixel(tick.value), top, "grid");
+    }
+    for (const double mode : {kLight, kHeavy}) svg.Line(x.Pixel(mode), bottom, x.Pixel(mode), top, "truth");
+    std::vector<Vector2d> points;
+    for (Index k = 0; k < grid.size(); ++k) points.emplace_back(x.Pixel(grid(k)), y.Pixel(curve.density(k)));
+    svg.Path(points, curve.css + " line");
+    points.emplace_back(kRight, bottom);
+    points.emplace_back(kLeft, bottom);
+    svg.Path(points, curve.css + " area", true);
+    svg.Line(kLeft, top - 12, kLeft + 26, top - 12, curve.css + " line");
+    svg.Text(kLeft + 33, top - 8, curve.name, "name", Svg::Anchor::kStart);
+    svg.Text(kRight, top - 8, curve.words, "muted", Svg::Anchor::kEnd);
+  }
+  std::string text = svg.Print();
+  return text.insert(text.find("</title>") + 9, kStyle);
+}
+
+void Write(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text;
+  if (!file.flush()) throw std::runtime_error("cannot write " + path.string());
+}
+
+std::string Percent(double light, double heavy) {
+  return fmt::format("{:.0f} % and {:.0f} %", 100 * light, 100 * heavy);
+}
+
+int MakeFigure(const std::filesystem::path& output, uint64_t seed, bool quick) {
+  std::filesystem::create_directories(output);
+  const std::vector<Transition> transitions = Record(quick ? 20 : 400, seed);
+  const Gaussian squared = BySquaredError(transitions, seed);
+  const double mean = squared.mean(0), sd = std::sqrt(squared.covariance(0, 0));
+  const Found population = AsPopulation(transitions, seed), mixture = ByConditionalMixture(transitions, seed);
+
+  // Drawn with a kernel, as the others are: it may be narrower than a line.
+  const Found gaussian{VectorXd::Constant(1, mean), VectorXd::Ones(1), std::hypot(sd, 0.03)};
+  const auto below = [&](double x) { return 0.5 * std::erfc((mean - x) / (sd * M_SQRT2)); };
+  const auto near = [&](double mode) { return below(mode + kNear) - below(mode - kNear); };
+  const std::string by_squares = Percent(near(kLight), near(kHeavy)),
+                    by_energy = Percent(population.Near(kLight), population.Near(kHeavy)),
+                    by_mixture = Percent(mixture.Near(kLight), mixture.Near(kHeavy));
+
+  const VectorXd grid = VectorXd::LinSpaced(321, -2, 2);
+  const std::string words = fmt::format("within {} of the two: ", kNear);
+  std::vector<Curve> curves = {{"squared error, Gaussian search", "squared", words + by_squares, grid},
+                               {"energy distance, population", "population", words + by_energy, grid},
+                               {"mixture, transition by transition", "mixture", words + by_mixture, grid}};
+  std::string csv = "xi,squared_error,population,mixture\n";
+  for (Index k = 0; k < grid.size(); ++k) {
+    curves[0].density(k) = gaussian.Density(grid(k));
+    curves[1].density(k) = population.Density(grid(k));
+    curves[2].density(k) = mixture.Density(grid(k));
+    csv += fmt::format("{:.4f},{:.6g},{:.6g},{:.6g}\n", grid(k), curves[0].density(k), curves[1].density(k),
+                       curves[2].density(k));
+  }
+  Write(output / "figure_1.csv", csv);
+  Write(output / "figure_1.svg", Draw(grid, curves));
+  std::cout << fmt::format(
+      "within {} of the light and of the heavy payload, which the robot has in {} of {} transitions: squared "
+      "error {}"
+      " (it is at {:.2f} ± {:.1g}), energy distance {}, mixture {}\n",
+      kNear, Percent(1 - kHeavyShare, kHeavyShare), transitions.size(), by_squares, mean, sd, by_energy,
+      by_mixture);
+  return 0;
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  std::string output = ".";
+  uint64_t seed = 1;
+  bool quick = false;
+  return plumb::Run(
+      "plumb-figure-1", "Which simulators three methods find for a robot whose payload is light or heavy.",
+      argc, argv,
+      [&](CLI::App& app) {
+        app.add_option("--output", output, "folder for figure_1.csv and figure_1.svg")->capture_default_str();
+        app.add_option("--seed", seed, "of all random numbers")->capture_default_str();
+        app.add_flag("--quick", quick, "a twentieth of the transitions, in a second");
+      },
+      [&](plumb::Process&) { return plumb::MakeFigure(output, seed, quick); });
+}
