@@ -45,7 +45,8 @@ struct RepsRun {
 };
 
 /// Relative-entropy policy search from the prior: samples of p_phi are weighted by exp(R / temperature), a Gaussian is fitted
-/// to them and moved to as far as the KL bound allows. Costs or log-likelihoods that are not finite are failures, infinitely bad.
+/// to them and moved to as far as the KL bound allows. It works in the prior's own coordinates and takes a uniform prior for the
+/// Gaussian of its central 68 %. Costs or log-likelihoods that are not finite are failures, infinitely bad.
 ///
 /// With `surrogate` R is a quadratic of the coordinates, fitted by weighted least squares to all samples so far that p_phi could have
 /// drawn (MORE: Abdolmaleki et al., NIPS 2015, section 3, with samples reused), and the Gaussian that follows is exact; where the
