@@ -1,57 +1,18 @@
 // `plumb excite`, run as a person would.
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 #include <string>
+
+#include "tests/cli/shell.h"
 
 namespace plumb {
 namespace {
 
-namespace fs = std::filesystem;
-
-struct Outcome {
-  int status;
-  std::string text;  ///< both streams
-};
-
-class Folder {
- public:
-  Folder() : path_(fs::temp_directory_path() / ("plumbline_excite_test_" + std::to_string(getpid()))) {
-    fs::create_directories(path_);
-  }
-  ~Folder() { fs::remove_all(path_); }
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  fs::path path_;
-};
-
 Outcome Excite(const std::string& robot, const std::string& arguments) {
-  const std::string command = std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb excite " +
-                              std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + robot + " " +
-                              arguments + " 2>&1";
-  FILE* pipe = popen(command.c_str(), "r");
-  REQUIRE(pipe);
-  std::string text;
-  std::array<char, 4096> buffer;
-  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
-  const int status = pclose(pipe);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text};
-}
-
-std::string Read(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  return Shell(Plumb() + "excite " + Robot(robot) + " " + arguments);
 }
 
 }  // namespace

@@ -4,15 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -20,6 +17,7 @@
 #include "cli/roll_out.h"
 #include "controller/policy.h"
 #include "robot/description.h"
+#include "tests/cli/shell.h"
 #include "trainer/checkpoint.h"
 
 namespace plumb {
@@ -27,41 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Outcome {
-  int status;
-  std::string text;  ///< both streams
-};
-
-class Folder {
- public:
-  Folder() : path_(fs::temp_directory_path() / ("plumbline_sim_test_" + std::to_string(getpid()))) {
-    fs::create_directories(path_);
-  }
-  ~Folder() { fs::remove_all(path_); }
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  fs::path path_;
-};
-
-std::string Robot(const std::string& name) { return std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name; }
-
-Outcome Sim(const std::string& arguments) {
-  const std::string command =
-      "DISPLAY= " + std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb sim " + arguments + " 2>&1";
-  FILE* pipe = popen(command.c_str(), "r");
-  REQUIRE(pipe);
-  std::string text;
-  std::array<char, 4096> buffer;
-  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
-  const int status = pclose(pipe);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text};
-}
-
-std::string Read(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
+Outcome Sim(const std::string& arguments) { return Shell("DISPLAY= " + Plumb() + "sim " + arguments); }
 
 struct Table {
   std::vector<std::string> names;
