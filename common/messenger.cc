@@ -7,15 +7,25 @@
 #include "common/lcm_guard.h"
 
 namespace plumb {
+namespace {
+
+constexpr int kMostAttempts = 3;
+
+}  // namespace
 
 Messenger::Messenger(const std::string& url) : url_(url), lcm_(url) {
-  if (!lcm_.good()) {
+  // liblcm tests itself when its file descriptor is first wanted, in two tenths of a second: a busy machine may need another go.
+  // A subscription made where that fails is a null pointer.
+  bool works = lcm_.good();
+  for (int attempt = 0; works && lcm_.getFileno() < 0; ++attempt) works = attempt < kMostAttempts;
+  if (!works) {
     const bool multicast = url.empty() || url.rfind("udpm", 0) == 0;
     throw std::runtime_error(fmt::format(
         "cannot open LCM at '{}'{}", url,
         multicast ? ": no route for multicast? Cure: ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"
                   : ""));
   }
+  Guard();
 }
 
 int Messenger::Drain(int most) {

@@ -27,8 +27,8 @@ class Messenger {
   /// Handles the messages that have arrived, but no more than `most`, so that a flood does not keep the caller from
   /// its other duties; what is left keeps fd() readable. @return how many, -1 at the end of a file or on failure.
   int Drain(int most = 1000);
-  /// Keeps malformed LCM datagrams from liblcm (see lcm_guard.h); call after the first subscription.
-  /// Subscriber does.
+  /// Keeps malformed LCM datagrams from liblcm (see lcm_guard.h), once. The constructor does, and
+  /// Subscriber where that was too early.
   void Guard();
 
  private:
