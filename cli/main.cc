@@ -102,7 +102,7 @@ int main(int argc, char** argv) {
         calibrate = app.add_subcommand("calibrate", "learn from logs which simulators could have produced the robot's motion");
         calibrate->add_option("robot", calibrate_flags.robot, "robot folder or TOML file")->required();
         calibrate->add_option("--log", calibrate_flags.logs, "LCM log; may be given several times")->allow_extra_args(false);
-        calibrate->add_option("--csv", calibrate_flags.tables, "table of transitions, as docs/calibrate.md has it")->allow_extra_args(false);
+        calibrate->add_option("--csv", calibrate_flags.tables, "table of transitions, columns as in README.md; may be given several times")->allow_extra_args(false);
         calibrate->add_option("--method", calibrate_flags.options.method, "of inference")
             ->check(CLI::IsMember(plumb::CalibrationMethods()))->capture_default_str();
         calibrate->add_option("--seed", calibrate_flags.options.seed, "of all random numbers")->check(seed)->capture_default_str();
