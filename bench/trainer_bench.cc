@@ -21,7 +21,7 @@ GaussianPolicy FreshPolicy() {
 struct Samples {
   explicit Samples(Workers& workers) {
     Rollout rollout(MakeGymPendulum, kShape, workers);
-    batch = rollout.Collect(FreshPolicy(), GymParameters, PendulumSettings().batch, 1, 1, 1);
+    batch = rollout.Collect(FreshPolicy(), GymParameters, PendulumSettings().batch, 1, 1, 1, 1);
     Random random(1);
     for (int i = 0; i < batch.size(); ++i) advantages.push_back(random.Normal());
   }
@@ -73,7 +73,7 @@ void CollectBatch(benchmark::State& state) {
   uint32_t number = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(
-        rollout.Collect(policy, GymParameters, PendulumSettings().batch, 1, 1, number++).size());
+        rollout.Collect(policy, GymParameters, PendulumSettings().batch, 1, 1, 1, number++).size());
   }
 }
 BENCHMARK(CollectBatch)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();

@@ -29,6 +29,7 @@ struct Checkpoint {
   policy_t policy;
   parameter_distribution_t distribution;  ///< of the iteration
   CriticState critic;
+  ObservationMoments observations;  ///< as in TrainerState
 };
 
 /// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint or the new

@@ -26,15 +26,6 @@ void Shuffle(std::vector<int>& order, Random& random) {
 
 }  // namespace
 
-void RunningMoments::Add(double value) {
-  count += 1;
-  const double offset = value - mean;
-  mean += offset / count;
-  squares += offset * (value - mean);
-}
-
-double RunningMoments::sd() const { return squares > 0 ? std::sqrt(squares / count) : 1; }
-
 Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers)
     : settings_(settings), observations_(observations), network_(Sizes(settings, observations), workers) {
   state_.parameters = OrthogonalParameters(Sizes(settings, observations), 1, random);
@@ -77,7 +68,7 @@ void Critic::Rescale(std::span<const double> targets) {
 
 bool Critic::Fit(std::span<const float> observations, std::span<const double> targets, Random& random) {
   const CriticState before = state_;
-  Rescale(targets);
+  if (settings_.normalise_values) Rescale(targets);
   const double mean = state_.targets.mean, sd = state_.targets.sd();
   // Twice, as the gradient of the square; per sd^2, since the error is in that unit.
   const auto l2 = static_cast<float>(2 * settings_.critic_l2 / (sd * sd));

@@ -49,7 +49,7 @@ UpdateReport TrainingSession::Advance() {
     ++update_;
   }
   if (update_ >= updates()) {
-    evaluation_return_ = trainer_.Evaluate(sample, kEvaluationEpisodes);
+    evaluation_return_ = trainer_.Evaluate(sample, kEvaluationEpisodes).mean;
     complete_ = true;
   }
   return last_;
@@ -86,7 +86,7 @@ Checkpoint TrainingSession::MakeCheckpoint() const {
   const TrainerState state = trainer_.state();
   return {seed_,       state.updates, state.steps,        state.dropped_episodes,   iteration_,
           update_,     complete_,     evaluation_return_, state.policy.ToMessage(), distribution_.ToMessage(),
-          state.critic};
+          state.critic, state.observations};
 }
 
 void TrainingSession::Restore(const Checkpoint& checkpoint) {
@@ -100,8 +100,8 @@ void TrainingSession::Restore(const Checkpoint& checkpoint) {
   }
   try {
     distribution_ = ParameterDistribution::FromMessage(checkpoint.distribution, description_);
-    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint.policy), checkpoint.critic, checkpoint.updates,
-                      checkpoint.steps, checkpoint.dropped_episodes});
+    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint.policy), checkpoint.critic, checkpoint.observations,
+                      checkpoint.updates, checkpoint.steps, checkpoint.dropped_episodes});
   } catch (const std::invalid_argument& error) {
     throw CheckpointError(fmt::format("the checkpoint is of another robot or network: {}", error.what()));
   }

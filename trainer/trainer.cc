@@ -1,5 +1,10 @@
 #include "trainer/trainer.h"
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -16,7 +21,8 @@ enum Stream : uint32_t {
   kCriticStream,
   kRolloutStream,
   kFitStream,
-  kEvaluationStream
+  kEvaluationStream,
+  kHeldOutStream
 };
 
 constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
@@ -47,14 +53,19 @@ Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make
       critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_) {}
 
 TrainerState Trainer::state() const {
-  return {policy_, critic_.state(), updates_, steps_, dropped_episodes_};
+  return {policy_, critic_.state(), observations_, updates_, steps_, dropped_episodes_};
 }
 
 void Trainer::Restore(TrainerState state) {
   if (state.policy.shape() != policy_.shape())
     throw std::invalid_argument("trainer: state of another network");
+  const Eigen::Index seen = state.observations.mean.size();
+  if (state.observations.squares.size() != seen || (seen != 0 && seen != policy_.shape().observations)) {
+    throw std::invalid_argument("trainer: state of other observations");
+  }
   critic_.Restore(std::move(state.critic));
   policy_ = std::move(state.policy);
+  observations_ = std::move(state.observations);
   updates_ = state.updates;
   steps_ = state.steps;
   dropped_episodes_ = state.dropped_episodes;
@@ -62,7 +73,8 @@ void Trainer::Restore(TrainerState state) {
 
 UpdateReport Trainer::Update(const ParameterSampler& sample) {
   const auto update = static_cast<uint32_t>(updates_);
-  const Batch batch = rollout_.Collect(policy_, sample, settings_.batch, seed_, kRolloutStream, update);
+  const Batch batch =
+      rollout_.Collect(policy_, sample, settings_.batch, settings_.worst_share, seed_, kRolloutStream, update);
   const std::vector<double> values = critic_.Values(batch.observations);
   const std::vector<double> final_values = critic_.Values(batch.final_observations);
   std::vector<EpisodeSpan> episodes;
@@ -76,21 +88,51 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   UpdateReport report;
   report.batch = batch.size();
   report.dropped_episodes = batch.dropped;
-  report.mean_return = batch.MeanReturn();
+  report.mean_return = batch.mean_return;
   report.explained_variance = ExplainedVariance(values, advantages.target);
   report.step = trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage});
   Random random(seed_, {kFitStream, update});
   report.critic_fitted = critic_.Fit(batch.observations, advantages.target, random);
   report.entropy = Entropy(policy_);
+  if (settings_.normalise_observations) {  // after the step: its batch was seen through the old normaliser
+    observations_.Merge(batch.moments);
+    policy_.observation_mean = observations_.mean.cast<float>();
+    policy_.observation_scale = observations_.sd().cast<float>();
+  }
   ++updates_;
-  steps_ += batch.size();
+  steps_ += batch.steps;
   dropped_episodes_ += batch.dropped;
   return report;
 }
 
-double Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
-  return rollout_.Evaluate(policy_, sample, episodes, seed_, kEvaluationStream,
-                           static_cast<uint32_t>(updates_));
+Evaluation Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
+  return plumb::Evaluate(
+      rollout_.Returns(policy_, sample, episodes, seed_, kEvaluationStream, static_cast<uint32_t>(updates_)));
+}
+
+Evaluation Trainer::EvaluateHeldOut(const ParameterSampler& sample, int episodes) {
+  return plumb::Evaluate(rollout_.Returns(policy_, sample, episodes, seed_, kHeldOutStream, 0));
+}
+
+Evaluation Evaluate(std::span<const double> returns) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> ordered;
+  std::copy_if(returns.begin(), returns.end(), std::back_inserter(ordered), [](double x) { return std::isfinite(x); });
+  std::sort(ordered.begin(), ordered.end());
+  Evaluation evaluation;
+  evaluation.episodes = static_cast<int>(returns.size());
+  evaluation.failed = static_cast<int>(returns.size() - ordered.size());
+  if (ordered.empty()) {
+    evaluation.mean = evaluation.tenth = evaluation.worst = kNone;
+    return evaluation;
+  }
+  evaluation.mean = std::accumulate(ordered.begin(), ordered.end(), 0.) / static_cast<double>(ordered.size());
+  const double at = 0.1 * static_cast<double>(ordered.size() - 1);
+  const auto below = static_cast<size_t>(at);
+  const double above = ordered[std::min(below + 1, ordered.size() - 1)];
+  evaluation.tenth = ordered[below] + (at - std::floor(at)) * (above - ordered[below]);
+  evaluation.worst = ordered.front();
+  return evaluation;
 }
 
 }  // namespace plumb

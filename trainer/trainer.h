@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "controller/policy.h"
@@ -16,8 +17,9 @@ namespace plumb {
 struct TrainerState {
   GaussianPolicy policy;
   CriticState critic;
+  ObservationMoments observations{};  ///< of all that was seen, if the policy's normaliser follows them
   int64_t updates = 0;           ///< since the beginning
-  int64_t steps = 0;             ///< simulated steps since the beginning
+  int64_t steps = 0;             ///< simulated steps since the beginning, those not learnt from too
   int64_t dropped_episodes = 0;  ///< since the beginning
 };
 
@@ -26,11 +28,23 @@ struct UpdateReport {
   Trpo::Step step;
   int batch = 0;  ///< steps it rests on
   int dropped_episodes = 0;
-  double mean_return = 0;         ///< of the batch's episodes, undiscounted
+  double mean_return = 0;         ///< of all episodes played, undiscounted
   double explained_variance = 0;  ///< of the critic, before it was fitted to this batch
   double entropy = 0;             ///< of the policy after the update [nat]
   bool critic_fitted = false;     ///< false: the fit was not finite and has been undone
 };
+
+/// A policy without exploration, in simulators that training has not seen.
+struct Evaluation {
+  int episodes = 0;
+  int failed = 0;    ///< of these: not finite, or no simulator; left out below
+  double mean = 0;   ///< return; NaN if all failed, as the others
+  double tenth = 0;  ///< 10th percentile
+  double worst = 0;
+};
+
+/// Of returns, NaN where an episode failed. The percentile is interpolated linearly between the ordered returns.
+Evaluation Evaluate(std::span<const double> returns);
 
 /// Trains a policy in simulation: roll out, estimate advantages, step the policy, fit the critic. Its random
 /// numbers are named by (seed, update, episode): the same bits for any number of threads, and for a run that
@@ -52,8 +66,10 @@ class Trainer {
 
   /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used.
   UpdateReport Update(const ParameterSampler& sample);
-  /// Mean return of the policy without exploration, on simulators drawn anew. Changes nothing.
-  double Evaluate(const ParameterSampler& sample, int episodes);
+  /// The policy without exploration on simulators drawn anew. Changes nothing.
+  Evaluation Evaluate(const ParameterSampler& sample, int episodes);
+  /// The same on simulators and initial states that are always the same for a seed: what makes policies comparable.
+  Evaluation EvaluateHeldOut(const ParameterSampler& sample, int episodes);
 
  private:
   TrainingSettings settings_;
@@ -63,6 +79,7 @@ class Trainer {
   Rollout rollout_;
   Trpo trpo_;
   Critic critic_;
+  ObservationMoments observations_;
   int64_t updates_ = 0;
   int64_t steps_ = 0;
   int64_t dropped_episodes_ = 0;

@@ -27,7 +27,7 @@ TEST_CASE("Training is the same bits for any number of threads") {
     CHECK(state.policy.parameters == first.policy.parameters);
     CHECK(state.critic.parameters == first.critic.parameters);
     CHECK(state.steps == 4000);
-    CHECK(trainer.Evaluate(GymParameters, 3) == trainer.Evaluate(GymParameters, 3));
+    CHECK(trainer.Evaluate(GymParameters, 3).mean == trainer.Evaluate(GymParameters, 3).mean);
   }
 }
 
@@ -43,13 +43,13 @@ TEST_CASE("The pendulum is learnt") {
   TrainingSettings settings = PendulumSettings();
   settings.hidden = {64, 64};
   Trainer trainer(settings, MakeGymPendulum, PendulumScale(), 1, 0);
-  const double before = trainer.Evaluate(GymParameters, 20);
+  const double before = trainer.Evaluate(GymParameters, 20).mean;
   for (int i = 0; i < 45; ++i) {
     const UpdateReport report = trainer.Update(GymParameters);
     if (report.step.accepted) REQUIRE(report.step.kl <= settings.kl);
     REQUIRE(std::isfinite(report.explained_variance));
   }
-  const double after = trainer.Evaluate(GymParameters, 20);
+  const double after = trainer.Evaluate(GymParameters, 20).mean;
   CHECK(before < -900);
   CHECK(after > -350);  // -150 is the best there is
   CHECK(trainer.policy().parameters.allFinite());
