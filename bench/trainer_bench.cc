@@ -20,7 +20,7 @@ GaussianPolicy FreshPolicy() {
 /// A batch with random advantages.
 struct Samples {
   explicit Samples(Workers& workers) {
-    Rollout rollout(MakeGymPendulum, kShape, workers);
+    RolloutSampler rollout(MakeGymPendulum, kShape, workers);
     batch = rollout.Collect(FreshPolicy(), GymParameters, PendulumSettings().batch, 1, 1, 1, 1);
     Random random(1);
     for (int i = 0; i < batch.size(); ++i) advantages.push_back(random.Normal());
@@ -68,7 +68,7 @@ BENCHMARK(CriticFit)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProc
 
 void CollectBatch(benchmark::State& state) {
   Workers workers(static_cast<int>(state.range(0)));
-  Rollout rollout(MakeGymPendulum, kShape, workers);
+  RolloutSampler rollout(MakeGymPendulum, kShape, workers);
   const GaussianPolicy policy = FreshPolicy();
   uint32_t number = 0;
   for (auto _ : state) {

@@ -97,6 +97,7 @@ class Reader {
 template <class Archive, class C>
 void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.seed);
+  archive(checkpoint.identity);
   archive(checkpoint.updates);
   archive(checkpoint.steps);
   archive(checkpoint.dropped_episodes);

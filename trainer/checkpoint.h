@@ -21,6 +21,7 @@ struct CheckpointError : std::runtime_error {
 /// bits.
 struct Checkpoint {
   uint64_t seed = 0;
+  uint64_t identity = 0;  ///< of all that a run of `plumb train` depends on; 0 in the trainer process
   int64_t updates = 0, steps = 0, dropped_episodes = 0;  ///< as in TrainerState
   int32_t iteration = 0;          ///< of SimOpt; the one under way or, if complete, just done
   int32_t iteration_updates = 0;  ///< TRPO updates done in it

@@ -18,7 +18,7 @@ constexpr int kMostTogether = 8, kTasks = 8;
 }  // namespace
 
 /// One episode.
-struct Rollout::Record {
+struct RolloutSampler::Record {
   std::vector<float> observations, actions;
   std::vector<double> rewards;
   Eigen::VectorXf final_observation;
@@ -31,7 +31,7 @@ struct Rollout::Record {
 };
 
 /// Plays one episode at a time, in its own simulation.
-struct Rollout::Player {
+struct RolloutSampler::Player {
   std::unique_ptr<Simulation> simulation;
   Eigen::VectorXf raw;
   Random random{0};
@@ -85,7 +85,7 @@ struct Rollout::Player {
 };
 
 /// What one thread works with.
-struct Rollout::Worker {
+struct RolloutSampler::Worker {
   std::vector<Player> players;
   kernels::Tape tape;
   Eigen::MatrixXf observations, actions;  // a column for each episode under way
@@ -95,7 +95,7 @@ struct Rollout::Worker {
             const std::function<void(int, Player&)>& begin);
 };
 
-void Rollout::Worker::Play(const GaussianPolicy& policy, const kernels::Network& network, int count, bool explore,
+void RolloutSampler::Worker::Play(const GaussianPolicy& policy, const kernels::Network& network, int count, bool explore,
                            const std::function<void(int, Player&)>& begin) {
   const Eigen::ArrayXf sd = policy.log_std().array().exp();
   std::vector<Player*> playing;
@@ -120,7 +120,7 @@ void Rollout::Worker::Play(const GaussianPolicy& policy, const kernels::Network&
   }
 }
 
-Rollout::Rollout(const SimulationFactory& make, const PolicyShape& shape, Workers& workers)
+RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape& shape, Workers& workers)
     : workers_(&workers), network_(shape.sizes()) {
   for (int i = 0; i < workers.size(); ++i) {
     auto worker = std::make_unique<Worker>(Worker{{}, kernels::Tape(shape.sizes(), kMostTogether),
@@ -134,9 +134,9 @@ Rollout::Rollout(const SimulationFactory& make, const PolicyShape& shape, Worker
   time_limit_ = state_.front()->players.front().simulation->steps_per_episode();
 }
 
-Rollout::~Rollout() = default;
+RolloutSampler::~RolloutSampler() = default;
 
-std::vector<Rollout::Record> Rollout::Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first, int count,
+std::vector<RolloutSampler::Record> RolloutSampler::Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first, int count,
                                           bool explore, uint64_t seed, uint32_t stream, uint32_t number) {
   network_.Set({policy.parameters.data(), static_cast<size_t>(policy.parameters.size())});
   std::vector<Record> records(static_cast<size_t>(count));
@@ -153,7 +153,7 @@ std::vector<Rollout::Record> Rollout::Run(const GaussianPolicy& policy, const Pa
   return records;
 }
 
-Batch Rollout::Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps, double worst_share,
+Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps, double worst_share,
                        uint64_t seed, uint32_t stream, uint32_t number) {
   Batch batch;
   std::vector<Record> records;
@@ -205,7 +205,7 @@ Batch Rollout::Collect(const GaussianPolicy& policy, const ParameterSampler& sam
   return batch;
 }
 
-std::vector<double> Rollout::Returns(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes,
+std::vector<double> RolloutSampler::Returns(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes,
                                      uint64_t seed, uint32_t stream, uint32_t number) {
   std::vector<double> returns;
   for (const Record& record : Run(policy, sample, 0, episodes, false, seed, stream, number)) {

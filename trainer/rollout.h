@@ -62,11 +62,11 @@ struct Batch {
 /// Rolls a policy out in simulators drawn one per episode. A thread plays several episodes side by side, so that the
 /// network is evaluated for all of them at once. Random numbers are named by seed, stream and episode: the batch is the
 /// same for any number of threads. Not thread-safe itself.
-class Rollout {
+class RolloutSampler {
  public:
   /// @param make called once per worker. @param workers must outlive this.
-  Rollout(const SimulationFactory& make, const PolicyShape& shape, Workers& workers);
-  ~Rollout();
+  RolloutSampler(const SimulationFactory& make, const PolicyShape& shape, Workers& workers);
+  ~RolloutSampler();
 
   /// Whole episodes of at least `steps` steps together.
   /// @param worst_share of the episodes, those of lowest return, are kept: what is learnt from them guards against the

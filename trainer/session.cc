@@ -84,9 +84,14 @@ training_status_t TrainingSession::Status() const {
 
 Checkpoint TrainingSession::MakeCheckpoint() const {
   const TrainerState state = trainer_.state();
-  return {seed_,       state.updates, state.steps,        state.dropped_episodes,   iteration_,
-          update_,     complete_,     evaluation_return_, state.policy.ToMessage(), distribution_.ToMessage(),
-          state.critic, state.observations};
+  Checkpoint checkpoint;
+  checkpoint.seed = seed_;
+  checkpoint.updates = state.updates, checkpoint.steps = state.steps, checkpoint.dropped_episodes = state.dropped_episodes;
+  checkpoint.iteration = iteration_, checkpoint.iteration_updates = update_, checkpoint.complete = complete_;
+  checkpoint.evaluation_return = evaluation_return_;
+  checkpoint.policy = state.policy.ToMessage(), checkpoint.distribution = distribution_.ToMessage();
+  checkpoint.critic = state.critic, checkpoint.observations = state.observations;
+  return checkpoint;
 }
 
 void TrainingSession::Restore(const Checkpoint& checkpoint) {

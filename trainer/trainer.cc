@@ -71,6 +71,11 @@ void Trainer::Restore(TrainerState state) {
   dropped_episodes_ = state.dropped_episodes;
 }
 
+void Trainer::Start(const GaussianPolicy& policy) {
+  if (policy.shape() != policy_.shape()) throw std::invalid_argument("trainer: the policy to begin with is another network");
+  policy_ = policy;
+}
+
 UpdateReport Trainer::Update(const ParameterSampler& sample) {
   const auto update = static_cast<uint32_t>(updates_);
   const Batch batch =

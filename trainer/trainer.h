@@ -60,6 +60,8 @@ class Trainer {
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.
   void Restore(TrainerState state);
+  /// Begins with another policy, before the first update. @throws std::invalid_argument if its network is another's.
+  void Start(const GaussianPolicy& policy);
   const GaussianPolicy& policy() const { return policy_; }
   int64_t updates() const { return updates_; }
   int64_t steps() const { return steps_; }
@@ -76,7 +78,7 @@ class Trainer {
   uint64_t seed_;
   Workers workers_;
   GaussianPolicy policy_;
-  Rollout rollout_;
+  RolloutSampler rollout_;
   Trpo trpo_;
   Critic critic_;
   ObservationMoments observations_;
