@@ -70,9 +70,15 @@ class TrainerProcess {
 
   void OnDistribution(const parameter_distribution_t& message) {
     // Repeats of one that has been dealt with are the normal case.
-    if (message.iteration != session_.awaited()) return;
+    const bool newer = session_.training() && message.iteration == session_.iteration();
+    if (message.iteration != session_.awaited() && !newer) return;
     try {
-      session_.Begin(ParameterDistribution::FromMessage(message, robot_));
+      const ParameterDistribution distribution = ParameterDistribution::FromMessage(message, robot_);
+      if (newer) {
+        if (session_.Replace(distribution)) spdlog::info("iteration {}: a newer distribution from update {} on", session_.iteration(), session_.update() + 1);
+        return;
+      }
+      session_.Begin(distribution);
     } catch (const std::invalid_argument& error) {
       spdlog::warn("ignored: {}", error.what());
       return;

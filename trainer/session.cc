@@ -42,6 +42,12 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
   return true;
 }
 
+bool TrainingSession::Replace(const ParameterDistribution& distribution) {
+  if (!training() || distribution.iteration != iteration_ || distribution.components == distribution_.components) return false;
+  distribution_ = distribution;
+  return true;
+}
+
 UpdateReport TrainingSession::Advance() {
   const ParameterSampler sample = [this](Random& random) { return distribution_.Sample(random); };
   if (update_ < updates()) {

@@ -30,6 +30,10 @@ class TrainingSession {
   /// Begins the iteration. @return false, and nothing happens, if it is not the one that is awaited.
   bool Begin(const ParameterDistribution& distribution);
 
+  /// Goes on training with another distribution of the same iteration, from the next batch on. @return false, and nothing
+  /// happens, if there is no training, or it is of another iteration, or no other.
+  bool Replace(const ParameterDistribution& distribution);
+
   bool training() const { return begun_ && !complete_; }
   /// One update; after the last of an iteration evaluates the policy and completes it.
   /// Only while training. @throws std::runtime_error if the simulations cannot be used.

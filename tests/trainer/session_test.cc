@@ -127,6 +127,29 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(third.MakeCheckpoint().critic.second_moment == straight.MakeCheckpoint().critic.second_moment);
 }
 
+TEST_CASE("A newer distribution of the iteration takes effect at the next batch") {
+  TrainingSession session = NewSession(), undisturbed = NewSession();
+  ParameterDistribution newer = Distribution(0);
+  CHECK_FALSE(session.Replace(newer));  // nothing has begun
+  for (TrainingSession* s : {&session, &undisturbed}) {
+    s->Begin(Distribution(0));
+    s->Advance();
+  }
+  CHECK_FALSE(session.Replace(newer));  // a repeat
+  newer.iteration = 1;
+  newer.components[0].mean[0] += 1;
+  CHECK_FALSE(session.Replace(newer));
+  newer.iteration = 0;
+  REQUIRE(session.Replace(newer));
+  CHECK(session.update() == 1);
+  CHECK(session.Policy(1).weight == undisturbed.Policy(1).weight);
+  for (TrainingSession* s : {&session, &undisturbed}) s->Advance();
+  CHECK(session.Policy(1).weight != undisturbed.Policy(1).weight);
+  CHECK(session.MakeCheckpoint().distribution.mean[0] == newer.components[0].mean[0]);
+  while (session.training()) session.Advance();
+  CHECK_FALSE(session.Replace(Distribution(0)));  // its policy is out
+}
+
 TEST_CASE("No checkpoint is nothing; one of another run is an error") {
   const TemporaryFolder folder;
   CHECK_FALSE(LoadCheckpoint(folder.File()));
