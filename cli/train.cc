@@ -39,7 +39,7 @@ class Stopwatch {
 
 RobotDescription ReadRobot(const TrainFlags& flags) {
   RobotDescription robot = LoadRobot(flags.robot);
-  if (flags.paper) robot.training.normalise_values = false, robot.training.fisher_fraction = 1;
+  if (flags.paper) robot.training = AsThePaper(robot.training);
   if (flags.worst_share > 0) robot.training.worst_share = flags.worst_share;
   return robot;
 }

@@ -42,6 +42,12 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 
 }  // namespace
 
+TrainingSettings AsThePaper(TrainingSettings settings) {
+  settings.normalise_values = false;
+  settings.fisher_fraction = 1;
+  return settings;
+}
+
 Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make,
                  const Eigen::VectorXd& action_scale, uint64_t seed, int threads)
     : settings_(settings),

@@ -13,6 +13,9 @@
 
 namespace plumb {
 
+/// The settings as the paper has them, where ours learn faster: value targets in units of return, the whole batch for Fisher's matrix.
+TrainingSettings AsThePaper(TrainingSettings settings);
+
 /// All that training has learnt: what a checkpoint keeps.
 struct TrainerState {
   GaussianPolicy policy;
