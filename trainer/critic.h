@@ -41,12 +41,28 @@ class Critic {
   bool Fit(std::span<const float> observations, std::span<const double> targets, Random& random);
 
  private:
+  /// A part of a minibatch.
+  struct Share {
+    kernels::Tape tape;
+    std::vector<float> inputs, outputs, output_gradient;
+    Eigen::VectorXf gradient;
+  };
+  /// The network as one thread has it.
+  struct Copy {
+    kernels::Network network;
+    int32_t adam_steps = -1;  ///< whose parameters these are
+  };
+
   void Rescale(std::span<const double> targets);
+  void Descend(std::span<const float> observations, std::span<const float> targets, std::span<const int> samples, float l2);
 
   TrainingSettings settings_;
   int observations_;
+  Workers* workers_;
   BatchNetwork network_;
   CriticState state_;
+  std::vector<Share> shares_;
+  std::vector<Copy> copies_;  // one per worker
 };
 
 /// 1 - var(target - value) / var(target); 0 if the targets do not vary.

@@ -24,12 +24,12 @@ Trpo::Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& 
       network_(shape.sizes(), workers),
       fisher_network_(shape.sizes(), workers) {}
 
-Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples) {
+Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples, std::vector<float>& means) {
   const int actions = shape_.actions, count = Count(samples);
   const Eigen::ArrayXf precision = (-2 * policy.log_std().array()).exp();
   // ln p(a) = -((a - mu) / sd)^2 / 2 - log_std + const: d/dmu = (a - mu) / sd^2, d/dlog_std = ((a - mu) /
   // sd)^2 - 1.
-  Eigen::MatrixXf means(actions, count);
+  means.resize(samples.actions.size());
   Eigen::VectorXf gradient(shape_.parameter_count());
   network_.Set(policy.parameters);
   network_.Gradient(
@@ -39,8 +39,9 @@ Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const Poli
           const auto weight = static_cast<float>(samples.advantages[static_cast<size_t>(first + i)] / count);
           for (int a = 0; a < actions; ++a) {
             const float mean = outputs[i * actions + a];
-            means(a, first + i) = mean;
-            const float action = samples.actions[static_cast<size_t>((first + i) * actions + a)];
+            const auto at = static_cast<size_t>((first + i) * actions + a);
+            means[at] = mean;
+            const float action = samples.actions[at];
             output_gradient[i * actions + a] = weight * (action - mean) * precision[a];
           }
         }
@@ -49,7 +50,8 @@ Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const Poli
   Eigen::VectorXd log_std_gradient = Eigen::VectorXd::Zero(actions);
   for (int i = 0; i < count; ++i) {
     for (int a = 0; a < actions; ++a) {
-      const float offset = samples.actions[static_cast<size_t>(i * actions + a)] - means(a, i);
+      const auto at = static_cast<size_t>(i * actions + a);
+      const float offset = samples.actions[at] - means[at];
       log_std_gradient[a] +=
           samples.advantages[static_cast<size_t>(i)] / count * (double{offset * offset * precision[a]} - 1);
     }
@@ -111,7 +113,8 @@ Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const flo
 
 Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {
   Step step;
-  const Eigen::VectorXd gradient = SurrogateGradient(policy, samples).cast<double>();
+  std::vector<float> means;
+  const Eigen::VectorXd gradient = SurrogateGradient(policy, samples, means).cast<double>();
   PrepareFisher(policy, samples);
   const LinearSolution natural = ConjugateGradient(
       [&](const Eigen::VectorXd& v, Eigen::VectorXd& fv) {
@@ -132,9 +135,6 @@ Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {
   const Eigen::VectorXd full_step = std::sqrt(2 * settings_.kl / curvature) * natural.x;
 
   const GaussianPolicy before = policy;
-  std::vector<float> means(samples.actions.size());
-  network_.Set(before.parameters);
-  network_.Forward(samples.observations.data(), Count(samples), means.data());
   double fraction = 1;
   while (step.tries < kLineSearchTries) {
     ++step.tries;

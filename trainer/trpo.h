@@ -39,7 +39,8 @@ class Trpo {
   Step Improve(GaussianPolicy& policy, const PolicySamples& samples);
 
   /// Gradient of the surrogate mean(ratio * advantage) at ratio = 1, in all parameters of the policy.
-  Eigen::VectorXf SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples);
+  /// @param means of the policy at the samples, actions x N, written.
+  Eigen::VectorXf SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples, std::vector<float>& means);
 
   /// Takes the samples at which FisherProduct averages: every n-th of these, n = 1 / fisher_fraction.
   void PrepareFisher(const GaussianPolicy& policy, const PolicySamples& samples);

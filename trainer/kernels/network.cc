@@ -245,14 +245,16 @@ void Tape::Backward(const Network& network, const float* output_gradient, float*
   }
 }
 
-void AdamStep(int count, int step, float rate, float l2, const float* __restrict gradient,
-              float* __restrict parameters, float* __restrict first_moment, float* __restrict second_moment) {
+void AdamStep(int count, int step, float rate, float l2, const float* const (&gradients)[2], float* __restrict parameters,
+              float* __restrict first_moment, float* __restrict second_moment) {
+  const float* __restrict one = gradients[0];
+  const float* __restrict other = gradients[1];
   constexpr float kBeta1 = 0.9f, kBeta2 = 0.999f, kEpsilon = 1e-8f;
   // The moments' bias corrections, folded into rate and denominator.
   const float correction = static_cast<float>(1 / std::sqrt(1 - std::pow(double{kBeta2}, step)));
   const float scale = static_cast<float>(rate / (1 - std::pow(double{kBeta1}, step)));
   for (int i = 0; i < count; ++i) {
-    const float g = gradient[i] + l2 * parameters[i];
+    const float g = one[i] + other[i] + l2 * parameters[i];
     first_moment[i] = kBeta1 * first_moment[i] + (1 - kBeta1) * g;
     second_moment[i] = kBeta2 * second_moment[i] + (1 - kBeta2) * g * g;
     parameters[i] -= scale * first_moment[i] / (std::sqrt(second_moment[i]) * correction + kEpsilon);
