@@ -101,9 +101,13 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   report.dropped_episodes = batch.dropped;
   report.mean_return = batch.mean_return;
   report.explained_variance = ExplainedVariance(values, advantages.target);
-  report.step = trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage});
-  Random random(seed_, {kFitStream, update});
-  report.critic_fitted = critic_.Fit(batch.observations, advantages.target, random);
+  // Neither needs the other's result.
+  workers_.Together(
+      [&] { report.step = trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage}); },
+      [&] {
+        Random random(seed_, {kFitStream, update});
+        report.critic_fitted = critic_.Fit(batch.observations, advantages.target, random);
+      });
   report.entropy = Entropy(policy_);
   if (settings_.normalise_observations) {  // after the step: its batch was seen through the old normaliser
     observations_.Merge(batch.moments);
