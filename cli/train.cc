@@ -127,12 +127,6 @@ class ProgressLine {
   Stopwatch clock_;
 };
 
-std::string Words(const Evaluation& e) {
-  std::string words = fmt::format("{:8.1f} mean {:8.1f} 10th percentile {:8.1f} worst", e.mean, e.tenth, e.worst);
-  if (e.failed > 0) words += fmt::format("  ({} of {} failed)", e.failed, e.episodes);
-  return words;
-}
-
 class Training {
  public:
   Training(TrainFlags flags, Process& process)

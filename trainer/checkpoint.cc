@@ -104,7 +104,11 @@ void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.iteration);
   archive(checkpoint.iteration_updates);
   archive(checkpoint.complete);
-  archive(checkpoint.evaluation_return);
+  archive(checkpoint.evaluation.episodes);
+  archive(checkpoint.evaluation.failed);
+  archive(checkpoint.evaluation.mean);
+  archive(checkpoint.evaluation.tenth);
+  archive(checkpoint.evaluation.worst);
   archive.EncodedMessage(checkpoint.policy);
   archive.EncodedMessage(checkpoint.distribution);
   archive(checkpoint.critic.parameters);

@@ -8,6 +8,7 @@
 #include "plumb/parameter_distribution_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "trainer/critic.h"
+#include "trainer/evaluation.h"
 
 namespace plumb {
 
@@ -26,7 +27,7 @@ struct Checkpoint {
   int32_t iteration = 0;          ///< of SimOpt; the one under way or, if complete, just done
   int32_t iteration_updates = 0;  ///< TRPO updates done in it
   bool complete = false;
-  double evaluation_return = 0;  ///< NaN before it is complete
+  Evaluation evaluation;         ///< of the policy, once it is complete
   policy_t policy;
   parameter_distribution_t distribution;  ///< of the iteration
   CriticState critic;

@@ -99,8 +99,8 @@ class TrainerProcess {
       spdlog::warn("update {}: {} episodes dropped, not finite", session_.update(), report.dropped_episodes);
     }
     if (session_.complete()) {
-      spdlog::info("iteration {} complete: return {:.1f} without exploration, {:.1f} s", session_.iteration(),
-                   session_.evaluation_return(), seconds_);
+      spdlog::info("iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s", session_.iteration(),
+                   session_.evaluation().episodes, Words(session_.evaluation()), seconds_);
       Save();
       Publish();
     } else {

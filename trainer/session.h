@@ -47,7 +47,8 @@ class TrainingSession {
   /// TRPO updates done and planned in this iteration.
   int update() const { return update_; }
   int updates() const;
-  double evaluation_return() const { return evaluation_return_; }
+  /// Of the complete iteration's policy.
+  const Evaluation& evaluation() const { return evaluation_; }
 
   /// The complete iteration's policy, its purpose and how many roll-outs are wanted; utime is the sender's.
   /// @param evaluation_episodes roll-outs of the last policy; of any other one is wanted.
@@ -65,7 +66,7 @@ class TrainingSession {
   bool complete_ = false;
   int iteration_ = 0;
   int update_ = 0;
-  double evaluation_return_;
+  Evaluation evaluation_;
   UpdateReport last_;
 };
 

@@ -1,10 +1,5 @@
 #include "trainer/trainer.h"
 
-#include <algorithm>
-#include <cmath>
-#include <iterator>
-#include <limits>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -127,27 +122,6 @@ Evaluation Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
 
 Evaluation Trainer::EvaluateHeldOut(const ParameterSampler& sample, int episodes) {
   return plumb::Evaluate(rollout_.Returns(policy_, sample, episodes, seed_, kHeldOutStream, 0));
-}
-
-Evaluation Evaluate(std::span<const double> returns) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  std::vector<double> ordered;
-  std::copy_if(returns.begin(), returns.end(), std::back_inserter(ordered), [](double x) { return std::isfinite(x); });
-  std::sort(ordered.begin(), ordered.end());
-  Evaluation evaluation;
-  evaluation.episodes = static_cast<int>(returns.size());
-  evaluation.failed = static_cast<int>(returns.size() - ordered.size());
-  if (ordered.empty()) {
-    evaluation.mean = evaluation.tenth = evaluation.worst = kNone;
-    return evaluation;
-  }
-  evaluation.mean = std::accumulate(ordered.begin(), ordered.end(), 0.) / static_cast<double>(ordered.size());
-  const double at = 0.1 * static_cast<double>(ordered.size() - 1);
-  const auto below = static_cast<size_t>(at);
-  const double above = ordered[std::min(below + 1, ordered.size() - 1)];
-  evaluation.tenth = ordered[below] + (at - std::floor(at)) * (above - ordered[below]);
-  evaluation.worst = ordered.front();
-  return evaluation;
 }
 
 }  // namespace plumb

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
 
 #include "controller/policy.h"
 #include "robot/description.h"
 #include "trainer/critic.h"
+#include "trainer/evaluation.h"
 #include "trainer/rollout.h"
 #include "trainer/trpo.h"
 #include "trainer/workers.h"
@@ -36,18 +36,6 @@ struct UpdateReport {
   double entropy = 0;             ///< of the policy after the update [nat]
   bool critic_fitted = false;     ///< false: the fit was not finite and has been undone
 };
-
-/// A policy without exploration, in simulators that training has not seen.
-struct Evaluation {
-  int episodes = 0;
-  int failed = 0;    ///< of these: not finite, or no simulator; left out below
-  double mean = 0;   ///< return; NaN if all failed, as the others
-  double tenth = 0;  ///< 10th percentile
-  double worst = 0;
-};
-
-/// Of returns, NaN where an episode failed. The percentile is interpolated linearly between the ordered returns.
-Evaluation Evaluate(std::span<const double> returns);
 
 /// Trains a policy in simulation: roll out, estimate advantages, step the policy, fit the critic. Its random
 /// numbers are named by (seed, update, episode): the same bits for any number of threads, and for a run that

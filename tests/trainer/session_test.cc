@@ -108,7 +108,7 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(second.update() == 3);
   while (second.training()) second.Advance();
   CHECK(second.Policy(1).weight == straight.Policy(1).weight);
-  CHECK(second.evaluation_return() == straight.evaluation_return());
+  CHECK(second.evaluation().worst == straight.evaluation().worst);
 
   // And once more, between iterations: the policy is there to be sent again, the next distribution is
   // awaited.
@@ -118,7 +118,7 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(third.complete());
   CHECK(third.awaited() == 1);
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
-  CHECK(third.Status().evaluation_return == straight.evaluation_return());
+  CHECK(third.Status().evaluation_tenth == straight.Status().evaluation_tenth);
   for (TrainingSession* session : {&third, &straight}) {
     session->Begin(Distribution(1));
     while (session->training()) session->Advance();
