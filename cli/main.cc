@@ -148,6 +148,8 @@ int main(int argc, char** argv) {
         train->add_flag("--paper", train_flags.paper, "as the paper has it: value targets not normalised, Fisher's matrix of the whole batch");
         train->add_option("--worst-share", train_flags.worst_share, "learn from that share of the episodes, those of lowest return; default: robot.toml's")
             ->check(CLI::Range(0.01, 1.0));
+        train->add_option("--worst-after", train_flags.worst_after, "updates that learn from all episodes first; default: robot.toml's")
+            ->check(CLI::Range(0, 1000000000));
         train->add_option("--evaluate-every", train_flags.evaluate_every, "updates, for the table's evaluation_return; 0 = never")
             ->check(CLI::Range(0, 1000000))->capture_default_str();
         train->add_option("--held-out", train_flags.held_out, "simulators to judge the policy by")

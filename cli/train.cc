@@ -41,6 +41,7 @@ RobotDescription ReadRobot(const TrainFlags& flags) {
   RobotDescription robot = LoadRobot(flags.robot);
   if (flags.paper) robot.training = AsThePaper(robot.training);
   if (flags.worst_share > 0) robot.training.worst_share = flags.worst_share;
+  if (flags.worst_after >= 0) robot.training.worst_after = flags.worst_after;
   return robot;
 }
 
@@ -56,7 +57,7 @@ uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot, cons
                     const std::optional<GaussianPolicy>& start) {
   const TrainingSettings& s = robot.training;
   std::ostringstream text;
-  text << VersionLine("plumb") << robot.fingerprint << s.normalise_values << s.fisher_fraction << ' ' << s.worst_share << ' ' << flags.seed;
+  text << VersionLine("plumb") << robot.fingerprint << s.normalise_values << s.fisher_fraction << ' ' << s.worst_share << ' ' << s.worst_after << ' ' << flags.seed;
   for (const auto& component : distribution.components) {
     text.precision(17);
     text << component.weight << component.mean << component.covariance;

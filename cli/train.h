@@ -19,6 +19,7 @@ struct TrainFlags {
   std::string from;                    ///< a policy or checkpoint to begin with; empty = from scratch
   bool paper = false;                  ///< value targets in units of return, the whole batch for Fisher's matrix
   double worst_share = 0;              ///< 0 = the robot's setting
+  int worst_after = -1;                ///< updates; negative = the robot's setting
   int evaluate_every = 0;              ///< updates; 0 = never
   int held_out = 100;                  ///< simulators
 };

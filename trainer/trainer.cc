@@ -79,8 +79,9 @@ void Trainer::Start(const GaussianPolicy& policy) {
 
 UpdateReport Trainer::Update(const ParameterSampler& sample) {
   const auto update = static_cast<uint32_t>(updates_);
-  const Batch batch =
-      rollout_.Collect(policy_, sample, settings_.batch, settings_.worst_share, seed_, kRolloutStream, update);
+  // Who cannot yet do it at all learns nothing from the worst of its failures.
+  const double share = updates_ < settings_.worst_after ? 1 : settings_.worst_share;
+  const Batch batch = rollout_.Collect(policy_, sample, settings_.batch, share, seed_, kRolloutStream, update);
   const std::vector<double> values = critic_.Values(batch.observations);
   const std::vector<double> final_values = critic_.Values(batch.final_observations);
   std::vector<EpisodeSpan> episodes;

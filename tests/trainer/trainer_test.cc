@@ -172,6 +172,7 @@ TEST_CASE("Learning from the worst episodes makes the worst simulators better") 
     TrainingSettings settings = SmallSettings();
     settings.batch = 800;
     settings.worst_share = worst ? .4 : 1;
+    settings.worst_after = 0;
     Trainer trainer(settings, [] { return std::make_unique<Dilemma>(); }, Eigen::VectorXd::Ones(1), 3, 1);
     for (int i = 0; i < 40; ++i) trainer.Update(coin);
     action[worst] = trainer.policy().Mean(Eigen::VectorXf::Ones(1))[0];
