@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include "common/messenger.h"
 #include "common/process.h"
 #include "drivers/driver.h"
+#include "drivers/flight_recorder.h"
 #include "drivers/state_log.h"
 #include "robot/description.h"
 
@@ -23,6 +25,8 @@ constexpr int64_t kStatusPeriod = 100'000;  // [us]
 constexpr int64_t kReopenPeriod = 100'000;  // [us]
 constexpr double kFarewell = 0.3;  // [s] real time that the drives have to confirm a disarm at the end
 constexpr int kBursts = 8;         // of frames per wake: a flood must not keep us from our deadlines
+constexpr int64_t kFlight = 2'000'000;     // [us] before a fault whose frames are kept
+constexpr size_t kFlightFrames = 40'000;   // more than two buses of 1 Mbit/s carry in that time
 
 /// From here on no page faults, and no other process before us. LCM's receive thread must exist already.
 void BecomeRealtime(int priority) {
@@ -44,7 +48,7 @@ void WriteState(int8_t state, std::string_view reason) {
 
 class DriverProcess {
  public:
-  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus)
+  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus, const std::string& flight_recorder)
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
@@ -58,6 +62,10 @@ class DriverProcess {
                   }),
         requests_(process.messenger(), "DRIVER_REQUEST", [this](const driver_request_t& request) {
           driver_.OnRequest(request, clock_.Now(), clock_.Utime());
+        }),
+        recorder_(flight_recorder, bus, kFlightFrames, [](const std::string& file, const std::string& error) {
+          if (error.empty()) spdlog::warn("the frames of the last 2 s are in {}", file);
+          else spdlog::error("the frames before the fault are lost: {}", error);
         }) {
     driver_.set_bus(bus);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
@@ -96,6 +104,7 @@ class DriverProcess {
       for (const Frame& frame : std::span(received_).first(static_cast<size_t>(count))) {
         const int64_t utime =
             frame.receive_ns != 0 ? clock_.UtimeFromRealtimeNs(frame.receive_ns) : clock_.Utime();
+        recorder_.Record(frame, false, utime);
         driver_.OnFrame(frame, now, utime);
       }
     }
@@ -107,7 +116,12 @@ class DriverProcess {
     const int64_t lateness = cycle_.Advance(now);
     const std::span<const Frame> frames = driver_.Tick(now, clock_.Utime(), lateness);
     const int accepted = frames.empty() ? 0 : transport_->Send(frames);
-    driver_.Transmitted(accepted, clock_.Utime());
+    const int64_t sent = clock_.Utime();
+    driver_.Transmitted(accepted, sent);
+    for (const Frame& frame : frames.first(static_cast<size_t>(std::max(accepted, 0)))) recorder_.Record(frame, true, sent);
+    const bool fault = driver_.state() == DriveState::kFault;
+    if (fault && !faulty_) recorder_.Dump(sent - kFlight, sent, driver_.reason());
+    faulty_ = fault;
 
     if (transport_->link() != LinkState::kUp && now >= next_reopen_) {
       next_reopen_ = now + kReopenPeriod;
@@ -158,6 +172,8 @@ class DriverProcess {
   Subscriber<joint_command_t> commands_;
   Subscriber<driver_request_t> requests_;
   std::array<Frame, 64> received_;
+  FlightRecorder recorder_;
+  bool faulty_ = false;
   int64_t next_reopen_ = 0;
   int64_t next_status_ = 0;
   uint64_t revision_ = 0;
@@ -168,20 +184,21 @@ class DriverProcess {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  std::string robot_path, bus;
+  std::string robot_path, bus, flight_recorder;
   int priority = 0;
   return plumb::Run(
       "plumb-driver", "Drives a robot's motors on a CAN bus: JOINT_COMMAND in, JOINT_STATE out.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder, or its TOML file")->required();
         app.add_option("--bus", bus, "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
+        app.add_option("--flight-recorder", flight_recorder, "folder: on every fault the frames of the last 2 s are written there");
         app.add_option("--realtime-priority", priority, "SCHED_FIFO priority, 0 = off")
             ->check(CLI::Range(0, 90))
             ->capture_default_str();
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
-        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus);
+        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder);
         plumb::BecomeRealtime(priority);
         return driver.Run();
       });

@@ -14,6 +14,8 @@
 namespace plumb {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr int kClosedLoop = 8, kIdle = 1;  // CANSimple axis states
 // A frame takes a moment from the driver to the witness, on a machine that is busy with other tests.
 constexpr int64_t kSlack = 60'000;  // [us]
@@ -59,6 +61,17 @@ TEST_CASE("a stopped controller") {
   stage.Listen(0.1);
   ExpectSafe(stage, stage.last_command, Us(stage.robot.driver.expiry + stage.robot.driver.cycle));
   CHECK_THAT(stage.drivers.newest().reason, Catch::Contains("command"));
+  // What was on the bus before is on disk, its reason above, the last torques among it.
+  std::vector<fs::path> records;
+  REQUIRE(stage.WaitUntil([&] {
+    records.clear();
+    if (fs::exists(stage.folder / "faults")) std::copy(fs::directory_iterator(stage.folder / "faults"), {}, std::back_inserter(records));
+    return records.size() == 1 && records[0].extension() == ".log";
+  }, 2));
+  const std::string record = Read(records[0]);
+  CHECK(record.rfind("# no command for", 0) == 0);
+  CHECK(record.find(" 02E#0000000000000000 T\n") != std::string::npos);
+  CHECK(record.find(" R\n") != std::string::npos);
   // It wakes up with old states in its hands; that alone must not move anything.
   stage.children.at("plumb-controller")->Signal(SIGCONT);
   stage.Listen(0.5);
