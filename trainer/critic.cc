@@ -35,8 +35,11 @@ void RunningMoments::Add(double value) {
 
 double RunningMoments::sd() const { return squares > 0 ? std::sqrt(squares / count) : 1; }
 
-Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers)
-    : settings_(settings), observations_(observations), network_(Sizes(settings, observations), workers) {
+Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers,
+               const Ranks& ranks)
+    : settings_(settings),
+      observations_(observations),
+      network_(Sizes(settings, observations), workers, ranks) {
   state_.parameters = OrthogonalParameters(Sizes(settings, observations), 1, random);
   state_.first_moment.setZero(state_.parameters.size());
   state_.second_moment.setZero(state_.parameters.size());
@@ -102,7 +105,7 @@ bool Critic::Fit(std::span<const float> observations, std::span<const double> ta
       network_.Set(state_.parameters);
       network_.Gradient(
           inputs.data(), size,
-          [&](int group, int columns, const float* outputs, float* output_gradient) {
+          [&](int group, int columns, const float* outputs, float* output_gradient, std::span<double>) {
             for (int i = 0; i < columns; ++i) {
               const float error = outputs[i] - normalised[static_cast<size_t>(group + i)];
               output_gradient[i] = 2 * error / static_cast<float>(size);

@@ -37,14 +37,14 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 }  // namespace
 
 Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make,
-                 const Eigen::VectorXd& action_scale, uint64_t seed, int threads)
+                 const Eigen::VectorXd& action_scale, uint64_t seed, int threads, const Ranks& ranks)
     : settings_(settings),
       seed_(seed),
       workers_(threads),
       policy_(FreshPolicy(settings, make, action_scale, seed)),
       rollout_(make, policy_.shape(), workers_),
-      trpo_(settings, policy_.shape(), workers_),
-      critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_) {}
+      trpo_(settings, policy_.shape(), workers_, ranks),
+      critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_, ranks) {}
 
 TrainerState Trainer::state() const {
   return {policy_, critic_.state(), updates_, steps_, dropped_episodes_};

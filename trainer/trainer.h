@@ -33,15 +33,17 @@ struct UpdateReport {
 };
 
 /// Trains a policy in simulation: roll out, estimate advantages, step the policy, fit the critic. Its random
-/// numbers are named by (seed, update, episode): the same bits for any number of threads, and for a run that
-/// was interrupted and resumed. Not thread-safe itself.
+/// numbers are named by (seed, update, episode): the same bits for any number of threads and ranks, and for a
+/// run that was interrupted and resumed. Not thread-safe itself.
 class Trainer {
  public:
   /// @param make makes simulations; called once per thread. @param action_scale effort of action 1, per
   /// action.
   /// @param threads 0 = as many as the machine has.
+  /// @param ranks must outlive this. All of them make the same trainer and call the same methods.
   Trainer(const TrainingSettings& settings, const SimulationFactory& make,
-          const Eigen::VectorXd& action_scale, uint64_t seed, int threads);
+          const Eigen::VectorXd& action_scale, uint64_t seed, int threads,
+          const Ranks& ranks = Ranks::Alone());
 
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.

@@ -22,8 +22,9 @@ struct PolicySamples {
 /// its length bounded by the Kullback-Leibler divergence between old and new policy. Not thread-safe.
 class Trpo {
  public:
-  /// @param workers must outlive this.
-  Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers);
+  /// @param workers,ranks must outlive this.
+  Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers,
+       const Ranks& ranks = Ranks::Alone());
 
   /// The outcome of one step.
   struct Step {
@@ -48,7 +49,8 @@ class Trpo {
   /// It is also the Hessian of the mean KL at the old policy.
   Eigen::VectorXf FisherProduct(const Eigen::Ref<const Eigen::VectorXf>& v);
 
-  /// Mean KL(before || after) and mean of (ratio - 1) * advantage, given the means of `before`.
+  /// Mean KL(before || after) and mean of (ratio - 1) * advantage.
+  /// @param means of `before`, actions x N; of the samples that other ranks look at, anything.
   struct Comparison {
     double kl, gain;
   };
@@ -61,6 +63,7 @@ class Trpo {
  private:
   TrainingSettings settings_;
   PolicyShape shape_;
+  std::vector<float> means_;     // of SurrogateGradient's policy, where this rank has looked, actions x N
   BatchNetwork network_;         // at the policy's own and, in the line search, at candidate parameters
   BatchNetwork fisher_network_;  // at the policy's parameters, with the activations of Fisher's samples
   std::vector<float> fisher_inputs_;
