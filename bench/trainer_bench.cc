@@ -20,8 +20,8 @@ GaussianPolicy FreshPolicy() {
 /// A batch with random advantages.
 struct Samples {
   explicit Samples(Workers& workers) {
-    Rollout rollout(MakeGymPendulum, kShape, workers);
-    batch = rollout.Collect(FreshPolicy(), GymParameters, PendulumSettings().batch, 1, 1, 1);
+    RolloutSampler rollout(MakeGymPendulum, kShape, workers);
+    batch = rollout.Collect(FreshPolicy(), GymParameters, PendulumSettings().batch, 1, 1, 1, 1);
     Random random(1);
     for (int i = 0; i < batch.size(); ++i) advantages.push_back(random.Normal());
   }
@@ -46,16 +46,22 @@ BENCHMARK(FisherProduct)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
 
+/// A policy's step; second argument: Fisher at every how many-th sample.
 void PolicyStep(benchmark::State& state) {
   Workers workers(static_cast<int>(state.range(0)));
   const Samples samples(workers);
-  Trpo trpo(PendulumSettings(), kShape, workers);
+  TrainingSettings settings = PendulumSettings();
+  settings.fisher_fraction = 1. / static_cast<double>(state.range(1));
+  Trpo trpo(settings, kShape, workers);
+  const GaussianPolicy fresh = FreshPolicy();
   for (auto _ : state) {
-    GaussianPolicy policy = FreshPolicy();
+    GaussianPolicy policy = fresh;
     benchmark::DoNotOptimize(trpo.Improve(policy, samples.View()).kl);
   }
 }
-BENCHMARK(PolicyStep)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(PolicyStep)
+    ->ArgsProduct({{1, 2}, {1, 5}})
+    ->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 
 void CriticFit(benchmark::State& state) {
   Workers workers(static_cast<int>(state.range(0)));
@@ -68,23 +74,27 @@ BENCHMARK(CriticFit)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProc
 
 void CollectBatch(benchmark::State& state) {
   Workers workers(static_cast<int>(state.range(0)));
-  Rollout rollout(MakeGymPendulum, kShape, workers);
+  RolloutSampler rollout(MakeGymPendulum, kShape, workers);
   const GaussianPolicy policy = FreshPolicy();
   uint32_t number = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(
-        rollout.Collect(policy, GymParameters, PendulumSettings().batch, 1, 1, number++).size());
+        rollout.Collect(policy, GymParameters, PendulumSettings().batch, 1, 1, 1, number++).size());
   }
 }
 BENCHMARK(CollectBatch)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 
 /// Everything: roll-out, policy, critic.
 void Update(benchmark::State& state) {
-  Trainer trainer(PendulumSettings(), MakeGymPendulum, Eigen::VectorXd::Constant(1, 2), 1,
+  TrainingSettings settings = PendulumSettings();
+  settings.fisher_fraction = 1. / static_cast<double>(state.range(1));
+  Trainer trainer(settings, MakeGymPendulum, Eigen::VectorXd::Constant(1, 2), 1,
                   static_cast<int>(state.range(0)));
   for (auto _ : state) benchmark::DoNotOptimize(trainer.Update(GymParameters).mean_return);
 }
-BENCHMARK(Update)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(Update)
+    ->ArgsProduct({{1, 2}, {1, 5}})
+    ->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 
 }  // namespace
 }  // namespace plumb

@@ -9,6 +9,7 @@
 #include "cli/excite.h"
 #include "cli/launch.h"
 #include "cli/sim.h"
+#include "cli/train.h"
 #include "common/process.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
@@ -61,11 +62,12 @@ int main(int argc, char** argv) {
   plumb::LaunchFlags flags;
   plumb::SimFlags sim_flags;
   plumb::CalibrateFlags calibrate_flags;
+  plumb::TrainFlags train_flags;
   std::string command = "plumb";
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
+  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -130,18 +132,41 @@ int main(int argc, char** argv) {
             ->check(CLI::Range(0.01, 600.0))->capture_default_str();
         excite->add_option("--posterior", excite_flags.posterior, "what is known already: a posterior.json; default: the prior");
         excite->add_option("--png", excite_flags.png, "draw the best one as a strip of snapshots");
+        train = app.add_subcommand("train", "train a policy on simulators drawn from a distribution");
+        train->add_option("robot", train_flags.robot, "robot folder or TOML file")->required();
+        train->add_option("--distribution", train_flags.distribution, "a posterior.json, 'prior', or 'nominal': the prior's means alone")
+            ->capture_default_str();
+        train->add_option("--steps", train_flags.steps, "to simulate, e.g. 2e6; default: updates x batch of robot.toml")
+            ->check(CLI::Range(1.0, 1e15));
+        train->add_option("--seed", train_flags.seed, "of all random numbers")->check(seed)->capture_default_str();
+        train->add_option("--threads", train_flags.threads, "0 = one per core; the result does not depend on it")
+            ->check(CLI::Range(0, 1024))->capture_default_str();
+        train->add_option("--output", train_flags.output, "the policy")->capture_default_str();
+        train->add_option("--checkpoint", train_flags.checkpoint, "to resume from; default: the output's name and .checkpoint");
+        train->add_option("--csv", train_flags.csv, "write a line of numbers for each update to this file");
+        train->add_option("--from", train_flags.from, "begin with this policy; default: from scratch");
+        train->add_flag("--paper", train_flags.paper, "as the paper has it: value targets not normalised, Fisher's matrix of the whole batch");
+        train->add_option("--worst-share", train_flags.worst_share, "learn from that share of the episodes, those of lowest return; default: robot.toml's")
+            ->check(CLI::Range(0.01, 1.0));
+        train->add_option("--worst-after", train_flags.worst_after, "updates that learn from all episodes first; default: robot.toml's")
+            ->check(CLI::Range(0, 1000000000));
+        train->add_option("--evaluate-every", train_flags.evaluate_every, "updates, for the table's evaluation_return; 0 = never")
+            ->check(CLI::Range(0, 1000000))->capture_default_str();
+        train->add_option("--held-out", train_flags.held_out, "simulators to judge the policy by")
+            ->check(CLI::Range(1, 1000000))->capture_default_str();
         doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* sub : {launch, sim, calibrate, excite, doctor, arm, disarm, estop}) sub->fallthrough();
+        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, arm, disarm, estop}) sub->fallthrough();
       },
       [&](plumb::Process& process) {
         if (launch->parsed()) return plumb::Launch(process, flags);
         if (sim->parsed()) return plumb::Simulate(process, sim_flags);
         if (calibrate->parsed()) return plumb::CalibrateLogs(process, calibrate_flags, command);
         if (excite->parsed()) return plumb::Excite(process, excite_flags);
+        if (train->parsed()) return plumb::Train(process, train_flags);
         if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus);
         if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM);
         if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM);

@@ -183,6 +183,11 @@ struct TrainingSettings {
   double fisher_fraction;
   double critic_l2, critic_rate;
   int critic_epochs, critic_minibatch;
+  bool normalise_values = true;         ///< the critic's targets, by their running mean and sd
+  bool normalise_observations = false;  ///< by their running mean and sd
+  double worst_share = 1;               ///< of the episodes, by return, that an update learns from (EPOpt); 1 = all
+  int worst_after = 100;                ///< updates that learn from all of them
+  double position_noise = 0, velocity_noise = 0;  ///< sd of what the policy is told [rad or m], [rad/s or m/s]
 };
 
 struct HiddenParameter {

@@ -19,6 +19,8 @@ struct ParameterDistribution {
     double weight;               ///< > 0; they sum to 1
     Eigen::VectorXd mean;        ///< P, in coordinates
     Eigen::MatrixXd covariance;  ///< P x P, symmetric, positive semidefinite, in coordinates
+
+    bool operator==(const Component&) const = default;
   };
 
   int iteration = 0;  ///< of SimOpt; 0 = the prior

@@ -118,6 +118,12 @@ TrainingSettings ReadTraining(Config config) {
   s.critic_rate = config.Number("critic_rate", kSanePositive);
   s.critic_epochs = config.Integer("critic_epochs", {1, 10000});
   s.critic_minibatch = config.Integer("critic_minibatch", {1, 1e7});
+  s.normalise_values = config.Boolean("normalise_values", true);
+  s.normalise_observations = config.Boolean("normalise_observations", false);
+  s.worst_share = config.Number("worst_share", {0.01, 1}, 1);
+  s.worst_after = config.Integer("worst_after", {0, 1e9}, 100);
+  s.position_noise = config.Number("position_noise", kSaneNotNegative, 0);
+  s.velocity_noise = config.Number("velocity_noise", kSaneNotNegative, 0);
   config.Finish();
   return s;
 }

@@ -50,6 +50,9 @@ class Environment {
 
   const Eigen::VectorXd& q() const { return simulator_.q(); }
   const Eigen::VectorXd& v() const { return simulator_.v(); }
+  /// The sensors' readings.
+  const Eigen::VectorXd& reading_q() const { return reading_q_; }
+  const Eigen::VectorXd& reading_v() const { return reading_v_; }
   /// What the latest action asked the motors for [Nm or N], one per velocity.
   const Eigen::VectorXd& effort() const { return effort_; }
   const Task& task() const { return *task_; }

@@ -21,7 +21,7 @@ namespace {
 // File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a checkpoint stays
 // where it was written.
 constexpr char kMagic[8] = {'P', 'L', 'U', 'M', 'B', 'T', 'R', 'N'};
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 constexpr size_t kHeader = sizeof kMagic + 2 * sizeof(uint32_t);
 
 class Writer {
@@ -31,9 +31,10 @@ class Writer {
     static_assert(std::is_arithmetic_v<T>);
     Append(&value, sizeof value);
   }
-  void operator()(const Eigen::VectorXf& values) {
+  template <class Number>
+  void operator()(const Eigen::VectorX<Number>& values) {
     (*this)(static_cast<uint64_t>(values.size()));
-    Append(values.data(), static_cast<size_t>(values.size()) * sizeof(float));
+    Append(values.data(), static_cast<size_t>(values.size()) * sizeof(Number));
   }
   template <class Message>
   void EncodedMessage(const Message& message) {
@@ -61,10 +62,11 @@ class Reader {
     static_assert(std::is_arithmetic_v<T>);
     std::memcpy(&value, Take(sizeof value), sizeof value);
   }
-  void operator()(Eigen::VectorXf& values) {
-    const size_t count = Count(sizeof(float));
+  template <class Number>
+  void operator()(Eigen::VectorX<Number>& values) {
+    const size_t count = Count(sizeof(Number));
     values.resize(static_cast<Eigen::Index>(count));
-    std::memcpy(values.data(), Take(count * sizeof(float)), count * sizeof(float));
+    std::memcpy(values.data(), Take(count * sizeof(Number)), count * sizeof(Number));
   }
   template <class Message>
   void EncodedMessage(Message& message) {
@@ -95,13 +97,18 @@ class Reader {
 template <class Archive, class C>
 void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.seed);
+  archive(checkpoint.identity);
   archive(checkpoint.updates);
   archive(checkpoint.steps);
   archive(checkpoint.dropped_episodes);
   archive(checkpoint.iteration);
   archive(checkpoint.iteration_updates);
   archive(checkpoint.complete);
-  archive(checkpoint.evaluation_return);
+  archive(checkpoint.evaluation.episodes);
+  archive(checkpoint.evaluation.failed);
+  archive(checkpoint.evaluation.mean);
+  archive(checkpoint.evaluation.tenth);
+  archive(checkpoint.evaluation.worst);
   archive.EncodedMessage(checkpoint.policy);
   archive.EncodedMessage(checkpoint.distribution);
   archive(checkpoint.critic.parameters);
@@ -111,6 +118,9 @@ void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.critic.targets.count);
   archive(checkpoint.critic.targets.mean);
   archive(checkpoint.critic.targets.squares);
+  archive(checkpoint.observations.count);
+  archive(checkpoint.observations.mean);
+  archive(checkpoint.observations.squares);
 }
 
 uint32_t Crc(const char* data, size_t size) {

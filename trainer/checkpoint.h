@@ -8,6 +8,7 @@
 #include "plumb/parameter_distribution_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "trainer/critic.h"
+#include "trainer/evaluation.h"
 
 namespace plumb {
 
@@ -21,14 +22,16 @@ struct CheckpointError : std::runtime_error {
 /// bits.
 struct Checkpoint {
   uint64_t seed = 0;
+  uint64_t identity = 0;  ///< of all that a run of `plumb train` depends on; 0 in the trainer process
   int64_t updates = 0, steps = 0, dropped_episodes = 0;  ///< as in TrainerState
   int32_t iteration = 0;          ///< of SimOpt; the one under way or, if complete, just done
   int32_t iteration_updates = 0;  ///< TRPO updates done in it
   bool complete = false;
-  double evaluation_return = 0;  ///< NaN before it is complete
+  Evaluation evaluation;         ///< of the policy, once it is complete
   policy_t policy;
   parameter_distribution_t distribution;  ///< of the iteration
   CriticState critic;
+  ObservationMoments observations;  ///< as in TrainerState
 };
 
 /// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint or the new

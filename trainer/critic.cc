@@ -18,6 +18,10 @@ std::vector<int> Sizes(const TrainingSettings& settings, int observations) {
   return sizes;
 }
 
+// A minibatch is shared by so many tasks, whatever the number of threads: sums over them are taken in order. More would be too
+// small to be worth handing to another thread.
+constexpr int kShares = 2;
+
 void Shuffle(std::vector<int>& order, Random& random) {
   for (size_t i = order.size(); i > 1; --i) {
     std::swap(order[i - 1], order[static_cast<size_t>(random.Uniform() * static_cast<double>(i))]);
@@ -26,23 +30,19 @@ void Shuffle(std::vector<int>& order, Random& random) {
 
 }  // namespace
 
-void RunningMoments::Add(double value) {
-  count += 1;
-  const double offset = value - mean;
-  mean += offset / count;
-  squares += offset * (value - mean);
-}
-
-double RunningMoments::sd() const { return squares > 0 ? std::sqrt(squares / count) : 1; }
-
-Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers,
-               const Ranks& ranks)
+Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers, const Ranks& ranks)
     : settings_(settings),
       observations_(observations),
+      workers_(&workers),
       network_(Sizes(settings, observations), workers, ranks) {
   state_.parameters = OrthogonalParameters(Sizes(settings, observations), 1, random);
   state_.first_moment.setZero(state_.parameters.size());
   state_.second_moment.setZero(state_.parameters.size());
+  const std::vector<int> sizes = Sizes(settings, observations);
+  for (int i = 0; i < kShares; ++i) {
+    shares_.push_back({kernels::Tape(sizes, settings.critic_minibatch / kShares + 1), {}, {}, {}, Eigen::VectorXf(state_.parameters.size())});
+  }
+  for (int i = 0; i < workers.size(); ++i) copies_.push_back({kernels::Network(sizes)});
 }
 
 void Critic::Restore(CriticState state) {
@@ -78,43 +78,58 @@ void Critic::Rescale(std::span<const double> targets) {
   state_.parameters.tail(1).array() += static_cast<float>((old_mean - mean) / sd);
 }
 
+// One step of Adam. Both halves, gradient and step, are shared by the threads.
+void Critic::Descend(std::span<const float> observations, std::span<const float> targets, std::span<const int> samples, float l2) {
+  const int size = static_cast<int>(samples.size());
+  workers_->Run(kShares, [&](int task, int worker) {
+    Copy& copy = copies_[static_cast<size_t>(worker)];
+    if (copy.adam_steps != state_.adam_steps) {
+      copy.network.Set({state_.parameters.data(), static_cast<size_t>(state_.parameters.size())});
+      copy.adam_steps = state_.adam_steps;
+    }
+    Share& share = shares_[static_cast<size_t>(task)];
+    const int first = size * task / kShares, count = size * (task + 1) / kShares - first;
+    share.inputs.resize(static_cast<size_t>(count * observations_));
+    share.outputs.resize(static_cast<size_t>(count));
+    share.output_gradient.resize(static_cast<size_t>(count));
+    for (int i = 0; i < count; ++i) {
+      std::copy_n(observations.begin() + ptrdiff_t{samples[static_cast<size_t>(first + i)]} * observations_, observations_,
+                  share.inputs.begin() + ptrdiff_t{i} * observations_);
+    }
+    share.tape.Forward(copy.network, share.inputs.data(), count, share.outputs.data());
+    for (int i = 0; i < count; ++i) {
+      const float error = share.outputs[static_cast<size_t>(i)] - targets[static_cast<size_t>(samples[static_cast<size_t>(first + i)])];
+      share.output_gradient[static_cast<size_t>(i)] = 2 * error / static_cast<float>(size);
+    }
+    share.tape.Backward(copy.network, share.output_gradient.data(), share.gradient.data());
+  });
+  ++state_.adam_steps;
+  const auto parameters = static_cast<int>(state_.parameters.size());
+  workers_->Run(kShares, [&](int task, int) {
+    const int first = parameters * task / kShares, count = parameters * (task + 1) / kShares - first;
+    kernels::AdamStep(count, state_.adam_steps, static_cast<float>(settings_.critic_rate), l2,
+                      {shares_[0].gradient.data() + first, shares_[1].gradient.data() + first}, state_.parameters.data() + first, state_.first_moment.data() + first, state_.second_moment.data() + first);
+  });
+}
+
 bool Critic::Fit(std::span<const float> observations, std::span<const double> targets, Random& random) {
   const CriticState before = state_;
-  Rescale(targets);
+  if (settings_.normalise_values) Rescale(targets);
   const double mean = state_.targets.mean, sd = state_.targets.sd();
   // Twice, as the gradient of the square; per sd^2, since the error is in that unit.
   const auto l2 = static_cast<float>(2 * settings_.critic_l2 / (sd * sd));
 
-  const int count = static_cast<int>(targets.size());
+  std::vector<float> normalised(targets.size());
+  std::transform(targets.begin(), targets.end(), normalised.begin(), [&](double t) { return static_cast<float>((t - mean) / sd); });
+
+  for (Copy& copy : copies_) copy.adam_steps = -1;
   std::vector<int> order(targets.size());
   std::iota(order.begin(), order.end(), 0);
-  std::vector<float> inputs, normalised;
-  Eigen::VectorXf gradient(state_.parameters.size());
   for (int epoch = 0; epoch < settings_.critic_epochs; ++epoch) {
     Shuffle(order, random);
-    for (int first = 0; first < count; first += settings_.critic_minibatch) {
-      const int size = std::min(settings_.critic_minibatch, count - first);
-      inputs.clear();
-      normalised.clear();
-      for (int i = first; i < first + size; ++i) {
-        const int sample = order[static_cast<size_t>(i)];
-        const auto begin = observations.begin() + ptrdiff_t{sample} * observations_;
-        inputs.insert(inputs.end(), begin, begin + observations_);
-        normalised.push_back(static_cast<float>((targets[static_cast<size_t>(sample)] - mean) / sd));
-      }
-      network_.Set(state_.parameters);
-      network_.Gradient(
-          inputs.data(), size,
-          [&](int group, int columns, const float* outputs, float* output_gradient, std::span<double>) {
-            for (int i = 0; i < columns; ++i) {
-              const float error = outputs[i] - normalised[static_cast<size_t>(group + i)];
-              output_gradient[i] = 2 * error / static_cast<float>(size);
-            }
-          },
-          gradient);
-      kernels::AdamStep(static_cast<int>(gradient.size()), ++state_.adam_steps,
-                        static_cast<float>(settings_.critic_rate), l2, gradient.data(),
-                        state_.parameters.data(), state_.first_moment.data(), state_.second_moment.data());
+    for (size_t first = 0; first < order.size(); first += static_cast<size_t>(settings_.critic_minibatch)) {
+      const size_t size = std::min(static_cast<size_t>(settings_.critic_minibatch), order.size() - first);
+      Descend(observations, normalised, {&order[first], size}, l2);
     }
   }
   if (state_.parameters.allFinite() && state_.second_moment.allFinite()) return true;

@@ -8,28 +8,19 @@
 #include "common/random.h"
 #include "robot/description.h"
 #include "trainer/batch_network.h"
+#include "trainer/moments.h"
 
 namespace plumb {
-
-/// Running mean and variance (Welford, 1962), in double.
-struct RunningMoments {
-  double count = 0, mean = 0, squares = 0;
-
-  void Add(double value);
-  /// Standard deviation; 1 until there is something to tell.
-  double sd() const;
-  bool operator==(const RunningMoments&) const = default;
-};
 
 /// All that a critic has learnt: what a checkpoint keeps.
 struct CriticState {
   Eigen::VectorXf parameters, first_moment, second_moment;  ///< of the network, and Adam's
   int32_t adam_steps = 0;
-  RunningMoments targets;  ///< of all value targets seen; the network's output is in their units
+  RunningMoments targets;  ///< of all value targets seen, the unit of the network's output; none: units of return
 };
 
-/// The value function: a tanh network fitted to value targets by Adam. The network predicts targets
-/// normalised by their running mean and standard deviation. When these move, its output layer is rescaled so
+/// The value function: a tanh network fitted to value targets by Adam. With normalise_values the network predicts
+/// targets normalised by their running mean and standard deviation; when these move, its output layer is rescaled so
 /// that the predicted values stay (van Hasselt et al., 2016, "Pop-Art"). Not thread-safe.
 class Critic {
  public:
@@ -51,12 +42,28 @@ class Critic {
   bool Fit(std::span<const float> observations, std::span<const double> targets, Random& random);
 
  private:
+  /// A part of a minibatch.
+  struct Share {
+    kernels::Tape tape;
+    std::vector<float> inputs, outputs, output_gradient;
+    Eigen::VectorXf gradient;
+  };
+  /// The network as one thread has it.
+  struct Copy {
+    kernels::Network network;
+    int32_t adam_steps = -1;  ///< whose parameters these are
+  };
+
   void Rescale(std::span<const double> targets);
+  void Descend(std::span<const float> observations, std::span<const float> targets, std::span<const int> samples, float l2);
 
   TrainingSettings settings_;
   int observations_;
+  Workers* workers_;
   BatchNetwork network_;
   CriticState state_;
+  std::vector<Share> shares_;
+  std::vector<Copy> copies_;  // one per worker
 };
 
 /// 1 - var(target - value) / var(target); 0 if the targets do not vary.

@@ -70,9 +70,15 @@ class TrainerProcess {
 
   void OnDistribution(const parameter_distribution_t& message) {
     // Repeats of one that has been dealt with are the normal case.
-    if (message.iteration != session_.awaited()) return;
+    const bool newer = session_.training() && message.iteration == session_.iteration();
+    if (message.iteration != session_.awaited() && !newer) return;
     try {
-      session_.Begin(ParameterDistribution::FromMessage(message, robot_));
+      const ParameterDistribution distribution = ParameterDistribution::FromMessage(message, robot_);
+      if (newer) {
+        if (session_.Replace(distribution)) spdlog::info("iteration {}: a newer distribution from update {} on", session_.iteration(), session_.update() + 1);
+        return;
+      }
+      session_.Begin(distribution);
     } catch (const std::invalid_argument& error) {
       spdlog::warn("ignored: {}", error.what());
       return;
@@ -93,8 +99,8 @@ class TrainerProcess {
       spdlog::warn("update {}: {} episodes dropped, not finite", session_.update(), report.dropped_episodes);
     }
     if (session_.complete()) {
-      spdlog::info("iteration {} complete: return {:.1f} without exploration, {:.1f} s", session_.iteration(),
-                   session_.evaluation_return(), seconds_);
+      spdlog::info("iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s", session_.iteration(),
+                   session_.evaluation().episodes, Words(session_.evaluation()), seconds_);
       Save();
       Publish();
     } else {

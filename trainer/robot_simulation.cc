@@ -1,6 +1,7 @@
 #include "trainer/robot_simulation.h"
 
 #include <memory>
+#include <stdexcept>
 
 #include "sim/environment.h"
 
@@ -9,7 +10,12 @@ namespace {
 
 class RobotSimulation : public Simulation {
  public:
-  explicit RobotSimulation(std::shared_ptr<const Model> model) : environment_(std::move(model)) {}
+  explicit RobotSimulation(std::shared_ptr<const Model> model)
+      : environment_(model),
+        position_noise_(model->description().training.position_noise),
+        velocity_noise_(model->description().training.velocity_noise),
+        q_(environment_.q()),
+        v_(environment_.v()) {}
 
   int observation_size() const override { return environment_.observation_size(); }
   int action_size() const override { return environment_.action_size(); }
@@ -17,20 +23,41 @@ class RobotSimulation : public Simulation {
   void Reset(const Eigen::VectorXd& parameters, Random& random) override {
     environment_.SetParameters(parameters);
     environment_.Reset(random);
+    if (noisy()) noise_ = Random(uint64_t{random.Bits()} << 32 | random.Bits());
+    Read();
   }
-  void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override { environment_.Observe(observation); }
+  void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override {
+    environment_.task().Observe(q_, v_, {observation.data(), static_cast<size_t>(observation.size())});
+  }
   Outcome Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
     const Environment::StepResult result = environment_.Step(action);
+    Read();
     return {result.reward, result.terminated};
   }
 
  private:
+  bool noisy() const { return position_noise_ > 0 || velocity_noise_ > 0; }
+
+  void Read() {
+    q_ = environment_.reading_q(), v_ = environment_.reading_v();
+    if (!noisy()) return;
+    for (double& q : q_) q += position_noise_ * noise_.Normal();
+    for (double& v : v_) v += velocity_noise_ * noise_.Normal();
+  }
+
   Environment environment_;
+  double position_noise_, velocity_noise_;
+  Random noise_{0};
+  Eigen::VectorXd q_, v_;  // what the policy is told
 };
 
 }  // namespace
 
 SimulationFactory SimulateRobot(const RobotDescription& description) {
+  const bool noisy = description.training.position_noise > 0;
+  if (noisy && description.num_positions() != description.num_velocities()) {
+    throw std::invalid_argument("position_noise: not for robots with spherical joints, whose positions are no numbers to add to");
+  }
   return [model = std::make_shared<const Model>(description)] { return std::make_unique<RobotSimulation>(model); };
 }
 

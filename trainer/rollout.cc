@@ -5,139 +5,206 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 namespace plumb {
+namespace {
 
-/// One episode.
-struct Rollout::Record {
-  std::vector<float> observations, actions;
-  std::vector<double> rewards;
-  Eigen::VectorXf final_observation;
-  double sum = 0;
-  bool terminated = false;
-  bool usable = false;
+// Episodes side by side: the kernels gain little from more columns. Tasks: enough for as many threads, in a number that two
+// and four of them share evenly.
+constexpr int kMostTogether = 8, kTasks = 8;
+
+}  // namespace
+
+/// Plays one episode at a time, in its own simulation.
+struct RolloutSampler::Player {
+  std::unique_ptr<Simulation> simulation;
+  Eigen::VectorXf raw;
+  Random random{0};
+  EpisodeRecord* record = nullptr;  // null: has nothing to play
+
+  void Begin(const ParameterSampler& sample, Random own, EpisodeRecord& episode) {
+    random = own;
+    record = &episode;
+    try {
+      simulation->Reset(sample(random), random);
+    } catch (const std::invalid_argument&) {
+      record = nullptr;
+    }
+  }
+
+  /// What the network sees now. Ends the episode if it is over, or not finite and of no use.
+  void Observe(const GaussianPolicy& policy, bool explore, float* observation) {
+    simulation->Observe(raw);
+    const Eigen::VectorXf normalised = policy.Normalize(raw);
+    if (!raw.allFinite() || !normalised.allFinite() || !std::isfinite(record->sum)) {
+      record = nullptr;
+      return;
+    }
+    if (explore) record->moments.Add(raw);
+    if (record->terminated || record->steps() == simulation->steps_per_episode()) {
+      record->final_observation = normalised;
+      record->usable = true;
+      record = nullptr;
+      return;
+    }
+    std::copy(normalised.begin(), normalised.end(), observation);
+  }
+
+  /// @param action the mean in, what was done out.
+  void Step(const float* observation, Eigen::Ref<Eigen::VectorXf> action, const Eigen::ArrayXf& sd, bool explore) {
+    if (explore) {
+      for (Eigen::Index a = 0; a < action.size(); ++a) action[a] += sd[a] * static_cast<float>(random.Normal());
+    }
+    if (!action.allFinite()) {
+      record = nullptr;
+      return;
+    }
+    const Simulation::Outcome outcome = simulation->Step(action);
+    record->rewards.push_back(outcome.reward);
+    record->sum += outcome.reward;
+    record->terminated = outcome.terminated;
+    if (!explore) return;
+    record->observations.insert(record->observations.end(), observation, observation + raw.size());
+    record->actions.insert(record->actions.end(), action.begin(), action.end());
+  }
 };
 
 /// What one thread works with.
-struct Rollout::Worker {
-  std::unique_ptr<Simulation> simulation;
+struct RolloutSampler::Worker {
+  std::vector<Player> players;
   kernels::Tape tape;
-  Eigen::VectorXf observation, action;
+  Eigen::MatrixXf observations, actions;  // a column for each episode under way
 
-  /// @return false if the episode must be dropped.
-  bool Play(const GaussianPolicy& policy, const kernels::Network& network, const ParameterSampler& sample,
-            bool explore, Random& random, Record& record);
+  /// @param begin gives a player an episode. Plays `count` of them in lock-step.
+  void Play(const GaussianPolicy& policy, const kernels::Network& network, int count, bool explore,
+            const std::function<void(int, Player&)>& begin);
 };
 
-bool Rollout::Worker::Play(const GaussianPolicy& policy, const kernels::Network& network,
-                           const ParameterSampler& sample, bool explore, Random& random, Record& record) {
-  try {
-    simulation->Reset(sample(random), random);
-  } catch (const std::invalid_argument&) {
-    return false;
-  }
+void RolloutSampler::Worker::Play(const GaussianPolicy& policy, const kernels::Network& network, int count, bool explore,
+                           const std::function<void(int, Player&)>& begin) {
   const Eigen::ArrayXf sd = policy.log_std().array().exp();
-  const auto observe = [&] {
-    simulation->Observe(observation);
-    observation = policy.Normalize(observation);
-    return observation.allFinite();
-  };
-  if (!observe()) return false;
-  for (int step = 0; step < simulation->steps_per_episode() && !record.terminated; ++step) {
-    tape.Forward(network, observation.data(), 1, action.data());
-    if (explore) {
-      for (Eigen::Index a = 0; a < action.size(); ++a)
-        action[a] += sd[a] * static_cast<float>(random.Normal());
+  std::vector<Player*> playing;
+  for (int i = 0; i < count; ++i) {
+    Player& player = players[static_cast<size_t>(i)];
+    begin(i, player);
+    playing.push_back(&player);
+  }
+  while (!playing.empty()) {
+    std::erase_if(playing, [](const Player* player) { return player->record == nullptr; });
+    int column = 0;
+    for (Player* player : playing) {
+      player->Observe(policy, explore, observations.col(column).data());
+      column += player->record != nullptr;
     }
-    const Simulation::Outcome outcome = simulation->Step(action);
-    record.observations.insert(record.observations.end(), observation.begin(), observation.end());
-    record.actions.insert(record.actions.end(), action.begin(), action.end());
-    record.rewards.push_back(outcome.reward);
-    record.sum += outcome.reward;
-    record.terminated = outcome.terminated;
-    if (!std::isfinite(record.sum) || !action.allFinite() || !observe()) return false;
+    std::erase_if(playing, [](const Player* player) { return player->record == nullptr; });
+    if (playing.empty()) return;
+    tape.Forward(network, observations.data(), column, actions.data());
+    for (column = 0; column < static_cast<int>(playing.size()); ++column) {
+      playing[static_cast<size_t>(column)]->Step(observations.col(column).data(), actions.col(column), sd, explore);
+    }
   }
-  record.final_observation = observation;
-  return true;
 }
 
-Rollout::Rollout(const SimulationFactory& make, const PolicyShape& shape, Workers& workers)
-    : workers_(&workers), network_(shape.sizes()) {
+RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape& shape, Workers& workers,
+                               const Ranks& ranks)
+    : workers_(&workers), ranks_(&ranks), network_(shape.sizes()) {
   for (int i = 0; i < workers.size(); ++i) {
-    state_.push_back(std::make_unique<Worker>(Worker{make(), kernels::Tape(shape.sizes(), 1),
-                                                     Eigen::VectorXf(shape.observations),
-                                                     Eigen::VectorXf(shape.actions)}));
+    auto worker = std::make_unique<Worker>(Worker{{}, kernels::Tape(shape.sizes(), kMostTogether),
+                                                  Eigen::MatrixXf(shape.observations, kMostTogether),
+                                                  Eigen::MatrixXf(shape.actions, kMostTogether)});
+    for (int k = 0; k < kMostTogether; ++k) {
+      worker->players.push_back({.simulation = make(), .raw = Eigen::VectorXf(shape.observations)});
+    }
+    state_.push_back(std::move(worker));
   }
-  time_limit_ = state_.front()->simulation->steps_per_episode();
+  time_limit_ = state_.front()->players.front().simulation->steps_per_episode();
 }
 
-Rollout::~Rollout() = default;
+RolloutSampler::~RolloutSampler() = default;
 
-std::vector<Rollout::Record> Rollout::Run(const GaussianPolicy& policy, const ParameterSampler& sample,
-                                          int first, int count, bool explore, uint64_t seed, uint32_t stream,
-                                          uint32_t number) {
+std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first,
+                                               int count, bool explore, uint64_t seed, uint32_t stream,
+                                               uint32_t number) {
   network_.Set({policy.parameters.data(), static_cast<size_t>(policy.parameters.size())});
-  std::vector<Record> records(static_cast<size_t>(count));
-  workers_->Run(count, [&](int task, int worker) {
-    Random random(seed, {stream, number, static_cast<uint32_t>(first + task)});
-    Record& record = records[static_cast<size_t>(task)];
-    record.usable =
-        state_[static_cast<size_t>(worker)]->Play(policy, network_, sample, explore, random, record);
+  const std::vector<int> bounds = ranks_->Bounds(count);
+  const auto rank = static_cast<size_t>(ranks_->rank());
+  const int own = bounds[rank + 1] - bounds[rank];
+  first += bounds[rank];
+  std::vector<EpisodeRecord> records(static_cast<size_t>(own));
+  int tasks = (own + kMostTogether - 1) / kMostTogether;
+  tasks = std::min(own, (tasks + kTasks - 1) / kTasks * kTasks);
+  workers_->Run(tasks, [&](int task, int worker) {
+    const int begin = own * task / tasks, end = own * (task + 1) / tasks;
+    state_[static_cast<size_t>(worker)]->Play(policy, network_, end - begin, explore, [&](int i, Player& player) {
+      const int episode = begin + i;
+      player.Begin(sample, Random(seed, {stream, number, static_cast<uint32_t>(first + episode)}),
+                   records[static_cast<size_t>(episode)]);
+    });
   });
-  return records;
+  return Gather(*ranks_, std::move(records));
 }
 
-Batch Rollout::Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps, uint64_t seed,
-                       uint32_t stream, uint32_t number) {
+Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps, double worst_share,
+                       uint64_t seed, uint32_t stream, uint32_t number) {
   Batch batch;
-  int played = 0;
-  while (batch.size() < steps) {
+  std::vector<EpisodeRecord> records;
+  std::vector<size_t> kept;  // of the records, by number
+  int kept_steps = 0;
+  double sum = 0;
+  while (kept_steps < steps) {
     // As many episodes as are missing if they last as long as those so far: known before they are played, so
     // that the number of threads cannot matter.
-    const double length =
-        batch.episodes.empty() ? time_limit_ : 1. * batch.size() / static_cast<double>(batch.episodes.size());
-    const int wanted = static_cast<int>(std::ceil((steps - batch.size()) / length));
-    for (const Record& record : Run(policy, sample, played, wanted, true, seed, stream, number)) {
+    const double length = kept.empty() ? time_limit_ : 1. * kept_steps / static_cast<double>(kept.size());
+    const int wanted = static_cast<int>(std::ceil((steps - kept_steps) / length / worst_share));
+    for (EpisodeRecord& record : Run(policy, sample, batch.played, wanted, true, seed, stream, number)) {
       if (!record.usable) {
         ++batch.dropped;
         continue;
       }
-      const int begin = batch.size();
-      batch.observations.insert(batch.observations.end(), record.observations.begin(),
-                                record.observations.end());
-      batch.actions.insert(batch.actions.end(), record.actions.begin(), record.actions.end());
-      batch.rewards.insert(batch.rewards.end(), record.rewards.begin(), record.rewards.end());
-      batch.final_observations.insert(batch.final_observations.end(), record.final_observation.begin(),
-                                      record.final_observation.end());
-      batch.episodes.push_back({begin, batch.size(), record.terminated, record.sum});
+      batch.moments.Merge(record.moments);
+      batch.steps += record.steps();
+      sum += record.sum;
+      records.push_back(std::move(record));
     }
-    played += wanted;
-    if (2 * batch.dropped > played && played >= 10) {
+    batch.played += wanted;
+    if (2 * batch.dropped > batch.played && batch.played >= 10) {
       throw std::runtime_error(fmt::format(
           "{} of {} simulated episodes were not finite or had impossible parameters: nothing to learn from",
-          batch.dropped, played));
+          batch.dropped, batch.played));
     }
+    kept.resize(records.size());
+    std::iota(kept.begin(), kept.end(), 0);
+    if (worst_share < 1) {
+      std::stable_sort(kept.begin(), kept.end(), [&](size_t a, size_t b) { return records[a].sum < records[b].sum; });
+      kept.resize(static_cast<size_t>(std::ceil(worst_share * static_cast<double>(records.size()))));
+      std::sort(kept.begin(), kept.end());
+    }
+    kept_steps = 0;
+    for (const size_t i : kept) kept_steps += records[i].steps();
   }
+  for (const size_t i : kept) {
+    const EpisodeRecord& record = records[i];
+    const int begin = batch.size();
+    batch.observations.insert(batch.observations.end(), record.observations.begin(), record.observations.end());
+    batch.actions.insert(batch.actions.end(), record.actions.begin(), record.actions.end());
+    batch.rewards.insert(batch.rewards.end(), record.rewards.begin(), record.rewards.end());
+    batch.final_observations.insert(batch.final_observations.end(), record.final_observation.begin(),
+                                    record.final_observation.end());
+    batch.episodes.push_back({begin, batch.size(), record.terminated, record.sum});
+  }
+  batch.mean_return = sum / static_cast<double>(records.size());
   return batch;
 }
 
-double Rollout::Evaluate(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes,
-                         uint64_t seed, uint32_t stream, uint32_t number) {
-  double sum = 0;
-  int usable = 0;
-  for (const Record& record : Run(policy, sample, 0, episodes, false, seed, stream, number)) {
-    if (!record.usable) continue;
-    sum += record.sum;
-    ++usable;
+std::vector<double> RolloutSampler::Returns(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes,
+                                     uint64_t seed, uint32_t stream, uint32_t number) {
+  std::vector<double> returns;
+  for (const EpisodeRecord& record : Run(policy, sample, 0, episodes, false, seed, stream, number)) {
+    returns.push_back(record.usable ? record.sum : std::numeric_limits<double>::quiet_NaN());
   }
-  return usable > 0 ? sum / usable : std::numeric_limits<double>::quiet_NaN();
-}
-
-double Batch::MeanReturn() const {
-  double sum = 0;
-  for (const Episode& episode : episodes) sum += episode.sum;
-  return sum / static_cast<double>(episodes.size());
+  return returns;
 }
 
 }  // namespace plumb

@@ -9,7 +9,7 @@
 namespace plumb {
 namespace {
 
-constexpr int kEvaluationEpisodes = 20;
+constexpr int kHeldOut = 50;  // simulators
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -19,8 +19,7 @@ TrainingSession::TrainingSession(const RobotDescription& description, const Simu
     : description_(description),
       iterations_(iterations),
       seed_(seed),
-      trainer_(description.training, make, description.effort_limits(), seed, threads),
-      evaluation_return_(kUnknown) {}
+      trainer_(description.training, make, description.effort_limits(), seed, threads) {}
 
 int TrainingSession::updates() const {
   return iteration_ == 0 ? description_.training.updates : description_.training.updates_again;
@@ -38,7 +37,13 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
   begun_ = true;
   complete_ = false;
   update_ = 0;
-  evaluation_return_ = kUnknown;
+  evaluation_ = {};
+  return true;
+}
+
+bool TrainingSession::Replace(const ParameterDistribution& distribution) {
+  if (!training() || distribution.iteration != iteration_ || distribution.components == distribution_.components) return false;
+  distribution_ = distribution;
   return true;
 }
 
@@ -49,7 +54,7 @@ UpdateReport TrainingSession::Advance() {
     ++update_;
   }
   if (update_ >= updates()) {
-    evaluation_return_ = trainer_.Evaluate(sample, kEvaluationEpisodes);
+    evaluation_ = trainer_.EvaluateHeldOut(sample, kHeldOut);
     complete_ = true;
   }
   return last_;
@@ -77,16 +82,23 @@ training_status_t TrainingSession::Status() const {
   status.surrogate_gain = any ? last_.step.surrogate_gain : kUnknown;
   status.explained_variance = any ? last_.explained_variance : kUnknown;
   status.entropy = Entropy(trainer_.policy());
-  status.evaluation_return = evaluation_return_;
+  status.evaluation_return = evaluation_.mean;
+  status.evaluation_tenth = evaluation_.tenth;
+  status.evaluation_worst = evaluation_.worst;
   status.complete = complete_;
   return status;
 }
 
 Checkpoint TrainingSession::MakeCheckpoint() const {
   const TrainerState state = trainer_.state();
-  return {seed_,       state.updates, state.steps,        state.dropped_episodes,   iteration_,
-          update_,     complete_,     evaluation_return_, state.policy.ToMessage(), distribution_.ToMessage(),
-          state.critic};
+  Checkpoint checkpoint;
+  checkpoint.seed = seed_;
+  checkpoint.updates = state.updates, checkpoint.steps = state.steps, checkpoint.dropped_episodes = state.dropped_episodes;
+  checkpoint.iteration = iteration_, checkpoint.iteration_updates = update_, checkpoint.complete = complete_;
+  checkpoint.evaluation = evaluation_;
+  checkpoint.policy = state.policy.ToMessage(), checkpoint.distribution = distribution_.ToMessage();
+  checkpoint.critic = state.critic, checkpoint.observations = state.observations;
+  return checkpoint;
 }
 
 void TrainingSession::Restore(const Checkpoint& checkpoint) {
@@ -100,8 +112,8 @@ void TrainingSession::Restore(const Checkpoint& checkpoint) {
   }
   try {
     distribution_ = ParameterDistribution::FromMessage(checkpoint.distribution, description_);
-    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint.policy), checkpoint.critic, checkpoint.updates,
-                      checkpoint.steps, checkpoint.dropped_episodes});
+    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint.policy), checkpoint.critic, checkpoint.observations,
+                      checkpoint.updates, checkpoint.steps, checkpoint.dropped_episodes});
   } catch (const std::invalid_argument& error) {
     throw CheckpointError(fmt::format("the checkpoint is of another robot or network: {}", error.what()));
   }
@@ -109,7 +121,7 @@ void TrainingSession::Restore(const Checkpoint& checkpoint) {
   iteration_ = checkpoint.iteration;
   update_ = checkpoint.iteration_updates;
   complete_ = checkpoint.complete;
-  evaluation_return_ = checkpoint.evaluation_return;
+  evaluation_ = checkpoint.evaluation;
 }
 
 }  // namespace plumb

@@ -30,6 +30,10 @@ class TrainingSession {
   /// Begins the iteration. @return false, and nothing happens, if it is not the one that is awaited.
   bool Begin(const ParameterDistribution& distribution);
 
+  /// Goes on training with another distribution of the same iteration, from the next batch on. @return false, and nothing
+  /// happens, if there is no training, or it is of another iteration, or no other.
+  bool Replace(const ParameterDistribution& distribution);
+
   bool training() const { return begun_ && !complete_; }
   /// One update; after the last of an iteration evaluates the policy and completes it.
   /// Only while training. @throws std::runtime_error if the simulations cannot be used.
@@ -43,7 +47,8 @@ class TrainingSession {
   /// TRPO updates done and planned in this iteration.
   int update() const { return update_; }
   int updates() const;
-  double evaluation_return() const { return evaluation_return_; }
+  /// Of the complete iteration's policy.
+  const Evaluation& evaluation() const { return evaluation_; }
 
   /// The complete iteration's policy, its purpose and how many roll-outs are wanted; utime is the sender's.
   /// @param evaluation_episodes roll-outs of the last policy; of any other one is wanted.
@@ -61,7 +66,7 @@ class TrainingSession {
   bool complete_ = false;
   int iteration_ = 0;
   int update_ = 0;
-  double evaluation_return_;
+  Evaluation evaluation_;
   UpdateReport last_;
 };
 

@@ -1,5 +1,8 @@
 #include "trainer/trainer.h"
 
+#include <fmt/format.h>
+
+#include <cstring>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -16,7 +19,8 @@ enum Stream : uint32_t {
   kCriticStream,
   kRolloutStream,
   kFitStream,
-  kEvaluationStream
+  kEvaluationStream,
+  kHeldOutStream
 };
 
 constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
@@ -36,33 +40,52 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 
 }  // namespace
 
+TrainingSettings AsThePaper(TrainingSettings settings) {
+  settings.normalise_values = false;
+  settings.fisher_fraction = 1;
+  return settings;
+}
+
 Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make,
                  const Eigen::VectorXd& action_scale, uint64_t seed, int threads, const Ranks& ranks)
     : settings_(settings),
       seed_(seed),
+      ranks_(&ranks),
       workers_(threads),
       policy_(FreshPolicy(settings, make, action_scale, seed)),
-      rollout_(make, policy_.shape(), workers_),
+      rollout_(make, policy_.shape(), workers_, ranks),
       trpo_(settings, policy_.shape(), workers_, ranks),
       critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_, ranks) {}
 
 TrainerState Trainer::state() const {
-  return {policy_, critic_.state(), updates_, steps_, dropped_episodes_};
+  return {policy_, critic_.state(), observations_, updates_, steps_, dropped_episodes_};
 }
 
 void Trainer::Restore(TrainerState state) {
   if (state.policy.shape() != policy_.shape())
     throw std::invalid_argument("trainer: state of another network");
+  const Eigen::Index seen = state.observations.mean.size();
+  if (state.observations.squares.size() != seen || (seen != 0 && seen != policy_.shape().observations)) {
+    throw std::invalid_argument("trainer: state of other observations");
+  }
   critic_.Restore(std::move(state.critic));
   policy_ = std::move(state.policy);
+  observations_ = std::move(state.observations);
   updates_ = state.updates;
   steps_ = state.steps;
   dropped_episodes_ = state.dropped_episodes;
 }
 
+void Trainer::Start(const GaussianPolicy& policy) {
+  if (policy.shape() != policy_.shape()) throw std::invalid_argument("trainer: the policy to begin with is another network");
+  policy_ = policy;
+}
+
 UpdateReport Trainer::Update(const ParameterSampler& sample) {
   const auto update = static_cast<uint32_t>(updates_);
-  const Batch batch = rollout_.Collect(policy_, sample, settings_.batch, seed_, kRolloutStream, update);
+  // Who cannot yet do it at all learns nothing from the worst of its failures.
+  const double share = updates_ < settings_.worst_after ? 1 : settings_.worst_share;
+  const Batch batch = rollout_.Collect(policy_, sample, settings_.batch, share, seed_, kRolloutStream, update);
   const std::vector<double> values = critic_.Values(batch.observations);
   const std::vector<double> final_values = critic_.Values(batch.final_observations);
   std::vector<EpisodeSpan> episodes;
@@ -76,21 +99,51 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   UpdateReport report;
   report.batch = batch.size();
   report.dropped_episodes = batch.dropped;
-  report.mean_return = batch.MeanReturn();
+  report.mean_return = batch.mean_return;
   report.explained_variance = ExplainedVariance(values, advantages.target);
-  report.step = trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage});
-  Random random(seed_, {kFitStream, update});
-  report.critic_fitted = critic_.Fit(batch.observations, advantages.target, random);
+  // Neither needs the other's result.
+  workers_.Together(
+      [&] { report.step = trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage}); },
+      [&] {
+        Random random(seed_, {kFitStream, update});
+        report.critic_fitted = critic_.Fit(batch.observations, advantages.target, random);
+      });
   report.entropy = Entropy(policy_);
+  if (settings_.normalise_observations) {  // after the step: its batch was seen through the old normaliser
+    observations_.Merge(batch.moments);
+    policy_.observation_mean = observations_.mean.cast<float>();
+    policy_.observation_scale = observations_.sd().cast<float>();
+  }
   ++updates_;
-  steps_ += batch.size();
+  steps_ += batch.steps;
   dropped_episodes_ += batch.dropped;
+  CompareRanks();
   return report;
 }
 
-double Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
-  return rollout_.Evaluate(policy_, sample, episodes, seed_, kEvaluationStream,
-                           static_cast<uint32_t>(updates_));
+void Trainer::CompareRanks() const {
+  struct Sums {
+    double policy, critic;  // of the parameters: one bit's difference in one of them shows
+  };
+  const std::vector<Sums> sums = ranks_->Collect(
+      Sums{policy_.parameters.cast<double>().sum(), critic_.state().parameters.cast<double>().sum()});
+  for (size_t r = 1; r < sums.size(); ++r) {
+    if (std::memcmp(&sums[r], &sums[0], sizeof(Sums)) != 0) {
+      throw std::runtime_error(fmt::format(
+          "rank {} has come to another policy or critic than rank 0 by update {}: do all have the same files and "
+          "processors with the same instruction set (this one's: {})?",
+          r, updates_, kernels::InstructionSet()));
+    }
+  }
+}
+
+Evaluation Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
+  return plumb::Evaluate(
+      rollout_.Returns(policy_, sample, episodes, seed_, kEvaluationStream, static_cast<uint32_t>(updates_)));
+}
+
+Evaluation Trainer::EvaluateHeldOut(const ParameterSampler& sample, int episodes) {
+  return plumb::Evaluate(rollout_.Returns(policy_, sample, episodes, seed_, kHeldOutStream, 0));
 }
 
 }  // namespace plumb

@@ -6,18 +6,23 @@
 #include "controller/policy.h"
 #include "robot/description.h"
 #include "trainer/critic.h"
+#include "trainer/evaluation.h"
 #include "trainer/rollout.h"
 #include "trainer/trpo.h"
 #include "trainer/workers.h"
 
 namespace plumb {
 
+/// The settings as the paper has them, where ours learn faster: value targets in units of return, the whole batch for Fisher's matrix.
+TrainingSettings AsThePaper(TrainingSettings settings);
+
 /// All that training has learnt: what a checkpoint keeps.
 struct TrainerState {
   GaussianPolicy policy;
   CriticState critic;
+  ObservationMoments observations{};  ///< of all that was seen, if the policy's normaliser follows them
   int64_t updates = 0;           ///< since the beginning
-  int64_t steps = 0;             ///< simulated steps since the beginning
+  int64_t steps = 0;             ///< simulated steps since the beginning, those not learnt from too
   int64_t dropped_episodes = 0;  ///< since the beginning
 };
 
@@ -26,7 +31,7 @@ struct UpdateReport {
   Trpo::Step step;
   int batch = 0;  ///< steps it rests on
   int dropped_episodes = 0;
-  double mean_return = 0;         ///< of the batch's episodes, undiscounted
+  double mean_return = 0;         ///< of all episodes played, undiscounted
   double explained_variance = 0;  ///< of the critic, before it was fitted to this batch
   double entropy = 0;             ///< of the policy after the update [nat]
   bool critic_fitted = false;     ///< false: the fit was not finite and has been undone
@@ -40,7 +45,7 @@ class Trainer {
   /// @param make makes simulations; called once per thread. @param action_scale effort of action 1, per
   /// action.
   /// @param threads 0 = as many as the machine has.
-  /// @param ranks must outlive this. All of them make the same trainer and call the same methods.
+  /// @param ranks must outlive this. All of them make the same trainer and call the same methods, in the same order.
   Trainer(const TrainingSettings& settings, const SimulationFactory& make,
           const Eigen::VectorXd& action_scale, uint64_t seed, int threads,
           const Ranks& ranks = Ranks::Alone());
@@ -48,23 +53,32 @@ class Trainer {
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.
   void Restore(TrainerState state);
+  /// Begins with another policy, before the first update. @throws std::invalid_argument if its network is another's.
+  void Start(const GaussianPolicy& policy);
   const GaussianPolicy& policy() const { return policy_; }
   int64_t updates() const { return updates_; }
   int64_t steps() const { return steps_; }
 
-  /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used.
+  /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used, or if ranks have come
+  /// to different results.
   UpdateReport Update(const ParameterSampler& sample);
-  /// Mean return of the policy without exploration, on simulators drawn anew. Changes nothing.
-  double Evaluate(const ParameterSampler& sample, int episodes);
+  /// The policy without exploration on simulators drawn anew. Changes nothing.
+  Evaluation Evaluate(const ParameterSampler& sample, int episodes);
+  /// The same on simulators and initial states that are always the same for a seed: what makes policies comparable.
+  Evaluation EvaluateHeldOut(const ParameterSampler& sample, int episodes);
 
  private:
+  void CompareRanks() const;
+
   TrainingSettings settings_;
   uint64_t seed_;
+  const Ranks* ranks_;
   Workers workers_;
   GaussianPolicy policy_;
-  Rollout rollout_;
+  RolloutSampler rollout_;
   Trpo trpo_;
   Critic critic_;
+  ObservationMoments observations_;
   int64_t updates_ = 0;
   int64_t steps_ = 0;
   int64_t dropped_episodes_ = 0;

@@ -25,10 +25,10 @@ Trpo::Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& 
       network_(shape.sizes(), workers, ranks),
       fisher_network_(shape.sizes(), workers, ranks) {}
 
-Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples) {
+Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples, std::vector<float>& means) {
   const int actions = shape_.actions, count = Count(samples);
   const Eigen::ArrayXf precision = (-2 * policy.log_std().array()).exp();
-  means_.resize(samples.actions.size());
+  means.resize(samples.actions.size());
   Eigen::VectorXf gradient(shape_.parameter_count());
   Eigen::VectorXd log_std_gradient(actions);
   network_.Set(policy.parameters);
@@ -41,8 +41,8 @@ Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const Poli
           const double weight = samples.advantages[static_cast<size_t>(first + i)] / count;
           for (int a = 0; a < actions; ++a) {
             const auto at = static_cast<size_t>((first + i) * actions + a);
-            means_[at] = outputs[i * actions + a];
-            const float offset = samples.actions[at] - means_[at];
+            means[at] = outputs[i * actions + a];
+            const float offset = samples.actions[at] - means[at];
             output_gradient[i * actions + a] = static_cast<float>(weight) * offset * precision[a];
             sums[static_cast<size_t>(a)] += weight * (double{offset * offset * precision[a]} - 1);
           }
@@ -108,7 +108,8 @@ Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const flo
 
 Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {
   Step step;
-  const Eigen::VectorXd gradient = SurrogateGradient(policy, samples).cast<double>();
+  std::vector<float> means;
+  const Eigen::VectorXd gradient = SurrogateGradient(policy, samples, means).cast<double>();
   PrepareFisher(policy, samples);
   const LinearSolution natural = ConjugateGradient(
       [&](const Eigen::VectorXd& v, Eigen::VectorXd& fv) {
@@ -134,7 +135,7 @@ Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {
     ++step.tries;
     policy.parameters = before.parameters + (fraction * full_step).cast<float>();
     policy.parameters.tail(shape_.actions) = policy.parameters.tail(shape_.actions).cwiseMax(kMinLogStd);
-    const Comparison comparison = Compare(before, means_, policy, samples);
+    const Comparison comparison = Compare(before, means, policy, samples);
     // Written so that NaN is refused.
     if (comparison.kl <= settings_.kl && comparison.gain > 0 && std::isfinite(comparison.gain)) {
       step.accepted = true;

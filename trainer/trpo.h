@@ -40,7 +40,8 @@ class Trpo {
   Step Improve(GaussianPolicy& policy, const PolicySamples& samples);
 
   /// Gradient of the surrogate mean(ratio * advantage) at ratio = 1, in all parameters of the policy.
-  Eigen::VectorXf SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples);
+  /// @param means of the policy at the samples, actions x N, written: those of the samples that this rank looks at.
+  Eigen::VectorXf SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples, std::vector<float>& means);
 
   /// Takes the samples at which FisherProduct averages: every n-th of these, n = 1 / fisher_fraction.
   void PrepareFisher(const GaussianPolicy& policy, const PolicySamples& samples);
@@ -50,10 +51,10 @@ class Trpo {
   Eigen::VectorXf FisherProduct(const Eigen::Ref<const Eigen::VectorXf>& v);
 
   /// Mean KL(before || after) and mean of (ratio - 1) * advantage.
-  /// @param means of `before`, actions x N; of the samples that other ranks look at, anything.
   struct Comparison {
     double kl, gain;
   };
+  /// @param means of `before`, as SurrogateGradient gives them.
   Comparison Compare(const GaussianPolicy& before, std::span<const float> means, const GaussianPolicy& after,
                      const PolicySamples& samples);
 
@@ -63,7 +64,6 @@ class Trpo {
  private:
   TrainingSettings settings_;
   PolicyShape shape_;
-  std::vector<float> means_;     // of SurrogateGradient's policy, where this rank has looked, actions x N
   BatchNetwork network_;         // at the policy's own and, in the line search, at candidate parameters
   BatchNetwork fisher_network_;  // at the policy's parameters, with the activations of Fisher's samples
   std::vector<float> fisher_inputs_;

@@ -60,8 +60,8 @@ TEST_CASE("A batch is the same bits for any number of threads") {
   Batch first;
   for (const int threads : {1, 2, 5}) {
     Workers workers(threads);
-    Rollout rollout(MakeGymPendulum, kShape, workers);
-    const Batch batch = rollout.Collect(SomePolicy(), RandomParameters, 1500, 7, 1, 2);
+    RolloutSampler rollout(MakeGymPendulum, kShape, workers);
+    const Batch batch = rollout.Collect(SomePolicy(), RandomParameters, 1500, 1, 7, 1, 2);
     CHECK(batch.size() == 1600);  // whole episodes of 200
     CHECK(batch.episodes.size() == 8);
     if (threads == 1) first = batch;
@@ -74,9 +74,9 @@ TEST_CASE("A batch is the same bits for any number of threads") {
 
 TEST_CASE("Replaying the actions of an episode gives its observations, rewards and last observation") {
   Workers workers(1);
-  Rollout rollout(MakeGymPendulum, kShape, workers);
+  RolloutSampler rollout(MakeGymPendulum, kShape, workers);
   const GaussianPolicy policy = SomePolicy();
-  const Batch batch = rollout.Collect(policy, RandomParameters, 600, 7, 1, 2);
+  const Batch batch = rollout.Collect(policy, RandomParameters, 600, 1, 7, 1, 2);
   for (int e = 0; e < 3; ++e) {
     Random random(7, {1, 2, static_cast<uint32_t>(e)});
     GymPendulum pendulum;
@@ -104,12 +104,12 @@ TEST_CASE("Replaying the actions of an episode gives its observations, rewards a
 
 TEST_CASE("Actions scatter about the policy's mean by its deviation") {
   Workers workers(1);
-  Rollout rollout(MakeGymPendulum, kShape, workers);
+  RolloutSampler rollout(MakeGymPendulum, kShape, workers);
   GaussianPolicy policy = SomePolicy();
   policy.parameters.tail(1).setConstant(-.5f);
   policy.observation_mean.setZero();
   policy.observation_scale.setOnes();
-  const Batch batch = rollout.Collect(policy, RandomParameters, 20000, 7, 1, 2);
+  const Batch batch = rollout.Collect(policy, RandomParameters, 20000, 1, 7, 1, 2);
   double sum = 0, squares = 0;
   for (int i = 0; i < batch.size(); ++i) {
     const Eigen::Vector3f observation(&batch.observations[static_cast<size_t>(3 * i)]);
@@ -125,8 +125,8 @@ TEST_CASE("Episodes that terminate early are followed by more, the same for any 
   Batch first;
   for (const int threads : {1, 3}) {
     Workers workers(threads);
-    Rollout rollout([] { return std::make_unique<Fragile>(Fragile::Break::kNever); }, kShape, workers);
-    const Batch batch = rollout.Collect(SomePolicy(), UniformParameter, 300, 7, 1, 2);
+    RolloutSampler rollout([] { return std::make_unique<Fragile>(Fragile::Break::kNever); }, kShape, workers);
+    const Batch batch = rollout.Collect(SomePolicy(), UniformParameter, 300, 1, 7, 1, 2);
     CHECK(batch.size() >= 300);
     CHECK(batch.size() < 450);  // how many were needed had to be guessed from the first few
     for (const Batch::Episode& episode : batch.episodes) {
@@ -141,8 +141,8 @@ TEST_CASE("Episodes that terminate early are followed by more, the same for any 
 TEST_CASE("What is not finite is dropped with its episode and counted") {
   for (const auto kind : {Fragile::Break::kReward, Fragile::Break::kObservation, Fragile::Break::kReset}) {
     Workers workers(2);
-    Rollout rollout([kind] { return std::make_unique<Fragile>(kind); }, kShape, workers);
-    const Batch batch = rollout.Collect(SomePolicy(), UniformParameter, 1000, 7, 1, 2);
+    RolloutSampler rollout([kind] { return std::make_unique<Fragile>(kind); }, kShape, workers);
+    const Batch batch = rollout.Collect(SomePolicy(), UniformParameter, 1000, 1, 7, 1, 2);
     CHECK(batch.dropped > 10);
     CHECK(batch.size() >= 1000);
     for (const double reward : batch.rewards) REQUIRE(reward == 1);
@@ -153,19 +153,19 @@ TEST_CASE("What is not finite is dropped with its episode and counted") {
 
 TEST_CASE("A simulation that mostly breaks is an error, not an endless loop") {
   Workers workers(2);
-  Rollout rollout([] { return std::make_unique<Fragile>(Fragile::Break::kReward); }, kShape, workers);
+  RolloutSampler rollout([] { return std::make_unique<Fragile>(Fragile::Break::kReward); }, kShape, workers);
   const ParameterSampler broken = [](Random&) -> Eigen::VectorXd { return Eigen::VectorXd::Zero(1); };
-  CHECK_THROWS_WITH(rollout.Collect(SomePolicy(), broken, 1000, 7, 1, 2),
+  CHECK_THROWS_WITH(rollout.Collect(SomePolicy(), broken, 1000, 1, 7, 1, 2),
                     Catch::Contains("nothing to learn from"));
-  CHECK(std::isnan(rollout.Evaluate(SomePolicy(), broken, 5, 7, 1, 2)));
+  for (const double sum : rollout.Returns(SomePolicy(), broken, 5, 7, 1, 2)) CHECK(std::isnan(sum));
 }
 
 TEST_CASE("A policy that has gone to NaN gives no batch") {
   Workers workers(1);
-  Rollout rollout(MakeGymPendulum, kShape, workers);
+  RolloutSampler rollout(MakeGymPendulum, kShape, workers);
   GaussianPolicy policy = SomePolicy();
   policy.parameters[5] = NAN;
-  CHECK_THROWS_AS(rollout.Collect(policy, RandomParameters, 3000, 7, 1, 2), std::runtime_error);
+  CHECK_THROWS_AS(rollout.Collect(policy, RandomParameters, 3000, 1, 7, 1, 2), std::runtime_error);
 }
 
 }  // namespace

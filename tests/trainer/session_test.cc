@@ -108,7 +108,7 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(second.update() == 3);
   while (second.training()) second.Advance();
   CHECK(second.Policy(1).weight == straight.Policy(1).weight);
-  CHECK(second.evaluation_return() == straight.evaluation_return());
+  CHECK(second.evaluation().worst == straight.evaluation().worst);
 
   // And once more, between iterations: the policy is there to be sent again, the next distribution is
   // awaited.
@@ -118,13 +118,36 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(third.complete());
   CHECK(third.awaited() == 1);
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
-  CHECK(third.Status().evaluation_return == straight.evaluation_return());
+  CHECK(third.Status().evaluation_tenth == straight.Status().evaluation_tenth);
   for (TrainingSession* session : {&third, &straight}) {
     session->Begin(Distribution(1));
     while (session->training()) session->Advance();
   }
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
   CHECK(third.MakeCheckpoint().critic.second_moment == straight.MakeCheckpoint().critic.second_moment);
+}
+
+TEST_CASE("A newer distribution of the iteration takes effect at the next batch") {
+  TrainingSession session = NewSession(), undisturbed = NewSession();
+  ParameterDistribution newer = Distribution(0);
+  CHECK_FALSE(session.Replace(newer));  // nothing has begun
+  for (TrainingSession* s : {&session, &undisturbed}) {
+    s->Begin(Distribution(0));
+    s->Advance();
+  }
+  CHECK_FALSE(session.Replace(newer));  // a repeat
+  newer.iteration = 1;
+  newer.components[0].mean[0] += 1;
+  CHECK_FALSE(session.Replace(newer));
+  newer.iteration = 0;
+  REQUIRE(session.Replace(newer));
+  CHECK(session.update() == 1);
+  CHECK(session.Policy(1).weight == undisturbed.Policy(1).weight);
+  for (TrainingSession* s : {&session, &undisturbed}) s->Advance();
+  CHECK(session.Policy(1).weight != undisturbed.Policy(1).weight);
+  CHECK(session.MakeCheckpoint().distribution.mean[0] == newer.components[0].mean[0]);
+  while (session.training()) session.Advance();
+  CHECK_FALSE(session.Replace(Distribution(0)));  // its policy is out
 }
 
 TEST_CASE("No checkpoint is nothing; one of another run is an error") {

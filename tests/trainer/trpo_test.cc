@@ -86,7 +86,8 @@ TEST_CASE("The surrogate's gradient is that of finite differences in double") {
   const Fixture f;
   Workers workers(1);
   Trpo trpo(f.settings, f.policy.shape(), workers);
-  const Eigen::VectorXd gradient = trpo.SurrogateGradient(f.policy, f.samples()).cast<double>();
+  std::vector<float> means;
+  const Eigen::VectorXd gradient = trpo.SurrogateGradient(f.policy, f.samples(), means).cast<double>();
   const Eigen::VectorXd p = f.policy.parameters.cast<double>();
   // Every seventh parameter, and the deviations.
   double error = 0, square = 0;

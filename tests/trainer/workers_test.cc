@@ -37,6 +37,50 @@ TEST_CASE("No two tasks run as the same worker at once") {
   CHECK(alone);
 }
 
+TEST_CASE("Two go together, each with jobs of its own, and whoever is idle helps") {
+  for (const int threads : {1, 2, 3}) {
+    Workers workers(threads);
+    for (int round = 0; round < 300; ++round) {
+      std::atomic<int> first{0}, second{0};
+      std::vector<std::atomic<int>> inside(static_cast<size_t>(threads));
+      std::atomic<bool> alone{true};
+      const auto job = [&](std::atomic<int>& done, int tasks) {
+        workers.Run(tasks, [&](int, int worker) {
+          if (++inside[static_cast<size_t>(worker)] != 1) alone = false;
+          ++done;
+          --inside[static_cast<size_t>(worker)];
+        });
+      };
+      // Either may be the longer one.
+      const int jobs = round % 7, others = round % 5;
+      workers.Together(
+          [&] {
+            for (int i = 0; i < jobs; ++i) job(first, 4);
+          },
+          [&] {
+            for (int i = 0; i < others; ++i) job(second, 3);
+          });
+      REQUIRE(first == 4 * jobs);
+      REQUIRE(second == 3 * others);
+      REQUIRE(alone);
+    }
+    CHECK_THROWS_WITH(workers.Together([] { throw std::runtime_error("first"); }, [] { throw std::runtime_error("second"); }), "first");
+    std::atomic<int> done{0};
+    CHECK_THROWS_WITH(workers.Together([&] { workers.Run(4, [&](int, int) { ++done; }); }, [] { throw std::runtime_error("second"); }), "second");
+    CHECK(done == 4);
+  }
+}
+
+TEST_CASE("Workers may be used by another's threads") {
+  Workers outer(3);
+  std::atomic<int> done{0};
+  outer.Run(6, [&](int, int) {
+    Workers inner(2);
+    inner.Run(5, [&](int, int worker) { done += worker < 2 ? 1 : 1000; });
+  });
+  CHECK(done == 30);
+}
+
 TEST_CASE("The lowest task's exception comes back and the threads live on") {
   Workers workers(3);
   std::atomic<int> done{0};

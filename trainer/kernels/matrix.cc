@@ -132,4 +132,91 @@ void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdif
   }
 }
 
+namespace {
+
+/// The sum of a packet's entries, always in the same order.
+float Sum(Packet packet) {
+  float entries[kWidth];
+  Store(entries, packet);
+  for (int width = kWidth / 2; width > 0; width /= 2) {
+    for (int i = 0; i < width; ++i) entries[i] += entries[i + width];
+  }
+  return entries[0];
+}
+
+/// kColumns scalar products at a time: their sums do not wait for each other.
+template <int kColumns>
+void ScalarProducts(int k, const float* a, const float* b, ptrdiff_t b_stride, float* products) {
+  Packet sum[kColumns] = {};
+  int l = 0;
+  for (; l + kWidth <= k; l += kWidth) {
+    const Packet left = Load(a + l);
+#pragma GCC unroll 8
+    for (int j = 0; j < kColumns; ++j) sum[j] += left * Load(b + j * b_stride + l);
+  }
+#pragma GCC unroll 8
+  for (int j = 0; j < kColumns; ++j) products[j] = Sum(sum[j]);
+  // Not the padding: where an entry above it is infinite it is no zero.
+  for (; l < k; ++l) {
+    for (int j = 0; j < kColumns; ++j) products[j] += a[l] * b[j * b_stride + l];
+  }
+}
+
+}  // namespace
+
+void MultiplyFewRows(int rows, int n, const Matrix& transposed, const float* b, ptrdiff_t b_stride, float* c,
+                     ptrdiff_t c_stride, Onto onto, const float* bias) {
+  constexpr int kTogether = 8;
+  const int k = transposed.rows();
+  for (int i = 0; i < rows; ++i) {
+    const float* a = transposed.column(i);
+    const auto add = [&](int j, const float* products, int count) {
+      for (int m = 0; m < count; ++m) {
+        float& to = c[(j + m) * c_stride + i];
+        to = products[m] + (onto == Onto::kItself ? to : onto == Onto::kBias ? bias[i] : 0.0f);
+      }
+    };
+    float products[kTogether];
+    int j = 0;
+    for (; j + kTogether <= n; j += kTogether) {
+      ScalarProducts<kTogether>(k, a, b + j * b_stride, b_stride, products);
+      add(j, products, kTogether);
+    }
+    for (; j < n; ++j) {
+      ScalarProducts<1>(k, a, b + j * b_stride, b_stride, products);
+      add(j, products, 1);
+    }
+  }
+}
+
+void Transpose(const Matrix& from, Matrix& to) {
+  // Squares of 4 by 4 in registers.
+  using Quad = float __attribute__((vector_size(16)));
+  using Order = int32_t __attribute__((vector_size(16)));
+  const auto load = [](const float* data) {
+    Quad quad;
+    std::memcpy(&quad, data, sizeof quad);
+    return quad;
+  };
+  int j = 0;
+  for (; j + 4 <= from.columns(); j += 4) {
+    int i = 0;
+    for (; i + 4 <= from.rows(); i += 4) {
+      const Quad a = load(from.column(j) + i), b = load(from.column(j + 1) + i);
+      const Quad c = load(from.column(j + 2) + i), d = load(from.column(j + 3) + i);
+      const Quad ab_low = __builtin_shuffle(a, b, Order{0, 4, 1, 5}), ab_high = __builtin_shuffle(a, b, Order{2, 6, 3, 7});
+      const Quad cd_low = __builtin_shuffle(c, d, Order{0, 4, 1, 5}), cd_high = __builtin_shuffle(c, d, Order{2, 6, 3, 7});
+      const Quad row[4] = {__builtin_shuffle(ab_low, cd_low, Order{0, 1, 4, 5}), __builtin_shuffle(ab_low, cd_low, Order{2, 3, 6, 7}),
+                           __builtin_shuffle(ab_high, cd_high, Order{0, 1, 4, 5}), __builtin_shuffle(ab_high, cd_high, Order{2, 3, 6, 7})};
+      for (int k = 0; k < 4; ++k) std::memcpy(to.column(i + k) + j, &row[k], sizeof row[k]);
+    }
+    for (; i < from.rows(); ++i) {
+      for (int k = 0; k < 4; ++k) to.column(i)[j + k] = from.column(j + k)[i];
+    }
+  }
+  for (; j < from.columns(); ++j) {
+    for (int i = 0; i < from.rows(); ++i) to.column(i)[j] = from.column(j)[i];
+  }
+}
+
 }  // namespace plumb::kernels

@@ -59,4 +59,15 @@ enum class Onto { kZero, kBias, kItself };
 void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdiff_t c_stride, Onto onto,
               const float* bias = nullptr);
 
+/// Whether a matrix has so few rows that padding them to whole packets would be most of the work.
+constexpr bool FewRows(int rows) { return 4 * rows <= kWidth; }
+
+/// The same product for a C of few rows, by scalar products of columns: C(i, j) = onto(i, j) + A'(:, i) . B(:, j).
+/// @param rows of C. @param transposed A' (k x rows). @param b the columns of B.
+void MultiplyFewRows(int rows, int n, const Matrix& transposed, const float* b, ptrdiff_t b_stride, float* c, ptrdiff_t c_stride,
+                     Onto onto, const float* bias = nullptr);
+
+/// to = from', both of whole size.
+void Transpose(const Matrix& from, Matrix& to);
+
 }  // namespace plumb::kernels

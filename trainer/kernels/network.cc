@@ -50,27 +50,23 @@ void MultiplyByTanhDerivative(Matrix& d, const Matrix& h, int h_column, int colu
   }
 }
 
-/// sum += the sum of the columns, taken in order.
-void AddColumns(const Matrix& d, int columns, float* sum) {
-  for (int i = 0; i < d.padded_rows(); i += kWidth) {
-    Packet total = Load(sum + i);
-    for (int j = 0; j < columns; ++j) total += Load(d.column(j) + i);
-    Store(sum + i, total);
+/// sum += the sum of the columns, taken in order; several packets at a time, whose sums do not wait for each other.
+template <int kPackets>
+int AddColumns(int i, const Matrix& d, int columns, float* sum) {
+  for (; i + kPackets * kWidth <= d.padded_rows(); i += kPackets * kWidth) {
+    Packet total[kPackets];
+    for (int k = 0; k < kPackets; ++k) total[k] = Load(sum + i + k * kWidth);
+    for (int j = 0; j < columns; ++j) {
+      const float* column = d.column(j) + i;
+#pragma GCC unroll 8
+      for (int k = 0; k < kPackets; ++k) total[k] += Load(column + k * kWidth);
+    }
+    for (int k = 0; k < kPackets; ++k) Store(sum + i + k * kWidth, total[k]);
   }
+  return i;
 }
 
-void Transpose(const Matrix& from, Matrix& to) {
-  constexpr int kSide = 16;  // squares of whole cache lines, on both sides
-  for (int j0 = 0; j0 < from.columns(); j0 += kSide) {
-    for (int i0 = 0; i0 < from.rows(); i0 += kSide) {
-      const int j1 = std::min(j0 + kSide, from.columns()), i1 = std::min(i0 + kSide, from.rows());
-      for (int i = i0; i < i1; ++i) {
-        float* row = to.column(i);
-        for (int j = j0; j < j1; ++j) row[j] = from.column(j)[i];
-      }
-    }
-  }
-}
+void AddColumns(const Matrix& d, int columns, float* sum) { AddColumns<1>(AddColumns<8>(0, d, columns, sum), d, columns, sum); }
 
 /// Copies between a dense rows x columns array and the padded columns of a matrix.
 void Pack(const float* dense, int columns, Matrix& matrix) {
@@ -87,16 +83,26 @@ void Unpack(const Matrix& matrix, int columns, float* dense) {
 
 struct Network::Layers {
   struct Layer {
-    Layer(int in, int out) : weight(out, in), transposed(in, out), bias(out, 1) {}
+    Layer(int in, int out, bool few_rows) : weight(out, in), transposed(in, out), bias(out, 1), few(few_rows) {}
     Matrix weight;      // out x in
     Matrix transposed;  // in x out
     Matrix bias;        // out x 1
+    bool few;           // rows; what is below is then a Matrix
+
+    /// to = onto + weight below.
+    void Apply(const RightFactor& below, int columns, float* to, ptrdiff_t stride, Onto onto, const Matrix& what) const {
+      if (few) {
+        MultiplyFewRows(weight.rows(), columns, transposed, below.data, below.column_stride, to, stride, onto, what.column(0));
+      } else {
+        Multiply(weight.padded_rows(), columns, weight.columns(), AsLeft(weight), below, to, stride, onto, what.column(0));
+      }
+    }
   };
   std::vector<Layer> all;
 };
 
 Network::Network(std::span<const int> sizes) : layers_(std::make_unique<Layers>()) {
-  for (size_t i = 1; i < sizes.size(); ++i) layers_->all.emplace_back(sizes[i - 1], sizes[i]);
+  for (size_t i = 1; i < sizes.size(); ++i) layers_->all.emplace_back(sizes[i - 1], sizes[i], i > 1 && FewRows(sizes[i]));
 }
 
 Network::Network(Network&&) noexcept = default;
@@ -137,7 +143,9 @@ Tape::Tape(std::span<const int> sizes, int columns) : storage_(std::make_unique<
   for (size_t i = 1; i < sizes.size(); ++i) {
     if (i + 1 < sizes.size()) s.hidden.emplace_back(sizes[i], columns);
     s.block.emplace_back(sizes[i], std::min(columns, kBlock));
-    s.weight_gradient.emplace_back(sizes[i], sizes[i - 1]);
+    // Of few rows, its transpose.
+    const bool few = i > 1 && FewRows(sizes[i]);
+    s.weight_gradient.emplace_back(sizes[few ? i - 1 : i], sizes[few ? i : i - 1]);
     s.bias_gradient.emplace_back(sizes[i], 1);
   }
 }
@@ -160,8 +168,7 @@ void Tape::Forward(const Network& network, const float* inputs, int columns, flo
       const bool last = l + 1 == s.block.size();
       Matrix& above = last ? s.block[l] : s.hidden[l];
       float* to = above.column(last ? 0 : first);
-      Multiply(above.padded_rows(), count, layer.weight.columns(), AsLeft(layer.weight), below, to,
-               above.stride(), Onto::kBias, layer.bias.column(0));
+      layer.Apply(below, count, to, above.stride(), Onto::kBias, layer.bias);
       if (!last) ApplyTanh(to, above.stride(), above.padded_rows(), count);
       below = {to, 1, above.stride()};
     }
@@ -179,12 +186,8 @@ void Tape::Tangent(const Network& network, const Network& direction, float* tang
       const auto& layer = network.layers_->all[l];
       const auto& change = direction.layers_->all[l];
       Matrix& dz = s.block[l];
-      Multiply(dz.padded_rows(), count, change.weight.columns(), AsLeft(change.weight), below, dz.column(0),
-               dz.stride(), Onto::kBias, change.bias.column(0));
-      if (l > 0) {
-        Multiply(dz.padded_rows(), count, layer.weight.columns(), AsLeft(layer.weight),
-                 AsRight(s.block[l - 1]), dz.column(0), dz.stride(), Onto::kItself);
-      }
+      change.Apply(below, count, dz.column(0), dz.stride(), Onto::kBias, change.bias);
+      if (l > 0) layer.Apply(AsRight(s.block[l - 1]), count, dz.column(0), dz.stride(), Onto::kItself, change.bias);
       if (l + 1 < s.block.size()) {
         MultiplyByTanhDerivative(dz, s.hidden[l], first, count);
         below = AsRight(s.hidden[l], first);
@@ -196,7 +199,9 @@ void Tape::Tangent(const Network& network, const Network& direction, float* tang
 
 void Tape::Backward(const Network& network, const float* output_gradient, float* gradient) {
   Storage& s = *storage_;
-  for (Matrix& matrix : s.weight_gradient) matrix.SetZero();
+  if (s.columns == 0) {  // else the first block sets them
+    for (Matrix& matrix : s.weight_gradient) matrix.SetZero();
+  }
   for (Matrix& matrix : s.bias_gradient) matrix.SetZero();
   const int inputs_per_column = network.inputs();
   ForBlocks(s.columns, [&](int first, int count) {
@@ -208,8 +213,13 @@ void Tape::Backward(const Network& network, const float* output_gradient, float*
           l > 0 ? AsRight(s.hidden[l - 1], first)
                 : RightFactor{s.inputs + ptrdiff_t{first} * inputs_per_column, 1, inputs_per_column};
       Matrix& dw = s.weight_gradient[l];
-      Multiply(dw.padded_rows(), dw.columns(), count, AsLeft(d), Transposed(below), dw.column(0), dw.stride(),
-               Onto::kItself);
+      const Onto onto = first == 0 ? Onto::kZero : Onto::kItself;
+      if (network.layers_->all[l].few) {
+        Multiply(dw.padded_rows(), dw.columns(), count, AsLeft(s.hidden[l - 1], first), Transposed(AsRight(d)), dw.column(0),
+                 dw.stride(), onto);
+      } else {
+        Multiply(dw.padded_rows(), dw.columns(), count, AsLeft(d), Transposed(below), dw.column(0), dw.stride(), onto);
+      }
       AddColumns(d, count, s.bias_gradient[l].column(0));
       if (l > 0) {
         const Matrix& transposed = network.layers_->all[l].transposed;
@@ -221,21 +231,30 @@ void Tape::Backward(const Network& network, const float* output_gradient, float*
     }
   });
   for (size_t l = 0; l < s.block.size(); ++l) {
-    Unpack(s.weight_gradient[l], s.weight_gradient[l].columns(), gradient);
+    const Matrix& dw = s.weight_gradient[l];
+    if (network.layers_->all[l].few) {
+      for (int j = 0; j < dw.columns(); ++j) {
+        for (int i = 0; i < dw.rows(); ++i) gradient[i * dw.columns() + j] = dw.column(j)[i];
+      }
+    } else {
+      Unpack(dw, dw.columns(), gradient);
+    }
     gradient += s.weight_gradient[l].rows() * s.weight_gradient[l].columns();
     Unpack(s.bias_gradient[l], 1, gradient);
     gradient += s.bias_gradient[l].rows();
   }
 }
 
-void AdamStep(int count, int step, float rate, float l2, const float* __restrict gradient,
-              float* __restrict parameters, float* __restrict first_moment, float* __restrict second_moment) {
+void AdamStep(int count, int step, float rate, float l2, const float* const (&gradients)[2], float* __restrict parameters,
+              float* __restrict first_moment, float* __restrict second_moment) {
+  const float* __restrict one = gradients[0];
+  const float* __restrict other = gradients[1];
   constexpr float kBeta1 = 0.9f, kBeta2 = 0.999f, kEpsilon = 1e-8f;
   // The moments' bias corrections, folded into rate and denominator.
   const float correction = static_cast<float>(1 / std::sqrt(1 - std::pow(double{kBeta2}, step)));
   const float scale = static_cast<float>(rate / (1 - std::pow(double{kBeta1}, step)));
   for (int i = 0; i < count; ++i) {
-    const float g = gradient[i] + l2 * parameters[i];
+    const float g = one[i] + other[i] + l2 * parameters[i];
     first_moment[i] = kBeta1 * first_moment[i] + (1 - kBeta1) * g;
     second_moment[i] = kBeta2 * second_moment[i] + (1 - kBeta2) * g * g;
     parameters[i] -= scale * first_moment[i] / (std::sqrt(second_moment[i]) * correction + kEpsilon);

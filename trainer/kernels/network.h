@@ -70,10 +70,10 @@ class PLUMB_KERNELS_EXPORT Tape {
 };
 
 /// One step of Adam (Kingma and Ba, 2015) with beta1 = 0.9, beta2 = 0.999, epsilon = 1e-8.
-/// @param step counts from 1. @param l2 added to the gradient: l2 * parameter.
+/// @param step counts from 1. @param l2 added to the gradient: l2 * parameter. @param gradients their sum is the gradient.
 /// All arrays have `count` values; parameters and moments are updated in place.
-PLUMB_KERNELS_EXPORT void AdamStep(int count, int step, float rate, float l2, const float* gradient,
-                                   float* parameters, float* first_moment, float* second_moment);
+PLUMB_KERNELS_EXPORT void AdamStep(int count, int step, float rate, float l2, const float* const (&gradients)[2], float* parameters,
+                                   float* first_moment, float* second_moment);
 
 /// "x86-64", "x86-64-v3", ...: the level of instruction set this copy was compiled for.
 PLUMB_KERNELS_EXPORT const char* InstructionSet();

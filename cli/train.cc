@@ -1,0 +1,235 @@
+#include "cli/train.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <sstream>
+
+#include "calibrator/batches.h"
+#include "calibrator/posterior_file.h"
+#include "common/atomic_file.h"
+#include "trainer/checkpoint.h"
+#include "trainer/policy_file.h"
+#include "trainer/robot_simulation.h"
+#include "trainer/trainer.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kCheckpointPeriod = 5;  // [s]
+constexpr int kEvaluationEpisodes = 20;  // of those along the way
+constexpr char kCsvHeader[] =
+    "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,accepted,dropped_episodes,seconds\n";
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+RobotDescription ReadRobot(const TrainFlags& flags) {
+  RobotDescription robot = LoadRobot(flags.robot);
+  if (flags.paper) robot.training = AsThePaper(robot.training);
+  if (flags.worst_share > 0) robot.training.worst_share = flags.worst_share;
+  if (flags.worst_after >= 0) robot.training.worst_after = flags.worst_after;
+  return robot;
+}
+
+ParameterDistribution ReadDistribution(const std::string& name, const RobotDescription& robot) {
+  if (name != "prior" && name != "nominal") return ReadPosterior(name, robot);
+  ParameterDistribution distribution = ParameterDistribution::Prior(robot);
+  if (name == "nominal") distribution.components[0].covariance.setZero();
+  return distribution;
+}
+
+/// What the result depends on, but for the steps: a longer run may go on from a shorter one.
+uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot, const ParameterDistribution& distribution,
+                    const std::optional<GaussianPolicy>& start) {
+  const TrainingSettings& s = robot.training;
+  std::ostringstream text;
+  text << VersionLine("plumb") << robot.fingerprint << s.normalise_values << s.fisher_fraction << ' ' << s.worst_share << ' ' << s.worst_after << ' ' << flags.seed;
+  for (const auto& component : distribution.components) {
+    text.precision(17);
+    text << component.weight << component.mean << component.covariance;
+  }
+  if (start) text << start->parameters << start->observation_mean << start->observation_scale;
+  return Hash(text.str());
+}
+
+/// progress.csv, a line for each update. A resumed run keeps the lines up to where it goes on from.
+class ProgressTable {
+ public:
+  ProgressTable(const std::string& file, int64_t updates) : file_(file) {
+    if (file.empty()) return;
+    std::string kept = kCsvHeader, line;
+    if (updates > 0) {
+      std::ifstream old(file);
+      for (int64_t last = 0; last < updates && std::getline(old, line);) {
+        last = std::atoll(line.c_str());
+        if (last > 0) kept += line + "\n";
+      }
+    }
+    WriteAtomically(file, kept);
+    stream_.open(file, std::ios::app);
+  }
+  void Add(const Trainer& trainer, const UpdateReport& report, double evaluation, double seconds) {
+    if (file_.empty()) return;
+    stream_ << fmt::format("{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{},{:.3f}\n", trainer.updates(), trainer.steps(),
+                           report.mean_return, evaluation, report.step.kl, report.step.surrogate_gain, report.explained_variance,
+                           report.entropy, report.step.accepted, report.dropped_episodes, seconds)
+            << std::flush;
+    if (!stream_) throw std::runtime_error(file_ + ": cannot be written");
+  }
+
+ private:
+  std::string file_;
+  std::ofstream stream_;
+};
+
+std::string Clock(double seconds) {
+  const auto whole = static_cast<int64_t>(std::ceil(std::max(seconds, 0.)));
+  return whole >= 3600 ? fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60) : fmt::format("{}:{:02}", whole / 60, whole % 60);
+}
+
+/// One line that is written over where people look at it; into a file, a line now and then.
+class ProgressLine {
+ public:
+  ~ProgressLine() {
+    if (terminal_ && shown_) std::cerr << "\n";
+  }
+  void Show(const Trainer& trainer, const UpdateReport& report, int64_t steps, int64_t done_before) {
+    const double seconds = clock_.seconds();
+    if (seconds < next_ && trainer.steps() < steps) return;
+    next_ = seconds + (terminal_ ? 0.1 : 5);
+    shown_ = true;
+    const double speed = static_cast<double>(trainer.steps() - done_before) / seconds;
+    const std::string line = fmt::format(
+        "{:3.0f} %  {:.3g} steps  return {:.5g}  KL {:.4f}  gain {:.3f}  explained {:.2f}  entropy {:.2f}  {:.3g} steps/s  {} left",
+        100 * std::min(1., static_cast<double>(trainer.steps()) / static_cast<double>(steps)), static_cast<double>(trainer.steps()),
+        report.mean_return, report.step.kl, report.step.surrogate_gain, report.explained_variance, report.entropy, speed,
+        Clock(static_cast<double>(steps - trainer.steps()) / speed));
+    std::cerr << (terminal_ ? "\r\033[K" : "") << line << (terminal_ ? "" : "\n") << std::flush;
+  }
+
+ private:
+  bool terminal_ = isatty(STDERR_FILENO);
+  bool shown_ = false;
+  double next_ = 0;
+  Stopwatch clock_;
+};
+
+class Training {
+ public:
+  Training(TrainFlags flags, Process& process)
+      : flags_(std::move(flags)),
+        process_(process),
+        robot_(ReadRobot(flags_)),
+        distribution_(ReadDistribution(flags_.distribution, robot_)),
+        trainer_(robot_.training, SimulateRobot(robot_), robot_.effort_limits(), flags_.seed, flags_.threads) {
+    if (flags_.checkpoint.empty()) flags_.checkpoint = flags_.output + ".checkpoint";
+    steps_ = flags_.steps > 0 ? static_cast<int64_t>(flags_.steps) : int64_t{robot_.training.updates} * robot_.training.batch;
+    for (const std::string& file : {flags_.output, flags_.checkpoint, flags_.csv}) {
+      if (!file.empty()) RequireWritable(file);
+    }
+    std::optional<GaussianPolicy> start;
+    if (!flags_.from.empty()) {
+      start = LoadPolicy(flags_.from, robot_, *MakeTask(robot_));
+      trainer_.Start(*start);
+    }
+    identity_ = IdentityOf(flags_, robot_, distribution_, start);
+    Resume();
+  }
+
+  int Run() {
+    const ParameterSampler sample = [this](Random& random) { return distribution_.Sample(random); };
+    ProgressTable table(flags_.csv, trainer_.updates());
+    {
+      ProgressLine line;
+      const int64_t before = trainer_.steps();
+      double saved = 0;
+      while (trainer_.steps() < steps_) {
+        if (process_.stopping()) {
+          Save();
+          std::cerr << fmt::format("\ninterrupted; the same command goes on from {}\n", flags_.checkpoint);
+          return 130;
+        }
+        const UpdateReport report = trainer_.Update(sample);
+        const bool judged = flags_.evaluate_every > 0 && trainer_.updates() % flags_.evaluate_every == 0;
+        const double evaluation = judged ? trainer_.Evaluate(sample, kEvaluationEpisodes).mean : NAN;
+        table.Add(trainer_, report, evaluation, clock_.seconds());
+        line.Show(trainer_, report, steps_, before);
+        Warn(report);
+        if (clock_.seconds() - saved > kCheckpointPeriod) Save(), saved = clock_.seconds();
+      }
+    }
+    Save();
+    Judge(sample);
+    return 0;
+  }
+
+ private:
+  void Resume() {
+    const std::optional<Checkpoint> checkpoint = LoadCheckpoint(flags_.checkpoint);
+    if (!checkpoint) return;
+    if (checkpoint->identity != identity_) {
+      throw CheckpointError(fmt::format("{} is of another run (robot, settings, distribution, start, seed or version): delete it, or give another --checkpoint",
+                                        flags_.checkpoint));
+    }
+    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint->policy), checkpoint->critic, checkpoint->observations, checkpoint->updates,
+                      checkpoint->steps, checkpoint->dropped_episodes});
+    std::cout << fmt::format("goes on from {}: update {}, {} steps\n", flags_.checkpoint, trainer_.updates(), trainer_.steps()) << std::flush;
+  }
+
+  void Save() {
+    const TrainerState state = trainer_.state();
+    Checkpoint checkpoint;
+    checkpoint.seed = flags_.seed, checkpoint.identity = identity_;
+    checkpoint.updates = state.updates, checkpoint.steps = state.steps, checkpoint.dropped_episodes = state.dropped_episodes;
+    checkpoint.policy = state.policy.ToMessage(), checkpoint.distribution = distribution_.ToMessage();
+    checkpoint.critic = state.critic, checkpoint.observations = state.observations;
+    SaveCheckpoint(flags_.checkpoint, checkpoint);
+  }
+
+  void Warn(const UpdateReport& report) {
+    if (!report.step.accepted) spdlog::warn("update {} skipped: {}", trainer_.updates(), report.step.failure);
+    if (!report.critic_fitted) spdlog::warn("update {}: the critic's fit was not finite", trainer_.updates());
+    if (report.dropped_episodes > 0) spdlog::warn("update {}: {} episodes dropped, not finite", trainer_.updates(), report.dropped_episodes);
+  }
+
+  void Judge(const ParameterSampler& sample) {
+    const ParameterDistribution prior = ParameterDistribution::Prior(robot_);
+    std::cout << fmt::format("{} steps, {} updates, {:.1f} s\nreturn without exploration, {} simulators held out:\n", trainer_.steps(),
+                             trainer_.updates(), clock_.seconds(), flags_.held_out);
+    std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Words(trainer_.EvaluateHeldOut(sample, flags_.held_out)));
+    if (flags_.distribution != "prior") {
+      const ParameterSampler of_prior = [&](Random& random) { return prior.Sample(random); };
+      std::cout << fmt::format("  {:24} {}\n", "prior", Words(trainer_.EvaluateHeldOut(of_prior, flags_.held_out)));
+    }
+    std::cout << std::flush;
+  }
+
+  TrainFlags flags_;
+  Process& process_;
+  Stopwatch clock_;
+  RobotDescription robot_;
+  ParameterDistribution distribution_;
+  Trainer trainer_;
+  int64_t steps_ = 0;
+  uint64_t identity_ = 0;
+};
+
+}  // namespace
+
+int Train(Process& process, TrainFlags flags) { return Training(std::move(flags), process).Run(); }
+
+}  // namespace plumb

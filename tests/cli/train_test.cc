@@ -1,0 +1,127 @@
+// plumb train as people run it: interrupted and resumed, with any number of threads, and given nonsense.
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
+#include <thread>
+
+#include "tests/cli/shell.h"
+#include "trainer/checkpoint.h"
+
+namespace plumb {
+namespace {
+
+std::string Train(const Folder& folder, const std::string& name, const std::string& flags) {
+  return Plumb() + "train " + Robot("pendulum") + " --held-out 5 --output " + folder / name + " --csv " + folder / (name + ".csv") + " " + flags;
+}
+
+// All columns but the last, which is the time.
+std::vector<std::string> Rows(const std::string& file) {
+  std::istringstream text(Read(file));
+  std::vector<std::string> rows;
+  for (std::string line; std::getline(text, line);) rows.push_back(line.substr(0, line.rfind(',')));
+  return rows;
+}
+
+TEST_CASE("train writes a policy, a table and what to expect of it") {
+  const Folder folder;
+  const Outcome outcome = Shell(Train(folder, "policy.onnx", "--steps 12000 --evaluate-every 2 --distribution nominal"));
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  CHECK(outcome.text.find("12000 steps, 4 updates") != std::string::npos);
+  CHECK(std::regex_search(outcome.text, std::regex("nominal +-[0-9.]+ mean, -[0-9.]+ 10th percentile, -[0-9.]+ worst")));
+  CHECK(std::regex_search(outcome.text, std::regex("prior +-[0-9.]+ mean")));
+  CHECK(std::regex_search(outcome.text, std::regex("return -[0-9]+.*KL 0.*gain.*explained.*entropy.*steps/s.*left")));
+  const auto rows = Rows(folder / "policy.onnx.csv");
+  REQUIRE(rows.size() == 5);
+  CHECK(rows[0] == "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,accepted,dropped_episodes");
+  CHECK(rows[1].find("1,3000,-") == 0);
+  CHECK(rows[1].find(",nan,") != std::string::npos);
+  CHECK(rows[2].find(",nan,") == std::string::npos);
+}
+
+TEST_CASE("an interrupted training goes on to the same bits, with any number of threads") {
+  const Folder folder;
+  REQUIRE(Shell(Train(folder, "straight", "--steps 45000 --threads 1")).status == 0);
+  int interruptions = 0;
+  for (int i = 0; i < 200; ++i) {
+    const std::string threads = i % 2 == 0 ? "1" : "2";
+    const Outcome outcome = Shell("timeout -s INT 0.25 " + Train(folder, "resumed", "--steps 45000 --threads " + threads));
+    INFO(outcome.text);
+    if (outcome.text.find("5 simulators held out") != std::string::npos && outcome.status == 0) break;
+    REQUIRE((outcome.status == 124 || outcome.status == 130));
+    ++interruptions;
+  }
+  CHECK(interruptions > 0);
+  CHECK(Rows(folder / "resumed.csv") == Rows(folder / "straight.csv"));
+  const auto straight = LoadCheckpoint(folder / "straight.checkpoint"), resumed = LoadCheckpoint(folder / "resumed.checkpoint");
+  REQUIRE(straight);
+  REQUIRE(resumed);
+  CHECK(resumed->policy.weight == straight->policy.weight);
+  CHECK(resumed->critic.second_moment == straight->critic.second_moment);
+  SECTION("and further, if asked for more steps") {
+    REQUIRE(Shell(Train(folder, "resumed", "--steps 60000")).status == 0);
+    REQUIRE(Shell(Train(folder, "long", "--steps 60000")).status == 0);
+    CHECK(LoadCheckpoint(folder / "resumed.checkpoint")->policy.weight == LoadCheckpoint(folder / "long.checkpoint")->policy.weight);
+  }
+  SECTION("but not as another run") {
+    const Outcome outcome = Shell(Train(folder, "resumed", "--steps 45000 --seed 2"));
+    CHECK(outcome.status == 1);
+    CHECK(outcome.text.find("is of another run") != std::string::npos);
+  }
+}
+
+TEST_CASE("the paper's settings are another run, and so is a guarded one") {
+  const Folder folder;
+  for (const std::string flags : {"--steps 6000", "--steps 6000 --paper", "--steps 6000 --worst-share 0.5 --worst-after 1"}) {
+    const std::string name = "p" + std::to_string(flags.size());
+    const Outcome outcome = Shell(Train(folder, name, flags));
+    INFO(outcome.text);
+    REQUIRE(outcome.status == 0);
+  }
+  const auto weights = [&](const std::string& name) { return LoadCheckpoint(folder / name + ".checkpoint")->policy.weight; };
+  CHECK(weights("p12") != weights("p20"));
+  CHECK(weights("p12") != weights("p46"));
+}
+
+TEST_CASE("a policy to begin with") {
+  const Folder folder;
+  REQUIRE(Shell(Train(folder, "first", "--steps 15000")).status == 0);
+  const Outcome outcome = Shell(Train(folder, "second", "--steps 3000 --seed 2 --from " + folder / "first.checkpoint"));
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  const auto first = LoadCheckpoint(folder / "first.checkpoint")->policy, second = LoadCheckpoint(folder / "second.checkpoint")->policy;
+  double moved = 0, size = 0;
+  for (size_t i = 0; i < first.weight.size(); ++i) {
+    moved += std::pow(second.weight[i] - first.weight[i], 2);
+    size += std::pow(first.weight[i], 2);
+  }
+  CHECK(moved > 0);
+  CHECK(moved < 0.01 * size);
+}
+
+TEST_CASE("nonsense is refused with a line that says why") {
+  const Folder folder;
+  const auto refused = [&](const std::string& flags, const std::string& why) {
+    const Outcome outcome = Shell(Train(folder, "policy", flags));
+    INFO(flags << ": " << outcome.text);
+    CHECK(outcome.status != 0);
+    CHECK(outcome.status != -1);
+    CHECK(outcome.text.find(why) != std::string::npos);
+    CHECK_FALSE(std::filesystem::exists(folder / "policy"));
+  };
+  refused("--steps 3000 --distribution " + folder / "none.json", "none.json");
+  refused("--steps -5", "--steps");
+  refused("--steps 3000 --worst-share 0", "--worst-share");
+  refused("--steps 3000 --from " + folder / "none.onnx", "none.onnx");
+  refused("--steps 3000 --checkpoint /proc/no/such", "/proc/no/such");
+  std::ofstream(folder / "text.json") << "{\"parameters\": 7}";
+  refused("--steps 3000 --distribution " + folder / "text.json", "text.json");
+  std::ofstream(folder / "policy.checkpoint") << "rubbish";
+  refused("--steps 3000", "policy.checkpoint is not a trainer's checkpoint");
+}
+
+}  // namespace
+}  // namespace plumb
