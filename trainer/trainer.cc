@@ -43,6 +43,7 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 TrainingSettings AsThePaper(TrainingSettings settings) {
   settings.normalise_values = false;
   settings.fisher_fraction = 1;
+  settings.critic_epochs = 20;
   return settings;
 }
 
