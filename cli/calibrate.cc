@@ -13,7 +13,7 @@
 
 #include "calibrator/identified_urdf.h"
 #include "calibrator/posterior_file.h"
-#include "calibrator/ranks.h"
+#include "calibrator/rank_batches.h"
 #include "calibrator/report.h"
 #include "calibrator/robot_sbc.h"
 #include "calibrator/summary.h"

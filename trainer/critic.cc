@@ -30,8 +30,11 @@ void Shuffle(std::vector<int>& order, Random& random) {
 
 }  // namespace
 
-Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers)
-    : settings_(settings), observations_(observations), workers_(&workers), network_(Sizes(settings, observations), workers) {
+Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers, const Ranks& ranks)
+    : settings_(settings),
+      observations_(observations),
+      workers_(&workers),
+      network_(Sizes(settings, observations), workers, ranks) {
   state_.parameters = OrthogonalParameters(Sizes(settings, observations), 1, random);
   state_.first_moment.setZero(state_.parameters.size());
   state_.second_moment.setZero(state_.parameters.size());

@@ -24,9 +24,10 @@ struct CriticState {
 /// that the predicted values stay (van Hasselt et al., 2016, "Pop-Art"). Not thread-safe.
 class Critic {
  public:
-  /// @param observations length of an input. @param random for the initial weights. @param workers must
-  /// outlive it.
-  Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers);
+  /// @param observations length of an input. @param random for the initial weights. @param workers,ranks
+  /// must outlive it.
+  Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers,
+         const Ranks& ranks = Ranks::Alone());
 
   const CriticState& state() const { return state_; }
   /// @throws std::invalid_argument if the sizes are another network's.

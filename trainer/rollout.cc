@@ -17,27 +17,14 @@ constexpr int kMostTogether = 8, kTasks = 8;
 
 }  // namespace
 
-/// One episode.
-struct RolloutSampler::Record {
-  std::vector<float> observations, actions;
-  std::vector<double> rewards;
-  Eigen::VectorXf final_observation;
-  ObservationMoments moments;
-  double sum = 0;
-  bool terminated = false;
-  bool usable = false;
-
-  int steps() const { return static_cast<int>(rewards.size()); }
-};
-
 /// Plays one episode at a time, in its own simulation.
 struct RolloutSampler::Player {
   std::unique_ptr<Simulation> simulation;
   Eigen::VectorXf raw;
   Random random{0};
-  Record* record = nullptr;  // null: has nothing to play
+  EpisodeRecord* record = nullptr;  // null: has nothing to play
 
-  void Begin(const ParameterSampler& sample, Random own, Record& episode) {
+  void Begin(const ParameterSampler& sample, Random own, EpisodeRecord& episode) {
     random = own;
     record = &episode;
     try {
@@ -120,8 +107,9 @@ void RolloutSampler::Worker::Play(const GaussianPolicy& policy, const kernels::N
   }
 }
 
-RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape& shape, Workers& workers)
-    : workers_(&workers), network_(shape.sizes()) {
+RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape& shape, Workers& workers,
+                               const Ranks& ranks)
+    : workers_(&workers), ranks_(&ranks), network_(shape.sizes()) {
   for (int i = 0; i < workers.size(); ++i) {
     auto worker = std::make_unique<Worker>(Worker{{}, kernels::Tape(shape.sizes(), kMostTogether),
                                                   Eigen::MatrixXf(shape.observations, kMostTogether),
@@ -136,27 +124,32 @@ RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape&
 
 RolloutSampler::~RolloutSampler() = default;
 
-std::vector<RolloutSampler::Record> RolloutSampler::Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first, int count,
-                                          bool explore, uint64_t seed, uint32_t stream, uint32_t number) {
+std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first,
+                                               int count, bool explore, uint64_t seed, uint32_t stream,
+                                               uint32_t number) {
   network_.Set({policy.parameters.data(), static_cast<size_t>(policy.parameters.size())});
-  std::vector<Record> records(static_cast<size_t>(count));
-  int tasks = (count + kMostTogether - 1) / kMostTogether;
-  tasks = std::min(count, (tasks + kTasks - 1) / kTasks * kTasks);
+  const std::vector<int> bounds = ranks_->Bounds(count);
+  const auto rank = static_cast<size_t>(ranks_->rank());
+  const int own = bounds[rank + 1] - bounds[rank];
+  first += bounds[rank];
+  std::vector<EpisodeRecord> records(static_cast<size_t>(own));
+  int tasks = (own + kMostTogether - 1) / kMostTogether;
+  tasks = std::min(own, (tasks + kTasks - 1) / kTasks * kTasks);
   workers_->Run(tasks, [&](int task, int worker) {
-    const int begin = count * task / tasks, end = count * (task + 1) / tasks;
+    const int begin = own * task / tasks, end = own * (task + 1) / tasks;
     state_[static_cast<size_t>(worker)]->Play(policy, network_, end - begin, explore, [&](int i, Player& player) {
       const int episode = begin + i;
       player.Begin(sample, Random(seed, {stream, number, static_cast<uint32_t>(first + episode)}),
                    records[static_cast<size_t>(episode)]);
     });
   });
-  return records;
+  return Gather(*ranks_, std::move(records));
 }
 
 Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps, double worst_share,
                        uint64_t seed, uint32_t stream, uint32_t number) {
   Batch batch;
-  std::vector<Record> records;
+  std::vector<EpisodeRecord> records;
   std::vector<size_t> kept;  // of the records, by number
   int kept_steps = 0;
   double sum = 0;
@@ -165,7 +158,7 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
     // that the number of threads cannot matter.
     const double length = kept.empty() ? time_limit_ : 1. * kept_steps / static_cast<double>(kept.size());
     const int wanted = static_cast<int>(std::ceil((steps - kept_steps) / length / worst_share));
-    for (Record& record : Run(policy, sample, batch.played, wanted, true, seed, stream, number)) {
+    for (EpisodeRecord& record : Run(policy, sample, batch.played, wanted, true, seed, stream, number)) {
       if (!record.usable) {
         ++batch.dropped;
         continue;
@@ -192,7 +185,7 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
     for (const size_t i : kept) kept_steps += records[i].steps();
   }
   for (const size_t i : kept) {
-    const Record& record = records[i];
+    const EpisodeRecord& record = records[i];
     const int begin = batch.size();
     batch.observations.insert(batch.observations.end(), record.observations.begin(), record.observations.end());
     batch.actions.insert(batch.actions.end(), record.actions.begin(), record.actions.end());
@@ -208,7 +201,7 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
 std::vector<double> RolloutSampler::Returns(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes,
                                      uint64_t seed, uint32_t stream, uint32_t number) {
   std::vector<double> returns;
-  for (const Record& record : Run(policy, sample, 0, episodes, false, seed, stream, number)) {
+  for (const EpisodeRecord& record : Run(policy, sample, 0, episodes, false, seed, stream, number)) {
     returns.push_back(record.usable ? record.sum : std::numeric_limits<double>::quiet_NaN());
   }
   return returns;

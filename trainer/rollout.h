@@ -9,6 +9,7 @@
 #include "common/random.h"
 #include "controller/policy.h"
 #include "trainer/kernels/network.h"
+#include "trainer/episode_record.h"
 #include "trainer/moments.h"
 #include "trainer/workers.h"
 
@@ -59,13 +60,14 @@ struct Batch {
   int size() const { return static_cast<int>(rewards.size()); }
 };
 
-/// Rolls a policy out in simulators drawn one per episode. A thread plays several episodes side by side, so that the
-/// network is evaluated for all of them at once. Random numbers are named by seed, stream and episode: the batch is the
-/// same for any number of threads. Not thread-safe itself.
+/// Rolls a policy out in simulators drawn one per episode. Ranks and threads share the episodes; a thread plays several
+/// side by side, so that the network is evaluated for all of them at once. Random numbers are named by seed, stream and
+/// episode: the batch is the same for any number of threads and ranks, and every rank gets all of it. Not thread-safe itself.
 class RolloutSampler {
  public:
-  /// @param make called once per worker. @param workers must outlive this.
-  RolloutSampler(const SimulationFactory& make, const PolicyShape& shape, Workers& workers);
+  /// @param make called several times per worker. @param workers,ranks must outlive this.
+  RolloutSampler(const SimulationFactory& make, const PolicyShape& shape, Workers& workers,
+                 const Ranks& ranks = Ranks::Alone());
   ~RolloutSampler();
 
   /// Whole episodes of at least `steps` steps together.
@@ -80,13 +82,14 @@ class RolloutSampler {
                               uint32_t stream, uint32_t number);
 
  private:
-  struct Record;
   struct Player;
   struct Worker;
-  std::vector<Record> Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first, int count,
-                          bool explore, uint64_t seed, uint32_t stream, uint32_t number);
+  /// The episodes [first, first + count), shared out among ranks and threads.
+  std::vector<EpisodeRecord> Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first, int count,
+                                 bool explore, uint64_t seed, uint32_t stream, uint32_t number);
 
   Workers* workers_;
+  const Ranks* ranks_;
   kernels::Network network_;
   std::vector<std::unique_ptr<Worker>> state_;  // one per worker
   int time_limit_;

@@ -1,5 +1,8 @@
 #include "trainer/trainer.h"
 
+#include <fmt/format.h>
+
+#include <cstring>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -45,14 +48,15 @@ TrainingSettings AsThePaper(TrainingSettings settings) {
 }
 
 Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make,
-                 const Eigen::VectorXd& action_scale, uint64_t seed, int threads)
+                 const Eigen::VectorXd& action_scale, uint64_t seed, int threads, const Ranks& ranks)
     : settings_(settings),
       seed_(seed),
+      ranks_(&ranks),
       workers_(threads),
       policy_(FreshPolicy(settings, make, action_scale, seed)),
-      rollout_(make, policy_.shape(), workers_),
-      trpo_(settings, policy_.shape(), workers_),
-      critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_) {}
+      rollout_(make, policy_.shape(), workers_, ranks),
+      trpo_(settings, policy_.shape(), workers_, ranks),
+      critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_, ranks) {}
 
 TrainerState Trainer::state() const {
   return {policy_, critic_.state(), observations_, updates_, steps_, dropped_episodes_};
@@ -114,7 +118,24 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   ++updates_;
   steps_ += batch.steps;
   dropped_episodes_ += batch.dropped;
+  CompareRanks();
   return report;
+}
+
+void Trainer::CompareRanks() const {
+  struct Sums {
+    double policy, critic;  // of the parameters: one bit's difference in one of them shows
+  };
+  const std::vector<Sums> sums = ranks_->Collect(
+      Sums{policy_.parameters.cast<double>().sum(), critic_.state().parameters.cast<double>().sum()});
+  for (size_t r = 1; r < sums.size(); ++r) {
+    if (std::memcmp(&sums[r], &sums[0], sizeof(Sums)) != 0) {
+      throw std::runtime_error(fmt::format(
+          "rank {} has come to another policy or critic than rank 0 by update {}: do all have the same files and "
+          "processors with the same instruction set (this one's: {})?",
+          r, updates_, kernels::InstructionSet()));
+    }
+  }
 }
 
 Evaluation Trainer::Evaluate(const ParameterSampler& sample, int episodes) {

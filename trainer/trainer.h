@@ -39,15 +39,17 @@ struct UpdateReport {
 };
 
 /// Trains a policy in simulation: roll out, estimate advantages, step the policy, fit the critic. Its random
-/// numbers are named by (seed, update, episode): the same bits for any number of threads, and for a run that
-/// was interrupted and resumed. Not thread-safe itself.
+/// numbers are named by (seed, update, episode): the same bits for any number of threads and ranks, and for a
+/// run that was interrupted and resumed. Not thread-safe itself.
 class Trainer {
  public:
   /// @param make makes simulations; called once per thread. @param action_scale effort of action 1, per
   /// action.
   /// @param threads 0 = as many as the machine has.
+  /// @param ranks must outlive this. All of them make the same trainer and call the same methods, in the same order.
   Trainer(const TrainingSettings& settings, const SimulationFactory& make,
-          const Eigen::VectorXd& action_scale, uint64_t seed, int threads);
+          const Eigen::VectorXd& action_scale, uint64_t seed, int threads,
+          const Ranks& ranks = Ranks::Alone());
 
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.
@@ -58,7 +60,8 @@ class Trainer {
   int64_t updates() const { return updates_; }
   int64_t steps() const { return steps_; }
 
-  /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used.
+  /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used, or if ranks have come
+  /// to different results.
   UpdateReport Update(const ParameterSampler& sample);
   /// The policy without exploration on simulators drawn anew. Changes nothing.
   Evaluation Evaluate(const ParameterSampler& sample, int episodes);
@@ -66,8 +69,11 @@ class Trainer {
   Evaluation EvaluateHeldOut(const ParameterSampler& sample, int episodes);
 
  private:
+  void CompareRanks() const;
+
   TrainingSettings settings_;
   uint64_t seed_;
+  const Ranks* ranks_;
   Workers workers_;
   GaussianPolicy policy_;
   RolloutSampler rollout_;

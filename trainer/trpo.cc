@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "trainer/conjugate_gradient.h"
@@ -18,44 +19,36 @@ int Count(const PolicySamples& samples) { return static_cast<int>(samples.advant
 
 }  // namespace
 
-Trpo::Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers)
+Trpo::Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers, const Ranks& ranks)
     : settings_(settings),
       shape_(shape),
-      network_(shape.sizes(), workers),
-      fisher_network_(shape.sizes(), workers) {}
+      network_(shape.sizes(), workers, ranks),
+      fisher_network_(shape.sizes(), workers, ranks) {}
 
 Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples, std::vector<float>& means) {
   const int actions = shape_.actions, count = Count(samples);
   const Eigen::ArrayXf precision = (-2 * policy.log_std().array()).exp();
-  // ln p(a) = -((a - mu) / sd)^2 / 2 - log_std + const: d/dmu = (a - mu) / sd^2, d/dlog_std = ((a - mu) /
-  // sd)^2 - 1.
   means.resize(samples.actions.size());
   Eigen::VectorXf gradient(shape_.parameter_count());
+  Eigen::VectorXd log_std_gradient(actions);
   network_.Set(policy.parameters);
+  // ln p(a) = -((a - mu) / sd)^2 / 2 - log_std + const: d/dmu = (a - mu) / sd^2, d/dlog_std = ((a - mu) /
+  // sd)^2 - 1.
   network_.Gradient(
       samples.observations.data(), count,
-      [&](int first, int columns, const float* outputs, float* output_gradient) {
+      [&](int first, int columns, const float* outputs, float* output_gradient, std::span<double> sums) {
         for (int i = 0; i < columns; ++i) {
-          const auto weight = static_cast<float>(samples.advantages[static_cast<size_t>(first + i)] / count);
+          const double weight = samples.advantages[static_cast<size_t>(first + i)] / count;
           for (int a = 0; a < actions; ++a) {
-            const float mean = outputs[i * actions + a];
             const auto at = static_cast<size_t>((first + i) * actions + a);
-            means[at] = mean;
-            const float action = samples.actions[at];
-            output_gradient[i * actions + a] = weight * (action - mean) * precision[a];
+            means[at] = outputs[i * actions + a];
+            const float offset = samples.actions[at] - means[at];
+            output_gradient[i * actions + a] = static_cast<float>(weight) * offset * precision[a];
+            sums[static_cast<size_t>(a)] += weight * (double{offset * offset * precision[a]} - 1);
           }
         }
       },
-      gradient.head(network_.parameter_count()));
-  Eigen::VectorXd log_std_gradient = Eigen::VectorXd::Zero(actions);
-  for (int i = 0; i < count; ++i) {
-    for (int a = 0; a < actions; ++a) {
-      const auto at = static_cast<size_t>(i * actions + a);
-      const float offset = samples.actions[at] - means[at];
-      log_std_gradient[a] +=
-          samples.advantages[static_cast<size_t>(i)] / count * (double{offset * offset * precision[a]} - 1);
-    }
-  }
+      gradient.head(network_.parameter_count()), {log_std_gradient.data(), static_cast<size_t>(actions)});
   gradient.tail(actions) = log_std_gradient.cast<float>();
   return gradient;
 }
@@ -68,9 +61,8 @@ void Trpo::PrepareFisher(const GaussianPolicy& policy, const PolicySamples& samp
     fisher_inputs_.insert(fisher_inputs_.end(), begin, begin + shape_.observations);
   }
   const int count = static_cast<int>(fisher_inputs_.size()) / shape_.observations;
-  std::vector<float> means(static_cast<size_t>(count * shape_.actions));
   fisher_network_.Set(policy.parameters);
-  fisher_network_.Forward(fisher_inputs_.data(), count, means.data());
+  fisher_network_.Linearize(fisher_inputs_.data(), count);
   fisher_metric_ = (-2 * policy.log_std().array()).exp() / static_cast<float>(count);
 }
 
@@ -85,30 +77,33 @@ Eigen::VectorXf Trpo::FisherProduct(const Eigen::Ref<const Eigen::VectorXf>& v) 
 Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const float> means,
                                const GaussianPolicy& after, const PolicySamples& samples) {
   const int actions = shape_.actions, count = Count(samples);
-  std::vector<float> new_means(means.size());
-  network_.Set(after.parameters);
-  network_.Forward(samples.observations.data(), count, new_means.data());
-
   const Eigen::ArrayXd log_std = before.log_std().cast<double>(),
                        new_log_std = after.log_std().cast<double>();
   const Eigen::ArrayXd precision = (-2 * log_std).exp(), new_precision = (-2 * new_log_std).exp();
   // KL of two Gaussians: ln(s'/s) + (s^2 + (mu - mu')^2) / (2 s'^2) - 1/2; the part that is the same for all
   // samples:
   const double spread = (new_log_std - log_std + (2 * (log_std - new_log_std)).exp() / 2 - .5).sum();
-  double kl = 0, gain = 0;
-  for (int i = 0; i < count; ++i) {
-    double log_ratio = (log_std - new_log_std).sum();
-    for (int a = 0; a < actions; ++a) {
-      const auto at = static_cast<size_t>(i * actions + a);
-      const double offset = double{samples.actions[at]} - means[at];
-      const double new_offset = double{samples.actions[at]} - new_means[at];
-      const double moved = double{new_means[at]} - means[at];
-      log_ratio += (offset * offset * precision[a] - new_offset * new_offset * new_precision[a]) / 2;
-      kl += moved * moved * new_precision[a] / 2;
-    }
-    gain += std::expm1(log_ratio) * samples.advantages[static_cast<size_t>(i)];
-  }
-  return {spread + kl / count, gain / count};
+  std::array<double, 2> sums;  // KL and gain
+  network_.Set(after.parameters);
+  network_.Sum(
+      samples.observations.data(), count,
+      [&](int first, int columns, const float* outputs, std::span<double> group_sums) {
+        for (int i = 0; i < columns; ++i) {
+          double log_ratio = (log_std - new_log_std).sum();
+          for (int a = 0; a < actions; ++a) {
+            const auto at = static_cast<size_t>((first + i) * actions + a);
+            const double new_mean = outputs[i * actions + a];
+            const double offset = double{samples.actions[at]} - means[at];
+            const double new_offset = double{samples.actions[at]} - new_mean;
+            const double moved = new_mean - means[at];
+            log_ratio += (offset * offset * precision[a] - new_offset * new_offset * new_precision[a]) / 2;
+            group_sums[0] += moved * moved * new_precision[a] / 2;
+          }
+          group_sums[1] += std::expm1(log_ratio) * samples.advantages[static_cast<size_t>(first + i)];
+        }
+      },
+      sums);
+  return {spread + sums[0] / count, sums[1] / count};
 }
 
 Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {

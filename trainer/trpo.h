@@ -22,8 +22,9 @@ struct PolicySamples {
 /// its length bounded by the Kullback-Leibler divergence between old and new policy. Not thread-safe.
 class Trpo {
  public:
-  /// @param workers must outlive this.
-  Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers);
+  /// @param workers,ranks must outlive this.
+  Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers,
+       const Ranks& ranks = Ranks::Alone());
 
   /// The outcome of one step.
   struct Step {
@@ -39,7 +40,7 @@ class Trpo {
   Step Improve(GaussianPolicy& policy, const PolicySamples& samples);
 
   /// Gradient of the surrogate mean(ratio * advantage) at ratio = 1, in all parameters of the policy.
-  /// @param means of the policy at the samples, actions x N, written.
+  /// @param means of the policy at the samples, actions x N, written: those of the samples that this rank looks at.
   Eigen::VectorXf SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples, std::vector<float>& means);
 
   /// Takes the samples at which FisherProduct averages: every n-th of these, n = 1 / fisher_fraction.
@@ -49,10 +50,11 @@ class Trpo {
   /// It is also the Hessian of the mean KL at the old policy.
   Eigen::VectorXf FisherProduct(const Eigen::Ref<const Eigen::VectorXf>& v);
 
-  /// Mean KL(before || after) and mean of (ratio - 1) * advantage, given the means of `before`.
+  /// Mean KL(before || after) and mean of (ratio - 1) * advantage.
   struct Comparison {
     double kl, gain;
   };
+  /// @param means of `before`, as SurrogateGradient gives them.
   Comparison Compare(const GaussianPolicy& before, std::span<const float> means, const GaussianPolicy& after,
                      const PolicySamples& samples);
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "calibrator/ranks.h"
+#include "calibrator/rank_batches.h"
 #include "common/random.h"
 #include "temporary_file.h"
 

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "common/ranks.h"
+#include "trainer/moments.h"
+
+namespace plumb {
+
+/// One episode as it was played. The observations and actions are those that are learnt from: as the network
+/// saw them, observations x steps, and as drawn, actions x steps; empty if nothing is.
+struct EpisodeRecord {
+  std::vector<float> observations, actions;
+  std::vector<double> rewards;        ///< one per step
+  Eigen::VectorXf final_observation;  ///< after the last step
+  ObservationMoments moments;         ///< of the observations as the task gives them, if it is learnt from
+  double sum = 0;                     ///< of the rewards
+  bool terminated = false;            ///< false: cut off by the time limit
+  bool usable = false;                ///< false: something was not finite, or there is no such simulator
+
+  int steps() const { return static_cast<int>(rewards.size()); }
+};
+
+/// The episodes of all ranks, in the order of ranks. Called by all of them.
+std::vector<EpisodeRecord> Gather(const Ranks& ranks, std::vector<EpisodeRecord> mine);
+
+}  // namespace plumb
