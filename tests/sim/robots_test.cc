@@ -120,7 +120,7 @@ TEST_CASE("every observation has a name of its own, with its unit") {
     CHECK(std::set<std::string>(task->observation_names().begin(), task->observation_names().end()).size() == size);
     // As many are written, and no more.
     std::vector<float> observation(size + 1, NAN);
-    Random random(1, 2);
+    Random random(1);
     Eigen::VectorXd q(robot.num_positions()), v(robot.num_velocities());
     task->InitialState(random, q, v);
     task->Observe(q, v, {observation.data(), size});
