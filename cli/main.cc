@@ -90,7 +90,7 @@ int main(int argc, char** argv) {
         launch->add_option("--output", flags.output, "folder for logs and checkpoints; default: a new one in runs/");
         sim = app.add_subcommand("sim", "simulate the robot's task here and now, without any other process");
         sim->add_option("robot", sim_flags.robot, "robot folder or TOML file")->required();
-        auto* policy = sim->add_option("--policy", sim_flags.policy, "a trainer's checkpoint; its mean action is taken");
+        auto* policy = sim->add_option("--policy", sim_flags.policy, "a trainer's checkpoint or an ONNX model that Plumbline has written; its mean action is taken");
         sim->add_flag("--random", sim_flags.random, "random actions; default: none")->excludes(policy);
         sim->add_option("--seed", sim_flags.seed, "of all random numbers")->check(seed)->capture_default_str();
         sim->add_option("--episodes", sim_flags.episodes, "how many")

@@ -1,7 +1,11 @@
 #!/usr/bin/env python3
 """Dependencies point down only: which folder may include which. Exit status 1 names every line that does not.
 
+<<<<<<< HEAD
 Also: SimTK headers only in sim/*.cc, MPI's only in common/ranks.cc, LCM and sockets only in main.cc files, common/ and drivers/can/ (tests aside).
+=======
+Also: SimTK headers only in sim/*.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in main.cc files, common/ and drivers/can/ (tests aside).
+>>>>>>> onnx
 """
 import pathlib
 import re
@@ -26,6 +30,7 @@ BELOW = {
 EXCEPTIONS = {("sim/main.cc", "drivers"), ("sim/virtual_robot.h", "drivers"), ("sim/virtual_robot.cc", "drivers")}
 SYSTEM = {
     r"(SimTK\w*|Simbody)\.h|simbody/": lambda p: p.startswith("sim/") and p.endswith(".cc"),
+    r"onnx/|google/protobuf/": lambda p: p.startswith("trainer/onnx_") and p.endswith(".cc"),
     r"lcm/": lambda p: p.startswith(("common/", "drivers/can/")) or p.endswith("main.cc"),
     r"mpi\.h": lambda p: p == "common/ranks.cc",
     r"sys/socket\.h|netinet/|linux/can": lambda p: p.startswith(("common/", "drivers/can/", "cli/doctor"))

@@ -151,6 +151,8 @@ void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
   }
 }
 
+bool IsCheckpoint(std::string_view bytes) { return bytes.starts_with(std::string_view(kMagic, sizeof kMagic)); }
+
 std::optional<Checkpoint> LoadCheckpoint(const std::string& file) {
   std::error_code ignored;  // whatever is wrong, opening the file tells
   const std::filesystem::file_status status = std::filesystem::status(file, ignored);
@@ -164,7 +166,7 @@ std::optional<Checkpoint> LoadCheckpoint(const std::string& file) {
   }
   const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
   try {
-    if (bytes.size() < kHeader || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0) {
+    if (bytes.size() < kHeader || !IsCheckpoint({bytes.data(), bytes.size()})) {
       throw CheckpointError("is not a trainer's checkpoint");
     }
     uint32_t version = 0, crc = 0;

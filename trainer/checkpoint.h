@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "plumb/parameter_distribution_t.hpp"
 #include "plumb/policy_t.hpp"
@@ -37,6 +38,9 @@ struct Checkpoint {
 /// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint or the new
 /// one: a temporary file, fsync, rename, fsync of the folder. @throws CheckpointError.
 void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint);
+
+/// Whether a file that begins with these bytes may be a checkpoint.
+bool IsCheckpoint(std::string_view bytes);
 
 /// @return nothing if there is no such file. @throws CheckpointError if it is not what was saved.
 std::optional<Checkpoint> LoadCheckpoint(const std::string& file);

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace plumb {
 namespace {
@@ -32,10 +35,21 @@ Eigen::VectorXd StateScale() {
   return (Eigen::VectorXd(2 * kCoordinates) << 1, 0.5, 0.2, 1, 1, 1, 2, 2, 2, 10, 10, 10).finished();
 }
 
+/// Of any robot: it is looked at more closely afterwards.
+std::vector<std::string> ObservationNames(const RobotDescription& description) {
+  std::vector<std::string> names;
+  for (size_t i = 1; i < description.joints.size(); ++i) {
+    const JointDescription& joint = description.joints[i];
+    names.push_back("q/" + joint.name + (joint.type == JointDescription::Type::kPrismatic ? " [m]" : " [rad]"));
+  }
+  for (std::string& name : VelocityNames(description)) names.push_back(std::move(name));
+  return names;
+}
+
 }  // namespace
 
 HopperTask::HopperTask(const RobotDescription& description)
-    : Task(description, /*observation_size=*/2 * kCoordinates - 1, StateScale()),
+    : Task(description, ObservationNames(description), StateScale()),
       period_(description.task.period) {
   if (!IsHopper(description)) {
     throw std::invalid_argument(

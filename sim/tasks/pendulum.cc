@@ -3,11 +3,29 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace plumb {
 
+namespace {
+
+/// Of any robot: it is looked at more closely afterwards.
+std::vector<std::string> ObservationNames(const RobotDescription& description) {
+  std::vector<std::string> names;
+  for (const JointDescription& joint : description.joints) {
+    names.push_back("cos(q/" + joint.name + ")");
+    names.push_back("sin(q/" + joint.name + ")");
+  }
+  for (std::string& name : VelocityNames(description)) names.push_back(std::move(name));
+  return names;
+}
+
+}  // namespace
+
 PendulumTask::PendulumTask(const RobotDescription& description)
-    : Task(description, /*observation_size=*/3, Eigen::Vector2d(1, 8)) {
+    : Task(description, ObservationNames(description), Eigen::Vector2d(1, 8)) {
   using Type = JointDescription::Type;
   if (description.num_joints() != 1 || description.joints[0].type == Type::kPrismatic ||
       description.joints[0].type == Type::kSpherical || description.joints[0].passive) {

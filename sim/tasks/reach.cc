@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 namespace plumb {
 namespace {
@@ -20,10 +21,22 @@ double Scale(const JointDescription& joint) {
   return joint.type == Type::kPrismatic && std::isfinite(half_range) ? half_range : 1;
 }
 
-int ObservationSize(const RobotDescription& description) {
-  int size = description.num_velocities();
-  for (const JointDescription& joint : description.joints) size += Endless(joint) ? 2 : joint.num_velocities();
-  return size;
+/// e/<joint> are the differences to the target.
+std::vector<std::string> ObservationNames(const RobotDescription& description) {
+  std::vector<std::string> names;
+  for (const JointDescription& joint : description.joints) {
+    const std::string error = "e/" + joint.name;
+    if (joint.type == Type::kSpherical) {
+      for (const char* axis : {"/x", "/y", "/z"}) names.push_back(error + axis + " [rad]");
+    } else if (Endless(joint)) {
+      names.push_back("sin(" + error + ")");
+      names.push_back("cos(" + error + ")");
+    } else {
+      names.push_back(error + (joint.type == Type::kPrismatic ? " [m]" : " [rad]"));
+    }
+  }
+  for (std::string& name : VelocityNames(description)) names.push_back(std::move(name));
+  return names;
 }
 
 Eigen::VectorXd StateScale(const RobotDescription& description) {
@@ -65,7 +78,7 @@ Eigen::Quaterniond AnyOrientation(Random& random) {
 }  // namespace
 
 ReachTask::ReachTask(const RobotDescription& description, const std::string& name)
-    : Task(description, ObservationSize(description), StateScale(description)) {
+    : Task(description, ObservationNames(description), StateScale(description)) {
   const TaskSettings& settings = description.task;
   Eigen::Index q = 0, v = 0;
   for (const JointDescription& joint : description.joints) {

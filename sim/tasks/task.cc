@@ -8,8 +8,8 @@
 
 namespace plumb {
 
-Task::Task(const RobotDescription& description, int observation_size, Eigen::VectorXd state_scale)
-    : observation_size_(observation_size),
+Task::Task(const RobotDescription& description, std::vector<std::string> observation_names, Eigen::VectorXd state_scale)
+    : observation_names_(std::move(observation_names)),
       state_scale_(std::move(state_scale)),
       effort_limits_(description.effort_limits()) {
   for (const JointDescription& joint : description.joints) {
@@ -43,6 +43,18 @@ void Task::Effort(std::span<const float> action, Eigen::Ref<Eigen::VectorXd> eff
 double WrapAngle(double angle) {
   constexpr double kPi = std::numbers::pi;
   return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi));
+}
+
+std::vector<std::string> VelocityNames(const RobotDescription& description) {
+  std::vector<std::string> names;
+  for (const JointDescription& joint : description.joints) {
+    if (joint.type == JointDescription::Type::kSpherical) {
+      for (const char* axis : {"/x", "/y", "/z"}) names.push_back("v/" + joint.name + axis + " [rad/s]");
+    } else {
+      names.push_back("v/" + joint.name + (joint.type == JointDescription::Type::kPrismatic ? " [m/s]" : " [rad/s]"));
+    }
+  }
+  return names;
 }
 
 }  // namespace plumb

@@ -19,7 +19,10 @@ class Task {
 
   virtual ~Task() = default;
 
-  int observation_size() const { return observation_size_; }
+  int observation_size() const { return static_cast<int>(observation_names_.size()); }
+  /// What each observation is, with its unit unless that is 1: "cos(q/pole)", "v/pole [rad/s]". A policy that was trained
+  /// with other names, or in another order, is another task's.
+  const std::vector<std::string>& observation_names() const { return observation_names_; }
   /// One action per driven joint.
   int action_size() const { return static_cast<int>(effort_limits_.size()); }
   /// Names of the driven joints.
@@ -55,12 +58,12 @@ class Task {
 
  protected:
   /// @throws std::invalid_argument if the robot drives a spherical joint: it would take three motors.
-  Task(const RobotDescription& description, int observation_size, Eigen::VectorXd state_scale);
+  Task(const RobotDescription& description, std::vector<std::string> observation_names, Eigen::VectorXd state_scale);
 
   const Eigen::VectorXd& effort_limits() const { return effort_limits_; }
 
  private:
-  int observation_size_;
+  std::vector<std::string> observation_names_;
   Eigen::VectorXd state_scale_;
   Eigen::VectorXd effort_limits_;
   std::vector<std::string> action_names_;
@@ -70,6 +73,10 @@ class Task {
 
 /// The same angle in [-pi, pi).
 double WrapAngle(double angle);
+
+/// Names of the velocities of all joints as observations: "v/<joint> [rad/s]" or "[m/s]"; a spherical joint's three are
+/// called <joint>/x, /y and /z.
+std::vector<std::string> VelocityNames(const RobotDescription& description);
 
 /// Makes the task that `description.task.name` names.
 /// @throws std::invalid_argument if there is none of that name (names the nearest) or it does not fit the

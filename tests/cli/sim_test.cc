@@ -19,6 +19,7 @@
 #include "robot/description.h"
 #include "tests/cli/shell.h"
 #include "trainer/checkpoint.h"
+#include "trainer/onnx_policy.h"
 
 namespace plumb {
 namespace {
@@ -155,7 +156,29 @@ TEST_CASE("sim: a trainer's policy, and whatever is not one") {
   CHECK_THAT(complaint(Robot("pendulum") + " --policy " + folder / "stronger"), Contains("effort limits"));
   CHECK_THAT(complaint(Robot("pendulum") + " --policy " + folder / "none"), Contains("there is no such policy"));
   CHECK_THAT(complaint(Robot("pendulum") + " --policy " + Robot("pendulum/robot.toml")),
-             Contains("robot.toml") && Contains("not a trainer's checkpoint"));
+             Contains("robot.toml") && Contains("neither a trainer's checkpoint nor an ONNX model"));
+}
+
+TEST_CASE("sim: a policy in ONNX does what it does as a checkpoint, on its own robot") {
+  const Folder folder;
+  const RobotDescription robot = LoadRobot(Robot("pendulum"));
+  GaussianPolicy policy(PolicyShape{3, {4}, 1});
+  for (Eigen::Index i = 0; i < policy.parameters.size(); ++i) policy.parameters[i] = 0.1f * static_cast<float>(i % 7 - 3);
+  policy.action_scale.setConstant(2);
+  Checkpoint checkpoint{};
+  checkpoint.policy = policy.ToMessage();
+  SaveCheckpoint(folder / "checkpoint", checkpoint);
+  WriteOnnxPolicy(folder / "policy.onnx", {policy, MakePolicyRecord(robot, *MakeTask(robot))});
+  const auto table = [&](const std::string& file) {
+    const Outcome outcome = Sim(Robot("pendulum") + " --csv " + folder / "a.csv" + " --policy " + folder / file);
+    INFO(outcome.text);
+    CHECK(outcome.status == 0);
+    return Read(folder / "a.csv");
+  };
+  CHECK(table("policy.onnx") == table("checkpoint"));
+  const Outcome other = Sim(Robot("hopper") + " --policy " + folder / "policy.onnx");
+  CHECK(other.status == 1);
+  CHECK_THAT(other.text, Catch::Contains("policy.onnx: the policy is for another robot: \"pendulum\", not \"hopper\""));
 }
 
 TEST_CASE("sim: errors say what to do") {

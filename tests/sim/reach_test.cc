@@ -98,6 +98,11 @@ TEST_CASE("reach: of a spherical joint the rotation vector to the target counts,
   const Eigen::Quaterniond target(0.6, 0, 0.8, 0);
   description.task.target = {1, 2, 3, 0.6, 0, 0.8, 0, 0};
   const auto task = MakeTask(description);
+  CHECK(task->observation_names() ==
+        std::vector<std::string>{"e/free/x [m]", "e/free/y [m]", "e/free/z [m]", "e/free/rotation/x [rad]",
+                                 "e/free/rotation/y [rad]", "e/free/rotation/z [rad]", "sin(e/wheel)", "cos(e/wheel)",
+                                 "v/free/x [m/s]", "v/free/y [m/s]", "v/free/z [m/s]", "v/free/rotation/x [rad/s]",
+                                 "v/free/rotation/y [rad/s]", "v/free/rotation/z [rad/s]", "v/wheel [rad/s]"});
   REQUIRE(task->observation_size() == 3 + 3 + 2 + 7);
   CHECK(task->action_indices() == std::vector<int>{6});
   CHECK(task->state_scale() == (Eigen::VectorXd(15) << 1, 1, 1, 1, 1, 1, 1, 1, 8, 8, 8, 8, 8, 8, 8).finished());

@@ -1,7 +1,12 @@
 // The robots that come with the house.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "sim/environment.h"
 #include "sim/tasks/task.h"
@@ -10,11 +15,15 @@
 namespace plumb {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr double kPi = std::numbers::pi;
 
 RobotDescription LoadExample(const std::string& name) {
   return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name);
 }
+
+using Names = std::vector<std::string>;
 
 }  // namespace
 
@@ -90,6 +99,35 @@ TEST_CASE("the other examples load, and their tasks fit") {
   CHECK(MakeTask(arm)->action_size() == 2);
   CHECK(cartpole.warnings.empty());
   CHECK(arm.warnings.empty());
+}
+
+TEST_CASE("every observation has a name of its own, with its unit") {
+  const auto names = [](const std::string& robot) { return MakeTask(LoadExample(robot))->observation_names(); };
+  CHECK(names("pendulum") == Names{"cos(q/pivot)", "sin(q/pivot)", "v/pivot [rad/s]"});
+  CHECK(names("cartpole") == Names{"e/cart [m]", "sin(e/hinge)", "cos(e/hinge)", "v/cart [m/s]", "v/hinge [rad/s]"});
+  CHECK(names("hopper") == Names{"q/rootz [m]", "q/rooty [rad]", "q/thigh [rad]", "q/leg [rad]", "q/foot [rad]",
+                                 "v/rootx [m/s]", "v/rootz [m/s]", "v/rooty [rad/s]", "v/thigh [rad/s]",
+                                 "v/leg [rad/s]", "v/foot [rad/s]"});
+  int files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots")) {
+    if (entry.path().extension() != ".toml") continue;
+    ++files;
+    INFO(entry.path());
+    const RobotDescription robot = LoadRobot(entry.path().string());
+    const auto task = MakeTask(robot);
+    const size_t size = task->observation_names().size();
+    CHECK(static_cast<int>(size) == task->observation_size());
+    CHECK(std::set<std::string>(task->observation_names().begin(), task->observation_names().end()).size() == size);
+    // As many are written, and no more.
+    std::vector<float> observation(size + 1, NAN);
+    Random random(1);
+    Eigen::VectorXd q(robot.num_positions()), v(robot.num_velocities());
+    task->InitialState(random, q, v);
+    task->Observe(q, v, {observation.data(), size});
+    CHECK(std::count_if(observation.begin(), observation.end(), [](float x) { return std::isnan(x); }) == 1);
+    CHECK(std::isnan(observation.back()));
+  }
+  CHECK(files >= 4);
 }
 
 }  // namespace plumb

@@ -117,7 +117,7 @@ TEST_CASE("only what has a motor is driven") {
   arm.joints[0] = Joint("ball", Type::kSpherical, 0, 0, 0);
   arm.joints[1] = Joint("elbow", Type::kRevolute, -1, 1, 3);
   struct Blind : Task {
-    explicit Blind(const RobotDescription& description) : Task(description, 1, Eigen::VectorXd::Ones(9)) {}
+    explicit Blind(const RobotDescription& description) : Task(description, {"nothing"}, Eigen::VectorXd::Ones(9)) {}
     void Observe(const State&, const State&, std::span<float>) const override {}
     double Reward(const State&, const State&, const State&, const State&, const State&) const override { return 0; }
     void InitialState(Random&, Eigen::Ref<Eigen::VectorXd>, Eigen::Ref<Eigen::VectorXd>) const override {}
