@@ -11,12 +11,17 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <span>
 #include <sstream>
+#include <thread>
 
 #include "calibrator/batches.h"
 #include "calibrator/posterior_file.h"
 #include "common/atomic_file.h"
+#include "common/config.h"
+#include "common/ranks.h"
 #include "trainer/checkpoint.h"
+#include "trainer/onnx_policy.h"
 #include "trainer/policy_file.h"
 #include "trainer/robot_simulation.h"
 #include "trainer/trainer.h"
@@ -69,6 +74,7 @@ uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot, cons
 /// progress.csv, a line for each update. A resumed run keeps the lines up to where it goes on from.
 class ProgressTable {
  public:
+  /// @param file empty = none. @param updates to keep.
   ProgressTable(const std::string& file, int64_t updates) : file_(file) {
     if (file.empty()) return;
     std::string kept = kCsvHeader, line;
@@ -104,10 +110,12 @@ std::string Clock(double seconds) {
 /// One line that is written over where people look at it; into a file, a line now and then.
 class ProgressLine {
  public:
+  explicit ProgressLine(bool speaks) : speaks_(speaks) {}
   ~ProgressLine() {
     if (terminal_ && shown_) std::cerr << "\n";
   }
   void Show(const Trainer& trainer, const UpdateReport& report, int64_t steps, int64_t done_before) {
+    if (!speaks_) return;
     const double seconds = clock_.seconds();
     if (seconds < next_ && trainer.steps() < steps) return;
     next_ = seconds + (terminal_ ? 0.1 : 5);
@@ -122,7 +130,7 @@ class ProgressLine {
   }
 
  private:
-  bool terminal_ = isatty(STDERR_FILENO);
+  bool speaks_, terminal_ = isatty(STDERR_FILENO);
   bool shown_ = false;
   double next_ = 0;
   Stopwatch clock_;
@@ -135,11 +143,12 @@ class Training {
         process_(process),
         robot_(ReadRobot(flags_)),
         distribution_(ReadDistribution(flags_.distribution, robot_)),
-        trainer_(robot_.training, SimulateRobot(robot_), robot_.effort_limits(), flags_.seed, flags_.threads) {
+        trainer_(robot_.training, SimulateRobot(robot_), robot_.effort_limits(), flags_.seed, Threads(), ranks_) {
+    if (!speaks()) spdlog::set_level(spdlog::level::err);
     if (flags_.checkpoint.empty()) flags_.checkpoint = flags_.output + ".checkpoint";
     steps_ = flags_.steps > 0 ? static_cast<int64_t>(flags_.steps) : int64_t{robot_.training.updates} * robot_.training.batch;
     for (const std::string& file : {flags_.output, flags_.checkpoint, flags_.csv}) {
-      if (!file.empty()) RequireWritable(file);
+      if (speaks() && !file.empty()) RequireWritable(file);
     }
     std::optional<GaussianPolicy> start;
     if (!flags_.from.empty()) {
@@ -152,18 +161,19 @@ class Training {
 
   int Run() {
     const ParameterSampler sample = [this](Random& random) { return distribution_.Sample(random); };
-    ProgressTable table(flags_.csv, trainer_.updates());
+    ProgressTable table(speaks() ? flags_.csv : "", trainer_.updates());
     {
-      ProgressLine line;
+      ProgressLine line(speaks());
       const int64_t before = trainer_.steps();
       double saved = 0;
       while (trainer_.steps() < steps_) {
-        if (process_.stopping()) {
+        if (Stopping()) {
           Save();
-          std::cerr << fmt::format("\ninterrupted; the same command goes on from {}\n", flags_.checkpoint);
+          if (speaks()) std::cerr << fmt::format("\ninterrupted; the same command goes on from {}\n", flags_.checkpoint);
           return 130;
         }
         const UpdateReport report = trainer_.Update(sample);
+        training_return_ = report.mean_return;
         const bool judged = flags_.evaluate_every > 0 && trainer_.updates() % flags_.evaluate_every == 0;
         const double evaluation = judged ? trainer_.Evaluate(sample, kEvaluationEpisodes).mean : NAN;
         table.Add(trainer_, report, evaluation, clock_.seconds());
@@ -178,8 +188,38 @@ class Training {
   }
 
  private:
+  bool speaks() const { return ranks_.rank() == 0; }
+
+  int Threads() const {
+    const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    return flags_.threads > 0 ? flags_.threads : std::max(1, cores / ranks_.size());
+  }
+
+  // All ranks stop after the same update, or the others would wait for ever.
+  bool Stopping() {
+    std::byte stopping{process_.stopping()};
+    ranks_.Broadcast({&stopping, 1});
+    return stopping != std::byte{0};
+  }
+
+  // Rank 0's file, for all.
+  std::optional<Checkpoint> SharedCheckpoint() const {
+    std::optional<Checkpoint> checkpoint;
+    std::string bytes;
+    if (speaks()) {
+      checkpoint = LoadCheckpoint(flags_.checkpoint);
+      if (checkpoint) bytes = EncodeCheckpoint(*checkpoint);
+    }
+    size_t size = bytes.size();
+    ranks_.Broadcast(std::as_writable_bytes(std::span(&size, 1)));
+    if (size == 0) return {};
+    bytes.resize(size);
+    ranks_.Broadcast(std::as_writable_bytes(std::span(bytes)));
+    return DecodeCheckpoint(bytes);
+  }
+
   void Resume() {
-    const std::optional<Checkpoint> checkpoint = LoadCheckpoint(flags_.checkpoint);
+    const std::optional<Checkpoint> checkpoint = SharedCheckpoint();
     if (!checkpoint) return;
     if (checkpoint->identity != identity_) {
       throw CheckpointError(fmt::format("{} is of another run (robot, settings, distribution, start, seed or version): delete it, or give another --checkpoint",
@@ -187,14 +227,17 @@ class Training {
     }
     trainer_.Restore({GaussianPolicy::FromMessage(checkpoint->policy), checkpoint->critic, checkpoint->observations, checkpoint->updates,
                       checkpoint->steps, checkpoint->dropped_episodes});
-    std::cout << fmt::format("goes on from {}: update {}, {} steps\n", flags_.checkpoint, trainer_.updates(), trainer_.steps()) << std::flush;
+    training_return_ = checkpoint->training_return;
+    if (speaks()) std::cout << fmt::format("goes on from {}: update {}, {} steps\n", flags_.checkpoint, trainer_.updates(), trainer_.steps()) << std::flush;
   }
 
   void Save() {
+    if (!speaks()) return;
     const TrainerState state = trainer_.state();
     Checkpoint checkpoint;
     checkpoint.seed = flags_.seed, checkpoint.identity = identity_;
     checkpoint.updates = state.updates, checkpoint.steps = state.steps, checkpoint.dropped_episodes = state.dropped_episodes;
+    checkpoint.training_return = training_return_;
     checkpoint.policy = state.policy.ToMessage(), checkpoint.distribution = distribution_.ToMessage();
     checkpoint.critic = state.critic, checkpoint.observations = state.observations;
     SaveCheckpoint(flags_.checkpoint, checkpoint);
@@ -207,23 +250,43 @@ class Training {
   }
 
   void Judge(const ParameterSampler& sample) {
+    const Evaluation own = trainer_.EvaluateHeldOut(sample, flags_.held_out);
     const ParameterDistribution prior = ParameterDistribution::Prior(robot_);
+    const Evaluation on_prior = trainer_.EvaluateHeldOut([&](Random& random) { return prior.Sample(random); }, flags_.held_out);
+    if (!speaks()) return;
+    WritePolicy(own);
     std::cout << fmt::format("{} steps, {} updates, {:.1f} s\nreturn without exploration, {} simulators held out:\n", trainer_.steps(),
                              trainer_.updates(), clock_.seconds(), flags_.held_out);
-    std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Words(trainer_.EvaluateHeldOut(sample, flags_.held_out)));
-    if (flags_.distribution != "prior") {
-      const ParameterSampler of_prior = [&](Random& random) { return prior.Sample(random); };
-      std::cout << fmt::format("  {:24} {}\n", "prior", Words(trainer_.EvaluateHeldOut(of_prior, flags_.held_out)));
+    std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Words(own));
+    if (flags_.distribution != "prior") std::cout << fmt::format("  {:24} {}\n", "prior", Words(on_prior));
+    std::cout << "wrote " << flags_.output << std::endl;
+  }
+
+  void WritePolicy(const Evaluation& evaluation) const {
+    PolicyRecord record = MakePolicyRecord(robot_, *MakeTask(robot_));
+    record.posterior = flags_.distribution;
+    if (flags_.distribution != "prior" && flags_.distribution != "nominal") {  // a file's name says little: also what is in it
+      record.posterior += fmt::format(" {:016x}", Hash(ReadFile(flags_.distribution)));
     }
-    std::cout << std::flush;
+    record.seed = flags_.seed, record.steps = trainer_.steps(), record.training_return = training_return_;
+    record.evaluation["simulators"] = evaluation.episodes;
+    record.evaluation["failed"] = evaluation.failed;
+    if (std::isfinite(evaluation.mean)) {
+      record.evaluation["mean"] = evaluation.mean;
+      record.evaluation["tenth_percentile"] = evaluation.tenth;
+      record.evaluation["worst"] = evaluation.worst;
+    }
+    WriteOnnxPolicy(flags_.output, {trainer_.policy(), record});
   }
 
   TrainFlags flags_;
   Process& process_;
   Stopwatch clock_;
+  Ranks ranks_;
   RobotDescription robot_;
   ParameterDistribution distribution_;
   Trainer trainer_;
+  double training_return_ = 0;
   int64_t steps_ = 0;
   uint64_t identity_ = 0;
 };

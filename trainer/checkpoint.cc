@@ -109,6 +109,7 @@ void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.evaluation.mean);
   archive(checkpoint.evaluation.tenth);
   archive(checkpoint.evaluation.worst);
+  archive(checkpoint.training_return);
   archive.EncodedMessage(checkpoint.policy);
   archive.EncodedMessage(checkpoint.distribution);
   archive(checkpoint.critic.parameters);
@@ -131,21 +132,38 @@ uint32_t Crc(const char* data, size_t size) {
 
 }  // namespace
 
-void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
+std::string EncodeCheckpoint(const Checkpoint& checkpoint) {
   Writer body;
   Transfer(body, checkpoint);
-  std::vector<char> bytes(kHeader);
+  std::string bytes(kHeader, '\0');
   const uint32_t crc = Crc(body.bytes().data(), body.bytes().size());
   std::memcpy(bytes.data(), kMagic, sizeof kMagic);
   std::memcpy(bytes.data() + sizeof kMagic, &kVersion, sizeof kVersion);
   std::memcpy(bytes.data() + sizeof kMagic + sizeof kVersion, &crc, sizeof crc);
-  bytes.insert(bytes.end(), body.bytes().begin(), body.bytes().end());
+  bytes.append(body.bytes().data(), body.bytes().size());
+  return bytes;
+}
 
+Checkpoint DecodeCheckpoint(std::string_view bytes) {
+  if (bytes.size() < kHeader || !IsCheckpoint(bytes)) throw CheckpointError("is not a trainer's checkpoint");
+  uint32_t version = 0, crc = 0;
+  std::memcpy(&version, bytes.data() + sizeof kMagic, sizeof version);
+  std::memcpy(&crc, bytes.data() + sizeof kMagic + sizeof version, sizeof crc);
+  if (version != kVersion) throw CheckpointError(fmt::format("has version {}, not {}", version, kVersion));
+  if (crc != Crc(bytes.data() + kHeader, bytes.size() - kHeader)) throw CheckpointError("is damaged");
+  Reader body(bytes.data() + kHeader, bytes.size() - kHeader);
+  Checkpoint checkpoint;
+  Transfer(body, checkpoint);
+  if (body.left() != 0) throw CheckpointError("is too long");
+  return checkpoint;
+}
+
+void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
   const std::filesystem::path path = std::filesystem::absolute(file);
   std::error_code ignored;  // whatever is wrong with the folder, opening the file tells
   std::filesystem::create_directories(path.parent_path(), ignored);
   try {
-    WriteAtomically(path, {bytes.data(), bytes.size()});
+    WriteAtomically(path, EncodeCheckpoint(checkpoint));
   } catch (const std::runtime_error& error) {
     throw CheckpointError(error.what());
   }
@@ -166,19 +184,7 @@ std::optional<Checkpoint> LoadCheckpoint(const std::string& file) {
   }
   const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
   try {
-    if (bytes.size() < kHeader || !IsCheckpoint({bytes.data(), bytes.size()})) {
-      throw CheckpointError("is not a trainer's checkpoint");
-    }
-    uint32_t version = 0, crc = 0;
-    std::memcpy(&version, bytes.data() + sizeof kMagic, sizeof version);
-    std::memcpy(&crc, bytes.data() + sizeof kMagic + sizeof version, sizeof crc);
-    if (version != kVersion) throw CheckpointError(fmt::format("has version {}, not {}", version, kVersion));
-    if (crc != Crc(bytes.data() + kHeader, bytes.size() - kHeader)) throw CheckpointError("is damaged");
-    Reader body(bytes.data() + kHeader, bytes.size() - kHeader);
-    Checkpoint checkpoint;
-    Transfer(body, checkpoint);
-    if (body.left() != 0) throw CheckpointError("is too long");
-    return checkpoint;
+    return DecodeCheckpoint({bytes.data(), bytes.size()});
   } catch (const CheckpointError& error) {
     throw CheckpointError(fmt::format("checkpoint {} {}", file, error.what()));
   }

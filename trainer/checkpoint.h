@@ -29,6 +29,7 @@ struct Checkpoint {
   int32_t iteration_updates = 0;  ///< TRPO updates done in it
   bool complete = false;
   Evaluation evaluation;         ///< of the policy, once it is complete
+  double training_return = 0;    ///< of the last batch
   policy_t policy;
   parameter_distribution_t distribution;  ///< of the iteration
   CriticState critic;
@@ -38,6 +39,10 @@ struct Checkpoint {
 /// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint or the new
 /// one: a temporary file, fsync, rename, fsync of the folder. @throws CheckpointError.
 void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint);
+
+/// The same as bytes, e.g. for another process of this machine's kind. @throws CheckpointError if they are not what was encoded.
+std::string EncodeCheckpoint(const Checkpoint& checkpoint);
+Checkpoint DecodeCheckpoint(std::string_view bytes);
 
 /// Whether a file that begins with these bytes may be a checkpoint.
 bool IsCheckpoint(std::string_view bytes);

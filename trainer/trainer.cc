@@ -23,6 +23,7 @@ enum Stream : uint32_t {
   kHeldOutStream
 };
 
+constexpr double kTrustedBatches = 10;  // that a normaliser to begin with counts for
 constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
 
 GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFactory& make,
@@ -80,6 +81,10 @@ void Trainer::Restore(TrainerState state) {
 void Trainer::Start(const GaussianPolicy& policy) {
   if (policy.shape() != policy_.shape()) throw std::invalid_argument("trainer: the policy to begin with is another network");
   policy_ = policy;
+  if (!settings_.normalise_observations) return;
+  observations_.count = kTrustedBatches * settings_.batch;
+  observations_.mean = policy.observation_mean.cast<double>();
+  observations_.squares = observations_.count * policy.observation_scale.cast<double>().cwiseAbs2();
 }
 
 UpdateReport Trainer::Update(const ParameterSampler& sample) {

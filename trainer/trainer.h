@@ -54,7 +54,7 @@ class Trainer {
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.
   void Restore(TrainerState state);
-  /// Begins with another policy, before the first update. @throws std::invalid_argument if its network is another's.
+  /// Begins with another policy, before the first update; its normaliser counts as much as ten batches. @throws std::invalid_argument if its network is another's.
   void Start(const GaussianPolicy& policy);
   const GaussianPolicy& policy() const { return policy_; }
   int64_t updates() const { return updates_; }

@@ -9,6 +9,7 @@
 
 #include "tests/cli/shell.h"
 #include "trainer/checkpoint.h"
+#include "trainer/onnx_policy.h"
 
 namespace plumb {
 namespace {
@@ -34,6 +35,15 @@ TEST_CASE("train writes a policy, a table and what to expect of it") {
   CHECK(std::regex_search(outcome.text, std::regex("nominal +-[0-9.]+ mean, -[0-9.]+ 10th percentile, -[0-9.]+ worst")));
   CHECK(std::regex_search(outcome.text, std::regex("prior +-[0-9.]+ mean")));
   CHECK(std::regex_search(outcome.text, std::regex("return -[0-9]+.*KL 0.*gain.*explained.*entropy.*steps/s.*left")));
+  CHECK(outcome.text.find("wrote " + folder / "policy.onnx") != std::string::npos);
+  const OnnxPolicy written = ReadOnnxPolicy(folder / "policy.onnx");
+  CHECK(written.policy.ToMessage().weight == LoadCheckpoint(folder / "policy.onnx.checkpoint")->policy.weight);
+  CHECK(written.record.robot == "pendulum");
+  CHECK(written.record.posterior == "nominal");
+  CHECK(written.record.steps == 12000);
+  CHECK(written.record.evaluation.at("simulators") == 5);
+  CHECK(written.record.evaluation.at("worst") <= written.record.evaluation.at("mean"));
+  CHECK(Shell(Plumb() + "sim " + Robot("pendulum") + " --policy " + folder / "policy.onnx").status == 0);
   const auto rows = Rows(folder / "policy.onnx.csv");
   REQUIRE(rows.size() == 5);
   CHECK(rows[0] == "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,accepted,dropped_episodes");
@@ -60,6 +70,7 @@ TEST_CASE("an interrupted training goes on to the same bits, with any number of 
   REQUIRE(straight);
   REQUIRE(resumed);
   CHECK(resumed->policy.weight == straight->policy.weight);
+  CHECK(Read(folder / "resumed") == Read(folder / "straight"));
   CHECK(resumed->critic.second_moment == straight->critic.second_moment);
   SECTION("and further, if asked for more steps") {
     REQUIRE(Shell(Train(folder, "resumed", "--steps 60000")).status == 0);
@@ -71,6 +82,25 @@ TEST_CASE("an interrupted training goes on to the same bits, with any number of 
     CHECK(outcome.status == 1);
     CHECK(outcome.text.find("is of another run") != std::string::npos);
   }
+}
+
+TEST_CASE("ranks give the same bits as one process, file by file") {
+  const Folder folder;
+  REQUIRE(Shell(Train(folder, "one", "--steps 12000 --threads 2")).status == 0);
+  if (Shell("command -v mpirun").status != 0) {
+    WARN("openmpi-bin is not installed: ranks are not tested");
+    return;
+  }
+  const std::string mpirun = "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n 3 ";
+  const Outcome begun = Shell(mpirun + Train(folder, "three", "--steps 6000 --threads 1"));
+  INFO(begun.text);
+  REQUIRE(begun.status == 0);
+  const Outcome outcome = Shell(mpirun + Train(folder, "three", "--steps 12000 --threads 1"));  // from its checkpoint
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  CHECK(Read(folder / "three") == Read(folder / "one"));
+  CHECK(Rows(folder / "three.csv") == Rows(folder / "one.csv"));
+  CHECK(Read(folder / "three.checkpoint") == Read(folder / "one.checkpoint"));
 }
 
 TEST_CASE("the paper's settings are another run, and so is a guarded one") {
@@ -89,7 +119,7 @@ TEST_CASE("the paper's settings are another run, and so is a guarded one") {
 TEST_CASE("a policy to begin with") {
   const Folder folder;
   REQUIRE(Shell(Train(folder, "first", "--steps 15000")).status == 0);
-  const Outcome outcome = Shell(Train(folder, "second", "--steps 3000 --seed 2 --from " + folder / "first.checkpoint"));
+  const Outcome outcome = Shell(Train(folder, "second", "--steps 3000 --seed 2 --from " + folder / "first"));
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
   const auto first = LoadCheckpoint(folder / "first.checkpoint")->policy, second = LoadCheckpoint(folder / "second.checkpoint")->policy;
