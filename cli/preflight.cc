@@ -29,6 +29,7 @@ void RequireFree(Process& process, const std::string& bus_url, bool real) {
     if (drivers.received() > 0 || policies.received() > 0) {
       throw std::runtime_error("another run is under way on " + process.lcm_url() + ": stop it, or give --lcm-url");
     }
+    bus->SetTime(process.clock().Now());
     if (bus->Receive(frames) > 0 && !real) {
       throw std::runtime_error("somebody talks on " + bus_url + " already: give another --bus (or --real)");
     }
