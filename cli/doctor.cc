@@ -70,12 +70,18 @@ std::vector<Finding> Can() {
   return findings;
 }
 
-Finding Bus(const std::string& url) {
+std::vector<Finding> Bus(const std::string& url) {
   try {
-    OpenTransport(url);
-    return {Level::kGood, "the bus " + url + " opens", ""};
+    const auto bus = OpenTransport(url);
+    std::vector<Finding> findings{{Level::kGood, "the bus " + url + " opens", ""}};
+    for (const std::string& warning : bus->warnings()) {
+      const size_t cure = warning.find("; cure: ");
+      findings.push_back({Level::kAdvice, warning.substr(0, cure),
+                          cure == std::string::npos ? "look at it" : warning.substr(cure + 8)});
+    }
+    return findings;
   } catch (const std::exception& error) {
-    return {Level::kBad, error.what(), ""};
+    return {{Level::kBad, error.what(), ""}};
   }
 }
 
@@ -125,7 +131,7 @@ std::vector<Finding> Packages() {
 
 std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus) {
   std::vector<Finding> findings{Multicast(lcm_url), UdpBuffers()};
-  for (const auto& group : {Can(), std::vector<Finding>{Bus(bus)}, RealTime(), Packages()}) {
+  for (const auto& group : {Can(), Bus(bus), RealTime(), Packages()}) {
     findings.insert(findings.end(), group.begin(), group.end());
   }
   return findings;

@@ -14,10 +14,21 @@ constexpr int64_t kListen = 500'000;  // [us]; statuses come ten times a second,
 
 bool StartsWith(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
 
+/// The bus behind the faults of "faulty:FAULTS:URL".
+std::string Innermost(std::string url) {
+  constexpr size_t kScheme = 7;
+  while (StartsWith(url, "faulty:")) {
+    const size_t colon = url.find(':', kScheme);
+    url.erase(0, colon == std::string::npos ? kScheme : colon + 1);
+  }
+  return url;
+}
+
 }  // namespace
 
 void RequireFree(Process& process, const std::string& bus_url, bool real) {
-  if (!real && !StartsWith(bus_url, "udp:") && !StartsWith(bus_url, "socketcan:vcan")) {
+  const std::string innermost = Innermost(bus_url);
+  if (!real && !StartsWith(innermost, "udp:") && !StartsWith(innermost, "socketcan:vcan")) {
     throw std::invalid_argument(bus_url + " is neither udp: nor a vcan interface: if a robot is on it, say --real");
   }
   const auto bus = OpenTransport(bus_url);
@@ -29,6 +40,7 @@ void RequireFree(Process& process, const std::string& bus_url, bool real) {
     if (drivers.received() > 0 || policies.received() > 0) {
       throw std::runtime_error("another run is under way on " + process.lcm_url() + ": stop it, or give --lcm-url");
     }
+    bus->SetTime(process.clock().Now());
     if (bus->Receive(frames) > 0 && !real) {
       throw std::runtime_error("somebody talks on " + bus_url + " already: give another --bus (or --real)");
     }

@@ -68,6 +68,7 @@ class DriverProcess {
           else spdlog::error("the frames before the fault are lost: {}", error);
         }) {
     driver_.set_bus(bus);
+    for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
                  robot.num_joints() == 1 ? "" : "s", driver_.cycle());
   }
@@ -83,7 +84,9 @@ class DriverProcess {
     std::array<pollfd, 3> polled{{{transport_->fd(), POLLIN, 0},
                                   {process_.messenger().fd(), POLLIN, 0},
                                   {process_.stop_fd(), POLLIN, 0}}};
-    const timespec wait = clock_.RealDuration(cycle_.Remaining(clock_.Now()));
+    const int64_t now = clock_.Now();
+    const int64_t next = std::max(transport_->NextEvent(), now) - now;
+    const timespec wait = clock_.RealDuration(std::min(cycle_.Remaining(now), next));
     ppoll(polled.data(), polled.size(), &wait, nullptr);
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
     ReceiveFrames();
@@ -97,6 +100,7 @@ class DriverProcess {
   }
 
   void ReceiveFrames() {
+    transport_->SetTime(clock_.Now());
     for (int burst = 0; burst < kBursts; ++burst) {
       const int count = transport_->Receive(received_);
       if (count <= 0) break;
@@ -115,6 +119,7 @@ class DriverProcess {
     const int64_t now = clock_.Now();
     const int64_t lateness = cycle_.Advance(now);
     const std::span<const Frame> frames = driver_.Tick(now, clock_.Utime(), lateness);
+    transport_->SetTime(now);
     const int accepted = frames.empty() ? 0 : transport_->Send(frames);
     const int64_t sent = clock_.Utime();
     driver_.Transmitted(accepted, sent);

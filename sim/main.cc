@@ -62,6 +62,7 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
     if (!robot.Place(wish.utime, q, v))
       spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
   });
+  for (const std::string& warning : transport->warnings()) spdlog::warn("{}", warning);
   spdlog::info("{} is on {}", description.name, bus_url);
 
   std::array<Frame, 32> frames;
@@ -69,9 +70,11 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
   LinkState link = LinkState::kUp;
   int64_t next_reopen = 0;
   int64_t now = clock.Utime();
-  while (process.Wait(std::min(robot.NextEvent() - now, kReopenPeriod), transport->fd())) {
+  const auto until_frame = [&] { return std::max(transport->NextEvent(), clock.Now()) - clock.Now(); };
+  while (process.Wait(std::min({robot.NextEvent() - now, kReopenPeriod, until_frame()}), transport->fd())) {
     // First the time, then the frames: what arrives in between must not find the robot already past it.
     now = clock.Utime();
+    transport->SetTime(clock.Now());
     for (int burst = 0; burst < kBursts; ++burst) {
       const int count = transport->Receive(frames);
       if (count == 0) break;

@@ -19,6 +19,7 @@ struct Frame {
   bool fd = false;                     ///< CAN FD
   bool bit_rate_switch = false;        ///< FD only
   bool error_state_indicator = false;  ///< FD only
+  bool foreign = false;                ///< received, though only we may send it (Filter::own)
   uint8_t length = 0;                  ///< bytes, 0..8, FD 0..64
   std::array<uint8_t, 64> data{};
   int64_t receive_ns = 0;  ///< CLOCK_REALTIME [ns] of reception as the kernel stamped it; 0 = not received

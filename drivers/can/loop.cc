@@ -26,6 +26,12 @@ Registry& TheRegistry() {
   return registry;
 }
 
+int64_t RealtimeNs() noexcept {
+  timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  return int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
 /// Frames wait in a socket pair: the kernel gives us a bounded queue that can be polled.
 class Loop : public Transport {
  public:
@@ -51,15 +57,16 @@ class Loop : public Transport {
   }
 
   int fd() const noexcept override { return sockets_[0]; }
+  void SetTime(int64_t now) noexcept override { virtual_ns_ = now * 1000; }
 
   int Send(std::span<const Frame> frames) noexcept override {
-    timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
+    const int64_t stamp = virtual_ns_ == kNever ? RealtimeNs() : virtual_ns_;
     Registry& registry = TheRegistry();
     const std::lock_guard lock(registry.mutex);
     const auto bus = registry.buses.find(name_);
     for (Frame frame : frames) {
-      frame.receive_ns = int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+      frame.receive_ns = stamp;
+      frame.foreign = false;
       for (Loop* member : bus->second) {
         if (member != this) member->Deliver(frame);
       }
@@ -72,7 +79,9 @@ class Loop : public Transport {
     int count = 0;
     while (static_cast<size_t>(count) < frames.size() &&
            recv(sockets_[0], &frames[static_cast<size_t>(count)], sizeof(Frame), 0) == sizeof(Frame)) {
-      ++count;
+      Frame& frame = frames[static_cast<size_t>(count++)];
+      frame.foreign = IsOurs(frame);
+      if (frame.foreign) ++stats_.foreign;
     }
     stats_.received += count;
     stats_.lost = overflows_;
@@ -86,6 +95,7 @@ class Loop : public Transport {
 
   std::string name_;
   int sockets_[2];
+  int64_t virtual_ns_ = kNever;
   std::atomic<int64_t> overflows_ = 0;
 };
 

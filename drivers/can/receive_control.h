@@ -10,9 +10,6 @@
 
 namespace plumb {
 
-/// Datagrams that one call of Receive looks at, echoes, malformed and unwanted ones included.
-inline constexpr size_t kMostExamined = 128;
-
 /// Room for what the kernel says about a received datagram.
 struct ControlBuffer {
   alignas(cmsghdr) char bytes[256];
@@ -20,7 +17,7 @@ struct ControlBuffer {
 
 /// What it said.
 struct ReceiveControl {
-  int64_t receive_ns = 0;           ///< CLOCK_REALTIME of arrival: the adapter's stamp if there is one
+  int64_t receive_ns = 0;           ///< CLOCK_REALTIME of arrival in the kernel; 0 = not stamped
   std::optional<int64_t> overflow;  ///< datagrams this socket has lost since it was opened (SO_RXQ_OVFL)
 };
 

@@ -1,24 +1,27 @@
 #include "drivers/can/socketcan.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
 #include <linux/net_tstamp.h>
+#include <linux/netlink.h>
+#include <linux/rtnetlink.h>
 #include <net/if.h>
 #include <net/if_arp.h>
+#include <sys/epoll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
 
+#include "drivers/can/can_link.h"
+#include "drivers/can/datagram_transport.h"
+#include "drivers/can/error_frame.h"
 #include "drivers/can/file_descriptor.h"
-#include "drivers/can/receive_control.h"
 
 namespace plumb {
 namespace {
@@ -38,10 +41,12 @@ size_t ToKernel(const Frame& frame, canfd_frame& out) noexcept {
 }
 
 /// @return false for a size or length that is no frame's.
-bool FromKernel(const canfd_frame& in, size_t size, Frame& frame) noexcept {
-  if (size != CAN_MTU && size != CANFD_MTU) return false;
+bool FromKernel(std::span<const uint8_t> datagram, Frame& frame) noexcept {
+  if (datagram.size() != CAN_MTU && datagram.size() != CANFD_MTU) return false;
+  canfd_frame in{};
+  std::ranges::copy(datagram, reinterpret_cast<uint8_t*>(&in));
   frame = Frame{};
-  frame.fd = size == CANFD_MTU;
+  frame.fd = datagram.size() == CANFD_MTU;
   frame.extended = (in.can_id & CAN_EFF_FLAG) != 0;
   frame.remote = (in.can_id & CAN_RTR_FLAG) != 0;
   frame.error = (in.can_id & CAN_ERR_FLAG) != 0;
@@ -57,10 +62,10 @@ bool FromKernel(const canfd_frame& in, size_t size, Frame& frame) noexcept {
   return true;
 }
 
-class SocketCan : public Transport {
+class SocketCan : public DatagramTransport {
  public:
   SocketCan(const std::string& interface, std::vector<Filter> filters)
-      : Transport(std::move(filters)), interface_(interface) {
+      : DatagramTransport(std::move(filters)), interface_(interface) {
     if (interface.empty() || interface.size() >= IFNAMSIZ) {
       throw std::runtime_error(fmt::format("socketcan:{}: not an interface name, such as can0", interface));
     }
@@ -70,6 +75,7 @@ class SocketCan : public Transport {
       kernel_filters_.push_back(
           {.can_id = filter.id, .can_mask = filter.mask | CAN_EFF_FLAG | (filter.remote ? 0 : CAN_RTR_FLAG)});
     }
+    epoll_ = FileDescriptor(epoll_create1(EPOLL_CLOEXEC));
     socket_ = OpenSocket();
     switch (socket_.valid() ? 0 : errno) {
       case 0:
@@ -87,70 +93,28 @@ class SocketCan : public Transport {
       default:
         Fail(std::strerror(errno));
     }
+    WatchLinks();
     link_ = InterfaceState();
-    for (size_t i = 0; i < kBatch; ++i) {
-      parts_[i] = {&buffers_[i], sizeof buffers_[i]};
-      messages_[i].msg_hdr.msg_iov = &parts_[i];
-      messages_[i].msg_hdr.msg_iovlen = 1;
-    }
+    AddWarnings();
   }
 
-  int fd() const noexcept override { return socket_.get(); }
-
-  int Send(std::span<const Frame> frames) noexcept override {
-    size_t sent = 0;
-    for (; sent < frames.size(); ++sent) {
-      canfd_frame frame;
-      const size_t size = ToKernel(frames[sent], frame);
-      if (send(socket_.get(), &frame, size, MSG_NOSIGNAL) != static_cast<ssize_t>(size)) {
-        OnError(errno);
-        break;
-      }
-    }
-    stats_.sent += static_cast<int64_t>(sent);
-    stats_.refused += static_cast<int64_t>(frames.size() - sent);
-    return static_cast<int>(sent);
-  }
-
-  int Receive(std::span<Frame> frames) noexcept override {
-    int count = 0;
-    // What is not handed out counts, too: a flood of it must not keep us.
-    for (size_t left = kMostExamined; left > 0 && static_cast<size_t>(count) < frames.size();) {
-      const size_t room = std::min({frames.size() - static_cast<size_t>(count), kBatch, left});
-      for (size_t i = 0; i < room; ++i) {
-        msghdr& header = messages_[i].msg_hdr;
-        header.msg_control = controls_[i].bytes;
-        header.msg_controllen = sizeof controls_[i].bytes;
-        header.msg_flags = 0;
-      }
-      const int got = recvmmsg(socket_.get(), messages_.data(), static_cast<unsigned>(room), 0, nullptr);
-      if (got < 0) {
-        OnError(errno);
-        break;
-      }
-      left -= static_cast<size_t>(got);
-      for (int i = 0; i < got; ++i) {
-        if (Take(static_cast<size_t>(i), frames[static_cast<size_t>(count)])) ++count;
-      }
-    }
-    stats_.received += count;
-    return count;
-  }
+  int fd() const noexcept override { return epoll_.get(); }
 
   LinkState Reopen() noexcept override {
     const LinkState state = InterfaceState();
-    // After a removal the old socket is dead, even if an interface of the same name has come: a new socket
-    // takes the old one's number.
+    // After a removal the old socket is dead, even if an interface of the same name has come, and binding it
+    // again does not bring its filters back: a new one takes its place.
     if (state != LinkState::kGone && (link_ == LinkState::kGone || InterfaceIndex() != index_)) {
-      const FileDescriptor fresh = OpenSocket();
-      if (!fresh.valid() || dup3(fresh.get(), socket_.get(), O_CLOEXEC) < 0) return link_ = LinkState::kGone;
+      FileDescriptor fresh = OpenSocket();
+      if (!fresh.valid()) return link_ = LinkState::kGone;
+      std::swap(socket_, fresh);
+      NoteNewReceiver();
     }
+    if (link_ != LinkState::kUp) bus_off_ = false;  // down and up has restarted the controller
     return link_ = state;
   }
 
  private:
-  static constexpr size_t kBatch = 16;
-
   [[noreturn]] void Fail(const std::string& what) const {
     throw std::runtime_error(fmt::format("socketcan:{}: {}", interface_, what));
   }
@@ -200,8 +164,8 @@ class SocketCan : public Transport {
     set(SOL_CAN_RAW, CAN_RAW_LOOPBACK, 1);       // candump on this machine sees our commands
     set(SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, 1);  // counted as echoes, not handed out
     set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1);
-    // The default receive buffer holds 278 frames: 35 ms of a busy bus.
-    if (!set(SOL_SOCKET, SO_RCVBUFFORCE, 4 << 20)) set(SOL_SOCKET, SO_RCVBUF, 4 << 20);
+    // The default receive buffer holds 278 frames: 35 ms of a busy bus. Beyond rmem_max needs CAP_NET_ADMIN.
+    if (!set(SOL_SOCKET, SO_RCVBUFFORCE, kReceiveBuffer)) set(SOL_SOCKET, SO_RCVBUF, kReceiveBuffer);
     // The least the kernel allows: about ten frames in flight, then EAGAIN. A long queue of torques would be
     // sent to the motors when a dead bus comes back.
     set(SOL_SOCKET, SO_SNDBUF, 0);
@@ -211,41 +175,101 @@ class SocketCan : public Transport {
     sockaddr_can address{};
     address.can_family = AF_CAN;
     address.can_ifindex = index;
-    if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return {};
+    if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 || !Watch(fd)) return {};
     index_ = index;
     return fresh;
   }
 
+  bool Watch(int fd) noexcept {
+    epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
+    return epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) == 0;
+  }
+
+  /// The kernel's notes on interfaces that come, go and change. Without them only Reopen finds out.
+  void WatchLinks() {
+    links_ = FileDescriptor(socket(AF_NETLINK, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, NETLINK_ROUTE));
+    sockaddr_nl address{};
+    address.nl_family = AF_NETLINK;
+    address.nl_groups = RTMGRP_LINK;
+    if (!links_.valid() ||
+        bind(links_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+        !Watch(links_.get())) {
+      links_ = FileDescriptor();
+    }
+  }
+
+  /// True if there have been notes. What they say does not matter: the interface itself is looked at.
+  bool LinksChanged() noexcept {
+    bool changed = false;
+    char any;
+    for (int i = 0; i < kMostNotes; ++i) {
+      if (recv(links_.get(), &any, sizeof any, MSG_TRUNC) < 0 && errno != ENOBUFS) break;
+      changed = true;
+    }
+    return changed;
+  }
+
+  void AddWarnings() {
+    const auto link = ReadCanLink(index_);
+    if (link && link->restart_ms == 0u) {
+      warnings_.push_back(
+          fmt::format("socketcan:{0}: restart-ms is 0: once bus-off, the controller stays off; cure: ip link "
+                      "set {0} down && "
+                      "ip link set {0} type can restart-ms 100 && ip link set {0} up",
+                      interface_));
+    }
+    int bytes = 0;
+    socklen_t size = sizeof bytes;
+    getsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &bytes, &size);
+    if (bytes < kReceiveBuffer) {
+      warnings_.push_back(fmt::format(
+          "socketcan:{}: the receive buffer holds about {} frames only; cure: sysctl -w net.core.rmem_max={}",
+          interface_, bytes / kBytesPerFrame, kReceiveBuffer));
+    }
+  }
+
+  int sender() const noexcept override { return socket_.get(); }
+  int receiver() const noexcept override { return socket_.get(); }
+  bool may_send() const noexcept override { return !bus_off_; }
+
+  size_t Encode(const Frame& frame, std::span<uint8_t> datagram) noexcept override {
+    canfd_frame out;
+    const size_t size = ToKernel(frame, out);
+    std::memcpy(datagram.data(), &out, size);
+    return size;
+  }
+  bool Decode(std::span<const uint8_t> datagram, Frame& frame) noexcept override {
+    if (!FromKernel(datagram, frame)) return false;
+    const BusEvent event = DecodeErrorFrame(frame);
+    // Who hears a frame is on the bus.
+    if (event == BusEvent::kRestarted || !frame.error) bus_off_ = false;
+    if (event == BusEvent::kBusOff) bus_off_ = true;
+    return true;
+  }
+  bool IsEcho(const Datagram& datagram) const noexcept override {
+    return (datagram.flags & MSG_CONFIRM) != 0;  // sent by this very socket
+  }
+
   /// ENETDOWN and ENODEV come once; afterwards a dead socket looks like a quiet bus. So the state is kept.
-  void OnError(int error) noexcept {
+  void OnSendError(int error) noexcept override {
     if (error == ENETDOWN) link_ = LinkState::kDown;
     if (error == ENODEV || error == ENXIO) link_ = LinkState::kGone;
   }
-
-  bool Take(size_t index, Frame& frame) noexcept {
-    const mmsghdr& message = messages_[index];
-    const ReceiveControl control = ReadControl(message.msg_hdr);
-    if (control.overflow) stats_.lost = *control.overflow;
-    if ((message.msg_hdr.msg_flags & MSG_CONFIRM) != 0) {
-      ++stats_.echoes;
-      return false;
-    }
-    if (!FromKernel(buffers_[index], message.msg_len, frame)) {
-      ++stats_.malformed;
-      return false;
-    }
-    frame.receive_ns = control.receive_ns;
-    return true;
+  void OnReceiveError(int error) noexcept override {
+    OnSendError(error);
+    // Not before the socket has told that it failed: who asks for link() must see that the bus was away.
+    if (error == EAGAIN && links_.valid() && LinksChanged()) Reopen();
   }
+
+  static constexpr int kMostNotes = 64;           // read in one go
+  static constexpr int kReceiveBuffer = 4 << 20;  // bytes
+  static constexpr int kBytesPerFrame = 766;      // of it; measured: 278 frames in 212992 bytes
 
   std::string interface_;
   int index_ = 0;
+  bool bus_off_ = false;
   std::vector<can_filter> kernel_filters_;
-  FileDescriptor socket_;
-  std::array<canfd_frame, kBatch> buffers_;
-  std::array<ControlBuffer, kBatch> controls_;
-  std::array<iovec, kBatch> parts_;
-  std::array<mmsghdr, kBatch> messages_{};
+  FileDescriptor epoll_, links_, socket_;
 };
 
 }  // namespace

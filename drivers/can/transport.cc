@@ -2,23 +2,34 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
+#include "drivers/can/faulty.h"
 #include "drivers/can/loop.h"
+#include "drivers/can/replay.h"
 #include "drivers/can/socketcan.h"
 #include "drivers/can/udp.h"
 
 namespace plumb {
+namespace {
+
+bool Matches(const Filter& filter, const Frame& frame) noexcept {
+  return !frame.extended && (frame.id & filter.mask) == (filter.id & filter.mask) &&
+         (filter.remote || !frame.remote);
+}
+
+}  // namespace
 
 bool Transport::Passes(const Frame& frame) const noexcept {
   if (filters_.empty() || frame.error) return true;
-  for (const Filter& filter : filters_) {
-    if (!frame.extended && (frame.id & filter.mask) == (filter.id & filter.mask) &&
-        (filter.remote || !frame.remote)) {
-      return true;
-    }
-  }
-  return false;
+  return std::ranges::any_of(filters_, [&](const Filter& filter) { return Matches(filter, frame); });
+}
+
+bool Transport::IsOurs(const Frame& frame) const noexcept {
+  if (frame.error) return false;
+  return std::ranges::any_of(filters_,
+                             [&](const Filter& filter) { return filter.own && Matches(filter, frame); });
 }
 
 std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters) {
@@ -28,8 +39,12 @@ std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Fil
   if (scheme == "socketcan") return OpenSocketCan(rest, std::move(filters));
   if (scheme == "udp") return OpenUdp(rest, std::move(filters));
   if (scheme == "loop") return OpenLoop(rest, std::move(filters));
+  if (scheme == "faulty") return OpenFaulty(rest, std::move(filters));
+  if (scheme == "replay") return OpenReplay(rest, std::move(filters));
   throw std::runtime_error(
-      fmt::format("bus '{}' is not socketcan:INTERFACE, udp:GROUP:PORT or loop:NAME", url));
+      fmt::format("bus '{}' is not socketcan:INTERFACE, udp:GROUP:PORT, loop:NAME, replay:FILE or "
+                  "faulty:FAULTS:BUS",
+                  url));
 }
 
 }  // namespace plumb

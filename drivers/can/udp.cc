@@ -7,15 +7,13 @@
 #include <sys/socket.h>
 #include <time.h>
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
 #include <stdexcept>
 
+#include "drivers/can/datagram_transport.h"
 #include "drivers/can/file_descriptor.h"
-#include "drivers/can/receive_control.h"
 #include "drivers/can/udp_codec.h"
 
 namespace plumb {
@@ -45,10 +43,10 @@ bool SetOption(int fd, int level, int option, const Value& value) {
   return setsockopt(fd, level, option, &value, sizeof value) == 0;
 }
 
-class Udp : public Transport {
+class Udp : public DatagramTransport {
  public:
   Udp(const std::string& address, std::vector<Filter> filters)
-      : Transport(std::move(filters)), url_("udp:" + address), group_(ParseAddress(address)) {
+      : DatagramTransport(std::move(filters)), url_("udp:" + address), group_(ParseAddress(address)) {
     receiver_ = FileDescriptor(socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     sender_ = FileDescriptor(socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     if (!receiver_.valid() || !sender_.valid()) Fail("cannot create a socket");
@@ -81,56 +79,9 @@ class Udp : public Transport {
     // Our own datagrams come back to us; this source address tells them from others'.
     socklen_t length = sizeof own_;
     getsockname(out, reinterpret_cast<sockaddr*>(&own_), &length);
-    for (size_t i = 0; i < kBatch; ++i) {
-      parts_[i] = {buffers_[i].data(), buffers_[i].size()};
-      messages_[i].msg_hdr.msg_iov = &parts_[i];
-      messages_[i].msg_hdr.msg_iovlen = 1;
-    }
   }
 
   int fd() const noexcept override { return receiver_.get(); }
-
-  int Send(std::span<const Frame> frames) noexcept override {
-    timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    const double timestamp = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-    std::array<uint8_t, kMaxUdpDatagram> datagram;
-    size_t sent = 0;
-    for (; sent < frames.size(); ++sent) {
-      const size_t size = EncodeUdp(frames[sent], timestamp, datagram);
-      if (send(sender_.get(), datagram.data(), size, MSG_NOSIGNAL) != static_cast<ssize_t>(size)) {
-        if (errno == ENETDOWN || errno == ENETUNREACH || errno == ENODEV) link_ = LinkState::kDown;
-        break;
-      }
-    }
-    stats_.sent += static_cast<int64_t>(sent);
-    stats_.refused += static_cast<int64_t>(frames.size() - sent);
-    return static_cast<int>(sent);
-  }
-
-  int Receive(std::span<Frame> frames) noexcept override {
-    int count = 0;
-    // What is not handed out counts, too: a flood of it must not keep us.
-    for (size_t left = kMostExamined; left > 0 && static_cast<size_t>(count) < frames.size();) {
-      const size_t room = std::min({frames.size() - static_cast<size_t>(count), kBatch, left});
-      for (size_t i = 0; i < room; ++i) {
-        msghdr& header = messages_[i].msg_hdr;
-        header.msg_name = &sources_[i];
-        header.msg_namelen = sizeof sources_[i];
-        header.msg_control = controls_[i].bytes;
-        header.msg_controllen = sizeof controls_[i].bytes;
-        header.msg_flags = 0;
-      }
-      const int got = recvmmsg(receiver_.get(), messages_.data(), static_cast<unsigned>(room), 0, nullptr);
-      if (got <= 0) break;
-      left -= static_cast<size_t>(got);
-      for (int i = 0; i < got; ++i) {
-        if (Take(static_cast<size_t>(i), frames[static_cast<size_t>(count)])) ++count;
-      }
-    }
-    stats_.received += count;
-    return count;
-  }
 
   LinkState Reopen() noexcept override {
     // Nothing tells us that a route is back except sending: the next Send finds out.
@@ -138,39 +89,37 @@ class Udp : public Transport {
   }
 
  private:
-  static constexpr size_t kBatch = 16;
+  static_assert(kMaxUdpDatagram <= kMaxDatagram);
 
   [[noreturn]] void Fail(const char* what) const {
     throw std::runtime_error(fmt::format("{}: {} ({})", url_, what, std::strerror(errno)));
   }
 
-  bool Take(size_t index, Frame& frame) noexcept {
-    const mmsghdr& message = messages_[index];
-    const ReceiveControl control = ReadControl(message.msg_hdr);
-    if (control.overflow) stats_.lost = *control.overflow;
-    const sockaddr_in& source = sources_[index];
-    if (source.sin_port == own_.sin_port && source.sin_addr.s_addr == own_.sin_addr.s_addr) {
-      ++stats_.echoes;
-      return false;
-    }
-    if ((message.msg_hdr.msg_flags & MSG_TRUNC) != 0 ||
-        !DecodeUdp(std::span(buffers_[index]).first(message.msg_len), frame)) {
-      ++stats_.malformed;
-      return false;
-    }
-    frame.receive_ns = control.receive_ns;
-    return Passes(frame);
+  int sender() const noexcept override { return sender_.get(); }
+  int receiver() const noexcept override { return receiver_.get(); }
+
+  size_t Encode(const Frame& frame, std::span<uint8_t> datagram) noexcept override {
+    timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    const double timestamp = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+    return EncodeUdp(frame, timestamp, datagram);
   }
+  bool Decode(std::span<const uint8_t> datagram, Frame& frame) noexcept override {
+    return DecodeUdp(datagram, frame);
+  }
+  bool IsEcho(const Datagram& datagram) const noexcept override {
+    return datagram.source.sin_port == own_.sin_port &&
+           datagram.source.sin_addr.s_addr == own_.sin_addr.s_addr;
+  }
+  void OnSendError(int error) noexcept override {
+    if (error == ENETDOWN || error == ENETUNREACH || error == ENODEV) link_ = LinkState::kDown;
+  }
+  void OnReceiveError(int) noexcept override {}
 
   std::string url_;
   sockaddr_in group_;
   sockaddr_in own_{};
   FileDescriptor receiver_, sender_;
-  std::array<std::array<uint8_t, kMaxUdpDatagram>, kBatch> buffers_;
-  std::array<ControlBuffer, kBatch> controls_;
-  std::array<sockaddr_in, kBatch> sources_;
-  std::array<iovec, kBatch> parts_;
-  std::array<mmsghdr, kBatch> messages_{};
 };
 
 }  // namespace

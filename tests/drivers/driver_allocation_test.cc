@@ -1,9 +1,13 @@
 // No allocation in the driver's cycle, whatever happens in it. This binary counts what operator new is asked
 // for.
 
+#include <unistd.h>
+
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <new>
 
 #include "drivers/can/transport.h"
@@ -88,6 +92,37 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   ::operator delete(::operator new(1));
   const long after = allocations;
   CHECK(after == before + 1);
+}
+
+TEST_CASE("an open transport allocates nothing, faults or not") {
+  const std::string name = "/tmp/driver_allocation_test." + std::to_string(getpid()) + ".log";
+  std::ofstream(name) << "(1.0) can0 029#11\n(1.1) can0 029#R\n";
+  std::array<Frame, 16> frames;
+  const FrameBatch batch = [] {
+    FrameBatch all;
+    for (int i = 0; i < 20; ++i) all.Push(*FrameFromText("02E#0000C03F00000000"));
+    return all;
+  }();
+  for (const std::string& url :
+       {std::string("loop:open"), "udp:239.74.163.79:" + std::to_string(20'000 + getpid() % 20'000),
+        "replay:" + name,
+        std::string("faulty:loss=0.1,duplicate=0.1,reorder=0.1,corrupt=0.1,delay=1ms,jitter=1ms,full=0.01,"
+                    "errors=0.1,busoff=0.0001:loop:open")}) {
+    INFO(url);
+    const auto one = OpenTransport(url), other = OpenTransport(url);
+    const long before = allocations;
+    for (int64_t now = 0; now < 1'000'000; now += 1000) {
+      for (Transport* transport : {one.get(), other.get()}) {
+        transport->SetTime(now);
+        transport->Send(batch.frames());
+        transport->Receive(frames);
+        transport->Reopen();
+      }
+    }
+    CHECK(allocations == before);
+    CHECK(one->stats().sent > 1000);
+  }
+  std::remove(name.c_str());
 }
 
 }  // namespace

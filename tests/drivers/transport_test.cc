@@ -77,6 +77,43 @@ TEST_CASE("a loop keeps the order and counts what it loses") {
   CHECK(b->stats().received == received);
 }
 
+TEST_CASE("a loop that is told the time stamps with it") {
+  const auto a = OpenTransport("loop:time"), b = OpenTransport("loop:time");
+  a->SetTime(123'456);
+  const Frame frame = *FrameFromText("029#11");
+  a->Send({&frame, 1});
+  std::array<Frame, 2> frames;
+  REQUIRE(b->Receive(frames) == 1);
+  CHECK(frames[0].receive_ns == 123'456'000);
+  CHECK(b->NextEvent() == Transport::kNever);
+}
+
+TEST_CASE("frames that only we may send are marked when another sends them") {
+  for (const std::string& url : {std::string("loop:foreign"), UdpUrl()}) {
+    INFO(url);
+    const std::vector<Filter> filters = {
+        {.id = 0x20, .mask = 0x7E0}, {.id = 0x2E, .own = true}, {.id = 0x100}};
+    const auto master = OpenTransport(url, filters), second = OpenTransport(url, filters);
+    std::vector<Frame> commands;
+    for (const char* text :
+         {"02E#00", "029#11", "02E#R", "0000002E#22", "100#", "20000040#0000000000000000"}) {
+      commands.push_back(*FrameFromText(text));
+    }
+    REQUIRE(second->Send(commands) == 6);
+    const std::vector<Frame> received = ReceiveAll(*master, 4);
+    REQUIRE(received.size() == 4);
+    for (const Frame& frame : received) CHECK(frame.foreign == (ToText(frame) == "02E#00"));
+    CHECK(master->stats().foreign == 1);
+    // What is passed on does not keep the mark.
+    REQUIRE(master->Send(std::span(received).first(2)) == 2);
+    const std::vector<Frame> returned = ReceiveAll(*second, 2);
+    REQUIRE(returned.size() == 2);
+    CHECK(returned[0].foreign);
+    CHECK_FALSE(returned[1].foreign);
+    CHECK(second->stats().foreign == 1);
+  }
+}
+
 TEST_CASE("filters let in what they name") {
   const auto a = OpenTransport("loop:filters");
   const auto host = OpenTransport("loop:filters", {{.id = 0x20, .mask = 0x7E0}});

@@ -2,59 +2,22 @@
 // that has vcan0 and ends with the test. Anywhere else every case fails or the whole is skipped; nothing
 // passes untested.
 
+#include <net/if.h>
 #include <poll.h>
 
 #include <array>
 #include <catch2/catch.hpp>
-#include <cstdlib>
-#include <string>
-#include <vector>
 
+#include "drivers/can/can_link.h"
 #include "drivers/can/error_frame.h"
 #include "drivers/can/transport.h"
 #include "tests/drivers/rig.h"
+#include "tests/drivers/socketcan/vcan.h"
 
 namespace plumb {
 namespace {
 
 using Catch::Matchers::Contains;
-using Texts = std::vector<std::string>;
-
-void RequireVcan() {
-  const char* backend = std::getenv("WITH_VCAN");
-  if (backend == nullptr) FAIL("run by tests/with-vcan");
-  // There vcan0 is the machine's own and not ours to remove: CTest counts this as skipped.
-  if (std::string(backend) == "native") std::exit(77);
-}
-
-void Shell(const std::string& command) {
-  INFO(command);
-  REQUIRE(std::system(command.c_str()) == 0);
-}
-
-/// vcan0, new and up, whatever the case before did with it.
-void FreshVcan() {
-  RequireVcan();
-  Shell("ip link del vcan0 2>/dev/null; ip link add dev vcan0 type vcan && ip link set vcan0 up");
-}
-
-/// All frames that arrive until nothing does for a while.
-Texts ReceiveAll(Transport& transport, int patience_ms = 200) {
-  Texts texts;
-  std::array<Frame, 8> frames;
-  for (;;) {
-    const int count = transport.Receive(frames);
-    for (int i = 0; i < count; ++i) texts.push_back(ToText(frames[static_cast<size_t>(i)]));
-    pollfd polled{transport.fd(), POLLIN, 0};
-    if (count == 0 && poll(&polled, 1, patience_ms) != 1) return texts;
-  }
-}
-
-int Send(Transport& transport, const Texts& texts) {
-  std::vector<Frame> frames;
-  for (const std::string& text : texts) frames.push_back(*FrameFromText(text));
-  return transport.Send(frames);
-}
 
 TEST_CASE("frames of every kind cross vcan, stamped; the sender's echo is only counted") {
   FreshVcan();
@@ -100,7 +63,46 @@ TEST_CASE("the kernel filters: other nodes, remote frames and 29-bit ids stay ou
   CHECK(Send(*sender, all) == 6);
   Shell("cansend vcan0 20000040#0000000000000000");
   CHECK(ReceiveAll(*host) == Texts{"029#11", "03F#22", "20000040#0000000000000000"});
-  CHECK(ReceiveAll(*drive) == Texts{"029#11", "029#R", "03F#22", "20000040#0000000000000000"});
+  // What stays out does not even wake us.
+  CHECK(Send(*sender, {"029#R", "049#11", "00000029#11"}) == 3);
+  CHECK_FALSE(Readable(*host, 50));
+  CHECK(ReceiveAll(*drive) == Texts{"029#11", "029#R", "03F#22", "20000040#0000000000000000", "029#R"});
+}
+
+TEST_CASE("another's command is told from our own echo, though it comes from this machine") {
+  FreshVcan();
+  const std::vector<Filter> filters = {{.id = 0x20, .mask = 0x7E0}, {.id = 0x2E, .own = true}};
+  const auto master = OpenTransport("socketcan:vcan0", filters),
+             second = OpenTransport("socketcan:vcan0", filters);
+  CHECK(Send(*master, {"02E#01", "02E#02"}) == 2);
+  CHECK(ReceiveAll(*master).empty());
+  CHECK(master->stats().echoes == 2);
+  CHECK(master->stats().foreign == 0);
+  CHECK(ReceiveAll(*second) == Texts{"02E#01", "02E#02"});
+  CHECK(second->stats().foreign == 2);
+
+  Shell("cansend vcan0 029#11 && cansend vcan0 02E#22 && cansend vcan0 02E#R && cansend vcan0 0000002E#33");
+  std::array<Frame, 8> frames;
+  REQUIRE(Readable(*master, 1000));
+  REQUIRE(master->Receive(frames) == 2);
+  CHECK_FALSE(frames[0].foreign);
+  CHECK(frames[1].foreign);
+  CHECK(ToText(frames[1]) == "02E#22");
+  CHECK(master->stats().foreign == 1);
+}
+
+TEST_CASE("a batch goes out whole and in order") {
+  FreshVcan();
+  const auto a = OpenTransport("socketcan:vcan0"), b = OpenTransport("socketcan:vcan0");
+  Texts texts;
+  for (int i = 0; i < 100; ++i) {
+    Frame frame{.id = 0x100};
+    frame.length = 1;
+    frame.data[0] = static_cast<uint8_t>(i);
+    texts.push_back(ToText(frame));
+  }
+  CHECK(Send(*a, texts) == 100);
+  CHECK(ReceiveAll(*b) == texts);
 }
 
 TEST_CASE("a bus-off error frame stops the driver") {
@@ -136,11 +138,16 @@ TEST_CASE("the interface goes down and comes up") {
   CHECK(bus->stats().refused == 2);
 
   Shell("ip link set vcan0 up");
-  CHECK(bus->Reopen() == LinkState::kUp);
+  CHECK(Readable(*bus, 1000));  // the kernel says so
+  CHECK(ReceiveAll(*bus).empty());
+  CHECK(bus->link() == LinkState::kUp);
   CHECK(bus->fd() == fd);
-  CHECK(other->Reopen() == LinkState::kUp);
+  CHECK(other->Reopen() == LinkState::kUp);  // or one asks
+  std::array<Frame, 1> none;
+  CHECK(other->Receive(none) == 0);
+  CHECK(other->link() == LinkState::kDown);  // it was, and nobody shall miss it
   ReceiveAll(*other);
-  CHECK(other->Reopen() == LinkState::kUp);
+  CHECK(other->link() == LinkState::kUp);
   CHECK(Send(*bus, {"02E#02"}) == 1);
   CHECK(ReceiveAll(*other) == Texts{"02E#02"});  // what was refused is not sent later
   CHECK(Send(*other, {"029#03", "049#03"}) == 2);
@@ -154,7 +161,7 @@ TEST_CASE("an interface that is down at the start") {
   CHECK(bus->link() == LinkState::kDown);
   Shell("ip link set vcan0 up");
   ReceiveAll(*bus);
-  CHECK(bus->Reopen() == LinkState::kUp);
+  CHECK(bus->link() == LinkState::kUp);
   CHECK(Send(*bus, {"02E#00"}) == 1);
 }
 
@@ -168,8 +175,12 @@ TEST_CASE("the interface is removed and comes back") {
   CHECK(Send(*bus, {"02E#00"}) == 0);
   CHECK(bus->Reopen() == LinkState::kGone);
   CHECK(bus->Reopen() == LinkState::kGone);
+  const unsigned before = if_nametoindex("vcan0");
   FreshVcan();
-  CHECK(bus->Reopen() == LinkState::kUp);
+  CHECK(if_nametoindex("vcan0") != before);
+  CHECK(Readable(*bus, 1000));
+  CHECK(ReceiveAll(*bus).empty());
+  CHECK(bus->link() == LinkState::kUp);
   CHECK(bus->fd() == fd);
   const auto other = OpenTransport("socketcan:vcan0");
   CHECK(Send(*bus, {"02E#01"}) == 1);
@@ -182,9 +193,11 @@ TEST_CASE("an interface that is replaced between two looks") {
   FreshVcan();
   const auto bus = OpenTransport("socketcan:vcan0");
   FreshVcan();
-  ReceiveAll(*bus);
+  std::array<Frame, 1> none;
+  CHECK(bus->Receive(none) == 0);
   CHECK(bus->link() != LinkState::kUp);
-  CHECK(bus->Reopen() == LinkState::kUp);
+  CHECK(ReceiveAll(*bus).empty());
+  CHECK(bus->link() == LinkState::kUp);
   Shell("cansend vcan0 029#04");
   CHECK(ReceiveAll(*bus) == Texts{"029#04"});
 }
@@ -214,6 +227,15 @@ TEST_CASE("interfaces that are none") {
   CHECK_THROWS_WITH(OpenTransport("socketcan:can7"),
                     Contains("socketcan:can7: no such interface") && Contains("ip link add can7 type vcan"));
   CHECK_THROWS_WITH(OpenTransport("socketcan:lo"), Contains("socketcan:lo: not a CAN interface"));
+}
+
+TEST_CASE("the kernel tells what an interface is, to anybody") {
+  FreshVcan();
+  const auto link = ReadCanLink(static_cast<int>(if_nametoindex("vcan0")));
+  REQUIRE(link);
+  CHECK(link->kind == "vcan");
+  CHECK_FALSE(link->restart_ms);
+  CHECK_FALSE(ReadCanLink(12345));
 }
 
 }  // namespace
