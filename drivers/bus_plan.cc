@@ -40,8 +40,8 @@ int64_t Releases(const Task& task, int64_t window) {
   return (window + task.jitter + task.period - 1) / task.period;
 }
 
-/// The last of the tasks, the others before it in priority, all with periods; `blocking` [ns] of what may have
-/// begun. @return [ns] or -1: it may wait for ever.
+/// The last of the tasks, the others before it in priority, all with periods; `blocking` [ns] of what may
+/// have begun. @return [ns] or -1: it may wait for ever.
 int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) {
   const Task& own = tasks.back();
   double load = 0;
@@ -78,8 +78,10 @@ void ComputeResponses(BusPlan& plan) {
     Row& row = plan.rows[i];
     if (row.message.period <= 0) continue;
     int64_t blocking = 0;
-    for (size_t j = i + 1; j < plan.rows.size(); ++j) blocking = std::max(blocking, plan.rows[j].worst_bits * bit);
-    higher.push_back({row.worst_bits * bit, row.message.period * kNanoseconds, row.message.jitter * kNanoseconds});
+    for (size_t j = i + 1; j < plan.rows.size(); ++j)
+      blocking = std::max(blocking, plan.rows[j].worst_bits * bit);
+    higher.push_back(
+        {row.worst_bits * bit, row.message.period * kNanoseconds, row.message.jitter * kNanoseconds});
     const int64_t response = Response(higher, blocking, bit);
     row.response = response < 0 ? std::numeric_limits<double>::infinity()
                                 : static_cast<double>(response) / static_cast<double>(kNanoseconds);
@@ -96,7 +98,8 @@ bool InheritJitter(BusPlan& plan, const std::vector<BusDevice>& devices) {
     const BusMessage& question = device->messages[static_cast<size_t>(row.message.answers)];
     for (const Row& other : plan.rows) {
       if (other.device != row.device || other.message.id != question.id) continue;
-      if (!(other.response <= static_cast<double>(row.message.period))) return false;  // it is an error already
+      if (!(other.response <= static_cast<double>(row.message.period)))
+        return false;  // it is an error already
       const auto jitter = static_cast<int64_t>(std::ceil(other.response));
       changed = changed || jitter != row.message.jitter;
       row.message.jitter = jitter;
@@ -108,19 +111,23 @@ bool InheritJitter(BusPlan& plan, const std::vector<BusDevice>& devices) {
 void Judge(BusPlan& plan) {
   const int percent = static_cast<int>(std::lround(100 * plan.worst_load));
   if (plan.worst_load > 1) {
-    plan.errors.push_back(fmt::format("the bus would be loaded to {} %: use longer periods, or two buses", percent));
+    plan.errors.push_back(
+        fmt::format("the bus would be loaded to {} %: use longer periods, or two buses", percent));
   } else if (plan.worst_load > BusPlan::kWarnLoad) {
-    plan.warnings.push_back(fmt::format("the bus is loaded to {} % at worst: above {:.0f} % nothing is left for errors "
-                                        "and repetitions",
-                                        percent, 100 * BusPlan::kWarnLoad));
+    plan.warnings.push_back(
+        fmt::format("the bus is loaded to {} % at worst: above {:.0f} % nothing is left for errors "
+                    "and repetitions",
+                    percent, 100 * BusPlan::kWarnLoad));
   }
   for (const Row& row : plan.rows) {
     const auto deadline = static_cast<double>(row.message.period);
     if (row.message.period <= 0 || row.response <= deadline) continue;
-    const std::string when = std::isfinite(row.response) ? fmt::format("{:.2f} ms after it is due", row.response / 1000)
-                                                         : std::string("later and later");
+    const std::string when = std::isfinite(row.response)
+                                 ? fmt::format("{:.2f} ms after it is due", row.response / 1000)
+                                 : std::string("later and later");
     plan.errors.push_back(fmt::format("{} of '{}' (id {:#05x}) may be sent {}, but is due every {:.2f} ms",
-                                      row.message.layout.name, row.device, row.message.id, when, deadline / 1000));
+                                      row.message.layout.name, row.device, row.message.id, when,
+                                      deadline / 1000));
   }
 }
 
@@ -146,8 +153,12 @@ BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate) {
         continue;
       }
       const int length = message.remote ? 0 : message.layout.length;
-      Row row{device.name, message, NominalBits(message.extended, length), WorstCaseBits(message.extended, length),
-              0, std::numeric_limits<double>::quiet_NaN()};
+      Row row{device.name,
+              message,
+              NominalBits(message.extended, length),
+              WorstCaseBits(message.extended, length),
+              0,
+              std::numeric_limits<double>::quiet_NaN()};
       if (message.period > 0) {
         const double rate = 1e6 / static_cast<double>(message.period) / bit_rate;
         row.worst_load = row.worst_bits * rate;
@@ -179,15 +190,15 @@ std::vector<BusDevice> BusDevices(const RobotDescription& robot) {
 }
 
 std::string ToText(const BusPlan& plan) {
-  std::string text = fmt::format("{:<10} {:<16} {:<24} {:>4} {:>9} {:>7} {:>8} {:>7} {:>9}\n", "id", "device", "message",
-                                 "dlc", "period ms", "bits", "load %", "from", "worst ms");
+  std::string text = fmt::format("{:<10} {:<16} {:<24} {:>4} {:>9} {:>7} {:>8} {:>7} {:>9}\n", "id", "device",
+                                 "message", "dlc", "period ms", "bits", "load %", "from", "worst ms");
   for (const Row& row : plan.rows) {
     const BusMessage& message = row.message;
     const bool periodic = message.period > 0;
     text += fmt::format(
         "{:<10} {:<16} {:<24} {:>4} {:>9} {:>7} {:>8} {:>7} {:>9}\n",
-        message.extended ? fmt::format("{:#010x}", message.id) : fmt::format("{:#05x}", message.id), row.device,
-        message.layout.name, message.layout.length,
+        message.extended ? fmt::format("{:#010x}", message.id) : fmt::format("{:#05x}", message.id),
+        row.device, message.layout.name, message.layout.length,
         periodic ? fmt::format("{:.2f}", static_cast<double>(message.period) / 1000) : "-",
         fmt::format("{}-{}", row.nominal_bits, row.worst_bits),
         periodic ? fmt::format("{:.2f}", 100 * row.worst_load) : "-",

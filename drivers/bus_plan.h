@@ -18,11 +18,11 @@ int WorstCaseBits(bool extended, int length);
 /// Whether all messages of a bus get through in time, whatever they say.
 ///
 /// Response times by the exact analysis of Davis, Burns, Bril and Lukkien, "Controller Area Network (CAN)
-/// schedulability analysis: Refuted, revisited and revised", Real-Time Systems 35 (2007): a message waits for the
-/// longest lower one, which has just begun, and for all higher ones, queued at the worst instants. It assumes that
-/// of the frames that wait at a node the highest goes first (send in the order of ids), and no errors.
-/// Every message must be on the bus before the next of its kind: deadlines are periods. Messages without a period
-/// block others once but are no load: the plan is that of a robot that moves.
+/// schedulability analysis: Refuted, revisited and revised", Real-Time Systems 35 (2007): a message waits for
+/// the longest lower one, which has just begun, and for all higher ones, queued at the worst instants. It
+/// assumes that of the frames that wait at a node the highest goes first (send in the order of ids), and no
+/// errors. Every message must be on the bus before the next of its kind: deadlines are periods. Messages
+/// without a period block others once but are no load: the plan is that of a robot that moves.
 struct BusPlan {
   static constexpr double kWarnLoad = 0.8;
 
@@ -31,13 +31,14 @@ struct BusPlan {
     BusMessage message;
     int nominal_bits, worst_bits;
     double worst_load;  ///< share of the bus; 0 without a period
-    double response;    ///< [us] from being due to having been sent, at worst; NaN without a period, else maybe infinite
+    double response;  ///< [us] from being due to having been sent, at worst; NaN without a period, else maybe
+                      ///< infinite
   };
-  double bit_rate;                 ///< [bit/s]
-  std::vector<Row> rows;           ///< highest priority first
-  double nominal_load = 0;         ///< share of the bus without stuff bits
-  double worst_load = 0;           ///< with the most there can be
-  std::vector<std::string> errors; ///< why it cannot work, a sentence each
+  double bit_rate;                  ///< [bit/s]
+  std::vector<Row> rows;            ///< highest priority first
+  double nominal_load = 0;          ///< share of the bus without stuff bits
+  double worst_load = 0;            ///< with the most there can be
+  std::vector<std::string> errors;  ///< why it cannot work, a sentence each
   std::vector<std::string> warnings;
 };
 

@@ -18,7 +18,8 @@ constexpr uint32_t kExtendedFlag = 0x80000000;
 std::string Identifier(const std::string& text) {
   std::string identifier;
   for (const char c : text) identifier += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
-  if (identifier.empty() || std::isdigit(static_cast<unsigned char>(identifier[0]))) identifier.insert(0, "_");
+  if (identifier.empty() || std::isdigit(static_cast<unsigned char>(identifier[0])))
+    identifier.insert(0, "_");
   return identifier;
 }
 
@@ -29,18 +30,20 @@ std::string Unique(const std::string& wish, std::set<std::string>& taken) {
   return name;
 }
 
-// DBC counts big-endian fields from their most significant bit, and bits within a byte from the least significant.
+// DBC counts big-endian fields from their most significant bit, and bits within a byte from the least
+// significant.
 int StartBit(const Field& field) {
   return field.order == Field::Order::kBigEndian ? field.bit / 8 * 8 + 7 - field.bit % 8 : field.bit;
 }
 
-std::string Signal(const Field& field, const std::string& name, const std::string& multiplex, const std::string& receiver) {
+std::string Signal(const Field& field, const std::string& name, const std::string& multiplex,
+                   const std::string& receiver) {
   const bool integer = field.kind != Field::Kind::kFloat;
   return fmt::format(" SG_ {} {}: {}|{}@{}{} ({},{}) [{}|{}] \"{}\" {}\n", name,
                      multiplex.empty() ? "" : multiplex + " ", StartBit(field), field.bits,
-                     field.order == Field::Order::kBigEndian ? 0 : 1, field.kind == Field::Kind::kUnsigned ? '+' : '-',
-                     field.scale, field.offset, integer ? field.lowest() : 0, integer ? field.highest() : 0, field.unit,
-                     receiver);
+                     field.order == Field::Order::kBigEndian ? 0 : 1,
+                     field.kind == Field::Kind::kUnsigned ? '+' : '-', field.scale, field.offset,
+                     integer ? field.lowest() : 0, integer ? field.highest() : 0, field.unit, receiver);
 }
 
 struct Sender {
@@ -60,7 +63,8 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
       if (message.layout.count() == 0 || message.remote) continue;
       std::vector<Sender>& senders = by_id[message.id | (message.extended ? kExtendedFlag : 0)];
       // The driver says it once for all.
-      if (senders.empty() || message.direction == Direction::kFromDevice) senders.push_back({&device, &message, node});
+      if (senders.empty() || message.direction == Direction::kFromDevice)
+        senders.push_back({&device, &message, node});
     }
   }
   std::string body, floats;
@@ -69,8 +73,9 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
     const bool from_device = first.direction == Direction::kFromDevice;
     const bool multiplexed = first.selector >= 0;
     const std::string label = first.shared ? senders[0].device->protocol : senders[0].device->name;
-    body += fmt::format("BO_ {} {}: {} {}\n", id, Unique(label + "_" + std::string(first.layout.name), messages),
-                        first.layout.length, from_device ? senders[0].node : kDriver);
+    body +=
+        fmt::format("BO_ {} {}: {} {}\n", id, Unique(label + "_" + std::string(first.layout.name), messages),
+                    first.layout.length, from_device ? senders[0].node : kDriver);
     const std::string receiver = from_device ? kDriver : first.shared ? "Vector__XXX" : senders[0].node;
     std::set<std::string> signals;
     for (const Sender& sender : senders) {

@@ -14,7 +14,8 @@ constexpr double kMostCounts = 4294967296;  // an unsigned 32-bit position
 
 /// Index of what has the name, or an error at the key that gave it.
 template <class T>
-int Find(const Config& config, const char* key, const std::string& name, const std::vector<T>& all, const char* what) {
+int Find(const Config& config, const char* key, const std::string& name, const std::vector<T>& all,
+         const char* what) {
   const auto at = std::find_if(all.begin(), all.end(), [&](const T& one) { return one.name == name; });
   if (at == all.end()) config.Fail(key, fmt::format("= \"{}\" is not a {} of the URDF", name, what));
   return static_cast<int>(at - all.begin());
@@ -35,14 +36,16 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
   // Between two readings it must turn by less than half of what it can tell apart.
   const double half = s.range / s.counts * std::acos(-1.);
   if (s.max_speed * s.period >= half) {
-    config.Fail("max_speed", fmt::format("= {} rad/s turns it by {:.3g} rad within a period, half its range or more",
-                                         s.max_speed, s.max_speed * s.period));
+    config.Fail("max_speed",
+                fmt::format("= {} rad/s turns it by {:.3g} rad within a period, half its range or more",
+                            s.max_speed, s.max_speed * s.period));
   }
   const std::string joint = config.String("joint");
   s.joint = Find(config, "joint", joint, robot.joints, "moving joint");
   const Type type = robot.joints[static_cast<size_t>(s.joint)].type;
   if (type == Type::kSpherical) {
-    config.Fail("joint", fmt::format("= \"{}\" is a spherical joint: an encoder measures one coordinate", joint));
+    config.Fail("joint",
+                fmt::format("= \"{}\" is a spherical joint: an encoder measures one coordinate", joint));
   }
   if (type == Type::kPrismatic) {
     s.radius = config.Number("radius", {1e-6, 1e6});

@@ -21,7 +21,8 @@ struct BusMessage {
   Direction direction = Direction::kFromDevice;
   int64_t period = 0;  ///< [us]; 0 = now and then, not while the robot moves
   int64_t jitter = 0;  ///< [us] by which it may be queued late
-  int answers = -1;    ///< it is the answer to that message of the device, whose response time adds to the jitter
+  int answers =
+      -1;  ///< it is the answer to that message of the device, whose response time adds to the jitter
   /// Other devices of the protocol may have it, too: broadcasts, and replies that say whose they are.
   bool shared = false;
   int selector = -1;  ///< of a shared one from the device: value of its first field that says whose it is

@@ -33,7 +33,9 @@ class CanSimpleMotor : public Motor {
                                                         : reports_.OnFrame(frame, now);
     if (command == kAddress.command && reports_.two_drives()) Fail(now, "two drives have its node id");
     if (const auto restart = reports_.TakeRestart()) {
-      Fail(now, "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): home the joint anew",
+      Fail(now,
+           "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): home the "
+           "joint anew",
            restart->silence / 1000, restart->jump);
     }
     return use;
@@ -138,7 +140,7 @@ class CanSimpleMotor : public Motor {
     }
   }
 
-  Frame Torque(double torque) noexcept override { return Make(kSetInputTorque, node_, {torque}); }
+  Frame Torque(double torque) noexcept override { return Make(kSetInputTorqueShort, node_, {torque}); }
 
   DriveState state() const noexcept override {
     if (!present_) return DriveState::kAbsent;
@@ -195,7 +197,7 @@ class CanSimpleMotor : public Motor {
       return Enter(Step::kRest, now);
     }
     if (out.room() < 3 || !Retry(now)) return;
-    out.Push(Make(kSetInputTorque, node_, {0}));
+    out.Push(Make(kSetInputTorqueShort, node_, {0}));
     out.Push(Make(kSetAxisState, node_, {kIdle}));
     if (disarms_ >= kDisarmsBeforeEstop) out.Push(Make(kEstop, node_));
   }

@@ -25,13 +25,12 @@ BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings
   };
   add(kHeartbeat, Direction::kFromDevice, heartbeat);
   add(kGetEncoderEstimates, Direction::kFromDevice, microseconds(driver.measurement));
-  add(kGetTorques, Direction::kFromDevice, telemetry);
   add(kGetTemperature, Direction::kFromDevice, telemetry);
   add(kGetBusVoltageCurrent, Direction::kFromDevice, telemetry);
-  for (const Layout& layout : {kGetVersion, kGetError, kAddress, kGetIq, kGetPowers}) {
+  for (const Layout& layout : {kGetVersion, kGetError, kAddress, kGetTorques, kGetIq, kGetPowers}) {
     add(layout, Direction::kFromDevice, 0);
   }
-  add(kSetInputTorque, Direction::kToDevice, microseconds(driver.cycle));
+  add(kSetInputTorqueShort, Direction::kToDevice, microseconds(driver.cycle));
   for (const Layout& layout : {kEstop, kSetAxisState, kSetControllerMode, kClearErrors}) {
     add(layout, Direction::kToDevice, 0);
   }

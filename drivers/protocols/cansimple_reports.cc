@@ -12,9 +12,9 @@ namespace {
 using namespace cansimple;
 
 constexpr double kRadiansPerTurn = 2 * std::numbers::pi;
-constexpr double kSilentIntervals = 2.5;    // one heartbeat may be lost
-constexpr int64_t kTogether = 1'000'000;    // [us] between silence and jump of one restart
-constexpr double kLeastJump = 0.05;         // [turns] beyond what the velocities explain
+constexpr double kSilentIntervals = 2.5;  // one heartbeat may be lost
+constexpr int64_t kTogether = 1'000'000;  // [us] between silence and jump of one restart
+constexpr double kLeastJump = 0.05;       // [turns] beyond what the velocities explain
 
 const Layout* Find(uint32_t command) {
   switch (command) {
@@ -105,7 +105,8 @@ FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexce
 
 void CanSimpleReports::OnHeartbeat(int axis_state, int64_t now) noexcept {
   const int64_t gap = heartbeat_ == 0 ? 0 : now - heartbeat_;
-  const bool silent = interval_ > 0 && static_cast<double>(gap) > kSilentIntervals * static_cast<double>(interval_);
+  const bool silent =
+      interval_ > 0 && static_cast<double>(gap) > kSilentIntervals * static_cast<double>(interval_);
   heartbeat_ = now;
   if (!silent) {
     interval_ = gap;

@@ -9,8 +9,8 @@
 
 namespace plumb {
 
-/// What an ODrive reports besides heartbeats and errors, remembered; and the signs that it has restarted. Pure
-/// logic; free of exceptions and allocation. Not thread-safe.
+/// What an ODrive reports besides heartbeats and errors, remembered; and the signs that it has restarted.
+/// Pure logic; free of exceptions and allocation. Not thread-safe.
 class CanSimpleReports {
  public:
   /// @param frame of the drive's id, not remote. kRejected for what is too short, not finite or unknown.

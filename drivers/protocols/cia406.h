@@ -2,10 +2,10 @@
 
 #include "drivers/protocols/fields.h"
 
-/// CANopen absolute encoders: CiA 301 (NMT, heartbeat, emergency, SDO, PDO) as far as the device profile CiA 406
-/// needs it. Identifiers are those of the predefined connection set, little-endian. Object numbers as in the
-/// profile: 6004h is the position, an unsigned 32-bit number of counts, and TPDO1 carries it, alone.
-/// The specifications are CAN in Automation's; layouts as printed in the manuals of Lika, SICK and Kuebler.
+/// CANopen absolute encoders: CiA 301 (NMT, heartbeat, emergency, SDO, PDO) as far as the device profile CiA
+/// 406 needs it. Identifiers are those of the predefined connection set, little-endian. Object numbers as in
+/// the profile: 6004h is the position, an unsigned 32-bit number of counts, and TPDO1 carries it, alone. The
+/// specifications are CAN in Automation's; layouts as printed in the manuals of Lika, SICK and Kuebler.
 namespace plumb::cia406 {
 
 // clang-format off

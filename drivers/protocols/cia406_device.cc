@@ -85,7 +85,8 @@ void Cia406Device::OnSdo(const Frame& frame, int64_t now) noexcept {
     answer_ = Make(kSdoAnswer, settings_.node, {double(specifier), index, subindex, code});
     answer_due_ = true;
   };
-  if (static_cast<int>((*values)[0]) != kWrite2 || index != kPdoParameter || subindex != kEventTimer) return answer(kAbort, kNoSuchObject);
+  if (static_cast<int>((*values)[0]) != kWrite2 || index != kPdoParameter || subindex != kEventTimer)
+    return answer(kAbort, kNoSuchObject);
   if (settings_.refuses_timer || data < 1 || data > 65535) return answer(kAbort, kValueOutOfRange);
   settings_.event_timer = 1000 * static_cast<int64_t>(data);
   if (operational()) next_position_ = Next(settings_.event_timer, now);

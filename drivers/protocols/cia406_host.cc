@@ -60,15 +60,18 @@ class Cia406Encoder : public Sensor {
     present_ = heard_ && now - heard_at_ <= timing_.timeout;
     if (state_ == SensorState::kRunning && now - position_at_ > timing_.timeout) {
       // What it has turned by then can still be counted, if it is not too long.
-      if (!present_) state_ = SensorState::kStarting;
-      else Fail("it is there, but has sent no position for {} ms", (now - position_at_) / 1000);
+      if (!present_)
+        state_ = SensorState::kStarting;
+      else
+        Fail("it is there, but has sent no position for {} ms", (now - position_at_) / 1000);
     }
     // One that is sending already may do so with another period.
     const bool tell = state_ == SensorState::kStarting || (state_ == SensorState::kRunning && !told_);
     if (!tell || now < retry_ || out.room() < 2) return;
     retry_ = now + kRetry;
     told_ = true;
-    out.Push(Make(kSdoRequest, node_, {kWrite2, double(kPdoParameter), double(kEventTimer), double(event_timer_)}));
+    out.Push(Make(kSdoRequest, node_,
+                  {kWrite2, double(kPdoParameter), double(kEventTimer), double(event_timer_)}));
     out.Push(Make(kNmt, node_, {kStart, double(node_)}));
   }
 
@@ -154,7 +157,8 @@ class Cia406Encoder : public Sensor {
     if (!values) return SensorUse::kRejected;
     const bool mine = (*values)[1] == kPdoParameter && (*values)[2] == kEventTimer;
     if (mine && static_cast<int>((*values)[0]) == kAbort && state_ == SensorState::kStarting) {
-      Fail("it refuses to send every {} ms (SDO abort {:#010x})", event_timer_, static_cast<uint32_t>((*values)[3]));
+      Fail("it refuses to send every {} ms (SDO abort {:#010x})", event_timer_,
+           static_cast<uint32_t>((*values)[3]));
     }
     return SensorUse::kConsumed;
   }
@@ -182,7 +186,8 @@ std::unique_ptr<Sensor> MakeCia406Encoder(const SensorDescription& d, const Sens
     throw std::invalid_argument(fmt::format("CANopen node {} is not in [1, 127]", d.node));
   }
   if (!(d.counts >= 1 && d.range >= 2 && d.range <= 4294967296. && d.period > 0 && d.max_speed > 0)) {
-    throw std::invalid_argument("an encoder needs counts, a range of 2 to 2^32, a period and a greatest speed");
+    throw std::invalid_argument(
+        "an encoder needs counts, a range of 2 to 2^32, a period and a greatest speed");
   }
   return std::make_unique<Cia406Encoder>(d, timing);
 }

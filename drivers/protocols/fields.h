@@ -60,7 +60,8 @@ struct Field {
   }
 
   /// Rounds to the nearest representable value (an unsigned field half-way between two: to the lower one);
-  /// saturates integers at the ends of their range. Not-a-number becomes, in an integer, what is nearest to 0.
+  /// saturates integers at the ends of their range. Not-a-number becomes, in an integer, what is nearest to
+  /// 0.
   /// @return the field's bits in place, in a payload as Decode takes it.
   constexpr uint64_t Encode(double value) const {
     const uint64_t raw = Raw(value) << shift();

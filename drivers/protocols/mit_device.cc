@@ -116,8 +116,8 @@ void MitDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) noexcep
   if (error_ != kNoError) armed_ = false;
   for (size_t i = 0; i < due_count_; ++i) {
     const Setpoint& s = due_[i];
-    const double torque = s.kp * (s.position - (sample.position - zero_)) +
-                          s.kd * (s.velocity - sample.velocity) + s.torque;
+    const double torque =
+        s.kp * (s.position - (sample.position - zero_)) + s.kd * (s.velocity - sample.velocity) + s.torque;
     out.Push(Reply(sample, torque));
   }
   due_count_ = 0;

@@ -64,7 +64,7 @@ class MitDevice {
   mit::Error error_ = mit::kNoError;
   double zero_ = 0;  ///< [rad] taken from positions
   bool make_zero_ = false;
-  int64_t fed_ = 0;  ///< time of the last command, or of being switched on
+  int64_t fed_ = 0;                   ///< time of the last command, or of being switched on
   std::array<mit::Setpoint, 8> due_;  ///< replies not yet sent: what was obeyed then
   size_t due_count_ = 0;
   int zeroed_ = 0;

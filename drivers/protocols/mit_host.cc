@@ -251,7 +251,8 @@ std::unique_ptr<Motor> MakeMitMotor(const MotorDescription& description, const M
     throw std::invalid_argument(fmt::format("MIT motor id {} is not in [1, 255]", description.node));
   }
   if (mit.master < 0 || mit.master > 0x7FF || mit.master == description.node) {
-    throw std::invalid_argument(fmt::format("MIT reply id {} is the motor's own or not in [0, 0x7FF]", mit.master));
+    throw std::invalid_argument(
+        fmt::format("MIT reply id {} is the motor's own or not in [0, 0x7FF]", mit.master));
   }
   if (!Positive(mit.ranges)) throw std::invalid_argument("a MIT motor's ranges must be positive");
   return std::make_unique<MitMotor>(description.node, mit, timing);

@@ -24,7 +24,7 @@ enum class SensorState : int8_t {
 
 /// Of an encoder, at its shaft. Turns are counted from the first reading after Start.
 struct EncoderReading {
-  double position = 0;                                       ///< [rad]
+  double position = 0;                                         ///< [rad]
   double velocity = std::numeric_limits<double>::quiet_NaN();  ///< [rad/s]; NaN if it reports none
 };
 
@@ -46,9 +46,9 @@ enum class SensorUse {
   kReading,  ///< completed a new reading
 };
 
-/// The driver's side of one sensor: what a protocol must offer. Pure logic, as Motor: no sockets, no clock; all
-/// methods but the constructor and filters() are free of exceptions and allocation; times are scaled monotonic
-/// microseconds. Frames to send go into a batch. Not thread-safe.
+/// The driver's side of one sensor: what a protocol must offer. Pure logic, as Motor: no sockets, no clock;
+/// all methods but the constructor and filters() are free of exceptions and allocation; times are scaled
+/// monotonic microseconds. Frames to send go into a batch. Not thread-safe.
 class Sensor {
  public:
   virtual ~Sensor() = default;
@@ -80,8 +80,8 @@ struct SensorTiming {
 };
 
 /// A sensor of the named protocol (SensorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or settings it cannot
-/// have.
+/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or settings it
+/// cannot have.
 std::unique_ptr<Sensor> MakeSensor(const SensorDescription& description, const SensorTiming& timing);
 
 /// What that sensor and the driver say on the bus, under its name.

@@ -4,8 +4,8 @@
 
 /// Xsens' MTi-600, Avior and Sirius on CAN: one quantity per message, big-endian, fixed-point. Layouts from
 /// Movella's "MTi CAN messages" (mtidocs.movella.com/canmessages); ids are the factory's, to which
-/// SensorDescription::base is added (they can be moved with SetCanOutputConfig). Status bits as in Xsens' public
-/// XsStatusFlag.
+/// SensorDescription::base is added (they can be moved with SetCanOutputConfig). Status bits as in Xsens'
+/// public XsStatusFlag.
 namespace plumb::xsens {
 
 namespace detail {
@@ -13,7 +13,8 @@ constexpr Field U(std::string_view name, int bits, std::string_view unit = "") {
   return {name, 0, static_cast<uint8_t>(bits), Field::Kind::kUnsigned, 1, unit, Field::Order::kBigEndian};
 }
 constexpr Field I16(std::string_view name, int index, double scale, std::string_view unit) {
-  return {name, static_cast<uint8_t>(16 * index), 16, Field::Kind::kSigned, scale, unit, Field::Order::kBigEndian};
+  return {name, static_cast<uint8_t>(16 * index), 16, Field::Kind::kSigned, scale,
+          unit, Field::Order::kBigEndian};
 }
 }  // namespace detail
 

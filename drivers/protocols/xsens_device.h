@@ -8,21 +8,21 @@
 
 namespace plumb {
 
-/// A virtual Xsens MTi that sends a sample per period, its messages in the order of their ids. Pure logic, used like
-/// CanSimpleDevice; it listens to nothing. Not thread-safe. Does not allocate.
+/// A virtual Xsens MTi that sends a sample per period, its messages in the order of their ids. Pure logic,
+/// used like CanSimpleDevice; it listens to nothing. Not thread-safe. Does not allocate.
 class XsensDevice {
  public:
   struct Settings {
-    int base = 0;              ///< added to the factory's ids
-    int64_t period = 5'000;    ///< [us] > 0
-    int64_t tick = 100;        ///< [us] > 0 of SampleTime
+    int base = 0;            ///< added to the factory's ids
+    int64_t period = 5'000;  ///< [us] > 0
+    int64_t tick = 100;      ///< [us] > 0 of SampleTime
     bool group_counter = false;
-    uint32_t first_tick = 0;   ///< SampleTime when it starts
+    uint32_t first_tick = 0;  ///< SampleTime when it starts
   };
   struct Sample {
-    std::array<double, 3> rate{};                     ///< [rad/s]
-    std::array<double, 3> force{};                    ///< [m/s^2]
-    std::array<double, 4> orientation{1, 0, 0, 0};    ///< unit quaternion (w, x, y, z)
+    std::array<double, 3> rate{};                   ///< [rad/s]
+    std::array<double, 3> force{};                  ///< [m/s^2]
+    std::array<double, 4> orientation{1, 0, 0, 0};  ///< unit quaternion (w, x, y, z)
     uint32_t status = xsens::kOrientationValid;
   };
 

@@ -24,15 +24,16 @@ class XsensImu : public Sensor {
 
   std::vector<Filter> filters() const override {
     std::vector<Filter> filters;
-    for (const Layout& layout : {kError, kWarning, kSampleTime, kGroupCounter, kStatusWord, kQuaternion, kRateOfTurn,
-                                 kAcceleration}) {
+    for (const Layout& layout : {kError, kWarning, kSampleTime, kGroupCounter, kStatusWord, kQuaternion,
+                                 kRateOfTurn, kAcceleration}) {
       filters.push_back({.id = base_ + layout.command});
     }
     return filters;
   }
 
   SensorUse OnFrame(const Frame& frame, int64_t now) noexcept override {
-    if (frame.extended || frame.remote || frame.error || frame.fd || frame.id < base_) return SensorUse::kNotMine;
+    if (frame.extended || frame.remote || frame.error || frame.fd || frame.id < base_)
+      return SensorUse::kNotMine;
     switch (frame.id - base_) {
       case kSampleTime.command:
         return OnSampleTime(frame, now);
@@ -123,8 +124,8 @@ class XsensImu : public Sensor {
     return SensorUse::kConsumed;
   }
 
-  // It follows SampleTime. A step other than 1 says that whole samples were lost, which is none of ours to mend; one
-  // of 0 that this SampleTime was not its own.
+  // It follows SampleTime. A step other than 1 says that whole samples were lost, which is none of ours to
+  // mend; one of 0 that this SampleTime was not its own.
   SensorUse OnGroupCounter(const Frame& frame) noexcept {
     const auto values = DecodePayload(kGroupCounter, frame);
     if (!values) return SensorUse::kRejected;
@@ -141,7 +142,7 @@ class XsensImu : public Sensor {
     heard_ = present_ = true;
     heard_at_ = now;
     if (parts_ == 0) return SensorUse::kConsumed;  // its SampleTime was lost
-    if ((parts_ & part) != 0 || now - began_at_ > period_) {
+    if ((parts_ & part) != 0 || 4 * (now - began_at_) > 3 * period_) {
       DropSample();
       return SensorUse::kConsumed;
     }
@@ -228,7 +229,8 @@ BusDevice XsensBusDevice(const SensorDescription& description) {
     message.period = every;
     device.messages.push_back(message);
   };
-  for (const Layout& layout : {kSampleTime, kStatusWord, kQuaternion, kRateOfTurn, kAcceleration}) add(layout, period);
+  for (const Layout& layout : {kSampleTime, kStatusWord, kQuaternion, kRateOfTurn, kAcceleration})
+    add(layout, period);
   for (const Layout& layout : {kError, kWarning}) add(layout, 0);
   return device;
 }

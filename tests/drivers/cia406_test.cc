@@ -90,9 +90,10 @@ TEST_CASE("an encoder is told its period and to start, and then read") {
   bench.Run(1);
   CHECK(bench.sent == std::vector<std::string>{"601#2B00180502000000", "000#0101"});
   bench.Run(100);
-  CHECK(bench.sent.size() == 2);
+  // Once more when its boot-up message came, which may be later than what we said.
+  CHECK(bench.sent.size() == 4);
   CHECK(bench.sensor->state() == SensorState::kRunning);
-  CHECK(bench.readings == 50);
+  CHECK(bench.readings >= 49);
   CHECK(bench.sensor->encoder()->position == Approx(0.5).margin(1e-4));
   CHECK(std::isnan(bench.sensor->encoder()->velocity));
   CHECK(bench.sensor->imu() == nullptr);

@@ -75,7 +75,8 @@ std::vector<Sent> RandomFrames(const std::vector<BusDevice>& devices, int each) 
         frame.id = message.id;
         frame.length = message.layout.length;
         do {
-          for (size_t byte = 0; byte < frame.length; ++byte) frame.data[byte] = static_cast<uint8_t>(random());
+          for (size_t byte = 0; byte < frame.length; ++byte)
+            frame.data[byte] = static_cast<uint8_t>(random());
           if (message.selector >= 0) frame.data[0] = static_cast<uint8_t>(message.selector);
         } while (!AllFinite(message.layout, *DecodePayload(message.layout, frame)));
         sent.push_back({&message, frame});
@@ -97,7 +98,9 @@ void CheckDecodes(const std::vector<BusDevice>& devices) {
       file << one.frame.id << " " << ToText(one.frame).substr(4) << "\n";
     }
   }
-  FILE* pipe = popen(("/usr/bin/python3 " + Source() + "/tests/drivers/decode_dbc.py " + dbc + " " + list + " 2>&1").c_str(), "r");
+  FILE* pipe = popen(
+      ("/usr/bin/python3 " + Source() + "/tests/drivers/decode_dbc.py " + dbc + " " + list + " 2>&1").c_str(),
+      "r");
   REQUIRE(pipe);
   std::string text;
   std::array<char, 4096> buffer;
@@ -151,10 +154,12 @@ TEST_CASE("a DBC's lines") {
                            " SG_ Pos_Estimate : 0|32@1- (1,0) [0|0] \"rev\" driver\n"
                            " SG_ Vel_Estimate : 32|32@1- (1,0) [0|0] \"rev/s\" driver\n"));
   CHECK_THAT(dbc, Contains("SIG_VALTYPE_ 73 Pos_Estimate : 1;\n"));
-  CHECK_THAT(dbc, Contains("BO_ 16 mit_Reply: 8 left_hip\n SG_ Motor_ID M : 7|8@0+ (1,0) [0|255] \"\" driver\n"));
+  CHECK_THAT(dbc,
+             Contains("BO_ 16 mit_Reply: 8 left_hip\n SG_ Motor_ID M : 7|8@0+ (1,0) [0|255] \"\" driver\n"));
   CHECK_THAT(dbc, Contains(" SG_ left_hip_Position m17 : 15|16@0+ ("));
   CHECK_THAT(dbc, Contains(" SG_ left_hip_2_Velocity m18 : 31|12@0+ ("));
-  CHECK_THAT(dbc, Contains("BO_ 946 imu_RateOfTurn: 6 imu\n SG_ Gyr_X : 7|16@0- (0.001953125,0) [-64|63.998046875] \"rad/s\" driver\n"));
+  CHECK_THAT(dbc, Contains("BO_ 946 imu_RateOfTurn: 6 imu\n SG_ Gyr_X : 7|16@0- (0.001953125,0) "
+                           "[-64|63.998046875] \"rad/s\" driver\n"));
   CHECK_THAT(dbc, Contains("BO_ 0 cia406_NMT: 2 driver\n"));
 }
 

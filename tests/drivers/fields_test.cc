@@ -29,7 +29,8 @@ static_assert(Layout{0, "", 8, {{kBig, kRange}}}.needed() == 8);
 
 TEST_CASE("big-endian fields: bytes written by hand") {
   constexpr auto field = [](int bit, int bits, Kind kind, double scale = 1) {
-    return Field{"x", static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), kind, scale, "", Order::kBigEndian};
+    return Field{"x", static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), kind, scale,
+                 "",  Order::kBigEndian};
   };
   CHECK(Text({0, "", 2, {{field(0, 16, Kind::kUnsigned)}}}, {0x1234}) == "000#1234");
   CHECK(Text({0, "", 3, {{field(8, 16, Kind::kUnsigned)}}}, {0x1234}) == "000#001234");

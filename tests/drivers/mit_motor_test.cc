@@ -133,7 +133,8 @@ TEST_CASE("arming: zeros, enter, an answer, and only then torque") {
 TEST_CASE("no kick: what a motor was told before it was switched on is not obeyed") {
   Bench bench;
   // Another master's last words, to a motor at rest: it would obey them on "enter".
-  bench.device.OnFrame(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.position = 5, .kp = 500}), bench.now);
+  bench.device.OnFrame(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.position = 5, .kp = 500}),
+                       bench.now);
   CHECK(bench.device.Torque(bench.sample) == 0);
   bench.applied = 0;
   CHECK(bench.Arm());

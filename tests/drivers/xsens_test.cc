@@ -46,7 +46,8 @@ TEST_CASE("Xsens messages have the documented bytes, both ways") {
     CHECK(ToText(frame) == row.text);
     const auto values = DecodePayload(*row.layout, *FrameFromText(row.text));
     REQUIRE(values);
-    for (size_t i = 0; i < v.size(); ++i) CHECK(std::abs((*values)[i] - v[i]) <= 0.5 * row.layout->fields[i].scale);
+    for (size_t i = 0; i < v.size(); ++i)
+      CHECK(std::abs((*values)[i] - v[i]) <= 0.5 * row.layout->fields[i].scale);
   }
   const auto swapped = DecodePayload(kAcceleration, *FrameFromText("034#00000000CF09"));
   REQUIRE(swapped);
@@ -92,7 +93,9 @@ struct Bench {
       if (sensor->OnFrame(frame, now) != SensorUse::kReading) continue;
       ++readings;
       const ImuSample& got = *sensor->imu();
-      if (std::abs(got.rate[0] - got.force[0]) > 0.005 || std::abs(got.rate[0] - got.orientation[1] * 10) > 0.005) ++mixed;
+      if (std::abs(got.rate[0] - got.force[0]) > 0.005 ||
+          std::abs(got.rate[0] - got.orientation[1] * 10) > 0.005)
+        ++mixed;
     }
   }
   void Run(int milliseconds) {
@@ -177,7 +180,8 @@ TEST_CASE("the status word says what a sample is worth") {
   CHECK(bench.sensor->imu()->orientation_valid);
   CHECK(bench.sensor->imu()->clipped);
   const auto use = [&](const char* text) { return bench.sensor->OnFrame(*FrameFromText(text), bench.now); };
-  for (const char* text : {"385#7F000001", "391#00000002", "3A1#0000000000000000", "3B2#000000000000"}) use(text);
+  for (const char* text : {"385#7F000001", "391#00000002", "3A1#0000000000000000", "3B2#000000000000"})
+    use(text);
   CHECK(use("3B4#000000000000") == SensorUse::kReading);
   CHECK_FALSE(bench.sensor->imu()->orientation_valid);  // no unit quaternion
 }

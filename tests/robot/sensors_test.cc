@@ -87,7 +87,8 @@ TEST_CASE("sensors: encoders and an IMU") {
 TEST_CASE("sensors: what is refused") {
   const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
     INFO(from << " -> " << to);
-    CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, from, to)), Contains("robot.toml:") && Contains(what));
+    CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, from, to)),
+                      Contains("robot.toml:") && Contains(what));
   };
   refused("name = \"hip_encoder\"", "name = \"boom\"", "occurs twice");
   refused("name = \"hip_encoder\"", "name = \"hip\"", "is a joint's");
@@ -104,7 +105,8 @@ TEST_CASE("sensors: what is refused") {
   refused("counts = 4096", "counts = 40.5", "whole number");
   refused("range = 268435456", "range = 4294967297", "range");
   refused("sign = -1", "sign = 0", "1 or -1");
-  refused("max_speed = 10.0\n[[sensor]]\nname = \"imu\"", "max_speed = 1600.0\n[[sensor]]\nname = \"imu\"", "half its range");
+  refused("max_speed = 10.0\n[[sensor]]\nname = \"imu\"", "max_speed = 1600.0\n[[sensor]]\nname = \"imu\"",
+          "half its range");
   refused("link = \"carriage\"", "link = \"carrige\"", "not a link");
   refused("base = 0x380", "base = 0x7C0", "base");
   refused("rpy = [0, 0, 1.5707963267948966]", "rpy = [0, 0]", "rpy");
@@ -136,7 +138,8 @@ TEST_CASE("MIT motors: what is refused") {
   refused("protocol = \"mit\"", "protocol = \"cansimple\"", "is of protocol \"mit\"");
   refused("master = 0x10", "master = 0x11", "id of its replies");
   refused("master = 0x10", "master = 0x800", "master");
-  refused("velocity = 75.0", "velocity = 59.0", "the joint's limit is 60 rad/s");  // 10 rad/s behind a gear of 6
+  refused("velocity = 75.0", "velocity = 59.0",
+          "the joint's limit is 60 rad/s");  // 10 rad/s behind a gear of 6
   refused("torque = 18.0", "torque = 3.0", "Nm at the motor");
   refused("source = \"the label\"", "", "source");
   refused("source = \"the label\"", "source = \"\"", "say where");
@@ -146,7 +149,8 @@ TEST_CASE("MIT motors: what is refused") {
 TEST_CASE("the bus has a bit rate, and drives a telemetry period") {
   CHECK(Load(kZooToml).bus_bit_rate == 1e6);
   CHECK(Load(kZooToml).driver.telemetry == 0.1);
-  CHECK(Load(Replaced(kZooToml, "[driver]", "bit_rate = 500000\n[driver]\ntelemetry = 0.02")).bus_bit_rate == 5e5);
+  CHECK(Load(Replaced(kZooToml, "[driver]", "bit_rate = 500000\n[driver]\ntelemetry = 0.02")).bus_bit_rate ==
+        5e5);
   CHECK_THROWS_WITH(Load(Replaced(kZooToml, "[driver]", "bit_rate = 2e6\n[driver]")), Contains("bit_rate"));
 }
 
