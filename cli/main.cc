@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "cli/calibrate.h"
+#include "cli/can.h"
 #include "cli/doctor.h"
 #include "cli/excite.h"
 #include "cli/launch.h"
@@ -67,7 +68,8 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr, *doctor = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
+  std::string can_robot, dbc_output;
+  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr, *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -156,10 +158,17 @@ int main(int argc, char** argv) {
             ->check(CLI::Range(1, 1000000))->capture_default_str();
         doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();
+        CLI::App* can = app.add_subcommand("can", "what is on the robot's CAN bus");
+        can->require_subcommand(1);
+        can_plan = can->add_subcommand("plan", "ids, load and response times; exit status 1 if it cannot work");
+        can_plan->add_option("robot", can_robot, "robot folder or TOML file")->required();
+        can_dbc = can->add_subcommand("dbc", "all messages as a DBC file, for other tools");
+        can_dbc->add_option("robot", can_robot, "robot folder or TOML file")->required();
+        can_dbc->add_option("--output", dbc_output, "file; default: print it");
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, arm, disarm, estop}) sub->fallthrough();
+        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, arm, disarm, estop}) sub->fallthrough();
       },
       [&](plumb::Process& process) {
         if (launch->parsed()) return plumb::Launch(process, flags);
@@ -168,6 +177,8 @@ int main(int argc, char** argv) {
         if (excite->parsed()) return plumb::Excite(process, excite_flags);
         if (train->parsed()) return plumb::Train(process, train_flags);
         if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus);
+        if (can_plan->parsed()) return plumb::PrintBusPlan(can_robot);
+        if (can_dbc->parsed()) return plumb::WriteDbc(can_robot, dbc_output);
         if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM);
         if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM);
         return plumb::Request(process, plumb::driver_request_t::ESTOP);

@@ -7,6 +7,7 @@
 #include "common/config.h"
 #include "robot/joints.h"
 #include "robot/parameters.h"
+#include "robot/sensors.h"
 #include "robot/settings.h"
 #include "robot/urdf.h"
 
@@ -92,7 +93,9 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
 
   Config bus = root.Table("bus");
   robot.bus_url = bus.String("url");
+  robot.bus_bit_rate = bus.Number("bit_rate", {1e4, 1e6}, robot.bus_bit_rate);
   bus.Finish();
+  robot.sensors = ReadSensors(root, robot);
   robot.driver = ReadDriver(root.Table("driver"));
   robot.estimator = ReadEstimator(root.Table("estimator"));
   robot.task = ReadTask(root.Table("task"), robot.joints);

@@ -30,6 +30,22 @@ struct LinkDescription {
   std::vector<Shape> visuals = {}, collisions = {};
 };
 
+/// What a motor of protocol "mit" means by its codes, see drivers/protocols/mit.h. All > 0, at the output shaft.
+struct MitRanges {
+  double position = 12.5;  ///< [rad] positions are in [-position, position]
+  double velocity = 0;     ///< [rad/s] likewise
+  double torque = 0;       ///< [Nm] likewise
+  double kp = 500;         ///< [Nm/rad] in [0, kp]
+  double kd = 5;           ///< [Nm s/rad] in [0, kd]
+};
+
+/// What protocol "mit" needs to know besides the node.
+struct MitDescription {
+  int master = 0;  ///< CAN id of the replies
+  MitRanges ranges;
+  std::string source;  ///< where the ranges are from: a wrong one scales silently
+};
+
 /// How a joint's motor is reached.
 struct MotorDescription {
   std::string protocol;  ///< file name in drivers/protocols/, e.g. "cansimple"
@@ -37,6 +53,30 @@ struct MotorDescription {
   double gear = 1;       ///< motor turns per joint turn (or per metre / 2 pi for a prismatic joint), > 0
   int sign = 1;          ///< +1 or -1
   double offset = 0;     ///< [rad] or [m] joint position at motor position 0
+  std::optional<MitDescription> mit = {};  ///< of protocol "mit" and no other
+};
+
+/// Something on the bus that measures and is no motor.
+struct SensorDescription {
+  std::string name;
+  std::string protocol;  ///< file name in drivers/protocols/: "cia406", an encoder, or "xsens", an IMU
+  double period = 0;     ///< [s] > 0 of its readings
+
+  // Of an encoder. It measures a joint: position = sign * radius * angle + offset.
+  int joint = -1;        ///< index into joints
+  int node = 0;          ///< CANopen node id, 1 to 127
+  double counts = 0;     ///< per turn, > 0
+  double range = 0;      ///< counts after which it begins anew, >= 2, <= 2^32; `counts` of a single-turn one
+  int sign = 1;          ///< +1 or -1
+  double offset = 0;     ///< [rad] or [m]
+  double radius = 1;     ///< 1 at a joint that turns, [m] > 0 at one that slides: the boom's length
+  double max_speed = 0;  ///< [rad/s] > 0 of the shaft; a reading that needs more is a fault
+
+  // Of an IMU.
+  int link = -1;                                           ///< index into links: what it is fixed to
+  int base = 0;                                            ///< CAN id added to the factory's
+  double tick = 1e-4;                                      ///< [s] unit of its SampleTime
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< its axes in the link's
 };
 
 /// What moves a joint besides inertia and gravity. Zeros say that there is none of it.
@@ -86,6 +126,7 @@ struct JointDescription {
 
 struct DriverSettings {  ///< all [s], scaled time
   double cycle, measurement, expiry, disarm_after, stale_after, heartbeat_timeout, start_guard;
+  double telemetry = 0.1;  ///< at which drives report temperatures and their supply
 };
 
 struct EstimatorSettings {
@@ -212,6 +253,8 @@ struct RobotDescription {
   std::vector<LinkDescription> links;
   std::vector<JointDescription> joints;
   std::string bus_url;
+  double bus_bit_rate = 1e6;  ///< [bit/s]
+  std::vector<SensorDescription> sensors;
   DriverSettings driver;
   EstimatorSettings estimator;
   SimulationSettings simulation;

@@ -11,6 +11,20 @@ namespace {
 
 constexpr Range kSane{-1e9, 1e9}, kSaneNotNegative{0, 1e9};
 
+MitDescription ReadMit(Config config) {
+  MitDescription mit;
+  mit.master = config.Integer("master", {0, 0x7FF}, 0);
+  mit.ranges.position = config.Number("position", {1e-3, 1e6}, mit.ranges.position);
+  mit.ranges.velocity = config.Number("velocity", {1e-3, 1e6});
+  mit.ranges.torque = config.Number("torque", {1e-3, 1e6});
+  mit.ranges.kp = config.Number("kp", {1e-3, 1e6}, mit.ranges.kp);
+  mit.ranges.kd = config.Number("kd", {1e-3, 1e6}, mit.ranges.kd);
+  mit.source = config.String("source");
+  if (mit.source.empty()) config.Fail("source", "is empty: say where the ranges are from");
+  config.Finish();
+  return mit;
+}
+
 MotorDescription ReadMotor(Config& config) {
   MotorDescription motor;
   motor.protocol = config.String("protocol");
@@ -19,6 +33,14 @@ MotorDescription ReadMotor(Config& config) {
   motor.sign = config.Integer("sign", {-1, 1}, 1);
   if (motor.sign == 0) config.Fail("sign", "must be 1 or -1");
   motor.offset = config.Number("offset", kSane, 0);
+  if (motor.protocol == "mit") {
+    motor.mit = ReadMit(config.Table("mit"));
+    if (motor.mit->master == motor.node) {
+      config.Fail("node", fmt::format("= {} is also the id of its replies, mit.master", motor.node));
+    }
+  } else if (config.Has("mit")) {
+    config.Fail("mit", fmt::format("is of protocol \"mit\", but the motor's is \"{}\"", motor.protocol));
+  }
   return motor;
 }
 
@@ -47,6 +69,20 @@ JointDynamics ReadDynamics(Config config, JointDynamics dynamics, const JointDes
   if (config.Has("no_load_speed")) dynamics.no_load_speed = config.Number("no_load_speed", {1e-9, HUGE_VAL});
   config.Finish();
   return dynamics;
+}
+
+// What the joint may do must have a code.
+void CheckMitRanges(const Config& config, const JointDescription& joint) {
+  const MitRanges& ranges = joint.motor.mit->ranges;
+  const double torque = joint.effort_limit / joint.motor.gear, velocity = joint.velocity_limit * joint.motor.gear;
+  if (torque > ranges.torque) {
+    config.Fail("mit", fmt::format("has torques up to {} Nm, but the joint's limit is {} Nm at the motor",
+                                   ranges.torque, torque));
+  }
+  if (velocity > ranges.velocity) {
+    config.Fail("mit", fmt::format("has velocities up to {} rad/s, but the joint's limit is {} rad/s at the motor",
+                                   ranges.velocity, velocity));
+  }
 }
 
 void CheckMotor(const UrdfModel& urdf, size_t index) {
@@ -118,7 +154,7 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
     if (seen[index]) config.Fail("name", fmt::format("= \"{}\" occurs twice", name));
     joint->passive = config.Boolean("passive", false);
     if (joint->passive) {
-      for (const char* key : {"protocol", "node", "gear", "sign", "offset"}) {
+      for (const char* key : {"protocol", "node", "gear", "sign", "offset", "mit"}) {
         if (config.Has(key)) config.Fail(key, "is of a motor, but the joint is passive");
       }
     } else {
@@ -129,6 +165,7 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
       }
       joint->motor = ReadMotor(config);
       CheckMotor(urdf, index);
+      if (joint->motor.mit) CheckMitRanges(config, *joint);
       for (size_t other = 0; other < joints.size(); ++other) {
         if (seen[other] && !joints[other].passive && joints[other].motor.protocol == joint->motor.protocol &&
             joints[other].motor.node == joint->motor.node) {

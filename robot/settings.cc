@@ -42,6 +42,7 @@ DriverSettings ReadDriver(Config config) {
   s.stale_after = config.Number("stale_after", {1e-3, 1});
   s.heartbeat_timeout = config.Number("heartbeat_timeout", {1e-3, 10});
   s.start_guard = config.Number("start_guard", {0, 10});
+  s.telemetry = config.Number("telemetry", {1e-3, 10}, s.telemetry);
   if (s.expiry < 2 * s.cycle) config.Fail("expiry", "must be at least two cycles");
   if (s.disarm_after < s.expiry) config.Fail("disarm_after", "must not be shorter than expiry");
   if (s.stale_after < 2 * s.measurement)

@@ -71,6 +71,8 @@ inline constexpr Layout kSetInputPos{0x0C, "Set_Input_Pos", 8,
 inline constexpr Layout kSetInputVel{0x0D, "Set_Input_Vel", 8,
     {{F("Input_Vel", 0, "rev/s"), F("Input_Torque_FF", 32, "Nm")}}};
 inline constexpr Layout kSetInputTorque{0x0E, "Set_Input_Torque", 8, {{F("Input_Torque", 0, "Nm")}}};
+/// The same in 95 bits at worst instead of 135: what comes after the torque may be left out.
+inline constexpr Layout kSetInputTorqueShort{0x0E, "Set_Input_Torque", 4, {{F("Input_Torque", 0, "Nm")}}};
 inline constexpr Layout kClearErrors{0x18, "Clear_Errors", 1, {{U("Identify", 0, 8)}}};
 // clang-format on
 

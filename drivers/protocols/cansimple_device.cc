@@ -25,7 +25,8 @@ CanSimpleDevice::CanSimpleDevice(const Settings& settings, int64_t now)
       fed_(now),
       next_heartbeat_(NextMultiple(settings.heartbeat_period, now)),
       next_encoder_(NextMultiple(settings.encoder_period, now)),
-      next_torques_(NextMultiple(settings.torques_period, now)) {
+      next_torques_(NextMultiple(settings.torques_period, now)),
+      next_telemetry_(NextMultiple(settings.telemetry_period, now)) {
   if (settings.node < 0 || settings.node > kMaxNode || settings.heartbeat_period <= 0) {
     throw std::invalid_argument("a CANSimple drive needs a node in [0, 0x3E] and a heartbeat");
   }
@@ -146,6 +147,17 @@ void CanSimpleDevice::FallIdle(uint32_t reason) noexcept {
   setpoint_ = 0;
 }
 
+void CanSimpleDevice::Reboot(int64_t now) noexcept {
+  state_ = kIdle;
+  control_mode_ = kPositionControl;
+  input_mode_ = kPassthrough;
+  procedure_result_ = kSuccess;
+  active_errors_ = disarm_reason_ = 0;
+  setpoint_ = 0;
+  fed_ = now;
+  requested_ = 0;
+}
+
 void CanSimpleDevice::CheckWatchdog(int64_t now) noexcept {
   if (armed() && settings_.watchdog > 0 && now - fed_ >= settings_.watchdog) FallIdle(kWatchdogTimerExpired);
 }
@@ -155,7 +167,7 @@ double CanSimpleDevice::Torque() const noexcept {
 }
 
 int64_t CanSimpleDevice::NextDue() const noexcept {
-  int64_t due = std::min({next_heartbeat_, next_encoder_, next_torques_});
+  int64_t due = std::min({next_heartbeat_, next_encoder_, next_torques_, next_telemetry_});
   if (armed() && settings_.watchdog > 0) due = std::min(due, fed_ + settings_.watchdog);
   return due;
 }
@@ -182,7 +194,7 @@ Frame CanSimpleDevice::Report(uint8_t command, const Sample& sample) const noexc
     case kGetIq.command:
       return Make(kGetIq, node, {torque / settings_.torque_constant, torque / settings_.torque_constant});
     case kGetTemperature.command:
-      return Make(kGetTemperature, node, {25, 25});
+      return Make(kGetTemperature, node, {settings_.temperature, settings_.temperature});
     case kGetBusVoltageCurrent.command:
       return Make(kGetBusVoltageCurrent, node, {settings_.bus_voltage, 0});
     default:
@@ -199,6 +211,9 @@ void CanSimpleDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) n
   };
   if (due(next_encoder_, settings_.encoder_period)) requested_ |= 1u << kGetEncoderEstimates.command;
   if (due(next_torques_, settings_.torques_period)) requested_ |= 1u << kGetTorques.command;
+  if (due(next_telemetry_, settings_.telemetry_period)) {
+    requested_ |= 1u << kGetTemperature.command | 1u << kGetBusVoltageCurrent.command;
+  }
   if (due(next_heartbeat_, settings_.heartbeat_period)) requested_ |= 1u << kHeartbeat.command;
   // The sample goes first: it is what the host is waiting for.
   constexpr uint8_t kFirst = kGetEncoderEstimates.command;

@@ -36,6 +36,8 @@ class CanSimpleDevice {
     uint64_t serial_number = 0;                                   ///< 48 bits, for the Address message
     double torque_constant = 0.0827;                              ///< [Nm/A] for Get_Iq
     double bus_voltage = 24;                                      ///< [V] for Get_Bus_Voltage_Current
+    int64_t telemetry_period = 0;  ///< [us] of Get_Temperature and Get_Bus_Voltage_Current; 0 = on request only
+    double temperature = 25;       ///< [degC] of motor and power stage
   };
   struct Sample {
     double position = 0;  ///< [rev] at the motor's shaft
@@ -60,6 +62,11 @@ class CanSimpleDevice {
 
   /// [Nm] the motor produces now: the last setpoint when in closed loop torque control, else 0.
   double Torque() const noexcept;
+
+  /// Loses its power and gets it back at `now`: idle, without a memory of errors and setpoints.
+  void Reboot(int64_t now) noexcept;
+  void set_bus_voltage(double volts) noexcept { settings_.bus_voltage = volts; }
+  void set_temperature(double degrees) noexcept { settings_.temperature = degrees; }
 
   bool armed() const noexcept { return state_ == cansimple::kClosedLoopControl; }
   int control_mode() const noexcept {
@@ -86,7 +93,7 @@ class CanSimpleDevice {
   uint32_t disarm_reason_ = 0;  ///< what disarmed it, until Clear_Errors
   double setpoint_ = 0;         ///< [Nm]
   int64_t fed_;                 ///< time of the last setpoint
-  int64_t next_heartbeat_, next_encoder_, next_torques_;
+  int64_t next_heartbeat_, next_encoder_, next_torques_, next_telemetry_;
   uint32_t requested_ = 0;  ///< bit i: command i has been asked for
   int64_t rejected_ = 0;
   int64_t setpoints_ = 0;

@@ -1,17 +1,16 @@
 #include "drivers/protocols/cansimple_host.h"
 
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
 #include "drivers/protocols/cansimple.h"
+#include "drivers/protocols/cansimple_reports.h"
 
 namespace plumb {
 namespace {
 
 using namespace cansimple;
 
-constexpr double kRadiansPerTurn = 2 * std::numbers::pi;
 constexpr int64_t kRetry = 50'000;      // [us] between repetitions of an unanswered frame
 constexpr int kModes = 2;               // one of them may be lost on the bus
 constexpr int kDisarmsBeforeEstop = 5;  // a drive that ignores these gets its emergency stop
@@ -28,35 +27,30 @@ class CanSimpleMotor : public Motor {
         frame.id >> 5 != static_cast<uint32_t>(node_)) {
       return FrameUse::kNotMine;
     }
-    switch (frame.id & 0x1F) {
-      case kHeartbeat.command:
-        return OnHeartbeat(frame, now);
-      case kGetVersion.command:
-        return OnVersion(frame);
-      case kGetError.command:
-        return OnError(frame);
-      case kGetEncoderEstimates.command:
-        return OnEstimates(frame);
-      case kGetTorques.command:
-        return OnTorques(frame);
-      case kGetIq.command:
-      case kGetTemperature.command:
-      case kGetBusVoltageCurrent.command:
-      case kGetPowers.command:
-        return frame.length == 8 ? FrameUse::kConsumed : FrameUse::kRejected;
-      default:
-        return FrameUse::kRejected;
+    const uint32_t command = frame.id & 0x1F;
+    const FrameUse use = command == kHeartbeat.command  ? OnHeartbeat(frame, now)
+                         : command == kGetError.command ? OnError(frame)
+                                                        : reports_.OnFrame(frame, now);
+    if (command == kAddress.command && reports_.two_drives()) Fail(now, "two drives have its node id");
+    if (const auto restart = reports_.TakeRestart()) {
+      Fail(now,
+           "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): home the "
+           "joint anew",
+           restart->silence / 1000, restart->jump);
     }
+    return use;
   }
 
-  const MotorEstimate& estimate() const noexcept override { return estimate_; }
-  double torque_estimate() const noexcept override { return torque_estimate_; }
+  const MotorEstimate& estimate() const noexcept override { return reports_.estimate(); }
+  double torque_estimate() const noexcept override { return reports_.torque_estimate(); }
+  MotorReadings readings() const noexcept override { return reports_.readings(); }
+  std::string_view identity() const noexcept override { return reports_.identity(); }
 
   void Arm(int64_t now) noexcept override {
     if (step_ == Step::kArmed) return;
     fault_ = estop_due_ = false;
     reason_.Clear();
-    version_ = Version::kUnknown;
+    reports_.ForgetFirmware();
     Enter(Step::kVersion, now);
   }
 
@@ -80,7 +74,8 @@ class CanSimpleMotor : public Motor {
     if (!present_ && heard_ && (Arming() || step_ == Step::kArmed)) {
       Fail(now, "no heartbeat for {} ms", (now - heartbeat_) / 1000);
     }
-    if (step_ == Step::kVersion && version_ == Version::kGood) Enter(Step::kClear, now);
+    const auto& firmware = reports_.firmware();
+    if (step_ == Step::kVersion && firmware && Spoken(*firmware)) Enter(Step::kClear, now);
     const bool late = now - entered_ >= timing_.heartbeat_timeout;
     switch (step_) {
       case Step::kRest:
@@ -88,8 +83,8 @@ class CanSimpleMotor : public Motor {
         if (present_ && axis_state_ == kClosedLoopControl) Disarm(now);
         break;
       case Step::kVersion:
-        if (version_ == Version::kBad) {
-          Fail(now, "its firmware is {}.{}, this driver speaks 0.6", firmware_major_, firmware_minor_);
+        if (firmware) {
+          Fail(now, "its firmware is {}.{}, this driver speaks 0.6", firmware->major, firmware->minor);
         } else if (late) {
           Fail(now, "it does not answer Get_Version (firmware older than 0.6?)");
         } else if (may_arm && Retry(now)) {
@@ -145,7 +140,7 @@ class CanSimpleMotor : public Motor {
     }
   }
 
-  Frame Torque(double torque) const noexcept override { return Make(kSetInputTorque, node_, {torque}); }
+  Frame Torque(double torque) noexcept override { return Make(kSetInputTorqueShort, node_, {torque}); }
 
   DriveState state() const noexcept override {
     if (!present_) return DriveState::kAbsent;
@@ -163,7 +158,9 @@ class CanSimpleMotor : public Motor {
 
  private:
   enum class Step { kRest, kVersion, kClear, kMode, kState, kAwait, kArmed, kDisarming };
-  enum class Version { kUnknown, kGood, kBad };
+  static bool Spoken(const CanSimpleReports::Firmware& firmware) noexcept {
+    return firmware.major == 0 && firmware.minor == 6;
+  }
 
   bool Arming() const noexcept { return step_ >= Step::kVersion && step_ <= Step::kAwait; }
 
@@ -200,7 +197,7 @@ class CanSimpleMotor : public Motor {
       return Enter(Step::kRest, now);
     }
     if (out.room() < 3 || !Retry(now)) return;
-    out.Push(Make(kSetInputTorque, node_, {0}));
+    out.Push(Make(kSetInputTorqueShort, node_, {0}));
     out.Push(Make(kSetAxisState, node_, {kIdle}));
     if (disarms_ >= kDisarmsBeforeEstop) out.Push(Make(kEstop, node_));
   }
@@ -213,6 +210,7 @@ class CanSimpleMotor : public Motor {
     axis_error_ = static_cast<uint32_t>((*values)[0]);
     axis_state_ = static_cast<int>((*values)[1]);
     axis_state_known_ = true;
+    reports_.OnHeartbeat(axis_state_, now);
     may_run_ = may_run_ || axis_state_ == kClosedLoopControl;
     procedure_result_ = static_cast<int>((*values)[2]);
     ++beats_;
@@ -229,15 +227,6 @@ class CanSimpleMotor : public Motor {
     return FrameUse::kConsumed;
   }
 
-  FrameUse OnVersion(const Frame& frame) noexcept {
-    const auto values = DecodePayload(kGetVersion, frame);
-    if (!values) return FrameUse::kRejected;
-    firmware_major_ = static_cast<int>((*values)[4]);
-    firmware_minor_ = static_cast<int>((*values)[5]);
-    version_ = firmware_major_ == 0 && firmware_minor_ == 6 ? Version::kGood : Version::kBad;
-    return FrameUse::kConsumed;
-  }
-
   FrameUse OnError(const Frame& frame) noexcept {
     const auto values = DecodePayload(kGetError, frame);
     if (!values) return FrameUse::kRejected;
@@ -248,32 +237,15 @@ class CanSimpleMotor : public Motor {
     return FrameUse::kConsumed;
   }
 
-  FrameUse OnEstimates(const Frame& frame) noexcept {
-    const auto values = DecodePayload(kGetEncoderEstimates, frame);
-    if (!values || !AllFinite(kGetEncoderEstimates, *values)) return FrameUse::kRejected;
-    estimate_ = {(*values)[0] * kRadiansPerTurn, (*values)[1] * kRadiansPerTurn};
-    return FrameUse::kEstimate;
-  }
-
-  FrameUse OnTorques(const Frame& frame) noexcept {
-    const auto values = DecodePayload(kGetTorques, frame);
-    if (!values || !AllFinite(kGetTorques, *values)) return FrameUse::kRejected;
-    torque_estimate_ = (*values)[1];
-    return FrameUse::kConsumed;
-  }
-
   const int node_;
   const MotorTiming timing_;
-  MotorEstimate estimate_;
-  double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
+  CanSimpleReports reports_;
   bool heard_ = false, present_ = false;  // ever, lately
   int64_t heartbeat_ = 0;
   uint32_t axis_error_ = 0;
   int axis_state_ = kUndefined, procedure_result_ = 0;
   bool axis_state_known_ = false;  // since the last disarm
-  Version version_ = Version::kUnknown;
   std::array<char, 100> words_;
-  int firmware_major_ = 0, firmware_minor_ = 0;
 
   Step step_ = Step::kRest;
   int64_t entered_ = 0, retry_ = 0;

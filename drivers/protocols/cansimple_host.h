@@ -1,5 +1,6 @@
 #pragma once
 
+#include "drivers/protocols/bus_device.h"
 #include "drivers/protocols/protocol.h"
 
 namespace plumb {
@@ -14,5 +15,12 @@ namespace plumb {
 /// The driver sends zero torque meanwhile, which feeds the drive's watchdog.
 /// @throws std::invalid_argument if the node is not in [0, 0x3E].
 std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description, const MotorTiming& timing);
+
+/// Heartbeats that are expected within heartbeat_timeout: with the factory's 100 ms, 0.5 s.
+inline constexpr int kBeatsPerTimeout = 5;
+
+/// What such a drive and its host say to each other, the drive configured to send heartbeats with a fifth of
+/// heartbeat_timeout, encoder estimates with `measurement`, temperatures and its supply with `telemetry`; all else on request.
+BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings& driver);
 
 }  // namespace plumb

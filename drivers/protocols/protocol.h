@@ -11,6 +11,7 @@
 
 #include "drivers/can/frame.h"
 #include "drivers/can/transport.h"
+#include "drivers/protocols/bus_device.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -40,6 +41,14 @@ struct MotorEstimate {
   double velocity = 0;  ///< [rad/s]
 };
 
+/// What else a drive reports, for whoever watches over it. NaN = it does not report that, or has not yet.
+struct MotorReadings {
+  double motor_temperature = std::numeric_limits<double>::quiet_NaN();  ///< [degC]
+  double drive_temperature = std::numeric_limits<double>::quiet_NaN();  ///< [degC] of its power stage
+  double bus_voltage = std::numeric_limits<double>::quiet_NaN();        ///< [V] of its supply
+  double bus_current = std::numeric_limits<double>::quiet_NaN();        ///< [A] from its supply
+};
+
 /// What a motor made of a frame.
 enum class FrameUse {
   kNotMine,   ///< another id, or not a frame a drive sends: remote, extended, FD, error
@@ -62,6 +71,10 @@ class Motor {
   virtual const MotorEstimate& estimate() const noexcept = 0;
   /// [Nm] the drive's torque estimate; NaN if it does not report one.
   virtual double torque_estimate() const noexcept = 0;
+  /// The newest of each.
+  virtual MotorReadings readings() const noexcept { return {}; }
+  /// What the drive says it is, such as "firmware 0.6.10, hardware 4.4.58"; empty if it has not said.
+  virtual std::string_view identity() const noexcept { return {}; }
 
   /// Begins the arming sequence, from any state but armed. state() tells how it goes.
   virtual void Arm(int64_t now) noexcept = 0;
@@ -76,7 +89,9 @@ class Motor {
   /// not sent, and the next Tick gives them again: no step follows one that did not happen.
   virtual void Transmitted(bool all, int64_t now) noexcept = 0;
   /// The frame of a torque setpoint [Nm]. Sent in every cycle while arming (zero) and armed.
-  virtual Frame Torque(double torque) const noexcept = 0;
+  virtual Frame Torque(double torque) noexcept = 0;
+  /// Setpoints that the protocol could not say as they were: beyond its range, or not finite.
+  virtual int64_t saturations() const noexcept { return 0; }
 
   virtual DriveState state() const noexcept = 0;
   /// Why it is not armed: decoded errors, the step at which arming failed. Empty if there is nothing to say.
@@ -92,8 +107,12 @@ struct MotorTiming {
 };
 
 /// A motor of the named protocol (MotorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or a node it cannot
-/// have.
+/// @throws std::invalid_argument for an unknown protocol (the message lists those known), or a node or
+/// settings it cannot have.
 std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const MotorTiming& timing);
+
+/// What that motor and its host say on the bus; without a name.
+/// @throws std::invalid_argument for an unknown protocol.
+BusDevice MotorBusDevice(const MotorDescription& description, const DriverSettings& driver);
 
 }  // namespace plumb

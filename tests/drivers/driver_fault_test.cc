@@ -207,7 +207,7 @@ TEST_CASE("the bus fails and comes back, the robot does not by itself") {
   CHECK(rig.driver->state() == DriveState::kFault);
   CHECK(rig.Reason() == expected);
   rig.Run(5);
-  CHECK(rig.Sent() == std::vector<std::string>{"02E#0000000000000000", "027#0100000000000000"});
+  CHECK(rig.Sent() == std::vector<std::string>{"02E#00000000", "027#0100000000000000"});
   rig.driver->OnLink(LinkState::kUp);
   rig.Inject("20000100#0000000000000000");
   rig.Run(500);

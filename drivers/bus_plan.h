@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/protocols/bus_device.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// Bits of a classic frame, the 3 of the interframe space included.
+/// @param length bytes of data; 0 for a remote frame.
+int NominalBits(bool extended, int length);
+/// With the most stuff bits that there can be.
+int WorstCaseBits(bool extended, int length);
+
+/// Whether all messages of a bus get through in time, whatever they say.
+///
+/// Response times by the exact analysis of Davis, Burns, Bril and Lukkien, "Controller Area Network (CAN)
+/// schedulability analysis: Refuted, revisited and revised", Real-Time Systems 35 (2007): a message waits for
+/// the longest lower one, which has just begun, and for all higher ones, queued at the worst instants. It
+/// assumes that of the frames that wait at a node the highest goes first (send in the order of ids), and no
+/// errors. Every message must be on the bus before the next of its kind: deadlines are periods. Messages
+/// without a period block others once but are no load: the plan is that of a robot that moves.
+struct BusPlan {
+  static constexpr double kWarnLoad = 0.8;
+
+  struct Row {
+    std::string device;
+    BusMessage message;
+    int nominal_bits, worst_bits;
+    double worst_load;  ///< share of the bus; 0 without a period
+    double response;  ///< [us] from being due to having been sent, at worst; NaN without a period, else maybe
+                      ///< infinite
+  };
+  double bit_rate;                  ///< [bit/s]
+  std::vector<Row> rows;            ///< highest priority first
+  double nominal_load = 0;          ///< share of the bus without stuff bits
+  double worst_load = 0;            ///< with the most there can be
+  std::vector<std::string> errors;  ///< why it cannot work, a sentence each
+  std::vector<std::string> warnings;
+};
+
+/// @param devices as their protocols declare them, named.
+/// @param bit_rate [bit/s] > 0
+BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate);
+
+/// All of a robot's motors and sensors, each under its joint's or its own name.
+/// @throws std::invalid_argument for an unknown protocol.
+std::vector<BusDevice> BusDevices(const RobotDescription& robot);
+
+/// A table for people: messages, loads, response times, errors and warnings.
+std::string ToText(const BusPlan& plan);
+
+}  // namespace plumb

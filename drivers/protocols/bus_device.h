@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/protocols/fields.h"
+
+namespace plumb {
+
+/// One kind of message that a device sends, or listens to and the driver sends.
+struct BusMessage {
+  enum class Direction : uint8_t { kFromDevice, kToDevice };
+  /// [us] assumed of what a program on Linux sends once per period.
+  static constexpr int64_t kHostJitter = 200;
+
+  Layout layout;  ///< name, fields, and bytes on the wire
+  uint32_t id = 0;
+  bool extended = false;
+  bool remote = false;  ///< a request: no data
+  Direction direction = Direction::kFromDevice;
+  int64_t period = 0;  ///< [us]; 0 = now and then, not while the robot moves
+  int64_t jitter = 0;  ///< [us] by which it may be queued late
+  int answers =
+      -1;  ///< it is the answer to that message of the device, whose response time adds to the jitter
+  /// Other devices of the protocol may have it, too: broadcasts, and replies that say whose they are.
+  bool shared = false;
+  int selector = -1;  ///< of a shared one from the device: value of its first field that says whose it is
+};
+
+/// Ids [first, last] that are a device's own, whatever of them it uses.
+struct IdRange {
+  uint32_t first, last;
+};
+
+/// What a device has to do with a bus.
+struct BusDevice {
+  std::string name;
+  std::string protocol;
+  std::vector<BusMessage> messages;
+  std::vector<IdRange> claims;  ///< of standard ids
+};
+
+}  // namespace plumb

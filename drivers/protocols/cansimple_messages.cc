@@ -1,0 +1,47 @@
+#include <cmath>
+
+#include "drivers/protocols/cansimple.h"
+#include "drivers/protocols/cansimple_host.h"
+
+namespace plumb {
+
+using namespace cansimple;
+
+BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings& driver) {
+  using Direction = BusMessage::Direction;
+  const auto microseconds = [](double seconds) { return std::llround(seconds * 1e6); };
+  const auto block = static_cast<uint32_t>(motor.node) << 5;
+  const int64_t heartbeat = microseconds(driver.heartbeat_timeout) / kBeatsPerTimeout;
+  const int64_t telemetry = microseconds(driver.telemetry);
+  BusDevice device{.name = "", .protocol = "cansimple", .messages = {}, .claims = {{block, block + 0x1F}}};
+  const auto add = [&](const Layout& layout, Direction direction, int64_t period) {
+    BusMessage message;
+    message.layout = layout;
+    message.id = block | layout.command;
+    message.direction = direction;
+    message.period = period;
+    if (direction == Direction::kToDevice) message.jitter = BusMessage::kHostJitter;
+    device.messages.push_back(message);
+  };
+  add(kHeartbeat, Direction::kFromDevice, heartbeat);
+  add(kGetEncoderEstimates, Direction::kFromDevice, microseconds(driver.measurement));
+  add(kGetTemperature, Direction::kFromDevice, telemetry);
+  add(kGetBusVoltageCurrent, Direction::kFromDevice, telemetry);
+  for (const Layout& layout : {kGetVersion, kGetError, kAddress, kGetTorques, kGetIq, kGetPowers}) {
+    add(layout, Direction::kFromDevice, 0);
+  }
+  add(kSetInputTorqueShort, Direction::kToDevice, microseconds(driver.cycle));
+  for (const Layout& layout : {kEstop, kSetAxisState, kSetControllerMode, kClearErrors}) {
+    add(layout, Direction::kToDevice, 0);
+  }
+  // To all drives at once; we send neither, but nobody else may.
+  for (const Layout& layout : {kEstop, kAddress}) {
+    add(layout, Direction::kToDevice, 0);
+    device.messages.back().id = static_cast<uint32_t>(kBroadcastNode) << 5 | layout.command;
+    device.messages.back().shared = true;
+    device.messages.back().remote = layout.command == kAddress.command;
+  }
+  return device;
+}
+
+}  // namespace plumb

@@ -1,0 +1,131 @@
+#include "drivers/protocols/cansimple_reports.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+#include <utility>
+
+namespace plumb {
+namespace {
+
+using namespace cansimple;
+
+constexpr double kRadiansPerTurn = 2 * std::numbers::pi;
+constexpr double kSilentIntervals = 2.5;  // one heartbeat may be lost
+constexpr int64_t kTogether = 1'000'000;  // [us] between silence and jump of one restart
+constexpr double kLeastJump = 0.05;       // [turns] beyond what the velocities explain
+
+const Layout* Find(uint32_t command) {
+  switch (command) {
+    case kGetVersion.command:
+      return &kGetVersion;
+    case kAddress.command:
+      return &kAddress;
+    case kGetEncoderEstimates.command:
+      return &kGetEncoderEstimates;
+    case kGetTorques.command:
+      return &kGetTorques;
+    case kGetIq.command:
+      return &kGetIq;
+    case kGetTemperature.command:
+      return &kGetTemperature;
+    case kGetBusVoltageCurrent.command:
+      return &kGetBusVoltageCurrent;
+    case kGetPowers.command:
+      return &kGetPowers;
+    default:
+      return nullptr;
+  }
+}
+
+}  // namespace
+
+FrameUse CanSimpleReports::OnFrame(const Frame& frame, int64_t now) noexcept {
+  const Layout* layout = Find(frame.id & 0x1F);
+  if (!layout) return FrameUse::kRejected;
+  const auto values = DecodePayload(*layout, frame);
+  if (!values || !AllFinite(*layout, *values)) return FrameUse::kRejected;
+  const FieldValues& v = *values;
+  switch (layout->command) {
+    case kGetVersion.command:
+      return OnVersion(v);
+    case kAddress.command:
+      return OnAddress(v);
+    case kGetEncoderEstimates.command:
+      return OnEstimates(v, now);
+    case kGetTorques.command:
+      torque_estimate_ = v[1];
+      break;
+    case kGetTemperature.command:
+      readings_.drive_temperature = v[0];
+      readings_.motor_temperature = v[1];
+      break;
+    case kGetBusVoltageCurrent.command:
+      readings_.bus_voltage = v[0];
+      readings_.bus_current = v[1];
+      break;
+    default:
+      break;
+  }
+  return FrameUse::kConsumed;
+}
+
+FrameUse CanSimpleReports::OnVersion(const FieldValues& v) noexcept {
+  const auto number = [&](size_t i) { return static_cast<int>(v[i]); };
+  firmware_ = {number(4), number(5)};
+  identity_.Set("firmware {}.{}.{}{}, hardware {}.{}.{}", number(4), number(5), number(6),
+                number(7) != 0 ? " unreleased" : "", number(1), number(2), number(3));
+  return FrameUse::kConsumed;
+}
+
+FrameUse CanSimpleReports::OnAddress(const FieldValues& v) noexcept {
+  two_drives_ = two_drives_ || (serial_number_ && *serial_number_ != v[1]);
+  serial_number_ = v[1];
+  return FrameUse::kConsumed;
+}
+
+FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexcept {
+  const MotorEstimate next{v[0] * kRadiansPerTurn, v[1] * kRadiansPerTurn};
+  if (estimated_) {
+    const double seconds = static_cast<double>(now - estimated_at_) * 1e-6;
+    const double turned = std::abs(next.position - estimate_.position) / kRadiansPerTurn;
+    const double fastest = std::max(std::abs(next.velocity), std::abs(estimate_.velocity)) / kRadiansPerTurn;
+    // Twice: it may have been faster in between.
+    if (turned > kLeastJump + 2 * fastest * seconds) {
+      jump_ = {now, (next.position - estimate_.position) / kRadiansPerTurn, true};
+      LookForRestart();
+    }
+  }
+  estimated_ = true;
+  estimated_at_ = now;
+  estimate_ = next;
+  return FrameUse::kEstimate;
+}
+
+void CanSimpleReports::OnHeartbeat(int axis_state, int64_t now) noexcept {
+  const int64_t gap = heartbeat_ == 0 ? 0 : now - heartbeat_;
+  const bool silent =
+      interval_ > 0 && static_cast<double>(gap) > kSilentIntervals * static_cast<double>(interval_);
+  heartbeat_ = now;
+  if (!silent) {
+    interval_ = gap;
+    return;
+  }
+  interval_ = 0;
+  if (axis_state != kIdle && axis_state != kUndefined) return;
+  silence_ = {now, static_cast<double>(gap), true};
+  LookForRestart();
+}
+
+void CanSimpleReports::LookForRestart() noexcept {
+  if (!silence_.seen || !jump_.seen || std::abs(silence_.at - jump_.at) > kTogether) return;
+  restart_ = Restart{static_cast<int64_t>(silence_.size), jump_.size};
+  silence_.seen = jump_.seen = false;
+}
+
+std::optional<CanSimpleReports::Restart> CanSimpleReports::TakeRestart() noexcept {
+  return std::exchange(restart_, std::nullopt);
+}
+
+}  // namespace plumb

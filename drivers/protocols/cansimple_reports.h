@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "drivers/protocols/cansimple.h"
+#include "drivers/protocols/protocol.h"
+
+namespace plumb {
+
+/// What an ODrive reports besides heartbeats and errors, remembered; and the signs that it has restarted.
+/// Pure logic; free of exceptions and allocation. Not thread-safe.
+class CanSimpleReports {
+ public:
+  /// @param frame of the drive's id, not remote. kRejected for what is too short, not finite or unknown.
+  FrameUse OnFrame(const Frame& frame, int64_t now) noexcept;
+  /// Call it with each heartbeat.
+  void OnHeartbeat(int axis_state, int64_t now) noexcept;
+
+  const MotorEstimate& estimate() const noexcept { return estimate_; }
+  double torque_estimate() const noexcept { return torque_estimate_; }
+  const MotorReadings& readings() const noexcept { return readings_; }
+  std::string_view identity() const noexcept { return identity_.text(); }
+
+  struct Firmware {
+    int major, minor;
+  };
+  /// Nothing until it has said so, or since it was forgotten.
+  const std::optional<Firmware>& firmware() const noexcept { return firmware_; }
+  void ForgetFirmware() noexcept { firmware_.reset(); }
+
+  /// True if frames with two serial numbers have come from one node: two drives that both obey us.
+  bool two_drives() const noexcept { return two_drives_; }
+
+  struct Restart {
+    int64_t silence;  ///< [us] between two heartbeats
+    double jump;      ///< [turns] of the position
+  };
+  /// Heartbeats stayed away, then said IDLE, and about that time the position jumped farther than it can have
+  /// turned: the drive lost its power, and with it its place. Told once.
+  std::optional<Restart> TakeRestart() noexcept;
+
+ private:
+  FrameUse OnVersion(const FieldValues& values) noexcept;
+  FrameUse OnAddress(const FieldValues& values) noexcept;
+  FrameUse OnEstimates(const FieldValues& values, int64_t now) noexcept;
+  void LookForRestart() noexcept;
+
+  MotorEstimate estimate_;
+  double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
+  MotorReadings readings_;
+  Reason identity_;
+  std::optional<Firmware> firmware_;
+  std::optional<double> serial_number_;
+  bool two_drives_ = false;
+
+  bool estimated_ = false;
+  int64_t estimated_at_ = 0;
+  int64_t heartbeat_ = 0, interval_ = 0;  // time of the last one; to the one before; 0 = not known
+  struct Event {
+    int64_t at = 0;
+    double size = 0;
+    bool seen = false;
+  };
+  Event silence_, jump_;
+  std::optional<Restart> restart_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,38 @@
+#include "drivers/protocols/xsens_device.h"
+
+#include <stdexcept>
+
+namespace plumb {
+
+using namespace xsens;
+
+XsensDevice::XsensDevice(const Settings& settings, int64_t now) : settings_(settings) {
+  if (settings.period <= 0 || settings.tick <= 0) {
+    throw std::invalid_argument("an IMU needs a period and a tick");
+  }
+  Reboot(now);
+}
+
+void XsensDevice::Reboot(int64_t now) noexcept {
+  started_ = now;
+  next_ = now - now % settings_.period + settings_.period;
+  counter_ = 0;
+}
+
+void XsensDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) noexcept {
+  const int base = settings_.base;
+  if (error_ != 0) out.Push(Make(kError, base, {double(error_)}));
+  error_ = 0;
+  if (now < next_) return;
+  next_ = now - now % settings_.period + settings_.period;
+  const auto ticks = settings_.first_tick + static_cast<uint32_t>((now - started_) / settings_.tick);
+  const auto& [w, x, y, z] = sample.orientation;
+  out.Push(Make(kSampleTime, base, {double(ticks)}));
+  if (settings_.group_counter) out.Push(Make(kGroupCounter, base, {double(counter_++)}));
+  out.Push(Make(kStatusWord, base, {double(sample.status)}));
+  out.Push(Make(kQuaternion, base, {w, x, y, z}));
+  out.Push(Make(kRateOfTurn, base, {sample.rate[0], sample.rate[1], sample.rate[2]}));
+  out.Push(Make(kAcceleration, base, {sample.force[0], sample.force[1], sample.force[2]}));
+}
+
+}  // namespace plumb

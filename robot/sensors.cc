@@ -1,0 +1,97 @@
+#include "robot/sensors.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+namespace plumb {
+namespace {
+
+constexpr double kMostCounts = 4294967296;  // an unsigned 32-bit position
+
+/// Index of what has the name, or an error at the key that gave it.
+template <class T>
+int Find(const Config& config, const char* key, const std::string& name, const std::vector<T>& all,
+         const char* what) {
+  const auto at = std::find_if(all.begin(), all.end(), [&](const T& one) { return one.name == name; });
+  if (at == all.end()) config.Fail(key, fmt::format("= \"{}\" is not a {} of the URDF", name, what));
+  return static_cast<int>(at - all.begin());
+}
+
+void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescription& s) {
+  using Type = JointDescription::Type;
+  s.node = config.Integer("node", {1, 127});
+  s.counts = config.Number("counts", {2, kMostCounts});
+  s.range = config.Number("range", {2, kMostCounts}, s.counts);
+  for (const auto& [key, counts] : {std::pair{"counts", s.counts}, std::pair{"range", s.range}}) {
+    if (counts != std::floor(counts)) config.Fail(key, fmt::format("= {} is not a whole number", counts));
+  }
+  s.sign = config.Integer("sign", {-1, 1}, 1);
+  if (s.sign == 0) config.Fail("sign", "must be 1 or -1");
+  s.offset = config.Number("offset", {-1e9, 1e9}, 0);
+  s.max_speed = config.Number("max_speed", {1e-3, 1e6});
+  // Between two readings it must turn by less than half of what it can tell apart.
+  const double half = s.range / s.counts * std::acos(-1.);
+  if (s.max_speed * s.period >= half) {
+    config.Fail("max_speed",
+                fmt::format("= {} rad/s turns it by {:.3g} rad within a period, half its range or more",
+                            s.max_speed, s.max_speed * s.period));
+  }
+  const std::string joint = config.String("joint");
+  s.joint = Find(config, "joint", joint, robot.joints, "moving joint");
+  const Type type = robot.joints[static_cast<size_t>(s.joint)].type;
+  if (type == Type::kSpherical) {
+    config.Fail("joint",
+                fmt::format("= \"{}\" is a spherical joint: an encoder measures one coordinate", joint));
+  }
+  if (type == Type::kPrismatic) {
+    s.radius = config.Number("radius", {1e-6, 1e6});
+  } else if (config.Has("radius")) {
+    config.Fail("radius", fmt::format("is of a joint that slides, but \"{}\" turns", joint));
+  }
+}
+
+void ReadImu(Config& config, const RobotDescription& robot, SensorDescription& s) {
+  s.base = config.Integer("base", {0, 0x7FF - 0x7F}, 0);
+  s.tick = config.Number("tick", {1e-9, 1}, s.tick);
+  s.link = Find(config, "link", config.String("link"), robot.links, "link");
+  const std::vector<double> rpy = config.Numbers("rpy", 3, {-10, 10}, std::vector<double>(3));
+  s.rotation = (Eigen::AngleAxisd(rpy[2], Eigen::Vector3d::UnitZ()) *
+                Eigen::AngleAxisd(rpy[1], Eigen::Vector3d::UnitY()) *
+                Eigen::AngleAxisd(rpy[0], Eigen::Vector3d::UnitX()))
+                   .toRotationMatrix();
+}
+
+}  // namespace
+
+std::vector<SensorDescription> ReadSensors(Config& root, const RobotDescription& robot) {
+  std::vector<SensorDescription> sensors;
+  for (Config& config : root.Tables("sensor")) {
+    SensorDescription s;
+    s.name = config.String("name");
+    if (s.name.empty()) config.Fail("name", "is empty");
+    for (const SensorDescription& other : sensors) {
+      if (other.name == s.name) config.Fail("name", fmt::format("= \"{}\" occurs twice", s.name));
+    }
+    for (const JointDescription& joint : robot.joints) {
+      if (joint.name == s.name) config.Fail("name", fmt::format("= \"{}\" is a joint's", s.name));
+    }
+    const std::vector<std::string> protocols = {"cia406", "xsens"};
+    const auto protocol = static_cast<size_t>(config.Choice("protocol", protocols));
+    s.protocol = protocols[protocol];
+    s.period = config.Number("period", {1e-4, 1});
+    if (protocol == 0) {
+      ReadEncoder(config, robot, s);
+    } else {
+      ReadImu(config, robot, s);
+    }
+    config.Finish();
+    sensors.push_back(s);
+  }
+  return sensors;
+}
+
+}  // namespace plumb

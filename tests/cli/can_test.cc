@@ -1,0 +1,46 @@
+// `plumb can`, run as a person would.
+#include <catch2/catch.hpp>
+#include <string>
+
+#include "tests/cli/shell.h"
+
+namespace plumb {
+
+TEST_CASE("can plan: the hopper's bus, and one that cannot work") {
+  const Outcome outcome = Shell(Plumb() + "can plan " + Robot("hopper"));
+  INFO(outcome.text);
+  CHECK(outcome.status == 0);
+  for (const char* word :
+       {"0x06e", "Set_Input_Torque", "boom_yaw", "TPDO1", "0x3b2", "at worst", "all deadlines are met"}) {
+    CHECK_THAT(outcome.text, Catch::Contains(word));
+  }
+  const Folder folder;
+  const std::string toml = Read(Robot("hopper") + "/robot.toml");
+  const std::string base = "base = 0x380";
+  std::string colliding = toml;
+  colliding.replace(colliding.find(base), base.size(), "base = 0x000");
+  std::ofstream(folder / "robot.toml") << colliding;
+  std::ofstream(folder / "robot.urdf") << Read(Robot("hopper") + "/robot.urdf");
+  const Outcome refused = Shell(Plumb() + "can plan " + folder / "robot.toml");
+  INFO(refused.text);
+  CHECK(refused.status == 1);
+  CHECK_THAT(refused.text,
+             Catch::Contains("error: CAN id 0x021: 'thigh' sends Heartbeat and 'imu' sends Quaternion"));
+}
+
+TEST_CASE("can dbc: to the screen or a file, the same") {
+  const Folder folder;
+  const Outcome printed = Shell(Plumb() + "can dbc " + Robot("hopper"));
+  CHECK(printed.status == 0);
+  CHECK_THAT(printed.text, Catch::Contains("BO_ 41 thigh_Get_Encoder_Estimates: 8 thigh"));
+  CHECK(Shell(Plumb() + "can dbc " + Robot("hopper") + " --output " + folder / "bus.dbc").status == 0);
+  CHECK(Read(folder / "bus.dbc") == printed.text);
+}
+
+TEST_CASE("can: usage") {
+  CHECK(Shell(Plumb() + "can").status == 2);
+  CHECK(Shell(Plumb() + "can plan").status == 2);
+  CHECK(Shell(Plumb() + "can plan /nowhere").status == 1);
+}
+
+}  // namespace plumb

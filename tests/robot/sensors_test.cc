@@ -1,0 +1,167 @@
+#include "robot/sensors.h"
+
+#include <catch2/catch.hpp>
+#include <cstdlib>
+
+#include "tests/robot/zoo.h"
+
+namespace plumb {
+namespace {
+
+using Catch::Contains;
+
+const std::string kSensors = R"([[sensor]]
+name = "boom"
+protocol = "cia406"
+node = 1
+period = 0.002
+joint = "rail/x"
+counts = 65536
+range = 268435456
+sign = -1
+offset = 0.25
+radius = 1.5
+max_speed = 10.0
+[[sensor]]
+name = "hip_encoder"
+protocol = "cia406"
+node = 2
+period = 0.002
+joint = "hip"
+counts = 4096
+max_speed = 10.0
+[[sensor]]
+name = "imu"
+protocol = "xsens"
+base = 0x380
+period = 0.005
+link = "carriage"
+rpy = [0, 0, 1.5707963267948966]
+)";
+const std::string kMit = R"(protocol = "mit"
+node = 0x11
+[joint.mit]
+master = 0x10
+velocity = 75.0
+torque = 18.0
+source = "the label"
+)";
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+RobotDescription Load(const std::string& toml) { return LoadRobot(RobotFolder(kZooUrdf, toml).path()); }
+
+std::string WithMit(const std::string& mit) {
+  return Replaced(kZooToml, "protocol = \"cansimple\"\nnode = 1\ngear = 6.0\n", "gear = 6.0\n" + mit);
+}
+
+TEST_CASE("sensors: encoders and an IMU") {
+  const RobotDescription robot = Load(kZooToml + kSensors);
+  REQUIRE(robot.sensors.size() == 3);
+  const SensorDescription& boom = robot.sensors[0];
+  CHECK(boom.name == "boom");
+  CHECK(boom.protocol == "cia406");
+  CHECK(robot.joints[static_cast<size_t>(boom.joint)].name == "rail/x");
+  CHECK(boom.node == 1);
+  CHECK(boom.counts == 65536);
+  CHECK(boom.range == 268435456);
+  CHECK(boom.sign == -1);
+  CHECK(boom.offset == 0.25);
+  CHECK(boom.radius == 1.5);
+  CHECK(boom.max_speed == 10);
+  CHECK(boom.period == 0.002);
+  CHECK(robot.sensors[1].range == 4096);
+  CHECK(robot.sensors[1].radius == 1);
+  const SensorDescription& imu = robot.sensors[2];
+  CHECK(imu.base == 0x380);
+  CHECK(imu.tick == 1e-4);
+  CHECK(robot.links[static_cast<size_t>(imu.link)].name == "carriage");
+  CHECK((imu.rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm() < 1e-12);
+  CHECK(Load(kZooToml).sensors.empty());
+}
+
+TEST_CASE("sensors: what is refused") {
+  const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
+    INFO(from << " -> " << to);
+    CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, from, to)),
+                      Contains("robot.toml:") && Contains(what));
+  };
+  refused("name = \"hip_encoder\"", "name = \"boom\"", "occurs twice");
+  refused("name = \"hip_encoder\"", "name = \"hip\"", "is a joint's");
+  refused("name = \"hip_encoder\"", "name = \"\"", "is empty");
+  refused("\"xsens\"", "\"xsense\"", "protocol");
+  refused("node = 1\n", "node = 0\n", "node");
+  refused("node = 1\n", "", "node");
+  refused("node = 1\n", "node = 1\nbase = 3\n", "base");
+  refused("joint = \"hip\"", "joint = \"knee\"", "not a moving joint");
+  refused("joint = \"hip\"", "joint = \"free/rotation\"", "spherical");
+  refused("joint = \"hip\"", "joint = \"hip\"\nradius = 2", "\"hip\" turns");
+  refused("radius = 1.5\n", "", "radius");
+  refused("counts = 4096", "counts = 0", "counts");
+  refused("counts = 4096", "counts = 40.5", "whole number");
+  refused("range = 268435456", "range = 4294967297", "range");
+  refused("sign = -1", "sign = 0", "1 or -1");
+  refused("max_speed = 10.0\n[[sensor]]\nname = \"imu\"", "max_speed = 1600.0\n[[sensor]]\nname = \"imu\"",
+          "half its range");
+  refused("link = \"carriage\"", "link = \"carrige\"", "not a link");
+  refused("base = 0x380", "base = 0x7C0", "base");
+  refused("rpy = [0, 0, 1.5707963267948966]", "rpy = [0, 0]", "rpy");
+  refused("period = 0.005", "period = 0", "period");
+}
+
+TEST_CASE("MIT motors: ranges with their source") {
+  const RobotDescription robot = Load(WithMit(kMit));
+  const MotorDescription& motor = robot.joints[3].motor;
+  CHECK(motor.protocol == "mit");
+  CHECK(motor.node == 0x11);
+  REQUIRE(motor.mit);
+  CHECK(motor.mit->master == 0x10);
+  CHECK(motor.mit->ranges.position == 12.5);
+  CHECK(motor.mit->ranges.velocity == 75);
+  CHECK(motor.mit->ranges.torque == 18);
+  CHECK(motor.mit->ranges.kp == 500);
+  CHECK(motor.mit->ranges.kd == 5);
+  CHECK(motor.mit->source == "the label");
+  CHECK_FALSE(robot.joints[9].motor.mit);
+}
+
+TEST_CASE("MIT motors: what is refused") {
+  const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
+    INFO(from << " -> " << to);
+    CHECK_THROWS_WITH(Load(WithMit(Replaced(kMit, from, to))), Contains("robot.toml:") && Contains(what));
+  };
+  refused(kMit.substr(kMit.find("[joint.mit]")), "", "mit");
+  refused("protocol = \"mit\"", "protocol = \"cansimple\"", "is of protocol \"mit\"");
+  refused("master = 0x10", "master = 0x11", "id of its replies");
+  refused("master = 0x10", "master = 0x800", "master");
+  refused("velocity = 75.0", "velocity = 59.0",
+          "the joint's limit is 60 rad/s");  // 10 rad/s behind a gear of 6
+  refused("torque = 18.0", "torque = 3.0", "Nm at the motor");
+  refused("source = \"the label\"", "", "source");
+  refused("source = \"the label\"", "source = \"\"", "say where");
+  refused("torque = 18.0", "torque = 18.0\nmaximum = 3", "maximum");
+}
+
+TEST_CASE("the bus has a bit rate, and drives a telemetry period") {
+  CHECK(Load(kZooToml).bus_bit_rate == 1e6);
+  CHECK(Load(kZooToml).driver.telemetry == 0.1);
+  CHECK(Load(Replaced(kZooToml, "[driver]", "bit_rate = 500000\n[driver]\ntelemetry = 0.02")).bus_bit_rate ==
+        5e5);
+  CHECK_THROWS_WITH(Load(Replaced(kZooToml, "[driver]", "bit_rate = 2e6\n[driver]")), Contains("bit_rate"));
+}
+
+TEST_CASE("the hopper's boom and IMU have the ids of its plan") {
+  const char* source = std::getenv("PLUMBLINE_SOURCE");
+  const RobotDescription hopper = LoadRobot(std::string(source ? source : ".") + "/robots/hopper");
+  REQUIRE(hopper.sensors.size() == 3);
+  CHECK(hopper.sensors[0].node == 1);
+  CHECK(hopper.sensors[1].node == 2);
+  CHECK(hopper.sensors[2].base == 0x380);
+}
+
+}  // namespace
+}  // namespace plumb
