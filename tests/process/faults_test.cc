@@ -70,7 +70,7 @@ TEST_CASE("a stopped controller") {
   }, 2));
   const std::string record = Read(records[0]);
   CHECK(record.rfind("# no command for", 0) == 0);
-  CHECK(record.find(" 02E#0000000000000000 T\n") != std::string::npos);
+  CHECK(record.find(" 02E#00000000 T\n") != std::string::npos);
   CHECK(record.find(" R\n") != std::string::npos);
   // It wakes up with old states in its hands; that alone must not move anything.
   stage.children.at("plumb-controller")->Signal(SIGCONT);
