@@ -1,8 +1,12 @@
 #include "drivers/driver.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
+#include "drivers/bus_plan.h"
 
 namespace plumb {
 namespace {
@@ -34,23 +38,21 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       now_(now),
       utime_(utime),
       stopped_utime_(utime - 1),
-      armed_by_(utime - 1) {
+      armed_by_(utime - 1),
+      foreign_at_(now - start_guard_ - 1) {
   joints_.reserve(robot.joints.size());
   for (const JointDescription& joint : robot.joints) {
     if (joint.passive) {
       throw std::invalid_argument(fmt::format("joint '{}' has no motor, and nothing else measures it", joint.name));
     }
     joints_.emplace_back(joint, TimingOf(robot.driver));
-    const Filter mine = joints_.back().motor->filter();
-    for (size_t i = 0; i + 1 < joints_.size(); ++i) {
-      const Filter other = joints_[i].motor->filter();
-      if (((mine.id ^ other.id) & mine.mask & other.mask) == 0) {
-        throw std::invalid_argument(
-            fmt::format("joints '{}' and '{}' have CAN ids in common (nodes {} and {})", joints_[i].name,
-                        joint.name, robot.joints[i].motor.node, joint.motor.node));
-      }
+    for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
+      if (message.direction != BusMessage::Direction::kToDevice || message.remote || message.extended || message.shared) continue;
+      own_.push_back({.id = message.id, .own = true});
     }
   }
+  const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
+  if (!plan.errors.empty()) throw std::invalid_argument(fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
   effort_sent_.assign(joints_.size(), 0);
   scratch_.resize(joints_.size());
   PrepareMessages();
@@ -60,6 +62,7 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
 std::vector<Filter> Driver::filters() const {
   std::vector<Filter> filters;
   for (const Joint& joint : joints_) filters.push_back(joint.motor->filter());
+  filters.insert(filters.end(), own_.begin(), own_.end());
   return filters;
 }
 
@@ -91,6 +94,11 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
       break;
   }
   if (frame.error) return;
+  if (frame.foreign) {
+    foreign_at_ = now;
+    if (Active()) Fault("second master: somebody else sends frame {:#05x} to the drives", frame.id);
+    return;
+  }
   bus_off_ = false;
   unacknowledged_ = 0;
   for (size_t i = 0; i < joints_.size(); ++i) {

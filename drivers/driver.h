@@ -34,17 +34,18 @@ namespace plumb {
 /// It arms only on a request, made after its start and after whatever stopped it last. Armed, it transmits a
 /// torque in every cycle: zero when the command has expired. It disarms and remembers why (FAULT) when
 /// commands stay away, a measurement or heartbeat is missing, a drive reports an error or falls idle, or the
-/// bus fails; only a new ARM leads out of FAULT.
+/// bus fails, or somebody else sends what only it may send; only a new ARM leads out of FAULT.
 ///
 /// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the constructor
 /// allocates (Status: when a text grows), blocks or throws. Not thread-safe.
 class Driver {
  public:
   /// @param now, utime time of the start.
-  /// @throws std::invalid_argument for an unknown protocol, or two joints with a CAN id in common.
+  /// @throws std::invalid_argument for an unknown protocol, or a bus that cannot work: ids in common, more than it carries (see
+  /// BusPlan).
   Driver(const RobotDescription& robot, int64_t now, int64_t utime);
 
-  /// Filters that let in what the drives send.
+  /// Filters that let in what the drives send, and what only we may send, should another do so.
   std::vector<Filter> filters() const;
   int64_t cycle() const { return cycle_; }  ///< [us] period in which Tick wants to be called
 
@@ -71,6 +72,8 @@ class Driver {
   /// @param messages_rejected LCM messages that did not decode.
   const driver_status_t& Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected);
   void set_bus(const std::string& url) { status_.bus = url; }
+  /// What it hears is a recording: it refuses to arm.
+  void set_replay(bool replay) { replay_ = replay; }
 
  private:
   enum class Mode { kRest, kArming, kArmed, kFault };
@@ -126,6 +129,9 @@ class Driver {
   bool expiry_counted_ = false;
   LinkState link_ = LinkState::kUp;
   bool bus_off_ = false;
+  bool replay_ = false;
+  int64_t foreign_at_;  // `now` of the last frame that only we may send, and another has sent
+  std::vector<Filter> own_;
   int unacknowledged_ = 0;
   int refused_cycles_ = 0;
 

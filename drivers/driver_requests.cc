@@ -60,6 +60,8 @@ void Driver::RequestArm(int64_t made) noexcept {
   if (stray_controller_ && now - last_command_ < start_guard_) {
     return Refuse("commands arrived when the driver started: stop the controller of an earlier run");
   }
+  if (replay_) return Refuse("the bus is a recording: nobody hears us");
+  if (now - foreign_at_ < start_guard_) return Refuse("somebody else commands the drives: there is a second master on the bus");
   if (link_ != LinkState::kUp) return Refuse("the CAN interface is not up");
   if (bus_off_) return Refuse("the CAN controller is bus-off");
   for (const Joint& joint : joints_) {

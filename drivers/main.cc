@@ -68,6 +68,7 @@ class DriverProcess {
           else spdlog::error("the frames before the fault are lost: {}", error);
         }) {
     driver_.set_bus(bus);
+    driver_.set_replay(transport_->is_replay());
     for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
                  robot.num_joints() == 1 ? "" : "s", driver_.cycle());
