@@ -147,7 +147,7 @@ int main(int argc, char** argv) {
         train->add_option("--checkpoint", train_flags.checkpoint, "to resume from; default: the output's name and .checkpoint");
         train->add_option("--csv", train_flags.csv, "write a line of numbers for each update to this file");
         train->add_option("--from", train_flags.from, "begin with this policy; default: from scratch");
-        train->add_flag("--paper", train_flags.paper, "as the paper has it: value targets not normalised, Fisher's matrix of the whole batch");
+        train->add_flag("--paper", train_flags.paper, "as the paper has it: value targets not normalised, Fisher's matrix of the whole batch; 20 passes of the critic");
         train->add_option("--worst-share", train_flags.worst_share, "learn from that share of the episodes, those of lowest return; default: robot.toml's")
             ->check(CLI::Range(0.01, 1.0));
         train->add_option("--worst-after", train_flags.worst_after, "updates that learn from all episodes first; default: robot.toml's")

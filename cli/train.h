@@ -17,7 +17,7 @@ struct TrainFlags {
   std::string checkpoint;              ///< file; empty = output + ".checkpoint"
   std::string csv;                     ///< file; empty = none
   std::string from;                    ///< a policy or checkpoint to begin with; empty = from scratch
-  bool paper = false;                  ///< value targets in units of return, the whole batch for Fisher's matrix
+  bool paper = false;                  ///< see AsThePaper
   double worst_share = 0;              ///< 0 = the robot's setting
   int worst_after = -1;                ///< updates; negative = the robot's setting
   int evaluate_every = 0;              ///< updates; 0 = never
