@@ -23,6 +23,7 @@ void Driver::PrepareMessages() {
     values->resize(size);
   }
   state_message_.valid.resize(size);
+  state_message_.measured.resize(size);
 
   status_.frames_received = status_.frames_sent = status_.frames_rejected = status_.frames_dropped = 0;
   status_.commands_accepted = status_.commands_rejected = status_.commands_expired = 0;
@@ -32,6 +33,10 @@ void Driver::PrepareMessages() {
   for (const Joint& joint : joints_) status_.joint_name.push_back(joint.name);
   status_.joint_state.resize(size);
   status_.joint_reason.resize(size);
+  for (auto* values : {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage}) values->resize(size);
+  status_.num_sensors = status_.num_phases = 0;
+  status_.frames_foreign = status_.commands_limited = status_.commands_forged = 0;
+  status_.commands_signed = false;
   status_.num_bins = kBins;
   status_.lateness.assign(kBins, 0);
 }
@@ -43,6 +48,7 @@ const joint_state_t* Driver::NextState() noexcept {
   message.utime = utime;
   ++message.sequence;
   for (size_t i = 0; i < joints_.size(); ++i) {
+    message.measured[i] = utime;
     message.position[i] = scratch_[i].position;
     message.velocity[i] = scratch_[i].velocity;
     message.effort_measured[i] = scratch_[i].effort;
@@ -88,6 +94,10 @@ const driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats
     const Motor& motor = *joints_[i].motor;
     status_.joint_state[i] = static_cast<int8_t>(motor.state());
     status_.joint_reason[i] = motor.reason();
+    const MotorReadings readings = motor.readings();
+    status_.motor_temperature[i] = readings.motor_temperature;
+    status_.drive_temperature[i] = readings.drive_temperature;
+    status_.bus_voltage[i] = readings.bus_voltage;
     if (status_.state == driver_status_t::ABSENT && motor.state() == DriveState::kAbsent) {
       status_.reason = joints_[i].name + ": " + status_.joint_reason[i];
     }
@@ -95,6 +105,7 @@ const driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats
   status_.frames_rejected = frames_rejected_ + stats.malformed;
   status_.frames_sent = stats.sent;
   status_.frames_dropped = stats.refused + stats.lost;
+  status_.frames_foreign = stats.foreign;
   status_.measurements_lost = measurements_.lost();
   status_.messages_rejected = requests_rejected_ + messages_rejected;
   return status_;

@@ -49,6 +49,7 @@ Recording Record(const RobotDescription& robot, uint32_t episode) {
     measured.utime = 1'000'000 + t + kMeasurement;
     measured.sequence = k;
     measured.num_joints = 1;
+    measured.measured = {measured.utime};
     measured.position = {encoder.Quantise(plant.q()(0) / turn) * turn};
     measured.velocity = {encoder.velocity() * turn};
     measured.effort_applied = {impulse / (kMeasurement * 1e-6)};

@@ -20,6 +20,7 @@ joint_state_t Message(int64_t sequence) {
   joint_state_t m{};
   m.sequence = sequence;
   m.num_joints = 2;
+  m.measured = {1, 2};
   m.position = m.velocity = m.effort_measured = m.effort_sent = m.effort_applied = {1, 2};
   m.valid = {1, 1};
   return m;

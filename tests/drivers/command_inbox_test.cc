@@ -11,7 +11,7 @@ constexpr int64_t kUtime = 1'700'000'000'000'000;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 joint_command_t Command(int64_t sequence, double effort, int joints = 2) {
-  joint_command_t command;
+  joint_command_t command{};
   const auto size = static_cast<size_t>(joints);
   command.utime = kUtime;
   command.sequence = sequence;

@@ -45,7 +45,7 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   // The wire is a real transport, so that its Send and Receive are counted, too.
   const auto driver_end = OpenTransport("loop:allocation"), drive_end = OpenTransport("loop:allocation");
   joint_command_t command = rig.MakeCommand(1);
-  driver_request_t arm;
+  driver_request_t arm{};
   arm.request = driver_request_t::ARM;
   rig.Status();
 

@@ -148,7 +148,7 @@ TEST_CASE("an ARM whose maker's clock is ahead counts once") {
   Rig rig;
   rig.Start();
   rig.Run(400);
-  driver_request_t arm;
+  driver_request_t arm{};
   arm.utime = rig.utime() + 1'000'000;
   arm.request = driver_request_t::ARM;
   rig.driver->OnRequest(arm, rig.now, rig.utime());

@@ -90,7 +90,7 @@ struct Rig {
   void Inject(const std::string& text) { driver->OnFrame(*FrameFromText(text), now, utime()); }
 
   joint_command_t MakeCommand(double value) {
-    joint_command_t command;
+    joint_command_t command{};
     const size_t size = drives.size();
     constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
     command.utime = utime();
@@ -108,7 +108,7 @@ struct Rig {
   }
   void Command(double value) { driver->OnCommand(MakeCommand(value), now, utime()); }
   void Request(int8_t what, int64_t made_before = 0) {
-    driver_request_t request;
+    driver_request_t request{};
     request.utime = utime() - made_before;
     request.request = what;
     driver->OnRequest(request, now, utime());

@@ -21,6 +21,7 @@ joint_state_t Measured(int64_t sequence, double position, double velocity = 0) {
   m.utime = 1'000'000 + 5000 * sequence;
   m.sequence = sequence;
   m.num_joints = 1;
+  m.measured = {m.utime};
   m.position = {position};
   m.velocity = {velocity};
   m.effort_measured = m.effort_sent = m.effort_applied = {0.0};

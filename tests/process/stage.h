@@ -134,13 +134,25 @@ class Stage {
     message.episodes = 1000;
     policies_.Publish(message);
   }
+  /// Arms and has a policy run until there is a torque on the bus. As the trainer it says the policy again and again; as
+  /// a person it arms again what a busy machine has stopped on the way.
+  bool BeginEpisode() {
+    torque = 0;
+    for (int attempt = 0; attempt < 15 && torque == 0; ++attempt) {
+      if (!Arm()) return false;
+      PublishPolicy();
+      WaitUntil([&] { return torque != 0 || drivers.newest().state == driver_status_t::FAULT; }, 2);
+    }
+    return torque != 0;
+  }
   /// Brings everything up to an episode with a torque on the bus.
   void RunWithTorque() {
     StartAll();
-    REQUIRE(Arm());
-    REQUIRE(WaitUntil([&] { return controllers.received() > 0; }, 5));
-    PublishPolicy();
-    REQUIRE(WaitUntil([&] { return torque != 0; }, 10));
+    REQUIRE(WaitUntil([&] { return controllers.received() > 0; }, 20));
+    const bool moving = BeginEpisode();
+    INFO("driver: " << int{drivers.newest().state} << " " << drivers.newest().reason << "; controller: "
+                    << int{controllers.newest().phase} << " " << controllers.newest().reason);
+    REQUIRE(moving);
     Listen(0.3);
     REQUIRE(torque != 0);
   }
