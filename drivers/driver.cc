@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
 #include "drivers/bus_plan.h"
@@ -22,8 +23,8 @@ MotorTiming TimingOf(const DriverSettings& settings) { return {Microseconds(sett
 
 }  // namespace
 
-Driver::Joint::Joint(const JointDescription& joint, const MotorTiming& timing)
-    : name(joint.name), motor(MakeMotor(joint.motor, timing)), map(joint.motor), limits(LimitsOf(joint)) {}
+Driver::Joint::Joint(size_t number, const JointDescription& joint, const MotorTiming& timing)
+    : index(number), name(joint.name), motor(MakeMotor(joint.motor, timing)), map(joint.motor), limits(LimitsOf(joint)) {}
 
 Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
     : cycle_(Microseconds(robot.driver.cycle)),
@@ -32,7 +33,9 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       start_guard_(Microseconds(robot.driver.start_guard)),
       start_now_(now),
       start_utime_(utime),
-      measurements_(robot.num_joints(), Microseconds(robot.driver.measurement)),
+      num_joints_(robot.joints.size()),
+      joints_(DrivenJoints(robot)),
+      measurements_(static_cast<int>(joints_.size()), Microseconds(robot.driver.measurement)),
       inbox_(robot.num_joints(), Microseconds(robot.driver.expiry)),
       history_(robot.num_joints(), kHistory),
       now_(now),
@@ -40,28 +43,48 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       stopped_utime_(utime - 1),
       armed_by_(utime - 1),
       foreign_at_(now - start_guard_ - 1) {
-  joints_.reserve(robot.joints.size());
-  for (const JointDescription& joint : robot.joints) {
-    if (joint.passive) {
-      throw std::invalid_argument(fmt::format("joint '{}' has no motor, and nothing else measures it", joint.name));
-    }
-    joints_.emplace_back(joint, TimingOf(robot.driver));
-    for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
-      if (message.direction != BusMessage::Direction::kToDevice || message.remote || message.extended || message.shared) continue;
-      own_.push_back({.id = message.id, .own = true});
-    }
-  }
+  for (const JointDescription& joint : robot.joints) names_.push_back(joint.name);
+  for (const SensorDescription& sensor : robot.sensors) sensors_.emplace_back(robot, sensor, stale_after_);
+  FindMeasuring(robot);
   const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
   if (!plan.errors.empty()) throw std::invalid_argument(fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
-  effort_sent_.assign(joints_.size(), 0);
+  effort_sent_.assign(num_joints_, 0);
   scratch_.resize(joints_.size());
   PrepareMessages();
   reason_.Set("waiting for ARM");
 }
 
+std::vector<Driver::Joint> Driver::DrivenJoints(const RobotDescription& robot) {
+  std::vector<Joint> joints;
+  for (size_t i = 0; i < robot.joints.size(); ++i) {
+    if (!robot.joints[i].passive) joints.emplace_back(i, robot.joints[i], TimingOf(robot.driver));
+  }
+  if (joints.empty()) throw std::invalid_argument("no joint has a motor");
+  return joints;
+}
+
+void Driver::FindMeasuring(const RobotDescription& robot) {
+  for (size_t i = 0; i < num_joints_; ++i) {
+    const JointDescription& joint = robot.joints[i];
+    if (!joint.passive) {
+      for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
+        if (message.direction != BusMessage::Direction::kToDevice || message.remote || message.extended || message.shared) continue;
+        own_.push_back({.id = message.id, .own = true});
+      }
+      continue;
+    }
+    const auto sensor = std::ranges::find(sensors_, static_cast<int>(i), &JointSensor::joint);
+    if (sensor == sensors_.end()) {
+      throw std::invalid_argument(fmt::format("joint '{}' has no motor, and no sensor measures it: give it one with [[sensor]]", joint.name));
+    }
+    passive_.push_back({i, static_cast<size_t>(sensor - sensors_.begin())});
+  }
+}
+
 std::vector<Filter> Driver::filters() const {
   std::vector<Filter> filters;
   for (const Joint& joint : joints_) filters.push_back(joint.motor->filter());
+  for (const JointSensor& sensor : sensors_) std::ranges::copy(sensor.device().filters(), std::back_inserter(filters));
   filters.insert(filters.end(), own_.begin(), own_.end());
   return filters;
 }
@@ -101,16 +124,19 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
   }
   bus_off_ = false;
   unacknowledged_ = 0;
+  if (!UseOfMotor(frame, now, utime) && !UseOfSensor(frame, now, utime)) ++frames_rejected_;
+}
+
+bool Driver::UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept {
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     switch (joint.motor->OnFrame(frame, now)) {
       case FrameUse::kNotMine:
         continue;
       case FrameUse::kRejected:
-        ++frames_rejected_;
-        return;
+        return false;
       case FrameUse::kConsumed:
-        return;
+        return true;
       case FrameUse::kEstimate: {
         const MotorEstimate& estimate = joint.motor->estimate();
         joint.latest = {joint.map.JointPosition(estimate.position),
@@ -119,11 +145,19 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
         joint.measured = true;
         joint.measured_at = now;
         measurements_.Add(static_cast<int>(i), joint.latest, utime);
-        return;
+        return true;
       }
     }
   }
-  ++frames_rejected_;
+  return false;
+}
+
+bool Driver::UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept {
+  for (JointSensor& sensor : sensors_) {
+    const SensorUse use = sensor.OnFrame(frame, now, utime);
+    if (use != SensorUse::kNotMine) return use != SensorUse::kRejected;
+  }
+  return false;
 }
 
 void Driver::OnLink(LinkState link) noexcept {
@@ -152,6 +186,7 @@ std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness
     joint.frames_end = torque_frames_ + housekeeping_.size();
   }
   turn_ = (turn_ + 1) % joints_.size();
+  for (JointSensor& sensor : sensors_) sensor.device().Tick(now, housekeeping_);
   for (const Frame& frame : housekeeping_.frames()) frames_.Push(frame);
   NoteChanges();
   return frames_.frames();
@@ -169,6 +204,9 @@ void Driver::CheckHealth() noexcept {
       return Fault("{}: no encoder estimate for {} ms", joint.name, (now_ - joint.measured_at) / 1000);
     }
     all_armed = all_armed && state == DriveState::kArmed;
+  }
+  for (const JointSensor& sensor : sensors_) {
+    if (!sensor.fresh(now_)) return Fault("{}: {}", sensor.name(), sensor.Silent(now_).text());
   }
   if (mode_ == Mode::kArming && all_armed) {
     mode_ = Mode::kArmed;
@@ -196,7 +234,7 @@ void Driver::CommandTorques() noexcept {
     joint.wish = 0;
     if (!Active()) continue;
     if (mode_ == Mode::kArmed && !inbox_.Expired(now_)) {
-      const double wished = inbox_.Effort(static_cast<int>(i), joint.latest.position, joint.latest.velocity);
+      const double wished = inbox_.Effort(static_cast<int>(joint.index), joint.latest.position, joint.latest.velocity);
       joint.wish =
           LimitEffort(wished, joint.latest.position, joint.latest.velocity, joint.limits).value_or(0);
     }
@@ -209,8 +247,9 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
   const auto taken = static_cast<size_t>(std::max(accepted, 0));
   // A torque that was not accepted leaves the drive with the one before.
   for (size_t i = 0; i < joints_.size(); ++i) {
-    if (torque_frames_ == 0) effort_sent_[i] = 0;
-    if (i < torque_frames_ && i < taken) effort_sent_[i] = joints_[i].wish;
+    double& sent = effort_sent_[joints_[i].index];
+    if (torque_frames_ == 0) sent = 0;
+    if (i < torque_frames_ && i < taken) sent = joints_[i].wish;
   }
   history_.Record(utime, effort_sent_);
   for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);

@@ -10,6 +10,7 @@
 #include "drivers/can/transport.h"
 #include "drivers/command_inbox.h"
 #include "drivers/effort_history.h"
+#include "drivers/joint_sensor.h"
 #include "drivers/joint_map.h"
 #include "drivers/limits.h"
 #include "drivers/measurements.h"
@@ -26,6 +27,7 @@ namespace plumb {
 ///
 ///   for (received frame) driver.OnFrame(frame, now, utime of its arrival);
 ///   while (const joint_state_t* state = driver.NextState()) publish(*state);
+///   while (const imu_t* imu = driver.NextImu()) publish(*imu);
 ///   driver.OnLink(...); driver.OnRequest(...); driver.OnCommand(...);   // what came since
 ///   frames = driver.Tick(now, utime, lateness);                         // once per cycle
 ///   driver.Transmitted(transport.Send(frames), utime right after it);  // after every Tick: what was not
@@ -33,25 +35,27 @@ namespace plumb {
 ///
 /// It arms only on a request, made after its start and after whatever stopped it last. Armed, it transmits a
 /// torque in every cycle: zero when the command has expired. It disarms and remembers why (FAULT) when
-/// commands stay away, a measurement or heartbeat is missing, a drive reports an error or falls idle, or the
-/// bus fails, or somebody else sends what only it may send; only a new ARM leads out of FAULT.
+/// commands stay away, a measurement or heartbeat is missing, a drive or sensor reports an error, a drive falls idle,
+/// the bus fails, or somebody else sends what only it may send; only a new ARM leads out of FAULT.
 ///
 /// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the constructor
 /// allocates (Status: when a text grows), blocks or throws. Not thread-safe.
 class Driver {
  public:
   /// @param now, utime time of the start.
-  /// @throws std::invalid_argument for an unknown protocol, or a bus that cannot work: ids in common, more than it carries (see
-  /// BusPlan).
+  /// @throws std::invalid_argument for an unknown protocol, a joint that nothing measures, or a bus that cannot work: ids
+  /// in common, more than it carries (see BusPlan).
   Driver(const RobotDescription& robot, int64_t now, int64_t utime);
 
-  /// Filters that let in what the drives send, and what only we may send, should another do so.
+  /// Filters that let in what drives and sensors send, and what only we may send, should another do so.
   std::vector<Filter> filters() const;
   int64_t cycle() const { return cycle_; }  ///< [us] period in which Tick wants to be called
 
   void OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept;
   /// The next JOINT_STATE, null if there is none; valid until the next call.
   const joint_state_t* NextState() noexcept;
+  /// The next IMU reading, null if there is none; valid until the next call.
+  const imu_t* NextImu() noexcept;
   void OnLink(LinkState link) noexcept;
   void OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept;
   void OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
@@ -77,8 +81,10 @@ class Driver {
 
  private:
   enum class Mode { kRest, kArming, kArmed, kFault };
+  /// A joint with a motor.
   struct Joint {
-    Joint(const JointDescription& joint, const MotorTiming& timing);
+    Joint(size_t number, const JointDescription& joint, const MotorTiming& timing);
+    size_t index;  // in the robot's joints
     std::string name;
     std::unique_ptr<Motor> motor;
     JointMap map;
@@ -98,6 +104,11 @@ class Driver {
     Disarm();
     mode_ = Mode::kFault;
   }
+  static std::vector<Joint> DrivenJoints(const RobotDescription& robot);
+  /// Of the joints without a motor. @throws std::invalid_argument if nothing measures one.
+  void FindMeasuring(const RobotDescription& robot);
+  bool UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept;
+  bool UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept;
   void Refuse(std::string_view why) noexcept;
   void Disarm() noexcept;
   void RequestArm(int64_t made) noexcept;
@@ -111,7 +122,15 @@ class Driver {
 
   const int64_t cycle_, disarm_after_, stale_after_, start_guard_;
   const int64_t start_now_, start_utime_;
-  std::vector<Joint> joints_;
+  const size_t num_joints_;  // of the robot
+  std::vector<std::string> names_;
+  std::vector<Joint> joints_;  // with a motor
+  std::vector<JointSensor> sensors_;
+  /// Which sensor measures a joint without a motor.
+  struct Measuring {
+    size_t joint, sensor;
+  };
+  std::vector<Measuring> passive_;
   Measurements measurements_;
   CommandInbox inbox_;
   EffortHistory history_;

@@ -73,6 +73,14 @@ void Driver::RequestArm(int64_t made) noexcept {
     }
     if (!why.text().empty()) return Refuse(why.text());
   }
+  for (JointSensor& sensor : sensors_) {
+    if (sensor.fresh(now)) continue;
+    Reason why;
+    why.Set("{}: {}", sensor.name(), sensor.Silent(now).text());
+    // Arming is a person's word that what was wrong is right again.
+    if (sensor.device().state() == SensorState::kFault) sensor.device().Start(now);
+    return Refuse(why.text());
+  }
   armed_by_ = made;
   arms_refused_ = 0;
   stray_controller_ = false;

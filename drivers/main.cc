@@ -55,6 +55,7 @@ class DriverProcess {
         transport_(OpenTransport(bus, driver_.filters())),
         cycle_(driver_.cycle(), clock_.Now()),
         states_(process.messenger(), "JOINT_STATE"),
+        imus_(process.messenger(), "IMU"),
         statuses_(process.messenger(), "DRIVER_STATUS"),
         commands_(process.messenger(), "JOINT_COMMAND",
                   [this](const joint_command_t& command) {
@@ -92,6 +93,7 @@ class DriverProcess {
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
     ReceiveFrames();
     while (const joint_state_t* state = driver_.NextState()) states_.Publish(*state);
+    while (const imu_t* imu = driver_.NextImu()) imus_.Publish(*imu);
     process_.messenger().Drain();
     if (cycle_.Due(clock_.Now())) {
       Cycle();
@@ -174,6 +176,7 @@ class DriverProcess {
   std::unique_ptr<Transport> transport_;
   Periodic cycle_;
   Publisher<joint_state_t> states_;
+  Publisher<imu_t> imus_;
   Publisher<driver_status_t> statuses_;
   Subscriber<joint_command_t> commands_;
   Subscriber<driver_request_t> requests_;
