@@ -123,7 +123,9 @@ class ClosedLoop {
       Start("setpriv", {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + process_.lcm_url(), "-q", "-f", flags_.log});
     }
     if (!flags_.real) Start("plumb-robot", {flags_.robot, "--bus", bus_, "--seed", seed});
-    Start("plumb-driver", {flags_.robot, "--bus", bus_, "--flight-recorder", (output_ / "faults").string()});
+    std::vector<std::string> driver{flags_.robot, "--bus", bus_, "--flight-recorder", (output_ / "faults").string()};
+    if (!flags_.real) driver.push_back("--virtual");
+    Start("plumb-driver", driver);
     Start("plumb-estimator", {flags_.robot});
     std::vector<std::string> controller{flags_.robot, "--seed", seed};
     if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});  // nobody throws a real robot about

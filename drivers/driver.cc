@@ -48,6 +48,10 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
   FindMeasuring(robot);
   const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
   if (!plan.errors.empty()) throw std::invalid_argument(fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
+  int polled = 0;
+  for (const Joint& joint : joints_) polled += joint.motor->num_polled();
+  poll_period_ = std::max(cycle_, Microseconds(robot.driver.telemetry) / std::max(1, polled));
+  next_poll_ = now;
   effort_sent_.assign(num_joints_, 0);
   scratch_.resize(joints_.size());
   PrepareMessages();
@@ -186,6 +190,7 @@ std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness
     joint.frames_end = torque_frames_ + housekeeping_.size();
   }
   turn_ = (turn_ + 1) % joints_.size();
+  Poll();
   for (JointSensor& sensor : sensors_) sensor.device().Tick(now, housekeeping_);
   for (const Frame& frame : housekeeping_.frames()) frames_.Push(frame);
   NoteChanges();
@@ -252,11 +257,30 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
     if (i < torque_frames_ && i < taken) sent = joints_[i].wish;
   }
   history_.Record(utime, effort_sent_);
+  LetJump();
   for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);
   refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;
   if (refused_cycles_ >= kRefusedCycles && Active()) {
     Fault("the bus has not accepted frames in {} cycles", refused_cycles_);
   }
+}
+
+void Driver::Poll() noexcept {
+  if (now_ < next_poll_ || mode_ == Mode::kArming) return;  // arming has need of all room there is
+  next_poll_ = now_ + poll_period_;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Motor& motor = *joints_[(poll_turn_ + i) % joints_.size()].motor;
+    if (motor.num_polled() == 0 || motor.state() == DriveState::kAbsent) continue;
+    motor.Poll(housekeeping_);
+    poll_turn_ = (poll_turn_ + i + 1) % joints_.size();
+    return;
+  }
+}
+
+void Driver::LetJump() noexcept {
+  const bool let = virtual_ && std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
+  for (Joint& joint : joints_) joint.motor->LetJump(let);
+  for (JointSensor& sensor : sensors_) sensor.device().LetJump(let);
 }
 
 DriveState Driver::state() const noexcept {

@@ -76,6 +76,8 @@ class Driver {
   /// @param messages_rejected LCM messages that did not decode.
   const driver_status_t& Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected);
   void set_bus(const std::string& url) { status_.bus = url; }
+  /// The robot is a virtual one, which is put elsewhere at once: while no effort is sent, positions may jump.
+  void set_virtual(bool is_virtual) { virtual_ = is_virtual; }
   /// What it hears is a recording: it refuses to arm.
   void set_replay(bool replay) { replay_ = replay; }
 
@@ -115,6 +117,8 @@ class Driver {
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;
   void CommandTorques() noexcept;
+  void LetJump() noexcept;
+  void Poll() noexcept;
   void PrepareMessages();
   void NoteLateness(int64_t lateness) noexcept;
   void NoteChanges() noexcept;
@@ -149,6 +153,7 @@ class Driver {
   LinkState link_ = LinkState::kUp;
   bool bus_off_ = false;
   bool replay_ = false;
+  bool virtual_ = false;
   int64_t foreign_at_;  // `now` of the last frame that only we may send, and another has sent
   std::vector<Filter> own_;
   int unacknowledged_ = 0;
@@ -157,6 +162,8 @@ class Driver {
   FrameBatch frames_, housekeeping_;
   size_t torque_frames_ = 0;
   size_t turn_ = 0;  // whose own frames come first
+  int64_t poll_period_, next_poll_;  // [us] one question to one drive
+  size_t poll_turn_ = 0;
   std::vector<double> effort_sent_;
   std::vector<JointMeasurement> scratch_;
   joint_state_t state_message_;

@@ -48,7 +48,8 @@ void WriteState(int8_t state, std::string_view reason) {
 
 class DriverProcess {
  public:
-  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus, const std::string& flight_recorder)
+  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus, const std::string& flight_recorder,
+                bool is_virtual)
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
@@ -69,6 +70,7 @@ class DriverProcess {
           else spdlog::error("the frames before the fault are lost: {}", error);
         }) {
     driver_.set_bus(bus);
+    driver_.set_virtual(is_virtual);
     driver_.set_replay(transport_->is_replay());
     for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
@@ -195,19 +197,21 @@ class DriverProcess {
 int main(int argc, char** argv) {
   std::string robot_path, bus, flight_recorder;
   int priority = 0;
+  bool is_virtual = false;
   return plumb::Run(
       "plumb-driver", "Drives a robot's motors on a CAN bus: JOINT_COMMAND in, JOINT_STATE out.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder, or its TOML file")->required();
         app.add_option("--bus", bus, "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
         app.add_option("--flight-recorder", flight_recorder, "folder: on every fault the frames of the last 2 s are written there");
+        app.add_flag("--virtual", is_virtual, "the robot is plumb-robot: while no effort is sent, its positions may jump");
         app.add_option("--realtime-priority", priority, "SCHED_FIFO priority, 0 = off")
             ->check(CLI::Range(0, 90))
             ->capture_default_str();
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
-        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder);
+        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder, is_virtual);
         plumb::BecomeRealtime(priority);
         return driver.Run();
       });

@@ -126,7 +126,7 @@ struct JointDescription {
 
 struct DriverSettings {  ///< all [s], scaled time
   double cycle, measurement, expiry, disarm_after, stale_after, heartbeat_timeout, start_guard;
-  double telemetry = 0.1;  ///< at which drives report temperatures and their supply
+  double telemetry = 0.1;  ///< at which each drive is asked for its temperatures and supply
 };
 
 struct EstimatorSettings {

@@ -68,6 +68,11 @@ class CanSimpleMotor : public Motor {
     estop_due_ = true;
   }
 
+  int num_polled() const noexcept override { return static_cast<int>(kPolledReports.size()); }
+  void Poll(FrameBatch& out) noexcept override {
+    out.Push(MakeRequest(kPolledReports[poll_turn_++ % kPolledReports.size()], node_));
+  }
+
   void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept override {
     const size_t before = out.size();
     present_ = heard_ && now - heartbeat_ <= timing_.heartbeat_timeout;
@@ -255,6 +260,7 @@ class CanSimpleMotor : public Motor {
   bool order_due_ = false;                   // no order to stop was accepted since the last order to run
   bool estop_due_ = false;                   // no Estop was accepted since it was asked for
   bool ask_error_ = false, fault_ = false;
+  size_t poll_turn_ = 0;
   Reason reason_;
 };
 

@@ -75,6 +75,8 @@ class Cia406Encoder : public Sensor {
     out.Push(Make(kNmt, node_, {kStart, double(node_)}));
   }
 
+  void LetJump(bool let) noexcept override { may_jump_ = let; }
+
   SensorState state() const noexcept override {
     return present_ || state_ == SensorState::kFault ? state_ : SensorState::kAbsent;
   }
@@ -115,7 +117,7 @@ class Cia406Encoder : public Sensor {
         Fail("no position for {} ms, in which it may have turned anywhere", dt / 1000);
         return SensorUse::kConsumed;
       }
-      if (std::abs(step) > most) {
+      if (!may_jump_ && std::abs(step) > most) {
         Fail("its position jumped by {} counts in {:.3g} ms: more than {:.3g} rad/s", step,
              static_cast<double>(dt) * 1e-3, counts_per_microsecond_ * 1e6 * radians_per_count_);
         return SensorUse::kConsumed;
@@ -174,6 +176,7 @@ class Cia406Encoder : public Sensor {
   int64_t heard_at_ = 0, position_at_ = 0;
   int64_t retry_ = std::numeric_limits<int64_t>::min();
   bool told_ = false;      // its period, since Start
+  bool may_jump_ = false;
   bool tracking_ = false;  // raw_ and position_at_ are of the last position
   double raw_ = 0, counts_ = 0;
   EncoderReading reading_;

@@ -63,6 +63,9 @@ class Sensor {
   /// Once per cycle: deadlines, and frames that make it send.
   virtual void Tick(int64_t now, FrameBatch& out) noexcept = 0;
 
+  /// See Motor::LetJump.
+  virtual void LetJump(bool) noexcept {}
+
   virtual SensorState state() const noexcept = 0;
   /// Why it is not running; empty if it is.
   virtual std::string_view reason() const noexcept = 0;

@@ -72,7 +72,7 @@ class Stage {
   }
   void StartRobotAndDriver() {
     Start("plumb-robot", {"--bus", bus_url, "--seed", "1"});
-    Start("plumb-driver", {"--bus", bus_url, "--flight-recorder", folder / "faults"});
+    Start("plumb-driver", {"--bus", bus_url, "--virtual", "--flight-recorder", folder / "faults"});
   }
   void StartAll() {
     StartRobotAndDriver();
