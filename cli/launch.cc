@@ -16,6 +16,7 @@
 #include "cli/preflight.h"
 #include "cli/progress.h"
 #include "common/atomic_file.h"
+#include "drivers/driver.h"
 #include "plumb/driver_request_t.hpp"
 #include "robot/description.h"
 #include "sim/parameters.h"
@@ -33,12 +34,11 @@ double SecondsSince(SteadyClock::time_point start) {
 }
 
 // What the driver would say in its log, said before anything starts.
-void RequireMeasured(const RobotDescription& robot) {
-  for (const JointDescription& joint : robot.joints) {
-    if (!joint.passive) continue;
-    throw std::invalid_argument(fmt::format(
-        "{} cannot be launched: joint '{}' has no motor, and nothing else on the bus measures it (plumb sim simulates it)",
-        robot.name, joint.name));
+void RequireDrivable(const RobotDescription& robot) {
+  try {
+    Driver(robot, 0, 0);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(fmt::format("{} cannot be launched (plumb sim simulates it): {}", robot.name, error.what()));
   }
 }
 
@@ -61,7 +61,7 @@ class ClosedLoop {
         trainings_(process.messenger(), "TRAINING_STATUS",
                    [&](const training_status_t& m) { progress_.OnTraining(m); }) {
     for (const std::string& warning : robot_.warnings) spdlog::warn("{}", warning);
-    RequireMeasured(robot_);
+    RequireDrivable(robot_);
     if (flags.real && flags.speed != 1) throw std::invalid_argument("a real robot runs at --speed 1");
     RequireFree(process, bus_, flags.real);
     if (!flags.real) truth_ = HiddenParameters(robot_, flags.seed);

@@ -28,6 +28,7 @@ Driver::Joint::Joint(size_t number, const JointDescription& joint, const MotorTi
 
 Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
     : cycle_(Microseconds(robot.driver.cycle)),
+      measurement_(Microseconds(robot.driver.measurement)),
       disarm_after_(Microseconds(robot.driver.disarm_after)),
       stale_after_(Microseconds(robot.driver.stale_after)),
       start_guard_(Microseconds(robot.driver.start_guard)),
@@ -35,7 +36,7 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       start_utime_(utime),
       num_joints_(robot.joints.size()),
       joints_(DrivenJoints(robot)),
-      measurements_(static_cast<int>(joints_.size()), Microseconds(robot.driver.measurement)),
+      measurements_(static_cast<int>(joints_.size()), measurement_),
       inbox_(robot.num_joints(), Microseconds(robot.driver.expiry)),
       history_(robot.num_joints(), kHistory),
       now_(now),
@@ -280,7 +281,10 @@ void Driver::Poll() noexcept {
 void Driver::LetJump() noexcept {
   const bool let = virtual_ && std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
   for (Joint& joint : joints_) joint.motor->LetJump(let);
-  for (JointSensor& sensor : sensors_) sensor.device().LetJump(let);
+  for (JointSensor& sensor : sensors_) {
+    sensor.device().LetJump(let);
+    sensor.ForgetTurns(let || !Active());
+  }
 }
 
 DriveState Driver::state() const noexcept {

@@ -65,7 +65,7 @@ const joint_state_t* Driver::NextState() noexcept {
   for (const Measuring& passive : passive_) {
     const size_t i = passive.joint;
     JointSensor& sensor = sensors_[passive.sensor];
-    const JointMeasurement& measurement = sensor.At(utime);
+    const JointMeasurement& measurement = sensor.At(utime + measurement_ / 2);
     message.measured[i] = sensor.measured();
     message.position[i] = measurement.position;
     message.velocity[i] = measurement.velocity;

@@ -77,7 +77,7 @@ JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
   const Eigen::Quaterniond turn = unturned_.conjugate() * link;
   const double twist = 2 * std::atan2(axis_.dot(turn.vec()), turn.w());
   // The one of the angles that look like this which is next to the last.
-  const double near = std::isfinite(newest_.position) ? newest_.position : 0;
+  const double near = std::isfinite(newest_.position) && !forget_turns_ ? newest_.position : 0;
   measurement.position = near + std::remainder(twist - near, 2 * std::numbers::pi);
   measurement.velocity = axis_.dot(to_link_ * Vector(sample.rate));
   return measurement;

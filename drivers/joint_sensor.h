@@ -34,11 +34,13 @@ class JointSensor {
   /// Index of the joint that it measures, -1: none.
   int joint() const { return joint_; }
   Sensor& device() { return *device_; }
+  /// While true, an angle is the one within half a turn of 0: nobody has counted turns. See also Motor::LetJump.
+  void ForgetTurns(bool forget) noexcept { forget_turns_ = forget; }
   const Sensor& device() const { return *device_; }
 
   SensorUse OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept;
 
-  /// What it measured of the joint at `utime` or last before: effort NaN; velocity NaN if it reports none.
+  /// What it measured of the joint last before or at `utime`: effort NaN; velocity NaN if it reports none.
   /// Call it with times that do not decrease.
   const JointMeasurement& At(int64_t utime) noexcept;
   int64_t measured() const noexcept { return measured_; }  ///< utime of what At has given
@@ -75,6 +77,7 @@ class JointSensor {
   TimedSamples<JointMeasurement> samples_;
   JointMeasurement given_, newest_;
   int64_t measured_ = 0;
+  bool forget_turns_ = true;
   bool heard_ = false;
   int64_t heard_at_ = 0;  // `now` of the newest
 };

@@ -107,8 +107,8 @@ class Cia406Encoder : public Sensor {
     Hear(now);
     if (state_ == SensorState::kFault) return SensorUse::kConsumed;
     const double raw = (*values)[0];
-    if (!tracking_) {
-      counts_ = raw;
+    if (!tracking_ || may_jump_) {
+      counts_ = std::remainder(raw, range_);
     } else {
       const double step = std::remainder(raw - raw_, range_);
       const int64_t dt = std::max(now - position_at_, period_);  // two may come at once after a delay
@@ -117,7 +117,7 @@ class Cia406Encoder : public Sensor {
         Fail("no position for {} ms, in which it may have turned anywhere", dt / 1000);
         return SensorUse::kConsumed;
       }
-      if (!may_jump_ && std::abs(step) > most) {
+      if (std::abs(step) > most) {
         Fail("its position jumped by {} counts in {:.3g} ms: more than {:.3g} rad/s", step,
              static_cast<double>(dt) * 1e-3, counts_per_microsecond_ * 1e6 * radians_per_count_);
         return SensorUse::kConsumed;

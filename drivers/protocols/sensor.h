@@ -22,7 +22,8 @@ enum class SensorState : int8_t {
   kFault = 3,     ///< it failed, and stays so until Start
 };
 
-/// Of an encoder, at its shaft. Turns are counted from the first reading after Start.
+/// Of an encoder, at its shaft. Turns are counted from the first reading after Start, which is within half a turn (or half
+/// the turns that it can tell apart) of 0.
 struct EncoderReading {
   double position = 0;                                         ///< [rad]
   double velocity = std::numeric_limits<double>::quiet_NaN();  ///< [rad/s]; NaN if it reports none
