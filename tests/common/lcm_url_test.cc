@@ -1,5 +1,7 @@
 #include "common/lcm_url.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstdlib>
@@ -46,12 +48,13 @@ TEST_CASE("an empty URL is what liblcm makes of it") {
 }
 
 TEST_CASE("the interfaces through which others reach a multicast group") {
-  const std::string url = "udpm://239.255.76.121:17656?ttl=0";
+  const int own = getpid() % 60'000;
+  const std::string url = "udpm://239.254." + std::to_string(own / 250) + "." + std::to_string(own % 250 + 1) + ":17657?ttl=0";
   CHECK(OpenInterfaces(url).empty());  // nobody listens
   const Messenger messenger(url);
   // The same question to the kernel's routing table, where the group's route is plain: no line for multicast, hence
   // the default route's interface; or all of multicast to the loopback.
-  std::vector<std::string> interfaces = OpenInterfaces(url);
+  const std::vector<std::string> interfaces = OpenInterfaces(url);
   std::ifstream table("/proc/net/route");
   std::string line, route_default, route_multicast;
   while (std::getline(table, line)) {
