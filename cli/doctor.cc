@@ -39,18 +39,28 @@ Finding Signatures(const std::string& lcm_url, const std::string& key) {
   if (!key.empty()) {
     try {
       const SigningKey usable(key);
-      return {Level::kGood, "commands are signed: " + key + " is a key that only its owner may read; give it to driver and controller", ""};
+      return {Level::kGood,
+              "commands are signed: " + key +
+                  " is a key that only its owner may read; give it to driver and controller",
+              ""};
     } catch (const std::exception& error) {
       return Split(Level::kBad, error.what(), "");
     }
   }
   if (!StaysOnMachine(lcm_url)) {
-    return {Level::kBad, "commands are not signed, and LCM at " + lcm_url + " leaves this machine: anybody on the network can command the robot",
+    return {Level::kBad,
+            "commands are not signed, and LCM at " + lcm_url +
+                " leaves this machine: anybody on the network can command the robot",
             "plumb key FILE, and --key FILE for launch, arm, plumb-driver and plumb-controller"};
   }
   const std::vector<std::string> open = OpenInterfaces(lcm_url);
-  if (open.empty()) return {Level::kGood, "commands are not signed, and need not be where all users of this machine are trusted: LCM stays on it", ""};
-  return {Level::kAdvice, fmt::format("commands are not signed; nothing of ours leaves this machine, but others can send to it through {}", fmt::join(open, ", ")),
+  if (open.empty()) {
+    return {Level::kGood, "commands are not signed, and LCM stays on this machine, whose users are trusted", ""};
+  }
+  return {Level::kAdvice,
+          fmt::format("commands are not signed; nothing of ours leaves this machine, but others can send to "
+                      "it through {}",
+                      fmt::join(open, ", ")),
           "ip route add 224.0.0.0/4 dev lo, or plumb key FILE and --key FILE"};
 }
 
@@ -60,9 +70,12 @@ std::vector<Finding> RunningDriver(Messenger& messenger, const std::string& lcm_
   if (messenger.lcm().handleTimeout(kListen) > 0) messenger.Drain();
   if (drivers.received() == 0) return {};
   const driver_status_t& driver = drivers.newest();
-  const std::string what = driver.commands_signed ? "obeys signed commands only" : "obeys commands that are not signed";
+  const std::string what =
+      driver.commands_signed ? "obeys signed commands only" : "obeys commands that are not signed";
   if (driver.commands_forged == 0) return {{Level::kGood, "the driver that is running " + what, ""}};
-  return {{Level::kAdvice, fmt::format("the driver that is running {}, and has dropped {} that were forged", what, driver.commands_forged),
+  return {{Level::kAdvice,
+           fmt::format("the driver that is running {}, and has dropped {} that were forged", what,
+                       driver.commands_forged),
            "find out who else publishes JOINT_COMMAND or DRIVER_REQUEST at " + lcm_url}};
 }
 
@@ -119,7 +132,8 @@ std::vector<Finding> Bus(const std::string& url) {
   try {
     const auto bus = OpenTransport(url);
     std::vector<Finding> findings{{Level::kGood, "the bus " + url + " opens", ""}};
-    for (const std::string& warning : bus->warnings()) findings.push_back(Split(Level::kAdvice, warning, "look at it"));
+    for (const std::string& warning : bus->warnings())
+      findings.push_back(Split(Level::kAdvice, warning, "look at it"));
     return findings;
   } catch (const std::exception& error) {
     return {{Level::kBad, error.what(), ""}};

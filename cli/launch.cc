@@ -128,12 +128,14 @@ class ClosedLoop {
       Start("setpriv", {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + process_.lcm_url(), "-q", "-f", flags_.log});
     }
     if (!flags_.real) Start("plumb-robot", {flags_.robot, "--bus", bus_, "--seed", seed});
-    std::vector<std::string> driver{flags_.robot, "--bus", bus_, "--flight-recorder", (output_ / "faults").string()};
+    std::vector<std::string> driver{flags_.robot, "--bus", bus_, "--flight-recorder",
+                                    (output_ / "faults").string()};
     if (flags_.allow_unsigned) driver.push_back("--unsigned");
     std::vector<std::string> controller{flags_.robot, "--seed", seed};
     if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});  // nobody throws a real robot about
     if (!flags_.key.empty()) {
-      for (auto* arguments : {&driver, &controller}) arguments->insert(arguments->end(), {"--key", flags_.key});
+      for (auto* arguments : {&driver, &controller})
+        arguments->insert(arguments->end(), {"--key", flags_.key});
     }
     Start("plumb-driver", driver);
     Start("plumb-estimator", {flags_.robot});
@@ -224,7 +226,8 @@ class ClosedLoop {
 
   /// For a person to type.
   std::string ArmCommand() const {
-    return "plumb arm --lcm-url '" + process_.lcm_url() + "'" + (flags_.key.empty() ? "" : " --key '" + flags_.key + "'");
+    return "plumb arm --lcm-url '" + process_.lcm_url() + "'" +
+           (flags_.key.empty() ? "" : " --key '" + flags_.key + "'");
   }
 
   void Request(int8_t what) {

@@ -38,7 +38,8 @@ int Request(Process& process, int8_t what, const std::string& key) {
     // In a run with a scaled clock the driver's time is not ours.
     if (heard) request.utime = statuses.newest().utime + 1;
     if (arming && heard && statuses.newest().commands_signed && !signer) {
-      std::cerr << "plumb: the driver obeys signed requests only: --key FILE, with the key that it was given" << std::endl;
+      std::cerr << "plumb: the driver obeys signed requests only: --key FILE, with the key that it was given"
+                << std::endl;
       return 1;
     }
     if (!arming || (heard && !asked)) {
@@ -67,7 +68,8 @@ int Request(Process& process, int8_t what, const std::string& key) {
 
 int MakeKey(const std::string& file) {
   MakeKeyFile(file);
-  std::cout << file << ": a new key; copy it to whatever may command the robot, and let nobody else read it" << std::endl;
+  std::cout << file << ": a new key; copy it to whatever may command the robot, and let nobody else read it"
+            << std::endl;
   return 0;
 }
 
@@ -84,7 +86,9 @@ int main(int argc, char** argv) {
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
   std::string can_robot, dbc_output, key, new_key;
-  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr, *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr, *make_key = nullptr;
+  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr,
+           *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr, *arm = nullptr, *disarm = nullptr,
+           *estop = nullptr, *make_key = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -102,8 +106,13 @@ int main(int argc, char** argv) {
         launch->add_option("--speed", flags.speed, "clock scale; a virtual robot can run faster than real time")
             ->check(CLI::Range(0.01, 100.0))->capture_default_str();
         launch->add_flag("--real", flags.real, "the robot itself is on the bus: no virtual one, ask before arming");
-        auto* launch_key = launch->add_option("--key", flags.key, "the controller signs with this key and the driver obeys nothing else (plumb key makes one)");
-        launch->add_flag("--unsigned", flags.allow_unsigned, "let the driver obey anybody, although LCM leaves this machine")->excludes(launch_key);
+        auto* launch_key = launch->add_option(
+            "--key", flags.key,
+            "the controller signs with this key and the driver obeys nothing else (plumb key makes one)");
+        launch
+            ->add_flag("--unsigned", flags.allow_unsigned,
+                       "let the driver obey anybody, although LCM leaves this machine")
+            ->excludes(launch_key);
         launch->add_option("--log", flags.log, "record all messages to this LCM log");
         launch->add_option("--summary", flags.summary, "write the outcome to this JSON file");
         launch->add_option("--output", flags.output, "folder for logs and checkpoints; default: a new one in runs/");
@@ -186,10 +195,13 @@ int main(int argc, char** argv) {
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* request : {arm, disarm, estop}) request->add_option("--key", key, "sign with the driver's key; only arm needs it");
+        for (CLI::App* request : {arm, disarm, estop})
+          request->add_option("--key", key, "sign with the driver's key; only arm needs it");
         make_key = app.add_subcommand("key", "make a key to sign commands with");
         make_key->add_option("file", new_key, "a new file, which only its owner may read")->required();
-        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, arm, disarm, estop, make_key}) sub->fallthrough();
+        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, arm,
+                              disarm, estop, make_key})
+          sub->fallthrough();
       },
       [&](plumb::Process& process) {
         if (launch->parsed()) return plumb::Launch(process, flags);

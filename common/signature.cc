@@ -34,14 +34,17 @@ struct KeyText {
 void ReadKeyText(const std::filesystem::path& file, KeyText& key) {
   // Without waiting, should it be a pipe.
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) Fail(file, fmt::format("the key cannot be read: {}; cure: plumb key {}", std::strerror(errno), file.string()));
+  if (fd < 0)
+    Fail(file,
+         fmt::format("the key cannot be read: {}; cure: plumb key {}", std::strerror(errno), file.string()));
   struct stat status {};
   const bool known = fstat(fd, &status) == 0;
   const ssize_t size = known && S_ISREG(status.st_mode) ? read(fd, key.text.data(), key.text.size()) : -1;
   close(fd);
   if (known && !S_ISREG(status.st_mode)) Fail(file, "not a file that could hold a key");
   if ((status.st_mode & 077) != 0) {
-    Fail(file, fmt::format("the key is open to others (mode {:04o}); cure: chmod 600 {}, or a new one if somebody has read it",
+    Fail(file, fmt::format("the key is open to others (mode {:04o}); cure: chmod 600 {}, or a new one if "
+                           "somebody has read it",
                            status.st_mode & 07777, file.string()));
   }
   if (size < 0) Fail(file, "the key cannot be read");
@@ -61,7 +64,9 @@ SigningKey::SigningKey(const std::filesystem::path& file) {
       sodium_hex2bin(key_.data(), key_.size(), key.text.data(), key.size, nullptr, &length, &end) == 0 &&
       end == key.text.data() + key.size;
   if (key.size != kDigits || !hexadecimal || length != key_.size()) {
-    Fail(file, fmt::format("not a key: one line of {} hexadecimal digits is expected; cure: plumb key NEW-FILE", kDigits));
+    Fail(file,
+         fmt::format("not a key: one line of {} hexadecimal digits is expected; cure: plumb key NEW-FILE",
+                     kDigits));
   }
 }
 

@@ -11,22 +11,24 @@
 
 namespace plumb {
 
-/// A message that ends in `int64_t counter; byte signature[32];` can be signed with a key that its sender and its
-/// receiver share and nobody else knows:
+/// A message that ends in `int64_t counter; byte signature[32];` can be signed with a key that its sender and
+/// its receiver share and nobody else knows:
 ///
-///   signature = BLAKE2b-256 with that key, of the channel's name, a zero byte, and the encoded message before it
+///   signature = BLAKE2b-256 with that key, of the channel's name, a zero byte, and the encoded message
+///   before it
 ///
-/// (RFC 7693; libsodium's crypto_generichash). The channel is in it, so that no message can pass for one of another
-/// channel; the type is, because LCM encodes its fingerprint first. The counter is the real time of signing [us], or one
-/// more than the one before where that is greater: it rises in a process, over restarts, and from sender to sender.
+/// (RFC 7693; libsodium's crypto_generichash). The channel is in it, so that no message can pass for one of
+/// another channel; the type is, because LCM encodes its fingerprint first. The counter is the real time of
+/// signing [us], or one more than the one before where that is greater: it rises in a process, over restarts,
+/// and from sender to sender.
 using Signature = std::array<uint8_t, 32>;
 
 /// A shared key of 256 bits. Thread-safe (immutable).
 class SigningKey {
  public:
   /// @param file 64 hexadecimal digits in one line, as MakeKeyFile writes them.
-  /// @throws std::runtime_error naming the file, what is wrong and the cure, if it cannot be read, holds anything else, or
-  /// may be read or written by anybody but its owner.
+  /// @throws std::runtime_error naming the file, what is wrong and the cure, if it cannot be read, holds
+  /// anything else, or may be read or written by anybody but its owner.
   explicit SigningKey(const std::filesystem::path& file);
   SigningKey(const SigningKey&) = default;
   SigningKey& operator=(const SigningKey&) = default;
@@ -68,8 +70,8 @@ class Signer {
   std::vector<uint8_t> encoding_;
 };
 
-/// Judges the messages of one channel as they arrive. Neither allocates, blocks nor throws after construction. Not
-/// thread-safe.
+/// Judges the messages of one channel as they arrive. Neither allocates, blocks nor throws after
+/// construction. Not thread-safe.
 class Verifier {
  public:
   /// How far the clocks of sender and receiver may be apart, the message's way included [us].
@@ -80,8 +82,8 @@ class Verifier {
       : key_(key), channel_(std::move(channel)), newest_(start) {}
 
   /// @param encoding the message as it was received. @param real_utime real time, not scaled [us].
-  /// @return why it must not be obeyed, a literal; empty if it was signed with the key within the last kClockError, and
-  /// later than every one that has been accepted before.
+  /// @return why it must not be obeyed, a literal; empty if it was signed with the key within the last
+  /// kClockError, and later than every one that has been accepted before.
   std::string_view Judge(std::span<const uint8_t> encoding, int64_t real_utime) noexcept;
 
  private:

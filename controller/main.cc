@@ -19,7 +19,8 @@ int main(int argc, char** argv) {
         app.add_option("--seed", seed, "of initial states and exploration")->capture_default_str();
         app.add_option("--rest", rest,
                        "[s] do not have the robot placed: let it rest that long, then begin where it is");
-        app.add_option("--key", key, "sign the commands with this key, which the driver shares (plumb key makes one)");
+        app.add_option("--key", key,
+                       "sign the commands with this key, which the driver shares (plumb key makes one)");
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);

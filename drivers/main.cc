@@ -58,18 +58,19 @@ std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const s
 
 void SayWhoMayCommand(const std::string& lcm_url, bool commands_signed) {
   if (commands_signed) return spdlog::info("takes signed commands only");
-  if (!StaysOnMachine(lcm_url)) return spdlog::warn("takes the commands of anybody on the network: they are not signed");
+  if (!StaysOnMachine(lcm_url)) return spdlog::warn("takes unsigned commands of anybody on the network");
   const std::vector<std::string> open = OpenInterfaces(lcm_url);
   if (open.empty()) return;
-  spdlog::warn("takes the commands of anybody who reaches LCM through {}: they are not signed; cure: --key FILE, or ip route add "
-               "224.0.0.0/4 dev lo",
-               fmt::join(open, ", "));
+  spdlog::warn(
+      "takes the commands of anybody who reaches LCM through {}: they are not signed; cure: --key FILE, or "
+      "ip route add 224.0.0.0/4 dev lo",
+      fmt::join(open, ", "));
 }
 
 class DriverProcess {
  public:
-  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus, const std::string& flight_recorder,
-                const std::optional<SigningKey>& key)
+  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus,
+                const std::string& flight_recorder, const std::optional<SigningKey>& key)
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
@@ -79,11 +80,15 @@ class DriverProcess {
         statuses_(process.messenger(), "DRIVER_STATUS"),
         command_signatures_(VerifierOf(key, "JOINT_COMMAND")),
         request_signatures_(VerifierOf(key, "DRIVER_REQUEST")),
-        commands_(process.messenger(), "JOINT_COMMAND", [this](const joint_command_t& command) { OnCommand(command); }),
-        requests_(process.messenger(), "DRIVER_REQUEST", [this](const driver_request_t& request) { OnRequest(request); }),
+        commands_(process.messenger(), "JOINT_COMMAND",
+                  [this](const joint_command_t& command) { OnCommand(command); }),
+        requests_(process.messenger(), "DRIVER_REQUEST",
+                  [this](const driver_request_t& request) { OnRequest(request); }),
         recorder_(flight_recorder, bus, kFlightFrames, [](const std::string& file, const std::string& error) {
-          if (error.empty()) spdlog::warn("the frames of the last 2 s are in {}", file);
-          else spdlog::error("the frames before the fault are lost: {}", error);
+          if (error.empty())
+            spdlog::warn("the frames of the last 2 s are in {}", file);
+          else
+            spdlog::error("the frames before the fault are lost: {}", error);
         }) {
     driver_.set_bus(bus);
     driver_.set_commands_signed(key.has_value());
@@ -237,8 +242,11 @@ int main(int argc, char** argv) {
         app.add_option("robot", robot_path, "robot folder, or its TOML file")->required();
         app.add_option("--bus", bus, "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
         app.add_option("--flight-recorder", flight_recorder, "folder: on every fault the frames of the last 2 s are written there");
-        auto* key = app.add_option("--key", key_file, "obey only commands and ARM requests signed with this key (plumb key makes one)");
-        app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")->excludes(key);
+        auto* key =
+            app.add_option("--key", key_file,
+                           "obey only commands and ARM requests signed with this key (plumb key makes one)");
+        app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")
+            ->excludes(key);
         app.add_option("--realtime-priority", priority, "SCHED_FIFO priority, 0 = off")
             ->check(CLI::Range(0, 90))
             ->capture_default_str();

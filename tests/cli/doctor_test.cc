@@ -39,14 +39,17 @@ TEST_CASE("an LCM address that cannot be opened is bad") {
 
 Finding Signatures(const std::string& lcm_url, const std::string& key = {}) {
   for (const Finding& finding : Examine(lcm_url, "loop:doctor_signatures", key)) {
-    if ((finding.what + finding.cure).find("sign") != std::string::npos || finding.what.find("key") != std::string::npos) return finding;
+    if ((finding.what + finding.cure).find("sign") != std::string::npos ||
+        finding.what.find("key") != std::string::npos)
+      return finding;
   }
   return {};
 }
 
 TEST_CASE("whether commands are signed, and whether that will do") {
   const std::string local = "udpm://239.255.76.67:17658?ttl=0", open = "udpm://239.255.76.67:17658?ttl=1";
-  // Unsigned on this machine alone is good; it is not alone where multicast comes in by another interface, too.
+  // Unsigned on this machine alone is good; it is not alone where multicast comes in by another interface,
+  // too.
   const Finding unsigned_here = Signatures(local);
   const Messenger messenger(local);
   const bool alone = OpenInterfaces(local).empty();
@@ -76,7 +79,8 @@ TEST_CASE("whether commands are signed, and whether that will do") {
 
 TEST_CASE("plumb key makes a key once") {
   const Folder folder;
-  const Outcome first = Shell(Plumb() + "key " + (folder / "key")), second = Shell(Plumb() + "key " + (folder / "key"));
+  const Outcome first = Shell(Plumb() + "key " + (folder / "key")),
+                second = Shell(Plumb() + "key " + (folder / "key"));
   CHECK(first.status == 0);
   CHECK_NOTHROW(SigningKey(folder / "key"));
   CHECK(second.status == 1);

@@ -87,8 +87,8 @@ std::string WhatIsWrong(const fs::path& file) {
   }
 }
 
-// Appendix E of RFC 7693: a hash of hashes with and without keys, of which those of 32 bytes with a key of 32 bytes are
-// what we use.
+// Appendix E of RFC 7693: a hash of hashes with and without keys, of which those of 32 bytes with a key of 32
+// bytes are what we use.
 TEST_CASE("the hash is RFC 7693's BLAKE2b") {
   const auto sequence = [](size_t length) {
     Bytes bytes(length);
@@ -125,15 +125,18 @@ TEST_CASE("the hash is the reference implementation's") {
   std::iota(text.begin(), text.end(), uint8_t{0});
   crypto_generichash(hash.data(), 64, text.data(), text.size(), key.data(), key.size());
   CHECK(Hex(hash) ==
-        "142709d62e28fcccd0af97fad0f8465b971e82201dc51070faa0372aa43e92484be1c1e73ba10906d5d1853db6a4106e0a7bf9800d373d6dee2d46d62ef2a461");
+        "142709d62e28fcccd0af97fad0f8465b971e82201dc51070faa0372aa43e92484be1c1e73ba10906d5d1853db6a4106e0a7b"
+        "f9800d373d6dee2d46d62ef2a461");
 }
 
-// What python3's hashlib says: blake2b(b"CHANNEL\0" + bytes(range(100)), key=bytes(range(32)), digest_size=32).
+// What python3's hashlib says: blake2b(b"CHANNEL\0" + bytes(range(100)), key=bytes(range(32)),
+// digest_size=32).
 TEST_CASE("a signature is the keyed hash of channel, zero byte and message") {
   const Folder folder;
   Bytes body(100);
   std::iota(body.begin(), body.end(), uint8_t{0});
-  CHECK(Hex(folder.Key().Sign("CHANNEL", body)) == "c64f7a366e791b518642d5b8ec7df3ef7e094baad3c9b628a772a6842078f474");
+  CHECK(Hex(folder.Key().Sign("CHANNEL", body)) ==
+        "c64f7a366e791b518642d5b8ec7df3ef7e094baad3c9b628a772a6842078f474");
 }
 
 // A foreign implementation signs, and says what it makes of our signature.
@@ -147,8 +150,9 @@ TEST_CASE("Python signs what we accept, and accepts what we sign") {
   Bytes unsigned_one = ours;
   std::fill(unsigned_one.end() - 32, unsigned_one.end(), uint8_t{0});
   const char* source = std::getenv("PLUMBLINE_SOURCE");
-  const std::string call = "/usr/bin/python3 " + std::string(source ? source : ".") + "/tests/common/sign.py " +
-                           (folder.path / "key0").string() + " JOINT_COMMAND " + Hex(unsigned_one);
+  const std::string call = "/usr/bin/python3 " + std::string(source ? source : ".") +
+                           "/tests/common/sign.py " + (folder.path / "key0").string() + " JOINT_COMMAND " +
+                           Hex(unsigned_one);
   FILE* pipe = popen(call.c_str(), "r");
   REQUIRE(pipe);
   std::string theirs(ours.size() * 2, '\0');
@@ -156,7 +160,8 @@ TEST_CASE("Python signs what we accept, and accepts what we sign") {
   CHECK(pclose(pipe) == 0);
   CHECK(theirs == Hex(ours));
   Bytes bytes(ours.size());
-  REQUIRE(sodium_hex2bin(bytes.data(), bytes.size(), theirs.data(), theirs.size(), nullptr, nullptr, nullptr) == 0);
+  REQUIRE(sodium_hex2bin(bytes.data(), bytes.size(), theirs.data(), theirs.size(), nullptr, nullptr,
+                         nullptr) == 0);
   Verifier verifier(key, "JOINT_COMMAND", kNow - 1);
   CHECK(verifier.Judge(unsigned_one, kNow) == kForeign);
   CHECK(verifier.Judge(bytes, kNow).empty());
@@ -190,8 +195,10 @@ TEST_CASE("another key, another channel and no key at all are not genuine") {
   const Folder folder;
   const SigningKey key = folder.Key();
   Verifier verifier(key, "JOINT_COMMAND", kNow - 1);
-  Signer other_key(folder.Key(1), "JOINT_COMMAND"), other_channel(key, "DRIVER_REQUEST"), cut_channel(key, "JOINT_COMMAN");
-  for (Signer* signer : {&other_key, &other_channel, &cut_channel}) CHECK(verifier.Judge(Signed(*signer, kNow), kNow) == kForeign);
+  Signer other_key(folder.Key(1), "JOINT_COMMAND"), other_channel(key, "DRIVER_REQUEST"),
+      cut_channel(key, "JOINT_COMMAN");
+  for (Signer* signer : {&other_key, &other_channel, &cut_channel})
+    CHECK(verifier.Judge(Signed(*signer, kNow), kNow) == kForeign);
   CHECK(verifier.Judge(Encode(Command()), kNow) == kForeign);
 }
 
@@ -200,12 +207,14 @@ TEST_CASE("of several messages only later ones are taken, by whomever they were 
   const SigningKey key = folder.Key();
   Signer one(key, "JOINT_COMMAND"), two(key, "JOINT_COMMAND");
   Verifier verifier(key, "JOINT_COMMAND", kNow - 1);
-  const Bytes first = Signed(one, kNow), second = Signed(one, kNow), third = Signed(two, kNow + 2), old = Signed(two, kNow);
+  const Bytes first = Signed(one, kNow), second = Signed(one, kNow), third = Signed(two, kNow + 2),
+              old = Signed(two, kNow);
   CHECK(verifier.Judge(second, kNow + 1).empty());  // its counter is kNow + 1
   CHECK_THAT(std::string(verifier.Judge(first, kNow + 1)), Catch::Contains("repetition"));
   CHECK_THAT(std::string(verifier.Judge(second, kNow + 1)), Catch::Contains("repetition"));
   CHECK(verifier.Judge(third, kNow + 2).empty());
-  CHECK(verifier.Judge(old, kNow + 2).empty());  // the same signer's counter rises although the clock went back
+  CHECK(
+      verifier.Judge(old, kNow + 2).empty());  // the same signer's counter rises although the clock went back
   CHECK_THAT(std::string(verifier.Judge(first, kNow + 2)), Catch::Contains("repetition"));
 }
 
@@ -213,8 +222,8 @@ TEST_CASE("what was recorded, withheld or dated ahead is not taken") {
   const Folder folder;
   const SigningKey key = folder.Key();
   Signer signer(key, "JOINT_COMMAND");
-  const Bytes recorded = Signed(signer, kNow - 1), withheld = Signed(signer, kNow + 1), ahead = Signed(signer, kNow + 4'000'000),
-              greatest = Signed(signer, INT64_MAX - 1);
+  const Bytes recorded = Signed(signer, kNow - 1), withheld = Signed(signer, kNow + 1),
+              ahead = Signed(signer, kNow + 4'000'000), greatest = Signed(signer, INT64_MAX - 1);
   Verifier verifier(key, "JOINT_COMMAND", kNow);  // a driver that starts now
   CHECK_THAT(std::string(verifier.Judge(recorded, kNow)), Catch::Contains("before the driver's start"));
   CHECK_THAT(std::string(verifier.Judge(withheld, kNow + 2'000'000)), Catch::Contains("too long ago"));
@@ -262,16 +271,20 @@ TEST_CASE("a key that others may read, or that is none, is refused with the cure
   const std::string digits(64, 'a');
   for (const mode_t mode : {0640, 0604, 0620, 0602, 0644, 0601}) {
     const fs::path file = folder.Write("open", digits, mode);
-    CHECK_THAT(WhatIsWrong(file), Catch::Contains(file.string()) && Catch::Contains("cure: chmod 600 " + file.string()));
+    CHECK_THAT(WhatIsWrong(file),
+               Catch::Contains(file.string()) && Catch::Contains("cure: chmod 600 " + file.string()));
   }
   CHECK(WhatIsWrong(folder.Write("good", digits)) == "nothing");
   CHECK(WhatIsWrong(folder.Write("line", digits + "\n", 0400)) == "nothing");
-  for (const std::string& text : {std::string(), std::string("\n"), digits.substr(1), digits + "a", digits + "\n\n", digits + " \n",
-                                  " " + digits.substr(1), digits.substr(1) + "g", digits.substr(2) + "0x", std::string(64, '\0'),
-                                  digits + digits, std::string(1 << 20, 'a')}) {
-    CHECK_THAT(WhatIsWrong(folder.Write("bad", text)), Catch::Contains("64 hexadecimal digits") && Catch::Contains("plumb key"));
+  for (const std::string& text :
+       {std::string(), std::string("\n"), digits.substr(1), digits + "a", digits + "\n\n", digits + " \n",
+        " " + digits.substr(1), digits.substr(1) + "g", digits.substr(2) + "0x", std::string(64, '\0'),
+        digits + digits, std::string(1 << 20, 'a')}) {
+    CHECK_THAT(WhatIsWrong(folder.Write("bad", text)),
+               Catch::Contains("64 hexadecimal digits") && Catch::Contains("plumb key"));
   }
-  CHECK_THAT(WhatIsWrong(folder.path / "absent"), Catch::Contains("No such file") && Catch::Contains("plumb key"));
+  CHECK_THAT(WhatIsWrong(folder.path / "absent"),
+             Catch::Contains("No such file") && Catch::Contains("plumb key"));
   CHECK_THAT(WhatIsWrong(folder.path), Catch::Contains("not a file"));
   REQUIRE(mkfifo((folder.path / "pipe").c_str(), 0600) == 0);
   CHECK_THAT(WhatIsWrong(folder.path / "pipe"), Catch::Contains("not a file"));

@@ -21,7 +21,8 @@ TEST_CASE("nothing but forged commands disarm as silence does, and the reason sa
   CHECK(rig.driver->state() == DriveState::kArmed);
   CHECK(rig.drives[0].Torque() == 0);
   CHECK(rig.RunUntil(DriveState::kFault) <= 260 - 110);
-  CHECK_THAT(rig.Reason(), Catch::StartsWith("commands refused: not signed with the driver's key (none taken for 25"));
+  CHECK_THAT(rig.Reason(),
+             Catch::StartsWith("commands refused: not signed with the driver's key (none taken for 25"));
   CHECK(rig.Status().commands_forged >= 110);
 }
 
@@ -61,7 +62,8 @@ TEST_CASE("a forged ARM arms nothing, and says why") {
   rig.driver->OnForgedArm(kWhy);
   rig.Run(100);
   CHECK(rig.driver->state() == DriveState::kFault);
-  CHECK_THAT(rig.Reason(), Catch::StartsWith("emergency stop requested; ARM refused") && Catch::EndsWith(kWhy));
+  CHECK_THAT(rig.Reason(),
+             Catch::StartsWith("emergency stop requested; ARM refused") && Catch::EndsWith(kWhy));
   CHECK(rig.Status().commands_forged == 3);
 }
 

@@ -1,4 +1,5 @@
-// Signed commands, with real processes: a loop that signs moves the robot, and nobody else does; stopping needs no key.
+// Signed commands, with real processes: a loop that signs moves the robot, and nobody else does; stopping
+// needs no key.
 
 #include <algorithm>
 #include <cmath>
@@ -27,9 +28,11 @@ std::string Output(Stage& stage, std::vector<std::string> arguments, bool fails)
 
 /// Somebody without the key, who has seen what a command looks like.
 struct Stranger {
-  explicit Stranger(Stage& s) : stage(s), commands(s.messenger, "JOINT_COMMAND"), requests(s.messenger, "DRIVER_REQUEST") {}
+  explicit Stranger(Stage& s)
+      : stage(s), commands(s.messenger, "JOINT_COMMAND"), requests(s.messenger, "DRIVER_REQUEST") {}
   void Command() {
-    joint_command_t command = stage.commands.received() > 0 ? stage.commands.newest() : joint_command_t{};  // signature and all
+    joint_command_t command =
+        stage.commands.received() > 0 ? stage.commands.newest() : joint_command_t{};  // its signature, too
     command.utime = Stage::RealUtime();
     command.counter = Stage::RealUtime();
     command.sequence += 1000;
@@ -80,14 +83,22 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
   float seen = 0;
   for (int i = 0; i < 50; ++i) {
     stranger.Command();
-    stage.WaitUntil([&] { seen = std::max(seen, std::abs(stage.torque)); return false; }, 0.01);
+    stage.WaitUntil(
+        [&] {
+          seen = std::max(seen, std::abs(stage.torque));
+          return false;
+        },
+        0.01);
   }
   CHECK(stage.WaitUntil([&] { return stage.drivers.newest().commands_forged == 50; }, 2));
   CHECK(seen > 0);
   CHECK(seen < 0.9f * greatest);
   CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
-  CHECK_THAT(Output(stage, {"plumb", "doctor", "--bus", stage.bus_url, "--lcm-url", stage.lcm_url, "--key", key}, false),
-             Contains("commands are signed: " + key.string()) && Contains("obeys signed commands only, and has dropped 50"));
+  CHECK_THAT(
+      Output(stage, {"plumb", "doctor", "--bus", stage.bus_url, "--lcm-url", stage.lcm_url, "--key", key},
+             false),
+      Contains("commands are signed: " + key.string()) &&
+          Contains("obeys signed commands only, and has dropped 50"));
 
   // Whoever wants to stop it may.
   stranger.Request(driver_request_t::DISARM);
@@ -97,20 +108,28 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
   // And nobody else starts it again.
   stranger.Request(driver_request_t::ARM);
   REQUIRE(stage.WaitUntil([&] { return stage.drivers.newest().commands_forged == 51; }, 2));
-  CHECK(stage.drivers.newest().reason == "disarmed on request; ARM refused: not signed with the driver's key");
+  CHECK(stage.drivers.newest().reason ==
+        "disarmed on request; ARM refused: not signed with the driver's key");
   CHECK_THAT(Output(stage, {"plumb", "arm", "--lcm-url", stage.lcm_url}, true), Contains("--key FILE"));
   stage.Listen(0.3);
   CHECK(stage.axis_state == kIdle);
-  CHECK_THAT(Output(stage, {"plumb", "arm", "--lcm-url", stage.lcm_url, "--key", key}, false), Contains("armed"));
+  CHECK_THAT(Output(stage, {"plumb", "arm", "--lcm-url", stage.lcm_url, "--key", key}, false),
+             Contains("armed"));
   REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 2));
 
   // Alone, the stranger is heard and not obeyed, and the driver says so.
   stage.children.at("plumb-controller")->Signal(SIGSTOP);
-  REQUIRE(stage.WaitUntil([&] { stranger.Command(); return stage.drivers.newest().state == driver_status_t::FAULT; }, 5));
+  REQUIRE(stage.WaitUntil(
+      [&] {
+        stranger.Command();
+        return stage.drivers.newest().state == driver_status_t::FAULT;
+      },
+      5));
   CHECK_THAT(stage.drivers.newest().reason, Contains("commands refused: not signed with the driver's key"));
   stage.children.at("plumb-controller")->Signal(SIGCONT);
   REQUIRE(stage.Arm());
-  CHECK_THAT(Output(stage, {"plumb", "estop", "--lcm-url", stage.lcm_url}, false), Contains("emergency stop requested"));
+  CHECK_THAT(Output(stage, {"plumb", "estop", "--lcm-url", stage.lcm_url}, false),
+             Contains("emergency stop requested"));
   CHECK(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 2));
 }
 
@@ -124,7 +143,8 @@ TEST_CASE("what was recorded is worth nothing, to the same driver and to one tha
   REQUIRE(recorder.messages.front().channel == "DRIVER_REQUEST");
   const auto replay = [&] {
     for (const Recorder::Message& message : recorder.messages) {
-      stage.messenger.lcm().publish(message.channel, message.bytes.data(), static_cast<unsigned>(message.bytes.size()));
+      stage.messenger.lcm().publish(message.channel, message.bytes.data(),
+                                    static_cast<unsigned>(message.bytes.size()));
       stage.Listen(0.005);
     }
     stage.Listen(0.3);
@@ -146,8 +166,9 @@ TEST_CASE("what was recorded is worth nothing, to the same driver and to one tha
   replay();
   CHECK(stage.drivers.newest().state == driver_status_t::IDLE);
   CHECK(stage.drivers.newest().commands_forged == forged);
-  CHECK_THAT(stage.drivers.newest().reason,
-             Contains("ARM refused") && Contains("signed, but a repetition, or from before the driver's start"));
+  CHECK_THAT(
+      stage.drivers.newest().reason,
+      Contains("ARM refused") && Contains("signed, but a repetition, or from before the driver's start"));
   // Nor when a person arms.
   REQUIRE(stage.Arm());
   replay();
@@ -162,24 +183,31 @@ TEST_CASE("a driver that others could command does not start without a key") {
   const std::string open = "udpm://239.255.76.67:17752?ttl=1";
   for (const std::vector<std::string>& program :
        {std::vector<std::string>{"plumb-driver", stage.robot_folder, "--bus", stage.bus_url},
-        std::vector<std::string>{"plumb", "launch", stage.robot_folder, "--bus", stage.bus_url, "--output", stage.folder / "run"}}) {
+        std::vector<std::string>{"plumb", "launch", stage.robot_folder, "--bus", stage.bus_url, "--output",
+                                 stage.folder / "run"}}) {
     std::vector<std::string> arguments = program;
     arguments.insert(arguments.end(), {"--lcm-url", open});
     const std::string output = Output(stage, arguments, true);
     INFO(output);
     CHECK(std::count(output.begin(), output.end(), '\n') == 1);
-    CHECK_THAT(output, Contains(open + " leaves this machine") && Contains("--key FILE") && Contains("--unsigned"));
+    CHECK_THAT(output,
+               Contains(open + " leaves this machine") && Contains("--key FILE") && Contains("--unsigned"));
   }
   // Allowed: it gets as far as opening LCM, at an address where nobody is.
-  CHECK_THAT(Output(stage, {"plumb-driver", stage.robot_folder, "--bus", stage.bus_url, "--lcm-url", "tcpq://127.0.0.1:1", "--unsigned"}, true),
+  CHECK_THAT(Output(stage,
+                    {"plumb-driver", stage.robot_folder, "--bus", stage.bus_url, "--lcm-url",
+                     "tcpq://127.0.0.1:1", "--unsigned"},
+                    true),
              Contains("cannot open LCM"));
   const fs::path key = stage.UseKey();
   fs::permissions(key, fs::perms::group_read, fs::perm_options::add);
   for (const char* program : {"plumb-driver", "plumb-controller"}) {
-    const std::string output = Output(stage, {program, stage.robot_folder, "--lcm-url", stage.lcm_url, "--key", key}, true);
+    const std::string output =
+        Output(stage, {program, stage.robot_folder, "--lcm-url", stage.lcm_url, "--key", key}, true);
     CHECK_THAT(output, Contains("mode 0640") && Contains("chmod 600 " + key.string()));
   }
-  CHECK_THAT(Output(stage, {"plumb-driver", stage.robot_folder, "--key", key, "--unsigned"}, true), Contains("excludes"));
+  CHECK_THAT(Output(stage, {"plumb-driver", stage.robot_folder, "--key", key, "--unsigned"}, true),
+             Contains("excludes"));
 }
 
 }  // namespace

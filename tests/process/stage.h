@@ -86,7 +86,8 @@ class Stage {
     Start("plumb-estimator");
     Start("plumb-controller", key_arguments_);
   }
-  /// From now on the driver wants, and the controller and Request give, signatures with a new key. @return its file.
+  /// From now on the driver wants, and the controller and Request give, signatures with a new key. @return
+  /// its file.
   std::filesystem::path UseKey() {
     const std::filesystem::path file = folder / "key";
     MakeKeyFile(file);
