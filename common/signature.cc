@@ -63,7 +63,7 @@ SigningKey::SigningKey(const std::filesystem::path& file) {
   const bool hexadecimal =
       sodium_hex2bin(key_.data(), key_.size(), key.text.data(), key.size, nullptr, &length, &end) == 0 &&
       end == key.text.data() + key.size;
-  if (key.size != kDigits || !hexadecimal || length != key_.size()) {
+  if (!hexadecimal || length != key_.size()) {
     Fail(file,
          fmt::format("not a key: one line of {} hexadecimal digits is expected; cure: plumb key NEW-FILE",
                      kDigits));
