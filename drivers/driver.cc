@@ -225,8 +225,9 @@ void Driver::CheckCommand() noexcept {
   if (mode_ != Mode::kArmed) return;
   const int64_t silence = now_ - (inbox_.empty() ? armed_at_ : inbox_.arrival());
   if (silence > disarm_after_) {
-    if (inbox_.refusal().empty()) return Fault("no command for {} ms", silence / 1000);
-    return Fault("commands refused: {} (none taken for {} ms)", inbox_.refusal(), silence / 1000);
+    const std::string_view refusal = inbox_.refusal().empty() ? forgery_ : inbox_.refusal();
+    if (refusal.empty()) return Fault("no command for {} ms", silence / 1000);
+    return Fault("commands refused: {} (none taken for {} ms)", refusal, silence / 1000);
   }
   if (!inbox_.empty() && inbox_.Expired(now_) && !expiry_counted_) {
     ++status_.commands_expired;

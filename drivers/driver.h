@@ -59,6 +59,9 @@ class Driver {
   void OnLink(LinkState link) noexcept;
   void OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept;
   void OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
+  /// Instead of the two above, what is not to be obeyed because its signature is wrong. @param why a literal.
+  void OnForgedArm(std::string_view why) noexcept;
+  void OnForgedCommand(std::string_view why) noexcept;
   /// @param lateness [us] after the cycle's deadline.
   /// @return what to send now, torques first; valid until the next call.
   std::span<const Frame> Tick(int64_t now, int64_t utime, int64_t lateness) noexcept;
@@ -76,6 +79,8 @@ class Driver {
   /// @param messages_rejected LCM messages that did not decode.
   const driver_status_t& Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected);
   void set_bus(const std::string& url) { status_.bus = url; }
+  /// Whether signatures are looked at before OnRequest and OnCommand are called.
+  void set_commands_signed(bool commands_signed) { status_.commands_signed = commands_signed; }
   /// The robot is a virtual one, which is put elsewhere at once: while no effort is sent, positions may jump.
   void set_virtual(bool is_virtual) { virtual_ = is_virtual; }
   /// What it hears is a recording: it refuses to arm.
@@ -149,6 +154,7 @@ class Driver {
   int64_t armed_at_ = 0;           // `now`
   bool stray_controller_ = false;  // commanded during the start guard
   int64_t last_command_ = 0;       // `now` of any command, valid or not
+  std::string_view forgery_;       // of a literal: what was wrong with a command since the last genuine one
   bool expiry_counted_ = false;
   LinkState link_ = LinkState::kUp;
   bool bus_off_ = false;

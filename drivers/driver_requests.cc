@@ -87,16 +87,29 @@ void Driver::RequestArm(int64_t made) noexcept {
   status_.stopped_by_request = false;
   refused_cycles_ = 0;
   inbox_.Clear();
+  forgery_ = {};
   cause_.Clear();
   for (Joint& joint : joints_) joint.motor->Arm(now);
   mode_ = Mode::kArming;
   reason_.Set("arming");
 }
 
+// Neither is taken for a sign of a controller: a forger could keep the robot from being armed.
+void Driver::OnForgedArm(std::string_view why) noexcept {
+  ++status_.commands_forged;
+  if (!Active()) Refuse(why);
+}
+
+void Driver::OnForgedCommand(std::string_view why) noexcept {
+  ++status_.commands_forged;
+  forgery_ = why;
+}
+
 void Driver::OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept {
   now_ = now;
   utime_ = utime;
   last_command_ = now;
+  forgery_ = {};
   if (now - start_now_ < start_guard_) {
     stray_controller_ = true;
     ++status_.commands_rejected;

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <poll.h>
 #include <sched.h>
 #include <spdlog/spdlog.h>
@@ -9,10 +10,13 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
 
+#include "common/lcm_url.h"
 #include "common/messenger.h"
 #include "common/process.h"
+#include "common/signature.h"
 #include "drivers/driver.h"
 #include "drivers/flight_recorder.h"
 #include "drivers/state_log.h"
@@ -46,10 +50,27 @@ void WriteState(int8_t state, std::string_view reason) {
   spdlog::log(level, "{}{}{}", names[static_cast<size_t>(state)], reason.empty() ? "" : ": ", reason);
 }
 
+/// Judges signed messages; without a key, obeys all.
+std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const std::string& channel) {
+  if (!key) return std::nullopt;
+  return Verifier(*key, channel, Clock().Utime());
+}
+
+void SayWhoMayCommand(const std::string& lcm_url, bool commands_signed) {
+  if (commands_signed) return spdlog::info("takes signed commands only");
+  if (!StaysOnMachine(lcm_url)) return spdlog::warn("takes unsigned commands of anybody on the network");
+  const std::vector<std::string> open = OpenInterfaces(lcm_url);
+  if (open.empty()) return;
+  spdlog::warn(
+      "takes the commands of anybody who reaches LCM through {}: they are not signed; cure: --key FILE, or "
+      "ip route add 224.0.0.0/4 dev lo",
+      fmt::join(open, ", "));
+}
+
 class DriverProcess {
  public:
-  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus, const std::string& flight_recorder,
-                bool is_virtual)
+  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus,
+                const std::string& flight_recorder, const std::optional<SigningKey>& key, bool is_virtual)
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
@@ -58,19 +79,22 @@ class DriverProcess {
         states_(process.messenger(), "JOINT_STATE"),
         imus_(process.messenger(), "IMU"),
         statuses_(process.messenger(), "DRIVER_STATUS"),
+        command_signatures_(VerifierOf(key, "JOINT_COMMAND")),
+        request_signatures_(VerifierOf(key, "DRIVER_REQUEST")),
         commands_(process.messenger(), "JOINT_COMMAND",
-                  [this](const joint_command_t& command) {
-                    driver_.OnCommand(command, clock_.Now(), clock_.Utime());
-                  }),
-        requests_(process.messenger(), "DRIVER_REQUEST", [this](const driver_request_t& request) {
-          driver_.OnRequest(request, clock_.Now(), clock_.Utime());
-        }),
+                  [this](const joint_command_t& command) { OnCommand(command); }),
+        requests_(process.messenger(), "DRIVER_REQUEST",
+                  [this](const driver_request_t& request) { OnRequest(request); }),
         recorder_(flight_recorder, bus, kFlightFrames, [](const std::string& file, const std::string& error) {
-          if (error.empty()) spdlog::warn("the frames of the last 2 s are in {}", file);
-          else spdlog::error("the frames before the fault are lost: {}", error);
+          if (error.empty())
+            spdlog::warn("the frames of the last 2 s are in {}", file);
+          else
+            spdlog::error("the frames before the fault are lost: {}", error);
         }) {
     driver_.set_bus(bus);
     driver_.set_virtual(is_virtual);
+    driver_.set_commands_signed(key.has_value());
+    SayWhoMayCommand(process.lcm_url(), key.has_value());
     driver_.set_replay(transport_->is_replay());
     for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
@@ -102,6 +126,23 @@ class DriverProcess {
     } else {
       log_.Drain();
     }
+  }
+
+  void OnCommand(const joint_command_t& command) {
+    if (command_signatures_) {
+      const std::string_view refusal = command_signatures_->Judge(commands_.encoding(), Clock().Utime());
+      if (!refusal.empty()) return driver_.OnForgedCommand(refusal);
+    }
+    driver_.OnCommand(command, clock_.Now(), clock_.Utime());
+  }
+
+  void OnRequest(const driver_request_t& request) {
+    // Stopping must never need a key.
+    if (request_signatures_ && request.request == driver_request_t::ARM) {
+      const std::string_view refusal = request_signatures_->Judge(requests_.encoding(), Clock().Utime());
+      if (!refusal.empty()) return driver_.OnForgedArm(refusal);
+    }
+    driver_.OnRequest(request, clock_.Now(), clock_.Utime());
   }
 
   void ReceiveFrames() {
@@ -180,6 +221,7 @@ class DriverProcess {
   Publisher<joint_state_t> states_;
   Publisher<imu_t> imus_;
   Publisher<driver_status_t> statuses_;
+  std::optional<Verifier> command_signatures_, request_signatures_;
   Subscriber<joint_command_t> commands_;
   Subscriber<driver_request_t> requests_;
   std::array<Frame, 64> received_;
@@ -195,7 +237,8 @@ class DriverProcess {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  std::string robot_path, bus, flight_recorder;
+  std::string robot_path, bus, flight_recorder, key_file;
+  bool allow_unsigned = false;
   int priority = 0;
   bool is_virtual = false;
   return plumb::Run(
@@ -205,13 +248,21 @@ int main(int argc, char** argv) {
         app.add_option("--bus", bus, "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
         app.add_option("--flight-recorder", flight_recorder, "folder: on every fault the frames of the last 2 s are written there");
         app.add_flag("--virtual", is_virtual, "the robot is plumb-robot: while no effort is sent, its positions may jump");
+        auto* key =
+            app.add_option("--key", key_file,
+                           "obey only commands and ARM requests signed with this key (plumb key makes one)");
+        app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")
+            ->excludes(key);
         app.add_option("--realtime-priority", priority, "SCHED_FIFO priority, 0 = off")
             ->check(CLI::Range(0, 90))
             ->capture_default_str();
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
-        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder, is_virtual);
+        plumb::RequireKey(process.lcm_url(), !key_file.empty(), allow_unsigned);
+        std::optional<plumb::SigningKey> key;
+        if (!key_file.empty()) key.emplace(key_file);
+        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder, key, is_virtual);
         plumb::BecomeRealtime(priority);
         return driver.Run();
       });
