@@ -73,7 +73,7 @@ void Driver::FindMeasuring(const RobotDescription& robot) {
     const JointDescription& joint = robot.joints[i];
     if (!joint.passive) {
       for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
-        if (message.direction != BusMessage::Direction::kToDevice || message.remote || message.extended || message.shared) continue;
+        if (message.direction != BusMessage::Direction::kToDevice || message.remote || message.extended) continue;
         own_.push_back({.id = message.id, .own = true});
       }
       continue;
@@ -124,6 +124,10 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
   if (frame.error) return;
   if (frame.foreign) {
     foreign_at_ = now;
+    // A button on the bus is obeyed by all drives, whomever it was for.
+    if (std::ranges::any_of(joints_, [&](const Joint& joint) { return joint.motor->IsEstop(frame); })) {
+      return Estop("emergency stop from the bus");
+    }
     if (Active()) Fault("second master: somebody else sends frame {:#05x} to the drives", frame.id);
     return;
   }

@@ -75,9 +75,9 @@ class Driver {
   bool confirmed_idle() const noexcept;
   /// Changes whenever a state or reason changes.
   uint64_t revision() const noexcept { return revision_; }
-  /// The message to publish; valid until the next call.
+  /// The message to publish, to which the caller may add what only it knows; valid until the next call.
   /// @param messages_rejected LCM messages that did not decode.
-  const driver_status_t& Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected);
+  driver_status_t& Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected);
   void set_bus(const std::string& url) { status_.bus = url; }
   /// Whether signatures are looked at before OnRequest and OnCommand are called.
   void set_commands_signed(bool commands_signed) { status_.commands_signed = commands_signed; }
@@ -118,6 +118,7 @@ class Driver {
   bool UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept;
   void Refuse(std::string_view why) noexcept;
   void Disarm() noexcept;
+  void Estop(std::string_view reason) noexcept;
   void RequestArm(int64_t made) noexcept;
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;

@@ -1,20 +1,14 @@
 // What the driver says: JOINT_STATE and DRIVER_STATUS.
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <functional>
 #include <limits>
 
 #include "drivers/driver.h"
+#include "drivers/phase_times.h"
 
 namespace plumb {
-namespace {
-
-constexpr size_t kBins = 20;  // of the lateness histogram, the last one open
-
-}  // namespace
-
 void Driver::PrepareMessages() {
   const size_t size = num_joints_;
   state_message_.sequence = -1;
@@ -44,8 +38,8 @@ void Driver::PrepareMessages() {
   status_.num_phases = 0;
   status_.frames_foreign = status_.commands_limited = status_.commands_forged = 0;
   status_.commands_signed = false;
-  status_.num_bins = kBins;
-  status_.lateness.assign(kBins, 0);
+  status_.num_bins = PhaseTimes::kBins;
+  status_.lateness.assign(PhaseTimes::kBins, 0);
 }
 
 const joint_state_t* Driver::NextState() noexcept {
@@ -92,9 +86,7 @@ const imu_t* Driver::NextImu() noexcept {
 void Driver::NoteLateness(int64_t lateness) noexcept {
   ++status_.cycles;
   if (lateness >= cycle_) ++status_.overruns;
-  const auto bin =
-      static_cast<size_t>(std::bit_width(static_cast<uint64_t>(std::max<int64_t>(lateness, 1)))) - 1;
-  ++status_.lateness[std::min(bin, kBins - 1)];
+  ++status_.lateness[PhaseTimes::Bin(lateness)];
 }
 
 void Driver::NoteChanges() noexcept {
@@ -116,7 +108,7 @@ void Driver::NoteChanges() noexcept {
   signature_ = signature;
 }
 
-const driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected) {
+driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected) {
   status_.utime = utime;
   status_.state = static_cast<int8_t>(state());
   status_.reason = reason();

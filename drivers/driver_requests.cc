@@ -26,15 +26,18 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
       reason_ = cause_;
       return Disarm();
     case driver_request_t::ESTOP:
-      status_.stopped_by_request = true;
-      Fault("emergency stop requested");
-      stopped_utime_ = utime;
-      for (Joint& joint : joints_) joint.motor->Estop(now);
-      return;
+      return Estop("emergency stop requested");
     default:
       ++requests_rejected_;
       return;
   }
+}
+
+void Driver::Estop(std::string_view reason) noexcept {
+  status_.stopped_by_request = true;
+  Fault("{}", reason);
+  stopped_utime_ = utime_;
+  for (Joint& joint : joints_) joint.motor->Estop(now_);
 }
 
 void Driver::Refuse(std::string_view why) noexcept {

@@ -1,24 +1,22 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <poll.h>
-#include <sched.h>
 #include <spdlog/spdlog.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <optional>
 #include <stdexcept>
 
 #include "common/lcm_url.h"
 #include "common/messenger.h"
 #include "common/process.h"
+#include "common/realtime.h"
 #include "common/signature.h"
 #include "drivers/driver.h"
 #include "drivers/flight_recorder.h"
+#include "drivers/phase_times.h"
 #include "drivers/state_log.h"
 #include "robot/description.h"
 
@@ -31,18 +29,6 @@ constexpr double kFarewell = 0.3;  // [s] real time that the drives have to conf
 constexpr int kBursts = 8;         // of frames per wake: a flood must not keep us from our deadlines
 constexpr int64_t kFlight = 2'000'000;     // [us] before a fault whose frames are kept
 constexpr size_t kFlightFrames = 40'000;   // more than two buses of 1 Mbit/s carry in that time
-
-/// From here on no page faults, and no other process before us. LCM's receive thread must exist already.
-void BecomeRealtime(int priority) {
-  if (priority == 0) return;
-  const sched_param parameter{.sched_priority = priority};
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &parameter) != 0) {
-    throw std::runtime_error(
-        fmt::format("--realtime-priority {}: {}; cure: run as root, or allow it with ulimit -r {} and ulimit "
-                    "-l unlimited",
-                    priority, std::strerror(errno), priority));
-  }
-}
 
 void WriteState(int8_t state, std::string_view reason) {
   constexpr std::array names = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
@@ -117,10 +103,12 @@ class DriverProcess {
     const timespec wait = clock_.RealDuration(std::min(cycle_.Remaining(now), next));
     ppoll(polled.data(), polled.size(), &wait, nullptr);
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
-    ReceiveFrames();
-    while (const joint_state_t* state = driver_.NextState()) states_.Publish(*state);
-    while (const imu_t* imu = driver_.NextImu()) imus_.Publish(*imu);
-    process_.messenger().Drain();
+    // What there was nothing to do for is not timed.
+    phases_.Mark();
+    if (ReceiveFrames()) phases_.End(PhaseTimes::kReceive);
+    if (Publish()) phases_.End(PhaseTimes::kPublish);
+    phases_.Mark();
+    if (process_.messenger().Drain() > 0) phases_.End(PhaseTimes::kCommand);
     if (cycle_.Due(clock_.Now())) {
       Cycle();
     } else {
@@ -145,11 +133,14 @@ class DriverProcess {
     driver_.OnRequest(request, clock_.Now(), clock_.Utime());
   }
 
-  void ReceiveFrames() {
+  /// @return whether there were any.
+  bool ReceiveFrames() {
+    bool any = false;
     transport_->SetTime(clock_.Now());
     for (int burst = 0; burst < kBursts; ++burst) {
       const int count = transport_->Receive(received_);
       if (count <= 0) break;
+      any = true;
       const int64_t now = clock_.Now();
       for (const Frame& frame : std::span(received_).first(static_cast<size_t>(count))) {
         const int64_t utime =
@@ -159,14 +150,26 @@ class DriverProcess {
       }
     }
     driver_.OnLink(transport_->link());
+    return any;
+  }
+
+  /// @return whether there was anything to say.
+  bool Publish() {
+    bool any = false;
+    while (const joint_state_t* state = driver_.NextState()) any = states_.Publish(*state) || any;
+    while (const imu_t* imu = driver_.NextImu()) any = imus_.Publish(*imu) || any;
+    return any;
   }
 
   void Cycle() {
     const int64_t now = clock_.Now();
     const int64_t lateness = cycle_.Advance(now);
+    phases_.Mark();
     const std::span<const Frame> frames = driver_.Tick(now, clock_.Utime(), lateness);
+    phases_.End(PhaseTimes::kControl);
     transport_->SetTime(now);
     const int accepted = frames.empty() ? 0 : transport_->Send(frames);
+    phases_.End(PhaseTimes::kSend);
     const int64_t sent = clock_.Utime();
     driver_.Transmitted(accepted, sent);
     for (const Frame& frame : frames.first(static_cast<size_t>(std::max(accepted, 0)))) recorder_.Record(frame, true, sent);
@@ -179,8 +182,9 @@ class DriverProcess {
       driver_.OnLink(transport_->Reopen());
     }
     if (driver_.revision() == revision_ && now < next_status_) return;
-    const driver_status_t& status =
+    driver_status_t& status =
         driver_.Status(clock_.Utime(), transport_->stats(), commands_.rejected() + requests_.rejected());
+    phases_.Fill(status);
     statuses_.Publish(status);
     log_.Note(status.state, status.reason);
     revision_ = driver_.revision();
@@ -226,6 +230,7 @@ class DriverProcess {
   Subscriber<driver_request_t> requests_;
   std::array<Frame, 64> received_;
   FlightRecorder recorder_;
+  PhaseTimes phases_;
   bool faulty_ = false;
   int64_t next_reopen_ = 0;
   int64_t next_status_ = 0;

@@ -62,6 +62,11 @@ class CanSimpleMotor : public Motor {
     Enter(Step::kDisarming, now);
   }
 
+  bool IsEstop(const Frame& frame) const noexcept override {
+    const uint32_t to = frame.id >> 5;
+    return (frame.id & 0x1F) == kEstop.command && !frame.remote && (to == static_cast<uint32_t>(node_) || to == kBroadcastNode);
+  }
+
   void Estop(int64_t now) noexcept override {
     Fail(now, "emergency stop requested");
     disarms_ = kDisarmsBeforeEstop;

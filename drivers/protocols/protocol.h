@@ -82,6 +82,8 @@ class Motor {
   virtual void Disarm(int64_t now) noexcept = 0;
   /// The drive's own emergency stop.
   virtual void Estop(int64_t now) noexcept = 0;
+  /// Whether the frame is somebody else's emergency stop for this drive, or for all.
+  virtual bool IsEstop(const Frame&) const noexcept { return false; }
   /// Once per cycle: deadlines, and the next frames of the sequence under way.
   /// @param may_arm false: no room for arming frames in this cycle, the sequence waits.
   virtual void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept = 0;
