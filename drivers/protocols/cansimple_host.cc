@@ -230,9 +230,7 @@ class CanSimpleMotor : public Motor {
     if (step_ == Step::kArmed && !running) {
       Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_), Words(axis_error_),
            DescribeProcedureResult(procedure_result_));
-      ask_error_ = true;
-      axis_state_known_ = true;  // it was running, so no order of ours is on its way
-      order_due_ = false;
+      ask_error_ = true;  // and tell it to stop nevertheless: it may be another with its node id that has spoken
     }
     return FrameUse::kConsumed;
   }
