@@ -138,8 +138,8 @@ TEST_CASE("what was recorded is worth nothing, to the same driver and to one tha
   stage.UseKey();
   Recorder recorder(stage);
   stage.RunWithTorque();
+  REQUIRE(stage.WaitUntil([&] { return recorder.messages.size() > 20; }, 10));
   recorder.recording = false;
-  REQUIRE(recorder.messages.size() > 20);
   REQUIRE(recorder.messages.front().channel == "DRIVER_REQUEST");
   const auto replay = [&] {
     for (const Recorder::Message& message : recorder.messages) {

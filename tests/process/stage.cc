@@ -18,6 +18,7 @@ void Stage::Witness() {
     for (const Frame& frame : std::span(frames_now).first(static_cast<size_t>(n))) {
       ++frames;
       if (frame.remote || frame.error || frame.extended) continue;
+      ++frames_by_id[frame.id];
       if (frame.id == 0x02E && frame.length >= 4) {
         std::memcpy(&torque, frame.data.data(), 4);
         if (torque != 0) last_torque_time = frame.receive_ns / 1000;
