@@ -72,7 +72,7 @@ struct Recorder {
 };
 
 TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping needs no key") {
-  Stage stage(70);
+  Stage stage(80);
   const fs::path key = stage.UseKey();
   stage.RunWithTorque();
   CHECK(stage.drivers.newest().commands_signed);
@@ -139,7 +139,7 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
 }
 
 TEST_CASE("what was recorded is worth nothing, to the same driver and to one that is started again") {
-  Stage stage(71);
+  Stage stage(81);
   stage.UseKey();
   Recorder recorder(stage);
   stage.RunWithTorque();
@@ -185,8 +185,8 @@ TEST_CASE("what was recorded is worth nothing, to the same driver and to one tha
 }
 
 TEST_CASE("a driver that others could command does not start without a key") {
-  Stage stage(72);
-  const std::string open = "udpm://239.255.76.67:17772?ttl=1";
+  Stage stage(82);
+  const std::string open = "udpm://239.255.76.67:17782?ttl=1";
   for (const std::vector<std::string>& program :
        {std::vector<std::string>{"plumb-driver", stage.robot_folder, "--bus", stage.bus_url},
         std::vector<std::string>{"plumb", "launch", stage.robot_folder, "--bus", stage.bus_url, "--output",
