@@ -45,7 +45,11 @@ class Stage {
         bus(OpenTransport(bus_url)),
         drivers(messenger, "DRIVER_STATUS"),
         controllers(messenger, "CONTROLLER_STATUS"),
-        commands(messenger, "JOINT_COMMAND", [this](const joint_command_t&) { last_command = RealUtime(); }),
+        commands(messenger, "JOINT_COMMAND",
+                 [this](const joint_command_t& command) {
+                   last_command = RealUtime();
+                   last_command_made = command.utime;
+                 }),
         states(messenger, "ROBOT_STATE", [this](const robot_state_t&) { last_state = RealUtime(); }),
         requests_(messenger, "DRIVER_REQUEST"),
         policies_(messenger, "POLICY") {
@@ -179,6 +183,7 @@ class Stage {
   float torque = 0;
   int axis_state = 0;
   int64_t last_torque_time = 0;  ///< of the last frame that asked for torque
+  int64_t longest_alone = 0;     ///< that a torque was asked for after the last command had been made
   int64_t frames = 0;
   std::map<uint32_t, int64_t> frames_by_id;  ///< standard data frames
 
@@ -192,6 +197,7 @@ class Stage {
   Subscriber<joint_command_t> commands;
   Subscriber<robot_state_t> states;
   int64_t last_command = 0, last_state = 0;  ///< real time of reception [us]
+  int64_t last_command_made = 0;             ///< its utime
   std::map<std::string, std::unique_ptr<Child>> children;
 
  private:
