@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "common/lcm_url.h"
+#include "common/messenger.h"
 #include "common/signature.h"
 #include "tests/cli/shell.h"
 
