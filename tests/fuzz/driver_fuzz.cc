@@ -69,7 +69,7 @@ class DriverGame {
     }
     boom_.emplace(Cia406Device::Settings{.event_timer = 5'000}, kStart);
     // As a rule the fuzzer begins with a robot that runs.
-    if (bytes_.Byte() < 240) ComeToRest(), Require(Arm());
+    if (bytes_.Byte() < 240) Require(Arm());
   }
 
   void Play() {
@@ -138,6 +138,7 @@ class DriverGame {
         break;
     }
     CheckState();
+    Require(driver_.Status(utime(), {}, 0).state == static_cast<int8_t>(driver_.state()));
   }
 
   int64_t utime() const { return kEpoch + now_ + ahead_; }
@@ -224,8 +225,6 @@ class DriverGame {
     if (state == DriveState::kFault) may_run_ = asked_to_arm_ = false;
     fault_ = state == DriveState::kFault;
     Require((state == DriveState::kArmed) == driver_.reason().empty());
-    const driver_status_t& status = driver_.Status(utime(), {}, 0);
-    Require(status.state == static_cast<int8_t>(state));
   }
 
   void Command(bool anything) {
@@ -302,20 +301,21 @@ class DriverGame {
     }
     ahead_ += 40'000'000'000;  // later than whatever was said
     commanding_ = false;
-    for (int i = 0; i < 400; ++i) Cycle();
+    for (int i = 0; i < 60; ++i) Cycle();
     sequence_ = 0;
   }
 
-  /// A sensor or drive that failed takes a first attempt to begin anew.
+  /// A sensor or drive that failed takes a first attempt to begin anew, and a while.
   bool Arm() {
-    for (int attempt = 0; attempt < 4 && driver_.state() != DriveState::kArmed; ++attempt) {
-      for (int i = 0; i < 100; ++i) Cycle();
+    for (int attempt = 0; attempt < 30 && driver_.state() != DriveState::kArmed; ++attempt) {
+      commanding_ = false;  // a controller that talks on would be taken for one of an earlier run
+      for (int i = 0; i < 12; ++i) Cycle();
       driver_request_t arm{};
       arm.utime = utime();
       arm.request = driver_request_t::ARM;
       Ask(arm);
       commanding_ = true;
-      for (int i = 0; i < 200 && driver_.state() != DriveState::kArmed; ++i) Cycle();
+      for (int i = 0; i < 30 && driver_.state() != DriveState::kArmed; ++i) Cycle();
     }
     return driver_.state() == DriveState::kArmed;
   }
