@@ -53,7 +53,7 @@ class Cia406Encoder : public Sensor {
     state_ = SensorState::kStarting;
     reason_.Clear();
     retry_ = now;
-    agreed_ = false;
+    agreed_ = tracking_ = false;
   }
 
   void Tick(int64_t now, FrameBatch& out) noexcept override {

@@ -161,6 +161,19 @@ TEST_CASE("a jump is a fault, not motion; Start leads out of it") {
   CHECK(bench.sensor->encoder()->position == Approx(0.6).margin(1e-4));
 }
 
+TEST_CASE("after Start turns are counted anew, from wherever it is") {
+  Bench bench;
+  bench.Run(50);
+  bench.tap = [](const Frame&) { return false; };
+  bench.position += 3;  // by hand, while nobody listened
+  bench.Run(10);
+  bench.tap = nullptr;
+  bench.sensor->Start(bench.now);
+  bench.Run(50);
+  CHECK(bench.sensor->state() == SensorState::kRunning);
+  CHECK(bench.sensor->encoder()->position == Approx(3.5).margin(1e-4));
+}
+
 TEST_CASE("lost and late positions are no jumps") {
   Bench bench;
   bench.velocity = 19;

@@ -33,8 +33,11 @@ class Drive : public VirtualDrive {
   std::vector<uint32_t> ids() const override { return {kNode, kMaster}; }
   void OnFrame(const Frame& frame, int64_t now) override {
     const int64_t rejected = device_.rejected();
+    const bool armed = device_.armed();
     device_.OnFrame(frame, now);
-    if (frame.id == kNode && device_.rejected() == rejected && !IsSpecial(frame)) fed_ = now;
+    const bool command = frame.id == kNode && device_.rejected() == rejected && !IsSpecial(frame);
+    // What it was told at rest counts from the moment it is switched on.
+    if (command || device_.armed() != armed) fed_ = now;
   }
   void Tick(int64_t now, FrameBatch& out) override {
     device_.Tick(now, sample_, out);
