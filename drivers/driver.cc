@@ -96,12 +96,20 @@ std::vector<Filter> Driver::filters() const {
 
 void Driver::Disarm() noexcept {
   stopped_utime_ = utime_;
+  stop_dated_ = false;
   inbox_.Clear();
   for (Joint& joint : joints_) {
     // One that has failed is being disarmed already, and remembers why.
     if (joint.motor->state() != DriveState::kFault) joint.motor->Disarm(now_);
   }
   mode_ = Mode::kRest;
+}
+
+/// A frame, or the link, stops us without saying what time it is, and the last time we were told is long ago where our
+/// process stood still: an ARM that was made meanwhile is older than the stop.
+void Driver::DateStop() noexcept {
+  if (!stop_dated_) stopped_utime_ = utime_;
+  stop_dated_ = true;
 }
 
 void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
@@ -179,11 +187,13 @@ void Driver::OnLink(LinkState link) noexcept {
 std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
   now_ = now;
   utime_ = utime;
+  DateStop();
   NoteLateness(lateness);
   housekeeping_.Clear();
   frames_.Clear();
   CheckHealth();
   CheckCommand();
+  DateStop();
   CommandTorques();
   // After the checks, so that a fault is answered in this cycle. The joints take turns to be the first.
   size_t arming = torque_frames_ < kMostFrames ? kMostFrames - torque_frames_ : 1;

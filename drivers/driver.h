@@ -119,6 +119,7 @@ class Driver {
   void Refuse(std::string_view why) noexcept;
   void Disarm() noexcept;
   void Estop(std::string_view reason) noexcept;
+  void DateStop() noexcept;
   void RequestArm(int64_t made) noexcept;
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;
@@ -151,6 +152,7 @@ class Driver {
   int arms_refused_ = 0;           // since it was armed last
   int64_t now_, utime_;            // latest times given
   int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
+  bool stop_dated_ = true;         // false: that time is the last one known before it
   int64_t armed_by_;               // utime of the last ARM request that was obeyed
   int64_t armed_at_ = 0;           // `now`
   bool stray_controller_ = false;  // commanded during the start guard

@@ -12,6 +12,7 @@ constexpr int64_t kClockError = 1'000'000;  // [us] that the clock of a request'
 void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept {
   now_ = now;
   utime_ = utime;
+  DateStop();
   switch (request.request) {
     case driver_request_t::ARM:
       return RequestArm(request.utime);

@@ -62,6 +62,31 @@ TEST_CASE("fault 4: the driver's process stands still for a shorter time than th
                  .within = 50});
 }
 
+TEST_CASE("an ARM that waited while the driver's process stood still is older than what stopped it") {
+  BusRig rig;
+  Bring(rig, 0);
+  rig.driver_stopped = true;
+  rig.Run(20);
+  driver_request_t arm{};
+  arm.utime = rig.utime();
+  arm.request = driver_request_t::ARM;
+  rig.Run(10);
+  rig.driver_stopped = false;
+  SECTION("the link") {
+    rig.driver->OnLink(LinkState::kDown);
+    rig.driver->OnLink(LinkState::kUp);
+  }
+  SECTION("the controller") {
+    rig.ControllerSays("20000040#0000000000000000");
+    rig.ControllerSays("20000100#0000000000000000");
+  }
+  REQUIRE(rig.driver->state() == DriveState::kFault);
+  rig.driver->OnRequest(arm, rig.now, rig.utime());
+  CHECK(rig.driver->state() == DriveState::kFault);
+  CHECK_THAT(rig.Reason(), Contains("ARM refused: it was made before the driver stopped"));
+  CHECK(rig.Arm());
+}
+
 TEST_CASE("fault 11: an idle drive with the same node id joins", "[fault]") {
   const auto heartbeat = [](BusRig& rig) {
     rig.each_millisecond.push_back([&rig] {
