@@ -198,7 +198,9 @@ void Driver::CommandTorques() noexcept {
     if (mode_ == Mode::kArmed && !inbox_.Expired(now_)) {
       const double wished = inbox_.Effort(static_cast<int>(i), joint.latest.position, joint.latest.velocity);
       joint.wish =
-          LimitEffort(wished, joint.latest.position, joint.latest.velocity, joint.limits).value_or(0);
+          LimitEffort(wished, {joint.latest.position, joint.latest.velocity, effort_sent_[i], cycle_ * 1e-6},
+                      joint.limits)
+              .value_or(0);
     }
     frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.wish)));
   }
