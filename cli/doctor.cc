@@ -1,6 +1,7 @@
 #include "cli/doctor.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -11,8 +12,11 @@
 #include <iostream>
 #include <sstream>
 
+#include "common/lcm_url.h"
 #include "common/messenger.h"
+#include "common/signature.h"
 #include "drivers/can/transport.h"
+#include "plumb/driver_status_t.hpp"
 
 namespace plumb {
 namespace {
@@ -22,14 +26,68 @@ using Level = Finding::Level;
 
 constexpr int kCanHardwareType = 280;       // ARPHRD_CAN, linux/if_arp.h
 constexpr long kReceiveBuffer = 2097152;    // of the default LCM URL
+constexpr int kListen = 300;                // [ms]; a driver's status comes ten times a second
 
-Finding Multicast(const std::string& lcm_url) {
+/// The fault in "FAULT; cure: CURE" and its cure, or `fallback` where it has none.
+Finding Split(Level level, const std::string& text, const std::string& fallback) {
+  const size_t cure = text.find("; cure: ");
+  return {level, text.substr(0, cure), cure == std::string::npos ? fallback : text.substr(cure + 8)};
+}
+
+/// Who may command the robot: those who have the key, or whom LCM reaches.
+Finding Signatures(const std::string& lcm_url, const std::string& key) {
+  if (!key.empty()) {
+    try {
+      const SigningKey usable(key);
+      return {Level::kGood,
+              "commands are signed: " + key +
+                  " is a key that only its owner may read; give it to driver and controller",
+              ""};
+    } catch (const std::exception& error) {
+      return Split(Level::kBad, error.what(), "");
+    }
+  }
+  if (!StaysOnMachine(lcm_url)) {
+    return {Level::kBad,
+            "commands are not signed, and LCM at " + lcm_url +
+                " leaves this machine: anybody on the network can command the robot",
+            "plumb key FILE, and --key FILE for launch, arm, plumb-driver and plumb-controller"};
+  }
+  const std::vector<std::string> open = OpenInterfaces(lcm_url);
+  if (open.empty()) {
+    return {Level::kGood, "commands are not signed, and LCM stays on this machine, whose users are trusted", ""};
+  }
+  return {Level::kAdvice,
+          fmt::format("commands are not signed; nothing of ours leaves this machine, but others can send to "
+                      "it through {}",
+                      fmt::join(open, ", ")),
+          "ip route add 224.0.0.0/4 dev lo, or plumb key FILE and --key FILE"};
+}
+
+/// What a driver that is running says of it; nothing if none is.
+std::vector<Finding> RunningDriver(Messenger& messenger, const std::string& lcm_url) {
+  const Subscriber<driver_status_t> drivers(messenger, "DRIVER_STATUS");
+  if (messenger.lcm().handleTimeout(kListen) > 0) messenger.Drain();
+  if (drivers.received() == 0) return {};
+  const driver_status_t& driver = drivers.newest();
+  const std::string what =
+      driver.commands_signed ? "obeys signed commands only" : "obeys commands that are not signed";
+  if (driver.commands_forged == 0) return {{Level::kGood, "the driver that is running " + what, ""}};
+  return {{Level::kAdvice,
+           fmt::format("the driver that is running {}, and has dropped {} that were forged", what,
+                       driver.commands_forged),
+           "find out who else publishes JOINT_COMMAND or DRIVER_REQUEST at " + lcm_url}};
+}
+
+std::vector<Finding> Lcm(const std::string& url, const std::string& key) {
   try {
-    const Messenger messenger(lcm_url);
-    return {Level::kGood, "LCM opens at " + lcm_url, ""};
+    Messenger messenger(url);  // as long as it lives, the multicast group is received
+    std::vector<Finding> findings{{Level::kGood, "LCM opens at " + url, ""}, Signatures(url, key)};
+    for (const Finding& finding : RunningDriver(messenger, url)) findings.push_back(finding);
+    return findings;
   } catch (const std::exception&) {
-    return {Level::kBad, "LCM cannot open " + lcm_url + ": no route for multicast",
-            "ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"};
+    return {{Level::kBad, "LCM cannot open " + url + ": no route for multicast",
+             "ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"}};
   }
 }
 
@@ -74,11 +132,8 @@ std::vector<Finding> Bus(const std::string& url) {
   try {
     const auto bus = OpenTransport(url);
     std::vector<Finding> findings{{Level::kGood, "the bus " + url + " opens", ""}};
-    for (const std::string& warning : bus->warnings()) {
-      const size_t cure = warning.find("; cure: ");
-      findings.push_back({Level::kAdvice, warning.substr(0, cure),
-                          cure == std::string::npos ? "look at it" : warning.substr(cure + 8)});
-    }
+    for (const std::string& warning : bus->warnings())
+      findings.push_back(Split(Level::kAdvice, warning, "look at it"));
     return findings;
   } catch (const std::exception& error) {
     return {{Level::kBad, error.what(), ""}};
@@ -129,17 +184,18 @@ std::vector<Finding> Packages() {
 
 }  // namespace
 
-std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus) {
-  std::vector<Finding> findings{Multicast(lcm_url), UdpBuffers()};
+std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus, const std::string& key) {
+  std::vector<Finding> findings = Lcm(lcm_url, key);
+  findings.push_back(UdpBuffers());
   for (const auto& group : {Can(), Bus(bus), RealTime(), Packages()}) {
     findings.insert(findings.end(), group.begin(), group.end());
   }
   return findings;
 }
 
-int Doctor(const std::string& lcm_url, const std::string& bus) {
+int Doctor(const std::string& lcm_url, const std::string& bus, const std::string& key) {
   int status = 0;
-  for (const Finding& finding : Examine(lcm_url, bus)) {
+  for (const Finding& finding : Examine(lcm_url, bus, key)) {
     const char* mark = finding.level == Level::kGood ? "good  " : finding.level == Level::kAdvice ? "advice" : "BAD   ";
     std::cout << mark << "  " << finding.what << "\n";
     if (!finding.cure.empty()) std::cout << "        cure: " << finding.cure << "\n";

@@ -10,12 +10,16 @@
 #include <chrono>
 #include <functional>
 #include <iostream>
+#include <optional>
 #include <stdexcept>
 
 #include "cli/child.h"
 #include "cli/preflight.h"
 #include "cli/progress.h"
 #include "common/atomic_file.h"
+#include "common/lcm_url.h"
+#include "common/signature.h"
+#include "drivers/driver.h"
 #include "plumb/driver_request_t.hpp"
 #include "robot/description.h"
 #include "sim/parameters.h"
@@ -33,12 +37,11 @@ double SecondsSince(SteadyClock::time_point start) {
 }
 
 // What the driver would say in its log, said before anything starts.
-void RequireMeasured(const RobotDescription& robot) {
-  for (const JointDescription& joint : robot.joints) {
-    if (!joint.passive) continue;
-    throw std::invalid_argument(fmt::format(
-        "{} cannot be launched: joint '{}' has no motor, and nothing else on the bus measures it (plumb sim simulates it)",
-        robot.name, joint.name));
+void RequireDrivable(const RobotDescription& robot) {
+  try {
+    Driver(robot, 0, 0);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(fmt::format("{} cannot be launched (plumb sim simulates it): {}", robot.name, error.what()));
   }
 }
 
@@ -61,7 +64,9 @@ class ClosedLoop {
         trainings_(process.messenger(), "TRAINING_STATUS",
                    [&](const training_status_t& m) { progress_.OnTraining(m); }) {
     for (const std::string& warning : robot_.warnings) spdlog::warn("{}", warning);
-    RequireMeasured(robot_);
+    RequireDrivable(robot_);
+    RequireKey(process.lcm_url(), !flags.key.empty(), flags.allow_unsigned);
+    if (!flags.key.empty()) signer_.emplace(SigningKey(flags.key), "DRIVER_REQUEST");
     if (flags.real && flags.speed != 1) throw std::invalid_argument("a real robot runs at --speed 1");
     RequireFree(process, bus_, flags.real);
     if (!flags.real) truth_ = HiddenParameters(robot_, flags.seed);
@@ -123,10 +128,18 @@ class ClosedLoop {
       Start("setpriv", {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + process_.lcm_url(), "-q", "-f", flags_.log});
     }
     if (!flags_.real) Start("plumb-robot", {flags_.robot, "--bus", bus_, "--seed", seed});
-    Start("plumb-driver", {flags_.robot, "--bus", bus_, "--flight-recorder", (output_ / "faults").string()});
-    Start("plumb-estimator", {flags_.robot});
+    std::vector<std::string> driver{flags_.robot, "--bus", bus_, "--flight-recorder",
+                                    (output_ / "faults").string()};
+    if (!flags_.real) driver.push_back("--virtual");
+    if (flags_.allow_unsigned) driver.push_back("--unsigned");
     std::vector<std::string> controller{flags_.robot, "--seed", seed};
     if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});  // nobody throws a real robot about
+    if (!flags_.key.empty()) {
+      for (auto* arguments : {&driver, &controller})
+        arguments->insert(arguments->end(), {"--key", flags_.key});
+    }
+    Start("plumb-driver", driver);
+    Start("plumb-estimator", {flags_.robot});
     Start("plumb-controller", controller);
     // The slow loop gives way to the fast one.
     Start("plumb-trainer", {flags_.robot, "--nice", "10", "--seed", seed, "--iterations", std::to_string(flags_.iterations),
@@ -191,13 +204,13 @@ class ClosedLoop {
     const driver_status_t& driver = progress_.driver();
     if (driver.stopped_by_request != stopped_) {
       stopped_ = driver.stopped_by_request;
-      if (stopped_) Print("stopped by request. To go on: plumb arm --lcm-url '" + process_.lcm_url() + "'");
+      if (stopped_) Print("stopped by request. To go on: " + ArmCommand());
     }
     if (stopped_) return true;
     if (driver.state == driver_status_t::FAULT && !fault_seen_) {
       fault_seen_ = true;
       Print("driver fault: " + driver.reason);
-      if (flags_.real) Print("Look at the robot. To go on: plumb arm --lcm-url '" + process_.lcm_url() + "'");
+      if (flags_.real) Print("Look at the robot. To go on: " + ArmCommand());
       if (!flags_.real && ++rearms_ > kMostRearms) {
         std::cerr << "plumb: too many faults\n";
         return false;
@@ -212,10 +225,17 @@ class ClosedLoop {
     return true;
   }
 
+  /// For a person to type.
+  std::string ArmCommand() const {
+    return "plumb arm --lcm-url '" + process_.lcm_url() + "'" +
+           (flags_.key.empty() ? "" : " --key '" + flags_.key + "'");
+  }
+
   void Request(int8_t what) {
     driver_request_t request{};
     request.utime = clock_.Utime();
     request.request = what;
+    if (signer_) signer_->Sign(request, Clock().Utime());
     requests_.Publish(request);
   }
 
@@ -276,6 +296,7 @@ class ClosedLoop {
   Clock clock_;
   Progress progress_;
   Publisher<driver_request_t> requests_;
+  std::optional<Signer> signer_;
   Subscriber<driver_status_t> drivers_;
   Subscriber<controller_status_t> controllers_;
   Subscriber<calibration_status_t> calibrations_;

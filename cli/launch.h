@@ -15,6 +15,8 @@ struct LaunchFlags {
   std::string bus;      ///< empty = the robot's own
   double speed = 1;     ///< scaled seconds per second
   bool real = false;    ///< the robot is on the bus: start no virtual one, ask before arming
+  std::string key;      ///< file of the key that commands are signed with; empty = they are not
+  bool allow_unsigned = false;  ///< although LCM leaves this machine
   std::string log;      ///< record all messages here; empty = do not
   std::string summary;  ///< JSON of the outcome; empty = do not
   std::string output;   ///< folder for logs and checkpoints; empty = a new one

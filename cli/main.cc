@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <iostream>
+#include <optional>
 
 #include "cli/calibrate.h"
 #include "cli/can.h"
@@ -12,6 +13,7 @@
 #include "cli/sim.h"
 #include "cli/train.h"
 #include "common/process.h"
+#include "common/signature.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
 
@@ -20,7 +22,9 @@ namespace {
 
 // Sends a request and says what the driver makes of it. A stop goes out at once and again and again; arming is asked for
 // once, when the driver has been heard, because one wish must not be granted later than it was made.
-int Request(Process& process, int8_t what) {
+int Request(Process& process, int8_t what, const std::string& key) {
+  std::optional<Signer> signer;
+  if (!key.empty()) signer.emplace(SigningKey(key), "DRIVER_REQUEST");
   Publisher<driver_request_t> requests(process.messenger(), "DRIVER_REQUEST");
   Subscriber<driver_status_t> statuses(process.messenger(), "DRIVER_STATUS");
   const bool arming = what == driver_request_t::ARM;
@@ -33,7 +37,13 @@ int Request(Process& process, int8_t what) {
     const bool heard = statuses.received() > 0;
     // In a run with a scaled clock the driver's time is not ours.
     if (heard) request.utime = statuses.newest().utime + 1;
+    if (arming && heard && statuses.newest().commands_signed && !signer) {
+      std::cerr << "plumb: the driver obeys signed requests only: --key FILE, with the key that it was given"
+                << std::endl;
+      return 1;
+    }
     if (!arming || (heard && !asked)) {
+      if (signer) signer->Sign(request, Clock().Utime());
       requests.Publish(request);
       asked = true;
     }
@@ -56,6 +66,13 @@ int Request(Process& process, int8_t what) {
   return 1;
 }
 
+int MakeKey(const std::string& file) {
+  MakeKeyFile(file);
+  std::cout << file << ": a new key; copy it to whatever may command the robot, and let nobody else read it"
+            << std::endl;
+  return 0;
+}
+
 }  // namespace
 }  // namespace plumb
 
@@ -68,8 +85,10 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  std::string can_robot, dbc_output;
-  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr, *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr, *arm = nullptr, *disarm = nullptr, *estop = nullptr;
+  std::string can_robot, dbc_output, key, new_key;
+  CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr,
+           *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr, *arm = nullptr, *disarm = nullptr,
+           *estop = nullptr, *make_key = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -87,6 +106,13 @@ int main(int argc, char** argv) {
         launch->add_option("--speed", flags.speed, "clock scale; a virtual robot can run faster than real time")
             ->check(CLI::Range(0.01, 100.0))->capture_default_str();
         launch->add_flag("--real", flags.real, "the robot itself is on the bus: no virtual one, ask before arming");
+        auto* launch_key = launch->add_option(
+            "--key", flags.key,
+            "the controller signs with this key and the driver obeys nothing else (plumb key makes one)");
+        launch
+            ->add_flag("--unsigned", flags.allow_unsigned,
+                       "let the driver obey anybody, although LCM leaves this machine")
+            ->excludes(launch_key);
         launch->add_option("--log", flags.log, "record all messages to this LCM log");
         launch->add_option("--summary", flags.summary, "write the outcome to this JSON file");
         launch->add_option("--output", flags.output, "folder for logs and checkpoints; default: a new one in runs/");
@@ -158,6 +184,7 @@ int main(int argc, char** argv) {
             ->check(CLI::Range(1, 1000000))->capture_default_str();
         doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")->capture_default_str();
+        doctor->add_option("--key", key, "key that the commands are going to be signed with");
         CLI::App* can = app.add_subcommand("can", "what is on the robot's CAN bus");
         can->require_subcommand(1);
         can_plan = can->add_subcommand("plan", "ids, load and response times; exit status 1 if it cannot work");
@@ -168,7 +195,13 @@ int main(int argc, char** argv) {
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, arm, disarm, estop}) sub->fallthrough();
+        for (CLI::App* request : {arm, disarm, estop})
+          request->add_option("--key", key, "sign with the driver's key; only arm needs it");
+        make_key = app.add_subcommand("key", "make a key to sign commands with");
+        make_key->add_option("file", new_key, "a new file, which only its owner may read")->required();
+        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, arm,
+                              disarm, estop, make_key})
+          sub->fallthrough();
       },
       [&](plumb::Process& process) {
         if (launch->parsed()) return plumb::Launch(process, flags);
@@ -176,11 +209,12 @@ int main(int argc, char** argv) {
         if (calibrate->parsed()) return plumb::CalibrateLogs(process, calibrate_flags, command);
         if (excite->parsed()) return plumb::Excite(process, excite_flags);
         if (train->parsed()) return plumb::Train(process, train_flags);
-        if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus);
+        if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus, key);
         if (can_plan->parsed()) return plumb::PrintBusPlan(can_robot);
         if (can_dbc->parsed()) return plumb::WriteDbc(can_robot, dbc_output);
-        if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM);
-        if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM);
-        return plumb::Request(process, plumb::driver_request_t::ESTOP);
+        if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM, key);
+        if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM, key);
+        if (make_key->parsed()) return plumb::MakeKey(new_key);
+        return plumb::Request(process, plumb::driver_request_t::ESTOP, key);
       });
 }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <lcm/lcm-cpp.hpp>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,6 +61,8 @@ class Subscriber {
   /// The newest message that decoded, untouched by later ones that did not; meaningless while received() is 0.
   const Message& newest() const { return newest_; }
   int64_t received() const { return received_; }
+  /// The bytes that newest() was decoded from, all of them. Valid within the callback only.
+  std::span<const uint8_t> encoding() const { return encoding_; }
   /// Messages that did not decode: wrong type, wrong length, hostile counts.
   int64_t rejected() const { return rejected_; }
   /// Throws what the callback threw, if it did.
@@ -83,6 +86,7 @@ class Subscriber {
     }
     ++received_;
     try {
+      encoding_ = {static_cast<const uint8_t*>(buffer->data), buffer->data_size};
       if (callback_) callback_(newest_);
     } catch (...) {
       failure_ = std::current_exception();
@@ -93,6 +97,7 @@ class Subscriber {
   lcm::Subscription* subscription_;
   Callback callback_;
   Message newest_{}, arriving_{};
+  std::span<const uint8_t> encoding_;
   int64_t received_ = 0;
   int64_t rejected_ = 0;
   std::exception_ptr failure_;

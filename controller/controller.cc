@@ -8,6 +8,7 @@
 namespace plumb {
 namespace {
 
+constexpr int64_t kLetGo = 30'000;           // [us] after which a command of zero has reached the drives: only then touch the robot
 constexpr int64_t kPlaceAgain = 1'000'000;    // [us] a robot not placed by then is asked to be placed anew
 constexpr int64_t kDriverTimeout = 1'000'000;  // [us] DRIVER_STATUS comes ten times a second
 constexpr double kPlaceSpeedFactor = 10;      // place_tolerance [rad] times this is the tolerance of speed [rad/s]
@@ -131,6 +132,10 @@ std::optional<joint_command_t> Controller::Tick(int64_t now, int64_t utime) {
     silent.reason = "it is silent";
     OnDriverStatus(silent, driver_heard_);
   }
+  if (place_ && !let_go_ && now - placing_since_ >= kLetGo) {
+    let_go_ = true;
+    ++changes_;
+  }
   const bool acting = phase() == controller_status_t::RUNNING || phase() == controller_status_t::PLACING;
   if (acting && state_heard_ >= 0 && now - state_heard_ > Microseconds(robot_.controller.state_timeout) &&
       // A robot that has just been placed gives the estimator a few states to settle.
@@ -153,6 +158,7 @@ void Controller::BeginPlacing(int64_t now, int64_t utime) {
   status_.step = 0;
   status_.episode_return = 0;
   Enter(controller_status_t::PLACING);
+  let_go_ = false;
   if (rest_ < 0) place_ = std::move(place);
   placing_since_ = now;
 }

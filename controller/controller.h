@@ -40,8 +40,8 @@ class Controller {
   /// Call at least every control period. @return a command of zero effort when it halts here.
   std::optional<joint_command_t> Tick(int64_t now, int64_t utime);
 
-  /// The wish to place the robot, while phase() is PLACING.
-  const std::optional<place_robot_t>& place() const { return place_; }
+  /// The wish to place the robot, while phase() is PLACING and the drives have had the time to let go of it; else null.
+  const place_robot_t* place() const { return place_ && let_go_ ? &*place_ : nullptr; }
   const controller_status_t& status() const { return status_; }
   int8_t phase() const { return status_.phase; }
   /// Counts changes of phase: publish the status when it moves.
@@ -77,6 +77,7 @@ class Controller {
 
   std::optional<place_robot_t> place_;
   int64_t placing_since_ = 0;
+  bool let_go_ = false;  // the efforts are zero by now
   int64_t attempt_ = 0;  // keys the initial state: a repeated episode begins differently
 
   int64_t episode_ = -1;

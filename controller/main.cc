@@ -2,11 +2,14 @@
 
 #include <spdlog/spdlog.h>
 
+#include <optional>
+
 #include "common/process.h"
+#include "common/signature.h"
 #include "controller/controller.h"
 
 int main(int argc, char** argv) {
-  std::string robot_path;
+  std::string robot_path, key;
   uint64_t seed = 1;
   double rest = -1;
   return plumb::Run(
@@ -16,6 +19,8 @@ int main(int argc, char** argv) {
         app.add_option("--seed", seed, "of initial states and exploration")->capture_default_str();
         app.add_option("--rest", rest,
                        "[s] do not have the robot placed: let it rest that long, then begin where it is");
+        app.add_option("--key", key,
+                       "sign the commands with this key, which the driver shares (plumb key makes one)");
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
@@ -26,8 +31,12 @@ int main(int argc, char** argv) {
         plumb::Publisher<plumb::place_robot_t> places(messenger, "PLACE_ROBOT");
         plumb::Publisher<plumb::controller_status_t> statuses(messenger, "CONTROLLER_STATUS");
 
-        const auto send = [&](const std::optional<plumb::joint_command_t>& command) {
-          if (command) commands.Publish(*command);
+        std::optional<plumb::Signer> signer;
+        if (!key.empty()) signer.emplace(plumb::SigningKey(key), "JOINT_COMMAND");
+        const auto send = [&](std::optional<plumb::joint_command_t> command) {
+          if (!command) return;
+          if (signer) signer->Sign(*command, plumb::Clock().Utime());
+          commands.Publish(*command);
         };
         plumb::Subscriber<plumb::robot_state_t> states(
             messenger, "ROBOT_STATE", [&](const plumb::robot_state_t& state) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 
 #include "drivers/bus_collisions.h"
@@ -71,18 +72,48 @@ int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) 
   return worst;
 }
 
+/// Of the polled messages of a direction one waits at a time: together they are one, the longest, as often as all of them.
+Task PolledTask(const BusPlan& plan, Direction direction, int64_t bit) {
+  Task all{0, 0, 0};
+  double rate = 0;
+  for (const Row& row : plan.rows) {
+    const BusMessage& message = row.message;
+    if (!message.polled || message.direction != direction) continue;
+    all.cost = std::max(all.cost, row.worst_bits * bit);
+    all.jitter = std::max(all.jitter, message.jitter * kNanoseconds);
+    rate += 1 / static_cast<double>(message.period * kNanoseconds);
+  }
+  all.period = static_cast<int64_t>(1 / rate);
+  return all;
+}
+
 void ComputeResponses(BusPlan& plan) {
   const auto bit = static_cast<int64_t>(std::ceil(1e9 / plan.bit_rate));
   std::vector<Task> higher;
+  std::map<Direction, size_t> polled;  // where in `higher`
   for (size_t i = 0; i < plan.rows.size(); ++i) {
     Row& row = plan.rows[i];
     if (row.message.period <= 0) continue;
     int64_t blocking = 0;
     for (size_t j = i + 1; j < plan.rows.size(); ++j)
       blocking = std::max(blocking, plan.rows[j].worst_bits * bit);
-    higher.push_back(
-        {row.worst_bits * bit, row.message.period * kNanoseconds, row.message.jitter * kNanoseconds});
-    const int64_t response = Response(higher, blocking, bit);
+    row.deadline = static_cast<double>(row.message.period);
+    int64_t response;
+    if (row.message.polled) {
+      const Task all = PolledTask(plan, row.message.direction, bit);
+      // It must be there before the next one is asked for.
+      row.deadline = static_cast<double>(all.period) / static_cast<double>(kNanoseconds);
+      const auto [counted, first] = polled.try_emplace(row.message.direction, higher.size());
+      if (first) higher.push_back(all);
+      std::vector<Task> tasks = higher;
+      std::rotate(tasks.begin() + static_cast<std::ptrdiff_t>(counted->second),
+                  tasks.begin() + static_cast<std::ptrdiff_t>(counted->second) + 1, tasks.end());
+      response = Response(tasks, blocking, bit);
+    } else {
+      higher.push_back(
+          {row.worst_bits * bit, row.message.period * kNanoseconds, row.message.jitter * kNanoseconds});
+      response = Response(higher, blocking, bit);
+    }
     row.response = response < 0 ? std::numeric_limits<double>::infinity()
                                 : static_cast<double>(response) / static_cast<double>(kNanoseconds);
   }
@@ -97,7 +128,10 @@ bool InheritJitter(BusPlan& plan, const std::vector<BusDevice>& devices) {
         std::find_if(devices.begin(), devices.end(), [&](const auto& d) { return d.name == row.device; });
     const BusMessage& question = device->messages[static_cast<size_t>(row.message.answers)];
     for (const Row& other : plan.rows) {
-      if (other.device != row.device || other.message.id != question.id) continue;
+      if (other.device != row.device || other.message.id != question.id || other.message.remote != question.remote ||
+          other.message.direction != question.direction) {
+        continue;
+      }
       if (!(other.response <= static_cast<double>(row.message.period)))
         return false;  // it is an error already
       const auto jitter = static_cast<int64_t>(std::ceil(other.response));
@@ -120,14 +154,13 @@ void Judge(BusPlan& plan) {
                     percent, 100 * BusPlan::kWarnLoad));
   }
   for (const Row& row : plan.rows) {
-    const auto deadline = static_cast<double>(row.message.period);
-    if (row.message.period <= 0 || row.response <= deadline) continue;
+    if (row.message.period <= 0 || row.response <= row.deadline) continue;
     const std::string when = std::isfinite(row.response)
                                  ? fmt::format("{:.2f} ms after it is due", row.response / 1000)
                                  : std::string("later and later");
     plan.errors.push_back(fmt::format("{} of '{}' (id {:#05x}) may be sent {}, but is due every {:.2f} ms",
                                       row.message.layout.name, row.device, row.message.id, when,
-                                      deadline / 1000));
+                                      row.deadline / 1000));
   }
 }
 
@@ -158,7 +191,8 @@ BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate) {
               NominalBits(message.extended, length),
               WorstCaseBits(message.extended, length),
               0,
-              std::numeric_limits<double>::quiet_NaN()};
+              std::numeric_limits<double>::quiet_NaN(),
+              0};
       if (message.period > 0) {
         const double rate = 1e6 / static_cast<double>(message.period) / bit_rate;
         row.worst_load = row.worst_bits * rate;

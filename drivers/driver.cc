@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
 #include "drivers/bus_plan.h"
+#include "drivers/stop.h"
 
 namespace plumb {
 namespace {
@@ -18,21 +20,34 @@ constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames:
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
+double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
+
 MotorTiming TimingOf(const DriverSettings& settings) { return {Microseconds(settings.heartbeat_timeout)}; }
 
 }  // namespace
 
-Driver::Joint::Joint(const JointDescription& joint, const MotorTiming& timing)
-    : name(joint.name), motor(MakeMotor(joint.motor, timing)), map(joint.motor), limits(LimitsOf(joint)) {}
+Driver::Joint::Joint(size_t number, const JointDescription& joint, const DriverSettings& settings)
+    : index(number),
+      name(joint.name),
+      motor(MakeMotor(joint.motor, TimingOf(settings))),
+      map(joint.motor),
+      limits(LimitsOf(joint)),
+      damping(joint.limits.damping),
+      turns(joint.type != JointDescription::Type::kPrismatic),
+      watch(PlausibilityOf(joint, settings)) {}
 
 Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
-    : cycle_(Microseconds(robot.driver.cycle)),
+    : settings_(robot.driver),
+      cycle_(Microseconds(robot.driver.cycle)),
+      measurement_(Microseconds(robot.driver.measurement)),
       disarm_after_(Microseconds(robot.driver.disarm_after)),
       stale_after_(Microseconds(robot.driver.stale_after)),
       start_guard_(Microseconds(robot.driver.start_guard)),
       start_now_(now),
       start_utime_(utime),
-      measurements_(robot.num_joints(), Microseconds(robot.driver.measurement)),
+      num_joints_(robot.joints.size()),
+      joints_(DrivenJoints(robot)),
+      measurements_(static_cast<int>(joints_.size()), measurement_),
       inbox_(robot.num_joints(), Microseconds(robot.driver.expiry)),
       history_(robot.num_joints(), kHistory),
       now_(now),
@@ -40,28 +55,62 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       stopped_utime_(utime - 1),
       armed_by_(utime - 1),
       foreign_at_(now - start_guard_ - 1) {
-  joints_.reserve(robot.joints.size());
-  for (const JointDescription& joint : robot.joints) {
-    if (joint.passive) {
-      throw std::invalid_argument(fmt::format("joint '{}' has no motor, and nothing else measures it", joint.name));
-    }
-    joints_.emplace_back(joint, TimingOf(robot.driver));
-    for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
-      if (message.direction != BusMessage::Direction::kToDevice || message.remote || message.extended || message.shared) continue;
-      own_.push_back({.id = message.id, .own = true});
-    }
-  }
+  for (const JointDescription& joint : robot.joints) names_.push_back(joint.name);
+  for (const SensorDescription& sensor : robot.sensors) sensors_.emplace_back(robot, sensor, stale_after_);
+  FindMeasuring(robot);
+  FindSecondEncoders(robot);
   const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
   if (!plan.errors.empty()) throw std::invalid_argument(fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
-  effort_sent_.assign(joints_.size(), 0);
+  int polled = 0;
+  for (const Joint& joint : joints_) polled += joint.motor->num_polled();
+  poll_period_ = std::max(cycle_, Microseconds(robot.driver.telemetry) / std::max(1, polled));
+  next_poll_ = now;
+  effort_sent_.assign(num_joints_, 0);
   scratch_.resize(joints_.size());
   PrepareMessages();
   reason_.Set("waiting for ARM");
 }
 
+std::vector<Driver::Joint> Driver::DrivenJoints(const RobotDescription& robot) {
+  std::vector<Joint> joints;
+  for (size_t i = 0; i < robot.joints.size(); ++i) {
+    if (!robot.joints[i].passive) joints.emplace_back(i, robot.joints[i], robot.driver);
+  }
+  if (joints.empty()) throw std::invalid_argument("no joint has a motor");
+  return joints;
+}
+
+void Driver::FindMeasuring(const RobotDescription& robot) {
+  for (size_t i = 0; i < num_joints_; ++i) {
+    const JointDescription& joint = robot.joints[i];
+    if (!joint.passive) {
+      for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
+        if (message.direction != BusMessage::Direction::kToDevice || message.remote || message.extended) continue;
+        own_.push_back({.id = message.id, .own = true});
+      }
+      continue;
+    }
+    const auto sensor = std::ranges::find(sensors_, static_cast<int>(i), &JointSensor::joint);
+    if (sensor == sensors_.end()) {
+      throw std::invalid_argument(fmt::format("joint '{}' has no motor, and no sensor measures it: give it one with [[sensor]]", joint.name));
+    }
+    passive_.push_back({i, static_cast<size_t>(sensor - sensors_.begin())});
+  }
+}
+
+void Driver::FindSecondEncoders(const RobotDescription& robot) {
+  for (size_t i = 0; i < sensors_.size(); ++i) {
+    const auto joint = std::ranges::find(joints_, sensors_[i].joint(), [](const Joint& j) { return static_cast<int>(j.index); });
+    const double tolerance = robot.sensors[i].tolerance;
+    if (joint == joints_.end() || std::isinf(tolerance)) continue;
+    second_encoders_.push_back({static_cast<size_t>(joint - joints_.begin()), i, tolerance});
+  }
+}
+
 std::vector<Filter> Driver::filters() const {
   std::vector<Filter> filters;
   for (const Joint& joint : joints_) filters.push_back(joint.motor->filter());
+  for (const JointSensor& sensor : sensors_) std::ranges::copy(sensor.device().filters(), std::back_inserter(filters));
   filters.insert(filters.end(), own_.begin(), own_.end());
   return filters;
 }
@@ -96,21 +145,28 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
   if (frame.error) return;
   if (frame.foreign) {
     foreign_at_ = now;
+    // A button on the bus is obeyed by all drives, whomever it was for.
+    if (std::ranges::any_of(joints_, [&](const Joint& joint) { return joint.motor->IsEstop(frame); })) {
+      return Estop("emergency stop from the bus");
+    }
     if (Active()) Fault("second master: somebody else sends frame {:#05x} to the drives", frame.id);
     return;
   }
   bus_off_ = false;
   unacknowledged_ = 0;
+  if (!UseOfMotor(frame, now, utime) && !UseOfSensor(frame, now, utime)) ++frames_rejected_;
+}
+
+bool Driver::UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept {
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     switch (joint.motor->OnFrame(frame, now)) {
       case FrameUse::kNotMine:
         continue;
       case FrameUse::kRejected:
-        ++frames_rejected_;
-        return;
+        return false;
       case FrameUse::kConsumed:
-        return;
+        return true;
       case FrameUse::kEstimate: {
         const MotorEstimate& estimate = joint.motor->estimate();
         joint.latest = {joint.map.JointPosition(estimate.position),
@@ -118,12 +174,21 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
                         joint.map.JointEffort(joint.motor->torque_estimate())};
         joint.measured = true;
         joint.measured_at = now;
+        joint.watch.Add(utime, joint.latest.position, joint.latest.velocity, effort_sent_[joint.index]);
         measurements_.Add(static_cast<int>(i), joint.latest, utime);
-        return;
+        return true;
       }
     }
   }
-  ++frames_rejected_;
+  return false;
+}
+
+bool Driver::UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept {
+  for (JointSensor& sensor : sensors_) {
+    const SensorUse use = sensor.OnFrame(frame, now, utime);
+    if (use != SensorUse::kNotMine) return use != SensorUse::kRejected;
+  }
+  return false;
 }
 
 void Driver::OnLink(LinkState link) noexcept {
@@ -152,58 +217,33 @@ std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness
     joint.frames_end = torque_frames_ + housekeeping_.size();
   }
   turn_ = (turn_ + 1) % joints_.size();
+  Poll();
+  for (JointSensor& sensor : sensors_) sensor.device().Tick(now, housekeeping_);
   for (const Frame& frame : housekeeping_.frames()) frames_.Push(frame);
   NoteChanges();
   return frames_.frames();
 }
 
-void Driver::CheckHealth() noexcept {
-  if (!Active()) return;
-  bool all_armed = true;
-  for (const Joint& joint : joints_) {
-    const DriveState state = joint.motor->state();
-    if (state != DriveState::kArming && state != DriveState::kArmed) {
-      return Fault("{}: {}", joint.name, joint.motor->reason());
-    }
-    if (now_ - joint.measured_at > stale_after_) {
-      return Fault("{}: no encoder estimate for {} ms", joint.name, (now_ - joint.measured_at) / 1000);
-    }
-    all_armed = all_armed && state == DriveState::kArmed;
-  }
-  if (mode_ == Mode::kArming && all_armed) {
-    mode_ = Mode::kArmed;
-    armed_at_ = now_;
-    reason_.Clear();
-  }
-}
-
-void Driver::CheckCommand() noexcept {
-  if (mode_ != Mode::kArmed) return;
-  const int64_t silence = now_ - (inbox_.empty() ? armed_at_ : inbox_.arrival());
-  if (silence > disarm_after_) {
-    if (inbox_.refusal().empty()) return Fault("no command for {} ms", silence / 1000);
-    return Fault("commands refused: {} (none taken for {} ms)", inbox_.refusal(), silence / 1000);
-  }
-  if (!inbox_.empty() && inbox_.Expired(now_) && !expiry_counted_) {
-    ++status_.commands_expired;
-    expiry_counted_ = true;
-  }
-}
-
 void Driver::CommandTorques() noexcept {
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    Joint& joint = joints_[i];
-    joint.wish = 0;
+  const bool commanded = mode_ == Mode::kArmed && !inbox_.empty(), fresh = commanded && !inbox_.Expired(now_);
+  bool limited = false;
+  for (Joint& joint : joints_) {
+    joint.effort = 0;
     if (!Active()) continue;
-    if (mode_ == Mode::kArmed && !inbox_.Expired(now_)) {
-      const double wished = inbox_.Effort(static_cast<int>(i), joint.latest.position, joint.latest.velocity);
-      joint.wish =
-          LimitEffort(wished, {joint.latest.position, joint.latest.velocity, effort_sent_[i], cycle_ * 1e-6},
-                      joint.limits)
-              .value_or(0);
+    const double position = joint.latest.position, velocity = joint.latest.velocity;
+    double wish = 0;
+    if (fresh) {
+      wish = inbox_.Effort(static_cast<int>(joint.index), position, velocity);
+    } else if (commanded) {
+      wish = StoppingEffort(settings_, joint.damping, joint.commanded, Seconds(now_ - inbox_.expires()), velocity);
     }
-    frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.wish)));
+    joint.effort =
+        LimitEffort(wish, {position, velocity, effort_sent_[joint.index], Seconds(cycle_)}, joint.limits).value_or(0);
+    if (fresh) joint.commanded = joint.effort;
+    limited = limited || (fresh && joint.effort != wish);
+    frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.effort)));
   }
+  if (limited) ++status_.commands_limited;
   torque_frames_ = frames_.size();
 }
 
@@ -211,14 +251,41 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
   const auto taken = static_cast<size_t>(std::max(accepted, 0));
   // A torque that was not accepted leaves the drive with the one before.
   for (size_t i = 0; i < joints_.size(); ++i) {
-    if (torque_frames_ == 0) effort_sent_[i] = 0;
-    if (i < torque_frames_ && i < taken) effort_sent_[i] = joints_[i].wish;
+    double& sent = effort_sent_[joints_[i].index];
+    if (torque_frames_ == 0) sent = 0;
+    if (i < torque_frames_ && i < taken) sent = joints_[i].effort;
   }
   history_.Record(utime, effort_sent_);
+  LetJump();
   for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);
   refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;
   if (refused_cycles_ >= kRefusedCycles && Active()) {
     Fault("the bus has not accepted frames in {} cycles", refused_cycles_);
+  }
+}
+
+void Driver::Poll() noexcept {
+  if (now_ < next_poll_ || mode_ == Mode::kArming) return;  // arming has need of all room there is
+  next_poll_ = now_ + poll_period_;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Motor& motor = *joints_[(poll_turn_ + i) % joints_.size()].motor;
+    if (motor.num_polled() == 0 || motor.state() == DriveState::kAbsent) continue;
+    motor.Poll(housekeeping_);
+    poll_turn_ = (poll_turn_ + i + 1) % joints_.size();
+    return;
+  }
+}
+
+void Driver::LetJump() noexcept {
+  const bool let = virtual_ && std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
+  may_jump_ = let;
+  for (Joint& joint : joints_) {
+    joint.motor->LetJump(let);
+    joint.watch.LetJump(let);
+  }
+  for (JointSensor& sensor : sensors_) {
+    sensor.device().LetJump(let);
+    sensor.ForgetTurns(let || !Active());
   }
 }
 

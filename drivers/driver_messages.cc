@@ -1,21 +1,16 @@
 // What the driver says: JOINT_STATE and DRIVER_STATUS.
 
 #include <algorithm>
-#include <bit>
+#include <cmath>
 #include <functional>
 #include <limits>
 
 #include "drivers/driver.h"
+#include "drivers/phase_times.h"
 
 namespace plumb {
-namespace {
-
-constexpr size_t kBins = 20;  // of the lateness histogram, the last one open
-
-}  // namespace
-
 void Driver::PrepareMessages() {
-  const size_t size = joints_.size();
+  const size_t size = num_joints_;
   state_message_.sequence = -1;
   state_message_.num_joints = static_cast<int32_t>(size);
   for (auto* values : {&state_message_.position, &state_message_.velocity, &state_message_.effort_measured,
@@ -30,15 +25,21 @@ void Driver::PrepareMessages() {
   status_.messages_rejected = status_.cycles = status_.overruns = status_.measurements_lost = 0;
   status_.stopped_by_request = false;
   status_.num_joints = static_cast<int32_t>(size);
-  for (const Joint& joint : joints_) status_.joint_name.push_back(joint.name);
+  status_.joint_name = names_;
   status_.joint_state.resize(size);
   status_.joint_reason.resize(size);
-  for (auto* values : {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage}) values->resize(size);
-  status_.num_sensors = status_.num_phases = 0;
+  for (auto* values : {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage}) {
+    values->assign(size, std::numeric_limits<double>::quiet_NaN());
+  }
+  status_.num_sensors = static_cast<int32_t>(sensors_.size());
+  for (const JointSensor& sensor : sensors_) status_.sensor_name.push_back(sensor.name());
+  status_.sensor_state.resize(sensors_.size());
+  status_.sensor_reason.resize(sensors_.size());
+  status_.num_phases = 0;
   status_.frames_foreign = status_.commands_limited = status_.commands_forged = 0;
   status_.commands_signed = false;
-  status_.num_bins = kBins;
-  status_.lateness.assign(kBins, 0);
+  status_.num_bins = PhaseTimes::kBins;
+  status_.lateness.assign(PhaseTimes::kBins, 0);
 }
 
 const joint_state_t* Driver::NextState() noexcept {
@@ -47,14 +48,27 @@ const joint_state_t* Driver::NextState() noexcept {
   joint_state_t& message = state_message_;
   message.utime = utime;
   ++message.sequence;
-  for (size_t i = 0; i < joints_.size(); ++i) {
+  for (size_t k = 0; k < joints_.size(); ++k) {
+    const size_t i = joints_[k].index;
     message.measured[i] = utime;
-    message.position[i] = scratch_[i].position;
-    message.velocity[i] = scratch_[i].velocity;
-    message.effort_measured[i] = scratch_[i].effort;
+    message.position[i] = scratch_[k].position;
+    message.velocity[i] = scratch_[k].velocity;
+    message.effort_measured[i] = scratch_[k].effort;
+    message.valid[i] = joints_[k].motor->state() != DriveState::kAbsent;
+  }
+  for (const Measuring& passive : passive_) {
+    const size_t i = passive.joint;
+    JointSensor& sensor = sensors_[passive.sensor];
+    const JointMeasurement& measurement = sensor.At(utime + measurement_ / 2);
+    message.measured[i] = sensor.measured();
+    message.position[i] = measurement.position;
+    message.velocity[i] = measurement.velocity;
+    message.effort_measured[i] = std::numeric_limits<double>::quiet_NaN();
+    message.valid[i] = sensor.fresh(now_) && std::isfinite(measurement.position);
+  }
+  for (size_t i = 0; i < num_joints_; ++i) {
     message.effort_sent[i] = effort_sent_[i];
     message.effort_applied[i] = std::numeric_limits<double>::quiet_NaN();
-    message.valid[i] = joints_[i].motor->state() != DriveState::kAbsent;
   }
   if (has_previous_) history_.Average(previous_utime_, utime, message.effort_applied);
   previous_utime_ = utime;
@@ -62,12 +76,17 @@ const joint_state_t* Driver::NextState() noexcept {
   return &message;
 }
 
+const imu_t* Driver::NextImu() noexcept {
+  for (JointSensor& sensor : sensors_) {
+    if (const imu_t* imu = sensor.NextImu()) return imu;
+  }
+  return nullptr;
+}
+
 void Driver::NoteLateness(int64_t lateness) noexcept {
   ++status_.cycles;
   if (lateness >= cycle_) ++status_.overruns;
-  const auto bin =
-      static_cast<size_t>(std::bit_width(static_cast<uint64_t>(std::max<int64_t>(lateness, 1)))) - 1;
-  ++status_.lateness[std::min(bin, kBins - 1)];
+  ++status_.lateness[PhaseTimes::Bin(lateness)];
 }
 
 void Driver::NoteChanges() noexcept {
@@ -80,33 +99,53 @@ void Driver::NoteChanges() noexcept {
   for (const Joint& joint : joints_) {
     mix(static_cast<uint64_t>(joint.motor->state()));
     mix(hash(joint.motor->reason()));
+    mix(Unwatched(joint));
+  }
+  for (const JointSensor& sensor : sensors_) {
+    mix(static_cast<uint64_t>(sensor.device().state()));
+    mix(hash(sensor.device().reason()));
   }
   if (signature != signature_) ++revision_;
   signature_ = signature;
 }
 
-const driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected) {
+driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected) {
   status_.utime = utime;
   status_.state = static_cast<int8_t>(state());
   status_.reason = reason();
   status_.bus_up = link_ == LinkState::kUp && !bus_off_;
-  for (size_t i = joints_.size(); i-- > 0;) {
-    const Motor& motor = *joints_[i].motor;
+  for (size_t k = joints_.size(); k-- > 0;) {
+    const Motor& motor = *joints_[k].motor;
+    const size_t i = joints_[k].index;
     status_.joint_state[i] = static_cast<int8_t>(motor.state());
     status_.joint_reason[i] = motor.reason();
     const MotorReadings readings = motor.readings();
+    if (Unwatched(joints_[k])) {
+      status_.joint_reason[i] = fmt::format("no temperatures for {} ms: if it gets too hot, nobody will know",
+                                            (now_ - readings.temperatures_at) / 1000);
+    }
     status_.motor_temperature[i] = readings.motor_temperature;
     status_.drive_temperature[i] = readings.drive_temperature;
     status_.bus_voltage[i] = readings.bus_voltage;
     if (status_.state == driver_status_t::ABSENT && motor.state() == DriveState::kAbsent) {
-      status_.reason = joints_[i].name + ": " + status_.joint_reason[i];
+      status_.reason = joints_[k].name + ": " + status_.joint_reason[i];
     }
+  }
+  for (size_t k = 0; k < sensors_.size(); ++k) {
+    status_.sensor_state[k] = static_cast<int8_t>(sensors_[k].device().state());
+    status_.sensor_reason[k] = sensors_[k].Silent(now_).text();
+  }
+  for (const Measuring& passive : passive_) {
+    const bool fresh = sensors_[passive.sensor].fresh(now_);
+    status_.joint_state[passive.joint] = fresh ? driver_status_t::IDLE : driver_status_t::ABSENT;
+    status_.joint_reason[passive.joint] = status_.sensor_reason[passive.sensor];
   }
   status_.frames_rejected = frames_rejected_ + stats.malformed;
   status_.frames_sent = stats.sent;
   status_.frames_dropped = stats.refused + stats.lost;
   status_.frames_foreign = stats.foreign;
   status_.measurements_lost = measurements_.lost();
+  for (const JointSensor& sensor : sensors_) status_.measurements_lost += sensor.lost();
   status_.messages_rejected = requests_rejected_ + messages_rejected;
   return status_;
 }

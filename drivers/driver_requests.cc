@@ -1,6 +1,7 @@
 // What the driver is asked: DRIVER_REQUEST and JOINT_COMMAND.
 
 #include "drivers/driver.h"
+#include "drivers/operating_limits.h"
 
 namespace plumb {
 namespace {
@@ -26,15 +27,18 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
       reason_ = cause_;
       return Disarm();
     case driver_request_t::ESTOP:
-      status_.stopped_by_request = true;
-      Fault("emergency stop requested");
-      stopped_utime_ = utime;
-      for (Joint& joint : joints_) joint.motor->Estop(now);
-      return;
+      return Estop("emergency stop requested");
     default:
       ++requests_rejected_;
       return;
   }
+}
+
+void Driver::Estop(std::string_view reason) noexcept {
+  status_.stopped_by_request = true;
+  Fault("{}", reason);
+  stopped_utime_ = utime_;
+  for (Joint& joint : joints_) joint.motor->Estop(now_);
 }
 
 void Driver::Refuse(std::string_view why) noexcept {
@@ -70,8 +74,23 @@ void Driver::RequestArm(int64_t made) noexcept {
       why.Set("{}: {}", joint.name, joint.motor->reason());
     } else if (!joint.measured || now - joint.measured_at > stale_after_) {
       why.Set("{}: no encoder estimates", joint.name);
+    } else if (joint.watch.crowded()) {
+      why.Set("{}: more encoder estimates than one drive is to send: two drives with one id?", joint.name);
+    } else if (Reason bad; !WithinOperatingLimits(joint.motor->readings(), settings_, bad)) {
+      why.Set("{}: {}", joint.name, bad.text());
     }
     if (!why.text().empty()) return Refuse(why.text());
+  }
+  for (JointSensor& sensor : sensors_) {
+    if (sensor.fresh(now)) continue;
+    Reason why;
+    why.Set("{}: {}", sensor.name(), sensor.Silent(now).text());
+    // Arming is a person's word that what was wrong is right again.
+    if (sensor.device().state() == SensorState::kFault) sensor.device().Start(now);
+    return Refuse(why.text());
+  }
+  for (const SecondEncoder& second : second_encoders_) {
+    if (Reason why; !Agree(second, why)) return Refuse(why.text());
   }
   armed_by_ = made;
   arms_refused_ = 0;
@@ -79,16 +98,33 @@ void Driver::RequestArm(int64_t made) noexcept {
   status_.stopped_by_request = false;
   refused_cycles_ = 0;
   inbox_.Clear();
+  forgery_ = {};
   cause_.Clear();
-  for (Joint& joint : joints_) joint.motor->Arm(now);
+  for (Joint& joint : joints_) {
+    joint.motor->Arm(now);
+    joint.watch.Forgive();
+    joint.commanded = 0;
+  }
   mode_ = Mode::kArming;
   reason_.Set("arming");
+}
+
+// Neither is taken for a sign of a controller: a forger could keep the robot from being armed.
+void Driver::OnForgedArm(std::string_view why) noexcept {
+  ++status_.commands_forged;
+  if (!Active()) Refuse(why);
+}
+
+void Driver::OnForgedCommand(std::string_view why) noexcept {
+  ++status_.commands_forged;
+  forgery_ = why;
 }
 
 void Driver::OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept {
   now_ = now;
   utime_ = utime;
   last_command_ = now;
+  forgery_ = {};
   if (now - start_now_ < start_guard_) {
     stray_controller_ = true;
     ++status_.commands_rejected;

@@ -1,20 +1,22 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <poll.h>
-#include <sched.h>
 #include <spdlog/spdlog.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
+#include <optional>
 #include <stdexcept>
 
+#include "common/lcm_url.h"
 #include "common/messenger.h"
 #include "common/process.h"
+#include "common/realtime.h"
+#include "common/signature.h"
 #include "drivers/driver.h"
 #include "drivers/flight_recorder.h"
+#include "drivers/phase_times.h"
 #include "drivers/state_log.h"
 #include "robot/description.h"
 
@@ -28,46 +30,57 @@ constexpr int kBursts = 8;         // of frames per wake: a flood must not keep 
 constexpr int64_t kFlight = 2'000'000;     // [us] before a fault whose frames are kept
 constexpr size_t kFlightFrames = 40'000;   // more than two buses of 1 Mbit/s carry in that time
 
-/// From here on no page faults, and no other process before us. LCM's receive thread must exist already.
-void BecomeRealtime(int priority) {
-  if (priority == 0) return;
-  const sched_param parameter{.sched_priority = priority};
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &parameter) != 0) {
-    throw std::runtime_error(
-        fmt::format("--realtime-priority {}: {}; cure: run as root, or allow it with ulimit -r {} and ulimit "
-                    "-l unlimited",
-                    priority, std::strerror(errno), priority));
-  }
-}
-
 void WriteState(int8_t state, std::string_view reason) {
   constexpr std::array names = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
   const auto level = state == driver_status_t::FAULT ? spdlog::level::warn : spdlog::level::info;
   spdlog::log(level, "{}{}{}", names[static_cast<size_t>(state)], reason.empty() ? "" : ": ", reason);
 }
 
+/// Judges signed messages; without a key, obeys all.
+std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const std::string& channel) {
+  if (!key) return std::nullopt;
+  return Verifier(*key, channel, Clock().Utime());
+}
+
+void SayWhoMayCommand(const std::string& lcm_url, bool commands_signed) {
+  if (commands_signed) return spdlog::info("takes signed commands only");
+  if (!StaysOnMachine(lcm_url)) return spdlog::warn("takes unsigned commands of anybody on the network");
+  const std::vector<std::string> open = OpenInterfaces(lcm_url);
+  if (open.empty()) return;
+  spdlog::warn(
+      "takes the commands of anybody who reaches LCM through {}: they are not signed; cure: --key FILE, or "
+      "ip route add 224.0.0.0/4 dev lo",
+      fmt::join(open, ", "));
+}
+
 class DriverProcess {
  public:
-  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus, const std::string& flight_recorder)
+  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus,
+                const std::string& flight_recorder, const std::optional<SigningKey>& key, bool is_virtual)
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
         transport_(OpenTransport(bus, driver_.filters())),
         cycle_(driver_.cycle(), clock_.Now()),
         states_(process.messenger(), "JOINT_STATE"),
+        imus_(process.messenger(), "IMU"),
         statuses_(process.messenger(), "DRIVER_STATUS"),
+        command_signatures_(VerifierOf(key, "JOINT_COMMAND")),
+        request_signatures_(VerifierOf(key, "DRIVER_REQUEST")),
         commands_(process.messenger(), "JOINT_COMMAND",
-                  [this](const joint_command_t& command) {
-                    driver_.OnCommand(command, clock_.Now(), clock_.Utime());
-                  }),
-        requests_(process.messenger(), "DRIVER_REQUEST", [this](const driver_request_t& request) {
-          driver_.OnRequest(request, clock_.Now(), clock_.Utime());
-        }),
+                  [this](const joint_command_t& command) { OnCommand(command); }),
+        requests_(process.messenger(), "DRIVER_REQUEST",
+                  [this](const driver_request_t& request) { OnRequest(request); }),
         recorder_(flight_recorder, bus, kFlightFrames, [](const std::string& file, const std::string& error) {
-          if (error.empty()) spdlog::warn("the frames of the last 2 s are in {}", file);
-          else spdlog::error("the frames before the fault are lost: {}", error);
+          if (error.empty())
+            spdlog::warn("the frames of the last 2 s are in {}", file);
+          else
+            spdlog::error("the frames before the fault are lost: {}", error);
         }) {
     driver_.set_bus(bus);
+    driver_.set_virtual(is_virtual);
+    driver_.set_commands_signed(key.has_value());
+    SayWhoMayCommand(process.lcm_url(), key.has_value());
     driver_.set_replay(transport_->is_replay());
     for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
@@ -90,9 +103,12 @@ class DriverProcess {
     const timespec wait = clock_.RealDuration(std::min(cycle_.Remaining(now), next));
     ppoll(polled.data(), polled.size(), &wait, nullptr);
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
-    ReceiveFrames();
-    while (const joint_state_t* state = driver_.NextState()) states_.Publish(*state);
-    process_.messenger().Drain();
+    // What there was nothing to do for is not timed.
+    phases_.Mark();
+    if (ReceiveFrames()) phases_.End(PhaseTimes::kReceive);
+    if (Publish()) phases_.End(PhaseTimes::kPublish);
+    phases_.Mark();
+    if (process_.messenger().Drain() > 0) phases_.End(PhaseTimes::kCommand);
     if (cycle_.Due(clock_.Now())) {
       Cycle();
     } else {
@@ -100,11 +116,31 @@ class DriverProcess {
     }
   }
 
-  void ReceiveFrames() {
+  void OnCommand(const joint_command_t& command) {
+    if (command_signatures_) {
+      const std::string_view refusal = command_signatures_->Judge(commands_.encoding(), Clock().Utime());
+      if (!refusal.empty()) return driver_.OnForgedCommand(refusal);
+    }
+    driver_.OnCommand(command, clock_.Now(), clock_.Utime());
+  }
+
+  void OnRequest(const driver_request_t& request) {
+    // Stopping must never need a key.
+    if (request_signatures_ && request.request == driver_request_t::ARM) {
+      const std::string_view refusal = request_signatures_->Judge(requests_.encoding(), Clock().Utime());
+      if (!refusal.empty()) return driver_.OnForgedArm(refusal);
+    }
+    driver_.OnRequest(request, clock_.Now(), clock_.Utime());
+  }
+
+  /// @return whether there were any.
+  bool ReceiveFrames() {
+    bool any = false;
     transport_->SetTime(clock_.Now());
     for (int burst = 0; burst < kBursts; ++burst) {
       const int count = transport_->Receive(received_);
       if (count <= 0) break;
+      any = true;
       const int64_t now = clock_.Now();
       for (const Frame& frame : std::span(received_).first(static_cast<size_t>(count))) {
         const int64_t utime =
@@ -114,14 +150,26 @@ class DriverProcess {
       }
     }
     driver_.OnLink(transport_->link());
+    return any;
+  }
+
+  /// @return whether there was anything to say.
+  bool Publish() {
+    bool any = false;
+    while (const joint_state_t* state = driver_.NextState()) any = states_.Publish(*state) || any;
+    while (const imu_t* imu = driver_.NextImu()) any = imus_.Publish(*imu) || any;
+    return any;
   }
 
   void Cycle() {
     const int64_t now = clock_.Now();
     const int64_t lateness = cycle_.Advance(now);
+    phases_.Mark();
     const std::span<const Frame> frames = driver_.Tick(now, clock_.Utime(), lateness);
+    phases_.End(PhaseTimes::kControl);
     transport_->SetTime(now);
     const int accepted = frames.empty() ? 0 : transport_->Send(frames);
+    phases_.End(PhaseTimes::kSend);
     const int64_t sent = clock_.Utime();
     driver_.Transmitted(accepted, sent);
     for (const Frame& frame : frames.first(static_cast<size_t>(std::max(accepted, 0)))) recorder_.Record(frame, true, sent);
@@ -134,8 +182,9 @@ class DriverProcess {
       driver_.OnLink(transport_->Reopen());
     }
     if (driver_.revision() == revision_ && now < next_status_) return;
-    const driver_status_t& status =
+    driver_status_t& status =
         driver_.Status(clock_.Utime(), transport_->stats(), commands_.rejected() + requests_.rejected());
+    phases_.Fill(status);
     statuses_.Publish(status);
     log_.Note(status.state, status.reason);
     revision_ = driver_.revision();
@@ -174,11 +223,14 @@ class DriverProcess {
   std::unique_ptr<Transport> transport_;
   Periodic cycle_;
   Publisher<joint_state_t> states_;
+  Publisher<imu_t> imus_;
   Publisher<driver_status_t> statuses_;
+  std::optional<Verifier> command_signatures_, request_signatures_;
   Subscriber<joint_command_t> commands_;
   Subscriber<driver_request_t> requests_;
   std::array<Frame, 64> received_;
   FlightRecorder recorder_;
+  PhaseTimes phases_;
   bool faulty_ = false;
   int64_t next_reopen_ = 0;
   int64_t next_status_ = 0;
@@ -190,21 +242,32 @@ class DriverProcess {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  std::string robot_path, bus, flight_recorder;
+  std::string robot_path, bus, flight_recorder, key_file;
+  bool allow_unsigned = false;
   int priority = 0;
+  bool is_virtual = false;
   return plumb::Run(
       "plumb-driver", "Drives a robot's motors on a CAN bus: JOINT_COMMAND in, JOINT_STATE out.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder, or its TOML file")->required();
         app.add_option("--bus", bus, "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
         app.add_option("--flight-recorder", flight_recorder, "folder: on every fault the frames of the last 2 s are written there");
+        app.add_flag("--virtual", is_virtual, "the robot is plumb-robot: while no effort is sent, its positions may jump");
+        auto* key =
+            app.add_option("--key", key_file,
+                           "obey only commands and ARM requests signed with this key (plumb key makes one)");
+        app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")
+            ->excludes(key);
         app.add_option("--realtime-priority", priority, "SCHED_FIFO priority, 0 = off")
             ->check(CLI::Range(0, 90))
             ->capture_default_str();
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
-        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder);
+        plumb::RequireKey(process.lcm_url(), !key_file.empty(), allow_unsigned);
+        std::optional<plumb::SigningKey> key;
+        if (!key_file.empty()) key.emplace(key_file);
+        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder, key, is_virtual);
         plumb::BecomeRealtime(priority);
         return driver.Run();
       });

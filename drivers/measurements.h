@@ -1,11 +1,10 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "drivers/passive_sync.h"
+#include "drivers/timed_samples.h"
 
 namespace plumb {
 
@@ -34,33 +33,14 @@ class Measurements {
   bool Next(int64_t& utime, std::span<JointMeasurement> measurements) noexcept;
 
   /// Estimates that found no partners, or no room.
-  int64_t dropped() const { return dropped_; }
+  int64_t dropped() const noexcept;
   /// Those and the estimates that never came; a gap or a step of the clock, after which it began anew, counts
   /// as one.
   int64_t lost() const noexcept;
 
  private:
-  static constexpr size_t kCapacity = 64;
-
-  struct Sample {
-    int64_t time = 0;  ///< of arrival until regularised, then of measurement
-    JointMeasurement measurement;
-  };
-  /// A queue of samples in a ring.
-  struct Joint {
-    explicit Joint(int64_t period) : sync(period) {}
-    Sample& At(size_t i) { return ring[(head + i) % kCapacity]; }
-    void Pop();
-    void Regularise();
-
-    PassiveSync sync;
-    std::array<Sample, kCapacity> ring;
-    size_t head = 0, count = 0, regular = 0;  ///< the first `regular` of `count` have times of measurement
-  };
-
   int64_t tolerance_;
-  std::vector<Joint> joints_;
-  int64_t dropped_ = 0;
+  std::vector<TimedSamples<JointMeasurement>> joints_;
 };
 
 }  // namespace plumb

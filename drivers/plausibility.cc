@@ -9,20 +9,38 @@ namespace {
 /// Drives say positions as float32: of 24 bits, and the last two are noise.
 constexpr double kCoarse = 0x1p-22;
 
-double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
+/// [rad] of a motor's shaft: coarse codes of positions, and what those of velocities add up to in a window.
+constexpr double kResolution = 0.05;
+
+double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
+int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
+
+/// [us] in which a motor sends an encoder estimate: nothing that it sends by itself comes more often.
+int64_t EstimatePeriod(const MotorDescription& motor, const DriverSettings& settings) {
+  int64_t period = Microseconds(settings.measurement);
+  for (const BusMessage& message : MotorBusDevice(motor, settings).messages) {
+    const bool from_device = message.direction == BusMessage::Direction::kFromDevice;
+    if (from_device && !message.polled && message.period > 0) period = std::min(period, message.period);
+  }
+  return period;
+}
 
 }  // namespace
+
+PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverSettings& settings) {
+  return {.velocity_limit = joint.velocity_limit,
+          .effort_limit = joint.effort_limit,
+          .resolution = kResolution / joint.motor.gear,
+          .period = EstimatePeriod(joint.motor, settings),
+          .lateness = Microseconds(settings.stale_after),
+          .stuck_after = Microseconds(settings.stuck_after)};
+}
 
 void Plausibility::Add(int64_t time, double position, double velocity, double effort) noexcept {
   const Estimate next{time, position, velocity};
   CountDevices(time);
   const int64_t since = time - last_.time;
-  if (!seen_ || since < 0) {
-    placing_until_ = kNever;
-    return Begin(next);
-  }
-  if (Jumped(next)) return Begin(next);
-  if (since > settings_.lateness) return Begin(next);
+  if (!seen_ || may_jump_ || since < 0 || Jumped(next) || since > settings_.lateness) return Begin(next);
   LookForStuck(next, effort);
   Compare(next);
   last_ = next;
@@ -42,12 +60,14 @@ double Plausibility::Slack(double position) const noexcept {
 void Plausibility::CountDevices(int64_t time) noexcept {
   const int64_t since = time - window_;
   if (!seen_ || since < 0 || since >= kWindow * settings_.period) {
+    crowded_ = count_ > kMostInWindow;
     window_ = time;
     count_ = 0;
   }
   if (++count_ > kMostInWindow) {
-    Complain("{} encoder estimates in {} ms, where one device sends {}: two devices with one id?", count_,
-             since / 1000, since / settings_.period + 1);
+    crowded_ = true;
+    Complain("{} encoder estimates in {} ms, where one device sends {}: two devices with one id?", count_, since / 1000,
+             since / settings_.period + 1);
   }
 }
 
@@ -59,10 +79,8 @@ bool Plausibility::Jumped(const Estimate& next) noexcept {
   const double most = settings_.velocity_limit * (seconds + Seconds(settings_.period)) +
                       before * Seconds(settings_.lateness) + Slack(next.position);
   if (!(std::abs(jump) > most)) return false;
-  if (!Placed(next)) {
-    Complain("the position jumped by {:.3g} in {:.3g} ms, at a velocity limit of {:.3g} it can do {:.3g}",
-             jump, seconds * 1e3, settings_.velocity_limit, most);
-  }
+  Complain("the position jumped by {:.3g} in {:.3g} ms, at a velocity limit of {:.3g} it can do {:.3g}",
+           jump, seconds * 1e3, settings_.velocity_limit, most);
   return true;
 }
 
@@ -73,16 +91,13 @@ void Plausibility::LookForStuck(const Estimate& next, double effort) noexcept {
   const bool pushed = std::abs(effort) >= kEffort * settings_.effort_limit;
   unchanged_ = same && pushed ? unchanged_ + (next.time - last_.time) : 0;
   if (settings_.stuck_after > 0 && unchanged_ >= settings_.stuck_after) {
-    Complain(
-        "encoder stuck, or the joint is blocked: position {:.5g} and velocity {:.3g} the same for {} ms at "
-        "an "
-        "effort of {:.3g}",
-        next.position, next.velocity, unchanged_ / 1000, effort);
+    Complain("encoder stuck, or the joint is blocked: {:.5g} at speed {:.3g} for {} ms under an effort of {:.3g}",
+             next.position, next.velocity, unchanged_ / 1000, effort);
   }
 }
 
 void Plausibility::Compare(const Estimate& next) noexcept {
-  if (std::isnan(next.velocity) || std::isnan(last_.velocity) || next.time < placing_until_ ||
+  if (std::isnan(next.velocity) || std::isnan(last_.velocity) ||
       comparison_.estimates >= kWindow) {
     comparison_ = {.first_velocity = next.velocity};
     return;
@@ -105,23 +120,6 @@ void Plausibility::Compare(const Estimate& next) noexcept {
   Complain("position and velocity disagree: it moved by {:.3g} in {:.0f} ms, and by {:.3g} by its velocity",
            c.moved, c.seconds * 1e3, c.said);
   c = {.first_velocity = next.velocity};
-}
-
-bool Plausibility::Placed(const Estimate& estimate) const noexcept {
-  return estimate.time < placing_until_ &&
-         std::abs(estimate.position - place_) <=
-             place_tolerance_ + std::abs(estimate.velocity) * Seconds(settings_.lateness);
-}
-
-void Plausibility::Place(int64_t time, double position, double tolerance) noexcept {
-  place_ = position;
-  place_tolerance_ = tolerance;
-  placing_until_ = time + kPlacing;
-  // It may have been obeyed before we were told.
-  if (seen_ && Placed(last_)) {
-    Forgive();
-    Begin(last_);
-  }
 }
 
 }  // namespace plumb

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 
 #include "drivers/protocols/protocol.h"
+#include "robot/description.h"
 
 namespace plumb {
 
@@ -16,6 +16,9 @@ struct PlausibilitySettings {
   int64_t lateness;       ///< [us] > 0 by which an estimate may be late; silence of more begins anew
   int64_t stuck_after;    ///< [us] as DriverSettings::stuck_after; 0 = not looked for
 };
+
+/// Of a joint with a motor. @throws std::invalid_argument for an unknown protocol.
+PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverSettings& settings);
 
 /// Whether one joint's estimates can be true. Looked for, with T the period and L the lateness:
 ///
@@ -43,7 +46,6 @@ class Plausibility {
   static constexpr int kMostInWindow = 150;       ///< estimates of one device within kWindow periods
   static constexpr double kDisagreement = 0.25;   ///< part of the path
   static constexpr double kEffort = 0.1;          ///< of the limit, under which a joint should move
-  static constexpr int64_t kPlacing = 1'000'000;  ///< [us] that a wish to place the robot is good for
 
   explicit Plausibility(const PlausibilitySettings& settings) : settings_(settings) {}
 
@@ -53,18 +55,17 @@ class Plausibility {
   /// @param effort [Nm] or [N] last sent.
   void Add(int64_t time, double position, double velocity, double effort) noexcept;
 
-  /// Somebody is asked to place the joint there (PLACE_ROBOT): a jump to it, also one just complained of, is
-  /// none, for a second from `time`.
-  /// @param tolerance [rad] or [m] around it.
-  void Place(int64_t time, double position, double tolerance) noexcept;
+  /// While true, the joint may be put elsewhere at once: nothing but the number of devices is judged.
+  void LetJump(bool let) noexcept { may_jump_ = let; }
 
   /// The first thing that was implausible; empty if nothing was.
   std::string_view complaint() const noexcept { return complaint_.text(); }
-  /// Takes the complaint back. What is wrong will be found again.
+  /// Takes the complaint back. What is wrong still will be found again.
   void Forgive() noexcept { complaint_.Clear(); }
+  /// Whether more than one device seems to send estimates; so until 100 T have gone by with no more than one would.
+  bool crowded() const noexcept { return crowded_; }
 
  private:
-  static constexpr int64_t kNever = std::numeric_limits<int64_t>::min();
   struct Estimate {
     int64_t time = 0;
     double position = 0, velocity = 0;
@@ -88,7 +89,6 @@ class Plausibility {
   void LookForStuck(const Estimate& next, double effort) noexcept;
   void Compare(const Estimate& next) noexcept;
   double Slack(double position) const noexcept;
-  bool Placed(const Estimate& estimate) const noexcept;
   void Begin(const Estimate& first) noexcept;
 
   PlausibilitySettings settings_;
@@ -99,8 +99,8 @@ class Plausibility {
   int64_t unchanged_ = 0;  // [us] under an effort
   int64_t window_ = 0;     // begin of that in which estimates are counted
   int count_ = 0;
-  double place_ = 0, place_tolerance_ = 0;
-  int64_t placing_until_ = kNever;
+  bool crowded_ = false;
+  bool may_jump_ = false;
 };
 
 }  // namespace plumb

@@ -8,15 +8,18 @@ namespace {
 
 // Nothing is known of the acceleration at a restart [rad/s^2]; any robot joint is well below it.
 constexpr double kInitialAccelerationSd = 100;
+// Nor of the velocity where it is not measured [rad/s].
+constexpr double kInitialVelocitySd = 10;
 
 double Square(double x) { return x * x; }
 
 }  // namespace
 
 void KinematicFilter::Restart(double position, double velocity) {
-  mean_ = {position, velocity, 0};
-  covariance_ = Eigen::Vector3d(Square(settings_.position_sd) + Square(velocity * settings_.timing_sd),
-                                Square(settings_.velocity_sd), Square(kInitialAccelerationSd))
+  const bool known = std::isfinite(velocity);
+  mean_ = {position, known ? velocity : 0, 0};
+  covariance_ = Eigen::Vector3d(Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd),
+                                Square(known ? settings_.velocity_sd : kInitialVelocitySd), Square(kInitialAccelerationSd))
                     .asDiagonal();
   window_.clear();
   window_.push_back({Eigen::Matrix3d::Identity(), mean_, covariance_, mean_, covariance_});
@@ -42,22 +45,27 @@ void KinematicFilter::Predict(double dt, double effort_step) {
   step_.predicted_covariance = covariance_;
 }
 
-void KinematicFilter::Update(double position, double velocity) {
-  Eigen::Matrix<double, 2, 3> observe = Eigen::Matrix<double, 2, 3>::Identity();
-  Eigen::Matrix2d noise = Eigen::Matrix2d::Zero();
+void KinematicFilter::Update(double position, double velocity, double age) {
   // A measurement time that is off by timing_sd displaces the position by velocity * timing_sd.
-  noise(0, 0) = Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd);
-  noise(1, 1) = Square(settings_.velocity_sd);
-  const Eigen::Vector2d innovation = Eigen::Vector2d(position, velocity) - observe * mean_;
-  const Eigen::Matrix2d total = observe * covariance_ * observe.transpose() + noise;
-  const Eigen::Matrix<double, 3, 2> gain = covariance_ * observe.transpose() * total.inverse();
-  mean_ += gain * innovation;
-  // Joseph's form keeps the covariance symmetric and positive.
-  const Eigen::Matrix3d keep = Eigen::Matrix3d::Identity() - gain * observe;
-  covariance_ = keep * covariance_ * keep.transpose() + gain * noise * gain.transpose();
+  const double position_variance = Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd);
+  Correct(PositionAgo(age), position, position_variance);
+  if (std::isfinite(velocity)) Correct({0, 1, -age}, velocity, Square(settings_.velocity_sd));
+  Skip();
+}
+
+void KinematicFilter::Skip() {
   step_.filtered_mean = mean_;
   step_.filtered_covariance = covariance_;
   window_.push_back(step_);
+}
+
+void KinematicFilter::Correct(const Eigen::Vector3d& observe, double measured, double variance) {
+  const double total = observe.dot(covariance_ * observe) + variance;
+  const Eigen::Vector3d gain = covariance_ * observe / total;
+  mean_ += gain * (measured - observe.dot(mean_));
+  // Joseph's form keeps the covariance symmetric and positive.
+  const Eigen::Matrix3d keep = Eigen::Matrix3d::Identity() - gain * observe.transpose();
+  covariance_ = keep * covariance_ * keep.transpose() + gain * variance * gain.transpose();
 }
 
 KinematicFilter::Smoothed KinematicFilter::TakeOldest() {

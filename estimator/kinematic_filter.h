@@ -23,14 +23,18 @@ class KinematicFilter {
  public:
   explicit KinematicFilter(const EstimatorSettings& settings) : settings_(settings) {}
 
-  /// Starts anew at a measured position [rad] and velocity [rad/s].
+  /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured.
   void Restart(double position, double velocity);
   /// @param dt [s] since the last call, > 0.
   /// @param effort_step [Nm] change of the mean applied effort against the previous interval.
   void Predict(double dt, double effort_step);
+  /// @param age [s] of the measurement; < 0: it was made a little later.
   /// @return the innovation of the position [rad], before the update.
-  double Innovation(double position) const { return position - mean_(0); }
-  void Update(double position, double velocity);
+  double Innovation(double position, double age) const { return position - PositionAgo(age).dot(mean_); }
+  /// @param velocity NaN: it was not measured. @param age [s] of the measurement; < 0: it was made a little later.
+  void Update(double position, double velocity, double age);
+  /// There is no measurement of this instant.
+  void Skip();
 
   const KinematicState& mean() const { return mean_; }
   const Eigen::Matrix3d& covariance() const { return covariance_; }
@@ -45,6 +49,10 @@ class KinematicFilter {
   Smoothed TakeOldest();
 
  private:
+  /// Row of the state's coefficients in what the position was so long ago.
+  static Eigen::Vector3d PositionAgo(double age) { return {1, -age, age * age / 2}; }
+  void Correct(const Eigen::Vector3d& observe, double measured, double variance);
+
   // One step of the forward pass, kept for the backward one.
   struct Step {
     Eigen::Matrix3d transition;  // from the previous step

@@ -7,11 +7,17 @@ namespace plumb {
 namespace {
 
 constexpr int64_t kLongestGap = 1'000'000;  // [us]; beyond it nothing is known of the motion in between
+constexpr int64_t kMostAhead = 10'000;      // [us] of a joint's reading before the others
 constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
 constexpr int kSettled = 5;                 // measurements after a restart until velocity can be trusted
 
 bool Finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+/// [s] of a joint's measurement.
+double Age(const joint_state_t& measured, size_t joint) {
+  return static_cast<double>(measured.utime - measured.measured[joint]) * 1e-6;
 }
 
 }  // namespace
@@ -20,6 +26,7 @@ StateObserver::StateObserver(const RobotDescription& robot)
     : n_(robot.num_joints()),
       settings_(robot.estimator),
       filters_(static_cast<size_t>(n_), KinematicFilter(robot.estimator)),
+      measured_(static_cast<size_t>(n_), -1),
       effort_(static_cast<size_t>(n_), 0),
       unknown_step_(2 * robot.effort_limits().maxCoeff()) {
   const auto n = static_cast<size_t>(n_);
@@ -29,13 +36,18 @@ StateObserver::StateObserver(const RobotDescription& robot)
 
 bool StateObserver::Acceptable(const joint_state_t& measured) const {
   // Times of this epoch only, so that differences cannot overflow.
-  return measured.num_joints == n_ && measured.utime >= 0 && measured.utime < kEndOfTime && Finite(measured.position) && Finite(measured.velocity) &&
-         !(started_ && measured.utime == state_.utime);
+  if (measured.num_joints != n_ || measured.utime < 0 || measured.utime >= kEndOfTime) return false;
+  const auto infinite = [](double x) { return std::isinf(x); };  // NaN: not measured
+  const auto of_that_time = [&](int64_t t) {
+    return t >= 0 && t < kEndOfTime && t - measured.utime <= kMostAhead && measured.utime - t <= kLongestGap;
+  };
+  return Finite(measured.position) && std::ranges::none_of(measured.velocity, infinite) &&
+         std::ranges::all_of(measured.measured, of_that_time) && !(started_ && measured.utime == state_.utime);
 }
 
 bool StateObserver::Displaced(const joint_state_t& measured) const {
   for (size_t i = 0; i < filters_.size(); ++i) {
-    if (std::abs(filters_[i].Innovation(measured.position[i])) > settings_.reset_after) return true;
+    if (IsNew(measured, i) && std::abs(filters_[i].Innovation(measured.position[i], Age(measured, i))) > settings_.reset_after) return true;
   }
   return false;
 }
@@ -68,9 +80,13 @@ bool StateObserver::OnJointState(const joint_state_t& measured) {
   if (restarted) {
     Restart(measured);
   } else {
-    for (size_t i = 0; i < filters_.size(); ++i) filters_[i].Update(measured.position[i], measured.velocity[i]);
+    for (size_t i = 0; i < filters_.size(); ++i) {
+      if (IsNew(measured, i)) filters_[i].Update(measured.position[i], measured.velocity[i], Age(measured, i));
+      else filters_[i].Skip();
+    }
     ++since_restart_;
   }
+  measured_ = measured.measured;
 
   state_.utime = measured.utime;
   state_.sequence = measured.sequence;

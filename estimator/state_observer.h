@@ -35,6 +35,8 @@ class StateObserver {
 
  private:
   bool Acceptable(const joint_state_t& measured) const;
+  /// Whether the joint was measured since the last message.
+  bool IsNew(const joint_state_t& measured, size_t joint) const { return measured.measured[joint] != measured_[joint]; }
   bool Displaced(const joint_state_t& measured) const;
   void Restart(const joint_state_t& measured);
   void EmitSmoothed();
@@ -45,7 +47,8 @@ class StateObserver {
   robot_state_t state_{};
   std::deque<robot_state_t> waiting_;  // causal states whose smoothed twins are due
   std::vector<robot_state_t> ready_;
-  std::vector<double> effort_;  // mean applied effort of the previous interval
+  std::vector<int64_t> measured_;  // when each joint was, as of the last message
+  std::vector<double> effort_;     // mean applied effort of the previous interval
   int since_restart_ = 0;
   bool started_ = false;
   double unknown_step_;  // [Nm] assumed change of an effort that is not known: from full one way to full the other

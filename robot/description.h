@@ -71,6 +71,8 @@ struct SensorDescription {
   double offset = 0;     ///< [rad] or [m]
   double radius = 1;     ///< 1 at a joint that turns, [m] > 0 at one that slides: the boom's length
   double max_speed = 0;  ///< [rad/s] > 0 of the shaft; a reading that needs more is a fault
+  /// [rad] or [m] > 0 by which it may differ from the motor of its joint, if that has one; infinite = not compared
+  double tolerance = std::numeric_limits<double>::infinity();
 
   // Of an IMU.
   int link = -1;                                           ///< index into links: what it is fixed to
@@ -139,9 +141,8 @@ struct DriverSettings {
   /// requests disarm at once, whatever this is.
   enum class Stop { kZero, kRamp, kDamping };
 
-  double cycle, measurement, expiry, disarm_after, stale_after, heartbeat_timeout,
-      start_guard;         ///< [s], scaled time
-  double telemetry = 0.1;  ///< [s] at which drives report temperatures and their supply
+  double cycle, measurement, expiry, disarm_after, stale_after, heartbeat_timeout, start_guard;  ///< [s], scaled time
+  double telemetry = 0.1;  ///< [s] at which each drive is asked for its temperatures and supply
   Stop stop = Stop::kZero;
   double ramp = 0;  ///< [s] > 0 of kRamp, else 0
 

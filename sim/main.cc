@@ -10,13 +10,17 @@
 #include <vector>
 
 #include "common/process.h"
+#include "common/random.h"
 #include "drivers/can/transport.h"
 #include "plumb/place_robot_t.hpp"
 #include "sim/parameters.h"
+#include "sim/tasks/task.h"
 #include "sim/virtual_robot.h"
 
 namespace plumb {
 namespace {
+
+constexpr uint32_t kStandStream = 0x5374616E;  // of random numbers; "Stan"
 
 /// "gravity=9.8" replaces one of the hidden parameters.
 void Set(const std::string& assignment, const RobotDescription& description, Eigen::VectorXd& physical) {
@@ -49,12 +53,21 @@ void LogTruth(const RobotDescription& description, const Eigen::VectorXd& physic
   spdlog::debug("seed {}:{}", seed, text);
 }
 
-int Serve(Process& process, const RobotDescription& description, const Eigen::VectorXd& physical,
+/// Puts the robot where an episode may begin: a legged one stands, and not in the ground.
+void Stand(const RobotDescription& description, uint64_t seed, VirtualRobot& robot) {
+  Eigen::VectorXd q(description.num_positions()), v(description.num_velocities());
+  Random random(seed, {kStandStream});
+  MakeTask(description)->InitialState(random, q, v);
+  robot.Place(0, q, v);
+}
+
+int Serve(Process& process, const RobotDescription& description, const Eigen::VectorXd& physical, uint64_t seed,
           const std::string& bus_url) {
   constexpr int64_t kReopenPeriod = 200'000;  // [us]
   constexpr int kBursts = 16;                 // of frames per wake, so that a flood cannot stop time
   const Clock& clock = process.clock();
   VirtualRobot robot(description, physical, clock.Utime());
+  Stand(description, seed, robot);
   const std::unique_ptr<Transport> transport = OpenTransport(bus_url, robot.filters());
   Subscriber<place_robot_t> places(process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
     const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(), static_cast<Eigen::Index>(wish.q.size()));
@@ -124,6 +137,6 @@ int main(int argc, char** argv) {
         Eigen::VectorXd physical = plumb::HiddenParameters(description, seed);
         for (const std::string& assignment : assignments) plumb::Set(assignment, description, physical);
         plumb::LogTruth(description, physical, seed);
-        return plumb::Serve(process, description, physical, bus_url.empty() ? description.bus_url : bus_url);
+        return plumb::Serve(process, description, physical, seed, bus_url.empty() ? description.bus_url : bus_url);
       });
 }

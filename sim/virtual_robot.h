@@ -3,27 +3,27 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "drivers/can/frame.h"
 #include "drivers/can/transport.h"
-#include "drivers/protocols/cansimple_device.h"
 #include "robot/description.h"
-#include "sim/encoder.h"
 #include "sim/mechanism.h"
+#include "sim/virtual_devices.h"
 
 namespace plumb {
 
-/// A robot that is not there: a Mechanism moved by virtual drives that listen to a CAN bus. Event-driven, with
+/// A robot that is not there: a Mechanism moved by virtual drives and felt by virtual sensors, all of them on a CAN bus. Event-driven, with
 /// time as an argument, so that its motion does not depend, to the bit, on when the process gets to run:
-/// torques change when their frame arrived, encoders are read at multiples of the measurement period,
+/// torques change when their frame arrived, sensors are read at multiples of their periods,
 /// watchdogs expire on time. Only the sending can be late. Times are microseconds. Does not throw after
 /// construction. Not thread-safe.
 class VirtualRobot {
  public:
   /// @param physical the true parameters, order of description.parameters.
-  /// @throws std::invalid_argument if a joint has no motor, a motor does not speak CANSimple, or a parameter
-  /// is not physical.
+  /// @throws std::invalid_argument if no virtual device speaks a motor's or sensor's protocol, or a parameter is not
+  /// physical.
   VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical, int64_t now);
 
   /// What the bus must let in.
@@ -40,10 +40,10 @@ class VirtualRobot {
   /// When Advance next has something to do.
   int64_t NextEvent() const;
 
-  /// Puts the robot at q, v at the time of the latest Advance or Receive, unless the wish of this utime has
+  /// Puts the robot at these q, v at the time of the latest Advance or Receive, unless the wish of this utime has
   /// been granted before. @return false if the wish is of the wrong size, not finite or beyond kFarthest.
-  bool Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& q,
-             const Eigen::Ref<const Eigen::VectorXd>& v);
+  bool Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& wish_q,
+             const Eigen::Ref<const Eigen::VectorXd>& wish_v);
 
   static constexpr int64_t kLatest = 50'000;         ///< [us]
   static constexpr int64_t kLongestGap = 5'000'000;  ///< [us]
@@ -53,23 +53,19 @@ class VirtualRobot {
   int64_t time() const { return time_; }
   const Eigen::VectorXd& q() const { return mechanism_.q(); }
   const Eigen::VectorXd& v() const { return mechanism_.v(); }
-  const std::vector<CanSimpleDevice>& drives() const { return drives_; }
+  /// The drives in order of their joints, then the sensors.
+  const std::vector<std::unique_ptr<VirtualDevice>>& devices() const { return devices_; }
 
  private:
   void Boot(int64_t now);
   void MoveTo(int64_t time);
   void Tick(FrameBatch& out);
-  double Effort(size_t joint) const;
-  double Turns(size_t joint) const;
-  double TurnsPerSecond(size_t joint) const;
-  CanSimpleDevice::Sample Read(size_t joint) const;
+  RobotMotion Motion() const { return {time_, q(), v()}; }
 
-  std::vector<JointDescription> joints_;
-  std::vector<CanSimpleDevice::Settings> settings_;
   Mechanism mechanism_;
-  std::vector<CanSimpleDevice> drives_;
-  std::vector<Encoder> encoders_;
-  std::vector<ShaftMotion> motions_;
+  std::vector<std::unique_ptr<VirtualDevice>> devices_;
+  std::vector<Eigen::Index> effort_index_;                // of each device in effort_; -1: it makes none
+  Eigen::VectorXd last_q_, last_v_;                       // before a motion
   Eigen::VectorXd effort_;                                // acts from time_ on
   FrameBatch unsent_;                                     // where frames go that would be too late
   int64_t time_;                                          // of the mechanism

@@ -62,10 +62,20 @@ class CanSimpleMotor : public Motor {
     Enter(Step::kDisarming, now);
   }
 
+  bool IsEstop(const Frame& frame) const noexcept override {
+    const uint32_t to = frame.id >> 5;
+    return (frame.id & 0x1F) == kEstop.command && !frame.remote && (to == static_cast<uint32_t>(node_) || to == kBroadcastNode);
+  }
+
   void Estop(int64_t now) noexcept override {
     Fail(now, "emergency stop requested");
     disarms_ = kDisarmsBeforeEstop;
     estop_due_ = true;
+  }
+
+  int num_polled() const noexcept override { return static_cast<int>(kPolledReports.size()); }
+  void Poll(FrameBatch& out) noexcept override {
+    out.Push(MakeRequest(kPolledReports[poll_turn_++ % kPolledReports.size()], node_));
   }
 
   void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept override {
@@ -220,9 +230,7 @@ class CanSimpleMotor : public Motor {
     if (step_ == Step::kArmed && !running) {
       Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_), Words(axis_error_),
            DescribeProcedureResult(procedure_result_));
-      ask_error_ = true;
-      axis_state_known_ = true;  // it was running, so no order of ours is on its way
-      order_due_ = false;
+      ask_error_ = true;  // and tell it to stop nevertheless: it may be another with its node id that has spoken
     }
     return FrameUse::kConsumed;
   }
@@ -255,6 +263,7 @@ class CanSimpleMotor : public Motor {
   bool order_due_ = false;                   // no order to stop was accepted since the last order to run
   bool estop_due_ = false;                   // no Estop was accepted since it was asked for
   bool ask_error_ = false, fault_ = false;
+  size_t poll_turn_ = 0;
   Reason reason_;
 };
 

@@ -20,7 +20,7 @@ std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description, c
 inline constexpr int kBeatsPerTimeout = 5;
 
 /// What such a drive and its host say to each other, the drive configured to send heartbeats with a fifth of
-/// heartbeat_timeout, encoder estimates with `measurement`, temperatures and its supply with `telemetry`; all else on request.
+/// heartbeat_timeout and encoder estimates with `measurement`; all else on request, temperatures and its supply every `telemetry`.
 BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings& driver);
 
 }  // namespace plumb

@@ -25,8 +25,14 @@ BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings
   };
   add(kHeartbeat, Direction::kFromDevice, heartbeat);
   add(kGetEncoderEstimates, Direction::kFromDevice, microseconds(driver.measurement));
-  add(kGetTemperature, Direction::kFromDevice, telemetry);
-  add(kGetBusVoltageCurrent, Direction::kFromDevice, telemetry);
+  for (const Layout& layout : kPolledReports) {
+    add(layout, Direction::kToDevice, telemetry);
+    device.messages.back().remote = device.messages.back().polled = true;
+    const int question = static_cast<int>(device.messages.size()) - 1;
+    add(layout, Direction::kFromDevice, telemetry);
+    device.messages.back().polled = true;
+    device.messages.back().answers = question;
+  }
   for (const Layout& layout : {kGetVersion, kGetError, kAddress, kGetTorques, kGetIq, kGetPowers}) {
     add(layout, Direction::kFromDevice, 0);
   }

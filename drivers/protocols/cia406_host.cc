@@ -75,6 +75,8 @@ class Cia406Encoder : public Sensor {
     out.Push(Make(kNmt, node_, {kStart, double(node_)}));
   }
 
+  void LetJump(bool let) noexcept override { may_jump_ = let; }
+
   SensorState state() const noexcept override {
     return present_ || state_ == SensorState::kFault ? state_ : SensorState::kAbsent;
   }
@@ -105,8 +107,8 @@ class Cia406Encoder : public Sensor {
     Hear(now);
     if (state_ == SensorState::kFault) return SensorUse::kConsumed;
     const double raw = (*values)[0];
-    if (!tracking_) {
-      counts_ = raw;
+    if (!tracking_ || may_jump_) {
+      counts_ = std::remainder(raw, range_);
     } else {
       const double step = std::remainder(raw - raw_, range_);
       const int64_t dt = std::max(now - position_at_, period_);  // two may come at once after a delay
@@ -174,6 +176,7 @@ class Cia406Encoder : public Sensor {
   int64_t heard_at_ = 0, position_at_ = 0;
   int64_t retry_ = std::numeric_limits<int64_t>::min();
   bool told_ = false;      // its period, since Start
+  bool may_jump_ = false;
   bool tracking_ = false;  // raw_ and position_at_ are of the last position
   double raw_ = 0, counts_ = 0;
   EncoderReading reading_;

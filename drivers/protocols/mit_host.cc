@@ -135,6 +135,8 @@ class MitMotor : public Motor {
     return MakeCommand(command_, node_, {.torque = std::isfinite(torque) ? torque : 0});
   }
 
+  void LetJump(bool let) noexcept override { may_jump_ = let; }
+
   DriveState state() const noexcept override {
     if (!present_) return DriveState::kAbsent;
     if (fault_) return DriveState::kFault;
@@ -180,7 +182,7 @@ class MitMotor : public Motor {
       estimate_.position = raw;
       return;
     }
-    if (std::abs(step) > ranges_.velocity * (static_cast<double>(dt) * 1e-6 + kUneven)) {
+    if (!may_jump_ && std::abs(step) > ranges_.velocity * (static_cast<double>(dt) * 1e-6 + kUneven)) {
       Fail(now, "its position jumped by {:.3g} rad in {:.3g} ms: it has restarted, or lost its place", step,
            static_cast<double>(dt) * 1e-3);
       estimate_.position = raw;
@@ -212,6 +214,7 @@ class MitMotor : public Motor {
   bool given_ = false;          // the last Tick gave a frame
   bool may_run_ = false;        // told to run, and not known to have stopped since
   bool fault_ = false;
+  bool may_jump_ = false;
   Reason reason_;
 };
 

@@ -83,14 +83,23 @@ class Motor {
   virtual void Disarm(int64_t now) noexcept = 0;
   /// The drive's own emergency stop.
   virtual void Estop(int64_t now) noexcept = 0;
+  /// Whether the frame is somebody else's emergency stop for this drive, or for all.
+  virtual bool IsEstop(const Frame&) const noexcept { return false; }
   /// Once per cycle: deadlines, and the next frames of the sequence under way.
   /// @param may_arm false: no room for arming frames in this cycle, the sequence waits.
   virtual void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept = 0;
+  /// How many readings it asks for in turn: with telemetry that comes unasked, all drives' would sometimes come at once.
+  virtual int num_polled() const noexcept { return 0; }
+  /// The question for the next of them.
+  virtual void Poll(FrameBatch&) noexcept {}
   /// After each Tick. @param all whether the transport took all frames of that Tick. If not, they count as
   /// not sent, and the next Tick gives them again: no step follows one that did not happen.
   virtual void Transmitted(bool all, int64_t now) noexcept = 0;
   /// The frame of a torque setpoint [Nm]. Sent in every cycle while arming (zero) and armed.
   virtual Frame Torque(double torque) noexcept = 0;
+  /// Of a virtual robot only, which is put elsewhere at once between episodes: while true, a position that jumps is no
+  /// fault. A real one cannot jump.
+  virtual void LetJump(bool) noexcept {}
   /// Setpoints that the protocol could not say as they were: beyond its range, or not finite.
   virtual int64_t saturations() const noexcept { return 0; }
 

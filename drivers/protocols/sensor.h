@@ -22,7 +22,8 @@ enum class SensorState : int8_t {
   kFault = 3,     ///< it failed, and stays so until Start
 };
 
-/// Of an encoder, at its shaft. Turns are counted from the first reading after Start.
+/// Of an encoder, at its shaft. Turns are counted from the first reading after Start, which is within half a turn (or half
+/// the turns that it can tell apart) of 0.
 struct EncoderReading {
   double position = 0;                                         ///< [rad]
   double velocity = std::numeric_limits<double>::quiet_NaN();  ///< [rad/s]; NaN if it reports none
@@ -62,6 +63,9 @@ class Sensor {
   virtual void Start(int64_t now) noexcept = 0;
   /// Once per cycle: deadlines, and frames that make it send.
   virtual void Tick(int64_t now, FrameBatch& out) noexcept = 0;
+
+  /// See Motor::LetJump.
+  virtual void LetJump(bool) noexcept {}
 
   virtual SensorState state() const noexcept = 0;
   /// Why it is not running; empty if it is.

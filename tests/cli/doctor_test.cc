@@ -1,7 +1,14 @@
 #include "cli/doctor.h"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
+
+#include "common/lcm_url.h"
+#include "common/messenger.h"
+#include "common/signature.h"
+#include "tests/cli/shell.h"
 
 namespace plumb {
 namespace {
@@ -29,6 +36,57 @@ TEST_CASE("an LCM address that cannot be opened is bad") {
   CHECK(std::any_of(findings.begin(), findings.end(), [](const Finding& f) {
     return f.level == Finding::Level::kGood && f.what == "the bus loop:doctor_test opens";
   }));
+}
+
+Finding Signatures(const std::string& lcm_url, const std::string& key = {}) {
+  for (const Finding& finding : Examine(lcm_url, "loop:doctor_signatures", key)) {
+    if ((finding.what + finding.cure).find("sign") != std::string::npos ||
+        finding.what.find("key") != std::string::npos)
+      return finding;
+  }
+  return {};
+}
+
+TEST_CASE("whether commands are signed, and whether that will do") {
+  const std::string local = "udpm://239.255.76.67:17658?ttl=0", open = "udpm://239.255.76.67:17658?ttl=1";
+  // Unsigned on this machine alone is good; it is not alone where multicast comes in by another interface,
+  // too.
+  const Finding unsigned_here = Signatures(local);
+  const Messenger messenger(local);
+  const bool alone = OpenInterfaces(local).empty();
+  CHECK(unsigned_here.level == (alone ? Finding::Level::kGood : Finding::Level::kAdvice));
+  CHECK_THAT(unsigned_here.what, Catch::StartsWith("commands are not signed"));
+  if (!alone) CHECK_THAT(unsigned_here.what, Catch::Contains(OpenInterfaces(local)[0]));
+  const Finding unsigned_open = Signatures(open);
+  CHECK(unsigned_open.level == Finding::Level::kBad);
+  CHECK_THAT(unsigned_open.what, Catch::Contains("anybody on the network"));
+  CHECK_THAT(unsigned_open.cure, Catch::Contains("plumb key"));
+
+  const Folder folder;
+  const std::string key = folder / "key";
+  MakeKeyFile(key);
+  for (const std::string& url : {local, open}) {
+    const Finding with_key = Signatures(url, key);
+    CHECK(with_key.level == Finding::Level::kGood);
+    CHECK_THAT(with_key.what, Catch::StartsWith("commands are signed: " + key));
+  }
+  chmod(key.c_str(), 0644);
+  const Finding readable = Signatures(local, key);
+  CHECK(readable.level == Finding::Level::kBad);
+  CHECK_THAT(readable.what, Catch::Contains("mode 0644"));
+  CHECK_THAT(readable.cure, Catch::StartsWith("chmod 600 " + key));
+  CHECK(Signatures(local, folder / "absent").level == Finding::Level::kBad);
+}
+
+TEST_CASE("plumb key makes a key once") {
+  const Folder folder;
+  const Outcome first = Shell(Plumb() + "key " + (folder / "key")),
+                second = Shell(Plumb() + "key " + (folder / "key"));
+  CHECK(first.status == 0);
+  CHECK_NOTHROW(SigningKey(folder / "key"));
+  CHECK(second.status == 1);
+  CHECK_THAT(second.text, Catch::Contains("never replaced"));
+  CHECK(Shell(Plumb() + "key").status == 2);
 }
 
 }  // namespace

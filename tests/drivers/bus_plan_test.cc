@@ -248,5 +248,28 @@ TEST_CASE("the robots we ship fit their buses") {
   CHECK_THROWS_AS(MotorBusDevice(MotorDescription{"nonsense"}, DriverSettings{}), std::invalid_argument);
 }
 
+TEST_CASE("of what is asked for in turn one message waits at a time") {
+  // Ten devices with an answer of 135 us each, above a message that is due every millisecond.
+  const auto plan = [](bool polled) {
+    std::vector<BusDevice> devices;
+    for (uint32_t i = 0; i < 10; ++i) {
+      BusMessage answer = Message(cansimple::kGetTemperature, 0x10 + i, 100'000, 8);
+      answer.polled = polled;
+      devices.push_back({"drive" + std::to_string(i), "", {answer}, {}});
+    }
+    devices.push_back({"sensor", "", {Message(cansimple::kGetEncoderEstimates, 0x100, 1'000, 8)}, {}});
+    return PlanBus(devices, 1e6);
+  };
+  CHECK_THAT(plan(false).errors.at(0), Contains("'sensor'"));
+  CHECK(Response(plan(false), 0x100) == 11 * 135);
+  CHECK(plan(true).errors.empty());
+  CHECK(Response(plan(true), 0x100) == 2 * 135);
+  // The first and the last of them may both find the wire taken, and nothing above them.
+  CHECK(Response(plan(true), 0x10) == 2 * 135);
+  CHECK(Response(plan(true), 0x19) == 2 * 135);
+  // They are a load, every one of them.
+  CHECK(plan(true).worst_load == Approx(plan(false).worst_load));
+}
+
 }  // namespace
 }  // namespace plumb

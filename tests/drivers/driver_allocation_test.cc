@@ -9,7 +9,9 @@
 #include <cstdlib>
 #include <fstream>
 #include <new>
+#include <vector>
 
+#include "common/signature.h"
 #include "drivers/can/transport.h"
 #include "tests/drivers/rig.h"
 
@@ -40,6 +42,10 @@ namespace {
 
 TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothing") {
   Rig rig(3);
+  rig.robot.driver.stuck_after = 0.4;
+  rig.robot.driver.stop = DriverSettings::Stop::kRamp;
+  rig.robot.driver.ramp = 0.1;
+  rig.robot.joints[0].limits.effort_rate = 50;
   rig.Start();
   REQUIRE(rig.Arm(1));
   // The wire is a real transport, so that its Send and Receive are counted, too.
@@ -54,7 +60,7 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   for (int cycle = 0; cycle < 1000; ++cycle) {
     rig.now += 5000;
     FrameBatch batch;
-    for (CanSimpleDevice& drive : rig.drives) drive.Tick(rig.now, {0.1, 0.2}, batch);
+    for (CanSimpleDevice& drive : rig.drives) drive.Tick(rig.now, {cycle % 300 == 140 ? 5.0 : 0.1, 0}, batch);  // jumps
     drive_end->Send(batch.frames());
     command.utime = arm.utime = rig.utime();
     ++command.sequence;
@@ -92,6 +98,36 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   ::operator delete(::operator new(1));
   const long after = allocations;
   CHECK(after == before + 1);
+}
+
+TEST_CASE("judging signatures, and what comes of it, allocates nothing") {
+  const std::string file = "/tmp/driver_allocation_test." + std::to_string(getpid()) + ".key";
+  MakeKeyFile(file);
+  const SigningKey key(file);
+  unlink(file.c_str());
+  Rig rig;
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  const int64_t start = Rig::kEpoch;
+  Signer signer(key, "JOINT_COMMAND");
+  Verifier verifier(key, "JOINT_COMMAND", start);
+  joint_command_t command = rig.MakeCommand(1);
+  std::vector<uint8_t> encoding(static_cast<size_t>(command.getEncodedSize()));
+  long counted = 0, genuine = 0, forged = 0;
+  for (int i = 1; i <= 1000; ++i) {
+    signer.Sign(command, start + i);
+    command.encode(encoding.data(), 0, static_cast<int>(encoding.size()));
+    if (i % 3 == 0) encoding.back() ^= 1;
+    const long before = allocations;
+    const std::string_view refusal = verifier.Judge(encoding, start + i);
+    ++(refusal.empty() ? genuine : forged);
+    if (!refusal.empty()) rig.driver->OnForgedCommand(refusal);
+    if (!refusal.empty()) rig.driver->OnForgedArm(refusal);
+    counted += allocations - before;
+  }
+  CHECK(counted == 0);
+  CHECK(genuine == 667);
+  CHECK(forged == 333);
 }
 
 TEST_CASE("an open transport allocates nothing, faults or not") {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "tests/drivers/rig.h"
@@ -164,6 +165,30 @@ TEST_CASE("robots it cannot drive") {
   CHECK_THROWS_WITH(rig.Start(), Contains("telepathy") && Contains("cansimple"));
   rig.robot.joints[1].motor = {.protocol = "cansimple", .node = 63};
   CHECK_THROWS_WITH(rig.Start(), Contains("63"));
+}
+
+TEST_CASE("temperatures and supplies are asked for, one at a time") {
+  Rig rig(2);
+  rig.Start();
+  CHECK(std::isnan(rig.Status().motor_temperature[0]));
+  REQUIRE(rig.Arm(1));
+  std::map<std::string, int> asked;
+  for (int i = 0; i < 200; ++i) {
+    rig.Run(5);
+    int questions = 0;
+    for (const std::string& text : rig.Sent()) {
+      if (!text.ends_with("#R")) continue;
+      ++questions;
+      ++asked[text];
+    }
+    CHECK(questions <= 1);
+  }
+  CHECK(asked == std::map<std::string, int>{{"035#R", 10}, {"037#R", 10}, {"055#R", 10}, {"057#R", 10}});
+  for (size_t i = 0; i < 2; ++i) {
+    CHECK(rig.Status().motor_temperature[i] == 25);
+    CHECK(rig.Status().drive_temperature[i] == 25);
+    CHECK(rig.Status().bus_voltage[i] == 24);
+  }
 }
 
 }  // namespace

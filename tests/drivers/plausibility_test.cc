@@ -89,7 +89,7 @@ TEST_CASE("at rest small jumps are found, and a second device") {
           rig.now);
       CHECK(rig.Found(5) > 0);
       CHECK_THAT(std::string(rig.watch.complaint()),
-                 StartsWith("151 encoder estimates in ") && Contains("two devices with one id?"));
+                 StartsWith("151 encoder estimates in ") && Contains("two devices with one id"));
     }
   }
 }
@@ -175,8 +175,8 @@ TEST_CASE("the same bits under an effort are a stuck encoder") {
     Given joint(settings);
     for (int i = 0; i < 1000; ++i) {
       if (const std::string why = joint.Add(position(i), velocity(i), effort); !why.empty()) {
-        CHECK_THAT(why, StartsWith("encoder stuck, or the joint is blocked: position 0.5 and velocity") &&
-                            Contains(" the same for 100 ms at an effort of "));
+        CHECK_THAT(why, StartsWith("encoder stuck, or the joint is blocked: 0.5 at speed ") &&
+                            Contains(" for 100 ms under an effort of "));
         return i;
       }
     }
@@ -194,31 +194,26 @@ TEST_CASE("the same bits under an effort are a stuck encoder") {
   CHECK(after(2, half, zero) == -1);
 }
 
-TEST_CASE("a robot that is placed jumps where it should") {
+TEST_CASE("a joint that may jump") {
   Given joint(kSettings);
   for (int i = 0; i < 50; ++i) joint.Add(0, 0);
-  SECTION("told before") {
-    joint.watch.Place(joint.time, 3, 0.1);
-    CHECK(joint.Add(3.05, 1) == "");
-  }
-  SECTION("told afterwards, before anybody has looked") {
-    CHECK(joint.Add(3.05, 1) != "");
-    joint.watch.Place(joint.time, 3, 0.1);
-    CHECK(joint.watch.complaint() == "");
-  }
-  SECTION("by little") {
-    joint.watch.Place(joint.time, 0.05, 0.1);
-    for (int i = 0; i < 300; ++i) REQUIRE(joint.Add(0.05, 0) == "");
-  }
-  SECTION("elsewhere") {
-    joint.watch.Place(joint.time, 3, 0.1);
-    CHECK(joint.Add(2, 1) != "");
-  }
-  SECTION("too late") {
-    joint.watch.Place(joint.time, 3, 0.1);
-    for (int i = 0; i < 200; ++i) joint.Add(0, 0);
-    CHECK(joint.Add(3, 1) != "");
-  }
+  joint.watch.LetJump(true);
+  CHECK(joint.Add(3, 1) == "");
+  joint.watch.LetJump(false);
+  for (int i = 0; i < 300; ++i) REQUIRE(joint.Add(3, 0) == "");
+  CHECK(joint.Add(0, 0) != "");
+}
+
+TEST_CASE("a second device is remembered until it is gone") {
+  Given joint(kSettings);
+  for (int i = 0; i < 1000; ++i) joint.Add(0, 0, 0, 2'500);
+  CHECK(joint.watch.crowded());
+  joint.watch.Forgive();
+  for (int i = 0; i < 100; ++i) joint.Add(0, 0);
+  CHECK(joint.watch.complaint().empty());
+  CHECK(joint.watch.crowded());
+  for (int i = 0; i < 100; ++i) joint.Add(0, 0);
+  CHECK_FALSE(joint.watch.crowded());
 }
 
 }  // namespace

@@ -62,6 +62,7 @@ struct Rig {
         if (!to_driver || to_driver(frame)) driver->OnFrame(frame, now, utime());
       }
     }
+    if (driver_stopped) return;
     while (const joint_state_t* state = driver->NextState()) states.push_back(*state);
     if (now % 5000 != cycle_phase) return;
     if (commanding) Command(effort);
@@ -152,6 +153,7 @@ struct Rig {
   int64_t sequence = 0;
   bool commanding = false;
   bool bus_full = false;
+  bool driver_stopped = false;  ///< its process has been stopped: it hears, says and does nothing
   double effort = 0;
 };
 

@@ -18,7 +18,7 @@ Frame Foreign(const char* text) {
 TEST_CASE("a second master on the bus stops the robot within the cycle, and keeps it from being armed") {
   Rig rig(2);
   rig.Start();
-  const auto obeyed = GENERATE("02E#0000C03F", "04E#0000C03F00000000", "027#08000000", "02C#0000003F24FAFA00", "022#");
+  const auto obeyed = GENERATE("02E#0000C03F", "04E#0000C03F00000000", "027#08000000", "02C#0000003F24FAFA00");
   SECTION("armed") {
     REQUIRE(rig.Arm(1));
     rig.Run(50);
@@ -40,6 +40,26 @@ TEST_CASE("a second master on the bus stops the robot within the cycle, and keep
     rig.Request(driver_request_t::ARM);
     CHECK(rig.driver->state() == DriveState::kArming);
   }
+}
+
+TEST_CASE("an emergency stop that somebody sends on the bus is everybody's, and a person's") {
+  Rig rig(2);
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  rig.Run(50);
+  const auto frame = GENERATE("022#", "042#", "7E2#");  // to one drive, to the other, to all
+  rig.driver->OnFrame(Foreign(frame), rig.now, rig.utime());
+  CHECK(rig.driver->state() == DriveState::kFault);
+  CHECK(rig.Reason() == "emergency stop from the bus");
+  CHECK(rig.Status().stopped_by_request);
+  rig.Run(50);
+  for (const CanSimpleDevice& drive : rig.drives) {
+    CHECK_FALSE(drive.armed());
+    CHECK(drive.disarm_reason() == cansimple::kEstopRequested);
+  }
+  rig.Run(1000);
+  CHECK(rig.driver->state() == DriveState::kFault);
+  CHECK(rig.Arm(1));
 }
 
 TEST_CASE("the transport is asked to tell another's commands from ours, for every drive") {

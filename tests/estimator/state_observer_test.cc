@@ -62,17 +62,17 @@ TEST_CASE("jumps of time restart it, repeated times and rubbish are refused") {
   for (int i = 0; i < 10; ++i) observer.OnJointState(Measured(i, 0));
   joint_state_t m = Measured(10, 0);
   SECTION("backwards") {
-    m.utime = 500'000;
+    m.utime = m.measured[0] = 500'000;
     REQUIRE(observer.OnJointState(m));
     CHECK(observer.state().restarted);
   }
   SECTION("far forwards") {
-    m.utime += 2'000'000;
+    m.measured[0] = m.utime += 2'000'000;
     REQUIRE(observer.OnJointState(m));
     CHECK(observer.state().restarted);
   }
   SECTION("a lost message is bridged") {
-    m.utime += 5000;
+    m.measured[0] = m.utime += 5000;
     REQUIRE(observer.OnJointState(m));
     CHECK_FALSE(observer.state().restarted);
   }
@@ -94,6 +94,18 @@ TEST_CASE("jumps of time restart it, repeated times and rubbish are refused") {
     m.num_joints = 2;
     m.position = m.velocity = {0, 0};
     CHECK_FALSE(observer.OnJointState(m));
+  }
+  SECTION("a joint measured in the future, or too long ago") {
+    for (const int64_t measured : {m.utime + 10'001, m.utime - 1'100'000, std::numeric_limits<int64_t>::min()}) {
+      m.measured[0] = measured;
+      CHECK_FALSE(observer.OnJointState(m));
+    }
+  }
+  SECTION("an old reading is not used twice") {
+    m.measured[0] -= 5000;
+    m.position[0] = 1;  // whatever it says: this is the reading of before
+    REQUIRE(observer.OnJointState(m));
+    CHECK(observer.state().q[0] == Approx(0).margin(1e-9));
   }
   SECTION("an unknown effort is not a reason to stop") {
     m.effort_applied[0] = std::numeric_limits<double>::quiet_NaN();

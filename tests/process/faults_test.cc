@@ -87,7 +87,7 @@ TEST_CASE("a killed driver: the drive's own watchdog ends it") {
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 5));
   CHECK(stage.last_torque_time <= killed + kSlack);
   // A driver that is started beside a running controller does not arm, and takes no old command for a new one.
-  stage.Start("plumb-driver", {"--bus", stage.bus_url});
+  stage.Start("plumb-driver", {"--bus", stage.bus_url, "--virtual"});
   stage.Listen(1.5);
   CHECK(stage.axis_state == kIdle);
   CHECK(stage.last_torque_time <= killed + kSlack);

@@ -9,12 +9,14 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/child.h"
 #include "common/clock.h"
 #include "common/messenger.h"
+#include "common/signature.h"
 #include "controller/policy.h"
 #include "drivers/can/transport.h"
 #include "plumb/controller_status_t.hpp"
@@ -70,14 +72,28 @@ class Stage {
     children.erase(name);
     return *children.emplace(name, std::make_unique<Child>(name, arguments, folder / (name + ".log"))).first->second;
   }
+  void StartDriver() {
+    std::vector<std::string> arguments{"--bus", bus_url, "--virtual", "--flight-recorder", folder / "faults"};
+    arguments.insert(arguments.end(), key_arguments_.begin(), key_arguments_.end());
+    Start("plumb-driver", arguments);
+  }
   void StartRobotAndDriver() {
     Start("plumb-robot", {"--bus", bus_url, "--seed", "1"});
-    Start("plumb-driver", {"--bus", bus_url, "--flight-recorder", folder / "faults"});
+    StartDriver();
   }
   void StartAll() {
     StartRobotAndDriver();
     Start("plumb-estimator");
-    Start("plumb-controller");
+    Start("plumb-controller", key_arguments_);
+  }
+  /// From now on the driver wants, and the controller and Request give, signatures with a new key. @return
+  /// its file.
+  std::filesystem::path UseKey() {
+    const std::filesystem::path file = folder / "key";
+    MakeKeyFile(file);
+    key_arguments_ = {"--key", file};
+    signer_.emplace(SigningKey(file), "DRIVER_REQUEST");
+    return file;
   }
   std::string Log(const std::string& name) { return children.at(name)->Tail(20); }
 
@@ -104,6 +120,7 @@ class Stage {
     driver_request_t request{};
     request.utime = RealUtime();
     request.request = what;
+    if (signer_) signer_->Sign(request, RealUtime());
     requests_.Publish(request);
   }
   /// Deliberately arms, as a person would: again if it was too early. @return whether it is armed.
@@ -178,6 +195,8 @@ class Stage {
  private:
   void Witness();
 
+  std::vector<std::string> key_arguments_;
+  std::optional<Signer> signer_;
   Publisher<driver_request_t> requests_;
   Publisher<policy_t> policies_;
 };

@@ -8,11 +8,14 @@
 
 namespace plumb {
 
-/// A file of robots/pendulum.
-inline RobotDescription LoadPendulum(const std::string& file) {
+/// A file of the source tree.
+inline std::string SourceFile(const std::string& file) {
   const char* source = std::getenv("PLUMBLINE_SOURCE");
-  return LoadRobot(std::string(source ? source : ".") + "/robots/pendulum/" + file);
+  return std::string(source ? source : ".") + "/" + file;
 }
+
+/// A file of robots/pendulum.
+inline RobotDescription LoadPendulum(const std::string& file) { return LoadRobot(SourceFile("robots/pendulum/" + file)); }
 
 /// A two-armed tree in space: slide on the base, two links in series on it, and one more arm on the base;
 /// axes and frames askew, so that no term of the equations of motion vanishes. Settings from the pendulum.

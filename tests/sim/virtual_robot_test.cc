@@ -8,6 +8,8 @@
 #include <optional>
 
 #include "common/random.h"
+#include "drivers/protocols/cansimple.h"
+#include "sim/plant.h"
 #include "sim/simulator.h"
 #include "sim/parameters.h"
 #include "tests/sim/robots.h"
@@ -39,7 +41,7 @@ struct Bench {
          at);
     Send(Make(cansimple::kSetInputTorque, kNode, {0}), at);
     Send(Make(cansimple::kSetAxisState, kNode, {cansimple::kClosedLoopControl}), at);
-    REQUIRE(robot.drives()[0].armed());
+    REQUIRE(robot.devices()[0]->armed());
   }
   /// Values of the messages of this layout that have been sent.
   std::vector<FieldValues> Sent(const Layout& layout) const {
@@ -156,17 +158,10 @@ TEST_CASE("without setpoints the watchdog stops the torque on time, though the p
                107'000);  // when the watchdog expires
   sleeping.Advance(150'000);
   stopped.Advance(150'000);
-  CHECK_FALSE(sleeping.robot.drives()[0].armed());
-  CHECK(sleeping.robot.drives()[0].disarm_reason() == cansimple::kWatchdogTimerExpired);
+  CHECK_FALSE(sleeping.robot.devices()[0]->armed());
+  CHECK(sleeping.robot.devices()[0]->disarm_reason() == cansimple::kWatchdogTimerExpired);
   CHECK(sleeping.robot.q()[0] == Approx(stopped.robot.q()[0]).epsilon(1e-12));
   CHECK(sleeping.robot.q()[0] != 0);
-}
-
-TEST_CASE("a joint without a motor is refused by its name: nothing would measure it") {
-  RobotDescription description = Pendulum();
-  description.joints[0].passive = true;
-  description.joints[0].motor = {};
-  CHECK_THROWS_WITH(Bench(description), Catch::Contains("'pivot' has no motor") && Catch::Contains("measures it"));
 }
 
 TEST_CASE("a placing wish is granted once, and only a sane one") {
@@ -205,7 +200,7 @@ TEST_CASE("after a gap in time the drives have rebooted and the robot is where i
     const double before = bench.robot.q()[0];
     bench.Advance(jump);
     CHECK(bench.robot.q()[0] == before);
-    CHECK_FALSE(bench.robot.drives()[0].armed());
+    CHECK_FALSE(bench.robot.devices()[0]->armed());
     CHECK(bench.robot.time() == kStart + jump);
     bench.out.Clear();
     bench.Advance(jump + 20'000);
@@ -249,8 +244,8 @@ TEST_CASE("garbage on the bus moves nothing") {
     bench.Send(frame, t);
     for (const Frame& answer : bench.out.frames()) REQUIRE(IsWellFormed(answer));
   }
-  CHECK(bench.robot.drives()[0].Torque() == 0);
-  CHECK(bench.robot.drives()[0].rejected() > 100);
+  CHECK(bench.robot.devices()[0]->Effort() == 0);
+  CHECK(bench.robot.devices()[0]->rejected() > 100);
   CHECK(bench.robot.q().allFinite());
 }
 
@@ -266,9 +261,9 @@ TEST_CASE("equal seeds and frames give equal robots to the bit") {
 
 TEST_CASE("a protocol without a virtual drive is refused") {
   RobotDescription description = Pendulum();
-  description.joints[0].motor.protocol = "mit";
+  description.joints[0].motor.protocol = "dynamixel";
   CHECK_THROWS_WITH(VirtualRobot(description, HiddenParameters(description, 1), kStart),
-                    Catch::Contains("cansimple"));
+                    Catch::Contains("'pivot'") && Catch::Contains("known: cansimple, mit"));
 }
 
 }  // namespace plumb

@@ -1,0 +1,115 @@
+// What may go wrong in a drive, or in the process that drives it.
+
+#include <catch2/catch.hpp>
+
+#include "tests/drivers/fault.h"
+
+namespace plumb {
+namespace {
+
+using Catch::Matchers::Contains;
+
+bool FromKnee(const Frame& frame) { return frame.id >> 5 == 2; }
+
+TEST_CASE("fault 1: a drive falls silent", "[fault]") {
+  ExpectStop({.number = "1",
+              .name = "a drive falls silent",
+              .detection = "no encoder estimate for `stale_after`",
+              .happens = [](BusRig& rig) { rig.silent = FromKnee; },
+              .is_over = [](BusRig& rig) { rig.silent = BusRig::Nothing; },
+              .reason = "knee1: no encoder estimate for 5",
+              .within = 60});
+}
+
+TEST_CASE("fault 2: a drive goes idle and reports no error", "[fault]") {
+  ExpectStop({.number = "2",
+              .name = "a drive goes idle and reports no error",
+              .detection = "the state in its heartbeat",
+              .happens = [](BusRig& rig) { rig.drives[1].OnFrame(*FrameFromText("047#01000000"), rig.now); },
+              .reason = "knee1: the drive went to IDLE: no error",
+              .within = 25});
+}
+
+TEST_CASE("fault 3: a drive's watchdog expires", "[fault]") {
+  ExpectStop({.number = "3",
+              .name = "torques do not reach a drive",
+              .detection = "its watchdog; error and state in its heartbeat",
+              .happens = [](BusRig& rig) { rig.deaf = [](const Frame& frame) { return frame.id == 0x4E; }; },
+              .is_over = [](BusRig& rig) { rig.deaf = BusRig::Nothing; },
+              .reason = "knee1: the drive went to IDLE: watchdog timer expired",
+              .within = 130});
+}
+
+TEST_CASE("fault 4: the driver's process stands still", "[fault]") {
+  ExpectStop({.number = "4",
+              .name = "the driver's process stands still or dies",
+              .detection = "the drives' watchdogs; when it goes on, their heartbeats",
+              .happens =
+                  [](BusRig& rig) {
+                    const joint_command_t old = rig.MakeCommand(2);
+                    rig.StopDriver(200);
+                    rig.driver->OnCommand(old, rig.now, rig.utime());  // that had waited for it
+                  },
+              .reason = "pivot: the drive went to IDLE: watchdog timer expired",
+              .within = 105});
+}
+
+TEST_CASE("fault 4: the driver's process stands still for a shorter time than the watchdog", "[fault]") {
+  ExpectToRunOn({.number = "4",
+                 .name = "it stands still for less than the watchdog and `stale_after`",
+                 .detection = "DRIVER_STATUS.overruns",
+                 .happens = [](BusRig& rig) { rig.StopDriver(40); },
+                 .within = 50});
+}
+
+TEST_CASE("fault 11: an idle drive with the same node id joins", "[fault]") {
+  const auto heartbeat = [](BusRig& rig) {
+    rig.each_millisecond.push_back([&rig] {
+      if (rig.now % 20'000 == 7000) rig.StrangerSends("041#0000000001000000");
+    });
+  };
+  ExpectStop({.number = "11",
+              .name = "another drive, idle, has the same node id",
+              .detection = "heartbeats that say something else",
+              .happens = heartbeat,
+              .is_over = [](BusRig& rig) { rig.each_millisecond.clear(); },
+              .reason = "knee1: the drive went to IDLE: no error",
+              .within = 30});
+}
+
+TEST_CASE("fault 12: a drive restarts", "[fault]") {
+  ExpectStop(
+      {.number = "12",
+       .name = "a drive loses its power and restarts elsewhere",
+       .detection =
+           "no encoder estimate for `stale_after`; then silence, IDLE and a jump: \"home the joint anew\"",
+       .happens =
+           [](BusRig& rig) {
+             rig.drives[1].Reboot(rig.now);
+             rig.silent = FromKnee;
+             rig.Run(300);
+             rig.silent = BusRig::Nothing;
+             rig.samples[1].position += 0.4;
+           },
+       .is_over =
+           [](BusRig& rig) {
+             CHECK_THAT(rig.Status().joint_reason[1],
+                        Contains("restarted") && Contains("home the joint anew"));
+           },
+       .reason = "knee1: no encoder estimate for 5",
+       .within = 60});
+}
+
+TEST_CASE("fault 13: heartbeats stay away, encoder estimates do not", "[fault]") {
+  ExpectStop(
+      {.number = "13",
+       .name = "a drive's heartbeats stay away, its encoder estimates do not",
+       .detection = "no heartbeat for `heartbeat_timeout`",
+       .happens = [](BusRig& rig) { rig.silent = [](const Frame& frame) { return frame.id == 0x41; }; },
+       .is_over = [](BusRig& rig) { rig.silent = BusRig::Nothing; },
+       .reason = "knee1: no heartbeat for 50",
+       .within = 510});
+}
+
+}  // namespace
+}  // namespace plumb
