@@ -60,7 +60,7 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   for (int cycle = 0; cycle < 1000; ++cycle) {
     rig.now += 5000;
     FrameBatch batch;
-    for (CanSimpleDevice& drive : rig.drives) drive.Tick(rig.now, {cycle % 300 == 140 ? 5.0 : 0.1, 0}, batch);  // jumps
+    for (CanSimpleDevice& drive : rig.drives) drive.Tick(rig.now, {cycle % 300 == 140 ? 5.0 : 0.0, 0}, batch);  // jumps
     drive_end->Send(batch.frames());
     command.utime = arm.utime = rig.utime();
     ++command.sequence;
