@@ -116,7 +116,7 @@ std::string_view Verifier::Judge(std::span<const uint8_t> encoding, int64_t real
   const auto signed_at = static_cast<int64_t>(counter);
   if (signed_at <= newest_) return "signed, but a repetition, or from before the driver's start";
   // One from far ahead would make void all that come after it.
-  if (signed_at < real_utime - kClockError) return "signed too long ago: are the clocks the same?";
+  if (signed_at < real_utime - kOldest) return "signed too long ago: are the clocks the same?";
   if (signed_at > real_utime + kClockError) return "signed in the future: are the clocks the same?";
   newest_ = signed_at;
   return {};

@@ -74,16 +74,17 @@ class Signer {
 /// construction. Not thread-safe.
 class Verifier {
  public:
-  /// How far the clocks of sender and receiver may be apart, the message's way included [us].
-  static constexpr int64_t kClockError = 1'000'000;
+  static constexpr int64_t kOldest =
+      10'000'000;  ///< age at which a message is void, however it was held up [us]
+  static constexpr int64_t kClockError = 1'000'000;  ///< that the sender's clock may be ahead of ours [us]
 
   /// @param start real time of the receiver's start [us]: what was signed before it is for an earlier run.
   Verifier(const SigningKey& key, std::string channel, int64_t start)
       : key_(key), channel_(std::move(channel)), newest_(start) {}
 
   /// @param encoding the message as it was received. @param real_utime real time, not scaled [us].
-  /// @return why it must not be obeyed, a literal; empty if it was signed with the key within the last
-  /// kClockError, and later than every one that has been accepted before.
+  /// @return why it must not be obeyed, a literal; empty if it was signed with the key, is no older than
+  /// kOldest, and was signed later than every one that has been accepted before.
   std::string_view Judge(std::span<const uint8_t> encoding, int64_t real_utime) noexcept;
 
  private:

@@ -1,5 +1,7 @@
 #include "drivers/protocols/cansimple_host.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -85,7 +87,7 @@ class CanSimpleMotor : public Motor {
       Fail(now, "no heartbeat for {} ms", (now - heartbeat_) / 1000);
     }
     const auto& firmware = reports_.firmware();
-    if (step_ == Step::kVersion && firmware && Spoken(*firmware)) Enter(Step::kClear, now);
+    if (step_ == Step::kVersion && present_ && firmware && Spoken(*firmware)) Enter(Step::kClear, now);
     const bool late = now - entered_ >= timing_.heartbeat_timeout;
     switch (step_) {
       case Step::kRest:
@@ -93,11 +95,13 @@ class CanSimpleMotor : public Motor {
         if (present_ && axis_state_ == kClosedLoopControl) Disarm(now);
         break;
       case Step::kVersion:
-        if (firmware) {
+        if (firmware && !Spoken(*firmware)) {
           Fail(now, "its firmware is {}.{}, this driver speaks 0.6", firmware->major, firmware->minor);
+        } else if (late && firmware) {
+          Fail(now, "it answers, but sends no heartbeat");
         } else if (late) {
           Fail(now, "it does not answer Get_Version (firmware older than 0.6?)");
-        } else if (may_arm && Retry(now)) {
+        } else if (!firmware && may_arm && Retry(now)) {
           out.Push(MakeRequest(kGetVersion, node_));
         }
         break;
@@ -150,7 +154,13 @@ class CanSimpleMotor : public Motor {
     }
   }
 
-  Frame Torque(double torque) noexcept override { return Make(kSetInputTorqueShort, node_, {torque}); }
+  Frame Torque(double torque) noexcept override {
+    const Field& field = kSetInputTorqueShort.fields[0];
+    if (!field.Holds(torque)) ++saturations_;
+    if (!std::isfinite(torque)) torque = 0;
+    return Make(kSetInputTorqueShort, node_, {std::clamp(torque, field.lowest(), field.highest())});
+  }
+  int64_t saturations() const noexcept override { return saturations_; }
 
   DriveState state() const noexcept override {
     if (!present_) return DriveState::kAbsent;
@@ -264,6 +274,7 @@ class CanSimpleMotor : public Motor {
   bool estop_due_ = false;                   // no Estop was accepted since it was asked for
   bool ask_error_ = false, fault_ = false;
   size_t poll_turn_ = 0;
+  int64_t saturations_ = 0;
   Reason reason_;
 };
 

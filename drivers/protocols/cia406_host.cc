@@ -53,23 +53,25 @@ class Cia406Encoder : public Sensor {
     state_ = SensorState::kStarting;
     reason_.Clear();
     retry_ = now;
-    told_ = false;
+    agreed_ = false;
   }
 
   void Tick(int64_t now, FrameBatch& out) noexcept override {
     present_ = heard_ && now - heard_at_ <= timing_.timeout;
     if (state_ == SensorState::kRunning && now - position_at_ > timing_.timeout) {
       // What it has turned by then can still be counted, if it is not too long.
-      if (!present_)
+      if (!present_) {
         state_ = SensorState::kStarting;
-      else
+        agreed_ = false;
+      } else {
         Fail("it is there, but has sent no position for {} ms", (now - position_at_) / 1000);
+      }
     }
-    // One that is sending already may do so with another period.
-    const bool tell = state_ == SensorState::kStarting || (state_ == SensorState::kRunning && !told_);
+    // One that is sending already may do so with another period: a stopped one, say, is started by what we send, but
+    // has no SDO until then.
+    const bool tell = state_ == SensorState::kStarting || (state_ == SensorState::kRunning && !agreed_);
     if (!tell || now < retry_ || out.room() < 2) return;
     retry_ = now + kRetry;
-    told_ = true;
     out.Push(Make(kSdoRequest, node_,
                   {kWrite2, double(kPdoParameter), double(kEventTimer), double(event_timer_)}));
     out.Push(Make(kNmt, node_, {kStart, double(node_)}));
@@ -140,6 +142,7 @@ class Cia406Encoder : public Sensor {
     if (state == kBootUp) {
       if (state_ == SensorState::kRunning) Fail("it has restarted");
       retry_ = now;
+      agreed_ = false;
     } else if (state != kOperational && state_ == SensorState::kRunning) {
       Fail("it went to NMT state {:#04x}", state);
     }
@@ -158,7 +161,9 @@ class Cia406Encoder : public Sensor {
     const auto values = DecodePayload(kSdoAnswer, frame);
     if (!values) return SensorUse::kRejected;
     const bool mine = (*values)[1] == kPdoParameter && (*values)[2] == kEventTimer;
-    if (mine && static_cast<int>((*values)[0]) == kAbort && state_ == SensorState::kStarting) {
+    if (!mine || agreed_) return SensorUse::kConsumed;
+    agreed_ = static_cast<int>((*values)[0]) == kWritten;
+    if (static_cast<int>((*values)[0]) == kAbort) {
       Fail("it refuses to send every {} ms (SDO abort {:#010x})", event_timer_,
            static_cast<uint32_t>((*values)[3]));
     }
@@ -175,8 +180,8 @@ class Cia406Encoder : public Sensor {
   bool heard_ = false, present_ = false;  // ever, lately
   int64_t heard_at_ = 0, position_at_ = 0;
   int64_t retry_ = std::numeric_limits<int64_t>::min();
-  bool told_ = false;      // its period, since Start
   bool may_jump_ = false;
+  bool agreed_ = false;    // it has said that it sends with our period, since Start
   bool tracking_ = false;  // raw_ and position_at_ are of the last position
   double raw_ = 0, counts_ = 0;
   EncoderReading reading_;

@@ -10,11 +10,15 @@ namespace {
 using namespace mit;
 
 // As the firmware does it: single precision, towards zero, and no look at the range. What is beyond 16 bits
-// is lost; velocity and torque would spill over into their neighbours, from which we refrain.
+// is lost; velocity and torque would spill over into their neighbours, from which we refrain. Its processor makes
+// of too large a number the largest integer, and of not-a-number 0.
 uint32_t Truncate(const Field& field, double value) {
   const auto least = static_cast<float>(field.lowest()), most = static_cast<float>(field.highest());
   const float code = (static_cast<float>(value) - least) * static_cast<float>(field.mask()) / (most - least);
-  if (field.bits == 16) return static_cast<uint32_t>(static_cast<int64_t>(std::floor(code))) & 0xFFFF;
+  if (std::isnan(code)) return 0;
+  if (field.bits == 16) {
+    return static_cast<uint32_t>(static_cast<int64_t>(std::floor(std::clamp(code, -0x1p31f, 0x1p31f)))) & 0xFFFF;
+  }
   return static_cast<uint32_t>(std::clamp(code, 0.f, static_cast<float>(field.mask())));
 }
 
@@ -79,6 +83,7 @@ double MitDevice::Torque(const Sample& sample) const noexcept {
   if (!armed_ || error_ != kNoError) return 0;
   const double torque = setpoint_.kp * (setpoint_.position - (sample.position - zero_)) +
                         setpoint_.kd * (setpoint_.velocity - sample.velocity) + setpoint_.torque;
+  if (std::isnan(torque)) return 0;  // where a simulation has come apart
   return std::clamp(torque, -settings_.ranges.torque, settings_.ranges.torque);
 }
 

@@ -74,7 +74,10 @@ class MitMotor : public Motor {
   void Disarm(int64_t now) noexcept override { Enter(Step::kDisarming, now); }
 
   // The protocol has no emergency stop but this.
-  void Estop(int64_t now) noexcept override { Fail(now, "emergency stop requested"); }
+  void Estop(int64_t now) noexcept override {
+    Fail(now, "emergency stop requested");
+    Disarm(now);
+  }
 
   void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept override {
     const size_t before = out.size();
@@ -170,7 +173,8 @@ class MitMotor : public Motor {
   void Fail(int64_t now, fmt::format_string<Args...> format, Args&&... args) noexcept {
     reason_.Set(format, std::forward<Args>(args)...);
     fault_ = true;
-    Disarm(now);
+    // To begin anew with every fault would never come to an end where faults keep coming.
+    if (Arming() || step_ == Step::kArmed) Disarm(now);
   }
 
   /// @param raw [rad] position of a reply. @param dt [us] since the one before, -1 = too long ago to count

@@ -95,7 +95,8 @@ class Motor {
   /// After each Tick. @param all whether the transport took all frames of that Tick. If not, they count as
   /// not sent, and the next Tick gives them again: no step follows one that did not happen.
   virtual void Transmitted(bool all, int64_t now) noexcept = 0;
-  /// The frame of a torque setpoint [Nm]. Sent in every cycle while arming (zero) and armed.
+  /// The frame of a torque setpoint [Nm]. Sent in every cycle while arming (zero) and armed. Whatever the number,
+  /// it is a setpoint a drive can obey: 0 for one that is not finite, the nearest for one beyond its range.
   virtual Frame Torque(double torque) noexcept = 0;
   /// Of a virtual robot only, which is put elsewhere at once between episodes: while true, a position that jumps is no
   /// fault. A real one cannot jump.

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "drivers/protocols/cansimple_device.h"
 #include "drivers/protocols/cansimple_host.h"
@@ -143,6 +144,33 @@ TEST_CASE("what is no restart") {
     }
     CHECK(bench.motor->state() == DriveState::kIdle);
   }
+}
+
+TEST_CASE("a drive that sends no heartbeat is asked who it is, and told nothing else") {
+  Bench bench;
+  bench.tap = [](const Frame& frame) { return frame.id != 0x021; };
+  bench.motor->Arm(bench.now);
+  bench.Run(499);
+  CHECK(bench.motor->identity() == "firmware 0.6.10, hardware 4.4.58");
+  CHECK(bench.motor->state() == DriveState::kAbsent);
+  CHECK(bench.drive.control_mode() == cansimple::kPositionControl);  // as it was when its power came on
+  bench.Run(2);
+  CHECK(bench.Reason() == "it answers, but sends no heartbeat");
+  CHECK_FALSE(bench.drive.armed());
+}
+
+TEST_CASE("whatever the torque, the setpoint is one that a drive can obey") {
+  Bench bench;
+  const auto text = [&](double torque) { return ToText(bench.motor->Torque(torque)); };
+  using Limits = std::numeric_limits<double>;
+  CHECK(text(1.5) == "02E#0000C03F");
+  CHECK(bench.motor->saturations() == 0);
+  CHECK(text(Limits::quiet_NaN()) == "02E#00000000");
+  CHECK(text(Limits::infinity()) == "02E#00000000");
+  CHECK(text(-Limits::infinity()) == "02E#00000000");
+  CHECK(text(1e300) == "02E#FFFF7F7F");  // the largest finite binary32
+  CHECK(text(-1e300) == "02E#FFFF7FFF");
+  CHECK(bench.motor->saturations() == 5);
 }
 
 TEST_CASE("a fault is asked about") {

@@ -99,6 +99,23 @@ TEST_CASE("an encoder is told its period and to start, and then read") {
   CHECK(bench.sensor->imu() == nullptr);
 }
 
+TEST_CASE("one that sends too seldom is told its period until it says that it has it") {
+  Bench bench;
+  // Somebody has given it 50 ms, and stopped it: it starts when it is told to, but does not hear its period before.
+  bench.device.OnFrame(*FrameFromText("601#2B00180532000000"), bench.now);
+  bench.device.OnFrame(*FrameFromText("000#0201"), bench.now);
+  bench.tap = [](const Frame& frame) { return frame.id != 0x701 && frame.id != 0x581; };
+  bench.Run(1);
+  bench.tap = nullptr;
+  bench.Run(700);
+  CHECK(bench.sensor->state() == SensorState::kRunning);
+  bench.readings = 0;
+  bench.sent.clear();
+  bench.Run(1000);
+  CHECK(bench.readings == 500);
+  CHECK(bench.sent.empty());
+}
+
 TEST_CASE("one that was there before, and one that comes later") {
   Bench bench;
   bench.tap = [](const Frame&) { return false; };

@@ -267,6 +267,22 @@ TEST_CASE("the first exit may be lost: the motor does not count as idle before t
   CHECK(bench.motor->confirmed_idle());
 }
 
+TEST_CASE("a motor whose position keeps jumping is told to exit, and believed") {
+  Bench bench;
+  REQUIRE(bench.Arm());
+  bench.sample.velocity = 600;  // twelve times what its range says
+  bench.Run(100);
+  CHECK(bench.motor->state() == DriveState::kFault);
+  CHECK_THAT(std::string(bench.motor->reason()), Contains("its position jumped"));
+  CHECK_FALSE(bench.device.armed());
+  CHECK(bench.motor->confirmed_idle());
+  bench.motor->Estop(bench.now);
+  const int exits = bench.Count(mit::kExit);
+  bench.Run(100);
+  CHECK(bench.Count(mit::kExit) >= exits + 2);
+  CHECK(bench.motor->confirmed_idle());
+}
+
 TEST_CASE("an emergency stop exits and says so") {
   Bench bench;
   CHECK(bench.Arm());

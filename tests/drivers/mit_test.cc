@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 #include <cstring>
 #include <optional>
 
@@ -107,6 +108,15 @@ TEST_CASE("the virtual motor replies with the firmware's bytes") {
   CHECK(reply(50, 18, {}, {0, 0}, 8).substr(16) == "1900");
   // Beyond the range the position goes round.
   CHECK(reply(50, 18, {}, {12.5 + 25. / 65535 * 1.5, 0}, 6).substr(0, 10) == "000#010000");
+  // A simulation that has come apart: numbers as the firmware's processor converts them, and no torque of them.
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  CHECK(reply(50, 18, {.kp = 1}, {nan, nan}, 6) == "000#010000000000");
+  CHECK(reply(50, 18, {}, {1e300, 1e300}, 6).substr(0, 13) == "000#010000FFF");
+  MitDevice motor({.node = 1, .master = 0, .ranges = Ranges(50, 18)});
+  motor.OnFrame(MakeSpecial(1, kEnter), 0);
+  motor.OnFrame(MakeCommand(CommandLayout(Ranges(50, 18)), 1, {.kp = 1}), 0);
+  CHECK(motor.Torque({nan, 0}) == 0);
+  CHECK(motor.Torque({-1e300, 0}) == 18);
 }
 
 TEST_CASE("every position, velocity, gain and torque code can be sent and comes back") {

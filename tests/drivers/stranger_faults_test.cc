@@ -32,19 +32,19 @@ TEST_CASE("fault 14: another master", "[fault]") {
 TEST_CASE("fault 15: an Estop from somebody else", "[fault]") {
   ExpectStop({.number = "15",
               .name = "somebody else sends a drive an Estop",
-              .detection = "as 14; that drive obeys at once",
+              .detection = "an Estop that is not ours; that drive obeys at once",
               .happens = [](BusRig& rig) { rig.StrangerSends("042#"); },
-              .reason = "second master: somebody else sends frame 0x042 to the drives",
+              .reason = "emergency stop from the bus",
               .within = 6});
 }
 
 TEST_CASE("fault 15: a broadcast Estop", "[fault]") {
   ExpectStop({.number = "15",
               .name = "somebody else sends all drives an Estop (broadcast)",
-              .detection = "error and state in their heartbeats; they obey at once",
+              .detection = "an Estop that is not ours; they obey at once",
               .happens = [](BusRig& rig) { rig.StrangerSends("7E2#"); },
-              .reason = "pivot: the drive went to IDLE: estop requested",
-              .within = 25});
+              .reason = "emergency stop from the bus",
+              .within = 6});
 }
 
 TEST_CASE("fault 16: the real-time clock is set", "[fault]") {

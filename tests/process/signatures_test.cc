@@ -11,6 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Catch::Contains;
+using Catch::StartsWith;
 
 constexpr int kIdle = 1;  // CANSimple axis state
 
@@ -71,7 +72,7 @@ struct Recorder {
 };
 
 TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping needs no key") {
-  Stage stage(50);
+  Stage stage(80);
   const fs::path key = stage.UseKey();
   stage.RunWithTorque();
   CHECK(stage.drivers.newest().commands_signed);
@@ -119,13 +120,17 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
 
   // Alone, the stranger is heard and not obeyed, and the driver says so.
   stage.children.at("plumb-controller")->Signal(SIGSTOP);
-  REQUIRE(stage.WaitUntil(
-      [&] {
-        stranger.Command();
-        return stage.drivers.newest().state == driver_status_t::FAULT;
-      },
-      5));
-  CHECK_THAT(stage.drivers.newest().reason, Contains("commands refused: not signed with the driver's key"));
+  const auto refused = [&] { return stage.drivers.newest().reason.rfind("commands refused", 0) == 0; };
+  for (int attempt = 0; attempt < 5 && !refused(); ++attempt) {  // a busy machine stops it for other reasons, too
+    REQUIRE(stage.Arm());
+    REQUIRE(stage.WaitUntil(
+        [&] {
+          stranger.Command();
+          return stage.drivers.newest().state == driver_status_t::FAULT;
+        },
+        5));
+  }
+  CHECK_THAT(stage.drivers.newest().reason, StartsWith("commands refused: not signed with the driver's key"));
   stage.children.at("plumb-controller")->Signal(SIGCONT);
   REQUIRE(stage.Arm());
   CHECK_THAT(Output(stage, {"plumb", "estop", "--lcm-url", stage.lcm_url}, false),
@@ -134,12 +139,12 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
 }
 
 TEST_CASE("what was recorded is worth nothing, to the same driver and to one that is started again") {
-  Stage stage(51);
+  Stage stage(81);
   stage.UseKey();
   Recorder recorder(stage);
   stage.RunWithTorque();
+  REQUIRE(stage.WaitUntil([&] { return recorder.messages.size() > 20; }, 10));
   recorder.recording = false;
-  REQUIRE(recorder.messages.size() > 20);
   REQUIRE(recorder.messages.front().channel == "DRIVER_REQUEST");
   const auto replay = [&] {
     for (const Recorder::Message& message : recorder.messages) {
@@ -179,8 +184,8 @@ TEST_CASE("what was recorded is worth nothing, to the same driver and to one tha
 }
 
 TEST_CASE("a driver that others could command does not start without a key") {
-  Stage stage(52);
-  const std::string open = "udpm://239.255.76.67:17752?ttl=1";
+  Stage stage(82);
+  const std::string open = "udpm://239.255.76.67:17782?ttl=1";
   for (const std::vector<std::string>& program :
        {std::vector<std::string>{"plumb-driver", stage.robot_folder, "--bus", stage.bus_url},
         std::vector<std::string>{"plumb", "launch", stage.robot_folder, "--bus", stage.bus_url, "--output",

@@ -1,5 +1,6 @@
 #include "tests/process/stage.h"
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -18,9 +19,12 @@ void Stage::Witness() {
     for (const Frame& frame : std::span(frames_now).first(static_cast<size_t>(n))) {
       ++frames;
       if (frame.remote || frame.error || frame.extended) continue;
+      ++frames_by_id[frame.id];
       if (frame.id == 0x02E && frame.length >= 4) {
         std::memcpy(&torque, frame.data.data(), 4);
-        if (torque != 0) last_torque_time = frame.receive_ns / 1000;
+        if (torque == 0) continue;
+        last_torque_time = frame.receive_ns / 1000;
+        longest_alone = std::max(longest_alone, last_torque_time - last_command_made);
       } else if (frame.id == 0x021 && frame.length == 8) {
         axis_state = frame.data[4];
       }

@@ -35,16 +35,21 @@ std::string Read(const std::filesystem::path& file);
 /// number of its own, so that tests run side by side. The bus is $PLUMBLINE_TEST_BUS where that is set.
 class Stage {
  public:
-  explicit Stage(int number)
+  /// @param robot_file folder or TOML file in robots/
+  explicit Stage(int number, const std::string& robot_file = "pendulum")
       : lcm_url("udpm://239.255.76.67:" + std::to_string(17700 + number) + "?ttl=0&recv_buf_size=2097152"),
         bus_url(Environment("PLUMBLINE_TEST_BUS", "udp:239.74.163.2:" + std::to_string(43200 + number))),
-        robot_folder(Environment("PLUMBLINE_SOURCE", ".") + "/robots/pendulum"),
+        robot_folder(Environment("PLUMBLINE_SOURCE", ".") + "/robots/" + robot_file),
         robot(LoadRobot(robot_folder)),
         messenger(lcm_url),
         bus(OpenTransport(bus_url)),
         drivers(messenger, "DRIVER_STATUS"),
         controllers(messenger, "CONTROLLER_STATUS"),
-        commands(messenger, "JOINT_COMMAND", [this](const joint_command_t&) { last_command = RealUtime(); }),
+        commands(messenger, "JOINT_COMMAND",
+                 [this](const joint_command_t& command) {
+                   last_command = RealUtime();
+                   last_command_made = command.utime;
+                 }),
         states(messenger, "ROBOT_STATE", [this](const robot_state_t&) { last_state = RealUtime(); }),
         requests_(messenger, "DRIVER_REQUEST"),
         policies_(messenger, "POLICY") {
@@ -151,16 +156,18 @@ class Stage {
     message.episodes = 1000;
     policies_.Publish(message);
   }
-  /// Arms and has a policy run until there is a torque on the bus. As the trainer it says the policy again and again; as
-  /// a person it arms again what a busy machine has stopped on the way.
+  /// Arms and has a policy run until there is a torque on the bus and stays there. As the trainer it says the policy again
+  /// and again; as a person it arms again what a busy machine has stopped on the way.
   bool BeginEpisode() {
-    torque = 0;
-    for (int attempt = 0; attempt < 15 && torque == 0; ++attempt) {
+    for (int attempt = 0; attempt < 15; ++attempt) {
+      torque = 0;
       if (!Arm()) return false;
       PublishPolicy();
-      WaitUntil([&] { return torque != 0 || drivers.newest().state == driver_status_t::FAULT; }, 2);
+      if (!WaitUntil([&] { return torque != 0 || drivers.newest().state == driver_status_t::FAULT; }, 2)) continue;
+      Listen(0.3);
+      if (torque != 0) return true;
     }
-    return torque != 0;
+    return false;
   }
   /// Brings everything up to an episode with a torque on the bus.
   void RunWithTorque() {
@@ -170,15 +177,15 @@ class Stage {
     INFO("driver: " << int{drivers.newest().state} << " " << drivers.newest().reason << "; controller: "
                     << int{controllers.newest().phase} << " " << controllers.newest().reason);
     REQUIRE(moving);
-    Listen(0.3);
-    REQUIRE(torque != 0);
   }
 
   // What the witness saw on the bus, node 1: newest torque setpoint [Nm], axis state, times [us].
   float torque = 0;
   int axis_state = 0;
   int64_t last_torque_time = 0;  ///< of the last frame that asked for torque
+  int64_t longest_alone = 0;     ///< that a torque was asked for after the last command had been made
   int64_t frames = 0;
+  std::map<uint32_t, int64_t> frames_by_id;  ///< standard data frames
 
   std::string lcm_url, bus_url, robot_folder;
   RobotDescription robot;
@@ -190,6 +197,7 @@ class Stage {
   Subscriber<joint_command_t> commands;
   Subscriber<robot_state_t> states;
   int64_t last_command = 0, last_state = 0;  ///< real time of reception [us]
+  int64_t last_command_made = 0;             ///< its utime
   std::map<std::string, std::unique_ptr<Child>> children;
 
  private:

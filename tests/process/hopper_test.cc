@@ -1,0 +1,71 @@
+// A robot with three motors, two boom encoders and an IMU on one bus: real processes, both protocols of motors.
+
+#include <cmath>
+
+#include "plumb/imu_t.hpp"
+#include "plumb/joint_state_t.hpp"
+#include "tests/process/stage.h"
+
+namespace plumb {
+namespace {
+
+void Stand(const std::string& robot, int number, const std::vector<uint32_t>& from_motors, const std::vector<uint32_t>& to_motors) {
+  Stage stage(number, robot);
+  Subscriber<joint_state_t> joints(stage.messenger, "JOINT_STATE");
+  Subscriber<imu_t> imus(stage.messenger, "IMU");
+  stage.StartRobotAndDriver();
+  stage.Start("plumb-estimator");
+  stage.Start("plumb-controller");
+  REQUIRE(stage.Arm(20));
+  // The controller commands zero: nobody pushes, everybody is heard.
+  REQUIRE(stage.WaitUntil([&] { return stage.last_state != 0 && imus.received() > 0; }, 10));
+  stage.frames_by_id.clear();
+  const int64_t imus_before = imus.received(), joints_before = joints.received();
+  stage.Listen(2);
+  INFO(stage.Log("plumb-driver"));
+  CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
+
+  // 2 s by a witness's clock; on a busy machine a little less may have come by then.
+  const auto frames = [&](uint32_t id) { return stage.frames_by_id[id]; };
+  const auto about = [](int64_t count, int64_t expected) { return count > expected * 8 / 10 && count < expected * 11 / 10; };
+  for (const uint32_t id : from_motors) CHECK(about(frames(id), 1000));
+  for (const uint32_t id : to_motors) CHECK(about(frames(id), 1000));
+  for (const uint32_t boom : {0x181u, 0x182u}) CHECK(about(frames(boom), 1000));
+  for (const uint32_t imu : {0x385u, 0x391u, 0x3A1u, 0x3B2u, 0x3B4u}) CHECK(about(frames(imu), 400));
+  CHECK(about(joints.received() - joints_before, 1000));
+  CHECK(about(imus.received() - imus_before, 400));
+
+  const joint_state_t& state = joints.newest();
+  REQUIRE(state.num_joints == 6);
+  for (size_t i = 0; i < 6; ++i) {
+    CHECK(state.valid[i]);
+    CHECK(std::isfinite(state.position[i]));
+    CHECK(std::abs(state.utime - state.measured[i]) <= 20'000);
+  }
+  // It has fallen, since nobody held it, as far as its foot on the ground lets it: the rest of it goes through.
+  CHECK(std::abs(state.position[1]) < 1.3);
+  const imu_t& imu = imus.newest();
+  CHECK(imu.link == "torso");
+  const double norm = std::hypot(std::hypot(imu.orientation[0], imu.orientation[1]), std::hypot(imu.orientation[2], imu.orientation[3]));
+  CHECK(norm == Approx(1).margin(1e-3));
+
+  const driver_status_t& status = stage.drivers.newest();
+  REQUIRE(status.num_sensors == 3);
+  for (size_t i = 0; i < 3; ++i) CHECK(status.sensor_state[i] == driver_status_t::SENSOR_RUNNING);
+  for (size_t i = 3; i < 6; ++i) CHECK(status.joint_state[i] == driver_status_t::ARMED);
+  if (robot == "hopper") CHECK(status.bus_voltage[3] == 24);
+  REQUIRE(status.num_phases == 5);
+  for (const auto& phase : status.phase_duration) CHECK(*std::max_element(phase.begin(), phase.end()) > 0);
+
+  // Without its boom nobody knows where it is.
+  stage.children.at("plumb-robot")->Signal(SIGSTOP);
+  CHECK(stage.WaitForDriver(driver_status_t::FAULT, 5));
+  stage.children.at("plumb-robot")->Signal(SIGCONT);
+}
+
+TEST_CASE("a hopper on ODrives") { Stand("hopper", 45, {0x29, 0x49, 0x69}, {0x2E, 0x4E, 0x6E}); }
+
+TEST_CASE("a hopper on motors of the MIT protocol") { Stand("hopper/mit.toml", 46, {0x101, 0x102, 0x103}, {0x1, 0x2, 0x3}); }
+
+}  // namespace
+}  // namespace plumb
