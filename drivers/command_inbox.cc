@@ -62,9 +62,8 @@ bool CommandInbox::Offer(const joint_command_t& command, int64_t now, int64_t ut
   return true;
 }
 
-bool CommandInbox::Expired(int64_t now) const noexcept {
-  const int64_t expiry = command_.expiry > 0 ? std::min(command_.expiry, expiry_) : expiry_;
-  return empty_ || now - arrival_ > expiry;
+int64_t CommandInbox::expires() const noexcept {
+  return arrival_ + (command_.expiry > 0 ? std::min(command_.expiry, expiry_) : expiry_);
 }
 
 double CommandInbox::Effort(int joint, double position, double velocity) const noexcept {

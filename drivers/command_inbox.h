@@ -28,7 +28,9 @@ class CommandInbox {
   bool empty() const noexcept { return empty_; }
   /// `now` of the last command taken. Meaningless while empty.
   int64_t arrival() const noexcept { return arrival_; }
-  bool Expired(int64_t now) const noexcept;
+  /// `now` until which the last command taken holds. Meaningless while empty.
+  int64_t expires() const noexcept;
+  bool Expired(int64_t now) const noexcept { return empty_ || now > expires(); }
 
   /// Effort wished for a joint that is at a position and velocity (joint side): the feed-forward effort plus
   /// kp (target - position) plus kd (target - velocity) where gains and targets are given.

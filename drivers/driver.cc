@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "drivers/bus_plan.h"
+#include "drivers/stop.h"
 
 namespace plumb {
 namespace {
@@ -19,15 +20,25 @@ constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames:
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
+double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
+
 MotorTiming TimingOf(const DriverSettings& settings) { return {Microseconds(settings.heartbeat_timeout)}; }
 
 }  // namespace
 
-Driver::Joint::Joint(size_t number, const JointDescription& joint, const MotorTiming& timing)
-    : index(number), name(joint.name), motor(MakeMotor(joint.motor, timing)), map(joint.motor), limits(LimitsOf(joint)) {}
+Driver::Joint::Joint(size_t number, const JointDescription& joint, const DriverSettings& settings)
+    : index(number),
+      name(joint.name),
+      motor(MakeMotor(joint.motor, TimingOf(settings))),
+      map(joint.motor),
+      limits(LimitsOf(joint)),
+      damping(joint.limits.damping),
+      turns(joint.type != JointDescription::Type::kPrismatic),
+      watch(PlausibilityOf(joint, settings)) {}
 
 Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
-    : cycle_(Microseconds(robot.driver.cycle)),
+    : settings_(robot.driver),
+      cycle_(Microseconds(robot.driver.cycle)),
       measurement_(Microseconds(robot.driver.measurement)),
       disarm_after_(Microseconds(robot.driver.disarm_after)),
       stale_after_(Microseconds(robot.driver.stale_after)),
@@ -47,6 +58,7 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
   for (const JointDescription& joint : robot.joints) names_.push_back(joint.name);
   for (const SensorDescription& sensor : robot.sensors) sensors_.emplace_back(robot, sensor, stale_after_);
   FindMeasuring(robot);
+  FindSecondEncoders(robot);
   const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
   if (!plan.errors.empty()) throw std::invalid_argument(fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
   int polled = 0;
@@ -62,7 +74,7 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
 std::vector<Driver::Joint> Driver::DrivenJoints(const RobotDescription& robot) {
   std::vector<Joint> joints;
   for (size_t i = 0; i < robot.joints.size(); ++i) {
-    if (!robot.joints[i].passive) joints.emplace_back(i, robot.joints[i], TimingOf(robot.driver));
+    if (!robot.joints[i].passive) joints.emplace_back(i, robot.joints[i], robot.driver);
   }
   if (joints.empty()) throw std::invalid_argument("no joint has a motor");
   return joints;
@@ -83,6 +95,15 @@ void Driver::FindMeasuring(const RobotDescription& robot) {
       throw std::invalid_argument(fmt::format("joint '{}' has no motor, and no sensor measures it: give it one with [[sensor]]", joint.name));
     }
     passive_.push_back({i, static_cast<size_t>(sensor - sensors_.begin())});
+  }
+}
+
+void Driver::FindSecondEncoders(const RobotDescription& robot) {
+  for (size_t i = 0; i < sensors_.size(); ++i) {
+    const auto joint = std::ranges::find(joints_, sensors_[i].joint(), [](const Joint& j) { return static_cast<int>(j.index); });
+    const double tolerance = robot.sensors[i].tolerance;
+    if (joint == joints_.end() || std::isinf(tolerance)) continue;
+    second_encoders_.push_back({static_cast<size_t>(joint - joints_.begin()), i, tolerance});
   }
 }
 
@@ -161,6 +182,7 @@ bool Driver::UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept
                         joint.map.JointEffort(joint.motor->torque_estimate())};
         joint.measured = true;
         joint.measured_at = now;
+        joint.watch.Add(utime, joint.latest.position, joint.latest.velocity, effort_sent_[joint.index]);
         measurements_.Add(static_cast<int>(i), joint.latest, utime);
         return true;
       }
@@ -212,55 +234,26 @@ std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness
   return frames_.frames();
 }
 
-void Driver::CheckHealth() noexcept {
-  if (!Active()) return;
-  bool all_armed = true;
-  for (const Joint& joint : joints_) {
-    const DriveState state = joint.motor->state();
-    if (state != DriveState::kArming && state != DriveState::kArmed) {
-      return Fault("{}: {}", joint.name, joint.motor->reason());
-    }
-    if (now_ - joint.measured_at > stale_after_) {
-      return Fault("{}: no encoder estimate for {} ms", joint.name, (now_ - joint.measured_at) / 1000);
-    }
-    all_armed = all_armed && state == DriveState::kArmed;
-  }
-  for (const JointSensor& sensor : sensors_) {
-    if (!sensor.fresh(now_)) return Fault("{}: {}", sensor.name(), sensor.Silent(now_).text());
-  }
-  if (mode_ == Mode::kArming && all_armed) {
-    mode_ = Mode::kArmed;
-    armed_at_ = now_;
-    reason_.Clear();
-  }
-}
-
-void Driver::CheckCommand() noexcept {
-  if (mode_ != Mode::kArmed) return;
-  const int64_t silence = now_ - (inbox_.empty() ? armed_at_ : inbox_.arrival());
-  if (silence > disarm_after_) {
-    const std::string_view refusal = inbox_.refusal().empty() ? forgery_ : inbox_.refusal();
-    if (refusal.empty()) return Fault("no command for {} ms", silence / 1000);
-    return Fault("commands refused: {} (none taken for {} ms)", refusal, silence / 1000);
-  }
-  if (!inbox_.empty() && inbox_.Expired(now_) && !expiry_counted_) {
-    ++status_.commands_expired;
-    expiry_counted_ = true;
-  }
-}
-
 void Driver::CommandTorques() noexcept {
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    Joint& joint = joints_[i];
-    joint.wish = 0;
+  const bool commanded = mode_ == Mode::kArmed && !inbox_.empty(), fresh = commanded && !inbox_.Expired(now_);
+  bool limited = false;
+  for (Joint& joint : joints_) {
+    joint.effort = 0;
     if (!Active()) continue;
-    if (mode_ == Mode::kArmed && !inbox_.Expired(now_)) {
-      const double wished = inbox_.Effort(static_cast<int>(joint.index), joint.latest.position, joint.latest.velocity);
-      joint.wish =
-          LimitEffort(wished, joint.latest.position, joint.latest.velocity, joint.limits).value_or(0);
+    const double position = joint.latest.position, velocity = joint.latest.velocity;
+    double wish = 0;
+    if (fresh) {
+      wish = inbox_.Effort(static_cast<int>(joint.index), position, velocity);
+    } else if (commanded) {
+      wish = StoppingEffort(settings_, joint.damping, joint.commanded, Seconds(now_ - inbox_.expires()), velocity);
     }
-    frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.wish)));
+    joint.effort =
+        LimitEffort(wish, {position, velocity, effort_sent_[joint.index], Seconds(cycle_)}, joint.limits).value_or(0);
+    if (fresh) joint.commanded = joint.effort;
+    limited = limited || (fresh && joint.effort != wish);
+    frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.effort)));
   }
+  if (limited) ++status_.commands_limited;
   torque_frames_ = frames_.size();
 }
 
@@ -270,7 +263,7 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
   for (size_t i = 0; i < joints_.size(); ++i) {
     double& sent = effort_sent_[joints_[i].index];
     if (torque_frames_ == 0) sent = 0;
-    if (i < torque_frames_ && i < taken) sent = joints_[i].wish;
+    if (i < torque_frames_ && i < taken) sent = joints_[i].effort;
   }
   history_.Record(utime, effort_sent_);
   LetJump();
@@ -295,7 +288,11 @@ void Driver::Poll() noexcept {
 
 void Driver::LetJump() noexcept {
   const bool let = virtual_ && std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
-  for (Joint& joint : joints_) joint.motor->LetJump(let);
+  may_jump_ = let;
+  for (Joint& joint : joints_) {
+    joint.motor->LetJump(let);
+    joint.watch.LetJump(let);
+  }
   for (JointSensor& sensor : sensors_) {
     sensor.device().LetJump(let);
     sensor.ForgetTurns(let || !Active());

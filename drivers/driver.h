@@ -10,10 +10,11 @@
 #include "drivers/can/transport.h"
 #include "drivers/command_inbox.h"
 #include "drivers/effort_history.h"
-#include "drivers/joint_sensor.h"
 #include "drivers/joint_map.h"
+#include "drivers/joint_sensor.h"
 #include "drivers/limits.h"
 #include "drivers/measurements.h"
+#include "drivers/plausibility.h"
 #include "drivers/protocols/protocol.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
@@ -34,9 +35,10 @@ namespace plumb {
 ///                                                                      // accepted is given again
 ///
 /// It arms only on a request, made after its start and after whatever stopped it last. Armed, it transmits a
-/// torque in every cycle: zero when the command has expired. It disarms and remembers why (FAULT) when
-/// commands stay away, a measurement or heartbeat is missing, a drive or sensor reports an error, a drive falls idle,
-/// the bus fails, or somebody else sends what only it may send; only a new ARM leads out of FAULT.
+/// torque in every cycle, within the joint's limits: zero when the command has expired, or what DriverSettings::stop
+/// says. It disarms and remembers why (FAULT) when commands stay away, a measurement or heartbeat is missing or cannot be
+/// true, a drive or sensor reports an error, a drive falls idle, is too hot or has a bad supply, the bus fails, or
+/// somebody else sends what only it may send; only a new ARM leads out of FAULT.
 ///
 /// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the constructor
 /// allocates (Status: when a text grows), blocks or throws. Not thread-safe.
@@ -90,16 +92,20 @@ class Driver {
   enum class Mode { kRest, kArming, kArmed, kFault };
   /// A joint with a motor.
   struct Joint {
-    Joint(size_t number, const JointDescription& joint, const MotorTiming& timing);
+    Joint(size_t number, const JointDescription& joint, const DriverSettings& settings);
     size_t index;  // in the robot's joints
     std::string name;
     std::unique_ptr<Motor> motor;
     JointMap map;
     JointLimits limits;
+    double damping;  // [Nm s/rad] or [N s/m] of a stop
+    bool turns;      // does not slide
+    Plausibility watch;
     bool measured = false;
     int64_t measured_at = 0;  // `now` of the last estimate
     JointMeasurement latest;
-    double wish = 0;        // effort in the torque frame of this cycle
+    double effort = 0;      // in the torque frame of this cycle
+    double commanded = 0;   // the same when the command was fresh last
     size_t frames_end = 0;  // the motor's own frames of this cycle are before this one
   };
 
@@ -114,6 +120,7 @@ class Driver {
   static std::vector<Joint> DrivenJoints(const RobotDescription& robot);
   /// Of the joints without a motor. @throws std::invalid_argument if nothing measures one.
   void FindMeasuring(const RobotDescription& robot);
+  void FindSecondEncoders(const RobotDescription& robot);
   bool UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept;
   bool UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept;
   void Refuse(std::string_view why) noexcept;
@@ -123,14 +130,20 @@ class Driver {
   void RequestArm(int64_t made) noexcept;
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;
+  struct SecondEncoder;
+  /// @param why is set if not.
+  bool Agree(const SecondEncoder& second, Reason& why) const noexcept;
   void CommandTorques() noexcept;
   void LetJump() noexcept;
   void Poll() noexcept;
   void PrepareMessages();
   void NoteLateness(int64_t lateness) noexcept;
   void NoteChanges() noexcept;
+  /// Whether an armed drive does not report its temperatures any more.
+  bool Unwatched(const Joint& joint) const noexcept;
   bool Active() const noexcept { return mode_ == Mode::kArming || mode_ == Mode::kArmed; }
 
+  const DriverSettings settings_;
   const int64_t cycle_, measurement_, disarm_after_, stale_after_, start_guard_;
   const int64_t start_now_, start_utime_;
   const size_t num_joints_;  // of the robot
@@ -142,6 +155,12 @@ class Driver {
     size_t joint, sensor;
   };
   std::vector<Measuring> passive_;
+  /// An encoder on a joint whose motor measures it, too.
+  struct SecondEncoder {
+    size_t joint, sensor;  // indices into joints_, sensors_
+    double tolerance;      // [rad] or [m]
+  };
+  std::vector<SecondEncoder> second_encoders_;
   Measurements measurements_;
   CommandInbox inbox_;
   EffortHistory history_;
@@ -162,7 +181,7 @@ class Driver {
   LinkState link_ = LinkState::kUp;
   bool bus_off_ = false;
   bool replay_ = false;
-  bool virtual_ = false;
+  bool virtual_ = false, may_jump_ = false;
   int64_t foreign_at_;  // `now` of the last frame that only we may send, and another has sent
   std::vector<Filter> own_;
   int unacknowledged_ = 0;

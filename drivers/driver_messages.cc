@@ -99,6 +99,7 @@ void Driver::NoteChanges() noexcept {
   for (const Joint& joint : joints_) {
     mix(static_cast<uint64_t>(joint.motor->state()));
     mix(hash(joint.motor->reason()));
+    mix(Unwatched(joint));
   }
   for (const JointSensor& sensor : sensors_) {
     mix(static_cast<uint64_t>(sensor.device().state()));
@@ -119,6 +120,10 @@ driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int6
     status_.joint_state[i] = static_cast<int8_t>(motor.state());
     status_.joint_reason[i] = motor.reason();
     const MotorReadings readings = motor.readings();
+    if (Unwatched(joints_[k])) {
+      status_.joint_reason[i] = fmt::format("no temperatures for {} ms: if it gets too hot, nobody will know",
+                                            (now_ - readings.temperatures_at) / 1000);
+    }
     status_.motor_temperature[i] = readings.motor_temperature;
     status_.drive_temperature[i] = readings.drive_temperature;
     status_.bus_voltage[i] = readings.bus_voltage;

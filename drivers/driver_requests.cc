@@ -1,6 +1,7 @@
 // What the driver is asked: DRIVER_REQUEST and JOINT_COMMAND.
 
 #include "drivers/driver.h"
+#include "drivers/operating_limits.h"
 
 namespace plumb {
 namespace {
@@ -74,6 +75,10 @@ void Driver::RequestArm(int64_t made) noexcept {
       why.Set("{}: {}", joint.name, joint.motor->reason());
     } else if (!joint.measured || now - joint.measured_at > stale_after_) {
       why.Set("{}: no encoder estimates", joint.name);
+    } else if (joint.watch.crowded()) {
+      why.Set("{}: more encoder estimates than one drive is to send: two drives with one id?", joint.name);
+    } else if (Reason bad; !WithinOperatingLimits(joint.motor->readings(), settings_, bad)) {
+      why.Set("{}: {}", joint.name, bad.text());
     }
     if (!why.text().empty()) return Refuse(why.text());
   }
@@ -85,6 +90,9 @@ void Driver::RequestArm(int64_t made) noexcept {
     if (sensor.device().state() == SensorState::kFault) sensor.device().Start(now);
     return Refuse(why.text());
   }
+  for (const SecondEncoder& second : second_encoders_) {
+    if (Reason why; !Agree(second, why)) return Refuse(why.text());
+  }
   armed_by_ = made;
   arms_refused_ = 0;
   stray_controller_ = false;
@@ -93,7 +101,11 @@ void Driver::RequestArm(int64_t made) noexcept {
   inbox_.Clear();
   forgery_ = {};
   cause_.Clear();
-  for (Joint& joint : joints_) joint.motor->Arm(now);
+  for (Joint& joint : joints_) {
+    joint.motor->Arm(now);
+    joint.watch.Forgive();
+    joint.commanded = 0;
+  }
   mode_ = Mode::kArming;
   reason_.Set("arming");
 }

@@ -96,7 +96,7 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.bus_bit_rate = bus.Number("bit_rate", {1e4, 1e6}, robot.bus_bit_rate);
   bus.Finish();
   robot.sensors = ReadSensors(root, robot);
-  robot.driver = ReadDriver(root.Table("driver"));
+  robot.driver = ReadDriver(root.Table("driver"), robot.joints);
   robot.estimator = ReadEstimator(root.Table("estimator"));
   robot.task = ReadTask(root.Table("task"), robot.joints);
   robot.simulation = ReadSimulation(root.Table("simulation"), robot.task.period);

@@ -71,6 +71,8 @@ struct SensorDescription {
   double offset = 0;     ///< [rad] or [m]
   double radius = 1;     ///< 1 at a joint that turns, [m] > 0 at one that slides: the boom's length
   double max_speed = 0;  ///< [rad/s] > 0 of the shaft; a reading that needs more is a fault
+  /// [rad] or [m] > 0 by which it may differ from the motor of its joint, if that has one; infinite = not compared
+  double tolerance = std::numeric_limits<double>::infinity();
 
   // Of an IMU.
   int link = -1;                                           ///< index into links: what it is fixed to
@@ -97,6 +99,14 @@ struct JointDynamics {
   double no_load_speed = std::numeric_limits<double>::infinity();
 };
 
+/// How the driver keeps a joint with a motor within its limits, and how the joint stops.
+struct JointLimitSettings {
+  double position_margin =
+      0;  ///< [rad] or [m] >= 0 before a position limit, in which efforts towards it fade
+  double effort_rate = std::numeric_limits<double>::infinity();  ///< [Nm/s] or [N/s] > 0, away from zero
+  double damping = 0;  ///< [Nm s/rad] or [N s/m] >= 0 of a stop by damping, see DriverSettings::stop
+};
+
 /// A moving joint, connecting links[parent] to links[child]. URDF's planar and floating joints are several of these:
 ///   planar    <name>/x, <name>/y prismatic in the plane, <name>/angle continuous about its normal
 ///   floating  <name>/x, <name>/y, <name>/z prismatic, <name>/rotation spherical
@@ -119,14 +129,31 @@ struct JointDescription {
   bool passive = false;       ///< has no motor
   MotorDescription motor;     ///< of a joint that is not passive
   JointDynamics dynamics;
+  JointLimitSettings limits;  ///< of a joint that is not passive
 
   int num_positions() const { return type == Type::kSpherical ? 4 : 1; }
   int num_velocities() const { return type == Type::kSpherical ? 3 : 1; }
 };
 
-struct DriverSettings {  ///< all [s], scaled time
-  double cycle, measurement, expiry, disarm_after, stale_after, heartbeat_timeout, start_guard;
-  double telemetry = 0.1;  ///< at which each drive is asked for its temperatures and supply
+struct DriverSettings {
+  /// What is on the joints when a command has expired, until the driver disarms: nothing, the last effort
+  /// that falls linearly to nothing within `ramp`, or -damping * velocity (JointLimitSettings). Faults and
+  /// requests disarm at once, whatever this is.
+  enum class Stop { kZero, kRamp, kDamping };
+
+  double cycle, measurement, expiry, disarm_after, stale_after, heartbeat_timeout, start_guard;  ///< [s], scaled time
+  double telemetry = 0.1;  ///< [s] at which each drive is asked for its temperatures and supply
+  Stop stop = Stop::kZero;
+  double ramp = 0;  ///< [s] > 0 of kRamp, else 0
+
+  // Beyond these is a fault. What a drive does not report is not judged.
+  double max_motor_temperature = 90, max_drive_temperature = 90;     ///< [degC]
+  double min_bus_voltage = 0;                                        ///< [V]
+  double max_bus_voltage = std::numeric_limits<double>::infinity();  ///< [V]
+  /// [s] for which position and velocity may stay the same bit by bit under an effort; 0 = for ever. Off
+  /// unless asked for: a joint that holds still on coarse codes, or leans against something, looks like a
+  /// dead encoder.
+  double stuck_after = 0;
 };
 
 struct EstimatorSettings {

@@ -71,6 +71,24 @@ JointDynamics ReadDynamics(Config config, JointDynamics dynamics, const JointDes
   return dynamics;
 }
 
+JointLimitSettings ReadLimits(Config config, const JointDescription& joint) {
+  JointLimitSettings limits;
+  limits.position_margin = config.Number("position_margin", kSaneNotNegative, 0);
+  // One margin for each limit, and none of the other's.
+  if (limits.position_margin > 0 && !(2 * limits.position_margin <= joint.upper - joint.lower)) {
+    config.Fail("position_margin",
+                fmt::format("= {} is more than half of what lies between the joint's limits",
+                            limits.position_margin));
+  }
+  if (limits.position_margin > 0 && !std::isfinite(joint.upper - joint.lower)) {
+    config.Fail("position_margin", "is of position limits, and the joint has none");
+  }
+  limits.effort_rate = config.Number("effort_rate", {1e-9, HUGE_VAL}, limits.effort_rate);
+  limits.damping = config.Number("damping", kSaneNotNegative, 0);
+  config.Finish();
+  return limits;
+}
+
 // What the joint may do must have a code.
 void CheckMitRanges(const Config& config, const JointDescription& joint) {
   const MitRanges& ranges = joint.motor.mit->ranges;
@@ -154,7 +172,7 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
     if (seen[index]) config.Fail("name", fmt::format("= \"{}\" occurs twice", name));
     joint->passive = config.Boolean("passive", false);
     if (joint->passive) {
-      for (const char* key : {"protocol", "node", "gear", "sign", "offset", "mit"}) {
+      for (const char* key : {"protocol", "node", "gear", "sign", "offset", "mit", "limits"}) {
         if (config.Has(key)) config.Fail(key, "is of a motor, but the joint is passive");
       }
     } else {
@@ -165,6 +183,7 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
       }
       joint->motor = ReadMotor(config);
       CheckMotor(urdf, index);
+      joint->limits = ReadLimits(config.Table("limits", false), *joint);
       if (joint->motor.mit) CheckMitRanges(config, *joint);
       for (size_t other = 0; other < joints.size(); ++other) {
         if (seen[other] && !joints[other].passive && joints[other].motor.protocol == joint->motor.protocol &&

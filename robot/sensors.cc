@@ -47,6 +47,12 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
     config.Fail("joint",
                 fmt::format("= \"{}\" is a spherical joint: an encoder measures one coordinate", joint));
   }
+  if (config.Has("tolerance")) {
+    if (robot.joints[static_cast<size_t>(s.joint)].passive) {
+      config.Fail("tolerance", fmt::format("is of two encoders of one joint, but \"{}\" has no motor", joint));
+    }
+    s.tolerance = config.Number("tolerance", {1e-6, 1e6});
+  }
   if (type == Type::kPrismatic) {
     s.radius = config.Number("radius", {1e-6, 1e6});
   } else if (config.Has("radius")) {

@@ -8,7 +8,7 @@
 namespace plumb {
 
 /// Tables of robot.toml that need nothing of the robot. All throw ConfigError.
-DriverSettings ReadDriver(Config config);
+DriverSettings ReadDriver(Config config, const std::vector<JointDescription>& joints);
 EstimatorSettings ReadEstimator(Config config);
 SimulationSettings ReadSimulation(Config config, double period);
 ControllerSettings ReadController(Config config);

@@ -60,6 +60,7 @@ FrameUse CanSimpleReports::OnFrame(const Frame& frame, int64_t now) noexcept {
     case kGetTemperature.command:
       readings_.drive_temperature = v[0];
       readings_.motor_temperature = v[1];
+      readings_.temperatures_at = now;
       break;
     case kGetBusVoltageCurrent.command:
       readings_.bus_voltage = v[0];

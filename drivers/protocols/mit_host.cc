@@ -46,6 +46,7 @@ class MitMotor : public Motor {
     if (frame.length == kWithVoltage) readings_.bus_voltage = (*values)[4];
     if (frame.length == kWithTemperature) {
       readings_.motor_temperature = (*values)[4];
+      readings_.temperatures_at = now;
       error_ = static_cast<int>((*values)[5]);
     }
     heard_ = present_ = true;

@@ -47,6 +47,7 @@ struct MotorReadings {
   double drive_temperature = std::numeric_limits<double>::quiet_NaN();  ///< [degC] of its power stage
   double bus_voltage = std::numeric_limits<double>::quiet_NaN();        ///< [V] of its supply
   double bus_current = std::numeric_limits<double>::quiet_NaN();        ///< [A] from its supply
+  int64_t temperatures_at = 0;  ///< [us] when it reported temperatures last; 0 before it has
 };
 
 /// What a motor made of a frame.

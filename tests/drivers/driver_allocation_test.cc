@@ -42,6 +42,10 @@ namespace {
 
 TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothing") {
   Rig rig(3);
+  rig.robot.driver.stuck_after = 0.4;
+  rig.robot.driver.stop = DriverSettings::Stop::kRamp;
+  rig.robot.driver.ramp = 0.1;
+  rig.robot.joints[0].limits.effort_rate = 50;
   rig.Start();
   REQUIRE(rig.Arm(1));
   // The wire is a real transport, so that its Send and Receive are counted, too.
@@ -56,7 +60,7 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   for (int cycle = 0; cycle < 1000; ++cycle) {
     rig.now += 5000;
     FrameBatch batch;
-    for (CanSimpleDevice& drive : rig.drives) drive.Tick(rig.now, {0.1, 0.2}, batch);
+    for (CanSimpleDevice& drive : rig.drives) drive.Tick(rig.now, {cycle % 300 == 140 ? 5.0 : 0.0, 0}, batch);  // jumps
     drive_end->Send(batch.frames());
     command.utime = arm.utime = rig.utime();
     ++command.sequence;

@@ -73,7 +73,11 @@ TEST_CASE("efforts are limited, geared and turned") {
   rig.samples[0] = {0, 0};  // joint at 0.5
   rig.Run(20);
   CHECK(rig.drives[0].Torque() == -0.5);    // 2 Nm at the joint
-  rig.samples[0] = {-4 * 0.6 / kTwoPi, 0};  // joint at 1.1
+  for (int i = 1; i <= 10; ++i) {  // joint to 1.1, at 12 rad/s
+    rig.samples[0] = {-4 * 0.06 * i / kTwoPi, -4 * 12 / kTwoPi};
+    rig.Run(5);
+  }
+  rig.samples[0].velocity = 0;
   rig.Run(20);
   CHECK(rig.states.back().position[0] == Approx(1.1));
   CHECK(rig.drives[0].Torque() == 0);

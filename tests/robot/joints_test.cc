@@ -64,6 +64,80 @@ TEST_CASE("joints have motors or are passive, with their dynamics") {
   CHECK(zoo.FindParameter("damping/hip") == -1);
 }
 
+TEST_CASE("limits of a joint with a motor") {
+  const std::string table =
+      "[joint.limits]\nposition_margin = 0.2\neffort_rate = 400\ndamping = 1.5\n[joint.dynamics]\narmature = "
+      "0.01";
+  const RobotDescription zoo = Load(Replaced(kZooToml, "[joint.dynamics]\narmature = 0.01", table));
+  CHECK(zoo.joints[3].limits.position_margin == 0.2);
+  CHECK(zoo.joints[3].limits.effort_rate == 400);
+  CHECK(zoo.joints[3].limits.damping == 1.5);
+  CHECK(zoo.joints[9].limits.position_margin == 0);
+  CHECK(std::isinf(zoo.joints[9].limits.effort_rate));
+  CHECK(zoo.joints[9].limits.damping == 0);
+
+  const auto refused = [&](const std::string& keys, const std::string& what) {  // the hip has [-1, 1.5]
+    Refused("[joint.dynamics]\narmature = 0.01",
+            "[joint.limits]\n" + keys + "\n[joint.dynamics]\narmature = 0.01", what);
+  };
+  refused("position_margin = -0.1", "limits.position_margin");
+  refused("position_margin = 1.26", "more than half");
+  refused("effort_rate = 0", "limits.effort_rate");
+  refused("damping = -1", "limits.damping");
+  refused("damping = nan", "limits.damping");
+  refused("dampng = 1", "did you mean damping?");
+  Refused("name = \"disc\"\nprotocol = \"cansimple\"\nnode = 2",
+          "name = \"disc\"\nprotocol = \"cansimple\"\nnode = 2\n[joint.limits]\nposition_margin = 0.1",
+          "the joint has none");
+  Refused("name = \"spring\"\npassive = true",
+          "name = \"spring\"\npassive = true\n[joint.limits]\ndamping = 1",
+          "limits is of a motor, but the joint is passive");
+}
+
+TEST_CASE("what the driver watches, and how it stops") {
+  using Stop = DriverSettings::Stop;
+  const DriverSettings defaults = Load(kZooToml).driver;
+  CHECK(defaults.stop == Stop::kZero);
+  CHECK(defaults.max_motor_temperature == 90);
+  CHECK(defaults.max_drive_temperature == 90);
+  CHECK(defaults.min_bus_voltage == 0);
+  CHECK(std::isinf(defaults.max_bus_voltage));
+  CHECK(defaults.stuck_after == 0);
+
+  const auto driver = [](const std::string& keys) {
+    return Load(Replaced(kZooToml, "[driver]", "[driver]\n" + keys)).driver;
+  };
+  CHECK(driver("stop = \"zero\"").stop == Stop::kZero);
+  const DriverSettings ramp = driver("stop = \"ramp\"\nramp = 0.15");
+  CHECK(ramp.stop == Stop::kRamp);
+  CHECK(ramp.ramp == 0.15);
+  const DriverSettings limits = driver(
+      "max_motor_temperature = 70\nmax_drive_temperature = inf\nmin_bus_voltage = 20\nmax_bus_voltage = "
+      "28\nstuck_after = 0.5");
+  CHECK(limits.max_motor_temperature == 70);
+  CHECK(std::isinf(limits.max_drive_temperature));
+  CHECK(limits.min_bus_voltage == 20);
+  CHECK(limits.max_bus_voltage == 28);
+  CHECK(limits.stuck_after == 0.5);
+  const std::string damped = Replaced(kZooToml, "[joint.dynamics]\narmature = 0.01",
+                                      "[joint.limits]\ndamping = 2\n[joint.dynamics]");
+  CHECK(Load(Replaced(damped, "[driver]", "[driver]\nstop = \"damping\"")).driver.stop == Stop::kDamping);
+
+  const auto refused = [](const std::string& keys, const std::string& what) {
+    Refused("[driver]", "[driver]\n" + keys, what);
+  };
+  refused("stop = \"soft\"", "is not one of zero, ramp, damping");
+  refused("stop = \"ramp\"", "driver.ramp is missing");
+  refused("stop = \"ramp\"\nramp = 0.16", "disarmed before its end");  // 0.25 - 0.1
+  refused("ramp = 0.1", "is for stop = \"ramp\" only");
+  refused("stop = \"damping\"", "no joint has a damping");
+  refused("max_motor_temperature = -1", "max_motor_temperature");
+  refused("max_drive_temperature = nan", "max_drive_temperature");
+  refused("min_bus_voltage = 30\nmax_bus_voltage = 28", "must be below max_bus_voltage");
+  refused("stuck_after = -1", "stuck_after");
+  refused("stuck_afer = 1", "did you mean stuck_after?");
+}
+
 TEST_CASE("a target per coordinate, and a spread") {
   const RobotDescription zoo = Load(kZooToml);
   // rail x, y, angle; hip; spring; free x, y, z, rotation; disc

@@ -1,6 +1,7 @@
 #include "robot/sensors.h"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstdlib>
 
 #include "tests/robot/zoo.h"
@@ -144,6 +145,15 @@ TEST_CASE("MIT motors: what is refused") {
   refused("source = \"the label\"", "", "source");
   refused("source = \"the label\"", "source = \"\"", "say where");
   refused("torque = 18.0", "torque = 18.0\nmaximum = 3", "maximum");
+}
+
+TEST_CASE("an encoder on a joint with a motor may differ from it by a tolerance") {
+  const std::string hip = "node = 2\nperiod = 0.002\n", boom = "node = 1\nperiod = 0.002\n";
+  CHECK(std::isinf(Load(kZooToml + kSensors).sensors[1].tolerance));
+  CHECK(Load(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0.05\n")).sensors[1].tolerance == 0.05);
+  CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0\n")), Contains("tolerance"));
+  CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, boom, boom + "tolerance = 0.05\n")),
+                    Contains("\"rail/x\" has no motor"));
 }
 
 TEST_CASE("the bus has a bit rate, and drives a telemetry period") {
