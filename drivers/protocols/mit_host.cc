@@ -44,10 +44,9 @@ class MitMotor : public Motor {
     estimate_.velocity = (*values)[2];
     torque_estimate_ = (*values)[3];
     if (frame.length == kWithVoltage) readings_.bus_voltage = (*values)[4];
-    if (frame.length == kWithTemperature) {
-      readings_.motor_temperature = (*values)[4];
-      error_ = static_cast<int>((*values)[5]);
-    }
+    if (frame.length == kWithTemperature) readings_.motor_temperature = (*values)[4];
+    // Of this reply: what a stranger says of a motor that reports no errors must not stay.
+    error_ = frame.length == kWithTemperature ? static_cast<int>((*values)[5]) : kNoError;
     heard_ = present_ = true;
     reply_ = now;
     ++replies_;
