@@ -47,8 +47,9 @@ class MitMotor : public Motor {
     if (frame.length == kWithTemperature) {
       readings_.motor_temperature = (*values)[4];
       readings_.temperatures_at = now;
-      error_ = static_cast<int>((*values)[5]);
     }
+    // Of this reply: what a stranger says of a motor that reports no errors must not stay.
+    error_ = frame.length == kWithTemperature ? static_cast<int>((*values)[5]) : kNoError;
     heard_ = present_ = true;
     reply_ = now;
     ++replies_;

@@ -23,7 +23,7 @@ TEST_CASE("JOINT_STATE comes once per measurement, with regular times and the ef
   rig.on_step = [&] {
     ++step;
     rig.effort = std::sin(0.013 * static_cast<double>(step));
-    for (size_t i = 0; i < 2; ++i) rig.samples[i] = {0.001 * static_cast<double>(step), 1.0 / kTwoPi};
+    for (size_t i = 0; i < 2; ++i) rig.samples[i] = {0.001 * static_cast<double>(step) / kTwoPi, 1.0 / kTwoPi};
   };
   REQUIRE(rig.Arm());
   // What was sent when, noted by the receiver's side.

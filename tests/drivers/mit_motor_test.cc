@@ -194,6 +194,16 @@ TEST_CASE("an error in a reply is a fault, and keeps the motor from being armed"
   CHECK(bench.Count(mit::kEnter) == 2);  // those of the first time
 }
 
+TEST_CASE("an error that a stranger reports does not stay") {
+  Bench bench(mit::kWithVoltage);  // such replies have no errors
+  REQUIRE(bench.Arm());
+  bench.motor->OnFrame(*FrameFromText("010#118A3D7FF7FF1903"), bench.now);
+  CHECK_THAT(std::string(bench.motor->reason()), Contains("over-voltage"));
+  bench.Run(100);
+  CHECK(bench.motor->confirmed_idle());
+  CHECK(bench.Arm());
+}
+
 TEST_CASE("the position is unwrapped over many turns, both ways") {
   Bench bench;
   for (const double velocity : {40.0, -45.0}) {

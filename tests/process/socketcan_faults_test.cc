@@ -167,8 +167,8 @@ TEST_CASE("what the kernel does to the bus stops the robot, says why, and a pers
            Fault{"tc qdisc add dev vx1 root netem loss 100%", "no encoder estimate",
                  "tc qdisc del dev vx1 root", kSoon},
            Fault{"cansend vx1 02E#0000A03F", "second master: somebody else sends frame 0x02e", "", kSoon},
-           Fault{"cansend vx1 022#", "second master: somebody else sends frame 0x022", "", kSoon},
-           Fault{"cansend vx1 7E2#", "the drive went to IDLE: estop requested", "", kSoon},
+           Fault{"cansend vx1 022#", "emergency stop from the bus", "", kSoon},
+           Fault{"cansend vx1 7E2#", "emergency stop from the bus", "", kSoon},
        }) {
     INFO(happens << ": " << cable.Status().reason);
     const int64_t now = Stage::RealUtime();
