@@ -66,7 +66,7 @@ void Plausibility::CountDevices(int64_t time) noexcept {
   }
   if (++count_ > kMostInWindow) {
     crowded_ = true;
-    Complain("{} encoder estimates in {} ms, where one device sends {}: two devices with one id?", count_, since / 1000,
+    Complain("{} encoder estimates in {} ms, where one device sends {}: two devices with one id, or somebody asks for them?", count_, since / 1000,
              since / settings_.period + 1);
   }
 }

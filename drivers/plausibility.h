@@ -36,7 +36,7 @@ PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverS
 /// - stuck: position and velocity are the same bit by bit for `stuck_after` while the effort sent is a tenth
 /// of
 ///   the limit or more;
-/// - two devices with one id: more than 150 estimates within 100 T.
+/// - two devices with one id: more than 150 estimates within 100 T. (Or somebody asks the one for more than it sends.)
 ///
 /// Losses, delays, bunches and doubles on the bus are no faults here. Pure logic; free of exceptions and
 /// allocation. Not thread-safe.
