@@ -27,7 +27,7 @@ int Request(Process& process, int8_t what, const std::string& key) {
   if (!key.empty()) signer.emplace(SigningKey(key), "DRIVER_REQUEST");
   Publisher<driver_request_t> requests(process.messenger(), "DRIVER_REQUEST");
   Subscriber<driver_status_t> statuses(process.messenger(), "DRIVER_STATUS");
-  const bool arming = what == driver_request_t::ARM;
+  const bool arming = what == driver_request_t::ARM || what == driver_request_t::ARM_HOMED;
   driver_request_t request{};
   request.request = what;
   request.utime = process.clock().Utime();
@@ -86,6 +86,7 @@ int main(int argc, char** argv) {
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
   std::string can_robot, dbc_output, key, new_key;
+  bool homed = false;
   CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr,
            *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr, *arm = nullptr, *disarm = nullptr,
            *estop = nullptr, *make_key = nullptr;
@@ -193,6 +194,7 @@ int main(int argc, char** argv) {
         can_dbc->add_option("robot", can_robot, "robot folder or TOML file")->required();
         can_dbc->add_option("--output", dbc_output, "file; default: print it");
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
+        arm->add_flag("--homed", homed, "joints whose drives have restarted are where their encoders say");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
         for (CLI::App* request : {arm, disarm, estop})
@@ -212,7 +214,9 @@ int main(int argc, char** argv) {
         if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus, key);
         if (can_plan->parsed()) return plumb::PrintBusPlan(can_robot);
         if (can_dbc->parsed()) return plumb::WriteDbc(can_robot, dbc_output);
-        if (arm->parsed()) return plumb::Request(process, plumb::driver_request_t::ARM, key);
+        if (arm->parsed()) {
+          return plumb::Request(process, homed ? plumb::driver_request_t::ARM_HOMED : plumb::driver_request_t::ARM, key);
+        }
         if (disarm->parsed()) return plumb::Request(process, plumb::driver_request_t::DISARM, key);
         if (make_key->parsed()) return plumb::MakeKey(new_key);
         return plumb::Request(process, plumb::driver_request_t::ESTOP, key);

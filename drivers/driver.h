@@ -127,7 +127,7 @@ class Driver {
   void Disarm() noexcept;
   void Estop(std::string_view reason) noexcept;
   void DateStop() noexcept;
-  void RequestArm(int64_t made) noexcept;
+  void RequestArm(int64_t made, bool homed) noexcept;
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;
   struct SecondEncoder;

@@ -53,7 +53,8 @@ void Driver::CheckCommand() noexcept {
 }
 
 bool Driver::Unwatched(const Joint& joint) const noexcept {
-  return mode_ == Mode::kArmed && TelemetryIsStale(joint.motor->readings(), std::llround(settings_.telemetry * 1e6), now_);
+  return mode_ == Mode::kArmed &&
+         TelemetryIsStale(joint.motor->readings(), std::llround(settings_.telemetry * 1e6), now_);
 }
 
 bool Driver::Agree(const SecondEncoder& second, Reason& why) const noexcept {
@@ -66,8 +67,8 @@ bool Driver::Agree(const SecondEncoder& second, Reason& why) const noexcept {
   // They are not of one time.
   const double most = second.tolerance + std::abs(joint.latest.velocity) * settings_.stale_after;
   if (std::abs(difference) <= most) return true;
-  why.Set("{}: {} measures {:.4g}, its motor {:.4g}, which differ by more than {:.3g}", joint.name, sensor.name(),
-          sensor.newest().position, joint.latest.position, most);
+  why.Set("{}: {} measures {:.4g}, its motor {:.4g}, which differ by more than {:.3g}", joint.name,
+          sensor.name(), sensor.newest().position, joint.latest.position, most);
   return false;
 }
 

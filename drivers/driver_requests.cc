@@ -16,7 +16,9 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
   DateStop();
   switch (request.request) {
     case driver_request_t::ARM:
-      return RequestArm(request.utime);
+      return RequestArm(request.utime, false);
+    case driver_request_t::ARM_HOMED:
+      return RequestArm(request.utime, true);
     // Stopping is obeyed whatever the request's time.
     case driver_request_t::DISARM:
       status_.stopped_by_request = true;
@@ -51,7 +53,7 @@ void Driver::Refuse(std::string_view why) noexcept {
   reason_.Set("{}{}ARM refused{}: {}", cause, cause.empty() ? "" : "; ", count.text(), why);
 }
 
-void Driver::RequestArm(int64_t made) noexcept {
+void Driver::RequestArm(int64_t made, bool homed) noexcept {
   if (Active()) return;  // obeyed already
   const int64_t now = now_;
   // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's clock may
@@ -69,7 +71,7 @@ void Driver::RequestArm(int64_t made) noexcept {
   if (now - foreign_at_ < start_guard_) return Refuse("somebody else commands the drives: there is a second master on the bus");
   if (link_ != LinkState::kUp) return Refuse("the CAN interface is not up");
   if (bus_off_) return Refuse("the CAN controller is bus-off");
-  for (const Joint& joint : joints_) {
+  for (Joint& joint : joints_) {
     Reason why;
     if (joint.motor->state() == DriveState::kAbsent) {
       why.Set("{}: {}", joint.name, joint.motor->reason());
@@ -80,6 +82,9 @@ void Driver::RequestArm(int64_t made) noexcept {
     } else if (Reason bad; !WithinOperatingLimits(joint.motor->readings(), settings_, bad)) {
       why.Set("{}: {}", joint.name, bad.text());
     }
+    // A virtual robot's encoders are absolute.
+    if (homed || virtual_) joint.motor->Homed();
+    if (joint.motor->lost_place()) why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed", joint.name);
     if (!why.text().empty()) return Refuse(why.text());
   }
   for (JointSensor& sensor : sensors_) {

@@ -126,7 +126,8 @@ class DriverProcess {
 
   void OnRequest(const driver_request_t& request) {
     // Stopping must never need a key.
-    if (request_signatures_ && request.request == driver_request_t::ARM) {
+    const bool stops = request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP;
+    if (request_signatures_ && !stops) {
       const std::string_view refusal = request_signatures_->Judge(requests_.encoding(), Clock().Utime());
       if (!refusal.empty()) return driver_.OnForgedArm(refusal);
     }

@@ -66,8 +66,10 @@ void Plausibility::CountDevices(int64_t time) noexcept {
   }
   if (++count_ > kMostInWindow) {
     crowded_ = true;
-    Complain("{} encoder estimates in {} ms, where one device sends {}: two devices with one id?", count_, since / 1000,
-             since / settings_.period + 1);
+    Complain(
+        "{} encoder estimates in {} ms, where one device sends {}: two devices with one id, or somebody asks "
+        "for them?",
+        count_, since / 1000, since / settings_.period + 1);
   }
 }
 
@@ -79,8 +81,8 @@ bool Plausibility::Jumped(const Estimate& next) noexcept {
   const double most = settings_.velocity_limit * (seconds + Seconds(settings_.period)) +
                       before * Seconds(settings_.lateness) + Slack(next.position);
   if (!(std::abs(jump) > most)) return false;
-  Complain("the position jumped by {:.3g} in {:.3g} ms, at a velocity limit of {:.3g} it can do {:.3g}",
-           jump, seconds * 1e3, settings_.velocity_limit, most);
+  Complain("the position jumped by {:.3g} in {:.3g} ms, at a velocity limit of {:.3g} it can do {:.3g}", jump,
+           seconds * 1e3, settings_.velocity_limit, most);
   return true;
 }
 
@@ -91,14 +93,14 @@ void Plausibility::LookForStuck(const Estimate& next, double effort) noexcept {
   const bool pushed = std::abs(effort) >= kEffort * settings_.effort_limit;
   unchanged_ = same && pushed ? unchanged_ + (next.time - last_.time) : 0;
   if (settings_.stuck_after > 0 && unchanged_ >= settings_.stuck_after) {
-    Complain("encoder stuck, or the joint is blocked: {:.5g} at speed {:.3g} for {} ms under an effort of {:.3g}",
-             next.position, next.velocity, unchanged_ / 1000, effort);
+    Complain(
+        "encoder stuck, or the joint is blocked: {:.5g} at speed {:.3g} for {} ms under an effort of {:.3g}",
+        next.position, next.velocity, unchanged_ / 1000, effort);
   }
 }
 
 void Plausibility::Compare(const Estimate& next) noexcept {
-  if (std::isnan(next.velocity) || std::isnan(last_.velocity) ||
-      comparison_.estimates >= kWindow) {
+  if (std::isnan(next.velocity) || std::isnan(last_.velocity) || comparison_.estimates >= kWindow) {
     comparison_ = {.first_velocity = next.velocity};
     return;
   }

@@ -28,24 +28,22 @@ PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverS
 ///   other. L, for those before may have come late, so that more time has passed than dt; T, for the joint
 ///   may have become faster since;
 /// - two sources that disagree: within a window of 100 estimates the position changed by D, the integral of
-/// the
-///   velocity (trapezoids) is I, and
+///   the velocity (trapezoids) is I, and
 ///     |D - I| > resolution + max(path of D, path of I) / 4 + L (|v first| + |v last| + sum |change of v|).
 ///   What the velocity lags, or the times of arrival err, by up to L is within the last term (summation by
 ///   parts);
 /// - stuck: position and velocity are the same bit by bit for `stuck_after` while the effort sent is a tenth
-/// of
-///   the limit or more;
-/// - two devices with one id: more than 150 estimates within 100 T.
+///   of the limit or more;
+/// - two devices with one id, or somebody who asks the one for more: more than 150 estimates within 100 T.
 ///
 /// Losses, delays, bunches and doubles on the bus are no faults here. Pure logic; free of exceptions and
 /// allocation. Not thread-safe.
 class Plausibility {
  public:
-  static constexpr int kWindow = 100;             ///< estimates, or periods
-  static constexpr int kMostInWindow = 150;       ///< estimates of one device within kWindow periods
-  static constexpr double kDisagreement = 0.25;   ///< part of the path
-  static constexpr double kEffort = 0.1;          ///< of the limit, under which a joint should move
+  static constexpr int kWindow = 100;            ///< estimates, or periods
+  static constexpr int kMostInWindow = 150;      ///< estimates of one device within kWindow periods
+  static constexpr double kDisagreement = 0.25;  ///< part of the path
+  static constexpr double kEffort = 0.1;         ///< of the limit, under which a joint should move
 
   explicit Plausibility(const PlausibilitySettings& settings) : settings_(settings) {}
 
@@ -62,7 +60,8 @@ class Plausibility {
   std::string_view complaint() const noexcept { return complaint_.text(); }
   /// Takes the complaint back. What is wrong still will be found again.
   void Forgive() noexcept { complaint_.Clear(); }
-  /// Whether more than one device seems to send estimates; so until 100 T have gone by with no more than one would.
+  /// Whether more than one device seems to send estimates; so until 100 T have gone by with no more than one
+  /// would.
   bool crowded() const noexcept { return crowded_; }
 
  private:

@@ -35,6 +35,7 @@ class CanSimpleMotor : public Motor {
                                                         : reports_.OnFrame(frame, now);
     if (command == kAddress.command && reports_.two_drives()) Fail(now, "two drives have its node id");
     if (const auto restart = reports_.TakeRestart()) {
+      lost_place_ = true;
       Fail(now,
            "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): home the "
            "joint anew",
@@ -64,6 +65,8 @@ class CanSimpleMotor : public Motor {
     Enter(Step::kDisarming, now);
   }
 
+  bool lost_place() const noexcept override { return lost_place_; }
+  void Homed() noexcept override { lost_place_ = false; }
   bool IsEstop(const Frame& frame) const noexcept override {
     const uint32_t to = frame.id >> 5;
     return (frame.id & 0x1F) == kEstop.command && !frame.remote && (to == static_cast<uint32_t>(node_) || to == kBroadcastNode);
@@ -273,6 +276,7 @@ class CanSimpleMotor : public Motor {
   bool order_due_ = false;                   // no order to stop was accepted since the last order to run
   bool estop_due_ = false;                   // no Estop was accepted since it was asked for
   bool ask_error_ = false, fault_ = false;
+  bool lost_place_ = false;
   size_t poll_turn_ = 0;
   int64_t saturations_ = 0;
   Reason reason_;

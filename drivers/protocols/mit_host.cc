@@ -140,6 +140,8 @@ class MitMotor : public Motor {
   }
 
   void LetJump(bool let) noexcept override { may_jump_ = let; }
+  bool lost_place() const noexcept override { return lost_place_; }
+  void Homed() noexcept override { lost_place_ = false; }
 
   DriveState state() const noexcept override {
     if (!present_) return DriveState::kAbsent;
@@ -188,6 +190,7 @@ class MitMotor : public Motor {
       return;
     }
     if (!may_jump_ && std::abs(step) > ranges_.velocity * (static_cast<double>(dt) * 1e-6 + kUneven)) {
+      lost_place_ = true;
       Fail(now, "its position jumped by {:.3g} rad in {:.3g} ms: it has restarted, or lost its place", step,
            static_cast<double>(dt) * 1e-3);
       estimate_.position = raw;
@@ -220,6 +223,7 @@ class MitMotor : public Motor {
   bool may_run_ = false;        // told to run, and not known to have stopped since
   bool fault_ = false;
   bool may_jump_ = false;
+  bool lost_place_ = false;
   Reason reason_;
 };
 

@@ -83,6 +83,10 @@ class Motor {
   virtual void Disarm(int64_t now) noexcept = 0;
   /// The drive's own emergency stop.
   virtual void Estop(int64_t now) noexcept = 0;
+  /// True if the drive has restarted and counts its position from elsewhere: until a person has homed the joint.
+  virtual bool lost_place() const noexcept { return false; }
+  /// A person has.
+  virtual void Homed() noexcept {}
   /// Whether the frame is somebody else's emergency stop for this drive, or for all.
   virtual bool IsEstop(const Frame&) const noexcept { return false; }
   /// Once per cycle: deadlines, and the next frames of the sequence under way.

@@ -136,8 +136,12 @@ TEST_CASE("fault 12: a drive restarts", "[fault]") {
            [](BusRig& rig) {
              CHECK_THAT(rig.Status().joint_reason[1],
                         Contains("restarted") && Contains("home the joint anew"));
+             CHECK_FALSE(rig.Arm(1));
+             CHECK_THAT(rig.Reason(), Contains("ARM refused") && Contains("home the joint, then plumb arm --homed"));
+             rig.commanding = false;
            },
        .reason = "knee1: no encoder estimate for 5",
+       .arm = driver_request_t::ARM_HOMED,
        .within = 60});
 }
 

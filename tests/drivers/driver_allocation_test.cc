@@ -52,7 +52,7 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   const auto driver_end = OpenTransport("loop:allocation"), drive_end = OpenTransport("loop:allocation");
   joint_command_t command = rig.MakeCommand(1);
   driver_request_t arm{};
-  arm.request = driver_request_t::ARM;
+  arm.request = driver_request_t::ARM_HOMED;
   rig.Status();
 
   std::array<Frame, 64> frames;

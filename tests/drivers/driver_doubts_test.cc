@@ -14,7 +14,8 @@ using Catch::Matchers::StartsWith;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-/// It stops the robot within so many ms, with the reason, without a torque from the same cycle on, and for good.
+/// It stops the robot within so many ms, with the reason, without a torque from the same cycle on, and for
+/// good.
 void CheckStops(Rig& rig, int64_t within, const std::string& reason) {
   REQUIRE(rig.drives[0].Torque() != 0);
   const int64_t took = rig.RunUntil(DriveState::kFault, within);
@@ -72,7 +73,8 @@ TEST_CASE("an encoder that cannot be right stops the robot") {
     };
     CheckStops(rig, 1000, "knee1: 151 encoder estimates in 37");
     rig.Request(driver_request_t::ARM);
-    CHECK_THAT(rig.Reason(), Contains("ARM refused: knee1: more encoder estimates than one drive is to send"));
+    CHECK_THAT(rig.Reason(),
+               Contains("ARM refused: knee1: more encoder estimates than one drive is to send"));
     rig.on_step = step;
     rig.Run(1000);
   }

@@ -25,6 +25,7 @@ struct Fault {
   std::function<void(BusRig&)> happens;
   std::function<void(BusRig&)> is_over = [](BusRig&) {};  ///< and what else is to be seen by then
   const char* reason = "";  ///< DRIVER_STATUS says, from its beginning; "" if the robot runs on
+  int8_t arm = driver_request_t::ARM;  ///< what leads back
   int64_t within = 0;       ///< [ms] until no torque is asked for or produced any more, at the latest
   std::function<void(BusRig&)> prepare = [](BusRig&) {};  ///< before it starts
 
@@ -75,7 +76,7 @@ inline void ExpectStop(const Fault& fault) {
     CHECK(rig.driver->state() == DriveState::kFault);
     CHECK(rig.driver->confirmed_idle());
     CHECK((std::max(rig.torque_asked_for, rig.torque_produced) - begin) / 1000 == took);
-    CHECK(rig.Arm(1));
+    CHECK(rig.Arm(1, fault.arm));
     rig.Run(50);
     for (const CanSimpleDevice& drive : rig.drives) CHECK(drive.Torque() == 1);
   }

@@ -116,9 +116,9 @@ struct Rig {
   }
 
   /// Past the start guard and armed, with a controller that commands `value` in every cycle.
-  bool Arm(double value = 0) {
+  bool Arm(double value = 0, int8_t request = driver_request_t::ARM) {
     Run(300);
-    Request(driver_request_t::ARM);
+    Request(request);
     commanding = true;
     effort = value;
     return RunUntil(DriveState::kArmed) >= 0;

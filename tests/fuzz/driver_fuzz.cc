@@ -252,7 +252,7 @@ class DriverGame {
 
   void Request() {
     driver_request_t request{};
-    request.request = static_cast<int8_t>(bytes_.Byte() % 5);
+    request.request = static_cast<int8_t>(bytes_.Byte() % 6);
     const uint8_t when = bytes_.Byte();
     request.utime = when < 192 ? utime() : when < 224 ? utime() + static_cast<int64_t>(bytes_.Modest(3e6)) : bytes_.Value<int64_t>();
     Ask(request);
@@ -260,7 +260,7 @@ class DriverGame {
 
   void Ask(const driver_request_t& request) {
     driver_.OnRequest(request, now_, utime());
-    if (request.request == driver_request_t::ARM) may_run_ = asked_to_arm_ = true;
+    if (request.request == driver_request_t::ARM || request.request == driver_request_t::ARM_HOMED) may_run_ = asked_to_arm_ = true;
     if (request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP) may_run_ = asked_to_arm_ = false;
   }
 
@@ -312,7 +312,7 @@ class DriverGame {
       for (int i = 0; i < 12; ++i) Cycle();
       driver_request_t arm{};
       arm.utime = utime();
-      arm.request = driver_request_t::ARM;
+      arm.request = driver_request_t::ARM_HOMED;
       Ask(arm);
       commanding_ = true;
       for (int i = 0; i < 30 && driver_.state() != DriveState::kArmed; ++i) Cycle();
