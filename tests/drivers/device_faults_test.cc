@@ -1,6 +1,7 @@
 // What may go wrong in a drive, or in the process that drives it.
 
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "tests/drivers/fault.h"
 
@@ -102,6 +103,21 @@ TEST_CASE("fault 11: an idle drive with the same node id joins", "[fault]") {
               .within = 30});
 }
 
+TEST_CASE("fault 11: a drive with the same node id joins, and says the same", "[fault]") {
+  const auto estimates = [](BusRig& rig) {
+    rig.each_millisecond.push_back([&rig] {
+      if (rig.now % 5'000 == 2000) rig.StrangerSends("049#0000000000000000");
+    });
+  };
+  ExpectStop({.number = "11",
+              .name = "another drive has the same node id and says the same",
+              .detection = "more than 150 encoder estimates in 100 periods; ARM is refused while they come",
+              .happens = estimates,
+              .is_over = [](BusRig& rig) { rig.each_millisecond.clear(); },
+              .reason = "knee1: 151 encoder estimates in 3",
+              .within = 650});
+}
+
 TEST_CASE("fault 12: a drive restarts", "[fault]") {
   ExpectStop(
       {.number = "12",
@@ -138,6 +154,45 @@ TEST_CASE("fault 13: heartbeats stay away, encoder estimates do not", "[fault]")
        .is_over = [](BusRig& rig) { rig.silent = BusRig::Nothing; },
        .reason = "knee1: no heartbeat for 50",
        .within = 510});
+}
+
+TEST_CASE("fault 13: an encoder jumps", "[fault]") {
+  ExpectStop({.number = "13",
+              .name = "an encoder jumps by half a radian",
+              .detection = "farther than the velocity limit lets the joint go",
+              .happens = [](BusRig& rig) { rig.samples[1].position += 0.5 / (2 * std::acos(-1.)); },
+              .reason = "knee1: the position jumped by 0.5 in 5 ms",
+              .within = 5});
+}
+
+TEST_CASE("fault 13: an encoder is stuck", "[fault]") {
+  const auto tremble = [](BusRig& rig) {  // as healthy ones do
+    rig.each_millisecond.push_back([&rig] {
+      for (auto& sample : rig.samples) sample.velocity = 1e-4 * static_cast<double>(rig.now / 1000 % 7);
+    });
+  };
+  ExpectStop({.number = "13",
+              .name = "an encoder is stuck, or the joint blocked",
+              .detection = "the same bits under an effort for `stuck_after` (off unless set), here 200 ms",
+              .happens = [](BusRig& rig) { rig.each_millisecond.clear(); },
+              .is_over = tremble,
+              .reason = "pivot: encoder stuck, or the joint is blocked",
+              .within = 205,
+              .prepare =
+                  [&](BusRig& rig) {
+                    rig.robot.driver.stuck_after = 0.2;
+                    tremble(rig);
+                  }});
+}
+
+TEST_CASE("fault 13: position and velocity contradict each other", "[fault]") {
+  ExpectStop({.number = "13",
+              .name = "a position stands still while its velocity says 1 rad/s",
+              .detection = "position and integral of the velocity differ by more than lags and losses explain",
+              .happens = [](BusRig& rig) { rig.samples[1].velocity = 1 / (2 * std::acos(-1.)); },
+              .is_over = [](BusRig& rig) { rig.samples[1].velocity = 0; },
+              .reason = "knee1: position and velocity disagree: it moved by 0 in",
+              .within = 500});
 }
 
 }  // namespace

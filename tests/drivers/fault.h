@@ -27,6 +27,7 @@ struct Fault {
   const char* reason = "";  ///< DRIVER_STATUS says, from its beginning; "" if the robot runs on
   int8_t arm = driver_request_t::ARM;  ///< what leads back
   int64_t within = 0;       ///< [ms] until no torque is asked for or produced any more, at the latest
+  std::function<void(BusRig&)> prepare = [](BusRig&) {};  ///< before it starts
 
   void PrintRow(const std::string& reaction, const std::string& time) const {
     if (std::getenv("PLUMBLINE_FAULT_TABLE") == nullptr) return;
@@ -52,6 +53,7 @@ inline void ExpectStop(const Fault& fault) {
   std::string reason;
   for (int64_t phase = 0; phase < kPhases; ++phase) {
     BusRig rig;
+    fault.prepare(rig);
     Bring(rig, phase);
     const int64_t begin = rig.now;
     fault.happens(rig);
