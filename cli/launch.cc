@@ -127,19 +127,21 @@ class ClosedLoop {
       // It knows no --parent of ours.
       Start("setpriv", {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + process_.lcm_url(), "-q", "-f", flags_.log});
     }
-    if (!flags_.real) Start("plumb-robot", {flags_.robot, "--bus", bus_, "--seed", seed});
+    const std::vector<std::string> behind{"--realtime-priority", std::to_string(std::max(flags_.priority - 5, 0))};
+    if (!flags_.real) Start("plumb-robot", {flags_.robot, "--bus", bus_, "--seed", seed, behind[0], behind[1]});
     std::vector<std::string> driver{flags_.robot, "--bus", bus_, "--flight-recorder",
                                     (output_ / "faults").string()};
     if (!flags_.real) driver.push_back("--virtual");
     if (flags_.allow_unsigned) driver.push_back("--unsigned");
-    std::vector<std::string> controller{flags_.robot, "--seed", seed};
+    driver.insert(driver.end(), {"--realtime-priority", std::to_string(flags_.priority)});
+    std::vector<std::string> controller{flags_.robot, "--seed", seed, behind[0], behind[1]};
     if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});  // nobody throws a real robot about
     if (!flags_.key.empty()) {
       for (auto* arguments : {&driver, &controller})
         arguments->insert(arguments->end(), {"--key", flags_.key});
     }
     Start("plumb-driver", driver);
-    Start("plumb-estimator", {flags_.robot});
+    Start("plumb-estimator", {flags_.robot, behind[0], behind[1]});
     Start("plumb-controller", controller);
     // The slow loop gives way to the fast one.
     Start("plumb-trainer", {flags_.robot, "--nice", "10", "--seed", seed, "--iterations", std::to_string(flags_.iterations),

@@ -17,6 +17,7 @@ struct LaunchFlags {
   bool real = false;    ///< the robot is on the bus: start no virtual one, ask before arming
   std::string key;      ///< file of the key that commands are signed with; empty = they are not
   bool allow_unsigned = false;  ///< although LCM leaves this machine
+  int priority = 0;     ///< SCHED_FIFO of the driver; robot, estimator and controller come right behind it. 0 = off
   std::string log;      ///< record all messages here; empty = do not
   std::string summary;  ///< JSON of the outcome; empty = do not
   std::string output;   ///< folder for logs and checkpoints; empty = a new one

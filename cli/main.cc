@@ -13,6 +13,7 @@
 #include "cli/sim.h"
 #include "cli/train.h"
 #include "common/process.h"
+#include "common/realtime.h"
 #include "common/signature.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
@@ -106,6 +107,7 @@ int main(int argc, char** argv) {
         launch->add_option("--bus", flags.bus, "CAN bus, e.g. socketcan:can0; default: the robot's own");
         launch->add_option("--speed", flags.speed, "clock scale; a virtual robot can run faster than real time")
             ->check(CLI::Range(0.01, 100.0))->capture_default_str();
+        plumb::AddRealtimeFlag(*launch, flags.priority);
         launch->add_flag("--real", flags.real, "the robot itself is on the bus: no virtual one, ask before arming");
         auto* launch_key = launch->add_option(
             "--key", flags.key,

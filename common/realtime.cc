@@ -38,4 +38,15 @@ void BecomeRealtime(int priority) {
   TouchStack();
 }
 
+void BecomeOrdinary() noexcept {
+  const sched_param parameter{.sched_priority = 0};
+  sched_setscheduler(0, SCHED_OTHER, &parameter);
+}
+
+void AddRealtimeFlag(CLI::App& app, int& priority) {
+  app.add_option("--realtime-priority", priority, "SCHED_FIFO priority, 0 = off")
+      ->check(CLI::Range(0, kHighestPriority))
+      ->capture_default_str();
+}
+
 }  // namespace plumb

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "common/process.h"
+#include "common/realtime.h"
 #include "common/signature.h"
 #include "controller/controller.h"
 
@@ -12,10 +13,12 @@ int main(int argc, char** argv) {
   std::string robot_path, key;
   uint64_t seed = 1;
   double rest = -1;
+  int priority = 0;
   return plumb::Run(
       "plumb-controller", "Runs a policy on the robot, episode by episode.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder or TOML file")->required();
+        plumb::AddRealtimeFlag(app, priority);
         app.add_option("--seed", seed, "of initial states and exploration")->capture_default_str();
         app.add_option("--rest", rest,
                        "[s] do not have the robot placed: let it rest that long, then begin where it is");
@@ -23,6 +26,7 @@ int main(int argc, char** argv) {
                        "sign the commands with this key, which the driver shares (plumb key makes one)");
       },
       [&](plumb::Process& process) {
+        plumb::BecomeRealtime(priority);
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
         const plumb::Clock& clock = process.clock();
         plumb::Controller controller(robot, seed, rest);

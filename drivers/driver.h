@@ -35,18 +35,19 @@ namespace plumb {
 ///                                                                      // accepted is given again
 ///
 /// It arms only on a request, made after its start and after whatever stopped it last. Armed, it transmits a
-/// torque in every cycle, within the joint's limits: zero when the command has expired, or what DriverSettings::stop
-/// says. It disarms and remembers why (FAULT) when commands stay away, a measurement or heartbeat is missing or cannot be
-/// true, a drive or sensor reports an error, a drive falls idle, is too hot or has a bad supply, the bus fails, or
-/// somebody else sends what only it may send; only a new ARM leads out of FAULT.
+/// torque in every cycle, within the joint's limits: zero when the command has expired, or what
+/// DriverSettings::stop says. It disarms and remembers why (FAULT) when commands stay away, a measurement or
+/// heartbeat is missing or cannot be true, a drive or sensor reports an error, a drive falls idle, is too hot
+/// or has a bad supply, the bus fails, or somebody else sends what only it may send; only a new ARM leads out
+/// of FAULT.
 ///
 /// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the constructor
 /// allocates (Status: when a text grows), blocks or throws. Not thread-safe.
 class Driver {
  public:
   /// @param now, utime time of the start.
-  /// @throws std::invalid_argument for an unknown protocol, a joint that nothing measures, or a bus that cannot work: ids
-  /// in common, more than it carries (see BusPlan).
+  /// @throws std::invalid_argument for an unknown protocol, a joint that nothing measures, or a bus that
+  /// cannot work: ids in common, more than it carries (see BusPlan).
   Driver(const RobotDescription& robot, int64_t now, int64_t utime);
 
   /// Filters that let in what drives and sensors send, and what only we may send, should another do so.
@@ -189,7 +190,7 @@ class Driver {
 
   FrameBatch frames_, housekeeping_;
   size_t torque_frames_ = 0;
-  size_t turn_ = 0;  // whose own frames come first
+  size_t turn_ = 0;                  // whose own frames come first
   int64_t poll_period_, next_poll_;  // [us] one question to one drive
   size_t poll_turn_ = 0;
   std::vector<double> effort_sent_;

@@ -68,7 +68,8 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
     return Refuse("commands arrived when the driver started: stop the controller of an earlier run");
   }
   if (replay_) return Refuse("the bus is a recording: nobody hears us");
-  if (now - foreign_at_ < start_guard_) return Refuse("somebody else commands the drives: there is a second master on the bus");
+  if (now - foreign_at_ < start_guard_)
+    return Refuse("somebody else commands the drives: there is a second master on the bus");
   if (link_ != LinkState::kUp) return Refuse("the CAN interface is not up");
   if (bus_off_) return Refuse("the CAN controller is bus-off");
   for (Joint& joint : joints_) {
@@ -84,7 +85,8 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
     }
     // A virtual robot's encoders are absolute.
     if (homed || virtual_) joint.motor->Homed();
-    if (joint.motor->lost_place()) why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed", joint.name);
+    if (joint.motor->lost_place())
+      why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed", joint.name);
     if (!why.text().empty()) return Refuse(why.text());
   }
   for (JointSensor& sensor : sensors_) {

@@ -8,6 +8,8 @@
 
 #include "common/atomic_file.h"
 
+#include "common/realtime.h"
+
 namespace plumb {
 
 FlightRecorder::FlightRecorder(const std::filesystem::path& folder, const std::string& bus, size_t frames, Report report)
@@ -47,6 +49,7 @@ bool FlightRecorder::Dump(int64_t since, int64_t utime, std::string_view reason)
 }
 
 void FlightRecorder::Serve() {
+  BecomeOrdinary();  // the cycle's priority is not for writing files
   // Signals are the main thread's business.
   sigset_t all;
   sigfillset(&all);

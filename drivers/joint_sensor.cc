@@ -37,7 +37,8 @@ JointSensor::JointSensor(const RobotDescription& robot, const SensorDescription&
 void JointSensor::FindTurnedJoint(const RobotDescription& robot, int link) {
   if (link == 0) return;
   const JointDescription& joint = robot.joints[static_cast<size_t>(link - 1)];
-  const bool turns = joint.type == JointDescription::Type::kRevolute || joint.type == JointDescription::Type::kContinuous;
+  const bool turns =
+      joint.type == JointDescription::Type::kRevolute || joint.type == JointDescription::Type::kContinuous;
   if (!turns || !joint.passive) return;
   Eigen::Matrix3d rotation = joint.rotation;
   for (int parent = joint.parent; parent != 0;) {
@@ -66,7 +67,8 @@ SensorUse JointSensor::OnFrame(const Frame& frame, int64_t now, int64_t utime) n
 }
 
 JointMeasurement JointSensor::OfEncoder(const EncoderReading& reading) const noexcept {
-  return {scale_ * reading.position + offset_, scale_ * reading.velocity, std::numeric_limits<double>::quiet_NaN()};
+  return {scale_ * reading.position + offset_, scale_ * reading.velocity,
+          std::numeric_limits<double>::quiet_NaN()};
 }
 
 JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
@@ -124,6 +126,8 @@ const imu_t* JointSensor::NextImu() noexcept {
   return &message_;
 }
 
-int64_t JointSensor::lost() const noexcept { return device_->incomplete() + samples_.lost() + imu_samples_.lost(); }
+int64_t JointSensor::lost() const noexcept {
+  return device_->incomplete() + samples_.lost() + imu_samples_.lost();
+}
 
 }  // namespace plumb

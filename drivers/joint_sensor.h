@@ -16,17 +16,20 @@
 
 namespace plumb {
 
-/// A sensor on the bus and what it says of the robot, in the robot's terms: the position of a joint, how a link turns.
+/// A sensor on the bus and what it says of the robot, in the robot's terms: the position of a joint, how a
+/// link turns.
 ///
-/// An encoder measures its joint. An IMU measures how its link turns, and with that the joint that turns it, if that has
-/// no motor and all joints from the base up to it only slide: the angle by which the link's orientation is turned about
-/// the joint's axis (the twist of its swing-twist decomposition, indifferent to a wrong heading where the axis is level).
+/// An encoder measures its joint. An IMU measures how its link turns, and with that the joint that turns it,
+/// if that has no motor and all joints from the base up to it only slide: the angle by which the link's
+/// orientation is turned about the joint's axis (the twist of its swing-twist decomposition, indifferent to a
+/// wrong heading where the axis is level).
 ///
-/// No method but the constructor throws or allocates. Not thread-safe. `now` is scaled monotonic, `utime` scaled real
-/// time [us].
+/// No method but the constructor throws or allocates. Not thread-safe. `now` is scaled monotonic, `utime`
+/// scaled real time [us].
 class JointSensor {
  public:
-  /// @param stale_after [us] without a reading after which it counts as silent, but never less than three periods.
+  /// @param stale_after [us] without a reading after which it counts as silent, but never less than three
+  /// periods.
   /// @throws std::invalid_argument for an unknown protocol or settings it cannot have.
   JointSensor(const RobotDescription& robot, const SensorDescription& sensor, int64_t stale_after);
 
@@ -34,7 +37,8 @@ class JointSensor {
   /// Index of the joint that it measures, -1: none.
   int joint() const { return joint_; }
   Sensor& device() { return *device_; }
-  /// While true, an angle is the one within half a turn of 0: nobody has counted turns. See also Motor::LetJump.
+  /// While true, an angle is the one within half a turn of 0: nobody has counted turns. See also
+  /// Motor::LetJump.
   void ForgetTurns(bool forget) noexcept { forget_turns_ = forget; }
   const Sensor& device() const { return *device_; }
 
@@ -69,8 +73,9 @@ class JointSensor {
   double scale_ = 1, offset_ = 0;  // of an encoder
   // Of an IMU.
   Eigen::Matrix3d to_link_ = Eigen::Matrix3d::Identity();  // its axes -> the link's
-  Eigen::Quaterniond unturned_ = Eigen::Quaterniond::Identity();  // link's axes -> world's where the joint is at 0
-  Eigen::Vector3d axis_ = Eigen::Vector3d::UnitZ();        // of the joint, in the link's axes
+  Eigen::Quaterniond unturned_ =
+      Eigen::Quaterniond::Identity();                // link's axes -> world's where the joint is at 0
+  Eigen::Vector3d axis_ = Eigen::Vector3d::UnitZ();  // of the joint, in the link's axes
   TimedSamples<ImuSample> imu_samples_;
   imu_t message_{};
 

@@ -259,15 +259,15 @@ int main(int argc, char** argv) {
                            "obey only commands and ARM requests signed with this key (plumb key makes one)");
         app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")
             ->excludes(key);
-        app.add_option("--realtime-priority", priority, "SCHED_FIFO priority, 0 = off")
-            ->check(CLI::Range(0, 90))
-            ->capture_default_str();
+        plumb::AddRealtimeFlag(app, priority);
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
         plumb::RequireKey(process.lcm_url(), !key_file.empty(), allow_unsigned);
         std::optional<plumb::SigningKey> key;
         if (!key_file.empty()) key.emplace(key_file);
+        // LCM's thread comes right behind the cycle: what it brings is part of it.
+        plumb::BecomeRealtime(std::max(priority - 1, 0));
         plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder, key, is_virtual);
         plumb::BecomeRealtime(priority);
         return driver.Run();

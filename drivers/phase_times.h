@@ -11,8 +11,8 @@
 
 namespace plumb {
 
-/// How long the phases of the driver's cycle take: histograms in powers of two of microseconds, as DRIVER_STATUS has them.
-/// Mark and End do not allocate. Not thread-safe.
+/// How long the phases of the driver's cycle take: histograms in powers of two of microseconds, as
+/// DRIVER_STATUS has them. Mark and End do not allocate. Not thread-safe.
 class PhaseTimes {
  public:
   enum Phase : size_t {
@@ -22,7 +22,8 @@ class PhaseTimes {
     kControl,  ///< checks and efforts
     kSend,     ///< frames to the bus
   };
-  static constexpr std::array<std::string_view, 5> kNames = {"receive", "publish", "command", "control", "send"};
+  static constexpr std::array<std::string_view, 5> kNames = {"receive", "publish", "command", "control",
+                                                             "send"};
   static constexpr size_t kBins = 20;  ///< the last one open
 
   /// Where [2^bin, 2^(bin + 1)) us belongs; below 1 us to bin 0.
@@ -46,7 +47,8 @@ class PhaseTimes {
       status.phase_name.assign(kNames.begin(), kNames.end());
       status.phase_duration.assign(kNames.size(), std::vector<int64_t>(kBins));
     }
-    for (size_t i = 0; i < kNames.size(); ++i) std::ranges::copy(counts_[i], status.phase_duration[i].begin());
+    for (size_t i = 0; i < kNames.size(); ++i)
+      std::ranges::copy(counts_[i], status.phase_duration[i].begin());
   }
 
  private:

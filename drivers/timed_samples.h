@@ -9,8 +9,8 @@
 
 namespace plumb {
 
-/// A queue of the samples of one periodic sensor, with times of measurement (PassiveSync) instead of times of arrival.
-/// Does not allocate. Not thread-safe.
+/// A queue of the samples of one periodic sensor, with times of measurement (PassiveSync) instead of times of
+/// arrival. Does not allocate. Not thread-safe.
 template <class Sample>
 class TimedSamples {
  public:
@@ -54,7 +54,8 @@ class TimedSamples {
   }
 
   int64_t dropped() const noexcept { return dropped_; }
-  /// Those dropped and those that never came; a gap or a step of the clock, after which it began anew, counts as one.
+  /// Those dropped and those that never came; a gap or a step of the clock, after which it began anew, counts
+  /// as one.
   int64_t lost() const noexcept { return dropped_ + sync_.lost() + sync_.resets(); }
 
  private:

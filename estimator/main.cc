@@ -3,14 +3,20 @@
 #include <spdlog/spdlog.h>
 
 #include "common/process.h"
+#include "common/realtime.h"
 #include "estimator/state_observer.h"
 
 int main(int argc, char** argv) {
   std::string robot_path;
+  int priority = 0;
   return plumb::Run(
       "plumb-estimator", "Estimates the robot's state from what its drives measure.", argc, argv,
-      [&](CLI::App& app) { app.add_option("robot", robot_path, "robot folder or TOML file")->required(); },
+      [&](CLI::App& app) {
+        app.add_option("robot", robot_path, "robot folder or TOML file")->required();
+        plumb::AddRealtimeFlag(app, priority);
+      },
       [&](plumb::Process& process) {
+        plumb::BecomeRealtime(priority);
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
         plumb::StateObserver observer(robot);
         plumb::Publisher<plumb::robot_state_t> causal(process.messenger(), "ROBOT_STATE");

@@ -11,6 +11,7 @@
 
 #include "common/process.h"
 #include "common/random.h"
+#include "common/realtime.h"
 #include "drivers/can/transport.h"
 #include "plumb/place_robot_t.hpp"
 #include "sim/parameters.h"
@@ -121,18 +122,21 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
 int main(int argc, char** argv) {
   std::string robot_path, bus_url;
   uint64_t seed = 1;
+  int priority = 0;
   std::vector<std::string> assignments;
   return plumb::Run(
       "plumb-robot", "The virtual robot: hidden parameters, drives on a CAN bus", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "folder or TOML file of the robot")->required();
         app.add_option("--bus", bus_url, "CAN bus; default: the robot's");
+        plumb::AddRealtimeFlag(app, priority);
         app.add_option("--seed", seed, "draws the hidden parameters")
             ->check(CLI::Range(0.0, 18446744073709551615.0))  // else -1 would be the greatest of them
             ->capture_default_str();
         app.add_option("--set", assignments, "NAME=VALUE: this parameter is not drawn, may be repeated");
       },
       [&](plumb::Process& process) {
+        plumb::BecomeRealtime(priority);
         const plumb::RobotDescription description = plumb::LoadRobot(robot_path);
         Eigen::VectorXd physical = plumb::HiddenParameters(description, seed);
         for (const std::string& assignment : assignments) plumb::Set(assignment, description, physical);

@@ -17,14 +17,15 @@ struct RobotMotion {
   const Eigen::VectorXd &q, &v;
 };
 
-/// A drive or a sensor of a virtual robot: what speaks on its bus and feels how it moves. Times are microseconds of one
-/// clock and do not decrease. Not thread-safe.
+/// A drive or a sensor of a virtual robot: what speaks on its bus and feels how it moves. Times are
+/// microseconds of one clock and do not decrease. Not thread-safe.
 class VirtualDevice {
  public:
   virtual ~VirtualDevice() = default;
 
   virtual std::vector<Filter> filters() const = 0;
-  /// Obeys a frame. @return true if the motion at this instant matters for that: an answer is due, or another effort.
+  /// Obeys a frame. @return true if the motion at this instant matters for that: an answer is due, or another
+  /// effort.
   virtual bool OnFrame(const Frame& frame, int64_t now) = 0;
   /// Does what is due at motion.time.
   virtual void Tick(const RobotMotion& motion, FrameBatch& out) = 0;
@@ -49,11 +50,13 @@ class VirtualDevice {
 };
 
 /// The drives in order of their joints, then the sensors in order.
-/// @throws std::invalid_argument if there is no virtual device of a protocol, or a device cannot have its settings.
+/// @throws std::invalid_argument if there is no virtual device of a protocol, or a device cannot have its
+/// settings.
 std::vector<std::unique_ptr<VirtualDevice>> VirtualDevices(const RobotDescription& robot);
 
 /// One each.
 std::unique_ptr<VirtualDevice> MakeVirtualDrive(const RobotDescription& robot, int joint);
-std::unique_ptr<VirtualDevice> MakeVirtualSensor(const RobotDescription& robot, const SensorDescription& sensor);
+std::unique_ptr<VirtualDevice> MakeVirtualSensor(const RobotDescription& robot,
+                                                 const SensorDescription& sensor);
 
 }  // namespace plumb

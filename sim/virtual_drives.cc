@@ -50,7 +50,9 @@ class VirtualDrive : public VirtualDevice {
   virtual void Restart(int64_t now) = 0;
 
   double Turns(const RobotMotion& motion) const { return map_.MotorPosition(motion.q[q_index_]) / kTurn; }
-  double TurnsPerSecond(const RobotMotion& motion) const { return map_.MotorVelocity(motion.v[v_index_]) / kTurn; }
+  double TurnsPerSecond(const RobotMotion& motion) const {
+    return map_.MotorVelocity(motion.v[v_index_]) / kTurn;
+  }
   double ReadTurns(const RobotMotion& motion) const { return encoder_.Quantise(Turns(motion)); }
   double ReadTurnsPerSecond() const { return encoder_.velocity(); }
 

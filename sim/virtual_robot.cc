@@ -83,7 +83,8 @@ void VirtualRobot::MoveTo(int64_t time) {
   last_q_ = q();
   last_v_ = v();
   // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a crash.
-  if (!mechanism_.Advance(effort_, static_cast<double>(time - time_) * 1e-6)) mechanism_.SetState(q(), 0 * v());
+  if (!mechanism_.Advance(effort_, static_cast<double>(time - time_) * 1e-6))
+    mechanism_.SetState(q(), 0 * v());
   time_ = time;
   for (const auto& device : devices_) device->Track({begin, last_q_, last_v_}, Motion());
 }

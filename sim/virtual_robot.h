@@ -14,16 +14,16 @@
 
 namespace plumb {
 
-/// A robot that is not there: a Mechanism moved by virtual drives and felt by virtual sensors, all of them on a CAN bus. Event-driven, with
-/// time as an argument, so that its motion does not depend, to the bit, on when the process gets to run:
-/// torques change when their frame arrived, sensors are read at multiples of their periods,
-/// watchdogs expire on time. Only the sending can be late. Times are microseconds. Does not throw after
-/// construction. Not thread-safe.
+/// A robot that is not there: a Mechanism moved by virtual drives and felt by virtual sensors, all of them on
+/// a CAN bus. Event-driven, with time as an argument, so that its motion does not depend, to the bit, on when
+/// the process gets to run: torques change when their frame arrived, sensors are read at multiples of their
+/// periods, watchdogs expire on time. Only the sending can be late. Times are microseconds. Does not throw
+/// after construction. Not thread-safe.
 class VirtualRobot {
  public:
   /// @param physical the true parameters, order of description.parameters.
-  /// @throws std::invalid_argument if no virtual device speaks a motor's or sensor's protocol, or a parameter is not
-  /// physical.
+  /// @throws std::invalid_argument if no virtual device speaks a motor's or sensor's protocol, or a parameter
+  /// is not physical.
   VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical, int64_t now);
 
   /// What the bus must let in.
@@ -40,8 +40,8 @@ class VirtualRobot {
   /// When Advance next has something to do.
   int64_t NextEvent() const;
 
-  /// Puts the robot at these q, v at the time of the latest Advance or Receive, unless the wish of this utime has
-  /// been granted before. @return false if the wish is of the wrong size, not finite or beyond kFarthest.
+  /// Puts the robot at these q, v at the time of the latest Advance or Receive, unless the wish of this utime
+  /// has been granted before. @return false if the wish is of the wrong size, not finite or beyond kFarthest.
   bool Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& wish_q,
              const Eigen::Ref<const Eigen::VectorXd>& wish_v);
 

@@ -82,8 +82,8 @@ LinkMotion MotionOf(const RobotDescription& robot, const RobotMotion& motion, in
   return links[static_cast<size_t>(link)];
 }
 
-/// At its link's origin. It measures as such sensors do, by the change of its velocity in a period: the force of an impact is
-/// spread over one.
+/// At its link's origin. It measures as such sensors do, by the change of its velocity in a period: the force
+/// of an impact is spread over one.
 class VirtualImu : public VirtualDevice {
  public:
   VirtualImu(const RobotDescription& robot, const SensorDescription& sensor)
@@ -136,7 +136,8 @@ class VirtualImu : public VirtualDevice {
 
 }  // namespace
 
-std::unique_ptr<VirtualDevice> MakeVirtualSensor(const RobotDescription& robot, const SensorDescription& sensor) {
+std::unique_ptr<VirtualDevice> MakeVirtualSensor(const RobotDescription& robot,
+                                                 const SensorDescription& sensor) {
   if (sensor.protocol == "cia406") return std::make_unique<VirtualEncoder>(robot, sensor);
   if (sensor.protocol == "xsens") return std::make_unique<VirtualImu>(robot, sensor);
   throw std::invalid_argument("sensor '" + sensor.name + "': no virtual sensor speaks '" + sensor.protocol +

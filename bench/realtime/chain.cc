@@ -91,10 +91,12 @@ class Chain {
                   }),
         requests_(messenger_, "DRIVER_REQUEST"),
         policies_(messenger_, "POLICY") {
-    Start("plumb-robot", {"--bus", bus_url_, "--seed", "1"});
-    Start("plumb-driver", {"--bus", bus_url_, "--realtime-priority", std::to_string(priority)});
-    Start("plumb-estimator", {});
-    Start("plumb-controller", {});
+    // All of them before the rest of the machine, and the driver before the others.
+    const std::vector<std::string> behind{"--realtime-priority", std::to_string(std::max(priority - 5, 0))};
+    Start("plumb-robot", {"--bus", bus_url_, "--seed", "1", behind[0], behind[1]});
+    Start("plumb-driver", {"--bus", bus_url_, "--virtual", "--realtime-priority", std::to_string(priority)});
+    Start("plumb-estimator", behind);
+    Start("plumb-controller", behind);
   }
   ~Chain() {
     for (auto& child : children_) child.Signal(SIGTERM);

@@ -70,9 +70,9 @@ void MeasureFloor(double seconds, int priority, int load) {
   Row("bare LCM: there and back", priority, load, round.size(), Quantiles(round), "");
 }
 
-void MeasureAll(const std::string& source, const std::string& binaries, double seconds, int priority,
-                int load) {
-  MeasureFloor(seconds, priority, load);
+void MeasureAll(const std::string& source, const std::string& binaries, double seconds, double floor_seconds,
+                int priority, int load) {
+  MeasureFloor(floor_seconds, priority, load);
   const ChainTimes chain = MeasureChain(source, binaries, seconds, priority, load);
   const std::string stops =
       chain.stops == 0 ? "" : fmt::format(", stopped {} times, last: {}", chain.stops, chain.reason);
@@ -86,11 +86,14 @@ void MeasureAll(const std::string& source, const std::string& binaries, double s
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  double seconds = 60;
+  double seconds = 60, floor_seconds = 20;
   std::string source = PLUMBLINE_SOURCE, binaries = PLUMBLINE_BINARIES;
   CLI::App app(
       "Measures how punctual this machine, the driver and the whole chain are, and prints a Markdown table");
-  app.add_option("--seconds", seconds, "of each measurement; there are twelve")
+  app.add_option("--seconds", seconds, "of each measurement of the chain; there are four")
+      ->check(CLI::Range(1., 3600.))
+      ->capture_default_str();
+  app.add_option("--floor-seconds", floor_seconds, "of each measurement of timers and LCM; there are eight")
       ->check(CLI::Range(1., 3600.))
       ->capture_default_str();
   app.add_option("--source", source, "folder with robots/")->capture_default_str();
@@ -98,14 +101,14 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   fmt::print(
-      "| {} s each, 1 kHz, times in us | driver's scheduling | machine, {} cores | n | p50 | p99 | p99.9 | "
+      "| {} s of the chain, {} s of the floor, 1 kHz, times in us | driver's scheduling | machine, {} cores | n | p50 | p99 | p99.9 | "
       "max | |\n"
       "|---|---|---|---|---|---|---|---|---|\n",
-      seconds, cores);
+      seconds, floor_seconds, cores);
   try {
     for (const int load : {0, cores}) {
       for (const int priority : {0, plumb::kPriority})
-        plumb::MeasureAll(source, binaries, seconds, priority, load);
+        plumb::MeasureAll(source, binaries, seconds, floor_seconds, priority, load);
     }
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());

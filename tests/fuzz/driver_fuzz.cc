@@ -1,7 +1,7 @@
-// libFuzzer: the driver's state machine with two virtual ODrives and a boom encoder, a wire that may spoil what it carries,
-// strangers, clocks that are set and people who ask for anything at any time. Whatever happens: no torque unless the robot is
-// armed, the command and the measurements are fresh, and limits are kept; and once nothing is wrong any more it can be
-// armed again.
+// libFuzzer: the driver's state machine with two virtual ODrives and a boom encoder, a wire that may spoil
+// what it carries, strangers, clocks that are set and people who ask for anything at any time. Whatever
+// happens: no torque unless the robot is armed, the command and the measurements are fresh, and limits are
+// kept; and once nothing is wrong any more it can be armed again.
 
 #include <cmath>
 #include <numbers>
@@ -12,6 +12,7 @@
 #include "drivers/protocols/cansimple_device.h"
 #include "drivers/protocols/cia406_device.h"
 #include "tests/fuzz/bytes.h"
+#include "tests/fuzz/leg.h"
 
 namespace plumb {
 namespace {
@@ -23,49 +24,14 @@ constexpr int64_t kStart = 1'000'000, kEpoch = 1'700'000'000'000'000;
 constexpr size_t kMotors = 2;
 constexpr int kSlide = 2;  // the passive joint
 
-RobotDescription Leg() {
-  RobotDescription robot;
-  robot.links.resize(4);
-  for (size_t i = 0; i < 3; ++i) {
-    JointDescription joint;
-    joint.name = std::string("joint") + std::to_string(i);
-    joint.parent = static_cast<int>(i);
-    joint.child = static_cast<int>(i) + 1;
-    joint.lower = -1.5;
-    joint.upper = 1.5;
-    joint.effort_limit = 3;
-    joint.velocity_limit = 20;
-    joint.motor = {.protocol = "cansimple", .node = static_cast<int>(i) + 1, .gear = i == 0 ? 1. : 6., .sign = i == 0 ? 1 : -1, .offset = 0.1};
-    robot.joints.push_back(joint);
-  }
-  JointDescription& slide = robot.joints[kSlide];
-  slide.type = JointDescription::Type::kPrismatic;
-  slide.passive = true;
-  slide.motor = {};
-  SensorDescription boom;
-  boom.name = "boom";
-  boom.protocol = "cia406";
-  boom.period = 0.005;
-  boom.joint = kSlide;
-  boom.node = 1;
-  boom.counts = boom.range = 65536;
-  boom.max_speed = 10;
-  robot.sensors.push_back(boom);
-  robot.driver = {.cycle = 0.005,
-                  .measurement = 0.005,
-                  .expiry = 0.02,
-                  .disarm_after = 0.06,
-                  .stale_after = 0.02,
-                  .heartbeat_timeout = 0.1,
-                  .start_guard = 0.05};
-  return robot;
-}
-
 class DriverGame {
  public:
   explicit DriverGame(Bytes& bytes) : bytes_(bytes), robot_(Leg()), driver_(robot_, kStart, kEpoch + kStart) {
     for (int node = 1; node <= static_cast<int>(kMotors); ++node) {
-      drives_.emplace_back(CanSimpleDevice::Settings{.node = node, .heartbeat_period = 20'000, .encoder_period = 5'000, .watchdog = 50'000}, kStart);
+      drives_.emplace_back(
+          CanSimpleDevice::Settings{
+              .node = node, .heartbeat_period = 20'000, .encoder_period = 5'000, .watchdog = 50'000},
+          kStart);
     }
     boom_.emplace(Cia406Device::Settings{.event_timer = 5'000}, kStart);
     // As a rule the fuzzer begins with a robot that runs.
@@ -151,7 +117,8 @@ class DriverGame {
     }
     if (commanding_) Command(false);
     while (const joint_state_t* state = driver_.NextState()) {
-      for (size_t i = 0; i < kMotors; ++i) Require(std::isfinite(state->position[i]) && std::isfinite(state->velocity[i]));
+      for (size_t i = 0; i < kMotors; ++i)
+        Require(std::isfinite(state->position[i]) && std::isfinite(state->velocity[i]));
     }
     Tick();
     CheckState();
@@ -161,7 +128,8 @@ class DriverGame {
     FrameBatch said;
     for (size_t i = 0; i < kMotors; ++i) {
       const JointMap map(robot_.joints[i].motor);
-      drives_[i].Tick(now_, {map.MotorPosition(position_[i]) / kTurn, map.MotorVelocity(velocity_[i]) / kTurn}, said);
+      drives_[i].Tick(
+          now_, {map.MotorPosition(position_[i]) / kTurn, map.MotorVelocity(velocity_[i]) / kTurn}, said);
     }
     boom_->Tick(now_, position_[kSlide], said);
     for (const Frame& frame : said.frames()) wire_.Carry(frame, [this](const Frame& f) { ToDriver(f); });
@@ -169,8 +137,9 @@ class DriverGame {
 
   void ToDriver(const Frame& frame) {
     for (size_t i = 0; i < kMotors; ++i) {
-      const bool estimates = frame.id == ((i + 1) << 5 | kGetEncoderEstimates.command) && !frame.extended && !frame.remote && !frame.error &&
-                             !frame.fd && !frame.foreign && frame.length >= 8;
+      const bool estimates = frame.id == ((i + 1) << 5 | kGetEncoderEstimates.command) && !frame.extended &&
+                             !frame.remote && !frame.error && !frame.fd && !frame.foreign &&
+                             frame.length >= 8;
       const auto values = estimates ? DecodePayload(kGetEncoderEstimates, frame) : std::nullopt;
       if (!values) continue;
       const JointMap map(robot_.joints[i].motor);
@@ -221,7 +190,8 @@ class DriverGame {
   void CheckState() {
     const DriveState state = driver_.state();
     // Only an order to arm leads out of a fault.
-    if (fault_ && !asked_to_arm_) Require(state == DriveState::kFault || state == DriveState::kIdle || state == DriveState::kAbsent);
+    if (fault_ && !asked_to_arm_)
+      Require(state == DriveState::kFault || state == DriveState::kIdle || state == DriveState::kAbsent);
     if (state == DriveState::kFault) may_run_ = asked_to_arm_ = false;
     fault_ = state == DriveState::kFault;
     Require((state == DriveState::kArmed) == driver_.reason().empty());
@@ -254,14 +224,18 @@ class DriverGame {
     driver_request_t request{};
     request.request = static_cast<int8_t>(bytes_.Byte() % 6);
     const uint8_t when = bytes_.Byte();
-    request.utime = when < 192 ? utime() : when < 224 ? utime() + static_cast<int64_t>(bytes_.Modest(3e6)) : bytes_.Value<int64_t>();
+    request.utime = when < 192   ? utime()
+                    : when < 224 ? utime() + static_cast<int64_t>(bytes_.Modest(3e6))
+                                 : bytes_.Value<int64_t>();
     Ask(request);
   }
 
   void Ask(const driver_request_t& request) {
     driver_.OnRequest(request, now_, utime());
-    if (request.request == driver_request_t::ARM || request.request == driver_request_t::ARM_HOMED) may_run_ = asked_to_arm_ = true;
-    if (request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP) may_run_ = asked_to_arm_ = false;
+    if (request.request == driver_request_t::ARM || request.request == driver_request_t::ARM_HOMED)
+      may_run_ = asked_to_arm_ = true;
+    if (request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP)
+      may_run_ = asked_to_arm_ = false;
   }
 
   void Surprise() {
@@ -320,8 +294,9 @@ class DriverGame {
     return driver_.state() == DriveState::kArmed;
   }
 
-  static constexpr uint32_t kIds[] = {0x20, 0x21, 0x23, 0x26, 0x29, 0x2E, 0x34, 0x35, 0x37, 0x3C, 0x41,  0x43,  0x49,  0x4E,
-                                      0x55, 0x57, 0x5C, 0x22, 0x42, 0x27, 0x7E2, 0x81, 0x181, 0x581, 0x701, 0x00, 0x40, 0x100};
+  static constexpr uint32_t kIds[] = {0x20,  0x21, 0x23,  0x26,  0x29,  0x2E, 0x34, 0x35, 0x37, 0x3C,
+                                      0x41,  0x43, 0x49,  0x4E,  0x55,  0x57, 0x5C, 0x22, 0x42, 0x27,
+                                      0x7E2, 0x81, 0x181, 0x581, 0x701, 0x00, 0x40, 0x100};
 
   Bytes& bytes_;
   const RobotDescription robot_;

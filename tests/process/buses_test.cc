@@ -14,7 +14,7 @@ using Catch::Contains;
 /// As Stage::StartAll, the driver with a bus of its own.
 void StartAll(Stage& stage, const std::string& drivers_bus) {
   stage.Start("plumb-robot", {"--bus", stage.bus_url, "--seed", "1"});
-  stage.Start("plumb-driver", {"--bus", drivers_bus});
+  stage.Start("plumb-driver", {"--bus", drivers_bus, "--virtual"});
   stage.Start("plumb-estimator");
   stage.Start("plumb-controller");
   REQUIRE(stage.WaitUntil([&] { return stage.controllers.received() > 0; }, 20));

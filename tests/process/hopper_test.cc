@@ -1,4 +1,5 @@
-// A robot with three motors, two boom encoders and an IMU on one bus: real processes, both protocols of motors.
+// A robot with three motors, two boom encoders and an IMU on one bus: real processes, both protocols of
+// motors.
 
 #include <cmath>
 
@@ -9,7 +10,8 @@
 namespace plumb {
 namespace {
 
-void Stand(const std::string& robot, int number, const std::vector<uint32_t>& from_motors, const std::vector<uint32_t>& to_motors) {
+void Stand(const std::string& robot, int number, const std::vector<uint32_t>& from_motors,
+           const std::vector<uint32_t>& to_motors) {
   Stage stage(number, robot);
   Subscriber<joint_state_t> joints(stage.messenger, "JOINT_STATE");
   Subscriber<imu_t> imus(stage.messenger, "IMU");
@@ -27,7 +29,9 @@ void Stand(const std::string& robot, int number, const std::vector<uint32_t>& fr
 
   // 2 s by a witness's clock; on a busy machine a little less may have come by then.
   const auto frames = [&](uint32_t id) { return stage.frames_by_id[id]; };
-  const auto about = [](int64_t count, int64_t expected) { return count > expected * 8 / 10 && count < expected * 11 / 10; };
+  const auto about = [](int64_t count, int64_t expected) {
+    return count > expected * 8 / 10 && count < expected * 11 / 10;
+  };
   for (const uint32_t id : from_motors) CHECK(about(frames(id), 1000));
   for (const uint32_t id : to_motors) CHECK(about(frames(id), 1000));
   for (const uint32_t boom : {0x181u, 0x182u}) CHECK(about(frames(boom), 1000));
@@ -42,11 +46,13 @@ void Stand(const std::string& robot, int number, const std::vector<uint32_t>& fr
     CHECK(std::isfinite(state.position[i]));
     CHECK(std::abs(state.utime - state.measured[i]) <= 20'000);
   }
-  // It has fallen, since nobody held it, as far as its foot on the ground lets it: the rest of it goes through.
+  // It has fallen, since nobody held it, as far as its foot on the ground lets it: the rest of it goes
+  // through.
   CHECK(std::abs(state.position[1]) < 1.3);
   const imu_t& imu = imus.newest();
   CHECK(imu.link == "torso");
-  const double norm = std::hypot(std::hypot(imu.orientation[0], imu.orientation[1]), std::hypot(imu.orientation[2], imu.orientation[3]));
+  const double norm = std::hypot(std::hypot(imu.orientation[0], imu.orientation[1]),
+                                 std::hypot(imu.orientation[2], imu.orientation[3]));
   CHECK(norm == Approx(1).margin(1e-3));
 
   const driver_status_t& status = stage.drivers.newest();
@@ -65,7 +71,9 @@ void Stand(const std::string& robot, int number, const std::vector<uint32_t>& fr
 
 TEST_CASE("a hopper on ODrives") { Stand("hopper", 45, {0x29, 0x49, 0x69}, {0x2E, 0x4E, 0x6E}); }
 
-TEST_CASE("a hopper on motors of the MIT protocol") { Stand("hopper/mit.toml", 46, {0x101, 0x102, 0x103}, {0x1, 0x2, 0x3}); }
+TEST_CASE("a hopper on motors of the MIT protocol") {
+  Stand("hopper/mit.toml", 46, {0x101, 0x102, 0x103}, {0x1, 0x2, 0x3});
+}
 
 }  // namespace
 }  // namespace plumb

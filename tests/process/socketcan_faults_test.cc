@@ -49,7 +49,7 @@ struct Cable {
     stage.robot_folder = PatientRobot(stage);
     stage.bus = OpenTransport("socketcan:vx1");
     stage.Start("plumb-robot", {"--bus", "socketcan:vx1", "--seed", "1"});
-    stage.Start("plumb-driver", {"--bus", "socketcan:vx0"});
+    stage.Start("plumb-driver", {"--bus", "socketcan:vx0", "--virtual"});
   }
 
   bool Until(const std::function<bool()>& so, double seconds) {

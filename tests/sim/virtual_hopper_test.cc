@@ -97,7 +97,8 @@ struct Bus {
     command.num_joints = description.num_joints();
     const auto n = static_cast<size_t>(description.num_joints());
     command.effort.assign(n, 0);
-    for (size_t i = 3; i < 6; ++i) command.effort[i] = effort * std::sin(1e-5 * static_cast<double>(now) + static_cast<double>(i));
+    for (size_t i = 3; i < 6; ++i)
+      command.effort[i] = effort * std::sin(1e-5 * static_cast<double>(now) + static_cast<double>(i));
     for (auto* none : {&command.position, &command.velocity, &command.kp, &command.kd}) {
       none->assign(n, std::numeric_limits<double>::quiet_NaN());
     }
@@ -144,7 +145,8 @@ TEST_CASE("a hopper on one bus: every joint is measured as it is, whatever measu
       CHECK(state.utime - state.measured[i] <= 5'100);
       const auto index = static_cast<Eigen::Index>(i);
       const double age = 1e-6 * static_cast<double>(state.utime - state.measured[i]);
-      // Resolutions, and what a joint moves within its reading's age and the tenth of a millisecond of our steps.
+      // Resolutions, and what a joint moves within its reading's age and the tenth of a millisecond of our
+      // steps.
       const double resolution = i < 2 ? 1.5 * 6.3 / 65536 : i == 2 ? 1e-4 : 25. / 32768 + 6.3 / 16384;
       CHECK(std::abs(state.position[i] - bus.truth_q[k][index]) <
             resolution + (age + 2.5e-3) * (std::abs(bus.truth_v[k][index]) + 0.5));
@@ -196,7 +198,8 @@ TEST_CASE("a sensor that goes silent stops the robot") {
 TEST_CASE("a joint that nothing measures is refused by its name") {
   RobotDescription description = LoadRobot(SourceFile("robots/hopper/robot.toml"));
   std::erase_if(description.sensors, [](const SensorDescription& sensor) { return sensor.name == "imu"; });
-  CHECK_THROWS_WITH(Driver(description, 0, kStart), Catch::Contains("'rooty' has no motor, and no sensor measures it"));
+  CHECK_THROWS_WITH(Driver(description, 0, kStart),
+                    Catch::Contains("'rooty' has no motor, and no sensor measures it"));
 }
 
 }  // namespace
