@@ -183,13 +183,17 @@ class DriverProcess {
       driver_.OnLink(transport_->Reopen());
     }
     if (driver_.revision() == revision_ && now < next_status_) return;
+    PublishStatus();
+    revision_ = driver_.revision();
+    next_status_ = now + kStatusPeriod;
+  }
+
+  void PublishStatus() {
     driver_status_t& status =
         driver_.Status(clock_.Utime(), transport_->stats(), commands_.rejected() + requests_.rejected());
     phases_.Fill(status);
     statuses_.Publish(status);
     log_.Note(status.state, status.reason);
-    revision_ = driver_.revision();
-    next_status_ = now + kStatusPeriod;
   }
 
   /// Zero torque and idle drives, confirmed by their heartbeats. @return 1 if a drive that may be armed has
@@ -204,6 +208,7 @@ class DriverProcess {
     do {
       Step();
     } while (!driver_.confirmed_idle() && clock_.Now() - begin < patience);
+    PublishStatus();  // the last word: nothing is sent after it
     log_.Drain();
     const bool idle = driver_.confirmed_idle();
     if (!log_.ready()) return idle ? 0 : 1;

@@ -66,7 +66,10 @@ TEST_CASE("a foreign witness sees every frame that the driver says it sent") {
   stage.children.at("plumb-controller")->Signal(SIGKILL);
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == 1; }, 2));
-  stage.Listen(1);         // nothing is sent any more, and DRIVER_STATUS has said so
+  // At rest it still asks for temperatures; its last DRIVER_STATUS counts them all.
+  stage.children.at("plumb-driver")->Signal(SIGTERM);
+  REQUIRE(stage.children.at("plumb-driver")->WaitFor(5));
+  stage.Listen(1);
   witness.Signal(SIGINT);  // it writes what it has kept back
   REQUIRE(witness.WaitFor(5));
   const std::vector<std::string> seen = FramesOfHost(Read(log));
