@@ -118,11 +118,11 @@ std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness
   DateStop();
   CommandTorques();
   // After the checks, so that a fault is answered in this cycle. The joints take turns to be the first.
-  size_t arming = torque_frames_ < kMostFrames ? kMostFrames - torque_frames_ : 1;
+  size_t arming = std::max(kMostFrames - std::min(kMostFrames, torque_frames_), kMostArmingFrames);
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[(turn_ + i) % joints_.size()];
     const size_t before = housekeeping_.size();
-    joint.motor->Tick(now, arming > 0, housekeeping_);
+    joint.motor->Tick(now, arming >= kMostArmingFrames, housekeeping_);
     arming -= std::min(arming, housekeeping_.size() - before);
     joint.frames_end = torque_frames_ + housekeeping_.size();
   }

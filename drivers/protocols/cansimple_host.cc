@@ -14,7 +14,6 @@ namespace {
 using namespace cansimple;
 
 constexpr int64_t kRetry = 50'000;      // [us] between repetitions of an unanswered frame
-constexpr int kModes = 2;               // one of them may be lost on the bus
 constexpr int kDisarmsBeforeEstop = 5;  // a drive that ignores these gets its emergency stop
 constexpr int kBeatsToArm = 4;  // heartbeats a drive has to enter closed loop; the first may be on its way
 
@@ -69,7 +68,8 @@ class CanSimpleMotor : public Motor {
   void Homed() noexcept override { lost_place_ = false; }
   bool IsEstop(const Frame& frame) const noexcept override {
     const uint32_t to = frame.id >> 5;
-    return (frame.id & 0x1F) == kEstop.command && !frame.remote && (to == static_cast<uint32_t>(node_) || to == kBroadcastNode);
+    return (frame.id & 0x1F) == kEstop.command && !frame.remote &&
+           (to == static_cast<uint32_t>(node_) || to == kBroadcastNode);
   }
 
   void Estop(int64_t now) noexcept override {
@@ -114,8 +114,7 @@ class CanSimpleMotor : public Motor {
         if (late) {
           Fail(now, "the bus has not taken its arming frames for {} ms", (now - entered_) / 1000);
         } else if (may_arm) {
-          out.Push(ArmingFrame());
-          if (step_ == Step::kState) may_run_ = true;
+          PushArmingFrames(out);
         }
         break;
       case Step::kAwait:
@@ -144,8 +143,7 @@ class CanSimpleMotor : public Motor {
       case Step::kClear:
         return Enter(Step::kMode, now);
       case Step::kMode:
-        if (++modes_ >= kModes) Enter(Step::kState, now);
-        return;
+        return Enter(Step::kState, now);
       case Step::kState:
         return Enter(Step::kAwait, now);
       case Step::kDisarming:
@@ -190,15 +188,22 @@ class CanSimpleMotor : public Motor {
   void Enter(Step step, int64_t now) noexcept {
     step_ = step;
     entered_ = retry_ = now;
-    beats_ = modes_ = 0;
+    beats_ = 0;
   }
 
   std::string_view Words(uint32_t errors) noexcept { return DescribeErrors(errors, words_); }
 
-  Frame ArmingFrame() const noexcept {
-    if (step_ == Step::kClear) return Make(kClearErrors, node_);
-    if (step_ == Step::kMode) return Make(kSetControllerMode, node_, {kTorqueControl, kPassthrough});
-    return Make(kSetAxisState, node_, {kClosedLoopControl});
+  // A drive that has lost its power since the first mode would run in the one it wakes up in, which holds a position.
+  void PushArmingFrames(FrameBatch& out) noexcept {
+    if (out.room() < 2) return;
+    if (step_ == Step::kClear) {
+      out.Push(Make(kClearErrors, node_));
+      return;
+    }
+    out.Push(Make(kSetControllerMode, node_, {kTorqueControl, kPassthrough}));
+    if (step_ == Step::kMode) return;
+    out.Push(Make(kSetAxisState, node_, {kClosedLoopControl}));
+    may_run_ = true;
   }
 
   bool Retry(int64_t now) noexcept {
@@ -243,7 +248,8 @@ class CanSimpleMotor : public Motor {
     if (step_ == Step::kArmed && !running) {
       Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_), Words(axis_error_),
            DescribeProcedureResult(procedure_result_));
-      ask_error_ = true;  // and tell it to stop nevertheless: it may be another with its node id that has spoken
+      ask_error_ =
+          true;  // and tell it to stop nevertheless: it may be another with its node id that has spoken
     }
     return FrameUse::kConsumed;
   }
@@ -270,11 +276,11 @@ class CanSimpleMotor : public Motor {
 
   Step step_ = Step::kRest;
   int64_t entered_ = 0, retry_ = 0;
-  int beats_ = 0, modes_ = 0, disarms_ = 0;  // heard in this step; accepted
-  bool given_ = false;                       // the last Tick gave frames
-  bool may_run_ = false;                     // told to run, or heard running, and not heard idle since
-  bool order_due_ = false;                   // no order to stop was accepted since the last order to run
-  bool estop_due_ = false;                   // no Estop was accepted since it was asked for
+  int beats_ = 0, disarms_ = 0;  // heard in this step; accepted
+  bool given_ = false;           // the last Tick gave frames
+  bool may_run_ = false;         // told to run, or heard running, and not heard idle since
+  bool order_due_ = false;       // no order to stop was accepted since the last order to run
+  bool estop_due_ = false;       // no Estop was accepted since it was asked for
   bool ask_error_ = false, fault_ = false;
   bool lost_place_ = false;
   size_t poll_turn_ = 0;

@@ -58,6 +58,9 @@ enum class FrameUse {
   kEstimate,  ///< carried a new MotorEstimate
 };
 
+/// The most frames of the arming sequence that a drive is given in a Tick.
+inline constexpr size_t kMostArmingFrames = 2;
+
 /// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All methods
 /// but the constructor are free of exceptions and allocation; times are scaled monotonic microseconds. Frames
 /// to send go into a batch. Units are SI at the motor's shaft; drives' own units end here. Not thread-safe.
@@ -90,7 +93,7 @@ class Motor {
   /// Whether the frame is somebody else's emergency stop for this drive, or for all.
   virtual bool IsEstop(const Frame&) const noexcept { return false; }
   /// Once per cycle: deadlines, and the next frames of the sequence under way.
-  /// @param may_arm false: no room for arming frames in this cycle, the sequence waits.
+  /// @param may_arm false: no room for kMostArmingFrames in this cycle, the sequence waits.
   virtual void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept = 0;
   /// How many readings it asks for in turn: with telemetry that comes unasked, all drives' would sometimes come at once.
   virtual int num_polled() const noexcept { return 0; }

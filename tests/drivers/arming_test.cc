@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <utility>
 
 #include "tests/drivers/rig.h"
 
@@ -79,10 +80,27 @@ TEST_CASE("one mode lost on the bus itself does not close the loop in another") 
   CHECK_FALSE(wrong);
 }
 
+TEST_CASE("a drive that restarts while it is armed does not run in the mode it wakes up in") {
+  const int after = GENERATE(1, 2);  // modes
+  Rig rig;
+  int modes = 0;
+  rig.to_drive = [&](Frame& frame) { return modes += frame.id == 0x2B, true; };
+  bool restarted = false, wrong = false;
+  rig.Start();
+  rig.on_step = [&] {
+    wrong = wrong || (rig.drives[0].armed() && rig.drives[0].control_mode() != cansimple::kTorqueControl);
+    if (modes == after && !std::exchange(restarted, true)) rig.drives[0].Reboot(rig.now);
+  };
+  rig.Arm();
+  rig.Run(20);
+  CHECK(restarted);
+  CHECK_FALSE(wrong);
+}
+
 TEST_CASE("many joints arm with few frames in each cycle") {
   const int joints = GENERATE(3, 6, 20);
   Rig rig(joints);
-  const size_t most = std::max<size_t>(8, static_cast<size_t>(joints) + 1);
+  const size_t most = std::max<size_t>(8, static_cast<size_t>(joints) + 2);
   size_t worst = 0;
   rig.accept = [&](const std::vector<Frame>& frames) {
     worst = std::max(worst, frames.size());
