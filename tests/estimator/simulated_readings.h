@@ -63,13 +63,14 @@ class SimulatedReadings {
     joint_state_t reading{};
     std::vector<imu_t> imus;
     Eigen::VectorXd last_v = v;  // at the IMU's last reading
-    joint_state_t held{};
     for (int64_t t = 0; t <= std::llround(duration * 1e6); t += kStep) {
       if (t % kPeriod == kDelay % kPeriod && t > kDelay) {  // the reading of kDelay ago arrives
         for (size_t i = 0; i < encoders_.size(); ++i) {
           reading.effort_applied[i] = impulse[static_cast<Eigen::Index>(i)] / (1e-6 * kPeriod);
         }
-        samples.push_back({reading, imus, mechanism_.q(), mechanism_.v()});
+        // The state is of the time that the message names, which is off a little.
+        const double off = 1e-6 * static_cast<double>(reading.utime - kStart - t);
+        samples.push_back({reading, imus, mechanism_.q() + off * mechanism_.v(), mechanism_.v()});
         imus.clear();
         impulse.setZero();
       }
