@@ -12,6 +12,7 @@
 #include "cli/launch.h"
 #include "cli/sim.h"
 #include "cli/train.h"
+#include "cli/tune.h"
 #include "common/process.h"
 #include "common/realtime.h"
 #include "common/signature.h"
@@ -86,11 +87,11 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  std::string can_robot, dbc_output, key, new_key;
+  std::string can_robot, dbc_output, tune_robot, tune_log, key, new_key;
   bool homed = false;
   CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr, *train = nullptr,
            *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr, *arm = nullptr, *disarm = nullptr,
-           *estop = nullptr, *make_key = nullptr;
+           *estop = nullptr, *make_key = nullptr, *tune = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -195,6 +196,11 @@ int main(int argc, char** argv) {
         can_dbc = can->add_subcommand("dbc", "all messages as a DBC file, for other tools");
         can_dbc->add_option("robot", can_robot, "robot folder or TOML file")->required();
         can_dbc->add_option("--output", dbc_output, "file; default: print it");
+        CLI::App* estimate = app.add_subcommand("estimate", "what the estimator assumes");
+        estimate->require_subcommand(1);
+        tune = estimate->add_subcommand("tune", "learn from a log what noise sensors and motion have, for robot.toml");
+        tune->add_option("robot", tune_robot, "robot folder or TOML file")->required();
+        tune->add_option("--log", tune_log, "LCM log with JOINT_STATE and IMU")->required();
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");
         arm->add_flag("--homed", homed, "joints whose drives have restarted are where their encoders say");
         disarm = app.add_subcommand("disarm", "switch the motors off");
@@ -203,7 +209,7 @@ int main(int argc, char** argv) {
           request->add_option("--key", key, "sign with the driver's key; only arm needs it");
         make_key = app.add_subcommand("key", "make a key to sign commands with");
         make_key->add_option("file", new_key, "a new file, which only its owner may read")->required();
-        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, arm,
+        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, estimate, tune, arm,
                               disarm, estop, make_key})
           sub->fallthrough();
       },
@@ -216,6 +222,7 @@ int main(int argc, char** argv) {
         if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus, key);
         if (can_plan->parsed()) return plumb::PrintBusPlan(can_robot);
         if (can_dbc->parsed()) return plumb::WriteDbc(can_robot, dbc_output);
+        if (tune->parsed()) return plumb::TuneEstimator(tune_robot, tune_log);
         if (arm->parsed()) {
           return plumb::Request(process, homed ? plumb::driver_request_t::ARM_HOMED : plumb::driver_request_t::ARM, key);
         }

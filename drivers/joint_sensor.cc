@@ -31,25 +31,8 @@ JointSensor::JointSensor(const RobotDescription& robot, const SensorDescription&
   if (sensor.link < 0) return;
   message_.name = sensor.name;
   message_.link = robot.links[static_cast<size_t>(sensor.link)].name;
-  FindTurnedJoint(robot, sensor.link);
-}
-
-void JointSensor::FindTurnedJoint(const RobotDescription& robot, int link) {
-  if (link == 0) return;
-  const JointDescription& joint = robot.joints[static_cast<size_t>(link - 1)];
-  const bool turns =
-      joint.type == JointDescription::Type::kRevolute || joint.type == JointDescription::Type::kContinuous;
-  if (!turns || !joint.passive) return;
-  Eigen::Matrix3d rotation = joint.rotation;
-  for (int parent = joint.parent; parent != 0;) {
-    const JointDescription& before = robot.joints[static_cast<size_t>(parent - 1)];
-    if (before.type != JointDescription::Type::kPrismatic) return;
-    rotation = before.rotation * rotation;
-    parent = before.parent;
-  }
-  joint_ = link - 1;
-  unturned_ = Eigen::Quaterniond(rotation);
-  axis_ = joint.axis;
+  mounting_ = MountingOf(robot, sensor.link);
+  joint_ = mounting_.turned;
 }
 
 SensorUse JointSensor::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
@@ -76,12 +59,11 @@ JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
   if (joint_ < 0 || !sample.orientation_valid) return measurement;
   const auto& [w, x, y, z] = sample.orientation;
   const Eigen::Quaterniond link = Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
-  const Eigen::Quaterniond turn = unturned_.conjugate() * link;
-  const double twist = 2 * std::atan2(axis_.dot(turn.vec()), turn.w());
+  const double twist = mounting_.Angle(link);
   // The one of the angles that look like this which is next to the last.
   const double near = std::isfinite(newest_.position) && !forget_turns_ ? newest_.position : 0;
   measurement.position = near + std::remainder(twist - near, 2 * std::numbers::pi);
-  measurement.velocity = axis_.dot(to_link_ * Vector(sample.rate));
+  measurement.velocity = mounting_.axis.dot(to_link_ * Vector(sample.rate));
   return measurement;
 }
 

@@ -13,16 +13,15 @@
 #include "drivers/timed_samples.h"
 #include "plumb/imu_t.hpp"
 #include "robot/description.h"
+#include "robot/imu_mounting.h"
 
 namespace plumb {
 
 /// A sensor on the bus and what it says of the robot, in the robot's terms: the position of a joint, how a
 /// link turns.
 ///
-/// An encoder measures its joint. An IMU measures how its link turns, and with that the joint that turns it,
-/// if that has no motor and all joints from the base up to it only slide: the angle by which the link's
-/// orientation is turned about the joint's axis (the twist of its swing-twist decomposition, indifferent to a
-/// wrong heading where the axis is level).
+/// An encoder measures its joint. An IMU measures how its link turns, and with that the joint that turns it, see
+/// ImuMounting.
 ///
 /// No method but the constructor throws or allocates. Not thread-safe. `now` is scaled monotonic, `utime`
 /// scaled real time [us].
@@ -62,7 +61,6 @@ class JointSensor {
   int64_t lost() const noexcept;
 
  private:
-  void FindTurnedJoint(const RobotDescription& robot, int link);
   JointMeasurement OfEncoder(const EncoderReading& reading) const noexcept;
   JointMeasurement OfImu(const ImuSample& sample) noexcept;
 
@@ -73,9 +71,7 @@ class JointSensor {
   double scale_ = 1, offset_ = 0;  // of an encoder
   // Of an IMU.
   Eigen::Matrix3d to_link_ = Eigen::Matrix3d::Identity();  // its axes -> the link's
-  Eigen::Quaterniond unturned_ =
-      Eigen::Quaterniond::Identity();                // link's axes -> world's where the joint is at 0
-  Eigen::Vector3d axis_ = Eigen::Vector3d::UnitZ();  // of the joint, in the link's axes
+  ImuMounting mounting_;
   TimedSamples<ImuSample> imu_samples_;
   imu_t message_{};
 

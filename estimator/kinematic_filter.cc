@@ -1,6 +1,7 @@
 #include "estimator/kinematic_filter.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 namespace plumb {
@@ -10,77 +11,118 @@ namespace {
 constexpr double kInitialAccelerationSd = 100;
 // Nor of the velocity where it is not measured [rad/s].
 constexpr double kInitialVelocitySd = 10;
+// [s] in which a bias may wander by as much as it may be at the start: warming up takes minutes.
+constexpr double kBiasWanders = 100;
 
-double Square(double x) { return x * x; }
+constexpr double Square(double x) { return x * x; }
 
 }  // namespace
 
+KinematicFilter::KinematicFilter(const EstimatorSettings& settings)
+    : settings_(settings), window_(static_cast<size_t>(settings.lag) + 2) {
+  covariance_(3, 3) = Square(settings.bias_sd);
+}
+
 void KinematicFilter::Restart(double position, double velocity) {
   const bool known = std::isfinite(velocity);
-  mean_ = {position, known ? velocity : 0, 0};
-  covariance_ = Eigen::Vector3d(Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd),
-                                Square(known ? settings_.velocity_sd : kInitialVelocitySd), Square(kInitialAccelerationSd))
+  mean_.head<3>() << position, known ? velocity : 0, 0;
+  const double bias_variance = covariance_(3, 3);
+  covariance_ = Eigen::Vector4d(Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd),
+                                Square(known ? settings_.velocity_sd : kInitialVelocitySd), Square(kInitialAccelerationSd),
+                                bias_variance)
                     .asDiagonal();
-  window_.clear();
-  window_.push_back({Eigen::Matrix3d::Identity(), mean_, covariance_, mean_, covariance_});
+  pending_ = 0;
+  predicted_mean_ = mean_;
+  predicted_covariance_ = covariance_;
+  Keep();
 }
 
 void KinematicFilter::Predict(double dt, double effort_step) {
-  Eigen::Matrix3d transition;
-  transition << 1, dt, dt * dt / 2,  //
-      0, 1, dt,                      //
-      0, 0, 1;
+  transition_ << 1, dt, dt * dt / 2, 0,  //
+      0, 1, dt, 0,                       //
+      0, 0, 1, 0,                        //
+      0, 0, 0, 1;
   const double d2 = dt * dt, d3 = d2 * dt, d4 = d3 * dt, d5 = d4 * dt;
-  Eigen::Matrix3d jerk;  // integral of the white jerk over dt
-  jerk << d5 / 20, d4 / 8, d3 / 6,  //
-      d4 / 8, d3 / 3, d2 / 2,       //
-      d3 / 6, d2 / 2, dt;
+  Eigen::Matrix4d jerk;  // integral of the white jerk over dt
+  jerk << d5 / 20, d4 / 8, d3 / 6, 0,  //
+      d4 / 8, d3 / 3, d2 / 2, 0,       //
+      d3 / 6, d2 / 2, dt, 0,           //
+      0, 0, 0, 0;
   // The mean effort of this interval differs from the last one's: the acceleration may step at its beginning.
-  const Eigen::Vector3d step = transition.col(2) * (settings_.effort_step * effort_step);
-  mean_ = transition * mean_;
-  covariance_ = transition * covariance_ * transition.transpose() + Square(settings_.jerk) * jerk +
+  const Eigen::Vector4d step = transition_.col(2) * (settings_.effort_step * effort_step);
+  mean_ = transition_ * mean_;
+  covariance_ = transition_ * covariance_ * transition_.transpose() + Square(settings_.jerk) * jerk +
                 step * step.transpose();
-  step_.transition = transition;
-  step_.predicted_mean = mean_;
-  step_.predicted_covariance = covariance_;
+  covariance_(3, 3) += Square(settings_.bias_sd) * dt / kBiasWanders;
+  predicted_mean_ = mean_;
+  predicted_covariance_ = covariance_;
 }
 
-void KinematicFilter::Update(double position, double velocity, double age) {
-  // A measurement time that is off by timing_sd displaces the position by velocity * timing_sd.
-  const double position_variance = Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd);
-  Correct(PositionAgo(age), position, position_variance);
-  if (std::isfinite(velocity)) Correct({0, 1, -age}, velocity, Square(settings_.velocity_sd));
-  Skip();
-}
-
-void KinematicFilter::Skip() {
-  step_.filtered_mean = mean_;
-  step_.filtered_covariance = covariance_;
-  window_.push_back(step_);
-}
-
-void KinematicFilter::Correct(const Eigen::Vector3d& observe, double measured, double variance) {
-  const double total = observe.dot(covariance_ * observe) + variance;
-  const Eigen::Vector3d gain = covariance_ * observe / total;
-  mean_ += gain * (measured - observe.dot(mean_));
-  // Joseph's form keeps the covariance symmetric and positive.
-  const Eigen::Matrix3d keep = Eigen::Matrix3d::Identity() - gain * observe.transpose();
-  covariance_ = keep * covariance_ * keep.transpose() + gain * variance * gain.transpose();
-}
-
-KinematicFilter::Smoothed KinematicFilter::TakeOldest() {
-  Smoothed smoothed{window_.back().filtered_mean, window_.back().filtered_covariance};
-  for (size_t i = window_.size() - 1; i-- > 0;) {
-    const Step& step = window_[i];
-    const Step& next = window_[i + 1];
-    const Eigen::Matrix3d gain = next.predicted_covariance.ldlt()
-                                     .solve(next.transition * step.filtered_covariance)
-                                     .transpose();
-    smoothed.mean = step.filtered_mean + gain * (smoothed.mean - next.predicted_mean);
-    smoothed.covariance = step.filtered_covariance +
-                          gain * (smoothed.covariance - next.predicted_covariance) * gain.transpose();
+KinematicFilter::Row KinematicFilter::RowOf(Quantity quantity, double age, double spread) const {
+  const double span = std::abs(age), jerk = Square(settings_.jerk);
+  switch (quantity) {
+    case Quantity::kPosition:
+      // A measurement time that is off by timing_sd displaces the position by velocity * timing_sd.
+      return {{1, -age, age * age / 2, 0},
+              Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd) + jerk * std::pow(span, 5) / 20};
+    case Quantity::kVelocity:
+    case Quantity::kRate:
+      return {{0, 1, -age, quantity == Quantity::kRate ? 1. : 0.},
+              Square(settings_.velocity_sd) + jerk * span * span * span / 3};
+    case Quantity::kAcceleration:
+      // The average of a random walk differs from its end by a third of the walk's variance.
+      return {{0, 0, 1, 1}, Square(settings_.acceleration_sd) + jerk * (span + spread / 3)};
   }
-  window_.pop_front();
+  return {};
+}
+
+KinematicFilter::Innovation KinematicFilter::Expect(Quantity quantity, double value, double age, double spread) const {
+  const Row row = RowOf(quantity, age, spread);
+  return {value - row.of_state.dot(mean_), row.of_state.dot(covariance_ * row.of_state) + row.variance};
+}
+
+KinematicFilter::Innovation KinematicFilter::Correct(Quantity quantity, double value, double age, double spread) {
+  const Row row = RowOf(quantity, age, spread);
+  const Eigen::Vector4d shared = covariance_ * row.of_state;
+  const Innovation innovation{value - row.of_state.dot(mean_), row.of_state.dot(shared) + row.variance};
+  const Eigen::Vector4d gain = shared / innovation.variance;
+  mean_ += gain * innovation.value;
+  // Joseph's form keeps the covariance symmetric and positive.
+  const Eigen::Matrix4d keep = Eigen::Matrix4d::Identity() - gain * row.of_state.transpose();
+  covariance_ = keep * covariance_ * keep.transpose() + gain * row.variance * gain.transpose();
+  return innovation;
+}
+
+void KinematicFilter::Keep() {
+  if (pending_ > 0) {
+    Step& last = At(pending_ - 1);
+    last.gain =
+        predicted_covariance_.ldlt().solve(transition_ * last.filtered_covariance).transpose();
+  }
+  // Nobody has taken the oldest.
+  if (pending_ == static_cast<int>(window_.size())) {
+    ++oldest_;
+    --pending_;
+  }
+  Step& step = At(pending_++);
+  step.filtered_mean = mean_;
+  step.filtered_covariance = covariance_;
+  step.mean_change = mean_ - predicted_mean_;
+  step.covariance_change = covariance_ - predicted_covariance_;
+}
+
+// The backward pass, unrolled forwards: what each later step's readings changed comes back through the gains in between.
+KinematicFilter::Smoothed KinematicFilter::TakeOldest() {
+  const Step& oldest = At(0);
+  Smoothed smoothed{oldest.filtered_mean.head<2>(), oldest.filtered_covariance.topLeftCorner<2, 2>()};
+  Eigen::Matrix<double, 2, 4> back = Eigen::Matrix<double, 2, 4>::Identity();
+  for (int i = 1; i < pending_; ++i) {
+    back = (back * At(i - 1).gain).eval();
+    smoothed.mean += back * At(i).mean_change;
+    smoothed.covariance += back * At(i).covariance_change * back.transpose();
+  }
+  oldest_ = (oldest_ + 1) % static_cast<int>(window_.size());
+  --pending_;
   return smoothed;
 }
 

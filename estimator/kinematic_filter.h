@@ -1,14 +1,18 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <deque>
+#include <vector>
 
 #include "robot/description.h"
 
 namespace plumb {
 
-/// Position, velocity and acceleration of one joint.
-using KinematicState = Eigen::Vector3d;
+/// Position, velocity and acceleration of one joint, and the bias of the inertial sensor that it carries.
+using KinematicState = Eigen::Vector4d;
+
+/// What a reading is of. A gyro's rate is the velocity plus the bias, an accelerometer's acceleration the acceleration
+/// plus the bias: no joint has both.
+enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 
 /// One joint's Kalman filter on a white-noise-jerk model (Bar-Shalom, Li, Kirubarajan, "Estimation with
 /// Applications to Tracking and Navigation", 2001, section 6.2.3), with a fixed-lag Rauch-Tung-Striebel smoother.
@@ -18,55 +22,71 @@ using KinematicState = Eigen::Vector3d;
 /// step is left open (a wide zero-mean Gaussian), because it is what calibration wants to learn; without the
 /// allowance the filter would round off every such corner and bias the effort's apparent effect.
 ///
-/// Not thread-safe.
+/// A reading counts at its own time: its row of the observation matrix is that of the state so long ago under constant
+/// acceleration, its variance grows by what the jerk may have done since. (That this is correlated with the filter's own
+/// error is neglected, which errs on the cautious side.)
+///
+/// A step is Predict, any number of Correct, Keep. None of them allocates. Not thread-safe.
 class KinematicFilter {
  public:
-  explicit KinematicFilter(const EstimatorSettings& settings) : settings_(settings) {}
+  explicit KinematicFilter(const EstimatorSettings& settings);
 
-  /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured.
+  /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured. Of the bias it keeps what
+  /// it knows.
   void Restart(double position, double velocity);
   /// @param dt [s] since the last call, > 0.
   /// @param effort_step [Nm] change of the mean applied effort against the previous interval.
   void Predict(double dt, double effort_step);
-  /// @param age [s] of the measurement; < 0: it was made a little later.
-  /// @return the innovation of the position [rad], before the update.
-  double Innovation(double position, double age) const { return position - PositionAgo(age).dot(mean_); }
-  /// @param velocity NaN: it was not measured. @param age [s] of the measurement; < 0: it was made a little later.
-  void Update(double position, double velocity, double age);
-  /// There is no measurement of this instant.
-  void Skip();
+
+  /// A reading less what was expected of it, and its variance if both are right.
+  struct Innovation {
+    double value, variance;
+    /// Normalised innovation squared: 1 on average.
+    double nis() const { return value * value / variance; }
+  };
+  /// @param age [s] of the reading; < 0: it was made a little later.
+  /// @param spread [s] over which an acceleration is the average, up to its time.
+  Innovation Expect(Quantity quantity, double value, double age, double spread = 0) const;
+  /// Takes it into account. @return what Expect says before.
+  Innovation Correct(Quantity quantity, double value, double age, double spread = 0);
+  /// Ends the step.
+  void Keep();
 
   const KinematicState& mean() const { return mean_; }
-  const Eigen::Matrix3d& covariance() const { return covariance_; }
+  const Eigen::Matrix4d& covariance() const { return covariance_; }
 
   struct Smoothed {
-    KinematicState mean;
-    Eigen::Matrix3d covariance;
+    Eigen::Vector2d mean;  ///< position, velocity
+    Eigen::Matrix2d covariance;
   };
-  /// Number of states that have been filtered and not yet taken out of the window.
-  int pending() const { return static_cast<int>(window_.size()); }
+  /// Number of states that have been filtered and not yet taken out of the window, at most settings.lag + 1.
+  int pending() const { return pending_; }
   /// The oldest pending state, given all measurements so far; takes it out of the window.
   Smoothed TakeOldest();
 
  private:
-  /// Row of the state's coefficients in what the position was so long ago.
-  static Eigen::Vector3d PositionAgo(double age) { return {1, -age, age * age / 2}; }
-  void Correct(const Eigen::Vector3d& observe, double measured, double variance);
+  struct Row {
+    Eigen::Vector4d of_state;
+    double variance;
+  };
+  Row RowOf(Quantity quantity, double age, double spread) const;
 
   // One step of the forward pass, kept for the backward one.
   struct Step {
-    Eigen::Matrix3d transition;  // from the previous step
-    KinematicState predicted_mean;
-    Eigen::Matrix3d predicted_covariance;
     KinematicState filtered_mean;
-    Eigen::Matrix3d filtered_covariance;
+    Eigen::Matrix4d filtered_covariance;
+    Eigen::Matrix4d gain;                // smoother's, from the next step to this one; unknown for the newest
+    KinematicState mean_change;          // by this step's readings
+    Eigen::Matrix4d covariance_change;   // likewise
   };
+  Step& At(int i) { return window_[static_cast<size_t>(oldest_ + i) % window_.size()]; }
 
   EstimatorSettings settings_;
-  KinematicState mean_ = KinematicState::Zero();
-  Eigen::Matrix3d covariance_ = Eigen::Matrix3d::Identity();
-  Step step_;
-  std::deque<Step> window_;
+  KinematicState mean_ = KinematicState::Zero(), predicted_mean_ = KinematicState::Zero();
+  Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero(), predicted_covariance_ = Eigen::Matrix4d::Zero();
+  Eigen::Matrix4d transition_ = Eigen::Matrix4d::Identity();
+  std::vector<Step> window_;  // ring
+  int oldest_ = 0, pending_ = 0;
 };
 
 }  // namespace plumb

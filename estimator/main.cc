@@ -1,4 +1,4 @@
-// plumb-estimator: JOINT_STATE -> ROBOT_STATE, ROBOT_STATE_SMOOTHED.
+// plumb-estimator: JOINT_STATE, IMU -> ROBOT_STATE, ROBOT_STATE_SMOOTHED, ESTIMATOR_STATUS.
 
 #include <spdlog/spdlog.h>
 
@@ -6,11 +6,17 @@
 #include "common/realtime.h"
 #include "estimator/state_observer.h"
 
+namespace {
+
+constexpr int64_t kStatusPeriod = 100'000;  // [us]
+
+}  // namespace
+
 int main(int argc, char** argv) {
   std::string robot_path;
   int priority = 0;
   return plumb::Run(
-      "plumb-estimator", "Estimates the robot's state from what its drives measure.", argc, argv,
+      "plumb-estimator", "Estimates the robot's state from what its drives and sensors measure.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder or TOML file")->required();
         plumb::AddRealtimeFlag(app, priority);
@@ -21,16 +27,32 @@ int main(int argc, char** argv) {
         plumb::StateObserver observer(robot);
         plumb::Publisher<plumb::robot_state_t> causal(process.messenger(), "ROBOT_STATE");
         plumb::Publisher<plumb::robot_state_t> smoothed(process.messenger(), "ROBOT_STATE_SMOOTHED");
+        plumb::Publisher<plumb::estimator_status_t> statuses(process.messenger(), "ESTIMATOR_STATUS");
+        int64_t told = 0, told_at = 0;  // reasons_changed() and utime of the last status
+        const auto publish_status = [&] {
+          const int64_t now = observer.state().utime;
+          if (told == observer.reasons_changed() && now >= told_at && now - told_at < kStatusPeriod) return;
+          told = observer.reasons_changed();
+          told_at = now;
+          const plumb::estimator_status_t status = observer.Status();
+          statuses.Publish(status);
+        };
+        plumb::Subscriber<plumb::imu_t> imus(process.messenger(), "IMU",
+                                             [&](const plumb::imu_t& imu) { observer.OnImu(imu); });
         plumb::Subscriber<plumb::joint_state_t> subscriber(
             process.messenger(), "JOINT_STATE", [&](const plumb::joint_state_t& measured) {
               if (!observer.OnJointState(measured)) return;
               causal.Publish(observer.state());
-              for (const plumb::robot_state_t& state : observer.TakeSmoothed()) smoothed.Publish(state);
+              for (const plumb::robot_state_t& state : observer.smoothed()) smoothed.Publish(state);
+              publish_status();
               if (observer.state().restarted) {
                 spdlog::debug("filter restarted at sequence {}", observer.state().sequence);
               }
             });
-        while (process.Wait(1'000'000)) subscriber.Rethrow();
+        while (process.Wait(1'000'000)) {
+          subscriber.Rethrow();
+          imus.Rethrow();
+        }
         spdlog::info("{} measurements, {} refused, {} undecodable, {} restarts", subscriber.received(),
                      observer.refused(), subscriber.rejected(), observer.restarts());
         return 0;

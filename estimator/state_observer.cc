@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robot/motion_noise.h"
+
 namespace plumb {
 namespace {
 
@@ -10,114 +12,288 @@ constexpr int64_t kLongestGap = 1'000'000;  // [us]; beyond it nothing is known 
 constexpr int64_t kMostAhead = 10'000;      // [us] of a joint's reading before the others
 constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
 constexpr int kSettled = 5;                 // measurements after a restart until velocity can be trusted
+constexpr double kSurely = 5;               // standard deviations
+constexpr double kVelocityLag = 4e-3;       // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
+constexpr double kBiasesInOrder = 5;        // times its sd
 
-bool Finite(const std::vector<double>& values) {
-  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
+
+int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
+
+AgreementWatch::Settings VelocityWatch(const EstimatorSettings& s, bool gyro) {
+  return {s.position_sd, s.velocity_sd, gyro ? kBiasesInOrder * s.bias_sd : 0, gyro ? 0 : kVelocityLag};
 }
 
-/// [s] of a joint's measurement.
-double Age(const joint_state_t& measured, size_t joint) {
-  return static_cast<double>(measured.utime - measured.measured[joint]) * 1e-6;
+// The level is the filter's velocity, which is a good deal better than the velocity that is measured.
+AgreementWatch::Settings AccelerationWatch(const EstimatorSettings& s) {
+  return {0.05, s.acceleration_sd, kBiasesInOrder * s.bias_sd, 0};
 }
 
 }  // namespace
 
 StateObserver::StateObserver(const RobotDescription& robot)
-    : n_(robot.num_joints()),
-      settings_(robot.estimator),
-      filters_(static_cast<size_t>(n_), KinematicFilter(robot.estimator)),
-      measured_(static_cast<size_t>(n_), -1),
-      effort_(static_cast<size_t>(n_), 0),
+    : lag_(robot.estimator.lag),
+      gravity_(robot.simulation.gravity),
       unknown_step_(2 * robot.effort_limits().maxCoeff()) {
-  const auto n = static_cast<size_t>(n_);
-  state_.num_joints = n_;
+  for (const SensorDescription& sensor : robot.sensors) {
+    if (sensor.link < 0) continue;
+    const double delay = std::isnan(sensor.noise.delay) ? robot.estimator.delay : sensor.noise.delay;
+    imus_.push_back({sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1});
+  }
+  for (int i = 0; i < robot.num_joints(); ++i) {
+    const EstimatorSettings settings = EstimatorOf(robot, i);
+    const auto turns = [&](const Imu& imu) { return imu.mounting.turned == i; };
+    const bool gyro = std::any_of(imus_.begin(), imus_.end(), turns);
+    Joint joint{.name = robot.joints[static_cast<size_t>(i)].name,
+                .settings = settings,
+                .filter = KinematicFilter(settings),
+                .velocity_watch = AgreementWatch(VelocityWatch(settings, gyro)),
+                .acceleration_watch = AgreementWatch(AccelerationWatch(settings))};
+    joint.gyro = gyro;
+    joint.accelerometer = settings.acceleration_sd > 0;
+    joints_.push_back(std::move(joint));
+  }
+  const auto n = joints_.size();
+  state_.num_joints = static_cast<int32_t>(n);
   for (auto* values : {&state_.q, &state_.v, &state_.q_sd, &state_.v_sd, &state_.effort}) values->resize(n, 0);
+  waiting_.assign(static_cast<size_t>(lag_) + 2, state_);
+  ready_.assign(static_cast<size_t>(lag_) + 2, state_);
 }
 
-bool StateObserver::Acceptable(const joint_state_t& measured) const {
+double StateObserver::Age(const joint_state_t& measured, size_t joint) const {
+  return Seconds(measured.utime - measured.measured[joint]) + joints_[joint].settings.delay;
+}
+
+bool StateObserver::IsNew(const joint_state_t& measured, size_t joint) const {
+  return measured.valid[joint] && measured.measured[joint] != joints_[joint].measured;
+}
+
+StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
   // Times of this epoch only, so that differences cannot overflow.
-  if (measured.num_joints != n_ || measured.utime < 0 || measured.utime >= kEndOfTime) return false;
-  const auto infinite = [](double x) { return std::isinf(x); };  // NaN: not measured
-  const auto of_that_time = [&](int64_t t) {
-    return t >= 0 && t < kEndOfTime && t - measured.utime <= kMostAhead && measured.utime - t <= kLongestGap;
-  };
-  return Finite(measured.position) && std::ranges::none_of(measured.velocity, infinite) &&
-         std::ranges::all_of(measured.measured, of_that_time) && !(started_ && measured.utime == state_.utime);
+  if (measured.num_joints != state_.num_joints || measured.utime < 0 || measured.utime >= kEndOfTime) return Use::kRefuse;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (std::isinf(measured.velocity[i])) return Use::kRefuse;  // NaN: not measured
+    if (!measured.valid[i]) continue;
+    const int64_t t = measured.measured[i];
+    const bool of_that_time =
+        t >= 0 && t < kEndOfTime && t - measured.utime <= kMostAhead && measured.utime - t <= kLongestGap;
+    if (!of_that_time || !std::isfinite(measured.position[i])) return Use::kRefuse;
+  }
+  if (!started_) return Use::kUse;
+  if (measured.utime == state_.utime) return Use::kDuplicate;
+  // A driver counts on when its clock is set back; what comes late has an earlier number.
+  const bool late = measured.utime < state_.utime && state_.utime - measured.utime <= kLongestGap &&
+                    measured.sequence < state_.sequence;
+  return late ? Use::kReordered : Use::kUse;
 }
 
 bool StateObserver::Displaced(const joint_state_t& measured) const {
-  for (size_t i = 0; i < filters_.size(); ++i) {
-    if (IsNew(measured, i) && std::abs(filters_[i].Innovation(measured.position[i], Age(measured, i))) > settings_.reset_after) return true;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (!IsNew(measured, i)) continue;
+    const Joint& joint = joints_[i];
+    if (joint.used < 0 || joint.out) return true;  // there it is
+    const auto innovation = joint.filter.Expect(Quantity::kPosition, measured.position[i], Age(measured, i));
+    const double limit = std::max(joint.settings.reset_after, kSurely * std::sqrt(innovation.variance));
+    if (std::abs(innovation.value) > limit) return true;
   }
   return false;
 }
 
 void StateObserver::Restart(const joint_state_t& measured) {
-  while (!waiting_.empty()) EmitSmoothed();
-  for (size_t i = 0; i < filters_.size(); ++i) filters_[i].Restart(measured.position[i], measured.velocity[i]);
+  while (num_waiting_ > 0) EmitSmoothed();
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[i];
+    const bool known = measured.valid[i];
+    // Where an invalid joint is, it will tell when it is back.
+    const double position = known ? measured.position[i] : joint.filter.mean()(0);
+    joint.filter.Restart(position, known && !joint.gyro ? measured.velocity[i] : std::numeric_limits<double>::quiet_NaN());
+    joint.velocity_watch.Restart();
+    joint.acceleration_watch.Restart();
+    if (known) joint.used = measured.measured[i];
+  }
   since_restart_ = 0;
   if (started_) ++restarts_;
   started_ = true;
 }
 
+void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
+  // A step of any joint's effort may step every joint's acceleration.
+  double step = 0;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    const double change = measured.effort_applied[i] - joints_[i].effort;
+    step = std::hypot(step, std::isfinite(change) ? change : unknown_step_);
+  }
+  for (Joint& joint : joints_) joint.filter.Predict(elapsed, step);
+}
+
+KinematicFilter::Innovation StateObserver::Correct(Joint& joint, Quantity quantity, double value, double age,
+                                                   double spread) {
+  const KinematicFilter::Innovation innovation = joint.filter.Correct(quantity, value, age, spread);
+  if (since_restart_ < kSettled || quantity == Quantity::kAcceleration) return innovation;
+  joint.deviance += innovation.nis() + std::log(innovation.variance);
+  ++joint.readings;
+  return innovation;
+}
+
+void StateObserver::UseReading(const joint_state_t& measured, size_t i) {
+  Joint& joint = joints_[i];
+  const double age = Age(measured, i), position = measured.position[i], velocity = measured.velocity[i];
+  const double elapsed = joint.used < 0 ? 0 : Seconds(measured.measured[i] - joint.used);
+  joint.position_nis.Add(Correct(joint, Quantity::kPosition, position, age).nis(), std::max(0.0, elapsed));
+  if (std::isfinite(velocity)) {
+    const Quantity quantity = joint.gyro ? Quantity::kRate : Quantity::kVelocity;
+    joint.velocity_nis.Add(Correct(joint, quantity, velocity, age).nis(), std::max(0.0, elapsed));
+    joint.velocity_watch.Add(position, velocity, elapsed > 0 ? elapsed : 2 * AgreementWatch::kLongestGap);
+    if (joint.velocity_watch.finding() != joint.velocity_found) {
+      joint.velocity_found = joint.velocity_watch.finding();
+      ++reasons_changed_;
+    }
+  }
+  joint.used = measured.measured[i];
+}
+
+void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured) {
+  const int64_t late = measured.utime - reading.utime;
+  if (late > ImuInbox::kLatest) {
+    ++imu_refused_;
+    return;
+  }
+  ++imu_readings_;
+  const double age = Seconds(late) + imu.delay;
+  const double elapsed = imu.used < 0 ? 0 : Seconds(reading.utime - imu.used);
+  imu.used = std::max(imu.used, reading.utime);
+  if (reading.clipped) return;
+  if (imu.mounting.turned >= 0) {
+    // JOINT_STATE has the last reading of each of its periods; those in between, only we have.
+    const auto turned = static_cast<size_t>(imu.mounting.turned);
+    Joint& joint = joints_[turned];
+    const int64_t apart = Microseconds(imu.period / 2);
+    if (joint.measured + apart < reading.utime && reading.utime < measured.measured[turned] - apart) {
+      Correct(joint, Quantity::kRate, imu.mounting.axis.dot(Eigen::Map<const Eigen::Vector3d>(reading.rate.data())), age);
+    }
+  }
+  if (imu.mounting.slides.empty() || !reading.orientation_valid) return;
+  const auto& [w, x, y, z] = reading.orientation;
+  // As the joints have it: neither a wrong heading nor a boom's roll matter.
+  const Eigen::Quaterniond turn =
+      imu.mounting.turned < 0 ? imu.mounting.unturned
+                              : imu.mounting.unturned *
+                                    Eigen::Quaterniond(Eigen::AngleAxisd(
+                                        imu.mounting.Angle(Eigen::Quaterniond(w, x, y, z)), imu.mounting.axis));
+  const Eigen::Vector3d acceleration =
+      turn * Eigen::Map<const Eigen::Vector3d>(reading.force.data()) - gravity_ * Eigen::Vector3d::UnitZ();
+  for (const ImuMounting::Slide& slide : imu.mounting.slides) {
+    Joint& joint = joints_[static_cast<size_t>(slide.joint)];
+    const double along = slide.direction.dot(acceleration);
+    joint.acceleration_nis.Add(Correct(joint, Quantity::kAcceleration, along, age, imu.period).nis(), std::max(0.0, elapsed));
+    joint.acceleration_watch.Add(joint.filter.mean()(1), along, elapsed > 0 ? elapsed : 2 * AgreementWatch::kLongestGap);
+    if (joint.acceleration_watch.finding() != joint.acceleration_found) {
+      joint.acceleration_found = joint.acceleration_watch.finding();
+      ++reasons_changed_;
+    }
+  }
+}
+
+void StateObserver::JudgeOutages(int64_t utime) {
+  for (Joint& joint : joints_) {
+    const bool out = joint.used < 0 || utime - joint.used > Microseconds(joint.settings.outage);
+    if (out == joint.out) continue;
+    joint.out = out;
+    if (out && joint.used >= 0) ++outages_;
+    ++reasons_changed_;
+  }
+}
+
+void StateObserver::OnImu(const imu_t& message) {
+  for (Imu& imu : imus_) {
+    if (imu.name != message.name) continue;
+    switch (imu.inbox.Put(message, started_ ? state_.utime : 0)) {
+      case ImuInbox::Verdict::kTaken: return;
+      case ImuInbox::Verdict::kReordered: ++imu_reordered_; return;
+      case ImuInbox::Verdict::kDuplicate: ++imu_duplicates_; return;
+      case ImuInbox::Verdict::kRefused: ++imu_refused_; return;
+    }
+  }
+  ++imu_refused_;
+}
+
 bool StateObserver::OnJointState(const joint_state_t& measured) {
-  if (!Acceptable(measured)) {
-    ++refused_;
-    return false;
+  num_ready_ = 0;
+  switch (Judge(measured)) {
+    case Use::kUse: break;
+    case Use::kRefuse: ++refused_; return false;
+    case Use::kDuplicate: ++duplicates_; return false;
+    case Use::kReordered: ++reordered_; return false;
   }
   const int64_t elapsed = measured.utime - state_.utime;
-  bool restarted = !started_ || elapsed <= 0 || elapsed > kLongestGap;
+  const bool jumped = started_ && (elapsed <= 0 || elapsed > kLongestGap);
+  bool restarted = !started_ || jumped;
   if (!restarted) {
-    // A step of any joint's effort may step every joint's acceleration.
-    double step = 0;
-    for (size_t i = 0; i < filters_.size(); ++i) {
-      const double change = measured.effort_applied[i] - effort_[i];
-      step = std::hypot(step, std::isfinite(change) ? change : unknown_step_);
-    }
-    for (KinematicFilter& filter : filters_) filter.Predict(static_cast<double>(elapsed) * 1e-6, step);
+    Predict(measured, Seconds(elapsed));
     restarted = Displaced(measured);
+  }
+  if (jumped) {
+    for (Imu& imu : imus_) imu.inbox.Clear();
+    for (Imu& imu : imus_) imu.used = -1;
+    for (Joint& joint : joints_) joint.used = -1;
   }
   if (restarted) {
     Restart(measured);
   } else {
-    for (size_t i = 0; i < filters_.size(); ++i) {
-      if (IsNew(measured, i)) filters_[i].Update(measured.position[i], measured.velocity[i], Age(measured, i));
-      else filters_[i].Skip();
-    }
     ++since_restart_;
+    for (size_t i = 0; i < joints_.size(); ++i) {
+      if (IsNew(measured, i)) UseReading(measured, i);
+    }
   }
-  measured_ = measured.measured;
-
-  state_.utime = measured.utime;
-  state_.sequence = measured.sequence;
-  state_.restarted = restarted;
-  state_.valid = since_restart_ >= kSettled;
-  for (size_t i = 0; i < filters_.size(); ++i) {
-    const KinematicFilter& filter = filters_[i];
-    state_.q[i] = filter.mean()(0);
-    state_.v[i] = filter.mean()(1);
-    state_.q_sd[i] = std::sqrt(filter.covariance()(0, 0));
-    state_.v_sd[i] = std::sqrt(filter.covariance()(1, 1));
-    state_.effort[i] = measured.effort_applied[i];
-    if (std::isfinite(measured.effort_applied[i])) effort_[i] = measured.effort_applied[i];
-    if (!measured.valid[i]) state_.valid = false;
+  for (Imu& imu : imus_) {
+    while (const ImuInbox::Reading* reading = imu.inbox.Take(measured.utime)) {
+      if (!restarted) UseImu(imu, *reading, measured);
+    }
   }
-  waiting_.push_back(state_);
-  if (static_cast<int>(waiting_.size()) > settings_.lag) EmitSmoothed();
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    joints_[i].measured = measured.measured[i];
+    if (!restarted) joints_[i].filter.Keep();
+  }
+  JudgeOutages(measured.utime);
+  ++measurements_;
+  FillState(measured, restarted);
   return true;
 }
 
+void StateObserver::FillState(const joint_state_t& measured, bool restarted) {
+  state_.utime = measured.utime;
+  state_.sequence = measured.sequence;
+  state_.restarted = restarted;
+  const bool was_valid = state_.valid;
+  state_.valid = since_restart_ >= kSettled;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[i];
+    state_.q[i] = joint.filter.mean()(0);
+    state_.v[i] = joint.filter.mean()(1);
+    state_.q_sd[i] = std::sqrt(joint.filter.covariance()(0, 0));
+    state_.v_sd[i] = std::sqrt(joint.filter.covariance()(1, 1));
+    state_.effort[i] = measured.effort_applied[i];
+    if (std::isfinite(measured.effort_applied[i])) joint.effort = measured.effort_applied[i];
+    if (joint.out) state_.valid = false;
+  }
+  if (state_.valid != was_valid) ++reasons_changed_;
+  const auto room = static_cast<int>(waiting_.size());
+  waiting_[static_cast<size_t>((first_waiting_ + num_waiting_++) % room)] = state_;
+  if (num_waiting_ > lag_) EmitSmoothed();
+}
+
 void StateObserver::EmitSmoothed() {
-  robot_state_t state = std::move(waiting_.front());
-  waiting_.pop_front();
-  for (size_t i = 0; i < filters_.size(); ++i) {
-    const KinematicFilter::Smoothed smoothed = filters_[i].TakeOldest();
+  robot_state_t& state = ready_[num_ready_++];
+  state = waiting_[static_cast<size_t>(first_waiting_)];
+  first_waiting_ = (first_waiting_ + 1) % static_cast<int>(waiting_.size());
+  --num_waiting_;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    const KinematicFilter::Smoothed smoothed = joints_[i].filter.TakeOldest();
     state.q[i] = smoothed.mean(0);
     state.v[i] = smoothed.mean(1);
     state.q_sd[i] = std::sqrt(std::max(0.0, smoothed.covariance(0, 0)));
     state.v_sd[i] = std::sqrt(std::max(0.0, smoothed.covariance(1, 1)));
   }
-  ready_.push_back(std::move(state));
 }
 
 }  // namespace plumb

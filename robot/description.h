@@ -56,6 +56,32 @@ struct MotorDescription {
   std::optional<MitDescription> mit = {};  ///< of protocol "mit" and no other
 };
 
+/// [estimator]: what the estimator assumes of a coordinate that nothing says more about, in [m] for [rad] where the
+/// joint slides, and how it goes about it. See EstimatorOf for a joint's own.
+struct EstimatorSettings {
+  double position_sd;  ///< [rad] of a reading
+  double velocity_sd;  ///< [rad/s]
+  double jerk;         ///< [rad/s^3 sqrt(s)]
+  double effort_step;  ///< [rad/s^2 per Nm]
+  double timing_sd;    ///< [s]
+  int lag;             ///< [measurements]
+  double reset_after;  ///< [rad]
+  double delay = 0;    ///< [s] of a reading on its way: the constant part, which arrivals cannot tell
+  double outage = 0.05;  ///< [s] that a silent joint is predicted before the state is invalid
+  // Of an IMU on a link that the joint carries; 0: there is none.
+  double acceleration_sd = 0;  ///< [m/s^2] of a slide's acceleration, averaged over a period of the IMU
+  double bias_sd = 0;          ///< [rad/s] of the gyro, if the joint turns, or [m/s^2] of the accelerometer
+};
+
+/// What robot.toml says of a joint's or a sensor's noise; NaN = nothing. Units as in EstimatorSettings.
+struct NoiseDescription {
+  double position_sd = std::numeric_limits<double>::quiet_NaN();
+  double velocity_sd = std::numeric_limits<double>::quiet_NaN();
+  double jerk = std::numeric_limits<double>::quiet_NaN();
+  double effort_step = std::numeric_limits<double>::quiet_NaN();
+  double delay = std::numeric_limits<double>::quiet_NaN();
+};
+
 /// Something on the bus that measures and is no motor.
 struct SensorDescription {
   std::string name;
@@ -79,6 +105,12 @@ struct SensorDescription {
   int base = 0;                                            ///< CAN id added to the factory's
   double tick = 1e-4;                                      ///< [s] unit of its SampleTime
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< its axes in the link's
+  double acceleration_sd = 0;       ///< [m/s^2] > 0
+  double rate_bias_sd = 0;          ///< [rad/s] >= 0
+  double acceleration_bias_sd = 0;  ///< [m/s^2] >= 0
+
+  /// position_sd and velocity_sd of an IMU: of the angle and of the rate of turn. Neither has a jerk or an effort_step.
+  NoiseDescription noise = {};
 };
 
 /// What moves a joint besides inertia and gravity. Zeros say that there is none of it.
@@ -130,6 +162,7 @@ struct JointDescription {
   MotorDescription motor;     ///< of a joint that is not passive
   JointDynamics dynamics;
   JointLimitSettings limits;  ///< of a joint that is not passive
+  NoiseDescription noise = {};
 
   int num_positions() const { return type == Type::kSpherical ? 4 : 1; }
   int num_velocities() const { return type == Type::kSpherical ? 3 : 1; }
@@ -156,15 +189,6 @@ struct DriverSettings {
   double stuck_after = 0;
 };
 
-struct EstimatorSettings {
-  double position_sd;  ///< [rad]
-  double velocity_sd;  ///< [rad/s]
-  double jerk;         ///< [rad/s^3 sqrt(s)]
-  double effort_step;  ///< [rad/s^2 per Nm]
-  double timing_sd;    ///< [s]
-  int lag;             ///< [measurements]
-  double reset_after;  ///< [rad]
-};
 
 /// Standard acceleration of free fall, ISO 80000-3 [m/s^2].
 inline constexpr double kStandardGravity = 9.80665;

@@ -89,6 +89,20 @@ JointLimitSettings ReadLimits(Config config, const JointDescription& joint) {
   return limits;
 }
 
+NoiseDescription ReadNoise(Config config) {
+  NoiseDescription noise;
+  const auto read = [&](const char* key, Range range, double& value) {
+    if (config.Has(key)) value = config.Number(key, range);
+  };
+  read("position_sd", {1e-12, 1e12}, noise.position_sd);
+  read("velocity_sd", {1e-12, 1e12}, noise.velocity_sd);
+  read("jerk", {1e-12, 1e12}, noise.jerk);
+  read("effort_step", {0, 1e12}, noise.effort_step);
+  read("delay", {0, 0.1}, noise.delay);
+  config.Finish();
+  return noise;
+}
+
 // What the joint may do must have a code.
 void CheckMitRanges(const Config& config, const JointDescription& joint) {
   const MitRanges& ranges = joint.motor.mit->ranges;
@@ -194,6 +208,7 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
     }
     seen[index] = true;
     joint->dynamics = ReadDynamics(config.Table("dynamics", false), joint->dynamics, *joint);
+    joint->noise = ReadNoise(config.Table("estimator", false));
     config.Finish();
   }
   for (size_t i = 0; i < joints.size(); ++i) {

@@ -11,6 +11,11 @@ namespace plumb {
 namespace {
 
 constexpr double kMostCounts = 4294967296;  // an unsigned 32-bit position
+constexpr Range kSanePositive{1e-12, 1e12};
+// Of an IMU about which nothing is said, of the size that data sheets of industrial ones give: half a degree of tilt
+// while it moves, and what its vibration adds to the rate's and the force's own noise.
+constexpr double kAngleSd = 0.01, kRateSd = 0.01, kRateBiasSd = 0.01;     // [rad], [rad/s], [rad/s]
+constexpr double kAccelerationSd = 0.3, kAccelerationBiasSd = 0.1;        // [m/s^2]
 
 /// Index of what has the name, or an error at the key that gave it.
 template <class T>
@@ -40,6 +45,8 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
                 fmt::format("= {} rad/s turns it by {:.3g} rad within a period, half its range or more",
                             s.max_speed, s.max_speed * s.period));
   }
+  // A reading is anywhere within its count: uniform, whose sd is width / sqrt(12).
+  const double turn = 2 * std::acos(-1.);
   const std::string joint = config.String("joint");
   s.joint = Find(config, "joint", joint, robot.joints, "moving joint");
   const Type type = robot.joints[static_cast<size_t>(s.joint)].type;
@@ -58,6 +65,8 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
   } else if (config.Has("radius")) {
     config.Fail("radius", fmt::format("is of a joint that slides, but \"{}\" turns", joint));
   }
+  s.noise.position_sd = config.Number("position_sd", kSanePositive, s.radius * turn / s.counts / std::sqrt(12.));
+  if (config.Has("velocity_sd")) s.noise.velocity_sd = config.Number("velocity_sd", kSanePositive);
 }
 
 void ReadImu(Config& config, const RobotDescription& robot, SensorDescription& s) {
@@ -69,6 +78,11 @@ void ReadImu(Config& config, const RobotDescription& robot, SensorDescription& s
                 Eigen::AngleAxisd(rpy[1], Eigen::Vector3d::UnitY()) *
                 Eigen::AngleAxisd(rpy[0], Eigen::Vector3d::UnitX()))
                    .toRotationMatrix();
+  s.noise.position_sd = config.Number("angle_sd", kSanePositive, kAngleSd);
+  s.noise.velocity_sd = config.Number("rate_sd", kSanePositive, kRateSd);
+  s.rate_bias_sd = config.Number("rate_bias_sd", {0, 1e3}, kRateBiasSd);
+  s.acceleration_sd = config.Number("acceleration_sd", kSanePositive, kAccelerationSd);
+  s.acceleration_bias_sd = config.Number("acceleration_bias_sd", {0, 1e3}, kAccelerationBiasSd);
 }
 
 }  // namespace
@@ -94,6 +108,7 @@ std::vector<SensorDescription> ReadSensors(Config& root, const RobotDescription&
     } else {
       ReadImu(config, robot, s);
     }
+    if (config.Has("delay")) s.noise.delay = config.Number("delay", {0, 0.1});
     config.Finish();
     sensors.push_back(s);
   }

@@ -83,6 +83,8 @@ EstimatorSettings ReadEstimator(Config config) {
   s.timing_sd = config.Number("timing_sd", kSaneNotNegative);
   s.lag = config.Integer("lag", {1, 1000});
   s.reset_after = config.Number("reset_after", kSanePositive);
+  s.delay = config.Number("delay", {0, 0.1}, s.delay);
+  s.outage = config.Number("outage", {1e-3, 1}, s.outage);
   config.Finish();
   return s;
 }

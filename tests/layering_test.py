@@ -20,7 +20,7 @@ BELOW = {
     "calibrator/inference": {"common"},
     "calibrator": {"common", "robot", "sim", "sim/tasks", "calibrator/inference"},
     "trainer": {"common", "robot", "sim", "sim/tasks", "controller"},
-    "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "controller", "calibrator", "calibrator/inference", "trainer"},
+    "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "controller", "calibrator", "calibrator/inference", "trainer"},
     "experiments": {"common", "robot", "sim", "sim/tasks", "calibrator", "calibrator/inference", "trainer", "controller"},
 }
 # The virtual robot speaks the protocols' device side.

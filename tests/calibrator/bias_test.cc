@@ -57,7 +57,7 @@ Recording Record(const RobotDescription& robot, uint32_t episode) {
     measured.valid = {1};
     observer.OnJointState(measured);
     recording.causal.push_back(observer.state());
-    for (robot_state_t& state : observer.TakeSmoothed()) recording.smoothed.push_back(std::move(state));
+    recording.smoothed.insert(recording.smoothed.end(), observer.smoothed().begin(), observer.smoothed().end());
     if ((t + kMeasurement) % kPeriod == 0 && t >= 2 * kPeriod) {
       joint_command_t command{};
       command.state_sequence = k;

@@ -15,6 +15,12 @@ EstimatorSettings Settings() {
           .reset_after = 0.2};
 }
 
+void Update(KinematicFilter& filter, double position, double velocity) {
+  filter.Correct(Quantity::kPosition, position, 0);
+  filter.Correct(Quantity::kVelocity, velocity, 0);
+  filter.Keep();
+}
+
 TEST_CASE("noiseless constant acceleration is followed exactly") {
   EstimatorSettings settings = Settings();
   KinematicFilter filter(settings);
@@ -23,7 +29,7 @@ TEST_CASE("noiseless constant acceleration is followed exactly") {
   filter.Restart(q(0), v(0));
   for (int i = 1; i <= 400; ++i) {
     filter.Predict(0.005, 0);
-    filter.Update(q(i * 0.005), v(i * 0.005), 0);
+    Update(filter, q(i * 0.005), v(i * 0.005));
   }
   CHECK(filter.mean()(0) == Approx(q(2)).epsilon(1e-9));
   CHECK(filter.mean()(1) == Approx(v(2)).epsilon(1e-6));
@@ -37,13 +43,13 @@ TEST_CASE("what is late, sometimes missing and of the position alone is followed
   for (int i = 1; i <= 800; ++i) {
     filter.Predict(0.005, 0);
     const double t = i * 0.005, age = i % 3 == 0 ? 0.0043 : 0.0007;
-    if (i % 2 == 0) filter.Update(q(t - age), NAN, age);
-    else filter.Skip();
+    if (i % 2 == 0) filter.Correct(Quantity::kPosition, q(t - age), age);
+    filter.Keep();
   }
   CHECK(filter.mean()(0) == Approx(q(4)).epsilon(1e-8));
   CHECK(filter.mean()(1) == Approx(16.7).epsilon(1e-5));
-  CHECK(filter.Innovation(q(4 - 0.003), 0.003) == Approx(0).margin(1e-6));
-  CHECK(filter.pending() == 801);
+  CHECK(filter.Expect(Quantity::kPosition, q(4 - 0.003), 0.003).value == Approx(0).margin(1e-6));
+  CHECK(filter.pending() == 22);
 }
 
 // Independent truth: the batch weighted least-squares solution of the same linear-Gaussian model, which a
@@ -63,7 +69,7 @@ TEST_CASE("the smoother equals batch least squares") {
   filter.Restart(position[0], velocity[0]);
   for (int i = 1; i < kSteps; ++i) {
     filter.Predict(dt, step[static_cast<size_t>(i)]);
-    filter.Update(position[static_cast<size_t>(i)], velocity[static_cast<size_t>(i)], 0);
+    Update(filter, position[static_cast<size_t>(i)], velocity[static_cast<size_t>(i)]);
   }
 
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(3 * kSteps, 3 * kSteps);
@@ -125,7 +131,7 @@ TEST_CASE("effort steps do not bias the smoothed velocity") {
       v += a * dt;
       filter.Predict(dt, effort - previous_effort);
       const double quantum = 2 * M_PI / 16384;
-      filter.Update(std::round((q + 1e-3 * random.Uniform()) / quantum) * quantum - 5e-4, v + 0.3 * random.Normal(), 0);
+      Update(filter, std::round((q + 1e-3 * random.Uniform()) / quantum) * quantum - 5e-4, v + 0.3 * random.Normal());
       true_v.push_back(v);
       corner.push_back((i + 1) % 20 == 10);  // the velocity's upper corners
       previous_effort = effort;

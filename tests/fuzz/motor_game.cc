@@ -160,6 +160,8 @@ void MotorGame::ComeToRestAndArm() {
   may_arm_ = true;
   motor_->Disarm(now_);
   run(1'000'000);
+  // A shaft that turns a thousand times within a cycle may look like a restart just now, which it stops once more.
+  for (int i = 0; i < 100 && !motor_->confirmed_idle(); ++i) Cycle(kStep);
   Require(motor_->confirmed_idle() && !drive_->armed());
   drive_->Heal();
   run(300'000);

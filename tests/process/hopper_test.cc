@@ -3,12 +3,66 @@
 
 #include <cmath>
 
+#include "calibrator/log_reader.h"
+#include "estimator/state_observer.h"
 #include "plumb/imu_t.hpp"
 #include "plumb/joint_state_t.hpp"
 #include "tests/process/stage.h"
 
 namespace plumb {
 namespace {
+
+template <class Message>
+std::string Bytes(const Message& message) {
+  std::string bytes(static_cast<size_t>(message.getEncodedSize()), '\0');
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+TEST_CASE("a log through the estimator gives the recorded states, bit for bit") {
+  Stage stage(48, "hopper");
+  const std::string log = stage.folder / "run.lcmlog";
+  Child logger("lcm-logger", {"lcm-logger", "--lcm-url=" + stage.lcm_url, "--quiet", log}, stage.folder / "logger.log");
+  stage.Listen(0.5);
+  // The estimator is there before the first message: the log has all that it has heard.
+  stage.Start("plumb-estimator");
+  stage.Listen(0.5);
+  stage.StartRobotAndDriver();
+  stage.Start("plumb-controller");
+  REQUIRE(stage.Arm(20));
+  stage.Listen(2);
+  logger.Signal(SIGTERM);
+  REQUIRE(logger.WaitFor(10));
+
+  StateObserver observer(LoadRobot(stage.robot_folder));
+  std::vector<std::string> expected, expected_smoothed, recorded, recorded_smoothed;
+  int64_t imus = 0;
+  ReadLog(log, [&](const std::string& channel, const void* data, int size, int64_t) {
+    if (channel == "IMU") {
+      imu_t imu;
+      REQUIRE(imu.decode(data, 0, size) == size);
+      observer.OnImu(imu);
+      ++imus;
+    } else if (channel == "JOINT_STATE") {
+      joint_state_t joints;
+      REQUIRE(joints.decode(data, 0, size) == size);
+      if (!observer.OnJointState(joints)) return true;
+      expected.push_back(Bytes(observer.state()));
+      for (const robot_state_t& state : observer.smoothed()) expected_smoothed.push_back(Bytes(state));
+    } else if (channel == "ROBOT_STATE" || channel == "ROBOT_STATE_SMOOTHED") {
+      (channel == "ROBOT_STATE" ? recorded : recorded_smoothed).emplace_back(static_cast<const char*>(data), static_cast<size_t>(size));
+    }
+    return true;
+  });
+  REQUIRE(imus > 300);
+  REQUIRE(recorded.size() > 800);
+  // The logger may have ended between a measurement and its state.
+  REQUIRE(expected.size() >= recorded.size());
+  CHECK(std::equal(recorded.begin(), recorded.end(), expected.begin()));
+  REQUIRE(expected_smoothed.size() >= recorded_smoothed.size());
+  REQUIRE(recorded_smoothed.size() > 800);
+  CHECK(std::equal(recorded_smoothed.begin(), recorded_smoothed.end(), expected_smoothed.begin()));
+}
 
 void Stand(const std::string& robot, int number, const std::vector<uint32_t>& from_motors,
            const std::vector<uint32_t>& to_motors) {

@@ -1,5 +1,6 @@
 #include "robot/sensors.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
@@ -112,6 +113,40 @@ TEST_CASE("sensors: what is refused") {
   refused("base = 0x380", "base = 0x7C0", "base");
   refused("rpy = [0, 0, 1.5707963267948966]", "rpy = [0, 0]", "rpy");
   refused("period = 0.005", "period = 0", "period");
+}
+
+TEST_CASE("noise: of a count, of an IMU, of a joint") {
+  const RobotDescription robot = Load(kZooToml + kSensors);
+  CHECK(robot.sensors[0].noise.position_sd == Approx(1.5 * 2 * M_PI / 65536 / std::sqrt(12.)));
+  CHECK(robot.sensors[1].noise.position_sd == Approx(2 * M_PI / 4096 / std::sqrt(12.)));
+  CHECK(std::isnan(robot.sensors[0].noise.velocity_sd));
+  CHECK(std::isnan(robot.sensors[0].noise.delay));
+  CHECK(robot.sensors[2].acceleration_sd > 0);
+  CHECK(robot.estimator.delay == 0);
+  CHECK(robot.estimator.outage == 0.05);
+  const std::string imu = Replaced(kSensors, "base = 0x380", "base = 0x380\nangle_sd = 0.003\nrate_bias_sd = 0.2\ndelay = 0.001");
+  const RobotDescription told = Load(kZooToml + imu);
+  CHECK(told.sensors[2].noise.position_sd == 0.003);
+  CHECK(told.sensors[2].rate_bias_sd == 0.2);
+  CHECK(told.sensors[2].noise.delay == 0.001);
+  const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
+    INFO(from << " -> " << to);
+    CHECK_THROWS_WITH(Load(Replaced(kZooToml + kSensors, from, to)), Contains("robot.toml:") && Contains(what));
+  };
+  refused("base = 0x380", "base = 0x380\nangle_sd = 0", "angle_sd");
+  refused("base = 0x380", "base = 0x380\nposition_sd = 0.1", "position_sd");
+  refused("node = 2\nperiod", "angle_sd = 0.1\nnode = 2\nperiod", "angle_sd");
+  refused("reset_after = 0.2", "reset_after = 0.2\noutage = 0", "outage");
+  refused("reset_after = 0.2", "reset_after = 0.2\ndelay = 0.2", "delay");
+  refused("name = \"disc\"\n", "name = \"disc\"\nestimator = {jerk = -1.0}\n", "jerk");
+  refused("name = \"disc\"\n", "name = \"disc\"\nestimator = {lag = 3}\n", "lag");
+  const RobotDescription joint =
+      Load(Replaced(kZooToml, "name = \"disc\"\n", "name = \"disc\"\nestimator = {jerk = 5.0, delay = 0.002}\n"));
+  const auto disc = std::find_if(joint.joints.begin(), joint.joints.end(), [](const auto& j) { return j.name == "disc"; });
+  REQUIRE(disc != joint.joints.end());
+  CHECK(disc->noise.jerk == 5);
+  CHECK(disc->noise.delay == 0.002);
+  CHECK(std::isnan(disc->noise.position_sd));
 }
 
 TEST_CASE("MIT motors: ranges with their source") {

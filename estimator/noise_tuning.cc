@@ -1,0 +1,88 @@
+#include "estimator/noise_tuning.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "robot/motion_noise.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kFactors[] = {3, 1.5, 1.2, 1.07};
+constexpr int kRounds = 4;           // with each factor at most
+constexpr double kWorthwhile = 1e-4; // of the deviance per reading
+constexpr int64_t kFewest = 100;     // readings
+
+using Parameter = double NoiseDescription::*;
+constexpr Parameter kParameters[] = {&NoiseDescription::jerk, &NoiseDescription::velocity_sd,
+                                     &NoiseDescription::effort_step, &NoiseDescription::position_sd};
+
+std::vector<NoiseDescription> NoiseOf(const RobotDescription& robot) {
+  std::vector<NoiseDescription> noise;
+  for (int i = 0; i < robot.num_joints(); ++i) {
+    const EstimatorSettings s = EstimatorOf(robot, i);
+    noise.push_back({s.position_sd, s.velocity_sd, s.jerk, s.effort_step, s.delay});
+  }
+  return noise;
+}
+
+}  // namespace
+
+TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(StateObserver&)>& play) {
+  const auto n = static_cast<size_t>(robot.num_joints());
+  RobotDescription tried = robot;
+  std::vector<bool> has_velocity(n, false);
+  const auto deviances = [&](const std::vector<NoiseDescription>& noise) {
+    for (size_t i = 0; i < n; ++i) tried.joints[i].noise = noise[i];
+    StateObserver observer(tried);
+    play(observer);
+    const estimator_status_t status = observer.Status();
+    std::vector<double> per_reading;
+    for (size_t i = 0; i < n; ++i) {
+      const int64_t readings = observer.readings(static_cast<int>(i));
+      if (readings < kFewest) {
+        throw std::invalid_argument(fmt::format("joint {}: {} readings are too few to learn noise from: at least {}",
+                                                robot.joints[i].name, readings, kFewest));
+      }
+      has_velocity[i] = std::isfinite(status.velocity_nis[i]);
+      per_reading.push_back(observer.deviance(static_cast<int>(i)) / static_cast<double>(readings));
+    }
+    return per_reading;
+  };
+
+  TunedNoise tuned;
+  tuned.joints = NoiseOf(robot);
+  tuned.before = tuned.after = deviances(tuned.joints);
+  for (const double factor : kFactors) {
+    bool better = true;
+    for (int round = 0; better && round < kRounds; ++round) {
+      better = false;
+      for (const Parameter parameter : kParameters) {
+        std::vector<bool> found(n, false);
+        for (const double step : {factor, 1 / factor}) {
+          std::vector<NoiseDescription> candidate = tuned.joints;
+          for (size_t i = 0; i < n; ++i) {
+            if (!found[i]) candidate[i].*parameter *= step;
+          }
+          const std::vector<double> deviance = deviances(candidate);
+          for (size_t i = 0; i < n; ++i) {
+            if (found[i] || !(deviance[i] < tuned.after[i] - kWorthwhile)) continue;
+            found[i] = better = true;
+            tuned.joints[i] = candidate[i];
+            tuned.after[i] = deviance[i];
+          }
+        }
+      }
+    }
+  }
+  for (size_t i = 0; i < n; ++i) {
+    if (!has_velocity[i]) tuned.joints[i].velocity_sd = std::numeric_limits<double>::quiet_NaN();
+    tuned.joints[i].delay = robot.joints[i].noise.delay;
+  }
+  return tuned;
+}
+
+}  // namespace plumb

@@ -1,0 +1,46 @@
+#include "robot/imu_mounting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace plumb {
+
+ImuMounting MountingOf(const RobotDescription& robot, int link) {
+  using Type = JointDescription::Type;
+  ImuMounting mounting;
+  std::vector<int> chain;  // from the link down to the base
+  for (int at = link; at != 0; at = robot.joints[static_cast<size_t>(chain.back())].parent) chain.push_back(at - 1);
+  std::reverse(chain.begin(), chain.end());
+
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // of the joint's axes, in the base's
+  for (const int index : chain) {
+    const JointDescription& joint = robot.joints[static_cast<size_t>(index)];
+    rotation = rotation * joint.rotation;
+    if (joint.type == Type::kPrismatic) {
+      mounting.slides.push_back({index, rotation * joint.axis});
+      continue;
+    }
+    const bool turns = joint.type == Type::kRevolute || joint.type == Type::kContinuous;
+    if (index != chain.back() || !turns || !joint.passive) return {};
+    mounting.turned = index;
+    mounting.axis = joint.axis;
+  }
+  mounting.unturned = Eigen::Quaterniond(rotation);
+  for (size_t i = 0; i < mounting.slides.size(); ++i) {
+    for (size_t k = 0; k < i; ++k) {
+      if (std::abs(mounting.slides[i].direction.dot(mounting.slides[k].direction)) > 1e-9) {
+        mounting.slides.clear();
+        return mounting;
+      }
+    }
+  }
+  return mounting;
+}
+
+double ImuMounting::Angle(const Eigen::Quaterniond& link_to_world) const {
+  const Eigen::Quaterniond turn = unturned.conjugate() * link_to_world;
+  return std::remainder(2 * std::atan2(axis.dot(turn.vec()), turn.w()), 2 * std::numbers::pi);
+}
+
+}  // namespace plumb

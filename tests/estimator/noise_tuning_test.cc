@@ -1,0 +1,60 @@
+#include "estimator/noise_tuning.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "common/random.h"
+
+namespace plumb {
+namespace {
+
+RobotDescription Robot() {
+  RobotDescription robot;
+  robot.joints.resize(1);
+  robot.joints[0].name = "pivot";
+  robot.joints[0].effort_limit = 2;
+  robot.estimator = {.position_sd = 1e-2, .velocity_sd = 1, .jerk = 1000, .effort_step = 0, .timing_sd = 0, .lag = 4,
+                     .reset_after = 100};
+  return robot;
+}
+
+// A motion that is what the filter assumes, white jerk, sampled exactly.
+void Play(StateObserver& observer, double position_sd, double velocity_sd, double jerk, int steps) {
+  Random random(3, {7});
+  constexpr double kSub = 1e-4;
+  double q = 0, v = 0, a = 0;
+  for (int k = 0; k < steps; ++k) {
+    for (int i = 0; i < 50; ++i) {
+      q += kSub * v;
+      v += kSub * a;
+      a += jerk * std::sqrt(kSub) * random.Normal() - kSub * (20 * a + 100 * v + 100 * q);  // stays within reach
+    }
+    joint_state_t m{};
+    m.utime = 1'000'000 + 5000 * k;
+    m.sequence = k;
+    m.num_joints = 1;
+    m.measured = {m.utime};
+    m.position = {q + position_sd * random.Normal()};
+    m.velocity = {v + velocity_sd * random.Normal()};
+    m.effort_measured = m.effort_sent = m.effort_applied = {0.0};
+    m.valid = {1};
+    observer.OnJointState(m);
+  }
+}
+
+TEST_CASE("known noise is found, far from where the search begins") {
+  const TunedNoise tuned = TuneNoise(Robot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 6000); });
+  CHECK(tuned.joints[0].position_sd == Approx(1e-3).epsilon(0.15));
+  CHECK(tuned.joints[0].velocity_sd == Approx(0.05).epsilon(0.15));
+  CHECK(tuned.joints[0].jerk == Approx(40).epsilon(0.3));
+  CHECK(tuned.joints[0].effort_step == 0);  // there was none to learn from
+  CHECK(tuned.after[0] < tuned.before[0] - 1);
+}
+
+TEST_CASE("too little to learn from is refused by name") {
+  CHECK_THROWS_WITH(TuneNoise(Robot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 50); }),
+                    Catch::Contains("joint pivot") && Catch::Contains("too few"));
+}
+
+}  // namespace
+}  // namespace plumb
