@@ -3,7 +3,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <ctime>
@@ -17,27 +16,13 @@
 #include "calibrator/report.h"
 #include "calibrator/robot_sbc.h"
 #include "calibrator/summary.h"
+#include "cli/progress_line.h"
 #include "common/atomic_file.h"
 
 namespace plumb {
 namespace {
 
 struct Interrupted {};
-
-// One line that is written over, where people look at it.
-class ProgressLine {
- public:
-  explicit ProgressLine(bool speaks) : shown_(speaks && isatty(STDERR_FILENO)) {}
-  ~ProgressLine() {
-    if (shown_) std::cerr << "\r\033[K" << std::flush;
-  }
-  void Show(const std::string& what, double share) const {
-    if (shown_) std::cerr << fmt::format("\r\033[K{} {:3.0f} %", what, 100 * share) << std::flush;
-  }
-
- private:
-  bool shown_;
-};
 
 std::vector<Log> ReadLogs(const CalibrateFlags& flags, const RobotDescription& robot) {
   std::vector<Log> logs;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calibrator/log_reader.h"
+#include "cli/progress_line.h"
 #include "estimator/noise_tuning.h"
 
 namespace plumb {
@@ -16,8 +17,9 @@ namespace {
 
 std::string Lines(const RobotDescription& robot, const TunedNoise& tuned, size_t i) {
   const NoiseDescription& noise = tuned.joints[i];
-  std::string text = fmt::format("# of [[joint]] \"{}\": deviance per reading {:.3f} instead of {:.3f}\n[joint.estimator]\n",
-                                 robot.joints[i].name, tuned.after[i], tuned.before[i]);
+  std::string text =
+      fmt::format("# of [[joint]] \"{}\": deviance per reading {:.3f} instead of {:.3f}\n[joint.estimator]\n",
+                  robot.joints[i].name, tuned.after[i], tuned.before[i]);
   const auto add = [&](const char* key, double value) {
     if (std::isfinite(value)) text += fmt::format("{} = {:.3g}\n", key, value);
   };
@@ -36,8 +38,10 @@ int TuneEstimator(const std::string& robot_path, const std::string& log) {
   std::vector<std::variant<joint_state_t, imu_t>> messages;
   int64_t undecodable = 0;
   const auto keep = [&](auto message, const void* data, int size) {
-    if (message.decode(data, 0, size) == size) messages.push_back(std::move(message));
-    else ++undecodable;
+    if (message.decode(data, 0, size) == size)
+      messages.push_back(std::move(message));
+    else
+      ++undecodable;
   };
   ReadLog(log, [&](const std::string& channel, const void* data, int size, int64_t) {
     if (channel == "JOINT_STATE") keep(joint_state_t{}, data, size);
@@ -47,10 +51,15 @@ int TuneEstimator(const std::string& robot_path, const std::string& log) {
   if (messages.empty()) {
     throw std::runtime_error(fmt::format("{}: has no JOINT_STATE ({} undecodable)", log, undecodable));
   }
+  const ProgressLine line;
+  int played = 0;
   const TunedNoise tuned = TuneNoise(robot, [&](StateObserver& observer) {
+    line.Show("playing the log with other noise", static_cast<double>(played++) / kMostPlays);
     for (const auto& message : messages) {
-      if (const auto* imu = std::get_if<imu_t>(&message)) observer.OnImu(*imu);
-      else observer.OnJointState(std::get<joint_state_t>(message));
+      if (const auto* imu = std::get_if<imu_t>(&message))
+        observer.OnImu(*imu);
+      else
+        observer.OnJointState(std::get<joint_state_t>(message));
     }
   });
   for (size_t i = 0; i < tuned.joints.size(); ++i) std::cout << Lines(robot, tuned, i) << '\n';

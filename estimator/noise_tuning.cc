@@ -12,13 +12,15 @@ namespace plumb {
 namespace {
 
 constexpr double kFactors[] = {3, 1.5, 1.2, 1.07};
-constexpr int kRounds = 4;           // with each factor at most
-constexpr double kWorthwhile = 1e-4; // of the deviance per reading
-constexpr int64_t kFewest = 100;     // readings
+constexpr int kRounds = 4;            // with each factor at most
+constexpr double kWorthwhile = 1e-4;  // of the deviance per reading
+constexpr int64_t kFewest = 100;      // readings
 
 using Parameter = double NoiseDescription::*;
 constexpr Parameter kParameters[] = {&NoiseDescription::jerk, &NoiseDescription::velocity_sd,
                                      &NoiseDescription::effort_step, &NoiseDescription::position_sd};
+static_assert(1 + std::size(kFactors) * kRounds * std::size(kParameters) * 2 ==
+              kMostPlays);  // both directions
 
 std::vector<NoiseDescription> NoiseOf(const RobotDescription& robot) {
   std::vector<NoiseDescription> noise;
@@ -44,8 +46,9 @@ TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(Sta
     for (size_t i = 0; i < n; ++i) {
       const int64_t readings = observer.readings(static_cast<int>(i));
       if (readings < kFewest) {
-        throw std::invalid_argument(fmt::format("joint {}: {} readings are too few to learn noise from: at least {}",
-                                                robot.joints[i].name, readings, kFewest));
+        throw std::invalid_argument(
+            fmt::format("joint {}: {} readings are too few to learn noise from: at least {}",
+                        robot.joints[i].name, readings, kFewest));
       }
       has_velocity[i] = std::isfinite(status.velocity_nis[i]);
       per_reading.push_back(observer.deviance(static_cast<int>(i)) / static_cast<double>(readings));

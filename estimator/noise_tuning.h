@@ -21,6 +21,7 @@ struct TunedNoise {
 /// parameter that makes no difference stays as it was.
 /// @param play gives an observer all messages of the log.
 /// @throws std::invalid_argument if there are fewer than 100 readings of a joint.
+inline constexpr int kMostPlays = 129;  ///< calls of `play`
 TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(StateObserver&)>& play);
 
 }  // namespace plumb
