@@ -6,8 +6,8 @@ namespace plumb {
 
 UnscentedFilter::UnscentedFilter(Eigen::Index size)
     : mean_(Eigen::VectorXd::Zero(size)),
-      shared_(size),
       gain_(size),
+      shared_(size),
       covariance_(Eigen::MatrixXd::Zero(size, size)),
       root_(size),
       points_(size, 2 * size + 1) {}
@@ -45,15 +45,15 @@ bool UnscentedFilter::Predict(const Motion& motion, const Eigen::MatrixXd& noise
   return true;
 }
 
-UnscentedFilter::Innovation UnscentedFilter::Expect(const Eigen::VectorXd& row, double value, double variance) const {
-  return {value - row.dot(mean_), row.dot(covariance_.selfadjointView<Eigen::Lower>() * row) + variance};
+UnscentedFilter::Innovation UnscentedFilter::Expect(const Eigen::VectorXd& row, double value, double variance) {
+  shared_.noalias() = covariance_ * row;
+  return {value - row.dot(mean_), row.dot(shared_) + variance};
 }
 
 void UnscentedFilter::Correct(const Eigen::VectorXd& row, double value, double variance) {
-  shared_.noalias() = covariance_ * row;
-  const double innovation_variance = row.dot(shared_) + variance;
-  gain_ = shared_ / innovation_variance;
-  mean_ += gain_ * (value - row.dot(mean_));
+  const Innovation innovation = Expect(row, value, variance);
+  gain_ = shared_ / innovation.variance;
+  mean_ += gain_ * innovation.value;
   // (1 - K h') P (1 - K h')' + K R K', one factor after the other, for a reading that is one number.
   covariance_.noalias() -= gain_ * shared_.transpose();
   shared_.noalias() = covariance_ * row;

@@ -43,12 +43,13 @@ class UnscentedFilter {
     double value, variance;
   };
   /// Of a reading that is row . state + white noise.
-  Innovation Expect(const Eigen::VectorXd& row, double value, double variance) const;
+  Innovation Expect(const Eigen::VectorXd& row, double value, double variance);
   /// Takes it into account: Joseph's form, which keeps the covariance symmetric and positive.
   void Correct(const Eigen::VectorXd& row, double value, double variance);
 
  private:
-  Eigen::VectorXd mean_, shared_, gain_;
+  Eigen::VectorXd mean_, gain_;
+  Eigen::VectorXd shared_;  // covariance of the state with the last reading
   Eigen::MatrixXd covariance_;
   Eigen::LLT<Eigen::MatrixXd> root_;
   Eigen::MatrixXd points_;  // sigma points, then their weighted deviations from the mean

@@ -16,8 +16,10 @@ constexpr double Square(double x) { return x * x; }
 
 double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
 
-// A JOINT_STATE has one number per joint.
-const RobotDescription& RequireSingleAxes(const RobotDescription& robot) {
+// A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as long as training's, its
+// error would be greater than the noise.
+RobotDescription ForFilter(RobotDescription robot) {
+  robot.simulation.integrator = SimulationSettings::Integrator::kLeapfrog;
   for (const JointDescription& joint : robot.joints) {
     if (joint.type != JointDescription::Type::kSpherical) continue;
     throw std::invalid_argument("joint " + joint.name + " is spherical: the filter on the simulator's dynamics has none");
@@ -43,7 +45,7 @@ size_t EffortsOnTheirWay(const RobotDescription& robot) {
 }  // namespace
 
 UnscentedObserver::UnscentedObserver(const RobotDescription& robot)
-    : simulator_(RequireSingleAxes(robot)),
+    : simulator_(ForFilter(robot)),
       n_(robot.num_joints()),
       filter_(StateSize(robot)),
       noise_(Eigen::MatrixXd::Zero(filter_.size(), filter_.size())),

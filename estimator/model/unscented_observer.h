@@ -17,10 +17,11 @@ namespace plumb {
 /// be had, and which decides what readings are acceptable at all.
 ///
 /// The state is q and v of all joints, and the biases of gyros. From measurement to measurement it moves as the simulator
-/// says, under the effort that JOINT_STATE says was applied; accelerations that the simulator does not know of are white, of
-/// spectral density [estimator.model] acceleration, squared, and independent. A new reading of a drive, an encoder, or an IMU's
-/// orientation and rate counts at its own time, by the prediction's mean acceleration, with the noise that EstimatorOf
-/// says; accelerometers, and an IMU's readings between those of JOINT_STATE, are not used.
+/// says, by leapfrog whatever robot.toml's integrator is, under the effort that JOINT_STATE says was applied. Accelerations
+/// that the simulator does not know of are white, of spectral density [estimator.model] acceleration, squared, and independent.
+/// A new reading of a drive, an encoder, or an IMU's orientation and rate counts at its own time, by the prediction's mean
+/// acceleration, with the noise that EstimatorOf says; accelerometers, and an IMU's readings between those of JOINT_STATE,
+/// are not used.
 ///
 /// OnJointState does not allocate after the first call. Not thread-safe.
 class UnscentedObserver {

@@ -13,14 +13,15 @@ struct ModelErrors {
   int64_t restarts = 0;  ///< of the filter on the model
 };
 
-/// The robot with the prior's means as parameters, but for the masses of all links: those times `mass`.
+/// The robot with the parameters that SimulatedReadings has, but for the masses of all links: those times `mass`.
 inline RobotDescription Assumed(const RobotDescription& robot, double mass = 1) {
-  const Model model(robot);
-  Eigen::VectorXd parameters = model.parameters().means();
+  Eigen::VectorXd parameters(static_cast<Eigen::Index>(robot.parameters.size()));
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
-    if (robot.parameters[i].name.rfind("mass/", 0) == 0) parameters[static_cast<Eigen::Index>(i)] *= mass;
+    const ParameterDescription& p = robot.parameters[i];
+    const bool heavier = p.name.rfind("mass/", 0) == 0;
+    parameters[static_cast<Eigen::Index>(i)] = p.ToPhysical(p.coordinate_mean()) * (heavier ? mass : 1);
   }
-  return model.Describe(parameters);
+  return Model(robot).Describe(parameters);
 }
 
 /// @param assumed what the filter on the model takes for the robot.
