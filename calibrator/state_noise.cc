@@ -5,11 +5,13 @@
 #include <cmath>
 #include <vector>
 
+#include "robot/motion_noise.h"
+
 namespace plumb {
 namespace {
 
 constexpr int kPeriods = 30;  // of control, until the filter has settled
-constexpr double kUnknown = 1e6;
+constexpr double kUnknown = 1e6, kUnmeasured = 1e3;
 
 // (sd of q, sd of v) where the acceleration steps by an unknown amount of this sd once per control step.
 Eigen::Vector2d Smoothed(const EstimatorSettings& settings, double dt, int per_control_step,
@@ -45,6 +47,14 @@ Eigen::Vector2d Smoothed(const EstimatorSettings& settings, double dt, int per_c
   return smoothed.diagonal().head<2>().cwiseSqrt();
 }
 
+// An encoder on a joint without a motor tells no velocity.
+bool MeasuresVelocity(const RobotDescription& robot, int joint) {
+  const auto encoder = [&](const SensorDescription& sensor) {
+    return sensor.link < 0 && sensor.joint == joint;
+  };
+  return !robot.joints[static_cast<size_t>(joint)].passive || std::ranges::none_of(robot.sensors, encoder);
+}
+
 }  // namespace
 
 Eigen::VectorXd SmoothedNoise(const RobotDescription& robot) {
@@ -53,10 +63,17 @@ Eigen::VectorXd SmoothedNoise(const RobotDescription& robot) {
   const int per_control_step = std::max(1, static_cast<int>(std::lround(robot.task.period / dt)));
   Eigen::VectorXd sd(2 * n);
   Eigen::Index velocity = 0;
+  // A step of any joint's effort may step every joint's acceleration.
+  double most_effort = 0;
   for (const JointDescription& joint : robot.joints) {
+    if (!joint.passive) most_effort = std::hypot(most_effort, joint.effort_limit);
+  }
+  for (int j = 0; j < robot.num_joints(); ++j) {
+    EstimatorSettings settings = EstimatorOf(robot, j);
+    if (!MeasuresVelocity(robot, j)) settings.velocity_sd = kUnmeasured;
     const Eigen::Vector2d noise =
-        Smoothed(robot.estimator, dt, per_control_step, robot.estimator.effort_step * joint.effort_limit);
-    for (int i = 0; i < joint.num_velocities(); ++i, ++velocity) {
+        Smoothed(settings, dt, per_control_step, settings.effort_step * most_effort);
+    for (int i = 0; i < robot.joints[static_cast<size_t>(j)].num_velocities(); ++i, ++velocity) {
       sd(velocity) = noise(0);
       sd(n + velocity) = noise(1);
     }

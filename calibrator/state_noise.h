@@ -10,9 +10,9 @@ namespace plumb {
 /// v), physical units, 2 * velocities entries.
 ///
 /// The steady state of a Kalman filter and Rauch-Tung-Striebel smoother (AIAA J. 3, 1965) of position,
-/// velocity and acceleration with the description's [estimator] settings: measurements each driver period,
-/// white jerk, and at each control step an acceleration step as the full effort of the joint may make it. A
-/// joint without a motor is taken to be measured like the others. Thread-safe.
+/// velocity and acceleration with the settings that the estimator has for each joint (EstimatorOf): measurements
+/// each driver period, white jerk, and at each control step an acceleration step as the joints' full efforts may
+/// make it. An IMU's accelerometer is left out. Thread-safe.
 Eigen::VectorXd SmoothedNoise(const RobotDescription& robot);
 
 }  // namespace plumb

@@ -156,6 +156,17 @@ TEST_CASE("smoothed states are better known than measured ones, and worse with a
   robot.estimator.position_sd *= 10;
   CHECK(SmoothedNoise(robot)(0) > 2 * noise(0));
   CHECK(SmoothedNoise(robot)(1) > noise(1));
+  robot.joints[0].noise.position_sd = robot.estimator.position_sd / 10;  // the joint's word is the last
+  CHECK(SmoothedNoise(robot) == noise);
+}
+
+TEST_CASE("of a joint without a drive the velocity is less well known") {
+  RobotDescription robot = Robot("hopper");
+  const Eigen::VectorXd boom = SmoothedNoise(robot);
+  const auto joint = static_cast<Eigen::Index>(robot.sensors[0].joint);
+  robot.sensors.erase(robot.sensors.begin());
+  robot.joints[static_cast<size_t>(joint)].passive = false;
+  CHECK(SmoothedNoise(robot)(6 + joint) < boom(6 + joint));
 }
 
 TEST_CASE("without parameters or motors there is nothing to excite") {

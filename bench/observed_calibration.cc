@@ -1,0 +1,73 @@
+// What the observer costs calibration: parameters from estimated states beside those from true states of the
+// same motions. A table for docs/measurements.md. build/bench/observed_calibration [motions]
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+#include "calibrator/calibration.h"
+#include "sim/parameters.h"
+#include "tests/calibrator/observed_log.h"
+#include "tests/estimator/observer_errors.h"
+
+namespace plumb {
+namespace {
+
+struct Way {
+  const char* name;
+  States states;
+};
+constexpr Way kWays[] = {{"true", States::kTrue},
+                         {"smoothed", States::kSmoothed},
+                         {"smoothed, taken for exact", States::kCertain},
+                         {"causal", States::kCausal}};
+
+void Print(const RobotDescription& robot, uint32_t motions) {
+  const std::vector<Knowable> knowable = KnowableOf(robot);
+  for (const Way& way : kWays) {
+    std::vector<double> square(knowable.size(), 0), sum(knowable.size(), 0), claimed(knowable.size(), 0);
+    std::vector<int> covered(knowable.size(), 0);
+    for (uint32_t seed = 1; seed <= motions; ++seed) {
+      const Eigen::VectorXd truth = HiddenParameters(robot, seed);
+      const Samples motion =
+          robot.num_joints() == 6 ? Hop(robot, seed, 2, truth) : Swing(robot, seed, 10, truth);
+      const std::vector<Log> logs{ObservedLog(robot, motion, way.states)};
+      const Findings found = Calibrate(robot, logs, {});
+      const Gaussian posterior = Moments(found.posterior);
+      const Eigen::VectorXd hidden =
+          truth.array().log();  // both robots' parameters have logarithms for coordinates
+      for (size_t i = 0; i < knowable.size(); ++i) {
+        const double error = knowable[i].power.dot(posterior.mean - hidden);
+        const double sd = std::sqrt(knowable[i].power.dot(posterior.covariance * knowable[i].power));
+        square[i] += error * error, sum[i] += error, claimed[i] += sd * sd;
+        covered[i] += std::abs(error) < 1.96 * sd;
+      }
+      fmt::print(stderr, "\r{} {}: {} of {} ", robot.name, way.name, seed, motions);
+    }
+    for (size_t i = 0; i < knowable.size(); ++i) {
+      fmt::print("| {} | {} | {} | {:.3f} | {:+.3f} | {:.3f} | {:.0f} % |\n", robot.name, way.name,
+                 knowable[i].name, 100 * std::sqrt(square[i] / motions), 100 * sum[i] / motions,
+                 100 * std::sqrt(claimed[i] / motions), 100. * covered[i] / motions);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  using namespace plumb;
+  const auto motions = static_cast<uint32_t>(argc > 1 ? std::atoi(argv[1]) : 20);
+  fmt::print(
+      "| robot | states | of | rms error % | mean error % | claimed sd % | within 95 % "
+      "|\n|---|---|---|---|---|---|---|\n");
+  for (const char* name : {"pendulum", "hopper"}) {
+    RobotDescription robot = WithSimulatedNoise(LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + name));
+    const Recordings training = Record(robot, 1000, 3);
+    const TunedNoise noise = TuneNoise(robot, [&](StateObserver& observer) { Play(training, observer); });
+    for (size_t i = 0; i < noise.joints.size(); ++i) robot.joints[i].noise = noise.joints[i];
+    Print(robot, motions);
+  }
+}

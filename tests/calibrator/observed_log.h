@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "calibrator/log.h"
+#include "estimator/state_observer.h"
+#include "tests/estimator/simulated_readings.h"
+
+namespace plumb {
+
+using Samples = std::vector<SimulatedReadings::Sample>;
+
+/// What calibration is told of a simulated motion's states.
+enum class States {
+  kTrue,      ///< the truth, with next to no uncertainty
+  kSmoothed,  ///< as plumb-calibrator is told: the smoother's
+  kCausal,    ///< what control is told
+  kCertain,   ///< the smoother's, but taken for exact where a transition begins: no errors in variables
+};
+
+/// The log of a motion that was controlled every robot.task.period.
+inline Log ObservedLog(const RobotDescription& robot, const Samples& motion, States states) {
+  const auto n = static_cast<size_t>(robot.num_joints());
+  const int64_t per_control = std::llround(robot.task.period * 1e6) / SimulatedReadings::kPeriod;
+  StateObserver observer(robot);
+  TransitionJoiner joiner = TransitionJoiner::Unbounded(robot);
+  joint_command_t command{};
+  command.num_joints = static_cast<int32_t>(n);
+  command.effort.assign(n, 0);
+  for (const SimulatedReadings::Sample& sample : motion) {
+    for (const imu_t& imu : sample.imus) observer.OnImu(imu);
+    observer.OnJointState(sample.joints);
+    if (states == States::kTrue) {
+      robot_state_t state = observer.state();
+      for (size_t i = 0; i < n; ++i) {
+        state.q[i] = sample.q[static_cast<Eigen::Index>(i)];
+        state.v[i] = sample.v[static_cast<Eigen::Index>(i)];
+        state.q_sd[i] = state.v_sd[i] = 1e-7;
+      }
+      joiner.OnState(state);
+    } else if (states == States::kCausal) {
+      joiner.OnState(observer.state());
+    } else {
+      for (const robot_state_t& state : observer.smoothed()) joiner.OnState(state);
+    }
+    if (sample.joints.sequence % per_control != 0) continue;
+    command.state_sequence = sample.joints.sequence;
+    joiner.OnCommand(command);
+    ++command.step;
+  }
+  Log log;
+  log.name = "simulated";
+  log.rollouts.push_back(joiner.Join(0, command.state_sequence + per_control));
+  if (states == States::kCertain) {
+    for (Transition& transition : log.rollouts[0].transitions) {
+      transition.q_sd.setZero();
+      transition.v_sd.setZero();
+    }
+  }
+  return log;
+}
+
+/// What of a robot's parameters a motion can tell: a name, and the powers of the parameters whose product it
+/// is.
+struct Knowable {
+  std::string name;
+  Eigen::VectorXd power;
+};
+inline std::vector<Knowable> KnowableOf(const RobotDescription& robot) {
+  if (robot.parameters.size() == 3)
+    return {{"g/l", Eigen::Vector3d(1, 0, -1)}, {"m l^2", Eigen::Vector3d(0, 1, 2)}};
+  std::vector<Knowable> masses;
+  for (size_t i = 0; i < robot.parameters.size(); ++i) {
+    masses.push_back(
+        {robot.parameters[i].name, Eigen::VectorXd::Unit(static_cast<Eigen::Index>(robot.parameters.size()),
+                                                         static_cast<Eigen::Index>(i))});
+  }
+  return masses;
+}
+
+}  // namespace plumb
