@@ -12,7 +12,8 @@ UnscentedFilter::UnscentedFilter(Eigen::Index size)
       root_(size),
       points_(size, 2 * size + 1) {}
 
-void UnscentedFilter::Restart(const Eigen::Ref<const Eigen::VectorXd>& mean, const Eigen::Ref<const Eigen::VectorXd>& sd) {
+void UnscentedFilter::Restart(const Eigen::Ref<const Eigen::VectorXd>& mean,
+                              const Eigen::Ref<const Eigen::VectorXd>& sd) {
   mean_ = mean;
   covariance_.setZero();
   covariance_.diagonal() = sd.array().square();
@@ -45,7 +46,8 @@ bool UnscentedFilter::Predict(const Motion& motion, const Eigen::MatrixXd& noise
   return true;
 }
 
-UnscentedFilter::Innovation UnscentedFilter::Expect(const Eigen::VectorXd& row, double value, double variance) {
+UnscentedFilter::Innovation UnscentedFilter::Expect(const Eigen::VectorXd& row, double value,
+                                                    double variance) {
   shared_.noalias() = covariance_ * row;
   return {value - row.dot(mean_), row.dot(shared_) + variance};
 }

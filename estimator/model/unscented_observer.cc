@@ -16,13 +16,14 @@ constexpr double Square(double x) { return x * x; }
 
 double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
 
-// A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as long as training's, its
-// error would be greater than the noise.
+// A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as long as
+// training's, its error would be greater than the noise.
 RobotDescription ForFilter(RobotDescription robot) {
   robot.simulation.integrator = SimulationSettings::Integrator::kLeapfrog;
   for (const JointDescription& joint : robot.joints) {
     if (joint.type != JointDescription::Type::kSpherical) continue;
-    throw std::invalid_argument("joint " + joint.name + " is spherical: the filter on the simulator's dynamics has none");
+    throw std::invalid_argument("joint " + joint.name +
+                                " is spherical: the filter on the simulator's dynamics has none");
   }
   return robot;
 }
@@ -73,7 +74,8 @@ bool UnscentedObserver::Move(Eigen::Ref<Eigen::VectorXd> state, double elapsed) 
   if (!past_.empty()) simulator_.Recall(past_);
   simulator_.Step(effort_, elapsed);
   const auto [q, v] = simulator_.Reading();
-  const bool within_reach = (q.array().abs() <= kFarthest).all() && (v.array().abs() <= kFarthest).all();  // and a number
+  const bool within_reach =
+      (q.array().abs() <= kFarthest).all() && (v.array().abs() <= kFarthest).all();  // and a number
   if (!simulator_.finite() || !within_reach) return false;
   state.head(n_) = q;
   state.segment(n_, n_) = v;
@@ -91,7 +93,8 @@ bool UnscentedObserver::Predict(double elapsed) {
     noise_(joint.bias, joint.bias) = Square(joint.settings.bias_sd) * elapsed / KinematicFilter::kBiasWanders;
   }
   acceleration_ = -filter_.mean().segment(n_, n_) / elapsed;
-  const bool predicted = filter_.Predict([this, elapsed](Eigen::Ref<Eigen::VectorXd> x) { return Move(x, elapsed); }, noise_);
+  const bool predicted =
+      filter_.Predict([this, elapsed](Eigen::Ref<Eigen::VectorXd> x) { return Move(x, elapsed); }, noise_);
   acceleration_ += filter_.mean().segment(n_, n_) / elapsed;
   return predicted;
 }
@@ -106,7 +109,8 @@ bool UnscentedObserver::UseReading(const joint_state_t& measured, size_t i) {
   row_(q) = 1;
   row_(v) = -age;
   const double position = measured.position[i] - acceleration_(q) * age * age / 2;
-  const double position_variance = Square(s.position_sd) + Square(filter_.mean()(v) * s.timing_sd) + density * span * span * span / 3;
+  const double position_variance =
+      Square(s.position_sd) + Square(filter_.mean()(v) * s.timing_sd) + density * span * span * span / 3;
   const auto [innovation, variance] = filter_.Expect(row_, position, position_variance);
   if (!(std::abs(innovation) <= std::max(s.reset_after, kSurely * std::sqrt(variance)))) return false;
   filter_.Correct(row_, position, position_variance);
@@ -114,7 +118,8 @@ bool UnscentedObserver::UseReading(const joint_state_t& measured, size_t i) {
   row_.setZero();
   row_(v) = 1;
   if (joint.bias >= 0) row_(joint.bias) = 1;
-  filter_.Correct(row_, measured.velocity[i] + acceleration_(q) * age, Square(s.velocity_sd) + density * span);
+  filter_.Correct(row_, measured.velocity[i] + acceleration_(q) * age,
+                  Square(s.velocity_sd) + density * span);
   return true;
 }
 

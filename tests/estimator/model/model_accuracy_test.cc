@@ -23,13 +23,15 @@ struct Motion {
   Recordings recordings;
 };
 
-TEST_CASE("with the right dynamics, velocities are more than twice as good as the kinematic filter's, through impacts, too") {
+TEST_CASE(
+    "with the right dynamics, velocities are more than twice as good as the kinematic filter's, through "
+    "impacts, too") {
   const Motion motion(GENERATE("pendulum", "hopper"));
   const ModelErrors errors = Compare(motion.robot, Assumed(motion.robot), motion.recordings);
   for (size_t i = 0; i < errors.model.size(); ++i) {
-    INFO(motion.robot.joints[i].name << ": v " << errors.kinematic[i].v() << ", on the model " << errors.model[i].v() << ", NEES "
-                                     << errors.model[i].nees_v() << "; q " << errors.kinematic[i].q() << ", "
-                                     << errors.model[i].q());
+    INFO(motion.robot.joints[i].name << ": v " << errors.kinematic[i].v() << ", on the model "
+                                     << errors.model[i].v() << ", NEES " << errors.model[i].nees_v() << "; q "
+                                     << errors.kinematic[i].q() << ", " << errors.model[i].q());
     CHECK(2 * errors.model[i].v() < errors.kinematic[i].v());
     CHECK(errors.model[i].q() < 1.2 * errors.kinematic[i].q());
     CHECK(errors.model[i].nees_v() < 2);
@@ -45,8 +47,8 @@ TEST_CASE("with masses 30 % too great it is worse than with the right ones, and 
   const ModelErrors wrong = Compare(motion.robot, motion.AssumedWith(1.3, 0.2), motion.recordings);
   double more = 0;
   for (size_t i = 0; i < wrong.model.size(); ++i) {
-    INFO(motion.robot.joints[i].name << ": v " << right.model[i].v() << ", wrong " << wrong.model[i].v() << ", smoothed "
-                                     << observed.joints[i].smoothed.v());
+    INFO(motion.robot.joints[i].name << ": v " << right.model[i].v() << ", wrong " << wrong.model[i].v()
+                                     << ", smoothed " << observed.joints[i].smoothed.v());
     CHECK(wrong.model[i].v() > 1.2 * observed.joints[i].smoothed.v());
     more = std::max(more, wrong.model[i].v() / right.model[i].v());
   }
@@ -58,15 +60,16 @@ TEST_CASE("taken at its word, a wrong model is worse than none, a right one bett
   const ModelErrors right = Compare(motion.robot, motion.AssumedWith(1, 0.005), motion.recordings);
   const ModelErrors wrong = Compare(motion.robot, motion.AssumedWith(1.3, 0.005), motion.recordings);
   for (size_t i = 0; i < wrong.model.size(); ++i) {
-    INFO(motion.robot.joints[i].name << ": v " << right.kinematic[i].v() << ", on the right model " << right.model[i].v()
-                                     << ", on the wrong one " << wrong.model[i].v());
+    INFO(motion.robot.joints[i].name << ": v " << right.kinematic[i].v() << ", on the right model "
+                                     << right.model[i].v() << ", on the wrong one " << wrong.model[i].v());
     CHECK(wrong.model[i].v() > 1.2 * wrong.kinematic[i].v());
     CHECK(right.model[i].v() < 0.5 * right.kinematic[i].v());
     CHECK(wrong.model[i].nees_v() > 10);
   }
 }
 
-TEST_CASE("a thousand steps of a hopper, impacts, unknown efforts and failures among them, allocate nothing") {
+TEST_CASE(
+    "a thousand steps of a hopper, impacts, unknown efforts and failures among them, allocate nothing") {
   const Motion motion("hopper");
   RobotDescription assumed = Assumed(motion.robot);
   assumed.joints[4].dynamics.delay = 0.007;

@@ -13,7 +13,8 @@ struct ModelErrors {
   int64_t restarts = 0;  ///< of the filter on the model
 };
 
-/// The robot with the parameters that SimulatedReadings has, but for the masses of all links: those times `mass`.
+/// The robot with the parameters that SimulatedReadings has, but for the masses of all links: those times
+/// `mass`.
 inline RobotDescription Assumed(const RobotDescription& robot, double mass = 1) {
   Eigen::VectorXd parameters(static_cast<Eigen::Index>(robot.parameters.size()));
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
@@ -25,7 +26,8 @@ inline RobotDescription Assumed(const RobotDescription& robot, double mass = 1) 
 }
 
 /// @param assumed what the filter on the model takes for the robot.
-inline ModelErrors Compare(const RobotDescription& robot, const RobotDescription& assumed, const Recordings& recordings) {
+inline ModelErrors Compare(const RobotDescription& robot, const RobotDescription& assumed,
+                           const Recordings& recordings) {
   constexpr size_t kSettle = 50;  // samples
   const auto n = static_cast<size_t>(robot.num_joints());
   ModelErrors errors{std::vector<StateErrors>(n), std::vector<StateErrors>(n)};

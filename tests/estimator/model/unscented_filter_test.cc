@@ -32,7 +32,8 @@ TEST_CASE("of a linear motion it is the Kalman filter") {
     REQUIRE(filter.Predict([&](Eigen::Ref<Eigen::VectorXd> x) { return x = transition * x, true; }, noise));
     mean = transition * mean;
     covariance = transition * covariance * transition.transpose() + noise;
-    const Eigen::Matrix2d expected = rows * covariance * rows.transpose() + Eigen::Matrix2d(variances.asDiagonal());
+    const Eigen::Matrix2d expected =
+        rows * covariance * rows.transpose() + Eigen::Matrix2d(variances.asDiagonal());
     const auto innovation = filter.Expect(rows.row(0).transpose(), reading(0), variances(0));
     CHECK(innovation.value == Approx(reading(0) - rows.row(0).dot(mean)).epsilon(1e-9));
     CHECK(innovation.variance == Approx(expected(0, 0)).epsilon(1e-9));
@@ -52,7 +53,8 @@ TEST_CASE("of a square it has the exact mean and variance") {
   for (const double m : {0.0, 0.7, -3.0}) {
     const double s = 0.4;
     filter.Restart(Eigen::VectorXd::Constant(1, m), Eigen::VectorXd::Constant(1, s));
-    REQUIRE(filter.Predict([](Eigen::Ref<Eigen::VectorXd> x) { return x = x.cwiseAbs2().eval(), true; }, Eigen::MatrixXd::Zero(1, 1)));
+    REQUIRE(filter.Predict([](Eigen::Ref<Eigen::VectorXd> x) { return x = x.cwiseAbs2().eval(), true; },
+                           Eigen::MatrixXd::Zero(1, 1)));
     CHECK(filter.mean()(0) == Approx(m * m + s * s).epsilon(1e-12));
     CHECK(filter.covariance()(0, 0) == Approx(2 * std::pow(s, 4) + 4 * m * m * s * s).epsilon(1e-12));
   }
@@ -62,7 +64,8 @@ TEST_CASE("a covariance stays one through a thousand exact readings") {
   UnscentedFilter filter(3);
   filter.Restart(Eigen::Vector3d::Zero(), Eigen::Vector3d(1, 1e4, 1e-4));
   for (int k = 0; k < 1000; ++k) {
-    REQUIRE(filter.Predict([](Eigen::Ref<Eigen::VectorXd> x) { return x(0) += 1e-3 * x(1), true; }, 1e-14 * Eigen::Matrix3d::Identity()));
+    REQUIRE(filter.Predict([](Eigen::Ref<Eigen::VectorXd> x) { return x(0) += 1e-3 * x(1), true; },
+                           1e-14 * Eigen::Matrix3d::Identity()));
     filter.Correct(Eigen::Vector3d(1, 0, 1), 0.1 * k, 1e-12);
     REQUIRE(filter.covariance().diagonal().minCoeff() > 0);
   }
@@ -73,7 +76,8 @@ TEST_CASE("a motion that fails leaves the filter as it was, and so does a covari
   UnscentedFilter filter(2);
   filter.Restart(Eigen::Vector2d(1, 2), Eigen::Vector2d(1, 1));
   int asked = 0;
-  CHECK_FALSE(filter.Predict([&](Eigen::Ref<Eigen::VectorXd> x) { return x.setZero(), ++asked < 4; }, Eigen::Matrix2d::Zero()));
+  CHECK_FALSE(filter.Predict([&](Eigen::Ref<Eigen::VectorXd> x) { return x.setZero(), ++asked < 4; },
+                             Eigen::Matrix2d::Zero()));
   CHECK(filter.mean() == Eigen::Vector2d(1, 2));
   CHECK(filter.covariance() == Eigen::Matrix2d::Identity());
   filter.Restart(Eigen::Vector2d(1, 2), Eigen::Vector2d(NAN, 1));

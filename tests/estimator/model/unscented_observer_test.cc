@@ -12,7 +12,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kMass = 2, kPeriod = 0.005, kAge = 0.0013;
+constexpr double kMass = 2, kPeriod = 0.005, kAge = 0.0013, kTiming = 0.004;
 
 /// A mass on a level slide without friction.
 RobotDescription Slide() {
@@ -23,8 +23,15 @@ RobotDescription Slide() {
   robot.joints[0].type = JointDescription::Type::kPrismatic;
   robot.joints[0].axis = Eigen::Vector3d::UnitX();
   robot.joints[0].dynamics = {};
-  robot.estimator = {.position_sd = 1e-3, .velocity_sd = 0.05, .jerk = 50, .effort_step = 0, .timing_sd = 0, .lag = 10,
-                     .reset_after = 0.5, .delay = kAge, .model_acceleration = 0.2};
+  robot.estimator = {.position_sd = 1e-3,
+                     .velocity_sd = 0.05,
+                     .jerk = 50,
+                     .effort_step = 0,
+                     .timing_sd = kTiming,
+                     .lag = 10,
+                     .reset_after = 0.5,
+                     .delay = kAge,
+                     .model_acceleration = 0.2};
   return robot;
 }
 
@@ -70,10 +77,10 @@ TEST_CASE("of a linear robot it is the Kalman filter") {
   noise *= 0.2 * 0.2;
   Eigen::Matrix2d rows;
   rows << 1, -kAge, 0, 1;
-  const Eigen::Vector2d variances(1e-6 + 0.04 * std::pow(kAge, 3) / 3, 0.0025 + 0.04 * kAge);
   for (int k = 1; k <= 400; ++k) {
     const double effort = random.Uniform(-2, 2), a = effort / kMass;
-    const Eigen::Vector2d reading(0.1 + 0.3 * kPeriod * k + 1e-3 * random.Normal(), 0.3 + 0.05 * random.Normal());
+    const Eigen::Vector2d reading(0.1 + 0.3 * kPeriod * k + 1e-3 * random.Normal(),
+                                  0.3 + 0.05 * random.Normal());
     const bool silent = k % 7 == 0;
     m = Measured(k, reading(0), reading(1), effort);
     m.valid[0] = !silent;
@@ -81,7 +88,11 @@ TEST_CASE("of a linear robot it is the Kalman filter") {
     mean = (transition * mean + Eigen::Vector2d(kPeriod * kPeriod / 2, kPeriod) * a).eval();
     covariance = (transition * covariance * transition.transpose() + noise).eval();
     if (!silent) {
-      const Eigen::Matrix2d spread = rows * covariance * rows.transpose() + Eigen::Matrix2d(variances.asDiagonal());
+      const double displaced = mean(1) * kTiming;
+      const Eigen::Vector2d variances(1e-6 + 0.04 * std::pow(kAge, 3) / 3 + displaced * displaced,
+                                      0.0025 + 0.04 * kAge);
+      const Eigen::Matrix2d spread =
+          rows * covariance * rows.transpose() + Eigen::Matrix2d(variances.asDiagonal());
       const Eigen::Matrix2d gain = covariance * rows.transpose() * spread.inverse();
       const Eigen::Vector2d known(a * kAge * kAge / 2, -a * kAge);
       mean += gain * (reading - known - rows * mean);
@@ -113,15 +124,57 @@ TEST_CASE("a silent joint moves on as the simulator says, under efforts that are
     observer.OnJointState(m, Kinematic(m));
     // What was applied from (j - 1) to j periods has acted from 2.4 periods later on.
     double v = 0.3;
-    for (int j = 1; j <= k; ++j) v += efforts[static_cast<size_t>(j)] / kMass * kPeriod * std::clamp(k - 2.4 - (j - 1), 0.0, 1.0);
+    for (int j = 1; j <= k; ++j)
+      v += efforts[static_cast<size_t>(j)] / kMass * kPeriod * std::clamp(k - 2.4 - (j - 1), 0.0, 1.0);
     REQUIRE(observer.state().v[0] == Approx(v).margin(1e-9));
   }
+}
+
+// A pendulum that hangs still, without a motor, on whose link a gyro says that it turns.
+TEST_CASE("a gyro's bias is told from a motion that the simulator does not expect") {
+  RobotDescription robot = LoadPendulum("robot.toml");
+  robot.parameters.clear();
+  robot.virtual_robot.hidden.clear();
+  robot.joints[0].passive = true;
+  SensorDescription imu;
+  imu.name = "imu";
+  imu.period = kPeriod;
+  imu.link = 1;
+  imu.noise.position_sd = 0.01;
+  imu.noise.velocity_sd = 0.01;
+  imu.rate_bias_sd = 0.1;
+  robot.sensors = {imu};
+  UnscentedObserver observer(robot);
+  for (int k = 0; k < 1000; ++k) {
+    const joint_state_t m = Measured(k, M_PI, 0.2, 0);
+    observer.OnJointState(m, Kinematic(m, M_PI, 0));
+  }
+  CHECK(std::abs(observer.state().v[0]) < 0.01);
+  CHECK(observer.state().q[0] == Approx(M_PI).margin(0.005));
+  CHECK(observer.restarts() == 0);
+}
+
+// Readings are late and biased, and so is the state: what it is for has only ever seen readings.
+TEST_CASE("the state is what sensors read of the simulator's") {
+  RobotDescription robot = Slide();
+  robot.joints[0].dynamics.sensor_bias = 0.5;
+  robot.joints[0].dynamics.stiffness = 8;  // relaxed at 0
+  UnscentedObserver observer(robot);
+  joint_state_t m = Measured(0, 0, 0, 0);
+  observer.OnJointState(m, Kinematic(m, 0.5, 0));
+  for (int k = 1; k <= 100; ++k) {
+    m = Measured(k, 0, 0, 0);
+    m.valid[0] = 0;
+    observer.OnJointState(m, Kinematic(m, 0.5, 0));
+  }
+  CHECK(observer.state().q[0] == Approx(0.5).margin(1e-9));
 }
 
 TEST_CASE("the kinematic state is taken over where the filter cannot go on") {
   UnscentedObserver observer(Slide());
   joint_state_t m = Measured(0, 0.1, 0.3, 0);
-  const auto step = [&](int64_t k, double q, double v, double effort, bool valid = true) -> const robot_state_t& {
+  const auto step = [&](int64_t k, double q, double v, double effort,
+                        bool valid = true) -> const robot_state_t& {
     m = Measured(k, 0.1, 0.3, effort);
     robot_state_t kinematic = Kinematic(m, q, v);
     kinematic.valid = valid;
@@ -130,7 +183,8 @@ TEST_CASE("the kinematic state is taken over where the filter cannot go on") {
   };
   const auto taken = [&](double q, double v) {
     const robot_state_t& s = observer.state();
-    return s.q[0] == q && s.v[0] == v && s.q_sd[0] == Approx(1e-3).epsilon(1e-12) && s.v_sd[0] == Approx(0.1).epsilon(1e-12);
+    return s.q[0] == q && s.v[0] == v && s.q_sd[0] == Approx(1e-3).epsilon(1e-12) &&
+           s.v_sd[0] == Approx(0.1).epsilon(1e-12);
   };
   step(0, 0.1, 0.3, 0);
   CHECK(taken(0.1, 0.3));
