@@ -17,7 +17,7 @@ namespace {
 constexpr int kTransitions = 1000;
 
 struct HopperLog {
-  explicit HopperLog(double start_sd) : robot(LoadRobot(PLUMBLINE_SOURCE "/robots/hopper")), model(std::make_shared<Model>(robot)) {
+  explicit HopperLog(double start_sd) : robot(LoadRobot(PLUMBLINE_SOURCE "/robots/hopper/gym.toml")), model(std::make_shared<Model>(robot)) {
     rollouts = RandomRollouts(robot, RandomMasses(robot, 1), kTransitions, 1e-4, 1);
     if (start_sd == 0) return;
     for (Rollout& rollout : rollouts) {

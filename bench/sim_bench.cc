@@ -86,7 +86,7 @@ struct Hops {
 const Hops& RandomHops() {
   static const Hops hops = [] {
     Hops made;
-    Environment hopper(Load("hopper"));
+    Environment hopper(Load("hopper/gym.toml"));
     Random random(5);
     hopper.Reset(random);
     while (made.size() < 1000) {
@@ -115,7 +115,7 @@ void ForEachHop(benchmark::State& state, Step step) {
 }
 
 void Hopper(benchmark::State& state) {
-  Simulator simulator(Load("hopper"));
+  Simulator simulator(Load("hopper/gym.toml"));
   ForEachHop(state, [&](const auto& q, const auto& v, const auto& effort) {
     simulator.SetState(q, v);
     simulator.Step(effort, 0.008);
@@ -124,7 +124,7 @@ void Hopper(benchmark::State& state) {
 BENCHMARK(Hopper);
 
 void HopperInFlight(benchmark::State& state) {
-  Simulator simulator(Load("hopper"));
+  Simulator simulator(Load("hopper/gym.toml"));
   const Eigen::VectorXd high = (Eigen::VectorXd(6) << 0, 5, 0, -0.5, -0.5, 0).finished();
   ForEachHop(state, [&](const auto&, const auto& v, const auto& effort) {
     simulator.SetState(high, v);
@@ -135,7 +135,7 @@ BENCHMARK(HopperInFlight);
 
 /// As if it did not move in a plane.
 void HopperInSpace(benchmark::State& state) {
-  const Model model(Load("hopper"));
+  const Model model(Load("hopper/gym.toml"));
   Topology topology = model.topology();
   topology.planar = false;
   const auto engine = MakeEngine(topology, model.description().simulation, model.parameters().terms());
@@ -150,7 +150,7 @@ void HopperInSpace(benchmark::State& state) {
 BENCHMARK(HopperInSpace);
 
 void HopperParameters(benchmark::State& state) {
-  Simulator simulator(Load("hopper"));
+  Simulator simulator(Load("hopper/gym.toml"));
   const Eigen::VectorXd masses = Eigen::Vector4d(3.6, 4.1, 2.7, 5.3);
   const CountAllocations count(state);
   for (auto _ : state) simulator.SetParameters(masses);
@@ -159,7 +159,7 @@ BENCHMARK(HopperParameters);
 
 /// Every parameter that the hopper has, geometry and inertias by Cholesky coordinates included.
 void HopperAllParameters(benchmark::State& state) {
-  RobotDescription robot = Load("hopper");
+  RobotDescription robot = Load("hopper/gym.toml");
   robot.parameters.clear();
   Eigen::VectorXd values(0);
   const auto add = [&](const std::string& path, double value) {
@@ -197,7 +197,7 @@ void HopperWindows(benchmark::State& state) {
   for (const Eigen::VectorXd& effort : hops.effort) efforts.push_back({{0.008, effort}});
   std::vector<Window> recorded;
   for (size_t i = 0; i < hops.size(); ++i) recorded.push_back({hops.q[i], hops.v[i], {efforts[i]}});
-  Windows windows(std::make_shared<Model>(Load("hopper")), static_cast<int>(state.range(0)));
+  Windows windows(std::make_shared<Model>(Load("hopper/gym.toml")), static_cast<int>(state.range(0)));
   Eigen::MatrixXd masses(4, 25);
   Random random(1);
   for (double& mass : masses.reshaped()) mass = random.Uniform(3, 5);
@@ -212,7 +212,7 @@ BENCHMARK(HopperWindows)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillis
 
 /// What a step cost if Simbody's own mass matrix and bias were all there is to it: once instead of four times.
 void SimbodyHopperMassAndBias(benchmark::State& state) {
-  RobotDescription robot = Load("hopper");
+  RobotDescription robot = Load("hopper/gym.toml");
   Plant plant(Model(robot).Describe(Model(robot).parameters().means()));
   ForEachHop(state, [&](const auto& q, const auto& v, const auto&) {
     plant.SetState(q, v);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <memory>
 #include <stdexcept>
 
@@ -27,6 +28,14 @@ Eigen::MatrixXd SmoothOverTime(const Eigen::MatrixXd& x, double sigma_rows) {
     }
   }
   return smooth / total;
+}
+
+// From the first to the last: Eigen's order depends on where in memory a column begins, hence on what is beside it, and a
+// batch may be shared out.
+Eigen::VectorXd ColumnSums(const Eigen::MatrixXd& values) {
+  Eigen::VectorXd sums(values.cols());
+  for (Eigen::Index j = 0; j < values.cols(); ++j) sums(j) = std::accumulate(values.col(j).begin(), values.col(j).end(), 0.0);
+  return sums;
 }
 
 }  // namespace
@@ -118,12 +127,12 @@ Eigen::MatrixXd Discrepancy::SquaredStepErrors(const Eigen::MatrixXd& parameters
 Eigen::VectorXd Discrepancy::LogLikelihood(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts) {
   const Eigen::MatrixXd squared = SquaredStepErrors(parameters, rollouts);
   const double weight = -0.5 * (kDegreesOfFreedom + 2 * static_cast<double>(n_));
-  return weight * (squared / kDegreesOfFreedom).array().log1p().matrix().colwise().sum().transpose();
+  return weight * ColumnSums((squared / kDegreesOfFreedom).array().log1p().matrix());
 }
 
 Eigen::VectorXd Discrepancy::StepError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts) {
   const Eigen::MatrixXd squared = SquaredStepErrors(parameters, rollouts);
-  return squared.colwise().sum().transpose() / static_cast<double>(squared.rows() * 2 * n_);
+  return ColumnSums(squared) / static_cast<double>(squared.rows() * 2 * n_);
 }
 
 Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts) {
@@ -227,7 +236,7 @@ Eigen::VectorXd Discrepancy::PredictionErrorHere(const Eigen::MatrixXd& paramete
                         static_cast<double>(observed.count());
     squared(static_cast<Eigen::Index>(window), sample) = std::isfinite(mean) ? mean : kInfinity;
   });
-  return squared.colwise().mean().transpose().cwiseSqrt();
+  return (ColumnSums(squared) / static_cast<double>(squared.rows())).cwiseSqrt();
 }
 
 }  // namespace plumb

@@ -1,6 +1,6 @@
 // How training goes, over several seeds: a table, a plot with the seeds' band, and a sentence.
 //
-//   plumb-learning-curves robots/hopper --steps 1e6 --output curves
+//   plumb-learning-curves robots/hopper/gym.toml --steps 1e6 --output curves
 //
 // A seed that the table already has is not run again: an interrupted experiment goes on with the others.
 #include <fmt/format.h>

@@ -12,7 +12,7 @@
 
 namespace plumb {
 
-inline RobotDescription Hopper(const std::string& file = "") {
+inline RobotDescription Hopper(const std::string& file = "/gym.toml") {
   return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/hopper" + file);
 }
 

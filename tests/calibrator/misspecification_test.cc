@@ -141,7 +141,8 @@ class Spoilt {
   }
 
   static const FittedLog& Right() {
-    static const FittedLog log(Robot("hopper"), RandomLog(Robot("hopper"), {}, 600, 11));
+    static const RobotDescription hopper = Robot("hopper/gym.toml");
+    static const FittedLog log(hopper, RandomLog(hopper, {}, 600, 11));
     return log;
   }
 };

@@ -22,7 +22,7 @@ TEST_CASE("contact: the ground holds what stands on it, also in the eyes of late
 
 // The ground's force is what the equations of motion lack without it: M dv/h + bias - efforts, along rootx and rootz.
 TEST_CASE("contact: the ground pushes within the cone, whatever heel and toe do") {
-  RobotDescription robot = LoadExample("hopper");
+  RobotDescription robot = LoadExample("hopper/gym.toml");
   robot.parameters.clear();
   const double friction = robot.simulation.contact->friction, h = 0.002;
   Simulator simulator(robot);

@@ -11,7 +11,7 @@ namespace {
 using State = MujocoHopper::State;
 
 RobotDescription Hopper() {
-  RobotDescription hopper = LoadExample("hopper");
+  RobotDescription hopper = LoadExample("hopper/gym.toml");
   for (JointDescription& joint : hopper.joints) joint.dynamics.delay = 0;
   return hopper;
 }

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 RobotDescription LoadHopper() {
   const char* source = std::getenv("PLUMBLINE_SOURCE");
-  return LoadRobot(std::string(source ? source : ".") + "/robots/hopper");
+  return LoadRobot(std::string(source ? source : ".") + "/robots/hopper/gym.toml");
 }
 
 /// Random states near the ground, and some control steps of uneven segments; windows of different lengths.
