@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <string>
 
 #include "tests/estimator/model/model_errors.h"
@@ -12,20 +12,20 @@
 namespace plumb {
 namespace {
 
+// Of processor time.
 double MicrosecondsPerStep(const RobotDescription& robot, const Recordings& recordings) {
-  using Clock = std::chrono::steady_clock;
-  StateObserver kinematic(robot);
-  UnscentedObserver model(Assumed(robot));
-  Clock::duration spent{};
-  int64_t steps = 0;
+  StateObserver observer(robot);
+  std::vector<robot_state_t> kinematic;
   for (const SimulatedReadings::Sample& sample : recordings.front()) {
-    kinematic.OnJointState(sample.joints);
-    const auto start = Clock::now();
-    model.OnJointState(sample.joints, kinematic.state());
-    spent += Clock::now() - start;
-    ++steps;
+    observer.OnJointState(sample.joints);
+    kinematic.push_back(observer.state());
   }
-  return std::chrono::duration<double, std::micro>(spent).count() / static_cast<double>(steps);
+  UnscentedObserver model(Assumed(robot));
+  const std::clock_t start = std::clock();
+  for (size_t k = 0; k < kinematic.size(); ++k)
+    model.OnJointState(recordings.front()[k].joints, kinematic[k]);
+  return 1e6 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC /
+         static_cast<double>(kinematic.size());
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ constexpr double Square(double x) { return x * x; }
 double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
 
 // A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as long as
-// training's, its error would be greater than the noise.
+// gym's, its error would be greater than the noise.
 RobotDescription ForFilter(RobotDescription robot) {
   robot.simulation.integrator = SimulationSettings::Integrator::kLeapfrog;
   for (const JointDescription& joint : robot.joints) {

@@ -26,7 +26,7 @@ struct Motion {
 TEST_CASE(
     "with the right dynamics, velocities are more than twice as good as the kinematic filter's, through "
     "impacts, too") {
-  const Motion motion(GENERATE("pendulum", "hopper"));
+  const Motion motion(GENERATE("pendulum", "hopper", "hopper/gym.toml"));
   const ModelErrors errors = Compare(motion.robot, Assumed(motion.robot), motion.recordings);
   for (size_t i = 0; i < errors.model.size(); ++i) {
     INFO(motion.robot.joints[i].name << ": v " << errors.kinematic[i].v() << ", on the model "

@@ -146,10 +146,11 @@ TEST_CASE("a gyro's bias is told from a motion that the simulator does not expec
   robot.sensors = {imu};
   UnscentedObserver observer(robot);
   for (int k = 0; k < 1000; ++k) {
-    const joint_state_t m = Measured(k, M_PI, 0.2, 0);
+    const joint_state_t m = Measured(k, M_PI, 0.2, NAN);  // of an effort that it cannot have
     observer.OnJointState(m, Kinematic(m, M_PI, 0));
   }
   CHECK(std::abs(observer.state().v[0]) < 0.01);
+  CHECK(observer.state().v_sd[0] < 0.02);
   CHECK(observer.state().q[0] == Approx(M_PI).margin(0.005));
   CHECK(observer.restarts() == 0);
 }
