@@ -5,11 +5,12 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <string>
 
 #include "calibrator/calibration.h"
 #include "sim/parameters.h"
-#include "tests/calibrator/observed_log.h"
+#include "tests/calibrator/hop_on_bus.h"
 #include "tests/estimator/observer_errors.h"
 
 namespace plumb {
@@ -24,15 +25,17 @@ constexpr Way kWays[] = {{"true", States::kTrue},
                          {"smoothed, taken for exact", States::kCertain},
                          {"causal", States::kCausal}};
 
-void Print(const RobotDescription& robot, uint32_t motions) {
+using Motion = std::function<Samples(uint32_t seed)>;
+
+void Print(const std::string& name, const RobotDescription& robot, const Motion& motion_of,
+           uint32_t motions) {
   const std::vector<Knowable> knowable = KnowableOf(robot);
   for (const Way& way : kWays) {
     std::vector<double> square(knowable.size(), 0), sum(knowable.size(), 0), claimed(knowable.size(), 0);
     std::vector<int> covered(knowable.size(), 0);
     for (uint32_t seed = 1; seed <= motions; ++seed) {
       const Eigen::VectorXd truth = HiddenParameters(robot, seed);
-      const Samples motion =
-          robot.num_joints() == 6 ? Hop(robot, seed, 2, truth) : Swing(robot, seed, 10, truth);
+      const Samples motion = motion_of(seed);
       const std::vector<Log> logs{ObservedLog(robot, motion, way.states)};
       const Findings found = Calibrate(robot, logs, {});
       const Gaussian posterior = Moments(found.posterior);
@@ -44,10 +47,10 @@ void Print(const RobotDescription& robot, uint32_t motions) {
         square[i] += error * error, sum[i] += error, claimed[i] += sd * sd;
         covered[i] += std::abs(error) < 1.96 * sd;
       }
-      fmt::print(stderr, "\r{} {}: {} of {} ", robot.name, way.name, seed, motions);
+      fmt::print(stderr, "\r{} {}: {} of {} ", name, way.name, seed, motions);
     }
     for (size_t i = 0; i < knowable.size(); ++i) {
-      fmt::print("| {} | {} | {} | {:.3f} | {:+.3f} | {:.3f} | {:.0f} % |\n", robot.name, way.name,
+      fmt::print("| {} | {} | {} | {:.3f} | {:+.3f} | {:.3f} | {:.0f} % |\n", name, way.name,
                  knowable[i].name, 100 * std::sqrt(square[i] / motions), 100 * sum[i] / motions,
                  100 * std::sqrt(claimed[i] / motions), 100. * covered[i] / motions);
     }
@@ -63,11 +66,19 @@ int main(int argc, char** argv) {
   fmt::print(
       "| robot | states | of | rms error % | mean error % | claimed sd % | within 95 % "
       "|\n|---|---|---|---|---|---|---|\n");
-  for (const char* name : {"pendulum", "hopper"}) {
+  for (const std::string name : {"pendulum", "hopper"}) {
     RobotDescription robot = WithSimulatedNoise(LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + name));
     const Recordings training = Record(robot, 1000, 3);
     const TunedNoise noise = TuneNoise(robot, [&](StateObserver& observer) { Play(training, observer); });
     for (size_t i = 0; i < noise.joints.size(); ++i) robot.joints[i].noise = noise.joints[i];
-    Print(robot, motions);
+    const auto simulated = [&](uint32_t seed) {
+      const Eigen::VectorXd truth = HiddenParameters(robot, seed);
+      return name == "hopper" ? Hop(robot, seed, 2, truth) : Swing(robot, seed, 10, truth);
+    };
+    Print(name, robot, simulated, motions);
   }
+  RobotDescription hopper = LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/hopper");
+  hopper.estimator.delay = 0;  // in virtual time frames arrive at once
+  Print(
+      "hopper on its bus", hopper, [&](uint32_t seed) { return HopOnBus(hopper, seed); }, motions);
 }

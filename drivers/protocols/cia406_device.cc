@@ -105,7 +105,8 @@ void Cia406Device::Tick(int64_t now, double position, FrameBatch& out) noexcept 
   emergency_ = false;
   if (now >= next_position_) {
     next_position_ = Next(settings_.event_timer, now);
-    const double counts = std::floor(position / (2 * std::numbers::pi) * settings_.counts);
+    // Where within a code zero lies is a matter of mounting: in its middle, so that readings are right on average.
+    const double counts = std::floor(position / (2 * std::numbers::pi) * settings_.counts + 0.5);
     out.Push(Make(kPosition, node, {counts - std::floor(counts / settings_.range) * settings_.range}));
   }
   if (now >= next_heartbeat_) {

@@ -7,9 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "drivers/driver.h"
-#include "sim/parameters.h"
-#include "sim/virtual_robot.h"
+#include "tests/sim/hopper_bus.h"
 #include "tests/sim/robots.h"
 
 namespace plumb {
@@ -17,100 +15,21 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr int64_t kStart = 1'700'000'000'000'000;  // [us]
+constexpr int64_t kStart = HopperBus::kStart;
 
-/// A robot and its driver, 100 us by 100 us.
-struct Bus {
-  explicit Bus(const std::string& file)
-      : description(LoadRobot(SourceFile("robots/hopper/" + file))),
-        robot(description, HiddenParameters(description, 3), kStart),
-        driver(description, 0, kStart) {
-    driver.set_virtual(true);
-  }
+RobotDescription Hopper(const std::string& file) { return LoadRobot(SourceFile("robots/hopper/" + file)); }
 
-  /// Standing, bent a little.
-  bool Place(int64_t wish) {
-    VectorXd q(6);
-    q << 2.5, 1.35, 0.03, -0.05, -0.1, 0.02;
-    return robot.Place(wish, q, VectorXd::Zero(6));
-  }
-
-  void Step() {
-    now += 100;
-    FrameBatch out;
-    robot.Advance(kStart + now, out);
-    Deliver(out);
-    while (const joint_state_t* state = driver.NextState()) {
-      states.push_back(*state);
-      truth_q.push_back(robot.q());
-      truth_v.push_back(robot.v());
-    }
-    while (const imu_t* imu = driver.NextImu()) imus.push_back(*imu);
-    if (now % driver.cycle() != 0) return;
-    if (commanding) Command();
-    const auto frames = driver.Tick(now, kStart + now, 0);
-    std::vector<Frame> sent(frames.begin(), frames.end());
-    driver.Transmitted(static_cast<int>(sent.size()), kStart + now);
-    for (const Frame& frame : sent) {
-      ++count[frame.id];
-      FrameBatch answers;
-      robot.Receive(frame, kStart + now, answers);
-      Deliver(answers);
-    }
-  }
-  void Run(int64_t milliseconds) {
-    for (int64_t end = now + 1000 * milliseconds; now < end;) Step();
-  }
-  bool Arm() {
-    Run(500);
-    driver_request_t arm{};
-    arm.utime = kStart + now;
-    arm.request = driver_request_t::ARM;
-    driver.OnRequest(arm, now, kStart + now);
-    commanding = true;
-    for (int i = 0; i < 20'000 && driver.state() != DriveState::kArmed; ++i) Step();
-    return driver.state() == DriveState::kArmed;
-  }
-
-  RobotDescription description;
-  VirtualRobot robot;
-  Driver driver;
-  int64_t now = 0;
-  bool commanding = false;
-  double effort = 0;
-  std::vector<joint_state_t> states;
-  std::vector<VectorXd> truth_q, truth_v;  // when each state was given out
-  std::vector<imu_t> imus;
-  std::map<uint32_t, int> count;  // of frames by id
-
- private:
-  void Deliver(const FrameBatch& batch) {
-    for (const Frame& frame : batch.frames()) {
-      ++count[frame.id];
-      driver.OnFrame(frame, now, kStart + now);
-    }
-  }
-  void Command() {
-    joint_command_t command{};
-    command.utime = kStart + now;
-    command.sequence = sequence_++;
-    command.num_joints = description.num_joints();
-    const auto n = static_cast<size_t>(description.num_joints());
-    command.effort.assign(n, 0);
-    for (size_t i = 3; i < 6; ++i)
-      command.effort[i] = effort * std::sin(1e-5 * static_cast<double>(now) + static_cast<double>(i));
-    for (auto* none : {&command.position, &command.velocity, &command.kp, &command.kd}) {
-      none->assign(n, std::numeric_limits<double>::quiet_NaN());
-    }
-    driver.OnCommand(command, now, kStart + now);
-  }
-  int64_t sequence_ = 0;
-};
+void Wiggle(HopperBus& bus) {
+  bus.effort = [&bus] {
+    const double phase = 1e-5 * static_cast<double>(bus.now);
+    return Eigen::Vector3d(30 * std::sin(phase + 3), 30 * std::sin(phase + 4), 30 * std::sin(phase + 5));
+  };
+}
 
 TEST_CASE("a hopper on one bus: every joint is measured as it is, whatever measures it") {
   const std::string file = GENERATE("robot.toml", "mit.toml");
   INFO(file);
-  Bus bus(file);
+  HopperBus bus(Hopper(file));
   REQUIRE(bus.Place(1));
   const bool armed = bus.Arm();
   INFO(bus.driver.reason());
@@ -118,7 +37,7 @@ TEST_CASE("a hopper on one bus: every joint is measured as it is, whatever measu
   REQUIRE(bus.Place(2));  // nobody pulls: a hand may be as fast as it likes
   bus.Run(100);
   bus.states.clear(), bus.truth_q.clear(), bus.truth_v.clear(), bus.imus.clear(), bus.count.clear();
-  bus.effort = 30;
+  Wiggle(bus);
   bus.Run(1000);
   INFO(bus.driver.reason());
   REQUIRE(bus.driver.state() == DriveState::kArmed);
@@ -160,7 +79,7 @@ TEST_CASE("a hopper on one bus: every joint is measured as it is, whatever measu
 }
 
 TEST_CASE("an IMU at rest feels gravity upwards, in its link's axes") {
-  Bus bus("robot.toml");
+  HopperBus bus(Hopper("robot.toml"));
   VectorXd q = VectorXd::Zero(6), v = VectorXd::Zero(6);
   q[1] = 1e3;  // far above the ground
   q[2] = 0.5;
@@ -177,14 +96,14 @@ TEST_CASE("an IMU at rest feels gravity upwards, in its link's axes") {
 }
 
 TEST_CASE("a sensor that goes silent stops the robot") {
-  Bus bus("robot.toml");
+  HopperBus bus(Hopper("robot.toml"));
   REQUIRE(bus.Place(1));
   REQUIRE(bus.Arm());
   bus.Run(100);
   // An emergency message of the boom's first encoder: hardware error.
   const Frame emergency = *FrameFromText("081#0050010000000000");
   bus.driver.OnFrame(emergency, bus.now, kStart + bus.now);
-  bus.effort = 30;
+  Wiggle(bus);
   bus.Run(10);
   CHECK(bus.driver.state() == DriveState::kFault);
   CHECK_THAT(std::string(bus.driver.reason()), Catch::Contains("boom_yaw: it reports error 0x5000"));
@@ -196,7 +115,7 @@ TEST_CASE("a sensor that goes silent stops the robot") {
 }
 
 TEST_CASE("a joint that nothing measures is refused by its name") {
-  RobotDescription description = LoadRobot(SourceFile("robots/hopper/robot.toml"));
+  RobotDescription description = Hopper("robot.toml");
   std::erase_if(description.sensors, [](const SensorDescription& sensor) { return sensor.name == "imu"; });
   CHECK_THROWS_WITH(Driver(description, 0, kStart),
                     Catch::Contains("'rooty' has no motor, and no sensor measures it"));

@@ -1,0 +1,54 @@
+// Calibration through the whole chain: virtual robot, frames on its bus, driver, observer. Quick form of
+// bench/observed_calibration.
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "calibrator/calibration.h"
+#include "tests/calibrator/fitted_log.h"
+#include "tests/calibrator/hop_on_bus.h"
+
+namespace plumb {
+namespace {
+
+struct Answer {
+  Eigen::VectorXd error, sd;  // of the masses, relative
+};
+
+Answer Calibrated(const RobotDescription& robot, const Samples& motion, States states, uint32_t seed) {
+  const std::vector<Log> logs{ObservedLog(robot, motion, states)};
+  CalibrationOptions options;
+  options.method = "laplace";
+  options.horizons = {1};
+  const Gaussian posterior = Moments(Calibrate(robot, logs, options).posterior);
+  return {posterior.mean - HiddenParameters(robot, seed).array().log().matrix(),
+          posterior.covariance.diagonal().cwiseSqrt()};
+}
+
+TEST_CASE(
+    "a hopper's masses are found through its bus as well as the posterior says, without errors in variables "
+    "they are not") {
+  RobotDescription robot = Robot("hopper");
+  robot.estimator.delay = 0;  // here frames arrive at once
+  double smoothed = 0, certain = 0;
+  for (const uint32_t seed : {1, 2}) {
+    const Samples motion = HopOnBus(robot, seed);
+    REQUIRE(motion.size() > 900);
+    const Answer truth = Calibrated(robot, motion, States::kTrue, seed);
+    CHECK(truth.error.cwiseAbs().maxCoeff() < 1e-3);
+    const Answer found = Calibrated(robot, motion, States::kSmoothed, seed);
+    INFO("errors " << found.error.transpose() << ", claimed " << found.sd.transpose());
+    CHECK((found.error.array().abs() < 3 * found.sd.array()).all());
+    CHECK(found.sd(0) < 0.02);
+    const Answer sure = Calibrated(robot, motion, States::kCertain, seed);
+    smoothed += (found.error.array() / found.sd.array()).square().mean() / 2;
+    certain += (sure.error.array() / sure.sd.array()).square().mean() / 2;
+  }
+  // Of honest standard deviations the mean square is 1.
+  INFO("mean square " << smoothed << ", taken for exact " << certain);
+  CHECK(smoothed < 3);
+  CHECK(certain > 2 * smoothed);
+}
+
+}  // namespace
+}  // namespace plumb
