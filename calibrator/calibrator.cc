@@ -84,6 +84,7 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
   m.dropped_late = drops.late;
   m.dropped_not_finite = drops.not_finite;
   m.dropped_restart = drops.restart;
+  m.dropped_model_based = drops.model_based;
   m.discrepancy = report ? report->discrepancy : kNaN;
   m.prior_discrepancy = report ? report->prior_discrepancy : kNaN;
   m.kl = report ? report->kl : kNaN;

@@ -75,9 +75,8 @@ class EpisodeJoiner {
   }
 
   DropCounts drops() const {
-    DropCounts sum = drops_of_earlier_runs_, own = joiner_.drops();
-    sum.gap += own.gap, sum.late += own.late, sum.not_finite += own.not_finite, sum.restart += own.restart;
-    return sum;
+    DropCounts sum = drops_of_earlier_runs_;
+    return sum += joiner_.drops();
   }
   int64_t fitting() const { return fitting_; }
   /// Messages of a robot with another number of joints, and the newest such number.
@@ -157,6 +156,10 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
                                        robot.num_joints()));
   }
   if (!log.rollouts.empty()) return log;
+  if (log.drops.model_based > 0) {
+    throw std::runtime_error(file + ": its states are model-based: calibration would find the parameters that the estimator "
+                                    "assumed. ROBOT_STATE_SMOOTHED has to be a kinematic estimator's");
+  }
   std::string why;
   if (counts.messages == 0) {
     why = fmt::format("none of its {} messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS",

@@ -56,8 +56,8 @@ class Session {
     if (!simopt_.running() && calibrator.ready()) {
       start_ = std::chrono::steady_clock::now();
       if (calibrator.Begin() == 0) {
-        spdlog::warn("iteration {} has no usable transition: it goes by with the earlier ones",
-                     simopt_.state().iteration + 1);
+        spdlog::warn("iteration {} has no usable transition: it goes by with the earlier ones; dropped so far: {}",
+                     simopt_.state().iteration + 1, calibrator.drops().words());
       }
       checkpoint_.Save(simopt_.state());
     }

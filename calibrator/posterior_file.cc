@@ -7,11 +7,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "calibrator/physics_fingerprint.h"
-#include "calibrator/posterior_format.h"
 #include "calibrator/summary.h"
 #include "common/atomic_file.h"
 #include "common/process.h"
+#include "robot/physics_fingerprint.h"
+#include "robot/posterior_format.h"
 
 namespace plumb {
 namespace {

@@ -7,7 +7,6 @@
 
 #include "calibrator/findings.h"
 #include "robot/description.h"
-#include "robot/parameter_distribution.h"
 
 namespace plumb {
 
@@ -30,13 +29,5 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
 /// written.
 void WritePosterior(const std::filesystem::path& file, const Findings& findings,
                     const RobotDescription& robot, const Provenance& provenance);
-
-/// The mixture of a posterior.json, for this robot: physics (see PhysicsFingerprint) and parameters must be
-/// those that the posterior was made with; priors and settings of tasks or training may have changed since.
-/// Thread-safe.
-/// @throws std::runtime_error "file: field: what is wrong" for anything missing, of the wrong type or size,
-/// not finite, another robot's or another version's, weights that do not sum to one, or a covariance that is
-/// not positive definite.
-ParameterDistribution ReadPosterior(const std::filesystem::path& file, const RobotDescription& robot);
 
 }  // namespace plumb

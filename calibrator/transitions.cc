@@ -26,7 +26,16 @@ double Transition::duration() const {
 }
 
 std::string DropCounts::words() const {
-  return fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap, gap == 1 ? "" : "s", late, not_finite, restart);
+  std::string words =
+      fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap, gap == 1 ? "" : "s", late, not_finite, restart);
+  if (model_based > 0) words += fmt::format(", {} model-based", model_based);
+  return words;
+}
+
+DropCounts& DropCounts::operator+=(const DropCounts& other) {
+  gap += other.gap, late += other.late, not_finite += other.not_finite, restart += other.restart;
+  model_based += other.model_based;
+  return *this;
 }
 
 TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
@@ -119,8 +128,12 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
       ++drops->gap;
       return false;
     }
-    if (expected == from) continue;
     const robot_state_t& now = state->second;
+    if (now.model_based) {
+      ++drops->model_based;
+      return false;
+    }
+    if (expected == from) continue;
     const robot_state_t& before = std::prev(state)->second;
     if (now.restarted) {
       ++drops->restart;

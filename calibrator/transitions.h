@@ -39,8 +39,10 @@ struct DropCounts {
   int64_t late = 0;        ///< the interval is not one control period (within 20 %)
   int64_t not_finite = 0;  ///< or an effort is unknown
   int64_t restart = 0;     ///< the estimator's filter restarted within the interval
-  int64_t total() const { return gap + late + not_finite + restart; }
-  /// "1 gap, 2 late, 0 not finite, 3 across restarts"
+  int64_t model_based = 0;  ///< the simulator's dynamics are in a state: what it tells of parameters is what was put in
+  int64_t total() const { return gap + late + not_finite + restart + model_based; }
+  DropCounts& operator+=(const DropCounts& other);
+  /// "1 gap, 2 late, 0 not finite, 3 across restarts", and ", 4 model-based" if there are any
   std::string words() const;
 };
 

@@ -36,8 +36,7 @@ void PrintLogs(const std::vector<Log>& logs) {
     std::cout << fmt::format("{}: {} transitions in {} roll-out{}", log.name, CountTransitions(log.rollouts), log.rollouts.size(),
                              log.rollouts.size() == 1 ? "" : "s");
     if (log.drops.total() > 0) {
-      std::cout << fmt::format("; dropped: {} gaps, {} late, {} not finite, {} across restarts", log.drops.gap, log.drops.late,
-                               log.drops.not_finite, log.drops.restart);
+      std::cout << "; dropped: " << log.drops.words();
     }
     std::cout << "\n";
     for (const std::string& warning : log.warnings) std::cout << "  " << warning << "\n";

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "calibrator/excitation.h"
-#include "calibrator/posterior_file.h"
 #include "calibrator/simopt.h"
 #include "common/atomic_file.h"
 #include "robot/description.h"
+#include "robot/posterior_reader.h"
 #include "sim/picture.h"
 #include "sim/tasks/task.h"
 

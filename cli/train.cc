@@ -16,10 +16,10 @@
 #include <thread>
 
 #include "calibrator/batches.h"
-#include "calibrator/posterior_file.h"
 #include "common/atomic_file.h"
 #include "common/config.h"
 #include "common/ranks.h"
+#include "robot/posterior_reader.h"
 #include "trainer/checkpoint.h"
 #include "trainer/onnx_policy.h"
 #include "trainer/policy_file.h"

@@ -11,8 +11,6 @@ namespace {
 constexpr double kInitialAccelerationSd = 100;
 // Nor of the velocity where it is not measured [rad/s].
 constexpr double kInitialVelocitySd = 10;
-// [s] in which a bias may wander by as much as it may be at the start: warming up takes minutes.
-constexpr double kBiasWanders = 100;
 
 constexpr double Square(double x) { return x * x; }
 

@@ -29,6 +29,9 @@ enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 /// A step is Predict, any number of Correct, Keep. None of them allocates. Not thread-safe.
 class KinematicFilter {
  public:
+  /// [s] in which a bias may wander by as much as it may be at the start: warming up takes minutes.
+  static constexpr double kBiasWanders = 100;
+
   explicit KinematicFilter(const EstimatorSettings& settings);
 
   /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured. Of the bias it keeps what

@@ -68,6 +68,9 @@ struct EstimatorSettings {
   double reset_after;  ///< [rad]
   double delay = 0;    ///< [s] of a reading on its way: the constant part, which arrivals cannot tell
   double outage = 0.05;  ///< [s] that a silent joint is predicted before the state is invalid
+  /// [rad/s^2 sqrt(s)] spectral density^(1/2) of what the accelerations differ by from the simulator's, of the filter on its
+  /// dynamics: [estimator.model]
+  double model_acceleration = 0.2;
   // Of an IMU on a link that the joint carries; 0: there is none.
   double acceleration_sd = 0;  ///< [m/s^2] of a slide's acceleration, averaged over a period of the IMU
   double bias_sd = 0;          ///< [rad/s] of the gyro, if the joint turns, or [m/s^2] of the accelerometer

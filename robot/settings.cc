@@ -85,6 +85,9 @@ EstimatorSettings ReadEstimator(Config config) {
   s.reset_after = config.Number("reset_after", kSanePositive);
   s.delay = config.Number("delay", {0, 0.1}, s.delay);
   s.outage = config.Number("outage", {1e-3, 1}, s.outage);
+  Config model = config.Table("model", false);
+  s.model_acceleration = model.Number("acceleration", kSanePositive, s.model_acceleration);
+  model.Finish();
   config.Finish();
   return s;
 }

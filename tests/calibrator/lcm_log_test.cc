@@ -42,6 +42,7 @@ class Recording {
     s.v_sd.assign(n, 1e-2);
     s.effort.assign(n, 0.5);
     s.valid = 1;
+    s.model_based = model_based;
     Add("ROBOT_STATE_SMOOTHED", s);
   }
   void Command(int64_t state, int64_t episode, int step) {
@@ -80,6 +81,7 @@ class Recording {
 
   std::string bytes;
   int64_t start = 7'000'000;
+  bool model_based = false;  // states from now on
 
  private:
   template <class T>
@@ -241,7 +243,7 @@ TEST_CASE("hostile numbers in messages do no harm") {
 }
 
 TEST_CASE("a log that is of no use is refused with the reason") {
-  Recording other, states, commands, foreign, late, damaged;
+  Recording other, states, commands, foreign, late, damaged, assumed;
   other.AddBytes("CAMERA", "anything");
   states.States(0, 100);
   commands.Command(0, 5, 0);
@@ -251,6 +253,9 @@ TEST_CASE("a log that is of no use is refused with the reason") {
   late.Command(150, -1, -1);
   late.States(0, 200);
   damaged.Episode(100, 30, 20);
+  assumed.model_based = true;
+  assumed.Episode(100, 30, 20);
+  assumed.States(211, 230);
   const size_t at = damaged.bytes.size();
   damaged.bytes += std::string(100, 'x');
   struct Case {
@@ -269,6 +274,9 @@ TEST_CASE("a log that is of no use is refused with the reason") {
       {"no state", commands.bytes, none + "2 gaps, 0 late, 0 not finite, 0 across restarts"},
       {"wrong robot", foreign.bytes, none + "10 messages are of a robot with 3 joints, 'pendulum' has 1"},
       {"another rate", late.bytes, none + "0 gaps, 5 late, 0 not finite, 0 across restarts"},
+      {"a state from the simulator's dynamics", assumed.bytes,
+       ": its states are model-based: calibration would find the parameters that the estimator assumed. ROBOT_STATE_SMOOTHED "
+       "has to be a kinematic estimator's"},
       {"a table", "t,q/pivot,v/pivot,u/pivot\n0,1,0,0\n0.05,1,0,0\n", ": is no LCM log"},
       {"garbage", std::string(5000, '\xa7'), ": is no LCM log"},
       {"damaged", damaged.bytes, ": damaged at byte " + std::to_string(at)},

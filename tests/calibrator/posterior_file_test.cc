@@ -6,8 +6,9 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "calibrator/physics_fingerprint.h"
 #include "calibrator/summary.h"
+#include "robot/physics_fingerprint.h"
+#include "robot/posterior_reader.h"
 #include "tests/calibrator/sample_findings.h"
 #include "tests/calibrator/synthetic.h"
 #include "tests/robot/zoo.h"

@@ -115,6 +115,17 @@ TEST_CASE_METHOD(Fixture, "gaps, lateness, restarts and rubbish are dropped and 
     CHECK(joiner.Join(42, 300).transitions.size() == 19);
     CHECK(joiner.drops().restart == 1);
   }
+  SECTION("a state with the simulator's dynamics in it, here between two transitions") {
+    States();
+    robot_state_t model_based = State(160);
+    model_based.model_based = 1;
+    joiner.OnState(model_based);
+    Commands();
+    CHECK(joiner.Join(42, 300).transitions.size() == 18);
+    CHECK(joiner.drops().model_based == 2);
+    CHECK(joiner.drops().total() == 2);
+    CHECK(joiner.drops().words() == "0 gaps, 0 late, 0 not finite, 0 across restarts, 2 model-based");
+  }
   SECTION("an unknown effort") {
     States();
     robot_state_t unknown = State(155);

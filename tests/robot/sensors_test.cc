@@ -124,6 +124,8 @@ TEST_CASE("noise: of a count, of an IMU, of a joint") {
   CHECK(robot.sensors[2].acceleration_sd > 0);
   CHECK(robot.estimator.delay == 0);
   CHECK(robot.estimator.outage == 0.05);
+  CHECK(robot.estimator.model_acceleration == 0.2);
+  CHECK(Load(Replaced(kZooToml, "reset_after = 0.2", "reset_after = 0.2\nmodel = {acceleration = 3.0}")).estimator.model_acceleration == 3);
   const std::string imu = Replaced(kSensors, "base = 0x380", "base = 0x380\nangle_sd = 0.003\nrate_bias_sd = 0.2\ndelay = 0.001");
   const RobotDescription told = Load(kZooToml + imu);
   CHECK(told.sensors[2].noise.position_sd == 0.003);
@@ -138,6 +140,8 @@ TEST_CASE("noise: of a count, of an IMU, of a joint") {
   refused("node = 2\nperiod", "angle_sd = 0.1\nnode = 2\nperiod", "angle_sd");
   refused("reset_after = 0.2", "reset_after = 0.2\noutage = 0", "outage");
   refused("reset_after = 0.2", "reset_after = 0.2\ndelay = 0.2", "delay");
+  refused("reset_after = 0.2", "reset_after = 0.2\nmodel = {acceleration = 0.0}", "estimator.model.acceleration");
+  refused("reset_after = 0.2", "reset_after = 0.2\nmodel = {jerk = 1.0}", "estimator.model.jerk");
   refused("name = \"disc\"\n", "name = \"disc\"\nestimator = {jerk = -1.0}\n", "jerk");
   refused("name = \"disc\"\n", "name = \"disc\"\nestimator = {lag = 3}\n", "lag");
   const RobotDescription joint =

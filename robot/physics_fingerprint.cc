@@ -1,4 +1,4 @@
-#include "calibrator/physics_fingerprint.h"
+#include "robot/physics_fingerprint.h"
 
 #include <cstring>
 

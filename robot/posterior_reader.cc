@@ -1,4 +1,5 @@
-// Reading posterior.json.
+#include "robot/posterior_reader.h"
+
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
@@ -7,9 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "calibrator/physics_fingerprint.h"
-#include "calibrator/posterior_file.h"
-#include "calibrator/posterior_format.h"
+#include "robot/physics_fingerprint.h"
+#include "robot/posterior_format.h"
 
 namespace plumb {
 namespace {
