@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "estimator/ground_contact.h"
 #include "estimator/imu_inbox.h"
 #include "estimator/kinematic_filter.h"
 #include "estimator/sensor_watch.h"
@@ -83,6 +85,9 @@ class StateObserver {
   };
   enum class Use { kUse, kRefuse, kDuplicate, kReordered };
 
+  static double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
+  static int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
+
   Use Judge(const joint_state_t& measured) const;
   bool IsNew(const joint_state_t& measured, size_t joint) const;
   double Age(const joint_state_t& measured, size_t joint) const;
@@ -102,6 +107,7 @@ class StateObserver {
   std::vector<Joint> joints_;
   std::vector<Imu> imus_;
   double unknown_step_;  // [Nm] assumed change of an effort that is not known: from full one way to full the other
+  GroundContact contact_;
   robot_state_t state_{};
   std::vector<robot_state_t> waiting_;  // ring of causal states whose smoothed twins are due
   int first_waiting_ = 0, num_waiting_ = 0;
