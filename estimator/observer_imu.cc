@@ -20,6 +20,21 @@ void StateObserver::OnImu(const imu_t& message) {
   ++imu_refused_;
 }
 
+void StateObserver::UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay) {
+  BaseObserver::Legs& legs = base_->legs();
+  const int64_t measured = reading.utime - delay;
+  const double age = Seconds(utime - measured);
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const KinematicState& mean = joints_[i].filter.mean();
+    legs.q[at] = mean(0) - age * mean(1) + age * age / 2 * mean(2);
+    legs.v[at] = mean(1) - age * mean(2);
+    legs.q_variance[at] = joints_[i].filter.covariance()(0, 0);
+    legs.v_variance[at] = joints_[i].filter.covariance()(1, 1);
+  }
+  base_->Read(measured, reading);
+}
+
 void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured) {
   const int64_t late = measured.utime - reading.utime;
   if (late > ImuInbox::kLatest) {
@@ -31,6 +46,7 @@ void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joi
   const double elapsed = imu.used < 0 ? 0 : Seconds(reading.utime - imu.used);
   imu.used = std::max(imu.used, reading.utime);
   if (reading.clipped) return;
+  if (imu.of_base) return UseForBase(reading, measured.utime, Microseconds(imu.delay));
   if (imu.mounting.turned >= 0) {
     // JOINT_STATE has the last reading of each of its periods; those in between, only we have.
     const auto turned = static_cast<size_t>(imu.mounting.turned);

@@ -32,10 +32,12 @@ StateObserver::StateObserver(const RobotDescription& robot)
       gravity_(robot.simulation.gravity),
       unknown_step_(2 * robot.effort_limits().maxCoeff()),
       contact_(robot) {
+  if (robot.estimator.base == EstimatorSettings::Base::kLegs) base_.emplace(robot);
   for (const SensorDescription& sensor : robot.sensors) {
     if (sensor.link < 0) continue;
     const double delay = std::isnan(sensor.noise.delay) ? robot.estimator.delay : sensor.noise.delay;
-    imus_.push_back({sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1});
+    imus_.push_back({sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1, false});
+    imus_.back().of_base = base_ && sensor.name == robot.sensors[base_->base().imu].name;
   }
   for (int i = 0; i < robot.num_joints(); ++i) {
     const EstimatorSettings settings = EstimatorOf(robot, i);
@@ -46,6 +48,7 @@ StateObserver::StateObserver(const RobotDescription& robot)
                 .filter = KinematicFilter(settings),
                 .velocity_watch = AgreementWatch(VelocityWatch(settings, gyro)),
                 .acceleration_watch = AgreementWatch(AccelerationWatch(settings))};
+    joint.of_base = base_ && base_->base().Has(i);
     joint.gyro = gyro;
     joint.accelerometer = settings.acceleration_sd > 0;
     joints_.push_back(std::move(joint));
@@ -64,7 +67,7 @@ double StateObserver::Age(const joint_state_t& measured, size_t joint) const {
 }
 
 bool StateObserver::IsNew(const joint_state_t& measured, size_t joint) const {
-  return measured.valid[joint] && measured.measured[joint] != joints_[joint].measured;
+  return !joints_[joint].of_base && measured.valid[joint] && measured.measured[joint] != joints_[joint].measured;
 }
 
 StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
@@ -100,6 +103,7 @@ bool StateObserver::Displaced(const joint_state_t& measured) const {
 
 void StateObserver::Restart(const joint_state_t& measured) {
   while (num_waiting_ > 0) EmitSmoothed();
+  if (base_) base_->Restart();
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     const bool known = measured.valid[i];
@@ -153,7 +157,7 @@ void StateObserver::UseReading(const joint_state_t& measured, size_t i) {
 
 void StateObserver::JudgeOutages(int64_t utime) {
   for (Joint& joint : joints_) {
-    const bool out = joint.used < 0 || utime - joint.used > Microseconds(joint.settings.outage);
+    const bool out = joint.of_base ? !base_->valid(utime) : joint.used < 0 || utime - joint.used > Microseconds(joint.settings.outage);
     if (out == joint.out) continue;
     joint.out = out;
     if (out && joint.used >= 0) ++outages_;
@@ -220,6 +224,7 @@ void StateObserver::FillState(const joint_state_t& measured, bool restarted) {
     if (std::isfinite(measured.effort_applied[i])) joint.effort = measured.effort_applied[i];
     if (joint.out) state_.valid = false;
   }
+  if (base_) base_->Fill(measured.utime, state_);
   if (state_.valid != was_valid) ++reasons_changed_;
   contact_.Judge(state_);
   const auto room = static_cast<int>(waiting_.size());
@@ -234,6 +239,7 @@ void StateObserver::EmitSmoothed() {
   --num_waiting_;
   for (size_t i = 0; i < joints_.size(); ++i) {
     const KinematicFilter::Smoothed smoothed = joints_[i].filter.TakeOldest();
+    if (joints_[i].of_base) continue;  // causal as it was
     state.q[i] = smoothed.mean(0);
     state.v[i] = smoothed.mean(1);
     state.q_sd[i] = std::sqrt(std::max(0.0, smoothed.covariance(0, 0)));

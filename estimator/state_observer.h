@@ -3,10 +3,12 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "estimator/base_observer.h"
 #include "estimator/ground_contact.h"
 #include "estimator/imu_inbox.h"
 #include "estimator/kinematic_filter.h"
@@ -64,6 +66,7 @@ class StateObserver {
     std::string name;
     EstimatorSettings settings;
     KinematicFilter filter;
+    bool of_base = false;     // its state is base_'s: no filter of its own
     bool gyro = false;        // its velocity is an IMU's rate
     bool accelerometer = false;
     int64_t measured = -1;    // utime of its newest reading
@@ -82,6 +85,7 @@ class StateObserver {
     double period, delay;  // [s]
     ImuInbox inbox;
     int64_t used = -1;     // utime of the newest reading that counted
+    bool of_base = false;  // base_ has its readings
   };
   enum class Use { kUse, kRefuse, kDuplicate, kReordered };
 
@@ -95,6 +99,7 @@ class StateObserver {
   void Restart(const joint_state_t& measured);
   void Predict(const joint_state_t& measured, double elapsed);
   void UseReading(const joint_state_t& measured, size_t joint);
+  void UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay);
   void UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured);
   KinematicFilter::Innovation Correct(Joint& joint, Quantity quantity, double value, double age, double spread = 0);
   void JudgeOutages(int64_t utime);
@@ -106,6 +111,7 @@ class StateObserver {
   double gravity_;
   std::vector<Joint> joints_;
   std::vector<Imu> imus_;
+  std::optional<BaseObserver> base_;
   double unknown_step_;  // [Nm] assumed change of an effort that is not known: from full one way to full the other
   GroundContact contact_;
   robot_state_t state_{};

@@ -68,6 +68,11 @@ struct EstimatorSettings {
   double reset_after;  ///< [rad]
   double delay = 0;    ///< [s] of a reading on its way: the constant part, which arrivals cannot tell
   double outage = 0.05;  ///< [s] that a silent joint is predicted before the state is invalid
+  /// How the joints of the robot's base are known: as all others, or, if nothing holds it, from its IMU and its legs.
+  enum class Base { kSensors, kLegs };
+  Base base = Base::kSensors;
+  double ground_sd = 5e-3;  ///< [m] of kLegs: by which the ground is uneven and gives way
+  double slip = 0.01;       ///< [m/sqrt(s)] of kLegs: by which a foot that rests creeps
   // Of an IMU on a link that the joint carries; 0: there is none.
   double acceleration_sd = 0;  ///< [m/s^2] of a slide's acceleration, averaged over a period of the IMU
   double bias_sd = 0;          ///< [rad/s] of the gyro, if the joint turns, or [m/s^2] of the accelerometer
