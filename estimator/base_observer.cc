@@ -88,9 +88,11 @@ void BaseObserver::Read(int64_t utime, const ImuInbox::Reading& reading) {
     // Its turn about the joint's axis only: a wrong heading does not matter.
     const Eigen::Quaterniond turn = Eigen::Quaterniond(base_.zero.rotation).conjugate() * Eigen::Quaterniond(w, x, y, z);
     const Eigen::AngleAxisd about(2 * std::atan2(base_.axis.dot(turn.vec()), turn.w()), base_.axis);
-    const Vector3d position = started_ ? odometry_.position() : base_.zero.position;
-    odometry_.Restart(position, Eigen::Quaterniond(base_.zero.rotation * about), feet_);
-    angle_ = std::remainder(Angle(), 2 * std::numbers::pi);
+    using Beginning = LegOdometry::Beginning;
+    odometry_.Restart(started_ ? Beginning::kMoves : Beginning::kStands, started_ ? odometry_.position() : base_.zero.position,
+                      Eigen::Quaterniond(base_.zero.rotation * about), feet_);
+    if (!started_) angle_ = 0;
+    angle_ += std::remainder(Angle() - angle_, 2 * std::numbers::pi);
     started_ = true;
     return;
   }

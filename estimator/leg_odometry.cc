@@ -11,7 +11,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kStartHeightSd = 0.1, kStartVelocitySd = 0.5;  // [m], [m/s]
+constexpr double kStandsHeightSd = 0.04, kStandsVelocitySd = 0.2;  // [m], [m/s]
+constexpr double kMovesHeightSd = 0.1, kMovesVelocitySd = 1;
 constexpr double kBiasWanders = 100;      // [s] in which a bias may wander by as much as it may be at the start
 constexpr double kSettlesIn = 0.05;       // [s] in which the ground under a foot gives way, or comes back
 constexpr double kFootSd = 1e-3;          // [m] play and elasticity of a leg
@@ -57,7 +58,9 @@ double LegOdometry::Sd(Eigen::Index block, const Vector3d& direction) const {
 
 double LegOdometry::rate_sd(const Vector3d& direction) const { return std::hypot(s_.rate_sd, Sd(kRateBias, direction)); }
 
-void LegOdometry::Restart(const Vector3d& position, const Eigen::Quaterniond& orientation, std::span<const Foot> feet) {
+void LegOdometry::Restart(Beginning beginning, const Vector3d& position, const Eigen::Quaterniond& orientation,
+                          std::span<const Foot> feet) {
+  const bool stands = beginning == Beginning::kStands;
   orientation_ = orientation.normalized();
   position_ = position;
   double lowest = std::numeric_limits<double>::infinity();
@@ -70,8 +73,8 @@ void LegOdometry::Restart(const Vector3d& position, const Eigen::Quaterniond& or
   for (Rest& foot : feet_) foot.test.Restart();
   covariance_.setZero();
   const Matrix3d in_body = orientation_.toRotationMatrix().transpose();
-  covariance_(kPosition + 2, kPosition + 2) = Square(kStartHeightSd);
-  covariance_.block<3, 3>(kVelocity, kVelocity) = Square(kStartVelocitySd) * allowed_;
+  covariance_(kPosition + 2, kPosition + 2) = Square(stands ? kStandsHeightSd : kMovesHeightSd);
+  covariance_.block<3, 3>(kVelocity, kVelocity) = Square(stands ? kStandsVelocitySd : kMovesVelocitySd) * allowed_;
   covariance_.block<3, 3>(kAngle, kAngle) = Square(s_.angle_sd) * allowed_turn_;
   covariance_.block<3, 3>(kRateBias, kRateBias) = Square(s_.rate_bias_sd) * in_body * allowed_turn_ * in_body.transpose();
   covariance_.block<3, 3>(kAccelerationBias, kAccelerationBias) =
@@ -155,10 +158,13 @@ ContactTest::Motion LegOdometry::MotionOf(const Foot& foot) const {
 }
 
 void LegOdometry::Judge(size_t index, const Foot& foot) {
-  const ContactTest::Motion motion = MotionOf(foot);
+  ContactTest::Motion motion = MotionOf(foot);
   const bool rested = rests(index);
-  // While the height is as good as unknown it excludes nothing; but what falls freely rests on nothing.
-  if (!rested && motion.height_sd > kHeightKnown && borne_ < s_.gravity / 2) return;
+  if (!rested && motion.height_sd > kHeightKnown) {
+    // A height that is as good as unknown excludes nothing and excuses nothing; but what falls freely rests on nothing.
+    if (borne_ < s_.gravity / 2) return;
+    motion.height = 0;
+  }
   if (motion.height < -kAstray * motion.height_sd) astray_ = true;
   const bool rests = feet_[index].test.Judge(motion);
   if (rests && !rested) SetDown(index, foot);
@@ -199,17 +205,23 @@ void LegOdometry::Wander(size_t index, const Foot& foot) {
 
 void LegOdometry::Correct(std::span<const Foot> feet) {
   for (size_t i = 0; i < feet.size(); ++i) {
-    if (rests(i)) Wander(i, feet[i]);
+    const bool rested = rests(i);
+    if (rested) Wander(i, feet[i]);
     Judge(i, feet[i]);
-    if (rests(i)) CorrectBy(i, feet[i]);
-    if (rests(i)) flight_ = lift_ = 0;
+    if (!rests(i)) continue;
+    flight_ = lift_ = 0;
+    if (CorrectBy(i, feet[i])) continue;
+    // It is elsewhere along the ground; if even the ground is elsewhere, it is we who are.
+    if (rested) ++slips_;
+    SetDown(i, feet[i]);
+    if (!rested || !CorrectBy(i, feet[i])) astray_ = true;
   }
   // Legs may swing, but what flies for long is not held up.
   if (flight_ > kLongFlight && lift_ > flight_ * s_.gravity / 2) astray_ = true;
 }
 
-// place - position - orientation * centre = 0, but for noise.
-void LegOdometry::CorrectBy(size_t index, const Foot& foot) {
+// place - position - orientation * centre = 0, but for noise. False: that cannot be, and nothing is changed.
+bool LegOdometry::CorrectBy(size_t index, const Foot& foot) {
   const Eigen::Index at = IndexOf(index);
   const Matrix3d to_world = orientation_.toRotationMatrix();
   const Vector3d arm = to_world * foot.centre;
@@ -224,11 +236,7 @@ void LegOdometry::CorrectBy(size_t index, const Foot& foot) {
   spread += seen_.middleCols<3>(kAngle) * by_angle.transpose();
   spread += to_world * foot.centre_variance * to_world.transpose() + Square(kFootSd) * Matrix3d::Identity();
   const Matrix3d inverse = spread.inverse();
-  if (innovation.dot(inverse * innovation) > kSlipped) {
-    ++slips_;
-    SetDown(index, foot);
-    return;
-  }
+  if (innovation.dot(inverse * innovation) > kSlipped) return false;
   gain_.noalias() = seen_.transpose() * inverse;
   error_.noalias() = gain_ * innovation;
   covariance_.noalias() -= gain_ * seen_;
@@ -239,6 +247,7 @@ void LegOdometry::CorrectBy(size_t index, const Foot& foot) {
     }
   }
   Shift();
+  return true;
 }
 
 void LegOdometry::Shift() {

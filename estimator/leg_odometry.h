@@ -49,9 +49,12 @@ class LegOdometry {
   /// @param num_feet up to FloatingBase::kMostPoints.
   LegOdometry(const Settings& settings, size_t num_feet);
 
-  /// At rest, more or less (0.5 m/s), with the lowest foot on the ground, more or less (0.1 m).
-  /// @param orientation body's axes -> world's. @param feet num_feet.
-  void Restart(const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation, std::span<const Foot> feet);
+  /// What is known when it begins: that it stands or is about to, within 0.04 m and 0.2 m/s, or, in the middle of a motion, little:
+  /// 0.1 m, 1 m/s. Either with the lowest foot on the ground and at rest on average.
+  enum class Beginning { kStands, kMoves };
+  /// @param position [m] horizontally; z does not matter. @param orientation body's axes -> world's. @param feet num_feet.
+  void Restart(Beginning beginning, const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation,
+               std::span<const Foot> feet);
   /// @param dt [s] > 0 since the last reading. @param rate [rad/s], force [m/s^2], averaged over them, in the body's axes.
   void Predict(double dt, const Eigen::Vector3d& rate, const Eigen::Vector3d& force);
   /// Judges which feet rest, and takes the places of those into account. @param feet at the time of the last reading.
@@ -68,7 +71,8 @@ class LegOdometry {
   bool rests(size_t foot) const { return feet_[foot].test.touching(); }
   /// A foot that rested was not where it should be: it slipped. Since the start.
   int64_t slips() const { return slips_; }
-  /// A foot is far below the ground, or the body is held up although no foot rests: the filter must restart.
+  /// A foot rests where no ground should be, or is far below it, or the body is held up although no foot rests: the filter must
+  /// restart.
   bool astray() const { return astray_; }
 
   /// Standard deviations along a direction of the world. The orientation's is [rad] about it.
@@ -98,7 +102,7 @@ class LegOdometry {
   void SetDown(size_t index, const Foot& foot);
   void Forget(Eigen::Index block);
   void Wander(size_t index, const Foot& foot);
-  void CorrectBy(size_t index, const Foot& foot);
+  bool CorrectBy(size_t index, const Foot& foot);
   void Shift();
 
   Settings s_;

@@ -34,7 +34,8 @@ struct BaseErrors {
   int64_t restarts = 0;
 };
 
-BaseErrors ErrorsOf(const RobotDescription& robot, const Recordings& recordings) {
+/// @param from sample on.
+BaseErrors ErrorsOf(const RobotDescription& robot, const Recordings& recordings, int64_t from = 0) {
   BaseErrors errors;
   double count = 0;
   for (const auto& recording : recordings) {
@@ -43,6 +44,7 @@ BaseErrors ErrorsOf(const RobotDescription& robot, const Recordings& recordings)
       for (const imu_t& imu : sample.imus) observer.OnImu(imu);
       REQUIRE(observer.OnJointState(sample.joints));
       const robot_state_t& state = observer.state();
+      if (state.sequence < from) continue;
       ++count;
       if (!state.valid) continue;
       ++errors.valid;
@@ -88,17 +90,40 @@ TEST_CASE("a hopper without a boom knows its height, pitch and velocities") {
   for (const StateErrors& joint : legs.base) {
     CHECK(joint.covered_v() > 0.88);
     CHECK(joint.nees_v() < 2);
-    CHECK(joint.nees_q() < 2.5);
+    CHECK(joint.nees_q() < 2);
   }
   // A boom is better, at what it measures.
   CHECK(beside.base[1].q() < 0.01 * legs.base[1].q() + 1e-3);
 }
 
-TEST_CASE("dropped, bouncing and tumbling it finds its height by its first steps") {
+TEST_CASE("placed a few centimetres above the ground it is known at once, and when it has landed") {
   const RobotDescription robot = Free();
-  const BaseErrors legs = ErrorsOf(robot, Record(robot, 1, 6));
+  Eigen::VectorXd q(6), v = Eigen::VectorXd::Zero(6);
+  q << 0, 1.25, 0, 0, 0, 0;  // gym's hopper begins like that
+  const auto recording = SimulatedReadings(robot, 4).Run(q, v, 0.5, 8000, [](double, const auto& q_now, const auto& v_now) {
+    return Eigen::VectorXd(-600 * q_now.template tail<3>() - 30 * v_now.template tail<3>());
+  });
+  StateObserver observer(robot);
+  int valid = 0;
+  for (size_t k = 0; k < recording.size(); ++k) {
+    for (const imu_t& imu : recording[k].imus) observer.OnImu(imu);
+    observer.OnJointState(recording[k].joints);
+    const robot_state_t& state = observer.state();
+    if (!state.valid) continue;
+    ++valid;
+    INFO(k);
+    CHECK(std::abs(state.q[1] - recording[k].q[1]) < (k < 120 ? 0.08 : 0.03));
+    CHECK(std::abs(state.q[2] - recording[k].q[2]) < 0.02);
+    if (k > 120) CHECK(std::abs(state.v[1] - recording[k].v[1]) < 0.15);
+  }
+  CHECK(valid > 220);
+}
+
+TEST_CASE("dropped from higher than it was told, bouncing and tumbling, it finds its height within 0.6 s") {
+  const RobotDescription robot = Free();
+  const BaseErrors legs = ErrorsOf(robot, Record(robot, 1, 6), 300);
   INFO("x, z, pitch: q, v, NEES q, NEES v, within 95 %\n" << Describe(legs));
-  CHECK(legs.valid > 0.8);
+  CHECK(legs.valid > 0.6);
   CHECK(legs.base[1].q() < 0.04);
   CHECK(legs.base[1].v() < 0.2);
   CHECK(legs.base[2].q() < 0.04);

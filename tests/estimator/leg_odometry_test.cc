@@ -69,7 +69,7 @@ class Walker {
   void Start(const Quaterniond& wrong = Quaterniond::Identity()) {
     const Vector3d off = s.angle_sd * Normal();
     const Quaterniond noise(Eigen::AngleAxisd(off.norm(), off.normalized()));
-    filter.Restart(Position(0), wrong * noise * Orientation(0), Feet());
+    filter.Restart(LegOdometry::Beginning::kStands, Position(0), wrong * noise * Orientation(0), Feet());
   }
   void Step() {
     const double before = now;
@@ -217,7 +217,7 @@ TEST_CASE("in a plane nothing leaves it") {
   s.normal = Vector3d::UnitY();
   Walker walker(11, 2, s);
   walker.sway = 0;
-  walker.filter.Restart(Vector3d::Zero(), Quaterniond::Identity(), walker.Feet());
+  walker.filter.Restart(LegOdometry::Beginning::kStands, Vector3d::Zero(), Quaterniond::Identity(), walker.Feet());
   walker.Run(2);
   constexpr double kRounding = 1e-6;
   CHECK(std::abs(walker.filter.position().y()) < kRounding);

@@ -31,7 +31,7 @@ RobotDescription Load(const std::string& toml, const std::string& urdf = Text("r
 TEST_CASE("floating base: the hopper's torso without its boom") {
   const RobotDescription robot = Load(Text("free.toml"));
   CHECK(robot.estimator.base == EstimatorSettings::Base::kLegs);
-  CHECK(robot.estimator.ground_sd == 0.015);
+  CHECK(robot.estimator.ground_sd == 0.018);
   CHECK(robot.estimator.slip == 0.05);
   const FloatingBase base = FloatingBaseOf(robot);
   CHECK(robot.links[static_cast<size_t>(base.link)].name == "torso");
@@ -65,7 +65,7 @@ TEST_CASE("floating base: who cannot do without a boom is told why, and where") 
   refused(toml, Replaced(urdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"1 0 0\"/>"), "upright plane");
   refused(toml, Replaced(urdf, "<axis xyz=\"1 0 0\"/>", "<axis xyz=\"0.6 0 0.8\"/>"), "right angles");
   refused(Replaced(toml, "base = \"legs\"", "base = \"feet\""), urdf, "base");
-  refused(Replaced(toml, "ground_sd = 0.015", "ground_sd = 0"), urdf, "ground_sd");
+  refused(Replaced(toml, "ground_sd = 0.018", "ground_sd = 0"), urdf, "ground_sd");
   refused(Replaced(toml, "base = \"legs\"", "base = \"sensors\""), urdf, "ground_sd");
 
   RobotDescription robot = Load(toml);
