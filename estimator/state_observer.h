@@ -58,6 +58,8 @@ class StateObserver {
   /// noise parameters are learnt from. Those of an IMU's accelerometer do not count.
   double deviance(int joint) const { return joints_[static_cast<size_t>(joint)].deviance; }
   int64_t readings(int joint) const { return joints_[static_cast<size_t>(joint)].readings; }
+  /// Whether the joint is of a base that nothing holds: its noise is that of the IMU and the legs.
+  bool of_base(int joint) const { return joints_[static_cast<size_t>(joint)].of_base; }
   int64_t refused() const { return refused_ + duplicates_ + reordered_; }
   int64_t restarts() const { return restarts_; }
 

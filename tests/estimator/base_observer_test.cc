@@ -187,6 +187,13 @@ TEST_CASE("without its IMU for longer than an outage the base is not known, and 
   CHECK(observer.state().valid);
 }
 
+TEST_CASE("noise is learnt of the legs' joints, the base's are left alone") {
+  const RobotDescription robot = Free();
+  const Recordings recordings = {HopUpright(robot, 11)};
+  const TunedNoise noise = TuneNoise(robot, [&](StateObserver& observer) { Play(recordings, observer); });
+  for (size_t i = 0; i < 6; ++i) CHECK((noise.after[i] < noise.before[i]) == (i >= 3));
+}
+
 TEST_CASE("a step without a boom allocates nothing") {
   const RobotDescription robot = Free();
   const auto recording = HopUpright(robot, 9);
