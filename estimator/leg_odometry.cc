@@ -12,7 +12,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kStandsHeightSd = 0.04, kStandsVelocitySd = 0.2;  // [m], [m/s]
-constexpr double kMovesHeightSd = 0.1, kMovesVelocitySd = 1;
+constexpr double kMovesHeightSd = 0.2, kMovesVelocitySd = 3;
 constexpr double kBiasWanders = 100;      // [s] in which a bias may wander by as much as it may be at the start
 constexpr double kSettlesIn = 0.05;       // [s] in which the ground under a foot gives way, or comes back
 constexpr double kFootSd = 1e-3;          // [m] play and elasticity of a leg

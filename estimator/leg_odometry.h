@@ -50,7 +50,7 @@ class LegOdometry {
   LegOdometry(const Settings& settings, size_t num_feet);
 
   /// What is known when it begins: that it stands or is about to, within 0.04 m and 0.2 m/s, or, in the middle of a motion, little:
-  /// 0.1 m, 1 m/s. Either with the lowest foot on the ground and at rest on average.
+  /// 0.2 m, 3 m/s. Either with the lowest foot on the ground and at rest on average.
   enum class Beginning { kStands, kMoves };
   /// @param position [m] horizontally; z does not matter. @param orientation body's axes -> world's. @param feet num_feet.
   void Restart(Beginning beginning, const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation,
