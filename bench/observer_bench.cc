@@ -53,6 +53,7 @@ void Steps(benchmark::State& state, const std::string& name, int lag) {
 
 BENCHMARK_CAPTURE(Steps, hopper_causal, "hopper", 1);
 BENCHMARK_CAPTURE(Steps, hopper_smoothed, "hopper", 20);
+BENCHMARK_CAPTURE(Steps, free_hopper_causal, "hopper/free.toml", 1);
 BENCHMARK_CAPTURE(Steps, pendulum_smoothed, "pendulum", 20);
 
 }  // namespace

@@ -3,20 +3,17 @@
 #include <stdexcept>
 #include <vector>
 
-#include "sim/dynamics/topology.h"
-#include "sim/kinematics.h"
+#include "robot/contact_points.h"
+#include "robot/kinematics.h"
 
 namespace plumb {
 namespace {
 
 bool TouchesGround(const RobotDescription& robot, const Eigen::Ref<const Eigen::VectorXd>& q) {
   const std::vector<Pose> poses = LinkPoses(robot, q);
-  for (size_t link = 1; link < poses.size(); ++link) {
-    for (const Shape& shape : robot.links[link].collisions) {
-      for (const auto& [centre, radius] : ContactSpheres(shape)) {
-        if ((poses[link].position + poses[link].rotation * centre).z() <= radius) return true;
-      }
-    }
+  for (const ContactPoint& point : ContactPoints(robot)) {
+    const Pose& link = poses[static_cast<size_t>(point.link)];
+    if ((link.position + link.rotation * point.centre).z() <= point.radius) return true;
   }
   return false;
 }
@@ -36,8 +33,7 @@ bool TouchesStop(const RobotDescription& robot, const Eigen::Ref<const Eigen::Ve
 
 Touch FindTouch(const RobotDescription& robot, const Eigen::Ref<const Eigen::VectorXd>& q) {
   if (q.size() != robot.num_positions()) throw std::invalid_argument("the state is not one of " + robot.name);
-  return {robot.simulation.contact && TouchesGround(robot, q),
-          robot.simulation.stop && TouchesStop(robot, q)};
+  return {TouchesGround(robot, q), robot.simulation.stop && TouchesStop(robot, q)};
 }
 
 Touch FindTouch(const RobotDescription& robot, const Transition& transition) {

@@ -62,7 +62,10 @@ int TuneEstimator(const std::string& robot_path, const std::string& log) {
         observer.OnJointState(std::get<joint_state_t>(message));
     }
   });
-  for (size_t i = 0; i < tuned.joints.size(); ++i) std::cout << Lines(robot, tuned, i) << '\n';
+  const StateObserver observer(robot);
+  for (size_t i = 0; i < tuned.joints.size(); ++i) {
+    if (!observer.of_base(static_cast<int>(i))) std::cout << Lines(robot, tuned, i) << '\n';
+  }
   return 0;
 }
 

@@ -15,7 +15,7 @@ void Driver::PrepareMessages() {
   state_message_.num_joints = static_cast<int32_t>(size);
   for (auto* values : {&state_message_.position, &state_message_.velocity, &state_message_.effort_measured,
                        &state_message_.effort_sent, &state_message_.effort_applied}) {
-    values->resize(size);
+    values->assign(size, std::numeric_limits<double>::quiet_NaN());  // of joints that nothing measures
   }
   state_message_.valid.resize(size);
   state_message_.measured.resize(size);
@@ -28,6 +28,12 @@ void Driver::PrepareMessages() {
   status_.joint_name = names_;
   status_.joint_state.resize(size);
   status_.joint_reason.resize(size);
+  for (size_t i = 0; i < size; ++i) {
+    const bool driven = std::ranges::any_of(joints_, [&](const Joint& joint) { return joint.index == i; });
+    if (driven || std::ranges::any_of(passive_, [&](const Measuring& measuring) { return measuring.joint == i; })) continue;
+    status_.joint_state[i] = driver_status_t::IDLE;
+    status_.joint_reason[i] = "nothing measures it: left to the estimator";
+  }
   for (auto* values : {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage}) {
     values->assign(size, std::numeric_limits<double>::quiet_NaN());
   }

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <stdexcept>
 
 #include "drivers/bus_plan.h"
 #include "drivers/driver.h"
+#include "robot/floating_base.h"
 
 namespace plumb {
 namespace {
@@ -77,6 +79,8 @@ std::vector<Driver::Joint> Driver::DrivenJoints(const RobotDescription& robot) {
 }
 
 void Driver::FindMeasuring(const RobotDescription& robot) {
+  std::optional<FloatingBase> base;
+  if (robot.estimator.base == EstimatorSettings::Base::kLegs) base = FloatingBaseOf(robot);
   for (size_t i = 0; i < num_joints_; ++i) {
     const JointDescription& joint = robot.joints[i];
     if (!joint.passive) {
@@ -88,6 +92,7 @@ void Driver::FindMeasuring(const RobotDescription& robot) {
       continue;
     }
     const auto sensor = std::ranges::find(sensors_, static_cast<int>(i), &JointSensor::joint);
+    if (sensor == sensors_.end() && base && base->Has(static_cast<int>(i))) continue;  // the estimator finds out
     if (sensor == sensors_.end()) {
       throw std::invalid_argument(fmt::format(
           "joint '{}' has no motor, and no sensor measures it: give it one with [[sensor]]", joint.name));

@@ -45,6 +45,10 @@ TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(Sta
     std::vector<double> per_reading;
     for (size_t i = 0; i < n; ++i) {
       const int64_t readings = observer.readings(static_cast<int>(i));
+      if (observer.of_base(static_cast<int>(i))) {  // nothing to learn: no trial is better than another
+        per_reading.push_back(0);
+        continue;
+      }
       if (readings < kFewest) {
         throw std::invalid_argument(
             fmt::format("joint {}: {} readings are too few to learn noise from: at least {}",

@@ -63,7 +63,8 @@ estimator_status_t StateObserver::Status() const {
     status.bias.push_back(joint.settings.bias_sd > 0 ? joint.filter.mean()(3) : kNone);
     status.joint_reason.push_back(SensorReason(joint));
     if (status.reason.empty() && joint.out) {
-      status.reason = joint.used < 0 ? fmt::format("{}: no reading yet", joint.name)
+      status.reason = joint.of_base  ? fmt::format("{}: not known until a foot rests on the ground", joint.name)
+                      : joint.used < 0 ? fmt::format("{}: no reading yet", joint.name)
                                      : fmt::format("{}: no reading for {:.2f} s", joint.name, status.age.back());
     }
   }

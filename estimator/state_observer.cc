@@ -16,10 +16,6 @@ constexpr double kSurely = 5;               // standard deviations
 constexpr double kVelocityLag = 4e-3;       // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
 constexpr double kBiasesInOrder = 5;        // times its sd
 
-double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
-
 AgreementWatch::Settings VelocityWatch(const EstimatorSettings& s, bool gyro) {
   return {s.position_sd, s.velocity_sd, gyro ? kBiasesInOrder * s.bias_sd : 0, gyro ? 0 : kVelocityLag};
 }
@@ -34,11 +30,14 @@ AgreementWatch::Settings AccelerationWatch(const EstimatorSettings& s) {
 StateObserver::StateObserver(const RobotDescription& robot)
     : lag_(robot.estimator.lag),
       gravity_(robot.simulation.gravity),
-      unknown_step_(2 * robot.effort_limits().maxCoeff()) {
+      unknown_step_(2 * robot.effort_limits().maxCoeff()),
+      contact_(robot) {
+  if (robot.estimator.base == EstimatorSettings::Base::kLegs) base_.emplace(robot);
   for (const SensorDescription& sensor : robot.sensors) {
     if (sensor.link < 0) continue;
     const double delay = std::isnan(sensor.noise.delay) ? robot.estimator.delay : sensor.noise.delay;
-    imus_.push_back({sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1});
+    imus_.push_back({sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1, false});
+    imus_.back().of_base = base_ && sensor.name == robot.sensors[base_->base().imu].name;
   }
   for (int i = 0; i < robot.num_joints(); ++i) {
     const EstimatorSettings settings = EstimatorOf(robot, i);
@@ -49,6 +48,7 @@ StateObserver::StateObserver(const RobotDescription& robot)
                 .filter = KinematicFilter(settings),
                 .velocity_watch = AgreementWatch(VelocityWatch(settings, gyro)),
                 .acceleration_watch = AgreementWatch(AccelerationWatch(settings))};
+    joint.of_base = base_ && base_->base().Has(i);
     joint.gyro = gyro;
     joint.accelerometer = settings.acceleration_sd > 0;
     joints_.push_back(std::move(joint));
@@ -56,6 +56,8 @@ StateObserver::StateObserver(const RobotDescription& robot)
   const auto n = joints_.size();
   state_.num_joints = static_cast<int32_t>(n);
   for (auto* values : {&state_.q, &state_.v, &state_.q_sd, &state_.v_sd, &state_.effort}) values->resize(n, 0);
+  state_.num_contacts = contact_.num_points();
+  state_.contact.assign(static_cast<size_t>(state_.num_contacts), -1);
   waiting_.assign(static_cast<size_t>(lag_) + 2, state_);
   ready_.assign(static_cast<size_t>(lag_) + 2, state_);
 }
@@ -65,7 +67,7 @@ double StateObserver::Age(const joint_state_t& measured, size_t joint) const {
 }
 
 bool StateObserver::IsNew(const joint_state_t& measured, size_t joint) const {
-  return measured.valid[joint] && measured.measured[joint] != joints_[joint].measured;
+  return !joints_[joint].of_base && measured.valid[joint] && measured.measured[joint] != joints_[joint].measured;
 }
 
 StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
@@ -101,6 +103,7 @@ bool StateObserver::Displaced(const joint_state_t& measured) const {
 
 void StateObserver::Restart(const joint_state_t& measured) {
   while (num_waiting_ > 0) EmitSmoothed();
+  if (base_) base_->Restart();
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     const bool known = measured.valid[i];
@@ -152,69 +155,14 @@ void StateObserver::UseReading(const joint_state_t& measured, size_t i) {
   joint.used = measured.measured[i];
 }
 
-void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured) {
-  const int64_t late = measured.utime - reading.utime;
-  if (late > ImuInbox::kLatest) {
-    ++imu_refused_;
-    return;
-  }
-  ++imu_readings_;
-  const double age = Seconds(late) + imu.delay;
-  const double elapsed = imu.used < 0 ? 0 : Seconds(reading.utime - imu.used);
-  imu.used = std::max(imu.used, reading.utime);
-  if (reading.clipped) return;
-  if (imu.mounting.turned >= 0) {
-    // JOINT_STATE has the last reading of each of its periods; those in between, only we have.
-    const auto turned = static_cast<size_t>(imu.mounting.turned);
-    Joint& joint = joints_[turned];
-    const int64_t apart = Microseconds(imu.period / 2);
-    if (joint.measured + apart < reading.utime && reading.utime < measured.measured[turned] - apart) {
-      Correct(joint, Quantity::kRate, imu.mounting.axis.dot(Eigen::Map<const Eigen::Vector3d>(reading.rate.data())), age);
-    }
-  }
-  if (imu.mounting.slides.empty() || !reading.orientation_valid) return;
-  const auto& [w, x, y, z] = reading.orientation;
-  // As the joints have it: neither a wrong heading nor a boom's roll matter.
-  const Eigen::Quaterniond turn =
-      imu.mounting.turned < 0 ? imu.mounting.unturned
-                              : imu.mounting.unturned *
-                                    Eigen::Quaterniond(Eigen::AngleAxisd(
-                                        imu.mounting.Angle(Eigen::Quaterniond(w, x, y, z)), imu.mounting.axis));
-  const Eigen::Vector3d acceleration =
-      turn * Eigen::Map<const Eigen::Vector3d>(reading.force.data()) - gravity_ * Eigen::Vector3d::UnitZ();
-  for (const ImuMounting::Slide& slide : imu.mounting.slides) {
-    Joint& joint = joints_[static_cast<size_t>(slide.joint)];
-    const double along = slide.direction.dot(acceleration);
-    joint.acceleration_nis.Add(Correct(joint, Quantity::kAcceleration, along, age, imu.period).nis(), std::max(0.0, elapsed));
-    joint.acceleration_watch.Add(joint.filter.mean()(1), along, elapsed > 0 ? elapsed : 2 * AgreementWatch::kLongestGap);
-    if (joint.acceleration_watch.finding() != joint.acceleration_found) {
-      joint.acceleration_found = joint.acceleration_watch.finding();
-      ++reasons_changed_;
-    }
-  }
-}
-
 void StateObserver::JudgeOutages(int64_t utime) {
   for (Joint& joint : joints_) {
-    const bool out = joint.used < 0 || utime - joint.used > Microseconds(joint.settings.outage);
+    const bool out = joint.of_base ? !base_->valid(utime) : joint.used < 0 || utime - joint.used > Microseconds(joint.settings.outage);
     if (out == joint.out) continue;
     joint.out = out;
     if (out && joint.used >= 0) ++outages_;
     ++reasons_changed_;
   }
-}
-
-void StateObserver::OnImu(const imu_t& message) {
-  for (Imu& imu : imus_) {
-    if (imu.name != message.name) continue;
-    switch (imu.inbox.Put(message, started_ ? state_.utime : 0)) {
-      case ImuInbox::Verdict::kTaken: return;
-      case ImuInbox::Verdict::kReordered: ++imu_reordered_; return;
-      case ImuInbox::Verdict::kDuplicate: ++imu_duplicates_; return;
-      case ImuInbox::Verdict::kRefused: ++imu_refused_; return;
-    }
-  }
-  ++imu_refused_;
 }
 
 bool StateObserver::OnJointState(const joint_state_t& measured) {
@@ -276,7 +224,9 @@ void StateObserver::FillState(const joint_state_t& measured, bool restarted) {
     if (std::isfinite(measured.effort_applied[i])) joint.effort = measured.effort_applied[i];
     if (joint.out) state_.valid = false;
   }
+  if (base_) base_->Fill(measured.utime, state_);
   if (state_.valid != was_valid) ++reasons_changed_;
+  contact_.Judge(state_);
   const auto room = static_cast<int>(waiting_.size());
   waiting_[static_cast<size_t>((first_waiting_ + num_waiting_++) % room)] = state_;
   if (num_waiting_ > lag_) EmitSmoothed();
@@ -289,6 +239,7 @@ void StateObserver::EmitSmoothed() {
   --num_waiting_;
   for (size_t i = 0; i < joints_.size(); ++i) {
     const KinematicFilter::Smoothed smoothed = joints_[i].filter.TakeOldest();
+    if (joints_[i].of_base) continue;  // causal as it was
     state.q[i] = smoothed.mean(0);
     state.v[i] = smoothed.mean(1);
     state.q_sd[i] = std::sqrt(std::max(0.0, smoothed.covariance(0, 0)));

@@ -1,11 +1,15 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "estimator/base_observer.h"
+#include "estimator/ground_contact.h"
 #include "estimator/imu_inbox.h"
 #include "estimator/kinematic_filter.h"
 #include "estimator/sensor_watch.h"
@@ -54,6 +58,8 @@ class StateObserver {
   /// noise parameters are learnt from. Those of an IMU's accelerometer do not count.
   double deviance(int joint) const { return joints_[static_cast<size_t>(joint)].deviance; }
   int64_t readings(int joint) const { return joints_[static_cast<size_t>(joint)].readings; }
+  /// Whether the joint is of a base that nothing holds: its noise is that of the IMU and the legs.
+  bool of_base(int joint) const { return joints_[static_cast<size_t>(joint)].of_base; }
   int64_t refused() const { return refused_ + duplicates_ + reordered_; }
   int64_t restarts() const { return restarts_; }
 
@@ -62,6 +68,7 @@ class StateObserver {
     std::string name;
     EstimatorSettings settings;
     KinematicFilter filter;
+    bool of_base = false;     // its state is base_'s: no filter of its own
     bool gyro = false;        // its velocity is an IMU's rate
     bool accelerometer = false;
     int64_t measured = -1;    // utime of its newest reading
@@ -80,8 +87,12 @@ class StateObserver {
     double period, delay;  // [s]
     ImuInbox inbox;
     int64_t used = -1;     // utime of the newest reading that counted
+    bool of_base = false;  // base_ has its readings
   };
   enum class Use { kUse, kRefuse, kDuplicate, kReordered };
+
+  static double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
+  static int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
   Use Judge(const joint_state_t& measured) const;
   bool IsNew(const joint_state_t& measured, size_t joint) const;
@@ -90,6 +101,7 @@ class StateObserver {
   void Restart(const joint_state_t& measured);
   void Predict(const joint_state_t& measured, double elapsed);
   void UseReading(const joint_state_t& measured, size_t joint);
+  void UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay);
   void UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured);
   KinematicFilter::Innovation Correct(Joint& joint, Quantity quantity, double value, double age, double spread = 0);
   void JudgeOutages(int64_t utime);
@@ -101,7 +113,9 @@ class StateObserver {
   double gravity_;
   std::vector<Joint> joints_;
   std::vector<Imu> imus_;
+  std::optional<BaseObserver> base_;
   double unknown_step_;  // [Nm] assumed change of an effort that is not known: from full one way to full the other
+  GroundContact contact_;
   robot_state_t state_{};
   std::vector<robot_state_t> waiting_;  // ring of causal states whose smoothed twins are due
   int first_waiting_ = 0, num_waiting_ = 0;

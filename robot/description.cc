@@ -97,9 +97,9 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   bus.Finish();
   robot.sensors = ReadSensors(root, robot);
   robot.driver = ReadDriver(root.Table("driver"), robot.joints);
-  robot.estimator = ReadEstimator(root.Table("estimator"));
   robot.task = ReadTask(root.Table("task"), robot.joints);
   robot.simulation = ReadSimulation(root.Table("simulation"), robot.task.period);
+  robot.estimator = ReadEstimator(root.Table("estimator"), robot);
   robot.warnings = std::move(urdf.warnings);
   if (robot.simulation.contact) {
     robot.warnings.insert(robot.warnings.end(), urdf.contact_warnings.begin(), urdf.contact_warnings.end());

@@ -71,6 +71,11 @@ struct EstimatorSettings {
   /// [rad/s^2 sqrt(s)] spectral density^(1/2) of what the accelerations differ by from the simulator's, of the filter on its
   /// dynamics: [estimator.model]
   double model_acceleration = 0.2;
+  /// How the joints of the robot's base are known: as all others, or, if nothing holds it, from its IMU and its legs.
+  enum class Base { kSensors, kLegs };
+  Base base = Base::kSensors;
+  double ground_sd = 5e-3;  ///< [m] of kLegs: by which the ground is uneven and gives way
+  double slip = 0.01;       ///< [m/sqrt(s)] of kLegs: by which a foot that rests creeps
   // Of an IMU on a link that the joint carries; 0: there is none.
   double acceleration_sd = 0;  ///< [m/s^2] of a slide's acceleration, averaged over a period of the IMU
   double bias_sd = 0;          ///< [rad/s] of the gyro, if the joint turns, or [m/s^2] of the accelerometer

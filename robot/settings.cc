@@ -1,8 +1,13 @@
 #include "robot/settings.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+
+#include "robot/floating_base.h"
 
 namespace plumb {
 namespace {
@@ -74,7 +79,7 @@ DriverSettings ReadDriver(Config config, const std::vector<JointDescription>& jo
   return s;
 }
 
-EstimatorSettings ReadEstimator(Config config) {
+EstimatorSettings ReadEstimator(Config config, const RobotDescription& robot) {
   EstimatorSettings s;
   s.position_sd = config.Number("position_sd", kSanePositive);
   s.velocity_sd = config.Number("velocity_sd", kSanePositive);
@@ -88,6 +93,16 @@ EstimatorSettings ReadEstimator(Config config) {
   Config model = config.Table("model", false);
   s.model_acceleration = model.Number("acceleration", kSanePositive, s.model_acceleration);
   model.Finish();
+  s.base = static_cast<EstimatorSettings::Base>(config.Choice("base", {"sensors", "legs"}, 0));
+  if (s.base == EstimatorSettings::Base::kLegs) {
+    try {
+      FloatingBaseOf(robot);
+    } catch (const std::invalid_argument& error) {
+      config.Fail("base", fmt::format("= \"legs\": {}", error.what()));
+    }
+    s.ground_sd = config.Number("ground_sd", kSanePositive, s.ground_sd);
+    s.slip = config.Number("slip", kSanePositive, s.slip);
+  }
   config.Finish();
   return s;
 }

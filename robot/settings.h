@@ -7,9 +7,10 @@
 
 namespace plumb {
 
-/// Tables of robot.toml that need nothing of the robot. All throw ConfigError.
+/// Tables of robot.toml that need little of the robot. All throw ConfigError.
 DriverSettings ReadDriver(Config config, const std::vector<JointDescription>& joints);
-EstimatorSettings ReadEstimator(Config config);
+/// @param robot with links, joints, sensors and simulation.
+EstimatorSettings ReadEstimator(Config config, const RobotDescription& robot);
 SimulationSettings ReadSimulation(Config config, double period);
 ControllerSettings ReadController(Config config);
 CalibrationSettings ReadCalibration(Config config);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "robot/contact_points.h"
 #include "sim/parameter_names.h"
 
 namespace plumb {
@@ -71,16 +72,12 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
     base_.globals.contact_stiffness = settings.contact->stiffness;
     base_.globals.contact_damping = settings.contact->damping;
     base_.globals.contact_friction = settings.contact->friction;
-    for (size_t link = 1; link < description.links.size(); ++link) {
-      for (const Shape& shape : description.links[link].collisions) {
-        for (const auto& [position, radius] : ContactSpheres(shape)) {
-          Physics<double>::Point point{};
-          Vector3d::Map(point.position) = topology.link_axes[link] * position;
-          point.radius = radius;
-          base_.points.push_back(point);
-          point_links_.push_back(static_cast<int>(link));
-        }
-      }
+    for (const ContactPoint& at : ContactPoints(description)) {
+      Physics<double>::Point point{};
+      Vector3d::Map(point.position) = topology.link_axes[static_cast<size_t>(at.link)] * at.centre;
+      point.radius = at.radius;
+      base_.points.push_back(point);
+      point_links_.push_back(at.link);
     }
   }
   if (settings.stop) {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "robot/description.h"
-#include "sim/kinematics.h"
+#include "robot/kinematics.h"
 
 namespace plumb {
 

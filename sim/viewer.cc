@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "sim/kinematics.h"
+#include "robot/kinematics.h"
 
 namespace plumb {
 namespace {

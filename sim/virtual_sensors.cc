@@ -7,7 +7,7 @@
 
 #include "drivers/protocols/cia406_device.h"
 #include "drivers/protocols/xsens_device.h"
-#include "sim/kinematics.h"
+#include "robot/kinematics.h"
 #include "sim/virtual_devices.h"
 
 namespace plumb {
@@ -50,44 +50,12 @@ class VirtualEncoder : public VirtualDevice {
   std::optional<Cia406Device> device_;
 };
 
-/// How a link's origin moves, in the base's axes.
-struct LinkMotion {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< link axes -> base axes
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< [m]
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< [rad/s]
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< [m/s]
-};
-
-/// From the base outwards: each joint adds its own motion to its parent's.
-LinkMotion MotionOf(const RobotDescription& robot, const RobotMotion& motion, int link) {
-  const std::vector<Pose> poses = LinkPoses(robot, motion.q);
-  std::vector<LinkMotion> links(robot.links.size());
-  Eigen::Index next = 0;
-  for (const JointDescription& joint : robot.joints) {
-    const LinkMotion& parent = links[static_cast<size_t>(joint.parent)];
-    LinkMotion& child = links[static_cast<size_t>(joint.child)];
-    child.rotation = poses[static_cast<size_t>(joint.child)].rotation;
-    child.position = poses[static_cast<size_t>(joint.child)].position;
-    child.rate = parent.rate;
-    child.velocity = parent.velocity + parent.rate.cross(child.position - parent.position);
-    if (joint.type == JointDescription::Type::kSpherical) {
-      child.rate += child.rotation * motion.v.segment<3>(next);
-    } else if (joint.type == JointDescription::Type::kPrismatic) {
-      child.velocity += child.rotation * joint.axis * motion.v[next];
-    } else {
-      child.rate += child.rotation * joint.axis * motion.v[next];
-    }
-    next += joint.num_velocities();
-  }
-  return links[static_cast<size_t>(link)];
-}
-
 /// At its link's origin. It measures as such sensors do, by the change of its velocity in a period: the force
 /// of an impact is spread over one.
 class VirtualImu : public VirtualDevice {
  public:
   VirtualImu(const RobotDescription& robot, const SensorDescription& sensor)
-      : robot_(robot), link_(sensor.link), to_link_(sensor.rotation) {
+      : kinematics_(robot), gravity_(robot.simulation.gravity), link_(sensor.link), to_link_(sensor.rotation) {
     settings_.base = sensor.base;
     settings_.period = Microseconds(sensor.period);
     settings_.tick = Microseconds(sensor.tick);
@@ -98,14 +66,15 @@ class VirtualImu : public VirtualDevice {
   bool OnFrame(const Frame&, int64_t) override { return false; }
   void Tick(const RobotMotion& motion, FrameBatch& out) override {
     if (motion.time < device_->NextDue()) return;
-    const LinkMotion link = MotionOf(robot_, motion, link_);
+    kinematics_.Update(motion.q, motion.v);
+    const LinkMotion& link = kinematics_.link(link_);
     const double elapsed = static_cast<double>(motion.time - last_time_) * 1e-6;
     const Eigen::Vector3d acceleration =
         elapsed > 0 ? Eigen::Vector3d((link.velocity - last_velocity_) / elapsed) : Eigen::Vector3d::Zero();
     last_time_ = motion.time;
     last_velocity_ = link.velocity;
     const Eigen::Matrix3d axes = link.rotation * to_link_;  // the sensor's -> the base's
-    const Eigen::Vector3d gravity(0, 0, -robot_.simulation.gravity);
+    const Eigen::Vector3d gravity(0, 0, -gravity_);
     XsensDevice::Sample sample;
     Eigen::Map<Eigen::Vector3d>(sample.rate.data()) = axes.transpose() * link.rate;
     Eigen::Map<Eigen::Vector3d>(sample.force.data()) = axes.transpose() * (acceleration - gravity);
@@ -121,11 +90,13 @@ class VirtualImu : public VirtualDevice {
   void Track(const RobotMotion&, const RobotMotion&) override {}
   void Place(const RobotMotion& motion) override {
     last_time_ = motion.time;
-    last_velocity_ = MotionOf(robot_, motion, link_).velocity;
+    kinematics_.Update(motion.q, motion.v);
+    last_velocity_ = kinematics_.link(link_).velocity;
   }
 
  private:
-  const RobotDescription robot_;
+  Kinematics kinematics_;
+  double gravity_;
   int link_;
   Eigen::Matrix3d to_link_;
   XsensDevice::Settings settings_;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "robot/contact_points.h"
+
 namespace plumb {
 namespace {
 
@@ -63,27 +65,6 @@ Matrix3d PlaneAxes(const Vector3d& normal) {
 
 }  // namespace
 
-std::vector<std::pair<Vector3d, double>> ContactSpheres(const Shape& shape) {
-  const Vector3d half = shape.rotation * Vector3d(0, 0, shape.size(1) / 2);
-  switch (shape.type) {
-    case Shape::Type::kSphere:
-      return {{shape.position, shape.size(0)}};
-    case Shape::Type::kCapsule:
-      return {{shape.position - half, shape.size(0)}, {shape.position + half, shape.size(0)}};
-    case Shape::Type::kBox: {
-      std::vector<std::pair<Vector3d, double>> corners;
-      for (int corner = 0; corner < 8; ++corner) {
-        const Vector3d signs(corner & 1 ? .5 : -.5, corner & 2 ? .5 : -.5, corner & 4 ? .5 : -.5);
-        corners.emplace_back(shape.position + shape.rotation * signs.cwiseProduct(shape.size), 0);
-      }
-      return corners;
-    }
-    case Shape::Type::kCylinder:
-      break;
-  }
-  return {};
-}
-
 Topology::Topology(const RobotDescription& robot) {
   const size_t n = robot.joints.size();
   for (size_t i = 0; i < n; ++i) {
@@ -93,13 +74,7 @@ Topology::Topology(const RobotDescription& robot) {
     }
   }
   link_axes = AxesAtZero(robot);
-  if (robot.simulation.contact) {
-    for (size_t link = 1; link < robot.links.size(); ++link) {
-      for (const Shape& shape : robot.links[link].collisions) {
-        points.insert(points.end(), ContactSpheres(shape).size(), {static_cast<int>(link)});
-      }
-    }
-  }
+  for (const ContactPoint& point : ContactPoints(robot)) points.push_back({point.link});
   const Vector3d normal = FindNormal(robot, link_axes);
   planar = !normal.isZero() && (points.empty() || std::abs(normal.z()) < kParallel);
   if (planar) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <utility>
 #include <vector>
 
 #include "robot/description.h"
@@ -49,10 +48,5 @@ struct Topology {
   /// @throws std::invalid_argument unless joint i moves link i + 1 and hangs on a link before it.
   explicit Topology(const RobotDescription& description);
 };
-
-/// Where a shape can touch the ground: centres [m] of spheres in the link frame and their radii. A sphere and
-/// the ends of a capsule are spheres, the corners of a box have radius zero; a cylinder's rim is not one of
-/// them.
-std::vector<std::pair<Eigen::Vector3d, double>> ContactSpheres(const Shape& shape);
 
 }  // namespace plumb

@@ -78,6 +78,21 @@ TEST_CASE("a hopper on one bus: every joint is measured as it is, whatever measu
   CHECK(moved.minCoeff() > 0.01);
 }
 
+TEST_CASE("without a boom the driver leaves the base's slides to the estimator, and says so") {
+  HopperBus bus(Hopper("free.toml"));
+  REQUIRE(bus.Place(1));
+  REQUIRE(bus.Arm());
+  bus.Run(100);
+  const joint_state_t& state = bus.states.back();
+  for (size_t i = 0; i < 6; ++i) {
+    CHECK(state.valid[i] == (i >= 2));
+    CHECK(std::isfinite(state.position[i]) == (i >= 2));
+  }
+  const driver_status_t& status = bus.driver.Status(kStart, {}, 0);
+  CHECK(status.joint_state[0] == driver_status_t::IDLE);
+  CHECK_THAT(status.joint_reason[1], Catch::Contains("estimator"));
+}
+
 TEST_CASE("an IMU at rest feels gravity upwards, in its link's axes") {
   HopperBus bus(Hopper("robot.toml"));
   VectorXd q = VectorXd::Zero(6), v = VectorXd::Zero(6);

@@ -1,4 +1,4 @@
-#include "sim/kinematics.h"
+#include "robot/kinematics.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
@@ -67,6 +67,42 @@ TEST_CASE("poses: frames askew, slides, and a spherical joint") {
   const auto turned = LinkPoses(ball, Eigen::Vector4d(3, 3, 0, 0));
   CHECK(Near(turned[1].rotation * Eigen::Vector3d::UnitZ(), {0, -1, 0}));
   CHECK_THROWS_AS(LinkPoses(ball, Eigen::VectorXd::Zero(1)), std::invalid_argument);
+}
+
+TEST_CASE("kinematics: velocities and Jacobians are the positions' derivatives") {
+  RobotDescription tree = MakeTree();
+  tree.joints[3].type = JointDescription::Type::kSpherical;
+  const Eigen::Vector3d point(0.1, -0.3, 0.2);
+  Eigen::VectorXd q(7), v(6);
+  q << 0.4, -0.7, 1.1, 0.5, -0.1, 0.7, 0.5;
+  v << 0.3, 1.2, -0.8, 0.9, -1.4, 0.6;
+  q.tail<4>().normalize();
+  // A little earlier or later; a spherical joint turns about axes of its link.
+  const auto moved = [&](double t) {
+    Eigen::VectorXd at = q;
+    at.head<3>() += t * v.head<3>();
+    const Eigen::Vector3d turn = t * v.tail<3>();
+    const Eigen::Quaterniond to = Eigen::Quaterniond(q[3], q[4], q[5], q[6]) *
+                                  Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
+    at.tail<4>() << to.w(), to.vec();
+    return LinkPoses(tree, at);
+  };
+  const double h = 1e-5;
+  const auto before = moved(-h), after = moved(h), now = moved(0);
+  Kinematics kinematics(tree);
+  kinematics.Update(q, v);
+  Eigen::Matrix3Xd jacobian(3, 6);
+  for (int link = 0; link < 5; ++link) {
+    const auto at = static_cast<size_t>(link);
+    const Eigen::Vector3d velocity = (after[at].position + after[at].rotation * point - before[at].position -
+                                      before[at].rotation * point) / (2 * h);
+    INFO("link " << link);
+    CHECK(Near(kinematics.Position(link, point), now[at].position + now[at].rotation * point));
+    CHECK((kinematics.Velocity(link, point) - velocity).norm() < 1e-8);
+    kinematics.Jacobian(link, point, jacobian);
+    CHECK((jacobian * v - velocity).norm() < 1e-8);
+  }
+  CHECK_THROWS_AS(kinematics.Update(v, v), std::invalid_argument);
 }
 
 }  // namespace plumb

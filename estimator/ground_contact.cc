@@ -1,0 +1,57 @@
+#include "estimator/ground_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+constexpr double kSurelyBelow = 2;  // standard deviations
+
+double Square(double x) { return x * x; }
+
+}  // namespace
+
+bool ContactTest::Judge(const Motion& motion) {
+  const double height_sd = std::hypot(motion.height_sd, kHeightSd), rise_sd = std::hypot(motion.rise_sd, kRiseSd);
+  const bool pressed_in = motion.height < -kSurelyBelow * height_sd;
+  const double height = std::max(0.0, motion.height), rise = pressed_in ? std::max(0.0, motion.rise) : motion.rise;
+  const double statistic = Square(height / height_sd) + Square(rise / rise_sd);
+  touching_ = statistic < (touching_ ? kLeaves : kTouches);
+  return touching_;
+}
+
+GroundContact::GroundContact(const RobotDescription& robot)
+    : points_(ContactPoints(robot)),
+      tests_(points_.size()),
+      kinematics_(robot),
+      jacobian_(3, robot.num_velocities()) {
+  if (!points_.empty() && robot.num_positions() != robot.num_joints()) {
+    throw std::invalid_argument("robot '" + robot.name + "' has a spherical joint: it can only be simulated");
+  }
+}
+
+void GroundContact::Judge(robot_state_t& state) {
+  if (points_.empty()) return;
+  if (!state.valid) {
+    std::fill(state.contact.begin(), state.contact.end(), int8_t{-1});
+    for (ContactTest& test : tests_) test.Restart();
+    return;
+  }
+  using Values = Eigen::Map<const Eigen::VectorXd>;
+  const auto n = static_cast<Eigen::Index>(state.q.size());
+  kinematics_.Update(Values(state.q.data(), n), Values(state.v.data(), n));
+  const Values q_sd(state.q_sd.data(), n), v_sd(state.v_sd.data(), n);
+  for (size_t i = 0; i < points_.size(); ++i) {
+    const ContactPoint& point = points_[i];
+    kinematics_.Jacobian(point.link, point.centre, jacobian_);
+    const auto vertical = jacobian_.row(2).transpose().array();
+    state.contact[i] = tests_[i].Judge({.height = kinematics_.Position(point.link, point.centre).z() - point.radius,
+                                        .height_sd = (vertical * q_sd.array()).matrix().norm(),
+                                        .rise = kinematics_.Velocity(point.link, point.centre).z(),
+                                        .rise_sd = (vertical * v_sd.array()).matrix().norm()});
+  }
+}
+
+}  // namespace plumb

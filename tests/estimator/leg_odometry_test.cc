@@ -1,0 +1,234 @@
+// A body in space that sways above its feet, after formulas; its feet creep and sink in as the filter takes them to.
+
+#include "estimator/leg_odometry.h"
+
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "common/random.h"
+
+namespace plumb {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kPeriod = 0.005, kRadius = 0.02, kGravity = 9.81;
+
+LegOdometry::Settings Settings() {
+  return {.rate_sd = 0.01, .rate_bias_sd = 0.01, .acceleration_sd = 0.1, .acceleration_bias_sd = 0.05, .period = kPeriod,
+          .angle_sd = 0.02, .ground_sd = 3e-3, .slip = 5e-3, .gravity = kGravity};
+}
+
+Matrix3d Variance(double sd) { return sd * sd * Matrix3d::Identity(); }
+
+class Walker {
+ public:
+  Walker(uint64_t seed, int num_feet, LegOdometry::Settings settings = Settings())
+      : s(settings), random(seed, {77}), filter(s, static_cast<size_t>(num_feet)), places(static_cast<size_t>(num_feet)) {
+    for (size_t i = 0; i < places.size(); ++i) {
+      const double around = 2 * M_PI * static_cast<double>(i) / num_feet;
+      places[i] << 0.3 * std::cos(around), 0.3 * std::sin(around), kRadius + s.ground_sd * random.Normal();
+    }
+    rate_bias = s.rate_bias_sd * Normal();
+    acceleration_bias = s.acceleration_bias_sd * Normal();
+  }
+
+  Vector3d Normal() { return {random.Normal(), random.Normal(), random.Normal()}; }
+  Vector3d Position(double t) const { return {0.05 * sway * std::sin(3 * t), 0.04 * sway * std::sin(2 * t), 0.5 + 0.05 * sway * std::sin(4 * t)}; }
+  Vector3d Velocity(double t) const {
+    return {0.15 * sway * std::cos(3 * t), 0.08 * sway * std::cos(2 * t), 0.2 * sway * std::cos(4 * t)};
+  }
+  Quaterniond Orientation(double t) const {
+    return Quaterniond(Eigen::AngleAxisd(0.3 * sway * std::sin(0.7 * t), Vector3d::UnitZ()) *
+                       Eigen::AngleAxisd(0.2 * sway * std::sin(3 * t), Vector3d::UnitY()) *
+                       Eigen::AngleAxisd(0.15 * sway * std::sin(2.3 * t), Vector3d::UnitX()));
+  }
+  /// In the body's axes.
+  Vector3d Rate(double t) const {
+    const Eigen::AngleAxisd turn(Orientation(t - 1e-4).conjugate() * Orientation(t + 1e-4));
+    return turn.angle() / 2e-4 * turn.axis();
+  }
+
+  std::vector<LegOdometry::Foot> Feet() {
+    std::vector<LegOdometry::Foot> feet(places.size());
+    const Matrix3d to_body = Orientation(now).toRotationMatrix().transpose();
+    for (size_t i = 0; i < feet.size(); ++i) {
+      feet[i].radius = kRadius;
+      feet[i].centre = to_body * (places[i] - Position(now)) + 1e-3 * Normal();
+      feet[i].velocity = -to_body * Velocity(now) - Rate(now).cross(feet[i].centre) + 0.01 * Normal();
+      feet[i].rate = -Rate(now);
+      feet[i].centre_variance = Matrix3d::Zero();  // a millimetre is what the filter allows any leg
+      feet[i].velocity_variance = Variance(0.01);
+    }
+    return feet;
+  }
+
+  void Start(const Quaterniond& wrong = Quaterniond::Identity()) {
+    const Vector3d off = s.angle_sd * Normal();
+    const Quaterniond noise(Eigen::AngleAxisd(off.norm(), off.normalized()));
+    filter.Restart(LegOdometry::Beginning::kStands, Position(0), wrong * noise * Orientation(0), Feet());
+  }
+  void Step() {
+    const double before = now;
+    now += kPeriod;
+    const double keeps = std::exp(-kPeriod / 0.05);
+    for (Vector3d& place : places) {
+      place.head<2>() += s.slip * std::sqrt(kPeriod) * Normal().head<2>();
+      place.z() = kRadius + keeps * (place.z() - kRadius) + s.ground_sd * std::sqrt(1 - keeps * keeps) * random.Normal();
+    }
+    const Vector3d acceleration = (Velocity(now) - Velocity(before)) / kPeriod + kGravity * Vector3d::UnitZ();
+    filter.Predict(kPeriod, Rate(now) + rate_bias + s.rate_sd * Normal(),
+                   Orientation((now + before) / 2).conjugate() * acceleration + acceleration_bias + s.acceleration_sd * Normal());
+    filter.Correct(Feet());
+  }
+  void Run(double duration) {
+    for (const double end = now + duration; now < end - kPeriod / 2;) Step();
+  }
+
+  Eigen::Matrix<double, 9, 1> Error() const {
+    Eigen::Matrix<double, 9, 1> e;
+    const Eigen::AngleAxisd turn(Orientation(now) * filter.orientation().conjugate());
+    e << Position(now) - filter.position(), Velocity(now) - filter.velocity(), turn.angle() * turn.axis();
+    return e;
+  }
+
+  LegOdometry::Settings s;
+  Random random;
+  LegOdometry filter;
+  std::vector<Vector3d> places;
+  Vector3d rate_bias, acceleration_bias;
+  double now = 0, sway = 1;
+};
+
+TEST_CASE("feet and IMU tell height, tilt and velocity of a body in space, and how well") {
+  const double sway = GENERATE(0.0, 1.0);
+  const int num_feet = GENERATE(2, 4);
+  INFO("sway " << sway << ", " << num_feet << " feet");
+  double nees = 0, height = 0, tilt = 0, velocity = 0;
+  int count = 0;
+  for (uint64_t seed = 1; seed <= 25; ++seed) {
+    Walker walker(seed, num_feet);
+    walker.sway = sway;
+    walker.Start();
+    walker.Run(2);
+    for (int i = 0; i < 4; ++i) {
+      walker.Run(0.5);
+      for (size_t foot = 0; foot < walker.places.size(); ++foot) REQUIRE(walker.filter.rests(foot));
+      const auto e = walker.Error();
+      nees += e.dot(walker.filter.covariance().ldlt().solve(e)) / 9;
+      height += e[2] * e[2];
+      velocity += e.segment<3>(3).squaredNorm() / 3;
+      tilt += e.segment<2>(6).squaredNorm() / 2;
+      ++count;
+    }
+    CHECK(walker.filter.slips() <= 10);  // of 3200 corrections at 99.9 %
+  }
+  INFO("rms height " << std::sqrt(height / count) << " m, tilt " << std::sqrt(tilt / count) << " rad, velocity "
+                     << std::sqrt(velocity / count) << " m/s; NEES " << nees / count);
+  CHECK(nees / count > 0.75);
+  CHECK(nees / count < 1.5);
+  CHECK(std::sqrt(height / count) < 3e-3);
+  CHECK(std::sqrt(tilt / count) < 0.01);
+  CHECK(std::sqrt(velocity / count) < 0.03);
+}
+
+TEST_CASE("heading and horizontal position are not known, and the less the longer") {
+  Walker walker(3, 3);
+  walker.Start();
+  walker.Run(2);
+  const LegOdometry& f = walker.filter;
+  const double heading = f.angle_sd(Vector3d::UnitZ()), x = f.position_sd(Vector3d::UnitX()), y = f.position_sd(Vector3d::UnitY()),
+               z = f.position_sd(Vector3d::UnitZ()), roll = f.angle_sd(Vector3d::UnitX()), pitch = f.angle_sd(Vector3d::UnitY());
+  walker.Run(20);
+  CHECK(f.angle_sd(Vector3d::UnitZ()) > heading);
+  CHECK(f.position_sd(Vector3d::UnitX()) > 1.5 * x);
+  CHECK(f.position_sd(Vector3d::UnitY()) > 1.5 * y);
+  CHECK(f.position_sd(Vector3d::UnitZ()) < 1.2 * z);
+  CHECK(f.angle_sd(Vector3d::UnitX()) < 1.2 * roll);
+  CHECK(f.angle_sd(Vector3d::UnitY()) < 1.2 * pitch);
+}
+
+TEST_CASE("a tilt guessed wrong, and biases, are found") {
+  LegOdometry::Settings s = Settings();
+  s.angle_sd = 0.2;
+  Walker walker(5, 3, s);
+  walker.Start(Quaterniond(Eigen::AngleAxisd(0.2, Vector3d::UnitY())));
+  CHECK(walker.Error().segment<2>(6).norm() > 0.1);
+  walker.Run(5);
+  CHECK(walker.Error().segment<2>(6).norm() < 0.02);
+  walker.Run(25);
+  CHECK((walker.filter.rate_bias() - walker.rate_bias).head<2>().norm() < 3e-3);
+  CHECK(std::abs((walker.filter.acceleration_bias() - walker.acceleration_bias).z()) < 0.02);
+}
+
+TEST_CASE("a foot that slips or is lifted is noticed, and breaks nothing") {
+  Walker walker(7, 3);
+  walker.Start();
+  walker.Run(2);
+  const int64_t slips = walker.filter.slips();
+  SECTION("slips") {
+    for (int i = 0; i < 20; ++i) {
+      walker.places[0].x() += 0.01;
+      walker.Step();
+    }
+    CHECK(walker.filter.slips() > slips);
+  }
+  SECTION("is lifted and set down elsewhere") {
+    walker.places[0].z() += 0.1;
+    walker.Step();
+    CHECK_FALSE(walker.filter.rests(0));
+    CHECK(walker.filter.rests(1));
+    for (int i = 0; i < 40; ++i) walker.places[0].z() = 0.1, walker.Step();
+    walker.places[0] += Vector3d(0.1, 0.1, 0);
+  }
+  walker.Run(1);
+  for (size_t i = 0; i < 3; ++i) CHECK(walker.filter.rests(i));
+  const auto e = walker.Error();
+  CHECK(std::abs(e[2]) < 0.01);
+  CHECK(e.segment<3>(3).norm() < 0.1);
+  CHECK(e.segment<2>(6).norm() < 0.02);
+  CHECK_FALSE(walker.filter.astray());
+}
+
+TEST_CASE("who flies grows unsure, and who is held up without feet is astray") {
+  Walker walker(9, 2);
+  walker.Start();
+  walker.Run(1);
+  for (Vector3d& place : walker.places) place.z() += 1;  // pulled up
+  const double z = walker.filter.position_sd(Vector3d::UnitZ());
+  for (int i = 0; i < 60; ++i) {
+    for (Vector3d& place : walker.places) place.z() = 1;
+    walker.Step();
+  }
+  CHECK(walker.filter.position_sd(Vector3d::UnitZ()) > 1.5 * z);
+  CHECK_FALSE(walker.filter.astray());
+  for (int i = 0; i < 60; ++i) {
+    for (Vector3d& place : walker.places) place.z() = 1;
+    walker.Step();
+  }
+  CHECK(walker.filter.astray());
+}
+
+TEST_CASE("in a plane nothing leaves it") {
+  LegOdometry::Settings s = Settings();
+  s.normal = Vector3d::UnitY();
+  Walker walker(11, 2, s);
+  walker.sway = 0;
+  walker.filter.Restart(LegOdometry::Beginning::kStands, Vector3d::Zero(), Quaterniond::Identity(), walker.Feet());
+  walker.Run(2);
+  constexpr double kRounding = 1e-6;
+  CHECK(std::abs(walker.filter.position().y()) < kRounding);
+  CHECK(std::abs(walker.filter.velocity().y()) < kRounding);
+  CHECK(std::abs(walker.filter.orientation().x()) < kRounding);
+  CHECK(std::abs(walker.filter.orientation().z()) < kRounding);
+  CHECK(walker.filter.position_sd(Vector3d::UnitY()) < kRounding);
+  CHECK(walker.filter.angle_sd(Vector3d::UnitX()) < kRounding);
+  CHECK(walker.filter.angle_sd(Vector3d::UnitY()) > 0);
+  CHECK(std::abs(walker.filter.position().z() - 0.5) < 0.01);
+}
+
+}  // namespace
+}  // namespace plumb
