@@ -1,0 +1,195 @@
+// Figure 2: how far calibrated simulators are from the "real" robot after n steps, step-based against original SimOpt.
+//
+// For each run the robot is the simulator itself (gym's Pendulum and Hopper) with parameters drawn anew, its states read with noise. A policy
+// trained on the prior moves it. The two SimOpts see the same roll-outs, one an iteration, and simulate the same number of steps: 25 simulators,
+// one update an iteration. Plumbline's default gets as many transitions of the same roll-outs as it can fit within the same number of
+// simulated steps, and within a hundredth of it. Other roll-outs of the same policy judge.
+//
+//   plumb-figure-2 robots --output figure_2
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+
+#include "calibrator/methods.h"
+#include "common/atomic_file.h"
+#include "experiments/budget.h"
+#include "experiments/curves.h"
+#include "experiments/loop.h"
+#include "experiments/n_step_error.h"
+#include "experiments/results.h"
+#include "experiments/simulated_system.h"
+#include "sim/parameters.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kHorizon = 50, kSimulators = 20, kHeldOut = 5;
+constexpr uint32_t kHeldOutFirst = 1000;  // number of its first episode
+
+struct Task {
+  const char *name, *robot;
+  int updates;  // TRPO's, of the policy that moves the robot
+};
+constexpr Task kTasks[] = {{"pendulum", "pendulum/gym.toml", 60}, {"hopper", "hopper/gym.toml", 150}};
+
+struct Method {
+  const char* key;
+  std::string label;
+  Way way;
+  int64_t share;  // of the budget: one so-manieth
+};
+const std::vector<Method> kMethods{{"original", Label(Way::kOriginal), Way::kOriginal, 1},
+                                   {"step", Label(Way::kStep), Way::kStep, 1},
+                                   {"default", Label(Way::kDefault) + ", same budget", Way::kDefault, 1},
+                                   {"default-100", Label(Way::kDefault) + ", a hundredth", Way::kDefault, 100},
+                                   {"prior", "the prior", Way::kPrior, 1}};
+
+struct Options {
+  std::string robots, output = ".";
+  int runs = 5, iterations = 40, threads = 0;
+  double noise = 1;
+  bool quick = false;
+};
+
+std::string KeyOf(const Task& task, const Method& method, int run) { return fmt::format("{},{},{}", task.name, method.key, run); }
+
+// What a run's methods have in common.
+struct Recorded {
+  std::string of;
+  RobotDescription robot;
+  std::vector<Rollout> seen, held_out;
+  int64_t budget = 0;  // simulated steps
+};
+
+Recorded Record(const Options& options, const Task& task, int run, const std::function<void(double)>& progress) {
+  Recorded recorded{fmt::format("{} {}", task.name, run), LoadRobot((std::filesystem::path(options.robots) / task.robot).string()), {}, {}};
+  const RobotDescription& robot = recorded.robot;
+  const auto seed = static_cast<uint64_t>(run);
+  const Eigen::VectorXd hidden = HiddenParameters(robot, seed), noise = options.noise * ReadingNoise(robot);
+  Loop loop(robot, hidden);
+  LoopSettings settings;
+  settings.seed = seed;
+  settings.threads = options.threads;
+  settings.first_updates = options.quick ? 2 : task.updates;
+  const auto trainer = loop.TrainFirst("prior", ParameterDistribution::Prior(robot), settings, progress);
+  SimulatedSystem noisy(robot, hidden, noise, seed), exact(robot, hidden, 0 * noise, seed);
+  for (int i = 0; i < options.iterations; ++i) {
+    recorded.seen.push_back(noisy.Run(trainer->policy(), true, robot.task.steps, static_cast<uint32_t>(i)).rollout);
+  }
+  for (uint32_t i = 0; i < kHeldOut; ++i) {
+    recorded.held_out.push_back(exact.Run(trainer->policy(), true, robot.task.steps, kHeldOutFirst + i).rollout);
+  }
+  recorded.budget = 25 * static_cast<int64_t>(CountTransitions(recorded.seen));
+  return recorded;
+}
+
+Results::Rows Measure(const Options& options, const Recorded& recorded, const Method& method, int run) {
+  const auto seed = static_cast<uint64_t>(run);
+  const RobotDescription& robot = recorded.robot;
+  ParameterDistribution distribution = ParameterDistribution::Prior(robot);
+  int64_t simulated = 0;
+  if (method.way == Way::kDefault) {
+    const BudgetedFit fit = FitWithin(robot, recorded.seen, recorded.budget / method.share, seed, options.threads);
+    distribution = fit.distribution, simulated = fit.simulated_steps;
+  } else if (Learns(method.way)) {
+    const auto simopt = MakeSimOpt(method.way, robot, seed, options.threads);
+    for (const Rollout& rollout : recorded.seen) {
+      simopt->Begin({rollout});
+      simopt->Update();
+    }
+    distribution = DistributionOf(*simopt, robot), simulated = recorded.budget;
+  }
+  const Eigen::VectorXd errors = NStepErrors(robot, distribution, recorded.held_out, kHorizon, kSimulators, 10, seed);
+  Results::Rows rows;
+  for (int n = 1; n <= kHorizon; ++n) rows.push_back({static_cast<double>(n), errors(n - 1), static_cast<double>(simulated)});
+  return rows;
+}
+
+Panel Draw(const Options& options, const Task& task, const Results& results) {
+  Panel panel{task.name, "n, control steps", "error after n steps, standard units", true, {}};
+  for (const Method& method : kMethods) {
+    Curve curve{method.label, {}, {}, {}, {}};
+    for (size_t n = 0; n < kHorizon; ++n) {
+      std::vector<double> errors;
+      for (int run = 1; run <= options.runs; ++run) errors.push_back(results.Of(KeyOf(task, method, run))[n][1]);
+      const Band band = ConfidenceBand(errors, true);
+      curve.x.push_back(static_cast<double>(n + 1)), curve.middle.push_back(band.middle), curve.low.push_back(band.low), curve.high.push_back(band.high);
+    }
+    panel.curves.push_back(std::move(curve));
+  }
+  return panel;
+}
+
+// How many of n = 1 ... 20 have the first curve below the second, and its band below the other's.
+std::string Below(const Panel& panel, size_t first, size_t second) {
+  constexpr size_t kJudged = 20;
+  int below = 0, apart = 0;
+  for (size_t n = 0; n < kJudged; ++n) {
+    below += panel.curves[first].middle[n] < panel.curves[second].middle[n];
+    apart += panel.curves[first].high[n] < panel.curves[second].low[n];
+  }
+  return fmt::format("at {} of n = 1 ... {}, bands apart at {}", below, kJudged, apart);
+}
+
+std::string Sentence(const Options& options, const Task& task, const Panel& panel, const Results& results) {
+  std::string text = fmt::format("{}, {} runs, error after 1, 10, 20, 50 steps, simulated steps:", task.name, options.runs);
+  for (size_t m = 0; m < kMethods.size(); ++m) {
+    double simulated = 0;
+    for (int run = 1; run <= options.runs; ++run) simulated += results.Of(KeyOf(task, kMethods[m], run))[0][2] / options.runs;
+    const auto& middle = panel.curves[m].middle;
+    text += fmt::format("\n  {:<42}{:10.2g}{:10.2g}{:10.2g}{:10.2g}{:12.0f}", kMethods[m].label, middle[0], middle[9], middle[19], middle[49], simulated);
+  }
+  text += fmt::format("\n  step-based below original {}; default with a hundredth below step-based {}, below original {}", Below(panel, 1, 0),
+                      Below(panel, 3, 1), Below(panel, 3, 0));
+  return text;
+}
+
+int MakeFigure(Process& process, const Options& options) {
+  const std::filesystem::path folder = options.output;
+  Results results(folder / "figure_2.csv", {"task", "method", "run"}, {"n", "error", "simulated_steps"});
+  std::vector<Job> jobs;
+  Recorded recorded;
+  for (const Task& task : kTasks) {
+    for (int run = 1; run <= options.runs; ++run) {
+      for (const Method& method : kMethods) {
+        jobs.push_back({KeyOf(task, method, run), 1, [&, run](const auto& progress) {
+                          if (recorded.of != fmt::format("{} {}", task.name, run)) recorded = Record(options, task, run, progress);
+                          return Measure(options, recorded, method, run);
+                        }});
+      }
+    }
+  }
+  if (!RunJobs(process, jobs, results)) return 130;
+  std::vector<Panel> panels;
+  for (const Task& task : kTasks) {
+    panels.push_back(Draw(options, task, results));
+    std::cout << Sentence(options, task, panels.back(), results) << "\n";
+  }
+  WriteAtomically(folder / "figure_2.svg",
+                  DrawCurves(fmt::format("error of simulators after n steps, mean of {} runs and its 95 % band", options.runs), panels));
+  return 0;
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  plumb::Options options;
+  return plumb::Run(
+      "plumb-figure-2", "How far calibrated simulators are from a robot after n steps, by each way of calibrating.", argc, argv,
+      [&](CLI::App& app) {
+        app.add_option("robots", options.robots, "the folder robots/")->required();
+        app.add_option("--output", options.output, "folder for figure_2.csv and figure_2.svg")->capture_default_str();
+        app.add_option("--runs", options.runs, "seeds, and robots, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
+        app.add_option("--iterations", options.iterations, "roll-outs, and updates of both SimOpts")->check(CLI::Range(1, 1000))->capture_default_str();
+        app.add_option("--noise", options.noise, "of the readings: a factor; 0 = exact, as in the paper")
+            ->check(CLI::Range(0.0, 1000.0))
+            ->capture_default_str();
+        app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
+        app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
+      },
+      [&](plumb::Process& process) { return plumb::MakeFigure(process, options); });
+}

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "experiments/real_system.h"
+#include "experiments/ways.h"
+#include "trainer/trainer.h"
+
+namespace plumb {
+
+/// How SimOpt's loop is run: roll out, calibrate, train, judge.
+struct LoopSettings {
+  Way way = Way::kDefault;
+  int iterations = 5;
+  int steps_per_iteration = 750;  ///< of the robot, at most; episodes follow each other until there are as many
+  int first_updates = 0, next_updates = 0;  ///< TRPO updates of the first policy and of each later one
+  int evaluation_episodes = 20;   ///< on the robot, without exploration: they judge, and nobody learns from them
+  uint64_t seed = 1;
+  int threads = 0;
+};
+
+/// Iteration 0 is the policy before the robot has been used.
+struct LoopRow {
+  int iteration;
+  double robot_return;      ///< mean without exploration
+  double simulated_return;  ///< the same on simulators of the distribution that it was trained on
+  double discrepancy;       ///< see CalibrationReport; NaN where nothing is learnt
+  int64_t transitions;      ///< of the robot so far
+  double robot_seconds;     ///< likewise
+  Eigen::VectorXd mean, sd; ///< of the parameters, physical units
+};
+
+/// Trains policies, one way after the other. The first policy of a distribution is trained once for all ways that begin with it.
+class Loop {
+ public:
+  /// @param model what is calibrated and trained in. @param truth physical units, for the oracle; empty if there is none.
+  Loop(RobotDescription model, Eigen::VectorXd truth);
+
+  /// @param real used for roll-outs and judgement. @param progress told the share that is done; may throw to break off.
+  std::vector<LoopRow> Run(RealSystem& real, const LoopSettings& settings, const std::function<void(double)>& progress);
+
+  /// Return without exploration, mean of some episodes.
+  static double Judge(RealSystem& real, const GaussianPolicy& policy, int steps, int episodes);
+
+  /// A trainer that has made so many updates on a distribution; from the one that made them before, if any.
+  std::unique_ptr<Trainer> TrainFirst(const std::string& name, const ParameterDistribution& distribution, const LoopSettings& settings,
+                                      const std::function<void(double)>& progress);
+
+  const RobotDescription& model() const { return model_; }
+
+ private:
+  std::unique_ptr<Trainer> MakeTrainer(const LoopSettings& settings) const;
+
+  RobotDescription model_;
+  Eigen::VectorXd truth_;
+  std::map<std::string, TrainerState> first_;  // by distribution, seed and updates
+};
+
+}  // namespace plumb
