@@ -15,6 +15,18 @@ constexpr size_t kStretch = 25;  // transitions
 
 }  // namespace
 
+std::vector<Rollout> FirstTransitions(const std::vector<Rollout>& rollouts, int64_t count) {
+  std::vector<Rollout> first;
+  for (const Rollout& rollout : rollouts) {
+    if (count <= 0) break;
+    first.push_back(rollout);
+    auto& transitions = first.back().transitions;
+    if (static_cast<int64_t>(transitions.size()) > count) transitions.resize(static_cast<size_t>(count));
+    count -= static_cast<int64_t>(transitions.size());
+  }
+  return first;
+}
+
 std::vector<Rollout> SpreadTransitions(const std::vector<Rollout>& rollouts, int64_t count) {
   std::vector<Rollout> all;
   for (const Rollout& rollout : rollouts) {

@@ -20,6 +20,9 @@ struct BudgetedFit {
 /// @throws std::invalid_argument if not even 10 transitions can be fitted.
 BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>& rollouts, int64_t budget, uint64_t seed, int threads);
 
+/// The first so many transitions.
+std::vector<Rollout> FirstTransitions(const std::vector<Rollout>& rollouts, int64_t count);
+
 /// About so many transitions, in stretches of 25 that are spread over the roll-outs evenly.
 std::vector<Rollout> SpreadTransitions(const std::vector<Rollout>& rollouts, int64_t count);
 

@@ -13,6 +13,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double kWidth = 380, kHeight = 300, kLeft = 62, kGap = 14, kTop = 30, kBelow = 46;  // of a panel
+constexpr size_t kAbreast = 2;
 constexpr double kLegendRow = 20, kLegendColumn = 250;
 
 constexpr char kStyle[] = R"(<style>
@@ -38,7 +39,7 @@ struct Range {
 void DrawPanel(const Panel& panel, double left, double top, Svg& svg) {
   Range x_range, y_range;
   for (const Curve& curve : panel.curves) {
-    for (const double x : curve.x) x_range.Take(x, false);
+    for (const double x : curve.x) x_range.Take(x, panel.logarithmic_x);
     for (const auto* values : {&curve.middle, &curve.low, &curve.high}) {
       for (const double y : *values) y_range.Take(y, panel.logarithmic);
     }
@@ -47,7 +48,7 @@ void DrawPanel(const Panel& panel, double left, double top, Svg& svg) {
   if (!(x_range.low <= x_range.high) || !(y_range.low <= y_range.high)) return;
   const double right = left + kWidth - kGap, bottom = top + kHeight - kBelow;
   const double margin = panel.logarithmic ? 0 : 0.03 * (y_range.high - y_range.low);
-  const Axis x(x_range.low, x_range.high, left + kLeft, right);
+  const Axis x(x_range.low, x_range.high, left + kLeft, right, panel.logarithmic_x);
   const Axis y(y_range.low - margin, y_range.high + margin, bottom, top + kTop, panel.logarithmic);
   svg.Frame(x, y, panel.x_label, panel.y_label, 6, 6);
   svg.BeginClip(left + kLeft, top + kTop, right - left - kLeft, bottom - top - kTop);
@@ -72,18 +73,21 @@ void DrawPanel(const Panel& panel, double left, double top, Svg& svg) {
 }  // namespace
 
 std::string DrawCurves(const std::string& title, const std::vector<Panel>& panels) {
-  const double width = kWidth * static_cast<double>(panels.size());
+  const size_t abreast = std::min(panels.size(), kAbreast);
+  const double width = kWidth * static_cast<double>(abreast), height = kHeight * std::ceil(static_cast<double>(panels.size()) / kAbreast);
   const auto columns = static_cast<size_t>(std::max(1.0, std::floor(width / kLegendColumn)));
   const std::vector<Curve>& curves = panels.at(0).curves;
   const double legend = kLegendRow * static_cast<double>((curves.size() + columns - 1) / columns) + 6;
-  Svg svg(width, legend + kHeight, title);
-  svg.Rectangle(0, 0, width, legend + kHeight, "paper");
+  Svg svg(width, legend + height, title);
+  svg.Rectangle(0, 0, width, legend + height, "paper");
   for (size_t c = 0; c < curves.size(); ++c) {
     const double left = 14 + kLegendColumn * static_cast<double>(c % columns), y = 16 + kLegendRow * static_cast<double>(c / columns);
     svg.Line(left, y - 4, left + 26, y - 4, "line c" + std::to_string(c));
     svg.Text(left + 33, y, curves[c].name, "label", Svg::Anchor::kStart);
   }
-  for (size_t p = 0; p < panels.size(); ++p) DrawPanel(panels[p], kWidth * static_cast<double>(p), legend, svg);
+  for (size_t p = 0; p < panels.size(); ++p) {
+    DrawPanel(panels[p], kWidth * static_cast<double>(p % kAbreast), legend + kHeight * static_cast<double>(p / kAbreast), svg);
+  }
   std::string text = svg.Print();
   return text.insert(text.find("</title>") + 9, kStyle);
 }

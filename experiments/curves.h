@@ -15,9 +15,10 @@ struct Panel {
   std::string title, x_label, y_label;
   bool logarithmic = false;            ///< the y axis; what is not positive is then left out
   std::vector<Curve> curves;           ///< the same names in the same order as the first panel's
+  bool logarithmic_x = false;
 };
 
-/// Panels side by side with one legend above, as SVG. At most eight curves. Colours are told apart by those who see fewer, too
+/// Panels, two abreast, with one legend above, as SVG. At most eight curves. Colours are told apart by those who see fewer, too
 /// (Okabe, Ito, "Color Universal Design", 2008).
 std::string DrawCurves(const std::string& title, const std::vector<Panel>& panels);
 

@@ -8,32 +8,20 @@
 //   plumb-figure-2 robots --output figure_2
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <iostream>
 
-#include "calibrator/methods.h"
 #include "common/atomic_file.h"
 #include "experiments/budget.h"
 #include "experiments/curves.h"
-#include "experiments/loop.h"
 #include "experiments/n_step_error.h"
+#include "experiments/recording.h"
 #include "experiments/results.h"
-#include "experiments/simulated_system.h"
-#include "sim/parameters.h"
 
 namespace plumb {
 namespace {
 
-constexpr int kHorizon = 50, kSimulators = 20, kHeldOut = 5;
-constexpr uint32_t kHeldOutFirst = 1000;  // number of its first episode
-
-struct Task {
-  const char *name, *robot;
-  int updates;  // TRPO's, of the policy that moves the robot
-};
-constexpr Task kTasks[] = {{"pendulum", "pendulum/gym.toml", 60}, {"hopper", "hopper/gym.toml", 150}};
+constexpr int kHorizon = 50, kSimulators = 20;
 
 struct Method {
   const char* key;
@@ -54,61 +42,46 @@ struct Options {
   bool quick = false;
 };
 
-std::string KeyOf(const Task& task, const Method& method, int run) { return fmt::format("{},{},{}", task.name, method.key, run); }
+std::string KeyOf(const PaperTask& task, const Method& method, int run) { return fmt::format("{},{},{}", task.name, method.key, run); }
 
 // What a run's methods have in common.
-struct Recorded {
+struct Remembered {
   std::string of;
-  RobotDescription robot;
-  std::vector<Rollout> seen, held_out;
+  Recording recording;
   int64_t budget = 0;  // simulated steps
 };
 
-Recorded Record(const Options& options, const Task& task, int run, const std::function<void(double)>& progress) {
-  Recorded recorded{fmt::format("{} {}", task.name, run), LoadRobot((std::filesystem::path(options.robots) / task.robot).string()), {}, {}};
-  const RobotDescription& robot = recorded.robot;
-  const auto seed = static_cast<uint64_t>(run);
-  const Eigen::VectorXd hidden = HiddenParameters(robot, seed), noise = options.noise * ReadingNoise(robot);
-  Loop loop(robot, hidden);
-  LoopSettings settings;
-  settings.seed = seed;
-  settings.threads = options.threads;
-  settings.first_updates = options.quick ? 2 : task.updates;
-  const auto trainer = loop.TrainFirst("prior", ParameterDistribution::Prior(robot), settings, progress);
-  SimulatedSystem noisy(robot, hidden, noise, seed), exact(robot, hidden, 0 * noise, seed);
-  for (int i = 0; i < options.iterations; ++i) {
-    recorded.seen.push_back(noisy.Run(trainer->policy(), true, robot.task.steps, static_cast<uint32_t>(i)).rollout);
-  }
-  for (uint32_t i = 0; i < kHeldOut; ++i) {
-    recorded.held_out.push_back(exact.Run(trainer->policy(), true, robot.task.steps, kHeldOutFirst + i).rollout);
-  }
-  recorded.budget = 25 * static_cast<int64_t>(CountTransitions(recorded.seen));
-  return recorded;
+Remembered RecordRun(const Options& options, const PaperTask& task, int run, const std::function<void(double)>& progress) {
+  const int updates = options.quick ? 40 : task.first_updates;
+  const RecordingSettings settings{updates, options.iterations, options.noise, static_cast<uint64_t>(run), options.threads};
+  Remembered remembered{fmt::format("{} {}", task.name, run), Record(LoadTask(options.robots, task), settings, progress)};
+  remembered.budget = 25 * static_cast<int64_t>(CountTransitions(remembered.recording.seen));
+  return remembered;
 }
 
-Results::Rows Measure(const Options& options, const Recorded& recorded, const Method& method, int run) {
+Results::Rows Measure(const Options& options, const Remembered& remembered, const Method& method, int run) {
   const auto seed = static_cast<uint64_t>(run);
-  const RobotDescription& robot = recorded.robot;
+  const RobotDescription& robot = remembered.recording.robot;
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   int64_t simulated = 0;
   if (method.way == Way::kDefault) {
-    const BudgetedFit fit = FitWithin(robot, recorded.seen, recorded.budget / method.share, seed, options.threads);
+    const BudgetedFit fit = FitWithin(robot, remembered.recording.seen, remembered.budget / method.share, seed, options.threads);
     distribution = fit.distribution, simulated = fit.simulated_steps;
   } else if (Learns(method.way)) {
     const auto simopt = MakeSimOpt(method.way, robot, seed, options.threads);
-    for (const Rollout& rollout : recorded.seen) {
+    for (const Rollout& rollout : remembered.recording.seen) {
       simopt->Begin({rollout});
       simopt->Update();
     }
-    distribution = DistributionOf(*simopt, robot), simulated = recorded.budget;
+    distribution = DistributionOf(*simopt, robot), simulated = remembered.budget;
   }
-  const Eigen::VectorXd errors = NStepErrors(robot, distribution, recorded.held_out, kHorizon, kSimulators, 10, seed);
+  const Eigen::VectorXd errors = NStepErrors(robot, distribution, remembered.recording.held_out, kHorizon, kSimulators, 10, seed);
   Results::Rows rows;
   for (int n = 1; n <= kHorizon; ++n) rows.push_back({static_cast<double>(n), errors(n - 1), static_cast<double>(simulated)});
   return rows;
 }
 
-Panel Draw(const Options& options, const Task& task, const Results& results) {
+Panel Draw(const Options& options, const PaperTask& task, const Results& results) {
   Panel panel{task.name, "n, control steps", "error after n steps, standard units", true, {}};
   for (const Method& method : kMethods) {
     Curve curve{method.label, {}, {}, {}, {}};
@@ -134,7 +107,7 @@ std::string Below(const Panel& panel, size_t first, size_t second) {
   return fmt::format("at {} of n = 1 ... {}, bands apart at {}", below, kJudged, apart);
 }
 
-std::string Sentence(const Options& options, const Task& task, const Panel& panel, const Results& results) {
+std::string Sentence(const Options& options, const PaperTask& task, const Panel& panel, const Results& results) {
   std::string text = fmt::format("{}, {} runs, error after 1, 10, 20, 50 steps, simulated steps:", task.name, options.runs);
   for (size_t m = 0; m < kMethods.size(); ++m) {
     double simulated = 0;
@@ -151,20 +124,20 @@ int MakeFigure(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
   Results results(folder / "figure_2.csv", {"task", "method", "run"}, {"n", "error", "simulated_steps"});
   std::vector<Job> jobs;
-  Recorded recorded;
-  for (const Task& task : kTasks) {
+  Remembered remembered;
+  for (const PaperTask& task : kPaperTasks) {
     for (int run = 1; run <= options.runs; ++run) {
       for (const Method& method : kMethods) {
         jobs.push_back({KeyOf(task, method, run), 1, [&, run](const auto& progress) {
-                          if (recorded.of != fmt::format("{} {}", task.name, run)) recorded = Record(options, task, run, progress);
-                          return Measure(options, recorded, method, run);
+                          if (remembered.of != fmt::format("{} {}", task.name, run)) remembered = RecordRun(options, task, run, progress);
+                          return Measure(options, remembered, method, run);
                         }});
       }
     }
   }
   if (!RunJobs(process, jobs, results)) return 130;
   std::vector<Panel> panels;
-  for (const Task& task : kTasks) {
+  for (const PaperTask& task : kPaperTasks) {
     panels.push_back(Draw(options, task, results));
     std::cout << Sentence(options, task, panels.back(), results) << "\n";
   }
@@ -189,7 +162,7 @@ int main(int argc, char** argv) {
             ->check(CLI::Range(0.0, 1000.0))
             ->capture_default_str();
         app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
+        app.add_flag("--quick", options.quick, "a policy that has hardly been trained: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::MakeFigure(process, options); });
 }

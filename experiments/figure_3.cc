@@ -12,7 +12,7 @@
 
 #include "common/atomic_file.h"
 #include "experiments/curves.h"
-#include "experiments/loop.h"
+#include "experiments/recording.h"
 #include "experiments/results.h"
 #include "experiments/simulated_system.h"
 #include "sim/parameters.h"
@@ -24,19 +24,13 @@ constexpr Way kWays[] = {Way::kOriginal, Way::kStep, Way::kDefault, Way::kPrior,
 constexpr double kRobotSeconds = 6;  // of an iteration: five of them are half a minute
 constexpr double kEnough = 0.95;     // of the oracle's return
 
-struct Task {
-  const char *name, *robot;
-  int first_updates, next_updates;
-};
-constexpr Task kTasks[] = {{"pendulum", "pendulum/gym.toml", 60, 15}, {"hopper", "hopper/gym.toml", 334, 60}};
-
 struct Options {
   std::string robots, output = ".";
   int runs = 5, iterations = 10, threads = 0;
   bool quick = false;
 };
 
-std::string KeyOf(const Task& task, Way way, int run) { return fmt::format("{},{},{}", task.name, Key(way), run); }
+std::string KeyOf(const PaperTask& task, Way way, int run) { return fmt::format("{},{},{}", task.name, Key(way), run); }
 
 // The loop of a task and a run, which remembers the first policy.
 struct Remembered {
@@ -44,8 +38,8 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
-Results::Rows RunLoop(const Options& options, const Task& task, Way way, int run, Remembered& remembered, const std::function<void(double)>& progress) {
-  const RobotDescription robot = LoadRobot((std::filesystem::path(options.robots) / task.robot).string());
+Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, int run, Remembered& remembered, const std::function<void(double)>& progress) {
+  const RobotDescription robot = LoadTask(options.robots, task);
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = HiddenParameters(robot, seed);
   if (const std::string of = fmt::format("{} {}", task.name, run); remembered.of != of) remembered = {of, std::make_unique<Loop>(robot, hidden)};
@@ -68,7 +62,7 @@ Results::Rows RunLoop(const Options& options, const Task& task, Way way, int run
   return rows;
 }
 
-Panel Draw(const Options& options, const Task& task, const Results& results) {
+Panel Draw(const Options& options, const PaperTask& task, const Results& results) {
   Panel panel{task.name, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
   for (const Way way : kWays) {
     Curve curve{Label(way), {}, {}, {}, {}};
@@ -86,7 +80,7 @@ Panel Draw(const Options& options, const Task& task, const Results& results) {
 // After k iterations, of all runs; a return below zero is a cost, of which the oracle's is the least.
 double ShareOfOracle(double value, double oracle) { return oracle > 0 ? value / oracle : oracle / value; }
 
-std::string Sentence(const Options& options, const Task& task, const Results& results) {
+std::string Sentence(const Options& options, const PaperTask& task, const Results& results) {
   std::string text = fmt::format("{}: return on the robot after 0, {}, {} iterations (mean of {} runs):", task.name,
                                  std::min(5, options.iterations), options.iterations, options.runs);
   const auto mean = [&](Way way, int k) {
@@ -114,7 +108,7 @@ int MakeFigure(Process& process, const Options& options) {
                   {"iteration", "robot_return", "simulated_return", "discrepancy", "transitions", "robot_seconds", "parameter_error"});
   std::vector<Job> jobs;
   Remembered remembered;
-  for (const Task& task : kTasks) {
+  for (const PaperTask& task : kPaperTasks) {
     for (int run = 1; run <= options.runs; ++run) {
       for (const Way way : kWays) {
         const double weight = task.first_updates * (Learns(way) ? 0.5 : 1.0) + options.iterations * task.next_updates;
@@ -126,7 +120,7 @@ int MakeFigure(Process& process, const Options& options) {
   }
   if (!RunJobs(process, jobs, results)) return 130;
   std::vector<Panel> panels;
-  for (const Task& task : kTasks) {
+  for (const PaperTask& task : kPaperTasks) {
     panels.push_back(Draw(options, task, results));
     std::cout << Sentence(options, task, results) << "\n";
   }

@@ -1,0 +1,37 @@
+#include "experiments/recording.h"
+
+#include <filesystem>
+
+#include "experiments/simulated_system.h"
+#include "sim/parameters.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kHeldOut = 5;               // episodes
+constexpr uint32_t kHeldOutFirst = 1000;  // number of the first of them
+
+}  // namespace
+
+RobotDescription LoadTask(const std::string& robots, const PaperTask& task) { return LoadRobot((std::filesystem::path(robots) / task.robot).string()); }
+
+Recording Record(const RobotDescription& robot, const RecordingSettings& settings, const std::function<void(double)>& progress) {
+  Recording recording{robot, HiddenParameters(robot, settings.seed), nullptr, {}, {}};
+  recording.loop = std::make_shared<Loop>(robot, recording.hidden);
+  LoopSettings first;
+  first.seed = settings.seed;
+  first.threads = settings.threads;
+  first.first_updates = settings.updates;
+  const auto trainer = recording.loop->TrainFirst(Key(Way::kPrior), ParameterDistribution::Prior(robot), first, progress);
+  const Eigen::VectorXd noise = settings.noise * ReadingNoise(robot);
+  SimulatedSystem read(robot, recording.hidden, noise, settings.seed), exact(robot, recording.hidden, 0 * noise, settings.seed);
+  for (int i = 0; i < settings.episodes; ++i) {
+    recording.seen.push_back(read.Run(trainer->policy(), true, robot.task.steps, static_cast<uint32_t>(i)).rollout);
+  }
+  for (uint32_t i = 0; i < kHeldOut; ++i) {
+    recording.held_out.push_back(exact.Run(trainer->policy(), true, robot.task.steps, kHeldOutFirst + i).rollout);
+  }
+  return recording;
+}
+
+}  // namespace plumb

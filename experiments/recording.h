@@ -1,0 +1,45 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "calibrator/transitions.h"
+#include "controller/policy.h"
+#include "experiments/loop.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// One of the paper's two tasks.
+struct PaperTask {
+  const char *name, *robot;  ///< file below robots/
+  int first_updates;         ///< TRPO's, of a first policy
+  int next_updates;          ///< and of each later one
+};
+inline constexpr PaperTask kPaperTasks[] = {{"pendulum", "pendulum/gym.toml", 60, 15}, {"hopper", "hopper/gym.toml", 334, 60}};
+
+RobotDescription LoadTask(const std::string& robots, const PaperTask& task);
+
+/// What a policy did on a robot with parameters that are drawn for each seed.
+struct Recording {
+  RobotDescription robot;
+  Eigen::VectorXd hidden;
+  std::shared_ptr<Loop> loop;     ///< that has trained the policy
+  std::vector<Rollout> seen;      ///< states as they are read, with noise
+  std::vector<Rollout> held_out;  ///< without: to judge by
+};
+
+struct RecordingSettings {
+  int updates;       ///< TRPO's, of the policy, which is trained on the prior
+  int episodes;      ///< seen
+  double noise = 1;  ///< of the readings, a factor
+  uint64_t seed = 1;
+  int threads = 0;
+};
+
+/// Trains a policy and rolls it out. Episodes are as long as the task's. @param progress told the share that is done; may throw to break off.
+Recording Record(const RobotDescription& robot, const RecordingSettings& settings, const std::function<void(double)>& progress);
+
+}  // namespace plumb
