@@ -39,6 +39,7 @@ struct Options {
   std::string robots, output = ".";
   int runs = 5, iterations = 40, threads = 0;
   double noise = 1;
+  Hidden hidden = Hidden::kPaper;
   bool quick = false;
 };
 
@@ -53,7 +54,7 @@ struct Remembered {
 
 Remembered RecordRun(const Options& options, const PaperTask& task, int run, const std::function<void(double)>& progress) {
   const int updates = options.quick ? 40 : task.first_updates;
-  const RecordingSettings settings{updates, options.iterations, options.noise, static_cast<uint64_t>(run), options.threads};
+  const RecordingSettings settings{updates, options.iterations, options.noise, options.hidden, static_cast<uint64_t>(run), options.threads};
   Remembered remembered{fmt::format("{} {}", task.name, run), Record(LoadTask(options.robots, task), settings, progress)};
   remembered.budget = 25 * static_cast<int64_t>(CountTransitions(remembered.recording.seen));
   return remembered;
@@ -120,9 +121,13 @@ std::string Sentence(const Options& options, const PaperTask& task, const Panel&
   return text;
 }
 
+std::string SettingsOf(const Options& options) {
+  return fmt::format("iterations {}, noise {}, hidden {}{}", options.iterations, options.noise, Key(options.hidden), options.quick ? ", quick" : "");
+}
+
 int MakeFigure(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
-  Results results(folder / "figure_2.csv", {"task", "method", "run"}, {"n", "error", "simulated_steps"});
+  Results results(folder / "figure_2.csv", SettingsOf(options), {"task", "method", "run"}, {"n", "error", "simulated_steps"});
   std::vector<Job> jobs;
   Remembered remembered;
   for (const PaperTask& task : kPaperTasks) {
@@ -161,6 +166,7 @@ int main(int argc, char** argv) {
         app.add_option("--noise", options.noise, "of the readings: a factor; 0 = exact, as in the paper")
             ->check(CLI::Range(0.0, 1000.0))
             ->capture_default_str();
+        plumb::AddHiddenFlag(app, options.hidden);
         app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
         app.add_flag("--quick", options.quick, "a policy that has hardly been trained: looks whether it runs");
       },

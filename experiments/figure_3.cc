@@ -15,7 +15,6 @@
 #include "experiments/recording.h"
 #include "experiments/results.h"
 #include "experiments/simulated_system.h"
-#include "sim/parameters.h"
 
 namespace plumb {
 namespace {
@@ -27,6 +26,7 @@ constexpr double kEnough = 0.95;     // of the oracle's return
 struct Options {
   std::string robots, output = ".";
   int runs = 5, iterations = 10, threads = 0;
+  Hidden hidden = Hidden::kPaper;
   bool quick = false;
 };
 
@@ -41,7 +41,7 @@ struct Remembered {
 Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, int run, Remembered& remembered, const std::function<void(double)>& progress) {
   const RobotDescription robot = LoadTask(options.robots, task);
   const auto seed = static_cast<uint64_t>(run);
-  const Eigen::VectorXd hidden = HiddenParameters(robot, seed);
+  const Eigen::VectorXd hidden = DrawHidden(robot, options.hidden, seed);
   if (const std::string of = fmt::format("{} {}", task.name, run); remembered.of != of) remembered = {of, std::make_unique<Loop>(robot, hidden)};
   SimulatedSystem real(robot, hidden, ReadingNoise(robot), seed);
   LoopSettings settings;
@@ -54,7 +54,7 @@ Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, in
   settings.seed = seed;
   settings.threads = options.threads;
   Results::Rows rows;
-  for (const LoopRow& row : remembered.loop->Run(real, settings, progress)) {
+  for (const LoopRow& row : remembered.loop->Run(real, settings, progress).rows) {
     const double error = std::sqrt((row.mean.array() / hidden.array() - 1).square().mean());
     rows.push_back({static_cast<double>(row.iteration), row.robot_return, row.simulated_return, row.discrepancy,
                     static_cast<double>(row.transitions), row.robot_seconds, error});
@@ -102,9 +102,13 @@ std::string Sentence(const Options& options, const PaperTask& task, const Result
   return text;
 }
 
+std::string SettingsOf(const Options& options) {
+  return fmt::format("iterations {}, hidden {}{}", options.iterations, Key(options.hidden), options.quick ? ", quick" : "");
+}
+
 int MakeFigure(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
-  Results results(folder / "figure_3.csv", {"task", "way", "run"},
+  Results results(folder / "figure_3.csv", SettingsOf(options), {"task", "way", "run"},
                   {"iteration", "robot_return", "simulated_return", "discrepancy", "transitions", "robot_seconds", "parameter_error"});
   std::vector<Job> jobs;
   Remembered remembered;
@@ -140,6 +144,7 @@ int main(int argc, char** argv) {
         app.add_option("--output", options.output, "folder for figure_3.csv and figure_3.svg")->capture_default_str();
         app.add_option("--runs", options.runs, "seeds, and robots, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
         app.add_option("--iterations", options.iterations, "of SimOpt")->check(CLI::Range(1, 1000))->capture_default_str();
+        plumb::AddHiddenFlag(app, options.hidden);
         app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
         app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
       },

@@ -50,7 +50,7 @@ std::unique_ptr<Trainer> Loop::TrainFirst(const std::string& name, const Paramet
   return trainer;
 }
 
-std::vector<LoopRow> Loop::Run(RealSystem& real, const LoopSettings& settings, const std::function<void(double)>& progress) {
+LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings, const std::function<void(double)>& progress) {
   ParameterDistribution distribution = FirstDistribution(settings.way, model_, truth_);
   const std::unique_ptr<SimOpt> simopt = Learns(settings.way) ? MakeSimOpt(settings.way, model_, settings.seed, settings.threads) : nullptr;
   const double all = settings.first_updates + settings.iterations * settings.next_updates;
@@ -58,14 +58,14 @@ std::vector<LoopRow> Loop::Run(RealSystem& real, const LoopSettings& settings, c
   const std::unique_ptr<Trainer> trainer = TrainFirst(Learns(settings.way) ? Key(Way::kPrior) : Key(settings.way), distribution, settings,
                                                       [&](double share) { progress(first * share); });
   const ParameterSampler sample = [&](Random& random) { return distribution.Sample(random); };
-  std::vector<LoopRow> rows;
+  LoopResult result;
   int64_t transitions = 0;
   double seconds = 0, discrepancy = std::numeric_limits<double>::quiet_NaN();
   for (int iteration = 0;; ++iteration) {
-    rows.push_back({iteration, Judge(real, trainer->policy(), model_.task.steps, settings.evaluation_episodes),
+    result.rows.push_back({iteration, Judge(real, trainer->policy(), model_.task.steps, settings.evaluation_episodes),
                     trainer->EvaluateHeldOut(sample, settings.evaluation_episodes).mean, discrepancy, transitions, seconds,
                     distribution.Mean(), distribution.Sd()});
-    if (iteration == settings.iterations) return rows;
+    if (iteration == settings.iterations) break;
     if (simopt) {
       std::vector<Rollout> rollouts = RollOut(real, trainer->policy(), settings.steps_per_iteration, iteration, &seconds);
       transitions += static_cast<int64_t>(CountTransitions(rollouts));
@@ -81,6 +81,8 @@ std::vector<LoopRow> Loop::Run(RealSystem& real, const LoopSettings& settings, c
       progress(first + next * (iteration + static_cast<double>(i) / settings.next_updates));
     }
   }
+  if (simopt) result.rollouts = simopt->state().rollouts;
+  return result;
 }
 
 double Loop::Judge(RealSystem& real, const GaussianPolicy& policy, int steps, int episodes) {

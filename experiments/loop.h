@@ -35,6 +35,11 @@ struct LoopRow {
   Eigen::VectorXd mean, sd; ///< of the parameters, physical units
 };
 
+struct LoopResult {
+  std::vector<LoopRow> rows;
+  std::vector<Rollout> rollouts;  ///< that were calibrated with
+};
+
 /// Trains policies, one way after the other. The first policy of a distribution is trained once for all ways that begin with it.
 class Loop {
  public:
@@ -42,7 +47,7 @@ class Loop {
   Loop(RobotDescription model, Eigen::VectorXd truth);
 
   /// @param real used for roll-outs and judgement. @param progress told the share that is done; may throw to break off.
-  std::vector<LoopRow> Run(RealSystem& real, const LoopSettings& settings, const std::function<void(double)>& progress);
+  LoopResult Run(RealSystem& real, const LoopSettings& settings, const std::function<void(double)>& progress);
 
   /// Return without exploration, mean of some episodes.
   static double Judge(RealSystem& real, const GaussianPolicy& policy, int steps, int episodes);

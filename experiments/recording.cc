@@ -1,6 +1,7 @@
 #include "experiments/recording.h"
 
 #include <filesystem>
+#include <map>
 
 #include "experiments/simulated_system.h"
 #include "sim/parameters.h"
@@ -9,14 +10,30 @@ namespace plumb {
 namespace {
 
 constexpr int kHeldOut = 5;               // episodes
+constexpr uint32_t kHiddenStream = 0x41dde4;
 constexpr uint32_t kHeldOutFirst = 1000;  // number of the first of them
 
 }  // namespace
 
 RobotDescription LoadTask(const std::string& robots, const PaperTask& task) { return LoadRobot((std::filesystem::path(robots) / task.robot).string()); }
 
+std::string Key(Hidden hidden) { return hidden == Hidden::kPaper ? "paper" : "prior"; }
+
+Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_t seed) {
+  if (hidden == Hidden::kPaper) return HiddenParameters(robot, seed);
+  Random random(seed, {kHiddenStream});
+  return ParameterDistribution::Prior(robot).Sample(random);
+}
+
+void AddHiddenFlag(CLI::App& app, Hidden& hidden) {
+  const std::map<std::string, Hidden> names{{Key(Hidden::kPaper), Hidden::kPaper}, {Key(Hidden::kPrior), Hidden::kPrior}};
+  app.add_option("--hidden", hidden, "where the robot's parameters are drawn from: the paper's narrow ranges, or the whole prior")
+      ->transform(CLI::CheckedTransformer(names, CLI::ignore_case))
+      ->default_str("paper");
+}
+
 Recording Record(const RobotDescription& robot, const RecordingSettings& settings, const std::function<void(double)>& progress) {
-  Recording recording{robot, HiddenParameters(robot, settings.seed), nullptr, {}, {}};
+  Recording recording{robot, DrawHidden(robot, settings.hidden, settings.seed), nullptr, {}, {}};
   recording.loop = std::make_shared<Loop>(robot, recording.hidden);
   LoopSettings first;
   first.seed = settings.seed;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <string>
@@ -22,6 +23,20 @@ inline constexpr PaperTask kPaperTasks[] = {{"pendulum", "pendulum/gym.toml", 60
 
 RobotDescription LoadTask(const std::string& robots, const PaperTask& task);
 
+/// Where a robot's parameters are drawn from.
+enum class Hidden {
+  kPaper,  ///< the ranges of [virtual_robot.hidden], which are narrow
+  kPrior,  ///< the prior: as far off as whoever wrote it thought possible
+};
+
+std::string Key(Hidden hidden);  ///< "paper", "prior"
+
+/// Parameters of "the real robot". @return physical units, order of robot.parameters.
+Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_t seed);
+
+/// The flag --hidden of an experiment.
+void AddHiddenFlag(CLI::App& app, Hidden& hidden);
+
 /// What a policy did on a robot with parameters that are drawn for each seed.
 struct Recording {
   RobotDescription robot;
@@ -35,6 +50,7 @@ struct RecordingSettings {
   int updates;       ///< TRPO's, of the policy, which is trained on the prior
   int episodes;      ///< seen
   double noise = 1;  ///< of the readings, a factor
+  Hidden hidden = Hidden::kPaper;
   uint64_t seed = 1;
   int threads = 0;
 };

@@ -24,14 +24,20 @@ std::string Words(double seconds) {
 
 }  // namespace
 
-Results::Results(std::filesystem::path file, std::vector<std::string> keys, std::vector<std::string> values) : file_(std::move(file)) {
-  header_ = fmt::format("{},{}", fmt::join(keys, ","), fmt::join(values, ","));
+Results::Results(std::filesystem::path file, const std::string& settings, std::vector<std::string> keys, std::vector<std::string> values)
+    : file_(std::move(file)) {
+  const std::string columns = fmt::format("{},{}", fmt::join(keys, ","), fmt::join(values, ","));
+  header_ = "# " + settings + "\n" + columns;
   if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path());
   std::ifstream stream(file_);
   if (!stream) return;
   const std::runtime_error foreign(file_.string() + ": not a table of this experiment: delete it, or give another --output");
   std::string line;
-  if (!std::getline(stream, line) || line != header_) throw foreign;
+  if (!std::getline(stream, line) || line.compare(0, 2, "# ") != 0) throw foreign;
+  if (line.substr(2) != settings) {
+    throw std::runtime_error(fmt::format("{}: was made with '{}', not '{}': delete it, or give another --output", file_.string(), line.substr(2), settings));
+  }
+  if (!std::getline(stream, line) || line != columns) throw foreign;
   while (std::getline(stream, line)) {
     size_t end = 0;
     for (size_t i = 0; i < keys.size(); ++i) {

@@ -16,8 +16,9 @@ class Results {
  public:
   using Rows = std::vector<std::vector<double>>;
 
-  /// Reads what is there. @param keys,values names of the columns. @throws std::runtime_error if the file is not such a table.
-  Results(std::filesystem::path file, std::vector<std::string> keys, std::vector<std::string> values);
+  /// Reads what is there. @param settings that all results depend on, in words: the first line, after a #.
+  /// @param keys,values names of the columns. @throws std::runtime_error if the file is no such table, or one of other settings.
+  Results(std::filesystem::path file, const std::string& settings, std::vector<std::string> keys, std::vector<std::string> values);
 
   bool Has(const std::string& key) const { return index_.count(key) > 0; }
   /// @param key values of the key's columns, separated by commas. @throws std::out_of_range if there is none.

@@ -35,6 +35,7 @@ constexpr double kTargets[] = {0.01, 0.001};  // errors after kHorizon steps, st
 struct Options {
   std::string robots, output = ".";
   int runs = 5, threads = 0;
+  Hidden hidden = Hidden::kPaper;
   bool quick = false;
 };
 
@@ -107,7 +108,7 @@ class Experiment {
     const std::string of = fmt::format("{} {}", task.name, run);
     if (now_.of == of) return;
     const RobotDescription robot = LoadTask(options_.robots, task);
-    const RecordingSettings settings{options_.quick ? 40 : task.first_updates, kUpdates, 1, static_cast<uint64_t>(run), options_.threads};
+    const RecordingSettings settings{options_.quick ? 40 : task.first_updates, kUpdates, 1, options_.hidden, static_cast<uint64_t>(run), options_.threads};
     now_ = {of, Record(robot, settings, progress)};
   }
 
@@ -187,10 +188,12 @@ std::string Needed(const Curve& curve, const std::function<bool(double)>& good) 
 
 double ShareOfOracle(double value, double oracle) { return oracle > 0 ? value / oracle : oracle / value; }
 
+std::string SettingsOf(const Options& options) { return fmt::format("hidden {}{}", Key(options.hidden), options.quick ? ", quick" : ""); }
+
 int Measure(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
-  Results robot(folder / "sample_efficiency_robot.csv", {"task", "way", "run"}, {"transitions", "robot_return"});
-  Results simulator(folder / "sample_efficiency_simulator.csv", {"task", "way", "run"}, {"simulated_steps", "error"});
+  Results robot(folder / "sample_efficiency_robot.csv", SettingsOf(options), {"task", "way", "run"}, {"transitions", "robot_return"});
+  Results simulator(folder / "sample_efficiency_simulator.csv", SettingsOf(options), {"task", "way", "run"}, {"simulated_steps", "error"});
   Experiment experiment(options);
   std::vector<Job> robot_jobs, simulator_jobs;
   for (const PaperTask& task : kPaperTasks) {
@@ -247,6 +250,7 @@ int main(int argc, char** argv) {
         app.add_option("robots", options.robots, "the folder robots/")->required();
         app.add_option("--output", options.output, "folder for the tables and sample_efficiency.svg")->capture_default_str();
         app.add_option("--runs", options.runs, "seeds, and robots, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
+        plumb::AddHiddenFlag(app, options.hidden);
         app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
         app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
       },
