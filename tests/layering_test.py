@@ -22,11 +22,11 @@ BELOW = {
     "calibrator": {"common", "robot", "sim", "sim/tasks", "calibrator/inference"},
     "trainer": {"common", "robot", "sim", "sim/tasks", "controller"},
     "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "controller", "calibrator", "calibrator/inference", "trainer"},
-    "experiments": {"common", "robot", "sim", "sim/tasks", "calibrator", "calibrator/inference", "trainer", "controller"},
+    "experiments": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "calibrator", "calibrator/inference", "trainer", "controller"},
 }
 # The virtual robot speaks the protocols' device side. Only the estimator's process knows its filter on the simulator.
 EXCEPTIONS = {(f"sim/{file}", "drivers") for file in
-              ("main.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h", "virtual_drives.cc", "virtual_sensors.cc")} | {("estimator/main.cc", "estimator/model"), ("estimator/main.cc", "sim")}
+              ("main.cc", "virtual_bus.h", "virtual_bus.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h", "virtual_drives.cc", "virtual_sensors.cc")} | {("estimator/main.cc", "estimator/model"), ("estimator/main.cc", "sim")}
 SYSTEM = {
     r"(SimTK\w*|Simbody)\.h|simbody/": lambda p: p.startswith("sim/") and p.endswith(".cc"),
     r"onnx/|google/protobuf/": lambda p: p.startswith("trainer/onnx_") and p.endswith(".cc"),
