@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Dependencies point down only: which folder may include which. Exit status 1 names every line that does not.
 
-Also: SimTK headers only in sim/*.cc, MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in
+Also: SimTK headers only in sim/*.cc, MuJoCo's only in sim/mujoco_engine.cc, MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in
 main.cc files, common/ and drivers/can/ (tests aside).
 """
 import pathlib
@@ -29,6 +29,7 @@ EXCEPTIONS = {(f"sim/{file}", "drivers") for file in
               ("main.cc", "virtual_bus.h", "virtual_bus.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h", "virtual_drives.cc", "virtual_sensors.cc")} | {("estimator/main.cc", "estimator/model"), ("estimator/main.cc", "sim")}
 SYSTEM = {
     r"(SimTK\w*|Simbody)\.h|simbody/": lambda p: p.startswith("sim/") and p.endswith(".cc"),
+    r"mujoco/": lambda p: p == "sim/mujoco_engine.cc",
     r"onnx/|google/protobuf/": lambda p: p.startswith("trainer/onnx_") and p.endswith(".cc"),
     r"lcm/": lambda p: p.startswith(("common/", "drivers/can/")) or p.endswith("main.cc"),
     r"mpi\.h": lambda p: p == "common/ranks.cc",
