@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <stdexcept>
@@ -17,6 +18,13 @@ std::string Words(const Eigen::Vector3d& v) { return fmt::format("{:.17g} {:.17g
 std::string Turn(const Eigen::Matrix3d& rotation) {
   const Eigen::Quaterniond q(rotation);
   return fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}", q.w(), q.x(), q.y(), q.z());
+}
+
+/// MuJoCo knows no rods that are infinitely thin.
+Eigen::Matrix3d Solid(const Eigen::Matrix3d& inertia) {
+  const double least = 1e-9 * inertia.trace();
+  const bool thin = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues()[0] < least;
+  return inertia + (thin ? least : 0) * Eigen::Matrix3d::Identity();
 }
 
 void RequireKnown(const JointDescription& joint) {
@@ -70,14 +78,14 @@ class Writer {
     Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
     size_t last = first;
     for (;; ++last) {
-      frame = frame * Eigen::Translation3d(joint(last).origin) * joint(last).rotation;
+      frame.translate(joint(last).origin).rotate(joint(last).rotation);
       placed.push_back({last, frame});
       if (!Weightless(last)) break;
     }
     text_ += fmt::format("<body pos=\"{}\" quat=\"{}\">\n", Words(frame.translation()), Turn(frame.linear()));
     for (const Placed& p : placed) WriteJoint(joint(p.joint), frame.inverse() * p.frame);
     const LinkDescription& link = robot_.links[last + 1];
-    const Eigen::Matrix3d& inertia = link.inertia;
+    const Eigen::Matrix3d inertia = Solid(link.inertia);
     text_ += fmt::format(
         "<inertial pos=\"{}\" mass=\"{:.17g}\" "
         "fullinertia=\"{:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\"/>\n",
