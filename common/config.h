@@ -38,8 +38,11 @@ inline constexpr Range kFinite{std::numeric_limits<double>::lowest(), std::numer
 /// column. Not thread-safe.
 class Config {
  public:
-  /// Reads a file. @throws ConfigError if it cannot be opened or parsed.
-  static Config Load(const std::string& file);
+  /// Reads a file, and the one that its key `extends` names, relative to its folder: what the file says stands in place of
+  /// what that one says; tables are merged, and of arrays of tables those with the same `name`.
+  /// @throws ConfigError if one cannot be opened or parsed, or they extend each other.
+  /// @param files if not null, those that were read are appended to it, this one first.
+  static Config Load(const std::string& file, std::vector<std::string>* files = nullptr);
   /// Reads text, for tests; `name` stands for the file.
   static Config Parse(const std::string& text, const std::string& name);
 
@@ -73,6 +76,8 @@ class Config {
 
   /// Call when everything has been read: the first key nobody read is an error.
   void Finish() const;
+  /// "file:line:column: " of `key` (or of the table, if it has no such key).
+  std::string Position(const std::string& key) const;
   /// An error at the position of `key` (or of the table, if it has no such key).
   [[noreturn]] void Fail(const std::string& key, const std::string& what) const;
 

@@ -74,7 +74,8 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   std::error_code error;
   if (fs::is_directory(file, error)) file /= "robot.toml";
   if (!fs::exists(file, error)) throw ConfigError(file.string() + ": there is no such robot");
-  Config root = Config::Load(file.string());
+  std::vector<std::string> files;
+  Config root = Config::Load(file.string(), &files);
 
   RobotDescription robot;
   robot.file = file.string();
@@ -85,7 +86,9 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   if (!fs::exists(urdf_path, error)) header.Fail("urdf", fmt::format("= \"{}\": there is no such file", urdf_file));
   header.Finish();
   UrdfModel urdf = LoadUrdf(urdf_path);
-  robot.fingerprint = Fingerprint(urdf_path, Fingerprint(robot.file, kFnvOffset));
+  files.push_back(urdf_path);
+  robot.fingerprint = kFnvOffset;
+  for (const std::string& part : files) robot.fingerprint = Fingerprint(part, robot.fingerprint);
   if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);
   ReadJoints(root, urdf);
   robot.links = std::move(urdf.links);
@@ -108,7 +111,7 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.controller = ReadController(root.Table("controller"));
   robot.calibration = ReadCalibration(root.Table("calibration"));
   robot.training = ReadTraining(root.Table("training"));
-  robot.virtual_robot = ReadVirtualRobot(root.Table("virtual_robot"), robot.parameters);
+  robot.virtual_robot = ReadVirtualRobot(root.Table("virtual_robot"), robot);
   root.Finish();
   return robot;
 }

@@ -295,11 +295,26 @@ struct HiddenParameter {
   double lower, upper;
 };
 
+/// What a virtual robot's joint with a motor has besides its JointDynamics: none of the models knows of it.
+struct UnmodelledJoint {
+  int joint = -1;       ///< index into joints
+  double friction = 0;  ///< [Nm] or [N] >= 0 of Coulomb friction
+  double delay = 0;     ///< [s] 0 to JointDynamics::kLongestDelay, of efforts
+  double backlash = 0;  ///< [rad] or [m] >= 0 between the two ends of the gear's play
+  double rotor = 0;     ///< [kg m^2] or [kg], seen at the joint, of what is before the play; > 0 if there is any
+};
+
 struct VirtualRobotSettings {
+  /// What integrates its motion, see Mechanism.
+  enum class Engine { kAuto, kMujoco };
+
   double watchdog;   ///< [s]
   double heartbeat;  ///< [s]
   int encoder_bits;  ///< per motor turn
-  std::vector<HiddenParameter> hidden;
+  std::vector<HiddenParameter> hidden = {};
+  Engine engine = Engine::kAuto;
+  std::string engine_source = {};  ///< "file:line:column: " of the engine, for messages
+  std::vector<UnmodelledJoint> joints = {};
 };
 
 /// Everything there is to know about a robot: robot.urdf and robot.toml, validated.
@@ -307,7 +322,7 @@ struct VirtualRobotSettings {
 /// The generalised coordinates q, v are the joints' one after the other: one each, but for spherical joints.
 struct RobotDescription {
   std::string file;  ///< the TOML file
-  uint64_t fingerprint = 0;  ///< of the contents of both files (FNV-1a): a checkpoint of other contents is another's
+  uint64_t fingerprint = 0;  ///< of the contents of all files (FNV-1a): a checkpoint of other contents is another's
   std::string name;
   std::vector<LinkDescription> links;
   std::vector<JointDescription> joints;

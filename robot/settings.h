@@ -15,6 +15,7 @@ SimulationSettings ReadSimulation(Config config, double period);
 ControllerSettings ReadController(Config config);
 CalibrationSettings ReadCalibration(Config config);
 TrainingSettings ReadTraining(Config config);
-VirtualRobotSettings ReadVirtualRobot(Config config, const std::vector<ParameterDescription>& parameters);
+/// @param robot with joints and parameters.
+VirtualRobotSettings ReadVirtualRobot(Config config, const RobotDescription& robot);
 
 }  // namespace plumb

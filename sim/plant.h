@@ -5,6 +5,7 @@
 #include <string>
 
 #include "robot/description.h"
+#include "sim/motion_engine.h"
 
 namespace plumb {
 
@@ -13,7 +14,7 @@ namespace plumb {
 /// force and articulated bodies, integrated by the classical Runge-Kutta method of fourth order. Of
 /// JointDynamics it knows damping, friction, springs and motor gains; armature, stops and contact it does not
 /// have. Not thread-safe.
-class Plant {
+class Plant : public MotionEngine {
  public:
   static constexpr double kStickSpeed = 0.01;  ///< [rad/s] or [m/s] below which friction is viscous
 
@@ -22,20 +23,17 @@ class Plant {
   /// 1e-10 rad up to 8 rad/s, a millionth of an encoder's count.
   /// @throws std::invalid_argument if the joints do not form a tree or Simbody refuses the inertias.
   explicit Plant(const RobotDescription& robot, double max_step = 0.005);
-  ~Plant();
+  ~Plant() override;
 
   /// What of the robot this physics leaves out, as a sentence; empty if nothing.
   static std::string Lacks(const RobotDescription& robot);
 
-  /// @throws std::invalid_argument if an entry is not finite or the size is wrong; the state is then
-  /// unchanged.
-  void SetState(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v);
-  /// Holds `effort` [Nm or N] for `duration` [s] >= 0 in equal steps. A state that would not be finite is not
-  /// taken on: the plant then stays where it was. Not for spherical joints. @return false in that case.
-  bool Advance(const Eigen::Ref<const Eigen::VectorXd>& effort, double duration);
+  void SetState(const Vector& q, const Vector& v) override;
+  /// In equal steps. Not for spherical joints.
+  bool Advance(const Vector& effort, double duration) override;
 
-  const Eigen::VectorXd& q() const;  ///< [rad or m]
-  const Eigen::VectorXd& v() const;  ///< [rad/s or m/s]
+  const Eigen::VectorXd& q() const override;
+  const Eigen::VectorXd& v() const override;
   /// Acceleration [rad/s^2 or m/s^2] at the current state.
   Eigen::VectorXd Acceleration(const Eigen::Ref<const Eigen::VectorXd>& effort) const;
   /// Simbody's calcM, and its calcResidualForce for zero accelerations: gravity's and inertia's efforts.

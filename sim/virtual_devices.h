@@ -15,6 +15,7 @@ namespace plumb {
 struct RobotMotion {
   int64_t time;  ///< [us]
   const Eigen::VectorXd &q, &v;
+  const Eigen::VectorXd &motor_q, &motor_v;  ///< of the joints as their motors have them, before any backlash
 };
 
 /// A drive or a sensor of a virtual robot: what speaks on its bus and feels how it moves. Times are

@@ -49,9 +49,9 @@ class VirtualDrive : public VirtualDevice {
   virtual double Torque() const = 0;  ///< [Nm] of the motor
   virtual void Restart(int64_t now) = 0;
 
-  double Turns(const RobotMotion& motion) const { return map_.MotorPosition(motion.q[q_index_]) / kTurn; }
+  double Turns(const RobotMotion& motion) const { return map_.MotorPosition(motion.motor_q[q_index_]) / kTurn; }
   double TurnsPerSecond(const RobotMotion& motion) const {
-    return map_.MotorVelocity(motion.v[v_index_]) / kTurn;
+    return map_.MotorVelocity(motion.motor_v[v_index_]) / kTurn;
   }
   double ReadTurns(const RobotMotion& motion) const { return encoder_.Quantise(Turns(motion)); }
   double ReadTurnsPerSecond() const { return encoder_.velocity(); }

@@ -18,7 +18,7 @@ RobotDescription TrueRobot(const RobotDescription& description, const Eigen::Vec
 VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical, int64_t now)
     : mechanism_(TrueRobot(description, physical)),
       devices_(VirtualDevices(description)),
-      effort_(Eigen::VectorXd::Zero(description.num_velocities())) {
+      efforts_(description) {
   std::vector<Eigen::Index> first;  // of the joints in v
   Eigen::Index next = 0;
   for (const JointDescription& joint : description.joints) {
@@ -33,7 +33,7 @@ VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::Vec
 
 void VirtualRobot::Boot(int64_t now) {
   time_ = latest_ = now;
-  effort_.setZero();
+  efforts_.Clear();
   for (const auto& device : devices_) device->Boot(Motion());
 }
 
@@ -73,20 +73,26 @@ void VirtualRobot::Advance(int64_t now, FrameBatch& out) {
 void VirtualRobot::Tick(FrameBatch& out) {
   for (size_t i = 0; i < devices_.size(); ++i) {
     devices_[i]->Tick(Motion(), out);
-    if (effort_index_[i] >= 0) effort_[effort_index_[i]] = devices_[i]->Effort();
+    if (effort_index_[i] >= 0) efforts_.Make(effort_index_[i], devices_[i]->Effort(), time_);
   }
 }
 
 void VirtualRobot::MoveTo(int64_t time) {
-  if (time <= time_) return;
-  const int64_t begin = time_;
-  last_q_ = q();
-  last_v_ = v();
-  // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a crash.
-  if (!mechanism_.Advance(effort_, static_cast<double>(time - time_) * 1e-6))
-    mechanism_.SetState(q(), 0 * v());
-  time_ = time;
-  for (const auto& device : devices_) device->Track({begin, last_q_, last_v_}, Motion());
+  while (time_ < time) {
+    const int64_t begin = time_, end = std::min(time, efforts_.NextChange());
+    last_q_ = q();
+    last_v_ = v();
+    last_motor_q_ = mechanism_.motor_q();
+    last_motor_v_ = mechanism_.motor_v();
+    // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a crash.
+    if (!mechanism_.Advance(efforts_.acting(), static_cast<double>(end - begin) * 1e-6))
+      mechanism_.SetState(q(), 0 * v());
+    time_ = end;
+    efforts_.Take(time_);
+    for (const auto& device : devices_) {
+      device->Track({begin, last_q_, last_v_, last_motor_q_, last_motor_v_}, Motion());
+    }
+  }
 }
 
 bool VirtualRobot::Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& wish_q,

@@ -9,6 +9,7 @@
 #include "drivers/can/frame.h"
 #include "drivers/can/transport.h"
 #include "robot/description.h"
+#include "sim/effort_delay.h"
 #include "sim/mechanism.h"
 #include "sim/virtual_devices.h"
 
@@ -60,13 +61,13 @@ class VirtualRobot {
   void Boot(int64_t now);
   void MoveTo(int64_t time);
   void Tick(FrameBatch& out);
-  RobotMotion Motion() const { return {time_, q(), v()}; }
+  RobotMotion Motion() const { return {time_, q(), v(), mechanism_.motor_q(), mechanism_.motor_v()}; }
 
   Mechanism mechanism_;
   std::vector<std::unique_ptr<VirtualDevice>> devices_;
-  std::vector<Eigen::Index> effort_index_;                // of each device in effort_; -1: it makes none
-  Eigen::VectorXd last_q_, last_v_;                       // before a motion
-  Eigen::VectorXd effort_;                                // acts from time_ on
+  std::vector<Eigen::Index> effort_index_;                // of each device in v; -1: it makes none
+  Eigen::VectorXd last_q_, last_v_, last_motor_q_, last_motor_v_;  // before a motion
+  EffortDelay efforts_;                                   // that act from time_ on
   FrameBatch unsent_;                                     // where frames go that would be too late
   int64_t time_;                                          // of the mechanism
   int64_t latest_;                                        // the latest that we have been told

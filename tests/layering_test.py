@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Dependencies point down only: which folder may include which. Exit status 1 names every line that does not.
 
-Also: SimTK headers only in sim/*.cc, MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in
+Also: SimTK headers only in sim/*.cc, MuJoCo's only in sim/mujoco_engine.cc, MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in
 main.cc files, common/ and drivers/can/ (tests aside).
 """
 import pathlib
@@ -22,13 +22,14 @@ BELOW = {
     "calibrator": {"common", "robot", "sim", "sim/tasks", "calibrator/inference"},
     "trainer": {"common", "robot", "sim", "sim/tasks", "controller"},
     "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "controller", "calibrator", "calibrator/inference", "trainer"},
-    "experiments": {"common", "robot", "sim", "sim/tasks", "calibrator", "calibrator/inference", "trainer", "controller"},
+    "experiments": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "calibrator", "calibrator/inference", "trainer", "controller"},
 }
 # The virtual robot speaks the protocols' device side. Only the estimator's process knows its filter on the simulator.
 EXCEPTIONS = {(f"sim/{file}", "drivers") for file in
-              ("main.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h", "virtual_drives.cc", "virtual_sensors.cc")} | {("estimator/main.cc", "estimator/model"), ("estimator/main.cc", "sim")}
+              ("main.cc", "virtual_bus.h", "virtual_bus.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h", "virtual_drives.cc", "virtual_sensors.cc")} | {("estimator/main.cc", "estimator/model"), ("estimator/main.cc", "sim")}
 SYSTEM = {
     r"(SimTK\w*|Simbody)\.h|simbody/": lambda p: p.startswith("sim/") and p.endswith(".cc"),
+    r"mujoco/": lambda p: p == "sim/mujoco_engine.cc",
     r"onnx/|google/protobuf/": lambda p: p.startswith("trainer/onnx_") and p.endswith(".cc"),
     r"lcm/": lambda p: p.startswith(("common/", "drivers/can/")) or p.endswith("main.cc"),
     r"mpi\.h": lambda p: p == "common/ranks.cc",

@@ -30,7 +30,7 @@ inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double dur
   bus.robot.Place(3, q, v);
   bus.states.clear(), bus.imus.clear();
 
-  const int64_t begin = bus.now;
+  const int64_t begin = bus.now();
   const int64_t per_control = std::llround(robot.task.period / robot.driver.measurement);
   int64_t answered = -1;
   Eigen::Vector3d held = Eigen::Vector3d::Zero();
@@ -39,7 +39,7 @@ inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double dur
     const joint_state_t& state = bus.states.back();
     if (state.sequence % per_control != 0 || state.sequence == answered) return held;
     answered = state.sequence;
-    const double bend = 0.5 + 0.5 * std::sin(2e-6 * M_PI * frequency * static_cast<double>(bus.now - begin));
+    const double bend = 0.5 + 0.5 * std::sin(2e-6 * M_PI * frequency * static_cast<double>(bus.now() - begin));
     const Eigen::Vector3d target(-0.1 - 0.4 * bend, -0.2 - 0.8 * bend, 0.1 + 0.4 * bend);
     for (size_t i = 0; i < 3; ++i) {
       const double wish =
@@ -53,9 +53,9 @@ inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double dur
     Eigen::VectorXd q, v;
   };
   std::vector<Moment> truth;
-  while (armed && bus.now < begin + std::llround(duration * 1e6)) {
+  while (armed && bus.now() < begin + std::llround(duration * 1e6)) {
     bus.Step();
-    truth.push_back({HopperBus::kStart + bus.now, bus.robot.q(), bus.robot.v()});
+    truth.push_back({HopperBus::kStart + bus.now(), bus.robot.q(), bus.robot.v()});
     armed = bus.driver.state() == DriveState::kArmed;
   }
   if (!armed) throw std::runtime_error("the driver has stopped: " + std::string(bus.driver.reason()));

@@ -71,6 +71,77 @@ TEST_CASE("what is no file of text is refused, however long") {
   fs::remove(file);
 }
 
+/// Files of a folder that is gone at the end.
+struct Folder {
+  Folder() { std::filesystem::create_directory(path); }
+  ~Folder() { std::filesystem::remove_all(path); }
+  void Write(const std::string& name, const std::string& text) const { std::ofstream(path / name) << text; }
+  std::string At(const std::string& name) const { return (path / name).string(); }
+  const std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("plumbline_config_folder_" + std::to_string(getpid()));
+};
+
+TEST_CASE("a file that extends another stands in its place, key by key, table by table, name by name") {
+  const Folder folder;
+  folder.Write("base.toml",
+               "a = 1\nb = 2\nlist = [1, 2]\n[t]\nx = 1\ny = 2\n[t.deep]\nz = 3\n"
+               "[[j]]\nname = \"hip\"\nm = 1\nn = 2\n[[j]]\nname = \"knee\"\nm = 3\n");
+  folder.Write("own.toml",
+               "extends = \"base.toml\"\nb = 20\nc = 30\nlist = [3]\n[t]\ny = 20\n[t.deep]\nw = 4\n"
+               "[[j]]\nname = \"hip\"\nm = 10\n[[j]]\nname = \"toe\"\nm = 50\n[u]\nv = 1\n");
+  folder.Write("last.toml", "extends = \"own.toml\"\nc = 300\n");
+  std::vector<std::string> files;
+  Config config = Config::Load(folder.At("last.toml"), &files);
+  CHECK(files == std::vector<std::string>{folder.At("last.toml"), folder.At("own.toml"), folder.At("base.toml")});
+  CHECK(config.Number("a") == 1);
+  CHECK(config.Number("b") == 20);
+  CHECK(config.Number("c") == 300);
+  CHECK(config.Numbers("list", 1) == std::vector<double>{3});
+  Config t = config.Table("t");
+  CHECK(t.Number("x") == 1);
+  CHECK(t.Number("y") == 20);
+  CHECK(t.Table("deep").Number("z") == 3);
+  CHECK(t.Table("deep").Number("w") == 4);
+  CHECK(config.Table("u").Number("v") == 1);
+  std::vector<Config> joints = config.Tables("j");
+  REQUIRE(joints.size() == 3);
+  CHECK(joints[0].Number("m") == 10);
+  CHECK(joints[0].Number("n") == 2);
+  CHECK(joints[1].Number("m") == 3);
+  CHECK(joints[2].String("name") == "toe");
+  config.Finish();
+}
+
+TEST_CASE("mistakes in files that extend each other are named in the file where they are") {
+  const Folder folder;
+  folder.Write("base.toml", "a = \"x\"\n[t]\nb = 1\n[[j]]\nname = \"hip\"\n");
+  folder.Write("own.toml",
+               "extends = \"base.toml\"\n[t]\nc = -1\nd = 1\n[[j]]\nname = \"hip\"\nm = -1\n[[j]]\nname = \"hip\"\n");
+  Config config = Config::Load(folder.At("own.toml"));
+  CHECK_THROWS_WITH(config.Number("a"), Equals(folder.At("base.toml") + ":1:5: a is not a number"));
+  Config t = config.Table("t");
+  CHECK_THROWS_WITH(t.Number("e"), Equals(folder.At("base.toml") + ":2:1: t.e is missing"));
+  CHECK_THROWS_WITH(t.Number("c", kPositive), Equals(folder.At("own.toml") + ":3:5: t.c = -1 is not a positive finite number"));
+  CHECK(t.Number("b") == 1);
+  CHECK_THROWS_WITH(t.Finish(), Catch::Contains(folder.At("own.toml") + ":4:5: t.d is not a known key"));
+  CHECK(t.Position("d") == folder.At("own.toml") + ":4:5: ");
+  std::vector<Config> joints = config.Tables("j");
+  REQUIRE(joints.size() == 2);  // of the same name: for the reader to refuse
+  CHECK_THROWS_WITH(joints[0].Number("m", kPositive),
+                    Equals(folder.At("own.toml") + ":7:5: j[0].m = -1 is not a positive finite number"));
+
+  const auto refused = [&](const std::string& text, const std::string& why) {
+    folder.Write("bad.toml", text);
+    CHECK_THROWS_WITH(Config::Load(folder.At("bad.toml")), Catch::Contains(folder.At("bad.toml") + why));
+  };
+  refused("extends = 3\n", ":1:11: extends is not a string");
+  refused("a = 1\nextends = \"none.toml\"\n", ":2:11: extends = \"none.toml\": there is no such file");
+  refused("extends = \"bad.toml\"\n", ":1:11: extends a file that extends a file");
+  folder.Write("folder.toml", "extends = \".\"\n");
+  CHECK_THROWS_WITH(Config::Load(folder.At("folder.toml")), Catch::Contains("is a folder"));
+  CHECK_THROWS_WITH(Read("extends = \"base.toml\"\n").Finish(), Catch::Contains("extends is not a known key"));
+}
+
 TEST_CASE("a key may hold a table or something else") {
   const Config config = Read("a = 1\nb = {c = 1}\n");
   CHECK_FALSE(config.IsTable("a"));

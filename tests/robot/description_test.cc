@@ -71,6 +71,34 @@ TEST_CASE("the log-normal prior has the mean and variance asked for") {
   CHECK(p.ToCoordinate(p.ToPhysical(0.3)) == Approx(0.3));
 }
 
+TEST_CASE("what a virtual robot has and no model knows is read, and refused where it makes no sense") {
+  const RobotDescription worn = LoadRobot(kPendulum + "/worn.toml");
+  REQUIRE(worn.virtual_robot.joints.size() == 1);
+  const UnmodelledJoint& pivot = worn.virtual_robot.joints[0];
+  CHECK(pivot.joint == 0);
+  CHECK(pivot.friction == 0.1);
+  CHECK(pivot.delay == 0.004);
+  CHECK(pivot.backlash == 0.01);
+  CHECK(pivot.rotor == 0.01);
+  CHECK(worn.virtual_robot.engine == VirtualRobotSettings::Engine::kAuto);
+  CHECK(worn.fingerprint != LoadRobot(kPendulum).fingerprint);
+  CHECK(LoadRobot(kPendulum + "/worn_fitted.toml").parameters.size() == worn.parameters.size() + 2);
+  const RobotDescription mujoco = LoadRobot(kPendulum + "/../hopper/mujoco.toml");
+  CHECK(mujoco.virtual_robot.engine == VirtualRobotSettings::Engine::kMujoco);
+  CHECK_THAT(mujoco.virtual_robot.engine_source, Contains("mujoco.toml:6:10: "));
+
+  const auto refused = [](const std::string& line, const std::string& why) {
+    const Edited robot("worn.toml", "rotor = 0.01            # [kg m^2] before it", line);
+    CHECK_THROWS_WITH(LoadRobot(robot.path() + "/worn.toml"), Contains("worn.toml:") && Contains(why));
+  };
+  refused("", "virtual_robot.joint[0].rotor is missing");
+  refused("rotor = 0", "virtual_robot.joint[0].rotor = 0 is not");
+  refused("rotor = 0.01\nmass = 1", "virtual_robot.joint[0].mass is not a known key");
+  refused("rotor = 0.01\n[[virtual_robot.joint]]\nname = \"pivot\"", "occurs twice");
+  refused("rotor = 0.01\n[[virtual_robot.joint]]\nname = \"pole\"", "\"pole\" is not a joint with a motor");
+  refused("rotor = 0.01\n[virtual_robot]\nengine = \"bullet\"", "is not one of auto, mujoco");
+}
+
 TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
   const auto message = [](const std::string& from, const std::string& to) {
     const Edited robot("robot.toml", from, to);

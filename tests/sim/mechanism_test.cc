@@ -3,6 +3,9 @@
 #include <catch2/catch.hpp>
 #include <limits>
 
+#include "sim/model.h"
+#include "sim/plant.h"
+#include "sim/simulator.h"
 #include "tests/sim/trees.h"
 
 namespace plumb {

@@ -21,7 +21,7 @@ RobotDescription Hopper(const std::string& file) { return LoadRobot(SourceFile("
 
 void Wiggle(HopperBus& bus) {
   bus.effort = [&bus] {
-    const double phase = 1e-5 * static_cast<double>(bus.now);
+    const double phase = 1e-5 * static_cast<double>(bus.now());
     return Eigen::Vector3d(30 * std::sin(phase + 3), 30 * std::sin(phase + 4), 30 * std::sin(phase + 5));
   };
 }
@@ -117,7 +117,7 @@ TEST_CASE("a sensor that goes silent stops the robot") {
   bus.Run(100);
   // An emergency message of the boom's first encoder: hardware error.
   const Frame emergency = *FrameFromText("081#0050010000000000");
-  bus.driver.OnFrame(emergency, bus.now, kStart + bus.now);
+  bus.driver.OnFrame(emergency, bus.now(), kStart + bus.now());
   Wiggle(bus);
   bus.Run(10);
   CHECK(bus.driver.state() == DriveState::kFault);
