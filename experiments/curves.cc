@@ -20,7 +20,7 @@ constexpr char kStyle[] = R"(<style>
 text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }
 text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600; }
 .paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; } .grid { fill: none; stroke: #e8ecf1; }
-.band { stroke: none; fill-opacity: 0.16; } .line { fill: none; stroke-width: 2; }
+.band { stroke: none; fill-opacity: 0.12; } .line { fill: none; stroke-width: 2; }
 .line.c0 { stroke: #0072b2; } .line.c1 { stroke: #d55e00; } .line.c2 { stroke: #009e73; } .line.c3 { stroke: #cc79a7; }
 .line.c4 { stroke: #5b6676; stroke-dasharray: 5 3; } .line.c5 { stroke: #1b2330; stroke-dasharray: 2 3; } .line.c6 { stroke: #e69f00; } .line.c7 { stroke: #56b4e9; }
 .band.c0 { fill: #0072b2; } .band.c1 { fill: #d55e00; } .band.c2 { fill: #009e73; } .band.c3 { fill: #cc79a7; }

@@ -5,19 +5,19 @@
 // transition is (s, a, s'): any angle, a velocity up to 2 rad/s, 3 N m either way for 50 ms, states read with
 // noise. Given (s, a), s' is bimodal. Prior of xi: N(0, 1).
 //
-//   plumb-figure-1 --output figure --seed 1
+//   plumb-figure-1 --output figure_1
 #include <fmt/format.h>
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 
 #include "calibrator/inference/conditional_mixture.h"
 #include "calibrator/inference/population_weights.h"
 #include "calibrator/inference/reps_search.h"
 #include "calibrator/svg.h"
-#include "common/process.h"
+#include "common/atomic_file.h"
+#include "experiments/results.h"
 
 namespace plumb {
 namespace {
@@ -69,6 +69,8 @@ struct Found {
   VectorXd xi, weights;  // sum to 1
   double width;          // of the kernel that it is drawn with
 
+  double mean() const { return xi.dot(weights); }
+  double sd() const { return std::sqrt((xi.array() - mean()).square().matrix().dot(weights)); }
   double Near(double mode) const { return ((xi.array() - mode).abs() < kNear).select(weights, 0).sum(); }
   double Density(double x) const {
     const auto kernel = (-0.5 * ((xi.array() - x) / width).square()).exp();
@@ -115,7 +117,7 @@ Found AsPopulation(const std::vector<Transition>& transitions, uint64_t seed) {
 }
 
 // The posterior of every transition alone, and all of them together.
-Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t seed) {
+Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t seed, const std::function<void(double)>& progress) {
   ConditionalMixtureOptions options;
   options.simulations = 600;
   options.rounds = 3;
@@ -124,6 +126,7 @@ Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t 
   const auto count = static_cast<Index>(transitions.size());
   Found found{VectorXd(count * options.samples), {}, 0.03};
   for (Index i = 0; i < count; ++i) {
+    progress(static_cast<double>(i) / static_cast<double>(count));
     const Transition& t = transitions[static_cast<size_t>(i)];
     const auto simulate = [&](const Eigen::MatrixXd& xi, int64_t first) {
       Eigen::MatrixXd outcomes(2, xi.cols());
@@ -141,9 +144,8 @@ Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t 
   return found;
 }
 
-struct Curve {
-  std::string name, css;
-  std::string words;
+struct Shown {
+  std::string name, css, words;
   VectorXd density;
 };
 
@@ -160,7 +162,7 @@ text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600; } te
 )";
 
 // A panel for each method, one above the other: their heights differ too much for one.
-std::string Draw(const VectorXd& grid, const std::vector<Curve>& curves) {
+std::string Draw(const VectorXd& grid, const std::vector<Shown>& curves) {
   constexpr double kWidth = 640, kLeft = 70, kRight = 626, kTop = 64, kHeight = 110, kGap = 40;
   const double height = kTop + static_cast<double>(curves.size()) * (kHeight + kGap) + 4;
   Svg svg(kWidth, height, "densities over simulators that three methods find for a robot that is two");
@@ -172,7 +174,7 @@ std::string Draw(const VectorXd& grid, const std::vector<Curve>& curves) {
                        100 * (1 - kHeavyShare), 100 * kHeavyShare),
            "label", Svg::Anchor::kStart);
   for (size_t i = 0; i < curves.size(); ++i) {
-    const Curve& curve = curves[i];
+    const Shown& curve = curves[i];
     const double top = kTop + static_cast<double>(i) * (kHeight + kGap), bottom = top + kHeight;
     const Axis y(0, 1.1 * curve.density.maxCoeff(), bottom, top);
     const bool last = i + 1 == curves.size();
@@ -195,52 +197,57 @@ std::string Draw(const VectorXd& grid, const std::vector<Curve>& curves) {
   return text.insert(text.find("</title>") + 9, kStyle);
 }
 
-void Write(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path);
-  file << text;
-  if (!file.flush()) throw std::runtime_error("cannot write " + path.string());
+// A method's rows: what it found, as a density, and in numbers that all rows repeat.
+Results::Rows Tabulate(const VectorXd& grid, const std::function<double(double)>& density, double light, double heavy, double mean, double sd) {
+  Results::Rows rows;
+  for (const double x : grid) rows.push_back({x, density(x), light, heavy, mean, sd});
+  return rows;
+}
+
+Results::Rows Tabulate(const VectorXd& grid, const Found& found) {
+  return Tabulate(grid, [&](double x) { return found.Density(x); }, found.Near(kLight), found.Near(kHeavy), found.mean(), found.sd());
+}
+
+Results::Rows Tabulate(const VectorXd& grid, const Gaussian& found) {
+  const double mean = found.mean(0), sd = std::sqrt(found.covariance(0, 0));
+  // Drawn with a kernel, as the others are: it may be narrower than a line.
+  const Found line{VectorXd::Constant(1, mean), VectorXd::Ones(1), std::hypot(sd, 0.03)};
+  const auto below = [&](double x) { return 0.5 * std::erfc((mean - x) / (sd * M_SQRT2)); };
+  const auto near = [&](double mode) { return below(mode + kNear) - below(mode - kNear); };
+  return Tabulate(grid, [&](double x) { return line.Density(x); }, near(kLight), near(kHeavy), mean, sd);
 }
 
 std::string Percent(double light, double heavy) {
   return fmt::format("{:.0f} % and {:.0f} %", 100 * light, 100 * heavy);
 }
 
-int MakeFigure(const std::filesystem::path& output, uint64_t seed, bool quick) {
-  std::filesystem::create_directories(output);
+int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t seed, bool quick) {
   const std::vector<Transition> transitions = Record(quick ? 20 : 400, seed);
-  const Gaussian squared = BySquaredError(transitions, seed);
-  const double mean = squared.mean(0), sd = std::sqrt(squared.covariance(0, 0));
-  const Found population = AsPopulation(transitions, seed), mixture = ByConditionalMixture(transitions, seed);
-
-  // Drawn with a kernel, as the others are: it may be narrower than a line.
-  const Found gaussian{VectorXd::Constant(1, mean), VectorXd::Ones(1), std::hypot(sd, 0.03)};
-  const auto below = [&](double x) { return 0.5 * std::erfc((mean - x) / (sd * M_SQRT2)); };
-  const auto near = [&](double mode) { return below(mode + kNear) - below(mode - kNear); };
-  const std::string by_squares = Percent(near(kLight), near(kHeavy)),
-                    by_energy = Percent(population.Near(kLight), population.Near(kHeavy)),
-                    by_mixture = Percent(mixture.Near(kLight), mixture.Near(kHeavy));
-
   const VectorXd grid = VectorXd::LinSpaced(321, -2, 2);
-  const std::string words = fmt::format("within {} of the two: ", kNear);
-  std::vector<Curve> curves = {{"squared error, Gaussian search", "squared", words + by_squares, grid},
-                               {"energy distance, population", "population", words + by_energy, grid},
-                               {"mixture, transition by transition", "mixture", words + by_mixture, grid}};
-  std::string csv = "xi,squared_error,population,mixture\n";
-  for (Index k = 0; k < grid.size(); ++k) {
-    curves[0].density(k) = gaussian.Density(grid(k));
-    curves[1].density(k) = population.Density(grid(k));
-    curves[2].density(k) = mixture.Density(grid(k));
-    csv += fmt::format("{:.4f},{:.6g},{:.6g},{:.6g}\n", grid(k), curves[0].density(k), curves[1].density(k),
-                       curves[2].density(k));
+  Results results(output / "figure_1.csv", fmt::format("seed {}{}", seed, quick ? ", quick" : ""), {"method"},
+                  {"xi", "density", "near_light", "near_heavy", "mean", "sd"});
+  const std::vector<Job> jobs = {
+      {"squared_error", 1, [&](const auto&) { return Tabulate(grid, BySquaredError(transitions, seed)); }},
+      {"population", 1, [&](const auto&) { return Tabulate(grid, AsPopulation(transitions, seed)); }},
+      {"mixture", 100, [&](const auto& progress) { return Tabulate(grid, ByConditionalMixture(transitions, seed, progress)); }}};
+  if (!RunJobs(process, jobs, results)) return 130;
+
+  std::vector<Shown> curves = {{"squared error, Gaussian search", "squared", {}, grid},
+                               {"energy distance, population", "population", {}, grid},
+                               {"mixture, transition by transition", "mixture", {}, grid}};
+  for (size_t i = 0; i < curves.size(); ++i) {
+    const Results::Rows& rows = results.Of(jobs[i].key);
+    curves[i].words = fmt::format("within {} of the two: {}", kNear, Percent(rows[0][2], rows[0][3]));
+    for (Index k = 0; k < grid.size(); ++k) curves[i].density(k) = rows[static_cast<size_t>(k)][1];
   }
-  Write(output / "figure_1.csv", csv);
-  Write(output / "figure_1.svg", Draw(grid, curves));
+  WriteAtomically(output / "figure_1.svg", Draw(grid, curves));
+  const auto& squared = results.Of("squared_error")[0];
+  const auto percent = [&](const char* method) { return Percent(results.Of(method)[0][2], results.Of(method)[0][3]); };
   std::cout << fmt::format(
-      "within {} of the light and of the heavy payload, which the robot has in {} of {} transitions: squared "
-      "error {}"
-      " (it is at {:.2f} ± {:.1g}), energy distance {}, mixture {}\n",
-      kNear, Percent(1 - kHeavyShare, kHeavyShare), transitions.size(), by_squares, mean, sd, by_energy,
-      by_mixture);
+      "within {} of the light and of the heavy payload, which the robot has in {} of {} transitions: squared error {} (it is at {:.2f} ± {:.1g}), "
+      "energy distance {}, mixture {}\n",
+      kNear, Percent(1 - kHeavyShare, kHeavyShare), transitions.size(), percent("squared_error"), squared[4], squared[5], percent("population"),
+      percent("mixture"));
   return 0;
 }
 
@@ -259,5 +266,5 @@ int main(int argc, char** argv) {
         app.add_option("--seed", seed, "of all random numbers")->capture_default_str();
         app.add_flag("--quick", quick, "a twentieth of the transitions, in a second");
       },
-      [&](plumb::Process&) { return plumb::MakeFigure(output, seed, quick); });
+      [&](plumb::Process& process) { return plumb::MakeFigure(process, output, seed, quick); });
 }
