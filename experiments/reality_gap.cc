@@ -79,10 +79,10 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   LoopSettings settings;
   settings.way = method.way;
   settings.iterations = options.iterations;
-  settings.steps_per_iteration = static_cast<int>(kRobotSeconds / model.task.period);
+  settings.steps_per_iteration = static_cast<int>((options.quick ? 1 : kRobotSeconds) / model.task.period);
   settings.first_updates = options.quick ? 2 : model.training.updates;
   settings.next_updates = options.quick ? 1 : model.training.updates_again;
-  settings.evaluation_episodes = options.quick ? 1 : 10;
+  settings.evaluation_episodes = options.quick ? 1 : 5;
   settings.seed = seed;
   settings.threads = options.threads;
   const LoopResult result = remembered.loop->Run(real, settings, progress);
