@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/impact.h"
 #include "robot/motion_noise.h"
 
 namespace plumb {
@@ -15,6 +16,8 @@ constexpr int kSettled = 5;                 // measurements after a restart unti
 constexpr double kSurely = 5;               // standard deviations
 constexpr double kVelocityLag = 4e-3;       // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
 constexpr double kBiasesInOrder = 5;        // times its sd
+
+double Square(double x) { return x * x; }
 
 AgreementWatch::Settings VelocityWatch(const EstimatorSettings& s, bool gyro) {
   return {s.position_sd, s.velocity_sd, gyro ? kBiasesInOrder * s.bias_sd : 0, gyro ? 0 : kVelocityLag};
@@ -45,6 +48,8 @@ StateObserver::StateObserver(const RobotDescription& robot)
     const bool gyro = std::any_of(imus_.begin(), imus_.end(), turns);
     Joint joint{.name = robot.joints[static_cast<size_t>(i)].name,
                 .settings = settings,
+                .lower = robot.joints[static_cast<size_t>(i)].lower,
+                .upper = robot.joints[static_cast<size_t>(i)].upper,
                 .filter = KinematicFilter(settings),
                 .velocity_watch = AgreementWatch(VelocityWatch(settings, gyro)),
                 .acceleration_watch = AgreementWatch(AccelerationWatch(settings))};
@@ -120,13 +125,22 @@ void StateObserver::Restart(const joint_state_t& measured) {
 }
 
 void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
-  // A step of any joint's effort may step every joint's acceleration.
-  double step = 0;
+  // What acts on one joint may step every joint's acceleration: its own most of all, others' by their coupling.
+  double efforts = 0, stops = 0;  // sums of squares
   for (size_t i = 0; i < joints_.size(); ++i) {
-    const double change = measured.effort_applied[i] - joints_[i].effort;
-    step = std::hypot(step, std::isfinite(change) ? change : unknown_step_);
+    Joint& joint = joints_[i];
+    const double change = measured.effort_applied[i] - joint.effort;
+    joint.effort_step = std::isfinite(change) ? change : unknown_step_;
+    joint.stop = joint.of_base ? 0 : StopSpeed(joint.lower, joint.upper, state_.q[i], state_.v[i], elapsed);
+    efforts += Square(joint.effort_step);
+    stops += Square(joint.stop);
   }
-  for (Joint& joint : joints_) joint.filter.Predict(elapsed, step);
+  const double ground = contact_.ImpactSpeed(elapsed);
+  for (Joint& joint : joints_) {
+    const double share = Square(joint.settings.coupling);
+    const auto felt = [&](double own, double all) { return std::sqrt(share * all + (1 - share) * Square(own)); };
+    joint.filter.Predict(elapsed, felt(joint.effort_step, efforts), {ground, felt(joint.stop, stops)});
+  }
 }
 
 KinematicFilter::Innovation StateObserver::Correct(Joint& joint, Quantity quantity, double value, double age,
