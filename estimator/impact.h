@@ -15,6 +15,8 @@ struct ImpactSpeeds {
 
 /// By how much an impact may be early or late: readings are, and the way to it is only as well known as the velocity.
 inline constexpr double kImpactTiming = 1e-3;   ///< [s]
+/// In which what is left of an impact fades: its force outlasts its speed.
+inline constexpr double kImpactFades = 5e-3;   ///< [s]
 inline constexpr double kGroundMargin = 2e-3;   ///< [m]
 inline constexpr double kStopMargin = 5e-3;     ///< [rad] or [m]
 

@@ -115,10 +115,12 @@ void StateObserver::Restart(const joint_state_t& measured) {
     // Where an invalid joint is, it will tell when it is back.
     const double position = known ? measured.position[i] : joint.filter.mean()(0);
     joint.filter.Restart(position, known && !joint.gyro ? measured.velocity[i] : std::numeric_limits<double>::quiet_NaN());
+    joint.stop = 0;
     joint.velocity_watch.Restart();
     joint.acceleration_watch.Restart();
     if (known) joint.used = measured.measured[i];
   }
+  ground_ = 0;
   since_restart_ = 0;
   if (started_) ++restarts_;
   started_ = true;
@@ -126,20 +128,23 @@ void StateObserver::Restart(const joint_state_t& measured) {
 
 void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
   // What acts on one joint may step every joint's acceleration: its own most of all, others' by their coupling.
+  const double left = std::exp(-elapsed / kImpactFades);  // of earlier impacts
   double efforts = 0, stops = 0;  // sums of squares
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     const double change = measured.effort_applied[i] - joint.effort;
     joint.effort_step = std::isfinite(change) ? change : unknown_step_;
-    joint.stop = joint.of_base ? 0 : StopSpeed(joint.lower, joint.upper, state_.q[i], state_.v[i], elapsed);
+    const double stop =
+        joint.of_base ? 0 : StopSpeed(joint.lower, joint.upper, state_.q[i], state_.v[i], elapsed);
+    joint.stop = std::max(joint.stop * left, stop);
     efforts += Square(joint.effort_step);
     stops += Square(joint.stop);
   }
-  const double ground = contact_.ImpactSpeed(elapsed);
+  ground_ = std::max(ground_ * left, contact_.ImpactSpeed(elapsed));
   for (Joint& joint : joints_) {
     const double share = Square(joint.settings.coupling);
     const auto felt = [&](double own, double all) { return std::sqrt(share * all + (1 - share) * Square(own)); };
-    joint.filter.Predict(elapsed, felt(joint.effort_step, efforts), {ground, felt(joint.stop, stops)});
+    joint.filter.Predict(elapsed, felt(joint.effort_step, efforts), {ground_, felt(joint.stop, stops)});
   }
 }
 

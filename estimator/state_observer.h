@@ -119,6 +119,7 @@ class StateObserver {
   std::optional<BaseObserver> base_;
   double unknown_step_;  // [Nm] assumed change of an effort that is not known: from full one way to full the other
   GroundContact contact_;
+  double ground_ = 0;  // [m/s] at which a point may meet the ground
   robot_state_t state_{};
   std::vector<robot_state_t> waiting_;  // ring of causal states whose smoothed twins are due
   int first_waiting_ = 0, num_waiting_ = 0;

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
@@ -108,6 +109,79 @@ TEST_CASE("where a joint meets its stop the velocity's error is as large as it s
   CHECK(with.impact > 0.5);
   CHECK(with.impact < 1.5);
   CHECK(with.free < 1.5);
+}
+
+TEST_CASE("how hard stops are is learnt, and that there are none") {
+  RobotDescription robot = Robot();
+  robot.estimator.jerk = 300;
+  std::vector<joint_state_t> readings;
+  for (uint32_t seed = 101; seed <= 112; ++seed) {
+    for (joint_state_t m : Bouncing(seed).measured) {
+      m.utime += 10'000'000 * int64_t{seed};
+      m.measured = {m.utime};
+      readings.push_back(m);
+    }
+  }
+  const auto play = [&](StateObserver& observer) {
+    for (const joint_state_t& m : readings) observer.OnJointState(m);
+  };
+  const TunedNoise tuned = TuneNoise(robot, play);
+  CHECK(tuned.joints[0].stop_impact > 30);
+  CHECK(tuned.joints[0].stop_impact < 300);
+  CHECK(tuned.joints[0].jerk < 30);
+  CHECK(tuned.joints[0].ground_impact == 0);
+  CHECK(tuned.after[0] < tuned.before[0] - 0.5);
+  robot.joints[0].lower = -10;  // it bounces off something else
+  CHECK(TuneNoise(robot, play).joints[0].stop_impact == 0);
+}
+
+TEST_CASE("a speed counts from shortly before the impact until it rests") {
+  constexpr double kAhead = 2e-3;
+  CHECK(StopSpeed(-1, 1, 0.9, 5, kAhead) == 0);
+  CHECK(StopSpeed(-1, 1, 0.982, 5, kAhead) == 5);
+  CHECK(StopSpeed(-1, 1, 1.01, -5, kAhead) == 5);
+  CHECK(StopSpeed(-1, 1, -0.982, -5, kAhead) == 5);
+  CHECK(StopSpeed(-1, 1, -0.982, 5, kAhead) == 0);
+  CHECK(StopSpeed(-1, 1, -1.01, 0, kAhead) == 0);
+  CHECK(StopSpeed(0, 0, 0, 5, kAhead) == 0);
+  const double infinity = std::numeric_limits<double>::infinity();
+  CHECK(StopSpeed(-infinity, infinity, 0, 5, kAhead) == 0);
+}
+
+// Two joints, one of which an effort acts upon, or its stop.
+std::vector<double> VelocitySds(double coupling, bool effort, bool stop) {
+  RobotDescription robot;
+  robot.joints.resize(2);
+  for (JointDescription& joint : robot.joints) joint.effort_limit = 2, joint.lower = -1, joint.upper = 1;
+  robot.estimator = {.position_sd = 1e-4, .velocity_sd = 0.5, .jerk = 1, .effort_step = 30, .stop_impact = 100,
+                     .coupling = coupling, .timing_sd = 0, .lag = 4, .reset_after = 10};
+  StateObserver observer(robot);
+  joint_state_t m{};
+  m.num_joints = 2;
+  m.position = m.velocity = m.effort_measured = m.effort_sent = m.effort_applied = {0, 0};
+  m.valid = {1, 1};
+  for (int k = 0; k <= 100; ++k) {
+    m.utime = 1'000'000 + 2000 * k;
+    m.sequence = k;
+    m.measured = {m.utime, m.utime};
+    m.velocity[0] = stop ? 3 : 0;
+    m.position[0] = stop ? 1.0 - 3 * 2e-3 * (100 - k) : 0.0;
+    m.effort_applied[0] = effort && k == 100 ? 1 : 0;
+    observer.OnJointState(m);
+  }
+  return observer.state().v_sd;
+}
+
+TEST_CASE("what acts on one joint is felt by others by their coupling") {
+  const std::vector<double> rest = VelocitySds(1, false, false);
+  for (const bool stop : {false, true}) {
+    const auto at = [&](double coupling) { return VelocitySds(coupling, !stop, stop); };
+    CHECK(at(0)[0] > 1.05 * rest[0]);
+    CHECK(at(0)[0] == Approx(at(1)[0]).epsilon(1e-9));
+    CHECK(at(0)[1] == Approx(rest[1]).epsilon(1e-9));
+    CHECK(at(0.5)[1] > at(0)[1]);
+    CHECK(at(1)[1] > at(0.5)[1]);
+  }
 }
 
 }  // namespace
