@@ -9,10 +9,6 @@
 #include <vector>
 
 #include "calibrator/touch.h"
-#include "robot/contact_points.h"
-#include "robot/kinematics.h"
-#include "sim/model.h"
-#include "sim/parameters.h"
 #include "tests/calibrator/hop_on_bus.h"
 #include "tests/estimator/observer_errors.h"
 
