@@ -1,5 +1,5 @@
 // What the observer costs calibration: parameters from estimated states beside those from true states of the
-// same motions. A table for docs/measurements.md. build/bench/observed_calibration [motions]
+// same motions. A table for docs/measurements.md. build/bench/observed_calibration [motions [robot]]
 
 #include <fmt/format.h>
 
@@ -25,7 +25,7 @@ constexpr Way kWays[] = {{"true", States::kTrue},
                          {"smoothed, taken for exact", States::kCertain},
                          {"causal", States::kCausal}};
 
-using Motion = std::function<Samples(uint32_t seed)>;
+using Motion = std::function<std::vector<Samples>(uint32_t seed)>;  // episodes
 
 void Print(const std::string& name, const RobotDescription& robot, const Motion& motion_of,
            uint32_t motions) {
@@ -33,11 +33,15 @@ void Print(const std::string& name, const RobotDescription& robot, const Motion&
   for (const Way& way : kWays) {
     std::vector<double> square(knowable.size(), 0), sum(knowable.size(), 0), claimed(knowable.size(), 0);
     std::vector<int> covered(knowable.size(), 0);
+    int alarms = 0;
+    double discrepancy = 0;
     for (uint32_t seed = 1; seed <= motions; ++seed) {
       const Eigen::VectorXd truth = HiddenParameters(robot, seed);
-      const Samples motion = motion_of(seed);
-      const std::vector<Log> logs{ObservedLog(robot, motion, way.states)};
+      const std::vector<Log> logs{ObservedLog(robot, motion_of(seed), way.states)};
       const Findings found = Calibrate(robot, logs, {});
+      alarms += found.misspecification.alarm;
+      discrepancy += found.stages.front().discrepancy / motions;
+      if (found.misspecification.alarm) fmt::print(stderr, "\n{} {} {}: {}\n", name, way.name, seed, found.misspecification.words);
       const Gaussian posterior = Moments(found.posterior);
       const Eigen::VectorXd hidden =
           truth.array().log();  // both robots' parameters have logarithms for coordinates
@@ -50,9 +54,10 @@ void Print(const std::string& name, const RobotDescription& robot, const Motion&
       fmt::print(stderr, "\r{} {}: {} of {} ", name, way.name, seed, motions);
     }
     for (size_t i = 0; i < knowable.size(); ++i) {
-      fmt::print("| {} | {} | {} | {:.3f} | {:+.3f} | {:.3f} | {:.0f} % |\n", name, way.name,
+      fmt::print("| {} | {} | {} | {:.3f} | {:+.3f} | {:.3f} | {:.0f} % | {:.2f} | {} |\n", name, way.name,
                  knowable[i].name, 100 * std::sqrt(square[i] / motions), 100 * sum[i] / motions,
-                 100 * std::sqrt(claimed[i] / motions), 100. * covered[i] / motions);
+                 100 * std::sqrt(claimed[i] / motions), 100. * covered[i] / motions, discrepancy, alarms);
+      std::fflush(stdout);
     }
   }
 }
@@ -64,21 +69,29 @@ int main(int argc, char** argv) {
   using namespace plumb;
   const auto motions = static_cast<uint32_t>(argc > 1 ? std::atoi(argv[1]) : 20);
   fmt::print(
-      "| robot | states | of | rms error % | mean error % | claimed sd % | within 95 % "
-      "|\n|---|---|---|---|---|---|---|\n");
+      "| robot | states | of | rms error % | mean error % | claimed sd % | within 95 % | discrepancy | alarms |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
+  const std::string only = argc > 2 ? argv[2] : "";
   for (const std::string name : {"pendulum", "hopper"}) {
+    if (!only.empty() && only != name) continue;
     RobotDescription robot = WithSimulatedNoise(LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + name));
     const Recordings training = Record(robot, 1000, 3);
     const TunedNoise noise = TuneNoise(robot, [&](StateObserver& observer) { Play(training, observer); });
     for (size_t i = 0; i < noise.joints.size(); ++i) robot.joints[i].noise = noise.joints[i];
     const auto simulated = [&](uint32_t seed) {
       const Eigen::VectorXd truth = HiddenParameters(robot, seed);
-      return name == "hopper" ? Hop(robot, seed, 2, truth) : Swing(robot, seed, 10, truth);
+      return std::vector<Samples>{name == "hopper" ? Hop(robot, seed, 2, truth) : Swing(robot, seed, 10, truth)};
     };
     Print(name, robot, simulated, motions);
   }
   RobotDescription hopper = LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/hopper");
   hopper.estimator.delay = 0;  // in virtual time frames arrive at once
-  Print(
-      "hopper on its bus", hopper, [&](uint32_t seed) { return HopOnBus(hopper, seed); }, motions);
+  if (only.empty() || only == "bus") {
+    Print(
+        "hopper on its bus", hopper, [&](uint32_t seed) { return std::vector<Samples>{HopOnBus(hopper, seed)}; },
+        motions);
+  }
+  if (only.empty() || only == "bang-bang") {
+    Print("hopper, bang-bang", hopper, [&](uint32_t seed) { return BangBangOnBus(hopper, seed); }, motions);
+  }
 }

@@ -68,11 +68,16 @@ Eigen::VectorXd SmoothedNoise(const RobotDescription& robot) {
   for (const JointDescription& joint : robot.joints) {
     if (!joint.passive) most_effort = std::hypot(most_effort, joint.effort_limit);
   }
+  const auto felt = [&](const JointDescription& joint, double coupling) {
+    const double own = joint.passive ? 0 : joint.effort_limit;
+    return std::hypot(coupling * most_effort, std::sqrt(1 - coupling * coupling) * own);
+  };
   for (int j = 0; j < robot.num_joints(); ++j) {
     EstimatorSettings settings = EstimatorOf(robot, j);
     if (!MeasuresVelocity(robot, j)) settings.velocity_sd = kUnmeasured;
     const Eigen::Vector2d noise =
-        Smoothed(settings, dt, per_control_step, settings.effort_step * most_effort);
+        Smoothed(settings, dt, per_control_step,
+                 settings.effort_step * felt(robot.joints[static_cast<size_t>(j)], settings.coupling));
     for (int i = 0; i < robot.joints[static_cast<size_t>(j)].num_velocities(); ++i, ++velocity) {
       sd(velocity) = noise(0);
       sd(n + velocity) = noise(1);

@@ -27,6 +27,9 @@ std::string Lines(const RobotDescription& robot, const TunedNoise& tuned, size_t
   add("velocity_sd", noise.velocity_sd);
   add("jerk", noise.jerk);
   add("effort_step", noise.effort_step);
+  if (noise.ground_impact > 0) add("ground_impact", noise.ground_impact);
+  if (noise.stop_impact > 0) add("stop_impact", noise.stop_impact);
+  add("coupling", noise.coupling);
   add("delay", noise.delay);
   return text;
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "estimator/impact.h"
+
 namespace plumb {
 namespace {
 
@@ -25,6 +27,7 @@ bool ContactTest::Judge(const Motion& motion) {
 GroundContact::GroundContact(const RobotDescription& robot)
     : points_(ContactPoints(robot)),
       tests_(points_.size()),
+      motions_(points_.size()),
       kinematics_(robot),
       jacobian_(3, robot.num_velocities()) {
   if (!points_.empty() && robot.num_positions() != robot.num_joints()) {
@@ -37,6 +40,7 @@ void GroundContact::Judge(robot_state_t& state) {
   if (!state.valid) {
     std::fill(state.contact.begin(), state.contact.end(), int8_t{-1});
     for (ContactTest& test : tests_) test.Restart();
+    std::fill(motions_.begin(), motions_.end(), ContactTest::Motion{});
     return;
   }
   using Values = Eigen::Map<const Eigen::VectorXd>;
@@ -47,11 +51,20 @@ void GroundContact::Judge(robot_state_t& state) {
     const ContactPoint& point = points_[i];
     kinematics_.Jacobian(point.link, point.centre, jacobian_);
     const auto vertical = jacobian_.row(2).transpose().array();
-    state.contact[i] = tests_[i].Judge({.height = kinematics_.Position(point.link, point.centre).z() - point.radius,
-                                        .height_sd = (vertical * q_sd.array()).matrix().norm(),
-                                        .rise = kinematics_.Velocity(point.link, point.centre).z(),
-                                        .rise_sd = (vertical * v_sd.array()).matrix().norm()});
+    motions_[i] = {.height = kinematics_.Position(point.link, point.centre).z() - point.radius,
+                   .height_sd = (vertical * q_sd.array()).matrix().norm(),
+                   .rise = kinematics_.Velocity(point.link, point.centre).z(),
+                   .rise_sd = (vertical * v_sd.array()).matrix().norm()};
+    state.contact[i] = tests_[i].Judge(motions_[i]);
   }
+}
+
+double GroundContact::ImpactSpeed(double ahead) const {
+  double fastest = 0;
+  for (const ContactTest::Motion& motion : motions_) {
+    fastest = std::max(fastest, SpeedBelow(0, kGroundMargin, motion.height, motion.rise, ahead));
+  }
+  return fastest;
 }
 
 }  // namespace plumb

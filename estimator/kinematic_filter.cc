@@ -17,7 +17,7 @@ constexpr double Square(double x) { return x * x; }
 }  // namespace
 
 KinematicFilter::KinematicFilter(const EstimatorSettings& settings)
-    : settings_(settings), window_(static_cast<size_t>(settings.lag) + 2) {
+    : settings_(settings), jerk_(Square(settings.jerk)), window_(static_cast<size_t>(settings.lag) + 2) {
   covariance_(3, 3) = Square(settings.bias_sd);
 }
 
@@ -29,13 +29,14 @@ void KinematicFilter::Restart(double position, double velocity) {
                                 Square(known ? settings_.velocity_sd : kInitialVelocitySd), Square(kInitialAccelerationSd),
                                 bias_variance)
                     .asDiagonal();
+  jerk_ = Square(settings_.jerk);
   pending_ = 0;
   predicted_mean_ = mean_;
   predicted_covariance_ = covariance_;
   Keep();
 }
 
-void KinematicFilter::Predict(double dt, double effort_step) {
+void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds& impact) {
   transition_ << 1, dt, dt * dt / 2, 0,  //
       0, 1, dt, 0,                       //
       0, 0, 1, 0,                        //
@@ -47,29 +48,33 @@ void KinematicFilter::Predict(double dt, double effort_step) {
       d3 / 6, d2 / 2, dt, 0,           //
       0, 0, 0, 0;
   // The mean effort of this interval differs from the last one's: the acceleration may step at its beginning.
-  const Eigen::Vector4d step = transition_.col(2) * (settings_.effort_step * effort_step);
+  // So may an impact make it; when, nobody knows: to readings of a moment ago it is so much more jerk.
+  const double impact_variance =
+      Square(settings_.ground_impact * impact.ground) + Square(settings_.stop_impact * impact.stop);
+  jerk_ = Square(settings_.jerk) + impact_variance / dt;
+  const double step_variance = Square(settings_.effort_step * effort_step) + impact_variance;
   mean_ = transition_ * mean_;
   covariance_ = transition_ * covariance_ * transition_.transpose() + Square(settings_.jerk) * jerk +
-                step * step.transpose();
+                step_variance * transition_.col(2) * transition_.col(2).transpose();
   covariance_(3, 3) += Square(settings_.bias_sd) * dt / kBiasWanders;
   predicted_mean_ = mean_;
   predicted_covariance_ = covariance_;
 }
 
 KinematicFilter::Row KinematicFilter::RowOf(Quantity quantity, double age, double spread) const {
-  const double span = std::abs(age), jerk = Square(settings_.jerk);
+  const double span = std::abs(age);
   switch (quantity) {
     case Quantity::kPosition:
       // A measurement time that is off by timing_sd displaces the position by velocity * timing_sd.
       return {{1, -age, age * age / 2, 0},
-              Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd) + jerk * std::pow(span, 5) / 20};
+              Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd) + jerk_ * std::pow(span, 5) / 20};
     case Quantity::kVelocity:
     case Quantity::kRate:
       return {{0, 1, -age, quantity == Quantity::kRate ? 1. : 0.},
-              Square(settings_.velocity_sd) + jerk * span * span * span / 3};
+              Square(settings_.velocity_sd) + jerk_ * span * span * span / 3};
     case Quantity::kAcceleration:
       // The average of a random walk differs from its end by a third of the walk's variance.
-      return {{0, 0, 1, 1}, Square(settings_.acceleration_sd) + jerk * (span + spread / 3)};
+      return {{0, 0, 1, 1}, Square(settings_.acceleration_sd) + jerk_ * (span + spread / 3)};
   }
   return {};
 }

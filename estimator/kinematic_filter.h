@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "estimator/impact.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -20,7 +21,8 @@ enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 /// It knows no dynamics, so what is inferred from its output about dynamics is not eaten from its own tail. It
 /// knows one thing beyond kinematics: acceleration may step when the applied effort steps. The size of that
 /// step is left open (a wide zero-mean Gaussian), because it is what calibration wants to learn; without the
-/// allowance the filter would round off every such corner and bias the effort's apparent effect.
+/// allowance the filter would round off every such corner and bias the effort's apparent effect. The same where kinematics
+/// says that there may be an impact.
 ///
 /// A reading counts at its own time: its row of the observation matrix is that of the state so long ago under constant
 /// acceleration, its variance grows by what the jerk may have done since. (That this is correlated with the filter's own
@@ -39,7 +41,8 @@ class KinematicFilter {
   void Restart(double position, double velocity);
   /// @param dt [s] since the last call, > 0.
   /// @param effort_step [Nm] change of the mean applied effort against the previous interval.
-  void Predict(double dt, double effort_step);
+  /// @param impact that there may be meanwhile.
+  void Predict(double dt, double effort_step, const ImpactSpeeds& impact = {});
 
   /// A reading less what was expected of it, and its variance if both are right.
   struct Innovation {
@@ -88,6 +91,7 @@ class KinematicFilter {
   KinematicState mean_ = KinematicState::Zero(), predicted_mean_ = KinematicState::Zero();
   Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero(), predicted_covariance_ = Eigen::Matrix4d::Zero();
   Eigen::Matrix4d transition_ = Eigen::Matrix4d::Identity();
+  double jerk_;  // squared spectral density of the last step's, impact included
   std::vector<Step> window_;  // ring
   int oldest_ = 0, pending_ = 0;
 };

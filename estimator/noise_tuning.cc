@@ -17,16 +17,22 @@ constexpr double kWorthwhile = 1e-4;  // of the deviance per reading
 constexpr int64_t kFewest = 100;      // readings
 
 using Parameter = double NoiseDescription::*;
-constexpr Parameter kParameters[] = {&NoiseDescription::jerk, &NoiseDescription::velocity_sd,
-                                     &NoiseDescription::effort_step, &NoiseDescription::position_sd};
-static_assert(1 + std::size(kFactors) * kRounds * std::size(kParameters) * 2 ==
-              kMostPlays);  // both directions
+// Causes of steps first: jerk can stand in for them, but not the other way round.
+constexpr Parameter kParameters[] = {&NoiseDescription::ground_impact, &NoiseDescription::stop_impact,
+                                     &NoiseDescription::jerk,          &NoiseDescription::velocity_sd,
+                                     &NoiseDescription::effort_step,   &NoiseDescription::position_sd,
+                                     &NoiseDescription::coupling};
+constexpr Parameter kImpacts[] = {&NoiseDescription::ground_impact, &NoiseDescription::stop_impact};
+// As it is, with impacts, both directions of each parameter, without impacts.
+static_assert(2 + std::size(kFactors) * kRounds * std::size(kParameters) * 2 + std::size(kImpacts) == kMostPlays);
+// [1/s] Where the search for an impact begins if there was none: 10 kg that meet 100 N s/m.
+constexpr double kFirstImpact = 10;
 
 std::vector<NoiseDescription> NoiseOf(const RobotDescription& robot) {
   std::vector<NoiseDescription> noise;
   for (int i = 0; i < robot.num_joints(); ++i) {
     const EstimatorSettings s = EstimatorOf(robot, i);
-    noise.push_back({s.position_sd, s.velocity_sd, s.jerk, s.effort_step, s.delay});
+    noise.push_back({s.position_sd, s.velocity_sd, s.jerk, s.effort_step, s.ground_impact, s.stop_impact, s.coupling, s.delay});
   }
   return noise;
 }
@@ -62,7 +68,14 @@ TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(Sta
 
   TunedNoise tuned;
   tuned.joints = NoiseOf(robot);
-  tuned.before = tuned.after = deviances(tuned.joints);
+  tuned.before = deviances(tuned.joints);
+  const std::vector<NoiseDescription> given = tuned.joints;
+  for (const Parameter impact : kImpacts) {
+    for (NoiseDescription& joint : tuned.joints) {
+      if (joint.*impact == 0) joint.*impact = kFirstImpact;
+    }
+  }
+  tuned.after = deviances(tuned.joints);
   for (const double factor : kFactors) {
     bool better = true;
     for (int round = 0; better && round < kRounds; ++round) {
@@ -73,6 +86,7 @@ TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(Sta
           std::vector<NoiseDescription> candidate = tuned.joints;
           for (size_t i = 0; i < n; ++i) {
             if (!found[i]) candidate[i].*parameter *= step;
+            candidate[i].coupling = std::min(1.0, candidate[i].coupling);
           }
           const std::vector<double> deviance = deviances(candidate);
           for (size_t i = 0; i < n; ++i) {
@@ -85,7 +99,21 @@ TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(Sta
       }
     }
   }
+  // What was not there and is not worth it is not there.
+  for (const Parameter impact : kImpacts) {
+    std::vector<NoiseDescription> candidate = tuned.joints;
+    for (size_t i = 0; i < n; ++i) {
+      if (given[i].*impact == 0) candidate[i].*impact = 0;
+    }
+    const std::vector<double> deviance = deviances(candidate);
+    for (size_t i = 0; i < n; ++i) {
+      if (!(deviance[i] < tuned.after[i] + kWorthwhile)) continue;
+      tuned.joints[i] = candidate[i];
+      tuned.after[i] = deviance[i];
+    }
+  }
   for (size_t i = 0; i < n; ++i) {
+    if (robot.joints[i].passive) tuned.joints[i].coupling = std::numeric_limits<double>::quiet_NaN();
     if (!has_velocity[i]) tuned.joints[i].velocity_sd = std::numeric_limits<double>::quiet_NaN();
     tuned.joints[i].delay = robot.joints[i].noise.delay;
   }

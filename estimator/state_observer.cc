@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/impact.h"
 #include "robot/motion_noise.h"
 
 namespace plumb {
@@ -15,6 +16,8 @@ constexpr int kSettled = 5;                 // measurements after a restart unti
 constexpr double kSurely = 5;               // standard deviations
 constexpr double kVelocityLag = 4e-3;       // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
 constexpr double kBiasesInOrder = 5;        // times its sd
+
+double Square(double x) { return x * x; }
 
 AgreementWatch::Settings VelocityWatch(const EstimatorSettings& s, bool gyro) {
   return {s.position_sd, s.velocity_sd, gyro ? kBiasesInOrder * s.bias_sd : 0, gyro ? 0 : kVelocityLag};
@@ -45,6 +48,8 @@ StateObserver::StateObserver(const RobotDescription& robot)
     const bool gyro = std::any_of(imus_.begin(), imus_.end(), turns);
     Joint joint{.name = robot.joints[static_cast<size_t>(i)].name,
                 .settings = settings,
+                .lower = robot.joints[static_cast<size_t>(i)].lower,
+                .upper = robot.joints[static_cast<size_t>(i)].upper,
                 .filter = KinematicFilter(settings),
                 .velocity_watch = AgreementWatch(VelocityWatch(settings, gyro)),
                 .acceleration_watch = AgreementWatch(AccelerationWatch(settings))};
@@ -110,23 +115,37 @@ void StateObserver::Restart(const joint_state_t& measured) {
     // Where an invalid joint is, it will tell when it is back.
     const double position = known ? measured.position[i] : joint.filter.mean()(0);
     joint.filter.Restart(position, known && !joint.gyro ? measured.velocity[i] : std::numeric_limits<double>::quiet_NaN());
+    joint.stop = 0;
     joint.velocity_watch.Restart();
     joint.acceleration_watch.Restart();
     if (known) joint.used = measured.measured[i];
   }
+  ground_ = 0;
   since_restart_ = 0;
   if (started_) ++restarts_;
   started_ = true;
 }
 
 void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
-  // A step of any joint's effort may step every joint's acceleration.
-  double step = 0;
+  // What acts on one joint may step every joint's acceleration: its own most of all, others' by their coupling.
+  const double left = std::exp(-elapsed / kImpactFades);  // of earlier impacts
+  double efforts = 0, stops = 0;  // sums of squares
   for (size_t i = 0; i < joints_.size(); ++i) {
-    const double change = measured.effort_applied[i] - joints_[i].effort;
-    step = std::hypot(step, std::isfinite(change) ? change : unknown_step_);
+    Joint& joint = joints_[i];
+    const double change = measured.effort_applied[i] - joint.effort;
+    joint.effort_step = std::isfinite(change) ? change : unknown_step_;
+    const double stop =
+        joint.of_base ? 0 : StopSpeed(joint.lower, joint.upper, state_.q[i], state_.v[i], elapsed);
+    joint.stop = std::max(joint.stop * left, stop);
+    efforts += Square(joint.effort_step);
+    stops += Square(joint.stop);
   }
-  for (Joint& joint : joints_) joint.filter.Predict(elapsed, step);
+  ground_ = std::max(ground_ * left, contact_.ImpactSpeed(elapsed));
+  for (Joint& joint : joints_) {
+    const double share = Square(joint.settings.coupling);
+    const auto felt = [&](double own, double all) { return std::sqrt(share * all + (1 - share) * Square(own)); };
+    joint.filter.Predict(elapsed, felt(joint.effort_step, efforts), {ground_, felt(joint.stop, stops)});
+  }
 }
 
 KinematicFilter::Innovation StateObserver::Correct(Joint& joint, Quantity quantity, double value, double age,

@@ -67,6 +67,7 @@ class StateObserver {
   struct Joint {
     std::string name;
     EstimatorSettings settings;
+    double lower, upper;  // its stops
     KinematicFilter filter;
     bool of_base = false;     // its state is base_'s: no filter of its own
     bool gyro = false;        // its velocity is an IMU's rate
@@ -75,6 +76,8 @@ class StateObserver {
     int64_t used = -1;        // of the newest that was valid and counted; -1 = none since the start
     bool out = false;         // silent for longer than an outage
     double effort = 0;        // mean applied effort of the previous interval
+    double effort_step = 0;   // [Nm] of this one against it
+    double stop = 0;          // [rad/s] at which it may meet its stop in this one
     NisAverage position_nis = {}, velocity_nis = {}, acceleration_nis = {};
     AgreementWatch velocity_watch, acceleration_watch;
     AgreementWatch::Finding velocity_found = AgreementWatch::Finding::kNone, acceleration_found = velocity_found;
@@ -116,6 +119,7 @@ class StateObserver {
   std::optional<BaseObserver> base_;
   double unknown_step_;  // [Nm] assumed change of an effort that is not known: from full one way to full the other
   GroundContact contact_;
+  double ground_ = 0;  // [m/s] at which a point may meet the ground
   robot_state_t state_{};
   std::vector<robot_state_t> waiting_;  // ring of causal states whose smoothed twins are due
   int first_waiting_ = 0, num_waiting_ = 0;

@@ -63,7 +63,11 @@ struct EstimatorSettings {
   double velocity_sd;  ///< [rad/s]
   double jerk;         ///< [rad/s^3 sqrt(s)]
   double effort_step;  ///< [rad/s^2 per Nm]
-  double timing_sd;    ///< [s]
+  /// sd of the acceleration's step per speed of an impact: of a point with the ground [rad/s^2 per m/s], of a joint with its
+  /// stop [rad/s^2 per rad/s]
+  double ground_impact = 0, stop_impact = 0;
+  double coupling = 1;  ///< of a joint with a motor: share of an effort's or a stop's effect that others' have, 0 to 1
+  double timing_sd;     ///< [s]
   int lag;             ///< [measurements]
   double reset_after;  ///< [rad]
   double delay = 0;    ///< [s] of a reading on its way: the constant part, which arrivals cannot tell
@@ -87,6 +91,9 @@ struct NoiseDescription {
   double velocity_sd = std::numeric_limits<double>::quiet_NaN();
   double jerk = std::numeric_limits<double>::quiet_NaN();
   double effort_step = std::numeric_limits<double>::quiet_NaN();
+  double ground_impact = std::numeric_limits<double>::quiet_NaN();
+  double stop_impact = std::numeric_limits<double>::quiet_NaN();
+  double coupling = std::numeric_limits<double>::quiet_NaN();
   double delay = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -117,7 +124,7 @@ struct SensorDescription {
   double rate_bias_sd = 0;          ///< [rad/s] >= 0
   double acceleration_bias_sd = 0;  ///< [m/s^2] >= 0
 
-  /// position_sd and velocity_sd of an IMU: of the angle and of the rate of turn. Neither has a jerk or an effort_step.
+  /// position_sd and velocity_sd of an IMU: of the angle and of the rate of turn. What moves it, the joint knows.
   NoiseDescription noise = {};
 };
 

@@ -98,6 +98,9 @@ NoiseDescription ReadNoise(Config config) {
   read("velocity_sd", {1e-12, 1e12}, noise.velocity_sd);
   read("jerk", {1e-12, 1e12}, noise.jerk);
   read("effort_step", {0, 1e12}, noise.effort_step);
+  read("ground_impact", {0, 1e12}, noise.ground_impact);
+  read("stop_impact", {0, 1e12}, noise.stop_impact);
+  read("coupling", {0, 1}, noise.coupling);
   read("delay", {0, 0.1}, noise.delay);
   config.Finish();
   return noise;

@@ -16,6 +16,9 @@ void Override(EstimatorSettings& s, const NoiseDescription& noise) {
   set(s.velocity_sd, noise.velocity_sd);
   set(s.jerk, noise.jerk);
   set(s.effort_step, noise.effort_step);
+  set(s.ground_impact, noise.ground_impact);
+  set(s.stop_impact, noise.stop_impact);
+  set(s.coupling, noise.coupling);
   set(s.delay, noise.delay);
 }
 
@@ -40,6 +43,7 @@ EstimatorSettings EstimatorOf(const RobotDescription& robot, int joint) {
     }
   }
   Override(s, robot.joints[static_cast<size_t>(joint)].noise);
+  if (robot.joints[static_cast<size_t>(joint)].passive) s.coupling = 1;  // none of the efforts is its own
   return s;
 }
 

@@ -108,6 +108,9 @@ EstimatorSettings ReadEstimator(Config config, const RobotDescription& robot) {
   s.velocity_sd = config.Number("velocity_sd", kSanePositive);
   s.jerk = config.Number("jerk", kSanePositive);
   s.effort_step = config.Number("effort_step", kSaneNotNegative);
+  s.ground_impact = config.Number("ground_impact", kSaneNotNegative, s.ground_impact);
+  s.stop_impact = config.Number("stop_impact", kSaneNotNegative, s.stop_impact);
+  s.coupling = config.Number("coupling", {0, 1}, s.coupling);
   s.timing_sd = config.Number("timing_sd", kSaneNotNegative);
   s.lag = config.Integer("lag", {1, 1000});
   s.reset_after = config.Number("reset_after", kSanePositive);

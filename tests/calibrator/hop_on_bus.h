@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
@@ -14,11 +16,22 @@
 
 namespace plumb {
 
+/// How the hopper on the bus is driven.
+enum class Drive {
+  kSprings,   ///< as Hop: by springs to a posture that bends and stretches
+  kBangBang,  ///< all or nothing towards the same posture, or at random: into the stops and into the ground
+};
+
 /// As Hop, but through the whole chain, in virtual time: the virtual robot, its drives and sensors, their
-/// frames, the driver. @throws std::runtime_error if the driver stops.
-inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double duration = 2) {
+/// frames, the driver. It ends early when a hopper that is driven by bang-bang has fallen.
+/// @param seed of the hidden parameters. @param motion its number: another one, another motion.
+/// @throws std::runtime_error if the driver stops.
+inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double duration = 2,
+                        Drive drive = Drive::kSprings, uint32_t motion = 0) {
+  constexpr double kFull = 200;                // [Nm]
+  constexpr double kFallen = 0.6, kLain = 0.7;  // [m] of the torso, [rad]
   HopperBus bus(robot, seed);
-  Random random(seed, {43});
+  Random random = motion == 0 ? Random(seed, {43}) : Random(seed, {43, motion});
   Eigen::VectorXd q(6), v = Eigen::VectorXd::Zero(6);
   q << 0, 1.35 + random.Uniform(0, 0.1), 0.02 * random.Normal(), -0.2, -0.4, 0.2;
   v[0] = random.Uniform(0, 0.5);
@@ -34,6 +47,7 @@ inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double dur
   const int64_t per_control = std::llround(robot.task.period / robot.driver.measurement);
   int64_t answered = -1;
   Eigen::Vector3d held = Eigen::Vector3d::Zero();
+  std::array<double, 3> astray{};  // [Nm]
   bus.effort = [&] {
     if (bus.states.empty()) return held;
     const joint_state_t& state = bus.states.back();
@@ -44,7 +58,11 @@ inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double dur
     for (size_t i = 0; i < 3; ++i) {
       const double wish =
           400 * (target[static_cast<int>(i)] - state.position[3 + i]) - 20 * state.velocity[3 + i];
-      held[static_cast<int>(i)] = std::clamp(wish, -200.0, 200.0);
+      held[static_cast<int>(i)] = std::clamp(wish, -kFull, kFull);
+      if (drive == Drive::kBangBang) {
+        if (random.Uniform(0, 1) < 0.3) astray[i] = 2 * kFull * random.Normal();
+        held[static_cast<int>(i)] = std::copysign(kFull, wish + astray[i]);
+      }
     }
     return held;
   };
@@ -57,6 +75,8 @@ inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double dur
     bus.Step();
     truth.push_back({HopperBus::kStart + bus.now(), bus.robot.q(), bus.robot.v()});
     armed = bus.driver.state() == DriveState::kArmed;
+    const Eigen::VectorXd& now = truth.back().q;
+    if (drive == Drive::kBangBang && (now[1] < kFallen || std::abs(now[2]) > kLain)) break;
   }
   if (!armed) throw std::runtime_error("the driver has stopped: " + std::string(bus.driver.reason()));
 
@@ -76,6 +96,16 @@ inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double dur
     samples.push_back(std::move(sample));
   }
   return samples;
+}
+
+/// Episodes of bang-bang until they are `duration` [s] in all.
+inline std::vector<Samples> BangBangOnBus(const RobotDescription& robot, uint32_t seed, double duration = 8) {
+  std::vector<Samples> episodes;
+  for (uint32_t motion = 1; duration > 0; ++motion) {
+    episodes.push_back(HopOnBus(robot, seed, std::min(duration, 2.0), Drive::kBangBang, motion));
+    duration -= robot.driver.measurement * static_cast<double>(std::max<size_t>(1, episodes.back().size()));
+  }
+  return episodes;
 }
 
 }  // namespace plumb

@@ -20,8 +20,8 @@ enum class States {
   kCertain,   ///< the smoother's, but taken for exact where a transition begins: no errors in variables
 };
 
-/// The log of a motion that was controlled every robot.task.period.
-inline Log ObservedLog(const RobotDescription& robot, const Samples& motion, States states) {
+/// What of a motion that was controlled every robot.task.period comes into a log, as this episode.
+inline Rollout Observed(const RobotDescription& robot, const Samples& motion, States states, int64_t episode = 0) {
   const auto n = static_cast<size_t>(robot.num_joints());
   const int64_t per_control = std::llround(robot.task.period * 1e6) / SimulatedReadings::kPeriod;
   StateObserver observer(robot);
@@ -50,16 +50,28 @@ inline Log ObservedLog(const RobotDescription& robot, const Samples& motion, Sta
     joiner.OnCommand(command);
     ++command.step;
   }
-  Log log;
-  log.name = "simulated";
-  log.rollouts.push_back(joiner.Join(0, command.state_sequence + per_control));
+  Rollout rollout = joiner.Join(0, command.state_sequence + per_control);
+  rollout.episode = episode;
   if (states == States::kCertain) {
-    for (Transition& transition : log.rollouts[0].transitions) {
+    for (Transition& transition : rollout.transitions) {
       transition.q_sd.setZero();
       transition.v_sd.setZero();
     }
   }
+  return rollout;
+}
+
+/// The log of motions, an episode each.
+inline Log ObservedLog(const RobotDescription& robot, const std::vector<Samples>& motions, States states) {
+  Log log;
+  log.name = "simulated";
+  for (size_t i = 0; i < motions.size(); ++i) {
+    log.rollouts.push_back(Observed(robot, motions[i], states, static_cast<int64_t>(i)));
+  }
   return log;
+}
+inline Log ObservedLog(const RobotDescription& robot, const Samples& motion, States states) {
+  return ObservedLog(robot, std::vector<Samples>{motion}, states);
 }
 
 /// What of a robot's parameters a motion can tell: a name, and the powers of the parameters whose product it

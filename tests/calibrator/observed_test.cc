@@ -50,5 +50,30 @@ TEST_CASE(
   CHECK(certain > 2 * smoothed);
 }
 
+TEST_CASE("driven into its stops and into the ground a hopper's masses are found all the same") {
+  RobotDescription robot = Robot("hopper");
+  robot.estimator.delay = 0;
+  constexpr uint32_t kSeed = 1;
+  const std::vector<Samples> motions = BangBangOnBus(robot, kSeed);
+  CalibrationOptions options;
+  options.method = "laplace";
+  options.horizons = {1};
+  const auto find = [&] {
+    const std::vector<Log> logs{ObservedLog(robot, motions, States::kSmoothed)};
+    return Calibrate(robot, logs, options);
+  };
+  const Findings found = find();
+  const Gaussian posterior = Moments(found.posterior);
+  const Eigen::ArrayXd error = posterior.mean.array() - HiddenParameters(robot, kSeed).array().log();
+  const Eigen::ArrayXd sd = posterior.covariance.diagonal().cwiseSqrt();
+  INFO("errors " << error.transpose() << ", claimed " << sd.transpose());
+  CHECK((error.abs() < 4 * sd).all());
+  CHECK(sd(0) < 0.01);
+  CHECK(found.stages[0].discrepancy < 1.6);
+  // Without impacts states are further off than they say.
+  for (JointDescription& joint : robot.joints) joint.noise.ground_impact = joint.noise.stop_impact = 0;
+  CHECK(find().stages[0].discrepancy > 10);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -43,6 +43,20 @@ class Edited {
   fs::path folder_;
 };
 
+TEST_CASE("impacts and coupling of the estimator are read and checked") {
+  const Edited good("robot.toml", "[estimator]\n", "[estimator]\nground_impact = 9.0\nstop_impact = 70.0\ncoupling = 0.1\n");
+  const EstimatorSettings settings = LoadRobot(good.path()).estimator;
+  CHECK(settings.ground_impact == 9);
+  CHECK(settings.stop_impact == 70);
+  CHECK(settings.coupling == 0.1);
+  CHECK(LoadRobot(kPendulum).estimator.stop_impact == 0);
+  CHECK(LoadRobot(kPendulum).estimator.coupling == 1);
+  for (const std::string key : {"ground_impact = -1.0", "stop_impact = -1.0", "coupling = 1.5"}) {
+    const Edited bad("robot.toml", "[estimator]\n", "[estimator]\n" + key + "\n");
+    CHECK_THROWS_WITH(LoadRobot(bad.path()), Contains(key.substr(0, key.find(' '))));
+  }
+}
+
 TEST_CASE("the pendulum is read whole") {
   const RobotDescription robot = LoadRobot(kPendulum);
   CHECK(robot.name == "pendulum");
