@@ -92,12 +92,10 @@ std::string Sentence(const Options& options, const PaperTask& task, const Result
     text += fmt::format("\n  {:<40}{:8.0f}{:8.0f}{:8.0f}", Label(way), mean(way, 0), mean(way, std::min(5, options.iterations)), mean(way, options.iterations));
   }
   for (const Way way : {Way::kOriginal, Way::kStep, Way::kDefault}) {
-    int enough = -1;
-    for (int k = 0; k <= options.iterations && enough < 0; ++k) {
-      if (ShareOfOracle(mean(way, k), mean(Way::kOracle, k)) >= kEnough) enough = k;
-    }
-    text += fmt::format("\n  {} has {:.0f} % of the oracle's return after as many iterations: {}", Label(way), 100 * kEnough,
-                        enough < 0 ? "never" : fmt::format("{} ({:.0f} s of the robot)", enough, enough * kRobotSeconds));
+    int enough = options.iterations + 1;
+    while (enough > 0 && ShareOfOracle(mean(way, enough - 1), mean(Way::kOracle, enough - 1)) >= kEnough) --enough;
+    text += fmt::format("\n  {} has {:.0f} % of the oracle's return for good after so many iterations: {}", Label(way), 100 * kEnough,
+                        enough > options.iterations ? "never" : fmt::format("{} ({:.0f} s of the robot)", enough, enough * kRobotSeconds));
   }
   return text;
 }
