@@ -1,5 +1,5 @@
-// How honest the observer's standard deviations are at impacts and elsewhere, on hoppers on their bus in virtual time: tables for
-// docs/measurements.md. build/bench/impacts [motions]
+// How honest the observer's standard deviations are at impacts and elsewhere, on hoppers on their bus in
+// virtual time: tables for docs/measurements.md. build/bench/impacts [motions]
 
 #include <fmt/format.h>
 
@@ -18,7 +18,8 @@ namespace {
 constexpr int kAround = 5;  // measurements
 constexpr size_t kSettle = 50;
 enum When { kFree, kStanding, kGround, kStop, kAlways, kWhens };
-constexpr const char* kNames[] = {"in the air", "on the ground", "touchdown, lift-off", "at a stop", "always"};
+constexpr const char* kNames[] = {"in the air", "on the ground", "touchdown, lift-off", "at a stop",
+                                  "always"};
 
 /// Stops count for 10 ms around, then changes of contact.
 std::vector<When> WhenOf(const RobotDescription& robot, const Samples& motion) {
@@ -56,7 +57,8 @@ void Print(const std::string& name, const RobotDescription& robot, const std::ve
           ++counts[w];
           for (size_t i = 0; i < n; ++i) {
             const auto at = static_cast<Eigen::Index>(i);
-            errors[w][i].Add(state.q[i] - motion[k].q[at], state.v[i] - motion[k].v[at], state.q_sd[i], state.v_sd[i]);
+            errors[w][i].Add(state.q[i] - motion[k].q[at], state.v[i] - motion[k].v[at], state.q_sd[i],
+                             state.v_sd[i]);
           }
         }
       }
@@ -85,7 +87,9 @@ int main(int argc, char** argv) {
     springs.push_back(HopOnBus(robot, seed));
     for (Samples& episode : BangBangOnBus(robot, seed)) bang_bang.push_back(std::move(episode));
   }
-  fmt::print("| hopper | when (states) | joint | NEES q | NEES v | v within 95 % | rms v |\n|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| hopper | when (states) | joint | NEES q | NEES v | v within 95 % | rms v "
+      "|\n|---|---|---|---|---|---|---|\n");
   Print("springs", robot, springs);
   Print("bang-bang", robot, bang_bang);
   for (JointDescription& joint : robot.joints) joint.noise.ground_impact = joint.noise.stop_impact = 0;

@@ -41,7 +41,8 @@ void Print(const std::string& name, const RobotDescription& robot, const Motion&
       const Findings found = Calibrate(robot, logs, {});
       alarms += found.misspecification.alarm;
       discrepancy += found.stages.front().discrepancy / motions;
-      if (found.misspecification.alarm) fmt::print(stderr, "\n{} {} {}: {}\n", name, way.name, seed, found.misspecification.words);
+      if (found.misspecification.alarm)
+        fmt::print(stderr, "\n{} {} {}: {}\n", name, way.name, seed, found.misspecification.words);
       const Gaussian posterior = Moments(found.posterior);
       const Eigen::VectorXd hidden =
           truth.array().log();  // both robots' parameters have logarithms for coordinates
@@ -69,7 +70,8 @@ int main(int argc, char** argv) {
   using namespace plumb;
   const auto motions = static_cast<uint32_t>(argc > 1 ? std::atoi(argv[1]) : 20);
   fmt::print(
-      "| robot | states | of | rms error % | mean error % | claimed sd % | within 95 % | discrepancy | alarms |\n"
+      "| robot | states | of | rms error % | mean error % | claimed sd % | within 95 % | discrepancy | "
+      "alarms |\n"
       "|---|---|---|---|---|---|---|---|---|\n");
   const std::string only = argc > 2 ? argv[2] : "";
   for (const std::string name : {"pendulum", "hopper"}) {
@@ -80,7 +82,8 @@ int main(int argc, char** argv) {
     for (size_t i = 0; i < noise.joints.size(); ++i) robot.joints[i].noise = noise.joints[i];
     const auto simulated = [&](uint32_t seed) {
       const Eigen::VectorXd truth = HiddenParameters(robot, seed);
-      return std::vector<Samples>{name == "hopper" ? Hop(robot, seed, 2, truth) : Swing(robot, seed, 10, truth)};
+      return std::vector<Samples>{name == "hopper" ? Hop(robot, seed, 2, truth)
+                                                   : Swing(robot, seed, 10, truth)};
     };
     Print(name, robot, simulated, motions);
   }
@@ -88,10 +91,11 @@ int main(int argc, char** argv) {
   hopper.estimator.delay = 0;  // in virtual time frames arrive at once
   if (only.empty() || only == "bus") {
     Print(
-        "hopper on its bus", hopper, [&](uint32_t seed) { return std::vector<Samples>{HopOnBus(hopper, seed)}; },
-        motions);
+        "hopper on its bus", hopper,
+        [&](uint32_t seed) { return std::vector<Samples>{HopOnBus(hopper, seed)}; }, motions);
   }
   if (only.empty() || only == "bang-bang") {
-    Print("hopper, bang-bang", hopper, [&](uint32_t seed) { return BangBangOnBus(hopper, seed); }, motions);
+    Print(
+        "hopper, bang-bang", hopper, [&](uint32_t seed) { return BangBangOnBus(hopper, seed); }, motions);
   }
 }

@@ -49,8 +49,8 @@ class GroundContact {
   /// Fills in state.contact from the rest of it, one each: -1 = not known, because the state is not valid. The joints'
   /// errors are taken as independent; how the errors of positions turn into ones of the vertical velocity is neglected.
   void Judge(robot_state_t& state);
-  /// [m/s] at which a point may meet the ground, or moves in it, within `ahead` [s] from the last state: the fastest one's. 0 if
-  /// that state was not valid.
+  /// [m/s] at which a point may meet the ground, or moves in it, within `ahead` [s] from the last state: the fastest
+  /// one's. 0 if that state was not valid.
   double ImpactSpeed(double ahead) const;
 
  private:

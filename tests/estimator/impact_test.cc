@@ -1,4 +1,5 @@
-// Impacts are not white jerk. Independent truth: joints that bounce off a stop made of a spring and a damper, by its exact solution.
+// Impacts are not white jerk. Independent truth: joints that bounce off a stop made of a spring and a damper,
+// by its exact solution.
 
 #include "estimator/impact.h"
 
@@ -26,8 +27,13 @@ RobotDescription Robot() {
   robot.joints[0].name = "pivot";
   robot.joints[0].upper = 10;
   robot.joints[0].effort_limit = 2;
-  robot.estimator = {.position_sd = kPositionSd, .velocity_sd = kVelocitySd, .jerk = 1, .effort_step = 0,
-                     .timing_sd = 0, .lag = 10, .reset_after = 0.2};
+  robot.estimator = {.position_sd = kPositionSd,
+                     .velocity_sd = kVelocitySd,
+                     .jerk = 1,
+                     .effort_step = 0,
+                     .timing_sd = 0,
+                     .lag = 10,
+                     .reset_after = 0.2};
   return robot;
 }
 
@@ -99,12 +105,14 @@ Nees NeesOf(const RobotDescription& robot) {
   return {sum[1] / count[1], sum[0] / count[0]};
 }
 
-TEST_CASE("where a joint meets its stop the velocity's error is as large as it says, with the impact left open") {
+TEST_CASE(
+    "where a joint meets its stop the velocity's error is as large as it says, with the impact left open") {
   RobotDescription robot = Robot();
   const Nees without = NeesOf(robot);
   robot.estimator.stop_impact = kStopImpact;
   const Nees with = NeesOf(robot);
-  INFO("at impacts " << without.impact << " and " << with.impact << ", elsewhere " << without.free << " and " << with.free);
+  INFO("at impacts " << without.impact << " and " << with.impact << ", elsewhere " << without.free << " and "
+                     << with.free);
   CHECK(without.impact > 20);
   CHECK(with.impact > 0.5);
   CHECK(with.impact < 1.5);
@@ -153,8 +161,15 @@ std::vector<double> VelocitySds(double coupling, bool effort, bool stop) {
   RobotDescription robot;
   robot.joints.resize(2);
   for (JointDescription& joint : robot.joints) joint.effort_limit = 2, joint.lower = -1, joint.upper = 1;
-  robot.estimator = {.position_sd = 1e-4, .velocity_sd = 0.5, .jerk = 1, .effort_step = 30, .stop_impact = 100,
-                     .coupling = coupling, .timing_sd = 0, .lag = 4, .reset_after = 10};
+  robot.estimator = {.position_sd = 1e-4,
+                     .velocity_sd = 0.5,
+                     .jerk = 1,
+                     .effort_step = 30,
+                     .stop_impact = 100,
+                     .coupling = coupling,
+                     .timing_sd = 0,
+                     .lag = 4,
+                     .reset_after = 10};
   StateObserver observer(robot);
   joint_state_t m{};
   m.num_joints = 2;

@@ -51,6 +51,9 @@ inline RobotDescription WithSimulatedNoise(RobotDescription robot) {
     if (sensor.link < 0) continue;
     sensor.noise.position_sd = S::kAngleNoise;
     sensor.noise.velocity_sd = S::kRateNoise;
+    const int turned = MountingOf(robot, sensor.link).turned;  // what it says of its IMU is of another one
+    if (turned >= 0) robot.joints[static_cast<size_t>(turned)].noise.position_sd = S::kAngleNoise;
+    if (turned >= 0) robot.joints[static_cast<size_t>(turned)].noise.velocity_sd = S::kRateNoise;
     sensor.rate_bias_sd = S::kRateBias;
     sensor.acceleration_sd = S::kForceNoise;
     sensor.acceleration_bias_sd = S::kForceBias;
