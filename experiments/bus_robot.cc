@@ -19,12 +19,12 @@
 namespace plumb {
 namespace {
 
-constexpr uint32_t kStandStream = 0x5374616E;             // of random numbers; "Stan"
-constexpr int64_t kFirstStart = 1'700'000'000'000'000;    // [us] utime of trial 0: a time as any
-constexpr int64_t kBetweenTrials = 1'000'000'000;         // [us] so that no two episodes begin at the same time
+constexpr uint32_t kStandStream = 0x5374616E;           // of random numbers; "Stan"
+constexpr int64_t kFirstStart = 1'700'000'000'000'000;  // [us] utime of trial 0: a time as any
+constexpr int64_t kBetweenTrials = 1'000'000'000;       // [us] so that no two episodes begin at the same time
 constexpr int64_t kArmAgain = 500'000, kStatus = 100'000;  // [us] periods of requests and of DRIVER_STATUS
-constexpr int64_t kPatience = 30'000'000;                 // [us] until the episode has begun
-constexpr int64_t kSlice = 10'000;                        // [us] in which plumb-controller looks at its clock
+constexpr int64_t kPatience = 30'000'000;                  // [us] until the episode has begun
+constexpr int64_t kSlice = 10'000;  // [us] in which plumb-controller looks at its clock
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
@@ -51,8 +51,9 @@ class Loop {
   void BeginEpisode() {
     for (int64_t next_request = kArmAgain; last_.episode < 0; bus_.Advance(bus_.now() + kSlice)) {
       if (bus_.now() >= kPatience) {
-        throw std::runtime_error("the robot does not begin an episode: the controller says '" + status().reason +
-                                 "', the driver '" + std::string(bus_.driver().reason()) + "'");
+        throw std::runtime_error("the robot does not begin an episode: the controller says '" +
+                                 status().reason + "', the driver '" + std::string(bus_.driver().reason()) +
+                                 "'");
       }
       if (bus_.driver().state() == DriveState::kArmed || bus_.now() < next_request) continue;
       driver_request_t arm{};
@@ -90,7 +91,8 @@ class Loop {
     }
     Send(controller_.Tick(bus_.now(), bus_.utime()));
     if (const place_robot_t* place = controller_.place()) {
-      robot().Place(place->utime, Eigen::VectorXd::Map(place->q.data(), static_cast<Eigen::Index>(place->q.size())),
+      robot().Place(place->utime,
+                    Eigen::VectorXd::Map(place->q.data(), static_cast<Eigen::Index>(place->q.size())),
                     Eigen::VectorXd::Map(place->v.data(), static_cast<Eigen::Index>(place->v.size())));
     }
   }
@@ -141,7 +143,8 @@ RealSystem::Trial BusRobot::Run(const GaussianPolicy& policy, bool explore, int 
   const controller_status_t& status = loop.status();
   const bool whole = !status.returns.empty();
   stopped_ = whole ? "" : status.reason;
-  return {loop.Join(), whole ? status.returns.back() : status.episode_return, status.step * model.task.period};
+  return {loop.Join(), whole ? status.returns.back() : status.episode_return,
+          status.step * model.task.period};
 }
 
 }  // namespace plumb

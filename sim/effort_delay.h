@@ -31,7 +31,7 @@ class EffortDelay {
     int64_t at;
     double effort;
   };
-  std::vector<int64_t> delay_;             // [us] of each velocity's coordinate
+  std::vector<int64_t> delay_;  // [us] of each velocity's coordinate
   std::vector<std::deque<Change>> coming_;
   Eigen::VectorXd acting_;
 };

@@ -11,7 +11,8 @@
 namespace plumb {
 namespace {
 
-constexpr double kPhase = 0.3;  // [rad] of the teeth's own swing in a step; the midpoint rule is stable up to 2
+constexpr double kPhase =
+    0.3;  // [rad] of the teeth's own swing in a step; the midpoint rule is stable up to 2
 
 }  // namespace
 
@@ -24,8 +25,12 @@ GearPlay::GearPlay(const RobotDescription& robot) {
       throw std::invalid_argument("joint '" + robot.joints[index].name +
                                   "' has backlash: its motor_gain, delay and no_load_speed have no place");
     }
-    Gear gear{.position = 0, .velocity = 0, .half = unmodelled.backlash / 2, .rotor = unmodelled.rotor,
-              .stiffness = robot.joints[index].effort_limit / (kBend * unmodelled.backlash), .damping = 0};
+    Gear gear{.position = 0,
+              .velocity = 0,
+              .half = unmodelled.backlash / 2,
+              .rotor = unmodelled.rotor,
+              .stiffness = robot.joints[index].effort_limit / (kBend * unmodelled.backlash),
+              .damping = 0};
     for (size_t i = 0; i < index; ++i) {
       gear.position += robot.joints[i].num_positions();
       gear.velocity += robot.joints[i].num_velocities();

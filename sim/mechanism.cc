@@ -71,7 +71,8 @@ RobotDescription WithFriction(RobotDescription robot) {
 
 }  // namespace
 
-Mechanism::Mechanism(RobotDescription robot) : engine_(MakeEngine(robot = WithFriction(std::move(robot)))), play_(robot) {}
+Mechanism::Mechanism(RobotDescription robot)
+    : engine_(MakeEngine(robot = WithFriction(std::move(robot)))), play_(robot) {}
 
 void Mechanism::SetState(const Vector& q, const Vector& v) {
   engine_->SetState(q, v);

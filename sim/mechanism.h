@@ -10,11 +10,13 @@
 namespace plumb {
 
 /// What moves in a virtual robot. By description.virtual_robot.engine:
-///   auto    a Plant, or, where the robot has something that a Plant has not (armature, stops, contact), a Simulator
+///   auto    a Plant, or, where the robot has something that a Plant has not (armature, stops, contact), a
+///   Simulator
 ///           with substeps a tenth as long as calibration's and at most kLongestSubstep: then reality has the
-///           simulator's equations, but not its integration errors: what a model of contact gets wrong does not
-///           show there
-///   mujoco  MuJoCo (see MakeMujocoEngine): another contact, other stops, another integrator than any model has
+///           simulator's equations, but not its integration errors: what a model of contact gets wrong does
+///           not show there
+///   mujoco  MuJoCo (see MakeMujocoEngine): another contact, other stops, another integrator than any model
+///   has
 /// Coulomb friction and backlash of description.virtual_robot.joints come on top. Not thread-safe.
 class Mechanism {
  public:

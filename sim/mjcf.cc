@@ -13,7 +13,9 @@ namespace {
 
 using Type = JointDescription::Type;
 
-std::string Words(const Eigen::Vector3d& v) { return fmt::format("{:.17g} {:.17g} {:.17g}", v[0], v[1], v[2]); }
+std::string Words(const Eigen::Vector3d& v) {
+  return fmt::format("{:.17g} {:.17g} {:.17g}", v[0], v[1], v[2]);
+}
 
 std::string Turn(const Eigen::Matrix3d& rotation) {
   const Eigen::Quaterniond q(rotation);
@@ -23,7 +25,9 @@ std::string Turn(const Eigen::Matrix3d& rotation) {
 /// MuJoCo knows no rods that are infinitely thin.
 Eigen::Matrix3d Solid(const Eigen::Matrix3d& inertia) {
   const double least = 1e-9 * inertia.trace();
-  const bool thin = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues()[0] < least;
+  const bool thin =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues()[0] <
+      least;
   return inertia + (thin ? least : 0) * Eigen::Matrix3d::Identity();
 }
 
@@ -54,7 +58,8 @@ class Writer {
         -robot_.simulation.gravity);
     if (const auto& contact = robot_.simulation.contact) {
       surface_ = fmt::format(
-          "condim=\"3\" friction=\"{:.17g} 0.005 0.0001\" margin=\"0.001\" solref=\"0.02 1\" solimp=\"0.8 0.8 0.01\"",
+          "condim=\"3\" friction=\"{:.17g} 0.005 0.0001\" margin=\"0.001\" solref=\"0.02 1\" solimp=\"0.8 "
+          "0.8 0.01\"",
           contact->friction);
       text_ += "<geom type=\"plane\" size=\"0 0 1\" contype=\"0\" conaffinity=\"1\" " + surface_ + "/>\n";
     }
@@ -109,11 +114,12 @@ class Writer {
   void WriteJoint(const JointDescription& j, const Eigen::Isometry3d& in_body) {
     const bool limited = robot_.simulation.stop && std::isfinite(j.upper);
     text_ += fmt::format(
-        "<joint type=\"{}\" pos=\"{}\" axis=\"{}\" armature=\"{:.17g}\" damping=\"{:.17g}\" frictionloss=\"{:.17g}\" "
+        "<joint type=\"{}\" pos=\"{}\" axis=\"{}\" armature=\"{:.17g}\" damping=\"{:.17g}\" "
+        "frictionloss=\"{:.17g}\" "
         "stiffness=\"{:.17g}\" springref=\"{:.17g}\"",
         j.type == Type::kPrismatic ? "slide" : "hinge", Words(in_body.translation()),
-        Words(in_body.linear() * j.axis), j.dynamics.armature, j.dynamics.damping,
-        j.dynamics.friction, j.dynamics.stiffness, j.dynamics.rest);
+        Words(in_body.linear() * j.axis), j.dynamics.armature, j.dynamics.damping, j.dynamics.friction,
+        j.dynamics.stiffness, j.dynamics.rest);
     if (limited) text_ += fmt::format(" limited=\"true\" range=\"{:.17g} {:.17g}\"", j.lower, j.upper);
     text_ += "/>\n";
   }
@@ -133,8 +139,9 @@ class Writer {
       default:
         return;  // the robot's warnings say so
     }
-    text_ += fmt::format("<geom type=\"{}\" size=\"{}\" pos=\"{}\" quat=\"{}\" contype=\"1\" conaffinity=\"0\" {}/>\n", type,
-                         size, Words(shape.position), Turn(shape.rotation), surface_);
+    text_ += fmt::format(
+        "<geom type=\"{}\" size=\"{}\" pos=\"{}\" quat=\"{}\" contype=\"1\" conaffinity=\"0\" {}/>\n", type,
+        size, Words(shape.position), Turn(shape.rotation), surface_);
   }
 
   const RobotDescription& robot_;

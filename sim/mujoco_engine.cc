@@ -83,7 +83,8 @@ class MujocoEngine : public MotionEngine {
     model_->opt.timestep = duration / count;
     for (Eigen::Index i = 0; i < effort.size(); ++i) data_->qfrc_applied[i] = gain_[i] * effort[i];
     for (int i = 0; i < count && !GivenUp(); ++i) mj_step(model_.get(), data_.get());
-    const auto q = Eigen::VectorXd::Map(data_->qpos, q_.size()), v = Eigen::VectorXd::Map(data_->qvel, v_.size());
+    const auto q = Eigen::VectorXd::Map(data_->qpos, q_.size()),
+               v = Eigen::VectorXd::Map(data_->qvel, v_.size());
     if (GivenUp() || !q.allFinite() || !v.allFinite()) {
       Restore();
       return false;

@@ -27,7 +27,7 @@ class VirtualBus {
   /// Whatever happens until then, and nothing after it: `now` is then `until`.
   void Advance(int64_t until);
 
-  int64_t now() const { return now_; }            ///< [us] since the start
+  int64_t now() const { return now_; }  ///< [us] since the start
   int64_t utime() const { return start_ + now_; }
   VirtualRobot& robot() { return robot_; }
   Driver& driver() { return driver_; }

@@ -45,7 +45,8 @@ std::vector<Rollout> Trials(BusRobot& system, const GaussianPolicy& policy, int 
 
 double Sum(const Rollout& rollout) {
   double sum = 0;
-  for (const Transition& t : rollout.transitions) sum += t.q.sum() + t.v.sum() + t.efforts.back().effort.sum();
+  for (const Transition& t : rollout.transitions)
+    sum += t.q.sum() + t.v.sum() + t.efforts.back().effort.sum();
   return sum;
 }
 
@@ -66,7 +67,8 @@ TEST_CASE("a trial is a function of seed and number, to the bit") {
   CHECK(Sum(one.Run(policy, false, 40, 3).rollout) != Sum(a.rollout));
 }
 
-/// Holds a hopper's leg bent, off its stops, as springs and dampers do: there the observer is as good as it says.
+/// Holds a hopper's leg bent, off its stops, as springs and dampers do: there the observer is as good as it
+/// says.
 GaussianPolicy Crouch(const RobotDescription& robot, float sd) {
   constexpr float kStiffness = 2, kDamping = 0.1f;  // action per rad, per rad/s
   GaussianPolicy policy = Wanderer(robot, sd);
@@ -134,10 +136,14 @@ TEST_CASE("backlash is a gap that the pendulum's parameters do not close") {
 }
 
 TEST_CASE("a hopper that MuJoCo moves is driven through its bus as any other") {
-  if (!HasMujoco()) return;
   const RobotDescription truth = Robot("hopper/mujoco.toml"), model = Robot("hopper");
   const Eigen::VectorXd hidden = HiddenParameters(truth, 2);
   BusRobot other_world(truth, model, hidden, 1), own_world(model, model, hidden, 1);
+  if (!HasMujoco()) {
+    CHECK_THROWS_WITH(other_world.Run(Wanderer(model, 0.5f), true, 100, 0),
+                      Catch::Contains("mujoco.toml:6:10: ") && Catch::Contains("libmujoco-dev"));
+    return;
+  }
   const std::vector<Rollout> there = Trials(other_world, Wanderer(model, 0.5f), 5),
                              here = Trials(own_world, Wanderer(model, 0.5f), 5);
   for (const Rollout& rollout : there) CHECK(rollout.transitions.size() >= 5);

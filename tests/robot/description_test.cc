@@ -92,7 +92,7 @@ TEST_CASE("what a virtual robot has and no model knows is read, and refused wher
   CHECK(pivot.joint == 0);
   CHECK(pivot.friction == 0.1);
   CHECK(pivot.delay == 0.004);
-  CHECK(pivot.backlash == 0.01);
+  CHECK(pivot.backlash == 0.003);
   CHECK(pivot.rotor == 0.01);
   CHECK(worn.virtual_robot.engine == VirtualRobotSettings::Engine::kAuto);
   CHECK(worn.fingerprint != LoadRobot(kPendulum).fingerprint);
