@@ -12,6 +12,8 @@ constexpr double kInitialAccelerationSd = 100;
 // Nor of the velocity where it is not measured [rad/s].
 constexpr double kInitialVelocitySd = 10;
 
+constexpr double kInstant = 1e-6;  // [s]
+
 constexpr double Square(double x) { return x * x; }
 
 }  // namespace
@@ -30,13 +32,14 @@ void KinematicFilter::Restart(double position, double velocity) {
                                 bias_variance)
                     .asDiagonal();
   jerk_ = Square(settings_.jerk);
+  step_ = {};
   pending_ = 0;
   predicted_mean_ = mean_;
   predicted_covariance_ = covariance_;
   Keep();
 }
 
-void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds& impact) {
+void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds& impact, double step_after) {
   transition_ << 1, dt, dt * dt / 2, 0,  //
       0, 1, dt, 0,                       //
       0, 0, 1, 0,                        //
@@ -47,15 +50,17 @@ void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds&
       d4 / 8, d3 / 3, d2 / 2, 0,       //
       d3 / 6, d2 / 2, dt, 0,           //
       0, 0, 0, 0;
-  // The mean effort of this interval differs from the last one's: the acceleration may step at its beginning.
-  // So may an impact make it; when, nobody knows: to readings of a moment ago it is so much more jerk.
+  // Where the effort steps, the acceleration may. So may an impact make it; when, nobody knows: at the beginning, and to readings of a moment
+  // ago it is so much more jerk.
   const double impact_variance =
       Square(settings_.ground_impact * impact.ground) + Square(settings_.stop_impact * impact.stop);
   jerk_ = Square(settings_.jerk) + impact_variance / dt;
-  const double step_variance = Square(settings_.effort_step * effort_step) + impact_variance;
+  const double since = (1 - step_after) * dt;
+  step_ = {settings_.effort_step * effort_step, since};
+  const Eigen::Vector4d step = step_.sd * Eigen::Vector4d(since * since / 2, since, 1, 0);
   mean_ = transition_ * mean_;
   covariance_ = transition_ * covariance_ * transition_.transpose() + Square(settings_.jerk) * jerk +
-                step_variance * transition_.col(2) * transition_.col(2).transpose();
+                impact_variance * transition_.col(2) * transition_.col(2).transpose() + step * step.transpose();
   covariance_(3, 3) += Square(settings_.bias_sd) * dt / kBiasWanders;
   predicted_mean_ = mean_;
   predicted_covariance_ = covariance_;
@@ -63,18 +68,22 @@ void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds&
 
 KinematicFilter::Row KinematicFilter::RowOf(Quantity quantity, double age, double spread) const {
   const double span = std::abs(age);
+  // A reading from before the step, or the part of an average that is, knows nothing of it.
+  const double before = std::max(0.0, age - step_.since), old = std::max(0.0, age + spread - step_.since),
+                unknown_velocity = step_.sd * before, unknown_position = unknown_velocity * before / 2;
   switch (quantity) {
     case Quantity::kPosition:
       // A measurement time that is off by timing_sd displaces the position by velocity * timing_sd.
       return {{1, -age, age * age / 2, 0},
-              Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd) + jerk_ * std::pow(span, 5) / 20};
+              Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd) + jerk_ * std::pow(span, 5) / 20 +
+                  Square(unknown_position)};
     case Quantity::kVelocity:
     case Quantity::kRate:
       return {{0, 1, -age, quantity == Quantity::kRate ? 1. : 0.},
-              Square(settings_.velocity_sd) + jerk_ * span * span * span / 3};
+              Square(settings_.velocity_sd) + jerk_ * span * span * span / 3 + Square(unknown_velocity)};
     case Quantity::kAcceleration:
       // The average of a random walk differs from its end by a third of the walk's variance.
-      return {{0, 0, 1, 1}, Square(settings_.acceleration_sd) + jerk_ * (span + spread / 3)};
+      return {{0, 0, 1, 1}, Square(settings_.acceleration_sd) + jerk_ * (span + spread / 3) + Square(step_.sd * std::min(1.0, old / (spread + kInstant)))};
   }
   return {};
 }

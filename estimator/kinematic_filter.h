@@ -40,9 +40,9 @@ class KinematicFilter {
   /// it knows.
   void Restart(double position, double velocity);
   /// @param dt [s] since the last call, > 0.
-  /// @param effort_step [Nm] change of the mean applied effort against the previous interval.
+  /// @param effort_step [Nm] of the applied effort. @param step_after share of dt after which it steps, 0 to 1.
   /// @param impact that there may be meanwhile.
-  void Predict(double dt, double effort_step, const ImpactSpeeds& impact = {});
+  void Predict(double dt, double effort_step, const ImpactSpeeds& impact = {}, double step_after = 0);
 
   /// A reading less what was expected of it, and its variance if both are right.
   struct Innovation {
@@ -92,6 +92,9 @@ class KinematicFilter {
   Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero(), predicted_covariance_ = Eigen::Matrix4d::Zero();
   Eigen::Matrix4d transition_ = Eigen::Matrix4d::Identity();
   double jerk_;  // squared spectral density of the last step's, impact included
+  struct {
+    double sd = 0, since = 0;  // of the acceleration, and [s] before the present
+  } step_;                     // of the effort, in the latest interval
   std::vector<Step> window_;  // ring
   int oldest_ = 0, pending_ = 0;
 };

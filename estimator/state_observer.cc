@@ -16,6 +16,7 @@ constexpr int kSettled = 5;                 // measurements after a restart unti
 constexpr double kSurely = 5;               // standard deviations
 constexpr double kVelocityLag = 4e-3;       // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
 constexpr double kBiasesInOrder = 5;        // times its sd
+constexpr double kRoundedEffort = 1e-9;     // [Nm] or [N]: what rounding makes of a mean
 
 double Square(double x) { return x * x; }
 
@@ -115,6 +116,7 @@ void StateObserver::Restart(const joint_state_t& measured) {
     // Where an invalid joint is, it will tell when it is back.
     const double position = known ? measured.position[i] : joint.filter.mean()(0);
     joint.filter.Restart(position, known && !joint.gyro ? measured.velocity[i] : std::numeric_limits<double>::quiet_NaN());
+    if (std::isfinite(measured.effort_applied[i])) joint.effort = measured.effort_applied[i];
     joint.stop = 0;
     joint.velocity_watch.Restart();
     joint.acceleration_watch.Restart();
@@ -126,14 +128,34 @@ void StateObserver::Restart(const joint_state_t& measured) {
   started_ = true;
 }
 
+// By how much the joints' efforts have stepped. From e0 to e1 after a share of the interval, its mean is share e0 + (1 - share) e1. What is
+// not explained by one step to the effort that was sent last counts as a step to the mean at the beginning.
+// @return the share after which the largest one has.
+double StateObserver::FindEffortSteps(const joint_state_t& measured) {
+  double largest = 0, largest_after = 0;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[i];
+    const double mean = measured.effort_applied[i], sent = measured.effort_sent[i];
+    joint.effort_step = std::isfinite(mean) ? mean - joint.effort : unknown_step_;
+    double after = 0;
+    if (std::isfinite(mean)) {
+      const double share = (sent - mean) / (sent - joint.effort);
+      const bool once = std::abs(joint.effort_step) > kRoundedEffort && share > 0 && share < 1;
+      if (once) joint.effort_step = sent - joint.effort, after = share;
+      joint.effort = once ? sent : mean;
+    }
+    if (std::abs(joint.effort_step) > largest) largest = std::abs(joint.effort_step), largest_after = after;
+  }
+  return largest_after;
+}
+
 void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
+  const double after = FindEffortSteps(measured);
   // What acts on one joint may step every joint's acceleration: its own most of all, others' by their coupling.
   const double left = std::exp(-elapsed / kImpactFades);  // of earlier impacts
   double efforts = 0, stops = 0;  // sums of squares
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
-    const double change = measured.effort_applied[i] - joint.effort;
-    joint.effort_step = std::isfinite(change) ? change : unknown_step_;
     const double stop =
         joint.of_base ? 0 : StopSpeed(joint.lower, joint.upper, state_.q[i], state_.v[i], elapsed);
     joint.stop = std::max(joint.stop * left, stop);
@@ -144,7 +166,7 @@ void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
   for (Joint& joint : joints_) {
     const double share = Square(joint.settings.coupling);
     const auto felt = [&](double own, double all) { return std::sqrt(share * all + (1 - share) * Square(own)); };
-    joint.filter.Predict(elapsed, felt(joint.effort_step, efforts), {ground_, felt(joint.stop, stops)});
+    joint.filter.Predict(elapsed, felt(joint.effort_step, efforts), {ground_, felt(joint.stop, stops)}, after);
   }
 }
 
@@ -240,7 +262,6 @@ void StateObserver::FillState(const joint_state_t& measured, bool restarted) {
     state_.q_sd[i] = std::sqrt(joint.filter.covariance()(0, 0));
     state_.v_sd[i] = std::sqrt(joint.filter.covariance()(1, 1));
     state_.effort[i] = measured.effort_applied[i];
-    if (std::isfinite(measured.effort_applied[i])) joint.effort = measured.effort_applied[i];
     if (joint.out) state_.valid = false;
   }
   if (base_) base_->Fill(measured.utime, state_);

@@ -75,8 +75,8 @@ class StateObserver {
     int64_t measured = -1;    // utime of its newest reading
     int64_t used = -1;        // of the newest that was valid and counted; -1 = none since the start
     bool out = false;         // silent for longer than an outage
-    double effort = 0;        // mean applied effort of the previous interval
-    double effort_step = 0;   // [Nm] of this one against it
+    double effort = 0;        // [Nm] that acts at the end of the latest interval
+    double effort_step = 0;   // [Nm] in it
     double stop = 0;          // [rad/s] at which it may meet its stop in this one
     NisAverage position_nis = {}, velocity_nis = {}, acceleration_nis = {};
     AgreementWatch velocity_watch, acceleration_watch;
@@ -102,6 +102,7 @@ class StateObserver {
   double Age(const joint_state_t& measured, size_t joint) const;
   bool Displaced(const joint_state_t& measured) const;
   void Restart(const joint_state_t& measured);
+  double FindEffortSteps(const joint_state_t& measured);
   void Predict(const joint_state_t& measured, double elapsed);
   void UseReading(const joint_state_t& measured, size_t joint);
   void UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay);

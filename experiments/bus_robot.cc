@@ -32,8 +32,8 @@ int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 class Loop {
  public:
   Loop(const RobotDescription& truth, const RobotDescription& model, const Eigen::VectorXd& hidden,
-       uint64_t seed, int64_t start)
-      : bus_(truth, hidden, model, start, Microseconds(truth.estimator.delay)),
+       uint64_t seed, int64_t start, int64_t phase)
+      : bus_(truth, hidden, model, start, Microseconds(truth.estimator.delay), phase),
         observer_(model),
         controller_(model, seed),
         joiner_(TransitionJoiner::Unbounded(model)),
@@ -129,12 +129,14 @@ RealSystem::Trial BusRobot::Run(const GaussianPolicy& policy, bool explore, int 
   message.episodes = 1;
   RobotDescription model = model_;
   model.task.steps = std::min(steps, model.task.steps);
-  Loop loop(truth_, model, hidden_, seed_, kFirstStart + number * kBetweenTrials);
+  // Drives and driver do not wait for each other.
+  Random random(seed_, {kStandStream, number});
+  const int64_t phase = Microseconds(random.Uniform(0, model.driver.cycle));
+  Loop loop(truth_, model, hidden_, seed_, kFirstStart + number * kBetweenTrials, phase);
   loop.SetPolicy(message);
 
   // Switched on, it lies about as it may, but not in the ground.
   Eigen::VectorXd q(model.num_positions()), v(model.num_velocities());
-  Random random(seed_, {kStandStream, number});
   MakeTask(model)->InitialState(random, q, v);
   loop.robot().Place(0, q, v);
 

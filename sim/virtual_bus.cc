@@ -6,10 +6,11 @@
 namespace plumb {
 
 VirtualBus::VirtualBus(const RobotDescription& robot, const Eigen::VectorXd& physical,
-                       const RobotDescription& driven, int64_t start, int64_t wire)
+                       const RobotDescription& driven, int64_t start, int64_t wire,
+                       int64_t phase)
     : start_(start), wire_(wire), robot_(robot, physical, start), driver_(driven, 0, start) {
   driver_.set_virtual(true);
-  next_cycle_ = driver_.cycle();
+  next_cycle_ = driver_.cycle() + phase;
 }
 
 void VirtualBus::Advance(int64_t until) {

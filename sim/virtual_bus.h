@@ -19,10 +19,10 @@ class VirtualBus {
  public:
   /// @param robot that is there, with these parameters. @param driven what the driver believes to be there.
   /// @param start utime of the beginning [us]. @param wire [us] >= 0 that every frame is on its way, in both
-  /// directions.
+  /// directions. @param phase [us] >= 0 by which the driver's cycles come after the drives' measurements.
   /// @throws std::invalid_argument, see VirtualRobot and Driver.
   VirtualBus(const RobotDescription& robot, const Eigen::VectorXd& physical, const RobotDescription& driven,
-             int64_t start, int64_t wire = 0);
+             int64_t start, int64_t wire = 0, int64_t phase = 0);
 
   /// Whatever happens until then, and nothing after it: `now` is then `until`.
   void Advance(int64_t until);

@@ -30,7 +30,8 @@ inline Samples HopOnBus(const RobotDescription& robot, uint32_t seed, double dur
                         Drive drive = Drive::kSprings, uint32_t motion = 0) {
   constexpr double kFull = 200;                // [Nm]
   constexpr double kFallen = 0.6, kLain = 0.7;  // [m] of the torso, [rad]
-  HopperBus bus(robot, seed);
+  // Driver and drives do not wait for each other.
+  HopperBus bus(robot, seed, static_cast<int64_t>(Random(seed, {44}).Uniform(0, 1e6 * robot.driver.cycle)));
   Random random = motion == 0 ? Random(seed, {43}) : Random(seed, {43, motion});
   Eigen::VectorXd q(6), v = Eigen::VectorXd::Zero(6);
   q << 0, 1.35 + random.Uniform(0, 0.1), 0.02 * random.Normal(), -0.2, -0.4, 0.2;

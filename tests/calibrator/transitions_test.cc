@@ -1,5 +1,6 @@
 #include "calibrator/transitions.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -62,6 +63,48 @@ TEST_CASE_METHOD(Fixture, "a transition carries the effort applied, cycle by cyc
     CHECK(t.efforts[static_cast<size_t>(i)].effort(0) == Approx(0.01 * (131 + i)));
   }
   CHECK(t.duration() == Approx(0.05));
+}
+
+// A staircase that steps from e0 to e1 at some time after state 130, as the driver averages it.
+struct Staircase : Fixture {
+  double Mean(int64_t sequence, double e0, double e1, double time) const {
+    const double from = 0.005 * static_cast<double>(sequence - 1 - 130), share = std::clamp((time - from) / 0.005, 0.0, 1.0);
+    return share * e0 + (1 - share) * e1;
+  }
+  std::vector<EffortSegment> Joined(double e0, double e1, double time, double disturbance = 0) {
+    for (int64_t i = 90; i <= 310; ++i) {
+      robot_state_t state = State(i);
+      state.effort = {Mean(i, e0, e1, time) + (i == 137 ? disturbance : 0)};
+      joiner.OnState(state);
+    }
+    Commands();
+    return joiner.Join(42, 300).transitions[3].efforts;
+  }
+};
+
+TEST_CASE_METHOD(Staircase, "an effort that steps between two measurements steps when it did") {
+  for (const double time : {0.0012, 0.0068, 0.0249, 0.0444}) {
+    joiner = TransitionJoiner(robot);
+    const std::vector<EffortSegment> efforts = Joined(0.7, -1.9, time);
+    REQUIRE(efforts.size() == 11);
+    double t = 0;
+    for (const EffortSegment& segment : efforts) {
+      CHECK(segment.effort(0) == Approx(t < time - 1e-9 ? 0.7 : -1.9));
+      t += segment.duration;
+    }
+    CHECK(t == Approx(0.05));
+  }
+}
+
+TEST_CASE_METHOD(Staircase, "where it steps with a measurement, at the very end, or more than once, the means stand") {
+  for (const double time : {0.010, 0.0481, -0.001, 0.060}) {
+    joiner = TransitionJoiner(robot);
+    const std::vector<EffortSegment> efforts = Joined(0.7, -1.9, time);
+    REQUIRE(efforts.size() == 10);
+    for (int i = 0; i < 10; ++i) CHECK(efforts[static_cast<size_t>(i)].effort(0) == Approx(Mean(131 + i, 0.7, -1.9, time)));
+  }
+  joiner = TransitionJoiner(robot);
+  CHECK(Joined(0.7, -1.9, 0.0068, 0.01).size() == 10);
 }
 
 TEST_CASE_METHOD(Fixture, "the order in which the channels interleave does not matter") {
