@@ -44,18 +44,6 @@ void RestoreStep(const Eigen::VectorXd& before, std::vector<EffortSegment>* segm
   segments->insert(mixed + 1, rest);
 }
 
-// Efforts arrive a little later than they were sent: what acted before acts so much longer.
-void Delay(const Eigen::VectorXd& before, double delay, std::vector<EffortSegment>* segments) {
-  double rest = delay;
-  while (!segments->empty() && segments->back().duration <= rest) {
-    rest -= segments->back().duration;
-    segments->pop_back();
-  }
-  if (!segments->empty()) segments->back().duration -= rest;
-  if (segments->empty()) return segments->push_back({delay - rest, before});
-  segments->insert(segments->begin(), {delay, before});
-}
-
 }  // namespace
 
 double Transition::duration() const {
@@ -77,7 +65,7 @@ DropCounts& DropCounts::operator+=(const DropCounts& other) {
 }
 
 TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
-    : n_(robot.num_joints()), period_(robot.task.period), delay_(robot.estimator.delay), most_states_(kMostStates), most_episodes_(kMostEpisodes) {}
+    : n_(robot.num_joints()), period_(robot.task.period), most_states_(kMostStates), most_episodes_(kMostEpisodes) {}
 
 TransitionJoiner TransitionJoiner::Unbounded(const RobotDescription& robot) {
   TransitionJoiner joiner(robot);
@@ -196,10 +184,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
     ++drops->not_finite;
     return false;
   }
-  const Eigen::VectorXd before = ToEigen(s.effort);
-  if (!before.allFinite()) return true;
-  RestoreStep(before, &transition->efforts);
-  if (delay_ > 0) Delay(before, delay_, &transition->efforts);
+  if (const Eigen::VectorXd before = ToEigen(s.effort); before.allFinite()) RestoreStep(before, &transition->efforts);
   return true;
 }
 

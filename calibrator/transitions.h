@@ -48,8 +48,8 @@ struct DropCounts {
 
 /// Joins ROBOT_STATE_SMOOTHED and JOINT_COMMAND by state_sequence: s is the state a command acted on, s' the
 /// state the next command acted on. The result depends on the messages' contents only, not on the order in
-/// which the two channels interleave. ROBOT_STATE's effort is a mean over an interval: where a step is within one, it is put back to
-/// where the means say that it was; and efforts act [estimator] delay later than they were sent. Not thread-safe.
+/// which the two channels interleave. ROBOT_STATE's effort is a mean over an interval: a step within one is put
+/// back to where the means say that it was. Not thread-safe.
 class TransitionJoiner {
  public:
   /// Memory is bounded: the oldest states and episodes are forgotten, as a process that runs for days must.
@@ -84,7 +84,7 @@ class TransitionJoiner {
   bool JoinOne(int64_t from, int64_t to, Transition* transition, DropCounts* drops) const;
 
   int n_;
-  double period_, delay_;
+  double period_;
   size_t most_states_, most_episodes_;
   std::map<int64_t, robot_state_t> states_;                         // by sequence
   std::map<int64_t, std::map<int, joint_command_t>> commands_;      // by episode, by step

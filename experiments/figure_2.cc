@@ -163,8 +163,8 @@ int main(int argc, char** argv) {
         app.add_option("--output", options.output, "folder for figure_2.csv and figure_2.svg")->capture_default_str();
         app.add_option("--runs", options.runs, "seeds, and robots, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
         app.add_option("--iterations", options.iterations, "roll-outs, and updates of both SimOpts")->check(CLI::Range(1, 1000))->capture_default_str();
-        app.add_option("--noise", options.noise, "of the readings: a factor; 0 = exact, as in the paper")
-            ->check(CLI::Range(0.0, 1000.0))
+        app.add_option("--noise", options.noise, "of the readings: a factor; with 1e-6 they are as good as exact, which the paper's are")
+            ->check(CLI::PositiveNumber)
             ->capture_default_str();
         plumb::AddHiddenFlag(app, options.hidden);
         app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));

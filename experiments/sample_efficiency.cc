@@ -179,16 +179,30 @@ Curve CurveOf(const Options& options, const PaperTask& task, Way way, const Resu
   return curve;
 }
 
-// The first x from which on the curve is that good; "never" if it does not end so.
-std::string Needed(const Curve& curve, const std::function<bool(double)>& good) {
-  size_t i = curve.x.size();
-  while (i > 0 && good(curve.middle[i - 1])) --i;
-  return i == curve.x.size() ? "never" : fmt::format("{:.0f}", curve.x[i]);
+// The first x from which on y is that good; "never" if it does not end so.
+std::string Needed(const std::vector<double>& x, const std::vector<double>& y, const std::function<bool(double)>& good) {
+  size_t i = x.size();
+  while (i > 0 && good(y[i - 1])) --i;
+  return i == x.size() ? "never" : fmt::format("{:.0f}", x[i]);
 }
 
 double ShareOfOracle(double value, double oracle) { return oracle > 0 ? value / oracle : oracle / value; }
 
 std::string SettingsOf(const Options& options) { return fmt::format("hidden {}{}", Key(options.hidden), options.quick ? ", quick" : ""); }
+
+// A way's share of the oracle's return on the same robot: the median of the runs, for each number of transitions.
+std::vector<double> Shares(const Options& options, const PaperTask& task, Way way, const Results& results) {
+  std::vector<double> medians;
+  for (size_t i = 0; i < results.Of(KeyOf(task, way, 1)).size(); ++i) {
+    std::vector<double> shares;
+    for (int run = 1; run <= options.runs; ++run) {
+      shares.push_back(ShareOfOracle(results.Of(KeyOf(task, way, run))[i][1], results.Of(KeyOf(task, Way::kOracle, run))[0][1]));
+    }
+    std::nth_element(shares.begin(), shares.begin() + static_cast<ptrdiff_t>(shares.size() / 2), shares.end());
+    medians.push_back(shares[shares.size() / 2]);
+  }
+  return medians;
+}
 
 int Measure(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
@@ -216,12 +230,11 @@ int Measure(Process& process, const Options& options) {
     errors.logarithmic_x = returns.logarithmic_x = true;
     std::cout << fmt::format("{}, {} runs:\n  {:<40}{:>22}{:>22}{:>22}\n", task.name, options.runs, "", "95 % of the oracle's",
                              fmt::format("error {} after {}", kTargets[0], kHorizon), fmt::format("error {} after {}", kTargets[1], kHorizon));
-    const double oracle = Bands(options, task, Way::kOracle, robot, false)[0].middle;
     for (const Way way : kWays) {
       errors.curves.push_back(CurveOf(options, task, way, simulator, true));
       returns.curves.push_back(CurveOf(options, task, way, robot, false));
-      std::cout << fmt::format("  {:<40}{:>22}", Label(way), Needed(returns.curves.back(), [&](double x) { return ShareOfOracle(x, oracle) >= kEnough; }));
-      for (const double target : kTargets) std::cout << fmt::format("{:>22}", Needed(errors.curves.back(), [&](double x) { return x <= target; }));
+      std::cout << fmt::format("  {:<40}{:>22}", Label(way), Needed(returns.curves.back().x, Shares(options, task, way, robot), [](double share) { return share >= kEnough; }));
+      for (const double target : kTargets) std::cout << fmt::format("{:>22}", Needed(errors.curves.back().x, errors.curves.back().middle, [&](double error) { return error <= target; }));
       std::cout << "\n";
     }
     for (const Way way : {Way::kPrior, Way::kOracle}) {
