@@ -14,7 +14,7 @@ using Eigen::Vector2d;
 
 constexpr double kWidth = 380, kHeight = 300, kLeft = 62, kGap = 14, kTop = 30, kBelow = 46;  // of a panel
 constexpr size_t kAbreast = 2;
-constexpr double kLegendRow = 20, kLegendColumn = 250;
+constexpr double kLegendRow = 20, kLegendColumn = 300;
 
 constexpr char kStyle[] = R"(<style>
 text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }

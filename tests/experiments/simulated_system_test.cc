@@ -1,5 +1,6 @@
 #include "experiments/simulated_system.h"
 
+#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cstdlib>
 
