@@ -163,7 +163,7 @@ int main(int argc, char** argv) {
         app.add_option("--output", options.output, "folder for figure_2.csv and figure_2.svg")->capture_default_str();
         app.add_option("--runs", options.runs, "seeds, and robots, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
         app.add_option("--iterations", options.iterations, "roll-outs, and updates of both SimOpts")->check(CLI::Range(1, 1000))->capture_default_str();
-        app.add_option("--noise", options.noise, "of the readings: a factor; with 1e-6 they are as good as exact, which the paper's are")
+        app.add_option("--noise", options.noise, "of the readings: a factor; the paper's are exact")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();
         plumb::AddHiddenFlag(app, options.hidden);

@@ -58,7 +58,7 @@ TEST_CASE("a trial is a function of seed and number, to the bit") {
   BusRobot one(robot, robot, hidden, 7), other(robot, robot, hidden, 7);
   other.Run(policy, true, 1000, 5);  // what was before does not matter
   const auto a = one.Run(policy, true, 40, 3), b = other.Run(policy, true, 40, 3);
-  CHECK(a.rollout.transitions.size() >= 20);
+  CHECK(a.rollout.transitions.size() >= 10);
   CHECK(a.rollout.transitions.size() <= 40);
   CHECK(a.seconds <= 40 * robot.task.period);
   CHECK(a.sum_of_rewards == b.sum_of_rewards);
