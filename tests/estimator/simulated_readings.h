@@ -69,6 +69,7 @@ class SimulatedReadings {
       if (t % kPeriod == kDelay % kPeriod && t > kDelay) {  // the reading of kDelay ago arrives
         for (size_t i = 0; i < encoders_.size(); ++i) {
           reading.effort_applied[i] = impulse[static_cast<Eigen::Index>(i)] / (1e-6 * kPeriod);
+          reading.effort_sent[i] = applied[static_cast<Eigen::Index>(i)];
         }
         // The state is of the time that the message names, which is off a little.
         const double off = 1e-6 * static_cast<double>(reading.utime - kStart - t);
