@@ -167,7 +167,7 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
     if (torque_frames_ == 0) sent = 0;
     if (i < torque_frames_ && i < taken) sent = joints_[i].effort;
   }
-  history_.Record(utime, effort_sent_);
+  history_.Record(utime + effort_delay_, effort_sent_);
   LetJump();
   for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);
   refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;

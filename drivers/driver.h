@@ -145,7 +145,7 @@ class Driver {
   bool Active() const noexcept { return mode_ == Mode::kArming || mode_ == Mode::kArmed; }
 
   const DriverSettings settings_;
-  const int64_t cycle_, measurement_, disarm_after_, stale_after_, start_guard_;
+  const int64_t cycle_, measurement_, disarm_after_, stale_after_, start_guard_, effort_delay_;
   const int64_t start_now_, start_utime_;
   const size_t num_joints_;  // of the robot
   std::vector<std::string> names_;

@@ -72,10 +72,8 @@ const joint_state_t* Driver::NextState() noexcept {
     message.effort_measured[i] = std::numeric_limits<double>::quiet_NaN();
     message.valid[i] = sensor.fresh(now_) && std::isfinite(measurement.position);
   }
-  for (size_t i = 0; i < num_joints_; ++i) {
-    message.effort_sent[i] = effort_sent_[i];
-    message.effort_applied[i] = std::numeric_limits<double>::quiet_NaN();
-  }
+  std::ranges::fill(message.effort_applied, std::numeric_limits<double>::quiet_NaN());
+  history_.At(utime, message.effort_sent);
   if (has_previous_) history_.Average(previous_utime_, utime, message.effort_applied);
   previous_utime_ = utime;
   has_previous_ = true;

@@ -40,6 +40,7 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       disarm_after_(Microseconds(robot.driver.disarm_after)),
       stale_after_(Microseconds(robot.driver.stale_after)),
       start_guard_(Microseconds(robot.driver.start_guard)),
+      effort_delay_(Microseconds(robot.driver.effort_delay)),
       start_now_(now),
       start_utime_(utime),
       num_joints_(robot.joints.size()),

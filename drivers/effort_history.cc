@@ -35,4 +35,14 @@ void EffortHistory::Average(int64_t from, int64_t to, std::span<double> average)
   }
 }
 
+void EffortHistory::At(int64_t utime, std::span<double> effort) const noexcept {
+  std::fill_n(effort.begin(), joints_, std::numeric_limits<double>::quiet_NaN());
+  for (size_t age = 0; age < count_; ++age) {
+    const size_t slot = Slot(age);
+    if (utime_[slot] > utime) continue;
+    std::copy_n(effort_.begin() + static_cast<std::ptrdiff_t>(slot * joints_), joints_, effort.begin());
+    return;
+  }
+}
+
 }  // namespace plumb

@@ -22,6 +22,8 @@ class EffortHistory {
 
   /// Time averages over [from, to]; NaN unless from < to and the history reaches back to `from`.
   void Average(int64_t from, int64_t to, std::span<double> average) const noexcept;
+  /// Those at a time; NaN unless the history reaches back to it.
+  void At(int64_t utime, std::span<double> effort) const noexcept;
 
  private:
   size_t Slot(size_t age) const { return (newest_ + capacity_ - age) % capacity_; }

@@ -12,104 +12,151 @@ constexpr double kInitialAccelerationSd = 100;
 // Nor of the velocity where it is not measured [rad/s].
 constexpr double kInitialVelocitySd = 10;
 
-constexpr double kInstant = 1e-6;  // [s]
+// Of a KinematicState: what every joint has, then what a joint with an inertial sensor has, then with an accelerometer.
+enum Entry { kPosition, kVelocity, kAcceleration, kStep, kBias, kMark };
+
+int SizeOf(const EstimatorSettings& settings) {
+  return settings.acceleration_sd > 0 ? kMark + 1 : settings.bias_sd > 0 ? kBias + 1 : kStep + 1;
+}
 
 constexpr double Square(double x) { return x * x; }
 
 }  // namespace
 
 KinematicFilter::KinematicFilter(const EstimatorSettings& settings)
-    : settings_(settings), jerk_(Square(settings.jerk)), window_(static_cast<size_t>(settings.lag) + 2) {
-  covariance_(3, 3) = Square(settings.bias_sd);
+    : settings_(settings),
+      size_(SizeOf(settings)),
+      jerk_(Square(settings.jerk)),
+      window_(static_cast<size_t>(settings.lag) + 2) {
+  covariance_(kBias, kBias) = Square(settings.bias_sd);
 }
 
 void KinematicFilter::Restart(double position, double velocity) {
   const bool known = std::isfinite(velocity);
-  mean_.head<3>() << position, known ? velocity : 0, 0;
-  const double bias_variance = covariance_(3, 3);
-  covariance_ = Eigen::Vector4d(Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd),
-                                Square(known ? settings_.velocity_sd : kInitialVelocitySd), Square(kInitialAccelerationSd),
-                                bias_variance)
+  const double bias = mean_(kBias), bias_variance = covariance_(kBias, kBias);
+  mean_ << position, known ? velocity : 0, 0, 0, bias, 0;
+  covariance_ = KinematicState(Square(settings_.position_sd) + Square(mean_(kVelocity) * settings_.timing_sd),
+                               Square(known ? settings_.velocity_sd : kInitialVelocitySd),
+                               Square(kInitialAccelerationSd), 0, bias_variance, 0)
                     .asDiagonal();
+  since_mark_ = std::numeric_limits<double>::infinity();
+  next_mark_ = std::numeric_limits<double>::quiet_NaN();
   jerk_ = Square(settings_.jerk);
-  step_ = {};
+  step_since_ = 0;
   pending_ = 0;
   predicted_mean_ = mean_;
   predicted_covariance_ = covariance_;
   Keep();
 }
 
+// The columns of the transition's transpose, of which most entries are 0 or 1.
+template <typename Matrix>
+void KinematicFilter::MoveColumns(Matrix& columns) const {
+  if (marks_) columns.col(kMark) = columns * mark_;
+  columns.col(kPosition) += dt_ * columns.col(kVelocity) + dt_ * dt_ / 2 * columns.col(kAcceleration);
+  columns.col(kVelocity) += dt_ * columns.col(kAcceleration);
+  columns.col(kStep).setZero();
+}
+
 void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds& impact, double step_after) {
-  transition_ << 1, dt, dt * dt / 2, 0,  //
-      0, 1, dt, 0,                       //
-      0, 0, 1, 0,                        //
-      0, 0, 0, 1;
+  dt_ = dt;
+  double unknown_mark = 0;
+  marks_ = !std::isnan(next_mark_);
+  if (marks_) {
+    const Row mark = VelocityAt(next_mark_);
+    mark_ = mark.of_state;
+    unknown_mark = mark.variance;
+    since_mark_ = next_mark_;
+    next_mark_ = std::numeric_limits<double>::quiet_NaN();
+  }
+  since_mark_ += dt;
   const double d2 = dt * dt, d3 = d2 * dt, d4 = d3 * dt, d5 = d4 * dt;
-  Eigen::Matrix4d jerk;  // integral of the white jerk over dt
-  jerk << d5 / 20, d4 / 8, d3 / 6, 0,  //
-      d4 / 8, d3 / 3, d2 / 2, 0,       //
-      d3 / 6, d2 / 2, dt, 0,           //
-      0, 0, 0, 0;
-  // Where the effort steps, the acceleration may. So may an impact make it; when, nobody knows: at the beginning, and to readings of a moment
-  // ago it is so much more jerk.
+  Eigen::Matrix3d jerk;  // integral of the white jerk over dt
+  jerk << d5 / 20, d4 / 8, d3 / 6,  //
+      d4 / 8, d3 / 3, d2 / 2,       //
+      d3 / 6, d2 / 2, dt;
+  // An impact may step the acceleration; when, nobody knows: at the beginning, and to readings of a moment ago it is so
+  // much more jerk.
+  const Eigen::Vector3d moved(dt * dt / 2, dt, 1);
   const double impact_variance =
       Square(settings_.ground_impact * impact.ground) + Square(settings_.stop_impact * impact.stop);
   jerk_ = Square(settings_.jerk) + impact_variance / dt;
-  const double since = (1 - step_after) * dt;
-  step_ = {settings_.effort_step * effort_step, since};
-  const Eigen::Vector4d step = step_.sd * Eigen::Vector4d(since * since / 2, since, 1, 0);
-  mean_ = transition_ * mean_;
-  covariance_ = transition_ * covariance_ * transition_.transpose() + Square(settings_.jerk) * jerk +
-                impact_variance * transition_.col(2) * transition_.col(2).transpose() + step * step.transpose();
-  covariance_(3, 3) += Square(settings_.bias_sd) * dt / kBiasWanders;
+  // Where the effort steps, the acceleration may.
+  step_since_ = (1 - step_after) * dt;
+  const double step_sd = settings_.effort_step * effort_step;
+  const Eigen::Vector4d step = step_sd * Eigen::Vector4d(step_since_ * step_since_ / 2, step_since_, 1, 1);
+
+  Eigen::RowVector<double, 6> mean = mean_.transpose();
+  MoveColumns(mean);
+  mean_ = mean.transpose();
+  MoveColumns(covariance_);
+  shared_ = covariance_;
+  covariance_ = shared_.transpose();
+  MoveColumns(covariance_);
+  covariance_.topLeftCorner<3, 3>() += Square(settings_.jerk) * jerk + impact_variance * moved * moved.transpose();
+  covariance_.topLeftCorner<4, 4>() += step * step.transpose();
+  covariance_(kBias, kBias) += Square(settings_.bias_sd) * dt / kBiasWanders;
+  covariance_(kMark, kMark) += unknown_mark;
   predicted_mean_ = mean_;
   predicted_covariance_ = covariance_;
 }
 
-KinematicFilter::Row KinematicFilter::RowOf(Quantity quantity, double age, double spread) const {
-  const double span = std::abs(age);
-  // A reading from before the step, or the part of an average that is, knows nothing of it.
-  const double before = std::max(0.0, age - step_.since), old = std::max(0.0, age + spread - step_.since),
-                unknown_velocity = step_.sd * before, unknown_position = unknown_velocity * before / 2;
+KinematicFilter::Row KinematicFilter::VelocityAt(double age) const {
+  const double span = std::abs(age), before_step = std::max(0.0, age - step_since_);
+  return {{0, 1, -age, before_step, 0, 0}, jerk_ * span * span * span / 3};
+}
+
+KinematicFilter::Row KinematicFilter::RowOf(Quantity quantity, double age) const {
   switch (quantity) {
-    case Quantity::kPosition:
+    case Quantity::kPosition: {
+      const double before_step = std::max(0.0, age - step_since_);
       // A measurement time that is off by timing_sd displaces the position by velocity * timing_sd.
-      return {{1, -age, age * age / 2, 0},
-              Square(settings_.position_sd) + Square(mean_(1) * settings_.timing_sd) + jerk_ * std::pow(span, 5) / 20 +
-                  Square(unknown_position)};
+      return {{1, -age, age * age / 2, -before_step * before_step / 2, 0, 0},
+              Square(settings_.position_sd) + Square(mean_(kVelocity) * settings_.timing_sd) +
+                  jerk_ * std::abs(age) * age * age * age * age / 20};
+    }
     case Quantity::kVelocity:
-    case Quantity::kRate:
-      return {{0, 1, -age, quantity == Quantity::kRate ? 1. : 0.},
-              Square(settings_.velocity_sd) + jerk_ * span * span * span / 3 + Square(unknown_velocity)};
-    case Quantity::kAcceleration:
-      // The average of a random walk differs from its end by a third of the walk's variance.
-      return {{0, 0, 1, 1}, Square(settings_.acceleration_sd) + jerk_ * (span + spread / 3) + Square(step_.sd * std::min(1.0, old / (spread + kInstant)))};
+    case Quantity::kRate: {
+      Row row = VelocityAt(age);
+      if (quantity == Quantity::kRate) row.of_state(kBias) = 1;
+      row.variance += Square(settings_.velocity_sd);
+      return row;
+    }
+    case Quantity::kAcceleration: {
+      const double window = since_mark_ - age;
+      Row row = VelocityAt(age);
+      row.of_state(kMark) = -1;
+      row.of_state /= window;
+      row.of_state(kBias) = 1;
+      row.variance = row.variance / Square(window) + Square(settings_.acceleration_sd);
+      return row;
+    }
   }
   return {};
 }
 
-KinematicFilter::Innovation KinematicFilter::Expect(Quantity quantity, double value, double age, double spread) const {
-  const Row row = RowOf(quantity, age, spread);
+KinematicFilter::Innovation KinematicFilter::Expect(Quantity quantity, double value, double age) const {
+  const Row row = RowOf(quantity, age);
   return {value - row.of_state.dot(mean_), row.of_state.dot(covariance_ * row.of_state) + row.variance};
 }
 
-KinematicFilter::Innovation KinematicFilter::Correct(Quantity quantity, double value, double age, double spread) {
-  const Row row = RowOf(quantity, age, spread);
-  const Eigen::Vector4d shared = covariance_ * row.of_state;
+KinematicFilter::Innovation KinematicFilter::Correct(Quantity quantity, double value, double age) {
+  const Row row = RowOf(quantity, age);
+  const KinematicState shared = covariance_ * row.of_state;
   const Innovation innovation{value - row.of_state.dot(mean_), row.of_state.dot(shared) + row.variance};
-  const Eigen::Vector4d gain = shared / innovation.variance;
-  mean_ += gain * innovation.value;
-  // Joseph's form keeps the covariance symmetric and positive.
-  const Eigen::Matrix4d keep = Eigen::Matrix4d::Identity() - gain * row.of_state.transpose();
-  covariance_ = keep * covariance_ * keep.transpose() + gain * row.variance * gain.transpose();
+  mean_ += shared * (innovation.value / innovation.variance);
+  const KinematicState known = shared / std::sqrt(innovation.variance);
+  covariance_ -= known * known.transpose();  // symmetric to the last bit
   return innovation;
 }
 
 void KinematicFilter::Keep() {
   if (pending_ > 0) {
-    Step& last = At(pending_ - 1);
-    last.gain =
-        predicted_covariance_.ldlt().solve(transition_ * last.filtered_covariance).transpose();
+    switch (size_) {
+      case 4: FindGain<4>(); break;
+      case 5: FindGain<5>(); break;
+      default: FindGain<6>();
+    }
   }
   // Nobody has taken the oldest.
   if (pending_ == static_cast<int>(window_.size())) {
@@ -123,18 +170,52 @@ void KinematicFilter::Keep() {
   step.covariance_change = covariance_ - predicted_covariance_;
 }
 
-// The backward pass, unrolled forwards: what each later step's readings changed comes back through the gains in between.
-KinematicFilter::Smoothed KinematicFilter::TakeOldest() {
-  const Step& oldest = At(0);
-  Smoothed smoothed{oldest.filtered_mean.head<2>(), oldest.filtered_covariance.topLeftCorner<2, 2>()};
-  Eigen::Matrix<double, 2, 4> back = Eigen::Matrix<double, 2, 4>::Identity();
-  for (int i = 1; i < pending_; ++i) {
-    back = (back * At(i - 1).gain).eval();
-    smoothed.mean += back * At(i).mean_change;
-    smoothed.covariance += back * At(i).covariance_change * back.transpose();
+// gain = shared predicted^-1, by Cholesky's factor L of the predicted covariance: column by column, all rows at once.
+template <int N>
+void KinematicFilter::FindGain() {
+  KinematicCovariance& gain = At(pending_ - 1).gain;
+  gain = shared_;
+  Eigen::Matrix<double, N, N> l;
+  Eigen::Matrix<double, N, 1> inverse;  // of L's diagonal; 0 where there is no uncertainty left, and nothing to be learnt
+  for (int j = 0; j < N; ++j) {
+    for (int i = j; i < N; ++i) {
+      l(i, j) = predicted_covariance_(i, j);
+      for (int k = 0; k < j; ++k) l(i, j) -= l(i, k) * l(j, k);
+    }
+    inverse(j) = l(j, j) > 0 ? 1 / std::sqrt(l(j, j)) : 0;
+    for (int i = j; i < N; ++i) l(i, j) *= inverse(j);
   }
+  for (int j = 0; j < N; ++j) {
+    for (int k = 0; k < j; ++k) gain.col(j) -= l(j, k) * gain.col(k);
+    gain.col(j) *= inverse(j);
+  }
+  for (int j = N - 1; j >= 0; --j) {
+    for (int k = j + 1; k < N; ++k) gain.col(j) -= l(k, j) * gain.col(k);
+    gain.col(j) *= inverse(j);
+  }
+}
+
+KinematicFilter::Smoothed KinematicFilter::TakeOldest() {
+  const Smoothed smoothed = size_ == 4 ? SmoothOldest<4>() : size_ == 5 ? SmoothOldest<5>() : SmoothOldest<6>();
   oldest_ = (oldest_ + 1) % static_cast<int>(window_.size());
   --pending_;
+  return smoothed;
+}
+
+// The backward pass, unrolled forwards: what each later step's readings changed comes back through the gains in between.
+template <int N>
+KinematicFilter::Smoothed KinematicFilter::SmoothOldest() {
+  const Step& oldest = At(0);
+  Smoothed smoothed{oldest.filtered_mean.head<2>(), oldest.filtered_covariance.topLeftCorner<2, 2>()};
+  using Back = Eigen::Matrix<double, 2, N>;
+  Back back = Back::Identity();
+  for (int i = 1; i < pending_; ++i) {
+    const Step& later = At(i);
+    back = Back(back.lazyProduct(At(i - 1).gain.topLeftCorner<N, N>()));
+    smoothed.mean += back.lazyProduct(later.mean_change.head<N>());
+    const Back changed = back.lazyProduct(later.covariance_change.topLeftCorner<N, N>());
+    smoothed.covariance += changed.lazyProduct(back.transpose());
+  }
   return smoothed;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "estimator/impact.h"
@@ -8,11 +10,13 @@
 
 namespace plumb {
 
-/// Position, velocity and acceleration of one joint, and the bias of the inertial sensor that it carries.
-using KinematicState = Eigen::Vector4d;
+/// Position, velocity and acceleration of one joint, the step of the acceleration with that of the effort in the latest
+/// interval, the bias of the inertial sensor that it carries, and the velocity that it had at the mark.
+using KinematicState = Eigen::Matrix<double, 6, 1>;
+using KinematicCovariance = Eigen::Matrix<double, 6, 6>;
 
-/// What a reading is of. A gyro's rate is the velocity plus the bias, an accelerometer's acceleration the acceleration
-/// plus the bias: no joint has both.
+/// What a reading is of. A gyro's rate is the velocity plus the bias. An accelerometer's acceleration is the mean since the mark, which
+/// is the change of the velocity since then, divided by the time, plus the bias. No joint has both.
 enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 
 /// One joint's Kalman filter on a white-noise-jerk model (Bar-Shalom, Li, Kirubarajan, "Estimation with
@@ -24,9 +28,9 @@ enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 /// allowance the filter would round off every such corner and bias the effort's apparent effect. The same where kinematics
 /// says that there may be an impact.
 ///
-/// A reading counts at its own time: its row of the observation matrix is that of the state so long ago under constant
-/// acceleration, its variance grows by what the jerk may have done since. (That this is correlated with the filter's own
-/// error is neglected, which errs on the cautious side.)
+/// A reading counts at its own time: its row of the observation matrix is that of the state so long ago under an
+/// acceleration that is constant but for the effort's step, its variance grows by what the jerk may have done since. (That
+/// this is correlated with the filter's own error is neglected, which errs on the cautious side.)
 ///
 /// A step is Predict, any number of Correct, Keep. None of them allocates. Not thread-safe.
 class KinematicFilter {
@@ -51,15 +55,20 @@ class KinematicFilter {
     double nis() const { return value * value / variance; }
   };
   /// @param age [s] of the reading; < 0: it was made a little later.
-  /// @param spread [s] over which an acceleration is the average, up to its time.
-  Innovation Expect(Quantity quantity, double value, double age, double spread = 0) const;
+  /// An acceleration needs a mark: since_mark() finite and above the age.
+  Innovation Expect(Quantity quantity, double value, double age) const;
   /// Takes it into account. @return what Expect says before.
-  Innovation Correct(Quantity quantity, double value, double age, double spread = 0);
+  Innovation Correct(Quantity quantity, double value, double age);
+  /// The mark is, from the next step on, where a reading of that age was made.
+  void Mark(double age) { next_mark_ = age; }
+  /// [s] from the mark to the present; infinite if there is none.
+  double since_mark() const { return std::isnan(next_mark_) ? since_mark_ : std::numeric_limits<double>::infinity(); }
   /// Ends the step.
   void Keep();
 
   const KinematicState& mean() const { return mean_; }
-  const Eigen::Matrix4d& covariance() const { return covariance_; }
+  const KinematicCovariance& covariance() const { return covariance_; }
+  double bias() const { return mean_(4); }  ///< [rad/s] of a gyro or [m/s^2] of an accelerometer
 
   struct Smoothed {
     Eigen::Vector2d mean;  ///< position, velocity
@@ -72,29 +81,41 @@ class KinematicFilter {
 
  private:
   struct Row {
-    Eigen::Vector4d of_state;
+    KinematicState of_state;
     double variance;
   };
-  Row RowOf(Quantity quantity, double age, double spread) const;
+  Row RowOf(Quantity quantity, double age) const;
+  /// Of the velocity that long ago, but for what all readings have of noise.
+  Row VelocityAt(double age) const;
+  template <typename Matrix>
+  void MoveColumns(Matrix& columns) const;
+  template <int N>
+  void FindGain();
+  template <int N>
+  Smoothed SmoothOldest();
 
   // One step of the forward pass, kept for the backward one.
   struct Step {
     KinematicState filtered_mean;
-    Eigen::Matrix4d filtered_covariance;
-    Eigen::Matrix4d gain;                // smoother's, from the next step to this one; unknown for the newest
-    KinematicState mean_change;          // by this step's readings
-    Eigen::Matrix4d covariance_change;   // likewise
+    KinematicCovariance filtered_covariance;
+    KinematicCovariance gain;               // smoother's, from the next step to this one; unknown for the newest
+    KinematicState mean_change;             // by this step's readings
+    KinematicCovariance covariance_change;  // likewise
   };
   Step& At(int i) { return window_[static_cast<size_t>(oldest_ + i) % window_.size()]; }
 
   EstimatorSettings settings_;
+  int size_;  // entries of the state that such a joint has
   KinematicState mean_ = KinematicState::Zero(), predicted_mean_ = KinematicState::Zero();
-  Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero(), predicted_covariance_ = Eigen::Matrix4d::Zero();
-  Eigen::Matrix4d transition_ = Eigen::Matrix4d::Identity();
+  KinematicCovariance covariance_ = KinematicCovariance::Zero(), predicted_covariance_ = KinematicCovariance::Zero();
+  // The latest step: its length [s], and of what the mark was made if it was.
+  double dt_ = 0;
+  bool marks_ = false;
+  KinematicState mark_ = KinematicState::Zero();
+  KinematicCovariance shared_ = KinematicCovariance::Zero();  // covariance of the state before it with that after it
+  double since_mark_ = std::numeric_limits<double>::infinity(), next_mark_ = std::numeric_limits<double>::quiet_NaN();
   double jerk_;  // squared spectral density of the last step's, impact included
-  struct {
-    double sd = 0, since = 0;  // of the acceleration, and [s] before the present
-  } step_;                     // of the effort, in the latest interval
+  double step_since_ = 0;  // [s] from the effort's step in the latest interval to the present
   std::vector<Step> window_;  // ring
   int oldest_ = 0, pending_ = 0;
 };

@@ -6,6 +6,11 @@
 #include "estimator/state_observer.h"
 
 namespace plumb {
+namespace {
+
+constexpr double kSamePeriod = 0.2;  // of an IMU's
+
+}  // namespace
 
 void StateObserver::OnImu(const imu_t& message) {
   for (Imu& imu : imus_) {
@@ -69,7 +74,12 @@ void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joi
   for (const ImuMounting::Slide& slide : imu.mounting.slides) {
     Joint& joint = joints_[static_cast<size_t>(slide.joint)];
     const double along = slide.direction.dot(acceleration);
-    joint.acceleration_nis.Add(Correct(joint, Quantity::kAcceleration, along, age, imu.period).nis(), std::max(0.0, elapsed));
+    // The mean since the last reading, or, if one is missing, since a moment of which nothing is kept.
+    const double window = joint.filter.since_mark() - age;
+    if (std::abs(window - imu.period) < kSamePeriod * imu.period) {
+      joint.acceleration_nis.Add(Correct(joint, Quantity::kAcceleration, along, age).nis(), std::max(0.0, elapsed));
+    }
+    joint.filter.Mark(age);
     joint.acceleration_watch.Add(joint.filter.mean()(1), along, elapsed > 0 ? elapsed : 2 * AgreementWatch::kLongestGap);
     if (joint.acceleration_watch.finding() != joint.acceleration_found) {
       joint.acceleration_found = joint.acceleration_watch.finding();

@@ -40,11 +40,11 @@ std::string OfAcceleration(const AgreementWatch& watch, Finding found) {
 
 std::string StateObserver::SensorReason(const Joint& joint) const {
   const bool biased =
-      joint.settings.bias_sd > 0 && std::abs(joint.filter.mean()(3)) > kSurelyBiased * joint.settings.bias_sd;
+      joint.settings.bias_sd > 0 && std::abs(joint.filter.bias()) > kSurelyBiased * joint.settings.bias_sd;
   std::string reason = OfVelocity(joint.velocity_watch, joint.velocity_found, joint.gyro ? "gyro" : "velocity");
   if (reason.empty()) reason = OfAcceleration(joint.acceleration_watch, joint.acceleration_found);
   if (reason.empty() && biased) {
-    reason = fmt::format("{} biased by {:.3g}", joint.gyro ? "gyro" : "accelerometer", joint.filter.mean()(3));
+    reason = fmt::format("{} biased by {:.3g}", joint.gyro ? "gyro" : "accelerometer", joint.filter.bias());
   }
   return reason;
 }
@@ -60,7 +60,7 @@ estimator_status_t StateObserver::Status() const {
     status.position_nis.push_back(joint.position_nis.value());
     status.velocity_nis.push_back(joint.velocity_nis.value());
     status.acceleration_nis.push_back(joint.acceleration_nis.value());
-    status.bias.push_back(joint.settings.bias_sd > 0 ? joint.filter.mean()(3) : kNone);
+    status.bias.push_back(joint.settings.bias_sd > 0 ? joint.filter.bias() : kNone);
     status.joint_reason.push_back(SensorReason(joint));
     if (status.reason.empty() && joint.out) {
       status.reason = joint.of_base  ? fmt::format("{}: not known until a foot rests on the ground", joint.name)

@@ -170,9 +170,8 @@ void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
   }
 }
 
-KinematicFilter::Innovation StateObserver::Correct(Joint& joint, Quantity quantity, double value, double age,
-                                                   double spread) {
-  const KinematicFilter::Innovation innovation = joint.filter.Correct(quantity, value, age, spread);
+KinematicFilter::Innovation StateObserver::Correct(Joint& joint, Quantity quantity, double value, double age) {
+  const KinematicFilter::Innovation innovation = joint.filter.Correct(quantity, value, age);
   if (since_restart_ < kSettled || quantity == Quantity::kAcceleration) return innovation;
   joint.deviance += innovation.nis() + std::log(innovation.variance);
   ++joint.readings;

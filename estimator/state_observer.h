@@ -107,7 +107,7 @@ class StateObserver {
   void UseReading(const joint_state_t& measured, size_t joint);
   void UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay);
   void UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured);
-  KinematicFilter::Innovation Correct(Joint& joint, Quantity quantity, double value, double age, double spread = 0);
+  KinematicFilter::Innovation Correct(Joint& joint, Quantity quantity, double value, double age);
   void JudgeOutages(int64_t utime);
   void FillState(const joint_state_t& measured, bool restarted);
   void EmitSmoothed();

@@ -33,7 +33,8 @@ class Loop {
  public:
   Loop(const RobotDescription& truth, const RobotDescription& model, const Eigen::VectorXd& hidden,
        uint64_t seed, int64_t start, int64_t phase)
-      : bus_(truth, hidden, model, start, Microseconds(truth.estimator.delay), phase),
+      : bus_(truth, hidden, model, start,
+             {Microseconds(truth.driver.effort_delay), Microseconds(truth.estimator.delay)}, phase),
         observer_(model),
         controller_(model, seed),
         joiner_(TransitionJoiner::Unbounded(model)),

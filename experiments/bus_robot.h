@@ -15,7 +15,7 @@ namespace plumb {
 /// number: the same bits every time. Not thread-safe.
 class BusRobot : public RealSystem {
  public:
-  /// @param truth the robot that is there. A frame takes its [estimator] delay.
+  /// @param truth the robot that is there. A frame takes its [estimator] delay to the driver, and [driver] effort_delay back.
   /// @param model what driver, observer and controller believe of it.
   /// @param hidden the true parameters, order of truth.parameters, physical units.
   BusRobot(RobotDescription truth, RobotDescription model, Eigen::VectorXd hidden, uint64_t seed);

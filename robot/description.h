@@ -193,6 +193,7 @@ struct DriverSettings {
   double telemetry = 0.1;  ///< [s] at which each drive is asked for its temperatures and supply
   Stop stop = Stop::kZero;
   double ramp = 0;  ///< [s] > 0 of kRamp, else 0
+  double effort_delay = 0;  ///< [s] 0 to 0.01, from a torque frame's transmission until it acts
 
   // Beyond these is a fault. What a drive does not report is not judged.
   double max_motor_temperature = 90, max_drive_temperature = 90;     ///< [degC]

@@ -70,6 +70,7 @@ DriverSettings ReadDriver(Config config, const std::vector<JointDescription>& jo
   s.stale_after = config.Number("stale_after", {1e-3, 1});
   s.heartbeat_timeout = config.Number("heartbeat_timeout", {1e-3, 10});
   s.start_guard = config.Number("start_guard", {0, 10});
+  s.effort_delay = config.Number("effort_delay", {0, 0.01}, 0);
   s.telemetry = config.Number("telemetry", {1e-3, 10}, s.telemetry);
   s.stop = static_cast<DriverSettings::Stop>(config.Choice("stop", {"zero", "ramp", "damping"}, 0));
   if (s.stop == DriverSettings::Stop::kRamp) {

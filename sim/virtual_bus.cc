@@ -6,7 +6,7 @@
 namespace plumb {
 
 VirtualBus::VirtualBus(const RobotDescription& robot, const Eigen::VectorXd& physical,
-                       const RobotDescription& driven, int64_t start, int64_t wire,
+                       const RobotDescription& driven, int64_t start, Wire wire,
                        int64_t phase)
     : start_(start), wire_(wire), robot_(robot, physical, start), driver_(driven, 0, start) {
   driver_.set_virtual(true);
@@ -47,10 +47,10 @@ void VirtualBus::Cycle() {
   driver_.Transmitted(static_cast<int>(sent.size()), utime());
   for (const Frame& frame : sent) {
     on_frame(frame);
-    if (wire_ == 0) {
+    if (wire_.to_robot == 0) {
       ToRobot(frame);
     } else {
-      to_robot_.push_back({now_ + wire_, frame});
+      to_robot_.push_back({now_ + wire_.to_robot, frame});
     }
   }
 }
@@ -66,10 +66,10 @@ void VirtualBus::ToDriver(const Frame& frame) { driver_.OnFrame(frame, now_, uti
 void VirtualBus::FromRobot(const FrameBatch& batch) {
   for (const Frame& frame : batch.frames()) {
     on_frame(frame);
-    if (wire_ == 0) {
+    if (wire_.to_driver == 0) {
       ToDriver(frame);
     } else {
-      to_driver_.push_back({now_ + wire_, frame});
+      to_driver_.push_back({now_ + wire_.to_driver, frame});
     }
   }
 }

@@ -17,12 +17,15 @@ namespace plumb {
 /// microsecond. Equal calls give equal bits. Not thread-safe.
 class VirtualBus {
  public:
+  struct Wire {
+    int64_t to_robot, to_driver;  ///< [us] >= 0
+  };
   /// @param robot that is there, with these parameters. @param driven what the driver believes to be there.
-  /// @param start utime of the beginning [us]. @param wire [us] >= 0 that every frame is on its way, in both
-  /// directions. @param phase [us] >= 0 by which the driver's cycles come after the drives' measurements.
+  /// @param start utime of the beginning [us]. @param wire how long frames are on their way.
+  /// @param phase [us] >= 0 by which the driver's cycles come after the drives' measurements.
   /// @throws std::invalid_argument, see VirtualRobot and Driver.
   VirtualBus(const RobotDescription& robot, const Eigen::VectorXd& physical, const RobotDescription& driven,
-             int64_t start, int64_t wire = 0, int64_t phase = 0);
+             int64_t start, Wire wire = {0, 0}, int64_t phase = 0);
 
   /// Whatever happens until then, and nothing after it: `now` is then `until`.
   void Advance(int64_t until);
@@ -51,7 +54,8 @@ class VirtualBus {
   void ToRobot(const Frame& frame);
   void ToDriver(const Frame& frame);
 
-  const int64_t start_, wire_;
+  const int64_t start_;
+  const Wire wire_;
   int64_t now_ = 0, next_cycle_;
   VirtualRobot robot_;
   Driver driver_;

@@ -61,6 +61,26 @@ TEST_CASE("JOINT_STATE comes once per measurement, with regular times and the ef
   }
 }
 
+TEST_CASE("an effort acts as much later than it was sent as its frame is on its way") {
+  Rig rig;
+  rig.robot.driver.effort_delay = 0.002;
+  rig.cycle_phase = 1000;  // commands follow the measurements by 1 ms
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  rig.Run(50);
+  rig.states.clear();
+  rig.effort = -1;
+  rig.Run(20);
+  const auto first = std::ranges::find_if(rig.states, [](const joint_state_t& state) { return state.effort_applied[0] != 1; });
+  REQUIRE(first != rig.states.end());
+  REQUIRE(first != rig.states.begin());
+  // Between two measurements, 5 ms apart, it was 1 for 3 ms and -1 for 2 ms.
+  CHECK(first->effort_applied[0] == Approx((3 * 1 - 2 * 1) / 5.0));
+  CHECK(first->effort_sent[0] == -1);
+  CHECK(std::prev(first)->effort_sent[0] == 1);
+  CHECK(std::next(first)->effort_applied[0] == Approx(-1));
+}
+
 TEST_CASE("the first JOINT_STATE has no effort applied, idle ones have zero") {
   Rig rig;
   rig.Start();

@@ -38,6 +38,23 @@ TEST_CASE("averages of a staircase") {
   CHECK(std::isnan(Average(history, 200, 250)[0]));
 }
 
+TEST_CASE("the effort at a time, whatever comes later") {
+  EffortHistory history(2, 8);
+  std::array<double, 2> effort{};
+  history.At(100, effort);
+  CHECK(std::isnan(effort[0]));
+  Record(history, 100, 1, -1);
+  Record(history, 200, 3, 0);
+  history.At(99, effort);
+  CHECK(std::isnan(effort[1]));
+  history.At(100, effort);
+  CHECK(effort == std::array<double, 2>{1, -1});
+  history.At(199, effort);
+  CHECK(effort == std::array<double, 2>{1, -1});
+  history.At(5000, effort);
+  CHECK(effort == std::array<double, 2>{3, 0});
+}
+
 TEST_CASE("the ring forgets the oldest, and everything when time goes back") {
   EffortHistory history(2, 4);
   for (int i = 0; i < 10; ++i) Record(history, 100 * i, i, 0);

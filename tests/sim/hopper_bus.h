@@ -18,7 +18,7 @@ struct HopperBus {
   static constexpr int64_t kStart = 1'700'000'000'000'000;  ///< [us]
 
   explicit HopperBus(const RobotDescription& hopper, uint64_t seed = 3, int64_t phase = 0)
-      : description(hopper), bus(description, HiddenParameters(description, seed), description, kStart, 0, phase) {
+      : description(hopper), bus(description, HiddenParameters(description, seed), description, kStart, {0, 0}, phase) {
     bus.on_state = [this](const joint_state_t& state) {
       states.push_back(state);
       truth_q.push_back(robot.q());
