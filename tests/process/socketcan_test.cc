@@ -1,7 +1,10 @@
 // The same processes over the kernel's own CAN: run by tests/with-vcan, in user-mode-linux where this machine's kernel
 // has none.
 
+#include <fmt/format.h>
+
 #include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -23,9 +26,17 @@ TEST_CASE("the loop closes over SocketCAN, and candump sees it") {
   // A foreign witness.
   Child candump("candump", {"candump", "-L", "vcan0"}, stage.folder / "candump.log");
   const fs::path summary_file = stage.folder / "summary.json";
-  Child launch("plumb", {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", stage.lcm_url, "--bus",
+  // The bus is what matters here. In user-mode-linux there is one processor for everything, and on some machines a slow
+  // one: half the rate and a policy that has learnt but a little will do, and the robot comes before the trainer.
+  constexpr int kRate = 100;  // [Hz]
+  const fs::path robot = stage.folder / "robot.toml";
+  std::ofstream(robot) << fmt::format(
+      "extends = \"{0}/robot.toml\"\n[robot]\nurdf = \"{0}/robot.urdf\"\n"
+      "[driver]\ncycle = {1}\nmeasurement = {1}\nstale_after = 0.1\n[training]\nupdates = 3\nupdates_again = 1\n",
+      stage.robot_folder, 1. / kRate);
+  Child launch("plumb", {Stage::Binary("plumb"), "launch", robot, "--lcm-url", stage.lcm_url, "--bus",
                          stage.bus_url, "--output", stage.folder / "run", "--iterations", "1", "--evaluation-episodes",
-                         "1", "--summary", summary_file},
+                         "1", "--summary", summary_file, "--realtime-priority", "50"},
                stage.folder / "launch.log");
   stage.WaitUntil([&] { return !launch.running(); }, 200);
   INFO(launch.Tail(30));
@@ -43,8 +54,8 @@ TEST_CASE("the loop closes over SocketCAN, and candump sees it") {
   candump.WaitFor(2);
   const std::string frames = Read(candump.log());
   CHECK(Count(frames, "vcan0 027#0800000000000000") >= 1);       // closed-loop control is asked for
-  CHECK(Count(frames, "vcan0 02E#[0-9A-F]{8}") > 20 * 200);     // torques, at 200 Hz for more than two roll-outs
-  CHECK(Count(frames, "vcan0 029#[0-9A-F]{16}") > 20 * 200);     // encoder estimates
+  CHECK(Count(frames, "vcan0 02E#[0-9A-F]{8}") > 20 * kRate);   // torques, for more than two roll-outs
+  CHECK(Count(frames, "vcan0 029#[0-9A-F]{16}") > 20 * kRate);   // encoder estimates
   CHECK(Count(frames, "vcan0 021#[0-9A-F]{8}08") > 100);         // heartbeats of an armed drive
 }
 
