@@ -12,7 +12,8 @@ constexpr double kInitialAccelerationSd = 100;
 // Nor of the velocity where it is not measured [rad/s].
 constexpr double kInitialVelocitySd = 10;
 
-// Of a KinematicState: what every joint has, then what a joint with an inertial sensor has, then with an accelerometer.
+// Of a KinematicState: what every joint has, then what a joint with an inertial sensor has, then with an
+// accelerometer.
 enum Entry { kPosition, kVelocity, kAcceleration, kStep, kBias, kMark };
 
 int SizeOf(const EstimatorSettings& settings) {
@@ -71,12 +72,12 @@ void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds&
   }
   since_mark_ += dt;
   const double d2 = dt * dt, d3 = d2 * dt, d4 = d3 * dt, d5 = d4 * dt;
-  Eigen::Matrix3d jerk;  // integral of the white jerk over dt
+  Eigen::Matrix3d jerk;             // integral of the white jerk over dt
   jerk << d5 / 20, d4 / 8, d3 / 6,  //
       d4 / 8, d3 / 3, d2 / 2,       //
       d3 / 6, d2 / 2, dt;
-  // An impact may step the acceleration; when, nobody knows: at the beginning, and to readings of a moment ago it is so
-  // much more jerk.
+  // An impact may step the acceleration; when, nobody knows: at the beginning, and to readings of a moment
+  // ago it is so much more jerk.
   const Eigen::Vector3d moved(dt * dt / 2, dt, 1);
   const double impact_variance =
       Square(settings_.ground_impact * impact.ground) + Square(settings_.stop_impact * impact.stop);
@@ -93,7 +94,8 @@ void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds&
   shared_ = covariance_;
   covariance_ = shared_.transpose();
   MoveColumns(covariance_);
-  covariance_.topLeftCorner<3, 3>() += Square(settings_.jerk) * jerk + impact_variance * moved * moved.transpose();
+  covariance_.topLeftCorner<3, 3>() +=
+      Square(settings_.jerk) * jerk + impact_variance * moved * moved.transpose();
   covariance_.topLeftCorner<4, 4>() += step * step.transpose();
   covariance_(kBias, kBias) += Square(settings_.bias_sd) * dt / kBiasWanders;
   covariance_(kMark, kMark) += unknown_mark;
@@ -153,9 +155,14 @@ KinematicFilter::Innovation KinematicFilter::Correct(Quantity quantity, double v
 void KinematicFilter::Keep() {
   if (pending_ > 0) {
     switch (size_) {
-      case 4: FindGain<4>(); break;
-      case 5: FindGain<5>(); break;
-      default: FindGain<6>();
+      case 4:
+        FindGain<4>();
+        break;
+      case 5:
+        FindGain<5>();
+        break;
+      default:
+        FindGain<6>();
     }
   }
   // Nobody has taken the oldest.
@@ -170,13 +177,15 @@ void KinematicFilter::Keep() {
   step.covariance_change = covariance_ - predicted_covariance_;
 }
 
-// gain = shared predicted^-1, by Cholesky's factor L of the predicted covariance: column by column, all rows at once.
+// gain = shared predicted^-1, by Cholesky's factor L of the predicted covariance: column by column, all rows
+// at once.
 template <int N>
 void KinematicFilter::FindGain() {
   KinematicCovariance& gain = At(pending_ - 1).gain;
   gain = shared_;
   Eigen::Matrix<double, N, N> l;
-  Eigen::Matrix<double, N, 1> inverse;  // of L's diagonal; 0 where there is no uncertainty left, and nothing to be learnt
+  Eigen::Matrix<double, N, 1>
+      inverse;  // of L's diagonal; 0 where there is no uncertainty left, and nothing to be learnt
   for (int j = 0; j < N; ++j) {
     for (int i = j; i < N; ++i) {
       l(i, j) = predicted_covariance_(i, j);
@@ -196,13 +205,16 @@ void KinematicFilter::FindGain() {
 }
 
 KinematicFilter::Smoothed KinematicFilter::TakeOldest() {
-  const Smoothed smoothed = size_ == 4 ? SmoothOldest<4>() : size_ == 5 ? SmoothOldest<5>() : SmoothOldest<6>();
+  const Smoothed smoothed = size_ == 4   ? SmoothOldest<4>()
+                            : size_ == 5 ? SmoothOldest<5>()
+                                         : SmoothOldest<6>();
   oldest_ = (oldest_ + 1) % static_cast<int>(window_.size());
   --pending_;
   return smoothed;
 }
 
-// The backward pass, unrolled forwards: what each later step's readings changed comes back through the gains in between.
+// The backward pass, unrolled forwards: what each later step's readings changed comes back through the gains
+// in between.
 template <int N>
 KinematicFilter::Smoothed KinematicFilter::SmoothOldest() {
   const Step& oldest = At(0);

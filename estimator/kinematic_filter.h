@@ -10,27 +10,31 @@
 
 namespace plumb {
 
-/// Position, velocity and acceleration of one joint, the step of the acceleration with that of the effort in the latest
-/// interval, the bias of the inertial sensor that it carries, and the velocity that it had at the mark.
+/// Position, velocity and acceleration of one joint, the step of the acceleration with that of the effort in
+/// the latest interval, the bias of the inertial sensor that it carries, and the velocity that it had at the
+/// mark.
 using KinematicState = Eigen::Matrix<double, 6, 1>;
 using KinematicCovariance = Eigen::Matrix<double, 6, 6>;
 
-/// What a reading is of. A gyro's rate is the velocity plus the bias. An accelerometer's acceleration is the mean since the mark, which
-/// is the change of the velocity since then, divided by the time, plus the bias. No joint has both.
+/// What a reading is of. A gyro's rate is the velocity plus the bias. An accelerometer's acceleration is the
+/// mean since the mark, which is the change of the velocity since then, divided by the time, plus the bias.
+/// No joint has both.
 enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 
 /// One joint's Kalman filter on a white-noise-jerk model (Bar-Shalom, Li, Kirubarajan, "Estimation with
-/// Applications to Tracking and Navigation", 2001, section 6.2.3), with a fixed-lag Rauch-Tung-Striebel smoother.
+/// Applications to Tracking and Navigation", 2001, section 6.2.3), with a fixed-lag Rauch-Tung-Striebel
+/// smoother.
 ///
-/// It knows no dynamics, so what is inferred from its output about dynamics is not eaten from its own tail. It
-/// knows one thing beyond kinematics: acceleration may step when the applied effort steps. The size of that
-/// step is left open (a wide zero-mean Gaussian), because it is what calibration wants to learn; without the
-/// allowance the filter would round off every such corner and bias the effort's apparent effect. The same where kinematics
-/// says that there may be an impact.
+/// It knows no dynamics, so what is inferred from its output about dynamics is not eaten from its own tail.
+/// It knows one thing beyond kinematics: acceleration may step when the applied effort steps. The size of
+/// that step is left open (a wide zero-mean Gaussian), because it is what calibration wants to learn; without
+/// the allowance the filter would round off every such corner and bias the effort's apparent effect. The same
+/// where kinematics says that there may be an impact.
 ///
-/// A reading counts at its own time: its row of the observation matrix is that of the state so long ago under an
-/// acceleration that is constant but for the effort's step, its variance grows by what the jerk may have done since. (That
-/// this is correlated with the filter's own error is neglected, which errs on the cautious side.)
+/// A reading counts at its own time: its row of the observation matrix is that of the state so long ago under
+/// an acceleration that is constant but for the effort's step, its variance grows by what the jerk may have
+/// done since. (That this is correlated with the filter's own error is neglected, which errs on the cautious
+/// side.)
 ///
 /// A step is Predict, any number of Correct, Keep. None of them allocates. Not thread-safe.
 class KinematicFilter {
@@ -40,11 +44,12 @@ class KinematicFilter {
 
   explicit KinematicFilter(const EstimatorSettings& settings);
 
-  /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured. Of the bias it keeps what
-  /// it knows.
+  /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured. Of the bias it
+  /// keeps what it knows.
   void Restart(double position, double velocity);
   /// @param dt [s] since the last call, > 0.
-  /// @param effort_step [Nm] of the applied effort. @param step_after share of dt after which it steps, 0 to 1.
+  /// @param effort_step [Nm] of the applied effort. @param step_after share of dt after which it steps, 0
+  /// to 1.
   /// @param impact that there may be meanwhile.
   void Predict(double dt, double effort_step, const ImpactSpeeds& impact = {}, double step_after = 0);
 
@@ -62,7 +67,9 @@ class KinematicFilter {
   /// The mark is, from the next step on, where a reading of that age was made.
   void Mark(double age) { next_mark_ = age; }
   /// [s] from the mark to the present; infinite if there is none.
-  double since_mark() const { return std::isnan(next_mark_) ? since_mark_ : std::numeric_limits<double>::infinity(); }
+  double since_mark() const {
+    return std::isnan(next_mark_) ? since_mark_ : std::numeric_limits<double>::infinity();
+  }
   /// Ends the step.
   void Keep();
 
@@ -89,6 +96,7 @@ class KinematicFilter {
   Row VelocityAt(double age) const;
   template <typename Matrix>
   void MoveColumns(Matrix& columns) const;
+  // Of the first N entries, those that the joint has: the backward pass is most of the work.
   template <int N>
   void FindGain();
   template <int N>
@@ -98,8 +106,8 @@ class KinematicFilter {
   struct Step {
     KinematicState filtered_mean;
     KinematicCovariance filtered_covariance;
-    KinematicCovariance gain;               // smoother's, from the next step to this one; unknown for the newest
-    KinematicState mean_change;             // by this step's readings
+    KinematicCovariance gain;    // smoother's, from the next step to this one; unknown for the newest
+    KinematicState mean_change;  // by this step's readings
     KinematicCovariance covariance_change;  // likewise
   };
   Step& At(int i) { return window_[static_cast<size_t>(oldest_ + i) % window_.size()]; }
@@ -107,15 +115,17 @@ class KinematicFilter {
   EstimatorSettings settings_;
   int size_;  // entries of the state that such a joint has
   KinematicState mean_ = KinematicState::Zero(), predicted_mean_ = KinematicState::Zero();
-  KinematicCovariance covariance_ = KinematicCovariance::Zero(), predicted_covariance_ = KinematicCovariance::Zero();
+  KinematicCovariance covariance_ = KinematicCovariance::Zero(),
+                      predicted_covariance_ = KinematicCovariance::Zero();
   // The latest step: its length [s], and of what the mark was made if it was.
   double dt_ = 0;
   bool marks_ = false;
   KinematicState mark_ = KinematicState::Zero();
-  KinematicCovariance shared_ = KinematicCovariance::Zero();  // covariance of the state before it with that after it
-  double since_mark_ = std::numeric_limits<double>::infinity(), next_mark_ = std::numeric_limits<double>::quiet_NaN();
-  double jerk_;  // squared spectral density of the last step's, impact included
-  double step_since_ = 0;  // [s] from the effort's step in the latest interval to the present
+  KinematicCovariance shared_ = KinematicCovariance::Zero();  // of the state before it with that after it
+  double since_mark_ = std::numeric_limits<double>::infinity(),
+         next_mark_ = std::numeric_limits<double>::quiet_NaN();
+  double jerk_;               // squared spectral density of the last step's, impact included
+  double step_since_ = 0;     // [s] from the effort's step in the latest interval to the present
   std::vector<Step> window_;  // ring
   int oldest_ = 0, pending_ = 0;
 };

@@ -16,10 +16,17 @@ void StateObserver::OnImu(const imu_t& message) {
   for (Imu& imu : imus_) {
     if (imu.name != message.name) continue;
     switch (imu.inbox.Put(message, started_ ? state_.utime : 0)) {
-      case ImuInbox::Verdict::kTaken: return;
-      case ImuInbox::Verdict::kReordered: ++imu_reordered_; return;
-      case ImuInbox::Verdict::kDuplicate: ++imu_duplicates_; return;
-      case ImuInbox::Verdict::kRefused: ++imu_refused_; return;
+      case ImuInbox::Verdict::kTaken:
+        return;
+      case ImuInbox::Verdict::kReordered:
+        ++imu_reordered_;
+        return;
+      case ImuInbox::Verdict::kDuplicate:
+        ++imu_duplicates_;
+        return;
+      case ImuInbox::Verdict::kRefused:
+        ++imu_refused_;
+        return;
     }
   }
   ++imu_refused_;
@@ -58,17 +65,19 @@ void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joi
     Joint& joint = joints_[turned];
     const int64_t apart = Microseconds(imu.period / 2);
     if (joint.measured + apart < reading.utime && reading.utime < measured.measured[turned] - apart) {
-      Correct(joint, Quantity::kRate, imu.mounting.axis.dot(Eigen::Map<const Eigen::Vector3d>(reading.rate.data())), age);
+      Correct(joint, Quantity::kRate,
+              imu.mounting.axis.dot(Eigen::Map<const Eigen::Vector3d>(reading.rate.data())), age);
     }
   }
   if (imu.mounting.slides.empty() || !reading.orientation_valid) return;
   const auto& [w, x, y, z] = reading.orientation;
   // As the joints have it: neither a wrong heading nor a boom's roll matter.
   const Eigen::Quaterniond turn =
-      imu.mounting.turned < 0 ? imu.mounting.unturned
-                              : imu.mounting.unturned *
-                                    Eigen::Quaterniond(Eigen::AngleAxisd(
-                                        imu.mounting.Angle(Eigen::Quaterniond(w, x, y, z)), imu.mounting.axis));
+      imu.mounting.turned < 0
+          ? imu.mounting.unturned
+          : imu.mounting.unturned *
+                Eigen::Quaterniond(
+                    Eigen::AngleAxisd(imu.mounting.Angle(Eigen::Quaterniond(w, x, y, z)), imu.mounting.axis));
   const Eigen::Vector3d acceleration =
       turn * Eigen::Map<const Eigen::Vector3d>(reading.force.data()) - gravity_ * Eigen::Vector3d::UnitZ();
   for (const ImuMounting::Slide& slide : imu.mounting.slides) {
@@ -77,10 +86,12 @@ void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joi
     // The mean since the last reading, or, if one is missing, since a moment of which nothing is kept.
     const double window = joint.filter.since_mark() - age;
     if (std::abs(window - imu.period) < kSamePeriod * imu.period) {
-      joint.acceleration_nis.Add(Correct(joint, Quantity::kAcceleration, along, age).nis(), std::max(0.0, elapsed));
+      joint.acceleration_nis.Add(Correct(joint, Quantity::kAcceleration, along, age).nis(),
+                                 std::max(0.0, elapsed));
     }
     joint.filter.Mark(age);
-    joint.acceleration_watch.Add(joint.filter.mean()(1), along, elapsed > 0 ? elapsed : 2 * AgreementWatch::kLongestGap);
+    joint.acceleration_watch.Add(joint.filter.mean()(1), along,
+                                 elapsed > 0 ? elapsed : 2 * AgreementWatch::kLongestGap);
     if (joint.acceleration_watch.finding() != joint.acceleration_found) {
       joint.acceleration_found = joint.acceleration_watch.finding();
       ++reasons_changed_;
