@@ -1,11 +1,7 @@
 // A robot with three motors, two boom encoders and an IMU on one bus: real processes, both protocols of
 // motors.
 
-#include <fmt/format.h>
-
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 
 #include "calibrator/log_reader.h"
 #include "estimator/state_observer.h"
@@ -15,8 +11,6 @@
 
 namespace plumb {
 namespace {
-
-namespace fs = std::filesystem;
 
 template <class Message>
 std::string Bytes(const Message& message) {
@@ -70,20 +64,10 @@ TEST_CASE("a log through the estimator gives the recorded states, bit for bit") 
   CHECK(std::equal(recorded_smoothed.begin(), recorded_smoothed.end(), expected_smoothed.begin()));
 }
 
-// A machine may stall for a moment. That stops the robot, as it should, and is tested elsewhere; here it would be in the way.
-std::string Patient(const Stage& stage) {
-  const fs::path robot = fs::is_directory(stage.robot_folder) ? fs::path(stage.robot_folder) / "robot.toml" : fs::path(stage.robot_folder);
-  const fs::path patient = stage.folder / "robot.toml";
-  std::ofstream(patient) << fmt::format(
-      "extends = \"{}\"\n[robot]\nurdf = \"{}\"\n[driver]\nstale_after = 0.3\ndisarm_after = 0.6\n[virtual_robot]\nwatchdog = 0.5\n",
-      robot.string(), (robot.parent_path() / "robot.urdf").string());
-  return patient;
-}
-
 void Stand(const std::string& robot, int number, const std::vector<uint32_t>& from_motors,
            const std::vector<uint32_t>& to_motors) {
   Stage stage(number, robot);
-  stage.robot_folder = Patient(stage);
+  stage.Forgive();
   Subscriber<joint_state_t> joints(stage.messenger, "JOINT_STATE");
   Subscriber<imu_t> imus(stage.messenger, "IMU");
   stage.StartRobotAndDriver();
