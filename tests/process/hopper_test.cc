@@ -19,7 +19,8 @@ std::string Bytes(const Message& message) {
   return bytes;
 }
 
-TEST_CASE("a log through the estimator gives the recorded states, bit for bit") {
+// @return false if logger or estimator has missed a message, which UDP may lose when the machine stalls.
+bool ReplayGivesTheRecordedStates() {
   Stage stage(48, "hopper");
   const std::string log = stage.folder / "run.lcmlog";
   Child logger("lcm-logger", {"lcm-logger", "--lcm-url=" + stage.lcm_url, "--quiet", log}, stage.folder / "logger.log");
@@ -37,6 +38,8 @@ TEST_CASE("a log through the estimator gives the recorded states, bit for bit") 
   StateObserver observer(LoadRobot(stage.robot_folder));
   std::vector<std::string> expected, expected_smoothed, recorded, recorded_smoothed;
   int64_t imus = 0;
+  bool gapless = true;
+  int64_t last_measured = -1, last_state = -1, last_smoothed = -1;
   ReadLog(log, [&](const std::string& channel, const void* data, int size, int64_t) {
     if (channel == "IMU") {
       imu_t imu;
@@ -46,14 +49,22 @@ TEST_CASE("a log through the estimator gives the recorded states, bit for bit") 
     } else if (channel == "JOINT_STATE") {
       joint_state_t joints;
       REQUIRE(joints.decode(data, 0, size) == size);
+      gapless = gapless && (last_measured < 0 || joints.sequence == last_measured + 1);
+      last_measured = joints.sequence;
       if (!observer.OnJointState(joints)) return true;
       expected.push_back(Bytes(observer.state()));
       for (const robot_state_t& state : observer.smoothed()) expected_smoothed.push_back(Bytes(state));
     } else if (channel == "ROBOT_STATE" || channel == "ROBOT_STATE_SMOOTHED") {
+      robot_state_t state;
+      REQUIRE(state.decode(data, 0, size) == size);
+      int64_t& last = channel == "ROBOT_STATE" ? last_state : last_smoothed;
+      gapless = gapless && (last < 0 || state.sequence == last + 1);
+      last = state.sequence;
       (channel == "ROBOT_STATE" ? recorded : recorded_smoothed).emplace_back(static_cast<const char*>(data), static_cast<size_t>(size));
     }
     return true;
   });
+  if (!gapless) return false;
   REQUIRE(imus > 300);
   REQUIRE(recorded.size() > 800);
   // The logger may have ended between a measurement and its state.
@@ -62,6 +73,11 @@ TEST_CASE("a log through the estimator gives the recorded states, bit for bit") 
   REQUIRE(expected_smoothed.size() >= recorded_smoothed.size());
   REQUIRE(recorded_smoothed.size() > 800);
   CHECK(std::equal(recorded_smoothed.begin(), recorded_smoothed.end(), expected_smoothed.begin()));
+  return true;
+}
+
+TEST_CASE("a log through the estimator gives the recorded states, bit for bit") {
+  REQUIRE((ReplayGivesTheRecordedStates() || ReplayGivesTheRecordedStates() || ReplayGivesTheRecordedStates()));
 }
 
 void Stand(const std::string& robot, int number, const std::vector<uint32_t>& from_motors,
