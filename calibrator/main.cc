@@ -1,9 +1,9 @@
 // plumb-calibrator: ROBOT_STATE_SMOOTHED, JOINT_COMMAND, CONTROLLER_STATUS -> PARAMETER_DISTRIBUTION.
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <chrono>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -26,15 +26,12 @@ struct Flags {
   int threads = 0;
 };
 
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// SimOpt fed with messages: common to the live run and to a log.
 class Session {
  public:
-  Session(const RobotDescription& robot, const Flags& flags)
+  Session(const RobotDescription& robot, const Flags& flags, const Clock& clock)
       : robot_(robot),
+        clock_(clock),
         seed_(flags.seed),
         folder_(flags.checkpoint),
         simopt_(robot, flags.seed, flags.threads > 0 ? flags.threads : static_cast<int>(std::thread::hardware_concurrency()),
@@ -54,7 +51,7 @@ class Session {
   /// Does one update if there is something to do. @return true when an iteration has been completed.
   bool Work() {
     if (!simopt_.running() && calibrator.ready()) {
-      start_ = std::chrono::steady_clock::now();
+      start_ = clock_.Now();
       if (calibrator.Begin() == 0) {
         spdlog::warn("iteration {} has no usable transition: it goes by with the earlier ones; dropped so far: {}",
                      simopt_.state().iteration + 1, calibrator.drops().words());
@@ -69,7 +66,7 @@ class Session {
     if (failed > 0) spdlog::warn("{} simulations failed in this iteration: they count as infinitely far", failed);
     for (const std::string& warning : report->warnings) spdlog::warn("iteration {}: {}", report->iteration, warning);
     report_ = std::move(report);
-    seconds_ = SecondsSince(start_);
+    seconds_ = static_cast<double>(clock_.Now() - start_) * 1e-6 / clock_.scale();
     WriteDistribution();
     return true;
   }
@@ -111,6 +108,7 @@ class Session {
   }
 
   const RobotDescription& robot_;
+  const Clock& clock_;
   uint64_t seed_;
   std::filesystem::path folder_;
   SimOpt simopt_;
@@ -123,11 +121,11 @@ class Session {
   std::optional<CalibrationReport> report_;
   std::optional<StreamingLaplace> stream_;
   int streamed_iteration_ = 0;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  double seconds_ = 0;
+  int64_t start_ = 0;    // of the calibration [us]
+  double seconds_ = 0;  // that the last one took, real ones
 };
 
-int RunLive(Process& process, Session& session) {
+int RunLive(Process& process, Session& session, double duration) {
   Messenger& messenger = process.messenger();
   Publisher<parameter_distribution_t> distribution(messenger, "PARAMETER_DISTRIBUTION");
   Publisher<calibration_status_t> status(messenger, "CALIBRATION_STATUS");
@@ -142,13 +140,16 @@ int RunLive(Process& process, Session& session) {
     status.Publish(session.Status());
   };
   publish();
-  auto last = std::chrono::steady_clock::now();
-  while (process.Wait(session.busy() ? 0 : 50'000)) {
+  constexpr int64_t kLook = 50'000, kRepeat = 1'000'000;  // [us]
+  int64_t last = process.clock().Now();
+  while (process.Sleep(session.busy() ? 0 : kLook)) {
     states.Rethrow(), commands.Rethrow(), controller.Rethrow();
     session.Stream();
-    if (session.Work() || SecondsSince(last) >= 1) {
+    const bool complete = session.Work();
+    if (complete) process.TakeVirtualTime(duration);
+    if (complete || process.clock().Now() - last >= kRepeat) {
       publish();
-      last = std::chrono::steady_clock::now();
+      last = process.clock().Now();
     }
   }
   const int64_t rejected = states.rejected() + commands.rejected() + controller.rejected();
@@ -200,8 +201,8 @@ int main(int argc, char** argv) {
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(flags.robot);
-        plumb::Session session(robot, flags);
-        return flags.log.empty() ? plumb::RunLive(process, session)
+        plumb::Session session(robot, flags, process.clock());
+        return flags.log.empty() ? plumb::RunLive(process, session, robot.calibration.duration)
                                  : plumb::RunLog(process, session, robot, flags.log);
       });
 }

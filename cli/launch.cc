@@ -7,15 +7,19 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 #include <iostream>
 #include <optional>
+#include <set>
 #include <stdexcept>
 
-#include "cli/child.h"
+#include "cli/folder_lock.h"
 #include "cli/preflight.h"
 #include "cli/progress.h"
+#include "cli/run_processes.h"
+#include "cli/virtual_run.h"
 #include "common/atomic_file.h"
 #include "common/lcm_url.h"
 #include "common/signature.h"
@@ -30,7 +34,9 @@ namespace {
 namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr int kMostRearms = 20; // of a virtual robot; a real one is armed by a person, every time
+constexpr int kMostRearms = 20;          // of a virtual robot; a real one is armed by a person, every time
+constexpr int64_t kArmAgain = 500'000;   // [us]
+constexpr int64_t kLook = 50'000;        // [us]
 
 double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
@@ -45,15 +51,52 @@ void RequireDrivable(const RobotDescription& robot) {
   }
 }
 
+fs::path MakeFolder(const std::string& wanted) {
+  const fs::path folder =
+      wanted.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), getpid())
+                     : fs::path(wanted);
+  fs::create_directories(folder);
+  return folder;
+}
+
+/// What is settled before anything starts.
+struct Setting {
+  Setting(const Process& process, const LaunchFlags& flags)
+      : robot(LoadRobot(flags.robot)), bus(flags.bus.empty() ? robot.bus_url : flags.bus) {
+    for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
+    RequireDrivable(robot);
+    RequireKey(process.lcm_url(), !flags.key.empty(), flags.allow_unsigned);
+    if (flags.real && flags.speed != 0) throw std::invalid_argument("a real robot runs at its own speed, without --speed");
+    if (!flags.real) truth = HiddenParameters(robot, flags.seed);
+    RequireFree(process.lcm_url(), bus, flags.real);
+    output = MakeFolder(flags.output);
+    lock.emplace(output);
+    if (flags.real || flags.real_time) return;
+    virtual_run.emplace(output, process.lcm_url(), VirtualRun::Records{flags.log, flags.can_log});
+    virtual_run->coordinator().most_speed = flags.speed;
+  }
+
+  Coordinator* coordinator() { return virtual_run ? &virtual_run->coordinator() : nullptr; }
+
+  RobotDescription robot;
+  std::string bus;
+  Eigen::VectorXd truth;  // physical; empty: nobody knows
+  fs::path output;
+  std::optional<FolderLock> lock;
+  std::optional<VirtualRun> virtual_run;
+};
+
 /// One run: its processes and what they say.
 class ClosedLoop {
  public:
-  ClosedLoop(Process& process, const LaunchFlags& flags)
+  ClosedLoop(Process& process, const LaunchFlags& flags, Setting& setting)
       : process_(process),
         flags_(flags),
-        robot_(LoadRobot(flags.robot)),
-        bus_(flags.bus.empty() ? robot_.bus_url : flags.bus),
-        clock_(flags.speed, process.clock().Utime()),
+        setting_(setting),
+        robot_(setting.robot),
+        clock_(process.participant() ? process.clock()
+                                     : Clock(flags.speed > 0 ? flags.speed : 1, process.clock().Utime())),
+        start_(clock_.Now()),
         progress_(robot_, flags.iterations),
         requests_(process.messenger(), "DRIVER_REQUEST"),
         drivers_(process.messenger(), "DRIVER_STATUS", [&](const driver_status_t& m) { progress_.OnDriver(m); }),
@@ -62,92 +105,69 @@ class ClosedLoop {
         calibrations_(process.messenger(), "CALIBRATION_STATUS",
                       [&](const calibration_status_t& m) { progress_.OnCalibration(m); }),
         trainings_(process.messenger(), "TRAINING_STATUS",
-                   [&](const training_status_t& m) { progress_.OnTraining(m); }) {
-    for (const std::string& warning : robot_.warnings) spdlog::warn("{}", warning);
-    RequireDrivable(robot_);
-    RequireKey(process.lcm_url(), !flags.key.empty(), flags.allow_unsigned);
+                   [&](const training_status_t& m) { progress_.OnTraining(m); }),
+        processes_(flags,
+                   {setting.bus, process.lcm_url(),
+                    setting.coordinator() ? setting.coordinator()->clock() : clock_.ToString(), setting.output},
+                   setting.coordinator()) {
     if (!flags.key.empty()) signer_.emplace(SigningKey(flags.key), "DRIVER_REQUEST");
-    if (flags.real && flags.speed != 1) throw std::invalid_argument("a real robot runs at --speed 1");
-    RequireFree(process, bus_, flags.real);
-    if (!flags.real) truth_ = HiddenParameters(robot_, flags.seed);
-    output_ = flags.output.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}",
-                                                                    fmt::localtime(std::time(nullptr)), getpid())
-                                   : fs::path(flags.output);
-    fs::create_directories(output_);
+    if (!setting.virtual_run) return;
+    setting.coordinator()->on_note = [this](const std::string& line) { Print("plumb: " + line); };
+    setting.coordinator()->go_on = [this] { return GoOn(); };
+    setting.virtual_run->on_stranger = [this](const std::string& channel, std::span<const uint8_t> message) {
+      OnStranger(channel, message);
+    };
   }
 
-  ~ClosedLoop() { StopAll(); }
-
   int Go() {
-    std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << bus_ << ", seed " << flags_.seed
-              << ", logs in " << output_.string() << std::endl;
-    StartAll();
+    std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << setting_.bus << ", seed " << flags_.seed
+              << ", logs in " << setting_.output.string() << std::endl;
+    if (setting_.virtual_run && !setting_.virtual_run->mirror_failure().empty()) {
+      std::cout << "nobody else can listen: " << setting_.virtual_run->mirror_failure() << std::endl;
+    }
+    processes_.Start();
     if (flags_.real) {
       const int status = ArmByPerson();
       if (status != 0) return status;
     }
     std::cout << progress_.Header() << std::endl;
     while (!progress_.finished()) {
-      if (!process_.Wait(50'000)) {
+      if (!process_.Wait(kLook)) {
         EndLine();
         std::cout << "interrupted" << std::endl;
-        StopAll();
         return 130;
       }
-      progress_.Account(SecondsSince(start_));
-      if (!AllRunning()) return 1;
-      if (!KeepArmed()) return 1;
+      progress_.Account(static_cast<double>(clock_.Now() - start_) * 1e-6, SecondsSince(really_started_));
+      if (!AllRunning() || !KeepArmed()) return 1;
       for (const std::string& row : progress_.TakeRows()) Print(row);
       ShowStatus();
     }
     EndLine();
-    StopAll();
-    std::cout << progress_.Conclusion(truth_);
+    processes_.Stop(false);
+    if (setting_.virtual_run) setting_.virtual_run->Finish();
+    std::cout << progress_.Conclusion(setting_.truth);
     WriteSummary();
     return 0;
   }
 
  private:
-  void Start(const std::string& name, std::vector<std::string> arguments) {
-    const fs::path here = fs::read_symlink("/proc/self/exe").parent_path();
-    const bool ours = name.rfind("plumb-", 0) == 0;
-    arguments.insert(arguments.begin(), ours ? (here / name).string() : name);
-    if (ours) {
-      for (const std::string& flag : {std::string("--lcm-url"), process_.lcm_url(), std::string("--clock"),
-                                      clock_.ToString(), std::string("--parent"), std::to_string(getpid())}) {
-        arguments.push_back(flag);
-      }
-    }
-    children_.emplace_back(name, arguments, output_ / (name + ".log"));
+  /// While somebody works in virtual time, a tenth of a second of real time has passed.
+  bool GoOn() {
+    setting_.virtual_run->ListenOutside();
+    ShowStatus();
+    return !processes_.Ended() && !stopped_from_outside_;
   }
 
-  void StartAll() {
-    const std::string seed = std::to_string(flags_.seed);
-    if (!flags_.log.empty()) {
-      // It knows no --parent of ours.
-      Start("setpriv", {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + process_.lcm_url(), "-q", "-f", flags_.log});
+  /// A run in virtual time hears nobody else; but whoever wants it to stop is obeyed.
+  void OnStranger(const std::string& channel, std::span<const uint8_t> message) {
+    driver_request_t request;
+    if (channel == "DRIVER_REQUEST" &&
+        request.decode(message.data(), 0, static_cast<int>(message.size())) == static_cast<int>(message.size()) &&
+        (request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP)) {
+      stopped_from_outside_ = true;
+    } else if (strange_channels_.insert(channel).second) {
+      Print("plumb: somebody outside the run says " + channel + ": not heard; --real-time hears everybody");
     }
-    const std::vector<std::string> behind{"--realtime-priority", std::to_string(std::max(flags_.priority - 5, 0))};
-    if (!flags_.real) Start("plumb-robot", {flags_.robot, "--bus", bus_, "--seed", seed, behind[0], behind[1]});
-    std::vector<std::string> driver{flags_.robot, "--bus", bus_, "--flight-recorder",
-                                    (output_ / "faults").string()};
-    if (!flags_.real) driver.push_back("--virtual");
-    if (flags_.allow_unsigned) driver.push_back("--unsigned");
-    driver.insert(driver.end(), {"--realtime-priority", std::to_string(flags_.priority)});
-    std::vector<std::string> controller{flags_.robot, "--seed", seed, behind[0], behind[1]};
-    if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});  // nobody throws a real robot about
-    if (!flags_.key.empty()) {
-      for (auto* arguments : {&driver, &controller})
-        arguments->insert(arguments->end(), {"--key", flags_.key});
-    }
-    Start("plumb-driver", driver);
-    Start("plumb-estimator", {flags_.robot, behind[0], behind[1]});
-    Start("plumb-controller", controller);
-    // The slow loop gives way to the fast one.
-    Start("plumb-trainer", {flags_.robot, "--nice", "10", "--seed", seed, "--iterations", std::to_string(flags_.iterations),
-                            "--evaluation-episodes", std::to_string(flags_.evaluation_episodes), "--checkpoint",
-                            (output_ / "training").string()});
-    Start("plumb-calibrator", {flags_.robot, "--nice", "10", "--seed", seed, "--checkpoint", (output_ / "calibration").string()});
   }
 
   // One consent is one attempt. @return 0 when armed, else the exit status.
@@ -155,7 +175,7 @@ class ClosedLoop {
     const auto until = [&](const std::function<bool()>& so, double seconds) {
       const auto start = SteadyClock::now();
       while (!so() && SecondsSince(start) < seconds && AllRunning()) {
-        if (!process_.Wait(50'000)) return false;
+        if (!process_.Wait(kLook)) return false;
       }
       return so();
     };
@@ -165,7 +185,7 @@ class ClosedLoop {
       return process_.stopping() ? 130 : 1;
     }
     until([] { return false; }, robot_.driver.start_guard + 0.1);  // the driver refuses any earlier wish
-    std::cout << "The motors of " << robot_.name << " on " << bus_
+    std::cout << "The motors of " << robot_.name << " on " << setting_.bus
               << " will be switched on.\nStand clear, keep the emergency stop at hand, and type 'arm': " << std::flush;
     std::string answer;
     while (answer.empty() || answer.back() != '\n') {
@@ -189,15 +209,18 @@ class ClosedLoop {
   }
 
   bool AllRunning() {
-    for (Child& child : children_) {
-      if (child.running()) continue;
+    if (stopped_from_outside_) {
       EndLine();
-      std::cerr << "plumb: " << child.name() << " ended (" << child.ending() << "); the end of "
-                << child.log().string() << ":\n"
-                << child.Tail(5);
+      std::cerr << "plumb: somebody outside the run has asked for a stop: the run ends here\n";
       return false;
     }
-    return true;
+    Child* const ended = processes_.Ended();
+    if (!ended) return true;
+    EndLine();
+    std::cerr << "plumb: " << ended->name() << " ended (" << ended->ending() << "); the end of "
+              << ended->log().string() << ":\n"
+              << ended->Tail(5);
+    return false;
   }
 
   // A virtual robot is armed at the beginning, and again after a fault, though not for ever. What a person has
@@ -220,9 +243,9 @@ class ClosedLoop {
     }
     if (driver.state == driver_status_t::ARMED) fault_seen_ = false;
     const bool down = driver.state == driver_status_t::IDLE || driver.state == driver_status_t::FAULT;
-    if (down && !flags_.real && SecondsSince(last_request_) * flags_.speed > 0.5) {
+    if (down && !flags_.real && clock_.Now() - last_request_ > kArmAgain) {
       Request(driver_request_t::ARM);
-      last_request_ = SteadyClock::now();
+      last_request_ = clock_.Now();
     }
     return true;
   }
@@ -230,6 +253,7 @@ class ClosedLoop {
   /// For a person to type.
   std::string ArmCommand() const {
     return "plumb arm --lcm-url '" + process_.lcm_url() + "'" +
+           (setting_.virtual_run ? " --clock '" + setting_.virtual_run->coordinator().clock() + "'" : "") +
            (flags_.key.empty() ? "" : " --key '" + flags_.key + "'");
   }
 
@@ -237,36 +261,19 @@ class ClosedLoop {
     driver_request_t request{};
     request.utime = clock_.Utime();
     request.request = what;
-    if (signer_) signer_->Sign(request, Clock().Utime());
+    if (signer_) signer_->Sign(request, clock_.SigningUtime());
     requests_.Publish(request);
-  }
-
-  void StopAll() {
-    // Everything that could command goes at once; the driver disarms and confirms; the robot and the log go last.
-    for (Child& child : children_) {
-      if (child.name() != "plumb-robot" && child.name() != "setpriv") child.Signal(SIGTERM);
-    }
-    for (Child& child : children_) {
-      if (child.name() == "plumb-driver") child.WaitFor(0.5);
-    }
-    for (Child& child : children_) child.Signal(SIGTERM);
-    const auto start = SteadyClock::now();
-    for (Child& child : children_) {
-      if (!child.WaitFor(std::max(0.0, 0.3 - SecondsSince(start)))) child.Signal(SIGKILL);
-    }
-    for (Child& child : children_) child.WaitFor(0.2);
-    children_.clear();
   }
 
   void WriteSummary() {
     if (flags_.summary.empty()) return;
-    nlohmann::json summary = progress_.Summary(truth_);
+    nlohmann::json summary = progress_.Summary(setting_.truth);
     summary["seed"] = flags_.seed;
-    summary["speed"] = flags_.speed;
-    summary["bus"] = bus_;
+    summary["time"] = setting_.virtual_run ? "virtual" : "real";
+    if (!setting_.virtual_run) summary["speed"] = clock_.scale();
+    summary["bus"] = setting_.bus;
     summary["rearms"] = rearms_;
     summary["version"] = VersionLine("plumb");
-    summary["seconds"]["total"] = SecondsSince(start_);
     WriteAtomically(flags_.summary, summary.dump(1) + "\n");
   }
 
@@ -282,7 +289,7 @@ class ClosedLoop {
     const bool terminal = isatty(STDOUT_FILENO) != 0;
     if (SecondsSince(last_status_) < (terminal ? 0.1 : 10)) return;
     last_status_ = SteadyClock::now();
-    const std::string line = progress_.StatusLine(SecondsSince(start_));
+    const std::string line = progress_.StatusLine(SecondsSince(really_started_));
     if (terminal) {
       std::cout << "\r\033[K" << line << std::flush;
       line_open_ = true;
@@ -293,9 +300,10 @@ class ClosedLoop {
 
   Process& process_;
   const LaunchFlags& flags_;
-  RobotDescription robot_;
-  std::string bus_;
-  Clock clock_;
+  Setting& setting_;
+  const RobotDescription& robot_;
+  const Clock clock_;
+  const int64_t start_;
   Progress progress_;
   Publisher<driver_request_t> requests_;
   std::optional<Signer> signer_;
@@ -303,16 +311,21 @@ class ClosedLoop {
   Subscriber<controller_status_t> controllers_;
   Subscriber<calibration_status_t> calibrations_;
   Subscriber<training_status_t> trainings_;
-  Eigen::VectorXd truth_;
-  fs::path output_;
-  std::vector<Child> children_;
-  SteadyClock::time_point start_ = SteadyClock::now(), last_status_ = start_, last_request_ = start_;
-  bool line_open_ = false, fault_seen_ = false, stopped_ = false;
+  const SteadyClock::time_point really_started_ = SteadyClock::now();
+  SteadyClock::time_point last_status_ = really_started_;
+  int64_t last_request_ = start_;
+  bool line_open_ = false, fault_seen_ = false, stopped_ = false, stopped_from_outside_ = false;
   int rearms_ = 0;
+  std::set<std::string> strange_channels_;
+  RunProcesses processes_;  // is stopped first
 };
 
 }  // namespace
 
-int Launch(Process& process, const LaunchFlags& flags) { return ClosedLoop(process, flags).Go(); }
+int Launch(Process& process, const LaunchFlags& flags) {
+  Setting setting(process, flags);
+  if (setting.virtual_run) process.Enter(setting.coordinator()->participant());
+  return ClosedLoop(process, flags, setting).Go();
+}
 
 }  // namespace plumb

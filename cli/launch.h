@@ -13,12 +13,14 @@ struct LaunchFlags {
   int iterations = 8;
   int evaluation_episodes = 10;
   std::string bus;      ///< empty = the robot's own
-  double speed = 1;     ///< scaled seconds per second
+  bool real_time = false;  ///< a virtual robot in real time; otherwise it runs in virtual time
+  double speed = 0;     ///< in real time scaled seconds per second, 0 = 1; in virtual time the most, 0 = no limit
   bool real = false;    ///< the robot is on the bus: start no virtual one, ask before arming
   std::string key;      ///< file of the key that commands are signed with; empty = they are not
   bool allow_unsigned = false;  ///< although LCM leaves this machine
   int priority = 0;     ///< SCHED_FIFO of the driver; robot, estimator and controller come right behind it. 0 = off
   std::string log;      ///< record all messages here; empty = do not
+  std::string can_log;  ///< record all frames here, in virtual time; empty = do not
   std::string summary;  ///< JSON of the outcome; empty = do not
   std::string output;   ///< folder for logs and checkpoints; empty = a new one
 };

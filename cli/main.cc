@@ -1,5 +1,6 @@
 // plumb: the front door.
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <iostream>
@@ -45,7 +46,7 @@ int Request(Process& process, int8_t what, const std::string& key) {
       return 1;
     }
     if (!arming || (heard && !asked)) {
-      if (signer) signer->Sign(request, Clock().Utime());
+      if (signer) signer->Sign(request, process.clock().SigningUtime());
       requests.Publish(request);
       asked = true;
     }
@@ -106,10 +107,13 @@ int main(int argc, char** argv) {
         launch->add_option("--evaluation-episodes", flags.evaluation_episodes, "roll-outs of the final policy")
             ->check(CLI::Range(1, 1000))->capture_default_str();
         launch->add_option("--bus", flags.bus, "CAN bus, e.g. socketcan:can0; default: the robot's own");
-        launch->add_option("--speed", flags.speed, "clock scale; a virtual robot can run faster than real time")
-            ->check(CLI::Range(0.01, 100.0))->capture_default_str();
+        auto* real_time = launch->add_flag("--real-time", flags.real_time,
+                                           "a virtual robot by this machine's clock, as a real one; default: in virtual time");
+        launch->add_option("--speed", flags.speed, "in real time the clock's scale; in virtual time at most so many times real time, 0 = no limit")
+            ->check(CLI::Range(0.0, 100.0));
         plumb::AddRealtimeFlag(*launch, flags.priority);
-        launch->add_flag("--real", flags.real, "the robot itself is on the bus: no virtual one, ask before arming");
+        launch->add_flag("--real", flags.real, "the robot itself is on the bus: no virtual one, ask before arming")
+            ->excludes(real_time);
         auto* launch_key = launch->add_option(
             "--key", flags.key,
             "the controller signs with this key and the driver obeys nothing else (plumb key makes one)");
@@ -118,6 +122,7 @@ int main(int argc, char** argv) {
                        "let the driver obey anybody, although LCM leaves this machine")
             ->excludes(launch_key);
         launch->add_option("--log", flags.log, "record all messages to this LCM log");
+        launch->add_option("--can-log", flags.can_log, "in virtual time: record all frames to this file, as candump -l does");
         launch->add_option("--summary", flags.summary, "write the outcome to this JSON file");
         launch->add_option("--output", flags.output, "folder for logs and checkpoints; default: a new one in runs/");
         sim = app.add_subcommand("sim", "simulate the robot's task here and now, without any other process");

@@ -79,16 +79,23 @@ void Progress::OnCalibration(const calibration_status_t& status) {
   };
   // Distribution k rests on the roll-out of policy k - 1.
   done_.push_back({status, or_nan(simulated_return_, status.iteration - 1),
-                   or_nan(robot_return_, status.iteration - 1), last_account_ - last_row_});
-  last_row_ = last_account_;
+                   or_nan(robot_return_, status.iteration - 1), spent_.accounted - last_row_});
+  last_row_ = spent_.accounted;
 }
 
-void Progress::Account(double seconds) {
-  const double elapsed = seconds - std::exchange(last_account_, seconds);
-  const int8_t phase = controller_.phase;
-  if (phase == controller_status_t::RUNNING || phase == controller_status_t::PLACING) robot_seconds_ += elapsed;
-  else if (!training_.complete && training_.updates > 0) training_seconds_ += elapsed;
-  else other_seconds_ += elapsed;
+double& Progress::Spent::Doing(const controller_status_t& c, const training_status_t& t) {
+  if (c.phase == controller_status_t::RUNNING || c.phase == controller_status_t::PLACING) return robot;
+  return !t.complete && t.updates > 0 ? training : other;
+}
+
+void Progress::Spent::Account(double now, const controller_status_t& c, const training_status_t& t) {
+  Doing(c, t) += now - accounted;
+  accounted = now;
+}
+
+void Progress::Account(double seconds, double real_seconds) {
+  spent_.Account(seconds, controller_, training_);
+  really_spent_.Account(real_seconds, controller_, training_);
 }
 
 std::string Progress::Header() const {
@@ -180,8 +187,9 @@ std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
                         evaluation_.size(), Mean(evaluation_), Median(evaluation_),
                         *std::min_element(evaluation_.begin(), evaluation_.end()));
   }
-  text += fmt::format("time: {:.0f} s on the robot, {:.0f} s training, {:.0f} s for the rest\n", robot_seconds_,
-                      training_seconds_, other_seconds_);
+  text += fmt::format("time: {:.0f} s on the robot, by its clock", spent_.robot) +
+          fmt::format("; {:.0f} s in all: {:.0f} s on the robot, {:.0f} s training, {:.0f} s for the rest\n",
+                      really_spent_.accounted, really_spent_.robot, really_spent_.training, really_spent_.other);
   return text;
 }
 
@@ -222,7 +230,10 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
   }
   if (!done_.empty()) summary["identifiability"] = done_.back().calibration.identifiability;
   summary["evaluation_returns"] = evaluation_;
-  summary["seconds"] = {{"robot", robot_seconds_}, {"training", training_seconds_}, {"other", other_seconds_}};
+  summary["seconds"] = {{"robot", spent_.robot},
+                        {"training", spent_.training},
+                        {"other", spent_.other},
+                        {"total", spent_.accounted}};
   return summary;
 }
 

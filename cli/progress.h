@@ -15,7 +15,7 @@
 namespace plumb {
 
 /// What a run has shown so far, gathered from the status messages: the live line, the table, the summary.
-/// Time is an argument [s of wall time since the start]. Not thread-safe.
+/// Time is an argument. Not thread-safe.
 class Progress {
  public:
   Progress(const RobotDescription& robot, int iterations) : robot_(robot), iterations_(iterations) {}
@@ -25,7 +25,8 @@ class Progress {
   void OnCalibration(const calibration_status_t& status);
   void OnTraining(const training_status_t& status);
   /// Attributes the time since the last call to what the loop is waiting for.
-  void Account(double seconds);
+  /// @param seconds by the run's clock since its start. @param real_seconds since then.
+  void Account(double seconds, double real_seconds);
 
   const driver_status_t& driver() const { return driver_; }
   /// Table rows that have become complete since the last call.
@@ -60,8 +61,15 @@ class Progress {
   size_t taken_ = 0;
   std::vector<double> evaluation_;
   bool finished_ = false;
-  double last_account_ = 0, last_row_ = 0;
-  double training_seconds_ = 0, robot_seconds_ = 0, other_seconds_ = 0;
+  /// [s] spent on what, by one clock.
+  struct Spent {
+    double& Doing(const controller_status_t& controller, const training_status_t& training);
+    void Account(double now, const controller_status_t& controller, const training_status_t& training);
+    double robot = 0, training = 0, other = 0;
+    double accounted = 0;  // up to when
+  };
+  Spent spent_, really_spent_;  // by the run's clock; in real time
+  double last_row_ = 0;
 };
 
 }  // namespace plumb

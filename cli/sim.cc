@@ -106,7 +106,7 @@ std::string DescribeParameters(const RobotDescription& robot) {
         fmt::format(" {} {}{}", parameter.name, parameter.mean, i + 1 < robot.parameters.size() ? "," : "");
     if (line.size() + item.size() > kLineLength) {
       text += line + "\n";
-      line = " ";
+      line.assign(1, ' ');
     }
     line += item;
   }

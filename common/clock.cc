@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace plumb {
 namespace {
@@ -21,6 +22,9 @@ Clock::Clock(double scale, int64_t epoch) : scale_(scale), epoch_(epoch) {
     throw std::invalid_argument(fmt::format("clock scale {} is not in (0, 1000]", scale));
   }
 }
+
+Clock::Clock(std::shared_ptr<const std::atomic<int64_t>> virtual_time)
+    : scale_(1), epoch_(0), virtual_time_(std::move(virtual_time)) {}
 
 Clock Clock::Parse(const std::string& text) {
   const auto at = text.find('@');
@@ -49,9 +53,14 @@ int64_t Clock::UtimeFromRealtimeNs(int64_t ns) const {
   return epoch_ + std::llround(static_cast<double>(since_ns) * 1e-3 * scale_);
 }
 
-int64_t Clock::Utime() const { return UtimeFromRealtimeNs(RealNs(CLOCK_REALTIME)); }
+int64_t Clock::Utime() const {
+  return virtual_time_ ? virtual_time_->load() : UtimeFromRealtimeNs(RealNs(CLOCK_REALTIME));
+}
+
+int64_t Clock::SigningUtime() const { return virtual_time_ ? virtual_time_->load() : RealNs(CLOCK_REALTIME) / 1000; }
 
 int64_t Clock::Now() const {
+  if (virtual_time_) return virtual_time_->load();
   return std::llround(static_cast<double>(RealNs(CLOCK_MONOTONIC)) * 1e-3 * scale_);
 }
 

@@ -2,32 +2,40 @@
 
 #include <time.h>
 
+#include <atomic>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 namespace plumb {
 
-/// The time of a whole run. One scale factor lets a closed loop with a virtual robot run faster (or slower)
-/// than real time: scaled = epoch + (real - epoch) * scale. Every process of a run is given the same scale
-/// and epoch (flag `--clock SCALE@EPOCH`). All times are int64 microseconds. Thread-safe (immutable).
+/// The time of a whole run. Real, or scaled: one factor lets a closed loop with a virtual robot run faster (or slower)
+/// than real time, scaled = epoch + (real - epoch) * scale; every process of a run is given the same scale and epoch
+/// (flag `--clock SCALE@EPOCH`). Or virtual: it stands still while a process works (docs/virtual-time.md). All times are
+/// int64 microseconds. Thread-safe (immutable).
 class Clock {
  public:
   /// @param scale scaled seconds per real second, in (0, 1000].
   /// @param epoch real CLOCK_REALTIME microseconds at which scaled and real time agree.
   /// @throws std::invalid_argument if scale is out of range.
   explicit Clock(double scale = 1, int64_t epoch = 0);
+  /// The virtual time of a run: Participant::time(). Utime and Now are the same.
+  explicit Clock(std::shared_ptr<const std::atomic<int64_t>> virtual_time);
 
   /// Reads the form "SCALE" or "SCALE@EPOCH". @throws std::invalid_argument naming the text.
   static Clock Parse(const std::string& text);
   std::string ToString() const;
 
   double scale() const { return scale_; }
+  bool is_virtual() const { return virtual_time_ != nullptr; }
 
   /// Scaled CLOCK_REALTIME: what messages carry as `utime`.
   int64_t Utime() const;
   /// Scaled CLOCK_MONOTONIC: for deadlines and staleness. Its origin is arbitrary.
   int64_t Now() const;
-  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds).
+  /// What signatures are dated by: real time, not scaled, so that it rises from run to run; virtual time, if it is.
+  int64_t SigningUtime() const;
+  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds). Not of virtual time, which no kernel knows.
   int64_t UtimeFromRealtimeNs(int64_t ns) const;
   /// Real time that corresponds to a scaled duration, for ppoll; negative durations give zero.
   timespec RealDuration(int64_t scaled_us) const;
@@ -35,6 +43,7 @@ class Clock {
  private:
   double scale_;
   int64_t epoch_;
+  std::shared_ptr<const std::atomic<int64_t>> virtual_time_;  // null: it is not virtual
 };
 
 /// Deadlines of a periodic loop, absolute, so that lateness does not accumulate. Not thread-safe.

@@ -28,7 +28,35 @@ Messenger::Messenger(const std::string& url) : url_(url), lcm_(url) {
   Guard();
 }
 
+// What the coordinator brings goes to the subscribers by liblcm's queue within the process.
+Messenger::Messenger(Participant& participant) : url_("memq://"), participant_(&participant), lcm_(url_) {}
+
+bool Messenger::Publish(const std::string& channel, std::span<const uint8_t> message) {
+  if (!participant_) {
+    return lcm_.publish(channel, message.data(), static_cast<unsigned>(message.size())) == 0;
+  }
+  participant_->Say(ChannelTopic(channel), {message.begin(), message.end()});
+  return true;
+}
+
+void Messenger::OnSubscription(const std::string& channel) {
+  if (participant_) {
+    participant_->Listen(ChannelTopic(channel));
+  } else {
+    Guard();
+  }
+}
+
 int Messenger::Drain(int most) {
+  if (participant_) {
+    std::deque<lockstep_post_t>& heard = participant_->messages();
+    int handled = 0;
+    for (; handled < most && !heard.empty(); heard.pop_front(), ++handled) {
+      lcm_.publish(heard.front().topic.name, heard.front().data.data(), static_cast<unsigned>(heard.front().size));
+      lcm_.handleTimeout(0);
+    }
+    return handled;
+  }
   for (int handled = 0; handled < most; ++handled) {
     const int result = lcm_.handleTimeout(0);
     if (result < 0) return handled > 0 ? handled : -1;

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/lockstep/participant.h"
+
 namespace plumb {
 
 /// LCM by multicast on this machine only (TTL 0), with a receive buffer large enough for a policy.
@@ -21,19 +23,27 @@ class Messenger {
   /// @param url an LCM URL; udpm, memq or file.
   /// @throws std::runtime_error that says how to cure it (no multicast route is the usual cause).
   explicit Messenger(const std::string& url);
+  /// The messages of a run in virtual time, which its coordinator carries.
+  explicit Messenger(Participant& participant);
 
   lcm::LCM& lcm() { return lcm_; }
-  /// For poll. Calling it starts LCM's receive thread.
+  /// For poll; not in virtual time. Calling it starts LCM's receive thread.
   int fd() { return lcm_.getFileno(); }
+  /// @return false if the message was not sent (liblcm says no more).
+  bool Publish(const std::string& channel, std::span<const uint8_t> message);
   /// Handles the messages that have arrived, but no more than `most`, so that a flood does not keep the caller from
   /// its other duties; what is left keeps fd() readable. @return how many, -1 at the end of a file or on failure.
   int Drain(int most = 1000);
-  /// Keeps malformed LCM datagrams from liblcm (see lcm_guard.h), once. The constructor does, and
-  /// Subscriber where that was too early.
-  void Guard();
+  /// Is told by Subscriber of each channel that somebody listens to.
+  void OnSubscription(const std::string& channel);
 
  private:
+  /// Keeps malformed LCM datagrams from liblcm (see lcm_guard.h), once. The constructor does, and
+  /// OnSubscription where that was too early.
+  void Guard();
+
   std::string url_;
+  Participant* participant_ = nullptr;  // of a run in virtual time
   lcm::LCM lcm_;
   bool guarded_ = false;
 };
@@ -52,7 +62,7 @@ class Subscriber {
       : messenger_(messenger), callback_(std::move(callback)) {
     subscription_ = messenger_.lcm().subscribe(channel, &Subscriber::OnBuffer, this);
     subscription_->setQueueCapacity(0);
-    messenger_.Guard();
+    messenger_.OnSubscription(channel);
   }
   ~Subscriber() { messenger_.lcm().unsubscribe(subscription_); }
   Subscriber(const Subscriber&) = delete;
@@ -115,7 +125,7 @@ class Publisher {
     const int size = message.getEncodedSize();
     if (static_cast<size_t>(size) > buffer_.size()) buffer_.resize(static_cast<size_t>(size));
     if (message.encode(buffer_.data(), 0, size) != size) return false;
-    return messenger_->lcm().publish(channel_, buffer_.data(), static_cast<unsigned>(size)) == 0;
+    return messenger_->Publish(channel_, std::span(buffer_).first(static_cast<size_t>(size)));
   }
 
  private:

@@ -1,5 +1,6 @@
 #include "common/process.h"
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
@@ -11,13 +12,16 @@
 #include <unistd.h>
 
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <stdexcept>
 
-#include "common/version.h"
+#include "common/program_version.h"
 
 namespace plumb {
 namespace {
+
+constexpr std::string_view kVirtual = "virtual:";
 
 int BlockStopSignals() {
   sigset_t set;
@@ -34,30 +38,65 @@ int BlockStopSignals() {
 }  // namespace
 
 Process::Process(std::string name, std::string lcm_url, const std::string& clock)
-    : name_(std::move(name)), lcm_url_(std::move(lcm_url)), clock_(Clock::Parse(clock)), stop_fd_(BlockStopSignals()) {}
+    : name_(std::move(name)),
+      lcm_url_(std::move(lcm_url)),
+      stop_fd_(BlockStopSignals()),
+      joined_(clock.starts_with(kVirtual) ? JoinRun(clock.substr(kVirtual.size()), name_) : nullptr),
+      participant_(joined_.get()),
+      clock_(joined_ ? Clock(joined_->time()) : Clock::Parse(clock)) {}
+
+void Process::Enter(Participant& participant) {
+  participant_ = &participant;
+  clock_ = Clock(participant.time());
+}
 
 Messenger& Process::messenger() {
-  if (!messenger_) messenger_ = std::make_unique<Messenger>(lcm_url_);
+  if (!messenger_) {
+    messenger_ = participant_ ? std::make_unique<Messenger>(*participant_) : std::make_unique<Messenger>(lcm_url_);
+  }
   return *messenger_;
 }
 
 bool Process::stopping() {
   signalfd_siginfo info;
   if (read(stop_fd_, &info, sizeof info) == sizeof info) stopping_ = true;
-  return stopping_;
+  return stopping_ || (participant_ && participant_->stopping());
 }
 
-bool Process::Wait(int64_t timeout, int fd) {
+void Process::Doze(int64_t timeout, int fd) {
+  if (participant_) {
+    return participant_->Wait(participant_->now() + timeout, Participant::Wake::kWhenHeard, stop_fd_);
+  }
   std::array<pollfd, 3> polled{{{stop_fd_, POLLIN, 0}, {messenger().fd(), POLLIN, 0}, {fd, POLLIN, 0}}};
   const timespec real = clock_.RealDuration(timeout);
   ppoll(polled.data(), fd < 0 ? 2 : 3, &real, nullptr);
-  if (polled[1].revents != 0) messenger().Drain();
+}
+
+bool Process::Wait(int64_t timeout, int fd) {
+  Doze(timeout, fd);
+  messenger().Drain();
   return !stopping();
 }
 
-std::string VersionLine(const std::string& name) {
-  return fmt::format("{} {} ({})", name, kVersion, kGitDescription);
+bool Process::Sleep(int64_t timeout) {
+  if (participant_) {
+    participant_->Wait(participant_->now() + timeout, Participant::Wake::kOnTime, stop_fd_);
+  } else {
+    pollfd stop{stop_fd_, POLLIN, 0};
+    const timespec real = clock_.RealDuration(timeout);
+    ppoll(&stop, 1, &real, nullptr);
+  }
+  messenger().Drain();
+  return !stopping();
 }
+
+void Process::TakeVirtualTime(double seconds) {
+  if (!participant_ || seconds == 0) return;
+  const int64_t end = participant_->now() + std::llround(seconds * 1e6);
+  while (participant_->now() < end && !stopping()) participant_->Wait(end, Participant::Wake::kOnTime, stop_fd_);
+}
+
+std::string VersionLine(const std::string& name) { return name + " " + ProgramVersion(); }
 
 int Run(const std::string& name, const std::string& description, int argc, char** argv,
         const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body) {
@@ -70,7 +109,7 @@ int Run(const std::string& name, const std::string& description, int argc, char*
   int niceness = 0;
   app.add_option("--lcm-url", lcm_url, "LCM provider; default: $LCM_DEFAULT_URL or this machine only")
       ->capture_default_str();
-  app.add_option("--clock", clock, "clock scale, or SCALE@EPOCH as plumb launch passes it")->capture_default_str();
+  app.add_option("--clock", clock, "clock scale, or SCALE@EPOCH or virtual:PATH as plumb launch passes it")->capture_default_str();
   app.add_option("--log-level", level, "trace, debug, info, warning, error")->capture_default_str();
   app.add_option("--parent", parent, "stop when this process, which started us, is gone");
   app.add_option("--nice", niceness, "give way to the others: 0 to 19")->check(CLI::Range(0, 19));

@@ -1,11 +1,16 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "common/clock.h"
+#include "common/lockstep/participant.h"
 #include "common/messenger.h"
+
+namespace CLI {
+class App;
+}
 
 namespace plumb {
 
@@ -18,6 +23,8 @@ namespace plumb {
 ///   }
 class Process {
  public:
+  /// @param clock SCALE, SCALE@EPOCH, or virtual:PATH of a coordinator. @throws std::exception if it is none of these,
+  /// or nobody keeps time there.
   Process(std::string name, std::string lcm_url, const std::string& clock);
 
   const std::string& name() const { return name_; }
@@ -25,6 +32,10 @@ class Process {
   /// Opens LCM on first use. @throws std::runtime_error with the cure.
   Messenger& messenger();
   const std::string& lcm_url() const { return lcm_url_; }
+  /// The place in a run in virtual time; null if there is none.
+  Participant* participant() { return participant_; }
+  /// From now on takes part in a run whose coordinator lives in this process. Before the first use of messenger().
+  void Enter(Participant& participant);
 
   /// Becomes readable when the process is asked to stop (SIGINT, SIGTERM, SIGHUP). For ppoll.
   int stop_fd() const { return stop_fd_; }
@@ -32,14 +43,25 @@ class Process {
   bool stopping();
   /// Sleeps until LCM has messages, `fd` (if not -1) is readable, the process is asked to stop, or `timeout`
   /// scaled microseconds have passed. Then drains LCM. @return false when the process is asked to stop.
+  /// In virtual time `fd` is a transport's, whose frames the participant hears.
   bool Wait(int64_t timeout, int fd = -1);
+  /// The same, and leaves LCM's messages for messenger().Drain().
+  void Doze(int64_t timeout, int fd = -1);
+  /// Sleeps for `timeout` scaled microseconds or until the process is asked to stop, whatever comes meanwhile. Then
+  /// drains LCM. For those who are in no hurry. @return false when the process is asked to stop.
+  bool Sleep(int64_t timeout);
+  /// A computation has been done that is to take that long [s] in virtual time, in which computations take none. Does
+  /// nothing otherwise. Leaves LCM's messages for messenger().Drain().
+  void TakeVirtualTime(double seconds);
 
  private:
   std::string name_;
   std::string lcm_url_;
-  Clock clock_;
   int stop_fd_;
   bool stopping_ = false;
+  std::unique_ptr<Participant> joined_;  // to a coordinator in another process
+  Participant* participant_;
+  Clock clock_;
   std::unique_ptr<Messenger> messenger_;
 };
 

@@ -1,5 +1,6 @@
 // plumb-controller: ROBOT_STATE, POLICY, DRIVER_STATUS -> JOINT_COMMAND, PLACE_ROBOT, CONTROLLER_STATUS.
 
+#include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
 
 #include <optional>
@@ -39,7 +40,7 @@ int main(int argc, char** argv) {
         if (!key.empty()) signer.emplace(plumb::SigningKey(key), "JOINT_COMMAND");
         const auto send = [&](std::optional<plumb::joint_command_t> command) {
           if (!command) return;
-          if (signer) signer->Sign(*command, plumb::Clock().Utime());
+          if (signer) signer->Sign(*command, clock.SigningUtime());
           commands.Publish(*command);
         };
         plumb::Subscriber<plumb::robot_state_t> states(

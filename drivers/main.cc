@@ -1,11 +1,12 @@
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <poll.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <stdexcept>
 
@@ -37,9 +38,9 @@ void WriteState(int8_t state, std::string_view reason) {
 }
 
 /// Judges signed messages; without a key, obeys all.
-std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const std::string& channel) {
+std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const std::string& channel, const Clock& clock) {
   if (!key) return std::nullopt;
-  return Verifier(*key, channel, Clock().Utime());
+  return Verifier(*key, channel, clock.SigningUtime());
 }
 
 void SayWhoMayCommand(const std::string& lcm_url, bool commands_signed) {
@@ -60,13 +61,14 @@ class DriverProcess {
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
-        transport_(OpenTransport(bus, driver_.filters())),
+        transport_(OpenTransport(bus, driver_.filters(),
+                                 {process.participant(), std::llround(robot.driver.effort_delay * 1e6)})),
         cycle_(driver_.cycle(), clock_.Now()),
         states_(process.messenger(), "JOINT_STATE"),
         imus_(process.messenger(), "IMU"),
         statuses_(process.messenger(), "DRIVER_STATUS"),
-        command_signatures_(VerifierOf(key, "JOINT_COMMAND")),
-        request_signatures_(VerifierOf(key, "DRIVER_REQUEST")),
+        command_signatures_(VerifierOf(key, "JOINT_COMMAND", clock_)),
+        request_signatures_(VerifierOf(key, "DRIVER_REQUEST", clock_)),
         commands_(process.messenger(), "JOINT_COMMAND",
                   [this](const joint_command_t& command) { OnCommand(command); }),
         requests_(process.messenger(), "DRIVER_REQUEST",
@@ -95,13 +97,9 @@ class DriverProcess {
  private:
   /// Waits for input or the cycle's deadline, and deals with what there is.
   void Step() {
-    std::array<pollfd, 3> polled{{{transport_->fd(), POLLIN, 0},
-                                  {process_.messenger().fd(), POLLIN, 0},
-                                  {process_.stop_fd(), POLLIN, 0}}};
     const int64_t now = clock_.Now();
     const int64_t next = std::max(transport_->NextEvent(), now) - now;
-    const timespec wait = clock_.RealDuration(std::min(cycle_.Remaining(now), next));
-    ppoll(polled.data(), polled.size(), &wait, nullptr);
+    process_.Doze(std::min(cycle_.Remaining(now), next), transport_->fd());
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
     // What there was nothing to do for is not timed.
     phases_.Mark();
@@ -118,7 +116,7 @@ class DriverProcess {
 
   void OnCommand(const joint_command_t& command) {
     if (command_signatures_) {
-      const std::string_view refusal = command_signatures_->Judge(commands_.encoding(), Clock().Utime());
+      const std::string_view refusal = command_signatures_->Judge(commands_.encoding(), clock_.SigningUtime());
       if (!refusal.empty()) return driver_.OnForgedCommand(refusal);
     }
     driver_.OnCommand(command, clock_.Now(), clock_.Utime());
@@ -128,7 +126,7 @@ class DriverProcess {
     // Stopping must never need a key.
     const bool stops = request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP;
     if (request_signatures_ && !stops) {
-      const std::string_view refusal = request_signatures_->Judge(requests_.encoding(), Clock().Utime());
+      const std::string_view refusal = request_signatures_->Judge(requests_.encoding(), clock_.SigningUtime());
       if (!refusal.empty()) return driver_.OnForgedArm(refusal);
     }
     driver_.OnRequest(request, clock_.Now(), clock_.Utime());
@@ -236,7 +234,7 @@ class DriverProcess {
   Subscriber<driver_request_t> requests_;
   std::array<Frame, 64> received_;
   FlightRecorder recorder_;
-  PhaseTimes phases_;
+  PhaseTimes phases_{!clock_.is_virtual()};
   bool faulty_ = false;
   int64_t next_reopen_ = 0;
   int64_t next_status_ = 0;

@@ -32,11 +32,14 @@ class PhaseTimes {
     return std::min(static_cast<size_t>(std::bit_width(positive)) - 1, kBins - 1);
   }
 
+  /// @param timed false: in virtual time, in which phases take none.
+  explicit PhaseTimes(bool timed = true) : timed_(timed) {}
+
   /// A phase begins.
-  void Mark() noexcept { mark_ = Clock::now(); }
+  void Mark() noexcept { mark_ = Now(); }
   /// It ends, and the next one begins.
   void End(Phase phase) noexcept {
-    const Clock::time_point now = Clock::now();
+    const Clock::time_point now = Now();
     ++counts_[phase][Bin(std::chrono::duration_cast<std::chrono::microseconds>(now - mark_).count())];
     mark_ = now;
   }
@@ -53,6 +56,9 @@ class PhaseTimes {
 
  private:
   using Clock = std::chrono::steady_clock;
+  Clock::time_point Now() const noexcept { return timed_ ? Clock::now() : Clock::time_point{}; }
+
+  bool timed_;
   Clock::time_point mark_;
   std::array<std::array<int64_t, kBins>, kNames.size()> counts_{};
 };

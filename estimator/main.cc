@@ -1,5 +1,6 @@
 // plumb-estimator: JOINT_STATE, IMU -> ROBOT_STATE, ROBOT_STATE_SMOOTHED, ESTIMATOR_STATUS.
 
+#include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
 
 #include <optional>

@@ -281,6 +281,7 @@ struct CalibrationSettings {
   int samples, updates;
   double kl, min_temperature;
   std::vector<int> horizons;
+  double duration = 0;  ///< [s] >= 0 that a calibration takes in virtual time
 };
 
 struct TrainingSettings {
@@ -295,6 +296,7 @@ struct TrainingSettings {
   bool normalise_observations = false;  ///< by their running mean and sd
   double worst_share = 1;               ///< of the episodes, by return, that an update learns from (EPOpt); 1 = all
   int worst_after = 100;                ///< updates that learn from all of them
+  double duration = 0;                  ///< [s] >= 0 that an iteration's training takes in virtual time
   double position_noise = 0, velocity_noise = 0;  ///< sd of what the policy is told [rad or m], [rad/s or m/s]
 };
 

@@ -169,6 +169,7 @@ CalibrationSettings ReadCalibration(Config config) {
   s.min_temperature = config.Number("min_temperature", kSanePositive);
   s.horizons = config.Integers("horizons", {1, 10000});
   if (s.horizons.empty()) config.Fail("horizons", "is empty");
+  s.duration = config.Number("duration", {0, 1e6}, 0);
   config.Finish();
   return s;
 }
@@ -193,6 +194,7 @@ TrainingSettings ReadTraining(Config config) {
   s.normalise_observations = config.Boolean("normalise_observations", false);
   s.worst_share = config.Number("worst_share", {0.01, 1}, 1);
   s.worst_after = config.Integer("worst_after", {0, 1e9}, 100);
+  s.duration = config.Number("duration", {0, 1e6}, 0);
   s.position_noise = config.Number("position_noise", kSaneNotNegative, 0);
   s.velocity_noise = config.Number("velocity_noise", kSaneNotNegative, 0);
   config.Finish();

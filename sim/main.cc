@@ -1,4 +1,5 @@
 // plumb-robot: a robot that is not there. Speaks its drives' side of the CAN bus and obeys PLACE_ROBOT.
+#include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -69,7 +70,8 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
   const Clock& clock = process.clock();
   VirtualRobot robot(description, physical, clock.Utime());
   Stand(description, seed, robot);
-  const std::unique_ptr<Transport> transport = OpenTransport(bus_url, robot.filters());
+  const std::unique_ptr<Transport> transport = OpenTransport(
+      bus_url, robot.filters(), {process.participant(), std::llround(description.estimator.delay * 1e6)});
   Subscriber<place_robot_t> places(process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
     const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(), static_cast<Eigen::Index>(wish.q.size()));
     const Eigen::Map<const Eigen::VectorXd> v(wish.v.data(), static_cast<Eigen::Index>(wish.v.size()));

@@ -1,3 +1,4 @@
+#include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
 
 #include <optional>
@@ -102,6 +103,7 @@ class TrainerProcess {
       spdlog::info("iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s", session_.iteration(),
                    session_.evaluation().episodes, Words(session_.evaluation()), seconds_);
       Save();
+      process_.TakeVirtualTime(robot_.training.duration);
       Publish();
     } else {
       if (session_.update() % kUpdatesPerCheckpoint == 0) Save();

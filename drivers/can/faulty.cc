@@ -152,7 +152,8 @@ class Faulty : public Transport {
 
 }  // namespace
 
-std::unique_ptr<Transport> OpenFaulty(const std::string& faults_and_bus, std::vector<Filter> filters) {
+std::unique_ptr<Transport> OpenFaulty(const std::string& faults_and_bus, std::vector<Filter> filters,
+                                      LockstepBus run) {
   const size_t colon = faults_and_bus.find(':');
   if (colon == std::string::npos) {
     throw std::runtime_error(
@@ -162,7 +163,7 @@ std::unique_ptr<Transport> OpenFaulty(const std::string& faults_and_bus, std::ve
   try {
     const Faults faults = ParseFaults(faults_and_bus.substr(0, colon));
     return std::make_unique<Faulty>(faults,
-                                    OpenTransport(faults_and_bus.substr(colon + 1), std::move(filters)));
+                                    OpenTransport(faults_and_bus.substr(colon + 1), std::move(filters), run));
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("faulty: {}", error.what()));
   }

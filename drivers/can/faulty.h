@@ -33,6 +33,7 @@ namespace plumb {
 /// (receive_ns = 0), as their arrival is when they are handed out.
 /// @param faults_and_bus what follows "faulty:".
 /// @throws std::runtime_error naming the fault that is not one; or what opening the other bus throws.
-std::unique_ptr<Transport> OpenFaulty(const std::string& faults_and_bus, std::vector<Filter> filters);
+std::unique_ptr<Transport> OpenFaulty(const std::string& faults_and_bus, std::vector<Filter> filters,
+                                      LockstepBus run = {});
 
 }  // namespace plumb

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "drivers/can/faulty.h"
+#include "drivers/can/lockstep_transport.h"
 #include "drivers/can/loop.h"
 #include "drivers/can/replay.h"
 #include "drivers/can/socketcan.h"
@@ -32,15 +33,19 @@ bool Transport::IsOurs(const Frame& frame) const noexcept {
                              [&](const Filter& filter) { return filter.own && Matches(filter, frame); });
 }
 
-std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters) {
+std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters, LockstepBus run) {
   const auto colon = url.find(':');
   const std::string scheme = url.substr(0, colon);
   const std::string rest = colon == std::string::npos ? "" : url.substr(colon + 1);
-  if (scheme == "socketcan") return OpenSocketCan(rest, std::move(filters));
-  if (scheme == "udp") return OpenUdp(rest, std::move(filters));
-  if (scheme == "loop") return OpenLoop(rest, std::move(filters));
-  if (scheme == "faulty") return OpenFaulty(rest, std::move(filters));
+  const bool lockstep = run.participant != nullptr;
+  std::unique_ptr<Transport> bus;
+  if (scheme == "faulty") return OpenFaulty(rest, std::move(filters), run);
   if (scheme == "replay") return OpenReplay(rest, std::move(filters));
+  if (scheme == "loop" && lockstep) return OpenLockstep(url, nullptr, std::move(filters), run);
+  if (scheme == "loop") return OpenLoop(rest, std::move(filters));
+  if (scheme == "socketcan") bus = OpenSocketCan(rest, filters);
+  if (scheme == "udp") bus = OpenUdp(rest, filters, lockstep);
+  if (bus) return lockstep ? OpenLockstep(url, std::move(bus), std::move(filters), run) : std::move(bus);
   throw std::runtime_error(
       fmt::format("bus '{}' is not socketcan:INTERFACE, udp:GROUP:PORT, loop:NAME, replay:FILE or "
                   "faulty:FAULTS:BUS",

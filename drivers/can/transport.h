@@ -11,6 +11,8 @@
 
 namespace plumb {
 
+class Participant;
+
 /// Standard (11-bit) frames a transport lets in: those with (frame.id & mask) == (id & mask). Remote frames
 /// pass only with `remote`; extended frames never do; error frames always do.
 struct Filter {
@@ -36,6 +38,12 @@ struct TransportStats {
   int64_t echoes = 0;     ///< own frames seen on the bus
   int64_t foreign = 0;    ///< frames received that only we may send: there is a second master
   int64_t injected = 0;   ///< faults made by faulty:
+};
+
+/// What a transport has to know of a run in virtual time.
+struct LockstepBus {
+  Participant* participant = nullptr;  ///< null: there is no such run
+  int64_t way = 0;                     ///< [us] that frames sent by this transport are on their way
 };
 
 /// A connection to a CAN bus. Send and Receive do not block, throw or allocate, and one's own frames are not
@@ -91,7 +99,8 @@ class Transport {
 ///   replay:run.log           a log of candump -l, or of python-can, in its own time; sends nothing
 ///   faulty:loss=0.1:URL      another bus with faults, see faulty.h
 /// docs/transports.md says more of each.
+/// @param run of a process that takes part in one: its bus is in virtual time, too, see lockstep_transport.h.
 /// @throws std::runtime_error: one line that names the cause and the cure.
-std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters = {});
+std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters = {}, LockstepBus run = {});
 
 }  // namespace plumb

@@ -45,8 +45,11 @@ bool SetOption(int fd, int level, int option, const Value& value) {
 
 class Udp : public DatagramTransport {
  public:
-  Udp(const std::string& address, std::vector<Filter> filters)
-      : DatagramTransport(std::move(filters)), url_("udp:" + address), group_(ParseAddress(address)) {
+  Udp(const std::string& address, std::vector<Filter> filters, bool told_time)
+      : DatagramTransport(std::move(filters)),
+        url_("udp:" + address),
+        group_(ParseAddress(address)),
+        told_time_(told_time) {
     receiver_ = FileDescriptor(socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     sender_ = FileDescriptor(socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     if (!receiver_.valid() || !sender_.valid()) Fail("cannot create a socket");
@@ -82,6 +85,7 @@ class Udp : public DatagramTransport {
   }
 
   int fd() const noexcept override { return receiver_.get(); }
+  void SetTime(int64_t now) noexcept override { now_ = now; }
 
   LinkState Reopen() noexcept override {
     // Nothing tells us that a route is back except sending: the next Send finds out.
@@ -99,6 +103,7 @@ class Udp : public DatagramTransport {
   int receiver() const noexcept override { return receiver_.get(); }
 
   size_t Encode(const Frame& frame, std::span<uint8_t> datagram) noexcept override {
+    if (told_time_) return EncodeUdp(frame, 1e-6 * static_cast<double>(now_), datagram);
     timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     const double timestamp = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
@@ -118,14 +123,16 @@ class Udp : public DatagramTransport {
 
   std::string url_;
   sockaddr_in group_;
+  bool told_time_;   // datagrams are dated with the time of SetTime, not with the machine's
+  int64_t now_ = 0;  // of SetTime [us]
   sockaddr_in own_{};
   FileDescriptor receiver_, sender_;
 };
 
 }  // namespace
 
-std::unique_ptr<Transport> OpenUdp(const std::string& address, std::vector<Filter> filters) {
-  return std::make_unique<Udp>(address, std::move(filters));
+std::unique_ptr<Transport> OpenUdp(const std::string& address, std::vector<Filter> filters, bool told_time) {
+  return std::make_unique<Udp>(address, std::move(filters), told_time);
 }
 
 }  // namespace plumb

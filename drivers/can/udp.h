@@ -9,6 +9,7 @@ namespace plumb {
 /// limits the rate; frames are lost only when a receiver is too slow.
 /// @param address "GROUP:PORT", an IPv4 multicast group.
 /// @throws std::runtime_error with the cure.
-std::unique_ptr<Transport> OpenUdp(const std::string& address, std::vector<Filter> filters);
+std::unique_ptr<Transport> OpenUdp(const std::string& address, std::vector<Filter> filters,
+                                   bool told_time = false);
 
 }  // namespace plumb

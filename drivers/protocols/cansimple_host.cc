@@ -43,6 +43,7 @@ class CanSimpleMotor : public Motor {
     return use;
   }
 
+  void LetJump(bool let) noexcept override { reports_.LetJump(let); }
   const MotorEstimate& estimate() const noexcept override { return reports_.estimate(); }
   double torque_estimate() const noexcept override { return reports_.torque_estimate(); }
   MotorReadings readings() const noexcept override { return reports_.readings(); }

@@ -33,6 +33,9 @@ class CanSimpleReports {
   /// True if frames with two serial numbers have come from one node: two drives that both obey us.
   bool two_drives() const noexcept { return two_drives_; }
 
+  /// See Motor::LetJump.
+  void LetJump(bool let) noexcept { may_jump_ = let; }
+
   struct Restart {
     int64_t silence;  ///< [us] between two heartbeats
     double jump;      ///< [turns] of the position
@@ -53,7 +56,7 @@ class CanSimpleReports {
   Reason identity_;
   std::optional<Firmware> firmware_;
   std::optional<double> serial_number_;
-  bool two_drives_ = false;
+  bool two_drives_ = false, may_jump_ = false;
 
   bool estimated_ = false;
   int64_t estimated_at_ = 0;

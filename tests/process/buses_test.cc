@@ -23,14 +23,12 @@ void StartAll(Stage& stage, const std::string& drivers_bus) {
 TEST_CASE("on a bus that loses one frame in twenty, and delays all, the robot runs on") {
   Stage stage(70);
   StartAll(stage, "faulty:loss=0.05,delay=500us,jitter=1ms,duplicate=0.02,reorder=0.02:" + stage.bus_url);
-  // A busy machine may stop it, too, but not every time.
-  bool ran = false;
-  for (int attempt = 0; attempt < 5 && !ran; ++attempt) {
-    REQUIRE(stage.BeginEpisode());
-    ran = !stage.WaitUntil([&] { return stage.drivers.newest().state != driver_status_t::ARMED; }, 2);
-  }
+  const bool begun = stage.BeginEpisode();
+  INFO(stage.drivers.newest().reason << "; " << stage.controllers.newest().reason << int{stage.controllers.newest().phase});
+  REQUIRE(begun);
+  const bool stopped = stage.WaitUntil([&] { return stage.drivers.newest().state != driver_status_t::ARMED; }, 10);
   INFO(stage.drivers.newest().reason);
-  CHECK(ran);
+  CHECK_FALSE(stopped);
   CHECK(stage.drivers.newest().measurements_lost > 10);
 }
 

@@ -5,43 +5,38 @@
 #include <nlohmann/json.hpp>
 
 #include "plumb/parameter_distribution_t.hpp"
-#include "tests/process/stage.h"
+#include "tests/process/launch.h"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
+using Catch::Contains;
 
-// Processes whose command line names the stage's LCM URL.
-int Left(const Stage& stage) {
-  int left = 0;
-  for (const auto& entry : fs::directory_iterator("/proc")) {
-    const std::string line = Read(entry.path() / "cmdline");
-    if (line.find(stage.lcm_url) != std::string::npos) ++left;
-  }
-  return left;
-}
+constexpr double kLong = 250;  // [s] of real time; less than the test's own limit
 
-Child Launch(Stage& stage, std::vector<std::string> flags) {
-  std::vector<std::string> arguments{Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", stage.lcm_url,
-                                     "--bus", stage.bus_url, "--output", stage.folder / "run"};
-  arguments.insert(arguments.end(), flags.begin(), flags.end());
-  return Child("plumb", arguments, stage.folder / "launch.log");
+/// Waits for a run's end. @return what it has printed.
+std::string Finish(Stage& stage, Child& launch) {
+  stage.WaitUntil([&] { return !launch.running(); }, kLong);
+  INFO(launch.Tail(30));
+  REQUIRE_FALSE(launch.running());
+  CHECK_FALSE(launch.failed());
+  return launch.Tail(100);
 }
 
 TEST_CASE("the loop closes, and its log gives the same distributions bit by bit") {
-  Stage stage(30);
-  stage.Forgive();
-  const fs::path summary_file = stage.folder / "summary.json", log = stage.folder / "run.lcmlog";
-  Child launch = Launch(stage, {"--iterations", "2", "--evaluation-episodes", "2", "--speed",
-                                Stage::Environment("PLUMBLINE_TEST_SPEED", "2"), "--seed", "3", "--log", log,
-                                "--summary", summary_file});
-  stage.WaitUntil([&] { return !launch.running(); }, 240);
-  INFO(launch.Tail(30));
-  REQUIRE_FALSE(launch.running());
-  REQUIRE_FALSE(launch.failed());
-  CHECK(stage.axis_state == 1);  // disarmed
+  Stage stage(30, "pendulum", Stage::Time::kReal);
+  const fs::path summary_file = stage.folder / "summary.json", log = stage.folder / "run.lcmlog",
+                 can_log = stage.folder / "can.log";
+  Child launch = Launch(stage, {"--iterations", "2", "--evaluation-episodes", "2", "--seed", "3", "--log", log,
+                                "--can-log", can_log, "--summary", summary_file});
+  Finish(stage, launch);
   CHECK(Left(stage) == 0);
+  // At the end the drive is disarmed: its last heartbeat says so.
+  const std::string frames = Read(can_log);
+  const size_t heartbeat = frames.rfind(" 021#");
+  REQUIRE(heartbeat != std::string::npos);
+  CHECK(frames.substr(heartbeat, 15) == " 021#0000000001");
 
   const auto summary = nlohmann::json::parse(Read(summary_file));
   CHECK(summary.at("seed") == 3);
@@ -93,109 +88,211 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
     arguments.push_back(flag);
   }
   Child offline("offline", arguments, stage.folder / "offline.log");
-  REQUIRE(offline.WaitFor(60));
+  REQUIRE(offline.WaitFor(kLong));
   INFO(offline.Tail(10));
   REQUIRE_FALSE(offline.failed());
   same(stage.folder / "offline");
 
-  // Played over LCM by lcm-logplayer.
-  arguments = calibrator;
-  const std::string url = "udpm://239.255.76.67:17750?ttl=0&recv_buf_size=2097152";
-  for (const std::string& flag : {std::string("--lcm-url"), url, std::string("--checkpoint"),
-                                  (stage.folder / "replayed").string()}) {
-    arguments.push_back(flag);
-  }
-  Messenger listener(url);
-  Subscriber<parameter_distribution_t> distributions(listener, "PARAMETER_DISTRIBUTION");
-  Child replayed("replayed", arguments, stage.folder / "replayed.log");
-  const auto until = [&](const std::function<bool()>& so, double seconds) {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-    while (!so() && std::chrono::steady_clock::now() < deadline) listener.lcm().handleTimeout(10);
-    return so();
-  };
-  REQUIRE(until([&] { return distributions.received() > 0; }, 10));  // it listens
-  // Without the live run's own distributions, which would come in between.
-  Child player("lcm-logplayer", {"lcm-logplayer", "--lcm-url=" + url, "--speed=2",
-                                 "--regexp=ROBOT_STATE_SMOOTHED|JOINT_COMMAND|CONTROLLER_STATUS", log},
-               stage.folder / "player.log");
-  CHECK(until([&] { return distributions.newest().iteration == 2; }, 120));
-  replayed.Signal(SIGTERM);
-  CHECK(replayed.WaitFor(5));
-  same(stage.folder / "replayed");
 }
 
-TEST_CASE("Ctrl-C stops everything within a second, motors disarmed, nothing left") {
-  Stage stage(31);
-  Child launch = Launch(stage, {"--speed", "1"});
-  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 30));
-  REQUIRE(stage.WaitUntil([&] { return stage.axis_state == 8; }, 5));
+/// All that a run leaves behind which must be the same, one after the other.
+std::string Traces(const Stage& stage, const std::string& output) {
+  std::string traces = Read(stage.folder / (output + ".lcmlog")) + Read(stage.folder / (output + ".can"));
+  for (const char* file : {"summary.json", "calibration/distribution_1.json", "training/trainer.checkpoint"}) {
+    const std::string trace = Read(stage.folder / output / file);
+    INFO(file);
+    REQUIRE_FALSE(trace.empty());
+    traces += trace;
+  }
+  return traces;
+}
+
+TEST_CASE("the same run, every time: beside others, stopped now and then, without a network") {
+  Stage stage(35, "pendulum", Stage::Time::kReal);
+  LearnLittle(stage);
+  const auto flags = [&](const std::string& output, std::vector<std::string> more = {}) {
+    std::vector<std::string> all{"--iterations", "1", "--evaluation-episodes", "1", "--log", stage.folder / (output + ".lcmlog"),
+                                 "--can-log", stage.folder / (output + ".can"), "--summary", stage.folder / output / "summary.json"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  Child first = Launch(stage, flags("first"), "first");
+  Finish(stage, first);
+  const std::string expected = Traces(stage, "first");
+
+  SECTION("while its processes are stopped at any time") {
+    Child again = Launch(stage, flags("again"), "again");
+    // Whoever belongs to it, one after the other, for a moment of real time.
+    for (int round = 0; again.running(); ++round) {
+      std::vector<pid_t> processes;
+      for (const auto& entry : fs::directory_iterator("/proc")) {
+        const pid_t pid = std::atoi(entry.path().filename().c_str());
+        if (pid != 0 && Read(entry.path() / "cmdline").find(stage.folder / "again") != std::string::npos) processes.push_back(pid);
+      }
+      if (processes.empty()) continue;
+      const pid_t victim = processes[static_cast<size_t>(round) % processes.size()];
+      kill(victim, SIGSTOP);
+      stage.Listen(0.02);
+      kill(victim, SIGCONT);
+      stage.Listen(0.01);
+    }
+    Finish(stage, again);
+    CHECK(Traces(stage, "again") == expected);
+  }
+  SECTION("beside processes that want the machine for themselves") {
+    std::vector<std::unique_ptr<Child>> others;
+    for (int i = 0; i < 4; ++i) {
+      others.push_back(std::make_unique<Child>("sh", std::vector<std::string>{"sh", "-c", "while :; do :; done"}, stage.folder / "others.log"));
+    }
+    Child again = Launch(stage, flags("again"), "again");
+    Finish(stage, again);
+    CHECK(Traces(stage, "again") == expected);
+  }
+  SECTION("on no bus and no network but its own") {
+    const std::string bus = stage.bus_url;
+    stage.lcm_url = "memq://";
+    stage.bus_url = "loop:";
+    Child again = Launch(stage, flags("again"), "again");
+    Finish(stage, again);
+    // Only what names the bus is another.
+    CHECK(Read(stage.folder / "again.can") == Read(stage.folder / "first.can"));
+    CHECK(Read(stage.folder / "again/calibration/distribution_1.json") == Read(stage.folder / "first/calibration/distribution_1.json"));
+    stage.bus_url = bus;
+  }
+  SECTION("another seed is another run") {
+    Child other = Launch(stage, flags("other", {"--seed", "2"}), "other");
+    Finish(stage, other);
+    CHECK(Traces(stage, "other") != expected);
+  }
+}
+
+TEST_CASE("Ctrl-C stops everything, motors disarmed, nothing left") {
+  Stage stage(31, "pendulum", Stage::Time::kReal);
+  Child launch = Launch(stage, {});
+  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
   SECTION("while training") {}
   SECTION("in an episode, with torque on the bus") {
-    REQUIRE(stage.WaitUntil([&] { return stage.torque != 0; }, 120));
+    REQUIRE(stage.WaitUntil([&] { return stage.torque != 0; }, kLong));
   }
   SECTION("and again, by an impatient hand") { launch.Signal(SIGINT); }
   launch.Signal(SIGINT);
-  const auto start = std::chrono::steady_clock::now();
-  CHECK(stage.WaitUntil([&] { return !launch.running(); }, 5));
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  INFO(seconds << " s");
-  CHECK(seconds < 1);
+  CHECK(stage.WaitUntil([&] { return !launch.running(); }, kLong));
+  CHECK(launch.ending() == "exit status 130");
   CHECK(stage.axis_state == 1);
   CHECK(stage.torque == 0);
   CHECK(Left(stage) == 0);
 }
 
 TEST_CASE("a launcher that is killed takes everything with it") {
-  Stage stage(32);
-  Child launch = Launch(stage, {"--log", stage.folder / "run.lcmlog"});
-  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 30));
+  Stage stage(32, "pendulum", Stage::Time::kReal);
+  std::vector<std::string> flags{"--log", stage.folder / "run.lcmlog"};
+  SECTION("in virtual time") {}
+  SECTION("in real time") { flags.push_back("--real-time"); }
+  Child launch = Launch(stage, flags);
+  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
   launch.Signal(SIGKILL);
-  CHECK(stage.WaitUntil([&] { return Left(stage) == 0; }, 5));
+  CHECK(stage.WaitUntil([&] { return Left(stage) == 0; }, kLong));
+}
+
+TEST_CASE("a process that is killed ends the run, which says so") {
+  Stage stage(36, "pendulum", Stage::Time::kReal);
+  Child launch = Launch(stage, {});
+  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
+  for (const auto& entry : fs::directory_iterator("/proc")) {
+    const std::string line = Read(entry.path() / "cmdline");
+    if (line.find(stage.lcm_url) == std::string::npos || line.find("plumb-estimator") == std::string::npos) continue;
+    kill(std::atoi(entry.path().filename().c_str()), SIGKILL);
+  }
+  REQUIRE(stage.WaitUntil([&] { return !launch.running(); }, kLong));
+  CHECK(launch.ending() == "exit status 1");
+  CHECK_THAT(launch.Tail(10), Contains("plumb-estimator ended (killed by signal 9)"));
+  CHECK(Left(stage) == 0);
 }
 
 TEST_CASE("what a person stops, the launcher does not start again") {
-  Stage stage(33);
+  Stage stage(33, "pendulum", Stage::Time::kReal);
   Child launch = Launch(stage, {});
-  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 30));
-  for (const char* stop : {"disarm", "estop"}) {
-    INFO(stop);
-    Child request("plumb", {Stage::Binary("plumb"), stop, "--lcm-url", stage.lcm_url}, stage.folder / "stop.log");
-    REQUIRE(stage.WaitUntil([&] { return !request.running(); }, 5));
+  const std::string clock = "virtual:" + (stage.folder / "run" / "clock").string();
+  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), Stage::Binary("plumb"));
+    Child request("plumb", arguments, stage.folder / "request.log");
+    REQUIRE(stage.WaitUntil([&] { return !request.running(); }, kLong));
+    INFO(request.Tail(5));
     CHECK_FALSE(request.failed());
-    stage.Listen(2);
-    CHECK(stage.axis_state == 1);
-    CHECK(stage.drivers.newest().state != driver_status_t::ARMED);
-    Child arm("plumb", {Stage::Binary("plumb"), "arm", "--lcm-url", stage.lcm_url}, stage.folder / "arm.log");
-    REQUIRE(stage.WaitUntil([&] { return !arm.running(); }, 5));
-    INFO(arm.Tail(5));
-    CHECK_FALSE(arm.failed());
-    CHECK(stage.WaitUntil([&] { return stage.axis_state == 8; }, 2));
+  };
+  SECTION("in the run: until it is armed again") {
+    for (const char* stop : {"disarm", "estop"}) {
+      INFO(stop);
+      run({stop, "--clock", clock});
+      const int64_t stopped = stage.drivers.newest().utime;
+      REQUIRE(stage.WaitUntil([&] { return stage.drivers.newest().utime > stopped + 2'000'000; }, kLong));
+      CHECK(stage.axis_state == 1);
+      CHECK(stage.drivers.newest().state != driver_status_t::ARMED);
+      run({"arm", "--clock", clock});
+      CHECK(stage.WaitUntil([&] { return stage.axis_state == 8; }, kLong));
+    }
+    launch.Signal(SIGINT);
+    CHECK(launch.WaitFor(kLong));
   }
-  launch.Signal(SIGINT);
-  CHECK(launch.WaitFor(5));
+  SECTION("from outside: for good") {
+    const char* stop = GENERATE("disarm", "estop");
+    Child request("plumb", {Stage::Binary("plumb"), stop, "--lcm-url", stage.lcm_url}, stage.folder / "stop.log");
+    REQUIRE(stage.WaitUntil([&] { return !launch.running(); }, kLong));
+    CHECK(launch.ending() == "exit status 1");
+    CHECK_THAT(launch.Tail(5), Contains("somebody outside the run has asked for a stop"));
+    CHECK(stage.axis_state == 1);
+    CHECK(stage.torque == 0);
+  }
+}
+
+TEST_CASE("who speaks from outside is named once, and not heard") {
+  Stage stage(37, "pendulum", Stage::Time::kReal);
+  LearnLittle(stage);
+  Child launch = Launch(stage, {"--iterations", "1", "--evaluation-episodes", "1"});
+  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
+  Publisher<joint_command_t> commands(stage.messenger, "JOINT_COMMAND");
+  joint_command_t command{};
+  command.num_joints = 1;
+  command.effort = {1000};
+  command.position = command.velocity = command.kp = command.kd = {NAN};
+  const Frame frame = *FrameFromText("029#0000000000000000");
+  while (launch.running()) {
+    command.utime = stage.drivers.newest().utime;
+    ++command.sequence;
+    commands.Publish(command);
+    stage.bus->Send({&frame, 1});
+    stage.Listen(0.05);
+  }
+  const std::string output = Finish(stage, launch);
+  CHECK_THAT(output, Contains("somebody outside the run says JOINT_COMMAND: not heard"));
+  CHECK_THAT(output, Contains("029#0000000000000000 on " + stage.bus_url + " is from outside the run, and ignored"));
+  CHECK(output.find("not heard") == output.rfind("not heard"));
 }
 
 TEST_CASE("a second run beside the first, and a bus that may carry a real robot, are refused") {
-  Stage stage(34);
-  const auto refusal = [&](const std::string& lcm_url, const std::string& bus_url) {
+  Stage stage(34, "pendulum", Stage::Time::kReal);
+  const auto refusal = [&](const std::string& lcm_url, const std::string& bus_url, const std::string& output) {
     Child second("plumb", {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", lcm_url, "--bus", bus_url,
-                           "--output", stage.folder / "second"},
+                           "--output", stage.folder / output},
                  stage.folder / ("second" + std::to_string(stage.frames) + ".log"));
-    stage.WaitUntil([&] { return !second.running(); }, 5);
+    stage.WaitUntil([&] { return !second.running(); }, kLong);
     REQUIRE_FALSE(second.running());
     CHECK(second.failed());
     return second.Tail(5);
   };
-  CHECK_THAT(refusal(stage.lcm_url, "socketcan:can0"), Catch::Contains("--real"));
-  Child launch = Launch(stage, {});
-  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 30));
+  CHECK_THAT(refusal(stage.lcm_url, "socketcan:can0", "second"), Contains("--real"));
+  Child launch = Launch(stage, {"--real-time"});
+  REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
   stage.Listen(0.1);
-  CHECK_THAT(refusal(stage.lcm_url, "udp:239.74.163.2:43260"), Catch::Contains("another run is under way"));
+  CHECK_THAT(refusal(stage.lcm_url, "udp:239.74.163.2:43260", "second"), Contains("another run is under way"));
   stage.Listen(0.1);
-  CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", stage.bus_url), Catch::Contains("somebody talks on"));
-  CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
+  CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", stage.bus_url, "second"), Contains("somebody talks on"));
+  stage.Listen(0.1);
+  CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", "udp:239.74.163.2:43260", "run"),
+             Contains("in use by process " + std::to_string(launch.pid())));
   launch.Signal(SIGINT);
-  CHECK(launch.WaitFor(5));
+  CHECK(launch.WaitFor(kLong));
 }
 
 }  // namespace

@@ -1,9 +1,6 @@
 // What must never hurt anybody, with real processes: whatever dies, stops or talks rubbish, the torque goes to zero
 // within the configured time, the drive is disarmed, the driver says why, and only a deliberate request re-arms.
 
-#include <arpa/inet.h>
-#include <sys/socket.h>
-
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -17,18 +14,20 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kClosedLoop = 8, kIdle = 1;  // CANSimple axis states
-// A frame takes a moment from the driver to the witness, on a machine that is busy with other tests.
-constexpr int64_t kSlack = 60'000;  // [us]
+constexpr int64_t kTick = 10'000;          // [us] in which plumb-controller looks at its clock
 
-int64_t Us(double seconds) { return static_cast<int64_t>(seconds * 1e6); }
+int64_t Us(double seconds) { return std::llround(seconds * 1e6); }
 
-// After the event: no torque later than `most` [us] after `since`, drive idle, driver in FAULT with a reason.
+int64_t Cycle(const Stage& stage) { return Us(stage.robot.driver.cycle); }
+
+// After the event: the last torque comes no later than `most` [us] after `since`, the drive is idle, the driver in FAULT
+// with a reason.
 void ExpectSafe(Stage& stage, int64_t since, int64_t most) {
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
   CHECK_FALSE(stage.drivers.newest().reason.empty());
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 2));
   INFO(stage.drivers.newest().reason << "; last torque " << stage.last_torque_time - since << " us after the event");
-  CHECK(stage.last_torque_time - since <= most + kSlack);
+  CHECK(stage.last_torque_time - since <= most);
   // It stays so, although everything that was well still is.
   const int64_t last_torque = stage.last_torque_time;
   stage.Listen(1);
@@ -44,35 +43,38 @@ void ExpectComesBackByArming(Stage& stage) {
 TEST_CASE("a killed estimator") {
   Stage stage(1);
   stage.RunWithTorque();
-  stage.children.at("plumb-estimator")->Signal(SIGKILL);
-  stage.WaitUntil([&] { return stage.controllers.newest().phase == controller_status_t::HALTED; }, 3);
+  stage.Kill("plumb-estimator");
+  REQUIRE(stage.WaitUntil([&] { return stage.controllers.newest().phase == controller_status_t::HALTED; }, 3));
+  const int64_t timeout = Us(stage.robot.controller.state_timeout);
+  CHECK(stage.Now() - stage.last_state > timeout);
+  CHECK(stage.Now() - stage.last_state <= timeout + kTick);
   CHECK_THAT(stage.controllers.newest().reason, Catch::Contains("no valid state"));
-  ExpectSafe(stage, stage.last_state, Us(stage.robot.controller.state_timeout + stage.robot.driver.cycle));
+  ExpectSafe(stage, stage.last_state, timeout + kTick);
   stage.Start("plumb-estimator");
   ExpectComesBackByArming(stage);
 }
 
-TEST_CASE("a stopped controller") {
+TEST_CASE("a controller that stands still") {
   Stage stage(2);
   stage.RunWithTorque();
-  stage.children.at("plumb-controller")->Signal(SIGSTOP);
+  stage.Stall("plumb-controller", 0.5);
   stage.Listen(0.1);
-  ExpectSafe(stage, stage.last_command, Us(stage.robot.driver.expiry + stage.robot.driver.cycle));
+  const int64_t expiry = Us(stage.robot.driver.expiry), last_command = stage.last_command;
+  ExpectSafe(stage, last_command, expiry);
+  CHECK(stage.last_torque_time - last_command >= expiry - Cycle(stage));  // and not earlier, either
   CHECK_THAT(stage.drivers.newest().reason, Catch::Contains("command"));
   // What was on the bus before is on disk, its reason above, the last torques among it.
   std::vector<fs::path> records;
-  REQUIRE(stage.WaitUntil([&] {
-    records.clear();
-    if (fs::exists(stage.folder / "faults")) std::copy(fs::directory_iterator(stage.folder / "faults"), {}, std::back_inserter(records));
+  REQUIRE(AwaitReally([&] {  // the disk takes its own time
+    records.assign(fs::directory_iterator(stage.folder / "faults"), {});
     return records.size() == 1 && records[0].extension() == ".log";
-  }, 2));
+  }));
   const std::string record = Read(records[0]);
   CHECK(record.rfind("# no command for", 0) == 0);
   CHECK(record.find(" 02E#00000000 T\n") != std::string::npos);
   CHECK(record.find(" R\n") != std::string::npos);
-  // It wakes up with old states in its hands; that alone must not move anything.
-  stage.children.at("plumb-controller")->Signal(SIGCONT);
-  stage.Listen(0.5);
+  // It has woken up meanwhile, with old states in its hands; that alone has moved nothing.
+  CHECK(stage.last_command > stage.last_torque_time);
   CHECK(stage.axis_state == kIdle);
   ExpectComesBackByArming(stage);
 }
@@ -80,26 +82,32 @@ TEST_CASE("a stopped controller") {
 TEST_CASE("a killed driver: the drive's own watchdog ends it") {
   Stage stage(3);
   stage.RunWithTorque();
-  const int64_t killed = Stage::RealUtime();
-  stage.children.at("plumb-driver")->Signal(SIGKILL);
+  const int64_t killed = stage.Now();
+  stage.Kill("plumb-driver");
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 5));
-  CHECK(stage.last_torque_time <= killed + kSlack);
+  CHECK(stage.last_torque_time <= killed);
+  const int64_t watchdog = Us(stage.robot.virtual_robot.watchdog), heartbeat = Us(stage.robot.virtual_robot.heartbeat);
+  CHECK(stage.Now() - stage.last_torque_time >= watchdog);
+  CHECK(stage.Now() - stage.last_torque_time <= watchdog + heartbeat);
   // A driver that is started beside a running controller does not arm, and takes no old command for a new one.
   stage.Start("plumb-driver", {"--bus", stage.bus_url, "--virtual"});
   stage.Listen(1.5);
   CHECK(stage.axis_state == kIdle);
-  CHECK(stage.last_torque_time <= killed + kSlack);
+  CHECK(stage.last_torque_time <= killed);
   ExpectComesBackByArming(stage);
 }
 
-TEST_CASE("a stopped driver: the watchdog ends it, and it wakes up disarmed") {
+TEST_CASE("a driver that stands still: the watchdog ends it, and it wakes up disarmed") {
   Stage stage(4);
   stage.RunWithTorque();
-  stage.children.at("plumb-driver")->Signal(SIGSTOP);
+  const int64_t stalled = stage.Now();
+  stage.Stall("plumb-driver", 0.3);
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 5));
-  stage.children.at("plumb-driver")->Signal(SIGCONT);
+  CHECK(stage.Now() < stalled + Us(0.3));
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
+  CHECK(stage.Now() == stalled + Us(0.3));  // in its first cycle
   stage.Listen(0.5);
+  CHECK(stage.last_torque_time <= stalled);
   CHECK(stage.axis_state == kIdle);
   ExpectComesBackByArming(stage);
 }
@@ -107,12 +115,14 @@ TEST_CASE("a stopped driver: the watchdog ends it, and it wakes up disarmed") {
 TEST_CASE("a drive that disappears") {
   Stage stage(5);
   stage.RunWithTorque();
-  stage.children.at("plumb-robot")->Signal(SIGKILL);
-  const int64_t gone = stage.last_state;
+  stage.Kill("plumb-robot");
+  const int64_t gone = stage.last_state, stale = Us(stage.robot.driver.stale_after);
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
+  CHECK(stage.Now() - gone > stale);
+  CHECK(stage.Now() - gone <= stale + Cycle(stage));
   stage.Listen(0.5);
   INFO(stage.drivers.newest().reason);
-  CHECK(stage.last_torque_time - gone <= Us(stage.robot.driver.stale_after + stage.robot.controller.state_timeout) + kSlack);
+  CHECK(stage.last_torque_time - gone <= stale);
   CHECK_THAT(stage.drivers.newest().reason, Catch::Contains("pivot"));
   stage.Start("plumb-robot", {"--bus", stage.bus_url, "--seed", "1"});
   stage.Listen(1);
@@ -152,63 +162,6 @@ TEST_CASE("garbage on the bus") {
   CHECK(std::isfinite(stage.states.newest().q[0]));
 }
 
-TEST_CASE("garbage datagrams on the udp bus and on LCM") {
-  Stage stage(7);
-  if (stage.bus_url.rfind("udp:", 0) != 0) return;  // there is no such thing on SocketCAN
-  stage.RunWithTorque();
-  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  const int ttl = 0;
-  setsockopt(fd, IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof ttl);
-  const auto address = [](const char* group, int port) {
-    sockaddr_in a{};
-    a.sin_family = AF_INET;
-    a.sin_port = htons(static_cast<uint16_t>(port));
-    inet_pton(AF_INET, group, &a.sin_addr);
-    return a;
-  };
-  const sockaddr_in targets[] = {address("239.74.163.2", 43207), address("239.255.76.67", 17707)};
-  Random random(2);
-  std::vector<uint8_t> bytes;
-  for (int i = 0; i < 4000; ++i) {
-    const sockaddr_in& to = targets[i % 2];
-    bytes.resize(4 + random.Bits() % 300);
-    for (uint8_t& byte : bytes) byte = static_cast<uint8_t>(random.Bits());
-    if (i % 4 == 1) std::memcpy(bytes.data(), "LC02", 4);
-    if (i % 4 == 3) std::memcpy(bytes.data(), "LC03", 4);
-    if (i % 6 == 0) bytes[0] = 0x8b;  // a map of eleven, as a real frame begins
-    sendto(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
-    if (i % 100 == 0) stage.Listen(0.005);
-  }
-  // A message with the right fingerprint and a hostile count: plain lcm-cpp subscribers die of it.
-  joint_command_t hostile{};
-  std::vector<uint8_t> message(static_cast<size_t>(hostile.getEncodedSize()));
-  hostile.encode(message.data(), 0, static_cast<int>(message.size()));
-  for (const uint32_t count : {0xffffffffu, 0x7fffffffu, 1u << 27}) {
-    const uint32_t network = htonl(count);
-    std::memcpy(message.data() + 8 + 8 + 8 + 8 + 8 + 4 + 4, &network, 4);
-    stage.messenger.lcm().publish("JOINT_COMMAND", message.data(), static_cast<unsigned>(message.size()));
-  }
-  // Commands that decode and are mad.
-  hostile.num_joints = 1;
-  hostile.sequence = 1'000'000'000;
-  hostile.position = hostile.velocity = hostile.kp = hostile.kd = {NAN};
-  Publisher<joint_command_t> publisher(stage.messenger, "JOINT_COMMAND");
-  for (const double effort : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
-    hostile.effort = {effort};
-    publisher.Publish(hostile);
-  }
-  close(fd);
-  stage.Listen(0.5);
-  CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
-  CHECK(stage.drivers.newest().messages_rejected >= 3);
-  CHECK(stage.drivers.newest().commands_rejected >= 3);
-  CHECK(std::abs(stage.torque) <= 2);
-  for (auto& [name, child] : stage.children) {
-    INFO(name);
-    CHECK(child->running());
-  }
-}
-
 TEST_CASE("an effort beyond the limit is clipped before it reaches the bus") {
   Stage stage(8);
   stage.StartRobotAndDriver();
@@ -221,7 +174,7 @@ TEST_CASE("an effort beyond the limit is clipped before it reaches the bus") {
   float greatest = 0;
   for (int i = 0; i < 10; ++i) {
     command.sequence = i;
-    command.utime = Stage::RealUtime();
+    command.utime = stage.Now();
     publisher.Publish(command);
     stage.WaitUntil([&] { greatest = std::max(greatest, std::abs(stage.torque)); return false; }, 0.02);
   }
@@ -231,17 +184,23 @@ TEST_CASE("an effort beyond the limit is clipped before it reaches the bus") {
 TEST_CASE("an emergency stop") {
   Stage stage(9);
   stage.RunWithTorque();
-  const int64_t asked = Stage::RealUtime();
+  const int64_t asked = stage.Now();
   stage.Request(driver_request_t::ESTOP);
-  ExpectSafe(stage, asked, Us(2 * stage.robot.driver.cycle));
+  ExpectSafe(stage, asked, 0);
   ExpectComesBackByArming(stage);
 }
 
 TEST_CASE("the driver disarms when it is asked to stop") {
   Stage stage(10);
   stage.RunWithTorque();
-  stage.children.at("plumb-driver")->Signal(SIGTERM);
-  CHECK(stage.children.at("plumb-driver")->WaitFor(2));
+  SECTION("by a signal") {
+    stage.children.at("plumb-driver")->Signal(SIGTERM);
+  }
+  SECTION("by the run") {
+    stage.coordinator->Stop("plumb-driver");
+  }
+  REQUIRE(stage.WaitUntil([&] { return !stage.coordinator->present("plumb-driver"); }, 600));
+  CHECK(stage.children.at("plumb-driver")->WaitFor(60));
   CHECK_FALSE(stage.children.at("plumb-driver")->failed());
   CHECK(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 1));
   CHECK(stage.torque == 0);

@@ -53,7 +53,8 @@ TEST_CASE("the causal state says that it is model-based, the smoothed one never 
 TEST_CASE("a model that cannot be had is one clear line") {
   Stage stage(91);
   Child& estimator = stage.Start("plumb-estimator", {"--model", "/nowhere/posterior.json"});
-  REQUIRE(estimator.WaitFor(10));
+  stage.WaitUntil([&] { return !stage.coordinator->present("plumb-estimator"); }, 1);
+  REQUIRE(estimator.WaitFor(60));
   CHECK(estimator.failed());
   CHECK_THAT(estimator.Tail(5), Contains("/nowhere/posterior.json: there is no such file"));
 }

@@ -15,13 +15,27 @@ using Catch::StartsWith;
 
 constexpr int kIdle = 1;  // CANSimple axis state
 
-/// Runs one of our programs to its end. @return its output.
+/// Runs one of our programs to its end, outside the run. @return its output.
 std::string Output(Stage& stage, std::vector<std::string> arguments, bool fails) {
   const fs::path log = stage.folder / "output.log";
   fs::remove(log);
   arguments[0] = Stage::Binary(arguments[0]);
   Child child("program", arguments, log);
-  REQUIRE(child.WaitFor(10));
+  REQUIRE(child.WaitFor(60));
+  INFO(child.Tail(50));
+  CHECK(child.failed() == fails);
+  return child.Tail(50);
+}
+/// Runs plumb in the run. @return its output.
+std::string InTheRun(Stage& stage, std::vector<std::string> arguments, bool fails) {
+  const fs::path log = stage.folder / "output.log";
+  fs::remove(log);
+  arguments.insert(arguments.begin(), Stage::Binary("plumb"));
+  arguments.insert(arguments.end(), {"--clock", stage.coordinator->clock()});
+  Child child("plumb", arguments, log);
+  stage.coordinator->Expect("plumb", child.pid());
+  REQUIRE(stage.WaitUntil([&] { return !stage.coordinator->present("plumb"); }, 10));
+  REQUIRE(child.WaitFor(60));
   INFO(child.Tail(50));
   CHECK(child.failed() == fails);
   return child.Tail(50);
@@ -34,8 +48,8 @@ struct Stranger {
   void Command() {
     joint_command_t command =
         stage.commands.received() > 0 ? stage.commands.newest() : joint_command_t{};  // its signature, too
-    command.utime = Stage::RealUtime();
-    command.counter = Stage::RealUtime();
+    command.utime = stage.Now();
+    command.counter = stage.Now();
     command.sequence += 1000;
     command.num_joints = 1;
     command.effort = {stage.robot.joints[0].effort_limit};
@@ -44,7 +58,7 @@ struct Stranger {
   }
   void Request(int8_t what) {
     driver_request_t request{};
-    request.utime = request.counter = Stage::RealUtime();
+    request.utime = request.counter = stage.Now();
     request.request = what;
     requests.Publish(request);
   }
@@ -60,12 +74,11 @@ struct Recorder {
     std::vector<uint8_t> bytes;
   };
   explicit Recorder(Stage& stage) {
-    stage.messenger.lcm().subscribe("JOINT_COMMAND", &Recorder::On, this)->setQueueCapacity(0);
-    stage.messenger.lcm().subscribe("DRIVER_REQUEST", &Recorder::On, this)->setQueueCapacity(0);
-  }
-  void On(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
-    const auto* bytes = static_cast<const uint8_t*>(buffer->data);
-    if (recording) messages.push_back({channel, {bytes, bytes + buffer->data_size}});
+    stage.coordinator->on_post = [this](const lockstep_post_t& post, const std::string&) {
+      const std::string& channel = post.topic.name;
+      if (recording && (channel == "JOINT_COMMAND" || channel == "DRIVER_REQUEST"))
+        messages.push_back({channel, post.data});
+    };
   }
   bool recording = true;
   std::vector<Message> messages;
@@ -95,12 +108,6 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
   CHECK(seen > 0);
   CHECK(seen < 0.9f * greatest);
   CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
-  CHECK_THAT(
-      Output(stage, {"plumb", "doctor", "--bus", stage.bus_url, "--lcm-url", stage.lcm_url, "--key", key},
-             false),
-      Contains("commands are signed: " + key.string()) &&
-          Contains("obeys signed commands only, and has dropped 50"));
-
   // Whoever wants to stop it may.
   stranger.Request(driver_request_t::DISARM);
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 2));
@@ -111,29 +118,24 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
   REQUIRE(stage.WaitUntil([&] { return stage.drivers.newest().commands_forged == 51; }, 2));
   CHECK(stage.drivers.newest().reason ==
         "disarmed on request; ARM refused: not signed with the driver's key");
-  CHECK_THAT(Output(stage, {"plumb", "arm", "--lcm-url", stage.lcm_url}, true), Contains("--key FILE"));
+  CHECK_THAT(InTheRun(stage, {"arm"}, true), Contains("--key FILE"));
   stage.Listen(0.3);
   CHECK(stage.axis_state == kIdle);
-  CHECK_THAT(Output(stage, {"plumb", "arm", "--lcm-url", stage.lcm_url, "--key", key}, false),
+  CHECK_THAT(InTheRun(stage, {"arm", "--key", key}, false),
              Contains("armed"));
   REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 2));
 
   // Alone, the stranger is heard and not obeyed, and the driver says so.
-  stage.children.at("plumb-controller")->Signal(SIGSTOP);
-  const auto refused = [&] { return stage.drivers.newest().reason.rfind("commands refused", 0) == 0; };
-  for (int attempt = 0; attempt < 5 && !refused(); ++attempt) {  // a busy machine stops it for other reasons, too
-    REQUIRE(stage.Arm());
-    REQUIRE(stage.WaitUntil(
-        [&] {
-          stranger.Command();
-          return stage.drivers.newest().state == driver_status_t::FAULT;
-        },
-        5));
+  stage.Stall("plumb-controller", 2);
+  for (int i = 0; i < 1000 && stage.drivers.newest().state != driver_status_t::FAULT; ++i) {
+    stranger.Command();
+    stage.Listen(0.005);
   }
+  REQUIRE(stage.drivers.newest().state == driver_status_t::FAULT);
   CHECK_THAT(stage.drivers.newest().reason, StartsWith("commands refused: not signed with the driver's key"));
-  stage.children.at("plumb-controller")->Signal(SIGCONT);
+  stage.Listen(2);
   REQUIRE(stage.Arm());
-  CHECK_THAT(Output(stage, {"plumb", "estop", "--lcm-url", stage.lcm_url}, false),
+  CHECK_THAT(InTheRun(stage, {"estop"}, false),
              Contains("emergency stop requested"));
   CHECK(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 2));
 }
@@ -148,15 +150,14 @@ TEST_CASE("what was recorded is worth nothing, to the same driver and to one tha
   REQUIRE(recorder.messages.front().channel == "DRIVER_REQUEST");
   const auto replay = [&] {
     for (const Recorder::Message& message : recorder.messages) {
-      stage.messenger.lcm().publish(message.channel, message.bytes.data(),
-                                    static_cast<unsigned>(message.bytes.size()));
+      stage.messenger.Publish(message.channel, message.bytes);
       stage.Listen(0.005);
     }
     stage.Listen(0.3);
   };
   const auto forged = static_cast<int64_t>(recorder.messages.size());
 
-  stage.children.erase("plumb-controller");
+  stage.Kill("plumb-controller");
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 2));
   const int64_t torque = stage.last_torque_time;
@@ -164,7 +165,7 @@ TEST_CASE("what was recorded is worth nothing, to the same driver and to one tha
   CHECK(stage.drivers.newest().state == driver_status_t::FAULT);
   CHECK(stage.drivers.newest().commands_forged == forged);
 
-  stage.children.erase("plumb-driver");
+  stage.Kill("plumb-driver");
   stage.StartDriver();
   REQUIRE(stage.WaitUntil([&] { return stage.drivers.newest().commands_forged == 0; }, 5));
   REQUIRE(stage.WaitForDriver(driver_status_t::IDLE, 5));

@@ -45,7 +45,7 @@ std::string PatientRobot(const Stage& stage) {
 
 /// The driver, the virtual robot, and a controller that asks for 1 Nm every 5 ms.
 struct Cable {
-  explicit Cable(int number) : stage(number), publisher(stage.messenger, "JOINT_COMMAND") {
+  explicit Cable(int number) : stage(number, "pendulum", Stage::Time::kReal), publisher(stage.messenger, "JOINT_COMMAND") {
     stage.robot_folder = PatientRobot(stage);
     stage.bus = OpenTransport("socketcan:vx1");
     stage.Start("plumb-robot", {"--bus", "socketcan:vx1", "--seed", "1"});
@@ -62,7 +62,7 @@ struct Cable {
         seconds);
   }
   void Command() {
-    const int64_t now = Stage::RealUtime();
+    const int64_t now = stage.Now();
     if (now < next) return;
     next = now + 5000;
     joint_command_t command{};
@@ -88,9 +88,9 @@ struct Cable {
             if (In(driver_status_t::ARMED) && stage.torque != 0 && stage.axis_state == kClosedLoop)
               return true;
             if (!In(driver_status_t::ARMED) && !In(driver_status_t::ARMING) &&
-                Stage::RealUtime() - asked > 400'000) {
+                stage.Now() - asked > 400'000) {
               stage.Request(driver_request_t::ARM);
-              asked = Stage::RealUtime();
+              asked = stage.Now();
             }
             return false;
           },
@@ -171,16 +171,16 @@ TEST_CASE("what the kernel does to the bus stops the robot, says why, and a pers
            Fault{"cansend vx1 7E2#", "emergency stop from the bus", "", kSoon},
        }) {
     INFO(happens << ": " << cable.Status().reason);
-    const int64_t now = Stage::RealUtime();
+    const int64_t now = cable.stage.Now();
     REQUIRE(std::system(happens) == 0);
-    cable.ExpectStopped(now, within + Stage::RealUtime() - now, reason, over);
+    cable.ExpectStopped(now, within + cable.stage.Now() - now, reason, over);
   }
 
   // Frames come faster than a driver that stands still reads them.
-  const int64_t dropped = cable.Status().frames_dropped, now = Stage::RealUtime();
+  const int64_t dropped = cable.Status().frames_dropped, now = cable.stage.Now();
   cable.stage.children.at("plumb-driver")->Signal(SIGSTOP);
   REQUIRE(std::system("cangen vx1 -g 0 -I 03F -L 8 -n 20000 -p 10") == 0);
-  const int64_t took = Stage::RealUtime() - now;
+  const int64_t took = cable.stage.Now() - now;
   cable.stage.children.at("plumb-driver")->Signal(SIGCONT);
   REQUIRE(cable.Until([&] { return cable.In(driver_status_t::FAULT); }, 5));
   cable.ExpectStopped(now, kSoon + took, "");

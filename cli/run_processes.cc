@@ -1,0 +1,128 @@
+#include "cli/run_processes.h"
+
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr char kRobot[] = "plumb-robot", kDriver[] = "plumb-driver", kLogger[] = "setpriv";
+
+double SecondsSince(SteadyClock::time_point start) {
+  return std::chrono::duration<double>(SteadyClock::now() - start).count();
+}
+
+}  // namespace
+
+void RunProcesses::Start(const std::string& name, std::vector<std::string> arguments) {
+  const fs::path here = fs::read_symlink("/proc/self/exe").parent_path();
+  const bool ours = name.starts_with("plumb-");
+  arguments.insert(arguments.begin(), ours ? (here / name).string() : name);
+  if (ours) {
+    arguments.insert(arguments.end(), {"--lcm-url", where_.lcm_url, "--clock", where_.clock, "--parent",
+                                       std::to_string(getpid())});
+  }
+  children_.emplace_back(name, arguments, where_.output / (name + ".log"));
+  if (ours && coordinator_) coordinator_->Expect(name, children_.back().pid());
+}
+
+void RunProcesses::Start() {
+  const std::string seed = std::to_string(flags_.seed);
+  const auto with_priority = [&](std::vector<std::string> arguments, int behind) {
+    const int priority = std::max(flags_.priority - behind, 0);
+    if (priority > 0) arguments.insert(arguments.end(), {"--realtime-priority", std::to_string(priority)});
+    return arguments;
+  };
+  if (!flags_.log.empty() && !coordinator_) {
+    // It knows no --parent of ours.
+    Start(kLogger, {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + where_.lcm_url, "-q", "-f", flags_.log});
+  }
+  if (!flags_.real) Start(kRobot, with_priority({flags_.robot, "--bus", where_.bus, "--seed", seed}, 5));
+  std::vector<std::string> driver{flags_.robot, "--bus", where_.bus, "--flight-recorder",
+                                  (where_.output / "faults").string()};
+  if (!flags_.real) driver.push_back("--virtual");
+  if (flags_.allow_unsigned) driver.push_back("--unsigned");
+  std::vector<std::string> controller{flags_.robot, "--seed", seed};
+  if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});  // nobody throws a real robot about
+  if (!flags_.key.empty()) {
+    for (auto* arguments : {&driver, &controller}) arguments->insert(arguments->end(), {"--key", flags_.key});
+  }
+  Start(kDriver, with_priority(driver, 0));
+  Start("plumb-estimator", with_priority({flags_.robot}, 5));
+  Start("plumb-controller", with_priority(controller, 5));
+  std::vector<std::string> calibrator{flags_.robot, "--seed", seed, "--checkpoint",
+                                      (where_.output / "calibration").string()};
+  std::vector<std::string> trainer{flags_.robot, "--seed", seed, "--iterations", std::to_string(flags_.iterations),
+                                   "--evaluation-episodes", std::to_string(flags_.evaluation_episodes),
+                                   "--checkpoint", (where_.output / "training").string()};
+  // In real time the slow loop gives way to the fast one.
+  if (!coordinator_) {
+    for (auto* arguments : {&calibrator, &trainer}) arguments->insert(arguments->end(), {"--nice", "10"});
+  }
+  Start("plumb-calibrator", calibrator);
+  Start("plumb-trainer", trainer);
+}
+
+Child* RunProcesses::Ended() {
+  const auto ended = std::ranges::find_if(children_, [](Child& child) { return !child.running(); });
+  return ended == children_.end() ? nullptr : &*ended;
+}
+
+void RunProcesses::Stop(bool hurry) noexcept {
+  if (children_.empty()) return;
+  try {
+    if (coordinator_) StopInVirtualTime(hurry);
+  } catch (const std::exception& error) {
+    spdlog::error("{}", error.what());
+  }
+  StopInRealTime();
+  children_.clear();
+}
+
+/// Everything that could command ends at one moment; the driver disarms and confirms; the robot goes last.
+void RunProcesses::StopInVirtualTime(bool hurry) {
+  constexpr int64_t kFarewell = 1'000'000, kSlice = 10'000;  // [us]
+  constexpr double kPatience = 0.5;                          // [s] of real time, with a person who waits
+  const auto start = SteadyClock::now();
+  const auto in_time = [&] { return !hurry || SecondsSince(start) < kPatience; };
+  coordinator_->go_on = in_time;
+  const auto anybody = [&](const auto& whom) {
+    return std::ranges::any_of(children_,
+                               [&](const Child& child) { return whom(child) && coordinator_->present(child.name()); });
+  };
+  const auto stop = [&](const auto& whom) {
+    for (const Child& child : children_) {
+      if (whom(child)) coordinator_->Stop(child.name());
+    }
+    const int64_t deadline = coordinator_->now() + kFarewell;
+    while (anybody(whom) && coordinator_->now() < deadline && in_time()) {
+      coordinator_->participant().Wait(coordinator_->now() + kSlice, Participant::Wake::kOnTime);
+    }
+  };
+  stop([](const Child& child) { return child.name() != kRobot; });
+  stop([](const Child&) { return true; });
+}
+
+void RunProcesses::StopInRealTime() {
+  for (Child& child : children_) {
+    if (child.name() != kRobot && child.name() != kLogger) child.Signal(SIGTERM);
+  }
+  for (Child& child : children_) {
+    if (child.name() == kDriver) child.WaitFor(0.5);
+  }
+  for (Child& child : children_) child.Signal(SIGTERM);
+  const auto start = SteadyClock::now();
+  for (Child& child : children_) {
+    if (!child.WaitFor(std::max(0.0, 0.3 - SecondsSince(start)))) child.Signal(SIGKILL);
+  }
+  for (Child& child : children_) child.WaitFor(0.2);
+}
+
+}  // namespace plumb

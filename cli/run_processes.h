@@ -1,0 +1,46 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cli/child.h"
+#include "cli/launch.h"
+#include "common/lockstep/coordinator.h"
+
+namespace plumb {
+
+/// The processes of a run: started together, and stopped in the order that is safe. Not thread-safe.
+class RunProcesses {
+ public:
+  struct Where {
+    std::string bus, lcm_url;
+    std::string clock;             ///< what --clock says
+    std::filesystem::path output;  ///< for their logs and checkpoints
+  };
+
+  /// @param coordinator of a run in virtual time; null in real time.
+  RunProcesses(const LaunchFlags& flags, Where where, Coordinator* coordinator)
+      : flags_(flags), where_(std::move(where)), coordinator_(coordinator) {}
+  ~RunProcesses() { Stop(true); }
+
+  /// @throws std::runtime_error if one cannot be started.
+  void Start();
+  /// One that has ended, though nobody has asked it to; null if all run.
+  Child* Ended();
+  /// Motors first, the virtual robot last. Does not throw. @param hurry whatever they do: within a second, for a person
+  /// who waits. Otherwise, in virtual time, always in the same way.
+  void Stop(bool hurry) noexcept;
+
+ private:
+  void Start(const std::string& name, std::vector<std::string> arguments);
+  void StopInVirtualTime(bool hurry);
+  void StopInRealTime();
+
+  const LaunchFlags& flags_;
+  const Where where_;
+  Coordinator* coordinator_;
+  std::vector<Child> children_;
+};
+
+}  // namespace plumb

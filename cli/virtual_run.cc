@@ -1,0 +1,62 @@
+#include "cli/virtual_run.h"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <string_view>
+
+namespace plumb {
+namespace {
+
+/// What candump would call the interface.
+std::string_view Interface(std::string_view bus_url) {
+  constexpr std::string_view kSocketCan = "socketcan:";
+  return bus_url.starts_with(kSocketCan) ? bus_url.substr(kSocketCan.size()) : "can0";
+}
+
+}  // namespace
+
+VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& lcm_url, const Records& records)
+    : coordinator_((folder / "clock").string()) {
+  if (!lcm_url.starts_with("memq:")) {
+    try {
+      mirror_.emplace(lcm_url);
+      mirror_->on_stranger = [this](const auto& channel, const auto& message) { on_stranger(channel, message); };
+    } catch (const std::runtime_error& error) {
+      mirror_failure_ = error.what();
+    }
+  }
+  if (!records.messages.empty()) messages_.emplace(records.messages);
+  if (!records.frames.empty()) {
+    frames_.open(records.frames);
+    if (!frames_) throw std::runtime_error(fmt::format("{}: {}", records.frames, std::strerror(errno)));
+  }
+  coordinator_.on_post = [this](const lockstep_post_t& post, const std::string&) { OnPost(post); };
+}
+
+VirtualRun::~VirtualRun() = default;
+
+void VirtualRun::OnPost(const lockstep_post_t& post) {
+  if (post.topic.kind == lockstep_topic_t::FRAME) {
+    if (!frames_.is_open()) return;
+    frames_ << fmt::format("({}.{:06}) {} ", post.arrival / 1'000'000, post.arrival % 1'000'000,
+                           Interface(post.topic.name));
+    frames_.write(reinterpret_cast<const char*>(post.data.data()), post.size);
+    frames_ << '\n';
+    return;
+  }
+  if (mirror_) mirror_->Publish(post.topic.name, post.data);
+  if (messages_) messages_->Write(post.arrival, post.topic.name, post.data);
+}
+
+void VirtualRun::Finish() {
+  if (mirror_) mirror_->Flush();
+  messages_.reset();
+  if (!frames_.is_open()) return;
+  frames_.close();
+  if (!frames_) throw std::runtime_error("the CAN log cannot be written: is the disk full?");
+}
+
+}  // namespace plumb

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "common/lcm_log_writer.h"
+#include "common/lockstep/coordinator.h"
+#include "common/lockstep/lcm_mirror.h"
+
+namespace plumb {
+
+/// What a run in virtual time has besides its processes: the coordinator, the mirror of its messages on LCM, and its
+/// records. Not thread-safe.
+class VirtualRun {
+ public:
+  struct Records {
+    std::string messages;  ///< LCM log to write, in lcm-logger's format, with the run's times; empty: none
+    std::string frames;    ///< CAN log to write, as candump -l does; empty: none
+  };
+
+  /// @param folder of the run, which no other has. @param lcm_url where its messages are mirrored; memq: nowhere.
+  /// @throws std::runtime_error if a file cannot be written.
+  VirtualRun(const std::filesystem::path& folder, const std::string& lcm_url, const Records& records);
+  ~VirtualRun();
+
+  Coordinator& coordinator() { return coordinator_; }
+  /// Why nobody outside sees the messages; empty if they do.
+  const std::string& mirror_failure() const { return mirror_failure_; }
+  /// Reads what others say on LCM.
+  void ListenOutside() {
+    if (mirror_) mirror_->Read();
+  }
+  /// All is said. Its record is complete afterwards. @throws std::runtime_error if something was lost.
+  void Finish();
+
+  /// Called with what somebody outside the run says on LCM: on_stranger(channel, message).
+  std::function<void(const std::string&, std::span<const uint8_t>)> on_stranger = [](const auto&, const auto&) {};
+
+ private:
+  void OnPost(const lockstep_post_t& post);
+
+  Coordinator coordinator_;
+  std::optional<LcmMirror> mirror_;
+  std::string mirror_failure_;
+  std::optional<LcmLogWriter> messages_;
+  std::ofstream frames_;
+};
+
+}  // namespace plumb

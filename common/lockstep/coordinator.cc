@@ -1,0 +1,354 @@
+#include "common/lockstep/coordinator.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "common/lockstep/process_watch.h"
+#include "common/program_version.h"
+#include "plumb/lockstep_grant_t.hpp"
+#include "plumb/lockstep_hello_t.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr int kGlance = 100;  // [ms] of real time between two looks at a participant that works
+constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
+
+std::string Key(const lockstep_topic_t& topic) {
+  return (topic.kind == lockstep_topic_t::FRAME ? 'f' : 'm') + topic.name;
+}
+
+}  // namespace
+
+struct Coordinator::Member {
+  enum class State {
+    kAbsent,    // has left, or has been killed; its turn is kept for one of the same name
+    kExpected,  // has been started
+    kWorking,   // has its turn, or comes up
+    kReported,  // its turn is over, and what it reports not yet made known
+    kWaiting,
+  };
+  bool settled() const { return state == State::kAbsent || state == State::kReported || state == State::kWaiting; }
+  bool heard(int64_t now) const { return !mail.empty() && mail.front().arrival <= now; }
+  /// @return kNever if nothing is due unless something is heard.
+  int64_t NextMoment() const {
+    const int64_t arrival = wakes && !mail.empty() ? mail.front().arrival : kNever;
+    return std::max(stalled_until, std::min(until, arrival));
+  }
+  void Put(const lockstep_post_t& post) {
+    auto place = mail.end();
+    while (place != mail.begin() && std::prev(place)->arrival > post.arrival) --place;
+    mail.insert(place, post);
+  }
+
+  std::string name;
+  State state = State::kExpected;
+  PacketSocket socket;
+  ProcessWatch watch;
+  lockstep_report_t report{};
+  int64_t grants = 0;  // that it has had
+  int64_t until = kNever;
+  bool wakes = true;
+  bool stop = false;  // is to be told, or has been
+  bool told = false;  // to stop
+  int64_t stalled_until = std::numeric_limits<int64_t>::min();
+  std::deque<lockstep_post_t> mail;  // by time of arrival
+};
+
+/// The owner's place: its turns end and begin in its calls of Wait.
+class Coordinator::Owner : public Participant {
+ public:
+  explicit Owner(Coordinator& coordinator) : coordinator_(coordinator) { SetNow(kBeginning); }
+
+  void Listen(const lockstep_topic_t& topic) override { coordinator_.listeners_[Key(topic)].push_back(&seat); }
+  void Say(const lockstep_topic_t& topic, std::vector<uint8_t> data, int64_t way) override {
+    lockstep_post_t post;
+    post.topic = topic;
+    post.arrival = now() + way;
+    post.size = static_cast<int32_t>(data.size());
+    post.data = std::move(data);
+    coordinator_.Route(post, seat);
+  }
+  void Wait(int64_t until, Wake wake, int stop_fd) override {
+    seat.until = wake == Wake::kWhenHeard && heard() ? now() : until;
+    seat.wakes = wake == Wake::kWhenHeard;
+    coordinator_.TakeTurns(stop_fd);
+    for (; seat.heard(now()); seat.mail.pop_front()) Hear(std::move(seat.mail.front()));
+  }
+  void Note(const std::string& line) override { coordinator_.on_note(line); }
+  void Fail(const std::string& why) override { coordinator_.failure_ = why; }
+
+  void MoveOn(int64_t now) { SetNow(now); }
+
+  Member seat;
+
+ private:
+  Coordinator& coordinator_;
+};
+
+Coordinator::Coordinator(std::string path)
+    : path_(std::move(path)), listener_(PacketSocket::Listen(path_)), owner_(std::make_unique<Owner>(*this)) {}
+
+Coordinator::~Coordinator() { unlink(path_.c_str()); }
+
+Participant& Coordinator::participant() { return *owner_; }
+
+int64_t Coordinator::now() const { return owner_->now(); }
+
+Coordinator::Member* Coordinator::Find(const std::string& name) const {
+  const auto found = std::ranges::find_if(members_, [&](const auto& member) { return member->name == name; });
+  return found == members_.end() ? nullptr : found->get();
+}
+
+Coordinator::Member& Coordinator::Seat(const std::string& name) {
+  if (Member* known = Find(name)) return *known;
+  if (turn_ == members_.size()) ++turn_;  // the owner stays the last one
+  members_.push_back(std::make_unique<Member>());
+  members_.back()->name = name;
+  return *members_.back();
+}
+
+void Coordinator::Expect(const std::string& name, pid_t pid) {
+  Member& member = Seat(name);
+  member.state = Member::State::kExpected;
+  member.watch = ProcessWatch(pid);
+}
+
+void Coordinator::Stop(const std::string& name) {
+  if (Member* member = Find(name)) member->stop = true;
+}
+
+void Coordinator::Stall(const std::string& name, int64_t duration) {
+  if (Member* member = Find(name)) member->stalled_until = now() + duration;
+}
+
+bool Coordinator::present(const std::string& name) const {
+  const Member* member = Find(name);
+  return member && member->state != Member::State::kAbsent;
+}
+
+bool Coordinator::AwaitEnd(const std::string& name) {
+  while (present(name)) {
+    Listen(-1, kGlance);
+    if (!go_on()) return false;
+  }
+  return true;
+}
+
+/// Until the owner's turn has come.
+void Coordinator::TakeTurns(int stop_fd) {
+  Member& owner = owner_->seat;
+  if (!Listen(stop_fd, 0)) return;
+  while (Settle(stop_fd)) {
+    if (!failure_.empty()) throw std::runtime_error(std::exchange(failure_, {}));
+    const size_t places = members_.size() + 1;
+    Member* next = nullptr;
+    for (size_t i = 1; i <= places && !next; ++i) {
+      const size_t place = (turn_ + i) % places;
+      Member& member = place == members_.size() ? owner : *members_[place];
+      if (!HasTurn(member)) continue;
+      turn_ = place;
+      next = &member;
+    }
+    if (next == &owner) return;
+    if (next) {
+      Grant(*next);
+    } else {
+      int64_t moment = owner.NextMoment();
+      for (const auto& member : members_) {
+        if (member->state == Member::State::kWaiting) moment = std::min(moment, member->NextMoment());
+      }
+      if (!MoveOn(moment, stop_fd)) return;
+    }
+  }
+}
+
+/// @return false if stop_fd has become readable meanwhile.
+bool Coordinator::MoveOn(int64_t moment, int stop_fd) {
+  if (most_speed > 0) {
+    using std::chrono::microseconds;
+    constexpr auto kSlack = std::chrono::milliseconds(100);  // that may be made up for
+    const auto real_now = std::chrono::steady_clock::now();
+    allowed_ = std::max(allowed_, real_now - kSlack) +
+               microseconds(std::llround(static_cast<double>(moment - now()) / most_speed));
+    const auto wait = std::chrono::duration_cast<std::chrono::milliseconds>(allowed_ - real_now);
+    if (wait.count() > 0 && !Listen(stop_fd, static_cast<int>(wait.count()))) return false;
+  }
+  owner_->MoveOn(moment);
+  turn_ = members_.size();  // at every moment the first one begins
+  return true;
+}
+
+bool Coordinator::HasTurn(const Member& member) const {
+  if (&member == &owner_->seat) return member.NextMoment() <= now();
+  if (member.state != Member::State::kWaiting) return false;
+  return member.NextMoment() <= now() || (member.stop && !member.told && member.stalled_until <= now());
+}
+
+void Coordinator::Grant(Member& member) {
+  lockstep_grant_t grant;
+  grant.number = ++member.grants;
+  grant.now = now();
+  grant.stop = member.stop;
+  for (; member.heard(now()); member.mail.pop_front()) grant.post.push_back(std::move(member.mail.front()));
+  grant.num_posts = static_cast<int32_t>(grant.post.size());
+  member.told = member.stop;
+  member.state = Member::State::kWorking;
+  member.watch.Begin();
+  // Where it does not read any more, its end is what is read next.
+  member.socket.Send(Encode(grant, buffer_), go_on);
+}
+
+/// Until nobody works, and all that was said meanwhile is on its way.
+/// @return false if the wait is to end before that: then it goes on with the next one.
+bool Coordinator::Settle(int stop_fd) {
+  for (bool working = true; working;) {
+    working = false;
+    for (const auto& member : members_) {
+      if (member->settled()) continue;
+      working = true;
+      if (!Listen(stop_fd, kGlance)) return false;
+      break;
+    }
+    if (working && std::chrono::steady_clock::now() >= next_glance_) {
+      next_glance_ = std::chrono::steady_clock::now() + std::chrono::milliseconds(kGlance);
+      WatchProgress();
+      if (!go_on()) return false;
+    }
+  }
+  for (const auto& member : members_) {
+    if (member->state == Member::State::kReported) Digest(*member);
+  }
+  return true;
+}
+
+void Coordinator::WatchProgress() {
+  for (const auto& member : members_) {
+    if (member->settled()) continue;
+    if (member->state == Member::State::kExpected && member->watch.dead()) {
+      on_note(member->name + " has ended before it has joined the run");
+      Leave(*member);
+      continue;
+    }
+    const std::string note = member->watch.Look();
+    if (note.empty()) continue;
+    const char* const whose = member->state == Member::State::kExpected ? "has not joined the run" : "has its turn";
+    const std::string line = fmt::format("{} {} at {:.6f} s: {}", member->name, whose,
+                                         static_cast<double>(now() - kBeginning) * 1e-6, note);
+    if (member->watch.idle() > kPatience) throw std::runtime_error("given up: " + line);
+    on_note(line);
+  }
+}
+
+/// Reads what has come. @return false if stop_fd is readable.
+bool Coordinator::Listen(int stop_fd, int timeout) {
+  polled_.clear();
+  polled_.push_back({stop_fd, POLLIN, 0});
+  polled_.push_back({listener_.fd(), POLLIN, 0});
+  for (const auto& stranger : strangers_) polled_.push_back({stranger.fd(), POLLIN, 0});
+  for (const auto& member : members_) polled_.push_back({member->socket.fd(), POLLIN, 0});
+  if (poll(polled_.data(), polled_.size(), timeout) > 0) {
+    const size_t first_member = 2 + strangers_.size();
+    for (size_t i = 0; i + first_member < polled_.size(); ++i) {
+      if (polled_[i + first_member].revents != 0) Read(*members_[i]);
+    }
+    for (size_t i = 2; i < first_member; ++i) {
+      if (polled_[i].revents != 0) Admit(strangers_[i - 2]);
+    }
+    std::erase_if(strangers_, [](const PacketSocket& stranger) { return !stranger.open(); });
+    if (polled_[1].revents != 0) strangers_.push_back(listener_.Accept());
+  }
+  return stop_fd < 0 || polled_[0].revents == 0;
+}
+
+/// A stranger has said something, or has gone: it joins, or is refused.
+void Coordinator::Admit(PacketSocket& stranger) {
+  if (!stranger.Read()) return stranger.Close();
+  const std::span<const uint8_t> packet = stranger.Next();
+  if (packet.empty()) return;
+  lockstep_hello_t hello;
+  lockstep_grant_t welcome{};
+  welcome.now = now();
+  if (!Decode(packet, hello)) {
+    welcome.refusal = "the run is another version's";
+  } else if (hello.version != ProgramVersion()) {
+    welcome.refusal = fmt::format("{} is {}, the run is {}: build both together", hello.name, hello.version, ProgramVersion());
+  } else if (const Member* known = Find(hello.name); known && known->socket.open()) {
+    welcome.refusal = fmt::format("there is a {} in the run already", hello.name);
+  }
+  stranger.Send(Encode(welcome, buffer_), go_on);
+  if (!welcome.refusal.empty()) {
+    on_note(fmt::format("refused: {}", welcome.refusal));
+    return stranger.Close();
+  }
+  Member& member = Seat(hello.name);
+  const std::string name = std::move(member.name);
+  member = Member();
+  member.name = name;
+  member.socket = std::move(stranger);
+  member.state = Member::State::kWorking;
+  member.watch = ProcessWatch(hello.pid);
+}
+
+void Coordinator::Read(Member& member) {
+  const bool there = member.socket.Read();
+  for (std::span<const uint8_t> packet; !(packet = member.socket.Next()).empty();) {
+    lockstep_report_t report;
+    if (!Decode(packet, report)) {
+      on_note(member.name + " says what is no report");
+      return Leave(member);
+    }
+    if (report.grant != member.grants) continue;  // it asked for a turn that it has been given meanwhile
+    if (member.state == Member::State::kWaiting) {
+      member.until = std::min(member.until, now());  // a signal has come: it wants to look at it
+    } else {
+      member.report = std::move(report);
+      member.state = Member::State::kReported;
+    }
+  }
+  if (there || (member.state == Member::State::kReported && member.report.leaves)) return;
+  on_note(fmt::format("{} has died at {:.6f} s", member.name, static_cast<double>(now() - kBeginning) * 1e-6));
+  Leave(member);
+}
+
+/// Its turn is over: the others hear what it has said.
+void Coordinator::Digest(Member& member) {
+  const lockstep_report_t report = std::exchange(member.report, {});
+  member.state = Member::State::kWaiting;
+  member.until = report.until;
+  member.wakes = report.wakes;
+  for (const lockstep_topic_t& topic : report.topic) listeners_[Key(topic)].push_back(&member);
+  for (const lockstep_post_t& post : report.post) Route(post, member);
+  if (!report.note.empty()) on_note(member.name + ": " + report.note);
+  if (!report.failure.empty()) failure_ = member.name + ": " + report.failure;
+  if (report.leaves) Leave(member);
+}
+
+void Coordinator::Leave(Member& member) {
+  member.socket.Close();
+  member.state = Member::State::kAbsent;
+  member.mail.clear();
+  for (auto& [key, listeners] : listeners_) std::erase(listeners, &member);
+}
+
+void Coordinator::Route(const lockstep_post_t& post, const Member& speaker) {
+  on_post(post, &speaker == &owner_->seat ? "" : speaker.name);
+  const auto listeners = listeners_.find(Key(post.topic));
+  if (listeners == listeners_.end()) return;
+  for (Member* listener : listeners->second) {
+    // On a bus nobody hears itself; LCM's messages come back.
+    if (listener == &speaker && post.topic.kind == lockstep_topic_t::FRAME) continue;
+    listener->Put(post);
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,146 @@
+#include "common/lockstep/packet_socket.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+namespace plumb {
+namespace {
+
+constexpr size_t kHead = sizeof(uint32_t);
+constexpr size_t kChunk = size_t{1} << 16;  // [bytes] read in one go
+
+[[noreturn]] void Fail(const std::string& path, const char* what) {
+  throw std::runtime_error(fmt::format("{}: {} ({})", path, what, std::strerror(errno)));
+}
+
+/// An address has room for 107 bytes only, a path may be longer: its folder is opened, and named by number.
+struct Address {
+  explicit Address(const std::string& path) {
+    const std::filesystem::path file(path);
+    const std::string folder = file.has_parent_path() ? file.parent_path().string() : ".";
+    directory = open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
+    if (directory < 0) Fail(folder, "cannot open the folder");
+    const std::string text = fmt::format("/proc/self/fd/{}/{}", directory, file.filename().string());
+    if (text.size() >= sizeof name.sun_path) {
+      errno = ENAMETOOLONG;
+      Fail(path, "cannot name a socket");
+    }
+    name.sun_family = AF_UNIX;
+    std::memcpy(name.sun_path, text.c_str(), text.size() + 1);
+  }
+  ~Address() { close(directory); }
+  Address(const Address&) = delete;
+  Address& operator=(const Address&) = delete;
+  const sockaddr* get() const { return reinterpret_cast<const sockaddr*>(&name); }
+
+  sockaddr_un name{};
+  int directory;
+};
+
+PacketSocket MakeSocket(int flags) {
+  return PacketSocket(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | flags, 0));
+}
+
+}  // namespace
+
+PacketSocket::PacketSocket(PacketSocket&& other) noexcept { *this = std::move(other); }
+
+PacketSocket& PacketSocket::operator=(PacketSocket&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  std::swap(in_, other.in_);
+  std::swap(out_, other.out_);
+  std::swap(begin_, other.begin_);
+  std::swap(end_, other.end_);
+  return *this;
+}
+
+PacketSocket::~PacketSocket() { Close(); }
+
+void PacketSocket::Close() {
+  if (fd_ >= 0) close(std::exchange(fd_, -1));
+}
+
+PacketSocket PacketSocket::Listen(const std::string& path) {
+  unlink(path.c_str());  // of a run that was killed; a living one holds the folder's lock
+  PacketSocket socket = MakeSocket(SOCK_NONBLOCK);
+  const Address address(path);
+  if (!socket.open() || bind(socket.fd(), address.get(), sizeof address.name) != 0 ||
+      listen(socket.fd(), 64) != 0) {
+    Fail(path, "cannot make a socket");
+  }
+  return socket;
+}
+
+PacketSocket PacketSocket::Connect(const std::string& path) {
+  PacketSocket socket = MakeSocket(0);
+  const Address address(path);
+  if (!socket.open() || connect(socket.fd(), address.get(), sizeof address.name) != 0) {
+    Fail(path, "nobody keeps a run's time there");
+  }
+  return socket;
+}
+
+PacketSocket PacketSocket::Accept() const {
+  return PacketSocket(accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC));
+}
+
+bool PacketSocket::Send(std::span<const uint8_t> packet, const std::function<bool()>& waiting) {
+  const auto length = static_cast<uint32_t>(packet.size());
+  out_.resize(kHead + packet.size());
+  std::memcpy(out_.data(), &length, kHead);
+  if (!packet.empty()) std::memcpy(out_.data() + kHead, packet.data(), packet.size());
+  for (size_t sent = 0; sent < out_.size();) {
+    const ssize_t n = send(fd_, out_.data() + sent, out_.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (n > 0) {
+      sent += static_cast<size_t>(n);
+    } else if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) {
+      pollfd writable{fd_, POLLOUT, 0};
+      if (poll(&writable, 1, 100) == 0 && waiting && !waiting()) return false;
+    } else {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool PacketSocket::Read() {
+  for (bool more = true; more;) {
+    if (begin_ == end_) begin_ = end_ = 0;
+    if (in_.size() - end_ < kChunk) in_.resize(end_ + kChunk);
+    const size_t room = in_.size() - end_;
+    const ssize_t n = recv(fd_, in_.data() + end_, room, MSG_DONTWAIT);
+    if (n < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
+    if (n == 0) return false;
+    end_ += static_cast<size_t>(n);
+    const size_t length = Length();
+    if (length == 0 || length > kLongest) return end_ - begin_ < kHead;
+    more = static_cast<size_t>(n) == room;
+  }
+  return true;
+}
+
+size_t PacketSocket::Length() const {
+  uint32_t length = 0;
+  if (end_ - begin_ >= kHead) std::memcpy(&length, in_.data() + begin_, kHead);
+  return length;
+}
+
+std::span<const uint8_t> PacketSocket::Next() {
+  const size_t length = Length();
+  if (length == 0 || end_ - begin_ - kHead < length) return {};
+  const std::span<const uint8_t> packet = std::span(in_).subspan(begin_ + kHead, length);
+  begin_ += kHead + length;
+  return packet;
+}
+
+}  // namespace plumb

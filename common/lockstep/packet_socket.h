@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace plumb {
+
+/// Packets on a Unix stream socket: four bytes of length, then the packet. Not thread-safe.
+class PacketSocket {
+ public:
+  static constexpr size_t kLongest = size_t{64} << 20;  ///< [bytes] a longer packet is not one of ours
+
+  PacketSocket() = default;
+  explicit PacketSocket(int fd) : fd_(fd) {}
+  PacketSocket(PacketSocket&& other) noexcept;
+  PacketSocket& operator=(PacketSocket&& other) noexcept;
+  ~PacketSocket();
+
+  /// Sockets at a path in the file system, however long: relative to its folder.
+  /// @throws std::runtime_error naming the path and the cause.
+  static PacketSocket Listen(const std::string& path);
+  static PacketSocket Connect(const std::string& path);
+  /// One who has connected; !open() if nobody has.
+  PacketSocket Accept() const;
+
+  bool open() const { return fd_ >= 0; }
+  int fd() const { return fd_; }
+  void Close();
+
+  /// Sends all of it, waiting for a receiver that does not read. @param waiting called every tenth of a second
+  /// meanwhile; false gives up. @return false if the other end is gone, or it was given up.
+  bool Send(std::span<const uint8_t> packet, const std::function<bool()>& waiting = {});
+  /// Reads what there is, without blocking. @return false if the other end is gone or sends no packets.
+  bool Read();
+  /// The next complete packet of what has been read; empty if there is none. Valid until the next call.
+  std::span<const uint8_t> Next();
+
+ private:
+  /// Of the next packet [bytes]; 0 if that much has not come yet.
+  size_t Length() const;
+
+  int fd_ = -1;
+  std::vector<uint8_t> in_, out_;
+  size_t begin_ = 0, end_ = 0;  // of what has been read into in_ and not been taken
+};
+
+/// Encodes an LCM type for a packet. @param buffer is overwritten.
+template <class Message>
+std::span<const uint8_t> Encode(const Message& message, std::vector<uint8_t>& buffer) {
+  buffer.resize(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(buffer.data(), 0, static_cast<int>(buffer.size()));
+  return buffer;
+}
+
+/// @return false if it is another type, or another version's.
+template <class Message>
+bool Decode(std::span<const uint8_t> packet, Message& message) {
+  const int length = static_cast<int>(packet.size());
+  return message.decode(packet.data(), 0, length) == length;
+}
+
+}  // namespace plumb

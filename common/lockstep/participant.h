@@ -1,0 +1,74 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plumb/lockstep_post_t.hpp"
+
+namespace plumb {
+
+/// A process's place in a run in virtual time (docs/virtual-time.md). Time stands still while the process works, and
+/// moves on in Wait, when everybody has done what was due. What it says and hears goes through here, in one order that
+/// is the same in every run. Clock, Messenger and OpenTransport know of it; other code need not. Not thread-safe, but
+/// for now() and time().
+class Participant {
+ public:
+  enum class Wake {
+    kWhenHeard,  ///< Wait ends early when something has been heard
+    kOnTime,     ///< what is heard meanwhile is there when Wait ends
+  };
+
+  virtual ~Participant() = default;
+
+  /// The run's time [us], utime and monotonic time alike.
+  int64_t now() const { return time_->load(std::memory_order_relaxed); }
+  /// The same, for Clock.
+  std::shared_ptr<const std::atomic<int64_t>> time() const { return time_; }
+
+  /// From now on hears what others say on a bus, or anybody on a channel.
+  virtual void Listen(const lockstep_topic_t& topic) = 0;
+  /// Says something, which arrives after `way` >= 0 microseconds, zero meaning: still now.
+  virtual void Say(const lockstep_topic_t& topic, std::vector<uint8_t> data, int64_t way = 0) = 0;
+  /// Gives the others their turn. Ends at `until`, when something has been heard (if wanted), or when the process is
+  /// asked to stop. @param stop_fd becomes readable when it is asked by a signal; -1: there is none.
+  /// @throws std::runtime_error if the run is over or cannot go on.
+  virtual void Wait(int64_t until, Wake wake, int stop_fd = -1) = 0;
+  /// A line for whoever watches the run.
+  virtual void Note(const std::string& line) = 0;
+  /// The run cannot go on: everybody stops, and a person is told why.
+  virtual void Fail(const std::string& why) = 0;
+  /// Whether the run has asked this process to end.
+  bool stopping() const { return stopping_; }
+
+  /// LCM messages that have been heard, in order; the reader takes them out.
+  std::deque<lockstep_post_t>& messages() { return messages_; }
+  /// Frames that have been heard on a bus; the reader takes them out. The reference stays valid.
+  std::deque<lockstep_post_t>& frames(const std::string& bus) { return frames_[bus]; }
+
+ protected:
+  Participant() = default;
+  void SetNow(int64_t now) { time_->store(now, std::memory_order_relaxed); }
+  void Hear(lockstep_post_t&& post);
+  bool heard() const;
+
+  bool stopping_ = false;
+
+ private:
+  std::shared_ptr<std::atomic<int64_t>> time_ = std::make_shared<std::atomic<int64_t>>(0);
+  std::deque<lockstep_post_t> messages_;
+  std::map<std::string, std::deque<lockstep_post_t>> frames_;
+};
+
+lockstep_topic_t ChannelTopic(const std::string& channel);
+lockstep_topic_t BusTopic(const std::string& url);
+
+/// Joins the run that is coordinated at a path. @param name of this process. @return its place, which it leaves when
+/// that is destroyed. @throws std::runtime_error, one line, if nobody is there or the run will not have us.
+std::unique_ptr<Participant> JoinRun(const std::string& path, const std::string& name);
+
+}  // namespace plumb

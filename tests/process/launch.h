@@ -1,0 +1,41 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "cli/child.h"
+#include "tests/process/stage.h"
+
+namespace plumb {
+
+/// `plumb launch` of a robot, watched from outside by a stage in real time.
+inline Child Launch(Stage& stage, std::vector<std::string> flags, const std::string& output = "run") {
+  std::vector<std::string> arguments{Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", stage.lcm_url,
+                                     "--bus", stage.bus_url, "--output", stage.folder / output};
+  arguments.insert(arguments.end(), flags.begin(), flags.end());
+  return Child("plumb", arguments, stage.folder / (output + ".log"));
+}
+
+/// The stage's robot becomes one that learns so little that a run takes seconds.
+inline void LearnLittle(Stage& stage) {
+  const std::filesystem::path file = stage.folder / "robot.toml";
+  std::ofstream(file) << fmt::format(
+      "extends = \"{0}/robot.toml\"\n[robot]\nurdf = \"{0}/robot.urdf\"\n[training]\nupdates = 3\nupdates_again = 1\n",
+      stage.robot_folder);
+  stage.robot_folder = file;
+}
+
+/// How many processes have the stage's LCM URL in their command line.
+inline int Left(const Stage& stage) {
+  int left = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    if (Read(entry.path() / "cmdline").find(stage.lcm_url) != std::string::npos) ++left;
+  }
+  return left;
+}
+
+}  // namespace plumb
