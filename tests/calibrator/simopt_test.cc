@@ -3,13 +3,13 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
 
 #include "calibrator/calibrator.h"
 #include "calibrator/checkpoint.h"
 #include "tests/calibrator/synthetic.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -145,13 +145,12 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   Iterate(threaded, robot, 2);
   CHECK(SameBits(straight.state().distribution, threaded.state().distribution));
 
-  const auto folder = std::filesystem::temp_directory_path() / "plumbline_simopt_test";
-  std::filesystem::remove_all(folder);
+  const TemporaryFolder folder;
   // A new process, as it were, after every single update.
   for (int i = 0; i < 2; ++i) {
     bool begun = false, done = false;
     while (!done) {
-      CalibrationCheckpoint checkpoint(folder, robot, 9);
+      CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
       SimOpt simopt(robot, 9, 1);
       if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
       if (!begun) {
@@ -163,7 +162,7 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
       checkpoint.Save(simopt.state());
     }
   }
-  CalibrationCheckpoint checkpoint(folder, robot, 9);
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
   const auto resumed = checkpoint.Load();
   REQUIRE(resumed);
   CHECK(resumed->iteration == 2);
@@ -172,16 +171,15 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   SECTION("another description's checkpoint is refused") {
     RobotDescription edited = robot;
     edited.fingerprint ^= 1;
-    CHECK_THROWS_WITH(CalibrationCheckpoint(folder, edited, 9).Load(), Catch::Contains("another robot.toml"));
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), edited, 9).Load(), Catch::Contains("another robot.toml"));
   }
   SECTION("another seed's checkpoint is refused") {
-    CHECK_THROWS_WITH(CalibrationCheckpoint(folder, robot, 10).Load(), Catch::Contains("another seed"));
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), robot, 10).Load(), Catch::Contains("another seed"));
   }
   SECTION("a damaged checkpoint is refused, naming the file") {
     std::ofstream(folder / "rollout_1.json") << "{\"episode\": 3";
     CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("rollout_1.json"));
   }
-  std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("an iteration without a usable transition goes by and invents nothing") {
@@ -227,11 +225,10 @@ TEST_CASE("an inference makes one update of all roll-outs, the same bits with an
     CHECK(sd < 0.01);
   }
 
-  const auto folder = std::filesystem::temp_directory_path() / ("plumbline_inference_test_" + method);
-  std::filesystem::remove_all(folder);
+  const TemporaryFolder folder;
   for (uint32_t i = 0; i < 3; ++i) {
     for (const bool begins : {true, false}) {  // a new process each time, as it were
-      CalibrationCheckpoint checkpoint(folder, robot, 9);
+      CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
       SimOpt simopt(robot, 9, 2, method);
       if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
       if (begins) simopt.Begin({Synthetic(robot, i)});
@@ -239,8 +236,7 @@ TEST_CASE("an inference makes one update of all roll-outs, the same bits with an
       checkpoint.Save(simopt.state());
     }
   }
-  CHECK(SameBits(straight.state().distribution, CalibrationCheckpoint(folder, robot, 9).Load()->distribution));
-  std::filesystem::remove_all(folder);
+  CHECK(SameBits(straight.state().distribution, CalibrationCheckpoint(folder.path(), robot, 9).Load()->distribution));
 }
 
 TEST_CASE("an inference lets an iteration without usable transitions go by, and an unknown method is refused") {
@@ -276,9 +272,8 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   REQUIRE(told.components.size() == 2);
   CHECK(told.components[1].weight == 0.75);
   CHECK(told.components[1].mean == second.mean);
-  const auto folder = std::filesystem::temp_directory_path() / "plumbline_mixture_test";
-  std::filesystem::remove_all(folder);
-  CalibrationCheckpoint checkpoint(folder, robot, 1);
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 1);
   checkpoint.Save(state);
   const auto loaded = checkpoint.Load();
   REQUIRE(loaded);
@@ -288,7 +283,6 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   text.replace(text.find("\"version\": 2"), 12, "\"version\": 1");
   std::ofstream(folder / "calibration.json") << text;
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/cli/shell.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -30,7 +31,7 @@ json Posterior(const std::string& file) {
   return j;
 }
 
-std::string HopperTable(const Folder& folder) {
+std::string HopperTable(const TemporaryFolder& folder) {
   const std::string file = folder / "hopper.csv";
   REQUIRE(Shell(Plumb() + "sim " + Robot("hopper") + " --random --episodes 20 --seed 3 --set mass/torso=3.6 mass/thigh=4.1 "
                 "mass/leg=2.8 mass/foot=5.2 --csv " + file).status == 0);
@@ -38,7 +39,7 @@ std::string HopperTable(const Folder& folder) {
 }
 
 TEST_CASE("plumb calibrate finds the masses of a hopper from plumb sim's own table, and says so everywhere") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string table = HopperTable(folder);
   const Outcome outcome = Shell(Plumb() + "calibrate " + Robot("hopper") + " --csv " + table + " --output " + (folder / "p.json") +
                                 " --report " + (folder / "r.html") + " --urdf " + (folder / "identified.urdf") + " --strict");
@@ -58,7 +59,7 @@ TEST_CASE("plumb calibrate finds the masses of a hopper from plumb sim's own tab
 }
 
 TEST_CASE("a calibration that was killed at any time goes on to the same bits, with any number of threads") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string table = HopperTable(folder);
   const std::string command = Plumb() + "calibrate " + Robot("hopper") + " --csv " + table + " --method reps --budget 200000 --output ";
   REQUIRE(Shell(command + (folder / "whole.json") + " --threads 1").status == 0);
@@ -102,7 +103,7 @@ TEST_CASE("ranks that share the work come to the same bits") {
     WARN("skipped: mpirun (openmpi-bin) is not installed");
     return;
   }
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string table = HopperTable(folder);
   const std::string arguments = "calibrate " + Robot("hopper") + " --csv " + table + " --threads 1 --output ";
   REQUIRE(Shell(Plumb() + arguments + (folder / "one.json")).status == 0);
@@ -114,7 +115,7 @@ TEST_CASE("ranks that share the work come to the same bits") {
 }
 
 TEST_CASE("what cannot be calibrated with is refused in one clear line") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto refused = [&](const std::string& arguments, const std::string& words) {
     const Outcome outcome = Shell(Plumb() + "calibrate " + arguments + " --output " + (folder / "x.json"));
     INFO(arguments << ": " << outcome.text);

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "tests/temporary_folder.h"
 #include "tests/trainer/pendulum.h"
 
 namespace plumb {
@@ -40,16 +41,8 @@ TrainingSession NewSession(uint64_t seed = 4) {
   return TrainingSession(Robot(), MakeGymPendulum, 2, seed, 1);
 }
 
-/// A folder of its own, gone afterwards.
-struct TemporaryFolder {
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "plumb-trainer-XXXXXX").string();
-    path = mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
-  std::string File() const { return (path / "sub" / "trainer.checkpoint").string(); }
-  std::filesystem::path path;
-};
+// In a folder that is still to be made.
+std::string CheckpointIn(const TemporaryFolder& folder) { return folder / "sub/trainer.checkpoint"; }
 
 std::string ReadAll(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -100,10 +93,10 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   while (straight.training()) straight.Advance();
   first.Begin(Distribution(0));
   for (int i = 0; i < 3; ++i) first.Advance();
-  SaveCheckpoint(folder.File(), first.MakeCheckpoint());
+  SaveCheckpoint(CheckpointIn(folder), first.MakeCheckpoint());
 
   TrainingSession second = NewSession();
-  second.Restore(LoadCheckpoint(folder.File()).value());
+  second.Restore(LoadCheckpoint(CheckpointIn(folder)).value());
   CHECK(second.training());
   CHECK(second.update() == 3);
   while (second.training()) second.Advance();
@@ -112,9 +105,9 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
 
   // And once more, between iterations: the policy is there to be sent again, the next distribution is
   // awaited.
-  SaveCheckpoint(folder.File(), second.MakeCheckpoint());
+  SaveCheckpoint(CheckpointIn(folder), second.MakeCheckpoint());
   TrainingSession third = NewSession();
-  third.Restore(LoadCheckpoint(folder.File()).value());
+  third.Restore(LoadCheckpoint(CheckpointIn(folder)).value());
   CHECK(third.complete());
   CHECK(third.awaited() == 1);
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
@@ -152,7 +145,7 @@ TEST_CASE("A newer distribution of the iteration takes effect at the next batch"
 
 TEST_CASE("No checkpoint is nothing; one of another run is an error") {
   const TemporaryFolder folder;
-  CHECK_FALSE(LoadCheckpoint(folder.File()));
+  CHECK_FALSE(LoadCheckpoint(CheckpointIn(folder)));
   TrainingSession session = NewSession();
   session.Begin(Distribution(0));
   const Checkpoint checkpoint = session.MakeCheckpoint();
@@ -170,7 +163,7 @@ TEST_CASE("No checkpoint is nothing; one of another run is an error") {
 
 TEST_CASE("What is not a regular file is no checkpoint, and is named") {
   const TemporaryFolder folder;
-  const std::string pipe = (folder.path / "pipe").string();
+  const std::string pipe = folder / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
   CHECK_THROWS_WITH(LoadCheckpoint(pipe), Catch::Contains(pipe + " is not a regular file"));
   CHECK_THROWS_WITH(LoadCheckpoint("/tmp"), Catch::Contains("/tmp is not a regular file"));
@@ -180,28 +173,28 @@ TEST_CASE("A damaged checkpoint is refused, wherever the damage") {
   const TemporaryFolder folder;
   TrainingSession session = NewSession();
   session.Begin(Distribution(0));
-  SaveCheckpoint(folder.File(), session.MakeCheckpoint());
-  const std::string good = ReadAll(folder.File());
-  REQUIRE(LoadCheckpoint(folder.File()));
-  CHECK_FALSE(std::filesystem::exists(folder.File() + ".new"));
+  SaveCheckpoint(CheckpointIn(folder), session.MakeCheckpoint());
+  const std::string good = ReadAll(CheckpointIn(folder));
+  REQUIRE(LoadCheckpoint(CheckpointIn(folder)));
+  CHECK_FALSE(std::filesystem::exists(CheckpointIn(folder) + ".new"));
   for (size_t at = 0; at < good.size(); at += 1 + at / 7) {
     std::string bad = good;
     bad[at] = static_cast<char>(bad[at] ^ 0x10);
-    WriteAll(folder.File(), bad);
-    REQUIRE_THROWS_AS(LoadCheckpoint(folder.File()), CheckpointError);
-    WriteAll(folder.File(), good.substr(0, at));
-    REQUIRE_THROWS_AS(LoadCheckpoint(folder.File()), CheckpointError);
+    WriteAll(CheckpointIn(folder), bad);
+    REQUIRE_THROWS_AS(LoadCheckpoint(CheckpointIn(folder)), CheckpointError);
+    WriteAll(CheckpointIn(folder), good.substr(0, at));
+    REQUIRE_THROWS_AS(LoadCheckpoint(CheckpointIn(folder)), CheckpointError);
   }
-  WriteAll(folder.File(), good + "x");
-  CHECK_THROWS_AS(LoadCheckpoint(folder.File()), CheckpointError);
+  WriteAll(CheckpointIn(folder), good + "x");
+  CHECK_THROWS_AS(LoadCheckpoint(CheckpointIn(folder)), CheckpointError);
 }
 
 TEST_CASE("A checkpoint that cannot be written says why and leaves the old one") {
   const TemporaryFolder folder;
   TrainingSession session = NewSession();
   session.Begin(Distribution(0));
-  WriteAll((folder.path / "sub").string(), "a file where the folder should be");
-  CHECK_THROWS_WITH(SaveCheckpoint(folder.File(), session.MakeCheckpoint()),
+  WriteAll(folder / "sub", "a file where the folder should be");
+  CHECK_THROWS_WITH(SaveCheckpoint(CheckpointIn(folder), session.MakeCheckpoint()),
                     Catch::Contains("Not a directory"));
 }
 
