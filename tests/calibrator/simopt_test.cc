@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <sstream>
+#include <stdexcept>
 
 #include "calibrator/calibrator.h"
 #include "calibrator/checkpoint.h"
@@ -20,11 +21,18 @@ const Eigen::Vector3d kGravityOverLength(1, 0, -1), kMassLengthSquared(0, 1, 2);
 
 double LogTruth(const Eigen::Vector3d& power) { return power.dot(kTruth.array().log().matrix()); }
 
+/// All updates of the iteration that has begun.
+CalibrationReport Finish(SimOpt& simopt) {
+  for (int update = 0; update < 100; ++update) {
+    if (auto report = simopt.Update()) return *report;
+  }
+  throw std::logic_error("the iteration does not end");
+}
+
 void Iterate(SimOpt& simopt, const RobotDescription& robot, int iterations, double v_sd = 0.01) {
   for (int i = 0; i < iterations; ++i) {
     simopt.Begin({SyntheticRollout(robot, kTruth, 100, 1e-4, v_sd, static_cast<uint32_t>(i))});
-    while (!simopt.Update()) {
-    }
+    Finish(simopt);
   }
 }
 
@@ -90,8 +98,7 @@ TEST_CASE("one wrecked transition in a hundred does not move the distribution") 
     Rollout rollout = SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, i);
     rollout.transitions[40].next_v(0) += 2;  // 140 standard deviations
     simopt.Begin({rollout});
-    while (!simopt.Update()) {
-    }
+    Finish(simopt);
   }
   for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
     CHECK(std::abs(power.dot(Moments(simopt.state().distribution).mean) - LogTruth(power)) < 0.01);
@@ -102,10 +109,7 @@ TEST_CASE("what the motion determines is found and said in words") {
   const RobotDescription robot = Pendulum();
   SimOpt simopt(robot, 1, 1);
   simopt.Begin({SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, 1)});
-  std::optional<CalibrationReport> report;
-  while (!(report = simopt.Update())) {
-  }
-  const Identifiability& found = report->identifiability;
+  const Identifiability found = Finish(simopt).identifiability;
   REQUIRE(found.null.size() == 1);
   CHECK((found.null[0] - kNull).norm() < 1e-3);
   REQUIRE(found.combinations.size() == 2);
@@ -123,7 +127,8 @@ TEST_CASE("every update keeps to the KL bound") {
     simopt.Begin({SyntheticRollout(robot, kTruth, 50, 1e-4, 0.01, 1)});
     Gaussian before = Moments(simopt.state().distribution);
     bool last = false;
-    while (!last) {
+    for (int update = 0; !last; ++update) {
+      REQUIRE(update < 100);
       last = simopt.Update().has_value();
       CHECK(KlDivergence(Moments(simopt.state().distribution), before) <= robot.calibration.kl * (1 + 1e-9));
       before = Moments(simopt.state().distribution);
@@ -149,7 +154,8 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   // A new process, as it were, after every single update.
   for (int i = 0; i < 2; ++i) {
     bool begun = false, done = false;
-    while (!done) {
+    for (int update = 0; !done; ++update) {
+      REQUIRE(update < 100);
       CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
       SimOpt simopt(robot, 9, 1);
       if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
@@ -189,12 +195,10 @@ TEST_CASE("an iteration without a usable transition goes by and invents nothing"
     CHECK_FALSE(simopt.Report());
     simopt.Begin({Rollout{}});
     CHECK_THROWS_AS(simopt.Begin({Rollout{}}), std::invalid_argument);
-    std::optional<CalibrationReport> report;
-    while (!(report = simopt.Update())) {
-    }
-    CHECK(report->iteration == 1);
-    CHECK(std::isnan(report->discrepancy));
-    CHECK(report->identifiability.combinations.empty());
+    const CalibrationReport report = Finish(simopt);
+    CHECK(report.iteration == 1);
+    CHECK(std::isnan(report.discrepancy));
+    CHECK(report.identifiability.combinations.empty());
     CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) == Approx(0).margin(1e-12));
   }
 }

@@ -144,7 +144,7 @@ TEST_CASE("Python signs what we accept, and accepts what we sign") {
   Bytes unsigned_one = ours;
   std::fill(unsigned_one.end() - 32, unsigned_one.end(), uint8_t{0});
   const char* source = std::getenv("PLUMBLINE_SOURCE");
-  const std::string call = "/usr/bin/python3 " + std::string(source ? source : ".") +
+  const std::string call = "timeout 60 /usr/bin/python3 " + std::string(source ? source : ".") +
                            "/tests/common/sign.py " + folder / "key0" + " JOINT_COMMAND " +
                            Hex(unsigned_one);
   FILE* pipe = popen(call.c_str(), "r");

@@ -32,6 +32,7 @@ Texts ReceiveAll(Transport& transport) {
   std::array<Frame, 2> frames;
   while (const int count = transport.Receive(frames)) {
     for (int i = 0; i < count; ++i) texts.push_back(ToText(frames[static_cast<size_t>(i)]));
+    REQUIRE(texts.size() < 1000);
   }
   return texts;
 }

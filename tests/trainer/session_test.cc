@@ -44,6 +44,13 @@ TrainingSession NewSession(uint64_t seed = 4) {
 // In a folder that is still to be made.
 std::string CheckpointIn(const TemporaryFolder& folder) { return folder / "sub/trainer.checkpoint"; }
 
+void TrainToTheEnd(TrainingSession& session) {
+  for (int update = 0; session.training(); ++update) {
+    REQUIRE(update < 100);
+    session.Advance();
+  }
+}
+
 std::string ReadAll(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
@@ -68,6 +75,7 @@ TEST_CASE("Iterations follow one another, each for its own distribution") {
     while (session.training()) {
       session.Advance();
       ++updates;
+      REQUIRE(updates < 100);
       CHECK(session.Status().update == updates);
     }
     CHECK(updates == (iteration == 0 ? 6 : 2));
@@ -90,7 +98,7 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   const TemporaryFolder folder;
   TrainingSession straight = NewSession(), first = NewSession();
   straight.Begin(Distribution(0));
-  while (straight.training()) straight.Advance();
+  TrainToTheEnd(straight);
   first.Begin(Distribution(0));
   for (int i = 0; i < 3; ++i) first.Advance();
   SaveCheckpoint(CheckpointIn(folder), first.MakeCheckpoint());
@@ -99,7 +107,7 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   second.Restore(LoadCheckpoint(CheckpointIn(folder)).value());
   CHECK(second.training());
   CHECK(second.update() == 3);
-  while (second.training()) second.Advance();
+  TrainToTheEnd(second);
   CHECK(second.Policy(1).weight == straight.Policy(1).weight);
   CHECK(second.evaluation().worst == straight.evaluation().worst);
 
@@ -114,7 +122,7 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(third.Status().evaluation_tenth == straight.Status().evaluation_tenth);
   for (TrainingSession* session : {&third, &straight}) {
     session->Begin(Distribution(1));
-    while (session->training()) session->Advance();
+    TrainToTheEnd(*session);
   }
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
   CHECK(third.MakeCheckpoint().critic.second_moment == straight.MakeCheckpoint().critic.second_moment);
@@ -139,7 +147,7 @@ TEST_CASE("A newer distribution of the iteration takes effect at the next batch"
   for (TrainingSession* s : {&session, &undisturbed}) s->Advance();
   CHECK(session.Policy(1).weight != undisturbed.Policy(1).weight);
   CHECK(session.MakeCheckpoint().distribution.mean[0] == newer.components[0].mean[0]);
-  while (session.training()) session.Advance();
+  TrainToTheEnd(session);
   CHECK_FALSE(session.Replace(Distribution(0)));  // its policy is out
 }
 
