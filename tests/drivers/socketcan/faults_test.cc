@@ -158,6 +158,8 @@ struct SerialAdapter {
     if (ioctl(kernels_end.get(), TIOCSETD, &discipline) != 0) return;
     ifreq request{};
     REQUIRE(ioctl(kernels_end.get(), SIOCGIFNAME, &request) == 0);
+    // It is made in the machine's first network namespace, which need not be ours.
+    if (if_nametoindex(request.ifr_name) == 0) return;
     name = request.ifr_name;
     Shell("ip link set " + name + " up");
   }
@@ -180,7 +182,7 @@ struct SerialAdapter {
   }
 
   FileDescriptor our_end, kernels_end;
-  std::string name;  // empty: the kernel has no slcan
+  std::string name;  // empty: there is no slcan here
 };
 
 TEST_CASE("an adapter that goes bus-off") {
@@ -188,7 +190,7 @@ TEST_CASE("an adapter that goes bus-off") {
   SerialAdapter adapter;
   if (adapter.name.empty()) {
     if (InGuest()) FAIL("the guest has no slcan");
-    WARN("not tested: this kernel has no slcan");
+    WARN("not tested: there is no slcan in this network namespace");
     return;
   }
   const auto bus = OpenTransport("socketcan:" + adapter.name);
