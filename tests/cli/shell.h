@@ -1,5 +1,6 @@
 #pragma once
 
+#include <signal.h>
 #include <sys/wait.h>
 
 #include <array>
@@ -18,12 +19,24 @@ struct Outcome {
   std::string text;  ///< both streams
 };
 
-inline Outcome Shell(const std::string& command) {
-  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+/// @param words if any, what it must say to be interrupted (SIGINT) at once.
+inline Outcome Shell(const std::string& command, const std::string& words = "") {
+  std::string quoted;
+  for (const char c : command) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  // What hangs is ended, with status 124. timeout passes our signal on to the command.
+  FILE* pipe = popen(("echo $$; exec timeout -k 60 120 sh -c '" + quoted + "' 2>&1 </dev/null").c_str(), "r");
   REQUIRE(pipe);
-  std::string text;
   std::array<char, 4096> buffer;
-  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
+  REQUIRE(fgets(buffer.data(), buffer.size(), pipe));
+  const pid_t pid = std::atoi(buffer.data());
+  std::string text;
+  bool interrupted = words.empty();
+  while (fgets(buffer.data(), buffer.size(), pipe)) {
+    text += buffer.data();
+    if (interrupted || text.find(words) == std::string::npos) continue;
+    kill(pid, SIGINT);
+    interrupted = true;
+  }
   const int status = pclose(pipe);
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text};
 }
