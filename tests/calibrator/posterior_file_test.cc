@@ -11,6 +11,7 @@
 #include "robot/posterior_reader.h"
 #include "tests/calibrator/sample_findings.h"
 #include "tests/calibrator/synthetic.h"
+#include "tests/calibrator/temporary_file.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {
@@ -19,30 +20,12 @@ namespace {
 using Catch::Contains;
 using nlohmann::json;
 
-/// A file with some text, gone at the end.
-class TextFile {
- public:
-  explicit TextFile(const std::string& text = "") {
-    path_ = std::filesystem::temp_directory_path() /
-            ("plumbline_posterior_" + std::to_string(getpid()) + ".json");
-    Write(text);
-  }
-  ~TextFile() { std::filesystem::remove(path_); }
-  TextFile(const TextFile&) = delete;
-  TextFile& operator=(const TextFile&) = delete;
-  void Write(const std::string& text) const { std::ofstream(path_, std::ios::binary) << text; }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 std::string Error(const std::string& text, const RobotDescription& robot) {
-  const TextFile file(text);
+  const TemporaryFile file(text, ".json");
   try {
     ReadPosterior(file.path(), robot);
   } catch (const std::runtime_error& error) {
-    CHECK_THAT(error.what(), Contains(file.path().string()));
+    CHECK_THAT(error.what(), Contains(file.path()));
     return error.what();
   }
   return "";
@@ -51,7 +34,7 @@ std::string Error(const std::string& text, const RobotDescription& robot) {
 TEST_CASE("a posterior reads back to the same bits") {
   const RobotDescription robot = Pendulum();
   const Findings findings = SampleFindings(robot);
-  const TextFile file;
+  const TemporaryFile file("", ".json");
   WritePosterior(file.path(), findings, robot, SampleProvenance());
   const ParameterDistribution read = ReadPosterior(file.path(), robot);
   REQUIRE(read.components.size() == 2);

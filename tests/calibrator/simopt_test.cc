@@ -3,13 +3,14 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <stdexcept>
 
 #include "calibrator/calibrator.h"
 #include "calibrator/checkpoint.h"
 #include "tests/calibrator/synthetic.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -20,11 +21,18 @@ const Eigen::Vector3d kGravityOverLength(1, 0, -1), kMassLengthSquared(0, 1, 2);
 
 double LogTruth(const Eigen::Vector3d& power) { return power.dot(kTruth.array().log().matrix()); }
 
+/// All updates of the iteration that has begun.
+CalibrationReport Finish(SimOpt& simopt) {
+  for (int update = 0; update < 100; ++update) {
+    if (auto report = simopt.Update()) return *report;
+  }
+  throw std::logic_error("the iteration does not end");
+}
+
 void Iterate(SimOpt& simopt, const RobotDescription& robot, int iterations, double v_sd = 0.01) {
   for (int i = 0; i < iterations; ++i) {
     simopt.Begin({SyntheticRollout(robot, kTruth, 100, 1e-4, v_sd, static_cast<uint32_t>(i))});
-    while (!simopt.Update()) {
-    }
+    Finish(simopt);
   }
 }
 
@@ -90,8 +98,7 @@ TEST_CASE("one wrecked transition in a hundred does not move the distribution") 
     Rollout rollout = SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, i);
     rollout.transitions[40].next_v(0) += 2;  // 140 standard deviations
     simopt.Begin({rollout});
-    while (!simopt.Update()) {
-    }
+    Finish(simopt);
   }
   for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
     CHECK(std::abs(power.dot(Moments(simopt.state().distribution).mean) - LogTruth(power)) < 0.01);
@@ -102,10 +109,7 @@ TEST_CASE("what the motion determines is found and said in words") {
   const RobotDescription robot = Pendulum();
   SimOpt simopt(robot, 1, 1);
   simopt.Begin({SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, 1)});
-  std::optional<CalibrationReport> report;
-  while (!(report = simopt.Update())) {
-  }
-  const Identifiability& found = report->identifiability;
+  const Identifiability found = Finish(simopt).identifiability;
   REQUIRE(found.null.size() == 1);
   CHECK((found.null[0] - kNull).norm() < 1e-3);
   REQUIRE(found.combinations.size() == 2);
@@ -123,7 +127,8 @@ TEST_CASE("every update keeps to the KL bound") {
     simopt.Begin({SyntheticRollout(robot, kTruth, 50, 1e-4, 0.01, 1)});
     Gaussian before = Moments(simopt.state().distribution);
     bool last = false;
-    while (!last) {
+    for (int update = 0; !last; ++update) {
+      REQUIRE(update < 100);
       last = simopt.Update().has_value();
       CHECK(KlDivergence(Moments(simopt.state().distribution), before) <= robot.calibration.kl * (1 + 1e-9));
       before = Moments(simopt.state().distribution);
@@ -145,13 +150,13 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   Iterate(threaded, robot, 2);
   CHECK(SameBits(straight.state().distribution, threaded.state().distribution));
 
-  const auto folder = std::filesystem::temp_directory_path() / "plumbline_simopt_test";
-  std::filesystem::remove_all(folder);
+  const TemporaryFolder folder;
   // A new process, as it were, after every single update.
   for (int i = 0; i < 2; ++i) {
     bool begun = false, done = false;
-    while (!done) {
-      CalibrationCheckpoint checkpoint(folder, robot, 9);
+    for (int update = 0; !done; ++update) {
+      REQUIRE(update < 100);
+      CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
       SimOpt simopt(robot, 9, 1);
       if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
       if (!begun) {
@@ -163,7 +168,7 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
       checkpoint.Save(simopt.state());
     }
   }
-  CalibrationCheckpoint checkpoint(folder, robot, 9);
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
   const auto resumed = checkpoint.Load();
   REQUIRE(resumed);
   CHECK(resumed->iteration == 2);
@@ -172,16 +177,15 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   SECTION("another description's checkpoint is refused") {
     RobotDescription edited = robot;
     edited.fingerprint ^= 1;
-    CHECK_THROWS_WITH(CalibrationCheckpoint(folder, edited, 9).Load(), Catch::Contains("another robot.toml"));
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), edited, 9).Load(), Catch::Contains("another robot.toml"));
   }
   SECTION("another seed's checkpoint is refused") {
-    CHECK_THROWS_WITH(CalibrationCheckpoint(folder, robot, 10).Load(), Catch::Contains("another seed"));
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), robot, 10).Load(), Catch::Contains("another seed"));
   }
   SECTION("a damaged checkpoint is refused, naming the file") {
     std::ofstream(folder / "rollout_1.json") << "{\"episode\": 3";
     CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("rollout_1.json"));
   }
-  std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("an iteration without a usable transition goes by and invents nothing") {
@@ -191,12 +195,10 @@ TEST_CASE("an iteration without a usable transition goes by and invents nothing"
     CHECK_FALSE(simopt.Report());
     simopt.Begin({Rollout{}});
     CHECK_THROWS_AS(simopt.Begin({Rollout{}}), std::invalid_argument);
-    std::optional<CalibrationReport> report;
-    while (!(report = simopt.Update())) {
-    }
-    CHECK(report->iteration == 1);
-    CHECK(std::isnan(report->discrepancy));
-    CHECK(report->identifiability.combinations.empty());
+    const CalibrationReport report = Finish(simopt);
+    CHECK(report.iteration == 1);
+    CHECK(std::isnan(report.discrepancy));
+    CHECK(report.identifiability.combinations.empty());
     CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) == Approx(0).margin(1e-12));
   }
 }
@@ -227,11 +229,10 @@ TEST_CASE("an inference makes one update of all roll-outs, the same bits with an
     CHECK(sd < 0.01);
   }
 
-  const auto folder = std::filesystem::temp_directory_path() / ("plumbline_inference_test_" + method);
-  std::filesystem::remove_all(folder);
+  const TemporaryFolder folder;
   for (uint32_t i = 0; i < 3; ++i) {
     for (const bool begins : {true, false}) {  // a new process each time, as it were
-      CalibrationCheckpoint checkpoint(folder, robot, 9);
+      CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
       SimOpt simopt(robot, 9, 2, method);
       if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
       if (begins) simopt.Begin({Synthetic(robot, i)});
@@ -239,8 +240,7 @@ TEST_CASE("an inference makes one update of all roll-outs, the same bits with an
       checkpoint.Save(simopt.state());
     }
   }
-  CHECK(SameBits(straight.state().distribution, CalibrationCheckpoint(folder, robot, 9).Load()->distribution));
-  std::filesystem::remove_all(folder);
+  CHECK(SameBits(straight.state().distribution, CalibrationCheckpoint(folder.path(), robot, 9).Load()->distribution));
 }
 
 TEST_CASE("an inference lets an iteration without usable transitions go by, and an unknown method is refused") {
@@ -276,9 +276,8 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   REQUIRE(told.components.size() == 2);
   CHECK(told.components[1].weight == 0.75);
   CHECK(told.components[1].mean == second.mean);
-  const auto folder = std::filesystem::temp_directory_path() / "plumbline_mixture_test";
-  std::filesystem::remove_all(folder);
-  CalibrationCheckpoint checkpoint(folder, robot, 1);
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 1);
   checkpoint.Save(state);
   const auto loaded = checkpoint.Load();
   REQUIRE(loaded);
@@ -288,7 +287,6 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   text.replace(text.find("\"version\": 2"), 12, "\"version\": 1");
   std::ofstream(folder / "calibration.json") << text;
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

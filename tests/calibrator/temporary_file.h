@@ -1,11 +1,10 @@
 #pragma once
 
-#include <unistd.h>
-
-#include <filesystem>
 #include <fstream>
 #include <string>
 #include <string_view>
+
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 
@@ -13,14 +12,9 @@ namespace plumb {
 class TemporaryFile {
  public:
   explicit TemporaryFile(std::string_view contents, const std::string& suffix = "")
-      : path_((std::filesystem::temp_directory_path() /
-               ("plumbline_log_test_" + std::to_string(getpid()) + suffix))
-                  .string()) {
+      : path_(folder_ / ("file" + suffix)) {
     Write(contents);
   }
-  ~TemporaryFile() { std::filesystem::remove(path_); }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
 
   void Write(std::string_view contents) const {
     std::ofstream(path_, std::ios::binary)
@@ -29,6 +23,7 @@ class TemporaryFile {
   const std::string& path() const { return path_; }
 
  private:
+  TemporaryFolder folder_;
   std::string path_;
 };
 

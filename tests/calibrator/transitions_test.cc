@@ -220,8 +220,7 @@ TEST_CASE("an iteration begins when its roll-outs are complete, whatever came fi
   REQUIRE(calibrator.ready());
   CHECK(calibrator.Begin() == 20);
   CHECK(CountTransitions(simopt.state().rollouts) == 20);
-  while (!simopt.Update()) {
-  }
+  for (int update = 0; !simopt.Update(); ++update) REQUIRE(update < 100);
   calibrator.OnControllerStatus(status);  // repeated at 10 Hz
   CHECK_FALSE(calibrator.ready());
   status.policy_iteration = 1;

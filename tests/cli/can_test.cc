@@ -3,6 +3,7 @@
 #include <string>
 
 #include "tests/cli/shell.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 
@@ -14,7 +15,7 @@ TEST_CASE("can plan: the hopper's bus, and one that cannot work") {
        {"0x06e", "Set_Input_Torque", "boom_yaw", "TPDO1", "0x3b2", "at worst", "all deadlines are met"}) {
     CHECK_THAT(outcome.text, Catch::Contains(word));
   }
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string toml = Read(Robot("hopper") + "/robot.toml");
   const std::string base = "base = 0x380";
   std::string colliding = toml;
@@ -29,7 +30,7 @@ TEST_CASE("can plan: the hopper's bus, and one that cannot work") {
 }
 
 TEST_CASE("can dbc: to the screen or a file, the same") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Outcome printed = Shell(Plumb() + "can dbc " + Robot("hopper"));
   CHECK(printed.status == 0);
   CHECK_THAT(printed.text, Catch::Contains("BO_ 41 thigh_Get_Encoder_Estimates: 8 thigh"));

@@ -9,6 +9,7 @@
 #include "common/messenger.h"
 #include "common/signature.h"
 #include "tests/cli/shell.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -62,7 +63,7 @@ TEST_CASE("whether commands are signed, and whether that will do") {
   CHECK_THAT(unsigned_open.what, Catch::Contains("anybody on the network"));
   CHECK_THAT(unsigned_open.cure, Catch::Contains("plumb key"));
 
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string key = folder / "key";
   MakeKeyFile(key);
   for (const std::string& url : {local, open}) {
@@ -79,7 +80,7 @@ TEST_CASE("whether commands are signed, and whether that will do") {
 }
 
 TEST_CASE("plumb key makes a key once") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Outcome first = Shell(Plumb() + "key " + (folder / "key")),
                 second = Shell(Plumb() + "key " + (folder / "key"));
   CHECK(first.status == 0);

@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <filesystem>
 #include <sstream>
 #include <string>
 
 #include "tests/cli/shell.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -19,7 +19,7 @@ Outcome Excite(const std::string& robot, const std::string& arguments) {
 
 TEST_CASE(
     "excite: a table of efforts within the limits, one row per control step, the same for the same seed") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string few = " --candidates 11 --seconds 3 --output ";
   const Outcome outcome =
       Excite("pendulum", "--seed 3" + few + folder / "a.csv" + " --png " + folder / "a.png");
@@ -52,7 +52,7 @@ TEST_CASE(
 }
 
 TEST_CASE("excite: of the falling hopper only what comes before the fall, in gym's units") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Outcome outcome = Excite("hopper", "--candidates 6 --seconds 4 --output " + folder / "a.csv");
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
@@ -62,7 +62,7 @@ TEST_CASE("excite: of the falling hopper only what comes before the fall, in gym
 }
 
 TEST_CASE("excite: what cannot be done is said before anything is computed") {
-  const Folder folder;
+  const TemporaryFolder folder;
   CHECK(Excite("pendulum", "--candidates 0").status != 0);
   CHECK(Excite("pendulum", "--seconds 0").status != 0);
   CHECK(Excite("nowhere", "").status != 0);

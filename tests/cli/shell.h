@@ -1,13 +1,12 @@
 #pragma once
 
+#include <signal.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -20,32 +19,27 @@ struct Outcome {
   std::string text;  ///< both streams
 };
 
-inline Outcome Shell(const std::string& command) {
-  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+/// @param words if any, what it must say to be interrupted (SIGINT) at once.
+inline Outcome Shell(const std::string& command, const std::string& words = "") {
+  std::string quoted;
+  for (const char c : command) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  // What hangs is ended, with status 124. timeout passes our signal on to the command.
+  FILE* pipe = popen(("echo $$; exec timeout -k 60 120 sh -c '" + quoted + "' 2>&1 </dev/null").c_str(), "r");
   REQUIRE(pipe);
-  std::string text;
   std::array<char, 4096> buffer;
-  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
+  REQUIRE(fgets(buffer.data(), buffer.size(), pipe));
+  const pid_t pid = std::atoi(buffer.data());
+  std::string text;
+  bool interrupted = words.empty();
+  while (fgets(buffer.data(), buffer.size(), pipe)) {
+    text += buffer.data();
+    if (interrupted || text.find(words) == std::string::npos) continue;
+    kill(pid, SIGINT);
+    interrupted = true;
+  }
   const int status = pclose(pipe);
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text};
 }
-
-/// A folder of the test's own, gone when it ends.
-class Folder {
- public:
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "plumbline_cli_test_XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()));
-    path_ = name;
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// The program under test, with a space behind it, and the robots it comes with.
 inline std::string Plumb() { return std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb "; }

@@ -8,13 +8,14 @@
 
 #include "tests/cli/shell.h"
 #include "tests/estimator/observer_errors.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string WriteLog(const Folder& folder, const std::vector<SimulatedReadings::Sample>& samples) {
+std::string WriteLog(const TemporaryFolder& folder, const std::vector<SimulatedReadings::Sample>& samples) {
   const std::string file = folder / "run.lcmlog";
   lcm::LogFile log(file, "w");
   REQUIRE(log.good());
@@ -42,7 +43,7 @@ double Deviance(const RobotDescription& robot, const std::vector<SimulatedReadin
 }
 
 TEST_CASE("plumb estimate tune prints settings under which another motion's readings are likelier") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const RobotDescription shipped = LoadRobot(Robot("pendulum"));
   const std::string log = WriteLog(folder, Swing(shipped, 1));
   const Outcome outcome = Shell(Plumb() + "estimate tune " + Robot("pendulum") + " --log " + log);
@@ -66,7 +67,7 @@ TEST_CASE("plumb estimate tune prints settings under which another motion's read
 }
 
 TEST_CASE("plumb estimate tune says what a log lacks") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::vector<SimulatedReadings::Sample> samples = Swing(LoadRobot(Robot("pendulum")), 1, 0.1);
   const Outcome little =
       Shell(Plumb() + "estimate tune " + Robot("pendulum") + " --log " + WriteLog(folder, samples));

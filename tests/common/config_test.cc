@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/temporary_folder.h"
+
 namespace plumb {
 namespace {
 
@@ -59,7 +61,8 @@ TEST_CASE("what is no file of text is refused, however long") {
   namespace fs = std::filesystem;
   CHECK_THROWS_WITH(ReadFile("/"), Equals("/: is a folder"));
   CHECK_THROWS_WITH(ReadFile("/dev/zero"), Equals("/dev/zero: is not a regular file"));
-  const std::string file = (fs::temp_directory_path() / ("plumbline_config_test_" + std::to_string(getpid()))).string();
+  const TemporaryFolder folder;
+  const std::string file = folder / "file";
   REQUIRE(mkfifo(file.c_str(), 0600) == 0);
   CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": is not a regular file"));  // nor does it wait for a writer
   fs::remove(file);
@@ -68,17 +71,10 @@ TEST_CASE("what is no file of text is refused, however long") {
   CHECK(ReadFile(file).empty());
   fs::resize_file(file, (size_t{16} << 20) + 1);
   CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": is longer than 16 MB"));
-  fs::remove(file);
 }
 
-/// Files of a folder that is gone at the end.
-struct Folder {
-  Folder() { std::filesystem::create_directory(path); }
-  ~Folder() { std::filesystem::remove_all(path); }
-  void Write(const std::string& name, const std::string& text) const { std::ofstream(path / name) << text; }
-  std::string At(const std::string& name) const { return (path / name).string(); }
-  const std::filesystem::path path =
-      std::filesystem::temp_directory_path() / ("plumbline_config_folder_" + std::to_string(getpid()));
+struct Folder : TemporaryFolder {
+  void Write(const std::string& name, const std::string& text) const { std::ofstream(*this / name) << text; }
 };
 
 TEST_CASE("a file that extends another stands in its place, key by key, table by table, name by name") {
@@ -91,8 +87,8 @@ TEST_CASE("a file that extends another stands in its place, key by key, table by
                "[[j]]\nname = \"hip\"\nm = 10\n[[j]]\nname = \"toe\"\nm = 50\n[u]\nv = 1\n");
   folder.Write("last.toml", "extends = \"own.toml\"\nc = 300\n");
   std::vector<std::string> files;
-  Config config = Config::Load(folder.At("last.toml"), &files);
-  CHECK(files == std::vector<std::string>{folder.At("last.toml"), folder.At("own.toml"), folder.At("base.toml")});
+  Config config = Config::Load(folder / "last.toml", &files);
+  CHECK(files == std::vector<std::string>{folder / "last.toml", folder / "own.toml", folder / "base.toml"});
   CHECK(config.Number("a") == 1);
   CHECK(config.Number("b") == 20);
   CHECK(config.Number("c") == 300);
@@ -117,28 +113,28 @@ TEST_CASE("mistakes in files that extend each other are named in the file where 
   folder.Write("base.toml", "a = \"x\"\n[t]\nb = 1\n[[j]]\nname = \"hip\"\n");
   folder.Write("own.toml",
                "extends = \"base.toml\"\n[t]\nc = -1\nd = 1\n[[j]]\nname = \"hip\"\nm = -1\n[[j]]\nname = \"hip\"\n");
-  Config config = Config::Load(folder.At("own.toml"));
-  CHECK_THROWS_WITH(config.Number("a"), Equals(folder.At("base.toml") + ":1:5: a is not a number"));
+  Config config = Config::Load(folder / "own.toml");
+  CHECK_THROWS_WITH(config.Number("a"), Equals((folder / "base.toml") + ":1:5: a is not a number"));
   Config t = config.Table("t");
-  CHECK_THROWS_WITH(t.Number("e"), Equals(folder.At("base.toml") + ":2:1: t.e is missing"));
-  CHECK_THROWS_WITH(t.Number("c", kPositive), Equals(folder.At("own.toml") + ":3:5: t.c = -1 is not a positive finite number"));
+  CHECK_THROWS_WITH(t.Number("e"), Equals((folder / "base.toml") + ":2:1: t.e is missing"));
+  CHECK_THROWS_WITH(t.Number("c", kPositive), Equals((folder / "own.toml") + ":3:5: t.c = -1 is not a positive finite number"));
   CHECK(t.Number("b") == 1);
-  CHECK_THROWS_WITH(t.Finish(), Catch::Contains(folder.At("own.toml") + ":4:5: t.d is not a known key"));
-  CHECK(t.Position("d") == folder.At("own.toml") + ":4:5: ");
+  CHECK_THROWS_WITH(t.Finish(), Catch::Contains((folder / "own.toml") + ":4:5: t.d is not a known key"));
+  CHECK(t.Position("d") == (folder / "own.toml") + ":4:5: ");
   std::vector<Config> joints = config.Tables("j");
   REQUIRE(joints.size() == 2);  // of the same name: for the reader to refuse
   CHECK_THROWS_WITH(joints[0].Number("m", kPositive),
-                    Equals(folder.At("own.toml") + ":7:5: j[0].m = -1 is not a positive finite number"));
+                    Equals((folder / "own.toml") + ":7:5: j[0].m = -1 is not a positive finite number"));
 
   const auto refused = [&](const std::string& text, const std::string& why) {
     folder.Write("bad.toml", text);
-    CHECK_THROWS_WITH(Config::Load(folder.At("bad.toml")), Catch::Contains(folder.At("bad.toml") + why));
+    CHECK_THROWS_WITH(Config::Load(folder / "bad.toml"), Catch::Contains((folder / "bad.toml") + why));
   };
   refused("extends = 3\n", ":1:11: extends is not a string");
   refused("a = 1\nextends = \"none.toml\"\n", ":2:11: extends = \"none.toml\": there is no such file");
   refused("extends = \"bad.toml\"\n", ":1:11: extends a file that extends a file");
   folder.Write("folder.toml", "extends = \".\"\n");
-  CHECK_THROWS_WITH(Config::Load(folder.At("folder.toml")), Catch::Contains("is a folder"));
+  CHECK_THROWS_WITH(Config::Load(folder / "folder.toml"), Catch::Contains("is a folder"));
   CHECK_THROWS_WITH(Read("extends = \"base.toml\"\n").Finish(), Catch::Contains("extends is not a known key"));
 }
 

@@ -13,6 +13,7 @@
 
 #include "plumb/driver_request_t.hpp"
 #include "plumb/joint_command_t.hpp"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -23,18 +24,12 @@ using Bytes = std::vector<uint8_t>;
 constexpr int64_t kNow = 1'700'000'000'000'000;  // [us]
 constexpr char kForeign[] = "not signed with the driver's key";
 
-/// A folder of the test's own, gone when it ends.
-struct Folder {
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "plumbline_signature_XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()));
-    path = name;
-  }
-  ~Folder() { fs::remove_all(path); }
+struct Folder : TemporaryFolder {
   fs::path Write(const std::string& name, const std::string& text, mode_t mode = 0600) const {
-    std::ofstream(path / name) << text;
-    chmod((path / name).c_str(), mode);
-    return path / name;
+    const fs::path file = path() / name;
+    std::ofstream(file) << text;
+    chmod(file.c_str(), mode);
+    return file;
   }
   /// A key of 32 bytes first, first + 1, ...
   SigningKey Key(int first = 0) const {
@@ -46,7 +41,6 @@ struct Folder {
     }
     return SigningKey(Write("key" + std::to_string(first), text + "\n"));
   }
-  fs::path path;
 };
 
 std::string Hex(std::span<const uint8_t> bytes) {
@@ -150,8 +144,8 @@ TEST_CASE("Python signs what we accept, and accepts what we sign") {
   Bytes unsigned_one = ours;
   std::fill(unsigned_one.end() - 32, unsigned_one.end(), uint8_t{0});
   const char* source = std::getenv("PLUMBLINE_SOURCE");
-  const std::string call = "/usr/bin/python3 " + std::string(source ? source : ".") +
-                           "/tests/common/sign.py " + (folder.path / "key0").string() + " JOINT_COMMAND " +
+  const std::string call = "timeout 60 /usr/bin/python3 " + std::string(source ? source : ".") +
+                           "/tests/common/sign.py " + folder / "key0" + " JOINT_COMMAND " +
                            Hex(unsigned_one);
   FILE* pipe = popen(call.c_str(), "r");
   REQUIRE(pipe);
@@ -249,7 +243,7 @@ TEST_CASE("requests are signed, too") {
 
 TEST_CASE("a new key file is its owner's alone, random, and never replaces another") {
   const Folder folder;
-  const fs::path file = folder.path / "new", other = folder.path / "other";
+  const fs::path file = folder.path() / "new", other = folder.path() / "other";
   const mode_t mask = umask(0);
   MakeKeyFile(file);
   MakeKeyFile(other);
@@ -264,7 +258,7 @@ TEST_CASE("a new key file is its owner's alone, random, and never replaces anoth
   const Signature before = SigningKey(file).Sign("X", body);
   CHECK_THROWS_WITH(MakeKeyFile(file), Catch::Contains("never replaced"));
   CHECK(SigningKey(file).Sign("X", body) == before);
-  CHECK_THROWS_WITH(MakeKeyFile(folder.path / "no folder" / "key"), Catch::Contains("cannot be written"));
+  CHECK_THROWS_WITH(MakeKeyFile(folder.path() / "no folder" / "key"), Catch::Contains("cannot be written"));
 }
 
 TEST_CASE("a key that others may read, or that is none, is refused with the cure") {
@@ -284,11 +278,11 @@ TEST_CASE("a key that others may read, or that is none, is refused with the cure
     CHECK_THAT(WhatIsWrong(folder.Write("bad", text)),
                Catch::Contains("64 hexadecimal digits") && Catch::Contains("plumb key"));
   }
-  CHECK_THAT(WhatIsWrong(folder.path / "absent"),
+  CHECK_THAT(WhatIsWrong(folder.path() / "absent"),
              Catch::Contains("No such file") && Catch::Contains("plumb key"));
-  CHECK_THAT(WhatIsWrong(folder.path), Catch::Contains("not a file"));
-  REQUIRE(mkfifo((folder.path / "pipe").c_str(), 0600) == 0);
-  CHECK_THAT(WhatIsWrong(folder.path / "pipe"), Catch::Contains("not a file"));
+  CHECK_THAT(WhatIsWrong(folder.path()), Catch::Contains("not a file"));
+  REQUIRE(mkfifo((folder.path() / "pipe").c_str(), 0600) == 0);
+  CHECK_THAT(WhatIsWrong(folder.path() / "pipe"), Catch::Contains("not a file"));
 }
 
 }  // namespace

@@ -178,7 +178,9 @@ TEST_CASE("a heartbeat from before the order to run was obeyed does not confirm 
   rig.Start();
   rig.Run(300);
   rig.Request(driver_request_t::ARM);
-  while (!std::ranges::any_of(rig.sent, [](const Frame& frame) { return frame.id == 0x27; })) rig.Step();
+  const auto has_order = [&] { return std::ranges::any_of(rig.sent, [](const Frame& frame) { return frame.id == 0x27; }); };
+  for (int i = 0; i < 1000 && !has_order(); ++i) rig.Step();
+  REQUIRE(has_order());
   rig.Request(driver_request_t::DISARM);
   rig.Inject("021#0000000001000000");
   rig.Step();

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <random>
@@ -16,6 +15,7 @@
 
 #include "drivers/bus_plan.h"
 #include "drivers/protocols/mit.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -74,7 +74,9 @@ std::vector<Sent> RandomFrames(const std::vector<BusDevice>& devices, int each) 
         Frame frame;
         frame.id = message.id;
         frame.length = message.layout.length;
+        int tries = 0;
         do {
+          REQUIRE(++tries < 1000);
           for (size_t byte = 0; byte < frame.length; ++byte)
             frame.data[byte] = static_cast<uint8_t>(random());
           if (message.selector >= 0) frame.data[0] = static_cast<uint8_t>(message.selector);
@@ -87,8 +89,7 @@ std::vector<Sent> RandomFrames(const std::vector<BusDevice>& devices, int each) 
 }
 
 void CheckDecodes(const std::vector<BusDevice>& devices) {
-  const auto folder = std::filesystem::temp_directory_path() / ("plumbline_dbc_" + std::to_string(getpid()));
-  std::filesystem::create_directories(folder);
+  const TemporaryFolder folder;
   const std::string dbc = folder / "bus.dbc", list = folder / "frames";
   std::ofstream(dbc) << ToDbc(devices);
   const std::vector<Sent> sent = RandomFrames(devices, 20);
@@ -99,14 +100,13 @@ void CheckDecodes(const std::vector<BusDevice>& devices) {
     }
   }
   FILE* pipe = popen(
-      ("/usr/bin/python3 " + Source() + "/tests/drivers/decode_dbc.py " + dbc + " " + list + " 2>&1").c_str(),
+      ("timeout 60 /usr/bin/python3 " + Source() + "/tests/drivers/decode_dbc.py " + dbc + " " + list + " 2>&1").c_str(),
       "r");
   REQUIRE(pipe);
   std::string text;
   std::array<char, 4096> buffer;
   while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
   const int status = pclose(pipe);
-  std::filesystem::remove_all(folder);
   INFO(text.substr(text.size() > 2000 ? text.size() - 2000 : 0));
   REQUIRE(status == 0);
 

@@ -5,7 +5,6 @@
 
 #include <atomic>
 #include <catch2/catch.hpp>
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <new>
@@ -14,6 +13,7 @@
 #include "common/signature.h"
 #include "drivers/can/transport.h"
 #include "tests/drivers/rig.h"
+#include "tests/temporary_folder.h"
 
 namespace {
 std::atomic<long> allocations = 0;
@@ -101,10 +101,9 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
 }
 
 TEST_CASE("judging signatures, and what comes of it, allocates nothing") {
-  const std::string file = "/tmp/driver_allocation_test." + std::to_string(getpid()) + ".key";
-  MakeKeyFile(file);
-  const SigningKey key(file);
-  unlink(file.c_str());
+  const TemporaryFolder folder;
+  MakeKeyFile(folder / "key");
+  const SigningKey key(folder / "key");
   Rig rig;
   rig.Start();
   REQUIRE(rig.Arm(1));
@@ -131,7 +130,8 @@ TEST_CASE("judging signatures, and what comes of it, allocates nothing") {
 }
 
 TEST_CASE("an open transport allocates nothing, faults or not") {
-  const std::string name = "/tmp/driver_allocation_test." + std::to_string(getpid()) + ".log";
+  const TemporaryFolder folder;
+  const std::string name = folder / "bus.log";
   std::ofstream(name) << "(1.0) can0 029#11\n(1.1) can0 029#R\n";
   std::array<Frame, 16> frames;
   const FrameBatch batch = [] {
@@ -158,7 +158,6 @@ TEST_CASE("an open transport allocates nothing, faults or not") {
     CHECK(allocations == before);
     CHECK(one->stats().sent > 1000);
   }
-  std::remove(name.c_str());
 }
 
 }  // namespace

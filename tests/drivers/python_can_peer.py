@@ -1,6 +1,6 @@
 """Answers each frame it receives by multicast: same data reversed, id + 1, remote frames by data frames.
 
-usage: python_can_peer.py GROUP PORT   (ends after a frame with id 0x7FF, or after 20 s)
+usage: python_can_peer.py GROUP PORT   (ends after a frame with id 0x7FF, or 60 s without any)
 """
 import sys
 
@@ -9,7 +9,7 @@ import can
 bus = can.Bus(interface="udp_multicast", channel=sys.argv[1], port=int(sys.argv[2]), hop_limit=0, fd=True)
 bus.send(can.Message(arbitration_id=0x001, is_extended_id=False, data=b"ready"))
 while True:
-    message = bus.recv(20)
+    message = bus.recv(60)
     if message is None or message.arbitration_id == 0x7FF:
         break
     if message.arbitration_id % 2 == 1:

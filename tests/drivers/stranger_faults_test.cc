@@ -1,10 +1,10 @@
 // Who else may interfere: commands that stay away, other masters, clocks, recordings.
 
 #include <catch2/catch.hpp>
-#include <filesystem>
 #include <fstream>
 
 #include "tests/drivers/fault.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -116,8 +116,8 @@ TEST_CASE("fault 17: a log is played on the live bus", "[fault]") {
 }
 
 TEST_CASE("fault 17: a recording instead of a bus", "[fault]") {
-  const std::filesystem::path log =
-      std::filesystem::temp_directory_path() / fmt::format("plumbline_recording_{}.log", getpid());
+  const TemporaryFolder folder;
+  const std::string log = folder / "recording.log";
   {
     std::ofstream file(log);
     for (int i = 0; i < 400; ++i) {
@@ -128,8 +128,7 @@ TEST_CASE("fault 17: a recording instead of a bus", "[fault]") {
   }
   Rig rig;
   rig.Start();
-  const auto recording = OpenTransport("replay:" + log.string(), rig.driver->filters());
-  std::filesystem::remove(log);
+  const auto recording = OpenTransport("replay:" + log, rig.driver->filters());
   rig.driver->set_replay(recording->is_replay());
   rig.to_driver = [](Frame&) { return false; };
   rig.on_step = [&] {

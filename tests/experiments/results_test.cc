@@ -1,29 +1,21 @@
 #include "experiments/results.h"
 
 #include <catch2/catch.hpp>
-#include <cstdlib>
 #include <fstream>
 #include <string>
 
+#include "tests/temporary_folder.h"
+
 namespace plumb {
 namespace {
-
-struct Folder {
-  std::filesystem::path path;
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "resultsXXXXXX").string();
-    path = mkdtemp(name.data());
-  }
-  ~Folder() { std::filesystem::remove_all(path); }
-};
 
 Results Open(const std::filesystem::path& file, const std::string& settings = "runs 2") { return Results(file, settings, {"task", "way"}, {"n", "error"}); }
 
 void Write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
 
 TEST_CASE("a table is read as it was written, nan included") {
-  const Folder folder;
-  const auto file = folder.path / "deep" / "table.csv";
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "deep" / "table.csv";
   {
     Results results = Open(file);
     results.Add("hop,step", {{1, 0.5}, {2, std::nan("")}});
@@ -39,8 +31,8 @@ TEST_CASE("a table is read as it was written, nan included") {
 }
 
 TEST_CASE("a table of something else is not touched") {
-  const Folder folder;
-  const auto file = folder.path / "table.csv";
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "table.csv";
   const std::string right = "# runs 2\ntask,way,n,error\n";
   for (const std::string text : {"", "x\n", "# runs 2\n", "# runs 2\ntask,way,n\n", "# runs 2\ntask,way,n,error\nhop,step,1\n", "# runs 2\ntask,way,n,error\nhop,step,1,2,3\n",
                                  "# runs 2\ntask,way,n,error\nhop\n", "# runs 2\ntask,way,n,error\nhop,step,1,two\n"}) {

@@ -9,6 +9,7 @@
 
 #include "common/config.h"
 #include "robot/urdf.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -27,20 +28,17 @@ std::string Text(const std::string& file) {
 class Edited {
  public:
   Edited(const std::string& file, const std::string& from, const std::string& to) {
-    static int count = 0;
-    folder_ = fs::temp_directory_path() / ("plumbline_description_test_" + std::to_string(getpid()) + "_" + std::to_string(count++));
-    fs::copy(kPendulum, folder_);
+    fs::copy(kPendulum, folder_.path());
     std::string text = Text(kPendulum + "/" + file);
     const auto at = text.find(from);
     REQUIRE(at != std::string::npos);
     text.replace(at, from.size(), to);
     std::ofstream(folder_ / file) << text;
   }
-  ~Edited() { fs::remove_all(folder_); }
-  std::string path() const { return folder_; }
+  std::string path() const { return folder_.path(); }
 
  private:
-  fs::path folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_CASE("impacts and coupling of the estimator are read and checked") {
@@ -166,7 +164,8 @@ TEST_CASE("mistakes in robot.urdf name the file and the element") {
 // Two 1 kg points 2 m apart, the second behind a fixed joint turned by 90 degrees: their common centre is in the
 // middle, the inertia about it is that of a dumbbell.
 TEST_CASE("links behind fixed joints are merged by the parallel axis theorem") {
-  const fs::path file = fs::temp_directory_path() / ("plumbline_dumbbell_" + std::to_string(getpid()) + ".urdf");
+  const TemporaryFolder folder;
+  const std::string file = folder / "dumbbell.urdf";
   std::ofstream(file) << R"(<robot name="d"><link name="base"/>
     <link name="a"><inertial><origin xyz="0 0 0"/><mass value="1"/>
       <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
@@ -177,7 +176,6 @@ TEST_CASE("links behind fixed joints are merged by the parallel axis theorem") {
     <joint name="weld" type="fixed"><parent link="a"/><child link="b"/>
       <origin xyz="2 -1 0" rpy="0 0 1.5707963267948966"/></joint></robot>)";
   const UrdfModel model = LoadUrdf(file);
-  fs::remove(file);
   REQUIRE(model.links.size() == 2);
   REQUIRE(model.joints.size() == 1);
   CHECK(model.joints[0].axis == Eigen::Vector3d::UnitZ());

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <unistd.h>
-
-#include <filesystem>
 #include <fstream>
 #include <string>
+
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 
@@ -214,26 +213,17 @@ encoder_bits = 14
 /// A robot's two files in a folder of their own, gone at the end.
 class RobotFolder {
  public:
-  RobotFolder(const std::string& urdf, const std::string& toml) {
-    static int count = 0;
-    folder_ = std::filesystem::temp_directory_path() /
-              ("plumbline_robot_" + std::to_string(getpid()) + "_" + std::to_string(count++));
-    std::filesystem::create_directories(folder_);
-    Write(urdf, toml);
-  }
-  ~RobotFolder() { std::filesystem::remove_all(folder_); }
-  RobotFolder(const RobotFolder&) = delete;
-  RobotFolder& operator=(const RobotFolder&) = delete;
+  RobotFolder(const std::string& urdf, const std::string& toml) { Write(urdf, toml); }
 
   void Write(const std::string& urdf, const std::string& toml) const {
     std::ofstream(folder_ / "robot.urdf", std::ios::binary) << urdf;
     std::ofstream(folder_ / "robot.toml", std::ios::binary) << toml;
   }
-  std::string path() const { return folder_; }
+  std::string path() const { return folder_.path(); }
   std::string urdf() const { return folder_ / "robot.urdf"; }
 
  private:
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
 };
 
 }  // namespace plumb

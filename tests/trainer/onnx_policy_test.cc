@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/shell.h"
+#include "tests/temporary_folder.h"
 #include "trainer/checkpoint.h"
 #include "trainer/policy_file.h"
 
@@ -136,7 +137,7 @@ TEST_CASE("a policy and its record survive ONNX to the bit") {
 }
 
 TEST_CASE("a file of a policy is written whole, and named where it cannot be") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const OnnxPolicy policy{RandomPolicy(kSmall), Record(kSmall)};
   WriteOnnxPolicy(folder / "p.onnx", policy);
   CHECK(SameBits(ReadOnnxPolicy(folder / "p.onnx").policy, policy.policy));
@@ -307,7 +308,7 @@ TEST_CASE("a damaged file is refused or is another policy") {
 }
 
 TEST_CASE("a program that knows no policies computes what the policy does") {
-  const Folder folder;
+  const TemporaryFolder folder;
   Random random(7);
   for (const PolicyShape& shape : {kSmall, PolicyShape{1, {}, 1}, PolicyShape{11, {64, 64}, 3}, PolicyShape{3, {128, 128}, 1}}) {
     const GaussianPolicy policy = RandomPolicy(shape, 5);
@@ -341,7 +342,7 @@ TEST_CASE("a program that knows no policies computes what the policy does") {
 }
 
 TEST_CASE("a policy is loaded from either file, and only for its own robot and task") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const RobotDescription robot = LoadRobot(Source() + "/robots/pendulum");
   const auto task = MakeTask(robot);
   GaussianPolicy policy = RandomPolicy({3, {4}, 1});

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "tests/mpirun.h"
+#include "tests/temporary_folder.h"
 #include "tests/trainer/pendulum.h"
 #include "trainer/trainer.h"
 
@@ -83,7 +84,7 @@ TEST_CASE("Training is the same bits for any number of ranks and threads") {
   const std::vector<double> alone = Train(Ranks::Alone(), 1);
   const std::string expected(reinterpret_cast<const char*>(alone.data()), alone.size() * sizeof(double));
   for (const auto& [ranks, threads] : {std::pair{1, 2}, {2, 1}, {3, 2}, {4, 1}}) {
-    const Folder folder;
+    const TemporaryFolder folder;
     const Outcome outcome =
         Shell("PLUMBLINE_THREADS=" + std::to_string(threads) + " PLUMBLINE_RESULTS=" + folder / "of_rank_" +
               " " + Mpirun(ranks, HiddenTest("train")));

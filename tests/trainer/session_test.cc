@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "tests/temporary_folder.h"
 #include "tests/trainer/pendulum.h"
 
 namespace plumb {
@@ -40,16 +41,15 @@ TrainingSession NewSession(uint64_t seed = 4) {
   return TrainingSession(Robot(), MakeGymPendulum, 2, seed, 1);
 }
 
-/// A folder of its own, gone afterwards.
-struct TemporaryFolder {
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "plumb-trainer-XXXXXX").string();
-    path = mkdtemp(name.data());
+// In a folder that is still to be made.
+std::string CheckpointIn(const TemporaryFolder& folder) { return folder / "sub/trainer.checkpoint"; }
+
+void TrainToTheEnd(TrainingSession& session) {
+  for (int update = 0; session.training(); ++update) {
+    REQUIRE(update < 100);
+    session.Advance();
   }
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
-  std::string File() const { return (path / "sub" / "trainer.checkpoint").string(); }
-  std::filesystem::path path;
-};
+}
 
 std::string ReadAll(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -75,6 +75,7 @@ TEST_CASE("Iterations follow one another, each for its own distribution") {
     while (session.training()) {
       session.Advance();
       ++updates;
+      REQUIRE(updates < 100);
       CHECK(session.Status().update == updates);
     }
     CHECK(updates == (iteration == 0 ? 6 : 2));
@@ -97,31 +98,31 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   const TemporaryFolder folder;
   TrainingSession straight = NewSession(), first = NewSession();
   straight.Begin(Distribution(0));
-  while (straight.training()) straight.Advance();
+  TrainToTheEnd(straight);
   first.Begin(Distribution(0));
   for (int i = 0; i < 3; ++i) first.Advance();
-  SaveCheckpoint(folder.File(), first.MakeCheckpoint());
+  SaveCheckpoint(CheckpointIn(folder), first.MakeCheckpoint());
 
   TrainingSession second = NewSession();
-  second.Restore(LoadCheckpoint(folder.File()).value());
+  second.Restore(LoadCheckpoint(CheckpointIn(folder)).value());
   CHECK(second.training());
   CHECK(second.update() == 3);
-  while (second.training()) second.Advance();
+  TrainToTheEnd(second);
   CHECK(second.Policy(1).weight == straight.Policy(1).weight);
   CHECK(second.evaluation().worst == straight.evaluation().worst);
 
   // And once more, between iterations: the policy is there to be sent again, the next distribution is
   // awaited.
-  SaveCheckpoint(folder.File(), second.MakeCheckpoint());
+  SaveCheckpoint(CheckpointIn(folder), second.MakeCheckpoint());
   TrainingSession third = NewSession();
-  third.Restore(LoadCheckpoint(folder.File()).value());
+  third.Restore(LoadCheckpoint(CheckpointIn(folder)).value());
   CHECK(third.complete());
   CHECK(third.awaited() == 1);
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
   CHECK(third.Status().evaluation_tenth == straight.Status().evaluation_tenth);
   for (TrainingSession* session : {&third, &straight}) {
     session->Begin(Distribution(1));
-    while (session->training()) session->Advance();
+    TrainToTheEnd(*session);
   }
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
   CHECK(third.MakeCheckpoint().critic.second_moment == straight.MakeCheckpoint().critic.second_moment);
@@ -146,13 +147,13 @@ TEST_CASE("A newer distribution of the iteration takes effect at the next batch"
   for (TrainingSession* s : {&session, &undisturbed}) s->Advance();
   CHECK(session.Policy(1).weight != undisturbed.Policy(1).weight);
   CHECK(session.MakeCheckpoint().distribution.mean[0] == newer.components[0].mean[0]);
-  while (session.training()) session.Advance();
+  TrainToTheEnd(session);
   CHECK_FALSE(session.Replace(Distribution(0)));  // its policy is out
 }
 
 TEST_CASE("No checkpoint is nothing; one of another run is an error") {
   const TemporaryFolder folder;
-  CHECK_FALSE(LoadCheckpoint(folder.File()));
+  CHECK_FALSE(LoadCheckpoint(CheckpointIn(folder)));
   TrainingSession session = NewSession();
   session.Begin(Distribution(0));
   const Checkpoint checkpoint = session.MakeCheckpoint();
@@ -170,7 +171,7 @@ TEST_CASE("No checkpoint is nothing; one of another run is an error") {
 
 TEST_CASE("What is not a regular file is no checkpoint, and is named") {
   const TemporaryFolder folder;
-  const std::string pipe = (folder.path / "pipe").string();
+  const std::string pipe = folder / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
   CHECK_THROWS_WITH(LoadCheckpoint(pipe), Catch::Contains(pipe + " is not a regular file"));
   CHECK_THROWS_WITH(LoadCheckpoint("/tmp"), Catch::Contains("/tmp is not a regular file"));
@@ -180,28 +181,28 @@ TEST_CASE("A damaged checkpoint is refused, wherever the damage") {
   const TemporaryFolder folder;
   TrainingSession session = NewSession();
   session.Begin(Distribution(0));
-  SaveCheckpoint(folder.File(), session.MakeCheckpoint());
-  const std::string good = ReadAll(folder.File());
-  REQUIRE(LoadCheckpoint(folder.File()));
-  CHECK_FALSE(std::filesystem::exists(folder.File() + ".new"));
+  SaveCheckpoint(CheckpointIn(folder), session.MakeCheckpoint());
+  const std::string good = ReadAll(CheckpointIn(folder));
+  REQUIRE(LoadCheckpoint(CheckpointIn(folder)));
+  CHECK_FALSE(std::filesystem::exists(CheckpointIn(folder) + ".new"));
   for (size_t at = 0; at < good.size(); at += 1 + at / 7) {
     std::string bad = good;
     bad[at] = static_cast<char>(bad[at] ^ 0x10);
-    WriteAll(folder.File(), bad);
-    REQUIRE_THROWS_AS(LoadCheckpoint(folder.File()), CheckpointError);
-    WriteAll(folder.File(), good.substr(0, at));
-    REQUIRE_THROWS_AS(LoadCheckpoint(folder.File()), CheckpointError);
+    WriteAll(CheckpointIn(folder), bad);
+    REQUIRE_THROWS_AS(LoadCheckpoint(CheckpointIn(folder)), CheckpointError);
+    WriteAll(CheckpointIn(folder), good.substr(0, at));
+    REQUIRE_THROWS_AS(LoadCheckpoint(CheckpointIn(folder)), CheckpointError);
   }
-  WriteAll(folder.File(), good + "x");
-  CHECK_THROWS_AS(LoadCheckpoint(folder.File()), CheckpointError);
+  WriteAll(CheckpointIn(folder), good + "x");
+  CHECK_THROWS_AS(LoadCheckpoint(CheckpointIn(folder)), CheckpointError);
 }
 
 TEST_CASE("A checkpoint that cannot be written says why and leaves the old one") {
   const TemporaryFolder folder;
   TrainingSession session = NewSession();
   session.Begin(Distribution(0));
-  WriteAll((folder.path / "sub").string(), "a file where the folder should be");
-  CHECK_THROWS_WITH(SaveCheckpoint(folder.File(), session.MakeCheckpoint()),
+  WriteAll(folder / "sub", "a file where the folder should be");
+  CHECK_THROWS_WITH(SaveCheckpoint(CheckpointIn(folder), session.MakeCheckpoint()),
                     Catch::Contains("Not a directory"));
 }
 

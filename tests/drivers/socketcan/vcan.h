@@ -46,20 +46,40 @@ inline void FreshVcan() {
   Shell("ip link del vcan0 2>/dev/null; ip link add dev vcan0 type vcan && ip link set vcan0 up");
 }
 
-inline bool Readable(const Transport& transport, int milliseconds) {
+/// Long enough for any machine: only who fails waits so long.
+constexpr int kPatience = 10'000;  // [ms]
+
+inline bool Readable(const Transport& transport, int milliseconds = kPatience) {
   pollfd polled{transport.fd(), POLLIN, 0};
   return poll(&polled, 1, milliseconds) == 1;
 }
 
-/// All frames that arrive until nothing does for a while.
-inline Texts ReceiveAll(Transport& transport, int patience_ms = 200) {
+/// The frames that are to arrive, however long it takes, and what else comes within a moment.
+inline Texts ReceiveAll(Transport& transport, size_t expected = 0) {
   Texts texts;
   std::array<Frame, 8> frames;
-  for (;;) {
+  for (int wakes = 0;; ++wakes) {
+    REQUIRE(wakes < 10'000);  // awake for nothing
     const int count = transport.Receive(frames);
     for (int i = 0; i < count; ++i) texts.push_back(ToText(frames[static_cast<size_t>(i)]));
-    if (count == 0 && !Readable(transport, patience_ms)) return texts;
+    if (count == 0 && !Readable(transport, texts.size() < expected ? kPatience : 50)) return texts;
   }
+}
+
+/// Whether just these frames arrive, and in this order.
+inline void CheckReceives(Transport& transport, const Texts& texts) {
+  CHECK(ReceiveAll(transport, texts.size()) == texts);
+}
+
+/// Whether what came is nothing but the echoes of what it has sent.
+inline void CheckEchoes(Transport& transport, int64_t expected) {
+  std::array<Frame, 8> none;
+  for (int wakes = 0; transport.stats().echoes < expected && Readable(transport); ++wakes) {
+    REQUIRE(wakes < 10'000);  // awake for nothing
+    REQUIRE(transport.Receive(none) == 0);
+  }
+  CHECK(ReceiveAll(transport).empty());
+  CHECK(transport.stats().echoes == expected);
 }
 
 inline int Send(Transport& transport, const Texts& texts) {
