@@ -10,7 +10,7 @@
 namespace plumb {
 namespace {
 
-constexpr int kGlances = 100, kGlance = 100;  // [ms] real time to wait for a message on its way, in as many parts
+constexpr int kGlance = 100;  // [ms] of real time between two looks for a message on its way
 constexpr char kSelfTest[] = "LCM_SELF_TEST";  // which liblcm says to itself when it starts
 
 size_t Hash(std::span<const uint8_t> message) {
@@ -19,7 +19,7 @@ size_t Hash(std::span<const uint8_t> message) {
 
 }  // namespace
 
-LcmMirror::LcmMirror(const std::string& url) : messenger_(url) {
+LcmMirror::LcmMirror(const std::string& url, int patience) : patience_(patience), messenger_(url) {
   subscription_ = messenger_.lcm().subscribe(".*", &LcmMirror::OnMessage, this);
   subscription_->setQueueCapacity(0);
   messenger_.OnSubscription(".*");
@@ -39,7 +39,7 @@ void LcmMirror::Publish(const std::string& channel, std::span<const uint8_t> mes
 void LcmMirror::AwaitRoom(size_t messages, size_t bytes) {
   Read();
   for (int glance = 0; said_.size() > messages || bytes_ > bytes; ++glance) {
-    if (glance == kGlances) {
+    if (glance == patience_) {
       throw std::runtime_error(fmt::format("lost on LCM: {}, number {} on its channel, has not come back",
                                            said_.front().channel, said_.front().number));
     }

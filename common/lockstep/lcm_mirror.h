@@ -16,8 +16,9 @@ namespace plumb {
 /// not come back has been lost. Not thread-safe.
 class LcmMirror {
  public:
+  /// @param patience [0.1 s] of real time until a message that has not come back is lost.
   /// @throws std::runtime_error as Messenger.
-  explicit LcmMirror(const std::string& url);
+  explicit LcmMirror(const std::string& url, int patience = 100);
   ~LcmMirror();
 
   /// @throws std::runtime_error naming channel and number, if a message of the run has not come back.
@@ -43,6 +44,7 @@ class LcmMirror {
   void OnMessage(const lcm::ReceiveBuffer* buffer, const std::string& channel) noexcept;
   void AwaitRoom(size_t messages, size_t bytes);
 
+  const int patience_;
   Messenger messenger_;
   lcm::Subscription* subscription_;
   std::deque<Said> said_;  // that has not come back yet

@@ -14,7 +14,7 @@
 namespace plumb {
 namespace {
 
-constexpr int kGlances = 100, kGlance = 100;  // [ms] real time to wait for a frame on its way, in as many parts
+constexpr int kGlance = 100;         // [ms] of real time between two looks for a frame on its way
 constexpr int64_t kEarly = 100'000;  // [us] by which a frame may be on the bus before the run says that it arrives
 
 class LockstepTransport : public Transport {
@@ -26,6 +26,7 @@ class LockstepTransport : public Transport {
         bus_(std::move(bus)),
         run_(*run.participant),
         way_(run.way),
+        patience_(run.patience),
         heard_(run_.frames(url)) {
     run_.Listen(topic_);
     if (!bus_) return;
@@ -90,7 +91,7 @@ class LockstepTransport : public Transport {
   bool Arrives(const Frame& frame) noexcept {
     if (!bus_) return true;
     ++expected_;
-    for (int glance = 0; glance <= kGlances; ++glance) {
+    for (int glance = 0; glance <= patience_; ++glance) {
       const auto found =
           std::ranges::find_if(early_, [&](const Early& early) { return SameOnWire(early.frame, frame); });
       if (found != early_.end()) {
@@ -123,6 +124,7 @@ class LockstepTransport : public Transport {
   const std::unique_ptr<Transport> bus_;
   Participant& run_;
   const int64_t way_;
+  const int patience_;
   std::deque<lockstep_post_t>& heard_;
   std::array<Frame, 64> batch_;
   std::deque<Early> early_;

@@ -44,6 +44,7 @@ struct TransportStats {
 struct LockstepBus {
   Participant* participant = nullptr;  ///< null: there is no such run
   int64_t way = 0;                     ///< [us] that frames sent by this transport are on their way
+  int patience = 100;                  ///< [0.1 s] of real time until a frame that has not arrived is lost
 };
 
 /// A connection to a CAN bus. Send and Receive do not block, throw or allocate, and one's own frames are not

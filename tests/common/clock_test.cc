@@ -1,5 +1,6 @@
 #include "common/clock.h"
 
+#include <atomic>
 #include <catch2/catch.hpp>
 
 namespace plumb {
@@ -46,6 +47,19 @@ TEST_CASE("absolute deadlines do not drift, missed ones are skipped and counted"
   CHECK(periodic.overruns() == 3);
   CHECK(periodic.Remaining(1520) == 80);
   CHECK(periodic.cycles() == 2);
+}
+
+TEST_CASE("virtual time is what it is told to be, everywhere the same") {
+  const auto time = std::make_shared<std::atomic<int64_t>>(1'000'000);
+  const Clock clock(time);
+  CHECK(clock.is_virtual());
+  CHECK_FALSE(Clock().is_virtual());
+  for (int i = 0; i < 2; ++i, *time += 250) {
+    CHECK(clock.Utime() == *time);
+    CHECK(clock.Now() == *time);
+    CHECK(clock.SigningUtime() == *time);
+  }
+  CHECK(clock.UtimeFromRealtimeNs(1'000'250'000) == 1'000'250);  // of a frame's stamp
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "common/lockstep/packet_socket.h"
 #include "plumb/lockstep_grant_t.hpp"
 #include "plumb/lockstep_hello_t.hpp"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -31,9 +32,6 @@ std::string Text(const lockstep_post_t& post) { return {post.data.begin(), post.
 class Run {
  public:
   Run() {
-    std::string name = (std::filesystem::temp_directory_path() / "plumbline_lockstep_XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    folder = name;
     coordinator.emplace((folder / "clock").string());
     coordinator->on_post = [this](const lockstep_post_t& post, const std::string& speaker) {
       transcript += std::to_string(coordinator->now() - kStart) + " " + (speaker.empty() ? "owner" : speaker) + " " +
@@ -45,7 +43,6 @@ class Run {
     // Threads that still wait are told that the run is over.
     coordinator.reset();
     for (std::thread& thread : threads) thread.join();
-    std::filesystem::remove_all(folder);
   }
 
   using Body = std::function<void(Participant&)>;
@@ -66,7 +63,8 @@ class Run {
     while (coordinator->now() < end) coordinator->participant().Wait(end, Wake::kOnTime);
   }
 
-  std::filesystem::path folder;
+  TemporaryFolder temporary;
+  const std::filesystem::path folder = temporary.path();
   std::optional<Coordinator> coordinator;
   std::string transcript, notes;
   std::vector<std::thread> threads;

@@ -134,6 +134,16 @@ TEST_CASE("what is no restart") {
     bench.Run(100);
     CHECK(bench.motor->state() == DriveState::kIdle);
   }
+  SECTION("silence, and a virtual robot that is placed elsewhere") {
+    bench.powered = false;
+    bench.Run(300);
+    bench.powered = true;
+    bench.Run(20);
+    bench.motor->LetJump(true);
+    bench.sample.position = -4;
+    bench.Run(100);
+    CHECK(bench.motor->state() == DriveState::kIdle);
+  }
   SECTION("one lost heartbeat of a joint that turns") {
     int count = 0;
     bench.tap = [&](const Frame& frame) { return frame.id != 0x21 || ++count % 2 == 0; };

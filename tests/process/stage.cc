@@ -12,16 +12,6 @@
 #include "controller/policy.h"
 
 namespace plumb {
-namespace {
-
-std::filesystem::path MakeFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "plumbline_stage_XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error(name + ": cannot make a folder");
-  return name;
-}
-
-}  // namespace
-
 std::string Read(const std::filesystem::path& file) {
   std::ifstream stream(file);
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
@@ -47,7 +37,7 @@ Stage::Stage(int number, const std::string& robot_file, Time time)
       bus_url(Environment("PLUMBLINE_TEST_BUS", "udp:239.74.163.2:" + std::to_string(43200 + number))),
       robot_folder(Environment("PLUMBLINE_SOURCE", ".") + "/robots/" + robot_file),
       robot(LoadRobot(robot_folder)),
-      folder(MakeFolder()),
+      folder(temporary_.path()),
       coordinator(time == Time::kVirtual ? std::optional<Coordinator>(std::in_place, (folder / "clock").string())
                                          : std::nullopt),
       clock(coordinator ? Clock(coordinator->participant().time()) : Clock()),
@@ -66,11 +56,7 @@ Stage::Stage(int number, const std::string& robot_file, Time time)
   if (coordinator) coordinator->on_note = [this](const std::string& line) { notes += line + "\n"; };
 }
 
-Stage::~Stage() {
-  children.clear();
-  std::error_code error;
-  std::filesystem::remove_all(folder, error);
-}
+Stage::~Stage() { children.clear(); }
 
 Child& Stage::Start(const std::string& name, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(),

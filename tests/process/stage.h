@@ -24,6 +24,7 @@
 #include "plumb/policy_t.hpp"
 #include "plumb/robot_state_t.hpp"
 #include "robot/description.h"
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 
@@ -98,7 +99,12 @@ class Stage {
 
   std::string lcm_url, bus_url, robot_folder;
   RobotDescription robot;
-  std::filesystem::path folder;
+
+ private:
+  TemporaryFolder temporary_;
+
+ public:
+  const std::filesystem::path folder;
   std::optional<Coordinator> coordinator;  ///< in virtual time
   Clock clock;
   Messenger messenger;

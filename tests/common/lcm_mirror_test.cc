@@ -1,0 +1,66 @@
+// What is said in a run in virtual time, on LCM.
+#include "common/lockstep/lcm_mirror.h"
+
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <string>
+#include <vector>
+
+namespace plumb {
+namespace {
+
+using Catch::Contains;
+
+std::string Url() {
+  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 20000) + "?ttl=0&recv_buf_size=2097152";
+}
+
+std::span<const uint8_t> Bytes(const std::string& text) {
+  return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
+}
+
+TEST_CASE("others hear all of it, and are heard apart from it") {
+  LcmMirror mirror(Url());
+  std::string strangers;
+  mirror.on_stranger = [&](const std::string& channel, std::span<const uint8_t> message) {
+    strangers += channel + " " + std::string(message.begin(), message.end()) + "\n";
+  };
+  Messenger other(Url());
+  std::vector<std::string> heard;
+  struct Listener {
+    void On(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+      heard.push_back(channel + " " + std::string(static_cast<const char*>(buffer->data), buffer->data_size));
+    }
+    std::vector<std::string>& heard;
+  } listener{heard};
+  other.lcm().subscribe(".*STATE", &Listener::On, &listener)->setQueueCapacity(0);
+  other.OnSubscription("");
+  for (int i = 0; i < 2000; ++i) {
+    mirror.Publish(i % 2 == 0 ? "JOINT_STATE" : "ROBOT_STATE", Bytes(std::to_string(i)));
+  }
+  other.Publish("JOINT_COMMAND", Bytes("mine"));
+  mirror.Flush();
+  for (int i = 0; i < 100 && strangers.empty(); ++i) usleep(100'000), mirror.Read();
+  CHECK(strangers == "JOINT_COMMAND mine\n");
+  for (int i = 0; i < 100 && heard.size() < 2000; ++i) other.lcm().handleTimeout(100), other.Drain();
+  REQUIRE(heard.size() == 2000);
+  CHECK(heard[1999] == "ROBOT_STATE 1999");
+}
+
+TEST_CASE("a message that does not come back has been lost: an error with channel and number") {
+  LcmMirror mirror(Url(), 5);
+  mirror.Publish("POLICY", Bytes("first"));
+  mirror.Flush();
+  // Larger than what the guard of LCM's socket lets in.
+  const std::string huge(size_t{5} << 20, 'x');
+  CHECK_THROWS_WITH(
+      [&] {
+        mirror.Publish("POLICY", Bytes(huge));
+        mirror.Flush();
+      }(),
+      Contains("lost on LCM: POLICY, number 2 on its channel"));
+}
+
+}  // namespace
+}  // namespace plumb
