@@ -114,9 +114,6 @@ class ClosedLoop {
     if (!setting.virtual_run) return;
     setting.coordinator()->on_note = [this](const std::string& line) { Print("plumb: " + line); };
     setting.coordinator()->go_on = [this] { return GoOn(); };
-    setting.virtual_run->on_stranger = [this](const std::string& channel, std::span<const uint8_t> message) {
-      OnStranger(channel, message);
-    };
   }
 
   int Go() {
@@ -153,13 +150,13 @@ class ClosedLoop {
  private:
   /// While somebody works in virtual time, a tenth of a second of real time has passed.
   bool GoOn() {
-    setting_.virtual_run->ListenOutside();
+    for (const auto& [channel, message] : setting_.virtual_run->TakeStrangers()) OnStranger(channel, message);
     ShowStatus();
     return !processes_.Ended() && !stopped_from_outside_;
   }
 
   /// A run in virtual time hears nobody else; but whoever wants it to stop is obeyed.
-  void OnStranger(const std::string& channel, std::span<const uint8_t> message) {
+  void OnStranger(const std::string& channel, const std::vector<uint8_t>& message) {
     driver_request_t request;
     if (channel == "DRIVER_REQUEST" &&
         request.decode(message.data(), 0, static_cast<int>(message.size())) == static_cast<int>(message.size()) &&

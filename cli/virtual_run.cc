@@ -23,7 +23,6 @@ VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& l
   if (!lcm_url.starts_with("memq:")) {
     try {
       mirror_.emplace(lcm_url);
-      mirror_->on_stranger = [this](const auto& channel, const auto& message) { on_stranger(channel, message); };
     } catch (const std::runtime_error& error) {
       mirror_failure_ = error.what();
     }

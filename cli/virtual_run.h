@@ -1,12 +1,10 @@
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <optional>
-#include <span>
 #include <string>
+#include <vector>
 
 #include "common/lcm_log_writer.h"
 #include "common/lockstep/coordinator.h"
@@ -31,15 +29,12 @@ class VirtualRun {
   Coordinator& coordinator() { return coordinator_; }
   /// Why nobody outside sees the messages; empty if they do.
   const std::string& mirror_failure() const { return mirror_failure_; }
-  /// Reads what others say on LCM.
-  void ListenOutside() {
-    if (mirror_) mirror_->Read();
+  /// What somebody outside the run has said on LCM since the last call.
+  std::vector<LcmMirror::Message> TakeStrangers() {
+    return mirror_ ? mirror_->TakeStrangers() : std::vector<LcmMirror::Message>();
   }
   /// All is said. Its record is complete afterwards. @throws std::runtime_error if something was lost.
   void Finish();
-
-  /// Called with what somebody outside the run says on LCM: on_stranger(channel, message).
-  std::function<void(const std::string&, std::span<const uint8_t>)> on_stranger = [](const auto&, const auto&) {};
 
  private:
   void OnPost(const lockstep_post_t& post);

@@ -28,7 +28,7 @@ Messenger::Messenger(const std::string& url) : url_(url), lcm_(url) {
   Guard();
 }
 
-// What the coordinator brings goes to the subscribers by liblcm's queue within the process.
+// liblcm has nothing to do in virtual time: what the coordinator brings goes straight to the subscribers.
 Messenger::Messenger(Participant& participant) : url_("memq://"), participant_(&participant), lcm_(url_) {}
 
 bool Messenger::Publish(const std::string& channel, std::span<const uint8_t> message) {
@@ -39,25 +39,45 @@ bool Messenger::Publish(const std::string& channel, std::span<const uint8_t> mes
   return true;
 }
 
-void Messenger::OnSubscription(const std::string& channel) {
-  if (participant_) {
-    participant_->Listen(ChannelTopic(channel));
+std::unique_ptr<Messenger::Subscription> Messenger::Subscribe(const std::string& channel, Handler handler) {
+  return std::make_unique<Subscription>(*this, channel, std::move(handler));
+}
+
+Messenger::Subscription::Subscription(Messenger& messenger, const std::string& channel, Handler handler)
+    : messenger_(messenger), channel_(channel), handler_(std::move(handler)) {
+  if (messenger.participant_) {
+    messenger.participant_->Listen(ChannelTopic(channel));
+    messenger.subscriptions_.push_back(this);
   } else {
-    Guard();
+    subscription_ = messenger.lcm_.subscribe(channel, &Subscription::OnBuffer, this);
+    subscription_->setQueueCapacity(0);
+    messenger.Guard();
   }
 }
 
+Messenger::Subscription::~Subscription() {
+  if (subscription_) messenger_.lcm_.unsubscribe(subscription_);
+  std::erase(messenger_.subscriptions_, this);
+}
+
+void Messenger::Subscription::OnBuffer(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+  handler_(channel, {static_cast<const uint8_t*>(buffer->data), buffer->data_size});
+}
+
 int Messenger::Drain(int most) {
+  int handled = 0;
   if (participant_) {
     std::deque<lockstep_post_t>& heard = participant_->messages();
-    int handled = 0;
-    for (; handled < most && !heard.empty(); heard.pop_front(), ++handled) {
-      lcm_.publish(heard.front().topic.name, heard.front().data.data(), static_cast<unsigned>(heard.front().size));
-      lcm_.handleTimeout(0);
+    for (; handled < most && !heard.empty(); ++handled) {
+      const lockstep_post_t post = std::move(heard.front());
+      heard.pop_front();
+      for (const Subscription* subscription : subscriptions_) {
+        if (subscription->channel_ == post.topic.name) subscription->handler_(post.topic.name, post.data);
+      }
     }
     return handled;
   }
-  for (int handled = 0; handled < most; ++handled) {
+  for (; handled < most; ++handled) {
     const int result = lcm_.handleTimeout(0);
     if (result < 0) return handled > 0 ? handled : -1;
     if (result == 0) return handled;

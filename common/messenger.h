@@ -34,18 +34,41 @@ class Messenger {
   /// Handles the messages that have arrived, but no more than `most`, so that a flood does not keep the caller from
   /// its other duties; what is left keeps fd() readable. @return how many, -1 at the end of a file or on failure.
   int Drain(int most = 1000);
-  /// Is told by Subscriber of each channel that somebody listens to.
-  void OnSubscription(const std::string& channel);
+  /// Called with a message's bytes as they arrived; must not throw.
+  using Handler = std::function<void(const std::string& channel, std::span<const uint8_t> message)>;
+  class Subscription;
+  /// Listens to a channel (in real time: to all whose names match a regular expression), without bound, as long as the
+  /// subscription lives. In order of arrival.
+  std::unique_ptr<Subscription> Subscribe(const std::string& channel, Handler handler);
 
  private:
   /// Keeps malformed LCM datagrams from liblcm (see lcm_guard.h), once. The constructor does, and
-  /// OnSubscription where that was too early.
+  /// Subscribe where that was too early.
   void Guard();
 
   std::string url_;
   Participant* participant_ = nullptr;  // of a run in virtual time
   lcm::LCM lcm_;
   bool guarded_ = false;
+  std::vector<Subscription*> subscriptions_;
+};
+
+/// Ends with its destruction. Must not outlive the Messenger.
+class Messenger::Subscription {
+ public:
+  Subscription(Messenger& messenger, const std::string& channel, Handler handler);
+  ~Subscription();
+  Subscription(const Subscription&) = delete;
+  Subscription& operator=(const Subscription&) = delete;
+
+ private:
+  friend class Messenger;
+  void OnBuffer(const lcm::ReceiveBuffer* buffer, const std::string& channel);
+
+  Messenger& messenger_;
+  const std::string channel_;
+  const Handler handler_;
+  lcm::Subscription* subscription_ = nullptr;  // null in virtual time
 };
 
 /// Receives messages of one type on one channel. Decodes them itself, because an exception must never cross
@@ -59,12 +82,9 @@ class Subscriber {
   /// @param callback called for every message, in order of arrival; may be empty when newest() is enough.
   /// It may throw: the exception is kept and thrown again by Rethrow().
   Subscriber(Messenger& messenger, const std::string& channel, Callback callback = {})
-      : messenger_(messenger), callback_(std::move(callback)) {
-    subscription_ = messenger_.lcm().subscribe(channel, &Subscriber::OnBuffer, this);
-    subscription_->setQueueCapacity(0);
-    messenger_.OnSubscription(channel);
-  }
-  ~Subscriber() { messenger_.lcm().unsubscribe(subscription_); }
+      : callback_(std::move(callback)),
+        subscription_(messenger.Subscribe(
+            channel, [this](const std::string&, std::span<const uint8_t> bytes) { OnMessage(bytes); })) {}
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
 
@@ -81,11 +101,11 @@ class Subscriber {
   }
 
  private:
-  void OnBuffer(const lcm::ReceiveBuffer* buffer, const std::string&) noexcept {
+  void OnMessage(std::span<const uint8_t> bytes) noexcept {
     try {
       // The two members take turns and keep their vectors' capacity: no allocation for messages of equal size.
-      const int length = static_cast<int>(buffer->data_size);
-      if (arriving_.decode(buffer->data, 0, length) != length) {
+      const int length = static_cast<int>(bytes.size());
+      if (arriving_.decode(bytes.data(), 0, length) != length) {
         ++rejected_;
         return;
       }
@@ -96,21 +116,20 @@ class Subscriber {
     }
     ++received_;
     try {
-      encoding_ = {static_cast<const uint8_t*>(buffer->data), buffer->data_size};
+      encoding_ = bytes;
       if (callback_) callback_(newest_);
     } catch (...) {
       failure_ = std::current_exception();
     }
   }
 
-  Messenger& messenger_;
-  lcm::Subscription* subscription_;
   Callback callback_;
   Message newest_{}, arriving_{};
   std::span<const uint8_t> encoding_;
   int64_t received_ = 0;
   int64_t rejected_ = 0;
   std::exception_ptr failure_;
+  std::unique_ptr<Messenger::Subscription> subscription_;  // ends first
 };
 
 /// Publishes messages of one type on one channel, encoding into its own buffer: no allocation once the

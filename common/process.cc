@@ -17,6 +17,7 @@
 #include <stdexcept>
 
 #include "common/program_version.h"
+#include "common/realtime.h"
 
 namespace plumb {
 namespace {
@@ -88,6 +89,14 @@ bool Process::Sleep(int64_t timeout) {
   }
   messenger().Drain();
   return !stopping();
+}
+
+void Process::BecomeFast(int priority) {
+  if (participant_) {
+    participant_->ShareProcessor();
+  } else {
+    BecomeRealtime(priority);
+  }
 }
 
 void Process::TakeVirtualTime(double seconds) {

@@ -50,6 +50,9 @@ class Process {
   /// Sleeps for `timeout` scaled microseconds or until the process is asked to stop, whatever comes meanwhile. Then
   /// drains LCM. For those who are in no hurry. @return false when the process is asked to stop.
   bool Sleep(int64_t timeout);
+  /// From here on this process belongs to the fast loop. @param priority for BecomeRealtime; in virtual time there are
+  /// no priorities, but its turns are to be short.
+  void BecomeFast(int priority);
   /// A computation has been done that is to take that long [s] in virtual time, in which computations take none. Does
   /// nothing otherwise. Leaves LCM's messages for messenger().Drain().
   void TakeVirtualTime(double seconds);

@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
                        "sign the commands with this key, which the driver shares (plumb key makes one)");
       },
       [&](plumb::Process& process) {
-        plumb::BecomeRealtime(priority);
+        process.BecomeFast(priority);
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
         const plumb::Clock& clock = process.clock();
         plumb::Controller controller(robot, seed, rest);

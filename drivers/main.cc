@@ -270,9 +270,9 @@ int main(int argc, char** argv) {
         std::optional<plumb::SigningKey> key;
         if (!key_file.empty()) key.emplace(key_file);
         // LCM's thread comes right behind the cycle: what it brings is part of it.
-        plumb::BecomeRealtime(std::max(priority - 1, 0));
+        process.BecomeFast(std::max(priority - 1, 0));
         plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder, key, is_virtual);
-        plumb::BecomeRealtime(priority);
+        process.BecomeFast(priority);
         return driver.Run();
       });
 }

@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
         plumb::AddRealtimeFlag(app, priority);
       },
       [&](plumb::Process& process) {
-        plumb::BecomeRealtime(priority);
+        process.BecomeFast(priority);
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
         plumb::StateObserver observer(robot);
         std::optional<plumb::UnscentedObserver> model_observer;

@@ -138,7 +138,7 @@ int main(int argc, char** argv) {
         app.add_option("--set", assignments, "NAME=VALUE: this parameter is not drawn, may be repeated");
       },
       [&](plumb::Process& process) {
-        plumb::BecomeRealtime(priority);
+        process.BecomeFast(priority);
         const plumb::RobotDescription description = plumb::LoadRobot(robot_path);
         Eigen::VectorXd physical = plumb::HiddenParameters(description, seed);
         for (const std::string& assignment : assignments) plumb::Set(assignment, description, physical);

@@ -51,6 +51,7 @@ struct Coordinator::Member {
   }
 
   std::string name;
+  pid_t pid = 0;
   State state = State::kExpected;
   PacketSocket socket;
   ProcessWatch watch;
@@ -84,6 +85,7 @@ class Coordinator::Owner : public Participant {
     coordinator_.TakeTurns(stop_fd);
     for (; seat.heard(now()); seat.mail.pop_front()) Hear(std::move(seat.mail.front()));
   }
+  void ShareProcessor() override {}  // it does
   void Note(const std::string& line) override { coordinator_.on_note(line); }
   void Fail(const std::string& why) override { coordinator_.failure_ = why; }
 
@@ -121,6 +123,7 @@ void Coordinator::Expect(const std::string& name, pid_t pid) {
   Member& member = Seat(name);
   member.state = Member::State::kExpected;
   member.watch = ProcessWatch(pid);
+  processor_.Release(pid);  // it has been born on ours
 }
 
 void Coordinator::Stop(const std::string& name) {
@@ -222,6 +225,7 @@ bool Coordinator::Settle(int stop_fd) {
     if (working && std::chrono::steady_clock::now() >= next_glance_) {
       next_glance_ = std::chrono::steady_clock::now() + std::chrono::milliseconds(kGlance);
       WatchProgress();
+      processor_.Balance();
       if (!go_on()) return false;
     }
   }
@@ -235,8 +239,7 @@ void Coordinator::WatchProgress() {
   for (const auto& member : members_) {
     if (member->settled()) continue;
     if (member->state == Member::State::kExpected && member->watch.dead()) {
-      on_note(member->name + " has ended before it has joined the run");
-      Leave(*member);
+      Leave(*member);  // it has ended before it has joined; whoever has started it knows why
       continue;
     }
     const std::string note = member->watch.Look();
@@ -296,6 +299,7 @@ void Coordinator::Admit(PacketSocket& stranger) {
   member.name = name;
   member.socket = std::move(stranger);
   member.state = Member::State::kWorking;
+  member.pid = hello.pid;
   member.watch = ProcessWatch(hello.pid);
 }
 
@@ -328,12 +332,14 @@ void Coordinator::Digest(Member& member) {
   member.wakes = report.wakes;
   for (const lockstep_topic_t& topic : report.topic) listeners_[Key(topic)].push_back(&member);
   for (const lockstep_post_t& post : report.post) Route(post, member);
+  if (report.shares_processor) processor_.Add(member.pid);
   if (!report.note.empty()) on_note(member.name + ": " + report.note);
   if (!report.failure.empty()) failure_ = member.name + ": " + report.failure;
   if (report.leaves) Leave(member);
 }
 
 void Coordinator::Leave(Member& member) {
+  processor_.Remove(member.pid);
   member.socket.Close();
   member.state = Member::State::kAbsent;
   member.mail.clear();

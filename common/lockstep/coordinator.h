@@ -13,6 +13,7 @@
 
 #include "common/lockstep/packet_socket.h"
 #include "common/lockstep/participant.h"
+#include "common/lockstep/shared_processor.h"
 #include "plumb/lockstep_report_t.hpp"
 
 namespace plumb {
@@ -92,6 +93,7 @@ class Coordinator {
   std::map<std::string, std::vector<Member*>> listeners_;  // of each topic
   std::vector<PacketSocket> strangers_;                    // who have not said yet who they are
   std::string failure_;
+  SharedProcessor processor_;
   std::vector<uint8_t> buffer_;
   std::vector<pollfd> polled_;
   std::chrono::steady_clock::time_point next_glance_{};

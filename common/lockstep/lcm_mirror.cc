@@ -4,13 +4,17 @@
 #include <poll.h>
 
 #include <algorithm>
+#include <chrono>
 #include <stdexcept>
 #include <string_view>
 
 namespace plumb {
 namespace {
 
-constexpr int kGlance = 100;  // [ms] of real time between two looks for a message on its way
+constexpr int kNap = 2;       // [ms] of real time for which there was nothing to do
+constexpr int kMostRead = 10'000;                               // messages in one go
+constexpr size_t kMostMessages = 400, kMostBytes = 500'000;  // on their way
+constexpr size_t kMostBehind = 20'000, kMostStrangers = 1000;   // messages
 constexpr char kSelfTest[] = "LCM_SELF_TEST";  // which liblcm says to itself when it starts
 
 size_t Hash(std::span<const uint8_t> message) {
@@ -19,49 +23,97 @@ size_t Hash(std::span<const uint8_t> message) {
 
 }  // namespace
 
-LcmMirror::LcmMirror(const std::string& url, int patience) : patience_(patience), messenger_(url) {
-  subscription_ = messenger_.lcm().subscribe(".*", &LcmMirror::OnMessage, this);
-  subscription_->setQueueCapacity(0);
-  messenger_.OnSubscription(".*");
-}
+LcmMirror::LcmMirror(const std::string& url, int patience)
+    : patience_(patience),
+      messenger_(url),
+      subscription_(messenger_.Subscribe(
+          ".*", [this](const auto& channel, const auto& message) { OnMessage(channel, message); })),
+      thread_([this] { Work(); }) {}
 
-LcmMirror::~LcmMirror() { messenger_.lcm().unsubscribe(subscription_); }
+LcmMirror::~LcmMirror() {
+  ended_ = true;
+  thread_.join();
+}
 
 void LcmMirror::Publish(const std::string& channel, std::span<const uint8_t> message) {
-  if (said_.size() >= kMostMessages || bytes_ + message.size() > kMostBytes) AwaitRoom(kMostMessages / 2, kMostBytes / 2);
-  said_.push_back({channel, ++numbers_[channel], message.size(), Hash(message)});
-  bytes_ += message.size();
-  if (!messenger_.Publish(channel, message)) {
-    throw std::runtime_error(fmt::format("LCM: {}, number {}, could not be sent", channel, said_.back().number));
-  }
+  if (unfinished_ >= kMostBehind) AwaitRoom(kMostBehind / 2);
+  const std::lock_guard lock(mutex_);
+  if (failure_) std::rethrow_exception(failure_);
+  ++unfinished_;
+  queue_.push_back({channel, {message.begin(), message.end()}});
 }
 
-void LcmMirror::AwaitRoom(size_t messages, size_t bytes) {
-  Read();
-  for (int glance = 0; said_.size() > messages || bytes_ > bytes; ++glance) {
-    if (glance == patience_) {
-      throw std::runtime_error(fmt::format("lost on LCM: {}, number {} on its channel, has not come back",
-                                           said_.front().channel, said_.front().number));
+std::vector<LcmMirror::Message> LcmMirror::TakeStrangers() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(strangers_, {});
+}
+
+void LcmMirror::AwaitRoom(size_t messages) {
+  while (unfinished_ > messages) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (failure_) std::rethrow_exception(failure_);
     }
-    const size_t before = said_.size();
-    pollfd readable{messenger_.fd(), POLLIN, 0};
-    poll(&readable, 1, kGlance);
-    Read();
-    if (said_.size() < before) glance = -1;
+    std::this_thread::sleep_for(std::chrono::milliseconds(kNap));
   }
 }
 
-void LcmMirror::OnMessage(const lcm::ReceiveBuffer* buffer, const std::string& channel) noexcept {
-  const std::span message(static_cast<const uint8_t*>(buffer->data), buffer->data_size);
+void LcmMirror::Work() {
+  std::vector<Message> batch;
+  try {
+    while (!ended_) {
+      {
+        const std::lock_guard lock(mutex_);
+        std::swap(batch, queue_);
+      }
+      for (const Message& message : batch) Say(message);
+      // Looks now and then instead of being told, which would cost the run more than it costs us.
+      if (batch.empty()) Nap();
+      messenger_.Drain(kMostRead);
+      batch.clear();
+    }
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
+  }
+}
+
+/// Naps are counted, and not the time: where this process stands still, so does what it waits for.
+void LcmMirror::Nap() {
+  pollfd readable{messenger_.fd(), POLLIN, 0};
+  poll(&readable, 1, kNap);
+  if (said_.empty() || said_.front().naps++ < patience_ * (100 / kNap)) return;
+  throw std::runtime_error(fmt::format("lost on LCM: {}, number {} on its channel, has not come back",
+                                       said_.front().channel, said_.front().number));
+}
+
+void LcmMirror::Say(const Message& message) {
+  if (said_.size() >= kMostMessages || said_bytes_ + message.bytes.size() > kMostBytes) {
+    while (!ended_ && (said_.size() > kMostMessages / 2 || said_bytes_ > kMostBytes / 2)) {
+      Nap();
+      messenger_.Drain(kMostRead);
+    }
+  }
+  said_.push_back({message.channel, ++numbers_[message.channel], message.bytes.size(), Hash(message.bytes), 0});
+  said_bytes_ += message.bytes.size();
+  if (!messenger_.Publish(message.channel, message.bytes)) {
+    throw std::runtime_error(
+        fmt::format("LCM: {}, number {} on its channel, could not be sent", message.channel, said_.back().number));
+  }
+}
+
+void LcmMirror::OnMessage(const std::string& channel, std::span<const uint8_t> message) noexcept {
   const size_t hash = Hash(message);
   const auto ours = std::ranges::find_if(said_, [&](const Said& said) {
     return said.hash == hash && said.bytes == message.size() && said.channel == channel;
   });
   if (ours != said_.end()) {
-    bytes_ -= ours->bytes;
+    said_bytes_ -= ours->bytes;
     said_.erase(ours);
+    --unfinished_;
   } else if (channel != kSelfTest) {
-    on_stranger(channel, message);
+    const std::lock_guard lock(mutex_);
+    if (strangers_.size() < kMostStrangers) strangers_.push_back({channel, {message.begin(), message.end()}});
   }
 }
 

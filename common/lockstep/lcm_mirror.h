@@ -1,11 +1,16 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
-#include <functional>
+#include <exception>
 #include <map>
+#include <mutex>
 #include <span>
 #include <string>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include "common/messenger.h"
 
@@ -13,43 +18,57 @@ namespace plumb {
 
 /// Says on LCM what is said in a run in virtual time, so that lcm-spy, lcm-logger and others see it as ever; and hears
 /// what comes back. It waits for it, so that nobody with a buffer as large as ours (2 MB) loses anything, and what does
-/// not come back has been lost. Not thread-safe.
+/// not come back has been lost. A thread of its own does so, that the run need not wait. Its calls are one thread's.
 class LcmMirror {
  public:
+  struct Message {
+    std::string channel;
+    std::vector<uint8_t> bytes;
+  };
+
   /// @param patience [0.1 s] of real time until a message that has not come back is lost.
   /// @throws std::runtime_error as Messenger.
   explicit LcmMirror(const std::string& url, int patience = 100);
   ~LcmMirror();
+  LcmMirror(const LcmMirror&) = delete;
+  LcmMirror& operator=(const LcmMirror&) = delete;
 
-  /// @throws std::runtime_error naming channel and number, if a message of the run has not come back.
+  /// Soon. Waits where it is far behind. @throws std::runtime_error naming channel and number, if an earlier message
+  /// has not come back.
   void Publish(const std::string& channel, std::span<const uint8_t> message);
-  /// Reads what there is: what others say, too.
-  void Read() { messenger_.Drain(kMostRead); }
+  /// What somebody outside the run has said since the last call.
+  std::vector<Message> TakeStrangers();
   /// Waits until everything has come back. @throws std::runtime_error as Publish.
-  void Flush() { AwaitRoom(0, 0); }
-
-  /// Called with what somebody outside the run has said.
-  std::function<void(const std::string& channel, std::span<const uint8_t> message)> on_stranger =
-      [](const auto&, const auto&) {};
+  void Flush() { AwaitRoom(0); }
 
  private:
-  static constexpr int kMostRead = 10'000;
-  static constexpr size_t kMostMessages = 400, kMostBytes = 500'000;  // on their way
-
   struct Said {
     std::string channel;
     int64_t number;  // on the channel
     size_t bytes, hash;
+    int naps;        // for which it has been the oldest
   };
-  void OnMessage(const lcm::ReceiveBuffer* buffer, const std::string& channel) noexcept;
-  void AwaitRoom(size_t messages, size_t bytes);
+  void Work();
+  void Say(const Message& message);
+  void OnMessage(const std::string& channel, std::span<const uint8_t> message) noexcept;
+  void Nap();
+  void AwaitRoom(size_t messages);
 
   const int patience_;
+  // Of the thread.
   Messenger messenger_;
-  lcm::Subscription* subscription_;
-  std::deque<Said> said_;  // that has not come back yet
-  size_t bytes_ = 0;       // of it
+  std::unique_ptr<Messenger::Subscription> subscription_;
+  std::deque<Said> said_;    // that has not come back yet
+  size_t said_bytes_ = 0;    // of it
   std::map<std::string, int64_t> numbers_;
+  // Of both.
+  std::mutex mutex_;
+  std::vector<Message> queue_;
+  std::vector<Message> strangers_;
+  std::exception_ptr failure_;
+  std::atomic<size_t> unfinished_ = 0;  // that were published and have not come back
+  std::atomic<bool> ended_ = false;
+  std::thread thread_;
 };
 
 }  // namespace plumb

@@ -55,6 +55,7 @@ class RemoteParticipant : public Participant {
     AwaitGrant(stop_fd);
   }
 
+  void ShareProcessor() override { report_.shares_processor = 1; }
   void Note(const std::string& line) override { report_.note += (report_.note.empty() ? "" : "; ") + line; }
   void Fail(const std::string& why) override { report_.failure = why; }
 

@@ -22,6 +22,7 @@ class MadeUpRun : public Participant {
     said += topic.name + " " + std::string(data.begin(), data.end()) + " " + std::to_string(now() + way) + "\n";
   }
   void Wait(int64_t until, Wake, int) override { SetNow(until); }
+  void ShareProcessor() override {}
   void Note(const std::string& line) override { noted += line + "\n"; }
   void Fail(const std::string& why) override { failed += why + "\n"; }
 
