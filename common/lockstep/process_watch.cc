@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 
 namespace plumb {
 namespace {
+
+constexpr double kComputing = 60;  // [s] that nobody wonders about
 
 using Seconds = std::chrono::duration<double>;
 
@@ -54,10 +57,11 @@ std::string ProcessWatch::Look() {
   if (stopped || process.ticks != ticks_) moved_ = now;
   ticks_ = process.ticks;
   const double waited = Seconds(now - begin_).count();
-  if (waited < next_note_) return {};
+  const bool computes = !stopped && idle() < 1;
+  if (waited < (computes ? std::max(next_note_, kComputing) : next_note_)) return {};
   next_note_ = 2 * waited;
   if (stopped) return fmt::format("stopped by a signal, waited for since {:.0f} s", waited);
-  if (idle() < 1) return fmt::format("computing since {:.0f} s", waited);
+  if (computes) return fmt::format("computing since {:.0f} s", waited);
   const std::string where = SleepsIn(pid_);
   return fmt::format("asleep{}{}, waited for since {:.0f} s", where.empty() ? "" : " in ", where, waited);
 }
