@@ -1,5 +1,6 @@
 #include "common/realtime.h"
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <malloc.h>
 #include <sched.h>

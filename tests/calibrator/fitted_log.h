@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
@@ -11,6 +10,7 @@
 #include "calibrator/candidates.h"
 #include "calibrator/discrepancy.h"
 #include "calibrator/misspecification.h"
+#include "common/decompositions.h"
 #include "common/random.h"
 #include "robot/description.h"
 #include "sim/environment.h"

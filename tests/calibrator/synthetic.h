@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <cstdlib>
 #include <string>
@@ -8,6 +7,7 @@
 #include "calibrator/discrepancy.h"
 #include "calibrator/simopt.h"
 #include "calibrator/transitions.h"
+#include "common/decompositions.h"
 #include "common/random.h"
 #include "robot/description.h"
 #include "sim/simulator.h"
@@ -60,10 +60,10 @@ inline Gaussian LaplacePosterior(const RobotDescription& robot, const std::vecto
       const Eigen::VectorXd y = x + 1e-6 * Eigen::VectorXd::Unit(x.size(), k);
       jacobian.col(k) = (discrepancy.Residuals(y.array().exp(), rollouts) - r) / 1e-6;
     }
-    precision = jacobian.transpose() * jacobian + Eigen::MatrixXd(prior.covariance.inverse());
-    x -= precision.ldlt().solve(jacobian.transpose() * r + prior.covariance.inverse() * (x - prior.mean));
+    precision = jacobian.transpose() * jacobian + Inverse(prior.covariance);
+    x -= precision.ldlt().solve(jacobian.transpose() * r + Inverse(prior.covariance) * (x - prior.mean));
   }
-  return {x, precision.inverse()};
+  return {x, Inverse(precision)};
 }
 
 }  // namespace plumb
