@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -11,8 +9,10 @@
 
 #include "calibrator/excitation.h"
 #include "calibrator/holdout.h"
+#include "calibrator/inference/chi_squared.h"
 #include "calibrator/methods.h"
 #include "calibrator/misspecification.h"
+#include "common/decompositions.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -210,7 +210,7 @@ class Run {
     const Eigen::VectorXd their_mode = sd.asDiagonal() * pseudo(theirs) * sd.asDiagonal() * weighted;
     Eigen::MatrixXd both(n, 0);
     const Eigen::MatrixXd my_projector = Projector(mine), their_projector = Projector(theirs);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> common(my_projector * their_projector * my_projector);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> common(Eigen::MatrixXd(my_projector * their_projector * my_projector));
     const Eigen::Index rank = (common.eigenvalues().array() > 0.99).count();
     both = common.eigenvectors().rightCols(rank);
     LogAgreement result;
@@ -226,8 +226,7 @@ class Run {
     const Eigen::MatrixXd spread = both.transpose() * (pseudo(mine) + pseudo(theirs)) * both;
     const double squared = offset.dot(spread.llt().solve(offset));
     result.distance = std::sqrt(squared);
-    const boost::math::chi_squared distribution(static_cast<double>(rank));
-    result.p = std::min(1.0, boost::math::cdf(boost::math::complement(distribution, squared)) * static_cast<double>(fits.size()));
+    result.p = std::min(1.0, ChiSquaredTail(static_cast<double>(rank), squared) * static_cast<double>(fits.size()));
     return result;
   }
 
@@ -245,7 +244,7 @@ class Run {
   Eigen::VectorXd LikelihoodMode(const LaplaceFit& fit) const {
     const Eigen::VectorXd sd = prior_sd();
     const Eigen::VectorXd right = Precision(fit.posterior) * fit.mode - findings_.prior.mean.cwiseQuotient(sd.cwiseAbs2());
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sd.asDiagonal() * Data(fit) * sd.asDiagonal());
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(sd.asDiagonal() * Data(fit) * sd.asDiagonal()));
     const Eigen::ArrayXd values = eigen.eigenvalues().array();
     const Eigen::VectorXd inverse = (values > 1).select(1 / values.max(1e-300), 0.0);  // as in Against
     return sd.asDiagonal() * (eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose()) * sd.asDiagonal() * right;

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "calibrator/inference/noise.h"
+#include "common/decompositions.h"
 #include "common/random.h"
 
 namespace plumb {

@@ -1,9 +1,6 @@
 // What whitened errors of the right model do not do: be too large, have a mean, correlate, depend on the
 // state.
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/poisson.hpp>
@@ -14,7 +11,9 @@
 #include <limits>
 #include <utility>
 
+#include "calibrator/inference/chi_squared.h"
 #include "calibrator/projected_errors.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -106,7 +105,7 @@ std::vector<Misfit> TestScale(const ProjectedErrors& errors, const std::vector<b
       const double squares = SumOfSquares(errors, rows);
       const std::string& name = errors.joint_of[static_cast<size_t>(joint)];
       tests.push_back({errors.Place(name, condition) + ": errors beyond the noise", name, condition, "scale",
-                       squares, cdf(complement(boost::math::chi_squared(freedom), squares)),
+                       squares, ChiSquaredTail(freedom, squares),
                        std::max(0.0, 1 - freedom / squares)});
     }
   }
@@ -203,7 +202,7 @@ std::vector<Misfit> TestWhiteness(const ProjectedErrors& errors) {
     }
     tests.push_back({CoordinateName(errors, c) + ": successive errors resemble each other", Joint(errors, c),
                      "", "whiteness", statistic,
-                     cdf(complement(boost::math::chi_squared(static_cast<double>(lags)), statistic)),
+                     ChiSquaredTail(static_cast<double>(lags), statistic),
                      std::clamp(predictable, 0.0, 1.0)});
   }
   return tests;
@@ -273,8 +272,8 @@ std::vector<Misfit> TestRegression(const ProjectedErrors& errors) {
     }
     // (P F)' (P F) with P the projection: only this coordinate's rows of the basis meet those of F.
     const Eigen::MatrixXd overlap = basis.transpose() * features;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(features.transpose() * features -
-                                                              overlap.transpose() * overlap);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(
+        Eigen::MatrixXd(features.transpose() * features - overlap.transpose() * overlap));
     const Eigen::VectorXd score = gram.eigenvectors().transpose() * (features.transpose() * r);
     double explained = 0, used = 0;
     for (Eigen::Index i = 0; i < score.size(); ++i) {

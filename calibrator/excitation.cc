@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,6 +14,7 @@
 
 #include "calibrator/discrepancy.h"
 #include "calibrator/state_noise.h"
+#include "common/decompositions.h"
 #include "common/random.h"
 #include "sim/simulator.h"
 #include "sim/tasks/task.h"
@@ -157,7 +157,7 @@ class Rater {
       if (gain >= rated.gain) continue;
       rated.gain = gain;
       rated.information = information;
-      rated.sd = (root_ * scaled.inverse() * root_.transpose()).diagonal().cwiseSqrt();
+      rated.sd = (root_ * Inverse(scaled) * root_.transpose()).diagonal().cwiseSqrt();
     }
     return rated;
   }
@@ -251,7 +251,7 @@ MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posteri
   if (!found.weak.empty()) {
     const Eigen::MatrixXd measures = Measures(robot, found.weak), precision = Precision(posterior);
     const auto left_open = [&](const RatedExcitation& rated) {
-      const Eigen::MatrixXd covariance = (precision + rated.information).inverse();
+      const Eigen::MatrixXd covariance = Inverse(precision + rated.information);
       return (measures.transpose() * covariance * measures).determinant();
     };
     std::stable_sort(

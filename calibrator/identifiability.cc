@@ -1,6 +1,5 @@
 #include "calibrator/identifiability.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 
 #include "calibrator/identifiability_words.h"
 #include "calibrator/sparse_basis.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -110,8 +110,7 @@ Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covaria
   }
   // Combinations are covariant: what counts as one is the inverse of a parameter's unit.
   const Eigen::MatrixXd complement =
-      (Eigen::HouseholderQR<Eigen::MatrixXd>(null).householderQ() * Eigen::MatrixXd::Identity(n, n))
-          .rightCols(rank);
+      FirstColumns(Eigen::HouseholderQR<Eigen::MatrixXd>(null).householderQ(), n).rightCols(rank);
   return SparseBasis(complement, prior_sd.cwiseInverse(), unchanged);
 }
 
@@ -174,7 +173,7 @@ std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information, const Ei
   std::vector<WeakDirection> weak;
   const Eigen::MatrixXd precision =
       information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
-  const Eigen::MatrixXd covariance = precision.inverse();
+  const Eigen::MatrixXd covariance = Inverse(precision);
   Eigen::MatrixXd told(n, 0);  // scaled, orthonormal
   for (Eigen::Index i = 0; i < n && static_cast<Eigen::Index>(weak.size()) < scaled_weak.cols(); ++i) {
     const bool involved =
@@ -236,7 +235,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::
   }
   const Eigen::MatrixXd precision =
       information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
-  for (const Eigen::VectorXd& power : AllPowers(found.null, precision.inverse(), prior_sd, CostOfPowers(robot))) {
+  for (const Eigen::VectorXd& power : AllPowers(found.null, Inverse(precision), prior_sd, CostOfPowers(robot))) {
     found.combinations.push_back(Describe(robot, power, prior_sd, distribution));
   }
   found.weak = FindWeak(information, prior_sd, eigen.eigenvectors().middleCols(nulls, weak), found.null);

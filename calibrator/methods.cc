@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,6 +14,7 @@
 #include "calibrator/inference/reps_search.h"
 #include "calibrator/robot_problem.h"
 #include "common/config.h"
+#include "common/decompositions.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {

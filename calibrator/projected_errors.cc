@@ -1,14 +1,14 @@
 #include "calibrator/projected_errors.h"
 
-#include <Eigen/QR>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <map>
 #include <stdexcept>
 #include <utility>
 
+#include "calibrator/inference/chi_squared.h"
 #include "calibrator/touch.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -45,7 +45,7 @@ Eigen::MatrixXd Range(const Eigen::MatrixXd& jacobian) {
   }
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
   qr.setThreshold(1e-7);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(jacobian.rows(), qr.rank());
+  return FirstColumns(qr.householderQ(), qr.rank());
 }
 
 double Median(std::vector<double> values) {
@@ -175,7 +175,7 @@ Score FindScore(const ProjectedErrors& errors, const Eigen::VectorXd& column, do
   score.gain = -2 * score.change * sum - score.change * score.change * cc;
   if (!(score.gain > 0)) return {};
   score.statistic = sum * sum / variance;
-  score.p = boost::math::cdf(boost::math::complement(boost::math::chi_squared(1), score.statistic));
+  score.p = ChiSquaredTail(1, score.statistic);
   return score;
 }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -16,6 +15,7 @@
 #include "calibrator/summary.h"
 #include "calibrator/svg.h"
 #include "common/atomic_file.h"
+#include "common/decompositions.h"
 #include "common/process.h"
 
 namespace plumb {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +10,7 @@
 
 #include "calibrator/curriculum.h"
 #include "calibrator/inference/distances.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

@@ -1,12 +1,12 @@
 #include "calibrator/sparse_basis.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
+#include "common/decompositions.h"
 #include "common/random.h"
 
 namespace plumb {
@@ -77,13 +77,12 @@ std::vector<Eigen::VectorXd> SparseBasis(const Eigen::MatrixXd& space, const Eig
   const Eigen::Index n = space.rows(), k = space.cols();
   if (k == 0) return chosen;
   const Eigen::MatrixXd orthonormal =
-      Eigen::HouseholderQR<Eigen::MatrixXd>(unit.cwiseInverse().asDiagonal() * space).householderQ() *
-      Eigen::MatrixXd::Identity(n, k);
+      FirstColumns(Eigen::HouseholderQR<Eigen::MatrixXd>(unit.cwiseInverse().asDiagonal() * space).householderQ(), k);
   Random random(0);
   for (int trial = 0; trial < kTrials; ++trial) {
     const std::vector<Eigen::Index> pivots = IndependentRows(orthonormal, random);
     if (static_cast<Eigen::Index>(pivots.size()) < k) continue;
-    const Eigen::MatrixXd reduced = orthonormal * orthonormal(pivots, Eigen::all).inverse();
+    const Eigen::MatrixXd reduced = orthonormal * Inverse(orthonormal(pivots, Eigen::all));
     for (const auto column : reduced.colwise()) {
       candidates.push_back(Round(unit.cwiseProduct(Prune(column)), belongs));
     }

@@ -1,6 +1,5 @@
 #include "calibrator/streaming.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 #include "calibrator/curriculum.h"
 #include "calibrator/inference/laplace.h"
 #include "calibrator/window_errors.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -222,7 +223,7 @@ std::vector<Eigen::Vector2d> Ellipse(const Eigen::Vector2d& mean, const Eigen::M
                                      double sigma) {
   std::vector<Eigen::Vector2d> points;
   if (!mean.allFinite() || !covariance.allFinite()) return points;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd{covariance});
   const Eigen::Matrix2d root =
       eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
   constexpr int kPoints = 64;

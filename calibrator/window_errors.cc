@@ -1,11 +1,11 @@
 #include "calibrator/window_errors.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "common/decompositions.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {

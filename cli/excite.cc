@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
-#include <iterator>
 #include <stdexcept>
 #include <vector>
 
@@ -60,10 +59,10 @@ std::string Csv(const RobotDescription& robot, const RatedExcitation& best) {
   for (const std::string& joint : task->action_names()) csv += ",u/" + joint;
   csv += "\n";
   for (Eigen::Index k = 0; k < best.steps; ++k) {
-    fmt::format_to(std::back_inserter(csv), "{:.17g}", static_cast<double>(k) * robot.task.period);
+    csv += fmt::format("{:.17g}", static_cast<double>(k) * robot.task.period);
     for (int i = 0; i < task->action_size(); ++i) {
-      fmt::format_to(std::back_inserter(csv), ",{:.17g}",
-                     best.excitation.action(k, i) * limits(i) / task->action_unit(i));
+      csv += fmt::format(",{:.17g}",
+                         best.excitation.action(k, i) * limits(i) / task->action_unit(i));
     }
     csv += "\n";
   }
@@ -91,7 +90,7 @@ Gaussian Known(const std::string& file, const RobotDescription& robot) {
 
 int Excite(Process& process, const ExciteFlags& flags) {
   const RobotDescription robot = LoadRobot(flags.robot);
-  for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
+  for (const std::string& warning : robot.warnings) spdlog::warn(warning);
   RequireWritable(flags.output);
   if (!flags.png.empty()) {
     if (flags.png == flags.output)

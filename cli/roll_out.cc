@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <iterator>
 #include <stdexcept>
 
 namespace plumb {
@@ -13,7 +12,7 @@ namespace {
 constexpr uint32_t kStartStream = 0x53544152, kActorStream = 0x4143544f;  // "STAR", "ACTO"
 
 void AppendNumbers(const Eigen::VectorXd& numbers, std::string& csv) {
-  for (const double number : numbers) fmt::format_to(std::back_inserter(csv), ",{:.17g}", number);
+  for (const double number : numbers) csv += fmt::format(",{:.17g}", number);
 }
 
 }  // namespace
@@ -100,11 +99,11 @@ std::string CsvHeader(const RobotDescription& robot) {
 }
 
 void AppendCsv(const SimulatedStep& step, std::string& csv) {
-  fmt::format_to(std::back_inserter(csv), "{:.17g}", step.time);
+  csv += fmt::format("{:.17g}", step.time);
   AppendNumbers(step.q, csv);
   AppendNumbers(step.v, csv);
   AppendNumbers(step.action, csv);
-  fmt::format_to(std::back_inserter(csv), ",{:.17g},{:d},{:d}\n", step.reward, step.terminated, step.truncated);
+  csv += fmt::format(",{:.17g},{:d},{:d}\n", step.reward, step.terminated, step.truncated);
 }
 
 }  // namespace plumb

@@ -118,7 +118,7 @@ std::string DescribeParameters(const RobotDescription& robot) {
 int Simulate(Process& process, const SimFlags& flags) {
   if (flags.random && !flags.policy.empty()) throw std::invalid_argument("--policy and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
-  for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
+  for (const std::string& warning : robot.warnings) spdlog::warn(warning);
   if (flags.urdf) robot.parameters.clear();
   for (const std::string& assignment : flags.set) Set(assignment, robot);
   RequireOutputs(flags);

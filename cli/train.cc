@@ -244,9 +244,9 @@ class Training {
   }
 
   void Warn(const UpdateReport& report) {
-    if (!report.step.accepted) spdlog::warn("update {} skipped: {}", trainer_.updates(), report.step.failure);
-    if (!report.critic_fitted) spdlog::warn("update {}: the critic's fit was not finite", trainer_.updates());
-    if (report.dropped_episodes > 0) spdlog::warn("update {}: {} episodes dropped, not finite", trainer_.updates(), report.dropped_episodes);
+    if (!report.step.accepted) spdlog::warn(fmt::format("update {} skipped: {}", trainer_.updates(), report.step.failure));
+    if (!report.critic_fitted) spdlog::warn(fmt::format("update {}: the critic's fit was not finite", trainer_.updates()));
+    if (report.dropped_episodes > 0) spdlog::warn(fmt::format("update {}: {} episodes dropped, not finite", trainer_.updates(), report.dropped_episodes));
   }
 
   void Judge(const ParameterSampler& sample) {

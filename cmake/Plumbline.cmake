@@ -3,8 +3,14 @@
 
 add_library(plumb_warnings INTERFACE)
 target_compile_options(plumb_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Werror
-  # GCC 12 sees ghosts in Eigen's inlined packet loads.
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds -Wno-maybe-uninitialized>)
+  # GCC 12 sees ghosts in Eigen's inlined packet loads, and where std::string's headers are precompiled.
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds -Wno-maybe-uninitialized -Wno-stringop-overflow>)
+
+# Headers that are many and large, parsed once for all of our targets instead of once for each file. Files include what
+# they use all the same: cmake -D CMAKE_DISABLE_PRECOMPILE_HEADERS=ON builds without.
+set(plumb_precompiled <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <iostream> <limits> <map>
+  <memory> <numeric> <optional> <set> <span> <sstream> <stdexcept> <string> <string_view> <utility> <vector>
+  <Eigen/Dense> <fmt/format.h>)
 
 # plumb_library(<folder> SOURCES a.cc ... LINKS other ...) -> static library plumb_<folder>
 function(plumb_library name)
@@ -12,6 +18,11 @@ function(plumb_library name)
   add_library(plumb_${name} STATIC ${ARG_SOURCES})
   target_include_directories(plumb_${name} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(plumb_${name} PUBLIC ${ARG_LINKS} PRIVATE plumb_warnings)
+  if(name STREQUAL common)
+    target_precompile_headers(plumb_common PRIVATE ${plumb_precompiled})
+  else()
+    target_precompile_headers(plumb_${name} REUSE_FROM plumb_common)
+  endif()
 endfunction()
 
 # plumb_process(<name> main.cc ... LINKS other ...) -> executable <build>/bin/plumb-<name>
@@ -20,20 +31,22 @@ function(plumb_process name)
   add_executable(plumb-${name} ${ARG_UNPARSED_ARGUMENTS})
   set_target_properties(plumb-${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
   target_link_libraries(plumb-${name} PRIVATE ${ARG_LINKS} plumb_warnings)
+  target_precompile_headers(plumb-${name} REUSE_FROM plumb_common)
 endfunction()
 
-# plumb_test(<name> [FOLDER folder] LINKS ...) -> one Catch2 binary of tests/<folder>/*_test.cc, one CTest entry
+# plumb_test(<name> [FOLDER folder] LINKS ...) -> one Catch2 binary of tests/<folder>/*.cc, one CTest entry
 function(plumb_test folder)
   cmake_parse_arguments(ARG "" "FOLDER" "LINKS" ${ARGN})
   if(NOT ARG_FOLDER)
     set(ARG_FOLDER ${folder})
   endif()
-  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${ARG_FOLDER}/*_test.cc)
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${ARG_FOLDER}/*.cc)
   if(NOT sources)
     return()
   endif()
   add_executable(${folder}_test ${sources})
   target_link_libraries(${folder}_test PRIVATE plumb_test_main ${ARG_LINKS} plumb_warnings)
+  target_precompile_headers(${folder}_test REUSE_FROM plumb_test_main)
   add_test(NAME ${folder} COMMAND ${folder}_test)
   set_tests_properties(${folder} PROPERTIES TIMEOUT 300 ENVIRONMENT "PLUMBLINE_SOURCE=${PROJECT_SOURCE_DIR};PLUMBLINE_BUILD=${PROJECT_BINARY_DIR}")
 endfunction()

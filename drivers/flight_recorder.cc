@@ -7,7 +7,6 @@
 #include <exception>
 
 #include "common/atomic_file.h"
-
 #include "common/realtime.h"
 
 namespace plumb {

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "common/decompositions.h"
 #include "robot/physics_fingerprint.h"
 #include "robot/posterior_format.h"
 

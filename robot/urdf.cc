@@ -5,12 +5,12 @@
 #include <urdf_model/model.h>
 #include <urdf_parser/urdf_parser.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 
 #include "common/config.h"
+#include "common/decompositions.h"
 #include "robot/urdf_xml.h"
 
 namespace plumb {
@@ -242,7 +242,7 @@ class Reader {
         inertial.ixy, inertial.iyy, inertial.iyz,         //
         inertial.ixz, inertial.iyz, inertial.izz;
     // Principal moments of a body: none negative, none larger than the sum of the others.
-    const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia).eigenvalues();
+    const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(inertia)).eigenvalues();
     const double slack = 1e-9 * moments.cwiseAbs().maxCoeff();
     if (!inertia.allFinite() || moments(0) < -slack || moments(2) > moments(0) + moments(1) + slack) {
       fail("no body can have this inertia");

@@ -1,11 +1,11 @@
 #include "sim/gear_play.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
+#include "common/decompositions.h"
 #include "sim/simulator.h"
 
 namespace plumb {
@@ -42,7 +42,7 @@ GearPlay::GearPlay(const RobotDescription& robot) {
   RobotDescription known = robot;
   known.parameters.clear();
   Simulator simulator(known);
-  const Eigen::MatrixXd mobility = simulator.MassMatrix().inverse();
+  const Eigen::MatrixXd mobility = Inverse(simulator.MassMatrix());
   for (Gear& gear : gears_) {
     const double reduced = 1 / (1 / gear.rotor + mobility(gear.velocity, gear.velocity));
     const double rate = std::max(2 * std::numbers::pi * kToothFrequency, std::sqrt(gear.stiffness / reduced));

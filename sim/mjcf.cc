@@ -2,11 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -26,7 +27,7 @@ std::string Turn(const Eigen::Matrix3d& rotation) {
 Eigen::Matrix3d Solid(const Eigen::Matrix3d& inertia) {
   const double least = 1e-9 * inertia.trace();
   const bool thin =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues()[0] <
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(inertia), Eigen::EigenvaluesOnly).eigenvalues()[0] <
       least;
   return inertia + (thin ? least : 0) * Eigen::Matrix3d::Identity();
 }

@@ -1,8 +1,9 @@
 #include "sim/model.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <stdexcept>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -60,7 +61,7 @@ void Model::RequireInertia() const {
   }
   // In units of the diagonal, so that metres and radians compare.
   const Eigen::VectorXd scale = mass.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(scale.asDiagonal() * mass * scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(Eigen::MatrixXd(scale.asDiagonal() * mass * scale.asDiagonal()));
   if (modes.info() != Eigen::Success || !(modes.eigenvalues()(0) > 1e-12)) {
     Eigen::Index worst = 0;
     if (modes.info() == Eigen::Success) modes.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);

@@ -17,10 +17,12 @@ double Turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vec
 
 /// A stick from the link's origin to `end`.
 Shape Stick(const Eigen::Vector3d& end) {
-  const double length = end.norm();
-  return {Shape::Type::kCapsule, end / 2,
-          Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), end).toRotationMatrix(),
-          Eigen::Vector3d(kStick, length, 0)};
+  // Not Quaterniond::FromTwoVectors: for vectors that are opposite it decomposes a matrix, which the compiler needs ten seconds for.
+  const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(end);
+  const double aside = across.norm();
+  const Eigen::Vector3d axis = aside > 0 ? Eigen::Vector3d(across / aside) : Eigen::Vector3d::UnitX();
+  return {Shape::Type::kCapsule, end / 2, Eigen::AngleAxisd(std::atan2(aside, end.z()), axis).toRotationMatrix(),
+          Eigen::Vector3d(kStick, end.norm(), 0)};
 }
 
 std::vector<std::vector<Shape>> ShapesOf(const RobotDescription& robot) {

@@ -1,8 +1,9 @@
 #include "trainer/initialization.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -14,7 +15,7 @@ Eigen::MatrixXd RandomOrthogonal(Eigen::Index rows, Eigen::Index columns, Random
   Eigen::MatrixXd normal(tall, narrow);
   for (double& value : normal.reshaped()) value = random.Normal();
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(normal);
-  Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(tall, narrow);
+  Eigen::MatrixXd q = FirstColumns(qr.householderQ(), narrow);
   for (Eigen::Index j = 0; j < narrow; ++j) {
     if (qr.matrixQR()(j, j) < 0) q.col(j) = -q.col(j);
   }

@@ -1,6 +1,5 @@
 #include "calibrator/inference/conditional_mixture.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +9,7 @@
 
 #include "calibrator/inference/gaussian_mixture.h"
 #include "calibrator/inference/truncated_prior.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

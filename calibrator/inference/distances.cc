@@ -1,6 +1,5 @@
 #include "calibrator/inference/distances.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +7,7 @@
 #include <vector>
 
 #include "calibrator/inference/gaussian.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

@@ -1,8 +1,9 @@
 #include "calibrator/inference/gaussian.h"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <stdexcept>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

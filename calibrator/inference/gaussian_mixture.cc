@@ -1,9 +1,10 @@
 #include "calibrator/inference/gaussian_mixture.h"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

@@ -1,9 +1,9 @@
 #include "calibrator/inference/group_sums.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 
 #include "calibrator/inference/noise.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -46,7 +46,7 @@ GroupSums::Fit GroupSums::Solve(bool scale_known) const {
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(1 + n, 1 + n);
     for (size_t g = 0; g < sums_.size(); ++g) sum += sums_[g] / (scale(static_cast<Eigen::Index>(g)) * scale(static_cast<Eigen::Index>(g)));
     fit.information = sum.bottomRightCorner(n, n);
-    const Eigen::LLT<Eigen::MatrixXd> precision(fit.information + identity);
+    const Eigen::LLT<Eigen::MatrixXd> precision(Eigen::MatrixXd(fit.information + identity));
     const Eigen::VectorXd step = -precision.solve(sum.col(0).tail(n) + reference_);
     effective = precision.solve(fit.information).trace();
     const bool settled = iteration > 0 && (step - point.tail(n)).cwiseAbs().maxCoeff() <= kSettled &&

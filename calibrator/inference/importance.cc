@@ -1,11 +1,12 @@
 #include "calibrator/inference/importance.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <vector>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

@@ -1,6 +1,5 @@
 #include "calibrator/inference/laplace.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +8,7 @@
 
 #include "calibrator/inference/noise.h"
 #include "calibrator/inference/sandwich.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -90,7 +90,7 @@ class Fit {
 
   double EffectiveParameters() const {
     const Eigen::MatrixXd h = Curvature();
-    return (h + Eigen::MatrixXd::Identity(n_, n_)).llt().solve(h).trace();
+    return Eigen::MatrixXd(h + Eigen::MatrixXd::Identity(n_, n_)).llt().solve(h).trace();
   }
   Eigen::MatrixXd Curvature() const { return noise_.Information(jacobian_); }
 
@@ -162,7 +162,7 @@ class Fit {
       const Sandwich wider = WidenBySandwich(information, weighted.asDiagonal() * jacobian_, problem_.cluster);
       honest = wider.information, fit.inflation = wider.inflation;
     }
-    fit.standard = {u_, (honest + identity).llt().solve(identity)};
+    fit.standard = {u_, Eigen::MatrixXd(honest + identity).llt().solve(identity)};
     fit.standard.covariance = (fit.standard.covariance + fit.standard.covariance.transpose()).eval() / 2;
     // dx/du: exact for normal priors.
     const Eigen::VectorXd width = (problem_.prior.FromStandard(u_.array() + kDifference) -

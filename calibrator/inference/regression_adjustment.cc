@@ -1,9 +1,10 @@
 #include "calibrator/inference/regression_adjustment.h"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

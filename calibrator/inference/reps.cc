@@ -1,10 +1,11 @@
 #include "calibrator/inference/reps.h"
 
-#include <Eigen/Dense>
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

@@ -1,9 +1,10 @@
 #include "calibrator/inference/reps_search.h"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 #include <optional>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

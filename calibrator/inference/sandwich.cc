@@ -1,7 +1,8 @@
 #include "calibrator/inference/sandwich.h"
 
-#include <Eigen/Dense>
 #include <cmath>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 
@@ -21,7 +22,7 @@ Sandwich WidenBySandwich(const Eigen::MatrixXd& information, const Eigen::Matrix
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(clusters, rank);
   for (size_t i = 0; i < cluster.size(); ++i) sums.row(cluster[i]) += scores.row(static_cast<Eigen::Index>(i)) * whiten;
   const double c = clusters;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> scatter(sums.transpose() * sums * (c / (c - 1)));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> scatter(Eigen::MatrixXd(sums.transpose() * sums * (c / (c - 1))));
   const double edge = 1 + std::sqrt(static_cast<double>(rank) / c);
   const double chance = edge * edge + 3 * std::sqrt(2 / c);
   Eigen::VectorXd kept = Eigen::VectorXd::Ones(rank);

@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "calibrator/inference/chi_squared.h"
 
 namespace plumb {
 namespace {
@@ -121,7 +122,7 @@ double UniformityByChi2(const std::vector<int>& ranks, int draws) {
   for (const int rank : ranks) observed[bin(rank)] += 1;
   double chi2 = 0;
   for (size_t i = 0; i < expected.size(); ++i) chi2 += std::pow(observed[i] - expected[i], 2) / expected[i];
-  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(bins - 1), chi2));
+  return ChiSquaredTail(bins - 1, chi2);
 }
 
 // At each point the number of ranks below it is binomial. The statistic is the least tail probability of

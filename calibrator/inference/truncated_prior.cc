@@ -1,11 +1,12 @@
 #include "calibrator/inference/truncated_prior.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "calibrator/inference/chi_squared.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 
@@ -15,11 +16,10 @@ TruncatedPrior::TruncatedPrior(const GaussianMixture& region, double outside) {
         "a truncated prior needs a region, and a share outside of it between 0 and 1");
   }
   const Eigen::Index n = region.components[0].mean.size();
-  const boost::math::chi_squared squared_radius(static_cast<double>(n));
-  const double scale = boost::math::quantile(boost::math::complement(squared_radius, outside));
+  const double scale = ChiSquaredAtTail(static_cast<double>(n), outside);
   double nearest = std::numeric_limits<double>::infinity();
   for (const Gaussian& component : region.components) {
-    const Eigen::LLT<Eigen::MatrixXd> factor(scale * component.covariance);
+    const Eigen::LLT<Eigen::MatrixXd> factor(Eigen::MatrixXd(scale * component.covariance));
     if (factor.info() != Eigen::Success) throw std::invalid_argument("covariance is not positive definite");
     ellipsoids_.push_back({component.mean, factor.matrixL(),
                            factor.matrixL().solve(Eigen::MatrixXd::Identity(n, n)),

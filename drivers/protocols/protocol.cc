@@ -1,5 +1,7 @@
 #include "drivers/protocols/protocol.h"
 
+#include <fmt/format.h>
+
 #include <stdexcept>
 
 #include "drivers/protocols/cansimple_host.h"

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -12,25 +10,10 @@
 #include "drivers/can/frame.h"
 #include "drivers/can/transport.h"
 #include "drivers/protocols/bus_device.h"
+#include "drivers/protocols/reason.h"
 #include "robot/description.h"
 
 namespace plumb {
-
-/// Why something is as it is: one line in a fixed buffer, so that the driver's cycle can write it.
-class Reason {
- public:
-  template <class... Args>
-  void Set(fmt::format_string<Args...> format, Args&&... args) noexcept {
-    const auto result = fmt::format_to_n(text_.data(), text_.size(), format, std::forward<Args>(args)...);
-    size_ = result.size < text_.size() ? result.size : text_.size();
-  }
-  void Clear() noexcept { size_ = 0; }
-  std::string_view text() const noexcept { return {text_.data(), size_}; }
-
- private:
-  std::array<char, 256> text_;
-  size_t size_ = 0;
-};
 
 /// How a drive is. The numbers are those of driver_status_t.
 enum class DriveState : int8_t { kAbsent = 0, kIdle = 1, kArming = 2, kArmed = 3, kFault = 4 };

@@ -1,8 +1,9 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <functional>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 

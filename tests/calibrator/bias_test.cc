@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "calibrator/simopt.h"
 #include "estimator/state_observer.h"
 #include "sim/encoder.h"
 #include "sim/plant.h"

@@ -1,12 +1,12 @@
 #include "calibrator/calibration.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "calibrator/holdout.h"
+#include "common/decompositions.h"
 #include "hopper.h"
 #include "inference/statistics.h"
 #include "synthetic.h"

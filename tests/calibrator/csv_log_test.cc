@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 #include <clocale>
 #include <cmath>
-#include <iterator>
 
 #include "calibrator/log.h"
 #include "sim/environment.h"
@@ -45,12 +44,12 @@ std::string SimulatedTable(const RobotDescription& robot, int episodes, int step
   }
   for (const std::string& name : task.action_names()) csv += ",u/" + name;
   csv += ",reward,terminated,truncated\n";
-  const auto append = [&](double x) { fmt::format_to(std::back_inserter(csv), ",{:.17g}", x); };
+  const auto append = [&](double x) { csv += fmt::format(",{:.17g}", x); };
   for (uint32_t episode = 0; episode < static_cast<uint32_t>(episodes); ++episode) {
     Random random(4, {episode});
     environment.Reset(random);
     for (int i = 0; i < steps; ++i) {
-      fmt::format_to(std::back_inserter(csv), "{:.17g}", i * robot.task.period);
+      csv += fmt::format("{:.17g}", i * robot.task.period);
       for (const double x : environment.q()) append(x);
       for (const double x : environment.v()) append(x);
       Eigen::VectorXf action(task.action_size());

@@ -1,11 +1,11 @@
 #include "calibrator/curriculum.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>
 
+#include "common/decompositions.h"
 #include "hopper.h"
 #include "sim/windows.h"
 

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "calibrator/simopt.h"
 #include "calibrator/sparse_basis.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/synthetic.h"

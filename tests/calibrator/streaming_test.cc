@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "calibrator/curriculum.h"
+#include "calibrator/simopt.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/synthetic.h"
 

@@ -1,69 +1,25 @@
 #pragma once
 
-#include <Eigen/Dense>
-#include <cmath>
-#include <cstdlib>
-#include <string>
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
 
-#include "calibrator/discrepancy.h"
-#include "calibrator/simopt.h"
+#include "calibrator/inference/gaussian.h"
 #include "calibrator/transitions.h"
-#include "common/random.h"
 #include "robot/description.h"
-#include "sim/simulator.h"
 
 namespace plumb {
 
-inline RobotDescription Pendulum() {
-  return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum");
-}
+RobotDescription Pendulum();
 
-/// A roll-out of the pendulum with known parameters under random efforts of 50 ms in ten segments, with independent
-/// noise of known size on every recorded state.
-inline Rollout SyntheticRollout(const RobotDescription& robot, const Eigen::VectorXd& truth, int steps, double q_sd,
-                                double v_sd, uint32_t stream) {
-  Simulator simulator(robot);
-  simulator.SetParameters(truth);
-  Random random(17, {stream});
-  const auto noisy = [&](double x, double sd) { return Eigen::VectorXd::Constant(1, x + sd * random.Normal()); };
-  simulator.SetState(Eigen::VectorXd::Constant(1, random.Uniform(-3, 3)), Eigen::VectorXd::Zero(1));
-  Rollout rollout;
-  rollout.episode = stream;
-  Eigen::VectorXd q = noisy(simulator.q()(0), q_sd), v = noisy(simulator.v()(0), v_sd);
-  for (int i = 0; i < steps; ++i) {
-    Transition t;
-    t.step = i;
-    t.q = q, t.v = v;
-    const Eigen::VectorXd effort = Eigen::VectorXd::Constant(1, random.Uniform(-2, 2));
-    for (int k = 0; k < 10; ++k) t.efforts.push_back({0.005, effort});
-    simulator.Step(t.efforts);
-    q = noisy(simulator.q()(0), q_sd), v = noisy(simulator.v()(0), v_sd);
-    t.next_q = q, t.next_v = v;
-    t.q_sd = t.next_q_sd = Eigen::VectorXd::Constant(1, q_sd);
-    t.v_sd = t.next_v_sd = Eigen::VectorXd::Constant(1, v_sd);
-    rollout.transitions.push_back(t);
-  }
-  return rollout;
-}
+/// A roll-out of the pendulum with known parameters under random efforts of 50 ms in ten segments, with
+/// independent noise of known size on every recorded state.
+Rollout SyntheticRollout(const RobotDescription& robot, const Eigen::VectorXd& truth, int steps, double q_sd,
+                         double v_sd, uint32_t stream);
 
-/// The Laplace approximation of the posterior, by Gauss-Newton from `start` (coordinates): independent of REPS.
-inline Gaussian LaplacePosterior(const RobotDescription& robot, const std::vector<Rollout>& rollouts,
-                                 Eigen::VectorXd start) {
-  const Gaussian prior = PriorGaussian(robot);
-  Discrepancy discrepancy(robot);
-  Eigen::VectorXd x = std::move(start);
-  Eigen::MatrixXd precision;
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::VectorXd r = discrepancy.Residuals(x.array().exp(), rollouts);
-    Eigen::MatrixXd jacobian(r.size(), x.size());
-    for (int k = 0; k < x.size(); ++k) {
-      const Eigen::VectorXd y = x + 1e-6 * Eigen::VectorXd::Unit(x.size(), k);
-      jacobian.col(k) = (discrepancy.Residuals(y.array().exp(), rollouts) - r) / 1e-6;
-    }
-    precision = jacobian.transpose() * jacobian + Eigen::MatrixXd(prior.covariance.inverse());
-    x -= precision.ldlt().solve(jacobian.transpose() * r + prior.covariance.inverse() * (x - prior.mean));
-  }
-  return {x, precision.inverse()};
-}
+/// The Laplace approximation of the posterior, by Gauss-Newton from `start` (coordinates): independent of
+/// REPS.
+Gaussian LaplacePosterior(const RobotDescription& robot, const std::vector<Rollout>& rollouts,
+                          Eigen::VectorXd start);
 
 }  // namespace plumb

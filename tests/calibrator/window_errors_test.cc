@@ -1,11 +1,11 @@
 #include "calibrator/window_errors.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "common/decompositions.h"
 #include "hopper.h"
 #include "inference/statistics.h"
 #include "synthetic.h"

@@ -2,11 +2,11 @@
 // error squared (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation",
 // 2001, section 5.4.2) of independent runs is chi-square, causal and smoothed.
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <vector>
 
+#include "common/decompositions.h"
 #include "common/random.h"
 #include "estimator/kinematic_filter.h"
 

@@ -1,10 +1,10 @@
 #include "estimator/kinematic_filter.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <vector>
 
+#include "common/decompositions.h"
 #include "common/random.h"
 
 namespace plumb {

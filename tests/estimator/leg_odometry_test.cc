@@ -1,8 +1,8 @@
 // A body in space that sways above its feet, after formulas; its feet creep and sink in as the filter takes them to.
 
+#include "common/decompositions.h"
 #include "estimator/leg_odometry.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 

@@ -1,6 +1,5 @@
 #include "experiments/bus_robot.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "calibrator/calibration.h"
+#include "common/decompositions.h"
 #include "sim/mujoco_engine.h"
 #include "sim/parameters.h"
 #include "sim/tasks/task.h"

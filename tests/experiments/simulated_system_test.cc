@@ -1,10 +1,10 @@
 #include "experiments/simulated_system.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <map>
 
+#include "common/decompositions.h"
 #include "experiments/budget.h"
 #include "experiments/n_step_error.h"
 #include "experiments/recording.h"

@@ -1,10 +1,9 @@
 #include "sim/parameters.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <catch2/catch.hpp>
 #include <limits>
 
+#include "common/decompositions.h"
 #include "sim/model.h"
 #include "sim/simulator.h"
 #include "tests/sim/robots.h"

@@ -1,10 +1,10 @@
 #include "trainer/conjugate_gradient.h"
 
-#include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 
+#include "common/decompositions.h"
 #include "common/random.h"
 
 namespace plumb {

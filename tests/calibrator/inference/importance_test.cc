@@ -1,10 +1,11 @@
 #include "calibrator/inference/importance.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

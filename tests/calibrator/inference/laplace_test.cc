@@ -1,11 +1,11 @@
 #include "calibrator/inference/laplace.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>
 
 #include "calibrator/inference/sandwich.h"
+#include "common/decompositions.h"
 #include "statistics.h"
 
 namespace plumb {

@@ -1,9 +1,10 @@
 #include "calibrator/inference/reps_search.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

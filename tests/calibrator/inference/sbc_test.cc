@@ -1,11 +1,11 @@
 #include "calibrator/inference/sbc.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>
 
 #include "calibrator/inference/gaussian.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 namespace {

@@ -1,9 +1,9 @@
 #include "estimator/model/unscented_filter.h"
 
-#include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "common/decompositions.h"
 #include "common/random.h"
 
 namespace plumb {

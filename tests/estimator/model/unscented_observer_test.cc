@@ -1,11 +1,11 @@
 #include "estimator/model/unscented_observer.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 
+#include "common/decompositions.h"
 #include "common/random.h"
 #include "tests/sim/robots.h"
 
