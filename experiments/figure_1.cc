@@ -6,6 +6,7 @@
 // noise. Given (s, a), s' is bimodal. Prior of xi: N(0, 1).
 //
 //   plumb-figure-1 --output figure_1
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <cmath>

@@ -6,6 +6,7 @@
 // simulated steps, and within a hundredth of it. Other roll-outs of the same policy judge.
 //
 //   plumb-figure-2 robots --output figure_2
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <filesystem>

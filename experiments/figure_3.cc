@@ -4,6 +4,7 @@
 // All ways have the same seeds and make the same number of TRPO updates; those that learn have the same seconds of the robot.
 //
 //   plumb-figure-3 robots --output figure_3
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <cmath>

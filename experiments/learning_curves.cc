@@ -3,6 +3,7 @@
 //   plumb-learning-curves robots/hopper/gym.toml --steps 1e6 --output curves
 //
 // A seed that the table already has is not run again: an interrupted experiment goes on with the others.
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <unistd.h>
 

@@ -7,6 +7,7 @@
 // to let the engine fit friction, delay and contact?
 //
 //   plumb-reality-gap robots --output reality_gap
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <array>

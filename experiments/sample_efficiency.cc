@@ -7,6 +7,7 @@
 //   simulator: 40 roll-outs calibrate, one an update, or for the default as many of their transitions as the budget allows.
 //
 //   plumb-sample-efficiency robots --output sample_efficiency
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -5,6 +5,7 @@
 //
 //   plumb-step-vs-trajectory robots/pendulum runs/a runs/b ... --csv table.csv
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <fstream>

@@ -53,7 +53,7 @@ struct Fixture {
 TEST_CASE_METHOD(Fixture, "a row shows the distribution beside the returns of the policy it was learned from") {
   Trained(0, -210);
   Rollout(0, policy_t::CALIBRATE, {-300});
-  progress.Account(12.5);
+  progress.Account(12.5, 1.25);
   progress.OnCalibration(Calibration(1));
   progress.OnCalibration(Calibration(1));  // repeated at 1 Hz
   const auto rows = progress.TakeRows();
@@ -91,6 +91,25 @@ TEST_CASE_METHOD(Fixture, "what was learned stands beside the truth, combination
   // with a real robot nobody knows the truth
   CHECK(progress.Summary({})["hidden"].is_null());
   CHECK(progress.Conclusion({}).find('%') == std::string::npos);
+}
+
+TEST_CASE_METHOD(Fixture, "the run's clock is told apart from real time, and only the former is in the summary") {
+  controller_status_t c{};
+  c.phase = controller_status_t::RUNNING;
+  progress.OnController(c);
+  progress.Account(60, 4);
+  c.phase = controller_status_t::WAITING;
+  progress.OnController(c);
+  training_status_t t{};
+  t.updates = 60;
+  progress.OnTraining(t);
+  progress.Account(60, 11);
+  CHECK_THAT(progress.Conclusion({}),
+             Catch::Contains("time: 60 s on the robot, by its clock; 11 s in all: 4 s on the robot, 7 s training, 0 s for the rest"));
+  const auto seconds = progress.Summary({})["seconds"];
+  CHECK(seconds["robot"] == 60);
+  CHECK(seconds["training"] == 0);
+  CHECK(seconds["total"] == 60);
 }
 
 TEST_CASE_METHOD(Fixture, "messages whose sizes do not fit are ignored") {

@@ -47,6 +47,15 @@ TEST_CASE("the loop closes over SocketCAN, and candump sees it") {
   const std::string seen = std::regex_replace(Read(candump.log()), time, ""),
                     said = std::regex_replace(Read(can_log), time, "");
   CHECK(seen == said);
+  // And it is the same run as without any such bus.
+  Child again("plumb", {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", "memq://", "--bus", "loop:", "--output",
+                        stage.folder / "again", "--iterations", "1", "--evaluation-episodes", "1", "--can-log", stage.folder / "again.log"},
+              stage.folder / "again.output");
+  stage.WaitUntil([&] { return !again.running(); }, 250);
+  INFO(again.Tail(30));
+  REQUIRE_FALSE(again.running());
+  CHECK(std::regex_replace(said, std::regex("vcan0 "), "can0 ") ==
+        std::regex_replace(Read(stage.folder / "again.log"), time, ""));
   CHECK(Count(said, "vcan0 027#0800000000000000") >= 1);        // closed-loop control is asked for
   CHECK(Count(said, "vcan0 02E#[0-9A-F]{8}") > 2 * 10 * kRate);  // torques, for more than two roll-outs
   CHECK(Count(said, "vcan0 029#[0-9A-F]{16}") > 2 * 10 * kRate);  // encoder estimates
