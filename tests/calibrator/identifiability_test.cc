@@ -6,6 +6,7 @@
 
 #include "calibrator/simopt.h"
 #include "calibrator/sparse_basis.h"
+#include "common/decompositions.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/synthetic.h"
 
