@@ -142,9 +142,9 @@ int RunLive(Process& process, Session& session, double duration) {
   publish();
   constexpr int64_t kLook = 50'000, kRepeat = 1'000'000;  // [us]
   int64_t last = process.clock().Now();
-  while (process.Sleep(session.busy() ? 0 : kLook)) {
+  const auto stream = [&] { session.Stream(); };
+  while (session.busy() ? process.Sleep(0) : process.Sleep(kLook, stream)) {
     states.Rethrow(), commands.Rethrow(), controller.Rethrow();
-    session.Stream();
     const bool complete = session.Work();
     if (complete) process.TakeVirtualTime(duration);
     if (complete || process.clock().Now() - last >= kRepeat) {

@@ -11,6 +11,7 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -79,12 +80,14 @@ bool Process::Wait(int64_t timeout, int fd) {
   return !stopping();
 }
 
-bool Process::Sleep(int64_t timeout) {
+bool Process::Sleep(int64_t timeout, const std::function<void()>& meanwhile) {
   if (participant_) {
-    participant_->Wait(participant_->now() + timeout, Participant::Wake::kOnTime, stop_fd_);
+    participant_->Wait(participant_->now() + timeout, Participant::Wake::kOnTime, stop_fd_, meanwhile);
   } else {
+    const int64_t end = clock_.Now() + timeout;
+    if (meanwhile) meanwhile();
     pollfd stop{stop_fd_, POLLIN, 0};
-    const timespec real = clock_.RealDuration(timeout);
+    const timespec real = clock_.RealDuration(std::max<int64_t>(end - clock_.Now(), 0));
     ppoll(&stop, 1, &real, nullptr);
   }
   messenger().Drain();

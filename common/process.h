@@ -48,8 +48,9 @@ class Process {
   /// The same, and leaves LCM's messages for messenger().Drain().
   void Doze(int64_t timeout, int fd = -1);
   /// Sleeps for `timeout` scaled microseconds or until the process is asked to stop, whatever comes meanwhile. Then
-  /// drains LCM. For those who are in no hurry. @return false when the process is asked to stop.
-  bool Sleep(int64_t timeout);
+  /// drains LCM. For those who are in no hurry. @param meanwhile work to do in that time, which sends and reads no message;
+  /// in virtual time the others need not wait for it. @return false when the process is asked to stop.
+  bool Sleep(int64_t timeout, const std::function<void()>& meanwhile = {});
   /// From here on this process belongs to the fast loop. @param priority for BecomeRealtime; in virtual time there are
   /// no priorities, but its turns are to be short.
   void BecomeFast(int priority);

@@ -80,7 +80,7 @@ class Coordinator {
   bool MoveOn(int64_t moment, int stop_fd);
   bool Listen(int stop_fd, int timeout);
   void Admit(PacketSocket& stranger);
-  void Read(Member& member);
+  void Read(Member& member, PacketSocket::When when);
   void Digest(Member& member);
   void Leave(Member& member);
   void Route(const lockstep_post_t& post, const Member& speaker);

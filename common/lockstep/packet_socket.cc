@@ -18,6 +18,7 @@ namespace {
 
 constexpr size_t kHead = sizeof(uint32_t);
 constexpr size_t kChunk = size_t{1} << 16;  // [bytes] read in one go
+constexpr int kSoon = 100;                  // [ms] for which a Read waits, at most
 
 [[noreturn]] void Fail(const std::string& path, const char* what) {
   throw std::runtime_error(fmt::format("{}: {} ({})", path, what, std::strerror(errno)));
@@ -113,7 +114,10 @@ bool PacketSocket::Send(std::span<const uint8_t> packet, const std::function<boo
   return true;
 }
 
-bool PacketSocket::Read() {
+bool PacketSocket::Read(When when) {
+  // Rather than with a blocking recv: that is woken, for nothing, when the other end reads what we have sent.
+  pollfd readable{fd_, POLLIN, 0};
+  if (when == When::kSoon && poll(&readable, 1, kSoon) == 0) return true;
   for (bool more = true; more;) {
     if (begin_ == end_) begin_ = end_ = 0;
     if (in_.size() - end_ < kChunk) in_.resize(end_ + kChunk);

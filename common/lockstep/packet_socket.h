@@ -33,8 +33,10 @@ class PacketSocket {
   /// Sends all of it, waiting for a receiver that does not read. @param waiting called every tenth of a second
   /// meanwhile; false gives up. @return false if the other end is gone, or it was given up.
   bool Send(std::span<const uint8_t> packet, const std::function<bool()>& waiting = {});
-  /// Reads what there is, without blocking. @return false if the other end is gone or sends no packets.
-  bool Read();
+  enum class When { kNow, kSoon };
+  /// Reads what there is, or, kSoon, waits for it, but for a tenth of a second at most. @return false if the other end is
+  /// gone or sends no packets.
+  bool Read(When when);
   /// The next complete packet of what has been read; empty if there is none. Valid until the next call.
   std::span<const uint8_t> Next();
 

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -36,8 +37,9 @@ class Participant {
   virtual void Say(const lockstep_topic_t& topic, std::vector<uint8_t> data, int64_t way = 0) = 0;
   /// Gives the others their turn. Ends at `until`, when something has been heard (if wanted), or when the process is
   /// asked to stop. @param stop_fd becomes readable when it is asked by a signal; -1: there is none.
+  /// @param meanwhile is done while the others go on: work that says and hears nothing, and whose results are of `until`.
   /// @throws std::runtime_error if the run is over or cannot go on.
-  virtual void Wait(int64_t until, Wake wake, int stop_fd = -1) = 0;
+  virtual void Wait(int64_t until, Wake wake, int stop_fd = -1, const std::function<void()>& meanwhile = {}) = 0;
   /// From now on this process's main thread works on the processor on which the coordinator does: handing over is much
   /// faster there than between two. For those whose turns are many and short.
   virtual void ShareProcessor() = 0;

@@ -48,10 +48,11 @@ class RemoteParticipant : public Participant {
     post.data = std::move(data);
   }
 
-  void Wait(int64_t until, Wake wake, int stop_fd) override {
+  void Wait(int64_t until, Wake wake, int stop_fd, const std::function<void()>& meanwhile) override {
     // What has been heard and not been read yet is read first; time does not pass meanwhile.
     if (wake == Wake::kWhenHeard && heard()) until = now();
     Report(until, wake);
+    if (meanwhile) meanwhile();
     AwaitGrant(stop_fd);
   }
 
@@ -79,19 +80,18 @@ class RemoteParticipant : public Participant {
     report_ = {};
   }
 
-  /// Until our turn has come. A signal asks for one at once.
+  /// Until our turn has come. A signal asks for it, where it does not come anyway.
   void AwaitGrant(int stop_fd) {
-    std::span<const uint8_t> packet;
     bool asked = false;
-    while ((packet = socket_.Next()).empty()) {
-      pollfd polled[] = {{socket_.fd(), POLLIN, 0}, {stop_fd, POLLIN, 0}};
-      poll(polled, stop_fd < 0 || asked ? 1 : 2, -1);
-      if (polled[1].revents != 0 && polled[0].revents == 0) {
-        asked = true;
-        Report(now(), Wake::kWhenHeard);
-      } else if (polled[0].revents != 0 && !socket_.Read()) {
-        Gone();
-      }
+    std::span<const uint8_t> packet;
+    while (true) {
+      if (!socket_.Read(PacketSocket::When::kSoon)) Gone();
+      packet = socket_.Next();
+      if (!packet.empty()) break;
+      pollfd stop{stop_fd, POLLIN, 0};
+      if (asked || poll(&stop, 1, 0) <= 0) continue;
+      asked = true;
+      Report(now(), Wake::kWhenHeard);
     }
     if (!Decode(packet, grant_)) throw std::runtime_error(path_ + ": the run is another version's");
     SetNow(grant_.now);

@@ -20,6 +20,14 @@ long long Waited() {
   return waited;
 }
 
+/// @param policy SCHED_BATCH: whoever is woken waits until the one who wakes it has gone to sleep, which is what it does
+/// next. With SCHED_OTHER it would be interrupted for that, and have to be resumed later.
+void Bind(pid_t pid, const cpu_set_t& processors, int policy) {
+  const sched_param none{};
+  sched_setscheduler(pid, policy, &none);
+  sched_setaffinity(pid, sizeof processors, &processors);
+}
+
 }  // namespace
 
 SharedProcessor::SharedProcessor() : self_(static_cast<pid_t>(syscall(SYS_gettid))) {
@@ -41,7 +49,7 @@ void SharedProcessor::Add(pid_t pid) {
 void SharedProcessor::Remove(pid_t pid) { others_.erase(pid); }
 
 void SharedProcessor::Release(pid_t pid) const {
-  if (CPU_COUNT(&allowed_) > 0) sched_setaffinity(pid, sizeof allowed_, &allowed_);
+  if (CPU_COUNT(&allowed_) > 0) Bind(pid, allowed_, SCHED_OTHER);
 }
 
 void SharedProcessor::Choose(int processor) {
@@ -50,8 +58,8 @@ void SharedProcessor::Choose(int processor) {
   cpu_set_t one;
   CPU_ZERO(&one);
   CPU_SET(processor, &one);
-  sched_setaffinity(self_, sizeof one, &one);
-  for (const pid_t pid : others_) sched_setaffinity(pid, sizeof one, &one);
+  Bind(self_, one, SCHED_BATCH);
+  for (const pid_t pid : others_) Bind(pid, one, SCHED_BATCH);
 }
 
 void SharedProcessor::Balance() {

@@ -58,6 +58,7 @@ int DatagramTransport::Receive(std::span<Frame> frames) noexcept {
     for (int i = 0; i < got; ++i) {
       if (Take(static_cast<size_t>(i), frames[count])) ++count;
     }
+    if (static_cast<size_t>(got) < room) break;
   }
   stats_.received += static_cast<int64_t>(count);
   return static_cast<int>(count);

@@ -244,7 +244,7 @@ TEST_CASE("who does not belong is refused with one line") {
                hello.name = "old";
                std::vector<uint8_t> buffer;
                socket.Send(Encode(hello, buffer));
-               while (socket.Read() && socket.Next().empty()) usleep(1000);
+               while (socket.Read(PacketSocket::When::kSoon) && socket.Next().empty()) usleep(1000);
              }),
              Contains(" "));
   CHECK_THAT(run.notes, Contains("refused: old is 0.0.1 (abc), the run is "));
@@ -253,7 +253,7 @@ TEST_CASE("who does not belong is refused with one line") {
     refusal([&] {
       PacketSocket socket = PacketSocket::Connect(path);
       send(socket.fd(), garbage.data(), garbage.size(), MSG_NOSIGNAL);
-      while (socket.Read()) socket.Next(), usleep(1000);
+      while (socket.Read(PacketSocket::When::kSoon)) socket.Next(), usleep(1000);
     });
   }
   run.transcript.clear();

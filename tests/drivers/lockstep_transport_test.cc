@@ -21,7 +21,7 @@ class MadeUpRun : public Participant {
   void Say(const lockstep_topic_t& topic, std::vector<uint8_t> data, int64_t way) override {
     said += topic.name + " " + std::string(data.begin(), data.end()) + " " + std::to_string(now() + way) + "\n";
   }
-  void Wait(int64_t until, Wake, int) override { SetNow(until); }
+  void Wait(int64_t until, Wake, int = -1, const std::function<void()>& = {}) override { SetNow(until); }
   void ShareProcessor() override {}
   void Note(const std::string& line) override { noted += line + "\n"; }
   void Fail(const std::string& why) override { failed += why + "\n"; }
