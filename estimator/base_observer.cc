@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kHeightKnown = 0.05, kTiltKnown = 0.1, kVelocityKnown = 0.5;  // [m], [rad], [m/s]
+constexpr double kHeightKnown = 0.1, kTiltKnown = 0.1, kVelocityKnown = 0.5;  // [m], [rad], [m/s]
 
 LegOdometry::Settings SettingsOf(const RobotDescription& robot, const FloatingBase& base) {
   const SensorDescription& imu = robot.sensors[base.imu];

@@ -36,7 +36,7 @@ class BaseObserver {
   /// Fills in q, v and their standard deviations of the base's joints at a time of at least the last reading's, under the
   /// acceleration and rate of that one. They are NaN before the first.
   void Fill(int64_t utime, robot_state_t& state) const;
-  /// The IMU is heard, and height, tilt and velocity are known well enough to act on: to 0.05 m, 0.1 rad, 0.5 m/s.
+  /// The IMU is heard, and height, tilt and velocity are known well enough to act on: to 0.1 m, 0.1 rad, 0.5 m/s.
   bool valid(int64_t utime) const;
 
   const LegOdometry& odometry() const { return odometry_; }

@@ -209,8 +209,15 @@ void LegOdometry::Correct(std::span<const Foot> feet) {
     if (rested) Wander(i, feet[i]);
     Judge(i, feet[i]);
     if (!rests(i)) continue;
+    const bool fits = CorrectBy(i, feet[i]);
+    if (!fits && !rested && lift_ < flight_ * s_.gravity / 2) {
+      // It swings above the ground: since the last one left nothing has held the body up.
+      feet_[i].test.Restart();
+      Forget(IndexOf(i));
+      continue;
+    }
     flight_ = lift_ = 0;
-    if (CorrectBy(i, feet[i])) continue;
+    if (fits) continue;
     // It is elsewhere along the ground; if even the ground is elsewhere, it is we who are.
     if (rested) ++slips_;
     SetDown(i, feet[i]);

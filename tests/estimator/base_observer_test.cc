@@ -124,7 +124,7 @@ TEST_CASE("dropped from higher than it was told, bouncing and tumbling, it finds
   const BaseErrors legs = ErrorsOf(robot, Record(robot, 1, 6), 300);
   INFO("x, z, pitch: q, v, NEES q, NEES v, within 95 %\n" << Describe(legs));
   CHECK(legs.valid > 0.6);
-  CHECK(legs.base[1].q() < 0.04);
+  CHECK(legs.base[1].q() < 0.06);  // of states that are valid up to an sd of 0.1
   CHECK(legs.base[1].v() < 0.2);
   CHECK(legs.base[2].q() < 0.04);
 }
