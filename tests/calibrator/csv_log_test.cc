@@ -85,7 +85,7 @@ double WorstPrediction(const Log& log, const RobotDescription& robot) {
 }
 
 TEST_CASE("a table recorded in the simulator leads, transition by transition, to the simulator's own bits") {
-  for (const char* name : {"pendulum/gym.toml", "hopper"}) {
+  for (const char* name : {"pendulum/gym.toml", "hopper/gym.toml"}) {
     const RobotDescription robot = Robot(name);
     const Log log = Read(SimulatedTable(robot, 3, 40), robot);
     REQUIRE(log.rollouts.size() == 3);
