@@ -30,6 +30,8 @@ class CommandInbox {
   int64_t arrival() const noexcept { return arrival_; }
   /// `now` until which the last command taken holds. Meaningless while empty.
   int64_t expires() const noexcept;
+  /// Whether the last command taken is part of an episode.
+  bool in_episode() const noexcept { return !empty_ && command_.episode >= 0; }
   bool Expired(int64_t now) const noexcept { return empty_ || now > expires(); }
 
   /// Effort wished for a joint that is at a position and velocity (joint side): the feed-forward effort plus

@@ -189,7 +189,9 @@ void Driver::Poll() noexcept {
 }
 
 void Driver::LetJump() noexcept {
-  const bool let = virtual_ && std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
+  // In an episode a policy, or a limit, may want no effort, too: nobody places the robot then.
+  const bool at_rest = std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
+  const bool let = virtual_ && at_rest && !(Active() && inbox_.in_episode());
   may_jump_ = let;
   for (Joint& joint : joints_) {
     joint.motor->LetJump(let);

@@ -84,7 +84,7 @@ class Driver {
   void set_bus(const std::string& url) { status_.bus = url; }
   /// Whether signatures are looked at before OnRequest and OnCommand are called.
   void set_commands_signed(bool commands_signed) { status_.commands_signed = commands_signed; }
-  /// The robot is a virtual one, which is put elsewhere at once: while no effort is sent, positions may jump.
+  /// The robot is a virtual one, which is put elsewhere at once: between episodes, while no effort is sent, positions may jump.
   void set_virtual(bool is_virtual) { virtual_ = is_virtual; }
   /// What it hears is a recording: it refuses to arm.
   void set_replay(bool replay) { replay_ = replay; }

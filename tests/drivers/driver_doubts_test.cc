@@ -108,6 +108,16 @@ TEST_CASE("only a virtual robot without an effort may jump") {
     rig.samples[0].position = 0;
     CheckStops(rig, 5, "pivot: the position jumped");
   }
+  SECTION("but not in the middle of an episode, whatever its effort") {
+    rig.driver->set_virtual(true);
+    REQUIRE(rig.Arm(0));
+    rig.episode = 1;
+    rig.Run(200);
+    CHECK(rig.driver->state() == DriveState::kArmed);
+    rig.samples[0].position = 0.5;
+    CHECK(rig.RunUntil(DriveState::kFault, 10) >= 0);
+    CHECK_THAT(rig.Reason(), Contains("pivot: the position jumped"));
+  }
 }
 
 TEST_CASE("heat and a bad supply stop the robot and keep it from being armed") {

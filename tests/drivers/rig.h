@@ -97,7 +97,7 @@ struct Rig {
     command.utime = utime();
     command.sequence = ++sequence;
     command.state_sequence = 0;
-    command.episode = -1;
+    command.episode = episode;
     command.step = -1;
     command.policy_iteration = -1;
     command.num_joints = static_cast<int32_t>(size);
@@ -155,6 +155,7 @@ struct Rig {
   bool bus_full = false;
   bool driver_stopped = false;  ///< its process has been stopped: it hears, says and does nothing
   double effort = 0;
+  int64_t episode = -1;
 };
 
 }  // namespace plumb
