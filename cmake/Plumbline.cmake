@@ -48,7 +48,7 @@ function(plumb_test folder)
   target_link_libraries(${folder}_test PRIVATE plumb_test_main ${ARG_LINKS} plumb_warnings)
   target_precompile_headers(${folder}_test REUSE_FROM plumb_test_main)
   add_test(NAME ${folder} COMMAND ${folder}_test)
-  set_tests_properties(${folder} PROPERTIES TIMEOUT 300 ENVIRONMENT "PLUMBLINE_SOURCE=${PROJECT_SOURCE_DIR};PLUMBLINE_BUILD=${PROJECT_BINARY_DIR}")
+  set_tests_properties(${folder} PROPERTIES ENVIRONMENT "PLUMBLINE_SOURCE=${PROJECT_SOURCE_DIR};PLUMBLINE_BUILD=${PROJECT_BINARY_DIR}")
 endfunction()
 
 # plumb_levels(<name> SOURCES a.cc ... OPTIONS -O3 ...) -> shared library plumb_<name>, built once per level of instruction

@@ -7,14 +7,17 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <iterator>
 
 #include "controller/policy.h"
 
 namespace plumb {
 std::string Read(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  // Empty where it cannot be read, as of a process that ends meanwhile, whose file in /proc fails while it is being read.
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
 }
 
 bool AwaitReally(const std::function<bool()>& so) {
