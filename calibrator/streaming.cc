@@ -13,8 +13,8 @@
 namespace plumb {
 namespace {
 
-// With each new transition: together they fill eight lanes; and looking costs little.
-constexpr size_t kLinearisedAgain = 7, kLookedAt = 128;
+// With each new transition. More would follow the mode sooner, and in virtual time the robot waits for it; looking costs little.
+constexpr size_t kLinearisedAgain = 3, kLookedAt = 128;
 constexpr double kStill = 0.01;      // [sd] of the posterior: a mode so near is where it was
 constexpr double kSettled = 1e-6;    // [sd]
 constexpr int kRounds = 30;          // until it has settled
