@@ -84,7 +84,7 @@ class Bench {
   }
 
  private:
-  static constexpr char kLcm[] = "udpm://239.255.76.67:17699?ttl=0", kBus[] = "udp:239.74.163.2:43199";
+  static constexpr char kLcm[] = "udpm://239.255.76.67:17699?ttl=0", kBus[] = "udp:239.74.163.2:23199";
 
   static int64_t Now() { return Clock().Utime(); }
   void Wait() {

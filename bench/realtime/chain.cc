@@ -245,7 +245,7 @@ class Chain {
   static constexpr double kTurn = 2 * std::numbers::pi;
 
   const std::string lcm_url_ = "udpm://239.255.76.67:17690?ttl=0&recv_buf_size=2097152";
-  const std::string bus_url_ = "udp:239.74.163.2:43190";
+  const std::string bus_url_ = "udp:239.74.163.2:23190";
   const Clock clock_;
   const fs::path folder_, robot_;
   const std::string binaries_;

@@ -13,7 +13,7 @@ namespace {
 using Catch::Contains;
 
 std::string Url() {
-  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 20000) + "?ttl=0&recv_buf_size=2097152";
+  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0&recv_buf_size=2097152";
 }
 
 std::span<const uint8_t> Bytes(const std::string& text) {

@@ -140,7 +140,7 @@ TEST_CASE("an open transport allocates nothing, faults or not") {
     return all;
   }();
   for (const std::string& url :
-       {std::string("loop:open"), "udp:239.74.163.79:" + std::to_string(20'000 + getpid() % 20'000),
+       {std::string("loop:open"), "udp:239.74.163.79:" + std::to_string(20'000 + getpid() % 12'000),
         "replay:" + name,
         std::string("faulty:loss=0.1,duplicate=0.1,reorder=0.1,corrupt=0.1,delay=1ms,jitter=1ms,full=0.01,"
                     "errors=0.1,busoff=0.0001:loop:open")}) {

@@ -67,7 +67,7 @@ class Peer {
 };
 
 TEST_CASE("python-can understands us and we understand it") {
-  const std::string group = "239.74.163.79", port = std::to_string(20'000 + getpid() % 20'000);
+  const std::string group = "239.74.163.79", port = std::to_string(20'000 + getpid() % 12'000);
   const auto bus = OpenTransport("udp:" + group + ":" + port);
   Peer peer(group, port);
 

@@ -14,7 +14,8 @@ namespace plumb {
 namespace {
 
 /// A port of this process's own, so that tests may run side by side.
-int Port() { return 20'000 + getpid() % 20'000; }
+// Below the range from which the kernel takes ports by itself (32768 to 60999).
+int Port() { return 20'000 + getpid() % 12'000; }
 std::string UdpUrl() { return "udp:239.74.163.77:" + std::to_string(Port()); }
 
 /// Long enough for any machine: only who fails waits so long.

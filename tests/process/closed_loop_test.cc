@@ -285,11 +285,11 @@ TEST_CASE("a second run beside the first, and a bus that may carry a real robot,
   Child launch = Launch(stage, {"--real-time"});
   REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
   stage.Listen(0.1);
-  CHECK_THAT(refusal(stage.lcm_url, "udp:239.74.163.2:43260", "second"), Contains("another run is under way"));
+  CHECK_THAT(refusal(stage.lcm_url, "udp:239.74.163.2:23260", "second"), Contains("another run is under way"));
   stage.Listen(0.1);
   CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", stage.bus_url, "second"), Contains("somebody talks on"));
   stage.Listen(0.1);
-  CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", "udp:239.74.163.2:43260", "run"),
+  CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", "udp:239.74.163.2:23260", "run"),
              Contains("in use by process " + std::to_string(launch.pid())));
   launch.Signal(SIGINT);
   CHECK(launch.WaitFor(kLong));

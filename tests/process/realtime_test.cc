@@ -107,7 +107,7 @@ TEST_CASE("garbage datagrams on the udp bus and on LCM") {
     inet_pton(AF_INET, group, &a.sin_addr);
     return a;
   };
-  const sockaddr_in targets[] = {address("239.74.163.2", 43253), address("239.255.76.67", 17753)};
+  const sockaddr_in targets[] = {address("239.74.163.2", 23253), address("239.255.76.67", 17753)};
   Random random(2);
   std::vector<uint8_t> bytes;
   for (int i = 0; i < 4000; ++i) {

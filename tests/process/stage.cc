@@ -35,9 +35,10 @@ std::string Stage::Environment(const char* name, const std::string& fallback) {
 
 std::string Stage::Binary(const std::string& name) { return Environment("PLUMBLINE_BUILD", "build") + "/bin/" + name; }
 
+// Ports below 32768: from there on the kernel gives them to anybody who asks for none.
 Stage::Stage(int number, const std::string& robot_file, Time time)
     : lcm_url("udpm://239.255.76.67:" + std::to_string(17700 + number) + "?ttl=0&recv_buf_size=2097152"),
-      bus_url(Environment("PLUMBLINE_TEST_BUS", "udp:239.74.163.2:" + std::to_string(43200 + number))),
+      bus_url(Environment("PLUMBLINE_TEST_BUS", "udp:239.74.163.2:" + std::to_string(23200 + number))),
       robot_folder(Environment("PLUMBLINE_SOURCE", ".") + "/robots/" + robot_file),
       robot(LoadRobot(robot_folder)),
       folder(temporary_.path()),

@@ -70,6 +70,7 @@ struct HopperBus {
     joint_command_t command{};
     command.utime = bus.utime();
     command.sequence = sequence_++;
+    command.episode = command.step = command.policy_iteration = -1;  // between episodes, where a robot may be placed
     command.num_joints = description.num_joints();
     const auto n = static_cast<size_t>(description.num_joints());
     command.effort.assign(n, 0);
