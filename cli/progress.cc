@@ -144,8 +144,7 @@ std::string Progress::StatusLine(double seconds) const {
   return line + "  waiting" + (c.reason.empty() ? "" : ": " + c.reason);
 }
 
-double Progress::TrueCombination(size_t index, const Eigen::VectorXd& truth) const {
-  const calibration_status_t& c = done_.back().calibration;
+double Progress::TrueCombination(const calibration_status_t& c, size_t index, const Eigen::VectorXd& truth) const {
   double sum = 0, alone = 0;
   bool log = true;
   int involved = 0;
@@ -174,7 +173,7 @@ std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
     // Where every parameter is determined, each is a combination of its own, which need not be told twice.
     for (size_t i = 0; i < c.combination.size() && c.combination.size() < c.mean.size(); ++i) {
       line(c.combination[i], c.combination_mean[i], c.combination_sd[i],
-           truth.size() > 0 ? TrueCombination(i, truth) : NAN);
+           truth.size() > 0 ? TrueCombination(c, i, truth) : NAN);
     }
     for (size_t i = 0; i < c.mean.size(); ++i) {
       line("  " + robot_.parameters[i].name, c.mean[i], c.sd[i],
@@ -209,7 +208,7 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
       combinations.push_back({{"name", c.combination[i]},
                               {"mean", c.combination_mean[i]},
                               {"sd", c.combination_sd[i]},
-                              {"hidden", truth.size() > 0 ? json(TrueCombination(i, truth)) : json()}});
+                              {"hidden", truth.size() > 0 ? json(TrueCombination(c, i, truth)) : json()}});
     }
     summary["iterations"].push_back({{"iteration", c.iteration},
                                      {"mean", c.mean},

@@ -48,8 +48,8 @@ class Progress {
     double simulated_return, robot_return, seconds;
   };
   std::string Row(const Iteration& iteration) const;
-  /// A determined combination's true value.
-  double TrueCombination(size_t index, const Eigen::VectorXd& truth) const;
+  /// The true value of an iteration's determined combination: which there are, and in which order, is each iteration's.
+  double TrueCombination(const calibration_status_t& c, size_t index, const Eigen::VectorXd& truth) const;
 
   const RobotDescription& robot_;
   int iterations_;

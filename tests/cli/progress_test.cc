@@ -88,6 +88,14 @@ TEST_CASE_METHOD(Fixture, "what was learned stands beside the truth, combination
   CHECK(summary["iterations"][0]["combinations"][1]["hidden"].get<double>() == Approx(1.21));
   CHECK(summary["iterations"][0]["robot_return"] == -300);
   CHECK(summary["evaluation_returns"].size() == 4);
+  // A later iteration may find the same combinations in another order.
+  calibration_status_t later = Calibration(2);
+  later.combination = {"mass length^2", "gravity / length"};
+  later.combination_power = {0, 1, 2, 1, 0, -1};
+  progress.OnCalibration(later);
+  const nlohmann::json iterations = progress.Summary(truth)["iterations"];
+  CHECK(iterations[0]["combinations"][1]["hidden"].get<double>() == Approx(1.21));
+  CHECK(iterations[1]["combinations"][0]["hidden"].get<double>() == Approx(1.21));
   // with a real robot nobody knows the truth
   CHECK(progress.Summary({})["hidden"].is_null());
   CHECK(progress.Conclusion({}).find('%') == std::string::npos);
