@@ -1,6 +1,7 @@
 // What it costs to calibrate the hopper's four masses from 1000 transitions, in one thread:
 //   build/bench/calibrator_bench [--benchmark_filter=...]
-// as they stream in (median, 99th percentile and longest of the transitions, each repeated), and all at once.
+// as they stream in (median, 99th percentile and longest of the transitions, each repeated), and
+// all at once.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -17,7 +18,9 @@ namespace {
 constexpr int kTransitions = 1000;
 
 struct HopperLog {
-  explicit HopperLog(double start_sd) : robot(LoadRobot(PLUMBLINE_SOURCE "/robots/hopper/gym.toml")), model(std::make_shared<Model>(robot)) {
+  explicit HopperLog(double start_sd)
+      : robot(LoadRobot(PLUMBLINE_SOURCE "/robots/hopper/gym.toml")),
+        model(std::make_shared<Model>(robot)) {
     rollouts = RandomRollouts(robot, RandomMasses(robot, 1), kTransitions, 1e-4, 1);
     if (start_sd == 0) return;
     for (Rollout& rollout : rollouts) {
@@ -39,7 +42,8 @@ double ProcessorSeconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// A log of 1000 transitions, one by one. Argument: 1 = both ends of known uncertainty, as a robot's are; 0 = starts exact.
+/// A log of 1000 transitions, one by one. Argument: 1 = both ends of known uncertainty, as a
+/// robot's are; 0 = starts exact.
 void StreamingTransition(benchmark::State& state) {
   const HopperLog log(state.range(0) == 1 ? 1e-3 : 0);
   std::vector<std::vector<double>> repeats(kTransitions);  // of each transition
@@ -62,7 +66,9 @@ void StreamingTransition(benchmark::State& state) {
     seconds.push_back(repeat[repeat.size() / 2]);
   }
   std::sort(seconds.begin(), seconds.end());
-  const auto quantile = [&](double share) { return 1e6 * seconds[static_cast<size_t>(share * static_cast<double>(seconds.size() - 1))]; };
+  const auto quantile = [&](double share) {
+    return 1e6 * seconds[static_cast<size_t>(share * static_cast<double>(seconds.size() - 1))];
+  };
   state.counters["p50_us"] = quantile(0.5);
   state.counters["p99_us"] = quantile(0.99);
   state.counters["max_us"] = quantile(1);
@@ -89,7 +95,8 @@ void OneStepFit(benchmark::State& state) {
   const HopperLog log(0);
   for (auto _ : state) {
     WindowErrors errors(log.model, log.rollouts, 1, 1);
-    const Eigen::VectorXd start = PriorOf(log.robot).FromStandard(Eigen::VectorXd::Zero(errors.parameter_count()));
+    const Eigen::VectorXd start =
+        PriorOf(log.robot).FromStandard(Eigen::VectorXd::Zero(errors.parameter_count()));
     benchmark::DoNotOptimize(FitLaplace(ProblemOf(log.robot, errors), start).mode.data());
   }
 }
@@ -97,7 +104,8 @@ BENCHMARK(OneStepFit)->Unit(benchmark::kMillisecond);
 
 void CurriculumFit(benchmark::State& state) {
   const HopperLog log(0);
-  for (auto _ : state) benchmark::DoNotOptimize(FitCurriculum(log.model, log.rollouts, {}).fit.mode.data());
+  for (auto _ : state)
+    benchmark::DoNotOptimize(FitCurriculum(log.model, log.rollouts, {}).fit.mode.data());
 }
 BENCHMARK(CurriculumFit)->Unit(benchmark::kMillisecond);
 

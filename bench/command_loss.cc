@@ -1,6 +1,6 @@
-// How long a torque outlives the commands, on the wire: a driver and a virtual robot on a udp bus, a
-// controller that falls silent again and again for longer than `expiry` and shorter than `disarm_after`, and
-// a listener with kernel time stamps.
+// How long a torque outlives the commands, on the wire: a driver and a virtual robot on a udp bus,
+// a controller that falls silent again and again for longer than `expiry` and shorter than
+// `disarm_after`, and a listener with kernel time stamps.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -47,7 +47,8 @@ struct Wire {
 
 class Bench {
  public:
-  Bench(const std::string& binaries, const std::string& robot_folder, const std::filesystem::path& logs)
+  Bench(const std::string& binaries, const std::string& robot_folder,
+        const std::filesystem::path& logs)
       : robot_(LoadRobot(robot_folder)),
         messenger_(kLcm),
         statuses_(messenger_, "DRIVER_STATUS"),
@@ -55,13 +56,15 @@ class Bench {
         requests_(messenger_, "DRIVER_REQUEST"),
         wire_{.bus = OpenTransport(kBus)},
         processes_{
-            Child("robot", {binaries + "/plumb-robot", robot_folder, "--lcm-url", kLcm, "--bus", kBus},
+            Child("robot",
+                  {binaries + "/plumb-robot", robot_folder, "--lcm-url", kLcm, "--bus", kBus},
                   logs / "robot.log"),
-            Child("driver", {binaries + "/plumb-driver", robot_folder, "--lcm-url", kLcm, "--bus", kBus},
+            Child("driver",
+                  {binaries + "/plumb-driver", robot_folder, "--lcm-url", kLcm, "--bus", kBus},
                   logs / "driver.log")} {}
 
-  /// @return [us] from the last command to the first torque frame that is zero; nothing if the robot had
-  /// stopped before.
+  /// @return [us] from the last command to the first torque frame that is zero; nothing if the
+  /// robot had stopped before.
   std::optional<int64_t> Trial() {
     if (!Armed()) return {};
     const int64_t commanding = Now() + 20'000 + random_.Bits() % 5000;
@@ -84,7 +87,8 @@ class Bench {
   }
 
  private:
-  static constexpr char kLcm[] = "udpm://239.255.76.67:17699?ttl=0", kBus[] = "udp:239.74.163.2:23199";
+  static constexpr char kLcm[] = "udpm://239.255.76.67:17699?ttl=0",
+                        kBus[] = "udp:239.74.163.2:23199";
 
   static int64_t Now() { return Clock().Utime(); }
   void Wait() {
@@ -100,7 +104,8 @@ class Bench {
     const auto size = static_cast<size_t>(command.num_joints);
     command.effort.assign(size, 0.3);
     command.velocity.assign(size, 0);
-    command.kd.assign(size, 0.5);  // or it would be faster and faster, and its velocity limit end the torque
+    // or it would be faster and faster, and its velocity limit end the torque
+    command.kd.assign(size, 0.5);
     command.position.assign(size, NAN);
     command.kp.assign(size, NAN);
     commands_.Publish(command);
@@ -161,11 +166,13 @@ int Run(const std::string& binaries, const std::string& robot_folder, int trials
   };
   const auto within = std::ranges::upper_bound(times, bound) - times.begin();
   fmt::print(
-      "from the last command to zero torque on the wire, {} trials (before {} more the robot had stopped), "
+      "from the last command to zero torque on the wire, {} trials (before {} more the robot had "
+      "stopped), "
       "expiry {} ms, "
       "cycle {} ms:\n",
       times.size(), stopped, settings.expiry * 1e3, settings.cycle * 1e3);
-  fmt::print("| p50 ms | p90 ms | p99 ms | max ms | within {:g} ms |\n|---|---|---|---|---|\n", bound);
+  fmt::print("| p50 ms | p90 ms | p99 ms | max ms | within {:g} ms |\n|---|---|---|---|---|\n",
+             bound);
   fmt::print("| {:.2f} | {:.2f} | {:.2f} | {:.2f} | {} of {} |\n", percentile(0.5), percentile(0.9),
              percentile(0.99), times.back(), within, times.size());
   return 0;
@@ -178,9 +185,11 @@ int main(int argc, char** argv) {
   CLI::App app("How long a torque outlives the commands, measured on the wire");
   std::string robot = "robots/pendulum";
   int trials = 1000;
-  app.add_option("robot", robot, "robot folder; its first motor is an ODrive, node 1")->capture_default_str();
+  app.add_option("robot", robot, "robot folder; its first motor is an ODrive, node 1")
+      ->capture_default_str();
   app.add_option("--trials", trials)->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const auto binaries = std::filesystem::canonical("/proc/self/exe").parent_path().parent_path() / "bin";
+  const auto binaries =
+      std::filesystem::canonical("/proc/self/exe").parent_path().parent_path() / "bin";
   return plumb::Run(binaries, robot, trials);
 }

@@ -1,5 +1,5 @@
-// How honest the observer's standard deviations are at impacts and elsewhere, on hoppers on their bus in
-// virtual time: tables for docs/measurements.md. build/bench/impacts [motions]
+// How honest the observer's standard deviations are at impacts and elsewhere, on hoppers on their
+// bus in virtual time: tables for docs/measurements.md. build/bench/impacts [motions]
 
 #include <fmt/format.h>
 
@@ -24,7 +24,8 @@ constexpr const char* kNames[] = {"in the air", "on the ground", "touchdown, lif
 /// Stops count for 10 ms around, then changes of contact.
 std::vector<When> WhenOf(const RobotDescription& robot, const Samples& motion) {
   std::vector<Touch> touch;
-  for (const SimulatedReadings::Sample& sample : motion) touch.push_back(FindTouch(robot, sample.q));
+  for (const SimulatedReadings::Sample& sample : motion)
+    touch.push_back(FindTouch(robot, sample.q));
   std::vector<When> when;
   const int n = static_cast<int>(motion.size());
   for (int k = 0; k < n; ++k) {
@@ -39,7 +40,8 @@ std::vector<When> WhenOf(const RobotDescription& robot, const Samples& motion) {
   return when;
 }
 
-void Print(const std::string& name, const RobotDescription& robot, const std::vector<Samples>& motions) {
+void Print(const std::string& name, const RobotDescription& robot,
+           const std::vector<Samples>& motions) {
   const auto n = static_cast<size_t>(robot.num_joints());
   std::vector<std::vector<StateErrors>> errors(kWhens, std::vector<StateErrors>(n));
   std::vector<int> counts(kWhens, 0);
@@ -57,8 +59,8 @@ void Print(const std::string& name, const RobotDescription& robot, const std::ve
           ++counts[w];
           for (size_t i = 0; i < n; ++i) {
             const auto at = static_cast<Eigen::Index>(i);
-            errors[w][i].Add(state.q[i] - motion[k].q[at], state.v[i] - motion[k].v[at], state.q_sd[i],
-                             state.v_sd[i]);
+            errors[w][i].Add(state.q[i] - motion[k].q[at], state.v[i] - motion[k].v[at],
+                             state.q_sd[i], state.v_sd[i]);
           }
         }
       }
@@ -68,8 +70,9 @@ void Print(const std::string& name, const RobotDescription& robot, const std::ve
     if (counts[w] == 0) continue;
     for (size_t i = 0; i < n; ++i) {
       const StateErrors& e = errors[w][i];
-      fmt::print("| {} | {} ({}) | {} | {:.2f} | {:.2f} | {:.0f} % | {:.2g} |\n", name, kNames[w], counts[w],
-                 robot.joints[i].name, e.nees_q(), e.nees_v(), 100 * e.covered_v(), e.v());
+      fmt::print("| {} | {} ({}) | {} | {:.2f} | {:.2f} | {:.0f} % | {:.2g} |\n", name, kNames[w],
+                 counts[w], robot.joints[i].name, e.nees_q(), e.nees_v(), 100 * e.covered_v(),
+                 e.v());
     }
   }
 }
@@ -92,6 +95,7 @@ int main(int argc, char** argv) {
       "|\n|---|---|---|---|---|---|---|\n");
   Print("springs", robot, springs);
   Print("bang-bang", robot, bang_bang);
-  for (JointDescription& joint : robot.joints) joint.noise.ground_impact = joint.noise.stop_impact = 0;
+  for (JointDescription& joint : robot.joints)
+    joint.noise.ground_impact = joint.noise.stop_impact = 0;
   Print("bang-bang, no impacts", robot, bang_bang);
 }

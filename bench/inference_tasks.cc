@@ -1,8 +1,8 @@
-// Tasks of simulation-based inference whose posteriors are known exactly, as Lueckmann, Boelts, Greenberg,
-// Goncalves and Macke define them ("Benchmarking simulation-based inference", AISTATS 2021, appendix T;
-// gaussian_mixture as corrected in version 1.1 of their package). For ten observations drawn from the prior
-// predictive distribution, writes posterior samples of a method and of the reference. bench/c2st.py compares
-// them.
+// Tasks of simulation-based inference whose posteriors are known exactly, as Lueckmann, Boelts,
+// Greenberg, Goncalves and Macke define them ("Benchmarking simulation-based inference", AISTATS
+// 2021, appendix T; gaussian_mixture as corrected in version 1.1 of their package). For ten
+// observations drawn from the prior predictive distribution, writes posterior samples of a method
+// and of the reference. bench/c2st.py compares them.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
@@ -30,8 +30,8 @@ bool Possible(const Prior& prior, const Eigen::VectorXd& parameters) {
   return std::isfinite(prior.LogDensity(parameters));
 }
 
-/// x = p + (-|a + b|, b - a) / sqrt 2, p on a crescent: radius N(0.1, 0.01) about (0.25, 0), angle U(-pi/2,
-/// pi/2).
+/// x = p + (-|a + b|, b - a) / sqrt 2, p on a crescent: radius N(0.1, 0.01) about (0.25, 0), angle
+/// U(-pi/2, pi/2).
 Task TwoMoons() {
   const Prior prior({Prior::Uniform(-1, 1), Prior::Uniform(-1, 1)});
   const auto crescent = [](Random& random) {
@@ -41,7 +41,8 @@ Task TwoMoons() {
   const auto simulate = [crescent](const Eigen::VectorXd& t, Random& random) -> Eigen::VectorXd {
     return crescent(random) + M_SQRT1_2 * Eigen::Vector2d(-std::abs(t(0) + t(1)), t(1) - t(0));
   };
-  const auto reference = [crescent, prior](const Eigen::VectorXd& x, Random& random) -> Eigen::VectorXd {
+  const auto reference = [crescent, prior](const Eigen::VectorXd& x,
+                                           Random& random) -> Eigen::VectorXd {
     for (;;) {
       // p is known up to which sign a + b has; the map's Jacobian is constant.
       const Eigen::Vector2d p = crescent(random);
@@ -63,7 +64,8 @@ Task TwoScales() {
     const double sd = random.Uniform() < 0.5 ? 1 : 0.1;
     return about + sd * StandardNormals(2, 1, random);
   };
-  const auto reference = [prior, scatter](const Eigen::VectorXd& x, Random& random) -> Eigen::VectorXd {
+  const auto reference = [prior, scatter](const Eigen::VectorXd& x,
+                                          Random& random) -> Eigen::VectorXd {
     for (;;) {
       const Eigen::VectorXd t = scatter(x, random);
       if (Possible(prior, t)) return t;
@@ -147,7 +149,8 @@ Posterior Infer(const std::string& method, const Problem& problem, int64_t simul
     options.samples = samples;
     return InferByRejection(problem, options, seed);
   }
-  throw std::invalid_argument("no method \"" + method + "\"; there are mixture, abc-smc and rejection");
+  throw std::invalid_argument("no method \"" + method +
+                              "\"; there are mixture, abc-smc and rejection");
 }
 
 }  // namespace
@@ -174,11 +177,13 @@ int main(int argc, char** argv) {
       const auto observation = static_cast<uint32_t>(i);
       const plumb::Problem problem = plumb::MakeProblem(task, observation);
       const std::clock_t start = std::clock();
-      const plumb::Posterior posterior = plumb::Infer(method, problem, simulations, samples, observation);
+      const plumb::Posterior posterior =
+          plumb::Infer(method, problem, simulations, samples, observation);
       const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
       const std::string stem = directory + "/" + std::to_string(i);
       plumb::Write(stem + ".method", posterior.samples);
-      plumb::Write(stem + ".reference", plumb::Reference(task, problem.observed, samples, observation));
+      plumb::Write(stem + ".reference",
+                   plumb::Reference(task, problem.observed, samples, observation));
       std::cout << task_name << ' ' << method << ' ' << simulations << " observation " << i << ": "
                 << posterior.simulations << " simulations, " << seconds << " s" << std::endl;
     }

@@ -1,5 +1,6 @@
-// How well the filter on the simulator's dynamics knows the state of simulated robots, beside the kinematic
-// one, and what a step of it costs: a table for docs/measurements.md. build/bench/model_observer [runs]
+// How well the filter on the simulator's dynamics knows the state of simulated robots, beside the
+// kinematic one, and what a step of it costs: a table for docs/measurements.md.
+// build/bench/model_observer [runs]
 
 #include <fmt/format.h>
 
@@ -35,7 +36,8 @@ int main(int argc, char** argv) {
   using namespace plumb;
   const int runs = argc > 1 ? std::atoi(argv[1]) : 6;
   fmt::print(
-      "| joint | q causal | q model | v causal | v smoothed | v model | masses + 3 % | + 10 % | + 30 % | "
+      "| joint | q causal | q model | v causal | v smoothed | v model | masses + 3 % | + 10 % | + "
+      "30 % | "
       "NEES v | + 30 % |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|\n");
   std::string costs;
@@ -51,14 +53,15 @@ int main(int argc, char** argv) {
       const StateErrors &kinematic = errors[0].kinematic[i], &right = errors[0].model[i],
                         &wrong = errors[3].model[i];
       fmt::print(
-          "| {} {} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2f} | {:.2f} "
+          "| {} {} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | "
+          "{:.2f} | {:.2f} "
           "|\n",
           name, robot.joints[i].name, kinematic.q(), right.q(), kinematic.v(),
-          observed.joints[i].smoothed.v(), right.v(), errors[1].model[i].v(), errors[2].model[i].v(),
-          wrong.v(), right.nees_v(), wrong.nees_v());
+          observed.joints[i].smoothed.v(), right.v(), errors[1].model[i].v(),
+          errors[2].model[i].v(), wrong.v(), right.nees_v(), wrong.nees_v());
     }
-    costs += fmt::format("{}: {:.1f} us a step, {} restarts\n", name, MicrosecondsPerStep(robot, recordings),
-                         errors[0].restarts);
+    costs += fmt::format("{}: {:.1f} us a step, {} restarts\n", name,
+                         MicrosecondsPerStep(robot, recordings), errors[0].restarts);
   }
   fmt::print("\n{}", costs);
 }

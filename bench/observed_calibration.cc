@@ -1,5 +1,6 @@
-// What the observer costs calibration: parameters from estimated states beside those from true states of the
-// same motions. A table for docs/measurements.md. build/bench/observed_calibration [motions [robot]]
+// What the observer costs calibration: parameters from estimated states beside those from true
+// states of the same motions. A table for docs/measurements.md. build/bench/observed_calibration
+// [motions [robot]]
 
 #include <fmt/format.h>
 
@@ -31,7 +32,8 @@ void Print(const std::string& name, const RobotDescription& robot, const Motion&
            uint32_t motions) {
   const std::vector<Knowable> knowable = KnowableOf(robot);
   for (const Way& way : kWays) {
-    std::vector<double> square(knowable.size(), 0), sum(knowable.size(), 0), claimed(knowable.size(), 0);
+    std::vector<double> square(knowable.size(), 0), sum(knowable.size(), 0),
+        claimed(knowable.size(), 0);
     std::vector<int> covered(knowable.size(), 0);
     int alarms = 0;
     double discrepancy = 0;
@@ -48,16 +50,18 @@ void Print(const std::string& name, const RobotDescription& robot, const Motion&
           truth.array().log();  // both robots' parameters have logarithms for coordinates
       for (size_t i = 0; i < knowable.size(); ++i) {
         const double error = knowable[i].power.dot(posterior.mean - hidden);
-        const double sd = std::sqrt(knowable[i].power.dot(posterior.covariance * knowable[i].power));
+        const double sd =
+            std::sqrt(knowable[i].power.dot(posterior.covariance * knowable[i].power));
         square[i] += error * error, sum[i] += error, claimed[i] += sd * sd;
         covered[i] += std::abs(error) < 1.96 * sd;
       }
       fmt::print(stderr, "\r{} {}: {} of {} ", name, way.name, seed, motions);
     }
     for (size_t i = 0; i < knowable.size(); ++i) {
-      fmt::print("| {} | {} | {} | {:.3f} | {:+.3f} | {:.3f} | {:.0f} % | {:.2f} | {} |\n", name, way.name,
-                 knowable[i].name, 100 * std::sqrt(square[i] / motions), 100 * sum[i] / motions,
-                 100 * std::sqrt(claimed[i] / motions), 100. * covered[i] / motions, discrepancy, alarms);
+      fmt::print("| {} | {} | {} | {:.3f} | {:+.3f} | {:.3f} | {:.0f} % | {:.2f} | {} |\n", name,
+                 way.name, knowable[i].name, 100 * std::sqrt(square[i] / motions),
+                 100 * sum[i] / motions, 100 * std::sqrt(claimed[i] / motions),
+                 100. * covered[i] / motions, discrepancy, alarms);
       std::fflush(stdout);
     }
   }
@@ -70,15 +74,18 @@ int main(int argc, char** argv) {
   using namespace plumb;
   const auto motions = static_cast<uint32_t>(argc > 1 ? std::atoi(argv[1]) : 20);
   fmt::print(
-      "| robot | states | of | rms error % | mean error % | claimed sd % | within 95 % | discrepancy | "
+      "| robot | states | of | rms error % | mean error % | claimed sd % | within 95 % | "
+      "discrepancy | "
       "alarms |\n"
       "|---|---|---|---|---|---|---|---|---|\n");
   const std::string only = argc > 2 ? argv[2] : "";
   for (const std::string name : {"pendulum", "hopper"}) {
     if (!only.empty() && only != name) continue;
-    RobotDescription robot = WithSimulatedNoise(LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + name));
+    RobotDescription robot =
+        WithSimulatedNoise(LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + name));
     const Recordings training = Record(robot, 1000, 3);
-    const TunedNoise noise = TuneNoise(robot, [&](StateObserver& observer) { Play(training, observer); });
+    const TunedNoise noise =
+        TuneNoise(robot, [&](StateObserver& observer) { Play(training, observer); });
     for (size_t i = 0; i < noise.joints.size(); ++i) robot.joints[i].noise = noise.joints[i];
     const auto simulated = [&](uint32_t seed) {
       const Eigen::VectorXd truth = HiddenParameters(robot, seed);
@@ -96,6 +103,7 @@ int main(int argc, char** argv) {
   }
   if (only.empty() || only == "bang-bang") {
     Print(
-        "hopper, bang-bang", hopper, [&](uint32_t seed) { return BangBangOnBus(hopper, seed); }, motions);
+        "hopper, bang-bang", hopper, [&](uint32_t seed) { return BangBangOnBus(hopper, seed); },
+        motions);
   }
 }

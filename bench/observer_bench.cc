@@ -1,4 +1,5 @@
-// What a step of the observer costs: build/bench/observer_bench. The time of a step is the inverse of items per second.
+// What a step of the observer costs: build/bench/observer_bench. The time of a step is the inverse
+// of items per second.
 
 #include <benchmark/benchmark.h>
 
@@ -19,7 +20,8 @@ void Steps(benchmark::State& state, const std::string& name, int lag) {
   joint_state_t m{};
   m.num_joints = robot.num_joints();
   m.measured.assign(n, 0);
-  m.position = m.velocity = m.effort_measured = m.effort_sent = m.effort_applied = std::vector<double>(n, 0.0);
+  m.position = m.velocity = m.effort_measured = m.effort_sent = m.effort_applied =
+      std::vector<double>(n, 0.0);
   m.valid.assign(n, 1);
   imu_t imu{};
   imu.name = "imu";
@@ -37,7 +39,8 @@ void Steps(benchmark::State& state, const std::string& name, int lag) {
         const bool passive = robot.joints[i].passive;
         m.measured[i] = m.utime;
         m.position[i] = 0.1 * std::sin(phase);
-        m.velocity[i] = passive && i < 2 ? std::numeric_limits<double>::quiet_NaN() : 0.5 * std::cos(phase);
+        m.velocity[i] =
+            passive && i < 2 ? std::numeric_limits<double>::quiet_NaN() : 0.5 * std::cos(phase);
         m.effort_applied[i] = 0;
       }
       if (k % 5 == 0 || k % 5 == 3) {

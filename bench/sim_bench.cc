@@ -1,5 +1,7 @@
-// Cost of the simulator beside its peers', in one run: build/bench/sim_bench [--benchmark_filter=...]
-//   gym's closed form, MuJoCo 2.2.2 (where libmujoco-dev is installed) and Simbody the textbook way.
+// Cost of the simulator beside its peers', in one run: build/bench/sim_bench
+// [--benchmark_filter=...]
+//   gym's closed form, MuJoCo 2.2.2 (where libmujoco-dev is installed) and Simbody the textbook
+//   way.
 // "allocations" is how often an iteration asks for memory.
 #include <benchmark/benchmark.h>
 
@@ -20,7 +22,9 @@
 namespace plumb {
 namespace {
 
-RobotDescription Load(const std::string& robot) { return LoadRobot(PLUMBLINE_SOURCE "/robots/" + robot); }
+RobotDescription Load(const std::string& robot) {
+  return LoadRobot(PLUMBLINE_SOURCE "/robots/" + robot);
+}
 
 class CountAllocations {
  public:
@@ -35,7 +39,8 @@ class CountAllocations {
   int64_t before_;
 };
 
-// --- The pendulum --------------------------------------------------------------------------------------------------
+// --- The pendulum
+// -------------------------------------------------------------------------------------------------
 
 const Eigen::VectorXd kOne = Eigen::VectorXd::Constant(1, 0.7);
 
@@ -76,7 +81,8 @@ void SimbodyPendulumFiveMilliseconds(benchmark::State& state) {
 }
 BENCHMARK(SimbodyPendulumFiveMilliseconds);
 
-// --- The hopper: from the states of random roll-outs, falls and all, one control step of 8 ms ----------------------
+// --- The hopper: from the states of random roll-outs, falls and all, one control step of 8 ms
+// ----------------------
 
 struct Hops {
   std::vector<Eigen::VectorXd> q, v, effort;
@@ -138,7 +144,8 @@ void HopperInSpace(benchmark::State& state) {
   const Model model(Load("hopper/gym.toml"));
   Topology topology = model.topology();
   topology.planar = false;
-  const auto engine = MakeEngine(topology, model.description().simulation, model.parameters().terms());
+  const auto engine =
+      MakeEngine(topology, model.description().simulation, model.parameters().terms());
   engine->SetPhysics(model.parameters().Nominal());
   const double h = 0.002;
   ForEachHop(state, [&](const auto& q, const auto& v, const auto& effort) {
@@ -172,15 +179,17 @@ void HopperAllParameters(benchmark::State& state) {
     const std::string of = link;
     add("mass/" + of, 3.5), add("length/" + of, 0.4);
     for (const char* axis : {"/x", "/y", "/z"}) add("com/" + of + axis, 0.1);
-    for (const char* entry : {"/xx", "/yy", "/zz", "/xy", "/xz", "/yz"}) add("inertia/" + of + entry, 0.1);
+    for (const char* entry : {"/xx", "/yy", "/zz", "/xy", "/xz", "/yz"})
+      add("inertia/" + of + entry, 0.1);
   }
   for (const char* joint : {"thigh", "leg", "foot"}) {
-    for (const char* kind : {"armature/", "damping/", "friction/", "stiffness/", "rest/", "gain/", "delay/",
-                             "sensor_delay/", "sensor_bias/", "no_load_speed/"}) {
+    for (const char* kind : {"armature/", "damping/", "friction/", "stiffness/", "rest/", "gain/",
+                             "delay/", "sensor_delay/", "sensor_bias/", "no_load_speed/"}) {
       add(std::string(kind) + joint, 0.01);
     }
   }
-  for (const char* path : {"contact/stiffness", "contact/damping", "contact/friction", "limit/stiffness", "limit/damping"}) {
+  for (const char* path : {"contact/stiffness", "contact/damping", "contact/friction",
+                           "limit/stiffness", "limit/damping"}) {
     add(path, 100);
   }
   Simulator simulator(robot);
@@ -197,20 +206,23 @@ void HopperWindows(benchmark::State& state) {
   for (const Eigen::VectorXd& effort : hops.effort) efforts.push_back({{0.008, effort}});
   std::vector<Window> recorded;
   for (size_t i = 0; i < hops.size(); ++i) recorded.push_back({hops.q[i], hops.v[i], {efforts[i]}});
-  Windows windows(std::make_shared<Model>(Load("hopper/gym.toml")), static_cast<int>(state.range(0)));
+  Windows windows(std::make_shared<Model>(Load("hopper/gym.toml")),
+                  static_cast<int>(state.range(0)));
   Eigen::MatrixXd masses(4, 25);
   Random random(1);
   for (double& mass : masses.reshaped()) mass = random.Uniform(3, 5);
   for (auto _ : state) {
-    windows.Predict(masses, recorded, [](Eigen::Index, size_t, size_t, const Eigen::VectorXd& q, const auto&) {
-      benchmark::DoNotOptimize(q.data());
-    });
+    windows.Predict(masses, recorded,
+                    [](Eigen::Index, size_t, size_t, const Eigen::VectorXd& q, const auto&) {
+                      benchmark::DoNotOptimize(q.data());
+                    });
   }
   state.SetItemsProcessed(state.iterations() * 25 * static_cast<int64_t>(hops.size()));
 }
 BENCHMARK(HopperWindows)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
-/// What a step cost if Simbody's own mass matrix and bias were all there is to it: once instead of four times.
+/// What a step cost if Simbody's own mass matrix and bias were all there is to it: once instead of
+/// four times.
 void SimbodyHopperMassAndBias(benchmark::State& state) {
   RobotDescription robot = Load("hopper/gym.toml");
   Plant plant(Model(robot).Describe(Model(robot).parameters().means()));

@@ -14,7 +14,8 @@ namespace {
 const PolicyShape kShape{3, {128, 128}, 1};
 
 GaussianPolicy FreshPolicy() {
-  return Trainer(PendulumSettings(), MakeGymPendulum, Eigen::VectorXd::Constant(1, 2), 1, 1).policy();
+  return Trainer(PendulumSettings(), MakeGymPendulum, Eigen::VectorXd::Constant(1, 2), 1, 1)
+      .policy();
 }
 
 /// A batch with random advantages.
@@ -61,7 +62,8 @@ void PolicyStep(benchmark::State& state) {
 }
 BENCHMARK(PolicyStep)
     ->ArgsProduct({{1, 2}, {1, 5}})
-    ->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
 
 void CriticFit(benchmark::State& state) {
   Workers workers(static_cast<int>(state.range(0)));
@@ -94,7 +96,8 @@ void Update(benchmark::State& state) {
 }
 BENCHMARK(Update)
     ->ArgsProduct({{1, 2}, {1, 5}})
-    ->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
 
 }  // namespace
 }  // namespace plumb

@@ -10,8 +10,8 @@
 
 namespace plumb {
 
-/// How batches of simulations get done. A batch is a matrix whose columns are computed apart from each other; whoever does
-/// them, the result has the same bits. Not thread-safe.
+/// How batches of simulations get done. A batch is a matrix whose columns are computed apart from
+/// each other; whoever does them, the result has the same bits. Not thread-safe.
 class Batches {
  public:
   /// Computes columns first ... first + count - 1 of a batch.
@@ -19,19 +19,22 @@ class Batches {
 
   virtual ~Batches() = default;
   /// @param identity of what is computed: equal batches have equal ones. @return rows x columns.
-  virtual Eigen::MatrixXd Run(uint64_t identity, Eigen::Index rows, Eigen::Index columns, const Columns& compute);
+  virtual Eigen::MatrixXd Run(uint64_t identity, Eigen::Index rows, Eigen::Index columns,
+                              const Columns& compute);
 };
 
-/// Batches that have been computed, in a file: an inference that was killed at any time, begun anew, goes through the same
-/// batches to the same bits, and needs not compute those again. What follows the first batch that is not the expected one,
-/// or is cut off, or damaged, is forgotten. Not thread-safe.
+/// Batches that have been computed, in a file: an inference that was killed at any time, begun
+/// anew, goes through the same batches to the same bits, and needs not compute those again. What
+/// follows the first batch that is not the expected one, or is cut off, or damaged, is forgotten.
+/// Not thread-safe.
 class Journal {
  public:
   /// @param identity of the whole inference: a journal of another one is begun anew.
   /// @throws std::runtime_error naming the file if it cannot be written.
   Journal(std::filesystem::path file, uint64_t identity);
 
-  /// The next batch, if it has been computed before: `batch` has its size. @return false if it has not.
+  /// The next batch, if it has been computed before: `batch` has its size. @return false if it has
+  /// not.
   bool Read(uint64_t identity, Eigen::MatrixXd* batch);
   /// @throws std::runtime_error naming the file if it cannot be written.
   void Append(uint64_t identity, const Eigen::MatrixXd& batch);
@@ -54,7 +57,8 @@ uint64_t Hash(const std::string& text, uint64_t from = 0xcbf29ce484222325);
 
 /// With how many threads, and by whom.
 struct Workforce {
-  Workforce(int thread_count = 1, Batches* done_by = nullptr) : threads(thread_count), batches(done_by) {}
+  Workforce(int thread_count = 1, Batches* done_by = nullptr)
+      : threads(thread_count), batches(done_by) {}
 
   int threads;
   Batches* batches;  ///< null: here and now

@@ -22,16 +22,19 @@ Rollout Calibrator::TakeArrived() {
 }
 
 void Calibrator::OnControllerStatus(const controller_status_t& status) {
-  rolling_out_ = status.phase == controller_status_t::RUNNING && status.purpose == policy_t::CALIBRATE &&
+  rolling_out_ = status.phase == controller_status_t::RUNNING &&
+                 status.purpose == policy_t::CALIBRATE &&
                  status.policy_iteration == simopt_.state().iteration;
-  if (status.phase != controller_status_t::COMPLETE || status.purpose != policy_t::CALIBRATE) return;
+  if (status.phase != controller_status_t::COMPLETE || status.purpose != policy_t::CALIBRATE)
+    return;
   // The policy of iteration k is rolled out to compute the distribution of iteration k + 1.
   if (status.policy_iteration != simopt_.state().iteration || status.num_episodes == 0) return;
   complete_ = status;
 }
 
 bool Calibrator::ready() const {
-  return complete_ && !simopt_.running() && complete_->policy_iteration == simopt_.state().iteration &&
+  return complete_ && !simopt_.running() &&
+         complete_->policy_iteration == simopt_.state().iteration &&
          joiner_.newest_state() >= *std::max_element(complete_->last_state_sequence.begin(),
                                                      complete_->last_state_sequence.end());
 }
@@ -51,12 +54,14 @@ ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::
   ParameterDistribution distribution{state.iteration, robot.parameters, {}};
   for (size_t i = 0; i < state.distribution.components.size(); ++i) {
     const Gaussian& component = state.distribution.components[i];
-    distribution.components.push_back({state.distribution.weights[i], component.mean, component.covariance});
+    distribution.components.push_back(
+        {state.distribution.weights[i], component.mean, component.covariance});
   }
   return distribution;
 }
 
-parameter_distribution_t DistributionMessage(const RobotDescription& robot, const SimOpt::State& state, uint64_t seed,
+parameter_distribution_t DistributionMessage(const RobotDescription& robot,
+                                             const SimOpt::State& state, uint64_t seed,
                                              const CalibrationReport* report) {
   parameter_distribution_t m = Distribution(robot, state).ToMessage();
   // The episode's identity is its start: a time that live run and replay share.
@@ -71,9 +76,9 @@ parameter_distribution_t DistributionMessage(const RobotDescription& robot, cons
   return m;
 }
 
-calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state, const DropCounts& drops,
-                                   const CalibrationReport* report, double seconds,
-                                   const StreamingLaplace* stream) {
+calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state,
+                                   const DropCounts& drops, const CalibrationReport* report,
+                                   double seconds, const StreamingLaplace* stream) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   calibration_status_t m{};
   m.utime = state.rollouts.empty() ? 0 : state.rollouts.back().episode;
@@ -116,7 +121,8 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
   m.seconds = seconds;
   if (stream && stream->determined()) {
     const Gaussian interim = stream->posterior();
-    const ParameterDistribution streamed{state.iteration, robot.parameters, {{1, interim.mean, interim.covariance}}};
+    const ParameterDistribution streamed{
+        state.iteration, robot.parameters, {{1, interim.mean, interim.covariance}}};
     const Eigen::VectorXd streamed_mean = streamed.Mean(), streamed_sd = streamed.Sd();
     m.streamed_transitions = static_cast<int32_t>(stream->transitions() - stream->left_out());
     m.streamed_mean.assign(streamed_mean.begin(), streamed_mean.end());

@@ -13,13 +13,15 @@
 
 namespace plumb {
 
-/// The calibrator without its sockets: takes the messages of a live run, of lcm-logplayer or of a log file, and
-/// says when an iteration's roll-outs are complete. What it computes depends on the messages' contents only:
-/// roll-outs are delimited by CONTROLLER_STATUS (phase COMPLETE, purpose CALIBRATE) and joined when every state
-/// they name has arrived, in whatever order the channels interleave. Not thread-safe.
+/// The calibrator without its sockets: takes the messages of a live run, of lcm-logplayer or of a
+/// log file, and says when an iteration's roll-outs are complete. What it computes depends on the
+/// messages' contents only: roll-outs are delimited by CONTROLLER_STATUS (phase COMPLETE, purpose
+/// CALIBRATE) and joined when every state they name has arrived, in whatever order the channels
+/// interleave. Not thread-safe.
 class Calibrator {
  public:
-  Calibrator(const RobotDescription& robot, SimOpt& simopt) : robot_(robot), simopt_(simopt), joiner_(robot) {}
+  Calibrator(const RobotDescription& robot, SimOpt& simopt)
+      : robot_(robot), simopt_(simopt), joiner_(robot) {}
 
   void OnState(const robot_state_t& smoothed) { joiner_.OnState(smoothed); }
   void OnCommand(const joint_command_t& command);
@@ -30,8 +32,8 @@ class Calibrator {
   /// Takes them and begins the iteration in SimOpt. @return the number of usable transitions.
   size_t Begin();
 
-  /// Transitions of the newest roll-out under way that have arrived since the last call. It may turn out that some of them
-  /// cannot be used, or more can: what counts is what Begin takes.
+  /// Transitions of the newest roll-out under way that have arrived since the last call. It may
+  /// turn out that some of them cannot be used, or more can: what counts is what Begin takes.
   Rollout TakeArrived();
 
   const DropCounts& drops() const { return joiner_.drops(); }
@@ -49,11 +51,13 @@ class Calibrator {
 /// SimOpt's distribution, as the trainer samples it.
 ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state);
 /// The same as a message. @param report of the iteration that led there; null for the prior.
-parameter_distribution_t DistributionMessage(const RobotDescription& robot, const SimOpt::State& state, uint64_t seed,
+parameter_distribution_t DistributionMessage(const RobotDescription& robot,
+                                             const SimOpt::State& state, uint64_t seed,
                                              const CalibrationReport* report);
-/// Findings as a message. @param stream of transitions that have arrived since, null if there is none.
-calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state, const DropCounts& drops,
-                                   const CalibrationReport* report, double seconds,
-                                   const StreamingLaplace* stream = nullptr);
+/// Findings as a message. @param stream of transitions that have arrived since, null if there is
+/// none.
+calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state,
+                                   const DropCounts& drops, const CalibrationReport* report,
+                                   double seconds, const StreamingLaplace* stream = nullptr);
 
 }  // namespace plumb

@@ -8,17 +8,19 @@ namespace plumb {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Differences are taken over this share of a likely surprise: the errors of what is not smooth (contact,
-// friction, delays) are asked for what such a change does to them, not for an infinitesimal one.
+// Differences are taken over this share of a likely surprise: the errors of what is not smooth
+// (contact, friction, delays) are asked for what such a change does to them, not for an
+// infinitesimal one.
 constexpr double kDifference = 0.2;
-// A transition in which contact begins or ends with the change, say, is no witness: its derivative means
-// nothing, but is large. Second differences may be such a share of first ones, and whitened errors may change
-// so much without any notice.
+// A transition in which contact begins or ends with the change, say, is no witness: its derivative
+// means nothing, but is large. Second differences may be such a share of first ones, and whitened
+// errors may change so much without any notice.
 constexpr double kLargestBend = 0.25, kNegligible = 0.1;
 
 double LargestEffort(const RobotDescription& robot) {
   double largest = 0;
-  for (const JointDescription& joint : robot.joints) largest = std::max(largest, joint.effort_limit);
+  for (const JointDescription& joint : robot.joints)
+    largest = std::max(largest, joint.effort_limit);
   return largest > 0 ? largest : 1;
 }
 
@@ -28,8 +30,8 @@ void AddLink(const LinkDescription& link, std::vector<Candidate>* all) {
   all->push_back({"mass/" + link.name, "kg", link.mass, 0.2 * link.mass, 0});
   all->push_back({"inertia/" + link.name, "", 1, 0.2, 0});
   for (Eigen::Index k = 0; k < 3 && gyration > 0; ++k) {
-    all->push_back(
-        {"com/" + link.name + "/" + "xyz"[k], "m", link.center_of_mass(k), 0.2 * gyration, -kInfinity});
+    all->push_back({"com/" + link.name + "/" + "xyz"[k], "m", link.center_of_mass(k),
+                    0.2 * gyration, -kInfinity});
   }
 }
 
@@ -39,7 +41,8 @@ void AddJoint(const JointDescription& joint, double effort, std::vector<Candidat
   const JointDynamics& has = joint.dynamics;
   const auto add = [&](const std::string& name, const std::string& unit, double value, double least,
                        double lower) {
-    all->push_back({name + "/" + joint.name, unit, value, std::max(0.3 * std::abs(value), least), lower});
+    all->push_back(
+        {name + "/" + joint.name, unit, value, std::max(0.3 * std::abs(value), least), lower});
   };
   add("damping", force + " s/" + place, has.damping, 0.01 * effort, 0);
   add("friction", force, has.friction, 0.05 * effort, 0);
@@ -61,8 +64,9 @@ std::vector<Candidate> FindCandidates(const RobotDescription& robot) {
       {"gravity", "m/s^2", robot.simulation.gravity, 0.1 * robot.simulation.gravity, 0}};
   for (size_t i = 1; i < robot.links.size(); ++i) AddLink(robot.links[i], &all);
   for (const JointDescription& joint : robot.joints) AddJoint(joint, LargestEffort(robot), &all);
-  const bool shapes = std::any_of(robot.links.begin() + 1, robot.links.end(),
-                                  [](const LinkDescription& link) { return !link.collisions.empty(); });
+  const bool shapes =
+      std::any_of(robot.links.begin() + 1, robot.links.end(),
+                  [](const LinkDescription& link) { return !link.collisions.empty(); });
   if (const auto& contact = robot.simulation.contact; contact && shapes) {
     all.push_back({"contact/stiffness", "N/m", contact->stiffness, 0.5 * contact->stiffness, 0});
     all.push_back({"contact/damping", "N s/m", contact->damping, 0.5 * contact->damping, 0});
@@ -85,9 +89,11 @@ std::vector<Candidate> FindCandidates(const RobotDescription& robot) {
 
 RobotDescription WithCandidates(RobotDescription robot, const std::vector<Candidate>& candidates) {
   for (const Candidate& candidate : candidates) {
-    std::erase_if(robot.frozen, [&](const FrozenParameter& frozen) { return frozen.name == candidate.path; });
-    robot.parameters.push_back({candidate.path, candidate.unit, ParameterDescription::Coordinate::kLinear,
-                                candidate.value, candidate.scale * candidate.scale});
+    std::erase_if(robot.frozen,
+                  [&](const FrozenParameter& frozen) { return frozen.name == candidate.path; });
+    robot.parameters.push_back({candidate.path, candidate.unit,
+                                ParameterDescription::Coordinate::kLinear, candidate.value,
+                                candidate.scale * candidate.scale});
   }
   return robot;
 }
@@ -114,7 +120,8 @@ Eigen::MatrixXd CandidateColumns(const WhitenedErrors& whitened, const Eigen::Ve
     if (!at.allFinite()) continue;
     const Eigen::ArrayXd above = at.col(0), other = at.col(1), here = errors;
     const Eigen::ArrayXd change = both ? (above - other).eval() : (above - here).eval();
-    const Eigen::ArrayXd bend = both ? (above - 2 * here + other).eval() : (above - 2 * other + here).eval();
+    const Eigen::ArrayXd bend =
+        both ? (above - 2 * here + other).eval() : (above - 2 * other + here).eval();
     const auto smooth = bend.abs() <= kLargestBend * change.abs().max(kNegligible);
     columns.col(k) = smooth.select(change / (both ? 2 * h : h), 0);
   }

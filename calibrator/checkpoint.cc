@@ -26,7 +26,8 @@ Eigen::VectorXd VectorFrom(const json& j) {
 
 json ToJson(const Gaussian& p) {
   const Eigen::MatrixXd& c = p.covariance;
-  return {{"mean", ToJson(p.mean)}, {"covariance", std::vector<double>(c.data(), c.data() + c.size())}};
+  return {{"mean", ToJson(p.mean)},
+          {"covariance", std::vector<double>(c.data(), c.data() + c.size())}};
 }
 
 Gaussian GaussianFrom(const json& j) {
@@ -34,7 +35,8 @@ Gaussian GaussianFrom(const json& j) {
   p.mean = VectorFrom(j.at("mean"));
   const auto values = j.at("covariance").get<std::vector<double>>();
   const Eigen::Index n = p.mean.size();
-  if (static_cast<Eigen::Index>(values.size()) != n * n) throw std::runtime_error("covariance has the wrong size");
+  if (static_cast<Eigen::Index>(values.size()) != n * n)
+    throw std::runtime_error("covariance has the wrong size");
   p.covariance = Eigen::MatrixXd::Map(values.data(), n, n);
   LogDensity(p, p.mean);  // throws unless it is positive definite
   return p;
@@ -55,18 +57,27 @@ GaussianMixture MixtureFrom(const json& j) {
     mixture.components.push_back(GaussianFrom(component));
     mixture.weights.push_back(component.at("weight"));
   }
-  const bool good = !mixture.weights.empty() && std::all_of(mixture.weights.begin(), mixture.weights.end(), [](double w) { return w > 0 && w <= 1; });
+  const bool good =
+      !mixture.weights.empty() && std::all_of(mixture.weights.begin(), mixture.weights.end(),
+                                              [](double w) { return w > 0 && w <= 1; });
   if (!good) throw std::runtime_error("the distribution's weights are none");
   return mixture;
 }
 
 // JSON has no NaN.
-double NumberOrNaN(const json& j) { return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>(); }
+double NumberOrNaN(const json& j) {
+  return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
+}
 
 const std::vector<std::pair<const char*, Eigen::VectorXd Transition::*>> kVectors{
-    {"q", &Transition::q},           {"v", &Transition::v},           {"next_q", &Transition::next_q},
-    {"next_v", &Transition::next_v}, {"q_sd", &Transition::q_sd},     {"v_sd", &Transition::v_sd},
-    {"next_q_sd", &Transition::next_q_sd}, {"next_v_sd", &Transition::next_v_sd}};
+    {"q", &Transition::q},
+    {"v", &Transition::v},
+    {"next_q", &Transition::next_q},
+    {"next_v", &Transition::next_v},
+    {"q_sd", &Transition::q_sd},
+    {"v_sd", &Transition::v_sd},
+    {"next_q_sd", &Transition::next_q_sd},
+    {"next_v_sd", &Transition::next_v_sd}};
 
 json ToJson(const Rollout& rollout) {
   json transitions = json::array();
@@ -74,11 +85,13 @@ json ToJson(const Rollout& rollout) {
     json entry{{"step", t.step}};
     for (const auto& [name, member] : kVectors) entry[name] = ToJson(t.*member);
     json efforts = json::array();
-    for (const EffortSegment& e : t.efforts) efforts.push_back({{"duration", e.duration}, {"effort", ToJson(e.effort)}});
+    for (const EffortSegment& e : t.efforts)
+      efforts.push_back({{"duration", e.duration}, {"effort", ToJson(e.effort)}});
     entry["efforts"] = std::move(efforts);
     transitions.push_back(std::move(entry));
   }
-  return {{"episode", rollout.episode}, {"policy_iteration", rollout.policy_iteration},
+  return {{"episode", rollout.episode},
+          {"policy_iteration", rollout.policy_iteration},
           {"transitions", std::move(transitions)}};
 }
 
@@ -90,7 +103,8 @@ Rollout RolloutFrom(const json& j) {
     Transition t;
     t.step = entry.at("step");
     for (const auto& [name, member] : kVectors) t.*member = VectorFrom(entry.at(name));
-    for (const json& e : entry.at("efforts")) t.efforts.push_back({e.at("duration"), VectorFrom(e.at("effort"))});
+    for (const json& e : entry.at("efforts"))
+      t.efforts.push_back({e.at("duration"), VectorFrom(e.at("effort"))});
     rollout.transitions.push_back(std::move(t));
   }
   return rollout;
@@ -119,7 +133,8 @@ std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
   }
 }
 
-CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder, const RobotDescription& robot, uint64_t seed)
+CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
+                                             const RobotDescription& robot, uint64_t seed)
     : folder_(std::move(folder)), robot_(robot.name), seed_(seed), fingerprint_(robot.fingerprint) {
   for (const ParameterDescription& p : robot.parameters) parameters_.push_back(p.name);
   std::error_code error;
@@ -129,7 +144,8 @@ CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder, const
 
 void CalibrationCheckpoint::Save(const SimOpt::State& state) {
   for (; saved_rollouts_ < state.rollouts.size(); ++saved_rollouts_) {
-    WriteAtomically(folder_ / RolloutFile(saved_rollouts_), ToJson(state.rollouts[saved_rollouts_]).dump());
+    WriteAtomically(folder_ / RolloutFile(saved_rollouts_),
+                    ToJson(state.rollouts[saved_rollouts_]).dump());
   }
   const json j{{"version", kVersion},
                {"robot", robot_},
@@ -153,17 +169,20 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
   try {
     const json j = ReadJson(file);
     if (j.at("version") != kVersion) throw std::runtime_error("is of another version");
-    if (j.at("robot") != robot_ || j.at("parameters") != parameters_) throw std::runtime_error("is another robot's");
+    if (j.at("robot") != robot_ || j.at("parameters") != parameters_)
+      throw std::runtime_error("is another robot's");
     if (j.at("seed") != seed_) throw std::runtime_error("has another seed; choose another folder");
     if (j.at("fingerprint") != fingerprint_) {
-      throw std::runtime_error("was made with another robot.toml or robot.urdf; choose another folder");
+      throw std::runtime_error(
+          "was made with another robot.toml or robot.urdf; choose another folder");
     }
     SimOpt::State state;
     state.iteration = j.at("iteration");
     state.update = j.at("update");
     state.distribution = MixtureFrom(j.at("distribution"));
     state.before = MixtureFrom(j.at("before"));
-    state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")), state.temperature = j.at("temperature");
+    state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
+    state.temperature = j.at("temperature");
     state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
     size_t count = 0;
     for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);

@@ -14,9 +14,11 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPeriodTolerance = 0.2;  // as TransitionJoiner's
-constexpr double kSamePeriod = 1e-6;      // decimal fractions in binary: the period itself was meant
-constexpr double kNearlyTheSame = 0.2;    // of the spread of s: no further from what the row before led to
-constexpr double kFarthestNoise = 7;      // [sd] of the noise that most rows show
+// decimal fractions in binary: the period itself was meant
+constexpr double kSamePeriod = 1e-6;
+// of the spread of s: no further from what the row before led to
+constexpr double kNearlyTheSame = 0.2;
+constexpr double kFarthestNoise = 7;  // [sd] of the noise that most rows show
 
 Eigen::VectorXd Start(const MotionRow& row) {
   return (Eigen::VectorXd(row.transition.q.size() + row.transition.v.size()) << row.transition.q,
@@ -24,7 +26,8 @@ Eigen::VectorXd Start(const MotionRow& row) {
       .finished();
 }
 Eigen::VectorXd End(const MotionRow& row) {
-  return (Eigen::VectorXd(row.transition.q.size() + row.transition.v.size()) << row.transition.next_q,
+  return (Eigen::VectorXd(row.transition.q.size() + row.transition.v.size())
+              << row.transition.next_q,
           row.transition.next_v)
       .finished();
 }
@@ -54,9 +57,10 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// How far from what the row before led to a state may be, coordinate by coordinate; empty if the rows of the table do not follow
-// each other: that a state happens to be near says nothing among unconnected transitions, so in most coordinates most of the rows
-// must be near. Then what keeps them apart is noise, and may be larger than the spread of a joint that hardly moves.
+// How far from what the row before led to a state may be, coordinate by coordinate; empty if the
+// rows of the table do not follow each other: that a state happens to be near says nothing among
+// unconnected transitions, so in most coordinates most of the rows must be near. Then what keeps
+// them apart is noise, and may be larger than the spread of a joint that hardly moves.
 Eigen::VectorXd Tolerance(const std::vector<MotionRow>& rows) {
   const Eigen::VectorXd near = kNearlyTheSame * Spread(rows);
   Eigen::VectorXd within = near;
@@ -85,7 +89,8 @@ std::vector<Link> LinksByState(const std::vector<MotionRow>& rows) {
   for (size_t i = 0; i + 1 < rows.size(); ++i) {
     if (rows[i].ends || rows[i + 1].t < rows[i].t) continue;
     const bool same = Near(rows[i], rows[i + 1], Eigen::VectorXd::Zero(Start(rows[i]).size()));
-    links[i] = {same || (within.size() > 0 && Near(rows[i], rows[i + 1], within)), same, rows[i + 1].t - rows[i].t};
+    links[i] = {same || (within.size() > 0 && Near(rows[i], rows[i + 1], within)), same,
+                rows[i + 1].t - rows[i].t};
   }
   return links;
 }
@@ -106,7 +111,10 @@ std::vector<Link> LinksByTime(std::vector<MotionRow>& rows) {
 class Assembly {
  public:
   Assembly(const RobotDescription& robot, bool has_next, Log* log)
-      : period_(robot.task.period), latency_(robot.simulation.latency), has_next_(has_next), log_(*log) {}
+      : period_(robot.task.period),
+        latency_(robot.simulation.latency),
+        has_next_(has_next),
+        log_(*log) {}
 
   void Take(std::vector<MotionRow>& rows, const std::vector<Link>& links) {
     const Link none;
@@ -139,12 +147,17 @@ class Assembly {
   }
 
  private:
-  bool IsLate(double interval) const { return std::abs(interval - period_) > kPeriodTolerance * period_; }
+  bool IsLate(double interval) const {
+    return std::abs(interval - period_) > kPeriodTolerance * period_;
+  }
 
-  bool Complete(MotionRow& row, const Eigen::VectorXd* effort_before, const Link& before, const Link& after) {
+  bool Complete(MotionRow& row, const Eigen::VectorXd* effort_before, const Link& before,
+                const Link& after) {
     if (!after.linked && !has_next_) return false;  // where it leads is not told
     // The last row of a stretch goes at the pace of those before.
-    const double interval = after.linked ? after.interval : before.linked ? before.interval : period_;
+    const double interval = after.linked    ? after.interval
+                            : before.linked ? before.interval
+                                            : period_;
     if (IsLate(interval)) {
       ++log_.drops.late;
       late_.push_back(interval);
@@ -159,13 +172,14 @@ class Assembly {
         !after.linked || std::abs(interval - period_) <= kSamePeriod * period_ ? period_ : interval;
     Transition& t = row.transition;
     if (latency_ > 0) {
-      t.efforts.push_back({std::min(latency_, duration),
-                           effort_before ? *effort_before : Eigen::VectorXd::Zero(row.effort.size()).eval()});
+      t.efforts.push_back(
+          {std::min(latency_, duration),
+           effort_before ? *effort_before : Eigen::VectorXd::Zero(row.effort.size()).eval()});
     }
     if (duration > latency_) t.efforts.push_back({duration - std::max(latency_, 0.0), row.effort});
-    const bool known =
-        t.q.allFinite() && t.v.allFinite() &&
-        std::all_of(t.efforts.begin(), t.efforts.end(), [](const auto& e) { return e.effort.allFinite(); });
+    const bool known = t.q.allFinite() && t.v.allFinite() &&
+                       std::all_of(t.efforts.begin(), t.efforts.end(),
+                                   [](const auto& e) { return e.effort.allFinite(); });
     if (!known || (t.next_q.array().isNaN().all() && t.next_v.array().isNaN().all())) {
       ++log_.drops.not_finite;
       return false;
@@ -190,7 +204,8 @@ Log ReadCsvLog(const std::string& file, const RobotDescription& robot) {
   MotionTable table = ReadMotionTable(file, robot);
   if (table.rows.empty()) throw std::runtime_error(file + ": has a head but no rows");
   Log log{file, {}, {}, std::move(table.warnings)};
-  const std::vector<Link> links = table.has_next ? LinksByState(table.rows) : LinksByTime(table.rows);
+  const std::vector<Link> links =
+      table.has_next ? LinksByState(table.rows) : LinksByTime(table.rows);
   Assembly assembly(robot, table.has_next, &log);
   assembly.Take(table.rows, links);
   if (!log.rollouts.empty()) return log;

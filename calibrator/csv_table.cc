@@ -41,12 +41,14 @@ CsvTable::CsvTable(const std::string& file) : file_(file) {
   Split();
   if (fields_.size() < 2) {
     const bool foreign = line_.find_first_of(";\t") != std::string::npos;
-    Fail(foreign ? "columns must be separated by commas" : "is no head of a table: it has no comma");
+    Fail(foreign ? "columns must be separated by commas"
+                 : "is no head of a table: it has no comma");
   }
   names_.assign(fields_.begin(), fields_.end());
   std::unordered_set<std::string_view> seen;
   for (const std::string& name : names_) {
-    if (!name.empty() && !seen.insert(name).second) Fail("column " + Quoted(name) + " is there twice");
+    if (!name.empty() && !seen.insert(name).second)
+      Fail("column " + Quoted(name) + " is there twice");
   }
 }
 
@@ -59,8 +61,8 @@ bool CsvTable::Next() {
   if (!ReadLine()) return false;
   Split();
   if (fields_.size() != names_.size()) {
-    Fail(fmt::format("has {} field{} where the head has {}", fields_.size(), fields_.size() == 1 ? "" : "s",
-                     names_.size()));
+    Fail(fmt::format("has {} field{} where the head has {}", fields_.size(),
+                     fields_.size() == 1 ? "" : "s", names_.size()));
   }
   return true;
 }
@@ -69,7 +71,8 @@ double CsvTable::Number(int column) const {
   const std::string_view text = Text(column);
   if (text.empty()) return std::numeric_limits<double>::quiet_NaN();
   const auto fail = [&](const char* why) {
-    Fail(fmt::format("{} is {}: {}", Quoted(names_[static_cast<size_t>(column)]), Quoted(text), why));
+    Fail(fmt::format("{} is {}: {}", Quoted(names_[static_cast<size_t>(column)]), Quoted(text),
+                     why));
   };
   const char* begin = text.data() + (text.front() == '+' ? 1 : 0);
   const char* end = text.data() + text.size();
@@ -87,8 +90,8 @@ void CsvTable::Fail(const std::string& what) const {
   throw std::runtime_error(fmt::format("{}:{}: {}", file_, line_number_, what));
 }
 
-// The next line that says something, without its end. A file that is no text may have no line ends: it is not
-// swallowed whole.
+// The next line that says something, without its end. A file that is no text may have no line ends:
+// it is not swallowed whole.
 bool CsvTable::ReadLine() {
   std::streambuf& bytes = *stream_.rdbuf();
   constexpr int kEnd = std::char_traits<char>::eof();

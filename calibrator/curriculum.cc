@@ -17,14 +17,16 @@ namespace {
 constexpr int kClusterSteps = 25;     // beyond the memory of an estimator's smoother
 constexpr int64_t kSearchSteps = 40;  // transitions that are enough to find a mode
 constexpr double kSameMode = 4;       // [sd] between two answers that count as one
-constexpr double kWorthless = 12;     // [nat] by which another mode may explain the transitions worse
-constexpr int kNoiseRounds = 4;       // until the noise of beginnings and ends agrees
-constexpr double kGrownNoise = 1.15;  // of a stage, relative to the first one's
+// [nat] by which another mode may explain the transitions worse
+constexpr double kWorthless = 12;
+constexpr int kNoiseRounds = 4;        // until the noise of beginnings and ends agrees
+constexpr double kGrownNoise = 1.15;   // of a stage, relative to the first one's
 constexpr double kLargestShift = 3.5;  // [sd] of a mode from one stage to the next
 
 class Curriculum {
  public:
-  Curriculum(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, const CurriculumOptions& options)
+  Curriculum(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
+             const CurriculumOptions& options)
       : model_(std::move(model)),
         robot_(model_->description()),
         prior_(PriorOf(robot_)),
@@ -47,9 +49,12 @@ class Curriculum {
       result_.noise_sd = NoiseOf(one_step, modes.back());
     }
     if (modes.size() > 1) one_step.set_noise_sd(noise);
-    std::stable_sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) { return a.log_posterior > b.log_posterior; });
+    std::stable_sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) {
+      return a.log_posterior > b.log_posterior;
+    });
     for (size_t i = 1; i < modes.size(); ++i) {
-      if (modes[i].log_posterior > modes[0].log_posterior - kWorthless && Differs(modes[i], modes[0])) {
+      if (modes[i].log_posterior > modes[0].log_posterior - kWorthless &&
+          Differs(modes[i], modes[0])) {
         result_.others.push_back(std::move(modes[i]));
       }
     }
@@ -85,7 +90,8 @@ class Curriculum {
   }
 
   // Modes that the guesses lead to on a part of the transitions; the best explanation first.
-  std::vector<Eigen::VectorXd> Search(const std::vector<Eigen::VectorXd>& guesses, const WindowErrors& all) {
+  std::vector<Eigen::VectorXd> Search(const std::vector<Eigen::VectorXd>& guesses,
+                                      const WindowErrors& all) {
     const auto every = static_cast<int>(std::max<int64_t>(1, all.steps() / kSearchSteps));
     LaplaceOptions quick;
     quick.sandwich = quick.robust = quick.jacobian_at_end = false;
@@ -105,21 +111,28 @@ class Curriculum {
         ++impossible;
       }
       Account(part);
-      if (!found.empty() && (found.back().scale.array() <= Noise::kLeastScale).all()) break;  // nothing is left to explain
-      options_.progress("first guesses", 0.3 * static_cast<double>(found.size()) / static_cast<double>(guesses.size()));
+      // nothing is left to explain
+      if (!found.empty() && (found.back().scale.array() <= Noise::kLeastScale).all()) break;
+      options_.progress("first guesses", 0.3 * static_cast<double>(found.size()) /
+                                             static_cast<double>(guesses.size()));
     }
     if (found.empty()) throw std::invalid_argument(last_error);
     if (impossible > 0) {
-      result_.warnings.push_back(fmt::format("{} of {} first guesses could not be simulated", impossible, guesses.size()));
+      result_.warnings.push_back(
+          fmt::format("{} of {} first guesses could not be simulated", impossible, guesses.size()));
     }
-    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.log_posterior > b.log_posterior; });
+    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
+      return a.log_posterior > b.log_posterior;
+    });
     // With a part of the evidence the difference is that much smaller.
     const double share = static_cast<double>(every);
     std::vector<Eigen::VectorXd> modes;
     std::vector<const LaplaceFit*> kept;
     for (const LaplaceFit& fit : found) {
       if (fit.log_posterior < found[0].log_posterior - std::max(3.0, kWorthless / share)) continue;
-      if (std::any_of(kept.begin(), kept.end(), [&](const LaplaceFit* other) { return !Differs(fit, *other); })) continue;
+      if (std::any_of(kept.begin(), kept.end(),
+                      [&](const LaplaceFit* other) { return !Differs(fit, *other); }))
+        continue;
       kept.push_back(&fit);
       modes.push_back(fit.mode);
     }
@@ -132,7 +145,8 @@ class Curriculum {
     return std::sqrt(offset.dot(spread.llt().solve(offset))) > kSameMode;
   }
 
-  // Fits until the sensitivity to the initial states, and the noise that both ends share, are those at the mode.
+  // Fits until the sensitivity to the initial states, and the noise that both ends share, are those
+  // at the mode.
   LaplaceFit FitStage(WindowErrors& errors, const Eigen::VectorXd& start, int rounds) {
     LaplaceFit fit;
     Eigen::VectorXd mode = start;
@@ -144,50 +158,63 @@ class Curriculum {
       const Eigen::VectorXd offset = fit.mode - mode;
       mode = fit.mode;
       if (exact) break;
-      const bool settled = (offset.array() / fit.posterior.covariance.diagonal().array().sqrt()).abs().maxCoeff() < 0.1 &&
-                           (errors.noise_known() || (fit.scale.array().log().abs() < 0.05).all());
+      const bool settled =
+          (offset.array() / fit.posterior.covariance.diagonal().array().sqrt()).abs().maxCoeff() <
+              0.1 &&
+          (errors.noise_known() || (fit.scale.array().log().abs() < 0.05).all());
       if (settled || round + 1 == rounds) break;
       if (!errors.noise_known()) errors.set_noise_sd(Scaled(errors.noise_sd(), fit));
     }
-    fit.log_posterior -= errors.LogSpread();  // of the errors themselves, whatever they were whitened by
+    // of the errors themselves, whatever they were whitened by
+    fit.log_posterior -= errors.LogSpread();
     return fit;
   }
 
   // What the errors' scale makes of the record, or of the assumption.
-  static Eigen::VectorXd NoiseOf(const WindowErrors& errors, const LaplaceFit& fit) { return Scaled(errors.EndNoise(), fit); }
+  static Eigen::VectorXd NoiseOf(const WindowErrors& errors, const LaplaceFit& fit) {
+    return Scaled(errors.EndNoise(), fit);
+  }
 
   // There is no scale of what was never observed.
   static Eigen::VectorXd Scaled(Eigen::VectorXd noise, const LaplaceFit& fit) {
-    for (Eigen::Index c = 0; c < std::min(noise.size(), fit.scale.size()); ++c) noise(c) *= std::max(fit.scale(c), 1e-150);
+    for (Eigen::Index c = 0; c < std::min(noise.size(), fit.scale.size()); ++c)
+      noise(c) *= std::max(fit.scale(c), 1e-150);
     return noise;
   }
 
   static Eigen::VectorXd RowScale(const WindowErrors& errors, const LaplaceFit& fit) {
     Eigen::VectorXd scale(static_cast<Eigen::Index>(errors.rows().size()));
-    for (size_t i = 0; i < errors.rows().size(); ++i) scale(static_cast<Eigen::Index>(i)) = fit.scale(errors.rows()[i].coordinate);
+    for (size_t i = 0; i < errors.rows().size(); ++i)
+      scale(static_cast<Eigen::Index>(i)) = fit.scale(errors.rows()[i].coordinate);
     return scale;
   }
 
   // @return false if windows of that length do not count.
   bool Lengthen(int horizon) {
     WindowErrors errors(model_, rollouts_, horizon, options_.workforce);
-    if (errors.windows() == static_cast<int>(errors.steps())) return false;  // no two transitions follow each other
+    // no two transitions follow each other
+    if (errors.windows() == static_cast<int>(errors.steps())) return false;
     if (!result_.noise_known) errors.set_noise_sd(result_.noise_sd);
     LaplaceFit fit;
     try {
       fit = FitStage(errors, result_.fit.mode, 2);
     } catch (const std::invalid_argument& error) {
       Account(errors);
-      result_.warnings.push_back(fmt::format("windows of {} steps are not used: {}", horizon, error.what()));
+      result_.warnings.push_back(
+          fmt::format("windows of {} steps are not used: {}", horizon, error.what()));
       return false;
     }
     Account(errors);
     const double grown = GrownNoise(errors, fit);
     const double shift = Shift(result_.fit, fit);
     std::string why;
-    if (!fit.converged) why = "the fit does not converge";
-    else if (!(grown < kGrownNoise)) why = fmt::format("their errors are {:.2g} times the noise of one step", grown);
-    else if (!(shift < kLargestShift)) why = fmt::format("they lead {:.2g} standard deviations away from what shorter ones say", shift);
+    if (!fit.converged)
+      why = "the fit does not converge";
+    else if (!(grown < kGrownNoise))
+      why = fmt::format("their errors are {:.2g} times the noise of one step", grown);
+    else if (!(shift < kLargestShift))
+      why = fmt::format("they lead {:.2g} standard deviations away from what shorter ones say",
+                        shift);
     if (!why.empty()) {
       result_.warnings.push_back(fmt::format("windows of {} steps are not used: {}", horizon, why));
       return false;
@@ -208,7 +235,8 @@ class Curriculum {
     return squares.cwiseQuotient(rows.cwiseMax(1)).cwiseSqrt();
   }
 
-  // Largest ratio of an entry's errors to what they were at first, less what chance may have made of it.
+  // Largest ratio of an entry's errors to what they were at first, less what chance may have made
+  // of it.
   double GrownNoise(const WindowErrors& errors, const LaplaceFit& fit) const {
     const Eigen::VectorXd noise = Whitened(errors, fit).cwiseProduct(errors.EndNoise());
     Eigen::VectorXd rows = Eigen::VectorXd::Zero(noise.size());
@@ -222,26 +250,33 @@ class Curriculum {
     return grown;
   }
 
-  // How far a mode has moved, in standard deviations of where it was known before, along the direction where that is most. If both
-  // stages are right the difference varies less than the earlier mode does (Hausman, Econometrica 46, 1978).
+  // How far a mode has moved, in standard deviations of where it was known before, along the
+  // direction where that is most. If both stages are right the difference varies less than the
+  // earlier mode does (Hausman, Econometrica 46, 1978).
   static double Shift(const LaplaceFit& before, const LaplaceFit& after) {
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(before.standard.covariance);
-    const Eigen::VectorXd along = axes.eigenvectors().transpose() * (after.standard.mean - before.standard.mean);
+    const Eigen::VectorXd along =
+        axes.eigenvectors().transpose() * (after.standard.mean - before.standard.mean);
     return (along.array().abs() / axes.eigenvalues().array().max(1e-300).sqrt()).maxCoeff();
   }
 
   void Record(const WindowErrors& errors, const LaplaceFit& fit, int horizon) {
     // Relative to the noise as recorded or, where nobody knows it, to that of one step.
-    const Eigen::VectorXd relative = NoiseOf(errors, fit).cwiseQuotient(result_.noise_known ? errors.EndNoise() : result_.noise_sd);
+    const Eigen::VectorXd relative =
+        NoiseOf(errors, fit)
+            .cwiseQuotient(result_.noise_known ? errors.EndNoise() : result_.noise_sd);
     double squares = 0;
     for (Eigen::Index i = 0; i < fit.errors.size(); ++i) {
-      squares += std::pow(fit.errors(i) * relative(errors.rows()[static_cast<size_t>(i)].coordinate), 2);
+      squares +=
+          std::pow(fit.errors(i) * relative(errors.rows()[static_cast<size_t>(i)].coordinate), 2);
     }
-    result_.stages.push_back({horizon, errors.windows(), errors.simulated_steps(), squares / static_cast<double>(fit.errors.size()),
-                              fit.mode, fit.posterior.covariance.diagonal().cwiseSqrt()});
+    result_.stages.push_back({horizon, errors.windows(), errors.simulated_steps(),
+                              squares / static_cast<double>(fit.errors.size()), fit.mode,
+                              fit.posterior.covariance.diagonal().cwiseSqrt()});
     result_.horizon = horizon;
     const double last = options_.horizons.empty() ? 1 : options_.horizons.back();
-    options_.progress(fmt::format("windows of {} step{}", horizon, horizon == 1 ? "" : "s"), 0.3 + 0.7 * horizon / std::max(last, 1.0));
+    options_.progress(fmt::format("windows of {} step{}", horizon, horizon == 1 ? "" : "s"),
+                      0.3 + 0.7 * horizon / std::max(last, 1.0));
   }
 
   void Account(const WindowErrors& errors) {
@@ -255,7 +290,8 @@ class Curriculum {
   std::span<const Rollout> rollouts_;
   const CurriculumOptions& options_;
   CurriculumFit result_;
-  Eigen::VectorXd first_errors_;  // of one step, root mean square of each entry of (q, v), physical units
+  // of one step, root mean square of each entry of (q, v), physical units
+  Eigen::VectorXd first_errors_;
   int64_t simulations_ = 0;
 };
 
@@ -273,17 +309,23 @@ LeastSquares ProblemOf(const RobotDescription& robot, WindowErrors& errors) {
   LeastSquares problem{PriorOf(robot),
                        [&](const Eigen::MatrixXd& coordinates) {
                          Eigen::MatrixXd physical(coordinates.rows(), coordinates.cols());
-                         for (Eigen::Index j = 0; j < coordinates.cols(); ++j) physical.col(j) = robot.ToPhysical(coordinates.col(j));
+                         for (Eigen::Index j = 0; j < coordinates.cols(); ++j)
+                           physical.col(j) = robot.ToPhysical(coordinates.col(j));
                          return errors.Whitened(physical);
                        },
-                       {}, {}, {}, errors.noise_known()};
+                       {},
+                       {},
+                       {},
+                       errors.noise_known()};
   int block = -1, cluster = -1, steps = kClusterSteps;
   const WindowErrors::Row* before = nullptr;
   for (const WindowErrors::Row& row : errors.rows()) {
-    const bool new_step = !before || row.window != before->window || row.transition != before->transition;
+    const bool new_step =
+        !before || row.window != before->window || row.transition != before->transition;
     const bool new_window = !before || row.window != before->window;
     if (new_step) ++block, ++steps;
-    if (!before || (new_window && (steps > kClusterSteps || row.rollout != before->rollout))) ++cluster, steps = 1;
+    if (!before || (new_window && (steps > kClusterSteps || row.rollout != before->rollout)))
+      ++cluster, steps = 1;
     problem.group.push_back(row.coordinate);
     problem.block.push_back(block);
     problem.cluster.push_back(cluster);

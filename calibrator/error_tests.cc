@@ -1,5 +1,5 @@
-// What whitened errors of the right model do not do: be too large, have a mean, correlate, depend on the
-// state.
+// What whitened errors of the right model do not do: be too large, have a mean, correlate, depend
+// on the state.
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
@@ -26,7 +26,8 @@ constexpr int kLastLag = 6;
 
 // Conditions that can be told apart, else the one there is.
 std::vector<std::string> Conditions(const ProjectedErrors& errors) {
-  return errors.conditions ? std::vector<std::string>{"contact", "free"} : std::vector<std::string>{""};
+  return errors.conditions ? std::vector<std::string>{"contact", "free"}
+                           : std::vector<std::string>{""};
 }
 
 using Rows = std::vector<Eigen::Index>;
@@ -74,9 +75,13 @@ Misfit CompareConditions(const ProjectedErrors& errors, int coordinate, const Ro
   const auto [free_mean, free_variance] = AbsoluteMean(errors, free);
   const double variance = contact_variance + free_variance;
   const double t = std::abs(contact_mean - free_mean) / std::sqrt(variance);
-  const auto of = [](double v, const Rows& rows) { return v * v / static_cast<double>(rows.size() - 1); };
-  const double freedom = variance * variance / (of(contact_variance, contact) + of(free_variance, free));
-  const double contact_squares = SumOfSquares(errors, contact), free_squares = SumOfSquares(errors, free);
+  const auto of = [](double v, const Rows& rows) {
+    return v * v / static_cast<double>(rows.size() - 1);
+  };
+  const double freedom =
+      variance * variance / (of(contact_variance, contact) + of(free_variance, free));
+  const double contact_squares = SumOfSquares(errors, contact),
+               free_squares = SumOfSquares(errors, free);
   const auto c = static_cast<double>(contact.size()), f = static_cast<double>(free.size());
   const double calm = std::min(contact_squares / c, free_squares / f);
   const char* worse = contact_squares / c > free_squares / f ? "contact" : "free";
@@ -96,7 +101,8 @@ std::vector<Misfit> TestScale(const ProjectedErrors& errors, const std::vector<b
   for (int joint = 0; joint < errors.n; ++joint) {
     for (const std::string& condition : Conditions(errors)) {
       const Rows rows = Where(
-          errors, [&](int c) { return c % errors.n == joint && noise_known[static_cast<size_t>(c)]; },
+          errors,
+          [&](int c) { return c % errors.n == joint && noise_known[static_cast<size_t>(c)]; },
           condition);
       if (rows.size() < kFewestRows) continue;
       double freedom = 0;
@@ -104,8 +110,8 @@ std::vector<Misfit> TestScale(const ProjectedErrors& errors, const std::vector<b
       if (freedom < 1) continue;
       const double squares = SumOfSquares(errors, rows);
       const std::string& name = errors.joint_of[static_cast<size_t>(joint)];
-      tests.push_back({errors.Place(name, condition) + ": errors beyond the noise", name, condition, "scale",
-                       squares, ChiSquaredTail(freedom, squares),
+      tests.push_back({errors.Place(name, condition) + ": errors beyond the noise", name, condition,
+                       "scale", squares, ChiSquaredTail(freedom, squares),
                        std::max(0.0, 1 - freedom / squares)});
     }
   }
@@ -131,12 +137,13 @@ std::vector<Misfit> TestOutliers(const ProjectedErrors& errors) {
       std::copy_if(rows.begin(), rows.end(), std::back_inserter(out),
                    [&](Eigen::Index i) { return errors.outlying[static_cast<size_t>(i)]; });
       const auto count = static_cast<double>(out.size()), all = static_cast<double>(rows.size());
-      const double p = count == 0 ? 1 : cdf(complement(boost::math::poisson(all * expected), count - 1));
+      const double p =
+          count == 0 ? 1 : cdf(complement(boost::math::poisson(all * expected), count - 1));
       const std::string& name = errors.joint_of[static_cast<size_t>(joint)];
-      const std::string many =
-          std::to_string(out.size()) + " of " + std::to_string(rows.size()) + " errors are outliers";
-      tests.push_back({errors.Place(name, condition) + ": " + many, name, condition, "outliers", count / all,
-                       p, SumOfSquares(errors, out) / SumOfSquares(errors, rows)});
+      const std::string many = std::to_string(out.size()) + " of " + std::to_string(rows.size()) +
+                               " errors are outliers";
+      tests.push_back({errors.Place(name, condition) + ": " + many, name, condition, "outliers",
+                       count / all, p, SumOfSquares(errors, out) / SumOfSquares(errors, rows)});
     }
   }
   return tests;
@@ -144,8 +151,8 @@ std::vector<Misfit> TestOutliers(const ProjectedErrors& errors) {
 
 namespace {
 
-// Of the normalised correlations at successive lags from 2 on, if errors correlate by rho at lag 1 and no
-// further: Bartlett, J. R. Stat. Soc. Suppl. 8 (1946), sum_m rho_m rho_(m + j - k).
+// Of the normalised correlations at successive lags from 2 on, if errors correlate by rho at lag 1
+// and no further: Bartlett, J. R. Stat. Soc. Suppl. 8 (1946), sum_m rho_m rho_(m + j - k).
 Eigen::MatrixXd LagCovariance(Eigen::Index lags, double rho) {
   constexpr double kMost =
       0.45;  // beyond 1/2 there is no such process, and at 1/2 a sum would have to vanish
@@ -200,8 +207,8 @@ std::vector<Misfit> TestWhiteness(const ProjectedErrors& errors) {
       // What chance alone would make of it does not count.
       predictable += std::pow(correlation(lag), 2) - covariance(0, 0) / pairs(lag);
     }
-    tests.push_back({CoordinateName(errors, c) + ": successive errors resemble each other", Joint(errors, c),
-                     "", "whiteness", statistic,
+    tests.push_back({CoordinateName(errors, c) + ": successive errors resemble each other",
+                     Joint(errors, c), "", "whiteness", statistic,
                      ChiSquaredTail(static_cast<double>(lags), statistic),
                      std::clamp(predictable, 0.0, 1.0)});
   }
@@ -238,9 +245,10 @@ Eigen::RowVectorXd Features(const Transition& t) {
   for (const EffortSegment& segment : t.efforts) effort += segment.duration * segment.effort;
   effort /= t.duration();
   Eigen::RowVectorXd features(1 + 4 * t.v.size() + 3 * t.q.size());
-  features << 1, effort.transpose(), t.v.transpose(), (t.v.array().abs() * t.v.array()).matrix().transpose(),
-      t.v.array().sign().matrix().transpose(), t.q.transpose(), t.q.array().sin().matrix().transpose(),
-      t.q.array().cos().matrix().transpose();
+  features << 1, effort.transpose(), t.v.transpose(),
+      (t.v.array().abs() * t.v.array()).matrix().transpose(),
+      t.v.array().sign().matrix().transpose(), t.q.transpose(),
+      t.q.array().sin().matrix().transpose(), t.q.array().cos().matrix().transpose();
   return features;
 }
 
@@ -261,8 +269,8 @@ std::vector<Misfit> TestRegression(const ProjectedErrors& errors) {
     double leverage = 0;
     for (Eigen::Index k = 0; k < count; ++k) {
       const Eigen::Index row = rows[static_cast<size_t>(k)];
-      features.row(k) =
-          Features(*errors.steps[static_cast<size_t>(errors.step_of[static_cast<size_t>(row)])].transition);
+      features.row(k) = Features(
+          *errors.steps[static_cast<size_t>(errors.step_of[static_cast<size_t>(row)])].transition);
       basis.row(k) = errors.basis.row(row);
       r(k) = errors.r(row);
       leverage += 1 - errors.freedom(row);
@@ -281,11 +289,13 @@ std::vector<Misfit> TestRegression(const ProjectedErrors& errors) {
       explained += score(i) * score(i) / gram.eigenvalues()(i);
       ++used;
     }
-    const double left = static_cast<double>(count) - used - leverage, rest = r.squaredNorm() - explained;
+    const double left = static_cast<double>(count) - used - leverage,
+                 rest = r.squaredNorm() - explained;
     if (left < 1 || used == 0 || !(rest > 0)) continue;
     const double f = explained / used / (rest / left);
-    tests.push_back({CoordinateName(errors, c) + ": errors depend on state and effort", Joint(errors, c), "",
-                     "structure", f, cdf(complement(boost::math::fisher_f(used, left), f)),
+    tests.push_back({CoordinateName(errors, c) + ": errors depend on state and effort",
+                     Joint(errors, c), "", "structure", f,
+                     cdf(complement(boost::math::fisher_f(used, left), f)),
                      std::clamp((explained - used * rest / left) / r.squaredNorm(), 0.0, 1.0)});
   }
   return tests;

@@ -64,7 +64,8 @@ class Rater {
     std::tie(q_, v_) = ExcitationStart(robot, settings.seed);
     Random random(settings.seed, {kDrawStream});
     draws_.resize(belief.mean.size(), settings.draws + 1);
-    draws_ << belief.mean, Transform(belief, StandardNormals(belief.mean.size(), settings.draws, random));
+    draws_ << belief.mean,
+        Transform(belief, StandardNormals(belief.mean.size(), settings.draws, random));
   }
 
   std::optional<RatedExcitation> Rate(Excitation excitation) {
@@ -74,7 +75,8 @@ class Rater {
       if (scale < 1) scaled.name += fmt::format(", times {:g}", scale);
       std::vector<Motion> motions;
       while (static_cast<Eigen::Index>(motions.size()) < draws_.cols()) {
-        motions.push_back(Move(scaled.action, draws_.col(static_cast<Eigen::Index>(motions.size()))));
+        motions.push_back(
+            Move(scaled.action, draws_.col(static_cast<Eigen::Index>(motions.size()))));
         if (motions.back().margin < settings_.margin) break;
       }
       if (motions.back().margin >= settings_.margin) return Weigh(std::move(scaled), motions);
@@ -85,7 +87,8 @@ class Rater {
  private:
   Motion Move(const Eigen::MatrixXd& action, const Eigen::VectorXd& coordinates) {
     const Eigen::Index n = robot_.num_velocities(), steps = action.rows();
-    const double period = robot_.task.period, latency = std::clamp(robot_.simulation.latency, 0.0, period);
+    const double period = robot_.task.period,
+                 latency = std::clamp(robot_.simulation.latency, 0.0, period);
     Motion motion{{}, Margin(robot_, q_, v_), Eigen::MatrixXd(n, steps + 1)};
     simulator_.SetParameters(robot_.ToPhysical(coordinates));
     simulator_.SetState(q_, v_);
@@ -126,7 +129,8 @@ class Rater {
     const Eigen::MatrixXd errors = discrepancy_.Residuals(physical, std::span(&rollout, 1));
     Eigen::MatrixXd jacobian(errors.rows(), d);
     for (Eigen::Index i = 0; i < d; ++i) {
-      const auto above = errors.col(2 * i), below = errors.col(2 * i + 1), middle = errors.col(2 * d);
+      const auto above = errors.col(2 * i), below = errors.col(2 * i + 1),
+                 middle = errors.col(2 * d);
       if (above.allFinite() && below.allFinite())
         jacobian.col(i) = (above - below) / (2 * h(i));
       else
@@ -189,7 +193,8 @@ Eigen::MatrixXd Measures(const RobotDescription& robot, const std::vector<WeakDi
 
 }  // namespace
 
-std::pair<Eigen::VectorXd, Eigen::VectorXd> ExcitationStart(const RobotDescription& robot, uint64_t seed) {
+std::pair<Eigen::VectorXd, Eigen::VectorXd> ExcitationStart(const RobotDescription& robot,
+                                                            uint64_t seed) {
   Eigen::VectorXd q(robot.num_positions()), v(robot.num_velocities());
   Random random(seed, {0, kStartStream});
   MakeTask(robot)->InitialState(random, q, v);
@@ -198,15 +203,18 @@ std::pair<Eigen::VectorXd, Eigen::VectorXd> ExcitationStart(const RobotDescripti
 
 std::vector<RatedExcitation> RateExcitations(const RobotDescription& robot, const Gaussian& belief,
                                              const ExcitationSettings& settings) {
-  if (robot.parameters.empty()) throw std::invalid_argument(robot.name + " has no parameters to be learned");
-  if (robot.driven().empty()) throw std::invalid_argument(robot.name + " has no motor to excite it");
+  if (robot.parameters.empty())
+    throw std::invalid_argument(robot.name + " has no parameters to be learned");
+  if (robot.driven().empty())
+    throw std::invalid_argument(robot.name + " has no motor to excite it");
   Rater rater(robot, belief, settings);
   std::vector<RatedExcitation> rated;
   for (Excitation& excitation : MakeExcitations(robot, settings)) {
     if (auto one = rater.Rate(std::move(excitation))) rated.push_back(*std::move(one));
   }
-  std::stable_sort(rated.begin(), rated.end(),
-                   [](const RatedExcitation& a, const RatedExcitation& b) { return a.gain > b.gain; });
+  std::stable_sort(
+      rated.begin(), rated.end(),
+      [](const RatedExcitation& a, const RatedExcitation& b) { return a.gain > b.gain; });
   return rated;
 }
 
@@ -216,7 +224,8 @@ Eigen::VectorXd PhysicalSd(const RobotDescription& robot, const Eigen::VectorXd&
   for (Eigen::Index i = 0; i < sd.size(); ++i) {
     const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
     const double h = 1e-4 * std::sqrt(parameter.coordinate_variance());
-    physical(i) = sd(i) * (parameter.ToPhysical(mean(i) + h) - parameter.ToPhysical(mean(i) - h)) / (2 * h);
+    physical(i) =
+        sd(i) * (parameter.ToPhysical(mean(i) + h) - parameter.ToPhysical(mean(i) - h)) / (2 * h);
   }
   return physical;
 }
@@ -231,9 +240,9 @@ std::string DescribeGain(const RobotDescription& robot, const Gaussian& belief,
     const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
     const double ratio = rated.sd(i) / before(i);
     if (ratio <= kHelps) {
-      helps += fmt::format("{}{} (sd {:.2g} -> {:.2g}{}{})", helps.empty() ? "" : ", ", parameter.name,
-                           before_physical(i), after_physical(i), parameter.unit.empty() ? "" : " ",
-                           parameter.unit);
+      helps += fmt::format("{}{} (sd {:.2g} -> {:.2g}{}{})", helps.empty() ? "" : ", ",
+                           parameter.name, before_physical(i), after_physical(i),
+                           parameter.unit.empty() ? "" : " ", parameter.unit);
     }
     if (ratio >= kHardlyHelps) hardly += (hardly.empty() ? "" : ", ") + parameter.name;
   }
@@ -254,14 +263,16 @@ MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posteri
       const Eigen::MatrixXd covariance = Inverse(precision + rated.information);
       return (measures.transpose() * covariance * measures).determinant();
     };
-    std::stable_sort(
-        advice.rated.begin(), advice.rated.end(),
-        [&](const RatedExcitation& a, const RatedExcitation& b) { return left_open(a) < left_open(b); });
+    std::stable_sort(advice.rated.begin(), advice.rated.end(),
+                     [&](const RatedExcitation& a, const RatedExcitation& b) {
+                       return left_open(a) < left_open(b);
+                     });
   }
-  advice.words = fmt::format("{} for {:.3g} s would tell most{}: {}", advice.rated[0].excitation.name,
-                             advice.rated[0].steps * robot.task.period,
-                             found.weak.empty() ? "" : " of what is hardly determined",
-                             DescribeGain(robot, posterior, advice.rated[0]));
+  advice.words =
+      fmt::format("{} for {:.3g} s would tell most{}: {}", advice.rated[0].excitation.name,
+                  advice.rated[0].steps * robot.task.period,
+                  found.weak.empty() ? "" : " of what is hardly determined",
+                  DescribeGain(robot, posterior, advice.rated[0]));
   return advice;
 }
 

@@ -45,7 +45,8 @@ Signal Multisine(int steps, double bandwidth, Random& random) {
   for (int i = 1; i <= kSines; ++i) {
     const double frequency = bandwidth * (i - random.Uniform(0, 0.5)) / kSines;
     const double phase = random.Uniform(0, 2 * std::numbers::pi);
-    for (int k = 0; k < steps; ++k) signal(k) += std::sin(2 * std::numbers::pi * frequency * k + phase);
+    for (int k = 0; k < steps; ++k)
+      signal(k) += std::sin(2 * std::numbers::pi * frequency * k + phase);
   }
   return signal / std::max(signal.cwiseAbs().maxCoeff(), 1e-9);
 }
@@ -88,8 +89,10 @@ Signal Make(Wave shape, int steps, double bandwidth, Random& random) {
 
 }  // namespace
 
-std::vector<Excitation> MakeExcitations(const RobotDescription& robot, const ExcitationSettings& settings) {
-  const int steps = std::max(1, static_cast<int>(std::lround(settings.seconds / robot.task.period)));
+std::vector<Excitation> MakeExcitations(const RobotDescription& robot,
+                                        const ExcitationSettings& settings) {
+  const int steps =
+      std::max(1, static_cast<int>(std::lround(settings.seconds / robot.task.period)));
   const auto joints = static_cast<Eigen::Index>(robot.driven().size());
   std::vector<Excitation> excitations;
   for (int c = 0; c < settings.candidates; ++c) {

@@ -12,8 +12,8 @@
 
 namespace plumb {
 
-/// Error of predicting n steps ahead on transitions that the fit has not seen, root mean square over states and windows,
-/// in standard units (Task::state_scale).
+/// Error of predicting n steps ahead on transitions that the fit has not seen, root mean square
+/// over states and windows, in standard units (Task::state_scale).
 struct HorizonError {
   int horizon;       ///< n
   int64_t windows;   ///< predicted; with 0 the errors are NaN
@@ -24,7 +24,8 @@ struct HorizonError {
 struct Holdout {
   int64_t fitted = 0, held_out = 0;  ///< transitions
   std::vector<HorizonError> errors;
-  bool better = false;  ///< the posterior predicts better than the prior at some horizons, and at none worse, chance apart
+  /// the posterior predicts better than the prior at some horizons, and at none worse, chance apart
+  bool better = false;
   std::string words;
 };
 
@@ -35,8 +36,10 @@ struct Misfit {
   std::string condition;  ///< "contact", "free" or empty = both
   std::string test;       ///< "scale", "whiteness", "bias", "structure", "outliers"
   double statistic;       ///< of the test
-  double p;               ///< of such a statistic if the model were right, corrected for the number of tests
-  double effect;          ///< share of the errors' variance that it makes, 0 to 1; NaN where there is no such share
+  /// of such a statistic if the model were right, corrected for the number of tests
+  double p;
+  /// share of the errors' variance that it makes, 0 to 1; NaN where there is no such share
+  double effect;
 };
 
 /// Whether the model can explain the robot at all.
@@ -51,7 +54,8 @@ struct LogAgreement {
   std::string log;
   Eigen::VectorXd mean, sd;  ///< of its own posterior, physical units
   double distance;           ///< Mahalanobis' from the others' together, in what the log can tell
-  double p;                  ///< of such a distance if all logs were of one robot, corrected for the number of logs
+  /// of such a distance if all logs were of one robot, corrected for the number of logs
+  double p;
 };
 
 struct Agreement {
@@ -65,14 +69,14 @@ struct Stage {
   int horizon;
   int64_t windows;
   int64_t simulated_steps;
-  double discrepancy;   ///< mean squared whitened error at its end
+  double discrepancy;        ///< mean squared whitened error at its end
   Eigen::VectorXd mean, sd;  ///< coordinates
 };
 
 /// All that a calibration has found.
 struct Findings {
-  std::string method;         ///< that was asked for
-  std::string used;           ///< that gave the answer, e.g. "laplace" where "auto" was asked for
+  std::string method;  ///< that was asked for
+  std::string used;    ///< that gave the answer, e.g. "laplace" where "auto" was asked for
   uint64_t seed = 0;
   Gaussian prior;             ///< coordinates
   GaussianMixture posterior;  ///< coordinates
@@ -81,20 +85,24 @@ struct Findings {
   int64_t simulated_steps = 0;   ///< transitions simulated for the fit
   int64_t diagnostic_steps = 0;  ///< and for the diagnostics
   int64_t failures = 0;          ///< simulations that failed
-  double discrepancy = 0;        ///< mean squared whitened one-step error of the mean; 1 = down to the noise
-  Eigen::VectorXd noise_sd;      ///< of each entry of (q, v), estimated or as recorded, physical units
-  Eigen::VectorXd errors;        ///< one-step errors of the mean, whitened, divided by their estimated scale
+  /// mean squared whitened one-step error of the mean; 1 = down to the noise
+  double discrepancy = 0;
+  /// of each entry of (q, v), estimated or as recorded, physical units
+  Eigen::VectorXd noise_sd;
+  /// one-step errors of the mean, whitened, divided by their estimated scale
+  Eigen::VectorXd errors;
   std::vector<WindowErrors::Row> rows;  ///< what each is about
   std::vector<Stage> stages;
   Identifiability identifiability;
-  Eigen::VectorXd cramer_rao;    ///< sd of each parameter's coordinate if nothing but the data told, infinite where they do not
+  /// sd of each parameter's coordinate if nothing but the data told, infinite where they do not
+  Eigen::VectorXd cramer_rao;
   std::string advice;  ///< which further motion would tell most of what is left open, in words
   Holdout holdout;
   Misspecification misspecification;
   Agreement agreement;
-  std::string check;             ///< how the posterior's shape was verified, in words
+  std::string check;  ///< how the posterior's shape was verified, in words
   std::vector<std::string> warnings;
-  double seconds = 0;            ///< wall time
+  double seconds = 0;  ///< wall time
 };
 
 }  // namespace plumb

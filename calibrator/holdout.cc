@@ -19,7 +19,8 @@ int64_t CountWindows(std::span<const Rollout> rollouts, int horizon) {
   const auto length = static_cast<size_t>(horizon);
   for (const Rollout& rollout : rollouts) {
     const auto& t = rollout.transitions;
-    for (size_t i = 0; i + length <= t.size(); ++i) count += t[i + length - 1].step == t[i].step + horizon - 1;
+    for (size_t i = 0; i + length <= t.size(); ++i)
+      count += t[i + length - 1].step == t[i].step + horizon - 1;
   }
   return count;
 }
@@ -29,7 +30,8 @@ double ObservedEntries(std::span<const Rollout> rollouts) {
   double entries = 0, transitions = 0;
   for (const Rollout& rollout : rollouts) {
     for (const Transition& t : rollout.transitions) {
-      entries += static_cast<double>(t.next_q.array().isFinite().count() + t.next_v.array().isFinite().count());
+      entries += static_cast<double>(t.next_q.array().isFinite().count() +
+                                     t.next_v.array().isFinite().count());
       ++transitions;
     }
   }
@@ -60,7 +62,8 @@ Split HoldOut(std::span<const Rollout> rollouts) {
   return split;
 }
 
-Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorXd& posterior, const Eigen::VectorXd& prior) {
+Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorXd& posterior,
+              const Eigen::VectorXd& prior) {
   Holdout result;
   result.fitted = static_cast<int64_t>(CountTransitions(split.fitted));
   result.held_out = static_cast<int64_t>(CountTransitions(split.held_out));
@@ -75,32 +78,45 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
       const Eigen::VectorXd errors = discrepancy.PredictionError(both, split.held_out, horizon);
       error.posterior = errors(0), error.prior = errors(1);
       ++tried;
-      // A root mean square of so many errors is known that well; where noise is most of it the two are alike.
+      // A root mean square of so many errors is known that well; where noise is most of it the two
+      // are alike.
       const double chance = 1 / std::sqrt(2.0 * static_cast<double>(error.windows) * entries);
-      if (error.posterior + kRounding < error.prior * (1 - chance)) ++better;
-      else if (error.posterior <= error.prior * (1 + chance) + kRounding) alike += fmt::format("{}{}", alike.empty() ? "" : ", ", horizon);
-      else worse += fmt::format("{}{}", worse.empty() ? "" : ", ", horizon);
+      if (error.posterior + kRounding < error.prior * (1 - chance))
+        ++better;
+      else if (error.posterior <= error.prior * (1 + chance) + kRounding)
+        alike += fmt::format("{}{}", alike.empty() ? "" : ", ", horizon);
+      else
+        worse += fmt::format("{}{}", worse.empty() ? "" : ", ", horizon);
     }
     result.errors.push_back(error);
   }
   result.better = better > 0 && worse.empty();
   if (tried == 0) {
-    result.words = "too few transitions to hold any out: whether the posterior predicts better than the prior is not known";
+    result.words =
+        "too few transitions to hold any out: whether the posterior predicts better than the prior "
+        "is not known";
   } else if (result.better) {
     const HorizonError* last = nullptr;
     for (const HorizonError& error : result.errors) {
       if (error.windows > 0) last = &error;
     }
-    result.words = fmt::format("on {} transitions that it has not seen, the posterior predicts better than the prior: errors are {:.3g} times "
-                               "the prior's after 1 step, {:.3g} times after {}",
-                               result.held_out, result.errors[0].posterior / result.errors[0].prior, last->posterior / last->prior,
-                               last->horizon);
+    result.words = fmt::format(
+        "on {} transitions that it has not seen, the posterior predicts better than the prior: "
+        "errors are {:.3g} times "
+        "the prior's after 1 step, {:.3g} times after {}",
+        result.held_out, result.errors[0].posterior / result.errors[0].prior,
+        last->posterior / last->prior, last->horizon);
   } else if (worse.empty()) {
-    result.words = fmt::format("on {} transitions that it has not seen, the posterior predicts no better than the prior: do not train with it",
-                               result.held_out);
+    result.words = fmt::format(
+        "on {} transitions that it has not seen, the posterior predicts no better than the prior: "
+        "do not train with it",
+        result.held_out);
   } else {
-    result.words = fmt::format("on {} transitions that it has not seen, the posterior predicts WORSE than the prior {} step{} "
-                               "ahead: do not train with it", result.held_out, worse, worse == "1" ? "" : "s");
+    result.words = fmt::format(
+        "on {} transitions that it has not seen, the posterior predicts WORSE than the prior {} "
+        "step{} "
+        "ahead: do not train with it",
+        result.held_out, worse, worse == "1" ? "" : "s");
   }
   return result;
 }

@@ -17,13 +17,15 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNull = 1e-6;             // of the largest information, in units of the prior
 constexpr double kNullInformation = 1e-2;  // and of the prior's
 constexpr double kWeakInformation = 1;     // of the prior's
-constexpr double kWeakEntry = 0.2;         // of the largest in a weak direction: smaller ones are not told
+// of the largest in a weak direction: smaller ones are not told
+constexpr double kWeakEntry = 0.2;
 constexpr int kLargestPower = 2;
 constexpr Eigen::Index kMostTried = 6;  // parameters of which all small powers are tried
 
 using Vectors = std::vector<Eigen::VectorXd>;
 
-// Every vector of small integer powers with its first entry positive, fewest and smallest powers first.
+// Every vector of small integer powers with its first entry positive, fewest and smallest powers
+// first.
 std::vector<Eigen::VectorXd> SmallPowers(Eigen::Index n) {
   std::vector<Eigen::VectorXd> powers;
   const auto base = static_cast<size_t>(2 * kLargestPower + 1);
@@ -42,23 +44,28 @@ std::vector<Eigen::VectorXd> SmallPowers(Eigen::Index n) {
   return powers;
 }
 
-// A power of a parameter of the whole robot, such as gravity, is less telling than one of a link's or joint's own.
+// A power of a parameter of the whole robot, such as gravity, is less telling than one of a link's
+// or joint's own.
 Eigen::VectorXd CostOfPowers(const RobotDescription& robot) {
   Eigen::VectorXd cost(static_cast<Eigen::Index>(robot.parameters.size()));
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
-    cost(static_cast<Eigen::Index>(i)) = robot.parameters[i].name.find('/') == std::string::npos ? 2 : 1;
+    cost(static_cast<Eigen::Index>(i)) =
+        robot.parameters[i].name.find('/') == std::string::npos ? 2 : 1;
   }
   return cost;
 }
 
 // Fewest and cheapest powers first.
-void SortBySimplicity(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& cost, Vectors* powers) {
-  std::stable_sort(powers->begin(), powers->end(), [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-    const auto key = [&](const Eigen::VectorXd& p) {
-      return std::make_tuple((p.array() != 0).count(), p.cwiseAbs().dot(cost), p.dot(covariance * p));
-    };
-    return key(a) < key(b);
-  });
+void SortBySimplicity(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& cost,
+                      Vectors* powers) {
+  std::stable_sort(powers->begin(), powers->end(),
+                   [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+                     const auto key = [&](const Eigen::VectorXd& p) {
+                       return std::make_tuple((p.array() != 0).count(), p.cwiseAbs().dot(cost),
+                                              p.dot(covariance * p));
+                     };
+                     return key(a) < key(b);
+                   });
 }
 
 // Parameters that null directions couple, in groups. Those that none involves are none's.
@@ -84,8 +91,8 @@ std::vector<std::vector<Eigen::Index>> CoupledGroups(const Vectors& null, Eigen:
   return groups;
 }
 
-// Combinations of a group's parameters that no null direction changes: a basis of all of them, of the
-// simplest form.
+// Combinations of a group's parameters that no null direction changes: a basis of all of them, of
+// the simplest form.
 Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covariance,
                      const Eigen::VectorXd& prior_sd, const Eigen::VectorXd& cost) {
   const Eigen::Index n = null.rows(), rank = n - null.cols();
@@ -115,8 +122,8 @@ Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covaria
 }
 
 // Of all parameters.
-Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior_sd,
-                  const Eigen::VectorXd& cost) {
+Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance,
+                  const Eigen::VectorXd& prior_sd, const Eigen::VectorXd& cost) {
   const Eigen::Index n = prior_sd.size();
   Vectors powers;
   std::vector<bool> involved(static_cast<size_t>(n), false);
@@ -129,7 +136,8 @@ Vectors AllPowers(const Vectors& null, const Eigen::MatrixXd& covariance, const 
       own.conservativeResize(Eigen::NoChange, own.cols() + 1);
       own.col(own.cols() - 1) = direction(members).normalized();
     }
-    for (const Eigen::VectorXd& power : SimplePowers(own, covariance(members, members), prior_sd(members), cost(members))) {
+    for (const Eigen::VectorXd& power :
+         SimplePowers(own, covariance(members, members), prior_sd(members), cost(members))) {
       powers.push_back(Eigen::VectorXd::Zero(n));
       powers.back()(members) = power;
     }
@@ -159,15 +167,16 @@ Combination Describe(const RobotDescription& robot, const Eigen::VectorXd& power
     const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(index)];
     const double coordinate = c.mean, small = 1e-4 * prior_sd(index);
     c.mean = parameter.ToPhysical(coordinate);
-    c.sd *=
-        (parameter.ToPhysical(coordinate + small) - parameter.ToPhysical(coordinate - small)) / (2 * small);
+    c.sd *= (parameter.ToPhysical(coordinate + small) - parameter.ToPhysical(coordinate - small)) /
+            (2 * small);
   }
   return c;
 }
 
-// Directions between null and determined. Parameters of which the data would say little even if all others
-// were known come on their own; what else is weak in what is left.
-std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information, const Eigen::VectorXd& prior_sd,
+// Directions between null and determined. Parameters of which the data would say little even if all
+// others were known come on their own; what else is weak in what is left.
+std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information,
+                                    const Eigen::VectorXd& prior_sd,
                                     const Eigen::MatrixXd& scaled_weak, const Vectors& null) {
   const Eigen::Index n = prior_sd.size();
   std::vector<WeakDirection> weak;
@@ -175,9 +184,10 @@ std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information, const Ei
       information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
   const Eigen::MatrixXd covariance = Inverse(precision);
   Eigen::MatrixXd told(n, 0);  // scaled, orthonormal
-  for (Eigen::Index i = 0; i < n && static_cast<Eigen::Index>(weak.size()) < scaled_weak.cols(); ++i) {
-    const bool involved =
-        std::any_of(null.begin(), null.end(), [&](const auto& direction) { return direction(i) != 0; });
+  for (Eigen::Index i = 0; i < n && static_cast<Eigen::Index>(weak.size()) < scaled_weak.cols();
+       ++i) {
+    const bool involved = std::any_of(null.begin(), null.end(),
+                                      [&](const auto& direction) { return direction(i) != 0; });
     if (involved || information(i, i) * prior_sd(i) * prior_sd(i) >= kWeakInformation) continue;
     weak.push_back({Eigen::VectorXd::Unit(n, i), std::sqrt(covariance(i, i)) / prior_sd(i)});
     told.conservativeResize(Eigen::NoChange, told.cols() + 1);
@@ -189,7 +199,8 @@ std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information, const Ei
   const Eigen::MatrixXd directions =
       Eigen::JacobiSVD<Eigen::MatrixXd>(left, Eigen::ComputeThinU).matrixU().leftCols(rest);
   for (const auto scaled : directions.colwise()) {
-    const double along = scaled.dot(prior_sd.asDiagonal() * information * prior_sd.asDiagonal() * scaled);
+    const double along =
+        scaled.dot(prior_sd.asDiagonal() * information * prior_sd.asDiagonal() * scaled);
     Eigen::VectorXd direction =
         (scaled.array().abs() < kWeakEntry * scaled.cwiseAbs().maxCoeff()).select(0, scaled);
     direction = direction.cwiseProduct(prior_sd);
@@ -202,7 +213,8 @@ std::vector<WeakDirection> FindWeak(const Eigen::MatrixXd& information, const Ei
 
 }  // namespace
 
-Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::MatrixXd& information,
+Identifiability FindIdentifiability(const RobotDescription& robot,
+                                    const Eigen::MatrixXd& information,
                                     const Eigen::VectorXd& prior_sd, const Gaussian& distribution) {
   const Eigen::Index n = distribution.mean.size();
   Identifiability found;
@@ -210,10 +222,12 @@ Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::
   found.cramer_rao = Eigen::VectorXd::Constant(n, kInfinity);
   if (!information.allFinite()) {
     found.information.setConstant(std::numeric_limits<double>::quiet_NaN());
-    found.words = "the simulation fails at the mean parameters, so nothing is known of what can be known";
+    found.words =
+        "the simulation fails at the mean parameters, so nothing is known of what can be known";
     return found;
   }
-  // In units of the prior. Directions are contravariant, combinations covariant: they scale inversely.
+  // In units of the prior. Directions are contravariant, combinations covariant: they scale
+  // inversely.
   const Eigen::MatrixXd scaled = prior_sd.asDiagonal() * information * prior_sd.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
   const Eigen::ArrayXd along = eigen.eigenvalues();
@@ -222,10 +236,12 @@ Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::
   const Eigen::Index weak = std::max<Eigen::Index>(0, (along < kWeakInformation).count() - nulls);
   found.null = SparseBasis(prior_sd.asDiagonal() * eigen.eigenvectors().leftCols(nulls), prior_sd,
                            [&](const Eigen::VectorXd& direction) {
-                             const Eigen::VectorXd unit = direction.cwiseQuotient(prior_sd).normalized();
+                             const Eigen::VectorXd unit =
+                                 direction.cwiseQuotient(prior_sd).normalized();
                              return unit.dot(scaled * unit) <= 3 * threshold;
                            });
-  const Eigen::MatrixXd determined = prior_sd.asDiagonal() * eigen.eigenvectors().rightCols(n - nulls);
+  const Eigen::MatrixXd determined =
+      prior_sd.asDiagonal() * eigen.eigenvectors().rightCols(n - nulls);
   const Eigen::MatrixXd bound =
       determined * along.tail(n - nulls).inverse().matrix().asDiagonal() * determined.transpose();
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -235,34 +251,39 @@ Identifiability FindIdentifiability(const RobotDescription& robot, const Eigen::
   }
   const Eigen::MatrixXd precision =
       information + Eigen::MatrixXd(prior_sd.array().square().inverse().matrix().asDiagonal());
-  for (const Eigen::VectorXd& power : AllPowers(found.null, Inverse(precision), prior_sd, CostOfPowers(robot))) {
+  for (const Eigen::VectorXd& power :
+       AllPowers(found.null, Inverse(precision), prior_sd, CostOfPowers(robot))) {
     found.combinations.push_back(Describe(robot, power, prior_sd, distribution));
   }
-  found.weak = FindWeak(information, prior_sd, eigen.eigenvectors().middleCols(nulls, weak), found.null);
+  found.weak =
+      FindWeak(information, prior_sd, eigen.eigenvectors().middleCols(nulls, weak), found.null);
   found.words = IdentifiabilityWords(robot, distribution.mean, found);
   return found;
 }
 
 Identifiability FindIdentifiability(const RobotDescription& robot, Discrepancy& discrepancy,
-                                    std::span<const Rollout> rollouts, const Gaussian& distribution) {
+                                    std::span<const Rollout> rollouts,
+                                    const Gaussian& distribution) {
   const Eigen::Index n = distribution.mean.size();
   Eigen::VectorXd prior_sd(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     prior_sd(i) = std::sqrt(robot.parameters[static_cast<size_t>(i)].coordinate_variance());
   }
-  // The middle and both ends of each difference, all in one batch. Where one end is no simulator, as beyond
-  // friction 0, the other one has to do.
+  // The middle and both ends of each difference, all in one batch. Where one end is no simulator,
+  // as beyond friction 0, the other one has to do.
   const Eigen::VectorXd h = 1e-4 * prior_sd;
   Eigen::MatrixXd physical(n, 2 * n + 1);
   for (Eigen::Index i = 0; i < n; ++i) {
     physical.col(2 * i) = robot.ToPhysical(distribution.mean + h(i) * Eigen::VectorXd::Unit(n, i));
-    physical.col(2 * i + 1) = robot.ToPhysical(distribution.mean - h(i) * Eigen::VectorXd::Unit(n, i));
+    physical.col(2 * i + 1) =
+        robot.ToPhysical(distribution.mean - h(i) * Eigen::VectorXd::Unit(n, i));
   }
   physical.col(2 * n) = robot.ToPhysical(distribution.mean);
   const Eigen::MatrixXd residuals = discrepancy.Residuals(physical, rollouts);
   Eigen::MatrixXd jacobian(residuals.rows(), n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const auto above = residuals.col(2 * i), below = residuals.col(2 * i + 1), middle = residuals.col(2 * n);
+    const auto above = residuals.col(2 * i), below = residuals.col(2 * i + 1),
+               middle = residuals.col(2 * n);
     if (above.allFinite() && below.allFinite()) {
       jacobian.col(i) = (above - below) / (2 * h(i));
     } else if (above.allFinite()) {

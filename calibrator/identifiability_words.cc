@@ -67,7 +67,8 @@ std::string Coupled(const RobotDescription& robot, const Eigen::VectorXd& mean,
   if (names.empty()) return "";
   std::string words = "; " + Join(names, ", ") + " are not identifiable separately:";
   for (const Eigen::VectorXd& direction : found.null) {
-    if (Single(direction) < 0) words += " (" + DirectionName(robot, mean, direction) + ") changes nothing";
+    if (Single(direction) < 0)
+      words += " (" + DirectionName(robot, mean, direction) + ") changes nothing";
   }
   return words;
 }
@@ -79,10 +80,12 @@ std::string WithoutEffect(const RobotDescription& robot, const Identifiability& 
     if (Single(direction) >= 0) names.push_back(FullName(robot, Single(direction)));
   }
   if (names.empty()) return "";
-  return "; " + Join(names, ", ") + (names.size() == 1 ? " has" : " have") + " no effect on this motion";
+  return "; " + Join(names, ", ") + (names.size() == 1 ? " has" : " have") +
+         " no effect on this motion";
 }
 
-std::string Weak(const RobotDescription& robot, const Eigen::VectorXd& mean, const Identifiability& found) {
+std::string Weak(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                 const Identifiability& found) {
   std::string words;
   for (const WeakDirection& weak : found.weak) {
     const Eigen::Index single = Single(weak.direction);
@@ -137,9 +140,11 @@ std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& 
     }
     const double small = 1e-4 * std::sqrt(parameter.coordinate_variance());
     const double slope =
-        (parameter.ToPhysical(mean(i) + small) - parameter.ToPhysical(mean(i) - small)) / (2 * small);
-    moves.push_back(fmt::format("{} {:+.3g}{}{}", ShortName(robot, index), step * slope * direction(i),
-                                parameter.unit.empty() ? "" : " ", parameter.unit));
+        (parameter.ToPhysical(mean(i) + small) - parameter.ToPhysical(mean(i) - small)) /
+        (2 * small);
+    moves.push_back(fmt::format("{} {:+.3g}{}{}", ShortName(robot, index),
+                                step * slope * direction(i), parameter.unit.empty() ? "" : " ",
+                                parameter.unit));
   }
   return Join(moves, ", ");
 }
@@ -147,15 +152,16 @@ std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& 
 std::string IdentifiabilityWords(const RobotDescription& robot, const Eigen::VectorXd& mean,
                                  const Identifiability& found) {
   std::string words = "every parameter is determined by this motion";
-  const bool coupled =
-      std::any_of(found.null.begin(), found.null.end(), [](const auto& d) { return Single(d) < 0; });
+  const bool coupled = std::any_of(found.null.begin(), found.null.end(),
+                                   [](const auto& d) { return Single(d) < 0; });
   if (coupled) {
     words = Known(found.combinations) + " can be known from this motion";
   } else if (!found.null.empty()) {
     words = found.combinations.empty() ? "nothing can be known from this motion"
                                        : "every other parameter is determined by this motion";
   }
-  return words + Coupled(robot, mean, found) + WithoutEffect(robot, found) + Weak(robot, mean, found);
+  return words + Coupled(robot, mean, found) + WithoutEffect(robot, found) +
+         Weak(robot, mean, found);
 }
 
 }  // namespace plumb

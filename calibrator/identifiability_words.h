@@ -14,8 +14,8 @@ bool AllLog(const RobotDescription& robot, const Eigen::VectorXd& power);
 /// "gravity / length", "mass length^2"; a sum where a coordinate is not logarithmic.
 std::string CombinationName(const RobotDescription& robot, const Eigen::VectorXd& power);
 
-/// "gravity +1 %, mass -2 %, length +1 %": a small step along a direction in the coordinates from `mean`.
-/// Parameters whose coordinate is not logarithmic move in their unit.
+/// "gravity +1 %, mass -2 %, length +1 %": a small step along a direction in the coordinates from
+/// `mean`. Parameters whose coordinate is not logarithmic move in their unit.
 std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& mean,
                           const Eigen::VectorXd& direction);
 

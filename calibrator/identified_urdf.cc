@@ -25,7 +25,8 @@ struct Toml {
 Toml ReadToml(const RobotDescription& robot) {
   Config root = Config::Load(robot.file);
   Toml toml;
-  toml.urdf = (std::filesystem::path(robot.file).parent_path() / root.Table("robot").String("urdf")).string();
+  toml.urdf = (std::filesystem::path(robot.file).parent_path() / root.Table("robot").String("urdf"))
+                  .string();
   for (Config& joint : root.Tables("joint")) {
     const std::string name = joint.String("name");
     const Config dynamics = joint.Table("dynamics", false);
@@ -61,7 +62,8 @@ class Placement {
     const std::string joint = name.substr(name.find('/') + 1);
     const auto found = std::find_if(file_.joints.begin(), file_.joints.end(),
                                     [&](const auto& j) { return j.name == joint; });
-    return found != file_.joints.end() && !file_.part[static_cast<size_t>(found - file_.joints.begin())] &&
+    return found != file_.joints.end() &&
+           !file_.part[static_cast<size_t>(found - file_.joints.begin())] &&
            toml_.dynamics.count(name) == 0;
   }
 
@@ -88,10 +90,11 @@ double StretchOf(const UrdfModel& file, size_t link, const std::vector<Value>& v
     return v.name == "length/" + file.links[link].name;
   });
   if (value == values.end()) return 1;
-  const auto child = std::find_if(file.joints.begin(), file.joints.end(),
-                                  [&](const auto& joint) { return joint.parent == static_cast<int>(link); });
-  const double length =
-      child == file.joints.end() ? 2 * file.links[link].center_of_mass.norm() : child->origin.norm();
+  const auto child = std::find_if(file.joints.begin(), file.joints.end(), [&](const auto& joint) {
+    return joint.parent == static_cast<int>(link);
+  });
+  const double length = child == file.joints.end() ? 2 * file.links[link].center_of_mass.norm()
+                                                   : child->origin.norm();
   return value->mean / length;
 }
 
@@ -110,16 +113,18 @@ std::string Comment(const RobotDescription& robot, const std::vector<Value>& val
       here += fmt::format("\n       {} = {:.6g}{}, {}", v.name, v.mean, unit, sd);
     } else if (!std::isnan(v.sd)) {  // robot.toml has the frozen ones already
       elsewhere += fmt::format(
-          "\n       [[parameter]]  # {}\n       name = {}\n       frozen = true\n       mean = {}", sd,
-          Quoted(v.name), v.mean);
+          "\n       [[parameter]]  # {}\n       name = {}\n       frozen = true\n       mean = {}",
+          sd, Quoted(v.name), v.mean);
     }
   }
   std::string words = "Identified by Plumbline from the motion of " + robot.name + ".";
   words += here.empty() ? "\n     Nothing of it is in this file." : "\n     In this file:" + here;
   if (!here.empty()) words += "\n     robot.toml needs no [[parameter]] of these names any more.";
   if (!elsewhere.empty()) {
-    words += "\n     Not in this file, but for robot.toml in place of its [[parameter]] of the same name:" +
-             elsewhere;
+    words +=
+        "\n     Not in this file, but for robot.toml in place of its [[parameter]] of the same "
+        "name:" +
+        elsewhere;
   }
   return words + "\n    ";
 }

@@ -13,16 +13,17 @@
 namespace plumb {
 namespace {
 
-// [states] A message may be in the log that much later than one of another channel that came after it.
+// [states] A message may be in the log that much later than one of another channel that came after
+// it.
 constexpr int64_t kPatience = 5000;
-// [states] The same within a channel, where messages keep their order but for a few: further back is another
-// run.
+// [states] The same within a channel, where messages keep their order but for a few: further back
+// is another run.
 constexpr int64_t kReordered = 1000;
 // No counter and no clock gets there; beyond it, sums and differences overflow.
 constexpr int64_t kLargest = int64_t{1} << 53;
 
-/// Joins the episodes of a log one after the other as soon as each is complete, so that no more than one or
-/// two need be remembered however long the log is.
+/// Joins the episodes of a log one after the other as soon as each is complete, so that no more
+/// than one or two need be remembered however long the log is.
 class EpisodeJoiner {
  public:
   EpisodeJoiner(const RobotDescription& robot, std::vector<Rollout>* rollouts)
@@ -47,13 +48,15 @@ class EpisodeJoiner {
     if (!Fits(command.num_joints)) return;
     // Whatever command comes next answers the state that the one before led to.
     for (Episode& episode : episodes_) {
-      if (!episode.next_state && episode.id != command.episode) episode.next_state = command.state_sequence;
+      if (!episode.next_state && episode.id != command.episode)
+        episode.next_state = command.state_sequence;
     }
     if (command.episode < 0) return;
     const auto found = std::find_if(episodes_.begin(), episodes_.end(),
                                     [&](const Episode& e) { return e.id == command.episode; });
     if (found == episodes_.end()) {
-      episodes_.push_back({command.episode, command.state_sequence, command.state_sequence, {}, {}});
+      episodes_.push_back(
+          {command.episode, command.state_sequence, command.state_sequence, {}, {}});
     } else {
       found->first_state = std::min(found->first_state, command.state_sequence);
       found->last_command = std::max(found->last_command, command.state_sequence);
@@ -119,7 +122,8 @@ class EpisodeJoiner {
     const double period = robot_.task.period + robot_.driver.measurement / 2;
     const int64_t until = from->utime + static_cast<int64_t>(period * 1e6);
     int64_t last = episode.last_command;
-    for (const robot_state_t* next; (next = joiner_.FindState(last + 1)) && next->utime <= until;) ++last;
+    for (const robot_state_t* next; (next = joiner_.FindState(last + 1)) && next->utime <= until;)
+      ++last;
     return last;
   }
 
@@ -157,13 +161,16 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
   }
   if (!log.rollouts.empty()) return log;
   if (log.drops.model_based > 0) {
-    throw std::runtime_error(file + ": its states are model-based: calibration would find the parameters that the estimator "
-                                    "assumed. ROBOT_STATE_SMOOTHED has to be a kinematic estimator's");
+    throw std::runtime_error(
+        file +
+        ": its states are model-based: calibration would find the parameters that the estimator "
+        "assumed. ROBOT_STATE_SMOOTHED has to be a kinematic estimator's");
   }
   std::string why;
   if (counts.messages == 0) {
-    why = fmt::format("none of its {} messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS",
-                      counts.events);
+    why = fmt::format(
+        "none of its {} messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS",
+        counts.events);
   } else if (joiner.fitting() == 0 && !log.warnings.empty()) {
     why = log.warnings.back();
   } else if (log.drops.total() == 0) {

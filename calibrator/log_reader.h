@@ -8,10 +8,12 @@ namespace plumb {
 
 /// Reads an LCM log event by event, in the file's order.
 /// @param on_event channel, data, size, time of reception [us]; return false to stop.
-/// @return the number of events. A log cut off in the middle of an event (a logger that was killed) ends there.
-/// @throws std::runtime_error naming the file if it is a folder, cannot be opened or is no LCM log, or the byte at which it
-/// is damaged.
+/// @return the number of events. A log cut off in the middle of an event (a logger that was killed)
+/// ends there.
+/// @throws std::runtime_error naming the file if it is a folder, cannot be opened or is no LCM log,
+/// or the byte at which it is damaged.
 int64_t ReadLog(const std::string& file,
-                const std::function<bool(const std::string& channel, const void* data, int size, int64_t utime)>& on_event);
+                const std::function<bool(const std::string& channel, const void* data, int size,
+                                         int64_t utime)>& on_event);
 
 }  // namespace plumb

@@ -1,8 +1,9 @@
-// plumb-calibrator: ROBOT_STATE_SMOOTHED, JOINT_COMMAND, CONTROLLER_STATUS -> PARAMETER_DISTRIBUTION.
+// plumb-calibrator: ROBOT_STATE_SMOOTHED, JOINT_COMMAND, CONTROLLER_STATUS ->
+// PARAMETER_DISTRIBUTION.
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
 
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -34,13 +35,16 @@ class Session {
         clock_(clock),
         seed_(flags.seed),
         folder_(flags.checkpoint),
-        simopt_(robot, flags.seed, flags.threads > 0 ? flags.threads : static_cast<int>(std::thread::hardware_concurrency()),
+        simopt_(robot, flags.seed,
+                flags.threads > 0 ? flags.threads
+                                  : static_cast<int>(std::thread::hardware_concurrency()),
                 flags.method.empty() ? robot.calibration.method : flags.method),
         calibrator(robot, simopt_),
         checkpoint_(flags.checkpoint, robot, flags.seed) {
     if (auto state = checkpoint_.Load()) {
       simopt_.Resume(std::move(*state));
-      spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration, simopt_.state().update);
+      spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration,
+                   simopt_.state().update);
       report_ = simopt_.Report();
       if (report_) WriteDistribution();  // a kill may have come before it
     }
@@ -48,13 +52,16 @@ class Session {
 
   bool busy() const { return simopt_.running() || calibrator.ready(); }
 
-  /// Does one update if there is something to do. @return true when an iteration has been completed.
+  /// Does one update if there is something to do. @return true when an iteration has been
+  /// completed.
   bool Work() {
     if (!simopt_.running() && calibrator.ready()) {
       start_ = clock_.Now();
       if (calibrator.Begin() == 0) {
-        spdlog::warn("iteration {} has no usable transition: it goes by with the earlier ones; dropped so far: {}",
-                     simopt_.state().iteration + 1, calibrator.drops().words());
+        spdlog::warn(
+            "iteration {} has no usable transition: it goes by with the earlier ones; dropped so "
+            "far: {}",
+            simopt_.state().iteration + 1, calibrator.drops().words());
       }
       checkpoint_.Save(simopt_.state());
     }
@@ -63,8 +70,10 @@ class Session {
     checkpoint_.Save(simopt_.state());
     if (!report) return false;
     const int64_t failed = report->failures.total() - (report_ ? report_->failures.total() : 0);
-    if (failed > 0) spdlog::warn("{} simulations failed in this iteration: they count as infinitely far", failed);
-    for (const std::string& warning : report->warnings) spdlog::warn("iteration {}: {}", report->iteration, warning);
+    if (failed > 0)
+      spdlog::warn("{} simulations failed in this iteration: they count as infinitely far", failed);
+    for (const std::string& warning : report->warnings)
+      spdlog::warn("iteration {}: {}", report->iteration, warning);
     report_ = std::move(report);
     seconds_ = static_cast<double>(clock_.Now() - start_) * 1e-6 / clock_.scale();
     WriteDistribution();
@@ -75,7 +84,8 @@ class Session {
   void Stream() {
     const Rollout arrived = calibrator.TakeArrived();
     if (arrived.transitions.empty()) return;
-    if (!stream_ || streamed_iteration_ != simopt_.state().iteration) {  // the complete roll-outs, as they were joined
+    // the complete roll-outs, as they were joined
+    if (!stream_ || streamed_iteration_ != simopt_.state().iteration) {
       stream_.emplace(std::make_shared<Model>(robot_));
       streamed_iteration_ = simopt_.state().iteration;
       for (const Rollout& rollout : simopt_.state().rollouts) Assimilate(rollout);
@@ -87,21 +97,29 @@ class Session {
     return DistributionMessage(robot_, simopt_.state(), seed_, report_ ? &*report_ : nullptr);
   }
   calibration_status_t Status() const {
-    return StatusMessage(robot_, simopt_.state(), calibrator.drops(), report_ ? &*report_ : nullptr, seconds_,
-                         stream_ && streamed_iteration_ == simopt_.state().iteration ? &*stream_ : nullptr);
+    return StatusMessage(
+        robot_, simopt_.state(), calibrator.drops(), report_ ? &*report_ : nullptr, seconds_,
+        stream_ && streamed_iteration_ == simopt_.state().iteration ? &*stream_ : nullptr);
   }
 
  private:
   void Assimilate(const Rollout& rollout) {
-    for (const Transition& transition : rollout.transitions) stream_->Add(transition, rollout.episode);
+    for (const Transition& transition : rollout.transitions)
+      stream_->Add(transition, rollout.episode);
   }
 
   void WriteDistribution() const {
     const parameter_distribution_t m = Distribution();
-    const nlohmann::json j{{"iteration", m.iteration}, {"seed", m.seed},          {"utime", m.utime},
-                           {"names", m.name},          {"weight", m.weight},      {"mean", m.mean},
+    const nlohmann::json j{{"iteration", m.iteration},
+                           {"seed", m.seed},
+                           {"utime", m.utime},
+                           {"names", m.name},
+                           {"weight", m.weight},
+                           {"mean", m.mean},
                            {"covariance", m.covariance},
-                           {"kl", m.kl},               {"ess", m.ess},            {"temperature", m.temperature},
+                           {"kl", m.kl},
+                           {"ess", m.ess},
+                           {"temperature", m.temperature},
                            {"discrepancy", m.discrepancy},
                            {"identifiability", report_->identifiability.words}};
     WriteAtomically(folder_ / fmt::format("distribution_{}.json", m.iteration), j.dump(1) + "\n");
@@ -121,7 +139,7 @@ class Session {
   std::optional<CalibrationReport> report_;
   std::optional<StreamingLaplace> stream_;
   int streamed_iteration_ = 0;
-  int64_t start_ = 0;    // of the calibration [us]
+  int64_t start_ = 0;   // of the calibration [us]
   double seconds_ = 0;  // that the last one took, real ones
 };
 
@@ -131,10 +149,12 @@ int RunLive(Process& process, Session& session, double duration) {
   Publisher<calibration_status_t> status(messenger, "CALIBRATION_STATUS");
   Subscriber<robot_state_t> states(messenger, "ROBOT_STATE_SMOOTHED",
                                    [&](const robot_state_t& m) { session.calibrator.OnState(m); });
-  Subscriber<joint_command_t> commands(messenger, "JOINT_COMMAND",
-                                       [&](const joint_command_t& m) { session.calibrator.OnCommand(m); });
+  Subscriber<joint_command_t> commands(messenger, "JOINT_COMMAND", [&](const joint_command_t& m) {
+    session.calibrator.OnCommand(m);
+  });
   Subscriber<controller_status_t> controller(
-      messenger, "CONTROLLER_STATUS", [&](const controller_status_t& m) { session.calibrator.OnControllerStatus(m); });
+      messenger, "CONTROLLER_STATUS",
+      [&](const controller_status_t& m) { session.calibrator.OnControllerStatus(m); });
   const auto publish = [&] {
     distribution.Publish(session.Distribution());
     status.Publish(session.Status());
@@ -166,7 +186,8 @@ void PrintIteration(const calibration_status_t& m, const RobotDescription& robot
   std::cout << line << std::endl;
 }
 
-int RunLog(Process& process, Session& session, const RobotDescription& robot, const std::string& file) {
+int RunLog(Process& process, Session& session, const RobotDescription& robot,
+           const std::string& file) {
   const MotionCounts counts = ReadMotion(file, session.calibrator, [&] {
     while (session.busy() && !process.stopping()) {
       if (session.Work()) PrintIteration(session.Status(), robot);
@@ -174,9 +195,10 @@ int RunLog(Process& process, Session& session, const RobotDescription& robot, co
     return !process.stopping();
   });
   const calibration_status_t found = session.Status();
-  spdlog::info("{} events, {} undecodable; dropped transitions: {}", counts.events, counts.undecodable,
-               session.calibrator.drops().words());
-  if (found.iteration == 0) throw std::runtime_error(file + ": holds no complete roll-out to calibrate with");
+  spdlog::info("{} events, {} undecodable; dropped transitions: {}", counts.events,
+               counts.undecodable, session.calibrator.drops().words());
+  if (found.iteration == 0)
+    throw std::runtime_error(file + ": holds no complete roll-out to calibrate with");
   std::cout << found.identifiability << std::endl;
   return 0;
 }
@@ -187,16 +209,21 @@ int RunLog(Process& process, Session& session, const RobotDescription& robot, co
 int main(int argc, char** argv) {
   plumb::Flags flags;
   return plumb::Run(
-      "plumb-calibrator", "Learns which simulators could have produced the robot's motion.", argc, argv,
+      "plumb-calibrator", "Learns which simulators could have produced the robot's motion.", argc,
+      argv,
       [&](CLI::App& app) {
         app.add_option("robot", flags.robot, "robot folder or TOML file")->required();
-        app.add_option("--log", flags.log, "calibrate from this LCM log instead of live messages, and exit");
-        app.add_option("--method", flags.method,
-                       "auto, laplace, mixture, reps or simopt; without it the one that robot.toml says");
+        app.add_option("--log", flags.log,
+                       "calibrate from this LCM log instead of live messages, and exit");
+        app.add_option(
+            "--method", flags.method,
+            "auto, laplace, mixture, reps or simopt; without it the one that robot.toml says");
         app.add_option("--seed", flags.seed, "of the random numbers")->capture_default_str();
-        app.add_option("--checkpoint", flags.checkpoint, "folder for checkpoints and distribution_<n>.json")
+        app.add_option("--checkpoint", flags.checkpoint,
+                       "folder for checkpoints and distribution_<n>.json")
             ->capture_default_str();
-        app.add_option("--threads", flags.threads, "0 = one per core; the result does not depend on it")
+        app.add_option("--threads", flags.threads,
+                       "0 = one per core; the result does not depend on it")
             ->capture_default_str();
       },
       [&](plumb::Process& process) {

@@ -27,8 +27,9 @@ struct MethodResult {
   Eigen::MatrixXd samples;    ///< coordinates, n x N, equally weighted
   Eigen::VectorXd noise_sd;   ///< of each entry of (q, v), physical units; empty = not estimated
   std::optional<CurriculumFit> curriculum;  ///< of laplace, and of what begins with it
-  double ess = std::numeric_limits<double>::quiet_NaN();  ///< effective size of the samples it rests on; NaN = on none
-  std::string check;          ///< how the shape was verified, in words
+  /// effective size of the samples it rests on; NaN = on none
+  double ess = std::numeric_limits<double>::quiet_NaN();
+  std::string check;  ///< how the shape was verified, in words
   std::vector<std::string> warnings;
   int64_t simulated_steps = 0, failures = 0;
 };
@@ -36,7 +37,8 @@ struct MethodResult {
 /// @throws std::invalid_argument naming the nearest method if there is none of that name.
 void RequireMethod(const std::string& name);
 
-/// Runs the method that input.options names. @throws std::invalid_argument if there is none of that name, or the data cannot be used.
+/// Runs the method that input.options names. @throws std::invalid_argument if there is none of that
+/// name, or the data cannot be used.
 MethodResult RunMethod(const MethodInput& input);
 
 }  // namespace plumb

@@ -32,7 +32,8 @@ bool Counts(const Misfit& misfit) {
   return Significant(misfit) && misfit.effect >= LeastEffect(misfit.test);
 }
 
-std::vector<Misfit> TestErrors(const ProjectedErrors& errors, const std::vector<bool>& noise_known) {
+std::vector<Misfit> TestErrors(const ProjectedErrors& errors,
+                               const std::vector<bool>& noise_known) {
   std::vector<Misfit> tests = TestScale(errors, noise_known);
   for (const auto& more :
        {TestOutliers(errors), TestWhiteness(errors), TestBias(errors), TestRegression(errors)}) {
@@ -46,9 +47,10 @@ std::string Change(const Candidate& candidate, double change) {
   const char* how = change > 0 ? "larger" : "smaller";
   const bool relative = candidate.value > 1e-3 * candidate.scale && std::isfinite(candidate.lower);
   if (relative)
-    return fmt::format("{} {:.2g} % {}", candidate.path, 100 * std::abs(change) / candidate.value, how);
-  return fmt::format("{} {:.2g}{}{} {}", candidate.path, std::abs(change), candidate.unit.empty() ? "" : " ",
-                     candidate.unit, how);
+    return fmt::format("{} {:.2g} % {}", candidate.path, 100 * std::abs(change) / candidate.value,
+                       how);
+  return fmt::format("{} {:.2g}{}{} {}", candidate.path, std::abs(change),
+                     candidate.unit.empty() ? "" : " ", candidate.unit, how);
 }
 
 // A candidate and what it would do.
@@ -69,17 +71,19 @@ void Locate(const ProjectedErrors& errors, const Explanation& explanation, Misfi
     const std::string& joint =
         errors.joint_of[static_cast<size_t>(errors.coordinate[static_cast<size_t>(i)] % errors.n)];
     if (joints.empty() || joints.back().first != joint) {
-      const auto known =
-          std::find_if(joints.begin(), joints.end(), [&](const auto& j) { return j.first == joint; });
+      const auto known = std::find_if(joints.begin(), joints.end(),
+                                      [&](const auto& j) { return j.first == joint; });
       if (known == joints.end()) joints.push_back({joint, 0});
     }
-    std::find_if(joints.begin(), joints.end(), [&](const auto& j) { return j.first == joint; })->second +=
-        gain;
+    std::find_if(joints.begin(), joints.end(), [&](const auto& j) {
+      return j.first == joint;
+    })->second += gain;
     total += gain;
     if (errors.Contact(i)) contact += gain;
   }
-  const auto most = std::max_element(joints.begin(), joints.end(),
-                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  const auto most =
+      std::max_element(joints.begin(), joints.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
   if (most != joints.end() && joints.size() > 1 && most->second >= kMostly * total)
     misfit->joint = most->first;
   if (errors.conditions && contact >= kMostly * total) misfit->condition = "contact";
@@ -112,13 +116,16 @@ std::vector<Explanation> FindExplanations(const ProjectedErrors& errors, const L
     Eigen::VectorXd column = errors.Project(raw);
     // What fitted parameters do as well, or nothing does, cannot be tested.
     if (!(column.norm() > 1e-4 * raw.norm()) || !(column.norm() * candidate.scale > 1e-3)) continue;
-    const Score score = FindScore(errors, column, candidate.scale, candidate.lower - candidate.value);
+    const Score score =
+        FindScore(errors, column, candidate.scale, candidate.lower - candidate.value);
     const double share = Share(errors, column, score.change);
-    Misfit misfit{Change(candidate, score.change), "", "", "structure", score.statistic, score.p, share};
+    Misfit misfit{
+        Change(candidate, score.change), "", "", "structure", score.statistic, score.p, share};
     found.push_back({k, std::move(column), score, std::move(misfit)});
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Explanation& a, const Explanation& b) { return a.score.gain > b.score.gain; });
+  std::stable_sort(found.begin(), found.end(), [](const Explanation& a, const Explanation& b) {
+    return a.score.gain > b.score.gain;
+  });
   return found;
 }
 
@@ -126,14 +133,15 @@ void Correct(size_t tests, std::vector<Misfit>* misfits) {
   for (Misfit& misfit : *misfits) misfit.p = std::min(1.0, misfit.p * static_cast<double>(tests));
 }
 
-// What share a gain is of the errors beyond the noise, or of all of them where the noise was estimated from
-// them.
+// What share a gain is of the errors beyond the noise, or of all of them where the noise was
+// estimated from them.
 struct Explained {
   double share;
   std::string words;
 };
 
-Explained Explain(const ProjectedErrors& errors, const std::vector<bool>& noise_known, double gain) {
+Explained Explain(const ProjectedErrors& errors, const std::vector<bool>& noise_known,
+                  double gain) {
   const bool known = std::all_of(noise_known.begin(), noise_known.end(), [](bool k) { return k; });
   const double squares = errors.r.squaredNorm(), beyond = squares - errors.freedom.sum();
   const bool of_it = known && beyond > 0;
@@ -168,8 +176,9 @@ Misspecification FindMisspecification(const RobotDescription& robot, const Lefto
     for (Explanation& explanation : explanations) {
       explanation.misfit.p = std::min(1.0, explanation.misfit.p * static_cast<double>(count));
     }
-    const auto best = std::find_if(explanations.begin(), explanations.end(),
-                                   [](const Explanation& explanation) { return Counts(explanation.misfit); });
+    const auto best =
+        std::find_if(explanations.begin(), explanations.end(),
+                     [](const Explanation& explanation) { return Counts(explanation.misfit); });
     if (best == explanations.end()) break;
     const Explained explained = Explain(errors, leftover.noise_known, best->score.gain);
     // No model is linear: a little of what the first candidate is about is always left.
@@ -213,14 +222,15 @@ Misspecification FindMisspecification(const RobotDescription& robot, const Lefto
       distinct.push_back(place);
   }
   if (!found.alarm) {
-    found.words =
-        fmt::format("nothing speaks against the model ({} tests of {} errors)", count, errors.r.size());
+    found.words = fmt::format("nothing speaks against the model ({} tests of {} errors)", count,
+                              errors.r.size());
     if (!rest.empty()) found.words += ", but look at " + Join(rest, "; ");
     return found;
   }
   found.words = "the model cannot explain this log: " + Join(distinct, "; ");
   for (const std::string& line : words) found.words += "; " + line;
-  if (!rest.empty()) found.words += (words.empty() ? "; " : "; not explained by that: ") + Join(rest, "; ");
+  if (!rest.empty())
+    found.words += (words.empty() ? "; " : "; not explained by that: ") + Join(rest, "; ");
   return found;
 }
 

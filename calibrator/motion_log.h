@@ -18,12 +18,14 @@ struct MotionCounts {
   int64_t undecodable = 0;  ///< of the three, left out
 };
 
-/// Hands what an LCM log tells of a robot's motion to a receiver, in the file's order, as a live run would:
-/// ROBOT_STATE_SMOOTHED to OnState, JOINT_COMMAND to OnCommand and CONTROLLER_STATUS to OnControllerStatus.
+/// Hands what an LCM log tells of a robot's motion to a receiver, in the file's order, as a live
+/// run would: ROBOT_STATE_SMOOTHED to OnState, JOINT_COMMAND to OnCommand and CONTROLLER_STATUS to
+/// OnControllerStatus.
 /// @param go_on asked after every event of any channel; false stops.
 /// @throws std::runtime_error, see ReadLog; and what the receiver and go_on throw.
 template <class Receiver>
-MotionCounts ReadMotion(const std::string& file, Receiver& receiver, const std::function<bool()>& go_on) {
+MotionCounts ReadMotion(const std::string& file, Receiver& receiver,
+                        const std::function<bool()>& go_on) {
   robot_state_t state{};
   joint_command_t command{};
   controller_status_t status{};
@@ -37,16 +39,17 @@ MotionCounts ReadMotion(const std::string& file, Receiver& receiver, const std::
     ++counts.undecodable;
     return false;
   };
-  counts.events = ReadLog(file, [&](const std::string& channel, const void* data, int size, int64_t) {
-    if (channel == "ROBOT_STATE_SMOOTHED") {
-      if (decoded(state, data, size)) receiver.OnState(state);
-    } else if (channel == "JOINT_COMMAND") {
-      if (decoded(command, data, size)) receiver.OnCommand(command);
-    } else if (channel == "CONTROLLER_STATUS") {
-      if (decoded(status, data, size)) receiver.OnControllerStatus(status);
-    }
-    return go_on();
-  });
+  counts.events =
+      ReadLog(file, [&](const std::string& channel, const void* data, int size, int64_t) {
+        if (channel == "ROBOT_STATE_SMOOTHED") {
+          if (decoded(state, data, size)) receiver.OnState(state);
+        } else if (channel == "JOINT_COMMAND") {
+          if (decoded(command, data, size)) receiver.OnCommand(command);
+        } else if (channel == "CONTROLLER_STATUS") {
+          if (decoded(status, data, size)) receiver.OnControllerStatus(status);
+        }
+        return go_on();
+      });
   return counts;
 }
 

@@ -62,23 +62,26 @@ std::vector<int> FindAll(const CsvTable& table, const std::vector<std::string>& 
   for (const std::string& name : names) {
     columns.push_back(table.Find(name));
     if (columns.back() < 0) {
-      table.Fail(
-          fmt::format("has no column '{}'; the nearest is {}", name, Quoted(Nearest(name, table.names()))));
+      table.Fail(fmt::format("has no column '{}'; the nearest is {}", name,
+                             Quoted(Nearest(name, table.names()))));
     }
   }
   return columns;
 }
 
-// A column that looks like a joint's but is of none of this robot's is of another robot, or misspelt: its
-// values would be ignored in silence.
-void RefuseForeign(const CsvTable& table, const std::vector<std::string>& known, const std::string& robot) {
+// A column that looks like a joint's but is of none of this robot's is of another robot, or
+// misspelt: its values would be ignored in silence.
+void RefuseForeign(const CsvTable& table, const std::vector<std::string>& known,
+                   const std::string& robot) {
   constexpr const char* kPrefixes[] = {"q/", "v/", "u/", "next_q/", "next_v/"};
   for (const std::string& name : table.names()) {
-    const bool of_a_joint = std::any_of(std::begin(kPrefixes), std::end(kPrefixes),
-                                        [&](const char* prefix) { return name.starts_with(prefix); });
+    const bool of_a_joint =
+        std::any_of(std::begin(kPrefixes), std::end(kPrefixes),
+                    [&](const char* prefix) { return name.starts_with(prefix); });
     if (of_a_joint && std::find(known.begin(), known.end(), name) == known.end()) {
-      table.Fail(fmt::format("column {} is of no joint{} of robot '{}'; the nearest is '{}'", Quoted(name),
-                             name.starts_with("u/") ? " with a motor" : "", robot, Nearest(name, known)));
+      table.Fail(fmt::format("column {} is of no joint{} of robot '{}'; the nearest is '{}'",
+                             Quoted(name), name.starts_with("u/") ? " with a motor" : "", robot,
+                             Nearest(name, known)));
     }
   }
 }
@@ -127,7 +130,9 @@ bool Flag(const CsvTable& table, int column) {
 class Efforts {
  public:
   explicit Efforts(const RobotDescription& robot)
-      : task_(MakeTask(robot)), limits_(robot.effort_limits()), velocities_(robot.num_velocities()) {}
+      : task_(MakeTask(robot)),
+        limits_(robot.effort_limits()),
+        velocities_(robot.num_velocities()) {}
 
   Eigen::VectorXd operator()(const Eigen::VectorXd& action) {
     Eigen::VectorXd effort = Eigen::VectorXd::Zero(velocities_);
@@ -176,7 +181,8 @@ std::string Join(const std::vector<std::string>& names) {
   return joined;
 }
 
-std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Names& names, int64_t clipped) {
+std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Names& names,
+                                  int64_t clipped) {
   if (rows.empty()) return {};
   std::vector<std::string> states = names.q, still, missing, warnings;
   states.insert(states.end(), names.v.begin(), names.v.end());
@@ -210,7 +216,8 @@ MotionTable ReadMotionTable(const std::string& file, const RobotDescription& rob
 Eigen::VectorXd Spread(const std::vector<MotionRow>& rows) {
   if (rows.empty()) return {};
   const Eigen::Index n = rows[0].transition.q.size();
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(n + rows[0].transition.v.size()), squares = mean, count = mean;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(n + rows[0].transition.v.size()), squares = mean,
+                  count = mean;
   for (const MotionRow& row : rows) {
     for (Eigen::Index i = 0; i < mean.size(); ++i) {
       const double s = i < n ? row.transition.q(i) : row.transition.v(i - n);

@@ -14,13 +14,15 @@ struct MotionRow {
   double t;                ///< [s], finite
   bool ends;               ///< the episode
   Eigen::VectorXd effort;  ///< commanded, per velocity, within the limits; NaN = unknown
-  Transition transition;  ///< q, v, and next_q, next_v if the table has them; NaN = unknown. Nothing else yet
+  /// q, v, and next_q, next_v if the table has them; NaN = unknown. Nothing else yet
+  Transition transition;
 };
 
 /// A table of motion: see ReadCsvLog.
 struct MotionTable {
-  std::vector<MotionRow> rows;  ///< in the file's order; t differs from row to row but where an episode ends
-  bool has_next = false;        ///< next_ columns are there
+  /// in the file's order; t differs from row to row but where an episode ends
+  std::vector<MotionRow> rows;
+  bool has_next = false;  ///< next_ columns are there
   std::vector<std::string> warnings;
 };
 

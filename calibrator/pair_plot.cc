@@ -42,7 +42,8 @@ class Pairs {
         cell_(std::clamp(860. / static_cast<double>(shown.size()), 104., 286.)),
         svg_(Left(shown.size()) + 4, cell_ * static_cast<double>(shown.size()) + kTop + kBottom,
              "prior and posterior, parameter by parameter") {
-    for (const Eigen::Index i : shown_) extents_.push_back(Extent(findings_, summary_, parameter(i), i));
+    for (const Eigen::Index i : shown_)
+      extents_.push_back(Extent(findings_, summary_, parameter(i), i));
   }
 
   std::string Draw() {
@@ -66,7 +67,8 @@ class Pairs {
   double Left(size_t column) const { return kLeft + cell_ * static_cast<double>(column); }
   double Top(size_t row) const { return kTop + cell_ * static_cast<double>(row); }
   Axis X(size_t column) const {
-    return {extents_[column].first, extents_[column].second, Left(column), Left(column) + cell_ - kGap};
+    return {extents_[column].first, extents_[column].second, Left(column),
+            Left(column) + cell_ - kGap};
   }
   Axis Y(size_t row) const {
     return {extents_[row].first, extents_[row].second, Top(row) + cell_ - kGap, Top(row)};
@@ -88,7 +90,8 @@ class Pairs {
     for (const double sigma : {1., 2.}) {
       Points points = Ellipse({p.mean(i), p.mean(j)}, covariance, sigma);
       for (Eigen::Vector2d& point : points) {
-        point = {x.Pixel(parameter(i).ToPhysical(point.x())), y.Pixel(parameter(j).ToPhysical(point.y()))};
+        point = {x.Pixel(parameter(i).ToPhysical(point.x())),
+                 y.Pixel(parameter(j).ToPhysical(point.y()))};
       }
       svg_.Path(points, css, true);
     }
@@ -147,7 +150,8 @@ class Pairs {
     BeginCell(row, row);
     for (size_t k = 0; k < kBins; ++k) {
       const double from = x.Pixel(low + width * static_cast<double>(k));
-      svg_.Rectangle(from, y.Pixel(bins[k]), x.Pixel(low + width * static_cast<double>(k + 1)) - from,
+      svg_.Rectangle(from, y.Pixel(bins[k]),
+                     x.Pixel(low + width * static_cast<double>(k + 1)) - from,
                      y.from() - y.Pixel(bins[k]), "posterior bar");
     }
     for (auto& point : prior) point = {x.Pixel(point.x()), y.Pixel(point.y())};
@@ -171,12 +175,14 @@ class Pairs {
     for (int count = cell_ < 150 ? 3 : 6; count >= 2; --count) {
       ticks = axis.Ticks(count);
       double width = 22;  // also of what is as high as a line
-      for (const auto& tick : ticks) width = std::max(width, 6.5 * static_cast<double>(tick.label.size()));
+      for (const auto& tick : ticks)
+        width = std::max(width, 6.5 * static_cast<double>(tick.label.size()));
       std::erase_if(ticks, [&](const auto& t) {
         const double at = axis.Pixel(t.value);
         return at < begin + width / 2 - kGap / 2 || at > end - width / 2 + kGap / 2;
       });
-      if (ticks.size() < 2 || std::abs(axis.Pixel(ticks[1].value) - axis.Pixel(ticks[0].value)) > width + 8)
+      if (ticks.size() < 2 ||
+          std::abs(axis.Pixel(ticks[1].value) - axis.Pixel(ticks[0].value)) > width + 8)
         break;
     }
     return ticks;
@@ -187,8 +193,10 @@ class Pairs {
     const double bottom = Top(shown_.size()) - kGap;
     const auto length = static_cast<size_t>((cell_ - 2 * kGap) / 7);
     const std::string full = WithUnit(parameter(shown_[k]));
-    const std::string name = full.size() <= length ? full : Shorten(parameter(shown_[k]).name, length);
-    for (const auto& tick : Ticks(x)) svg_.Text(x.Pixel(tick.value), bottom + 15, tick.label, "tick");
+    const std::string name =
+        full.size() <= length ? full : Shorten(parameter(shown_[k]).name, length);
+    for (const auto& tick : Ticks(x))
+      svg_.Text(x.Pixel(tick.value), bottom + 15, tick.label, "tick");
     svg_.Text((x.from() + x.to()) / 2, bottom + 35, name);
     if (k > 0) {
       for (const auto& tick : Ticks(y))
@@ -208,8 +216,8 @@ class Pairs {
 
 }  // namespace
 
-std::string PairPlot(const Findings& findings, const Summary& summary, const RobotDescription& robot,
-                     const std::vector<Eigen::Index>& shown) {
+std::string PairPlot(const Findings& findings, const Summary& summary,
+                     const RobotDescription& robot, const std::vector<Eigen::Index>& shown) {
   return Pairs(findings, summary, robot, shown).Draw();
 }
 

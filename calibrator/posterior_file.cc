@@ -24,7 +24,8 @@ json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.
 
 json ToJson(const Eigen::MatrixXd& matrix) {
   json rows = json::array();
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) rows.push_back(ToJson(Eigen::VectorXd(matrix.row(i))));
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+    rows.push_back(ToJson(Eigen::VectorXd(matrix.row(i))));
   return rows;
 }
 
@@ -45,7 +46,8 @@ json ToJson(const ParameterDescription& p) {
 json ToJson(const GaussianMixture& mixture) {
   return {{"weights", mixture.weights},
           {"means", List(mixture.components, [](const Gaussian& g) { return ToJson(g.mean); })},
-          {"covariances", List(mixture.components, [](const Gaussian& g) { return ToJson(g.covariance); })}};
+          {"covariances",
+           List(mixture.components, [](const Gaussian& g) { return ToJson(g.covariance); })}};
 }
 
 // One sample per row, evenly chosen where there are too many.
@@ -61,8 +63,9 @@ json ToJson(const Misspecification& found) {
   return {{"raised", found.alarm},
           {"words", found.words},
           {"misfits", List(found.misfits, [](const Misfit& m) {
-             return json{{"what", m.what},    {"joint", m.joint},         {"condition", m.condition},
-                         {"test", m.test},    {"statistic", m.statistic}, {"p", m.p},
+             return json{{"what", m.what},           {"joint", m.joint},
+                         {"condition", m.condition}, {"test", m.test},
+                         {"statistic", m.statistic}, {"p", m.p},
                          {"effect", m.effect}};
            })}};
 }
@@ -88,15 +91,16 @@ json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao,
 }
 
 json ToJson(const Holdout& holdout) {
-  return {
-      {"words", holdout.words},
-      {"better", holdout.better},
-      {"fitted", holdout.fitted},
-      {"held_out", holdout.held_out},
-      {"errors", List(holdout.errors, [](const HorizonError& e) {
-         return json{
-             {"horizon", e.horizon}, {"windows", e.windows}, {"posterior", e.posterior}, {"prior", e.prior}};
-       })}};
+  return {{"words", holdout.words},
+          {"better", holdout.better},
+          {"fitted", holdout.fitted},
+          {"held_out", holdout.held_out},
+          {"errors", List(holdout.errors, [](const HorizonError& e) {
+             return json{{"horizon", e.horizon},
+                         {"windows", e.windows},
+                         {"posterior", e.posterior},
+                         {"prior", e.prior}};
+           })}};
 }
 
 json ToJson(const Agreement& agreement) {
@@ -112,8 +116,12 @@ json ToJson(const Agreement& agreement) {
 }
 
 json ToJson(const Stage& s) {
-  return {{"horizon", s.horizon},         {"windows", s.windows},   {"simulated_steps", s.simulated_steps},
-          {"discrepancy", s.discrepancy}, {"mean", ToJson(s.mean)}, {"sd", ToJson(s.sd)}};
+  return {{"horizon", s.horizon},
+          {"windows", s.windows},
+          {"simulated_steps", s.simulated_steps},
+          {"discrepancy", s.discrepancy},
+          {"mean", ToJson(s.mean)},
+          {"sd", ToJson(s.sd)}};
 }
 
 json Interval(const Summary& summary) {
@@ -191,9 +199,13 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
       {"samples", Samples(summary.samples)},
       {"versions",
        {{"plumbline", VersionLine("plumb")},
-        {"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+        {"eigen",
+         fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
         {"compiler", __VERSION__}}},
-      {"run", {{"seconds", findings.seconds}, {"date", provenance.date}, {"command", provenance.command}}}};
+      {"run",
+       {{"seconds", findings.seconds},
+        {"date", provenance.date},
+        {"command", provenance.command}}}};
   return Print(j, "") + "\n";
 }
 

@@ -24,7 +24,8 @@ void RequireSizes(const Leftover& leftover, Eigen::Index n) {
       leftover.noise_known.size() != static_cast<size_t>(2 * n) ||
       leftover.columns.cols() != static_cast<Eigen::Index>(leftover.candidates.size()) ||
       (leftover.columns.cols() > 0 && leftover.columns.rows() != rows)) {
-    throw std::invalid_argument("errors, their Jacobian and what they are about do not fit together");
+    throw std::invalid_argument(
+        "errors, their Jacobian and what they are about do not fit together");
   }
   for (const WindowErrors::Row& row : leftover.rows) {
     if (row.rollout < 0 || static_cast<size_t>(row.rollout) >= leftover.rollouts.size() ||
@@ -58,7 +59,9 @@ bool SameReading(const Transition& a, const Transition& b) {
   return a.next_q.allFinite() && a.next_v.allFinite() && a.next_q == b.q && a.next_v == b.v;
 }
 
-bool Exact(const Transition& t) { return (t.q_sd.array() == 0).all() && (t.v_sd.array() == 0).all(); }
+bool Exact(const Transition& t) {
+  return (t.q_sd.array() == 0).all() && (t.v_sd.array() == 0).all();
+}
 
 }  // namespace
 
@@ -69,7 +72,8 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const Leftover& 
     joint_of.insert(joint_of.end(), static_cast<size_t>(joint.num_velocities()), joint.name);
   }
   std::map<std::pair<int, int>, int> index;
-  for (const WindowErrors::Row& row : leftover.rows) index.emplace(std::pair(row.rollout, row.transition), 0);
+  for (const WindowErrors::Row& row : leftover.rows)
+    index.emplace(std::pair(row.rollout, row.transition), 0);
   int ground = 0, stop = 0;
   for (auto& [key, number] : index) {
     number = static_cast<int>(steps.size());
@@ -78,8 +82,8 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const Leftover& 
     const Touch touch = FindTouch(robot, transition);
     ground += touch.ground;
     stop += touch.stop;
-    steps.push_back(
-        {&transition, touch.any(), -1, false, std::vector<Eigen::Index>(static_cast<size_t>(2 * n), -1)});
+    steps.push_back({&transition, touch.any(), -1, false,
+                     std::vector<Eigen::Index>(static_cast<size_t>(2 * n), -1)});
     const auto before = index.find({key.first, key.second - 1});
     if (before == index.end()) continue;
     Step& last = steps[static_cast<size_t>(before->second)];
@@ -89,7 +93,8 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const Leftover& 
   }
   const auto touching =
       std::count_if(steps.begin(), steps.end(), [](const Step& step) { return step.contact; });
-  contact_words = static_cast<double>(ground) >= kMostOf * static_cast<double>(touching) ? "at ground contact"
+  contact_words = static_cast<double>(ground) >= kMostOf * static_cast<double>(touching)
+                      ? "at ground contact"
                   : static_cast<double>(stop) >= kMostOf * static_cast<double>(touching)
                       ? "at a stop"
                       : "in contact with the ground or a stop";
@@ -135,7 +140,8 @@ void ProjectedErrors::Weigh(const Eigen::VectorXd& errors) {
   };
   for (Eigen::Index i = 0; i < errors.size(); ++i) sizes[group(i)].push_back(std::abs(errors(i)));
   std::map<std::pair<int, bool>, double> largest;
-  for (const auto& [key, values] : sizes) largest[key] = kOutlier * std::max(1.0, 1.4826 * Median(values));
+  for (const auto& [key, values] : sizes)
+    largest[key] = kOutlier * std::max(1.0, 1.4826 * Median(values));
   weight.setOnes(errors.size());
   Eigen::Index outliers = 0;
   for (Eigen::Index i = 0; i < errors.size(); ++i) {
@@ -145,7 +151,8 @@ void ProjectedErrors::Weigh(const Eigen::VectorXd& errors) {
     weight(i) = ratio;
     ++outliers;
   }
-  few_outliers = static_cast<double>(outliers) < kLeastOutliers * static_cast<double>(errors.size());
+  few_outliers =
+      static_cast<double>(outliers) < kLeastOutliers * static_cast<double>(errors.size());
 }
 
 std::string ProjectedErrors::Place(const std::string& joint, const std::string& condition) const {
@@ -156,7 +163,8 @@ std::string ProjectedErrors::Place(const std::string& joint, const std::string& 
   return where.empty() ? who : who + ", " + where;
 }
 
-Score FindScore(const ProjectedErrors& errors, const Eigen::VectorXd& column, double scale, double lower) {
+Score FindScore(const ProjectedErrors& errors, const Eigen::VectorXd& column, double scale,
+                double lower) {
   Score score;
   const double cc = column.squaredNorm();
   if (!(cc > 0) || !std::isfinite(cc)) return score;

@@ -8,20 +8,24 @@
 
 namespace plumb {
 
-/// Errors that no other values of the fitted parameters would explain, sorted by what they are about.
+/// Errors that no other values of the fitted parameters would explain, sorted by what they are
+/// about.
 struct ProjectedErrors {
-  /// @param robot with known parameters. @throws std::invalid_argument if sizes do not fit together.
+  /// @param robot with known parameters. @throws std::invalid_argument if sizes do not fit
+  /// together.
   ProjectedErrors(const RobotDescription& robot, const Leftover& leftover);
 
   /// As if the parameter with this (projected) column had been fitted, too.
   void Explain(const Eigen::VectorXd& column);
 
-  Eigen::VectorXd Project(const Eigen::VectorXd& x) const { return x - basis * (basis.transpose() * x); }
+  Eigen::VectorXd Project(const Eigen::VectorXd& x) const {
+    return x - basis * (basis.transpose() * x);
+  }
 
   Eigen::Index n = 0;  ///< velocities
   Eigen::VectorXd r;   ///< rows, weighted
-  /// Of each row: 1, but for outliers, which count as if they were kOutlier robust sd of their kind large.
-  /// All columns that meet r have to be weighted, too.
+  /// Of each row: 1, but for outliers, which count as if they were kOutlier robust sd of their kind
+  /// large. All columns that meet r have to be weighted, too.
   Eigen::VectorXd weight;
   Eigen::VectorXd freedom;  ///< of each row: 1 - its leverage
   Eigen::MatrixXd basis;    ///< of the Jacobian's range, orthonormal
@@ -35,13 +39,17 @@ struct ProjectedErrors {
   std::vector<Step> steps;      ///< transitions, in order
   std::vector<int> step_of;     ///< of each row
   std::vector<int> coordinate;  ///< of each row
-  std::vector<bool> outlying;   ///< of each row: beyond kOutlier robust sd of its coordinate and condition
-  /// Of each coordinate: its noise is said to be known, and the errors are significantly smaller than that.
+  /// of each row: beyond kOutlier robust sd of its coordinate and condition
+  std::vector<bool> outlying;
+  /// Of each coordinate: its noise is said to be known, and the errors are significantly smaller
+  /// than that.
   std::vector<bool> quiet;
-  bool few_outliers = false;  ///< fewer than kLeastOutliers of all rows: the other tests leave them out
+  /// fewer than kLeastOutliers of all rows: the other tests leave them out
+  bool few_outliers = false;
   std::vector<std::string> joint_of;  ///< of each velocity
   std::string contact_words;          ///< "at ground contact", "at a stop", ...
-  bool conditions = false;            ///< there are enough transitions in contact and free to tell them apart
+  /// there are enough transitions in contact and free to tell them apart
+  bool conditions = false;
 
   bool Contact(Eigen::Index row) const {
     return steps[static_cast<size_t>(step_of[static_cast<size_t>(row)])].contact;
@@ -58,19 +66,22 @@ struct ProjectedErrors {
 
 inline constexpr double kOutlier = 5;
 
-/// One direction in which errors may lie: Rao's score test with a variance that errors' own may enlarge.
+/// One direction in which errors may lie: Rao's score test with a variance that errors' own may
+/// enlarge.
 struct Score {
   double statistic = 0;  ///< chi^2 of one degree of freedom
   double p = 1;          ///< not corrected
-  double change = 0;     ///< -c' r / (c' c + 1 / scale^2): by how much the parameter would have to be larger
-  double gain = 0;       ///< by how much that would reduce the sum of squares
+  /// -c' r / (c' c + 1 / scale^2): by how much the parameter would have to be larger
+  double change = 0;
+  double gain = 0;  ///< by how much that would reduce the sum of squares
 };
-/// @param column projected. @param scale of likely changes, infinite for no opinion. @param lower least
-/// change.
-Score FindScore(const ProjectedErrors& errors, const Eigen::VectorXd& column, double scale, double lower);
+/// @param column projected. @param scale of likely changes, infinite for no opinion. @param lower
+/// least change.
+Score FindScore(const ProjectedErrors& errors, const Eigen::VectorXd& column, double scale,
+                double lower);
 
-/// Tests of errors for what they are themselves: scale, outliers, whiteness and bias. p not corrected; all,
-/// whether they count or not.
+/// Tests of errors for what they are themselves: scale, outliers, whiteness and bias. p not
+/// corrected; all, whether they count or not.
 std::vector<Misfit> TestScale(const ProjectedErrors& errors, const std::vector<bool>& noise_known);
 std::vector<Misfit> TestOutliers(const ProjectedErrors& errors);
 std::vector<Misfit> TestWhiteness(const ProjectedErrors& errors);

@@ -10,7 +10,8 @@ class RankBatches : public Batches {
  public:
   /// @param ranks must outlive this. @param journal of rank 0; null = none, and on the others.
   RankBatches(const Ranks& ranks, Journal* journal) : ranks_(ranks), journal_(journal) {}
-  Eigen::MatrixXd Run(uint64_t identity, Eigen::Index rows, Eigen::Index columns, const Columns& compute) override;
+  Eigen::MatrixXd Run(uint64_t identity, Eigen::Index rows, Eigen::Index columns,
+                      const Columns& compute) override;
 
  private:
   const Ranks& ranks_;

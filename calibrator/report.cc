@@ -30,7 +30,8 @@ constexpr double kInvolved = 1e-3;
 constexpr double kHardly = 0.22;  // nat: the data made the sd smaller by less than a fifth
 
 constexpr char kKeys[] =
-    "<span class=\"key prior\"></span>prior (dashed) &#160; <span class=\"key posterior\"></span>posterior. ";
+    "<span class=\"key prior\"></span>prior (dashed) &#160; <span class=\"key "
+    "posterior\"></span>posterior. ";
 
 std::string Verdict(const std::string& css, const std::string& title, const std::string& words) {
   return "<div class=\"verdict " + css + "\"><b>" + title + "</b>" + Escape(words) + "</div>\n";
@@ -48,34 +49,39 @@ class Report {
 
   std::string Print() const {
     return "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/>"
-           "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>Calibration "
+           "<meta name=\"viewport\" content=\"width=device-width, "
+           "initial-scale=1\"/>\n<title>Calibration "
            "of " +
-           Escape(robot_.name) + "</title>\n<style>" + kReportStyle + "</style></head>\n<body><main>\n" +
-           Headline() + Parameters() + Pairs() + KnownAndUnknown() + Predictions() + Misfits() +
-           ResidualSection(residuals_) + Logs() + Stages() + Reproduce() + "</main></body>\n</html>\n";
+           Escape(robot_.name) + "</title>\n<style>" + kReportStyle +
+           "</style></head>\n<body><main>\n" + Headline() + Parameters() + Pairs() +
+           KnownAndUnknown() + Predictions() + Misfits() + ResidualSection(residuals_) + Logs() +
+           Stages() + Reproduce() + "</main></body>\n</html>\n";
   }
 
  private:
   Index size() const { return summary_.mean.size(); }
-  const ParameterDescription& parameter(Index i) const { return robot_.parameters[static_cast<size_t>(i)]; }
+  const ParameterDescription& parameter(Index i) const {
+    return robot_.parameters[static_cast<size_t>(i)];
+  }
   std::string Name(Index i) const { return Escape(parameter(i).name); }
 
   std::string Headline() const {
     const size_t logs = provenance_.logs.size();
-    std::string html =
-        fmt::format("<h1>Calibration of {}</h1>\n<p class=\"sub\">{} parameter{} from {} transitions",
-                    Escape(robot_.name), size(), size() == 1 ? "" : "s", findings_.transitions);
+    std::string html = fmt::format(
+        "<h1>Calibration of {}</h1>\n<p class=\"sub\">{} parameter{} from {} transitions",
+        Escape(robot_.name), size(), size() == 1 ? "" : "s", findings_.transitions);
     if (logs > 0) html += fmt::format(" of {} log{}", logs, logs == 1 ? "" : "s");
     if (!provenance_.date.empty()) html += ", " + Escape(provenance_.date);
     html += "</p>\n<div class=\"verdicts\">\n";
 
-    const bool all_known = findings_.identifiability.null.empty() && !findings_.identifiability.words.empty();
+    const bool all_known =
+        findings_.identifiability.null.empty() && !findings_.identifiability.words.empty();
     html += Verdict(all_known ? "good" : "", "What can be known", KnownWords() + Values());
     const Misspecification& model = findings_.misspecification;
     html += model.alarm ? Verdict("bad", "The model does not explain the robot", model.words)
-            : model.words.empty()
-                ? Verdict("", "The model was not tested", "Whether it can explain the robot is not known.")
-                : Verdict("good", "The model explains the robot", model.words);
+            : model.words.empty() ? Verdict("", "The model was not tested",
+                                            "Whether it can explain the robot is not known.")
+                                  : Verdict("good", "The model explains the robot", model.words);
     const bool tried = std::any_of(findings_.holdout.errors.begin(), findings_.holdout.errors.end(),
                                    [](const HorizonError& e) { return e.windows > 0; });
     html += !tried ? Verdict("", "Predictions were not tested", findings_.holdout.words)
@@ -83,8 +89,9 @@ class Report {
                 ? Verdict("good", "Predicts better than the prior", findings_.holdout.words)
                 : Verdict("bad", "Does not predict better than the prior", findings_.holdout.words);
     if (!findings_.agreement.logs.empty()) {
-      html += findings_.agreement.agree ? Verdict("good", "The logs agree", findings_.agreement.words)
-                                        : Verdict("bad", "The logs disagree", findings_.agreement.words);
+      html += findings_.agreement.agree
+                  ? Verdict("good", "The logs agree", findings_.agreement.words)
+                  : Verdict("bad", "The logs disagree", findings_.agreement.words);
     }
     html += "</div>\n";
     for (const std::string& warning : findings_.warnings)
@@ -121,36 +128,40 @@ class Report {
     std::vector<std::string> others;
     bool involved = false;
     for (Index k = 0; k < size(); ++k) {
-      const bool together =
-          std::any_of(findings_.identifiability.null.begin(), findings_.identifiability.null.end(),
-                      [&](const Eigen::VectorXd& d) {
-                        return d.size() == size() && std::abs(d(i)) > kInvolved && std::abs(d(k)) > kInvolved;
-                      });
+      const bool together = std::any_of(
+          findings_.identifiability.null.begin(), findings_.identifiability.null.end(),
+          [&](const Eigen::VectorXd& d) {
+            return d.size() == size() && std::abs(d(i)) > kInvolved && std::abs(d(k)) > kInvolved;
+          });
       involved = involved || together;
       if (together && k != i) others.push_back(Name(k));
     }
     if (involved && others.empty()) return "no: the motion does not depend on it";
     constexpr size_t kMostNames = 3;
-    if (others.size() > kMostNames) return fmt::format("only in combination with {} others", others.size());
+    if (others.size() > kMostNames)
+      return fmt::format("only in combination with {} others", others.size());
     if (involved) return fmt::format("only in combination with {}", fmt::join(others, ", "));
     if (summary_.gain(i) < kHardly) return "hardly: the motion adds little to the prior";
     return "yes";
   }
 
   std::string Parameters() const {
-    Table table(
-        {"parameter", "unit", "prior", "posterior", "95 % interval", "Cram&#233;r-Rao sd", "identifiable"});
+    Table table({"parameter", "unit", "prior", "posterior", "95 % interval", "Cram&#233;r-Rao sd",
+                 "identifiable"});
     for (Index i = 0; i < size(); ++i) {
       const double sd = summary_.sd(i);
-      table.Add({Name(i), Escape(parameter(i).unit), PlusMinus(summary_.prior_mean(i), summary_.prior_sd(i)),
+      table.Add({Name(i), Escape(parameter(i).unit),
+                 PlusMinus(summary_.prior_mean(i), summary_.prior_sd(i)),
                  "<b>" + PlusMinus(summary_.mean(i), sd) + "</b>",
                  Number(summary_.lower(i), sd) + " to " + Number(summary_.upper(i), sd),
                  Number(CramerRao(i), CramerRao(i)), Identifiable(i)});
     }
     return "<h2>Parameters</h2>\n" + table.Print() +
-           "<p class=\"note\">Mean &#177; standard deviation. Cram&#233;r-Rao: the smallest sd that an "
+           "<p class=\"note\">Mean &#177; standard deviation. Cram&#233;r-Rao: the smallest sd "
+           "that an "
            "unbiased estimate from these "
-           "data alone can have; &#8734; where they do not tell the parameter on its own. A posterior may be "
+           "data alone can have; &#8734; where they do not tell the parameter on its own. A "
+           "posterior may be "
            "narrower, as it knows the "
            "prior, too.</p>\n";
   }
@@ -164,15 +175,18 @@ class Report {
                        [&](Index a, Index b) { return summary_.gain(a) > summary_.gain(b); });
       shown.resize(kMostPairs);
       std::sort(shown.begin(), shown.end());
-      selection = fmt::format("Of {} parameters these are the {} that the data have told most about. ",
-                              size(), kMostPairs);
+      selection =
+          fmt::format("Of {} parameters these are the {} that the data have told most about. ",
+                      size(), kMostPairs);
     }
     return "<h2>Prior and posterior</h2>\n" +
            Figure(Scrolling(PairPlot(findings_, summary_, robot_, shown)),
                   selection + kKeys +
-                      "Ellipses: 1 and 2 sigma, one pair for each component of the posterior; dots are its "
+                      "Ellipses: 1 and 2 sigma, one pair for each component of the posterior; dots "
+                      "are its "
                       "samples. Where the "
-                      "posterior is much narrower than the prior, only its surroundings are shown. Numbers: "
+                      "posterior is much narrower than the prior, only its surroundings are shown. "
+                      "Numbers: "
                       "the posterior's "
                       "correlation of the coordinates.") +
            Paragraph(findings_.check);
@@ -183,7 +197,8 @@ class Report {
     std::string html = "<h2>What can be known from this motion</h2>\n" + Paragraph(KnownWords());
     if (!found.combinations.empty()) {
       Table table({"what the motion determines", "value"});
-      for (const Combination& c : found.combinations) table.Add({Escape(c.name), PlusMinus(c.mean, c.sd)});
+      for (const Combination& c : found.combinations)
+        table.Add({Escape(c.name), PlusMinus(c.mean, c.sd)});
       html += table.Print();
     }
     if (!found.null.empty()) {
@@ -195,12 +210,14 @@ class Report {
     if (!findings_.advice.empty()) html += Paragraph(findings_.advice);
     const std::string scree = ScreePlot(InformationEigenvalues(), kNull);
     if (scree.empty()) return html;
-    return html + Figure(scree,
-                         "Eigenvalues of the Fisher information in units of the prior, greatest first. Along "
-                         "a direction with "
-                         "1 (dashed) the data tell as much as the prior; what is below a millionth of the "
-                         "greatest (dotted) cannot "
-                         "be known from them.");
+    return html +
+           Figure(
+               scree,
+               "Eigenvalues of the Fisher information in units of the prior, greatest first. Along "
+               "a direction with "
+               "1 (dashed) the data tell as much as the prior; what is below a millionth of the "
+               "greatest (dotted) cannot "
+               "be known from them.");
   }
 
   std::string Direction(const Eigen::VectorXd& direction) const {
@@ -208,15 +225,16 @@ class Report {
     for (Index i = 0; i < std::min(size(), direction.size()); ++i) {
       if (!(std::abs(direction(i)) > kInvolved)) continue;
       const bool log = parameter(i).coordinate == Coordinate::kLog;
-      words +=
-          (words.empty() ? "" : ", ") + Name(i) + fmt::format(" {:+.3g}{}", direction(i), log ? " %" : "");
+      words += (words.empty() ? "" : ", ") + Name(i) +
+               fmt::format(" {:+.3g}{}", direction(i), log ? " %" : "");
     }
     return words;
   }
 
   std::vector<double> InformationEigenvalues() const {
     const Eigen::MatrixXd& information = findings_.identifiability.information;
-    if (information.rows() != size() || information.cols() != size() || !information.allFinite()) return {};
+    if (information.rows() != size() || information.cols() != size() || !information.allFinite())
+      return {};
     const Eigen::VectorXd sd = findings_.prior.covariance.diagonal().cwiseSqrt();
     const Eigen::MatrixXd scaled = sd.asDiagonal() * information * sd.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled, Eigen::EigenvaluesOnly);
@@ -230,13 +248,10 @@ class Report {
     std::string html = "<h2>Predictions of held-out motion</h2>\n" + Paragraph(holdout.words);
     const std::string plot = ErrorPlot(holdout.errors);
     if (plot.empty()) return html;
-    html += Figure(
-        plot,
-        kKeys +
-            fmt::format(
-                "Root mean square error of predicting so many control steps ahead, of {} transitions that "
-                "the fit has not seen.",
-                holdout.held_out));
+    html += Figure(plot, kKeys + fmt::format("Root mean square error of predicting so many control "
+                                             "steps ahead, of {} transitions that "
+                                             "the fit has not seen.",
+                                             holdout.held_out));
     Table table({"steps ahead", "windows", "posterior", "prior", "ratio"});
     for (const HorizonError& e : holdout.errors) {
       table.Add({std::to_string(e.horizon), std::to_string(e.windows), Number(e.posterior, NAN),
@@ -255,8 +270,9 @@ class Report {
     if (model.misfits.empty()) return html;
     Table table({"misfit", "test", "statistic", "p, corrected", "share of the errors"});
     for (const Misfit& m : model.misfits) {
-      table.Add({Escape(m.what), Escape(m.test), Number(m.statistic, NAN), Number(m.p, NAN),
-                 std::isfinite(m.effect) ? fmt::format("{:.0f} %", 100 * m.effect) : "\xe2\x80\x93"});
+      table.Add(
+          {Escape(m.what), Escape(m.test), Number(m.statistic, NAN), Number(m.p, NAN),
+           std::isfinite(m.effect) ? fmt::format("{:.0f} %", 100 * m.effect) : "\xe2\x80\x93"});
     }
     return html + table.Print();
   }
@@ -267,7 +283,8 @@ class Report {
     Table table({"", "log", "distance", "p, corrected"});
     for (size_t k = 0; k < agreement.logs.size(); ++k) {
       const LogAgreement& log = agreement.logs[k];
-      table.Add({std::to_string(k + 1), Escape(log.log), Number(log.distance, 0.1), Number(log.p, NAN)});
+      table.Add(
+          {std::to_string(k + 1), Escape(log.log), Number(log.distance, 0.1), Number(log.p, NAN)});
     }
     std::string html = "<h2>Do the logs agree?</h2>\n" + Paragraph(agreement.words) + table.Print();
     constexpr size_t kMostLogs = 40;
@@ -282,7 +299,8 @@ class Report {
 
   std::string Stages() const {
     if (findings_.stages.empty()) return "";
-    Table table({"stage", "steps per window", "windows", "simulated steps", "mean squared whitened error"});
+    Table table(
+        {"stage", "steps per window", "windows", "simulated steps", "mean squared whitened error"});
     for (size_t k = 0; k < findings_.stages.size(); ++k) {
       const Stage& s = findings_.stages[k];
       table.Add({std::to_string(k + 1), std::to_string(s.horizon), std::to_string(s.windows),
@@ -305,8 +323,8 @@ class Report {
     add("robot's files", fmt::format("{}, fingerprint {:#018x}", robot_.file, robot_.fingerprint));
     add("version", VersionLine("plumb"));
     add("simulated steps",
-        fmt::format("{} for the fit, {} for diagnostics; {} simulations failed", findings_.simulated_steps,
-                    findings_.diagnostic_steps, findings_.failures));
+        fmt::format("{} for the fit, {} for diagnostics; {} simulations failed",
+                    findings_.simulated_steps, findings_.diagnostic_steps, findings_.failures));
     add("wall time", fmt::format("{:.1f} s", findings_.seconds));
     return "<h2>How to do it again</h2>\n" +
            (provenance_.command.empty() ? "" : "<pre>" + Escape(provenance_.command) + "</pre>\n") +
@@ -322,13 +340,14 @@ class Report {
 
 }  // namespace
 
-std::string ReportHtml(const Findings& findings, const RobotDescription& robot, const Provenance& provenance,
-                       const Residuals& residuals) {
+std::string ReportHtml(const Findings& findings, const RobotDescription& robot,
+                       const Provenance& provenance, const Residuals& residuals) {
   return Report(findings, robot, provenance, residuals).Print();
 }
 
-void WriteReport(const std::filesystem::path& file, const Findings& findings, const RobotDescription& robot,
-                 const Provenance& provenance, const Residuals& residuals) {
+void WriteReport(const std::filesystem::path& file, const Findings& findings,
+                 const RobotDescription& robot, const Provenance& provenance,
+                 const Residuals& residuals) {
   WriteAtomically(file, ReportHtml(findings, robot, provenance, residuals));
 }
 

@@ -18,7 +18,9 @@ std::string Number(double value, double sd) {
   return fmt::format("{:.{}f}", value, digits);
 }
 
-std::string PlusMinus(double value, double sd) { return Number(value, sd) + " \xc2\xb1 " + Number(sd, sd); }
+std::string PlusMinus(double value, double sd) {
+  return Number(value, sd) + " \xc2\xb1 " + Number(sd, sd);
+}
 
 Table::Table(const std::vector<std::string>& header) {
   for (const std::string& cell : header) rows_ += "<th>" + cell + "</th>";
@@ -34,14 +36,20 @@ void Table::Add(const std::vector<std::string>& cells) {
   rows_ += "</tr>\n";
 }
 
-std::string Table::Print() const { return "<div class=\"scroll\"><table>\n" + rows_ + "</table></div>\n"; }
+std::string Table::Print() const {
+  return "<div class=\"scroll\"><table>\n" + rows_ + "</table></div>\n";
+}
 
-std::string Paragraph(const std::string& text) { return text.empty() ? "" : "<p>" + Escape(text) + "</p>\n"; }
+std::string Paragraph(const std::string& text) {
+  return text.empty() ? "" : "<p>" + Escape(text) + "</p>\n";
+}
 
 std::string Figure(const std::string& drawing, const std::string& caption) {
   return "<figure>" + drawing + "<figcaption>" + caption + "</figcaption></figure>\n";
 }
 
-std::string Scrolling(const std::string& drawing) { return "<div class=\"scroll\">" + drawing + "</div>"; }
+std::string Scrolling(const std::string& drawing) {
+  return "<div class=\"scroll\">" + drawing + "</div>";
+}
 
 }  // namespace plumb

@@ -63,14 +63,15 @@ std::string ScreePlot(const std::vector<double>& eigenvalues, double null) {
   Svg svg(440, 280, "eigenvalues of the Fisher information in units of the prior");
   const double range = std::max(1., highest) / lowest;
   const Axis x(0.5, count + 0.5, 70, 428);
-  const Axis y(lowest / std::pow(range, 0.04), std::max(1., highest) * std::max(2., std::pow(range, 0.05)),
-               246, 12, true);
+  const Axis y(lowest / std::pow(range, 0.04),
+               std::max(1., highest) * std::max(2., std::pow(range, 0.05)), 246, 12, true);
   svg.Frame(x, y, "", "information", 1, 8);
   svg.Line(x.from(), y.Pixel(1), x.to(), y.Pixel(1), "prior line");
   svg.Line(x.from(), y.Pixel(highest * null), x.to(), y.Pixel(highest * null), "limit");
   const double width = std::min(46., 0.6 * (x.to() - x.from()) / count);
   for (size_t i = 0; i < eigenvalues.size(); ++i) {
-    const double at = x.Pixel(static_cast<double>(i + 1)), top = y.Pixel(std::max(eigenvalues[i], y.lower()));
+    const double at = x.Pixel(static_cast<double>(i + 1)),
+                 top = y.Pixel(std::max(eigenvalues[i], y.lower()));
     svg.Rectangle(at - width / 2, top, width, y.from() - top, "posterior bar");
     if (count <= 20) svg.Text(at, y.from() + 16, std::to_string(i + 1), "tick");
   }
@@ -82,20 +83,23 @@ std::string ResidualHistogram(const std::vector<double>& residuals) {
   constexpr double kEnd = 5, kBin = 2 * kEnd / kBins;
   std::vector<double> bins(kBins, 0);
   for (const double r : residuals) {  // what is beyond the ends is in the last bins
-    ++bins[static_cast<size_t>(
-        std::clamp(static_cast<int>(std::floor((std::clamp(r, -kEnd, kEnd) + kEnd) / kBin)), 0, kBins - 1))];
+    ++bins[static_cast<size_t>(std::clamp(
+        static_cast<int>(std::floor((std::clamp(r, -kEnd, kEnd) + kEnd) / kBin)), 0, kBins - 1))];
   }
   for (double& bin : bins) bin /= kBin * std::max<double>(1, static_cast<double>(residuals.size()));
   Svg svg(kWidth, kHeight, "histogram of residuals");
   const Axis x(-kEnd, kEnd, kLeft, kRight);
-  const Axis y(0, 1.1 * std::max(Density(0), *std::max_element(bins.begin(), bins.end())), kBottom, kTop);
+  const Axis y(0, 1.1 * std::max(Density(0), *std::max_element(bins.begin(), bins.end())), kBottom,
+               kTop);
   svg.Frame(x, y, "residual [sd]", "density", 6, 4);
   for (int k = 0; k < kBins; ++k) {
     const double from = x.Pixel(-kEnd + k * kBin), top = y.Pixel(bins[static_cast<size_t>(k)]);
-    svg.Rectangle(from, top, x.Pixel(-kEnd + (k + 1) * kBin) - from, y.from() - top, "posterior bar");
+    svg.Rectangle(from, top, x.Pixel(-kEnd + (k + 1) * kBin) - from, y.from() - top,
+                  "posterior bar");
   }
   Points normal;
-  for (double z = -kEnd; z <= kEnd + 1e-9; z += 0.1) normal.emplace_back(x.Pixel(z), y.Pixel(Density(z)));
+  for (double z = -kEnd; z <= kEnd + 1e-9; z += 0.1)
+    normal.emplace_back(x.Pixel(z), y.Pixel(Density(z)));
   svg.Path(normal, "reference line");
   return svg.Print();
 }
@@ -131,7 +135,8 @@ std::string ResidualCorrelation(const std::vector<double>& correlation, size_t c
     if (std::isfinite(c)) end = std::max(end, 1.15 * std::abs(c));
   }
   end = std::min(end, 1.05);
-  const Axis x(0, static_cast<double>(correlation.size()) + 1, kLeft, kRight), y(-end, end, kBottom, kTop);
+  const Axis x(0, static_cast<double>(correlation.size()) + 1, kLeft, kRight),
+      y(-end, end, kBottom, kTop);
   svg.Frame(x, y, "lag [steps]", "autocorrelation", 5, 5);
   svg.Rectangle(kLeft, y.Pixel(std::min(band, end)), kRight - kLeft,
                 y.Pixel(-std::min(band, end)) - y.Pixel(std::min(band, end)), "band");
@@ -143,7 +148,8 @@ std::string ResidualCorrelation(const std::vector<double>& correlation, size_t c
   return svg.Print();
 }
 
-std::string ResidualsOverTime(const Eigen::VectorXd& residuals, const std::vector<WindowErrors::Row>& rows) {
+std::string ResidualsOverTime(const Eigen::VectorXd& residuals,
+                              const std::vector<WindowErrors::Row>& rows) {
   struct Sum {
     double squares = 0;
     double count = 0;
@@ -168,12 +174,14 @@ std::string ResidualsOverTime(const Eigen::VectorXd& residuals, const std::vecto
     ++at;
   }
   double highest = 2;
-  for (const Sum& bin : binned) highest = std::max(highest, 1.1 * std::sqrt(bin.squares / bin.count));
+  for (const Sum& bin : binned)
+    highest = std::max(highest, 1.1 * std::sqrt(bin.squares / bin.count));
   Svg svg(920, 250, "residuals over the record");
   const Axis x(0, static_cast<double>(total), 70, 906), y(0, highest, 204, 12);
   svg.Frame(x, y, "transition", "rms [sd]", 8, 5);
   if (begins.size() <= 100) {
-    for (const double begin : begins) svg.Line(x.Pixel(begin), y.from(), x.Pixel(begin), y.to(), "limit");
+    for (const double begin : begins)
+      svg.Line(x.Pixel(begin), y.from(), x.Pixel(begin), y.to(), "limit");
   }
   svg.Line(x.from(), y.Pixel(1), x.to(), y.Pixel(1), "reference line");
   Points points;
@@ -189,8 +197,8 @@ std::string ResidualsOverTime(const Eigen::VectorXd& residuals, const std::vecto
 std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary,
                           const RobotDescription& robot, Eigen::Index parameter) {
   const auto fits = [&](const LogAgreement& l) {
-    return parameter < l.mean.size() && parameter < l.sd.size() && std::isfinite(l.mean(parameter)) &&
-           std::isfinite(l.sd(parameter));
+    return parameter < l.mean.size() && parameter < l.sd.size() &&
+           std::isfinite(l.mean(parameter)) && std::isfinite(l.sd(parameter));
   };
   double low = summary.lower(parameter), high = summary.upper(parameter);
   for (const LogAgreement& l : logs) {

@@ -85,7 +85,8 @@ std::string ResidualSection(const Residuals& residuals) {
   }
   if (total == 0) return html + "<p>There are none.</p>\n";
   html +=
-      "<p>Whitened one-step errors of the posterior's mean. Of a model that explains the robot they are "
+      "<p>Whitened one-step errors of the posterior's mean. Of a model that explains the robot "
+      "they are "
       "independent, with the standard "
       "normal distribution. ";
   html += fmt::format("{} residuals", total);
@@ -93,13 +94,15 @@ std::string ResidualSection(const Residuals& residuals) {
     html += fmt::format(", and {} without a number", residuals.rows.size() - total);
   if (shown.size() > kMostCoordinates) {
     const size_t all = shown.size();
-    std::stable_sort(shown.begin(), shown.end(),
-                     [&](size_t a, size_t b) { return MeanSquare(sorted[a]) > MeanSquare(sorted[b]); });
+    std::stable_sort(shown.begin(), shown.end(), [&](size_t a, size_t b) {
+      return MeanSquare(sorted[a]) > MeanSquare(sorted[b]);
+    });
     shown.resize(kMostCoordinates);
     std::sort(shown.begin(), shown.end());
     html += fmt::format("; of {} coordinates the {} with the greatest", all, kMostCoordinates);
   }
-  html += ".</p>\n<figure><div class=\"scroll\">" + ResidualsOverTime(residuals.whitened, residuals.rows) +
+  html += ".</p>\n<figure><div class=\"scroll\">" +
+          ResidualsOverTime(residuals.whitened, residuals.rows) +
           "</div><figcaption>Root mean square over the record; dashed lines begin a "
           "roll-out.</figcaption></figure>\n";
   for (const size_t i : shown) {
@@ -107,14 +110,17 @@ std::string ResidualSection(const Residuals& residuals) {
         "<h3>{}</h3><p class=\"note\">root mean square {:.3g}, mean {:.2g}, {} residuals</p>\n<div "
         "class=\"panels\">\n",
         Escape(residuals.coordinates[i]), std::sqrt(MeanSquare(sorted[i])),
-        std::accumulate(sorted[i].begin(), sorted[i].end(), 0.) / static_cast<double>(sorted[i].size()),
+        std::accumulate(sorted[i].begin(), sorted[i].end(), 0.) /
+            static_cast<double>(sorted[i].size()),
         sorted[i].size());
     html += ResidualHistogram(sorted[i]) + ResidualQuantiles(sorted[i]) +
-            ResidualCorrelation(Autocorrelation(residuals, static_cast<int>(i), kLags), sorted[i].size()) +
+            ResidualCorrelation(Autocorrelation(residuals, static_cast<int>(i), kLags),
+                                sorted[i].size()) +
             "</div>\n";
   }
   return html +
-         "<p class=\"note\">Left: histogram and the standard normal density. Middle: quantiles. Right: "
+         "<p class=\"note\">Left: histogram and the standard normal density. Middle: quantiles. "
+         "Right: "
          "autocorrelation and the "
          "band of 95 % of white noise.</p>\n";
 }

@@ -10,8 +10,9 @@ namespace plumb {
 
 /// Whitened residuals of the posterior's mean, for a look at what the model leaves unexplained.
 struct Residuals {
-  Eigen::VectorXd whitened;              ///< NaN where there is none
-  std::vector<WindowErrors::Row> rows;   ///< what each is of; coordinate is an index of `coordinates`
+  Eigen::VectorXd whitened;  ///< NaN where there is none
+  /// what each is of; coordinate is an index of `coordinates`
+  std::vector<WindowErrors::Row> rows;
   std::vector<std::string> coordinates;  ///< names: "q knee", "v knee"
 };
 

@@ -8,14 +8,17 @@ namespace plumb {
 namespace {
 
 // Where the recorded steps lead these parameters, exactly, from the recorded states on.
-std::vector<Rollout> Replay(WindowErrors& errors, std::span<const Rollout> rollouts, const Eigen::VectorXd& physical) {
+std::vector<Rollout> Replay(WindowErrors& errors, std::span<const Rollout> rollouts,
+                            const Eigen::VectorXd& physical) {
   const Eigen::VectorXd raw = errors.Raw(physical);
   std::vector<Rollout> replayed(rollouts.begin(), rollouts.end());
   const Eigen::Index n = errors.num_velocities();
   for (size_t i = 0; i < errors.rows().size(); ++i) {
     const WindowErrors::Row& row = errors.rows()[i];
-    Transition& t = replayed[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
-    (row.coordinate < n ? t.next_q(row.coordinate) : t.next_v(row.coordinate - n)) += raw(static_cast<Eigen::Index>(i));
+    Transition& t =
+        replayed[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+    (row.coordinate < n ? t.next_q(row.coordinate) : t.next_v(row.coordinate - n)) +=
+        raw(static_cast<Eigen::Index>(i));
   }
   return replayed;
 }
@@ -37,8 +40,8 @@ void Blur(std::vector<Rollout>& rollouts, const Eigen::VectorXd& noise_sd, Rando
 
 }  // namespace
 
-SbcResult RunRobotSbc(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, const Eigen::VectorXd& noise_sd,
-                      const RobotSbcOptions& options) {
+SbcResult RunRobotSbc(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
+                      const Eigen::VectorXd& noise_sd, const RobotSbcOptions& options) {
   const RobotDescription& robot = model->description();
   const Prior prior = PriorOf(robot);
   WindowErrors errors(model, rollouts, 1, options.threads);
@@ -51,15 +54,19 @@ SbcResult RunRobotSbc(std::shared_ptr<const Model> model, std::span<const Rollou
   still.most_iterations = 0;
   const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), mean, still);
   const Eigen::VectorXd sd = (prior.FromStandard(Eigen::VectorXd::Ones(prior.size())) - mean);
-  for (const Combination& c : FindIdentifiability(robot, view.information, sd, view.posterior).combinations) {
-    if ((c.power.array() != 0).count() < 2) continue;  // a parameter on its own is among them already
-    quantities.push_back({c.name, [power = c.power](const Eigen::VectorXd& x) { return power.dot(x); }});
+  for (const Combination& c :
+       FindIdentifiability(robot, view.information, sd, view.posterior).combinations) {
+    // a parameter on its own is among them already
+    if ((c.power.array() != 0).count() < 2) continue;
+    quantities.push_back(
+        {c.name, [power = c.power](const Eigen::VectorXd& x) { return power.dot(x); }});
   }
   CurriculumOptions curriculum;
   curriculum.horizons = {1};
   curriculum.workforce = options.threads;
   int run = 0;
-  const auto fit = [&](const Eigen::VectorXd& truth, Random& random) -> std::optional<Eigen::MatrixXd> {
+  const auto fit = [&](const Eigen::VectorXd& truth,
+                       Random& random) -> std::optional<Eigen::MatrixXd> {
     options.progress(++run / static_cast<double>(options.runs));
     std::vector<Rollout> data = Replay(errors, rollouts, robot.ToPhysical(truth));
     Blur(data, noise_sd, random);

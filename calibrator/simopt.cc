@@ -15,7 +15,8 @@ namespace {
 // Where the paper's objectives end in costs mapped to [0, 1] (table of Cui & Hensel).
 constexpr double kScaledMinTemperature = 0.01;
 
-constexpr int kLongestWindow = 50;  // [control steps] beyond which one-step models of robots do not hold
+// [control steps] beyond which one-step models of robots do not hold
+constexpr int kLongestWindow = 50;
 
 std::optional<Objective> SearchOf(const std::string& method) {
   if (method == "reps") return Objective::kPosterior;
@@ -65,7 +66,9 @@ SimOpt::~SimOpt() = default;
 void SimOpt::Resume(State state) {
   for (const GaussianMixture* mixture : {&state.distribution, &state.before}) {
     for (const Gaussian& component : mixture->components) {
-      if (component.mean.size() == prior_.mean.size() && component.covariance.rows() == prior_.mean.size()) continue;
+      if (component.mean.size() == prior_.mean.size() &&
+          component.covariance.rows() == prior_.mean.size())
+        continue;
       throw std::invalid_argument("the checkpoint has another number of parameters than the robot");
     }
   }
@@ -93,7 +96,8 @@ std::span<const Rollout> SimOpt::Newest() const {
 Eigen::MatrixXd SimOpt::Samples(int iteration, int update) const {
   Eigen::MatrixXd normals(prior_.mean.size(), robot_.calibration.samples);
   for (Eigen::Index i = 0; i < normals.cols(); ++i) {
-    Random random(seed_, {static_cast<uint32_t>(iteration), static_cast<uint32_t>(update), static_cast<uint32_t>(i)});
+    Random random(seed_, {static_cast<uint32_t>(iteration), static_cast<uint32_t>(update),
+                          static_cast<uint32_t>(i)});
     for (Eigen::Index j = 0; j < normals.rows(); ++j) normals(j, i) = random.Normal();
   }
   return Transform(Moments(state_.distribution), normals);
@@ -103,12 +107,19 @@ Eigen::VectorXd SimOpt::Returns(const Eigen::MatrixXd& samples) {
   // Without data the samples' own scatter must not move anything.
   if (CountTransitions(state_.rollouts) == 0) return Eigen::VectorXd::Constant(samples.cols(), NAN);
   Eigen::MatrixXd physical(samples.rows(), samples.cols());
-  for (Eigen::Index i = 0; i < samples.cols(); ++i) physical.col(i) = robot_.ToPhysical(samples.col(i));
+  for (Eigen::Index i = 0; i < samples.cols(); ++i)
+    physical.col(i) = robot_.ToPhysical(samples.col(i));
   Eigen::VectorXd values;
   switch (*objective_) {
-    case Objective::kPosterior: values = discrepancy_.LogLikelihood(physical, state_.rollouts); break;
-    case Objective::kStep: values = discrepancy_.StepError(physical, Newest()); break;
-    case Objective::kTrajectory: values = discrepancy_.TrajectoryError(physical, Newest()); break;
+    case Objective::kPosterior:
+      values = discrepancy_.LogLikelihood(physical, state_.rollouts);
+      break;
+    case Objective::kStep:
+      values = discrepancy_.StepError(physical, Newest());
+      break;
+    case Objective::kTrajectory:
+      values = discrepancy_.TrajectoryError(physical, Newest());
+      break;
   }
   if (objective_ != Objective::kPosterior) return ScaledReturns(values);
   const Gaussian present = Moments(state_.distribution);
@@ -129,11 +140,14 @@ std::optional<CalibrationReport> SimOpt::Update() {
 void SimOpt::Search() {
   const Eigen::MatrixXd samples = Samples(state_.iteration + 1, state_.update);
   const Eigen::VectorXd returns = Returns(samples);
-  if (returns.array().isNaN().any() || !std::isfinite(returns.maxCoeff())) return;  // nothing is known: keep it
-  const double coldest = objective_ == Objective::kPosterior ? robot_.calibration.min_temperature : kScaledMinTemperature;
+  // nothing is known: keep it
+  if (returns.array().isNaN().any() || !std::isfinite(returns.maxCoeff())) return;
+  const double coldest = objective_ == Objective::kPosterior ? robot_.calibration.min_temperature
+                                                             : kScaledMinTemperature;
   const RepsWeights weights = SolveReps(returns, robot_.calibration.kl, coldest);
   const Gaussian present = Moments(state_.distribution);
-  const Gaussian limited = LimitKl(present, FitGaussian(samples, weights, present), robot_.calibration.kl);
+  const Gaussian limited =
+      LimitKl(present, FitGaussian(samples, weights, present), robot_.calibration.kl);
   state_.kl += KlDivergence(limited, present);
   state_.ess = weights.ess;
   state_.temperature = weights.temperature;
@@ -155,22 +169,25 @@ void SimOpt::Infer() {
   }
 }
 
-// One mode leads to the next iteration's. Of several none may be given up, and in the beginning there is none: the
-// search is then one from many places, the prior's mean first.
+// One mode leads to the next iteration's. Of several none may be given up, and in the beginning
+// there is none: the search is then one from many places, the prior's mean first.
 MethodResult SimOpt::RunFromWhereItIs() const {
   CalibrationOptions options;
   options.method = method_;
   options.horizons = {1};
-  for (const int horizon : robot_.calibration.horizons) options.horizons.push_back(std::min(horizon, kLongestWindow));
+  for (const int horizon : robot_.calibration.horizons)
+    options.horizons.push_back(std::min(horizon, kLongestWindow));
   std::sort(options.horizons.begin(), options.horizons.end());
-  options.horizons.erase(std::unique(options.horizons.begin(), options.horizons.end()), options.horizons.end());
+  options.horizons.erase(std::unique(options.horizons.begin(), options.horizons.end()),
+                         options.horizons.end());
   options.seed = seed_;
   options.workforce = threads_;
   const bool one_mode = state_.iteration > 0 && state_.before.components.size() == 1;
   if (one_mode) {
     try {
       return RunMethod({model_, state_.rollouts, options, state_.before.components[0].mean});
-    } catch (const std::invalid_argument&) {  // perhaps it cannot be simulated where the new roll-outs went
+      // perhaps it cannot be simulated where the new roll-outs went
+    } catch (const std::invalid_argument&) {
     }
   }
   return RunMethod({model_, state_.rollouts, options});
@@ -180,8 +197,8 @@ std::optional<CalibrationReport> SimOpt::Report() {
   if (state_.iteration == 0 || running()) return {};
   const auto newest = Newest();
   Eigen::MatrixXd physical(prior_.mean.size(), 3);
-  physical << robot_.ToPhysical(Moments(state_.before).mean), robot_.ToPhysical(Moments(state_.distribution).mean),
-      robot_.ToPhysical(prior_.mean);
+  physical << robot_.ToPhysical(Moments(state_.before).mean),
+      robot_.ToPhysical(Moments(state_.distribution).mean), robot_.ToPhysical(prior_.mean);
   CalibrationReport report;
   report.iteration = state_.iteration;
   report.kl = state_.kl;
@@ -194,7 +211,8 @@ std::optional<CalibrationReport> SimOpt::Report() {
     const Eigen::VectorXd errors = discrepancy_.PredictionError(physical, newest, horizon);
     report.errors.push_back({horizon, errors(0), errors(1), errors(2)});
   }
-  report.identifiability = FindIdentifiability(robot_, discrepancy_, state_.rollouts, Moments(state_.distribution));
+  report.identifiability =
+      FindIdentifiability(robot_, discrepancy_, state_.rollouts, Moments(state_.distribution));
   report.failures = discrepancy_.failures();
   report.failures.diverged += failures_;
   report.warnings = warnings_;

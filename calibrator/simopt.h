@@ -17,14 +17,17 @@ namespace plumb {
 
 /// What an update by relative-entropy policy search strives for.
 enum class Objective {
-  /// R = ln p(transitions | xi) + ln prior(xi) - ln p_phi(xi), temperature >= min_temperature. With temperature 1
-  /// the weighted samples are exactly the Bayesian posterior's, so the distribution comes to rest there: it
-  /// neither collapses nor forgets its prior where the data say nothing. A greater temperature (the KL bound)
-  /// is a step on the geometric path from p_phi to the posterior.
+  /// R = ln p(transitions | xi) + ln prior(xi) - ln p_phi(xi), temperature >= min_temperature. With
+  /// temperature 1 the weighted samples are exactly the Bayesian posterior's, so the distribution
+  /// comes to rest there: it neither collapses nor forgets its prior where the data say nothing. A
+  /// greater temperature (the KL bound) is a step on the geometric path from p_phi to the
+  /// posterior.
   kPosterior,
-  /// R = - step error of the newest roll-out, costs mapped to [0, 1], temperature >= 0.01: the paper's.
+  /// R = - step error of the newest roll-out, costs mapped to [0, 1], temperature >= 0.01: the
+  /// paper's.
   kStep,
-  /// R = - trajectory error of the newest roll-out (SimOpt eq. 5), costs mapped to [0, 1], temperature >= 0.01.
+  /// R = - trajectory error of the newest roll-out (SimOpt eq. 5), costs mapped to [0, 1],
+  /// temperature >= 0.01.
   kTrajectory,
 };
 
@@ -39,8 +42,10 @@ struct PredictionErrors {
 /// What one iteration found.
 struct CalibrationReport {
   int iteration = 0;
-  double kl = 0;           ///< D_KL(after || before) of their moments, summed over the updates [nat]
-  double ess = 0;          ///< effective sample size of the last update; NaN = the method draws no samples
+  /// D_KL(after || before) of their moments, summed over the updates [nat]
+  double kl = 0;
+  /// effective sample size of the last update; NaN = the method draws no samples
+  double ess = 0;
   double temperature = 0;  ///< of the last update; 1 = Bayes' rule
   double discrepancy = 0;  ///< step error of the mean on the newest roll-out; 1 = down to the noise
   double prior_discrepancy = 0;
@@ -50,13 +55,16 @@ struct CalibrationReport {
   std::vector<std::string> warnings;  ///< of the method; empty after Resume
 };
 
-/// The loop's inference: the distribution over simulators, from roll-outs that come iteration by iteration.
-///   auto, laplace, mixture   one update an iteration: the posterior given all roll-outs so far (RunMethod). Windows grow up to
-///                            the robot's calibration horizons, or 50 steps; the search begins at the present mean
-///   reps                     some updates an iteration by step-based SimOpt (Cui & Hensel), Objective::kPosterior
+/// The loop's inference: the distribution over simulators, from roll-outs that come iteration by
+/// iteration.
+///   auto, laplace, mixture   one update an iteration: the posterior given all roll-outs so far
+///                            (RunMethod). Windows grow up to the robot's calibration horizons, or
+///                            50 steps; the search begins at the present mean
+///   reps                     some updates an iteration by step-based SimOpt (Cui & Hensel),
+///                            Objective::kPosterior
 ///   simopt                   the same with Objective::kTrajectory
-/// Random numbers are keyed by (seed, iteration, update), so an interrupted calibration resumes to the same bits,
-/// with any number of threads. Not thread-safe; uses `threads` threads inside.
+/// Random numbers are keyed by (seed, iteration, update), so an interrupted calibration resumes to
+/// the same bits, with any number of threads. Not thread-safe; uses `threads` threads inside.
 class SimOpt {
  public:
   /// Everything a resumed run needs, apart from the robot.
@@ -71,7 +79,8 @@ class SimOpt {
   };
 
   /// By relative-entropy policy search.
-  SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective = Objective::kPosterior);
+  SimOpt(const RobotDescription& robot, uint64_t seed, int threads,
+         Objective objective = Objective::kPosterior);
   /// By the method of that name. @throws std::invalid_argument naming the nearest if there is none.
   SimOpt(const RobotDescription& robot, uint64_t seed, int threads, const std::string& method);
   ~SimOpt();
@@ -80,16 +89,19 @@ class SimOpt {
   /// Takes up an earlier state. @throws std::invalid_argument if it is not of this robot.
   void Resume(State state);
 
-  /// Begins an iteration with the roll-outs of the newest policy. They may hold no usable transition: the
-  /// iteration then goes by with what earlier ones have shown. @throws std::invalid_argument if one is running.
+  /// Begins an iteration with the roll-outs of the newest policy. They may hold no usable
+  /// transition: the iteration then goes by with what earlier ones have shown. @throws
+  /// std::invalid_argument if one is running.
   void Begin(std::vector<Rollout> rollouts);
   bool running() const;
-  /// One update. Data that cannot be used leave the distribution as it is. @return the report when it was the iteration's last.
+  /// One update. Data that cannot be used leave the distribution as it is. @return the report when
+  /// it was the iteration's last.
   std::optional<CalibrationReport> Update();
   /// The report of the iteration completed last, e.g. after Resume; empty for the prior.
   std::optional<CalibrationReport> Report();
 
-  /// n x samples of the distribution's coordinates that update `update` of iteration `iteration` evaluates, of reps and simopt.
+  /// n x samples of the distribution's coordinates that update `update` of iteration `iteration`
+  /// evaluates, of reps and simopt.
   Eigen::MatrixXd Samples(int iteration, int update) const;
 
  private:

@@ -53,7 +53,8 @@ Eigen::VectorXd Prune(const Eigen::VectorXd& x) {
   return (x.array().abs() < kEntry * x.cwiseAbs().maxCoeff()).select(0, x);
 }
 
-// Integers in proportion to x, if there are small ones that belong; else x with 1 as its first entry.
+// Integers in proportion to x, if there are small ones that belong; else x with 1 as its first
+// entry.
 Eigen::VectorXd Round(const Eigen::VectorXd& x, const Belongs& belongs) {
   double smallest = x.cwiseAbs().maxCoeff();
   const Eigen::Index first = First(x);
@@ -77,7 +78,9 @@ std::vector<Eigen::VectorXd> SparseBasis(const Eigen::MatrixXd& space, const Eig
   const Eigen::Index n = space.rows(), k = space.cols();
   if (k == 0) return chosen;
   const Eigen::MatrixXd orthonormal =
-      FirstColumns(Eigen::HouseholderQR<Eigen::MatrixXd>(unit.cwiseInverse().asDiagonal() * space).householderQ(), k);
+      FirstColumns(Eigen::HouseholderQR<Eigen::MatrixXd>(unit.cwiseInverse().asDiagonal() * space)
+                       .householderQ(),
+                   k);
   Random random(0);
   for (int trial = 0; trial < kTrials; ++trial) {
     const std::vector<Eigen::Index> pivots = IndependentRows(orthonormal, random);

@@ -13,7 +13,8 @@ namespace {
 constexpr int kPeriods = 30;  // of control, until the filter has settled
 constexpr double kUnknown = 1e6, kUnmeasured = 1e3;
 
-// (sd of q, sd of v) where the acceleration steps by an unknown amount of this sd once per control step.
+// (sd of q, sd of v) where the acceleration steps by an unknown amount of this sd once per control
+// step.
 Eigen::Vector2d Smoothed(const EstimatorSettings& settings, double dt, int per_control_step,
                          double acceleration_step) {
   Eigen::Matrix3d transition, process;
@@ -23,9 +24,11 @@ Eigen::Vector2d Smoothed(const EstimatorSettings& settings, double dt, int per_c
       std::pow(dt, 4) / 8, std::pow(dt, 3) / 3, dt * dt / 2,                  //
       std::pow(dt, 3) / 6, dt * dt / 2, dt;
   process *= s;
-  const Eigen::Vector2d measurement(std::pow(settings.position_sd, 2), std::pow(settings.velocity_sd, 2));
+  const Eigen::Vector2d measurement(std::pow(settings.position_sd, 2),
+                                    std::pow(settings.velocity_sd, 2));
   std::vector<Eigen::Matrix3d> filtered, predicted;
-  Eigen::Matrix3d covariance = Eigen::Vector3d(measurement(0), measurement(1), kUnknown).asDiagonal();
+  Eigen::Matrix3d covariance =
+      Eigen::Vector3d(measurement(0), measurement(1), kUnknown).asDiagonal();
   // As many steps of control after the middle as the lag allows to look ahead.
   const int at = kPeriods * per_control_step, last = at + settings.lag;
   for (int k = 0; k <= last; ++k) {
@@ -41,7 +44,8 @@ Eigen::Vector2d Smoothed(const EstimatorSettings& settings, double dt, int per_c
   Eigen::Matrix3d smoothed = filtered.back();
   for (int k = last - 1; k >= at; --k) {
     const Eigen::Matrix3d& ahead = predicted[static_cast<size_t>(k + 1)];
-    const Eigen::Matrix3d gain = filtered[static_cast<size_t>(k)] * transition.transpose() * ahead.inverse();
+    const Eigen::Matrix3d gain =
+        filtered[static_cast<size_t>(k)] * transition.transpose() * ahead.inverse();
     smoothed = filtered[static_cast<size_t>(k)] + gain * (smoothed - ahead) * gain.transpose();
   }
   return smoothed.diagonal().head<2>().cwiseSqrt();
@@ -52,7 +56,8 @@ bool MeasuresVelocity(const RobotDescription& robot, int joint) {
   const auto encoder = [&](const SensorDescription& sensor) {
     return sensor.link < 0 && sensor.joint == joint;
   };
-  return !robot.joints[static_cast<size_t>(joint)].passive || std::ranges::none_of(robot.sensors, encoder);
+  return !robot.joints[static_cast<size_t>(joint)].passive ||
+         std::ranges::none_of(robot.sensors, encoder);
 }
 
 }  // namespace
@@ -75,9 +80,9 @@ Eigen::VectorXd SmoothedNoise(const RobotDescription& robot) {
   for (int j = 0; j < robot.num_joints(); ++j) {
     EstimatorSettings settings = EstimatorOf(robot, j);
     if (!MeasuresVelocity(robot, j)) settings.velocity_sd = kUnmeasured;
-    const Eigen::Vector2d noise =
-        Smoothed(settings, dt, per_control_step,
-                 settings.effort_step * felt(robot.joints[static_cast<size_t>(j)], settings.coupling));
+    const Eigen::Vector2d noise = Smoothed(
+        settings, dt, per_control_step,
+        settings.effort_step * felt(robot.joints[static_cast<size_t>(j)], settings.coupling));
     for (int i = 0; i < robot.joints[static_cast<size_t>(j)].num_velocities(); ++i, ++velocity) {
       sd(velocity) = noise(0);
       sd(n + velocity) = noise(1);

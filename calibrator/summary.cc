@@ -40,16 +40,19 @@ void RequireFit(const Findings& findings, Eigen::Index n) {
     total += mixture.weights[i];
     RequireGaussian(mixture.components[i], n, fmt::format("component {} of the posterior", i));
   }
-  Require(std::abs(total - 1) <= kRounding, fmt::format("the posterior's weights sum to {}", total));
+  Require(std::abs(total - 1) <= kRounding,
+          fmt::format("the posterior's weights sum to {}", total));
   const Eigen::MatrixXd& samples = findings.samples;
-  Require(samples.cols() == 0 || samples.rows() == n, fmt::format("the samples are not of {} parameters", n));
+  Require(samples.cols() == 0 || samples.rows() == n,
+          fmt::format("the samples are not of {} parameters", n));
   Require(samples.allFinite(), "the samples are not finite");
 }
 
 Eigen::MatrixXd Draw(const Findings& findings, const RobotDescription& robot) {
   Random random(findings.seed, {kStream});
   Eigen::MatrixXd samples(findings.prior.mean.size(), kDraws);
-  for (auto column : samples.colwise()) column = robot.ToPhysical(Sample(findings.posterior, random));
+  for (auto column : samples.colwise())
+    column = robot.ToPhysical(Sample(findings.posterior, random));
   return samples;
 }
 
@@ -63,7 +66,8 @@ double Quantile(const std::vector<double>& sorted, double share) {
   return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
-ParameterDistribution ToDistribution(const GaussianMixture& mixture, const RobotDescription& robot) {
+ParameterDistribution ToDistribution(const GaussianMixture& mixture,
+                                     const RobotDescription& robot) {
   ParameterDistribution distribution;
   distribution.iteration = 1;
   distribution.parameters = robot.parameters;
@@ -95,10 +99,10 @@ Summary Summarise(const Findings& findings, const RobotDescription& robot) {
   }
 
   summary.coordinates = Moments(findings.posterior);
-  summary.gain =
-      (findings.prior.covariance.diagonal().array() / summary.coordinates.covariance.diagonal().array())
-          .log() /
-      2;
+  summary.gain = (findings.prior.covariance.diagonal().array() /
+                  summary.coordinates.covariance.diagonal().array())
+                     .log() /
+                 2;
   return summary;
 }
 

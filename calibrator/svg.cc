@@ -25,7 +25,8 @@ size_t CharacterLength(const std::string& text, size_t at) {
   if (first < 0x80) return 1;
   if (first >= 0xc2 && first <= 0xdf && continues(1)) return 2;
   const bool overlong = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xf0 && byte(1) < 0x90);
-  const bool surrogate = first == 0xed && byte(1) >= 0xa0, beyond = first == 0xf4 && byte(1) >= 0x90;
+  const bool surrogate = first == 0xed && byte(1) >= 0xa0,
+             beyond = first == 0xf4 && byte(1) >= 0x90;
   const bool not_xml = first == 0xef && byte(1) == 0xbf && byte(2) >= 0xbe;  // U+FFFE and U+FFFF
   if (overlong || surrogate || beyond || not_xml) return 0;
   if (first >= 0xe0 && first <= 0xef && continues(2)) return 3;
@@ -58,7 +59,8 @@ std::string Escape(const std::string& text) {
   for (size_t at = 0; at < text.size();) {
     const size_t length = CharacterLength(text, at);
     const char c = text[at];
-    if (length == 0 || (static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t') || c == 127) {
+    if (length == 0 || (static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t') ||
+        c == 127) {
       escaped += "\xef\xbf\xbd";  // U+FFFD, replacement character
     } else if (c == '&') {
       escaped += "&amp;";
@@ -92,7 +94,8 @@ Axis::Axis(double lower, double upper, double from, double to, bool logarithmic)
   if (logarithmic_) {
     lower_ /= 2, upper_ *= 2;
   } else {
-    const double room = std::max(1e-9 * std::abs(lower_), lower_ == 0 ? 1. : 1e-3 * std::abs(lower_));
+    const double room =
+        std::max(1e-9 * std::abs(lower_), lower_ == 0 ? 1. : 1e-3 * std::abs(lower_));
     lower_ -= room, upper_ += room;
   }
 }
@@ -151,12 +154,14 @@ void Svg::Path(const std::vector<Eigen::Vector2d>& points, const std::string& cs
     d += fmt::format("{}{:.1f} {:.1f}", command, p.x(), p.y());
     command = 'L';
   }
-  if (!d.empty()) body_ += fmt::format("<path class=\"{}\" d=\"{}{}\"/>\n", css, d, closed ? "Z" : "");
+  if (!d.empty())
+    body_ += fmt::format("<path class=\"{}\" d=\"{}{}\"/>\n", css, d, closed ? "Z" : "");
 }
 
 void Svg::Circle(double x, double y, double radius, const std::string& css) {
   if (!std::isfinite(x) || !std::isfinite(y)) return;
-  body_ += fmt::format("<circle class=\"{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\"/>\n", css, x, y, radius);
+  body_ += fmt::format("<circle class=\"{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\"/>\n", css, x, y,
+                       radius);
 }
 
 void Svg::Dots(const std::vector<Eigen::Vector2d>& points, const std::string& css) {
@@ -169,8 +174,9 @@ void Svg::Dots(const std::vector<Eigen::Vector2d>& points, const std::string& cs
 
 void Svg::Rectangle(double x, double y, double width, double height, const std::string& css) {
   if (!std::isfinite(x + y + width + height)) return;
-  body_ += fmt::format("<rect class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n",
-                       css, x, y, std::max(0., width), std::max(0., height));
+  body_ += fmt::format(
+      "<rect class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n", css, x,
+      y, std::max(0., width), std::max(0., height));
 }
 
 void Svg::Text(double x, double y, const std::string& text, const std::string& css, Anchor anchor,
@@ -179,20 +185,22 @@ void Svg::Text(double x, double y, const std::string& text, const std::string& c
   constexpr const char* kAnchors[] = {"start", "middle", "end"};
   const std::string turn =
       angle == 0 ? "" : fmt::format(" transform=\"rotate({} {:.1f} {:.1f})\"", angle, x, y);
-  body_ += fmt::format("<text class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", css,
-                       x, y, kAnchors[static_cast<int>(anchor)], turn, Escape(text));
+  body_ +=
+      fmt::format("<text class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n",
+                  css, x, y, kAnchors[static_cast<int>(anchor)], turn, Escape(text));
 }
 
 // A nested <svg> clips without an id that would have to be unique in the page.
 void Svg::BeginClip(double x, double y, double width, double height) {
   body_ += fmt::format(
-      "<svg x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{3:.1f}\" viewBox=\"{0:.1f} {1:.1f} "
+      "<svg x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{3:.1f}\" viewBox=\"{0:.1f} "
+      "{1:.1f} "
       "{2:.1f} {3:.1f}\">\n",
       x, y, width, height);
 }
 
-void Svg::Frame(const Axis& x, const Axis& y, const std::string& x_label, const std::string& y_label,
-                int x_ticks, int y_ticks) {
+void Svg::Frame(const Axis& x, const Axis& y, const std::string& x_label,
+                const std::string& y_label, int x_ticks, int y_ticks) {
   const double left = x.from(), right = x.to(), bottom = y.from(), top = y.to();
   if (!x_label.empty()) {
     for (const auto& [value, label] : x.Ticks(x_ticks)) {

@@ -6,8 +6,9 @@
 
 namespace plumb {
 
-/// For text and attribute values of HTML and SVG: & < > " ' are escaped, control characters and bytes that
-/// are not UTF-8 replaced, so that a page stays well-formed XML whatever a file called itself.
+/// For text and attribute values of HTML and SVG: & < > " ' are escaped, control characters and
+/// bytes that are not UTF-8 replaced, so that a page stays well-formed XML whatever a file called
+/// itself.
 std::string Escape(const std::string& text);
 
 /// At most `length` bytes and an ellipsis in their middle: of a path the end tells most. For ASCII.
@@ -31,7 +32,8 @@ class Axis {
     double value;
     std::string label;
   };
-  /// At most `count` round values; logarithmic: powers of ten, with 2 and 5 between where there are few.
+  /// At most `count` round values; logarithmic: powers of ten, with 2 and 5 between where there are
+  /// few.
   std::vector<Tick> Ticks(int count) const;
 
  private:
@@ -39,8 +41,8 @@ class Axis {
   bool logarithmic_;
 };
 
-/// A drawing under construction. Everything has a CSS class, which gives it its colours: dark and light in
-/// one drawing. Coordinates are pixels, y downwards; what is not finite is left out.
+/// A drawing under construction. Everything has a CSS class, which gives it its colours: dark and
+/// light in one drawing. Coordinates are pixels, y downwards; what is not finite is left out.
 class Svg {
  public:
   /// @param title is read out to those who cannot see the drawing.
@@ -48,7 +50,8 @@ class Svg {
 
   void Line(double x1, double y1, double x2, double y2, const std::string& css);
   /// Points (x, y) in rows; interrupted where one is not finite.
-  void Path(const std::vector<Eigen::Vector2d>& points, const std::string& css, bool closed = false);
+  void Path(const std::vector<Eigen::Vector2d>& points, const std::string& css,
+            bool closed = false);
   /// Many dots, as large as the class' stroke is wide, with round caps.
   void Dots(const std::vector<Eigen::Vector2d>& points, const std::string& css);
   void Circle(double x, double y, double radius, const std::string& css);

@@ -32,7 +32,8 @@ bool TouchesStop(const RobotDescription& robot, const Eigen::Ref<const Eigen::Ve
 }  // namespace
 
 Touch FindTouch(const RobotDescription& robot, const Eigen::Ref<const Eigen::VectorXd>& q) {
-  if (q.size() != robot.num_positions()) throw std::invalid_argument("the state is not one of " + robot.name);
+  if (q.size() != robot.num_positions())
+    throw std::invalid_argument("the state is not one of " + robot.name);
   return {TouchesGround(robot, q), robot.simulation.stop && TouchesStop(robot, q)};
 }
 

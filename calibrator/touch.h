@@ -14,13 +14,15 @@ struct Touch {
   bool any() const { return ground || stop; }
 };
 
-/// Only what the robot's simulator knows counts: the ground with SimulationSettings::contact, stops with
-/// ::stop.
+/// Only what the robot's simulator knows counts: the ground with SimulationSettings::contact, stops
+/// with ::stop.
 /// @param robot with known parameters (Model::Describe), as lengths decide how far down it reaches.
-/// @param q as in RobotDescription. @throws std::invalid_argument if q has the wrong size. Thread-safe.
+/// @param q as in RobotDescription. @throws std::invalid_argument if q has the wrong size.
+/// Thread-safe.
 Touch FindTouch(const RobotDescription& robot, const Eigen::Ref<const Eigen::VectorXd>& q);
 
-/// Of a transition: at its beginning or its end. Where the end was not observed the beginning has to do.
+/// Of a transition: at its beginning or its end. Where the end was not observed the beginning has
+/// to do.
 Touch FindTouch(const RobotDescription& robot, const Transition& transition);
 
 }  // namespace plumb

@@ -18,9 +18,11 @@ Eigen::VectorXd ToEigen(const std::vector<double>& values) {
   return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-// Where a staircase of efforts steps once, within a measurement's interval, its mean tells when: with e0 before and e1 after, after the share
-// (e1 - mean) / (e1 - e0). The step is put back there. Left as its mean, it would move a joint wrongly by up to a / 8 T^2, a the step of the
-// acceleration and T the interval: 1.6 % of what a command does in four intervals. Where there are more steps, or none, nothing is changed.
+// Where a staircase of efforts steps once, within a measurement's interval, its mean tells when:
+// with e0 before and e1 after, after the share (e1 - mean) / (e1 - e0). The step is put back there.
+// Left as its mean, it would move a joint wrongly by up to a / 8 T^2, a the step of the
+// acceleration and T the interval: 1.6 % of what a command does in four intervals. Where there are
+// more steps, or none, nothing is changed.
 // @param before effort of the interval before the first segment.
 void RestoreStep(const Eigen::VectorXd& before, std::vector<EffortSegment>* segments) {
   constexpr double kSame = 1e-9;  // of an effort: rounding of a mean
@@ -29,7 +31,9 @@ void RestoreStep(const Eigen::VectorXd& before, std::vector<EffortSegment>* segm
   const double step = (after - before).cwiseAbs().maxCoeff(&joint);
   const double same = kSame * (1 + before.cwiseAbs().maxCoeff() + after.cwiseAbs().maxCoeff());
   if (!(step > same)) return;
-  const auto is = [&](const EffortSegment& segment, const Eigen::VectorXd& effort) { return (segment.effort - effort).cwiseAbs().maxCoeff() <= same; };
+  const auto is = [&](const EffortSegment& segment, const Eigen::VectorXd& effort) {
+    return (segment.effort - effort).cwiseAbs().maxCoeff() <= same;
+  };
   auto mixed = segments->begin();
   while (mixed != segments->end() && is(*mixed, before)) ++mixed;
   if (mixed == segments->end() || is(*mixed, after)) return;  // it steps where an interval begins
@@ -39,7 +43,8 @@ void RestoreStep(const Eigen::VectorXd& before, std::vector<EffortSegment>* segm
   if (mixed + 1 == segments->end()) return;  // what comes after it is not known
   const double share = (after(joint) - mixed->effort(joint)) / (after(joint) - before(joint));
   if (!(share > kSame && share < 1 - kSame)) return;
-  const EffortSegment rest{(1 - share) * mixed->duration, (mixed->effort - share * before) / (1 - share)};
+  const EffortSegment rest{(1 - share) * mixed->duration,
+                           (mixed->effort - share * before) / (1 - share)};
   *mixed = {share * mixed->duration, before};
   segments->insert(mixed + 1, rest);
 }
@@ -47,13 +52,14 @@ void RestoreStep(const Eigen::VectorXd& before, std::vector<EffortSegment>* segm
 }  // namespace
 
 double Transition::duration() const {
-  return std::accumulate(efforts.begin(), efforts.end(), 0.0,
-                         [](double sum, const EffortSegment& segment) { return sum + segment.duration; });
+  return std::accumulate(
+      efforts.begin(), efforts.end(), 0.0,
+      [](double sum, const EffortSegment& segment) { return sum + segment.duration; });
 }
 
 std::string DropCounts::words() const {
-  std::string words =
-      fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap, gap == 1 ? "" : "s", late, not_finite, restart);
+  std::string words = fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap,
+                                  gap == 1 ? "" : "s", late, not_finite, restart);
   if (model_based > 0) words += fmt::format(", {} model-based", model_based);
   return words;
 }
@@ -65,7 +71,10 @@ DropCounts& DropCounts::operator+=(const DropCounts& other) {
 }
 
 TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
-    : n_(robot.num_joints()), period_(robot.task.period), most_states_(kMostStates), most_episodes_(kMostEpisodes) {}
+    : n_(robot.num_joints()),
+      period_(robot.task.period),
+      most_states_(kMostStates),
+      most_episodes_(kMostEpisodes) {}
 
 TransitionJoiner TransitionJoiner::Unbounded(const RobotDescription& robot) {
   TransitionJoiner joiner(robot);
@@ -80,8 +89,10 @@ const robot_state_t* TransitionJoiner::FindState(int64_t sequence) const {
 
 void TransitionJoiner::OnState(const robot_state_t& smoothed) {
   if (smoothed.num_joints != n_) return;
-  // A restarted driver counts from 0 again, at a later time; what was before cannot be joined with it.
-  if (!states_.empty() && smoothed.sequence <= newest_state() && smoothed.utime > states_.rbegin()->second.utime) {
+  // A restarted driver counts from 0 again, at a later time; what was before cannot be joined with
+  // it.
+  if (!states_.empty() && smoothed.sequence <= newest_state() &&
+      smoothed.utime > states_.rbegin()->second.utime) {
     states_.clear();
     commands_.clear();
   }
@@ -90,7 +101,9 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
 }
 
 void TransitionJoiner::OnCommand(const joint_command_t& command) {
-  if (command.num_joints != n_ || command.episode < 0 || command.step < 0 || command.step >= kMostSteps) return;
+  if (command.num_joints != n_ || command.episode < 0 || command.step < 0 ||
+      command.step >= kMostSteps)
+    return;
   commands_[command.episode].insert_or_assign(command.step, command);
   if (commands_.size() > most_episodes_) commands_.erase(commands_.begin());
 }
@@ -111,7 +124,8 @@ Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
     Transition transition;
     transition.step = command->first;
     const int64_t to = next != commands.end() ? next->second.state_sequence : last_state;
-    if (JoinOne(command->second.state_sequence, to, &transition, &drops_)) rollout.transitions.push_back(std::move(transition));
+    if (JoinOne(command->second.state_sequence, to, &transition, &drops_))
+      rollout.transitions.push_back(std::move(transition));
   }
   commands_.erase(found);
   return rollout;
@@ -129,14 +143,16 @@ std::vector<Transition> TransitionJoiner::Arrived(int64_t episode, int* from) co
     Transition transition;
     transition.step = command->first;
     const bool follows = next->first == command->first + 1;
-    if (follows && JoinOne(command->second.state_sequence, next->second.state_sequence, &transition, &uncounted)) {
+    if (follows && JoinOne(command->second.state_sequence, next->second.state_sequence, &transition,
+                           &uncounted)) {
       arrived.push_back(std::move(transition));
     }
   }
   return arrived;
 }
 
-bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition, DropCounts* drops) const {
+bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
+                               DropCounts* drops) const {
   const auto first = states_.find(from), last = states_.find(to);
   if (first == states_.end() || last == states_.end() || to <= from) {
     ++drops->gap;
@@ -165,7 +181,8 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
       ++drops->restart;
       return false;
     }
-    EffortSegment segment{static_cast<double>(now.utime - before.utime) * 1e-6, ToEigen(now.effort)};
+    EffortSegment segment{static_cast<double>(now.utime - before.utime) * 1e-6,
+                          ToEigen(now.effort)};
     finite = finite && segment.duration > 0 && segment.effort.allFinite();
     transition->efforts.push_back(std::move(segment));
   }
@@ -175,16 +192,17 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
   transition->next_q = ToEigen(t.q), transition->next_v = ToEigen(t.v);
   transition->q_sd = ToEigen(s.q_sd), transition->v_sd = ToEigen(s.v_sd);
   transition->next_q_sd = ToEigen(t.q_sd), transition->next_v_sd = ToEigen(t.v_sd);
-  for (const Eigen::VectorXd* x : {&transition->q, &transition->v, &transition->next_q, &transition->next_v,
-                                   &transition->q_sd, &transition->v_sd, &transition->next_q_sd,
-                                   &transition->next_v_sd}) {
+  for (const Eigen::VectorXd* x :
+       {&transition->q, &transition->v, &transition->next_q, &transition->next_v, &transition->q_sd,
+        &transition->v_sd, &transition->next_q_sd, &transition->next_v_sd}) {
     finite = finite && x->allFinite();
   }
   if (!finite) {
     ++drops->not_finite;
     return false;
   }
-  if (const Eigen::VectorXd before = ToEigen(s.effort); before.allFinite()) RestoreStep(before, &transition->efforts);
+  if (const Eigen::VectorXd before = ToEigen(s.effort); before.allFinite())
+    RestoreStep(before, &transition->efforts);
   return true;
 }
 

@@ -13,16 +13,16 @@
 
 namespace plumb {
 
-/// One control step of the robot: s -> s' under the effort that was actually applied, cycle by cycle. The first
-/// segments still carry the previous command: it takes milliseconds until a command reaches the motor, and a
-/// simulator that ignored that would be calibrated to be wrong.
+/// One control step of the robot: s -> s' under the effort that was actually applied, cycle by
+/// cycle. The first segments still carry the previous command: it takes milliseconds until a
+/// command reaches the motor, and a simulator that ignored that would be calibrated to be wrong.
 struct Transition {
-  int step;                              ///< in the episode
-  Eigen::VectorXd q, v;                  ///< smoothed state, finite
-  Eigen::VectorXd next_q, next_v;        ///< smoothed state; NaN = not observed
+  int step;                        ///< in the episode
+  Eigen::VectorXd q, v;            ///< smoothed state, finite
+  Eigen::VectorXd next_q, next_v;  ///< smoothed state; NaN = not observed
   /// Their standard deviations. 0 = exact; NaN = not known, to be estimated from the errors.
   Eigen::VectorXd q_sd, v_sd, next_q_sd, next_v_sd;
-  std::vector<EffortSegment> efforts;                ///< from s to s', gapless
+  std::vector<EffortSegment> efforts;  ///< from s to s', gapless
   double duration() const;
 };
 
@@ -39,20 +39,22 @@ struct DropCounts {
   int64_t late = 0;        ///< the interval is not one control period (within 20 %)
   int64_t not_finite = 0;  ///< or an effort is unknown
   int64_t restart = 0;     ///< the estimator's filter restarted within the interval
-  int64_t model_based = 0;  ///< the simulator's dynamics are in a state: what it tells of parameters is what was put in
+  /// the simulator's dynamics are in a state: what it tells of parameters is what was put in
+  int64_t model_based = 0;
   int64_t total() const { return gap + late + not_finite + restart + model_based; }
   DropCounts& operator+=(const DropCounts& other);
   /// "1 gap, 2 late, 0 not finite, 3 across restarts", and ", 4 model-based" if there are any
   std::string words() const;
 };
 
-/// Joins ROBOT_STATE_SMOOTHED and JOINT_COMMAND by state_sequence: s is the state a command acted on, s' the
-/// state the next command acted on. The result depends on the messages' contents only, not on the order in
-/// which the two channels interleave. ROBOT_STATE's effort is a mean over an interval: a step within one is put
-/// back to where the means say that it was. Not thread-safe.
+/// Joins ROBOT_STATE_SMOOTHED and JOINT_COMMAND by state_sequence: s is the state a command acted
+/// on, s' the state the next command acted on. The result depends on the messages' contents only,
+/// not on the order in which the two channels interleave. ROBOT_STATE's effort is a mean over an
+/// interval: a step within one is put back to where the means say that it was. Not thread-safe.
 class TransitionJoiner {
  public:
-  /// Memory is bounded: the oldest states and episodes are forgotten, as a process that runs for days must.
+  /// Memory is bounded: the oldest states and episodes are forgotten, as a process that runs for
+  /// days must.
   explicit TransitionJoiner(const RobotDescription& robot);
   /// Nothing is forgotten but by Forget.
   static TransitionJoiner Unbounded(const RobotDescription& robot);
@@ -63,15 +65,17 @@ class TransitionJoiner {
   /// Sequence number of the newest state, -1 before the first.
   int64_t newest_state() const { return states_.empty() ? -1 : states_.rbegin()->first; }
 
-  /// The state of that sequence number, null if it was not received or has been forgotten. Valid until the next call.
+  /// The state of that sequence number, null if it was not received or has been forgotten. Valid
+  /// until the next call.
   const robot_state_t* FindState(int64_t sequence) const;
 
   /// Builds the roll-out of an episode from what has been received, and forgets its commands.
   /// @param last_state sequence of the state that ended it.
   Rollout Join(int64_t episode, int64_t last_state);
 
-  /// The transitions of an episode under way from step `*from` on that have been received whole, their successor's command
-  /// included: what Join will say of them, unless a message comes late. Forgets and counts nothing.
+  /// The transitions of an episode under way from step `*from` on that have been received whole,
+  /// their successor's command included: what Join will say of them, unless a message comes late.
+  /// Forgets and counts nothing.
   /// @param from becomes the first step that has not been looked at.
   std::vector<Transition> Arrived(int64_t episode, int* from) const;
 
@@ -86,8 +90,8 @@ class TransitionJoiner {
   int n_;
   double period_;
   size_t most_states_, most_episodes_;
-  std::map<int64_t, robot_state_t> states_;                         // by sequence
-  std::map<int64_t, std::map<int, joint_command_t>> commands_;      // by episode, by step
+  std::map<int64_t, robot_state_t> states_;                     // by sequence
+  std::map<int64_t, std::map<int, joint_command_t>> commands_;  // by episode, by step
   DropCounts drops_;
 };
 

@@ -14,7 +14,8 @@ using Eigen::Vector3d;
 
 namespace {
 
-// Numbers this close, relative to the largest of their kind, differ by rounding only: the text's stays.
+// Numbers this close, relative to the largest of their kind, differ by rounding only: the text's
+// stays.
 constexpr double kRounding = 1e-14;
 
 std::vector<double> Numbers(const TiXmlElement* element, const char* attribute, size_t count) {
@@ -34,7 +35,8 @@ Vector3d Vector(const TiXmlElement* element, const char* attribute) {
 
 Matrix3d Rotation(const TiXmlElement* origin) {
   const Vector3d rpy = Vector(origin, "rpy");
-  return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
+  return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
           Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
       .toRotationMatrix();
 }
@@ -52,7 +54,8 @@ double UrdfNumbers::Body::mass() const {
   return inertial ? Numbers(inertial->FirstChildElement("mass"), "value", 1)[0] : 0;
 }
 
-UrdfNumbers::UrdfNumbers(const std::string& text, const UrdfModel& file, const RobotDescription& now)
+UrdfNumbers::UrdfNumbers(const std::string& text, const UrdfModel& file,
+                         const RobotDescription& now)
     : edits_(text), file_(file), now_(now) {}
 
 void UrdfNumbers::WriteLink(size_t index, double stretch) {
@@ -65,8 +68,8 @@ void UrdfNumbers::WriteLink(size_t index, double stretch) {
   const auto same = [](const auto& a, const auto& b) {
     return (a - b).cwiseAbs().maxCoeff() <= kRounding * b.cwiseAbs().maxCoeff();
   };
-  if (std::abs(was.mass - is.mass) > kRounding * was.mass || !same(is.center_of_mass, was.center_of_mass) ||
-      !same(is.inertia, was.inertia)) {
+  if (std::abs(was.mass - is.mass) > kRounding * was.mass ||
+      !same(is.center_of_mass, was.center_of_mass) || !same(is.inertia, was.inertia)) {
     WriteInertials(is, stretch);
   }
 }
@@ -109,10 +112,10 @@ void UrdfNumbers::ForEachJoint(const TiXmlElement& parent,
   }
 }
 
-// Numbers of an attribute; those that the text has already, up to rounding in units of `scale`, stay as
-// they are.
-void UrdfNumbers::Set(const TiXmlElement& element, const char* attribute, const std::vector<double>& values,
-                      double scale) {
+// Numbers of an attribute; those that the text has already, up to rounding in units of `scale`,
+// stay as they are.
+void UrdfNumbers::Set(const TiXmlElement& element, const char* attribute,
+                      const std::vector<double>& values, double scale) {
   std::vector<double> numbers = Numbers(&element, attribute, values.size());
   bool changed = false;
   for (size_t i = 0; i < values.size(); ++i) {
@@ -128,13 +131,13 @@ void UrdfNumbers::SetPosition(const TiXmlElement& parent, const Vector3d& positi
   if (const TiXmlElement* origin = parent.FirstChildElement("origin")) {
     Set(*origin, "xyz", {position.x(), position.y(), position.z()}, scale);
   } else if (scale > 0) {
-    edits_.AddChild(parent,
-                    fmt::format("<origin xyz=\"{} {} {}\"/>", position.x(), position.y(), position.z()));
+    edits_.AddChild(parent, fmt::format("<origin xyz=\"{} {} {}\"/>", position.x(), position.y(),
+                                        position.z()));
   }
 }
 
-// All positions in the link, of what is fixed to it and of the joints that it carries; and the sizes of its
-// solids.
+// All positions in the link, of what is fixed to it and of the joints that it carries; and the
+// sizes of its solids.
 void UrdfNumbers::Stretch(double factor) {
   const auto move = [&](const TiXmlElement& parent) {
     SetPosition(parent, factor * Vector(parent.FirstChildElement("origin"), "xyz"));
@@ -142,7 +145,8 @@ void UrdfNumbers::Stretch(double factor) {
   for (const Body& body : bodies_) {
     ForEachJoint(*body.link, move);
     for (const char* kind : {"visual", "collision"}) {
-      for (const TiXmlElement* e = body.link->FirstChildElement(kind); e; e = e->NextSiblingElement(kind)) {
+      for (const TiXmlElement* e = body.link->FirstChildElement(kind); e;
+           e = e->NextSiblingElement(kind)) {
         move(*e);
         StretchSolid(*e->FirstChildElement("geometry")->FirstChildElement(), factor);
       }

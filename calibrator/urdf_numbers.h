@@ -12,17 +12,17 @@
 
 namespace plumb {
 
-/// A URDF's text in which links and joints get other numbers. Those that differ by rounding only stay as they
-/// are written.
+/// A URDF's text in which links and joints get other numbers. Those that differ by rounding only
+/// stay as they are written.
 class UrdfNumbers {
  public:
-  /// @param file what LoadUrdf makes of the text. @param now what it shall make of the result. Both must
-  /// outlive this.
+  /// @param file what LoadUrdf makes of the text. @param now what it shall make of the result. Both
+  /// must outlive this.
   UrdfNumbers(const std::string& text, const UrdfModel& file, const RobotDescription& now);
 
-  /// Writes mass, centre of mass and inertia of links[index], and what its being `stretch` times as long
-  /// moves: all that is fixed to it, the origins of the joints that it carries, and the sizes of its solids.
-  /// Nothing for the links without mass of a planar or floating joint.
+  /// Writes mass, centre of mass and inertia of links[index], and what its being `stretch` times as
+  /// long moves: all that is fixed to it, the origins of the joints that it carries, and the sizes
+  /// of its solids. Nothing for the links without mass of a planar or floating joint.
   void WriteLink(size_t index, double stretch);
   /// @param attribute of a joint's <dynamics>, which is added if there is none. Once for each.
   void WriteDynamics(const std::string& joint, const char* attribute, double value);

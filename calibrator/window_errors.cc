@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// Relative to the units of the state; large against the rounding of a simulation, small against its curvature.
+// Relative to the units of the state; large against the rounding of a simulation, small against its
+// curvature.
 constexpr double kDifference = 1e-6;
 
 constexpr double kGuess = 1e-3;  // relative to the units of the state
@@ -28,14 +29,22 @@ size_t StretchLength(const Rollout& rollout, size_t first) {
 
 }  // namespace
 
-Eigen::VectorXd GuessedNoise(const RobotDescription& robot) { return kGuess * MakeTask(robot)->state_scale(); }
+Eigen::VectorXd GuessedNoise(const RobotDescription& robot) {
+  return kGuess * MakeTask(robot)->state_scale();
+}
 
-Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd) { return kDifference * (noise_sd / kGuess).cwiseMax(1.0); }
+Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd) {
+  return kDifference * (noise_sd / kGuess).cwiseMax(1.0);
+}
 
-WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
-                           Workforce workforce, int every)
-    : n_(model->num_velocities()), rollouts_(rollouts), simulate_(std::move(model), workforce.threads), batches_(workforce.batches) {
-  if (simulate_.model().num_positions() != n_) throw std::invalid_argument("calibration does not know spherical joints yet");
+WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
+                           int horizon, Workforce workforce, int every)
+    : n_(model->num_velocities()),
+      rollouts_(rollouts),
+      simulate_(std::move(model), workforce.threads),
+      batches_(workforce.batches) {
+  if (simulate_.model().num_positions() != n_)
+    throw std::invalid_argument("calibration does not know spherical joints yet");
   scale_ = MakeTask(simulate_.model().description())->state_scale();
   noise_sd_ = GuessedNoise(simulate_.model().description());
   const auto longest = static_cast<size_t>(std::max(1, horizon));
@@ -65,7 +74,8 @@ void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
     const Transition& t = transitions[i];
     for (Eigen::Index c = 0; c < 2 * n_; ++c) {
       if (!std::isfinite(c < n_ ? t.next_q(c) : t.next_v(c - n_))) continue;
-      rows_.push_back({static_cast<int>(windows_.size()), static_cast<int>(rollout), static_cast<int>(i), static_cast<int>(c)});
+      rows_.push_back({static_cast<int>(windows_.size()), static_cast<int>(rollout),
+                       static_cast<int>(i), static_cast<int>(c)});
     }
   }
   if (rows_.size() == row_count) return;  // nothing was observed
@@ -99,29 +109,37 @@ void WindowErrors::set_noise_sd(const Eigen::VectorXd& sd) {
 }
 
 double WindowErrors::EndSd(const Row& row) const {
-  const Transition& t = rollouts_[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
-  const double sd = row.coordinate < n_ ? t.next_q_sd(row.coordinate) : t.next_v_sd(row.coordinate - n_);
+  const Transition& t =
+      rollouts_[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+  const double sd =
+      row.coordinate < n_ ? t.next_q_sd(row.coordinate) : t.next_v_sd(row.coordinate - n_);
   return sd > 0 ? sd : noise_sd_(row.coordinate);  // no reading is exact
 }
 
 Eigen::VectorXd WindowErrors::EndNoise() const {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * n_), count = squares;
-  for (const Row& row : rows_) squares(row.coordinate) += std::pow(EndSd(row), 2), count(row.coordinate) += 1;
-  return (count.array() > 0).select((squares.array() / count.array().max(1)).sqrt(), noise_sd_.array());
+  for (const Row& row : rows_)
+    squares(row.coordinate) += std::pow(EndSd(row), 2), count(row.coordinate) += 1;
+  return (count.array() > 0)
+      .select((squares.array() / count.array().max(1)).sqrt(), noise_sd_.array());
 }
 
 bool WindowErrors::noise_known() const {
   return std::all_of(rows_.begin(), rows_.end(), [&](const Row& row) {
-    const Transition& t = rollouts_[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
-    return (row.coordinate < n_ ? t.next_q_sd(row.coordinate) : t.next_v_sd(row.coordinate - n_)) > 0;
+    const Transition& t = rollouts_[static_cast<size_t>(row.rollout)]
+                              .transitions[static_cast<size_t>(row.transition)];
+    return (row.coordinate < n_ ? t.next_q_sd(row.coordinate) : t.next_v_sd(row.coordinate - n_)) >
+           0;
   });
 }
 
 bool WindowErrors::starts_known() const {
-  return std::all_of(starts_.begin(), starts_.end(), [](const Start& start) { return (start.sd.array() == 0).all(); });
+  return std::all_of(starts_.begin(), starts_.end(),
+                     [](const Start& start) { return (start.sd.array() == 0).all(); });
 }
 
-Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows) {
+Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical,
+                                       std::span<const Window> windows) {
   Eigen::MatrixXd errors(static_cast<Eigen::Index>(rows_.size()), physical.cols());
   simulate_.Predict(
       physical, windows,
@@ -129,7 +147,8 @@ Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical, std::spa
         const auto& step_rows = step_rows_[window];
         for (Eigen::Index i = step_rows[step]; i < step_rows[step + 1]; ++i) {
           const Row& row = rows_[static_cast<size_t>(i)];
-          const Transition& t = rollouts_[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+          const Transition& t = rollouts_[static_cast<size_t>(row.rollout)]
+                                    .transitions[static_cast<size_t>(row.transition)];
           const Eigen::Index c = row.coordinate;
           errors(i, sample) = c < n_ ? q(c) - t.next_q(c) : v(c - n_) - t.next_v(c - n_);
         }
@@ -139,22 +158,30 @@ Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical, std::spa
 }
 
 // @param which initial states: 0 = the recorded ones.
-Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows, uint64_t which) {
-  const auto compute = [&](Eigen::Index first, Eigen::Index count) { return Simulate(physical.middleCols(first, count), windows); };
+Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical,
+                                      std::span<const Window> windows, uint64_t which) {
+  const auto compute = [&](Eigen::Index first, Eigen::Index count) {
+    return Simulate(physical.middleCols(first, count), windows);
+  };
   Batches here;
-  const Eigen::MatrixXd errors = (batches_ ? *batches_ : here)
-      .Run(Hash(physical, Hash(&which, sizeof which, identity_)), static_cast<Eigen::Index>(rows_.size()), physical.cols(), compute);
+  const Eigen::MatrixXd errors =
+      (batches_ ? *batches_ : here)
+          .Run(Hash(physical, Hash(&which, sizeof which, identity_)),
+               static_cast<Eigen::Index>(rows_.size()), physical.cols(), compute);
   simulated_steps_ += steps_ * physical.cols();
   for (Eigen::Index j = 0; j < errors.cols(); ++j) {
     if (errors.col(j).allFinite()) continue;
     for (size_t w = 0; w < windows_.size(); ++w) {
-      failures_ += !errors.col(j).segment(first_row_[w], first_row_[w + 1] - first_row_[w]).allFinite();
+      failures_ +=
+          !errors.col(j).segment(first_row_[w], first_row_[w + 1] - first_row_[w]).allFinite();
     }
   }
   return errors;
 }
 
-Eigen::MatrixXd WindowErrors::Raw(const Eigen::MatrixXd& physical) { return Predict(physical, windows_); }
+Eigen::MatrixXd WindowErrors::Raw(const Eigen::MatrixXd& physical) {
+  return Predict(physical, windows_);
+}
 
 bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
   if (starts_known()) return true;
@@ -170,20 +197,23 @@ bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
   const bool good = sensitivity.allFinite();
   if (!good) sensitivity = FreeMotion();
   for (size_t w = 0; w < windows_.size(); ++w) {
-    starts_[w].sensitivity = sensitivity.middleRows(first_row_[w], first_row_[w + 1] - first_row_[w]);
+    starts_[w].sensitivity =
+        sensitivity.middleRows(first_row_[w], first_row_[w + 1] - first_row_[w]);
   }
   return good;
 }
 
 Eigen::MatrixXd WindowErrors::FreeMotion() const {
-  Eigen::MatrixXd sensitivity = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_.size()), 2 * n_);
+  Eigen::MatrixXd sensitivity =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_.size()), 2 * n_);
   for (size_t i = 0; i < rows_.size(); ++i) {
     const Row& row = rows_[i];
     const auto at = static_cast<Eigen::Index>(i);
     sensitivity(at, row.coordinate) = 1;
     if (row.coordinate >= n_) continue;
     const auto& steps = step_rows_[static_cast<size_t>(row.window)];
-    const auto& t = rollouts_[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+    const auto& t = rollouts_[static_cast<size_t>(row.rollout)]
+                        .transitions[static_cast<size_t>(row.transition)];
     const auto step = std::upper_bound(steps.begin(), steps.end(), at) - steps.begin();
     sensitivity(at, row.coordinate + n_) = t.duration() * static_cast<double>(step);
   }
@@ -206,7 +236,8 @@ double WindowErrors::LogSpread() const {
   return sum;
 }
 
-// A Kalman filter of what the recorded initial state was off by, a constant: its innovations, divided by their spread.
+// A Kalman filter of what the recorded initial state was off by, a constant: its innovations,
+// divided by their spread.
 // @return ln det of that.
 double WindowErrors::WhitenWindow(size_t w, Eigen::MatrixXd* errors) const {
   const auto& step_rows = step_rows_[w];

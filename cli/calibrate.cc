@@ -33,7 +33,8 @@ std::vector<Log> ReadLogs(const CalibrateFlags& flags, const RobotDescription& r
 
 void PrintLogs(const std::vector<Log>& logs) {
   for (const Log& log : logs) {
-    std::cout << fmt::format("{}: {} transitions in {} roll-out{}", log.name, CountTransitions(log.rollouts), log.rollouts.size(),
+    std::cout << fmt::format("{}: {} transitions in {} roll-out{}", log.name,
+                             CountTransitions(log.rollouts), log.rollouts.size(),
                              log.rollouts.size() == 1 ? "" : "s");
     if (log.drops.total() > 0) {
       std::cout << "; dropped: " << log.drops.words();
@@ -49,60 +50,75 @@ void PrintFindings(const Findings& findings, const RobotDescription& robot) {
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     const auto number = [](double mean, double sd) {
-      const int digits = std::clamp(static_cast<int>(1 - std::floor(std::log10(std::max(sd, 1e-12)))), 0, 12);
+      const int digits =
+          std::clamp(static_cast<int>(1 - std::floor(std::log10(std::max(sd, 1e-12)))), 0, 12);
       return fmt::format("{:.{}f} ± {:.2g}", mean, digits, sd);
     };
     std::cout << fmt::format("{:24} {:>22} {:>24} {:>12.6g} {:>12.6g}\n",
                              robot.parameters[i].name + " [" + robot.parameters[i].unit + "]",
-                             number(summary.prior_mean(at), summary.prior_sd(at)), number(summary.mean(at), summary.sd(at)),
-                             summary.lower(at), summary.upper(at));
+                             number(summary.prior_mean(at), summary.prior_sd(at)),
+                             number(summary.mean(at), summary.sd(at)), summary.lower(at),
+                             summary.upper(at));
   }
-  for (const std::string* words : {&findings.identifiability.words, &findings.advice, &findings.misspecification.words, &findings.holdout.words,
-                                   &findings.agreement.words, &findings.check}) {
+  for (const std::string* words :
+       {&findings.identifiability.words, &findings.advice, &findings.misspecification.words,
+        &findings.holdout.words, &findings.agreement.words, &findings.check}) {
     if (!words->empty()) std::cout << "- " << *words << "\n";
   }
   for (const std::string& warning : findings.warnings) std::cout << "! " << warning << "\n";
-  std::cout << fmt::format("{}, {} transitions simulated for the fit and {} for the diagnostics, {} failed; {:.2f} s\n", findings.used,
-                           findings.simulated_steps, findings.diagnostic_steps, findings.failures, findings.seconds);
+  std::cout << fmt::format(
+      "{}, {} transitions simulated for the fit and {} for the diagnostics, {} failed; {:.2f} s\n",
+      findings.used, findings.simulated_steps, findings.diagnostic_steps, findings.failures,
+      findings.seconds);
 }
 
 Residuals ResidualsOf(const Findings& findings, const RobotDescription& robot) {
   Residuals residuals{findings.errors, findings.rows, {}};
   for (const char* kind : {"q ", "v "}) {
-    for (const JointDescription& joint : robot.joints) residuals.coordinates.push_back(kind + joint.name);
+    for (const JointDescription& joint : robot.joints)
+      residuals.coordinates.push_back(kind + joint.name);
   }
   return residuals;
 }
 
-uint64_t IdentityOf(const RobotDescription& robot, const CalibrateFlags& flags, const std::vector<Log>& logs) {
-  uint64_t identity = Hash(VersionLine("plumb") + flags.options.method + flags.options.discrepancy, robot.fingerprint);
+uint64_t IdentityOf(const RobotDescription& robot, const CalibrateFlags& flags,
+                    const std::vector<Log>& logs) {
+  uint64_t identity = Hash(VersionLine("plumb") + flags.options.method + flags.options.discrepancy,
+                           robot.fingerprint);
   identity = Hash(&flags.options.seed, sizeof flags.options.seed, identity);
   identity = Hash(&flags.options.budget, sizeof flags.options.budget, identity);
-  identity = Hash(flags.options.horizons.data(), flags.options.horizons.size() * sizeof(int), identity);
+  identity =
+      Hash(flags.options.horizons.data(), flags.options.horizons.size() * sizeof(int), identity);
   for (const Log& log : logs) {
     for (const Rollout& rollout : log.rollouts) {
       for (const Transition& t : rollout.transitions) {
-        for (const Eigen::VectorXd* x : {&t.q, &t.v, &t.next_q, &t.next_v}) identity = Hash(Eigen::MatrixXd(*x), identity);
-        for (const EffortSegment& segment : t.efforts) identity = Hash(Eigen::MatrixXd(segment.effort), identity);
+        for (const Eigen::VectorXd* x : {&t.q, &t.v, &t.next_q, &t.next_v})
+          identity = Hash(Eigen::MatrixXd(*x), identity);
+        for (const EffortSegment& segment : t.efforts)
+          identity = Hash(Eigen::MatrixXd(segment.effort), identity);
       }
     }
   }
   return identity;
 }
 
-std::string List(const std::vector<int>& numbers) { return fmt::format("{}", fmt::join(numbers, ", ")); }
+std::string List(const std::vector<int>& numbers) {
+  return fmt::format("{}", fmt::join(numbers, ", "));
+}
 
-int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::vector<Log>& logs, const ProgressLine& line,
-        const std::function<void()>& look) {
+int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::vector<Log>& logs,
+        const ProgressLine& line, const std::function<void()>& look) {
   CalibrationOptions options = flags.options;
   options.method = "laplace", options.horizons = {1};
   const Findings findings = Calibrate(robot, logs, options);
   std::vector<Rollout> rollouts;
-  for (const Log& log : logs) rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
+  for (const Log& log : logs)
+    rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
   RobotSbcOptions sbc;
   sbc.runs = flags.sbc, sbc.seed = options.seed, sbc.threads = options.workforce.threads;
   sbc.progress = [&](double share) { look(), line.Show("simulation-based calibration", share); };
-  std::cout << Words(RunRobotSbc(std::make_shared<Model>(robot), rollouts, findings.noise_sd, sbc)) << std::endl;
+  std::cout << Words(RunRobotSbc(std::make_shared<Model>(robot), rollouts, findings.noise_sd, sbc))
+            << std::endl;
   return 0;
 }
 
@@ -113,7 +129,8 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const bool speaks = ranks.rank() == 0;
   if (!speaks) spdlog::set_level(spdlog::level::err);
   const RobotDescription robot = LoadRobot(flags.robot);
-  if (flags.logs.empty() && flags.tables.empty()) throw std::invalid_argument("there is nothing to calibrate with: give a --log or a --csv");
+  if (flags.logs.empty() && flags.tables.empty())
+    throw std::invalid_argument("there is nothing to calibrate with: give a --log or a --csv");
   if (speaks) {
     for (const std::string& file : {flags.output, flags.report, flags.urdf}) {
       if (!file.empty()) RequireWritable(file);
@@ -122,7 +139,8 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const std::vector<Log> logs = ReadLogs(flags, robot);
   if (speaks) PrintLogs(logs);
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  flags.options.workforce.threads = flags.threads > 0 ? flags.threads : std::max(1, cores / ranks.size());
+  flags.options.workforce.threads =
+      flags.threads > 0 ? flags.threads : std::max(1, cores / ranks.size());
   const ProgressLine line(speaks);
   const auto look = [&] {
     if (process.stopping()) throw Interrupted();
@@ -134,27 +152,36 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
     if (speaks) journal.emplace(journal_file, IdentityOf(robot, flags, logs));
     RankBatches batches(ranks, journal ? &*journal : nullptr);
     flags.options.workforce.batches = &batches;
-    flags.options.progress = [&](const std::string& what, double share) { look(), line.Show(what, share); };
+    flags.options.progress = [&](const std::string& what, double share) {
+      look(), line.Show(what, share);
+    };
     const Findings findings = Calibrate(robot, logs, flags.options);
     if (!speaks) return 0;
-    if (journal->resumed() > 0) std::cout << fmt::format("went on from {}: {} batches of simulations were there\n", journal_file, journal->resumed());
+    if (journal->resumed() > 0)
+      std::cout << fmt::format("went on from {}: {} batches of simulations were there\n",
+                               journal_file, journal->resumed());
     PrintFindings(findings, robot);
     Provenance provenance;
     for (const Log& log : logs) provenance.logs.push_back(log.name);
-    provenance.options = {{"horizons", List(flags.options.horizons)}, {"budget", std::to_string(flags.options.budget)},
+    provenance.options = {{"horizons", List(flags.options.horizons)},
+                          {"budget", std::to_string(flags.options.budget)},
                           {"discrepancy", flags.options.discrepancy}};
     provenance.command = command;
     provenance.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
     WritePosterior(flags.output, findings, robot, provenance);
     const Summary summary = Summarise(findings, robot);
-    if (!flags.report.empty()) WriteReport(flags.report, findings, robot, provenance, ResidualsOf(findings, robot));
+    if (!flags.report.empty())
+      WriteReport(flags.report, findings, robot, provenance, ResidualsOf(findings, robot));
     if (!flags.urdf.empty()) WriteIdentifiedUrdf(flags.urdf, robot, summary.mean, summary.sd);
     journal->Finish();
-    std::cout << "wrote " << flags.output << (flags.report.empty() ? "" : ", " + flags.report) << (flags.urdf.empty() ? "" : ", " + flags.urdf) << std::endl;
-    const bool trustworthy = findings.holdout.better && !findings.misspecification.alarm && findings.agreement.agree;
+    std::cout << "wrote " << flags.output << (flags.report.empty() ? "" : ", " + flags.report)
+              << (flags.urdf.empty() ? "" : ", " + flags.urdf) << std::endl;
+    const bool trustworthy =
+        findings.holdout.better && !findings.misspecification.alarm && findings.agreement.agree;
     return flags.strict && !trustworthy ? 3 : 0;
   } catch (const Interrupted&) {
-    if (speaks && flags.sbc == 0) std::cerr << "\ninterrupted; the same command goes on from " << journal_file << std::endl;
+    if (speaks && flags.sbc == 0)
+      std::cerr << "\ninterrupted; the same command goes on from " << journal_file << std::endl;
     return 130;
   }
 }

@@ -13,17 +13,18 @@ struct CalibrateFlags {
   std::string robot;
   std::vector<std::string> logs, tables;  ///< LCM logs, CSV files
   CalibrationOptions options;
-  int threads = 0;        ///< 0 = one per core
+  int threads = 0;  ///< 0 = one per core
   std::string output = "posterior.json";
   std::string report, urdf;  ///< files; empty = none
-  int sbc = 0;            ///< runs of simulation-based calibration instead; 0 = none
-  bool strict = false;    ///< exit status 3 if the findings should not be trusted
+  int sbc = 0;               ///< runs of simulation-based calibration instead; 0 = none
+  bool strict = false;       ///< exit status 3 if the findings should not be trusted
 };
 
-/// `plumb calibrate`: learns from logs which simulators could have produced the robot's motion, writes what it has learned, and says
-/// so in words. With mpirun its ranks share the work. An interrupted run leaves a journal beside the output, from which the
-/// same command goes on. @return exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better than the prior,
-/// the model cannot explain the logs, or they do not agree.
+/// `plumb calibrate`: learns from logs which simulators could have produced the robot's motion,
+/// writes what it has learned, and says so in words. With mpirun its ranks share the work. An
+/// interrupted run leaves a journal beside the output, from which the same command goes on. @return
+/// exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better
+/// than the prior, the model cannot explain the logs, or they do not agree.
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command);
 
 }  // namespace plumb

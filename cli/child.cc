@@ -17,7 +17,8 @@
 
 namespace plumb {
 
-Child::Child(std::string name, const std::vector<std::string>& arguments, const std::filesystem::path& log)
+Child::Child(std::string name, const std::vector<std::string>& arguments,
+             const std::filesystem::path& log)
     : name_(std::move(name)), log_(log) {
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
@@ -26,7 +27,8 @@ Child::Child(std::string name, const std::vector<std::string>& arguments, const 
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
   posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log_.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
+  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log_.c_str(),
+                                   O_WRONLY | O_CREAT | O_APPEND, 0644);
   posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
 
   posix_spawnattr_t attributes;
@@ -40,7 +42,9 @@ Child::Child(std::string name, const std::vector<std::string>& arguments, const 
   const int error = posix_spawnp(&pid_, argv[0], &files, &attributes, argv.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&files);
-  if (error != 0) throw std::runtime_error(fmt::format("cannot start {}: {}", arguments[0], std::strerror(error)));
+  if (error != 0)
+    throw std::runtime_error(
+        fmt::format("cannot start {}: {}", arguments[0], std::strerror(error)));
 }
 
 Child::Child(Child&& other) noexcept

@@ -9,13 +9,14 @@
 
 namespace plumb {
 
-/// A process this one has started, in a process group of its own: a Ctrl-C at the terminal reaches only us, and we
-/// stop the others in the right order. Destroying it kills it. Not thread-safe.
+/// A process this one has started, in a process group of its own: a Ctrl-C at the terminal reaches
+/// only us, and we stop the others in the right order. Destroying it kills it. Not thread-safe.
 class Child {
  public:
   /// @param arguments argv, the program first. @param log receives its standard output and error.
   /// @throws std::runtime_error if it cannot be started.
-  Child(std::string name, const std::vector<std::string>& arguments, const std::filesystem::path& log);
+  Child(std::string name, const std::vector<std::string>& arguments,
+        const std::filesystem::path& log);
   Child(Child&& other) noexcept;
   Child& operator=(Child&&) = delete;
   ~Child();

@@ -24,14 +24,15 @@ namespace {
 namespace fs = std::filesystem;
 using Level = Finding::Level;
 
-constexpr int kCanHardwareType = 280;       // ARPHRD_CAN, linux/if_arp.h
-constexpr long kReceiveBuffer = 2097152;    // of the default LCM URL
-constexpr int kListen = 300;                // [ms]; a driver's status comes ten times a second
+constexpr int kCanHardwareType = 280;     // ARPHRD_CAN, linux/if_arp.h
+constexpr long kReceiveBuffer = 2097152;  // of the default LCM URL
+constexpr int kListen = 300;              // [ms]; a driver's status comes ten times a second
 
 /// The fault in "FAULT; cure: CURE" and its cure, or `fallback` where it has none.
 Finding Split(Level level, const std::string& text, const std::string& fallback) {
   const size_t cure = text.find("; cure: ");
-  return {level, text.substr(0, cure), cure == std::string::npos ? fallback : text.substr(cure + 8)};
+  return {level, text.substr(0, cure),
+          cure == std::string::npos ? fallback : text.substr(cure + 8)};
 }
 
 /// Who may command the robot: those who have the key, or whom LCM reaches.
@@ -55,13 +56,16 @@ Finding Signatures(const std::string& lcm_url, const std::string& key) {
   }
   const std::vector<std::string> open = OpenInterfaces(lcm_url);
   if (open.empty()) {
-    return {Level::kGood, "commands are not signed, and LCM stays on this machine, whose users are trusted", ""};
+    return {Level::kGood,
+            "commands are not signed, and LCM stays on this machine, whose users are trusted", ""};
   }
-  return {Level::kAdvice,
-          fmt::format("commands are not signed; nothing of ours leaves this machine, but others can send to "
-                      "it through {}",
-                      fmt::join(open, ", ")),
-          "ip route add 224.0.0.0/4 dev lo, or plumb key FILE and --key FILE"};
+  return {
+      Level::kAdvice,
+      fmt::format(
+          "commands are not signed; nothing of ours leaves this machine, but others can send to "
+          "it through {}",
+          fmt::join(open, ", ")),
+      "ip route add 224.0.0.0/4 dev lo, or plumb key FILE and --key FILE"};
 }
 
 /// What a driver that is running says of it; nothing if none is.
@@ -72,7 +76,8 @@ std::vector<Finding> RunningDriver(Messenger& messenger, const std::string& lcm_
   const driver_status_t& driver = drivers.newest();
   const std::string what =
       driver.commands_signed ? "obeys signed commands only" : "obeys commands that are not signed";
-  if (driver.commands_forged == 0) return {{Level::kGood, "the driver that is running " + what, ""}};
+  if (driver.commands_forged == 0)
+    return {{Level::kGood, "the driver that is running " + what, ""}};
   return {{Level::kAdvice,
            fmt::format("the driver that is running {}, and has dropped {} that were forged", what,
                        driver.commands_forged),
@@ -94,8 +99,10 @@ std::vector<Finding> Lcm(const std::string& url, const std::string& key) {
 Finding UdpBuffers() {
   long maximum = 0;
   std::ifstream("/proc/sys/net/core/rmem_max") >> maximum;
-  if (maximum >= kReceiveBuffer) return {Level::kGood, fmt::format("UDP receive buffers up to {} bytes", maximum), ""};
-  return {Level::kAdvice, fmt::format("UDP receive buffers only up to {} bytes: policies may get lost", maximum),
+  if (maximum >= kReceiveBuffer)
+    return {Level::kGood, fmt::format("UDP receive buffers up to {} bytes", maximum), ""};
+  return {Level::kAdvice,
+          fmt::format("UDP receive buffers only up to {} bytes: policies may get lost", maximum),
           fmt::format("sysctl -w net.core.rmem_max={}", 2 * kReceiveBuffer)};
 }
 
@@ -116,7 +123,8 @@ std::vector<Finding> Can() {
     std::string flags;
     std::ifstream(entry.path() / "flags") >> flags;
     const bool up = (std::strtoul(flags.c_str(), nullptr, 16) & 1) != 0;
-    if (up) findings.push_back({Level::kGood, "CAN interface " + name + " is up", ""});
+    if (up)
+      findings.push_back({Level::kGood, "CAN interface " + name + " is up", ""});
     else
       findings.push_back({Level::kAdvice, "CAN interface " + name + " is down",
                           "ip link set " + name + " up type can bitrate 1000000 restart-ms 100"});
@@ -144,15 +152,19 @@ std::vector<Finding> RealTime() {
   std::vector<Finding> findings;
   rlimit limit{};
   getrlimit(RLIMIT_RTPRIO, &limit);
-  if (geteuid() == 0 || limit.rlim_cur >= 80) findings.push_back({Level::kGood, "real-time priorities are allowed", ""});
+  if (geteuid() == 0 || limit.rlim_cur >= 80)
+    findings.push_back({Level::kGood, "real-time priorities are allowed", ""});
   else
-    findings.push_back({Level::kAdvice, "real-time priorities are not allowed: --realtime-priority will be refused",
+    findings.push_back({Level::kAdvice,
+                        "real-time priorities are not allowed: --realtime-priority will be refused",
                         "echo '@realtime - rtprio 90' >> /etc/security/limits.d/plumbline.conf"});
   getrlimit(RLIMIT_MEMLOCK, &limit);
-  if (geteuid() == 0 || limit.rlim_cur >= (64u << 20)) findings.push_back({Level::kGood, "memory may be locked", ""});
+  if (geteuid() == 0 || limit.rlim_cur >= (64u << 20))
+    findings.push_back({Level::kGood, "memory may be locked", ""});
   else
-    findings.push_back({Level::kAdvice, "memory may not be locked",
-                        "echo '@realtime - memlock unlimited' >> /etc/security/limits.d/plumbline.conf"});
+    findings.push_back(
+        {Level::kAdvice, "memory may not be locked",
+         "echo '@realtime - memlock unlimited' >> /etc/security/limits.d/plumbline.conf"});
   return findings;
 }
 
@@ -174,9 +186,11 @@ std::vector<Finding> Packages() {
                   {"can_viewer", "python3-can", "shows the udp: bus"},
                   {"linux.uml", "user-mode-linux", "tests SocketCAN where the kernel has none"}};
   for (const auto& p : programs) {
-    if (InPath(p.program)) findings.push_back({Level::kGood, fmt::format("{} is installed", p.program), ""});
+    if (InPath(p.program))
+      findings.push_back({Level::kGood, fmt::format("{} is installed", p.program), ""});
     else
-      findings.push_back({Level::kAdvice, fmt::format("{}, which {}, is missing", p.program, p.purpose),
+      findings.push_back({Level::kAdvice,
+                          fmt::format("{}, which {}, is missing", p.program, p.purpose),
                           fmt::format("apt-get install {}", p.package)});
   }
   return findings;
@@ -184,7 +198,8 @@ std::vector<Finding> Packages() {
 
 }  // namespace
 
-std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus, const std::string& key) {
+std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus,
+                             const std::string& key) {
   std::vector<Finding> findings = Lcm(lcm_url, key);
   findings.push_back(UdpBuffers());
   for (const auto& group : {Can(), Bus(bus), RealTime(), Packages()}) {
@@ -196,7 +211,9 @@ std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus,
 int Doctor(const std::string& lcm_url, const std::string& bus, const std::string& key) {
   int status = 0;
   for (const Finding& finding : Examine(lcm_url, bus, key)) {
-    const char* mark = finding.level == Level::kGood ? "good  " : finding.level == Level::kAdvice ? "advice" : "BAD   ";
+    const char* mark = finding.level == Level::kGood     ? "good  "
+                       : finding.level == Level::kAdvice ? "advice"
+                                                         : "BAD   ";
     std::cout << mark << "  " << finding.what << "\n";
     if (!finding.cure.empty()) std::cout << "        cure: " << finding.cure << "\n";
     if (finding.level == Level::kBad) status = 1;

@@ -13,10 +13,12 @@ struct Finding {
   std::string cure;  ///< a command, empty if all is well
 };
 
-/// Looks at everything a run needs of this machine: multicast, who may command the robot, UDP buffers, CAN,
-/// real-time limits, packages. Changes nothing. @param bus URL of the bus that is going to be used. @param
-/// key file of the key that commands are going to be signed with; empty = none.
-std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus, const std::string& key = {});
+/// Looks at everything a run needs of this machine: multicast, who may command the robot, UDP
+/// buffers, CAN, real-time limits, packages. Changes nothing. @param bus URL of the bus that is
+/// going to be used. @param key file of the key that commands are going to be signed with; empty =
+/// none.
+std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus,
+                             const std::string& key = {});
 
 /// Prints the findings. @return exit status: 1 if any is bad.
 int Doctor(const std::string& lcm_url, const std::string& bus, const std::string& key);

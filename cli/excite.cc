@@ -33,21 +33,25 @@ std::string DescribeStart(const RobotDescription& robot, uint64_t seed) {
 }
 
 std::string Table(const RobotDescription& robot, const std::vector<RatedExcitation>& rated) {
-  std::string text = fmt::format("{:<44}{:>12}{:>9}{:>9}\n", "excitation", "gain [nat]", "s", "margin");
+  std::string text =
+      fmt::format("{:<44}{:>12}{:>9}{:>9}\n", "excitation", "gain [nat]", "s", "margin");
   for (size_t i = 0; i < std::min(rated.size(), kMostRows); ++i) {
-    text += fmt::format("{:<44}{:>12.2f}{:>9.2f}{:>7.0f} %\n", rated[i].excitation.name, rated[i].gain,
-                        rated[i].steps * robot.task.period, 100 * rated[i].margin);
+    text += fmt::format("{:<44}{:>12.2f}{:>9.2f}{:>7.0f} %\n", rated[i].excitation.name,
+                        rated[i].gain, rated[i].steps * robot.task.period, 100 * rated[i].margin);
   }
   return text;
 }
 
-std::string Expected(const RobotDescription& robot, const Gaussian& prior, const RatedExcitation& best) {
-  const Eigen::VectorXd before = PhysicalSd(robot, prior.mean, prior.covariance.diagonal().cwiseSqrt());
+std::string Expected(const RobotDescription& robot, const Gaussian& prior,
+                     const RatedExcitation& best) {
+  const Eigen::VectorXd before =
+      PhysicalSd(robot, prior.mean, prior.covariance.diagonal().cwiseSqrt());
   const Eigen::VectorXd after = PhysicalSd(robot, prior.mean, best.sd);
   std::string text = fmt::format("{:<28}{:>12}{:>14}\n", "parameter", "present sd", "expected sd");
   for (Eigen::Index i = 0; i < before.size(); ++i) {
     const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
-    text += fmt::format("{:<28}{:>12.3g}{:>14.3g} {}\n", parameter.name, before(i), after(i), parameter.unit);
+    text += fmt::format("{:<28}{:>12.3g}{:>14.3g} {}\n", parameter.name, before(i), after(i),
+                        parameter.unit);
   }
   return text;
 }
@@ -61,8 +65,8 @@ std::string Csv(const RobotDescription& robot, const RatedExcitation& best) {
   for (Eigen::Index k = 0; k < best.steps; ++k) {
     csv += fmt::format("{:.17g}", static_cast<double>(k) * robot.task.period);
     for (int i = 0; i < task->action_size(); ++i) {
-      csv += fmt::format(",{:.17g}",
-                         best.excitation.action(k, i) * limits(i) / task->action_unit(i));
+      csv +=
+          fmt::format(",{:.17g}", best.excitation.action(k, i) * limits(i) / task->action_unit(i));
     }
     csv += "\n";
   }
@@ -101,11 +105,12 @@ int Excite(Process& process, const ExciteFlags& flags) {
   settings.candidates = flags.candidates;
   settings.seconds = flags.seconds;
   settings.seed = flags.seed;
-  const Gaussian prior = flags.posterior.empty() ? PriorGaussian(robot) : Known(flags.posterior, robot);
+  const Gaussian prior =
+      flags.posterior.empty() ? PriorGaussian(robot) : Known(flags.posterior, robot);
   const std::vector<RatedExcitation> rated = RateExcitations(robot, prior, settings);
   if (process.stopping()) return 130;
-  std::cout << fmt::format("{}, task {}, seed {}: {} of {} excitations keep within the limits\n", robot.name,
-                           robot.task.name, flags.seed, rated.size(), flags.candidates);
+  std::cout << fmt::format("{}, task {}, seed {}: {} of {} excitations keep within the limits\n",
+                           robot.name, robot.task.name, flags.seed, rated.size(), flags.candidates);
   if (rated.empty()) {
     std::cerr << "plumb: no excitation that was tried keeps within the robot's limits" << std::endl;
     return 1;

@@ -17,10 +17,11 @@ struct ExciteFlags {
   std::string png;        ///< file; empty = none
 };
 
-/// `plumb excite`: looks for the efforts that would tell most of the robot's parameters and stay within its
-/// limits, says what is to be expected of them, and writes the best ones as a table t, u/<joint>... in the
-/// task's units of action, one row per control step. No messages, no buses. @return exit status: 0; 1 if no
-/// excitation keeps within the limits, and no file is written then; 130 if it was interrupted.
+/// `plumb excite`: looks for the efforts that would tell most of the robot's parameters and stay
+/// within its limits, says what is to be expected of them, and writes the best ones as a table t,
+/// u/<joint>... in the task's units of action, one row per control step. No messages, no buses.
+/// @return exit status: 0; 1 if no excitation keeps within the limits, and no file is written then;
+/// 130 if it was interrupted.
 int Excite(Process& process, const ExciteFlags& flags);
 
 }  // namespace plumb

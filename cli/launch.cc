@@ -34,9 +34,10 @@ namespace {
 namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr int kMostRearms = 20;          // of a virtual robot; a real one is armed by a person, every time
-constexpr int64_t kArmAgain = 500'000;   // [us]
-constexpr int64_t kLook = 50'000;        // [us]
+// of a virtual robot; a real one is armed by a person, every time
+constexpr int kMostRearms = 20;
+constexpr int64_t kArmAgain = 500'000;  // [us]
+constexpr int64_t kLook = 50'000;       // [us]
 
 double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
@@ -47,13 +48,15 @@ void RequireDrivable(const RobotDescription& robot) {
   try {
     Driver(robot, 0, 0);
   } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(fmt::format("{} cannot be launched (plumb sim simulates it): {}", robot.name, error.what()));
+    throw std::invalid_argument(fmt::format("{} cannot be launched (plumb sim simulates it): {}",
+                                            robot.name, error.what()));
   }
 }
 
 fs::path MakeFolder(const std::string& wanted) {
   const fs::path folder =
-      wanted.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), getpid())
+      wanted.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}",
+                                                      fmt::localtime(std::time(nullptr)), getpid())
                      : fs::path(wanted);
   fs::create_directories(folder);
   return folder;
@@ -66,7 +69,8 @@ struct Setting {
     for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
     RequireDrivable(robot);
     RequireKey(process.lcm_url(), !flags.key.empty(), flags.allow_unsigned);
-    if (flags.real && flags.speed != 0) throw std::invalid_argument("a real robot runs at its own speed, without --speed");
+    if (flags.real && flags.speed != 0)
+      throw std::invalid_argument("a real robot runs at its own speed, without --speed");
     if (!flags.real) truth = HiddenParameters(robot, flags.seed);
     RequireFree(process.lcm_url(), bus, flags.real);
     output = MakeFolder(flags.output);
@@ -94,12 +98,14 @@ class ClosedLoop {
         flags_(flags),
         setting_(setting),
         robot_(setting.robot),
-        clock_(process.participant() ? process.clock()
-                                     : Clock(flags.speed > 0 ? flags.speed : 1, process.clock().Utime())),
+        clock_(process.participant()
+                   ? process.clock()
+                   : Clock(flags.speed > 0 ? flags.speed : 1, process.clock().Utime())),
         start_(clock_.Now()),
         progress_(robot_, flags.iterations),
         requests_(process.messenger(), "DRIVER_REQUEST"),
-        drivers_(process.messenger(), "DRIVER_STATUS", [&](const driver_status_t& m) { progress_.OnDriver(m); }),
+        drivers_(process.messenger(), "DRIVER_STATUS",
+                 [&](const driver_status_t& m) { progress_.OnDriver(m); }),
         controllers_(process.messenger(), "CONTROLLER_STATUS",
                      [&](const controller_status_t& m) { progress_.OnController(m); }),
         calibrations_(process.messenger(), "CALIBRATION_STATUS",
@@ -108,7 +114,8 @@ class ClosedLoop {
                    [&](const training_status_t& m) { progress_.OnTraining(m); }),
         processes_(flags,
                    {setting.bus, process.lcm_url(),
-                    setting.coordinator() ? setting.coordinator()->clock() : clock_.ToString(), setting.output},
+                    setting.coordinator() ? setting.coordinator()->clock() : clock_.ToString(),
+                    setting.output},
                    setting.coordinator()) {
     if (!flags.key.empty()) signer_.emplace(SigningKey(flags.key), "DRIVER_REQUEST");
     if (!setting.virtual_run) return;
@@ -117,10 +124,11 @@ class ClosedLoop {
   }
 
   int Go() {
-    std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << setting_.bus << ", seed " << flags_.seed
-              << ", logs in " << setting_.output.string() << std::endl;
+    std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << setting_.bus << ", seed "
+              << flags_.seed << ", logs in " << setting_.output.string() << std::endl;
     if (setting_.virtual_run && !setting_.virtual_run->mirror_failure().empty()) {
-      std::cout << "nobody else can listen: " << setting_.virtual_run->mirror_failure() << std::endl;
+      std::cout << "nobody else can listen: " << setting_.virtual_run->mirror_failure()
+                << std::endl;
     }
     processes_.Start();
     if (flags_.real) {
@@ -134,7 +142,8 @@ class ClosedLoop {
         std::cout << "interrupted" << std::endl;
         return 130;
       }
-      progress_.Account(static_cast<double>(clock_.Now() - start_) * 1e-6, SecondsSince(really_started_));
+      progress_.Account(static_cast<double>(clock_.Now() - start_) * 1e-6,
+                        SecondsSince(really_started_));
       if (!AllRunning() || !KeepArmed()) return 1;
       for (const std::string& row : progress_.TakeRows()) Print(row);
       ShowStatus();
@@ -150,7 +159,8 @@ class ClosedLoop {
  private:
   /// While somebody works in virtual time, a tenth of a second of real time has passed.
   bool GoOn() {
-    for (const auto& [channel, message] : setting_.virtual_run->TakeStrangers()) OnStranger(channel, message);
+    for (const auto& [channel, message] : setting_.virtual_run->TakeStrangers())
+      OnStranger(channel, message);
     ShowStatus();
     return !processes_.Ended() && !stopped_from_outside_;
   }
@@ -159,11 +169,14 @@ class ClosedLoop {
   void OnStranger(const std::string& channel, const std::vector<uint8_t>& message) {
     driver_request_t request;
     if (channel == "DRIVER_REQUEST" &&
-        request.decode(message.data(), 0, static_cast<int>(message.size())) == static_cast<int>(message.size()) &&
-        (request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP)) {
+        request.decode(message.data(), 0, static_cast<int>(message.size())) ==
+            static_cast<int>(message.size()) &&
+        (request.request == driver_request_t::DISARM ||
+         request.request == driver_request_t::ESTOP)) {
       stopped_from_outside_ = true;
     } else if (strange_channels_.insert(channel).second) {
-      Print("plumb: somebody outside the run says " + channel + ": not heard; --real-time hears everybody");
+      Print("plumb: somebody outside the run says " + channel +
+            ": not heard; --real-time hears everybody");
     }
   }
 
@@ -178,12 +191,16 @@ class ClosedLoop {
     };
     const auto state_is = [&](int8_t state) { return progress_.driver().state == state; };
     if (!until([&] { return state_is(driver_status_t::IDLE); }, 5)) {
-      std::cerr << "plumb: the driver is not ready to arm: " << progress_.driver().reason << std::endl;
+      std::cerr << "plumb: the driver is not ready to arm: " << progress_.driver().reason
+                << std::endl;
       return process_.stopping() ? 130 : 1;
     }
-    until([] { return false; }, robot_.driver.start_guard + 0.1);  // the driver refuses any earlier wish
-    std::cout << "The motors of " << robot_.name << " on " << setting_.bus
-              << " will be switched on.\nStand clear, keep the emergency stop at hand, and type 'arm': " << std::flush;
+    // the driver refuses any earlier wish
+    until([] { return false; }, robot_.driver.start_guard + 0.1);
+    std::cout
+        << "The motors of " << robot_.name << " on " << setting_.bus
+        << " will be switched on.\nStand clear, keep the emergency stop at hand, and type 'arm': "
+        << std::flush;
     std::string answer;
     while (answer.empty() || answer.back() != '\n') {
       if (!process_.Wait(1'000'000, STDIN_FILENO)) return 130;
@@ -220,8 +237,8 @@ class ClosedLoop {
     return false;
   }
 
-  // A virtual robot is armed at the beginning, and again after a fault, though not for ever. What a person has
-  // stopped, and a real robot in any case, only a person starts.
+  // A virtual robot is armed at the beginning, and again after a fault, though not for ever. What a
+  // person has stopped, and a real robot in any case, only a person starts.
   bool KeepArmed() {
     const driver_status_t& driver = progress_.driver();
     if (driver.stopped_by_request != stopped_) {
@@ -239,7 +256,8 @@ class ClosedLoop {
       }
     }
     if (driver.state == driver_status_t::ARMED) fault_seen_ = false;
-    const bool down = driver.state == driver_status_t::IDLE || driver.state == driver_status_t::FAULT;
+    const bool down =
+        driver.state == driver_status_t::IDLE || driver.state == driver_status_t::FAULT;
     if (down && !flags_.real && clock_.Now() - last_request_ > kArmAgain) {
       Request(driver_request_t::ARM);
       last_request_ = clock_.Now();
@@ -250,7 +268,8 @@ class ClosedLoop {
   /// For a person to type.
   std::string ArmCommand() const {
     return "plumb arm --lcm-url '" + process_.lcm_url() + "'" +
-           (setting_.virtual_run ? " --clock '" + setting_.virtual_run->coordinator().clock() + "'" : "") +
+           (setting_.virtual_run ? " --clock '" + setting_.virtual_run->coordinator().clock() + "'"
+                                 : "") +
            (flags_.key.empty() ? "" : " --key '" + flags_.key + "'");
   }
 

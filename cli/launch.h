@@ -12,22 +12,24 @@ struct LaunchFlags {
   uint64_t seed = 1;
   int iterations = 8;
   int evaluation_episodes = 10;
-  std::string bus;      ///< empty = the robot's own
+  std::string bus;         ///< empty = the robot's own
   bool real_time = false;  ///< a virtual robot in real time; otherwise it runs in virtual time
-  double speed = 0;     ///< in real time scaled seconds per second, 0 = 1; in virtual time the most, 0 = no limit
-  bool real = false;    ///< the robot is on the bus: start no virtual one, ask before arming
-  std::string key;      ///< file of the key that commands are signed with; empty = they are not
+  /// in real time scaled seconds per second, 0 = 1; in virtual time the most, 0 = no limit
+  double speed = 0;
+  bool real = false;  ///< the robot is on the bus: start no virtual one, ask before arming
+  std::string key;    ///< file of the key that commands are signed with; empty = they are not
   bool allow_unsigned = false;  ///< although LCM leaves this machine
-  int priority = 0;     ///< SCHED_FIFO of the driver; robot, estimator and controller come right behind it. 0 = off
+  /// SCHED_FIFO of the driver; robot, estimator and controller come right behind it. 0 = off
+  int priority = 0;
   std::string log;      ///< record all messages here; empty = do not
   std::string can_log;  ///< record all frames here, in virtual time; empty = do not
   std::string summary;  ///< JSON of the outcome; empty = do not
   std::string output;   ///< folder for logs and checkpoints; empty = a new one
 };
 
-/// `plumb launch`: starts every process of a run, arms, shows progress, stops everything again whatever happens:
-/// motors first, the virtual robot last, within a second. @return exit status: 0 finished, 1 something failed,
-/// 130 interrupted.
+/// `plumb launch`: starts every process of a run, arms, shows progress, stops everything again
+/// whatever happens: motors first, the virtual robot last, within a second. @return exit status: 0
+/// finished, 1 something failed, 130 interrupted.
 int Launch(Process& process, const LaunchFlags& flags);
 
 }  // namespace plumb

@@ -14,9 +14,12 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kListen = 500'000;  // [us]; statuses come ten times a second, heartbeats at least as often
+// [us]; statuses come ten times a second, heartbeats at least as often
+constexpr int64_t kListen = 500'000;
 
-bool StartsWith(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
+bool StartsWith(const std::string& text, const std::string& start) {
+  return text.rfind(start, 0) == 0;
+}
 
 /// The bus behind the faults of "faulty:FAULTS:URL".
 std::string Innermost(std::string url) {
@@ -34,7 +37,8 @@ void RequireFree(const std::string& lcm_url, const std::string& bus_url, bool re
   const std::string innermost = Innermost(bus_url);
   if (!real && !StartsWith(innermost, "udp:") && !StartsWith(innermost, "socketcan:vcan") &&
       !StartsWith(innermost, "loop:")) {
-    throw std::invalid_argument(bus_url + " is neither udp: nor a vcan interface: if a robot is on it, say --real");
+    throw std::invalid_argument(
+        bus_url + " is neither udp: nor a vcan interface: if a robot is on it, say --real");
   }
   const auto bus = OpenTransport(bus_url);
   Messenger messenger(lcm_url);
@@ -47,11 +51,13 @@ void RequireFree(const std::string& lcm_url, const std::string& bus_url, bool re
     poll(polled.data(), polled.size(), 10);
     messenger.Drain();
     if (drivers.received() > 0 || policies.received() > 0) {
-      throw std::runtime_error("another run is under way on " + lcm_url + ": stop it, or give --lcm-url");
+      throw std::runtime_error("another run is under way on " + lcm_url +
+                               ": stop it, or give --lcm-url");
     }
     bus->SetTime(clock.Now());
     if (bus->Receive(frames) > 0 && !real) {
-      throw std::runtime_error("somebody talks on " + bus_url + " already: give another --bus (or --real)");
+      throw std::runtime_error("somebody talks on " + bus_url +
+                               " already: give another --bus (or --real)");
     }
   }
 }

@@ -12,7 +12,9 @@ namespace plumb {
 namespace {
 
 double Mean(const std::vector<double>& values) {
-  return values.empty() ? NAN : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  return values.empty() ? NAN
+                        : std::accumulate(values.begin(), values.end(), 0.0) /
+                              static_cast<double>(values.size());
 }
 
 double Median(std::vector<double> values) {
@@ -24,29 +26,41 @@ double Median(std::vector<double> values) {
 
 const char* DriverState(int8_t state) {
   switch (state) {
-    case driver_status_t::IDLE: return "idle";
-    case driver_status_t::ARMING: return "arming";
-    case driver_status_t::ARMED: return "armed";
-    case driver_status_t::FAULT: return "FAULT";
-    default: return "absent";
+    case driver_status_t::IDLE:
+      return "idle";
+    case driver_status_t::ARMING:
+      return "arming";
+    case driver_status_t::ARMED:
+      return "armed";
+    case driver_status_t::FAULT:
+      return "FAULT";
+    default:
+      return "absent";
   }
 }
 
 std::string PlusMinus(double mean, double sd) { return fmt::format("{:.3f} ± {:.3f}", mean, sd); }
 
-std::string OrDash(double value) { return std::isfinite(value) ? fmt::format("{:.0f}", value) : "-"; }
+std::string OrDash(double value) {
+  return std::isfinite(value) ? fmt::format("{:.0f}", value) : "-";
+}
 
 // Width in terminal cells: UTF-8 continuation bytes take none.
 std::string Pad(const std::string& text, size_t width) {
-  const auto cells = static_cast<size_t>(
-      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+  const auto cells = static_cast<size_t>(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xc0) != 0x80;
+  }));
   return cells < width ? std::string(width - cells, ' ') + text : text;
 }
 
-std::string Title(const ParameterDescription& parameter) { return parameter.name + " [" + parameter.unit + "]"; }
+std::string Title(const ParameterDescription& parameter) {
+  return parameter.name + " [" + parameter.unit + "]";
+}
 
 // Of a parameter's column: as wide as mean and sd, and two blanks before a longer title.
-size_t Width(const ParameterDescription& parameter) { return std::max<size_t>(20, Title(parameter).size() + 2); }
+size_t Width(const ParameterDescription& parameter) {
+  return std::max<size_t>(20, Title(parameter).size() + 2);
+}
 
 }  // namespace
 
@@ -84,11 +98,13 @@ void Progress::OnCalibration(const calibration_status_t& status) {
 }
 
 double& Progress::Spent::Doing(const controller_status_t& c, const training_status_t& t) {
-  if (c.phase == controller_status_t::RUNNING || c.phase == controller_status_t::PLACING) return robot;
+  if (c.phase == controller_status_t::RUNNING || c.phase == controller_status_t::PLACING)
+    return robot;
   return !t.complete && t.updates > 0 ? training : other;
 }
 
-void Progress::Spent::Account(double now, const controller_status_t& c, const training_status_t& t) {
+void Progress::Spent::Account(double now, const controller_status_t& c,
+                              const training_status_t& t) {
   Doing(c, t) += now - accounted;
   accounted = now;
 }
@@ -109,11 +125,14 @@ std::string Progress::Header() const {
 std::string Progress::Row(const Iteration& iteration) const {
   const calibration_status_t& c = iteration.calibration;
   std::string row = fmt::format("{:4d}", c.iteration);
-  for (size_t i = 0; i < c.mean.size(); ++i) row += Pad(PlusMinus(c.mean[i], c.sd[i]), Width(robot_.parameters[i]));
+  for (size_t i = 0; i < c.mean.size(); ++i)
+    row += Pad(PlusMinus(c.mean[i], c.sd[i]), Width(robot_.parameters[i]));
   row += fmt::format("{:13.2f}", c.discrepancy);
   for (const double error : c.error_before) row += fmt::format("{:9.4f}", error);
-  return row + fmt::format("{:8.3f}{:>6}{:>12}{:>7}{:7.1f}", c.kl, std::isnan(c.ess) ? "-" : fmt::format("{:.1f}", c.ess), OrDash(iteration.simulated_return),
-                           OrDash(iteration.robot_return), iteration.seconds);
+  return row + fmt::format("{:8.3f}{:>6}{:>12}{:>7}{:7.1f}", c.kl,
+                           std::isnan(c.ess) ? "-" : fmt::format("{:.1f}", c.ess),
+                           OrDash(iteration.simulated_return), OrDash(iteration.robot_return),
+                           iteration.seconds);
 }
 
 std::vector<std::string> Progress::TakeRows() {
@@ -130,21 +149,25 @@ std::string Progress::StatusLine(double seconds) const {
   switch (c.phase) {
     case controller_status_t::PLACING:
     case controller_status_t::RUNNING:
-      return line + fmt::format("  policy {} {} {}/{}: step {}/{}, return {:.0f}", c.policy_iteration, purpose,
-                                c.num_episodes + 1, c.episodes_wanted, c.step, robot_.task.steps, c.episode_return);
-    case controller_status_t::HALTED: return line + "  controller halted: " + c.reason;
-    default: break;
+      return line + fmt::format("  policy {} {} {}/{}: step {}/{}, return {:.0f}",
+                                c.policy_iteration, purpose, c.num_episodes + 1, c.episodes_wanted,
+                                c.step, robot_.task.steps, c.episode_return);
+    case controller_status_t::HALTED:
+      return line + "  controller halted: " + c.reason;
+    default:
+      break;
   }
   if (training_.updates > 0 && !training_.complete) {
-    return line + fmt::format("  training policy {}: update {}/{}, return {:.0f}, {:.0f} k steps", training_.iteration,
-                              training_.update, training_.updates, training_.mean_return,
-                              static_cast<double>(training_.steps) / 1000);
+    return line + fmt::format("  training policy {}: update {}/{}, return {:.0f}, {:.0f} k steps",
+                              training_.iteration, training_.update, training_.updates,
+                              training_.mean_return, static_cast<double>(training_.steps) / 1000);
   }
   if (c.phase == controller_status_t::COMPLETE) return line + "  calibrating";
   return line + "  waiting" + (c.reason.empty() ? "" : ": " + c.reason);
 }
 
-double Progress::TrueCombination(const calibration_status_t& c, size_t index, const Eigen::VectorXd& truth) const {
+double Progress::TrueCombination(const calibration_status_t& c, size_t index,
+                                 const Eigen::VectorXd& truth) const {
   double sum = 0, alone = 0;
   bool log = true;
   int involved = 0;
@@ -157,7 +180,8 @@ double Progress::TrueCombination(const calibration_status_t& c, size_t index, co
     log = log && robot_.parameters[i].coordinate == ParameterDescription::Coordinate::kLog;
   }
   if (log) return std::exp(sum);
-  return involved == 1 && std::isfinite(alone) ? alone : sum;  // as calibrator/identifiability.h has it
+  // as calibrator/identifiability.h has it
+  return involved == 1 && std::isfinite(alone) ? alone : sum;
 }
 
 std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
@@ -167,10 +191,12 @@ std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
     text += fmt::format("{:<24}{:>22}{:>12}{:>10}\n", "", "learned", "hidden", "error");
     const auto line = [&](const std::string& name, double mean, double sd, double real) {
       text += fmt::format("{:<24}", name) + Pad(PlusMinus(mean, sd), 22);
-      if (std::isfinite(real)) text += fmt::format("{:12.3f}{:9.2f} %", real, 100 * (mean / real - 1));
+      if (std::isfinite(real))
+        text += fmt::format("{:12.3f}{:9.2f} %", real, 100 * (mean / real - 1));
       text += "\n";
     };
-    // Where every parameter is determined, each is a combination of its own, which need not be told twice.
+    // Where every parameter is determined, each is a combination of its own, which need not be told
+    // twice.
     for (size_t i = 0; i < c.combination.size() && c.combination.size() < c.mean.size(); ++i) {
       line(c.combination[i], c.combination_mean[i], c.combination_sd[i],
            truth.size() > 0 ? TrueCombination(c, i, truth) : NAN);
@@ -182,13 +208,18 @@ std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
     text += c.identifiability + ".\n";
   }
   if (!evaluation_.empty()) {
-    text += fmt::format("final policy on the robot, {} roll-outs: mean return {:.0f}, median {:.0f}, worst {:.0f}\n",
-                        evaluation_.size(), Mean(evaluation_), Median(evaluation_),
-                        *std::min_element(evaluation_.begin(), evaluation_.end()));
+    text += fmt::format(
+        "final policy on the robot, {} roll-outs: mean return {:.0f}, median {:.0f}, worst "
+        "{:.0f}\n",
+        evaluation_.size(), Mean(evaluation_), Median(evaluation_),
+        *std::min_element(evaluation_.begin(), evaluation_.end()));
   }
-  text += fmt::format("time: {:.0f} s on the robot, by its clock", spent_.robot) +
-          fmt::format("; {:.0f} s in all: {:.0f} s on the robot, {:.0f} s training, {:.0f} s for the rest\n",
-                      really_spent_.accounted, really_spent_.robot, really_spent_.training, really_spent_.other);
+  text +=
+      fmt::format("time: {:.0f} s on the robot, by its clock", spent_.robot) +
+      fmt::format(
+          "; {:.0f} s in all: {:.0f} s on the robot, {:.0f} s training, {:.0f} s for the rest\n",
+          really_spent_.accounted, really_spent_.robot, really_spent_.training,
+          really_spent_.other);
   return text;
 }
 
@@ -199,16 +230,18 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
   for (const ParameterDescription& p : robot_.parameters) names.push_back(p.name);
   summary["robot"] = robot_.name;
   summary["parameters"] = names;
-  summary["hidden"] = truth.size() > 0 ? json(std::vector<double>(truth.begin(), truth.end())) : json();
+  summary["hidden"] =
+      truth.size() > 0 ? json(std::vector<double>(truth.begin(), truth.end())) : json();
   summary["iterations"] = json::array();
   for (const Iteration& iteration : done_) {
     const calibration_status_t& c = iteration.calibration;
     json combinations = json::array();
     for (size_t i = 0; i < c.combination.size(); ++i) {
-      combinations.push_back({{"name", c.combination[i]},
-                              {"mean", c.combination_mean[i]},
-                              {"sd", c.combination_sd[i]},
-                              {"hidden", truth.size() > 0 ? json(TrueCombination(c, i, truth)) : json()}});
+      combinations.push_back(
+          {{"name", c.combination[i]},
+           {"mean", c.combination_mean[i]},
+           {"sd", c.combination_sd[i]},
+           {"hidden", truth.size() > 0 ? json(TrueCombination(c, i, truth)) : json()}});
     }
     summary["iterations"].push_back({{"iteration", c.iteration},
                                      {"mean", c.mean},

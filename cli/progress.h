@@ -14,11 +14,12 @@
 
 namespace plumb {
 
-/// What a run has shown so far, gathered from the status messages: the live line, the table, the summary.
-/// Time is an argument. Not thread-safe.
+/// What a run has shown so far, gathered from the status messages: the live line, the table, the
+/// summary. Time is an argument. Not thread-safe.
 class Progress {
  public:
-  Progress(const RobotDescription& robot, int iterations) : robot_(robot), iterations_(iterations) {}
+  Progress(const RobotDescription& robot, int iterations)
+      : robot_(robot), iterations_(iterations) {}
 
   void OnDriver(const driver_status_t& status) { driver_ = status; }
   void OnController(const controller_status_t& status);
@@ -48,8 +49,10 @@ class Progress {
     double simulated_return, robot_return, seconds;
   };
   std::string Row(const Iteration& iteration) const;
-  /// The true value of an iteration's determined combination: which there are, and in which order, is each iteration's.
-  double TrueCombination(const calibration_status_t& c, size_t index, const Eigen::VectorXd& truth) const;
+  /// The true value of an iteration's determined combination: which there are, and in which order,
+  /// is each iteration's.
+  double TrueCombination(const calibration_status_t& c, size_t index,
+                         const Eigen::VectorXd& truth) const;
 
   const RobotDescription& robot_;
   int iterations_;
@@ -64,7 +67,8 @@ class Progress {
   /// [s] spent on what, by one clock.
   struct Spent {
     double& Doing(const controller_status_t& controller, const training_status_t& training);
-    void Account(double now, const controller_status_t& controller, const training_status_t& training);
+    void Account(double now, const controller_status_t& controller,
+                 const training_status_t& training);
     double robot = 0, training = 0, other = 0;
     double accounted = 0;  // up to when
   };

@@ -17,8 +17,9 @@ void AppendNumbers(const Eigen::VectorXd& numbers, std::string& csv) {
 
 }  // namespace
 
-SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& robot, const Actor& actor, uint64_t seed,
-                             uint32_t number, const std::function<void(const SimulatedStep&)>& see,
+SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& robot,
+                             const Actor& actor, uint64_t seed, uint32_t number,
+                             const std::function<void(const SimulatedStep&)>& see,
                              const std::function<bool()>& stop) {
   const Task& task = environment.task();
   Random start(seed, {number, kStartStream}), random(seed, {number, kActorStream});
@@ -37,7 +38,8 @@ SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& r
     step.v = environment.v();
     const Environment::StepResult result = environment.Step(action);
     for (int i = 0; i < environment.action_size(); ++i) {
-      step.action[i] = environment.effort()[task.action_indices()[static_cast<size_t>(i)]] / task.action_unit(i);
+      step.action[i] =
+          environment.effort()[task.action_indices()[static_cast<size_t>(i)]] / task.action_unit(i);
     }
     ++episode.steps;
     episode.sum += result.reward;
@@ -71,14 +73,15 @@ std::string Totals(const std::vector<SimulatedEpisode>& episodes) {
   for (const SimulatedEpisode& episode : episodes) {
     if (!failed(episode)) squares += std::pow(episode.sum - sum / count, 2);
   }
-  std::string text =
-      fmt::format("{} episode{}, {} steps", episodes.size(), episodes.size() == 1 ? "" : "s", steps);
+  std::string text = fmt::format("{} episode{}, {} steps", episodes.size(),
+                                 episodes.size() == 1 ? "" : "s", steps);
   if (count > 0) text += fmt::format(", mean return {:.1f}", sum / count);
-  if (count > 1) text += fmt::format(", standard deviation {:.1f}", std::sqrt(squares / (count - 1)));
+  if (count > 1)
+    text += fmt::format(", standard deviation {:.1f}", std::sqrt(squares / (count - 1)));
   const size_t failures = episodes.size() - static_cast<size_t>(count);
   if (failures > 0) {
-    text +=
-        fmt::format("; {} failed: no longer finite{}", failures, count > 0 ? ", left out of the mean" : "");
+    text += fmt::format("; {} failed: no longer finite{}", failures,
+                        count > 0 ? ", left out of the mean" : "");
   }
   return text;
 }

@@ -26,8 +26,8 @@ void RunProcesses::Start(const std::string& name, std::vector<std::string> argum
   const bool ours = name.starts_with("plumb-");
   arguments.insert(arguments.begin(), ours ? (here / name).string() : name);
   if (ours) {
-    arguments.insert(arguments.end(), {"--lcm-url", where_.lcm_url, "--clock", where_.clock, "--parent",
-                                       std::to_string(getpid())});
+    arguments.insert(arguments.end(), {"--lcm-url", where_.lcm_url, "--clock", where_.clock,
+                                       "--parent", std::to_string(getpid())});
   }
   children_.emplace_back(name, arguments, where_.output / (name + ".log"));
   if (ours && coordinator_) coordinator_->Expect(name, children_.back().pid());
@@ -37,34 +37,46 @@ void RunProcesses::Start() {
   const std::string seed = std::to_string(flags_.seed);
   const auto with_priority = [&](std::vector<std::string> arguments, int behind) {
     const int priority = std::max(flags_.priority - behind, 0);
-    if (priority > 0) arguments.insert(arguments.end(), {"--realtime-priority", std::to_string(priority)});
+    if (priority > 0)
+      arguments.insert(arguments.end(), {"--realtime-priority", std::to_string(priority)});
     return arguments;
   };
   if (!flags_.log.empty() && !coordinator_) {
     // It knows no --parent of ours.
-    Start(kLogger, {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + where_.lcm_url, "-q", "-f", flags_.log});
+    Start(kLogger, {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + where_.lcm_url, "-q", "-f",
+                    flags_.log});
   }
-  if (!flags_.real) Start(kRobot, with_priority({flags_.robot, "--bus", where_.bus, "--seed", seed}, 5));
+  if (!flags_.real)
+    Start(kRobot, with_priority({flags_.robot, "--bus", where_.bus, "--seed", seed}, 5));
   std::vector<std::string> driver{flags_.robot, "--bus", where_.bus, "--flight-recorder",
                                   (where_.output / "faults").string()};
   if (!flags_.real) driver.push_back("--virtual");
   if (flags_.allow_unsigned) driver.push_back("--unsigned");
   std::vector<std::string> controller{flags_.robot, "--seed", seed};
-  if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});  // nobody throws a real robot about
+  // nobody throws a real robot about
+  if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});
   if (!flags_.key.empty()) {
-    for (auto* arguments : {&driver, &controller}) arguments->insert(arguments->end(), {"--key", flags_.key});
+    for (auto* arguments : {&driver, &controller})
+      arguments->insert(arguments->end(), {"--key", flags_.key});
   }
   Start(kDriver, with_priority(driver, 0));
   Start("plumb-estimator", with_priority({flags_.robot}, 5));
   Start("plumb-controller", with_priority(controller, 5));
   std::vector<std::string> calibrator{flags_.robot, "--seed", seed, "--checkpoint",
                                       (where_.output / "calibration").string()};
-  std::vector<std::string> trainer{flags_.robot, "--seed", seed, "--iterations", std::to_string(flags_.iterations),
-                                   "--evaluation-episodes", std::to_string(flags_.evaluation_episodes),
-                                   "--checkpoint", (where_.output / "training").string()};
+  std::vector<std::string> trainer{flags_.robot,
+                                   "--seed",
+                                   seed,
+                                   "--iterations",
+                                   std::to_string(flags_.iterations),
+                                   "--evaluation-episodes",
+                                   std::to_string(flags_.evaluation_episodes),
+                                   "--checkpoint",
+                                   (where_.output / "training").string()};
   // In real time the slow loop gives way to the fast one.
   if (!coordinator_) {
-    for (auto* arguments : {&calibrator, &trainer}) arguments->insert(arguments->end(), {"--nice", "10"});
+    for (auto* arguments : {&calibrator, &trainer})
+      arguments->insert(arguments->end(), {"--nice", "10"});
   }
   Start("plumb-calibrator", calibrator);
   Start("plumb-trainer", trainer);
@@ -86,16 +98,19 @@ void RunProcesses::Stop(bool hurry) noexcept {
   children_.clear();
 }
 
-/// Everything that could command ends at one moment; the driver disarms and confirms; the robot goes last.
+/// Everything that could command ends at one moment; the driver disarms and confirms; the robot
+/// goes last.
 void RunProcesses::StopInVirtualTime(bool hurry) {
   constexpr int64_t kFarewell = 1'000'000, kSlice = 10'000;  // [us]
-  constexpr double kPatience = 0.5;                          // [s] of real time, with a person who waits
+  // [s] of real time, with a person who waits
+  constexpr double kPatience = 0.5;
   const auto start = SteadyClock::now();
   const auto in_time = [&] { return !hurry || SecondsSince(start) < kPatience; };
   coordinator_->go_on = in_time;
   const auto anybody = [&](const auto& whom) {
-    return std::ranges::any_of(children_,
-                               [&](const Child& child) { return whom(child) && coordinator_->present(child.name()); });
+    return std::ranges::any_of(children_, [&](const Child& child) {
+      return whom(child) && coordinator_->present(child.name());
+    });
   };
   const auto stop = [&](const auto& whom) {
     for (const Child& child : children_) {

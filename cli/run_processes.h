@@ -10,7 +10,8 @@
 
 namespace plumb {
 
-/// The processes of a run: started together, and stopped in the order that is safe. Not thread-safe.
+/// The processes of a run: started together, and stopped in the order that is safe. Not
+/// thread-safe.
 class RunProcesses {
  public:
   struct Where {
@@ -28,8 +29,8 @@ class RunProcesses {
   void Start();
   /// One that has ended, though nobody has asked it to; null if all run.
   Child* Ended();
-  /// Motors first, the virtual robot last. Does not throw. @param hurry whatever they do: within a second, for a person
-  /// who waits. Otherwise, in virtual time, always in the same way.
+  /// Motors first, the virtual robot last. Does not throw. @param hurry whatever they do: within a
+  /// second, for a person who waits. Otherwise, in virtual time, always in the same way.
   void Stop(bool hurry) noexcept;
 
  private:

@@ -40,8 +40,8 @@ void RequireOutputs(const SimFlags& flags) {
   }
 }
 
-/// "mass/thigh=4": gives the parameter that value. One that is not among the uncertain ones joins them, for the
-/// simulator to know or to refuse.
+/// "mass/thigh=4": gives the parameter that value. One that is not among the uncertain ones joins
+/// them, for the simulator to know or to refuse.
 void Set(const std::string& assignment, RobotDescription& robot) {
   const size_t equals = assignment.find('=');
   double value = NAN;
@@ -72,12 +72,12 @@ Eigen::VectorXd Means(const RobotDescription& robot) {
 
 Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task& task) {
   if (!flags.policy.empty()) {
-    return [policy = LoadPolicy(flags.policy, robot, task)](const Eigen::VectorXf& observation, Random&) {
-      return policy.Mean(observation);
-    };
+    return [policy = LoadPolicy(flags.policy, robot, task)](
+               const Eigen::VectorXf& observation, Random&) { return policy.Mean(observation); };
   }
   const int size = task.action_size();
-  if (!flags.random) return [size](const Eigen::VectorXf&, Random&) { return Eigen::VectorXf::Zero(size).eval(); };
+  if (!flags.random)
+    return [size](const Eigen::VectorXf&, Random&) { return Eigen::VectorXf::Zero(size).eval(); };
   return [size](const Eigen::VectorXf&, Random& random) {
     Eigen::VectorXf action(size);
     for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
@@ -87,10 +87,14 @@ Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task
 
 const char* Describe(SimulatedEpisode::End end) {
   switch (end) {
-    case SimulatedEpisode::End::kTimeLimit: return "time limit";
-    case SimulatedEpisode::End::kTerminated: return "terminated by the task";
-    case SimulatedEpisode::End::kNotFinite: return "the simulation is no longer finite";
-    case SimulatedEpisode::End::kInterrupted: return "interrupted";
+    case SimulatedEpisode::End::kTimeLimit:
+      return "time limit";
+    case SimulatedEpisode::End::kTerminated:
+      return "terminated by the task";
+    case SimulatedEpisode::End::kNotFinite:
+      return "the simulation is no longer finite";
+    case SimulatedEpisode::End::kInterrupted:
+      return "interrupted";
   }
   return "";
 }
@@ -98,12 +102,13 @@ const char* Describe(SimulatedEpisode::End end) {
 /// "parameters: mass/torso 3.8, ...", in lines of bearable length.
 std::string DescribeParameters(const RobotDescription& robot) {
   std::string text = "parameters:", line = text;
-  if (robot.parameters.empty()) return text + " none, the robot is as its URDF and TOML tables have it\n";
+  if (robot.parameters.empty())
+    return text + " none, the robot is as its URDF and TOML tables have it\n";
   text.clear();
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
     const ParameterDescription& parameter = robot.parameters[i];
-    const std::string item =
-        fmt::format(" {} {}{}", parameter.name, parameter.mean, i + 1 < robot.parameters.size() ? "," : "");
+    const std::string item = fmt::format(" {} {}{}", parameter.name, parameter.mean,
+                                         i + 1 < robot.parameters.size() ? "," : "");
     if (line.size() + item.size() > kLineLength) {
       text += line + "\n";
       line.assign(1, ' ');
@@ -116,7 +121,8 @@ std::string DescribeParameters(const RobotDescription& robot) {
 }  // namespace
 
 int Simulate(Process& process, const SimFlags& flags) {
-  if (flags.random && !flags.policy.empty()) throw std::invalid_argument("--policy and --random exclude each other");
+  if (flags.random && !flags.policy.empty())
+    throw std::invalid_argument("--policy and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
   if (flags.urdf) robot.parameters.clear();
@@ -140,7 +146,9 @@ int Simulate(Process& process, const SimFlags& flags) {
   std::vector<Snapshot> film;  // of the first episode
   std::vector<SimulatedEpisode> episodes;
   int64_t asked = 0;
-  const auto stop = [&] { return (flags.view || ++asked % kStepsPerLook == 0) && process.stopping(); };
+  const auto stop = [&] {
+    return (flags.view || ++asked % kStepsPerLook == 0) && process.stopping();
+  };
   const int64_t begin = process.clock().Now();
   for (int number = 0; number < flags.episodes; ++number) {
     if (process.stopping()) {
@@ -152,18 +160,19 @@ int Simulate(Process& process, const SimFlags& flags) {
       if (number == 0) film.push_back({step.time, step.q});
       if (viewer) viewer->Show(step.time, step.q);
     };
-    episodes.push_back(
-        PlayEpisode(environment, robot, actor, flags.seed, static_cast<uint32_t>(number), see, stop));
+    episodes.push_back(PlayEpisode(environment, robot, actor, flags.seed,
+                                   static_cast<uint32_t>(number), see, stop));
     const SimulatedEpisode& episode = episodes.back();
-    std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum, Describe(episode.end))
+    std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum,
+                             Describe(episode.end))
               << std::endl;
     if (episode.end == SimulatedEpisode::End::kInterrupted) return 130;
     if (number == 0 && environment.q().allFinite()) {
       film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
     }
   }
-  const double seconds =
-      std::max(static_cast<double>(process.clock().Now() - begin) * 1e-6 / process.clock().scale(), 1e-6);
+  const double seconds = std::max(
+      static_cast<double>(process.clock().Now() - begin) * 1e-6 / process.clock().scale(), 1e-6);
   double steps = 0;
   for (const SimulatedEpisode& episode : episodes) steps += static_cast<double>(episode.steps);
   std::cout << Totals(episodes)

@@ -20,8 +20,9 @@ struct SimFlags {
   bool view = false;
 };
 
-/// `plumb sim`: rolls a policy, random actions or no action out in the simulator, without messages or buses, and says
-/// how it went. @return exit status: 0, or 130 if it was interrupted; then it writes no files.
+/// `plumb sim`: rolls a policy, random actions or no action out in the simulator, without messages
+/// or buses, and says how it went. @return exit status: 0, or 130 if it was interrupted; then it
+/// writes no files.
 int Simulate(Process& process, const SimFlags& flags);
 
 }  // namespace plumb

@@ -32,11 +32,14 @@ namespace {
 constexpr double kCheckpointPeriod = 5;  // [s]
 constexpr int kEvaluationEpisodes = 20;  // of those along the way
 constexpr char kCsvHeader[] =
-    "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,accepted,dropped_episodes,seconds\n";
+    "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,"
+    "accepted,dropped_episodes,seconds\n";
 
 class Stopwatch {
  public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -58,11 +61,13 @@ ParameterDistribution ReadDistribution(const std::string& name, const RobotDescr
 }
 
 /// What the result depends on, but for the steps: a longer run may go on from a shorter one.
-uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot, const ParameterDistribution& distribution,
+uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
+                    const ParameterDistribution& distribution,
                     const std::optional<GaussianPolicy>& start) {
   const TrainingSettings& s = robot.training;
   std::ostringstream text;
-  text << VersionLine("plumb") << robot.fingerprint << s.normalise_values << s.fisher_fraction << ' ' << s.worst_share << ' ' << s.worst_after << ' ' << flags.seed;
+  text << VersionLine("plumb") << robot.fingerprint << s.normalise_values << s.fisher_fraction
+       << ' ' << s.worst_share << ' ' << s.worst_after << ' ' << flags.seed;
   for (const auto& component : distribution.components) {
     text.precision(17);
     text << component.weight << component.mean << component.covariance;
@@ -90,8 +95,9 @@ class ProgressTable {
   }
   void Add(const Trainer& trainer, const UpdateReport& report, double evaluation, double seconds) {
     if (file_.empty()) return;
-    stream_ << fmt::format("{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{},{:.3f}\n", trainer.updates(), trainer.steps(),
-                           report.mean_return, evaluation, report.step.kl, report.step.surrogate_gain, report.explained_variance,
+    stream_ << fmt::format("{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{},{:.3f}\n",
+                           trainer.updates(), trainer.steps(), report.mean_return, evaluation,
+                           report.step.kl, report.step.surrogate_gain, report.explained_variance,
                            report.entropy, report.step.accepted, report.dropped_episodes, seconds)
             << std::flush;
     if (!stream_) throw std::runtime_error(file_ + ": cannot be written");
@@ -104,7 +110,8 @@ class ProgressTable {
 
 std::string Clock(double seconds) {
   const auto whole = static_cast<int64_t>(std::ceil(std::max(seconds, 0.)));
-  return whole >= 3600 ? fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60) : fmt::format("{}:{:02}", whole / 60, whole % 60);
+  return whole >= 3600 ? fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60)
+                       : fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
 /// One line that is written over where people look at it; into a file, a line now and then.
@@ -114,7 +121,8 @@ class ProgressLine {
   ~ProgressLine() {
     if (terminal_ && shown_) std::cerr << "\n";
   }
-  void Show(const Trainer& trainer, const UpdateReport& report, int64_t steps, int64_t done_before) {
+  void Show(const Trainer& trainer, const UpdateReport& report, int64_t steps,
+            int64_t done_before) {
     if (!speaks_) return;
     const double seconds = clock_.seconds();
     if (seconds < next_ && trainer.steps() < steps) return;
@@ -122,9 +130,11 @@ class ProgressLine {
     shown_ = true;
     const double speed = static_cast<double>(trainer.steps() - done_before) / seconds;
     const std::string line = fmt::format(
-        "{:3.0f} %  {:.3g} steps  return {:.5g}  KL {:.4f}  gain {:.3f}  explained {:.2f}  entropy {:.2f}  {:.3g} steps/s  {} left",
-        100 * std::min(1., static_cast<double>(trainer.steps()) / static_cast<double>(steps)), static_cast<double>(trainer.steps()),
-        report.mean_return, report.step.kl, report.step.surrogate_gain, report.explained_variance, report.entropy, speed,
+        "{:3.0f} %  {:.3g} steps  return {:.5g}  KL {:.4f}  gain {:.3f}  explained {:.2f}  entropy "
+        "{:.2f}  {:.3g} steps/s  {} left",
+        100 * std::min(1., static_cast<double>(trainer.steps()) / static_cast<double>(steps)),
+        static_cast<double>(trainer.steps()), report.mean_return, report.step.kl,
+        report.step.surrogate_gain, report.explained_variance, report.entropy, speed,
         Clock(static_cast<double>(steps - trainer.steps()) / speed));
     std::cerr << (terminal_ ? "\r\033[K" : "") << line << (terminal_ ? "" : "\n") << std::flush;
   }
@@ -143,10 +153,12 @@ class Training {
         process_(process),
         robot_(ReadRobot(flags_)),
         distribution_(ReadDistribution(flags_.distribution, robot_)),
-        trainer_(robot_.training, SimulateRobot(robot_), robot_.effort_limits(), flags_.seed, Threads(), ranks_) {
+        trainer_(robot_.training, SimulateRobot(robot_), robot_.effort_limits(), flags_.seed,
+                 Threads(), ranks_) {
     if (!speaks()) spdlog::set_level(spdlog::level::err);
     if (flags_.checkpoint.empty()) flags_.checkpoint = flags_.output + ".checkpoint";
-    steps_ = flags_.steps > 0 ? static_cast<int64_t>(flags_.steps) : int64_t{robot_.training.updates} * robot_.training.batch;
+    steps_ = flags_.steps > 0 ? static_cast<int64_t>(flags_.steps)
+                              : int64_t{robot_.training.updates} * robot_.training.batch;
     for (const std::string& file : {flags_.output, flags_.checkpoint, flags_.csv}) {
       if (speaks() && !file.empty()) RequireWritable(file);
     }
@@ -169,13 +181,17 @@ class Training {
       while (trainer_.steps() < steps_) {
         if (Stopping()) {
           Save();
-          if (speaks()) std::cerr << fmt::format("\ninterrupted; the same command goes on from {}\n", flags_.checkpoint);
+          if (speaks())
+            std::cerr << fmt::format("\ninterrupted; the same command goes on from {}\n",
+                                     flags_.checkpoint);
           return 130;
         }
         const UpdateReport report = trainer_.Update(sample);
         training_return_ = report.mean_return;
-        const bool judged = flags_.evaluate_every > 0 && trainer_.updates() % flags_.evaluate_every == 0;
-        const double evaluation = judged ? trainer_.Evaluate(sample, kEvaluationEpisodes).mean : NAN;
+        const bool judged =
+            flags_.evaluate_every > 0 && trainer_.updates() % flags_.evaluate_every == 0;
+        const double evaluation =
+            judged ? trainer_.Evaluate(sample, kEvaluationEpisodes).mean : NAN;
         table.Add(trainer_, report, evaluation, clock_.seconds());
         line.Show(trainer_, report, steps_, before);
         Warn(report);
@@ -222,13 +238,19 @@ class Training {
     const std::optional<Checkpoint> checkpoint = SharedCheckpoint();
     if (!checkpoint) return;
     if (checkpoint->identity != identity_) {
-      throw CheckpointError(fmt::format("{} is of another run (robot, settings, distribution, start, seed or version): delete it, or give another --checkpoint",
-                                        flags_.checkpoint));
+      throw CheckpointError(
+          fmt::format("{} is of another run (robot, settings, distribution, start, seed or "
+                      "version): delete it, or give another --checkpoint",
+                      flags_.checkpoint));
     }
-    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint->policy), checkpoint->critic, checkpoint->observations, checkpoint->updates,
-                      checkpoint->steps, checkpoint->dropped_episodes});
+    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint->policy), checkpoint->critic,
+                      checkpoint->observations, checkpoint->updates, checkpoint->steps,
+                      checkpoint->dropped_episodes});
     training_return_ = checkpoint->training_return;
-    if (speaks()) std::cout << fmt::format("goes on from {}: update {}, {} steps\n", flags_.checkpoint, trainer_.updates(), trainer_.steps()) << std::flush;
+    if (speaks())
+      std::cout << fmt::format("goes on from {}: update {}, {} steps\n", flags_.checkpoint,
+                               trainer_.updates(), trainer_.steps())
+                << std::flush;
   }
 
   void Save() {
@@ -236,39 +258,50 @@ class Training {
     const TrainerState state = trainer_.state();
     Checkpoint checkpoint;
     checkpoint.seed = flags_.seed, checkpoint.identity = identity_;
-    checkpoint.updates = state.updates, checkpoint.steps = state.steps, checkpoint.dropped_episodes = state.dropped_episodes;
+    checkpoint.updates = state.updates, checkpoint.steps = state.steps,
+    checkpoint.dropped_episodes = state.dropped_episodes;
     checkpoint.training_return = training_return_;
-    checkpoint.policy = state.policy.ToMessage(), checkpoint.distribution = distribution_.ToMessage();
+    checkpoint.policy = state.policy.ToMessage(),
+    checkpoint.distribution = distribution_.ToMessage();
     checkpoint.critic = state.critic, checkpoint.observations = state.observations;
     SaveCheckpoint(flags_.checkpoint, checkpoint);
   }
 
   void Warn(const UpdateReport& report) {
-    if (!report.step.accepted) spdlog::warn(fmt::format("update {} skipped: {}", trainer_.updates(), report.step.failure));
-    if (!report.critic_fitted) spdlog::warn(fmt::format("update {}: the critic's fit was not finite", trainer_.updates()));
-    if (report.dropped_episodes > 0) spdlog::warn(fmt::format("update {}: {} episodes dropped, not finite", trainer_.updates(), report.dropped_episodes));
+    if (!report.step.accepted)
+      spdlog::warn(fmt::format("update {} skipped: {}", trainer_.updates(), report.step.failure));
+    if (!report.critic_fitted)
+      spdlog::warn(fmt::format("update {}: the critic's fit was not finite", trainer_.updates()));
+    if (report.dropped_episodes > 0)
+      spdlog::warn(fmt::format("update {}: {} episodes dropped, not finite", trainer_.updates(),
+                               report.dropped_episodes));
   }
 
   void Judge(const ParameterSampler& sample) {
     const Evaluation own = trainer_.EvaluateHeldOut(sample, flags_.held_out);
     const ParameterDistribution prior = ParameterDistribution::Prior(robot_);
-    const Evaluation on_prior = trainer_.EvaluateHeldOut([&](Random& random) { return prior.Sample(random); }, flags_.held_out);
+    const Evaluation on_prior = trainer_.EvaluateHeldOut(
+        [&](Random& random) { return prior.Sample(random); }, flags_.held_out);
     if (!speaks()) return;
     WritePolicy(own);
-    std::cout << fmt::format("{} steps, {} updates, {:.1f} s\nreturn without exploration, {} simulators held out:\n", trainer_.steps(),
-                             trainer_.updates(), clock_.seconds(), flags_.held_out);
+    std::cout << fmt::format(
+        "{} steps, {} updates, {:.1f} s\nreturn without exploration, {} simulators held out:\n",
+        trainer_.steps(), trainer_.updates(), clock_.seconds(), flags_.held_out);
     std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Words(own));
-    if (flags_.distribution != "prior") std::cout << fmt::format("  {:24} {}\n", "prior", Words(on_prior));
+    if (flags_.distribution != "prior")
+      std::cout << fmt::format("  {:24} {}\n", "prior", Words(on_prior));
     std::cout << "wrote " << flags_.output << std::endl;
   }
 
   void WritePolicy(const Evaluation& evaluation) const {
     PolicyRecord record = MakePolicyRecord(robot_, *MakeTask(robot_));
     record.posterior = flags_.distribution;
-    if (flags_.distribution != "prior" && flags_.distribution != "nominal") {  // a file's name says little: also what is in it
+    // a file's name says little: also what is in it
+    if (flags_.distribution != "prior" && flags_.distribution != "nominal") {
       record.posterior += fmt::format(" {:016x}", Hash(ReadFile(flags_.distribution)));
     }
-    record.seed = flags_.seed, record.steps = trainer_.steps(), record.training_return = training_return_;
+    record.seed = flags_.seed, record.steps = trainer_.steps(),
+    record.training_return = training_return_;
     record.evaluation["simulators"] = evaluation.episodes;
     record.evaluation["failed"] = evaluation.failed;
     if (std::isfinite(evaluation.mean)) {

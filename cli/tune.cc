@@ -17,9 +17,9 @@ namespace {
 
 std::string Lines(const RobotDescription& robot, const TunedNoise& tuned, size_t i) {
   const NoiseDescription& noise = tuned.joints[i];
-  std::string text =
-      fmt::format("# of [[joint]] \"{}\": deviance per reading {:.3f} instead of {:.3f}\n[joint.estimator]\n",
-                  robot.joints[i].name, tuned.after[i], tuned.before[i]);
+  std::string text = fmt::format(
+      "# of [[joint]] \"{}\": deviance per reading {:.3f} instead of {:.3f}\n[joint.estimator]\n",
+      robot.joints[i].name, tuned.after[i], tuned.before[i]);
   const auto add = [&](const char* key, double value) {
     if (std::isfinite(value)) text += fmt::format("{} = {:.3g}\n", key, value);
   };
@@ -52,7 +52,8 @@ int TuneEstimator(const std::string& robot_path, const std::string& log) {
     return true;
   });
   if (messages.empty()) {
-    throw std::runtime_error(fmt::format("{}: has no JOINT_STATE ({} undecodable)", log, undecodable));
+    throw std::runtime_error(
+        fmt::format("{}: has no JOINT_STATE ({} undecodable)", log, undecodable));
   }
   const ProgressLine line;
   int played = 0;

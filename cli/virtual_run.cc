@@ -18,7 +18,8 @@ std::string_view Interface(std::string_view bus_url) {
 
 }  // namespace
 
-VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& lcm_url, const Records& records)
+VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& lcm_url,
+                       const Records& records)
     : coordinator_((folder / "clock").string()) {
   if (!lcm_url.starts_with("memq:")) {
     try {
@@ -30,7 +31,8 @@ VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& l
   if (!records.messages.empty()) messages_.emplace(records.messages);
   if (!records.frames.empty()) {
     frames_.open(records.frames);
-    if (!frames_) throw std::runtime_error(fmt::format("{}: {}", records.frames, std::strerror(errno)));
+    if (!frames_)
+      throw std::runtime_error(fmt::format("{}: {}", records.frames, std::strerror(errno)));
   }
   coordinator_.on_post = [this](const lockstep_post_t& post, const std::string&) { OnPost(post); };
 }

@@ -12,18 +12,21 @@
 
 namespace plumb {
 
-/// What a run in virtual time has besides its processes: the coordinator, the mirror of its messages on LCM, and its
-/// records. Not thread-safe.
+/// What a run in virtual time has besides its processes: the coordinator, the mirror of its
+/// messages on LCM, and its records. Not thread-safe.
 class VirtualRun {
  public:
   struct Records {
-    std::string messages;  ///< LCM log to write, in lcm-logger's format, with the run's times; empty: none
-    std::string frames;    ///< CAN log to write, as candump -l does; empty: none
+    /// LCM log to write, in lcm-logger's format, with the run's times; empty: none
+    std::string messages;
+    std::string frames;  ///< CAN log to write, as candump -l does; empty: none
   };
 
-  /// @param folder of the run, which no other has. @param lcm_url where its messages are mirrored; memq: nowhere.
+  /// @param folder of the run, which no other has. @param lcm_url where its messages are mirrored;
+  /// memq: nowhere.
   /// @throws std::runtime_error if a file cannot be written.
-  VirtualRun(const std::filesystem::path& folder, const std::string& lcm_url, const Records& records);
+  VirtualRun(const std::filesystem::path& folder, const std::string& lcm_url,
+             const Records& records);
   ~VirtualRun();
 
   Coordinator& coordinator() { return coordinator_; }
@@ -33,7 +36,8 @@ class VirtualRun {
   std::vector<LcmMirror::Message> TakeStrangers() {
     return mirror_ ? mirror_->TakeStrangers() : std::vector<LcmMirror::Message>();
   }
-  /// All is said. Its record is complete afterwards. @throws std::runtime_error if something was lost.
+  /// All is said. Its record is complete afterwards. @throws std::runtime_error if something was
+  /// lost.
   void Finish();
 
  private:

@@ -53,7 +53,8 @@ void RequireWritable(const std::filesystem::path& file) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(file, error);
   if (std::filesystem::is_directory(status) || !file.has_filename()) fail("it is a folder");
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) fail("it is not a regular file");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    fail("it is not a regular file");
   const std::string temporary = Temporary(file);
   // Without waiting, should that be a pipe.
   const int fd = open(temporary.c_str(), O_WRONLY | O_CREAT | O_NONBLOCK | O_CLOEXEC, 0644);

@@ -41,7 +41,8 @@ Clock Clock::Parse(const std::string& text) {
     }
     return Clock(scale, epoch);
   } catch (const std::exception&) {
-    throw std::invalid_argument(fmt::format("clock '{}' is not SCALE or SCALE@EPOCH, scale in (0, 1000]", text));
+    throw std::invalid_argument(
+        fmt::format("clock '{}' is not SCALE or SCALE@EPOCH, scale in (0, 1000]", text));
   }
 }
 
@@ -57,7 +58,9 @@ int64_t Clock::Utime() const {
   return virtual_time_ ? virtual_time_->load() : UtimeFromRealtimeNs(RealNs(CLOCK_REALTIME));
 }
 
-int64_t Clock::SigningUtime() const { return virtual_time_ ? virtual_time_->load() : RealNs(CLOCK_REALTIME) / 1000; }
+int64_t Clock::SigningUtime() const {
+  return virtual_time_ ? virtual_time_->load() : RealNs(CLOCK_REALTIME) / 1000;
+}
 
 int64_t Clock::Now() const {
   if (virtual_time_) return virtual_time_->load();

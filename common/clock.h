@@ -9,10 +9,11 @@
 
 namespace plumb {
 
-/// The time of a whole run. Real, or scaled: one factor lets a closed loop with a virtual robot run faster (or slower)
-/// than real time, scaled = epoch + (real - epoch) * scale; every process of a run is given the same scale and epoch
-/// (flag `--clock SCALE@EPOCH`). Or virtual: it stands still while a process works (docs/virtual-time.md). All times are
-/// int64 microseconds. Thread-safe (immutable).
+/// The time of a whole run. Real, or scaled: one factor lets a closed loop with a virtual robot run
+/// faster (or slower) than real time, scaled = epoch + (real - epoch) * scale; every process of a
+/// run is given the same scale and epoch (flag `--clock SCALE@EPOCH`). Or virtual: it stands still
+/// while a process works (docs/virtual-time.md). All times are int64 microseconds. Thread-safe
+/// (immutable).
 class Clock {
  public:
   /// @param scale scaled seconds per real second, in (0, 1000].
@@ -33,9 +34,11 @@ class Clock {
   int64_t Utime() const;
   /// Scaled CLOCK_MONOTONIC: for deadlines and staleness. Its origin is arbitrary.
   int64_t Now() const;
-  /// What signatures are dated by: real time, not scaled, so that it rises from run to run; virtual time, if it is.
+  /// What signatures are dated by: real time, not scaled, so that it rises from run to run; virtual
+  /// time, if it is.
   int64_t SigningUtime() const;
-  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds). Not of virtual time, which no kernel knows.
+  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds). Not of virtual time, which
+  /// no kernel knows.
   int64_t UtimeFromRealtimeNs(int64_t ns) const;
   /// Real time that corresponds to a scaled duration, for ppoll; negative durations give zero.
   timespec RealDuration(int64_t scaled_us) const;
@@ -49,15 +52,16 @@ class Clock {
 /// Deadlines of a periodic loop, absolute, so that lateness does not accumulate. Not thread-safe.
 class Periodic {
  public:
-  /// @param period scaled microseconds, > 0. @param now scaled monotonic time of the first deadline's start.
+  /// @param period scaled microseconds, > 0. @param now scaled monotonic time of the first
+  /// deadline's start.
   Periodic(int64_t period, int64_t now) : period_(period), deadline_(now + period) {}
 
   /// Scaled microseconds until the deadline, 0 if it has passed.
   int64_t Remaining(int64_t now) const { return deadline_ > now ? deadline_ - now : 0; }
   bool Due(int64_t now) const { return now >= deadline_; }
 
-  /// Moves on to the next deadline after `now`. Deadlines that were missed altogether are skipped and
-  /// counted as overruns. @return how late this one was [us].
+  /// Moves on to the next deadline after `now`. Deadlines that were missed altogether are skipped
+  /// and counted as overruns. @return how late this one was [us].
   int64_t Advance(int64_t now);
 
   int64_t cycles() const { return cycles_; }

@@ -20,7 +20,8 @@ constexpr int kLongestChain = 8;  // of files that extend each other
 // What is merged into a file keeps the name of its own.
 std::string At(const std::string& file, const toml::source_region& source) {
   if (source.begin.line == 0) return file + ": ";
-  return fmt::format("{}:{}:{}: ", source.path ? *source.path : file, source.begin.line, source.begin.column);
+  return fmt::format("{}:{}:{}: ", source.path ? *source.path : file, source.begin.line,
+                     source.begin.column);
 }
 
 toml::table ParseTable(const std::string& text, const std::string& name) {
@@ -32,10 +33,13 @@ toml::table ParseTable(const std::string& text, const std::string& name) {
 }
 
 bool IsTables(const toml::node& node) {
-  return node.is_array() && !node.as_array()->empty() && node.as_array()->is_homogeneous<toml::table>();
+  return node.is_array() && !node.as_array()->empty() &&
+         node.as_array()->is_homogeneous<toml::table>();
 }
 
-std::optional<std::string> NameOf(const toml::node& node) { return (*node.as_table())["name"].value<std::string>(); }
+std::optional<std::string> NameOf(const toml::node& node) {
+  return (*node.as_table())["name"].value<std::string>();
+}
 
 void MergeByName(toml::array& base, toml::array& own);
 
@@ -76,11 +80,14 @@ toml::table LoadChain(const std::string& file, std::vector<std::string>& files) 
   if (!extends) return own;
   const std::string at = At(file, extends->source());
   if (!extends->is_string()) throw ConfigError(at + "extends is not a string");
-  if (files.size() > kLongestChain) throw ConfigError(at + "extends a file that extends a file ... and so on, without end");
-  const std::filesystem::path base_file = std::filesystem::path(file).parent_path() / *extends->value<std::string>();
+  if (files.size() > kLongestChain)
+    throw ConfigError(at + "extends a file that extends a file ... and so on, without end");
+  const std::filesystem::path base_file =
+      std::filesystem::path(file).parent_path() / *extends->value<std::string>();
   std::error_code error;
   if (!std::filesystem::exists(base_file, error)) {
-    throw ConfigError(fmt::format("{}extends = \"{}\": there is no such file", at, *extends->value<std::string>()));
+    throw ConfigError(fmt::format("{}extends = \"{}\": there is no such file", at,
+                                  *extends->value<std::string>()));
   }
   toml::table base = LoadChain(base_file.string(), files);
   own.erase("extends");
@@ -92,7 +99,8 @@ std::string Describe(Range range) {
   const auto bounded = [](double x) { return std::abs(x) < std::numeric_limits<double>::max(); };
   if (range.lower == std::numeric_limits<double>::min()) return "a positive finite number";
   if (range.lower == 0 && !bounded(range.upper)) return "a finite number not below 0";
-  if (bounded(range.lower) && bounded(range.upper)) return fmt::format("in [{}, {}]", range.lower, range.upper);
+  if (bounded(range.lower) && bounded(range.upper))
+    return fmt::format("in [{}, {}]", range.lower, range.upper);
   if (bounded(range.lower)) return fmt::format("a finite number not below {}", range.lower);
   if (bounded(range.upper)) return fmt::format("a finite number not above {}", range.upper);
   return "a finite number";
@@ -122,7 +130,8 @@ std::string ReadFile(const std::string& file) {
   const std::filesystem::file_status status = std::filesystem::status(file, error);
   if (std::filesystem::is_directory(status)) throw ConfigError(file + ": is a folder");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw ConfigError(file + ": is not a regular file");  // opening a pipe would wait for who writes to it
+    // opening a pipe would wait for who writes to it
+    throw ConfigError(file + ": is not a regular file");
   }
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw ConfigError(file + ": cannot be opened");
@@ -136,7 +145,8 @@ std::string ReadFile(const std::string& file) {
   return text;
 }
 
-Config::Config(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file, std::string path)
+Config::Config(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file,
+               std::string path)
     : root_(std::move(root)), table_(table), file_(std::move(file)), path_(std::move(path)) {}
 Config::Config(Config&&) noexcept = default;
 Config& Config::operator=(Config&&) noexcept = default;
@@ -161,7 +171,9 @@ bool Config::Has(const std::string& key) const {
   return table().contains(key);
 }
 
-bool Config::IsTable(const std::string& key) const { return Has(key) && table().get(key)->is_table(); }
+bool Config::IsTable(const std::string& key) const {
+  return Has(key) && table().get(key)->is_table();
+}
 
 std::string Config::Position(const std::string& key) const {
   const toml::node* node = table().get(key);
@@ -174,9 +186,11 @@ void Config::Fail(const std::string& key, const std::string& what) const {
 }
 
 void Config::FailMissing(const std::string& key) const {
-  // A required key that is not there has usually been misspelt: then its line is the better place to point to.
+  // A required key that is not there has usually been misspelt: then its line is the better place
+  // to point to.
   for (const std::string& present : Keys()) {
-    if (known_.count(present) == 0 && EditDistance(present, key) <= std::min<size_t>(2, key.size() / 2)) {
+    if (known_.count(present) == 0 &&
+        EditDistance(present, key) <= std::min<size_t>(2, key.size() / 2)) {
       Fail(present, "is not a known key; did you mean " + key + "?");
     }
   }
@@ -205,7 +219,8 @@ int Config::Integer(const std::string& key, Range range, std::optional<int> fall
   const int64_t value = *node->value<int64_t>();
   range.lower = std::max(range.lower, -2147483648.0);
   range.upper = std::min(range.upper, 2147483647.0);
-  if (!Inside(static_cast<double>(value), range)) Fail(key, fmt::format("= {} is not {}", value, Describe(range)));
+  if (!Inside(static_cast<double>(value), range))
+    Fail(key, fmt::format("= {} is not {}", value, Describe(range)));
   return static_cast<int>(value);
 }
 
@@ -229,11 +244,13 @@ std::string Config::String(const std::string& key, std::optional<std::string> fa
   return *node->value<std::string>();
 }
 
-int Config::Choice(const std::string& key, const std::vector<std::string>& choices, std::optional<int> fallback) {
+int Config::Choice(const std::string& key, const std::vector<std::string>& choices,
+                   std::optional<int> fallback) {
   if (!Has(key) && fallback) return *fallback;
   const std::string value = String(key);
   const auto found = std::find(choices.begin(), choices.end(), value);
-  if (found == choices.end()) Fail(key, fmt::format("= \"{}\" is not one of {}", value, fmt::join(choices, ", ")));
+  if (found == choices.end())
+    Fail(key, fmt::format("= \"{}\" is not one of {}", value, fmt::join(choices, ", ")));
   return static_cast<int>(found - choices.begin());
 }
 
@@ -249,17 +266,21 @@ std::vector<double> Config::Numbers(const std::string& key, size_t size, Range r
   for (const toml::node& node : *array) {
     if (!node.is_number()) Fail(key, "is not an array of numbers");
     values.push_back(*node.value<double>());
-    if (!Inside(values.back(), range)) Fail(key, fmt::format("contains {}, not {}", values.back(), Describe(range)));
+    if (!Inside(values.back(), range))
+      Fail(key, fmt::format("contains {}, not {}", values.back(), Describe(range)));
   }
-  if (size != 0 && values.size() != size) Fail(key, fmt::format("has {} numbers, not {}", values.size(), size));
+  if (size != 0 && values.size() != size)
+    Fail(key, fmt::format("has {} numbers, not {}", values.size(), size));
   return values;
 }
 
-std::vector<int> Config::Integers(const std::string& key, Range range, std::optional<std::vector<int>> fallback) {
+std::vector<int> Config::Integers(const std::string& key, Range range,
+                                  std::optional<std::vector<int>> fallback) {
   if (!Has(key) && fallback) return *fallback;
   std::vector<int> values;
   for (const double number : Numbers(key, 0, range)) {
-    if (number != std::floor(number) || std::abs(number) > 2147483647) Fail(key, "is not an array of integers");
+    if (number != std::floor(number) || std::abs(number) > 2147483647)
+      Fail(key, "is not an array of integers");
     values.push_back(static_cast<int>(number));
   }
   return values;
@@ -281,10 +302,12 @@ std::vector<Config> Config::Tables(const std::string& key) {
   std::vector<Config> tables;
   if (!Has(key)) return tables;
   const toml::array* array = table().get(key)->as_array();
-  if (!array || !array->is_homogeneous<toml::table>()) Fail(key, "is not an array of tables: write [[" + key + "]]");
+  if (!array || !array->is_homogeneous<toml::table>())
+    Fail(key, "is not an array of tables: write [[" + key + "]]");
   for (const toml::node& node : *array) {
-    tables.push_back(Config(root_, node.as_table(), file_,
-                            fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, tables.size())));
+    tables.push_back(
+        Config(root_, node.as_table(), file_,
+               fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, tables.size())));
   }
   return tables;
 }
@@ -305,10 +328,11 @@ std::vector<std::string> Config::Keys() const {
 void Config::Finish() const {
   for (const std::string& key : Keys()) {
     if (known_.count(key) != 0) continue;
-    const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
-      return EditDistance(a, key) < EditDistance(b, key);
-    });
-    Fail(key, "is not a known key" + (nearest == known_.end() ? "" : "; did you mean " + *nearest + "?"));
+    const auto nearest = std::min_element(
+        known_.begin(), known_.end(),
+        [&](const auto& a, const auto& b) { return EditDistance(a, key) < EditDistance(b, key); });
+    Fail(key, "is not a known key" +
+                  (nearest == known_.end() ? "" : "; did you mean " + *nearest + "?"));
   }
 }
 

@@ -29,17 +29,20 @@ struct Range {
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
 };
-inline constexpr Range kPositive{std::numeric_limits<double>::min(), std::numeric_limits<double>::max()};
+inline constexpr Range kPositive{std::numeric_limits<double>::min(),
+                                 std::numeric_limits<double>::max()};
 inline constexpr Range kNotNegative{0, std::numeric_limits<double>::max()};
-inline constexpr Range kFinite{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
+inline constexpr Range kFinite{std::numeric_limits<double>::lowest(),
+                               std::numeric_limits<double>::max()};
 
-/// One table of a TOML file, read strictly: every value has a type and a range, and every key that nobody
-/// asked for is an error that names the nearest known one. All errors are ConfigErrors with file, line and
-/// column. Not thread-safe.
+/// One table of a TOML file, read strictly: every value has a type and a range, and every key that
+/// nobody asked for is an error that names the nearest known one. All errors are ConfigErrors with
+/// file, line and column. Not thread-safe.
 class Config {
  public:
-  /// Reads a file, and the one that its key `extends` names, relative to its folder: what the file says stands in place of
-  /// what that one says; tables are merged, and of arrays of tables those with the same `name`.
+  /// Reads a file, and the one that its key `extends` names, relative to its folder: what the file
+  /// says stands in place of what that one says; tables are merged, and of arrays of tables those
+  /// with the same `name`.
   /// @throws ConfigError if one cannot be opened or parsed, or they extend each other.
   /// @param files if not null, those that were read are appended to it, this one first.
   static Config Load(const std::string& file, std::vector<std::string>* files = nullptr);
@@ -61,11 +64,13 @@ class Config {
   bool Boolean(const std::string& key, std::optional<bool> fallback = {});
   std::string String(const std::string& key, std::optional<std::string> fallback = {});
   /// One of the choices. @return its index.
-  int Choice(const std::string& key, const std::vector<std::string>& choices, std::optional<int> fallback = {});
+  int Choice(const std::string& key, const std::vector<std::string>& choices,
+             std::optional<int> fallback = {});
   /// Array of numbers; `size` 0 = any length.
   std::vector<double> Numbers(const std::string& key, size_t size, Range range = kFinite,
                               std::optional<std::vector<double>> fallback = {});
-  std::vector<int> Integers(const std::string& key, Range range, std::optional<std::vector<int>> fallback = {});
+  std::vector<int> Integers(const std::string& key, Range range,
+                            std::optional<std::vector<int>> fallback = {});
 
   /// A sub-table `[key]`; empty if absent and not required.
   Config Table(const std::string& key, bool required = true);
@@ -82,7 +87,8 @@ class Config {
   [[noreturn]] void Fail(const std::string& key, const std::string& what) const;
 
  private:
-  Config(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file, std::string path);
+  Config(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file,
+         std::string path);
   const toml::table& table() const { return *table_; }
   [[noreturn]] void FailMissing(const std::string& key) const;
 
@@ -93,7 +99,8 @@ class Config {
   mutable std::set<std::string> known_;
 };
 
-/// The bytes of a regular file. @throws ConfigError if it is none, cannot be read or is longer than 16 MB.
+/// The bytes of a regular file. @throws ConfigError if it is none, cannot be read or is longer than
+/// 16 MB.
 std::string ReadFile(const std::string& file);
 
 /// Levenshtein's distance, for "did you mean".

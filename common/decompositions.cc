@@ -10,7 +10,8 @@ template void HouseholderQR<MatrixXd>::computeInPlace();
 template void ColPivHouseholderQR<MatrixXd>::computeInPlace();
 template void FullPivHouseholderQR<MatrixXd>::computeInPlace();
 template JacobiSVD<MatrixXd>& JacobiSVD<MatrixXd>::compute(const MatrixXd&, unsigned int);
-template SelfAdjointEigenSolver<MatrixXd>& SelfAdjointEigenSolver<MatrixXd>::compute(const EigenBase<MatrixXd>&, int);
+template SelfAdjointEigenSolver<MatrixXd>& SelfAdjointEigenSolver<MatrixXd>::compute(
+    const EigenBase<MatrixXd>&, int);
 
 }  // namespace Eigen
 
@@ -18,7 +19,8 @@ namespace plumb {
 
 Eigen::MatrixXd Inverse(const Eigen::MatrixXd& m) { return m.inverse(); }
 
-Eigen::MatrixXd FirstColumns(const Eigen::HouseholderQR<Eigen::MatrixXd>::HouseholderSequenceType& q, Eigen::Index columns) {
+Eigen::MatrixXd FirstColumns(
+    const Eigen::HouseholderQR<Eigen::MatrixXd>::HouseholderSequenceType& q, Eigen::Index columns) {
   return q * Eigen::MatrixXd::Identity(q.rows(), columns);
 }
 

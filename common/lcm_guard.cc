@@ -12,8 +12,8 @@
 namespace plumb {
 namespace {
 
-// Assembles classic BPF with forward labels. A conditional jump reaches only 255 instructions, so each one
-// steps over an unconditional jump, whose reach is unlimited.
+// Assembles classic BPF with forward labels. A conditional jump reaches only 255 instructions, so
+// each one steps over an unconditional jump, whose reach is unlimited.
 class Assembler {
  public:
   enum Label { kDrop, kAccept, kFragment, kFirstFragment, kChannelName, kNumLabels };
@@ -51,12 +51,13 @@ std::vector<sock_filter> LcmGuardProgram(uint32_t max_message) {
   constexpr int kLoadWord = BPF_LD | BPF_W | BPF_ABS, kLoadHalf = BPF_LD | BPF_H | BPF_ABS,
                 kLoadByte = BPF_LD | BPF_B | BPF_ABS, kLoadX = BPF_LDX | BPF_W | BPF_MEM;
   constexpr int kEqual = BPF_JEQ | BPF_K, kGreater = BPF_JGT | BPF_K, kGreaterX = BPF_JGT | BPF_X;
-  constexpr uint32_t kUdp = 8;            // the filter sees the UDP header first
+  constexpr uint32_t kUdp = 8;  // the filter sees the UDP header first
   constexpr uint32_t kWhole = 0x4c433032, kFragment = 0x4c433033;  // "LC02", "LC03"
   constexpr uint32_t kMaxName = 64;
   using A = Assembler;
   A a;
-  const auto require_name_at = [&](uint32_t at) {  // a NUL within reach; a load beyond the end drops
+  // a NUL within reach; a load beyond the end drops
+  const auto require_name_at = [&](uint32_t at) {
     for (uint32_t i = 0; i < kMaxName; ++i) {
       a.Op(kLoadByte, at + i);
       a.JumpWhen(kEqual, 0, A::kAccept);
@@ -123,7 +124,8 @@ int AttachLcmGuard(uint16_t port, uint32_t max_message) {
         address.sin_family != AF_INET || address.sin_port != htons(port)) {
       continue;
     }
-    if (setsockopt(fd, SOL_SOCKET, SO_ATTACH_FILTER, &attachment, sizeof attachment) == 0) ++guarded;
+    if (setsockopt(fd, SOL_SOCKET, SO_ATTACH_FILTER, &attachment, sizeof attachment) == 0)
+      ++guarded;
   }
   closedir(descriptors);
   return guarded;

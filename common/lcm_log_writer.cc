@@ -17,13 +17,15 @@ LcmLogWriter::LcmLogWriter(std::string file)
 
 LcmLogWriter::~LcmLogWriter() = default;
 
-void LcmLogWriter::Write(int64_t utime, const std::string& channel, std::span<const uint8_t> message) {
+void LcmLogWriter::Write(int64_t utime, const std::string& channel,
+                         std::span<const uint8_t> message) {
   lcm::LogEvent event{};
   event.timestamp = utime;
   event.channel = channel;
   event.datalen = static_cast<int32_t>(message.size());
   event.data = const_cast<uint8_t*>(message.data());  // which it does not change
-  if (log_->writeEvent(&event) != 0) throw std::runtime_error(fmt::format("{}: {}", file_, std::strerror(errno)));
+  if (log_->writeEvent(&event) != 0)
+    throw std::runtime_error(fmt::format("{}: {}", file_, std::strerror(errno)));
 }
 
 }  // namespace plumb

@@ -11,7 +11,8 @@ class LogFile;
 
 namespace plumb {
 
-/// Writes an LCM log as lcm-logger does: lcm-logplayer plays it, --log of other programs reads it. Not thread-safe.
+/// Writes an LCM log as lcm-logger does: lcm-logplayer plays it, --log of other programs reads it.
+/// Not thread-safe.
 class LcmLogWriter {
  public:
   /// @throws std::runtime_error naming the file, if it cannot be written.

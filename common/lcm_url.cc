@@ -24,12 +24,14 @@ std::string Resolved(const std::string& url) {
 
 bool StaysOnMachine(const std::string& url) {
   const std::string resolved = Resolved(url);
-  if (resolved.empty() || resolved.starts_with("memq://") || resolved.starts_with("file://")) return true;
+  if (resolved.empty() || resolved.starts_with("memq://") || resolved.starts_with("file://"))
+    return true;
   if (!resolved.starts_with(kUdpm)) return false;
   // liblcm takes the last of several; we want all of them to be plainly 0.
   for (size_t at = resolved.find_first_of("?&"); at != std::string::npos;
        at = resolved.find_first_of("?&", at + 1)) {
-    const std::string option = resolved.substr(at + 1, resolved.find_first_of("?&", at + 1) - at - 1);
+    const std::string option =
+        resolved.substr(at + 1, resolved.find_first_of("?&", at + 1) - at - 1);
     if (option == "ttl" || (option.starts_with("ttl=") && option != "ttl=0")) return false;
   }
   return true;
@@ -42,8 +44,8 @@ std::vector<std::string> OpenInterfaces(const std::string& url) {
   address.erase(std::min(address.size(), address.find_first_of(":?")));
   in_addr group{};
   if (inet_pton(AF_INET, address.empty() ? kDefaultGroup : address.c_str(), &group) != 1) return {};
-  // A line for an interface, "2 eth0 : ...", then an indented one for each of its groups, in the order of
-  // memory.
+  // A line for an interface, "2 eth0 : ...", then an indented one for each of its groups, in the
+  // order of memory.
   const std::string wanted = fmt::format("{:08X}", group.s_addr);
   std::vector<std::string> interfaces;
   std::ifstream table("/proc/net/igmp");
@@ -62,11 +64,11 @@ std::vector<std::string> OpenInterfaces(const std::string& url) {
 
 void RequireKey(const std::string& url, bool key, bool allow_unsigned) {
   if (key || allow_unsigned || StaysOnMachine(url)) return;
-  throw std::invalid_argument(
-      fmt::format("LCM at {} leaves this machine: anybody on the network could command the robot; cure: "
-                  "--key FILE (plumb key "
-                  "FILE makes one), or --unsigned to allow just that",
-                  Resolved(url)));
+  throw std::invalid_argument(fmt::format(
+      "LCM at {} leaves this machine: anybody on the network could command the robot; cure: "
+      "--key FILE (plumb key "
+      "FILE makes one), or --unsigned to allow just that",
+      Resolved(url)));
 }
 
 }  // namespace plumb

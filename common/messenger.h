@@ -31,14 +31,15 @@ class Messenger {
   int fd() { return lcm_.getFileno(); }
   /// @return false if the message was not sent (liblcm says no more).
   bool Publish(const std::string& channel, std::span<const uint8_t> message);
-  /// Handles the messages that have arrived, but no more than `most`, so that a flood does not keep the caller from
-  /// its other duties; what is left keeps fd() readable. @return how many, -1 at the end of a file or on failure.
+  /// Handles the messages that have arrived, but no more than `most`, so that a flood does not keep
+  /// the caller from its other duties; what is left keeps fd() readable. @return how many, -1 at
+  /// the end of a file or on failure.
   int Drain(int most = 1000);
   /// Called with a message's bytes as they arrived; must not throw.
   using Handler = std::function<void(const std::string& channel, std::span<const uint8_t> message)>;
   class Subscription;
-  /// Listens to a channel (in real time: to all whose names match a regular expression), without bound, as long as the
-  /// subscription lives. In order of arrival.
+  /// Listens to a channel (in real time: to all whose names match a regular expression), without
+  /// bound, as long as the subscription lives. In order of arrival.
   std::unique_ptr<Subscription> Subscribe(const std::string& channel, Handler handler);
 
  private:
@@ -71,24 +72,27 @@ class Messenger::Subscription {
   lcm::Subscription* subscription_ = nullptr;  // null in virtual time
 };
 
-/// Receives messages of one type on one channel. Decodes them itself, because an exception must never cross
-/// liblcm's C frames: what does not decode is counted and forgotten. The queue is unbounded, since a bounded
-/// one keeps the oldest messages; Messenger::Drain empties it. Not thread-safe; must not outlive the Messenger.
+/// Receives messages of one type on one channel. Decodes them itself, because an exception must
+/// never cross liblcm's C frames: what does not decode is counted and forgotten. The queue is
+/// unbounded, since a bounded one keeps the oldest messages; Messenger::Drain empties it. Not
+/// thread-safe; must not outlive the Messenger.
 template <class Message>
 class Subscriber {
  public:
   using Callback = std::function<void(const Message&)>;
 
-  /// @param callback called for every message, in order of arrival; may be empty when newest() is enough.
-  /// It may throw: the exception is kept and thrown again by Rethrow().
+  /// @param callback called for every message, in order of arrival; may be empty when newest() is
+  /// enough. It may throw: the exception is kept and thrown again by Rethrow().
   Subscriber(Messenger& messenger, const std::string& channel, Callback callback = {})
       : callback_(std::move(callback)),
         subscription_(messenger.Subscribe(
-            channel, [this](const std::string&, std::span<const uint8_t> bytes) { OnMessage(bytes); })) {}
+            channel,
+            [this](const std::string&, std::span<const uint8_t> bytes) { OnMessage(bytes); })) {}
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
 
-  /// The newest message that decoded, untouched by later ones that did not; meaningless while received() is 0.
+  /// The newest message that decoded, untouched by later ones that did not; meaningless while
+  /// received() is 0.
   const Message& newest() const { return newest_; }
   int64_t received() const { return received_; }
   /// The bytes that newest() was decoded from, all of them. Valid within the callback only.
@@ -103,7 +107,8 @@ class Subscriber {
  private:
   void OnMessage(std::span<const uint8_t> bytes) noexcept {
     try {
-      // The two members take turns and keep their vectors' capacity: no allocation for messages of equal size.
+      // The two members take turns and keep their vectors' capacity: no allocation for messages of
+      // equal size.
       const int length = static_cast<int>(bytes.size());
       if (arriving_.decode(bytes.data(), 0, length) != length) {
         ++rejected_;
@@ -132,12 +137,13 @@ class Subscriber {
   std::unique_ptr<Messenger::Subscription> subscription_;  // ends first
 };
 
-/// Publishes messages of one type on one channel, encoding into its own buffer: no allocation once the
-/// largest message has been sent. Not thread-safe; must not outlive the Messenger.
+/// Publishes messages of one type on one channel, encoding into its own buffer: no allocation once
+/// the largest message has been sent. Not thread-safe; must not outlive the Messenger.
 template <class Message>
 class Publisher {
  public:
-  Publisher(Messenger& messenger, std::string channel) : messenger_(&messenger), channel_(std::move(channel)) {}
+  Publisher(Messenger& messenger, std::string channel)
+      : messenger_(&messenger), channel_(std::move(channel)) {}
 
   /// @return false if the message was not sent (liblcm says no more).
   bool Publish(const Message& message) {

@@ -1,6 +1,5 @@
 #include "common/process.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
@@ -10,6 +9,7 @@
 #include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
@@ -43,7 +43,8 @@ Process::Process(std::string name, std::string lcm_url, const std::string& clock
     : name_(std::move(name)),
       lcm_url_(std::move(lcm_url)),
       stop_fd_(BlockStopSignals()),
-      joined_(clock.starts_with(kVirtual) ? JoinRun(clock.substr(kVirtual.size()), name_) : nullptr),
+      joined_(clock.starts_with(kVirtual) ? JoinRun(clock.substr(kVirtual.size()), name_)
+                                          : nullptr),
       participant_(joined_.get()),
       clock_(joined_ ? Clock(joined_->time()) : Clock::Parse(clock)) {}
 
@@ -54,7 +55,8 @@ void Process::Enter(Participant& participant) {
 
 Messenger& Process::messenger() {
   if (!messenger_) {
-    messenger_ = participant_ ? std::make_unique<Messenger>(*participant_) : std::make_unique<Messenger>(lcm_url_);
+    messenger_ = participant_ ? std::make_unique<Messenger>(*participant_)
+                              : std::make_unique<Messenger>(lcm_url_);
   }
   return *messenger_;
 }
@@ -67,9 +69,11 @@ bool Process::stopping() {
 
 void Process::Doze(int64_t timeout, int fd) {
   if (participant_) {
-    return participant_->Wait(participant_->now() + timeout, Participant::Wake::kWhenHeard, stop_fd_);
+    return participant_->Wait(participant_->now() + timeout, Participant::Wake::kWhenHeard,
+                              stop_fd_);
   }
-  std::array<pollfd, 3> polled{{{stop_fd_, POLLIN, 0}, {messenger().fd(), POLLIN, 0}, {fd, POLLIN, 0}}};
+  std::array<pollfd, 3> polled{
+      {{stop_fd_, POLLIN, 0}, {messenger().fd(), POLLIN, 0}, {fd, POLLIN, 0}}};
   const timespec real = clock_.RealDuration(timeout);
   ppoll(polled.data(), fd < 0 ? 2 : 3, &real, nullptr);
 }
@@ -82,7 +86,8 @@ bool Process::Wait(int64_t timeout, int fd) {
 
 bool Process::Sleep(int64_t timeout, const std::function<void()>& meanwhile) {
   if (participant_) {
-    participant_->Wait(participant_->now() + timeout, Participant::Wake::kOnTime, stop_fd_, meanwhile);
+    participant_->Wait(participant_->now() + timeout, Participant::Wake::kOnTime, stop_fd_,
+                       meanwhile);
   } else {
     const int64_t end = clock_.Now() + timeout;
     if (meanwhile) meanwhile();
@@ -105,7 +110,8 @@ void Process::BecomeFast(int priority) {
 void Process::TakeVirtualTime(double seconds) {
   if (!participant_ || seconds == 0) return;
   const int64_t end = participant_->now() + std::llround(seconds * 1e6);
-  while (participant_->now() < end && !stopping()) participant_->Wait(end, Participant::Wake::kOnTime, stop_fd_);
+  while (participant_->now() < end && !stopping())
+    participant_->Wait(end, Participant::Wake::kOnTime, stop_fd_);
 }
 
 std::string VersionLine(const std::string& name) { return name + " " + ProgramVersion(); }
@@ -119,9 +125,12 @@ int Run(const std::string& name, const std::string& description, int argc, char*
   std::string level = "info";
   int parent = 0;
   int niceness = 0;
-  app.add_option("--lcm-url", lcm_url, "LCM provider; default: $LCM_DEFAULT_URL or this machine only")
+  app.add_option("--lcm-url", lcm_url,
+                 "LCM provider; default: $LCM_DEFAULT_URL or this machine only")
       ->capture_default_str();
-  app.add_option("--clock", clock, "clock scale, or SCALE@EPOCH or virtual:PATH as plumb launch passes it")->capture_default_str();
+  app.add_option("--clock", clock,
+                 "clock scale, or SCALE@EPOCH or virtual:PATH as plumb launch passes it")
+      ->capture_default_str();
   app.add_option("--log-level", level, "trace, debug, info, warning, error")->capture_default_str();
   app.add_option("--parent", parent, "stop when this process, which started us, is gone");
   app.add_option("--nice", niceness, "give way to the others: 0 to 19")->check(CLI::Range(0, 19));

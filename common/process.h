@@ -23,8 +23,8 @@ namespace plumb {
 ///   }
 class Process {
  public:
-  /// @param clock SCALE, SCALE@EPOCH, or virtual:PATH of a coordinator. @throws std::exception if it is none of these,
-  /// or nobody keeps time there.
+  /// @param clock SCALE, SCALE@EPOCH, or virtual:PATH of a coordinator. @throws std::exception if
+  /// it is none of these, or nobody keeps time there.
   Process(std::string name, std::string lcm_url, const std::string& clock);
 
   const std::string& name() const { return name_; }
@@ -34,28 +34,30 @@ class Process {
   const std::string& lcm_url() const { return lcm_url_; }
   /// The place in a run in virtual time; null if there is none.
   Participant* participant() { return participant_; }
-  /// From now on takes part in a run whose coordinator lives in this process. Before the first use of messenger().
+  /// From now on takes part in a run whose coordinator lives in this process. Before the first use
+  /// of messenger().
   void Enter(Participant& participant);
 
   /// Becomes readable when the process is asked to stop (SIGINT, SIGTERM, SIGHUP). For ppoll.
   int stop_fd() const { return stop_fd_; }
   /// True once the process has been asked to stop. Never blocks.
   bool stopping();
-  /// Sleeps until LCM has messages, `fd` (if not -1) is readable, the process is asked to stop, or `timeout`
-  /// scaled microseconds have passed. Then drains LCM. @return false when the process is asked to stop.
-  /// In virtual time `fd` is a transport's, whose frames the participant hears.
+  /// Sleeps until LCM has messages, `fd` (if not -1) is readable, the process is asked to stop, or
+  /// `timeout` scaled microseconds have passed. Then drains LCM. @return false when the process is
+  /// asked to stop. In virtual time `fd` is a transport's, whose frames the participant hears.
   bool Wait(int64_t timeout, int fd = -1);
   /// The same, and leaves LCM's messages for messenger().Drain().
   void Doze(int64_t timeout, int fd = -1);
-  /// Sleeps for `timeout` scaled microseconds or until the process is asked to stop, whatever comes meanwhile. Then
-  /// drains LCM. For those who are in no hurry. @param meanwhile work to do in that time, which sends and reads no message;
-  /// in virtual time the others need not wait for it. @return false when the process is asked to stop.
+  /// Sleeps for `timeout` scaled microseconds or until the process is asked to stop, whatever comes
+  /// meanwhile. Then drains LCM. For those who are in no hurry. @param meanwhile work to do in that
+  /// time, which sends and reads no message; in virtual time the others need not wait for it.
+  /// @return false when the process is asked to stop.
   bool Sleep(int64_t timeout, const std::function<void()>& meanwhile = {});
-  /// From here on this process belongs to the fast loop. @param priority for BecomeRealtime; in virtual time there are
-  /// no priorities, but its turns are to be short.
+  /// From here on this process belongs to the fast loop. @param priority for BecomeRealtime; in
+  /// virtual time there are no priorities, but its turns are to be short.
   void BecomeFast(int priority);
-  /// A computation has been done that is to take that long [s] in virtual time, in which computations take none. Does
-  /// nothing otherwise. Leaves LCM's messages for messenger().Drain().
+  /// A computation has been done that is to take that long [s] in virtual time, in which
+  /// computations take none. Does nothing otherwise. Leaves LCM's messages for messenger().Drain().
   void TakeVirtualTime(double seconds);
 
  private:
@@ -72,8 +74,9 @@ class Process {
 /// "plumb-driver 0.1.0 (3f2a9c1, clean)"
 std::string VersionLine(const std::string& name);
 
-/// Parses the flags (the common ones and `add_flags`), starts the log, blocks the stop signals, runs `body`,
-/// and turns any exception into one clear line and exit status 1. Usage errors exit with 2.
+/// Parses the flags (the common ones and `add_flags`), starts the log, blocks the stop signals,
+/// runs `body`, and turns any exception into one clear line and exit status 1. Usage errors exit
+/// with 2.
 int Run(const std::string& name, const std::string& description, int argc, char** argv,
         const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body);
 

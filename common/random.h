@@ -6,10 +6,10 @@
 
 namespace plumb {
 
-/// Counter-based random numbers: Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3",
-/// SC 2011; Random123). A generator is named by a seed and up to three stream words, such as (iteration,
-/// sample): equal names give equal numbers in any thread, process or resumed run. Not thread-safe; cheap to
-/// construct and copy.
+/// Counter-based random numbers: Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as
+/// 1, 2, 3", SC 2011; Random123). A generator is named by a seed and up to three stream words, such
+/// as (iteration, sample): equal names give equal numbers in any thread, process or resumed run.
+/// Not thread-safe; cheap to construct and copy.
 class Random {
  public:
   /// @throws std::invalid_argument for more than three stream words.

@@ -43,7 +43,8 @@ std::vector<std::byte> Ranks::Concatenate(std::span<const std::byte> mine) const
   const std::vector<int64_t> sizes = Collect(static_cast<int64_t>(mine.size()));
   std::vector<int64_t> ends(sizes.size());
   std::partial_sum(sizes.begin(), sizes.end(), ends.begin());
-  if (ends.back() > INT_MAX) throw std::length_error("ranks: more than 2 GiB to be gathered at once");
+  if (ends.back() > INT_MAX)
+    throw std::length_error("ranks: more than 2 GiB to be gathered at once");
   std::vector<int> bounds{0};
   for (const int64_t end : ends) bounds.push_back(static_cast<int>(end));
   std::vector<std::byte> all(static_cast<size_t>(ends.back()));
@@ -122,7 +123,8 @@ void Ranks::AllGather(void* items, size_t item_size, std::span<const int> bounds
 void Ranks::Exchange(const float* send, std::span<const int> send_counts, float* receive,
                      std::span<const int> receive_counts) const {
   MPI_Alltoallv(send, send_counts.data(), Displacements(send_counts).data(), MPI_FLOAT, receive,
-                receive_counts.data(), Displacements(receive_counts).data(), MPI_FLOAT, MPI_COMM_WORLD);
+                receive_counts.data(), Displacements(receive_counts).data(), MPI_FLOAT,
+                MPI_COMM_WORLD);
 }
 
 #else
@@ -130,7 +132,8 @@ void Ranks::Exchange(const float* send, std::span<const int> send_counts, float*
 Ranks::Ranks() {
   if (StartedByMpirun()) {
     throw std::runtime_error(
-        "mpirun has started this, but it was built without OpenMPI: install libopenmpi-dev and build again");
+        "mpirun has started this, but it was built without OpenMPI: install libopenmpi-dev and "
+        "build again");
   }
 }
 

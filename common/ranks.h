@@ -8,20 +8,20 @@
 
 namespace plumb {
 
-/// Several copies of a program, on one machine or many, that share the work: started with
-/// `mpirun -n 4 plumb ...`. All of them run the same computation on the same data, each does part of the
-/// parts that take long, and all get all of the results; rank 0 alone speaks and writes. Without mpirun, or
-/// in a build without OpenMPI, there is one rank.
+/// Several copies of a program, on one machine or many, that share the work: started with `mpirun
+/// -n 4 plumb ...`. All of them run the same computation on the same data, each does part of the
+/// parts that take long, and all get all of the results; rank 0 alone speaks and writes. Without
+/// mpirun, or in a build without OpenMPI, there is one rank.
 ///
-/// The methods that exchange data are called by all ranks, in the same order; with one rank they cost
-/// nothing. To be used by one thread, and made once at most.
+/// The methods that exchange data are called by all ranks, in the same order; with one rank they
+/// cost nothing. To be used by one thread, and made once at most.
 class Ranks {
  public:
-  /// Joins the others if mpirun has started this program. @throws std::runtime_error if it has and this build
-  /// has no MPI.
+  /// Joins the others if mpirun has started this program. @throws std::runtime_error if it has and
+  /// this build has no MPI.
   Ranks();
-  /// A rank that an exception takes out says no farewell: mpirun then ends the others, which would wait for
-  /// it.
+  /// A rank that an exception takes out says no farewell: mpirun then ends the others, which would
+  /// wait for it.
   ~Ranks();
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
@@ -38,9 +38,10 @@ class Ranks {
   /// All get what rank 0 has.
   void Broadcast(std::span<std::byte> bytes) const;
 
-  /// Each rank has filled in its part of the items, those that `bounds` gives it, and gets the others'.
-  /// @param items bounds.back() of them, of item_size bytes each. @param bounds as from Bounds, or other
-  /// ones.
+  /// Each rank has filled in its part of the items, those that `bounds` gives it, and gets the
+  /// others'.
+  /// @param items bounds.back() of them, of item_size bytes each. @param bounds as from Bounds, or
+  /// other ones.
   void AllGather(void* items, size_t item_size, std::span<const int> bounds) const;
 
   /// A value of each rank, in their order. @param T trivially copyable.
@@ -55,11 +56,11 @@ class Ranks {
   /// @throws std::length_error if it is more than 2 GiB.
   std::vector<std::byte> Concatenate(std::span<const std::byte> mine) const;
 
-  /// The sum of many vectors in the order of tree_sum.h, and so of the same bits for any number of ranks.
-  /// Each rank sums one slice of the vectors, of all ranks' branches: two messages between any two ranks,
-  /// together as long as those of any all-reduce.
-  /// @param terms of the sum; the ranks have them as Bounds(terms) says. @param mine Branches(terms, ...) of
-  /// this rank's terms; the values may be overwritten. @param sum written.
+  /// The sum of many vectors in the order of tree_sum.h, and so of the same bits for any number of
+  /// ranks. Each rank sums one slice of the vectors, of all ranks' branches: two messages between
+  /// any two ranks, together as long as those of any all-reduce.
+  /// @param terms of the sum; the ranks have them as Bounds(terms) says. @param mine
+  /// Branches(terms, ...) of this rank's terms; the values may be overwritten. @param sum written.
   void TreeSum(int terms, std::span<const PartialSum> mine, std::span<float> sum) const;
 
  private:

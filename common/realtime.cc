@@ -1,11 +1,11 @@
 #include "common/realtime.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <malloc.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <array>
 #include <cerrno>
@@ -30,11 +30,12 @@ void BecomeRealtime(int priority) {
   mallopt(M_TRIM_THRESHOLD, -1);
   mallopt(M_MMAP_MAX, 0);
   const sched_param parameter{.sched_priority = priority};
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &parameter) != 0) {
-    throw std::runtime_error(
-        fmt::format("--realtime-priority {}: {}; cure: run as root, or allow it with ulimit -r {} and ulimit "
-                    "-l unlimited",
-                    priority, std::strerror(errno), priority));
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 ||
+      sched_setscheduler(0, SCHED_FIFO, &parameter) != 0) {
+    throw std::runtime_error(fmt::format(
+        "--realtime-priority {}: {}; cure: run as root, or allow it with ulimit -r {} and ulimit "
+        "-l unlimited",
+        priority, std::strerror(errno), priority));
   }
   TouchStack();
 }

@@ -35,17 +35,19 @@ void ReadKeyText(const std::filesystem::path& file, KeyText& key) {
   // Without waiting, should it be a pipe.
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0)
-    Fail(file,
-         fmt::format("the key cannot be read: {}; cure: plumb key {}", std::strerror(errno), file.string()));
+    Fail(file, fmt::format("the key cannot be read: {}; cure: plumb key {}", std::strerror(errno),
+                           file.string()));
   struct stat status {};
   const bool known = fstat(fd, &status) == 0;
-  const ssize_t size = known && S_ISREG(status.st_mode) ? read(fd, key.text.data(), key.text.size()) : -1;
+  const ssize_t size =
+      known && S_ISREG(status.st_mode) ? read(fd, key.text.data(), key.text.size()) : -1;
   close(fd);
   if (known && !S_ISREG(status.st_mode)) Fail(file, "not a file that could hold a key");
   if ((status.st_mode & 077) != 0) {
-    Fail(file, fmt::format("the key is open to others (mode {:04o}); cure: chmod 600 {}, or a new one if "
-                           "somebody has read it",
-                           status.st_mode & 07777, file.string()));
+    Fail(file,
+         fmt::format("the key is open to others (mode {:04o}); cure: chmod 600 {}, or a new one if "
+                     "somebody has read it",
+                     status.st_mode & 07777, file.string()));
   }
   if (size < 0) Fail(file, "the key cannot be read");
   key.size = static_cast<size_t>(size);
@@ -60,25 +62,28 @@ SigningKey::SigningKey(const std::filesystem::path& file) {
   ReadKeyText(file, key);
   size_t length = 0;
   const char* end = nullptr;
-  const bool hexadecimal =
-      sodium_hex2bin(key_.data(), key_.size(), key.text.data(), key.size, nullptr, &length, &end) == 0 &&
-      end == key.text.data() + key.size;
+  const bool hexadecimal = sodium_hex2bin(key_.data(), key_.size(), key.text.data(), key.size,
+                                          nullptr, &length, &end) == 0 &&
+                           end == key.text.data() + key.size;
   if (!hexadecimal || length != key_.size()) {
     Fail(file,
-         fmt::format("not a key: one line of {} hexadecimal digits is expected; cure: plumb key NEW-FILE",
-                     kDigits));
+         fmt::format(
+             "not a key: one line of {} hexadecimal digits is expected; cure: plumb key NEW-FILE",
+             kDigits));
   }
 }
 
 SigningKey::~SigningKey() { sodium_memzero(key_.data(), key_.size()); }
 
 Signature SigningKey::Sign(std::string_view channel, std::span<const uint8_t> body) const noexcept {
-  static_assert(crypto_generichash_BYTES == sizeof(Signature) && crypto_generichash_KEYBYTES == sizeof key_);
+  static_assert(crypto_generichash_BYTES == sizeof(Signature) &&
+                crypto_generichash_KEYBYTES == sizeof key_);
   const uint8_t zero = 0;
   Signature signature;
   crypto_generichash_state state;
   crypto_generichash_init(&state, key_.data(), key_.size(), signature.size());
-  crypto_generichash_update(&state, reinterpret_cast<const uint8_t*>(channel.data()), channel.size());
+  crypto_generichash_update(&state, reinterpret_cast<const uint8_t*>(channel.data()),
+                            channel.size());
   crypto_generichash_update(&state, &zero, 1);
   crypto_generichash_update(&state, body.data(), body.size());
   crypto_generichash_final(&state, signature.data(), signature.size());

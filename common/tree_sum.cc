@@ -7,7 +7,8 @@ namespace {
 
 int Middle(int begin, int end) { return begin + (end - begin) / 2; }
 
-void Collect(int branch_begin, int branch_end, int begin, int end, std::vector<std::pair<int, int>>& found) {
+void Collect(int branch_begin, int branch_end, int begin, int end,
+             std::vector<std::pair<int, int>>& found) {
   if (branch_end <= begin || end <= branch_begin) return;
   if (begin <= branch_begin && branch_end <= end) {
     found.emplace_back(branch_begin, branch_end);
@@ -29,8 +30,8 @@ std::vector<std::pair<int, int>> Branches(int terms, int begin, int end) {
 PartialSum AddUp(std::span<const PartialSum> parts, size_t first, size_t count) {
   if (parts.size() == 1) return parts.front();
   const int middle = Middle(parts.front().begin, parts.back().end);
-  const auto right = std::partition_point(parts.begin(), parts.end(),
-                                          [middle](const PartialSum& part) { return part.begin < middle; });
+  const auto right = std::partition_point(
+      parts.begin(), parts.end(), [middle](const PartialSum& part) { return part.begin < middle; });
   const auto split = static_cast<size_t>(right - parts.begin());
   const PartialSum left_sum = AddUp(parts.first(split), first, count);
   const PartialSum right_sum = AddUp(parts.subspan(split), first, count);

@@ -8,12 +8,16 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kLetGo = 30'000;           // [us] after which a command of zero has reached the drives: only then touch the robot
-constexpr int64_t kPlaceAgain = 1'000'000;    // [us] a robot not placed by then is asked to be placed anew
+// [us] after which a command of zero has reached the drives: only then touch the robot
+constexpr int64_t kLetGo = 30'000;
+// [us] a robot not placed by then is asked to be placed anew
+constexpr int64_t kPlaceAgain = 1'000'000;
 constexpr int64_t kDriverTimeout = 1'000'000;  // [us] DRIVER_STATUS comes ten times a second
-constexpr double kPlaceSpeedFactor = 10;      // place_tolerance [rad] times this is the tolerance of speed [rad/s]
+// place_tolerance [rad] times this is the tolerance of speed [rad/s]
+constexpr double kPlaceSpeedFactor = 10;
 
-// Third words of the random streams, so that placement, exploration and the other processes' streams never meet.
+// Third words of the random streams, so that placement, exploration and the other processes'
+// streams never meet.
 constexpr uint32_t kPlacementStream = 0xC0000000, kExplorationStream = 0x80000000;
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
@@ -34,7 +38,8 @@ Controller::Controller(const RobotDescription& robot, uint64_t seed, double rest
       effort_(step_v_),
       observation_(task_->observation_size()) {
   if (robot.num_positions() != robot.num_joints()) {
-    throw std::invalid_argument("robot '" + robot.name + "' has a spherical joint: it can only be simulated");
+    throw std::invalid_argument("robot '" + robot.name +
+                                "' has a spherical joint: it can only be simulated");
   }
   status_.policy_iteration = -1;
   Enter(controller_status_t::WAITING, "no policy yet");
@@ -53,16 +58,20 @@ void Controller::OnPolicy(const policy_t& message) {
   const GaussianPolicy* known = next_policy_ ? next_policy_.get() : policy_.get();
   const policy_t& header = next_policy_ ? next_header_ : policy_header_;
   if (known && message.iteration == header.iteration && message.purpose == header.purpose &&
-      std::equal(message.weight.begin(), message.weight.end(), known->parameters.begin(), known->parameters.end())) {
+      std::equal(message.weight.begin(), message.weight.end(), known->parameters.begin(),
+                 known->parameters.end())) {
     return;
   }
   auto policy = std::make_unique<GaussianPolicy>(GaussianPolicy::FromMessage(message));
-  if (policy->shape().observations != task_->observation_size() || policy->shape().actions != task_->action_size()) {
-    throw std::invalid_argument("the policy is for another robot: it has other numbers of observations or actions");
+  if (policy->shape().observations != task_->observation_size() ||
+      policy->shape().actions != task_->action_size()) {
+    throw std::invalid_argument(
+        "the policy is for another robot: it has other numbers of observations or actions");
   }
   const Eigen::ArrayXf limits = robot_.effort_limits().cast<float>();
   if (((policy->action_scale.array() - limits).abs() > 1e-4f * limits).any()) {
-    throw std::invalid_argument("the policy is for other effort limits: an action of 1 would be another effort");
+    throw std::invalid_argument(
+        "the policy is for other effort limits: an action of 1 would be another effort");
   }
   next_policy_ = std::move(policy);
   next_header_ = message;
@@ -77,7 +86,8 @@ void Controller::TakePolicy() {
   status_.purpose = policy_header_.purpose;
   status_.episodes_wanted = policy_header_.episodes;
   status_.num_episodes = 0;
-  for (auto* list : {&status_.episode, &status_.first_state_sequence, &status_.last_state_sequence}) list->clear();
+  for (auto* list : {&status_.episode, &status_.first_state_sequence, &status_.last_state_sequence})
+    list->clear();
   status_.returns.clear();
   attempt_ = 0;
   ++changes_;
@@ -98,8 +108,8 @@ void Controller::OnDriverStatus(const driver_status_t& status, int64_t now) {
   } else if (phase() != controller_status_t::COMPLETE) {
     if (phase() == controller_status_t::RUNNING) ++status_.episodes_aborted;
     if (phase() != controller_status_t::HALTED) {
-      Enter(controller_status_t::WAITING, "the driver is not armed" +
-                                              (driver_reason_.empty() ? "" : ": " + driver_reason_));
+      Enter(controller_status_t::WAITING,
+            "the driver is not armed" + (driver_reason_.empty() ? "" : ": " + driver_reason_));
     }
   }
 }
@@ -115,7 +125,8 @@ joint_command_t Controller::ZeroCommand(int64_t utime) {
   command.policy_iteration = status_.policy_iteration;
   command.num_joints = robot_.num_joints();
   command.effort.assign(n, 0);
-  for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd}) values->assign(n, NAN);
+  for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd})
+    values->assign(n, NAN);
   return command;
 }
 
@@ -136,8 +147,10 @@ std::optional<joint_command_t> Controller::Tick(int64_t now, int64_t utime) {
     let_go_ = true;
     ++changes_;
   }
-  const bool acting = phase() == controller_status_t::RUNNING || phase() == controller_status_t::PLACING;
-  if (acting && state_heard_ >= 0 && now - state_heard_ > Microseconds(robot_.controller.state_timeout) &&
+  const bool acting =
+      phase() == controller_status_t::RUNNING || phase() == controller_status_t::PLACING;
+  if (acting && state_heard_ >= 0 &&
+      now - state_heard_ > Microseconds(robot_.controller.state_timeout) &&
       // A robot that has just been placed gives the estimator a few states to settle.
       !(phase() == controller_status_t::PLACING && now - placing_since_ < kPlaceAgain)) {
     return Halt("no valid state for too long", utime);
@@ -150,8 +163,8 @@ void Controller::BeginPlacing(int64_t now, int64_t utime) {
   place.utime = utime;
   place.num_joints = robot_.num_joints();
   Eigen::VectorXd q(robot_.num_positions()), v(robot_.num_velocities());
-  Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_++),
-                        kPlacementStream});
+  Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration),
+                        static_cast<uint32_t>(attempt_++), kPlacementStream});
   task_->InitialState(random, q, v);
   place.q.assign(q.begin(), q.end());
   place.v.assign(v.begin(), v.end());
@@ -177,7 +190,8 @@ bool Controller::Placed(const robot_state_t& state) const {
   return true;
 }
 
-std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, int64_t now, int64_t utime) {
+std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, int64_t now,
+                                                   int64_t utime) {
   if (state.num_joints != robot_.num_joints()) return {};
   const bool finite = Map(state.q).allFinite() && Map(state.v).allFinite();
   // A backlog brings states in quick succession that are all old: their own time tells.
@@ -190,7 +204,10 @@ std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, i
   if (phase() == controller_status_t::RUNNING) {
     if (!finite) return Halt("the state is not finite", utime);
     if (late) return Halt("the state is late", utime);
-    if (!state.valid) return Halt(state.restarted ? "the estimator restarted in an episode" : "the state is not valid", utime);
+    if (!state.valid)
+      return Halt(
+          state.restarted ? "the estimator restarted in an episode" : "the state is not valid",
+          utime);
     return Act(state, utime);
   }
   const bool good = finite && state.valid && !late;
@@ -203,12 +220,17 @@ std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, i
   }
   if (phase() == controller_status_t::WAITING && Armed() && policy_ && good) {
     const bool more = status_.num_episodes < status_.episodes_wanted;
-    if (more) BeginPlacing(now, utime);
-    else Enter(controller_status_t::COMPLETE);
-  } else if (phase() == controller_status_t::PLACING && rest_ < 0 && now - placing_since_ > kPlaceAgain) {
+    if (more)
+      BeginPlacing(now, utime);
+    else
+      Enter(controller_status_t::COMPLETE);
+  } else if (phase() == controller_status_t::PLACING && rest_ < 0 &&
+             now - placing_since_ > kPlaceAgain) {
     BeginPlacing(now, utime);
   }
-  if (state.utime < next_decision_ && next_decision_ - state.utime < Microseconds(robot_.task.period)) return {};
+  if (state.utime < next_decision_ &&
+      next_decision_ - state.utime < Microseconds(robot_.task.period))
+    return {};
   next_decision_ = state.utime + Microseconds(robot_.task.period);
   return ZeroCommand(utime);
 }
@@ -217,7 +239,8 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   const int64_t period = Microseconds(robot_.task.period);
   // Measurements come at their own rate: answer the one nearest to the decision's time.
   if (state.utime < next_decision_ - Microseconds(robot_.driver.measurement) / 2) return {};
-  if (state.utime > next_decision_ + period / 2) return Halt("a state came half a control period late", utime);
+  if (state.utime > next_decision_ + period / 2)
+    return Halt("a state came half a control period late", utime);
   next_decision_ += period;
   const auto q = Map(state.q), v = Map(state.v);
   if (status_.step > 0) status_.episode_return += task_->Reward(step_q_, step_v_, effort_, q, v);
@@ -230,8 +253,9 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   if (policy_header_.purpose == policy_t::EVALUATE) {
     action = policy_->Mean(observation_);
   } else {  // the policy's own noise excites what is to be learned
-    Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_),
-                          kExplorationStream | static_cast<uint32_t>(status_.step)});
+    Random random(seed_,
+                  {static_cast<uint32_t>(status_.policy_iteration), static_cast<uint32_t>(attempt_),
+                   kExplorationStream | static_cast<uint32_t>(status_.step)});
     action = policy_->Sample(observation_, random);
   }
   if (!action.allFinite()) return Halt("the policy's action is not finite", utime);

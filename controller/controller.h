@@ -17,19 +17,20 @@
 
 namespace plumb {
 
-/// Runs a policy on the robot, episode by episode. Without sockets or clocks: time is an argument (`now` scaled
-/// monotonic, `utime` scaled real time, both [us]). Not thread-safe.
+/// Runs a policy on the robot, episode by episode. Without sockets or clocks: time is an argument
+/// (`now` scaled monotonic, `utime` scaled real time, both [us]). Not thread-safe.
 ///
 /// - A policy is exchanged only between episodes.
 /// - Between episodes it commands zero effort, which keeps an armed driver from disarming.
 /// - It is silent unless the driver is arming or armed, and after a halt: silence disarms.
-/// - A late (by arrival or by its own time), invalid or non-finite state or action halts it: one command of zero effort, then silence until the
-///   driver has been seen disarmed and armed anew, which takes a person.
+/// - A late (by arrival or by its own time), invalid or non-finite state or action halts it: one
+///   command of zero effort, then silence until the driver has been seen disarmed and armed anew,
+///   which takes a person.
 class Controller {
  public:
-  /// @param rest [s] negative: each episode begins in a state of the task's choice, where PLACE_ROBOT has the robot
-  /// put. Otherwise, for a robot that nobody can place: it is given zero effort for that long and the episode begins
-  /// wherever it then is.
+  /// @param rest [s] negative: each episode begins in a state of the task's choice, where
+  /// PLACE_ROBOT has the robot put. Otherwise, for a robot that nobody can place: it is given zero
+  /// effort for that long and the episode begins wherever it then is.
   Controller(const RobotDescription& robot, uint64_t seed, double rest = -1);
 
   /// A new policy. @throws std::invalid_argument if it does not fit the robot or is damaged.
@@ -40,7 +41,8 @@ class Controller {
   /// Call at least every control period. @return a command of zero effort when it halts here.
   std::optional<joint_command_t> Tick(int64_t now, int64_t utime);
 
-  /// The wish to place the robot, while phase() is PLACING and the drives have had the time to let go of it; else null.
+  /// The wish to place the robot, while phase() is PLACING and the drives have had the time to let
+  /// go of it; else null.
   const place_robot_t* place() const { return place_ && let_go_ ? &*place_ : nullptr; }
   const controller_status_t& status() const { return status_; }
   int8_t phase() const { return status_.phase; }

@@ -1,7 +1,8 @@
-// plumb-controller: ROBOT_STATE, POLICY, DRIVER_STATUS -> JOINT_COMMAND, PLACE_ROBOT, CONTROLLER_STATUS.
+// plumb-controller: ROBOT_STATE, POLICY, DRIVER_STATUS -> JOINT_COMMAND, PLACE_ROBOT,
+// CONTROLLER_STATUS.
 
-#include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
 
 #include <optional>
 
@@ -21,10 +22,12 @@ int main(int argc, char** argv) {
         app.add_option("robot", robot_path, "robot folder or TOML file")->required();
         plumb::AddRealtimeFlag(app, priority);
         app.add_option("--seed", seed, "of initial states and exploration")->capture_default_str();
-        app.add_option("--rest", rest,
-                       "[s] do not have the robot placed: let it rest that long, then begin where it is");
-        app.add_option("--key", key,
-                       "sign the commands with this key, which the driver shares (plumb key makes one)");
+        app.add_option(
+            "--rest", rest,
+            "[s] do not have the robot placed: let it rest that long, then begin where it is");
+        app.add_option(
+            "--key", key,
+            "sign the commands with this key, which the driver shares (plumb key makes one)");
       },
       [&](plumb::Process& process) {
         process.BecomeFast(priority);
@@ -48,15 +51,17 @@ int main(int argc, char** argv) {
               send(controller.OnState(state, clock.Now(), clock.Utime()));
             });
         plumb::Subscriber<plumb::driver_status_t> drivers(
-            messenger, "DRIVER_STATUS",
-            [&](const plumb::driver_status_t& status) { controller.OnDriverStatus(status, clock.Now()); });
-        plumb::Subscriber<plumb::policy_t> policies(messenger, "POLICY", [&](const plumb::policy_t& policy) {
-          try {
-            controller.OnPolicy(policy);
-          } catch (const std::invalid_argument& error) {
-            spdlog::warn("policy {} refused: {}", policy.iteration, error.what());
-          }
-        });
+            messenger, "DRIVER_STATUS", [&](const plumb::driver_status_t& status) {
+              controller.OnDriverStatus(status, clock.Now());
+            });
+        plumb::Subscriber<plumb::policy_t> policies(
+            messenger, "POLICY", [&](const plumb::policy_t& policy) {
+              try {
+                controller.OnPolicy(policy);
+              } catch (const std::invalid_argument& error) {
+                spdlog::warn("policy {} refused: {}", policy.iteration, error.what());
+              }
+            });
 
         constexpr int64_t kTick = 10'000, kStatusPeriod = 100'000;  // [us]
         int64_t published = clock.Now() - kStatusPeriod, seen = -1;

@@ -17,7 +17,9 @@ constexpr int kMaxWidth = 4096;
 constexpr int64_t kMaxParameters = 1 << 24;
 constexpr int kMaxEpisodes = 1'000'000;
 
-[[noreturn]] void Reject(const std::string& what) { throw std::invalid_argument("policy: " + what); }
+[[noreturn]] void Reject(const std::string& what) {
+  throw std::invalid_argument("policy: " + what);
+}
 
 int64_t CountParameters(const std::vector<int>& sizes) {
   int64_t count = sizes.back();
@@ -54,7 +56,9 @@ Eigen::VectorXf TakePositive(const char* what, const std::vector<float>& values,
   return result;
 }
 
-std::vector<float> ToVector(const Eigen::VectorXf& values) { return {values.begin(), values.end()}; }
+std::vector<float> ToVector(const Eigen::VectorXf& values) {
+  return {values.begin(), values.end()};
+}
 
 }  // namespace
 
@@ -90,8 +94,8 @@ GaussianPolicy GaussianPolicy::FromMessage(const policy_t& message) {
   GaussianPolicy policy({sizes.front(), {sizes.begin() + 1, sizes.end() - 1}, sizes.back()});
   const PolicyShape& shape = policy.shape_;
   policy.parameters = Take("weights", message.weight, message.num_weights, shape.parameter_count());
-  policy.observation_mean =
-      Take("observation means", message.observation_mean, message.num_observations, shape.observations);
+  policy.observation_mean = Take("observation means", message.observation_mean,
+                                 message.num_observations, shape.observations);
   policy.observation_scale = TakePositive("observation scales", message.observation_scale,
                                           message.num_observations, shape.observations);
   policy.action_scale =
@@ -118,7 +122,8 @@ policy_t GaussianPolicy::ToMessage() const {
   return message;
 }
 
-Eigen::VectorXf GaussianPolicy::Normalize(const Eigen::Ref<const Eigen::VectorXf>& observation) const {
+Eigen::VectorXf GaussianPolicy::Normalize(
+    const Eigen::Ref<const Eigen::VectorXf>& observation) const {
   const auto normalised = (observation - observation_mean).array() / observation_scale.array();
   // This order of min and max lets NaN through, to be seen by whoever checks the action.
   return normalised.unaryExpr([](float x) {

@@ -16,9 +16,10 @@ std::string Verb(const BusMessage& message) {
 }
 
 // Both say, or both hear, what their protocol lets several devices say or hear.
-bool MayShare(const BusDevice& a, const BusMessage& in_a, const BusDevice& b, const BusMessage& in_b) {
-  return a.protocol == b.protocol && in_a.shared && in_b.shared && in_a.direction == in_b.direction &&
-         (in_a.selector < 0 || in_a.selector != in_b.selector);
+bool MayShare(const BusDevice& a, const BusMessage& in_a, const BusDevice& b,
+              const BusMessage& in_b) {
+  return a.protocol == b.protocol && in_a.shared && in_b.shared &&
+         in_a.direction == in_b.direction && (in_a.selector < 0 || in_a.selector != in_b.selector);
 }
 
 std::optional<std::string> SameId(const BusDevice& a, const BusDevice& b,
@@ -27,14 +28,14 @@ std::optional<std::string> SameId(const BusDevice& a, const BusDevice& b,
     for (const BusMessage& in_b : b.messages) {
       if (in_a.id != in_b.id || in_a.extended != in_b.extended) continue;
       if (!MayShare(a, in_a, b, in_b)) {
-        return fmt::format("CAN id {:#05x}: '{}' {} and '{}' {}", in_a.id, a.name, Verb(in_a), b.name,
-                           Verb(in_b));
+        return fmt::format("CAN id {:#05x}: '{}' {} and '{}' {}", in_a.id, a.name, Verb(in_a),
+                           b.name, Verb(in_b));
       }
       if (in_a.direction == Direction::kFromDevice) {
-        warnings.push_back(
-            fmt::format("CAN id {:#05x}: both '{}' and '{}' send {}; begun at the same instant they "
-                        "destroy each other: if the motors let you, give each an id of its own",
-                        in_a.id, a.name, b.name, in_a.layout.name));
+        warnings.push_back(fmt::format(
+            "CAN id {:#05x}: both '{}' and '{}' send {}; begun at the same instant they "
+            "destroy each other: if the motors let you, give each an id of its own",
+            in_a.id, a.name, b.name, in_a.layout.name));
       }
     }
   }
@@ -46,8 +47,8 @@ std::optional<std::string> Within(const BusDevice& a, const BusDevice& b) {
   for (const IdRange& range : a.claims) {
     for (const BusMessage& message : b.messages) {
       if (!message.extended && message.id >= range.first && message.id <= range.last) {
-        return fmt::format("CAN id {:#05x}: '{}' {}, but ids {:#05x} to {:#05x} are '{}'s", message.id,
-                           b.name, Verb(message), range.first, range.last, a.name);
+        return fmt::format("CAN id {:#05x}: '{}' {}, but ids {:#05x} to {:#05x} are '{}'s",
+                           message.id, b.name, Verb(message), range.first, range.last, a.name);
       }
     }
     for (const IdRange& other : b.claims) {

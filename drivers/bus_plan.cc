@@ -41,12 +41,13 @@ int64_t Releases(const Task& task, int64_t window) {
   return (window + task.jitter + task.period - 1) / task.period;
 }
 
-/// The last of the tasks, the others before it in priority, all with periods; `blocking` [ns] of what may
-/// have begun. @return [ns] or -1: it may wait for ever.
+/// The last of the tasks, the others before it in priority, all with periods; `blocking` [ns] of
+/// what may have begun. @return [ns] or -1: it may wait for ever.
 int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) {
   const Task& own = tasks.back();
   double load = 0;
-  for (const Task& task : tasks) load += static_cast<double>(task.cost) / static_cast<double>(task.period);
+  for (const Task& task : tasks)
+    load += static_cast<double>(task.cost) / static_cast<double>(task.period);
   if (load >= 1) return -1;
   // The longest time in which the bus is busy with this one and higher ones.
   int64_t busy = own.cost;
@@ -63,7 +64,8 @@ int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) 
     for (int round = 0;; ++round) {
       if (round > kMostRounds) return -1;
       int64_t next = blocking + instance * own.cost;
-      for (size_t i = 0; i + 1 < tasks.size(); ++i) next += Releases(tasks[i], wait + bit) * tasks[i].cost;
+      for (size_t i = 0; i + 1 < tasks.size(); ++i)
+        next += Releases(tasks[i], wait + bit) * tasks[i].cost;
       if (next == wait) break;
       wait = next;
     }
@@ -72,7 +74,8 @@ int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) 
   return worst;
 }
 
-/// Of the polled messages of a direction one waits at a time: together they are one, the longest, as often as all of them.
+/// Of the polled messages of a direction one waits at a time: together they are one, the longest,
+/// as often as all of them.
 Task PolledTask(const BusPlan& plan, Direction direction, int64_t bit) {
   Task all{0, 0, 0};
   double rate = 0;
@@ -110,8 +113,8 @@ void ComputeResponses(BusPlan& plan) {
                   tasks.begin() + static_cast<std::ptrdiff_t>(counted->second) + 1, tasks.end());
       response = Response(tasks, blocking, bit);
     } else {
-      higher.push_back(
-          {row.worst_bits * bit, row.message.period * kNanoseconds, row.message.jitter * kNanoseconds});
+      higher.push_back({row.worst_bits * bit, row.message.period * kNanoseconds,
+                        row.message.jitter * kNanoseconds});
       response = Response(higher, blocking, bit);
     }
     row.response = response < 0 ? std::numeric_limits<double>::infinity()
@@ -124,11 +127,12 @@ bool InheritJitter(BusPlan& plan, const std::vector<BusDevice>& devices) {
   bool changed = false;
   for (Row& row : plan.rows) {
     if (row.message.answers < 0 || row.message.period <= 0) continue;
-    const auto device =
-        std::find_if(devices.begin(), devices.end(), [&](const auto& d) { return d.name == row.device; });
+    const auto device = std::find_if(devices.begin(), devices.end(),
+                                     [&](const auto& d) { return d.name == row.device; });
     const BusMessage& question = device->messages[static_cast<size_t>(row.message.answers)];
     for (const Row& other : plan.rows) {
-      if (other.device != row.device || other.message.id != question.id || other.message.remote != question.remote ||
+      if (other.device != row.device || other.message.id != question.id ||
+          other.message.remote != question.remote ||
           other.message.direction != question.direction) {
         continue;
       }
@@ -158,9 +162,9 @@ void Judge(BusPlan& plan) {
     const std::string when = std::isfinite(row.response)
                                  ? fmt::format("{:.2f} ms after it is due", row.response / 1000)
                                  : std::string("later and later");
-    plan.errors.push_back(fmt::format("{} of '{}' (id {:#05x}) may be sent {}, but is due every {:.2f} ms",
-                                      row.message.layout.name, row.device, row.message.id, when,
-                                      row.deadline / 1000));
+    plan.errors.push_back(fmt::format(
+        "{} of '{}' (id {:#05x}) may be sent {}, but is due every {:.2f} ms",
+        row.message.layout.name, row.device, row.message.id, when, row.deadline / 1000));
   }
 }
 
@@ -178,7 +182,8 @@ int WorstCaseBits(bool extended, int length) {
 BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate) {
   BusPlan plan;
   plan.bit_rate = bit_rate;
-  std::set<std::pair<uint64_t, Direction>> broadcasts;  // from the driver to several devices: sent once
+  // from the driver to several devices: sent once
+  std::set<std::pair<uint64_t, Direction>> broadcasts;
   for (const BusDevice& device : devices) {
     for (const BusMessage& message : device.messages) {
       if (message.shared && message.direction == Direction::kToDevice &&
@@ -202,8 +207,9 @@ BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate) {
       plan.rows.push_back(row);
     }
   }
-  std::stable_sort(plan.rows.begin(), plan.rows.end(),
-                   [](const Row& a, const Row& b) { return Priority(a.message) < Priority(b.message); });
+  std::stable_sort(plan.rows.begin(), plan.rows.end(), [](const Row& a, const Row& b) {
+    return Priority(a.message) < Priority(b.message);
+  });
   FindCollisions(devices, plan.errors, plan.warnings);
   ComputeResponses(plan);
   // Jitters only grow from round to round, up to a period.
@@ -224,8 +230,9 @@ std::vector<BusDevice> BusDevices(const RobotDescription& robot) {
 }
 
 std::string ToText(const BusPlan& plan) {
-  std::string text = fmt::format("{:<10} {:<16} {:<24} {:>4} {:>9} {:>7} {:>8} {:>7} {:>9}\n", "id", "device",
-                                 "message", "dlc", "period ms", "bits", "load %", "from", "worst ms");
+  std::string text =
+      fmt::format("{:<10} {:<16} {:<24} {:>4} {:>9} {:>7} {:>8} {:>7} {:>9}\n", "id", "device",
+                  "message", "dlc", "period ms", "bits", "load %", "from", "worst ms");
   for (const Row& row : plan.rows) {
     const BusMessage& message = row.message;
     const bool periodic = message.period > 0;
@@ -239,8 +246,8 @@ std::string ToText(const BusPlan& plan) {
         message.direction == Direction::kToDevice ? "driver" : "device",
         periodic ? fmt::format("{:.2f}", row.response / 1000) : "-");
   }
-  text += fmt::format("load {:.1f} % nominal, {:.1f} % at worst, of {:g} bit/s\n", 100 * plan.nominal_load,
-                      100 * plan.worst_load, plan.bit_rate);
+  text += fmt::format("load {:.1f} % nominal, {:.1f} % at worst, of {:g} bit/s\n",
+                      100 * plan.nominal_load, 100 * plan.worst_load, plan.bit_rate);
   for (const std::string& error : plan.errors) text += "error: " + error + "\n";
   for (const std::string& warning : plan.warnings) text += "warning: " + warning + "\n";
   if (plan.errors.empty()) text += "all deadlines are met\n";

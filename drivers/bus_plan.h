@@ -17,13 +17,14 @@ int WorstCaseBits(bool extended, int length);
 
 /// Whether all messages of a bus get through in time, whatever they say.
 ///
-/// Response times by the exact analysis of Davis, Burns, Bril and Lukkien, "Controller Area Network (CAN)
-/// schedulability analysis: Refuted, revisited and revised", Real-Time Systems 35 (2007): a message waits for
-/// the longest lower one, which has just begun, and for all higher ones, queued at the worst instants. It
-/// assumes that of the frames that wait at a node the highest goes first (send in the order of ids), and no
-/// errors. Every message must be on the bus before the next of its kind: deadlines are periods; of those that the driver
-/// asks for in turn (BusMessage::polled), before the next question, so that one of them waits at a time. Messages
-/// without a period block others once but are no load: the plan is that of a robot that moves.
+/// Response times by the exact analysis of Davis, Burns, Bril and Lukkien, "Controller Area Network
+/// (CAN) schedulability analysis: Refuted, revisited and revised", Real-Time Systems 35 (2007): a
+/// message waits for the longest lower one, which has just begun, and for all higher ones, queued
+/// at the worst instants. It assumes that of the frames that wait at a node the highest goes first
+/// (send in the order of ids), and no errors. Every message must be on the bus before the next of
+/// its kind: deadlines are periods; of those that the driver asks for in turn (BusMessage::polled),
+/// before the next question, so that one of them waits at a time. Messages without a period block
+/// others once but are no load: the plan is that of a robot that moves.
 struct BusPlan {
   static constexpr double kWarnLoad = 0.8;
 
@@ -32,8 +33,8 @@ struct BusPlan {
     BusMessage message;
     int nominal_bits, worst_bits;
     double worst_load;  ///< share of the bus; 0 without a period
-    double response;  ///< [us] from being due to having been sent, at worst; NaN without a period, else maybe
-                      ///< infinite
+    /// [us] from being due to having been sent, at worst; NaN without a period, else maybe infinite
+    double response;
     double deadline;  ///< [us] after which it is too late
   };
   double bit_rate;                  ///< [bit/s]

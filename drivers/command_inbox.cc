@@ -12,7 +12,8 @@ constexpr int64_t kGreatestSequence = 1'000'000'000'000;  // at 1 kHz reached in
 
 }  // namespace
 
-CommandInbox::CommandInbox(int num_joints, int64_t expiry) : num_joints_(num_joints), expiry_(expiry) {
+CommandInbox::CommandInbox(int num_joints, int64_t expiry)
+    : num_joints_(num_joints), expiry_(expiry) {
   const auto size = static_cast<size_t>(num_joints);
   for (auto* values :
        {&command_.effort, &command_.position, &command_.velocity, &command_.kp, &command_.kd}) {
@@ -31,7 +32,8 @@ std::string_view CommandInbox::Judge(const joint_command_t& command, int64_t uti
   for (const auto* values :
        {&command.effort, &command.position, &command.velocity, &command.kp, &command.kd}) {
     if (values->size() != size) return "they are for another number of joints";
-    if (std::ranges::any_of(*values, [](double x) { return std::isinf(x); })) return "a number is infinite";
+    if (std::ranges::any_of(*values, [](double x) { return std::isinf(x); }))
+      return "a number is infinite";
   }
   const auto nan = [](double x) { return std::isnan(x); };
   const auto negative = [](double x) { return x < 0; };
@@ -41,7 +43,8 @@ std::string_view CommandInbox::Judge(const joint_command_t& command, int64_t uti
   }
   // Not as a difference: a hostile utime must not overflow.
   if (command.utime < utime - expiry_) return "they were computed too long ago";
-  if (command.utime > utime + expiry_) return "they are dated in the future: are the clocks the same?";
+  if (command.utime > utime + expiry_)
+    return "they are dated in the future: are the clocks the same?";
   if (command.expiry < 0) return "their expiry is negative";
   if (command.sequence < 0 || command.sequence > kGreatestSequence)
     return "no sequence is numbered like this";

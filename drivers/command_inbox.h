@@ -8,18 +8,21 @@
 namespace plumb {
 
 /// The newest valid command and nothing else: commands are never queued. Does not allocate after
-/// construction. Not thread-safe. Times: `now` scaled monotonic [us], `utime` scaled real time [us].
+/// construction. Not thread-safe. Times: `now` scaled monotonic [us], `utime` scaled real time
+/// [us].
 class CommandInbox {
  public:
   /// @param expiry [us] after arrival a command is void; a command may shorten but not lengthen it.
   CommandInbox(int num_joints, int64_t expiry);
 
-  /// Forgets everything: the next command may have any plausible sequence number (a new controller).
+  /// Forgets everything: the next command may have any plausible sequence number (a new
+  /// controller).
   void Clear() noexcept;
 
-  /// Takes a command if it has the right size, finite efforts, no infinite or negative gains, was computed no
-  /// longer than an expiry from `utime`, and has a greater sequence number than the last one taken. One that
-  /// is too much greater is nobody's next and would make void what the real controller says.
+  /// Takes a command if it has the right size, finite efforts, no infinite or negative gains, was
+  /// computed no longer than an expiry from `utime`, and has a greater sequence number than the
+  /// last one taken. One that is too much greater is nobody's next and would make void what the
+  /// real controller says.
   /// @return false if not; the one before stays in force.
   bool Offer(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
   /// Why the last command was refused; empty if none was since the last one taken.
@@ -34,8 +37,9 @@ class CommandInbox {
   bool in_episode() const noexcept { return !empty_ && command_.episode >= 0; }
   bool Expired(int64_t now) const noexcept { return empty_ || now > expires(); }
 
-  /// Effort wished for a joint that is at a position and velocity (joint side): the feed-forward effort plus
-  /// kp (target - position) plus kd (target - velocity) where gains and targets are given.
+  /// Effort wished for a joint that is at a position and velocity (joint side): the feed-forward
+  /// effort plus kp (target - position) plus kd (target - velocity) where gains and targets are
+  /// given.
   double Effort(int joint, double position, double velocity) const noexcept;
 
  private:

@@ -30,10 +30,11 @@ std::string Unique(const std::string& wish, std::set<std::string>& taken) {
   return name;
 }
 
-// DBC counts big-endian fields from their most significant bit, and bits within a byte from the least
-// significant.
+// DBC counts big-endian fields from their most significant bit, and bits within a byte from the
+// least significant.
 int StartBit(const Field& field) {
-  return field.order == Field::Order::kBigEndian ? field.bit / 8 * 8 + 7 - field.bit % 8 : field.bit;
+  return field.order == Field::Order::kBigEndian ? field.bit / 8 * 8 + 7 - field.bit % 8
+                                                 : field.bit;
 }
 
 std::string Signal(const Field& field, const std::string& name, const std::string& multiplex,
@@ -43,7 +44,8 @@ std::string Signal(const Field& field, const std::string& name, const std::strin
                      multiplex.empty() ? "" : multiplex + " ", StartBit(field), field.bits,
                      field.order == Field::Order::kBigEndian ? 0 : 1,
                      field.kind == Field::Kind::kUnsigned ? '+' : '-', field.scale, field.offset,
-                     integer ? field.lowest() : 0, integer ? field.highest() : 0, field.unit, receiver);
+                     integer ? field.lowest() : 0, integer ? field.highest() : 0, field.unit,
+                     receiver);
 }
 
 struct Sender {
@@ -73,10 +75,12 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
     const bool from_device = first.direction == Direction::kFromDevice;
     const bool multiplexed = first.selector >= 0;
     const std::string label = first.shared ? senders[0].device->protocol : senders[0].device->name;
-    body +=
-        fmt::format("BO_ {} {}: {} {}\n", id, Unique(label + "_" + std::string(first.layout.name), messages),
-                    first.layout.length, from_device ? senders[0].node : kDriver);
-    const std::string receiver = from_device ? kDriver : first.shared ? "Vector__XXX" : senders[0].node;
+    body += fmt::format("BO_ {} {}: {} {}\n", id,
+                        Unique(label + "_" + std::string(first.layout.name), messages),
+                        first.layout.length, from_device ? senders[0].node : kDriver);
+    const std::string receiver = from_device    ? kDriver
+                                 : first.shared ? "Vector__XXX"
+                                                : senders[0].node;
     std::set<std::string> signals;
     for (const Sender& sender : senders) {
       const Layout& layout = sender.message->layout;
@@ -92,7 +96,8 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
         }
         name = Unique(name, signals);
         body += Signal(field, name, multiplex, receiver);
-        if (field.kind == Field::Kind::kFloat) floats += fmt::format("SIG_VALTYPE_ {} {} : 1;\n", id, name);
+        if (field.kind == Field::Kind::kFloat)
+          floats += fmt::format("SIG_VALTYPE_ {} {} : 1;\n", id, name);
       }
     }
     body += "\n";

@@ -7,8 +7,9 @@
 namespace plumb {
 namespace {
 
-constexpr int kRefusedCycles = 10;   // consecutive cycles whose frames were not accepted
-constexpr size_t kMostFrames = 8;    // in a cycle while arming: the kernel holds about ten in flight
+constexpr int kRefusedCycles = 10;  // consecutive cycles whose frames were not accepted
+// in a cycle while arming: the kernel holds about ten in flight
+constexpr size_t kMostFrames = 8;
 constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
 
 double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
@@ -26,8 +27,8 @@ void Driver::Disarm() noexcept {
   mode_ = Mode::kRest;
 }
 
-/// A frame, or the link, stops us without saying what time it is, and the last time we were told is long ago
-/// where our process stood still: an ARM that was made meanwhile is older than the stop.
+/// A frame, or the link, stops us without saying what time it is, and the last time we were told is
+/// long ago where our process stood still: an ARM that was made meanwhile is older than the stop.
 void Driver::DateStop() noexcept {
   if (!stop_dated_) stopped_utime_ = utime_;
   stop_dated_ = true;
@@ -45,7 +46,8 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
       bus_off_ = false;
       return;
     case BusEvent::kNoAck:
-      if (++unacknowledged_ > kUnacknowledged && Active()) Fault("nobody on the bus acknowledges frames");
+      if (++unacknowledged_ > kUnacknowledged && Active())
+        Fault("nobody on the bus acknowledges frames");
       return;
     case BusEvent::kNone:
       break;
@@ -54,7 +56,8 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
   if (frame.foreign) {
     foreign_at_ = now;
     // A button on the bus is obeyed by all drives, whomever it was for.
-    if (std::ranges::any_of(joints_, [&](const Joint& joint) { return joint.motor->IsEstop(frame); })) {
+    if (std::ranges::any_of(joints_,
+                            [&](const Joint& joint) { return joint.motor->IsEstop(frame); })) {
       return Estop("emergency stop from the bus");
     }
     if (Active()) Fault("second master: somebody else sends frame {:#05x} to the drives", frame.id);
@@ -82,7 +85,8 @@ bool Driver::UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept
                         joint.map.JointEffort(joint.motor->torque_estimate())};
         joint.measured = true;
         joint.measured_at = now;
-        joint.watch.Add(utime, joint.latest.position, joint.latest.velocity, effort_sent_[joint.index]);
+        joint.watch.Add(utime, joint.latest.position, joint.latest.velocity,
+                        effort_sent_[joint.index]);
         measurements_.Add(static_cast<int>(i), joint.latest, utime);
         return true;
       }
@@ -102,7 +106,8 @@ bool Driver::UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcep
 void Driver::OnLink(LinkState link) noexcept {
   link_ = link;
   if (link != LinkState::kUp && Active()) {
-    Fault("{}", link == LinkState::kDown ? "the CAN interface is down" : "the CAN interface is gone");
+    Fault("{}",
+          link == LinkState::kDown ? "the CAN interface is down" : "the CAN interface is gone");
   }
 }
 
@@ -117,7 +122,8 @@ std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness
   CheckCommand();
   DateStop();
   CommandTorques();
-  // After the checks, so that a fault is answered in this cycle. The joints take turns to be the first.
+  // After the checks, so that a fault is answered in this cycle. The joints take turns to be the
+  // first.
   size_t arming = std::max(kMostFrames - std::min(kMostFrames, torque_frames_), kMostArmingFrames);
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[(turn_ + i) % joints_.size()];
@@ -135,7 +141,8 @@ std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness
 }
 
 void Driver::CommandTorques() noexcept {
-  const bool commanded = mode_ == Mode::kArmed && !inbox_.empty(), fresh = commanded && !inbox_.Expired(now_);
+  const bool commanded = mode_ == Mode::kArmed && !inbox_.empty(),
+             fresh = commanded && !inbox_.Expired(now_);
   bool limited = false;
   for (Joint& joint : joints_) {
     joint.effort = 0;
@@ -145,11 +152,12 @@ void Driver::CommandTorques() noexcept {
     if (fresh) {
       wish = inbox_.Effort(static_cast<int>(joint.index), position, velocity);
     } else if (commanded) {
-      wish = StoppingEffort(settings_, joint.damping, joint.commanded, Seconds(now_ - inbox_.expires()),
-                            velocity);
+      wish = StoppingEffort(settings_, joint.damping, joint.commanded,
+                            Seconds(now_ - inbox_.expires()), velocity);
     }
     joint.effort =
-        LimitEffort(wish, {position, velocity, effort_sent_[joint.index], Seconds(cycle_)}, joint.limits)
+        LimitEffort(wish, {position, velocity, effort_sent_[joint.index], Seconds(cycle_)},
+                    joint.limits)
             .value_or(0);
     if (fresh) joint.commanded = joint.effort;
     limited = limited || (fresh && joint.effort != wish);
@@ -220,7 +228,8 @@ DriveState Driver::state() const noexcept {
 }
 
 bool Driver::confirmed_idle() const noexcept {
-  return std::ranges::all_of(joints_, [](const Joint& joint) { return joint.motor->confirmed_idle(); });
+  return std::ranges::all_of(joints_,
+                             [](const Joint& joint) { return joint.motor->confirmed_idle(); });
 }
 
 }  // namespace plumb

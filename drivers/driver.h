@@ -24,33 +24,35 @@
 
 namespace plumb {
 
-/// The driver without sockets and clock: frames and messages go in, frames and messages come out. One cycle:
+/// The driver without sockets and clock: frames and messages go in, frames and messages come out.
+/// One cycle:
 ///
 ///   for (received frame) driver.OnFrame(frame, now, utime of its arrival);
 ///   while (const joint_state_t* state = driver.NextState()) publish(*state);
 ///   while (const imu_t* imu = driver.NextImu()) publish(*imu);
 ///   driver.OnLink(...); driver.OnRequest(...); driver.OnCommand(...);   // what came since
 ///   frames = driver.Tick(now, utime, lateness);                         // once per cycle
-///   driver.Transmitted(transport.Send(frames), utime right after it);  // after every Tick: what was not
-///                                                                      // accepted is given again
+///   driver.Transmitted(transport.Send(frames), utime right after it);
+///   // after every Tick: what was not accepted is given again
 ///
-/// It arms only on a request, made after its start and after whatever stopped it last. Armed, it transmits a
-/// torque in every cycle, within the joint's limits: zero when the command has expired, or what
-/// DriverSettings::stop says. It disarms and remembers why (FAULT) when commands stay away, a measurement or
-/// heartbeat is missing or cannot be true, a drive or sensor reports an error, a drive falls idle, is too hot
-/// or has a bad supply, the bus fails, or somebody else sends what only it may send; only a new ARM leads out
-/// of FAULT.
+/// It arms only on a request, made after its start and after whatever stopped it last. Armed, it
+/// transmits a torque in every cycle, within the joint's limits: zero when the command has expired,
+/// or what DriverSettings::stop says. It disarms and remembers why (FAULT) when commands stay away,
+/// a measurement or heartbeat is missing or cannot be true, a drive or sensor reports an error, a
+/// drive falls idle, is too hot or has a bad supply, the bus fails, or somebody else sends what
+/// only it may send; only a new ARM leads out of FAULT.
 ///
-/// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the constructor
-/// allocates (Status: when a text grows), blocks or throws. Not thread-safe.
+/// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the
+/// constructor allocates (Status: when a text grows), blocks or throws. Not thread-safe.
 class Driver {
  public:
   /// @param now, utime time of the start.
-  /// @throws std::invalid_argument for an unknown protocol, a joint that nothing measures, or a bus that
-  /// cannot work: ids in common, more than it carries (see BusPlan).
+  /// @throws std::invalid_argument for an unknown protocol, a joint that nothing measures, or a bus
+  /// that cannot work: ids in common, more than it carries (see BusPlan).
   Driver(const RobotDescription& robot, int64_t now, int64_t utime);
 
-  /// Filters that let in what drives and sensors send, and what only we may send, should another do so.
+  /// Filters that let in what drives and sensors send, and what only we may send, should another do
+  /// so.
   std::vector<Filter> filters() const;
   int64_t cycle() const { return cycle_; }  ///< [us] period in which Tick wants to be called
 
@@ -62,7 +64,8 @@ class Driver {
   void OnLink(LinkState link) noexcept;
   void OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept;
   void OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
-  /// Instead of the two above, what is not to be obeyed because its signature is wrong. @param why a literal.
+  /// Instead of the two above, what is not to be obeyed because its signature is wrong. @param why
+  /// a literal.
   void OnForgedArm(std::string_view why) noexcept;
   void OnForgedCommand(std::string_view why) noexcept;
   /// @param lateness [us] after the cycle's deadline.
@@ -78,13 +81,15 @@ class Driver {
   bool confirmed_idle() const noexcept;
   /// Changes whenever a state or reason changes.
   uint64_t revision() const noexcept { return revision_; }
-  /// The message to publish, to which the caller may add what only it knows; valid until the next call.
+  /// The message to publish, to which the caller may add what only it knows; valid until the next
+  /// call.
   /// @param messages_rejected LCM messages that did not decode.
   driver_status_t& Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected);
   void set_bus(const std::string& url) { status_.bus = url; }
   /// Whether signatures are looked at before OnRequest and OnCommand are called.
   void set_commands_signed(bool commands_signed) { status_.commands_signed = commands_signed; }
-  /// The robot is a virtual one, which is put elsewhere at once: between episodes, while no effort is sent, positions may jump.
+  /// The robot is a virtual one, which is put elsewhere at once: between episodes, while no effort
+  /// is sent, positions may jump.
   void set_virtual(bool is_virtual) { virtual_ = is_virtual; }
   /// What it hears is a recording: it refuses to arm.
   void set_replay(bool replay) { replay_ = replay; }
@@ -168,7 +173,8 @@ class Driver {
 
   Mode mode_ = Mode::kRest;
   Reason reason_;
-  Reason cause_;                   // what stopped it: a fault or a request; the beginning of the reason
+  // what stopped it: a fault or a request; the beginning of the reason
+  Reason cause_;
   int arms_refused_ = 0;           // since it was armed last
   int64_t now_, utime_;            // latest times given
   int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
@@ -177,7 +183,8 @@ class Driver {
   int64_t armed_at_ = 0;           // `now`
   bool stray_controller_ = false;  // commanded during the start guard
   int64_t last_command_ = 0;       // `now` of any command, valid or not
-  std::string_view forgery_;       // of a literal: what was wrong with a command since the last genuine one
+  // of a literal: what was wrong with a command since the last genuine one
+  std::string_view forgery_;
   bool expiry_counted_ = false;
   LinkState link_ = LinkState::kUp;
   bool bus_off_ = false;

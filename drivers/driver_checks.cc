@@ -17,9 +17,11 @@ void Driver::CheckHealth() noexcept {
       return Fault("{}: {}", joint.name, joint.motor->reason());
     }
     if (now_ - joint.measured_at > stale_after_) {
-      return Fault("{}: no encoder estimate for {} ms", joint.name, (now_ - joint.measured_at) / 1000);
+      return Fault("{}: no encoder estimate for {} ms", joint.name,
+                   (now_ - joint.measured_at) / 1000);
     }
-    if (!joint.watch.complaint().empty()) return Fault("{}: {}", joint.name, joint.watch.complaint());
+    if (!joint.watch.complaint().empty())
+      return Fault("{}: {}", joint.name, joint.watch.complaint());
     if (Reason why; !WithinOperatingLimits(joint.motor->readings(), settings_, why)) {
       return Fault("{}: {}", joint.name, why.text());
     }

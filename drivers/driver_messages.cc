@@ -13,14 +13,17 @@ void Driver::PrepareMessages() {
   const size_t size = num_joints_;
   state_message_.sequence = -1;
   state_message_.num_joints = static_cast<int32_t>(size);
-  for (auto* values : {&state_message_.position, &state_message_.velocity, &state_message_.effort_measured,
-                       &state_message_.effort_sent, &state_message_.effort_applied}) {
-    values->assign(size, std::numeric_limits<double>::quiet_NaN());  // of joints that nothing measures
+  for (auto* values :
+       {&state_message_.position, &state_message_.velocity, &state_message_.effort_measured,
+        &state_message_.effort_sent, &state_message_.effort_applied}) {
+    // of joints that nothing measures
+    values->assign(size, std::numeric_limits<double>::quiet_NaN());
   }
   state_message_.valid.resize(size);
   state_message_.measured.resize(size);
 
-  status_.frames_received = status_.frames_sent = status_.frames_rejected = status_.frames_dropped = 0;
+  status_.frames_received = status_.frames_sent = status_.frames_rejected = status_.frames_dropped =
+      0;
   status_.commands_accepted = status_.commands_rejected = status_.commands_expired = 0;
   status_.messages_rejected = status_.cycles = status_.overruns = status_.measurements_lost = 0;
   status_.stopped_by_request = false;
@@ -29,12 +32,16 @@ void Driver::PrepareMessages() {
   status_.joint_state.resize(size);
   status_.joint_reason.resize(size);
   for (size_t i = 0; i < size; ++i) {
-    const bool driven = std::ranges::any_of(joints_, [&](const Joint& joint) { return joint.index == i; });
-    if (driven || std::ranges::any_of(passive_, [&](const Measuring& measuring) { return measuring.joint == i; })) continue;
+    const bool driven =
+        std::ranges::any_of(joints_, [&](const Joint& joint) { return joint.index == i; });
+    if (driven || std::ranges::any_of(
+                      passive_, [&](const Measuring& measuring) { return measuring.joint == i; }))
+      continue;
     status_.joint_state[i] = driver_status_t::IDLE;
     status_.joint_reason[i] = "nothing measures it: left to the estimator";
   }
-  for (auto* values : {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage}) {
+  for (auto* values :
+       {&status_.motor_temperature, &status_.drive_temperature, &status_.bus_voltage}) {
     values->assign(size, std::numeric_limits<double>::quiet_NaN());
   }
   status_.num_sensors = static_cast<int32_t>(sensors_.size());
@@ -113,7 +120,8 @@ void Driver::NoteChanges() noexcept {
   signature_ = signature;
 }
 
-driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected) {
+driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats,
+                                int64_t messages_rejected) {
   status_.utime = utime;
   status_.state = static_cast<int8_t>(state());
   status_.reason = reason();
@@ -125,8 +133,9 @@ driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats, int6
     status_.joint_reason[i] = motor.reason();
     const MotorReadings readings = motor.readings();
     if (Unwatched(joints_[k])) {
-      status_.joint_reason[i] = fmt::format("no temperatures for {} ms: if it gets too hot, nobody will know",
-                                            (now_ - readings.temperatures_at) / 1000);
+      status_.joint_reason[i] =
+          fmt::format("no temperatures for {} ms: if it gets too hot, nobody will know",
+                      (now_ - readings.temperatures_at) / 1000);
     }
     status_.motor_temperature[i] = readings.motor_temperature;
     status_.drive_temperature[i] = readings.drive_temperature;

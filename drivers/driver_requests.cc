@@ -6,7 +6,8 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kClockError = 1'000'000;  // [us] that the clock of a request's maker may be ahead of ours
+// [us] that the clock of a request's maker may be ahead of ours
+constexpr int64_t kClockError = 1'000'000;
 
 }  // namespace
 
@@ -56,16 +57,18 @@ void Driver::Refuse(std::string_view why) noexcept {
 void Driver::RequestArm(int64_t made, bool homed) noexcept {
   if (Active()) return;  // obeyed already
   const int64_t now = now_;
-  // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's clock may
-  // be ahead of ours, so that it looks newer than the stop). One from further ahead would make all void that
-  // come after it.
-  if (made > utime_ + kClockError) return Refuse("it is dated in the future: are the clocks the same?");
+  // Of another run, or from before whatever stopped us, or one that was obeyed already (its maker's
+  // clock may be ahead of ours, so that it looks newer than the stop). One from further ahead would
+  // make all void that come after it.
+  if (made > utime_ + kClockError)
+    return Refuse("it is dated in the future: are the clocks the same?");
   if (made < start_utime_) return Refuse("it was made before the driver started");
   if (made <= stopped_utime_) return Refuse("it was made before the driver stopped");
   if (made <= armed_by_) return Refuse("it, or a newer one, was obeyed already");
   if (now - start_now_ < start_guard_) return Refuse("the driver has only just started");
   if (stray_controller_ && now - last_command_ < start_guard_) {
-    return Refuse("commands arrived when the driver started: stop the controller of an earlier run");
+    return Refuse(
+        "commands arrived when the driver started: stop the controller of an earlier run");
   }
   if (replay_) return Refuse("the bus is a recording: nobody hears us");
   if (now - foreign_at_ < start_guard_)
@@ -79,14 +82,16 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
     } else if (!joint.measured || now - joint.measured_at > stale_after_) {
       why.Set("{}: no encoder estimates", joint.name);
     } else if (joint.watch.crowded()) {
-      why.Set("{}: more encoder estimates than one drive is to send: two drives with one id?", joint.name);
+      why.Set("{}: more encoder estimates than one drive is to send: two drives with one id?",
+              joint.name);
     } else if (Reason bad; !WithinOperatingLimits(joint.motor->readings(), settings_, bad)) {
       why.Set("{}: {}", joint.name, bad.text());
     }
     // A virtual robot's encoders are absolute.
     if (homed || virtual_) joint.motor->Homed();
     if (joint.motor->lost_place())
-      why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed", joint.name);
+      why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed",
+              joint.name);
     if (!why.text().empty()) return Refuse(why.text());
   }
   for (JointSensor& sensor : sensors_) {

@@ -19,7 +19,9 @@ constexpr int kHistory = 2048;  // cycles of transmitted efforts: ten seconds
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
-MotorTiming TimingOf(const DriverSettings& settings) { return {Microseconds(settings.heartbeat_timeout)}; }
+MotorTiming TimingOf(const DriverSettings& settings) {
+  return {Microseconds(settings.heartbeat_timeout)};
+}
 
 }  // namespace
 
@@ -54,12 +56,14 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       armed_by_(utime - 1),
       foreign_at_(now - start_guard_ - 1) {
   for (const JointDescription& joint : robot.joints) names_.push_back(joint.name);
-  for (const SensorDescription& sensor : robot.sensors) sensors_.emplace_back(robot, sensor, stale_after_);
+  for (const SensorDescription& sensor : robot.sensors)
+    sensors_.emplace_back(robot, sensor, stale_after_);
   FindMeasuring(robot);
   FindSecondEncoders(robot);
   const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
   if (!plan.errors.empty())
-    throw std::invalid_argument(fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
+    throw std::invalid_argument(
+        fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
   int polled = 0;
   for (const Joint& joint : joints_) polled += joint.motor->num_polled();
   poll_period_ = std::max(cycle_, Microseconds(robot.driver.telemetry) / std::max(1, polled));
@@ -86,17 +90,20 @@ void Driver::FindMeasuring(const RobotDescription& robot) {
     const JointDescription& joint = robot.joints[i];
     if (!joint.passive) {
       for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
-        if (message.direction != BusMessage::Direction::kToDevice || message.remote || message.extended)
+        if (message.direction != BusMessage::Direction::kToDevice || message.remote ||
+            message.extended)
           continue;
         own_.push_back({.id = message.id, .own = true});
       }
       continue;
     }
     const auto sensor = std::ranges::find(sensors_, static_cast<int>(i), &JointSensor::joint);
-    if (sensor == sensors_.end() && base && base->Has(static_cast<int>(i))) continue;  // the estimator finds out
+    // the estimator finds out
+    if (sensor == sensors_.end() && base && base->Has(static_cast<int>(i))) continue;
     if (sensor == sensors_.end()) {
       throw std::invalid_argument(fmt::format(
-          "joint '{}' has no motor, and no sensor measures it: give it one with [[sensor]]", joint.name));
+          "joint '{}' has no motor, and no sensor measures it: give it one with [[sensor]]",
+          joint.name));
     }
     passive_.push_back({i, static_cast<size_t>(sensor - sensors_.begin())});
   }

@@ -15,7 +15,8 @@ void EffortHistory::Record(int64_t utime, std::span<const double> effort) noexce
   if (count_ > 0 && utime <= utime_[newest_]) count_ = 0;
   newest_ = (newest_ + 1) % capacity_;
   utime_[newest_] = utime;
-  std::copy_n(effort.begin(), joints_, effort_.begin() + static_cast<std::ptrdiff_t>(newest_ * joints_));
+  std::copy_n(effort.begin(), joints_,
+              effort_.begin() + static_cast<std::ptrdiff_t>(newest_ * joints_));
   count_ = std::min(count_ + 1, capacity_);
 }
 
@@ -40,7 +41,8 @@ void EffortHistory::At(int64_t utime, std::span<double> effort) const noexcept {
   for (size_t age = 0; age < count_; ++age) {
     const size_t slot = Slot(age);
     if (utime_[slot] > utime) continue;
-    std::copy_n(effort_.begin() + static_cast<std::ptrdiff_t>(slot * joints_), joints_, effort.begin());
+    std::copy_n(effort_.begin() + static_cast<std::ptrdiff_t>(slot * joints_), joints_,
+                effort.begin());
     return;
   }
 }

@@ -7,16 +7,16 @@
 
 namespace plumb {
 
-/// What effort each joint was told to produce, and when: the drives hold a setpoint until the next one, so
-/// the effort is a staircase with steps at the times of transmission. Record and Average do not allocate. Not
-/// thread-safe.
+/// What effort each joint was told to produce, and when: the drives hold a setpoint until the next
+/// one, so the effort is a staircase with steps at the times of transmission. Record and Average do
+/// not allocate. Not thread-safe.
 class EffortHistory {
  public:
   /// @param capacity steps remembered, > 0.
   EffortHistory(int num_joints, int capacity);
 
-  /// From `utime` [us] on the joints' setpoints are these. Time that does not advance (the clock was set
-  /// back) forgets everything before.
+  /// From `utime` [us] on the joints' setpoints are these. Time that does not advance (the clock
+  /// was set back) forgets everything before.
   void Record(int64_t utime, std::span<const double> effort) noexcept;
   void Clear() noexcept { count_ = 0; }
 

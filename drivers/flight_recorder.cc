@@ -11,7 +11,8 @@
 
 namespace plumb {
 
-FlightRecorder::FlightRecorder(const std::filesystem::path& folder, const std::string& bus, size_t frames, Report report)
+FlightRecorder::FlightRecorder(const std::filesystem::path& folder, const std::string& bus,
+                               size_t frames, Report report)
     : folder_(folder), bus_(bus), report_(std::move(report)) {
   if (folder_.empty()) return;
   std::filesystem::create_directories(folder_);
@@ -66,9 +67,11 @@ void FlightRecorder::Write(const Tape& tape) const {
   const std::filesystem::path file = folder_ / fmt::format("fault_{}.log", utime_);
   std::string text = fmt::format("# {}\n", reason_.text());
   for (size_t i = 0; i < tape.count; ++i) {
-    const Entry& entry = tape.entries[(tape.next + tape.entries.size() - tape.count + i) % tape.entries.size()];
+    const Entry& entry =
+        tape.entries[(tape.next + tape.entries.size() - tape.count + i) % tape.entries.size()];
     if (entry.utime < since_) continue;
-    text += fmt::format("({}.{:06}) {} {} {}\n", entry.utime / 1'000'000, entry.utime % 1'000'000, bus_, ToText(entry.frame), entry.sent ? 'T' : 'R');
+    text += fmt::format("({}.{:06}) {} {} {}\n", entry.utime / 1'000'000, entry.utime % 1'000'000,
+                        bus_, ToText(entry.frame), entry.sent ? 'T' : 'R');
   }
   try {
     WriteAtomically(file, text);

@@ -14,16 +14,19 @@
 
 namespace plumb {
 
-/// The latest frames on the bus, for the time after a fault. The driver's thread records and asks for a dump; a thread of the
-/// recorder's own writes the file. Record and Dump do not block, allocate or throw; both by one thread.
+/// The latest frames on the bus, for the time after a fault. The driver's thread records and asks
+/// for a dump; a thread of the recorder's own writes the file. Record and Dump do not block,
+/// allocate or throw; both by one thread.
 class FlightRecorder {
  public:
   /// Called by the writing thread when a file is complete, with its name, or with what went wrong.
   using Report = std::function<void(const std::string& file, const std::string& error)>;
 
-  /// @param folder of the files, made if need be; empty = nothing is recorded. @param frames the most that are kept.
+  /// @param folder of the files, made if need be; empty = nothing is recorded. @param frames the
+  /// most that are kept.
   /// @param bus its name in the files. @throws std::runtime_error if the folder cannot be made.
-  FlightRecorder(const std::filesystem::path& folder, const std::string& bus, size_t frames, Report report);
+  FlightRecorder(const std::filesystem::path& folder, const std::string& bus, size_t frames,
+                 Report report);
   /// Completes the file under way.
   ~FlightRecorder();
   FlightRecorder(const FlightRecorder&) = delete;
@@ -31,9 +34,10 @@ class FlightRecorder {
 
   /// @param utime when it was received or sent [us].
   void Record(const Frame& frame, bool sent, int64_t utime) noexcept;
-  /// Has all that was recorded since `since` written to folder/fault_<utime>.log, as candump -l writes (canplayer plays it back),
-  /// each line ending in T (sent) or R (received), below a comment with the reason. Recording begins anew. @return false, and
-  /// nothing happens, if the last file is still being written or nothing is recorded at all.
+  /// Has all that was recorded since `since` written to folder/fault_<utime>.log, as candump -l
+  /// writes (canplayer plays it back), each line ending in T (sent) or R (received), below a
+  /// comment with the reason. Recording begins anew. @return false, and nothing happens, if the
+  /// last file is still being written or nothing is recorded at all.
   bool Dump(int64_t since, int64_t utime, std::string_view reason) noexcept;
 
  private:

@@ -15,7 +15,8 @@ Eigen::Map<const Eigen::Vector3d> Vector(const std::array<double, 3>& values) {
 
 }  // namespace
 
-JointSensor::JointSensor(const RobotDescription& robot, const SensorDescription& sensor, int64_t stale_after)
+JointSensor::JointSensor(const RobotDescription& robot, const SensorDescription& sensor,
+                         int64_t stale_after)
     : name_(sensor.name),
       stale_after_(std::max(stale_after, 3 * Microseconds(sensor.period))),
       joint_(sensor.joint),
@@ -58,7 +59,8 @@ JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
   JointMeasurement measurement = newest_;
   if (joint_ < 0 || !sample.orientation_valid) return measurement;
   const auto& [w, x, y, z] = sample.orientation;
-  const Eigen::Quaterniond link = Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
+  const Eigen::Quaterniond link =
+      Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
   const double twist = mounting_.Angle(link);
   // The one of the angles that look like this which is next to the last.
   const double near = std::isfinite(newest_.position) && !forget_turns_ ? newest_.position : 0;
@@ -97,7 +99,8 @@ const imu_t* JointSensor::NextImu() noexcept {
   Eigen::Map<Eigen::Vector3d>(message_.rate) = to_link_ * Vector(sample.rate);
   Eigen::Map<Eigen::Vector3d>(message_.force) = to_link_ * Vector(sample.force);
   const auto& [w, x, y, z] = sample.orientation;
-  const Eigen::Quaterniond link = Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
+  const Eigen::Quaterniond link =
+      Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
   message_.orientation[0] = link.w();
   message_.orientation[1] = link.x();
   message_.orientation[2] = link.y();

@@ -17,18 +17,18 @@
 
 namespace plumb {
 
-/// A sensor on the bus and what it says of the robot, in the robot's terms: the position of a joint, how a
-/// link turns.
+/// A sensor on the bus and what it says of the robot, in the robot's terms: the position of a
+/// joint, how a link turns.
 ///
-/// An encoder measures its joint. An IMU measures how its link turns, and with that the joint that turns it, see
-/// ImuMounting.
+/// An encoder measures its joint. An IMU measures how its link turns, and with that the joint that
+/// turns it, see ImuMounting.
 ///
-/// No method but the constructor throws or allocates. Not thread-safe. `now` is scaled monotonic, `utime`
-/// scaled real time [us].
+/// No method but the constructor throws or allocates. Not thread-safe. `now` is scaled monotonic,
+/// `utime` scaled real time [us].
 class JointSensor {
  public:
-  /// @param stale_after [us] without a reading after which it counts as silent, but never less than three
-  /// periods.
+  /// @param stale_after [us] without a reading after which it counts as silent, but never less than
+  /// three periods.
   /// @throws std::invalid_argument for an unknown protocol or settings it cannot have.
   JointSensor(const RobotDescription& robot, const SensorDescription& sensor, int64_t stale_after);
 
@@ -43,8 +43,8 @@ class JointSensor {
 
   SensorUse OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept;
 
-  /// What it measured of the joint last before or at `utime`: effort NaN; velocity NaN if it reports none.
-  /// Call it with times that do not decrease.
+  /// What it measured of the joint last before or at `utime`: effort NaN; velocity NaN if it
+  /// reports none. Call it with times that do not decrease.
   const JointMeasurement& At(int64_t utime) noexcept;
   int64_t measured() const noexcept { return measured_; }  ///< utime of what At has given
   /// The newest position, which At may not have given yet.

@@ -12,7 +12,8 @@ struct JointLimits {
   double lower, upper;  ///< [rad] or [m]; infinite for a continuous joint
   double velocity;      ///< [rad/s] or [m/s]; infinite = none
   double effort;        ///< [Nm] or [N]
-  double margin = 0;    ///< [rad] or [m] >= 0 within a position limit, where efforts towards it fade
+  /// [rad] or [m] >= 0 within a position limit, where efforts towards it fade
+  double margin = 0;
   double effort_rate = std::numeric_limits<double>::infinity();  ///< [Nm/s] or [N/s] > 0
 };
 
@@ -37,13 +38,13 @@ struct JointSituation {
 
 /// The effort that may be sent for the effort that is wished:
 /// - at most the effort limit, either way;
-/// - what is allowed towards a position limit falls linearly from the effort limit to zero within `margin`
-///   before it; beyond the limit there is only what brings the joint back. Likewise for what makes the joint
-///   faster, in the last kVelocityBand before the velocity limit;
-/// - away from zero, it changes by at most effort_rate times the time since the effort last sent; towards
-/// zero at
-///   once: a limit never keeps an effort on.
+/// - what is allowed towards a position limit falls linearly from the effort limit to zero within
+///   `margin` before it; beyond the limit there is only what brings the joint back. Likewise for
+///   what makes the joint faster, in the last kVelocityBand before the velocity limit;
+/// - away from zero, it changes by at most effort_rate times the time since the effort last sent;
+///   towards zero at once: a limit never keeps an effort on.
 /// @return nothing if the wish, position or velocity is not finite.
-std::optional<double> LimitEffort(double wish, const JointSituation& joint, const JointLimits& limits);
+std::optional<double> LimitEffort(double wish, const JointSituation& joint,
+                                  const JointLimits& limits);
 
 }  // namespace plumb

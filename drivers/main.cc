@@ -1,8 +1,8 @@
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
@@ -26,30 +26,36 @@ namespace {
 
 constexpr int64_t kStatusPeriod = 100'000;  // [us]
 constexpr int64_t kReopenPeriod = 100'000;  // [us]
-constexpr double kFarewell = 0.3;  // [s] real time that the drives have to confirm a disarm at the end
-constexpr int kBursts = 8;         // of frames per wake: a flood must not keep us from our deadlines
-constexpr int64_t kFlight = 2'000'000;     // [us] before a fault whose frames are kept
-constexpr size_t kFlightFrames = 40'000;   // more than two buses of 1 Mbit/s carry in that time
+// [s] real time that the drives have to confirm a disarm at the end
+constexpr double kFarewell = 0.3;
+// of frames per wake: a flood must not keep us from our deadlines
+constexpr int kBursts = 8;
+constexpr int64_t kFlight = 2'000'000;    // [us] before a fault whose frames are kept
+constexpr size_t kFlightFrames = 40'000;  // more than two buses of 1 Mbit/s carry in that time
 
 void WriteState(int8_t state, std::string_view reason) {
   constexpr std::array names = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
   const auto level = state == driver_status_t::FAULT ? spdlog::level::warn : spdlog::level::info;
-  spdlog::log(level, "{}{}{}", names[static_cast<size_t>(state)], reason.empty() ? "" : ": ", reason);
+  spdlog::log(level, "{}{}{}", names[static_cast<size_t>(state)], reason.empty() ? "" : ": ",
+              reason);
 }
 
 /// Judges signed messages; without a key, obeys all.
-std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const std::string& channel, const Clock& clock) {
+std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const std::string& channel,
+                                   const Clock& clock) {
   if (!key) return std::nullopt;
   return Verifier(*key, channel, clock.SigningUtime());
 }
 
 void SayWhoMayCommand(const std::string& lcm_url, bool commands_signed) {
   if (commands_signed) return spdlog::info("takes signed commands only");
-  if (!StaysOnMachine(lcm_url)) return spdlog::warn("takes unsigned commands of anybody on the network");
+  if (!StaysOnMachine(lcm_url))
+    return spdlog::warn("takes unsigned commands of anybody on the network");
   const std::vector<std::string> open = OpenInterfaces(lcm_url);
   if (open.empty()) return;
   spdlog::warn(
-      "takes the commands of anybody who reaches LCM through {}: they are not signed; cure: --key FILE, or "
+      "takes the commands of anybody who reaches LCM through {}: they are not signed; cure: --key "
+      "FILE, or "
       "ip route add 224.0.0.0/4 dev lo",
       fmt::join(open, ", "));
 }
@@ -57,12 +63,14 @@ void SayWhoMayCommand(const std::string& lcm_url, bool commands_signed) {
 class DriverProcess {
  public:
   DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus,
-                const std::string& flight_recorder, const std::optional<SigningKey>& key, bool is_virtual)
+                const std::string& flight_recorder, const std::optional<SigningKey>& key,
+                bool is_virtual)
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
-        transport_(OpenTransport(bus, driver_.filters(),
-                                 {process.participant(), std::llround(robot.driver.effort_delay * 1e6)})),
+        transport_(
+            OpenTransport(bus, driver_.filters(),
+                          {process.participant(), std::llround(robot.driver.effort_delay * 1e6)})),
         cycle_(driver_.cycle(), clock_.Now()),
         states_(process.messenger(), "JOINT_STATE"),
         imus_(process.messenger(), "IMU"),
@@ -73,12 +81,13 @@ class DriverProcess {
                   [this](const joint_command_t& command) { OnCommand(command); }),
         requests_(process.messenger(), "DRIVER_REQUEST",
                   [this](const driver_request_t& request) { OnRequest(request); }),
-        recorder_(flight_recorder, bus, kFlightFrames, [](const std::string& file, const std::string& error) {
-          if (error.empty())
-            spdlog::warn("the frames of the last 2 s are in {}", file);
-          else
-            spdlog::error("the frames before the fault are lost: {}", error);
-        }) {
+        recorder_(flight_recorder, bus, kFlightFrames,
+                  [](const std::string& file, const std::string& error) {
+                    if (error.empty())
+                      spdlog::warn("the frames of the last 2 s are in {}", file);
+                    else
+                      spdlog::error("the frames before the fault are lost: {}", error);
+                  }) {
     driver_.set_bus(bus);
     driver_.set_virtual(is_virtual);
     driver_.set_commands_signed(key.has_value());
@@ -116,7 +125,8 @@ class DriverProcess {
 
   void OnCommand(const joint_command_t& command) {
     if (command_signatures_) {
-      const std::string_view refusal = command_signatures_->Judge(commands_.encoding(), clock_.SigningUtime());
+      const std::string_view refusal =
+          command_signatures_->Judge(commands_.encoding(), clock_.SigningUtime());
       if (!refusal.empty()) return driver_.OnForgedCommand(refusal);
     }
     driver_.OnCommand(command, clock_.Now(), clock_.Utime());
@@ -124,9 +134,11 @@ class DriverProcess {
 
   void OnRequest(const driver_request_t& request) {
     // Stopping must never need a key.
-    const bool stops = request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP;
+    const bool stops =
+        request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP;
     if (request_signatures_ && !stops) {
-      const std::string_view refusal = request_signatures_->Judge(requests_.encoding(), clock_.SigningUtime());
+      const std::string_view refusal =
+          request_signatures_->Judge(requests_.encoding(), clock_.SigningUtime());
       if (!refusal.empty()) return driver_.OnForgedArm(refusal);
     }
     driver_.OnRequest(request, clock_.Now(), clock_.Utime());
@@ -171,7 +183,8 @@ class DriverProcess {
     phases_.End(PhaseTimes::kSend);
     const int64_t sent = clock_.Utime();
     driver_.Transmitted(accepted, sent);
-    for (const Frame& frame : frames.first(static_cast<size_t>(std::max(accepted, 0)))) recorder_.Record(frame, true, sent);
+    for (const Frame& frame : frames.first(static_cast<size_t>(std::max(accepted, 0))))
+      recorder_.Record(frame, true, sent);
     const bool fault = driver_.state() == DriveState::kFault;
     if (fault && !faulty_) recorder_.Dump(sent - kFlight, sent, driver_.reason());
     faulty_ = fault;
@@ -187,15 +200,15 @@ class DriverProcess {
   }
 
   void PublishStatus() {
-    driver_status_t& status =
-        driver_.Status(clock_.Utime(), transport_->stats(), commands_.rejected() + requests_.rejected());
+    driver_status_t& status = driver_.Status(clock_.Utime(), transport_->stats(),
+                                             commands_.rejected() + requests_.rejected());
     phases_.Fill(status);
     statuses_.Publish(status);
     log_.Note(status.state, status.reason);
   }
 
-  /// Zero torque and idle drives, confirmed by their heartbeats. @return 1 if a drive that may be armed has
-  /// not confirmed it in time, else 0: one that was never there has nothing to confirm.
+  /// Zero torque and idle drives, confirmed by their heartbeats. @return 1 if a drive that may be
+  /// armed has not confirmed it in time, else 0: one that was never there has nothing to confirm.
   int Farewell() {
     driver_request_t disarm{};
     disarm.utime = clock_.Utime();
@@ -212,7 +225,8 @@ class DriverProcess {
     if (!log_.ready()) return idle ? 0 : 1;
     if (!idle) {
       spdlog::error(
-          "stopped, but a drive that was armed has not confirmed that it is idle; cure: cut its power");
+          "stopped, but a drive that was armed has not confirmed that it is idle; cure: cut its "
+          "power");
     } else if (driver_.state() == DriveState::kAbsent) {
       spdlog::info("stopped; a drive is absent");
     } else {
@@ -251,15 +265,19 @@ int main(int argc, char** argv) {
   int priority = 0;
   bool is_virtual = false;
   return plumb::Run(
-      "plumb-driver", "Drives a robot's motors on a CAN bus: JOINT_COMMAND in, JOINT_STATE out.", argc, argv,
+      "plumb-driver", "Drives a robot's motors on a CAN bus: JOINT_COMMAND in, JOINT_STATE out.",
+      argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder, or its TOML file")->required();
-        app.add_option("--bus", bus, "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
-        app.add_option("--flight-recorder", flight_recorder, "folder: on every fault the frames of the last 2 s are written there");
-        app.add_flag("--virtual", is_virtual, "the robot is plumb-robot: while no effort is sent, its positions may jump");
-        auto* key =
-            app.add_option("--key", key_file,
-                           "obey only commands and ARM requests signed with this key (plumb key makes one)");
+        app.add_option("--bus", bus,
+                       "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
+        app.add_option("--flight-recorder", flight_recorder,
+                       "folder: on every fault the frames of the last 2 s are written there");
+        app.add_flag("--virtual", is_virtual,
+                     "the robot is plumb-robot: while no effort is sent, its positions may jump");
+        auto* key = app.add_option(
+            "--key", key_file,
+            "obey only commands and ARM requests signed with this key (plumb key makes one)");
         app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")
             ->excludes(key);
         plumb::AddRealtimeFlag(app, priority);
@@ -271,7 +289,8 @@ int main(int argc, char** argv) {
         if (!key_file.empty()) key.emplace(key_file);
         // LCM's thread comes right behind the cycle: what it brings is part of it.
         process.BecomeFast(std::max(priority - 1, 0));
-        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus, flight_recorder, key, is_virtual);
+        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus,
+                                    flight_recorder, key, is_virtual);
         process.BecomeFast(priority);
         return driver.Run();
       });

@@ -7,7 +7,8 @@ namespace plumb {
 
 // 0.6 and not 0.5: two drives whose clocks are half a period apart must still find each other.
 Measurements::Measurements(int num_joints, int64_t period)
-    : tolerance_(period * 6 / 10), joints_(static_cast<size_t>(num_joints), TimedSamples<JointMeasurement>(period)) {}
+    : tolerance_(period * 6 / 10),
+      joints_(static_cast<size_t>(num_joints), TimedSamples<JointMeasurement>(period)) {}
 
 void Measurements::Add(int joint, const JointMeasurement& measurement, int64_t arrival) noexcept {
   joints_[static_cast<size_t>(joint)].Add(measurement, arrival);

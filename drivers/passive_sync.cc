@@ -15,13 +15,16 @@ PassiveSync::PassiveSync(int64_t period, double rate_error, int64_t max_gap)
       step_(period_ * (1 + rate_error)),
       max_gap_(static_cast<double>(max_gap)) {}
 
-size_t PassiveSync::Regularise(std::span<const int64_t> arrivals, std::span<int64_t> times) noexcept {
+size_t PassiveSync::Regularise(std::span<const int64_t> arrivals,
+                               std::span<int64_t> times) noexcept {
   for (size_t i = 0; i < arrivals.size(); ++i) {
     const std::span<const int64_t> waiting = arrivals.subspan(i);
-    const bool undecided = waiting.size() < kMostWaiting &&
-                           static_cast<double>(waiting.back() - waiting.front()) < kEvidence * period_;
+    const bool undecided =
+        waiting.size() < kMostWaiting &&
+        static_cast<double>(waiting.back() - waiting.front()) < kEvidence * period_;
     const double gap = SinceOrigin(waiting.front()) - estimate_;
-    // The estimate is never later than the arrival, and arrivals are in order: the clock was set back.
+    // The estimate is never later than the arrival, and arrivals are in order: the clock was set
+    // back.
     const bool jump = started_ && (gap > max_gap_ || gap < -period_);
     if (!started_ || jump) {
       if (jump && undecided) return i;
@@ -48,7 +51,8 @@ size_t PassiveSync::Regularise(std::span<const int64_t> arrivals, std::span<int6
 double PassiveSync::Lateness(std::span<const int64_t> waiting, double first) const noexcept {
   double lateness = SinceOrigin(waiting.front()) - first;
   for (size_t i = 1; i < waiting.size(); ++i) {
-    lateness = std::min(lateness, SinceOrigin(waiting[i]) - (first + static_cast<double>(i) * step_));
+    lateness =
+        std::min(lateness, SinceOrigin(waiting[i]) - (first + static_cast<double>(i) * step_));
   }
   return lateness;
 }

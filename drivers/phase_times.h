@@ -22,8 +22,8 @@ class PhaseTimes {
     kControl,  ///< checks and efforts
     kSend,     ///< frames to the bus
   };
-  static constexpr std::array<std::string_view, 5> kNames = {"receive", "publish", "command", "control",
-                                                             "send"};
+  static constexpr std::array<std::string_view, 5> kNames = {"receive", "publish", "command",
+                                                             "control", "send"};
   static constexpr size_t kBins = 20;  ///< the last one open
 
   /// Where [2^bin, 2^(bin + 1)) us belongs; below 1 us to bin 0.
@@ -40,7 +40,8 @@ class PhaseTimes {
   /// It ends, and the next one begins.
   void End(Phase phase) noexcept {
     const Clock::time_point now = Now();
-    ++counts_[phase][Bin(std::chrono::duration_cast<std::chrono::microseconds>(now - mark_).count())];
+    ++counts_[phase]
+             [Bin(std::chrono::duration_cast<std::chrono::microseconds>(now - mark_).count())];
     mark_ = now;
   }
 

@@ -13,8 +13,9 @@ struct PlausibilitySettings {
   double effort_limit;    ///< [Nm] or [N] > 0
   double resolution;      ///< [rad] or [m] > 0 differences of positions that mean nothing
   int64_t period;         ///< [us] > 0 at which one device sends estimates
-  int64_t lateness;       ///< [us] > 0 by which an estimate may be late; silence of more begins anew
-  int64_t stuck_after;    ///< [us] as DriverSettings::stuck_after; 0 = not looked for
+  /// [us] > 0 by which an estimate may be late; silence of more begins anew
+  int64_t lateness;
+  int64_t stuck_after;  ///< [us] as DriverSettings::stuck_after; 0 = not looked for
 };
 
 /// Of a joint with a motor. @throws std::invalid_argument for an unknown protocol.
@@ -24,20 +25,22 @@ PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverS
 ///
 /// - a jump: the position changed by more than
 ///     velocity_limit (dt + T) + v L + resolution,
-///   dt the time between the two arrivals, v the previous velocity in the jump's direction, 0 if it has the
-///   other. L, for those before may have come late, so that more time has passed than dt; T, for the joint
-///   may have become faster since;
-/// - two sources that disagree: within a window of 100 estimates the position changed by D, the integral of
-///   the velocity (trapezoids) is I, and
-///     |D - I| > resolution + max(path of D, path of I) / 4 + L (|v first| + |v last| + sum |change of v|).
-///   What the velocity lags, or the times of arrival err, by up to L is within the last term (summation by
-///   parts);
-/// - stuck: position and velocity are the same bit by bit for `stuck_after` while the effort sent is a tenth
-///   of the limit or more;
-/// - two devices with one id, or somebody who asks the one for more: more than 150 estimates within 100 T.
+///   dt the time between the two arrivals, v the previous velocity in the jump's direction, 0 if it
+///   has the other. L, for those before may have come late, so that more time has passed than dt;
+///   T, for the joint may have become faster since;
+/// - two sources that disagree: within a window of 100 estimates the position changed by D, the
+///   integral of the velocity (trapezoids) is I, and
+///     |D - I| > resolution + max(path of D, path of I) / 4
+///               + L (|v first| + |v last| + sum |change of v|).
+///   What the velocity lags, or the times of arrival err, by up to L is within the last term
+///   (summation by parts);
+/// - stuck: position and velocity are the same bit by bit for `stuck_after` while the effort sent
+///   is a tenth of the limit or more;
+/// - two devices with one id, or somebody who asks the one for more: more than 150 estimates within
+///   100 T.
 ///
-/// Losses, delays, bunches and doubles on the bus are no faults here. Pure logic; free of exceptions and
-/// allocation. Not thread-safe.
+/// Losses, delays, bunches and doubles on the bus are no faults here. Pure logic; free of
+/// exceptions and allocation. Not thread-safe.
 class Plausibility {
  public:
   static constexpr int kWindow = 100;            ///< estimates, or periods
@@ -53,15 +56,16 @@ class Plausibility {
   /// @param effort [Nm] or [N] last sent.
   void Add(int64_t time, double position, double velocity, double effort) noexcept;
 
-  /// While true, the joint may be put elsewhere at once: nothing but the number of devices is judged.
+  /// While true, the joint may be put elsewhere at once: nothing but the number of devices is
+  /// judged.
   void LetJump(bool let) noexcept { may_jump_ = let; }
 
   /// The first thing that was implausible; empty if nothing was.
   std::string_view complaint() const noexcept { return complaint_.text(); }
   /// Takes the complaint back. What is wrong still will be found again.
   void Forgive() noexcept { complaint_.Clear(); }
-  /// Whether more than one device seems to send estimates; so until 100 T have gone by with no more than one
-  /// would.
+  /// Whether more than one device seems to send estimates; so until 100 T have gone by with no more
+  /// than one would.
   bool crowded() const noexcept { return crowded_; }
 
  private:

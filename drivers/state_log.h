@@ -10,9 +10,10 @@
 
 namespace plumb {
 
-/// The changes of the driver's state on their way to the log. Noting one takes neither time nor memory; they
-/// are written later, when there is time, and only while the log's descriptor takes them: who reads our
-/// stderr through a pipe and stops reading must not stop the robot's torques. Not thread-safe.
+/// The changes of the driver's state on their way to the log. Noting one takes neither time nor
+/// memory; they are written later, when there is time, and only while the log's descriptor takes
+/// them: who reads our stderr through a pipe and stops reading must not stop the robot's torques.
+/// Not thread-safe.
 class StateLog {
  public:
   using Write = std::function<void(int8_t state, std::string_view reason)>;
@@ -20,8 +21,8 @@ class StateLog {
   /// @param fd where `write` writes to, in the end.
   StateLog(int fd, Write write);
 
-  /// A state (driver_status_t) and the reason for it; nothing if they are those of the last time. The oldest
-  /// of those not written makes room.
+  /// A state (driver_status_t) and the reason for it; nothing if they are those of the last time.
+  /// The oldest of those not written makes room.
   void Note(int8_t state, std::string_view reason) noexcept;
 
   /// Writes what was noted, until the descriptor would make us wait.

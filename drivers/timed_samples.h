@@ -9,8 +9,8 @@
 
 namespace plumb {
 
-/// A queue of the samples of one periodic sensor, with times of measurement (PassiveSync) instead of times of
-/// arrival. Does not allocate. Not thread-safe.
+/// A queue of the samples of one periodic sensor, with times of measurement (PassiveSync) instead
+/// of times of arrival. Does not allocate. Not thread-safe.
 template <class Sample>
 class TimedSamples {
  public:
@@ -31,10 +31,12 @@ class TimedSamples {
     std::array<int64_t, kCapacity> arrivals, times;
     const size_t fresh = count_ - regular_;
     for (size_t i = 0; i < fresh; ++i) arrivals[i] = At(regular_ + i).time;
-    const size_t timed = sync_.Regularise(std::span(arrivals).first(fresh), std::span(times).first(fresh));
+    const size_t timed =
+        sync_.Regularise(std::span(arrivals).first(fresh), std::span(times).first(fresh));
     for (size_t i = 0; i < timed; ++i) At(regular_ + i).time = times[i];
     regular_ += timed;
-    // The clock was set back in between: what was measured by the old time would stand in the way of the new.
+    // The clock was set back in between: what was measured by the old time would stand in the way
+    // of the new.
     while (regular_ > 1 && At(1).time < At(0).time) Drop();
   }
 
@@ -54,8 +56,8 @@ class TimedSamples {
   }
 
   int64_t dropped() const noexcept { return dropped_; }
-  /// Those dropped and those that never came; a gap or a step of the clock, after which it began anew, counts
-  /// as one.
+  /// Those dropped and those that never came; a gap or a step of the clock, after which it began
+  /// anew, counts as one.
   int64_t lost() const noexcept { return dropped_ + sync_.lost() + sync_.resets(); }
 
  private:
@@ -68,7 +70,8 @@ class TimedSamples {
 
   PassiveSync sync_;
   std::array<Entry, kCapacity> ring_;
-  size_t head_ = 0, count_ = 0, regular_ = 0;  ///< the first `regular` of `count` have times of measurement
+  /// the first `regular` of `count` have times of measurement
+  size_t head_ = 0, count_ = 0, regular_ = 0;
   int64_t dropped_ = 0;
 };
 

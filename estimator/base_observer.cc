@@ -69,7 +69,8 @@ void BaseObserver::LookAtLegs() {
 }
 
 double BaseObserver::Angle() const {
-  const Eigen::Quaterniond turn = Eigen::Quaterniond(base_.zero.rotation).conjugate() * odometry_.orientation();
+  const Eigen::Quaterniond turn =
+      Eigen::Quaterniond(base_.zero.rotation).conjugate() * odometry_.orientation();
   return 2 * std::atan2(base_.axis.dot(turn.vec()), turn.w());
 }
 
@@ -86,17 +87,20 @@ void BaseObserver::Read(int64_t utime, const ImuInbox::Reading& reading) {
   utime_ = utime;
   if (begin) {
     // Its turn about the joint's axis only: a wrong heading does not matter.
-    const Eigen::Quaterniond turn = Eigen::Quaterniond(base_.zero.rotation).conjugate() * Eigen::Quaterniond(w, x, y, z);
+    const Eigen::Quaterniond turn =
+        Eigen::Quaterniond(base_.zero.rotation).conjugate() * Eigen::Quaterniond(w, x, y, z);
     const Eigen::AngleAxisd about(2 * std::atan2(base_.axis.dot(turn.vec()), turn.w()), base_.axis);
     using Beginning = LegOdometry::Beginning;
-    odometry_.Restart(started_ ? Beginning::kMoves : Beginning::kStands, started_ ? odometry_.position() : base_.zero.position,
+    odometry_.Restart(started_ ? Beginning::kMoves : Beginning::kStands,
+                      started_ ? odometry_.position() : base_.zero.position,
                       Eigen::Quaterniond(base_.zero.rotation * about), feet_);
     if (!started_) angle_ = 0;
     angle_ += std::remainder(Angle() - angle_, 2 * std::numbers::pi);
     started_ = true;
     return;
   }
-  odometry_.Predict(elapsed, Eigen::Map<const Vector3d>(reading.rate.data()), Eigen::Map<const Vector3d>(reading.force.data()));
+  odometry_.Predict(elapsed, Eigen::Map<const Vector3d>(reading.rate.data()),
+                    Eigen::Map<const Vector3d>(reading.force.data()));
   odometry_.Correct(feet_);
   angle_ += std::remainder(Angle() - angle_, 2 * std::numbers::pi);
 }
@@ -112,12 +116,16 @@ void BaseObserver::Fill(int64_t utime, robot_state_t& state) const {
   };
   for (const ImuMounting::Slide& slide : base_.slides) {
     const Vector3d& along = slide.direction;
-    const double velocity = along.dot(odometry_.velocity()), acceleration = along.dot(odometry_.acceleration());
+    const double velocity = along.dot(odometry_.velocity()),
+                 acceleration = along.dot(odometry_.acceleration());
     const double velocity_sd = odometry_.velocity_sd(along);
     // Since the last reading the acceleration may have changed by as much as before it.
     const double change = odometry_.acceleration_change() * ahead;
-    set(slide.joint, along.dot(odometry_.position() - base_.zero.position) + ahead * velocity + ahead * ahead / 2 * acceleration,
-        velocity + ahead * acceleration, std::hypot(odometry_.position_sd(along), ahead * velocity_sd, ahead / 2 * change),
+    set(slide.joint,
+        along.dot(odometry_.position() - base_.zero.position) + ahead * velocity +
+            ahead * ahead / 2 * acceleration,
+        velocity + ahead * acceleration,
+        std::hypot(odometry_.position_sd(along), ahead * velocity_sd, ahead / 2 * change),
         std::hypot(velocity_sd, change));
   }
   const double rate = base_.axis.dot(odometry_.rate());
@@ -129,9 +137,10 @@ void BaseObserver::Fill(int64_t utime, robot_state_t& state) const {
 bool BaseObserver::valid(int64_t utime) const {
   if (!started_ || static_cast<double>(utime - utime_) * 1e-6 > longest_gap_) return false;
   double velocity_sd = 0;
-  for (const ImuMounting::Slide& slide : base_.slides) velocity_sd = std::hypot(velocity_sd, odometry_.velocity_sd(slide.direction));
-  return odometry_.position_sd(Vector3d::UnitZ()) < kHeightKnown && odometry_.angle_sd(base_.normal()) < kTiltKnown &&
-         velocity_sd < kVelocityKnown;
+  for (const ImuMounting::Slide& slide : base_.slides)
+    velocity_sd = std::hypot(velocity_sd, odometry_.velocity_sd(slide.direction));
+  return odometry_.position_sd(Vector3d::UnitZ()) < kHeightKnown &&
+         odometry_.angle_sd(base_.normal()) < kTiltKnown && velocity_sd < kVelocityKnown;
 }
 
 }  // namespace plumb

@@ -14,11 +14,13 @@
 
 namespace plumb {
 
-/// The joints of a base that nothing holds, from its IMU and its legs ([estimator] base = "legs"): a robot's description
-/// around LegOdometry. Times are microseconds of one clock. Does not allocate after construction. Not thread-safe.
+/// The joints of a base that nothing holds, from its IMU and its legs ([estimator] base = "legs"):
+/// a robot's description around LegOdometry. Times are microseconds of one clock. Does not allocate
+/// after construction. Not thread-safe.
 class BaseObserver {
  public:
-  /// Of all joints, of which the base's are ignored; variances [rad^2] or [m^2], [rad^2/s^2] or [m^2/s^2].
+  /// Of all joints, of which the base's are ignored; variances [rad^2] or [m^2], [rad^2/s^2] or
+  /// [m^2/s^2].
   struct Legs {
     Eigen::VectorXd q, v, q_variance, v_variance;
   };
@@ -33,10 +35,11 @@ class BaseObserver {
   void Restart() { started_ = false; }
   /// @param utime of measurement, > that of the reading before; others have no effect.
   void Read(int64_t utime, const ImuInbox::Reading& reading);
-  /// Fills in q, v and their standard deviations of the base's joints at a time of at least the last reading's, under the
-  /// acceleration and rate of that one. They are NaN before the first.
+  /// Fills in q, v and their standard deviations of the base's joints at a time of at least the
+  /// last reading's, under the acceleration and rate of that one. They are NaN before the first.
   void Fill(int64_t utime, robot_state_t& state) const;
-  /// The IMU is heard, and height, tilt and velocity are known well enough to act on: to 0.1 m, 0.1 rad, 0.5 m/s.
+  /// The IMU is heard, and height, tilt and velocity are known well enough to act on: to 0.1 m, 0.1
+  /// rad, 0.5 m/s.
   bool valid(int64_t utime) const;
 
   const LegOdometry& odometry() const { return odometry_; }

@@ -16,9 +16,11 @@ double Square(double x) { return x * x; }
 }  // namespace
 
 bool ContactTest::Judge(const Motion& motion) {
-  const double height_sd = std::hypot(motion.height_sd, kHeightSd), rise_sd = std::hypot(motion.rise_sd, kRiseSd);
+  const double height_sd = std::hypot(motion.height_sd, kHeightSd),
+               rise_sd = std::hypot(motion.rise_sd, kRiseSd);
   const bool pressed_in = motion.height < -kSurelyBelow * height_sd;
-  const double height = std::max(0.0, motion.height), rise = pressed_in ? std::max(0.0, motion.rise) : motion.rise;
+  const double height = std::max(0.0, motion.height),
+               rise = pressed_in ? std::max(0.0, motion.rise) : motion.rise;
   const double statistic = Square(height / height_sd) + Square(rise / rise_sd);
   touching_ = statistic < (touching_ ? kLeaves : kTouches);
   return touching_;
@@ -31,7 +33,8 @@ GroundContact::GroundContact(const RobotDescription& robot)
       kinematics_(robot),
       jacobian_(3, robot.num_velocities()) {
   if (!points_.empty() && robot.num_positions() != robot.num_joints()) {
-    throw std::invalid_argument("robot '" + robot.name + "' has a spherical joint: it can only be simulated");
+    throw std::invalid_argument("robot '" + robot.name +
+                                "' has a spherical joint: it can only be simulated");
   }
 }
 

@@ -11,15 +11,16 @@
 
 namespace plumb {
 
-/// Judges the hypothesis that a point rests on the ground by two residuals that should then be zero: its height and its
-/// vertical velocity, each over its standard deviation. No forces, hence no masses: what calibration learns from it is not
-/// what it put in. Not thread-safe.
+/// Judges the hypothesis that a point rests on the ground by two residuals that should then be
+/// zero: its height and its vertical velocity, each over its standard deviation. No forces, hence
+/// no masses: what calibration learns from it is not what it put in. Not thread-safe.
 class ContactTest {
  public:
   /// What is not known of the ground rather than of the robot: it is not quite even, and gives way.
   static constexpr double kHeightSd = 1e-3;  ///< [m]
   static constexpr double kRiseSd = 0.2;     ///< [m/s]
-  /// Bounds of the sum of both squares, chi-square with two degrees of freedom if the point rests: 86 % and 98.9 % of it.
+  /// Bounds of the sum of both squares, chi-square with two degrees of freedom if the point rests:
+  /// 86 % and 98.9 % of it.
   static constexpr double kTouches = 4, kLeaves = 9;
 
   /// Of the sphere's lowest point. Standard deviations as the filter has them, without those above.
@@ -27,8 +28,8 @@ class ContactTest {
     double height, height_sd;  ///< [m] above the ground
     double rise, rise_sd;      ///< [m/s]
   };
-  /// A point that is surely below ground level may sink: it presses the ground in. What is lower than the ground never
-  /// speaks against contact. @return touching()
+  /// A point that is surely below ground level may sink: it presses the ground in. What is lower
+  /// than the ground never speaks against contact. @return touching()
   bool Judge(const Motion& motion);
   void Restart() { touching_ = false; }
   bool touching() const { return touching_; }
@@ -37,20 +38,21 @@ class ContactTest {
   bool touching_ = false;
 };
 
-/// ROBOT_STATE's contact flags: the points of ContactPoints(robot) on the plane z = 0 of the base. Does not allocate
-/// after construction. Not thread-safe.
+/// ROBOT_STATE's contact flags: the points of ContactPoints(robot) on the plane z = 0 of the base.
+/// Does not allocate after construction. Not thread-safe.
 class GroundContact {
  public:
-  /// @throws std::invalid_argument if points can touch the ground and a joint is spherical: ROBOT_STATE has one coordinate
-  /// a joint.
+  /// @throws std::invalid_argument if points can touch the ground and a joint is spherical:
+  /// ROBOT_STATE has one coordinate a joint.
   explicit GroundContact(const RobotDescription& robot);
 
   int32_t num_points() const { return static_cast<int32_t>(points_.size()); }
-  /// Fills in state.contact from the rest of it, one each: -1 = not known, because the state is not valid. The joints'
-  /// errors are taken as independent; how the errors of positions turn into ones of the vertical velocity is neglected.
+  /// Fills in state.contact from the rest of it, one each: -1 = not known, because the state is not
+  /// valid. The joints' errors are taken as independent; how the errors of positions turn into ones
+  /// of the vertical velocity is neglected.
   void Judge(robot_state_t& state);
-  /// [m/s] at which a point may meet the ground, or moves in it, within `ahead` [s] from the last state: the fastest
-  /// one's. 0 if that state was not valid.
+  /// [m/s] at which a point may meet the ground, or moves in it, within `ahead` [s] from the last
+  /// state: the fastest one's. 0 if that state was not valid.
   double ImpactSpeed(double ahead) const;
 
  private:

@@ -11,7 +11,8 @@ constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
 bool Sane(const imu_t& imu) {
   const auto finite = [](double x) { return std::isfinite(x); };
   if (imu.utime < 0 || imu.utime >= kEndOfTime) return false;
-  if (!std::ranges::all_of(imu.rate, finite) || !std::ranges::all_of(imu.force, finite)) return false;
+  if (!std::ranges::all_of(imu.rate, finite) || !std::ranges::all_of(imu.force, finite))
+    return false;
   double norm = 0;
   for (const double x : imu.orientation) norm += x * x;
   return !imu.orientation_valid || std::abs(norm - 1) < 0.01;
@@ -21,7 +22,8 @@ bool Sane(const imu_t& imu) {
 
 ImuInbox::Verdict ImuInbox::Put(const imu_t& imu, int64_t state_utime) {
   if (!Sane(imu)) return Verdict::kRefused;
-  if (state_utime > 0 && (state_utime - imu.utime > kLatest || imu.utime - state_utime > kAhead)) return Verdict::kRefused;
+  if (state_utime > 0 && (state_utime - imu.utime > kLatest || imu.utime - state_utime > kAhead))
+    return Verdict::kRefused;
   const auto seen = std::span(seen_).first(std::min(remembered_, kRoom));
   if (std::ranges::find(seen, imu.utime) != seen.end()) return Verdict::kDuplicate;
   if (count_ == kRoom) return Verdict::kRefused;

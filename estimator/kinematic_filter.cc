@@ -12,8 +12,8 @@ constexpr double kInitialAccelerationSd = 100;
 // Nor of the velocity where it is not measured [rad/s].
 constexpr double kInitialVelocitySd = 10;
 
-// Of a KinematicState: what every joint has, then what a joint with an inertial sensor has, then with an
-// accelerometer.
+// Of a KinematicState: what every joint has, then what a joint with an inertial sensor has, then
+// with an accelerometer.
 enum Entry { kPosition, kVelocity, kAcceleration, kStep, kBias, kMark };
 
 int SizeOf(const EstimatorSettings& settings) {
@@ -36,10 +36,11 @@ void KinematicFilter::Restart(double position, double velocity) {
   const bool known = std::isfinite(velocity);
   const double bias = mean_(kBias), bias_variance = covariance_(kBias, kBias);
   mean_ << position, known ? velocity : 0, 0, 0, bias, 0;
-  covariance_ = KinematicState(Square(settings_.position_sd) + Square(mean_(kVelocity) * settings_.timing_sd),
-                               Square(known ? settings_.velocity_sd : kInitialVelocitySd),
-                               Square(kInitialAccelerationSd), 0, bias_variance, 0)
-                    .asDiagonal();
+  covariance_ =
+      KinematicState(Square(settings_.position_sd) + Square(mean_(kVelocity) * settings_.timing_sd),
+                     Square(known ? settings_.velocity_sd : kInitialVelocitySd),
+                     Square(kInitialAccelerationSd), 0, bias_variance, 0)
+          .asDiagonal();
   since_mark_ = std::numeric_limits<double>::infinity();
   next_mark_ = std::numeric_limits<double>::quiet_NaN();
   jerk_ = Square(settings_.jerk);
@@ -54,12 +55,14 @@ void KinematicFilter::Restart(double position, double velocity) {
 template <typename Matrix>
 void KinematicFilter::MoveColumns(Matrix& columns) const {
   if (marks_) columns.col(kMark) = columns * mark_;
-  columns.col(kPosition) += dt_ * columns.col(kVelocity) + dt_ * dt_ / 2 * columns.col(kAcceleration);
+  columns.col(kPosition) +=
+      dt_ * columns.col(kVelocity) + dt_ * dt_ / 2 * columns.col(kAcceleration);
   columns.col(kVelocity) += dt_ * columns.col(kAcceleration);
   columns.col(kStep).setZero();
 }
 
-void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds& impact, double step_after) {
+void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds& impact,
+                              double step_after) {
   dt_ = dt;
   double unknown_mark = 0;
   marks_ = !std::isnan(next_mark_);
@@ -76,8 +79,8 @@ void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds&
   jerk << d5 / 20, d4 / 8, d3 / 6,  //
       d4 / 8, d3 / 3, d2 / 2,       //
       d3 / 6, d2 / 2, dt;
-  // An impact may step the acceleration; when, nobody knows: at the beginning, and to readings of a moment
-  // ago it is so much more jerk.
+  // An impact may step the acceleration; when, nobody knows: at the beginning, and to readings of a
+  // moment ago it is so much more jerk.
   const Eigen::Vector3d moved(dt * dt / 2, dt, 1);
   const double impact_variance =
       Square(settings_.ground_impact * impact.ground) + Square(settings_.stop_impact * impact.stop);
@@ -85,7 +88,8 @@ void KinematicFilter::Predict(double dt, double effort_step, const ImpactSpeeds&
   // Where the effort steps, the acceleration may.
   step_since_ = (1 - step_after) * dt;
   const double step_sd = settings_.effort_step * effort_step;
-  const Eigen::Vector4d step = step_sd * Eigen::Vector4d(step_since_ * step_since_ / 2, step_since_, 1, 1);
+  const Eigen::Vector4d step =
+      step_sd * Eigen::Vector4d(step_since_ * step_since_ / 2, step_since_, 1, 1);
 
   Eigen::RowVector<double, 6> mean = mean_.transpose();
   MoveColumns(mean);
@@ -137,15 +141,18 @@ KinematicFilter::Row KinematicFilter::RowOf(Quantity quantity, double age) const
   return {};
 }
 
-KinematicFilter::Innovation KinematicFilter::Expect(Quantity quantity, double value, double age) const {
+KinematicFilter::Innovation KinematicFilter::Expect(Quantity quantity, double value,
+                                                    double age) const {
   const Row row = RowOf(quantity, age);
-  return {value - row.of_state.dot(mean_), row.of_state.dot(covariance_ * row.of_state) + row.variance};
+  return {value - row.of_state.dot(mean_),
+          row.of_state.dot(covariance_ * row.of_state) + row.variance};
 }
 
 KinematicFilter::Innovation KinematicFilter::Correct(Quantity quantity, double value, double age) {
   const Row row = RowOf(quantity, age);
   const KinematicState shared = covariance_ * row.of_state;
-  const Innovation innovation{value - row.of_state.dot(mean_), row.of_state.dot(shared) + row.variance};
+  const Innovation innovation{value - row.of_state.dot(mean_),
+                              row.of_state.dot(shared) + row.variance};
   mean_ += shared * (innovation.value / innovation.variance);
   const KinematicState known = shared / std::sqrt(innovation.variance);
   covariance_ -= known * known.transpose();  // symmetric to the last bit
@@ -177,8 +184,8 @@ void KinematicFilter::Keep() {
   step.covariance_change = covariance_ - predicted_covariance_;
 }
 
-// gain = shared predicted^-1, by Cholesky's factor L of the predicted covariance: column by column, all rows
-// at once.
+// gain = shared predicted^-1, by Cholesky's factor L of the predicted covariance: column by column,
+// all rows at once.
 template <int N>
 void KinematicFilter::FindGain() {
   KinematicCovariance& gain = At(pending_ - 1).gain;
@@ -213,12 +220,13 @@ KinematicFilter::Smoothed KinematicFilter::TakeOldest() {
   return smoothed;
 }
 
-// The backward pass, unrolled forwards: what each later step's readings changed comes back through the gains
-// in between.
+// The backward pass, unrolled forwards: what each later step's readings changed comes back through
+// the gains in between.
 template <int N>
 KinematicFilter::Smoothed KinematicFilter::SmoothOldest() {
   const Step& oldest = At(0);
-  Smoothed smoothed{oldest.filtered_mean.head<2>(), oldest.filtered_covariance.topLeftCorner<2, 2>()};
+  Smoothed smoothed{oldest.filtered_mean.head<2>(),
+                    oldest.filtered_covariance.topLeftCorner<2, 2>()};
   using Back = Eigen::Matrix<double, 2, N>;
   Back back = Back::Identity();
   for (int i = 1; i < pending_; ++i) {

@@ -10,31 +10,32 @@
 
 namespace plumb {
 
-/// Position, velocity and acceleration of one joint, the step of the acceleration with that of the effort in
-/// the latest interval, the bias of the inertial sensor that it carries, and the velocity that it had at the
-/// mark.
+/// Position, velocity and acceleration of one joint, the step of the acceleration with that of the
+/// effort in the latest interval, the bias of the inertial sensor that it carries, and the velocity
+/// that it had at the mark.
 using KinematicState = Eigen::Matrix<double, 6, 1>;
 using KinematicCovariance = Eigen::Matrix<double, 6, 6>;
 
-/// What a reading is of. A gyro's rate is the velocity plus the bias. An accelerometer's acceleration is the
-/// mean since the mark, which is the change of the velocity since then, divided by the time, plus the bias.
-/// No joint has both.
+/// What a reading is of. A gyro's rate is the velocity plus the bias. An accelerometer's
+/// acceleration is the mean since the mark, which is the change of the velocity since then, divided
+/// by the time, plus the bias. No joint has both.
 enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 
-/// One joint's Kalman filter on a white-noise-jerk model (Bar-Shalom, Li, Kirubarajan, "Estimation with
-/// Applications to Tracking and Navigation", 2001, section 6.2.3), with a fixed-lag Rauch-Tung-Striebel
-/// smoother.
+/// One joint's Kalman filter on a white-noise-jerk model (Bar-Shalom, Li, Kirubarajan, "Estimation
+/// with Applications to Tracking and Navigation", 2001, section 6.2.3), with a fixed-lag
+/// Rauch-Tung-Striebel smoother.
 ///
-/// It knows no dynamics, so what is inferred from its output about dynamics is not eaten from its own tail.
-/// It knows one thing beyond kinematics: acceleration may step when the applied effort steps. The size of
-/// that step is left open (a wide zero-mean Gaussian), because it is what calibration wants to learn; without
-/// the allowance the filter would round off every such corner and bias the effort's apparent effect. The same
-/// where kinematics says that there may be an impact.
+/// It knows no dynamics, so what is inferred from its output about dynamics is not eaten from its
+/// own tail. It knows one thing beyond kinematics: acceleration may step when the applied effort
+/// steps. The size of that step is left open (a wide zero-mean Gaussian), because it is what
+/// calibration wants to learn; without the allowance the filter would round off every such corner
+/// and bias the effort's apparent effect. The same where kinematics says that there may be an
+/// impact.
 ///
-/// A reading counts at its own time: its row of the observation matrix is that of the state so long ago under
-/// an acceleration that is constant but for the effort's step, its variance grows by what the jerk may have
-/// done since. (That this is correlated with the filter's own error is neglected, which errs on the cautious
-/// side.)
+/// A reading counts at its own time: its row of the observation matrix is that of the state so long
+/// ago under an acceleration that is constant but for the effort's step, its variance grows by what
+/// the jerk may have done since. (That this is correlated with the filter's own error is neglected,
+/// which errs on the cautious side.)
 ///
 /// A step is Predict, any number of Correct, Keep. None of them allocates. Not thread-safe.
 class KinematicFilter {
@@ -44,14 +45,15 @@ class KinematicFilter {
 
   explicit KinematicFilter(const EstimatorSettings& settings);
 
-  /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured. Of the bias it
-  /// keeps what it knows.
+  /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured. Of
+  /// the bias it keeps what it knows.
   void Restart(double position, double velocity);
   /// @param dt [s] since the last call, > 0.
-  /// @param effort_step [Nm] of the applied effort. @param step_after share of dt after which it steps, 0
-  /// to 1.
+  /// @param effort_step [Nm] of the applied effort. @param step_after share of dt after which it
+  /// steps, 0 to 1.
   /// @param impact that there may be meanwhile.
-  void Predict(double dt, double effort_step, const ImpactSpeeds& impact = {}, double step_after = 0);
+  void Predict(double dt, double effort_step, const ImpactSpeeds& impact = {},
+               double step_after = 0);
 
   /// A reading less what was expected of it, and its variance if both are right.
   struct Innovation {
@@ -81,7 +83,8 @@ class KinematicFilter {
     Eigen::Vector2d mean;  ///< position, velocity
     Eigen::Matrix2d covariance;
   };
-  /// Number of states that have been filtered and not yet taken out of the window, at most settings.lag + 1.
+  /// Number of states that have been filtered and not yet taken out of the window, at most
+  /// settings.lag + 1.
   int pending() const { return pending_; }
   /// The oldest pending state, given all measurements so far; takes it out of the window.
   Smoothed TakeOldest();
@@ -106,8 +109,9 @@ class KinematicFilter {
   struct Step {
     KinematicState filtered_mean;
     KinematicCovariance filtered_covariance;
-    KinematicCovariance gain;    // smoother's, from the next step to this one; unknown for the newest
-    KinematicState mean_change;  // by this step's readings
+    // smoother's, from the next step to this one; unknown for the newest
+    KinematicCovariance gain;
+    KinematicState mean_change;             // by this step's readings
     KinematicCovariance covariance_change;  // likewise
   };
   Step& At(int i) { return window_[static_cast<size_t>(oldest_ + i) % window_.size()]; }
@@ -121,7 +125,8 @@ class KinematicFilter {
   double dt_ = 0;
   bool marks_ = false;
   KinematicState mark_ = KinematicState::Zero();
-  KinematicCovariance shared_ = KinematicCovariance::Zero();  // of the state before it with that after it
+  // of the state before it with that after it
+  KinematicCovariance shared_ = KinematicCovariance::Zero();
   double since_mark_ = std::numeric_limits<double>::infinity(),
          next_mark_ = std::numeric_limits<double>::quiet_NaN();
   double jerk_;               // squared spectral density of the last step's, impact included

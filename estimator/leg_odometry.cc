@@ -13,15 +13,20 @@ using Eigen::Vector3d;
 
 constexpr double kStandsHeightSd = 0.04, kStandsVelocitySd = 0.2;  // [m], [m/s]
 constexpr double kMovesHeightSd = 0.2, kMovesVelocitySd = 3;
-constexpr double kBiasWanders = 100;      // [s] in which a bias may wander by as much as it may be at the start
-constexpr double kSettlesIn = 0.05;       // [s] in which the ground under a foot gives way, or comes back
-constexpr double kFootSd = 1e-3;          // [m] play and elasticity of a leg
-constexpr double kAnywhereSd = 1;         // [m] of a foot that has just been set down, horizontally
-constexpr double kSlipped = 16.3;         // chi-square with three degrees of freedom: 99.9 %
-constexpr double kHeightKnown = 0.03;     // [m] sd below which the filter itself can tell whether a foot rests
-constexpr double kBorneFor = 0.1;         // [s] over which the force on the body is averaged before that
-constexpr double kLongFlight = 0.5;       // [s] after which the force on a body in flight is zero on average
-constexpr double kAstray = 8;             // standard deviations below the ground
+// [s] in which a bias may wander by as much as it may be at the start
+constexpr double kBiasWanders = 100;
+// [s] in which the ground under a foot gives way, or comes back
+constexpr double kSettlesIn = 0.05;
+constexpr double kFootSd = 1e-3;   // [m] play and elasticity of a leg
+constexpr double kAnywhereSd = 1;  // [m] of a foot that has just been set down, horizontally
+constexpr double kSlipped = 16.3;  // chi-square with three degrees of freedom: 99.9 %
+// [m] sd below which the filter itself can tell whether a foot rests
+constexpr double kHeightKnown = 0.03;
+// [s] over which the force on the body is averaged before that
+constexpr double kBorneFor = 0.1;
+// [s] after which the force on a body in flight is zero on average
+constexpr double kLongFlight = 0.5;
+constexpr double kAstray = 8;  // standard deviations below the ground
 
 double Square(double x) { return x * x; }
 
@@ -40,7 +45,10 @@ Eigen::Quaterniond Turn(const Vector3d& by) {
 }  // namespace
 
 LegOdometry::LegOdometry(const Settings& settings, size_t num_feet)
-    : s_(settings), allowed_(Matrix3d::Identity()), allowed_turn_(Matrix3d::Identity()), feet_(num_feet) {
+    : s_(settings),
+      allowed_(Matrix3d::Identity()),
+      allowed_turn_(Matrix3d::Identity()),
+      feet_(num_feet) {
   if (s_.normal) {
     allowed_turn_ = *s_.normal * s_.normal->transpose();
     allowed_ -= allowed_turn_;
@@ -56,15 +64,18 @@ double LegOdometry::Sd(Eigen::Index block, const Vector3d& direction) const {
   return std::sqrt(std::max(0.0, direction.dot(covariance_.block<3, 3>(block, block) * direction)));
 }
 
-double LegOdometry::rate_sd(const Vector3d& direction) const { return std::hypot(s_.rate_sd, Sd(kRateBias, direction)); }
+double LegOdometry::rate_sd(const Vector3d& direction) const {
+  return std::hypot(s_.rate_sd, Sd(kRateBias, direction));
+}
 
-void LegOdometry::Restart(Beginning beginning, const Vector3d& position, const Eigen::Quaterniond& orientation,
-                          std::span<const Foot> feet) {
+void LegOdometry::Restart(Beginning beginning, const Vector3d& position,
+                          const Eigen::Quaterniond& orientation, std::span<const Foot> feet) {
   const bool stands = beginning == Beginning::kStands;
   orientation_ = orientation.normalized();
   position_ = position;
   double lowest = std::numeric_limits<double>::infinity();
-  for (const Foot& foot : feet) lowest = std::min(lowest, (orientation_ * foot.centre).z() - foot.radius);
+  for (const Foot& foot : feet)
+    lowest = std::min(lowest, (orientation_ * foot.centre).z() - foot.radius);
   position_.z() = -lowest;
   velocity_ = rate_bias_ = acceleration_bias_ = rate_ = acceleration_ = Vector3d::Zero();
   force_.reset();
@@ -74,9 +85,11 @@ void LegOdometry::Restart(Beginning beginning, const Vector3d& position, const E
   covariance_.setZero();
   const Matrix3d in_body = orientation_.toRotationMatrix().transpose();
   covariance_(kPosition + 2, kPosition + 2) = Square(stands ? kStandsHeightSd : kMovesHeightSd);
-  covariance_.block<3, 3>(kVelocity, kVelocity) = Square(stands ? kStandsVelocitySd : kMovesVelocitySd) * allowed_;
+  covariance_.block<3, 3>(kVelocity, kVelocity) =
+      Square(stands ? kStandsVelocitySd : kMovesVelocitySd) * allowed_;
   covariance_.block<3, 3>(kAngle, kAngle) = Square(s_.angle_sd) * allowed_turn_;
-  covariance_.block<3, 3>(kRateBias, kRateBias) = Square(s_.rate_bias_sd) * in_body * allowed_turn_ * in_body.transpose();
+  covariance_.block<3, 3>(kRateBias, kRateBias) =
+      Square(s_.rate_bias_sd) * in_body * allowed_turn_ * in_body.transpose();
   covariance_.block<3, 3>(kAccelerationBias, kAccelerationBias) =
       Square(s_.acceleration_bias_sd) * in_body * allowed_ * in_body.transpose();
 }
@@ -104,21 +117,25 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
   orientation_ = (orientation_ * Turn(turn)).normalized();
 
   // F P F': each row of the transition is used before what it refers to changes.
-  const Matrix3d by_angle = -dt * Cross(felt), by_acceleration_bias = -dt * half, by_rate_bias = -dt * half;
+  const Matrix3d by_angle = -dt * Cross(felt), by_acceleration_bias = -dt * half,
+                 by_rate_bias = -dt * half;
   auto& p = covariance_;
-  p.middleRows<3>(kPosition) += dt * p.middleRows<3>(kVelocity) + dt / 2 * (by_angle * p.middleRows<3>(kAngle)) +
-                                dt / 2 * (by_acceleration_bias * p.middleRows<3>(kAccelerationBias));
+  p.middleRows<3>(kPosition) +=
+      dt * p.middleRows<3>(kVelocity) + dt / 2 * (by_angle * p.middleRows<3>(kAngle)) +
+      dt / 2 * (by_acceleration_bias * p.middleRows<3>(kAccelerationBias));
   p.middleRows<3>(kVelocity) += by_angle * p.middleRows<3>(kAngle);
   p.middleRows<3>(kVelocity) += by_acceleration_bias * p.middleRows<3>(kAccelerationBias);
   p.middleRows<3>(kAngle) += by_rate_bias * p.middleRows<3>(kRateBias);
-  p.middleCols<3>(kPosition) += dt * p.middleCols<3>(kVelocity) + dt / 2 * (p.middleCols<3>(kAngle) * by_angle.transpose()) +
-                                dt / 2 * (p.middleCols<3>(kAccelerationBias) * by_acceleration_bias.transpose());
+  p.middleCols<3>(kPosition) +=
+      dt * p.middleCols<3>(kVelocity) + dt / 2 * (p.middleCols<3>(kAngle) * by_angle.transpose()) +
+      dt / 2 * (p.middleCols<3>(kAccelerationBias) * by_acceleration_bias.transpose());
   p.middleCols<3>(kVelocity) += p.middleCols<3>(kAngle) * by_angle.transpose();
-  p.middleCols<3>(kVelocity) += p.middleCols<3>(kAccelerationBias) * by_acceleration_bias.transpose();
+  p.middleCols<3>(kVelocity) +=
+      p.middleCols<3>(kAccelerationBias) * by_acceleration_bias.transpose();
   p.middleCols<3>(kAngle) += p.middleCols<3>(kRateBias) * by_rate_bias.transpose();
 
-  // Readings that are missing were as wrong as the one that is there may be of them. When within a period the force of an
-  // impact acted is not known, nor when the rate changed: anywhere in it.
+  // Readings that are missing were as wrong as the one that is there may be of them. When within a
+  // period the force of an impact acted is not known, nor when the rate changed: anywhere in it.
   const double periods = std::max(1.0, dt / s_.period);
   const double velocity = Square(s_.acceleration_sd * dt * periods);
   const double within = Square(acceleration_change_ * dt * dt) / 12;
@@ -126,10 +143,13 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
   p.block<3, 3>(kPosition, kPosition) += (velocity * dt * dt / 4 + within) * allowed_;
   p.block<3, 3>(kPosition, kVelocity) += velocity * dt / 2 * allowed_;
   p.block<3, 3>(kVelocity, kPosition) += velocity * dt / 2 * allowed_;
-  p.block<3, 3>(kAngle, kAngle) += (Square(s_.rate_sd * dt * periods) + Square(rate_change_ * dt) / 12) * allowed_turn_;
-  const Matrix3d turns = half.transpose() * allowed_turn_ * half, moves = half.transpose() * allowed_ * half;
+  p.block<3, 3>(kAngle, kAngle) +=
+      (Square(s_.rate_sd * dt * periods) + Square(rate_change_ * dt) / 12) * allowed_turn_;
+  const Matrix3d turns = half.transpose() * allowed_turn_ * half,
+                 moves = half.transpose() * allowed_ * half;
   p.block<3, 3>(kRateBias, kRateBias) += Square(s_.rate_bias_sd) * dt / kBiasWanders * turns;
-  p.block<3, 3>(kAccelerationBias, kAccelerationBias) += Square(s_.acceleration_bias_sd) * dt / kBiasWanders * moves;
+  p.block<3, 3>(kAccelerationBias, kAccelerationBias) +=
+      Square(s_.acceleration_bias_sd) * dt / kBiasWanders * moves;
 }
 
 ContactTest::Motion LegOdometry::MotionOf(const Foot& foot) const {
@@ -143,13 +163,16 @@ ContactTest::Motion LegOdometry::MotionOf(const Foot& foot) const {
     const Vector3d by_angle = lever.cross(up);
     return p(block + 2, block + 2) + by_angle.dot(p.block<3, 3>(kAngle, kAngle) * by_angle) +
            by_bias.dot(p.block<3, 3>(kRateBias, kRateBias) * by_bias) +
-           2 * p.block<1, 3>(block + 2, kAngle).dot(by_angle) + 2 * p.block<1, 3>(block + 2, kRateBias).dot(by_bias) +
+           2 * p.block<1, 3>(block + 2, kAngle).dot(by_angle) +
+           2 * p.block<1, 3>(block + 2, kRateBias).dot(by_bias) +
            2 * by_angle.dot(p.block<3, 3>(kAngle, kRateBias) * by_bias);
   };
   const Vector3d up_in_body = to_world.row(2);
   const Vector3d by_rate = up_in_body.cross(foot.centre);
-  const double height = variance(kPosition, arm, Vector3d::Zero()) + up_in_body.dot(foot.centre_variance * up_in_body);
-  const double rise = variance(kVelocity, moves, by_rate) + up_in_body.dot(foot.velocity_variance * up_in_body) +
+  const double height = variance(kPosition, arm, Vector3d::Zero()) +
+                        up_in_body.dot(foot.centre_variance * up_in_body);
+  const double rise = variance(kVelocity, moves, by_rate) +
+                      up_in_body.dot(foot.velocity_variance * up_in_body) +
                       Square(s_.rate_sd) * by_rate.squaredNorm();
   return {.height = position_.z() + arm.z() - foot.radius,
           .height_sd = std::sqrt(std::max(0.0, height) + Square(s_.ground_sd)),
@@ -161,7 +184,8 @@ void LegOdometry::Judge(size_t index, const Foot& foot) {
   ContactTest::Motion motion = MotionOf(foot);
   const bool rested = rests(index);
   if (!rested && motion.height_sd > kHeightKnown) {
-    // A height that is as good as unknown excludes nothing and excuses nothing; but what falls freely rests on nothing.
+    // A height that is as good as unknown excludes nothing and excuses nothing; but what falls
+    // freely rests on nothing.
     if (borne_ < s_.gravity / 2) return;
     motion.height = 0;
   }
@@ -176,7 +200,8 @@ void LegOdometry::Forget(Eigen::Index block) {
   covariance_.middleCols<3>(block).setZero();
 }
 
-// Where along the ground, the correction that follows will find out; how high the ground is, is known.
+// Where along the ground, the correction that follows will find out; how high the ground is, is
+// known.
 void LegOdometry::SetDown(size_t index, const Foot& foot) {
   const Eigen::Index at = IndexOf(index);
   Forget(at);
@@ -227,12 +252,14 @@ void LegOdometry::Correct(std::span<const Foot> feet) {
   if (flight_ > kLongFlight && lift_ > flight_ * s_.gravity / 2) astray_ = true;
 }
 
-// place - position - orientation * centre = 0, but for noise. False: that cannot be, and nothing is changed.
+// place - position - orientation * centre = 0, but for noise. False: that cannot be, and nothing is
+// changed.
 bool LegOdometry::CorrectBy(size_t index, const Foot& foot) {
   const Eigen::Index at = IndexOf(index);
   const Matrix3d to_world = orientation_.toRotationMatrix();
   const Vector3d arm = to_world * foot.centre;
-  // Of what is expected, not of what is seen: a turn of everything about the vertical must remain invisible.
+  // Of what is expected, not of what is seen: a turn of everything about the vertical must remain
+  // invisible.
   const Vector3d expected = feet_[index].place - position_;
   const Matrix3d by_angle = Cross(expected);
   const Vector3d innovation = arm - expected;
@@ -241,7 +268,8 @@ bool LegOdometry::CorrectBy(size_t index, const Foot& foot) {
   seen_ += by_angle * p.middleRows<3>(kAngle);
   Matrix3d spread = seen_.middleCols<3>(at) - seen_.middleCols<3>(kPosition);
   spread += seen_.middleCols<3>(kAngle) * by_angle.transpose();
-  spread += to_world * foot.centre_variance * to_world.transpose() + Square(kFootSd) * Matrix3d::Identity();
+  spread += to_world * foot.centre_variance * to_world.transpose() +
+            Square(kFootSd) * Matrix3d::Identity();
   const Matrix3d inverse = spread.inverse();
   if (innovation.dot(inverse * innovation) > kSlipped) return false;
   gain_.noalias() = seen_.transpose() * inverse;

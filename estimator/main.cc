@@ -1,7 +1,7 @@
 // plumb-estimator: JOINT_STATE, IMU -> ROBOT_STATE, ROBOT_STATE_SMOOTHED, ESTIMATOR_STATUS.
 
-#include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
 
 #include <optional>
 
@@ -16,11 +16,14 @@ namespace {
 
 constexpr int64_t kStatusPeriod = 100'000;  // [us]
 
-/// The robot that the filter on the simulator's dynamics takes for granted. @param model "nominal" or a posterior.json.
-plumb::RobotDescription AssumedRobot(const plumb::RobotDescription& robot, const std::string& model) {
+/// The robot that the filter on the simulator's dynamics takes for granted. @param model "nominal"
+/// or a posterior.json.
+plumb::RobotDescription AssumedRobot(const plumb::RobotDescription& robot,
+                                     const std::string& model) {
   const plumb::Model simulated(robot);
   const bool nominal = model == "nominal";
-  return simulated.Describe(nominal ? simulated.parameters().means() : plumb::ReadPosterior(model, robot).Mean());
+  return simulated.Describe(nominal ? simulated.parameters().means()
+                                    : plumb::ReadPosterior(model, robot).Mean());
 }
 
 }  // namespace
@@ -29,11 +32,13 @@ int main(int argc, char** argv) {
   std::string robot_path, model;
   int priority = 0;
   return plumb::Run(
-      "plumb-estimator", "Estimates the robot's state from what its drives and sensors measure.", argc, argv,
+      "plumb-estimator", "Estimates the robot's state from what its drives and sensors measure.",
+      argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder or TOML file")->required();
         app.add_option("--model", model,
-                       "ROBOT_STATE, for control, from a filter on the simulator's dynamics with these parameters: a "
+                       "ROBOT_STATE, for control, from a filter on the simulator's dynamics with "
+                       "these parameters: a "
                        "posterior.json, or 'nominal', the prior's means; default: without");
         plumb::AddRealtimeFlag(app, priority);
       },
@@ -44,12 +49,15 @@ int main(int argc, char** argv) {
         std::optional<plumb::UnscentedObserver> model_observer;
         if (!model.empty()) model_observer.emplace(AssumedRobot(robot, model));
         plumb::Publisher<plumb::robot_state_t> causal(process.messenger(), "ROBOT_STATE");
-        plumb::Publisher<plumb::robot_state_t> smoothed(process.messenger(), "ROBOT_STATE_SMOOTHED");
-        plumb::Publisher<plumb::estimator_status_t> statuses(process.messenger(), "ESTIMATOR_STATUS");
+        plumb::Publisher<plumb::robot_state_t> smoothed(process.messenger(),
+                                                        "ROBOT_STATE_SMOOTHED");
+        plumb::Publisher<plumb::estimator_status_t> statuses(process.messenger(),
+                                                             "ESTIMATOR_STATUS");
         int64_t told = 0, told_at = 0;  // reasons_changed() and utime of the last status
         const auto publish_status = [&] {
           const int64_t now = observer.state().utime;
-          if (told == observer.reasons_changed() && now >= told_at && now - told_at < kStatusPeriod) return;
+          if (told == observer.reasons_changed() && now >= told_at && now - told_at < kStatusPeriod)
+            return;
           told = observer.reasons_changed();
           told_at = now;
           plumb::estimator_status_t status = observer.Status();
@@ -73,9 +81,12 @@ int main(int argc, char** argv) {
           subscriber.Rethrow();
           imus.Rethrow();
         }
-        spdlog::info("{} measurements, {} refused, {} undecodable, {} restarts", subscriber.received(),
-                     observer.refused(), subscriber.rejected(), observer.restarts());
-        if (model_observer) spdlog::info("filter on the simulator's dynamics: {} restarts", model_observer->restarts());
+        spdlog::info("{} measurements, {} refused, {} undecodable, {} restarts",
+                     subscriber.received(), observer.refused(), subscriber.rejected(),
+                     observer.restarts());
+        if (model_observer)
+          spdlog::info("filter on the simulator's dynamics: {} restarts",
+                       model_observer->restarts());
         return 0;
       });
 }

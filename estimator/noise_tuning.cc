@@ -18,13 +18,16 @@ constexpr int64_t kFewest = 100;      // readings
 
 using Parameter = double NoiseDescription::*;
 // Causes of steps first: jerk can stand in for them, but not the other way round.
-constexpr Parameter kParameters[] = {&NoiseDescription::ground_impact, &NoiseDescription::stop_impact,
-                                     &NoiseDescription::jerk,          &NoiseDescription::velocity_sd,
-                                     &NoiseDescription::effort_step,   &NoiseDescription::position_sd,
-                                     &NoiseDescription::coupling};
+constexpr Parameter kParameters[] = {
+    &NoiseDescription::ground_impact, &NoiseDescription::stop_impact,
+    &NoiseDescription::jerk,          &NoiseDescription::velocity_sd,
+    &NoiseDescription::effort_step,   &NoiseDescription::position_sd,
+    &NoiseDescription::coupling};
 constexpr Parameter kImpacts[] = {&NoiseDescription::ground_impact, &NoiseDescription::stop_impact};
 // As it is, with impacts, both directions of each parameter, without impacts.
-static_assert(2 + std::size(kFactors) * kRounds * std::size(kParameters) * 2 + std::size(kImpacts) == kMostPlays);
+static_assert(2 + std::size(kFactors) * kRounds * std::size(kParameters) * 2 +
+                  std::size(kImpacts) ==
+              kMostPlays);
 // [1/s] Where the search for an impact begins if there was none: 10 kg that meet 100 N s/m.
 constexpr double kFirstImpact = 10;
 
@@ -32,14 +35,16 @@ std::vector<NoiseDescription> NoiseOf(const RobotDescription& robot) {
   std::vector<NoiseDescription> noise;
   for (int i = 0; i < robot.num_joints(); ++i) {
     const EstimatorSettings s = EstimatorOf(robot, i);
-    noise.push_back({s.position_sd, s.velocity_sd, s.jerk, s.effort_step, s.ground_impact, s.stop_impact, s.coupling, s.delay});
+    noise.push_back({s.position_sd, s.velocity_sd, s.jerk, s.effort_step, s.ground_impact,
+                     s.stop_impact, s.coupling, s.delay});
   }
   return noise;
 }
 
 }  // namespace
 
-TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(StateObserver&)>& play) {
+TunedNoise TuneNoise(const RobotDescription& robot,
+                     const std::function<void(StateObserver&)>& play) {
   const auto n = static_cast<size_t>(robot.num_joints());
   RobotDescription tried = robot;
   std::vector<bool> has_velocity(n, false);
@@ -51,7 +56,8 @@ TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(Sta
     std::vector<double> per_reading;
     for (size_t i = 0; i < n; ++i) {
       const int64_t readings = observer.readings(static_cast<int>(i));
-      if (observer.of_base(static_cast<int>(i))) {  // nothing to learn: no trial is better than another
+      // nothing to learn: no trial is better than another
+      if (observer.of_base(static_cast<int>(i))) {
         per_reading.push_back(0);
         continue;
       }
@@ -113,7 +119,8 @@ TunedNoise TuneNoise(const RobotDescription& robot, const std::function<void(Sta
     }
   }
   for (size_t i = 0; i < n; ++i) {
-    if (robot.joints[i].passive) tuned.joints[i].coupling = std::numeric_limits<double>::quiet_NaN();
+    if (robot.joints[i].passive)
+      tuned.joints[i].coupling = std::numeric_limits<double>::quiet_NaN();
     if (!has_velocity[i]) tuned.joints[i].velocity_sd = std::numeric_limits<double>::quiet_NaN();
     tuned.joints[i].delay = robot.joints[i].noise.delay;
   }

@@ -47,7 +47,8 @@ void StateObserver::UseForBase(const ImuInbox::Reading& reading, int64_t utime, 
   base_->Read(measured, reading);
 }
 
-void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured) {
+void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading,
+                           const joint_state_t& measured) {
   const int64_t late = measured.utime - reading.utime;
   if (late > ImuInbox::kLatest) {
     ++imu_refused_;
@@ -64,7 +65,8 @@ void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joi
     const auto turned = static_cast<size_t>(imu.mounting.turned);
     Joint& joint = joints_[turned];
     const int64_t apart = Microseconds(imu.period / 2);
-    if (joint.measured + apart < reading.utime && reading.utime < measured.measured[turned] - apart) {
+    if (joint.measured + apart < reading.utime &&
+        reading.utime < measured.measured[turned] - apart) {
       Correct(joint, Quantity::kRate,
               imu.mounting.axis.dot(Eigen::Map<const Eigen::Vector3d>(reading.rate.data())), age);
     }
@@ -76,14 +78,16 @@ void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading, const joi
       imu.mounting.turned < 0
           ? imu.mounting.unturned
           : imu.mounting.unturned *
-                Eigen::Quaterniond(
-                    Eigen::AngleAxisd(imu.mounting.Angle(Eigen::Quaterniond(w, x, y, z)), imu.mounting.axis));
+                Eigen::Quaterniond(Eigen::AngleAxisd(
+                    imu.mounting.Angle(Eigen::Quaterniond(w, x, y, z)), imu.mounting.axis));
   const Eigen::Vector3d acceleration =
-      turn * Eigen::Map<const Eigen::Vector3d>(reading.force.data()) - gravity_ * Eigen::Vector3d::UnitZ();
+      turn * Eigen::Map<const Eigen::Vector3d>(reading.force.data()) -
+      gravity_ * Eigen::Vector3d::UnitZ();
   for (const ImuMounting::Slide& slide : imu.mounting.slides) {
     Joint& joint = joints_[static_cast<size_t>(slide.joint)];
     const double along = slide.direction.dot(acceleration);
-    // The mean since the last reading, or, if one is missing, since a moment of which nothing is kept.
+    // The mean since the last reading, or, if one is missing, since a moment of which nothing is
+    // kept.
     const double window = joint.filter.since_mark() - age;
     if (std::abs(window - imu.period) < kSamePeriod * imu.period) {
       joint.acceleration_nis.Add(Correct(joint, Quantity::kAcceleration, along, age).nis(),

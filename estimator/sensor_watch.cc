@@ -34,11 +34,16 @@ void AgreementWatch::Judge() {
   const double allowed = noise + s_.rate_bias * time_ + s_.rate_lag * std::abs(rate_ - first_rate_);
   duration_ = time_;
   excess_ = excess;
-  if (std::abs(excess) <= allowed) finding_ = Finding::kNone;
-  else if (!level_moved_) finding_ = Finding::kLevelStuck;
-  else if (!rate_moved_) finding_ = Finding::kRateStuck;
-  else if (std::abs(largest_step_) > 0.8 * std::abs(excess)) finding_ = Finding::kLevelJumped;
-  else finding_ = Finding::kDisagree;
+  if (std::abs(excess) <= allowed)
+    finding_ = Finding::kNone;
+  else if (!level_moved_)
+    finding_ = Finding::kLevelStuck;
+  else if (!rate_moved_)
+    finding_ = Finding::kRateStuck;
+  else if (std::abs(largest_step_) > 0.8 * std::abs(excess))
+    finding_ = Finding::kLevelJumped;
+  else
+    finding_ = Finding::kDisagree;
   // The next window begins where this one ends.
   const double level = level_, rate = rate_;
   readings_ = 0;

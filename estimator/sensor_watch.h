@@ -5,7 +5,8 @@
 
 namespace plumb {
 
-/// Exponential average of a reading's normalised innovation squared, over about half a second. NaN before the first.
+/// Exponential average of a reading's normalised innovation squared, over about half a second. NaN
+/// before the first.
 class NisAverage {
  public:
   static constexpr double kTime = 0.5;  ///< [s]
@@ -21,9 +22,10 @@ class NisAverage {
   double value_ = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// Two sensors of one motion, of a level and of its rate (position and velocity, velocity and acceleration): what the level
-/// changed by in a quarter of a second must be the integral of the rate. No model of the motion is needed for that, so an
-/// impact raises no alarm, and what neither sensor alone could be blamed for shows. Does not allocate. Not thread-safe.
+/// Two sensors of one motion, of a level and of its rate (position and velocity, velocity and
+/// acceleration): what the level changed by in a quarter of a second must be the integral of the
+/// rate. No model of the motion is needed for that, so an impact raises no alarm, and what neither
+/// sensor alone could be blamed for shows. Does not allocate. Not thread-safe.
 class AgreementWatch {
  public:
   enum class Finding {
@@ -38,9 +40,10 @@ class AgreementWatch {
     double rate_bias = 0;      ///< that would be in order
     double rate_lag = 0;       ///< [s] by which the rate may be late
   };
-  static constexpr double kWindow = 0.25;     ///< [s]
-  static constexpr double kLongestGap = 0.1;  ///< [s] between readings; after it a window begins anew
-  static constexpr double kSigmas = 6;        ///< beyond which there is no doubt
+  static constexpr double kWindow = 0.25;  ///< [s]
+  /// [s] between readings; after it a window begins anew
+  static constexpr double kLongestGap = 0.1;
+  static constexpr double kSigmas = 6;  ///< beyond which there is no doubt
 
   explicit AgreementWatch(const Settings& settings) : s_(settings) {}
 
@@ -51,9 +54,10 @@ class AgreementWatch {
 
   /// Of the last complete window.
   Finding finding() const { return finding_; }
-  double excess() const { return excess_; }  ///< change of the level less the rate's integral, or its part in the jump
+  /// change of the level less the rate's integral, or its part in the jump
+  double excess() const { return excess_; }
   double duration() const { return duration_; }  ///< [s]
-  double level() const { return level_; }  ///< the newest
+  double level() const { return level_; }        ///< the newest
 
  private:
   void Judge();

@@ -9,22 +9,27 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kLongestGap = 1'000'000;  // [us]; beyond it nothing is known of the motion in between
-constexpr int64_t kMostAhead = 10'000;      // [us] of a joint's reading before the others
+// [us]; beyond it nothing is known of the motion in between
+constexpr int64_t kLongestGap = 1'000'000;
+constexpr int64_t kMostAhead = 10'000;            // [us] of a joint's reading before the others
 constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
-constexpr int kSettled = 5;                 // measurements after a restart until velocity can be trusted
-constexpr double kSurely = 5;               // standard deviations
-constexpr double kVelocityLag = 4e-3;       // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
-constexpr double kBiasesInOrder = 5;        // times its sd
-constexpr double kRoundedEffort = 1e-9;     // [Nm] or [N]: what rounding makes of a mean
+// measurements after a restart until velocity can be trusted
+constexpr int kSettled = 5;
+constexpr double kSurely = 5;  // standard deviations
+// [s] of a drive's velocity estimate: twice that of an ODrive as it comes
+constexpr double kVelocityLag = 4e-3;
+constexpr double kBiasesInOrder = 5;     // times its sd
+constexpr double kRoundedEffort = 1e-9;  // [Nm] or [N]: what rounding makes of a mean
 
 double Square(double x) { return x * x; }
 
 AgreementWatch::Settings VelocityWatch(const EstimatorSettings& s, bool gyro) {
-  return {s.position_sd, s.velocity_sd, gyro ? kBiasesInOrder * s.bias_sd : 0, gyro ? 0 : kVelocityLag};
+  return {s.position_sd, s.velocity_sd, gyro ? kBiasesInOrder * s.bias_sd : 0,
+          gyro ? 0 : kVelocityLag};
 }
 
-// The level is the filter's velocity, which is a good deal better than the velocity that is measured.
+// The level is the filter's velocity, which is a good deal better than the velocity that is
+// measured.
 AgreementWatch::Settings AccelerationWatch(const EstimatorSettings& s) {
   return {0.05, s.acceleration_sd, kBiasesInOrder * s.bias_sd, 0};
 }
@@ -39,8 +44,10 @@ StateObserver::StateObserver(const RobotDescription& robot)
   if (robot.estimator.base == EstimatorSettings::Base::kLegs) base_.emplace(robot);
   for (const SensorDescription& sensor : robot.sensors) {
     if (sensor.link < 0) continue;
-    const double delay = std::isnan(sensor.noise.delay) ? robot.estimator.delay : sensor.noise.delay;
-    imus_.push_back({sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1, false});
+    const double delay =
+        std::isnan(sensor.noise.delay) ? robot.estimator.delay : sensor.noise.delay;
+    imus_.push_back(
+        {sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1, false});
     imus_.back().of_base = base_ && sensor.name == robot.sensors[base_->base().imu].name;
   }
   for (int i = 0; i < robot.num_joints(); ++i) {
@@ -61,7 +68,8 @@ StateObserver::StateObserver(const RobotDescription& robot)
   }
   const auto n = joints_.size();
   state_.num_joints = static_cast<int32_t>(n);
-  for (auto* values : {&state_.q, &state_.v, &state_.q_sd, &state_.v_sd, &state_.effort}) values->resize(n, 0);
+  for (auto* values : {&state_.q, &state_.v, &state_.q_sd, &state_.v_sd, &state_.effort})
+    values->resize(n, 0);
   state_.num_contacts = contact_.num_points();
   state_.contact.assign(static_cast<size_t>(state_.num_contacts), -1);
   waiting_.assign(static_cast<size_t>(lag_) + 2, state_);
@@ -73,18 +81,21 @@ double StateObserver::Age(const joint_state_t& measured, size_t joint) const {
 }
 
 bool StateObserver::IsNew(const joint_state_t& measured, size_t joint) const {
-  return !joints_[joint].of_base && measured.valid[joint] && measured.measured[joint] != joints_[joint].measured;
+  return !joints_[joint].of_base && measured.valid[joint] &&
+         measured.measured[joint] != joints_[joint].measured;
 }
 
 StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
   // Times of this epoch only, so that differences cannot overflow.
-  if (measured.num_joints != state_.num_joints || measured.utime < 0 || measured.utime >= kEndOfTime) return Use::kRefuse;
+  if (measured.num_joints != state_.num_joints || measured.utime < 0 ||
+      measured.utime >= kEndOfTime)
+    return Use::kRefuse;
   for (size_t i = 0; i < joints_.size(); ++i) {
     if (std::isinf(measured.velocity[i])) return Use::kRefuse;  // NaN: not measured
     if (!measured.valid[i]) continue;
     const int64_t t = measured.measured[i];
-    const bool of_that_time =
-        t >= 0 && t < kEndOfTime && t - measured.utime <= kMostAhead && measured.utime - t <= kLongestGap;
+    const bool of_that_time = t >= 0 && t < kEndOfTime && t - measured.utime <= kMostAhead &&
+                              measured.utime - t <= kLongestGap;
     if (!of_that_time || !std::isfinite(measured.position[i])) return Use::kRefuse;
   }
   if (!started_) return Use::kUse;
@@ -100,8 +111,10 @@ bool StateObserver::Displaced(const joint_state_t& measured) const {
     if (!IsNew(measured, i)) continue;
     const Joint& joint = joints_[i];
     if (joint.used < 0 || joint.out) return true;  // there it is
-    const auto innovation = joint.filter.Expect(Quantity::kPosition, measured.position[i], Age(measured, i));
-    const double limit = std::max(joint.settings.reset_after, kSurely * std::sqrt(innovation.variance));
+    const auto innovation =
+        joint.filter.Expect(Quantity::kPosition, measured.position[i], Age(measured, i));
+    const double limit =
+        std::max(joint.settings.reset_after, kSurely * std::sqrt(innovation.variance));
     if (std::abs(innovation.value) > limit) return true;
   }
   return false;
@@ -115,7 +128,8 @@ void StateObserver::Restart(const joint_state_t& measured) {
     const bool known = measured.valid[i];
     // Where an invalid joint is, it will tell when it is back.
     const double position = known ? measured.position[i] : joint.filter.mean()(0);
-    joint.filter.Restart(position, known && !joint.gyro ? measured.velocity[i] : std::numeric_limits<double>::quiet_NaN());
+    joint.filter.Restart(position, known && !joint.gyro ? measured.velocity[i]
+                                                        : std::numeric_limits<double>::quiet_NaN());
     if (std::isfinite(measured.effort_applied[i])) joint.effort = measured.effort_applied[i];
     joint.stop = 0;
     joint.velocity_watch.Restart();
@@ -128,8 +142,9 @@ void StateObserver::Restart(const joint_state_t& measured) {
   started_ = true;
 }
 
-// By how much the joints' efforts have stepped. From e0 to e1 after a share of the interval, its mean is share e0 + (1 - share) e1. What is
-// not explained by one step to the effort that was sent last counts as a step to the mean at the beginning.
+// By how much the joints' efforts have stepped. From e0 to e1 after a share of the interval, its
+// mean is share e0 + (1 - share) e1. What is not explained by one step to the effort that was sent
+// last counts as a step to the mean at the beginning.
 // @return the share after which the largest one has.
 double StateObserver::FindEffortSteps(const joint_state_t& measured) {
   double largest = 0, largest_after = 0;
@@ -144,16 +159,18 @@ double StateObserver::FindEffortSteps(const joint_state_t& measured) {
       if (once) joint.effort_step = sent - joint.effort, after = share;
       joint.effort = once ? sent : mean;
     }
-    if (std::abs(joint.effort_step) > largest) largest = std::abs(joint.effort_step), largest_after = after;
+    if (std::abs(joint.effort_step) > largest)
+      largest = std::abs(joint.effort_step), largest_after = after;
   }
   return largest_after;
 }
 
 void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
   const double after = FindEffortSteps(measured);
-  // What acts on one joint may step every joint's acceleration: its own most of all, others' by their coupling.
+  // What acts on one joint may step every joint's acceleration: its own most of all, others' by
+  // their coupling.
   const double left = std::exp(-elapsed / kImpactFades);  // of earlier impacts
-  double efforts = 0, stops = 0;  // sums of squares
+  double efforts = 0, stops = 0;                          // sums of squares
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     const double stop =
@@ -165,12 +182,16 @@ void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
   ground_ = std::max(ground_ * left, contact_.ImpactSpeed(elapsed));
   for (Joint& joint : joints_) {
     const double share = Square(joint.settings.coupling);
-    const auto felt = [&](double own, double all) { return std::sqrt(share * all + (1 - share) * Square(own)); };
-    joint.filter.Predict(elapsed, felt(joint.effort_step, efforts), {ground_, felt(joint.stop, stops)}, after);
+    const auto felt = [&](double own, double all) {
+      return std::sqrt(share * all + (1 - share) * Square(own));
+    };
+    joint.filter.Predict(elapsed, felt(joint.effort_step, efforts),
+                         {ground_, felt(joint.stop, stops)}, after);
   }
 }
 
-KinematicFilter::Innovation StateObserver::Correct(Joint& joint, Quantity quantity, double value, double age) {
+KinematicFilter::Innovation StateObserver::Correct(Joint& joint, Quantity quantity, double value,
+                                                   double age) {
   const KinematicFilter::Innovation innovation = joint.filter.Correct(quantity, value, age);
   if (since_restart_ < kSettled || quantity == Quantity::kAcceleration) return innovation;
   joint.deviance += innovation.nis() + std::log(innovation.variance);
@@ -180,13 +201,16 @@ KinematicFilter::Innovation StateObserver::Correct(Joint& joint, Quantity quanti
 
 void StateObserver::UseReading(const joint_state_t& measured, size_t i) {
   Joint& joint = joints_[i];
-  const double age = Age(measured, i), position = measured.position[i], velocity = measured.velocity[i];
+  const double age = Age(measured, i), position = measured.position[i],
+               velocity = measured.velocity[i];
   const double elapsed = joint.used < 0 ? 0 : Seconds(measured.measured[i] - joint.used);
-  joint.position_nis.Add(Correct(joint, Quantity::kPosition, position, age).nis(), std::max(0.0, elapsed));
+  joint.position_nis.Add(Correct(joint, Quantity::kPosition, position, age).nis(),
+                         std::max(0.0, elapsed));
   if (std::isfinite(velocity)) {
     const Quantity quantity = joint.gyro ? Quantity::kRate : Quantity::kVelocity;
     joint.velocity_nis.Add(Correct(joint, quantity, velocity, age).nis(), std::max(0.0, elapsed));
-    joint.velocity_watch.Add(position, velocity, elapsed > 0 ? elapsed : 2 * AgreementWatch::kLongestGap);
+    joint.velocity_watch.Add(position, velocity,
+                             elapsed > 0 ? elapsed : 2 * AgreementWatch::kLongestGap);
     if (joint.velocity_watch.finding() != joint.velocity_found) {
       joint.velocity_found = joint.velocity_watch.finding();
       ++reasons_changed_;
@@ -197,7 +221,9 @@ void StateObserver::UseReading(const joint_state_t& measured, size_t i) {
 
 void StateObserver::JudgeOutages(int64_t utime) {
   for (Joint& joint : joints_) {
-    const bool out = joint.of_base ? !base_->valid(utime) : joint.used < 0 || utime - joint.used > Microseconds(joint.settings.outage);
+    const bool out =
+        joint.of_base ? !base_->valid(utime)
+                      : joint.used < 0 || utime - joint.used > Microseconds(joint.settings.outage);
     if (out == joint.out) continue;
     joint.out = out;
     if (out && joint.used >= 0) ++outages_;
@@ -208,10 +234,17 @@ void StateObserver::JudgeOutages(int64_t utime) {
 bool StateObserver::OnJointState(const joint_state_t& measured) {
   num_ready_ = 0;
   switch (Judge(measured)) {
-    case Use::kUse: break;
-    case Use::kRefuse: ++refused_; return false;
-    case Use::kDuplicate: ++duplicates_; return false;
-    case Use::kReordered: ++reordered_; return false;
+    case Use::kUse:
+      break;
+    case Use::kRefuse:
+      ++refused_;
+      return false;
+    case Use::kDuplicate:
+      ++duplicates_;
+      return false;
+    case Use::kReordered:
+      ++reordered_;
+      return false;
   }
   const int64_t elapsed = measured.utime - state_.utime;
   const bool jumped = started_ && (elapsed <= 0 || elapsed > kLongestGap);

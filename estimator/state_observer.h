@@ -22,24 +22,28 @@
 
 namespace plumb {
 
-/// Turns JOINT_STATE and IMU into ROBOT_STATE (causal) and ROBOT_STATE_SMOOTHED (the same sequence numbers, `lag`
-/// measurements later, sooner when the filter restarts). Time advances by differences of utime only, so a log
-/// gives the same states at any speed of replay. Not thread-safe.
+/// Turns JOINT_STATE and IMU into ROBOT_STATE (causal) and ROBOT_STATE_SMOOTHED (the same sequence
+/// numbers, `lag` measurements later, sooner when the filter restarts). Time advances by
+/// differences of utime only, so a log gives the same states at any speed of replay. Not
+/// thread-safe.
 ///
-/// Every JOINT_STATE is one step of all joints' filters. What of its readings is new, and those of the IMUs since the last
-/// one, count at their own time. A joint without a new valid reading is predicted; after [estimator] outage the state is
-/// not valid until the joint is back.
+/// Every JOINT_STATE is one step of all joints' filters. What of its readings is new, and those of
+/// the IMUs since the last one, count at their own time. A joint without a new valid reading is
+/// predicted; after [estimator] outage the state is not valid until the joint is back.
 ///
-/// The filter restarts after a jump of time (backwards, or more than a second forwards), when a joint comes back after an
-/// outage, and when the robot has evidently been moved by hand (innovation above reset_after and all uncertainty); such a
-/// state says `restarted`. It is `valid` when all joints are and the filter has settled.
+/// The filter restarts after a jump of time (backwards, or more than a second forwards), when a
+/// joint comes back after an outage, and when the robot has evidently been moved by hand
+/// (innovation above reset_after and all uncertainty); such a state says `restarted`. It is `valid`
+/// when all joints are and the filter has settled.
 ///
-/// OnJointState and OnImu do not allocate after construction, but for strings in what they are given.
+/// OnJointState and OnImu do not allocate after construction, but for strings in what they are
+/// given.
 class StateObserver {
  public:
   explicit StateObserver(const RobotDescription& robot);
 
-  /// Handles a measurement. @return false if it was not used: wrong number of joints, not finite, not newer.
+  /// Handles a measurement. @return false if it was not used: wrong number of joints, not finite,
+  /// not newer.
   bool OnJointState(const joint_state_t& measured);
   /// Keeps a reading until the JOINT_STATE of its time or a later one.
   void OnImu(const imu_t& imu);
@@ -54,8 +58,9 @@ class StateObserver {
   /// Changes whenever a reason of Status may have: it need not be asked more often.
   int64_t reasons_changed() const { return reasons_changed_; }
 
-  /// -2 ln of the likelihood of a joint's innovations since the start, but for a constant, and how many there were: what
-  /// noise parameters are learnt from. Those of an IMU's accelerometer do not count.
+  /// -2 ln of the likelihood of a joint's innovations since the start, but for a constant, and how
+  /// many there were: what noise parameters are learnt from. Those of an IMU's accelerometer do not
+  /// count.
   double deviance(int joint) const { return joints_[static_cast<size_t>(joint)].deviance; }
   int64_t readings(int joint) const { return joints_[static_cast<size_t>(joint)].readings; }
   /// Whether the joint is of a base that nothing holds: its noise is that of the IMU and the legs.
@@ -69,18 +74,19 @@ class StateObserver {
     EstimatorSettings settings;
     double lower, upper;  // its stops
     KinematicFilter filter;
-    bool of_base = false;     // its state is base_'s: no filter of its own
-    bool gyro = false;        // its velocity is an IMU's rate
+    bool of_base = false;  // its state is base_'s: no filter of its own
+    bool gyro = false;     // its velocity is an IMU's rate
     bool accelerometer = false;
-    int64_t measured = -1;    // utime of its newest reading
-    int64_t used = -1;        // of the newest that was valid and counted; -1 = none since the start
-    bool out = false;         // silent for longer than an outage
-    double effort = 0;        // [Nm] that acts at the end of the latest interval
-    double effort_step = 0;   // [Nm] in it
-    double stop = 0;          // [rad/s] at which it may meet its stop in this one
+    int64_t measured = -1;   // utime of its newest reading
+    int64_t used = -1;       // of the newest that was valid and counted; -1 = none since the start
+    bool out = false;        // silent for longer than an outage
+    double effort = 0;       // [Nm] that acts at the end of the latest interval
+    double effort_step = 0;  // [Nm] in it
+    double stop = 0;         // [rad/s] at which it may meet its stop in this one
     NisAverage position_nis = {}, velocity_nis = {}, acceleration_nis = {};
     AgreementWatch velocity_watch, acceleration_watch;
-    AgreementWatch::Finding velocity_found = AgreementWatch::Finding::kNone, acceleration_found = velocity_found;
+    AgreementWatch::Finding velocity_found = AgreementWatch::Finding::kNone,
+                            acceleration_found = velocity_found;
     double deviance = 0;
     int64_t readings = 0;  // in it
   };
@@ -118,7 +124,8 @@ class StateObserver {
   std::vector<Joint> joints_;
   std::vector<Imu> imus_;
   std::optional<BaseObserver> base_;
-  double unknown_step_;  // [Nm] assumed change of an effort that is not known: from full one way to full the other
+  // [Nm] assumed change of an effort that is not known: from full one way to full the other
+  double unknown_step_;
   GroundContact contact_;
   double ground_ = 0;  // [m/s] at which a point may meet the ground
   robot_state_t state_{};
@@ -129,7 +136,8 @@ class StateObserver {
   int since_restart_ = 0;
   bool started_ = false;
   int64_t reasons_changed_ = 0;
-  int64_t measurements_ = 0, refused_ = 0, duplicates_ = 0, reordered_ = 0, restarts_ = 0, outages_ = 0;
+  int64_t measurements_ = 0, refused_ = 0, duplicates_ = 0, reordered_ = 0, restarts_ = 0,
+          outages_ = 0;
   int64_t imu_readings_ = 0, imu_refused_ = 0, imu_duplicates_ = 0, imu_reordered_ = 0;
 };
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int64_t kFewest = 10;
 constexpr int64_t kCheapest = 50;  // simulated steps for a transition
-constexpr size_t kStretch = 25;  // transitions
+constexpr size_t kStretch = 25;    // transitions
 
 }  // namespace
 
@@ -21,7 +21,8 @@ std::vector<Rollout> FirstTransitions(const std::vector<Rollout>& rollouts, int6
     if (count <= 0) break;
     first.push_back(rollout);
     auto& transitions = first.back().transitions;
-    if (static_cast<int64_t>(transitions.size()) > count) transitions.resize(static_cast<size_t>(count));
+    if (static_cast<int64_t>(transitions.size()) > count)
+      transitions.resize(static_cast<size_t>(count));
     count -= static_cast<int64_t>(transitions.size());
   }
   return first;
@@ -33,7 +34,8 @@ std::vector<Rollout> SpreadTransitions(const std::vector<Rollout>& rollouts, int
     for (size_t first = 0; first < rollout.transitions.size(); first += kStretch) {
       const auto begin = rollout.transitions.begin() + static_cast<ptrdiff_t>(first);
       Rollout stretch{rollout.episode, rollout.policy_iteration, {}};
-      stretch.transitions.assign(begin, begin + static_cast<ptrdiff_t>(std::min(kStretch, rollout.transitions.size() - first)));
+      stretch.transitions.assign(begin, begin + static_cast<ptrdiff_t>(std::min(
+                                                    kStretch, rollout.transitions.size() - first)));
       all.push_back(std::move(stretch));
     }
   }
@@ -42,12 +44,14 @@ std::vector<Rollout> SpreadTransitions(const std::vector<Rollout>& rollouts, int
   for (size_t i = 0; i < kept; ++i) {
     spread.push_back(std::move(all[i * all.size() / kept]));
     auto& transitions = spread.back().transitions;
-    if (static_cast<int64_t>(transitions.size()) > count) transitions.resize(static_cast<size_t>(count));
+    if (static_cast<int64_t>(transitions.size()) > count)
+      transitions.resize(static_cast<size_t>(count));
   }
   return spread;
 }
 
-BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>& rollouts, int64_t budget, uint64_t seed, int threads) {
+BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>& rollouts,
+                      int64_t budget, uint64_t seed, int threads) {
   const auto model = std::make_shared<const Model>(robot);
   CalibrationOptions options;
   options.seed = seed;
@@ -60,15 +64,18 @@ BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>&
       count = std::min(count * 9 / 10, count * budget / result.simulated_steps);
       continue;
     }
-    BudgetedFit fit{ParameterDistribution::Prior(robot), result.simulated_steps, static_cast<int64_t>(CountTransitions(spread))};
+    BudgetedFit fit{ParameterDistribution::Prior(robot), result.simulated_steps,
+                    static_cast<int64_t>(CountTransitions(spread))};
     fit.distribution.components.clear();
     for (size_t i = 0; i < result.posterior.components.size(); ++i) {
       const Gaussian& component = result.posterior.components[i];
-      fit.distribution.components.push_back({result.posterior.weights[i], component.mean, component.covariance});
+      fit.distribution.components.push_back(
+          {result.posterior.weights[i], component.mean, component.covariance});
     }
     return fit;
   }
-  throw std::invalid_argument("a budget of " + std::to_string(budget) + " simulated steps is not enough for a fit");
+  throw std::invalid_argument("a budget of " + std::to_string(budget) +
+                              " simulated steps is not enough for a fit");
 }
 
 }  // namespace plumb

@@ -14,11 +14,13 @@ struct BudgetedFit {
   int64_t transitions = 0;      ///< of the roll-outs that it rests on
 };
 
-/// Plumbline's default method, begun at the prior's mean, with as many of the roll-outs' transitions, spread over all of them, as it can fit within so
-/// many simulated control steps. What a fit costs per transition is not known beforehand: one that has cost too much does not count, nor does
-/// its cost, and is tried again with fewer transitions.
+/// Plumbline's default method, begun at the prior's mean, with as many of the roll-outs'
+/// transitions, spread over all of them, as it can fit within so many simulated control steps. What
+/// a fit costs per transition is not known beforehand: one that has cost too much does not count,
+/// nor does its cost, and is tried again with fewer transitions.
 /// @throws std::invalid_argument if not even 10 transitions can be fitted.
-BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>& rollouts, int64_t budget, uint64_t seed, int threads);
+BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>& rollouts,
+                      int64_t budget, uint64_t seed, int threads);
 
 /// The first so many transitions.
 std::vector<Rollout> FirstTransitions(const std::vector<Rollout>& rollouts, int64_t count);

@@ -21,10 +21,12 @@ namespace {
 
 constexpr uint32_t kStandStream = 0x5374616E;           // of random numbers; "Stan"
 constexpr int64_t kFirstStart = 1'700'000'000'000'000;  // [us] utime of trial 0: a time as any
-constexpr int64_t kBetweenTrials = 1'000'000'000;       // [us] so that no two episodes begin at the same time
-constexpr int64_t kArmAgain = 500'000, kStatus = 100'000;  // [us] periods of requests and of DRIVER_STATUS
-constexpr int64_t kPatience = 30'000'000;                  // [us] until the episode has begun
-constexpr int64_t kSlice = 10'000;  // [us] in which plumb-controller looks at its clock
+// [us] so that no two episodes begin at the same time
+constexpr int64_t kBetweenTrials = 1'000'000'000;
+// [us] periods of requests and of DRIVER_STATUS
+constexpr int64_t kArmAgain = 500'000, kStatus = 100'000;
+constexpr int64_t kPatience = 30'000'000;  // [us] until the episode has begun
+constexpr int64_t kSlice = 10'000;         // [us] in which plumb-controller looks at its clock
 
 int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
@@ -53,8 +55,8 @@ class Loop {
     for (int64_t next_request = kArmAgain; last_.episode < 0; bus_.Advance(bus_.now() + kSlice)) {
       if (bus_.now() >= kPatience) {
         throw std::runtime_error("the robot does not begin an episode: the controller says '" +
-                                 status().reason + "', the driver '" + std::string(bus_.driver().reason()) +
-                                 "'");
+                                 status().reason + "', the driver '" +
+                                 std::string(bus_.driver().reason()) + "'");
       }
       if (bus_.driver().state() == DriveState::kArmed || bus_.now() < next_request) continue;
       driver_request_t arm{};
@@ -68,7 +70,8 @@ class Loop {
   void FinishEpisode() {
     while (status().phase == controller_status_t::RUNNING) bus_.Advance(bus_.now() + kSlice);
     const int64_t patience = bus_.now() + kStatus + 10 * kSlice;
-    while (joiner_.newest_state() < last_state() && bus_.now() < patience) bus_.Advance(bus_.now() + kSlice);
+    while (joiner_.newest_state() < last_state() && bus_.now() < patience)
+      bus_.Advance(bus_.now() + kSlice);
   }
   Rollout Join() { return joiner_.Join(last_.episode, last_state()); }
 
@@ -92,9 +95,10 @@ class Loop {
     }
     Send(controller_.Tick(bus_.now(), bus_.utime()));
     if (const place_robot_t* place = controller_.place()) {
-      robot().Place(place->utime,
-                    Eigen::VectorXd::Map(place->q.data(), static_cast<Eigen::Index>(place->q.size())),
-                    Eigen::VectorXd::Map(place->v.data(), static_cast<Eigen::Index>(place->v.size())));
+      robot().Place(
+          place->utime,
+          Eigen::VectorXd::Map(place->q.data(), static_cast<Eigen::Index>(place->q.size())),
+          Eigen::VectorXd::Map(place->v.data(), static_cast<Eigen::Index>(place->v.size())));
     }
   }
   void Send(const std::optional<joint_command_t>& command) {
@@ -120,10 +124,12 @@ class Loop {
 
 }  // namespace
 
-BusRobot::BusRobot(RobotDescription truth, RobotDescription model, Eigen::VectorXd hidden, uint64_t seed)
+BusRobot::BusRobot(RobotDescription truth, RobotDescription model, Eigen::VectorXd hidden,
+                   uint64_t seed)
     : truth_(std::move(truth)), model_(std::move(model)), hidden_(std::move(hidden)), seed_(seed) {}
 
-RealSystem::Trial BusRobot::Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) {
+RealSystem::Trial BusRobot::Run(const GaussianPolicy& policy, bool explore, int steps,
+                                uint32_t number) {
   policy_t message = policy.ToMessage();
   message.iteration = static_cast<int32_t>(number);
   message.purpose = explore ? policy_t::CALIBRATE : policy_t::EVALUATE;

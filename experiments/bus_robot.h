@@ -9,22 +9,25 @@
 
 namespace plumb {
 
-/// The fast loop round a virtual robot, in virtual time: its drives and sensors, their frames, the driver,
-/// the observer, the controller and the joiner of transitions, the classes that the processes are made of.
-/// Each trial begins with switching everything on and is a function of the policy, the seed and the trial's
-/// number: the same bits every time. Not thread-safe.
+/// The fast loop round a virtual robot, in virtual time: its drives and sensors, their frames, the
+/// driver, the observer, the controller and the joiner of transitions, the classes that the
+/// processes are made of. Each trial begins with switching everything on and is a function of the
+/// policy, the seed and the trial's number: the same bits every time. Not thread-safe.
 class BusRobot : public RealSystem {
  public:
-  /// @param truth the robot that is there. A frame takes its [estimator] delay to the driver, and [driver] effort_delay back.
+  /// @param truth the robot that is there. A frame takes its [estimator] delay to the driver, and
+  /// [driver] effort_delay back.
   /// @param model what driver, observer and controller believe of it.
   /// @param hidden the true parameters, order of truth.parameters, physical units.
   BusRobot(RobotDescription truth, RobotDescription model, Eigen::VectorXd hidden, uint64_t seed);
 
-  /// The robot is armed and placed where the model's task begins an episode. The policy is told the causal
-  /// state; the roll-out has the smoothed ones. The trial ends by the task's termination, after `steps` or
-  /// the task's own time limit, or because the controller or the driver stops it: see stopped().
+  /// The robot is armed and placed where the model's task begins an episode. The policy is told the
+  /// causal state; the roll-out has the smoothed ones. The trial ends by the task's termination,
+  /// after `steps` or the task's own time limit, or because the controller or the driver stops it:
+  /// see stopped().
   /// @param number < 2^31.
-  /// @throws std::invalid_argument if the policy is not of this robot, or the robot cannot be simulated.
+  /// @throws std::invalid_argument if the policy is not of this robot, or the robot cannot be
+  /// simulated.
   /// @throws std::runtime_error if the robot cannot be armed or placed.
   Trial Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
 

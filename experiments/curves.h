@@ -7,23 +7,24 @@ namespace plumb {
 
 /// A line with a band.
 struct Curve {
-  std::string name;                    ///< in the legend
+  std::string name;  ///< in the legend
   std::vector<double> x, middle, low, high;
 };
 
 struct Panel {
   std::string title, x_label, y_label;
-  bool logarithmic = false;            ///< the y axis; what is not positive is then left out
-  std::vector<Curve> curves;           ///< the same names in the same order as the first panel's
+  bool logarithmic = false;   ///< the y axis; what is not positive is then left out
+  std::vector<Curve> curves;  ///< the same names in the same order as the first panel's
   bool logarithmic_x = false;
 };
 
-/// Panels, two abreast, with one legend above, as SVG. At most eight curves. Colours are told apart by those who see fewer, too
-/// (Okabe, Ito, "Color Universal Design", 2008).
+/// Panels, two abreast, with one legend above, as SVG. At most eight curves. Colours are told apart
+/// by those who see fewer, too (Okabe, Ito, "Color Universal Design", 2008).
 std::string DrawCurves(const std::string& title, const std::vector<Panel>& panels);
 
-/// Of several runs: the mean and the 95 % confidence interval of the mean by Student's t; of their logarithms if asked for, as numbers that
-/// span orders of magnitude want. One run has no interval: it is NaN.
+/// Of several runs: the mean and the 95 % confidence interval of the mean by Student's t; of their
+/// logarithms if asked for, as numbers that span orders of magnitude want. One run has no interval:
+/// it is NaN.
 struct Band {
   double middle, low, high;
 };

@@ -1,13 +1,14 @@
-// Figure 1 of "step-based SimOpt": which simulators explain a robot that is not one simulator but two.
+// Figure 1 of "step-based SimOpt": which simulators explain a robot that is not one simulator but
+// two.
 //
-// The robot is one joint under gravity with an arm, J = 0.05 kg m^2, and a payload at 0.5 m that is sometimes
-// light and sometimes heavy: 0.8 exp(xi / 2) kg, xi = -1 in four transitions of ten and +1 in six. A
-// transition is (s, a, s'): any angle, a velocity up to 2 rad/s, 3 N m either way for 50 ms, states read with
-// noise. Given (s, a), s' is bimodal. Prior of xi: N(0, 1).
+// The robot is one joint under gravity with an arm, J = 0.05 kg m^2, and a payload at 0.5 m that is
+// sometimes light and sometimes heavy: 0.8 exp(xi / 2) kg, xi = -1 in four transitions of ten and
+// +1 in six. A transition is (s, a, s'): any angle, a velocity up to 2 rad/s, 3 N m either way for
+// 50 ms, states read with noise. Given (s, a), s' is bimodal. Prior of xi: N(0, 1).
 //
 //   plumb-figure-1 --output figure_1
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <cmath>
 #include <filesystem>
@@ -43,7 +44,8 @@ Vector2d Step(Vector2d state, double effort, double xi) {
   constexpr int kSubsteps = 10;
   const double mass = 0.8 * std::exp(xi / 2), inertia = kArm + mass * kLength * kLength;
   for (int i = 0; i < kSubsteps; ++i) {
-    state(1) += kTime / kSubsteps * (effort - mass * kGravity * kLength * std::sin(state(0))) / inertia;
+    state(1) +=
+        kTime / kSubsteps * (effort - mass * kGravity * kLength * std::sin(state(0))) / inertia;
     state(0) += kTime / kSubsteps * state(1);
   }
   return state;
@@ -72,7 +74,9 @@ struct Found {
 
   double mean() const { return xi.dot(weights); }
   double sd() const { return std::sqrt((xi.array() - mean()).square().matrix().dot(weights)); }
-  double Near(double mode) const { return ((xi.array() - mode).abs() < kNear).select(weights, 0).sum(); }
+  double Near(double mode) const {
+    return ((xi.array() - mode).abs() < kNear).select(weights, 0).sum();
+  }
   double Density(double x) const {
     const auto kernel = (-0.5 * ((xi.array() - x) / width).square()).exp();
     return (weights.array() * kernel).sum() / (width * std::sqrt(2 * M_PI));
@@ -92,7 +96,8 @@ Gaussian BySquaredError(const std::vector<Transition>& transitions, uint64_t see
     for (const Transition& t : transitions) {
       for (Index j = 0; j < xi.cols(); ++j) {
         const Vector2d error = Step(t.state, t.effort, xi(0, j)) - t.next;
-        costs(j) += error.cwiseQuotient(kNoise).squaredNorm() / static_cast<double>(transitions.size());
+        costs(j) +=
+            error.cwiseQuotient(kNoise).squaredNorm() / static_cast<double>(transitions.size());
       }
     }
     return costs;
@@ -118,7 +123,8 @@ Found AsPopulation(const std::vector<Transition>& transitions, uint64_t seed) {
 }
 
 // The posterior of every transition alone, and all of them together.
-Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t seed, const std::function<void(double)>& progress) {
+Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t seed,
+                           const std::function<void(double)>& progress) {
   ConditionalMixtureOptions options;
   options.simulations = 600;
   options.rounds = 3;
@@ -132,13 +138,15 @@ Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t 
     const auto simulate = [&](const Eigen::MatrixXd& xi, int64_t first) {
       Eigen::MatrixXd outcomes(2, xi.cols());
       for (Index j = 0; j < xi.cols(); ++j) {
-        Random noise(seed, {kSimulation, static_cast<uint32_t>(i), static_cast<uint32_t>(first + j)});
+        Random noise(seed,
+                     {kSimulation, static_cast<uint32_t>(i), static_cast<uint32_t>(first + j)});
         outcomes.col(j) = Read(Step(t.state, t.effort, xi(0, j)), noise);
       }
       return outcomes;
     };
     const Problem problem{OfXi(), t.next, simulate};
-    const Posterior posterior = InferConditionalMixture(problem, options, seed + static_cast<uint64_t>(i));
+    const Posterior posterior =
+        InferConditionalMixture(problem, options, seed + static_cast<uint64_t>(i));
     found.xi.segment(i * options.samples, options.samples) = posterior.samples.row(0).transpose();
   }
   found.weights = VectorXd::Constant(found.xi.size(), 1 / static_cast<double>(found.xi.size()));
@@ -152,8 +160,10 @@ struct Shown {
 
 constexpr char kStyle[] = R"(<style>
 text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }
-text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600; } text.muted { fill: #5b6676; }
-.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; } .grid { fill: none; stroke: #e8ecf1; }
+text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600;
+  } text.muted { fill: #5b6676; }
+.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; }
+.grid { fill: none; stroke: #e8ecf1; }
 .truth { fill: none; stroke: #1b2330; stroke-width: 1.2; stroke-dasharray: 4 3; }
 .line { stroke-width: 1.8; } .area { stroke: none; fill-opacity: 0.18; }
 .squared.line { fill: none; stroke: #b3261e; } .squared.area { fill: #b3261e; }
@@ -166,14 +176,17 @@ text.tick { font-size: 11px; fill: #5b6676; } text.name { font-weight: 600; } te
 std::string Draw(const VectorXd& grid, const std::vector<Shown>& curves) {
   constexpr double kWidth = 640, kLeft = 70, kRight = 626, kTop = 64, kHeight = 110, kGap = 40;
   const double height = kTop + static_cast<double>(curves.size()) * (kHeight + kGap) + 4;
-  Svg svg(kWidth, height, "densities over simulators that three methods find for a robot that is two");
+  Svg svg(kWidth, height,
+          "densities over simulators that three methods find for a robot that is two");
   svg.Rectangle(0, 0, kWidth, height, "paper");
   const Axis x(grid(0), grid(grid.size() - 1), kLeft, kRight);
   svg.Line(kLeft, 20, kLeft + 26, 20, "truth");
-  svg.Text(kLeft + 33, 24,
-           fmt::format("the robot: light, ξ = -1, in {:.0f} % of the transitions, heavy, ξ = 1, in {:.0f} %",
-                       100 * (1 - kHeavyShare), 100 * kHeavyShare),
-           "label", Svg::Anchor::kStart);
+  svg.Text(
+      kLeft + 33, 24,
+      fmt::format(
+          "the robot: light, ξ = -1, in {:.0f} % of the transitions, heavy, ξ = 1, in {:.0f} %",
+          100 * (1 - kHeavyShare), 100 * kHeavyShare),
+      "label", Svg::Anchor::kStart);
   for (size_t i = 0; i < curves.size(); ++i) {
     const Shown& curve = curves[i];
     const double top = kTop + static_cast<double>(i) * (kHeight + kGap), bottom = top + kHeight;
@@ -183,9 +196,11 @@ std::string Draw(const VectorXd& grid, const std::vector<Shown>& curves) {
     for (const Axis::Tick& tick : x.Ticks(8)) {
       svg.Line(x.Pixel(tick.value), bottom, x.Pixel(tick.value), top, "grid");
     }
-    for (const double mode : {kLight, kHeavy}) svg.Line(x.Pixel(mode), bottom, x.Pixel(mode), top, "truth");
+    for (const double mode : {kLight, kHeavy})
+      svg.Line(x.Pixel(mode), bottom, x.Pixel(mode), top, "truth");
     std::vector<Vector2d> points;
-    for (Index k = 0; k < grid.size(); ++k) points.emplace_back(x.Pixel(grid(k)), y.Pixel(curve.density(k)));
+    for (Index k = 0; k < grid.size(); ++k)
+      points.emplace_back(x.Pixel(grid(k)), y.Pixel(curve.density(k)));
     svg.Path(points, curve.css + " line");
     points.emplace_back(kRight, bottom);
     points.emplace_back(kLeft, bottom);
@@ -199,14 +214,17 @@ std::string Draw(const VectorXd& grid, const std::vector<Shown>& curves) {
 }
 
 // A method's rows: what it found, as a density, and in numbers that all rows repeat.
-Results::Rows Tabulate(const VectorXd& grid, const std::function<double(double)>& density, double light, double heavy, double mean, double sd) {
+Results::Rows Tabulate(const VectorXd& grid, const std::function<double(double)>& density,
+                       double light, double heavy, double mean, double sd) {
   Results::Rows rows;
   for (const double x : grid) rows.push_back({x, density(x), light, heavy, mean, sd});
   return rows;
 }
 
 Results::Rows Tabulate(const VectorXd& grid, const Found& found) {
-  return Tabulate(grid, [&](double x) { return found.Density(x); }, found.Near(kLight), found.Near(kHeavy), found.mean(), found.sd());
+  return Tabulate(
+      grid, [&](double x) { return found.Density(x); }, found.Near(kLight), found.Near(kHeavy),
+      found.mean(), found.sd());
 }
 
 Results::Rows Tabulate(const VectorXd& grid, const Gaussian& found) {
@@ -215,7 +233,8 @@ Results::Rows Tabulate(const VectorXd& grid, const Gaussian& found) {
   const Found line{VectorXd::Constant(1, mean), VectorXd::Ones(1), std::hypot(sd, 0.03)};
   const auto below = [&](double x) { return 0.5 * std::erfc((mean - x) / (sd * M_SQRT2)); };
   const auto near = [&](double mode) { return below(mode + kNear) - below(mode - kNear); };
-  return Tabulate(grid, [&](double x) { return line.Density(x); }, near(kLight), near(kHeavy), mean, sd);
+  return Tabulate(
+      grid, [&](double x) { return line.Density(x); }, near(kLight), near(kHeavy), mean, sd);
 }
 
 std::string Percent(double light, double heavy) {
@@ -225,12 +244,16 @@ std::string Percent(double light, double heavy) {
 int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t seed, bool quick) {
   const std::vector<Transition> transitions = Record(quick ? 20 : 400, seed);
   const VectorXd grid = VectorXd::LinSpaced(321, -2, 2);
-  Results results(output / "figure_1.csv", fmt::format("seed {}{}", seed, quick ? ", quick" : ""), {"method"},
-                  {"xi", "density", "near_light", "near_heavy", "mean", "sd"});
+  Results results(output / "figure_1.csv", fmt::format("seed {}{}", seed, quick ? ", quick" : ""),
+                  {"method"}, {"xi", "density", "near_light", "near_heavy", "mean", "sd"});
   const std::vector<Job> jobs = {
-      {"squared_error", 1, [&](const auto&) { return Tabulate(grid, BySquaredError(transitions, seed)); }},
-      {"population", 1, [&](const auto&) { return Tabulate(grid, AsPopulation(transitions, seed)); }},
-      {"mixture", 100, [&](const auto& progress) { return Tabulate(grid, ByConditionalMixture(transitions, seed, progress)); }}};
+      {"squared_error", 1,
+       [&](const auto&) { return Tabulate(grid, BySquaredError(transitions, seed)); }},
+      {"population", 1,
+       [&](const auto&) { return Tabulate(grid, AsPopulation(transitions, seed)); }},
+      {"mixture", 100, [&](const auto& progress) {
+         return Tabulate(grid, ByConditionalMixture(transitions, seed, progress));
+       }}};
   if (!RunJobs(process, jobs, results)) return 130;
 
   std::vector<Shown> curves = {{"squared error, Gaussian search", "squared", {}, grid},
@@ -238,17 +261,21 @@ int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t s
                                {"mixture, transition by transition", "mixture", {}, grid}};
   for (size_t i = 0; i < curves.size(); ++i) {
     const Results::Rows& rows = results.Of(jobs[i].key);
-    curves[i].words = fmt::format("within {} of the two: {}", kNear, Percent(rows[0][2], rows[0][3]));
+    curves[i].words =
+        fmt::format("within {} of the two: {}", kNear, Percent(rows[0][2], rows[0][3]));
     for (Index k = 0; k < grid.size(); ++k) curves[i].density(k) = rows[static_cast<size_t>(k)][1];
   }
   WriteAtomically(output / "figure_1.svg", Draw(grid, curves));
   const auto& squared = results.Of("squared_error")[0];
-  const auto percent = [&](const char* method) { return Percent(results.Of(method)[0][2], results.Of(method)[0][3]); };
+  const auto percent = [&](const char* method) {
+    return Percent(results.Of(method)[0][2], results.Of(method)[0][3]);
+  };
   std::cout << fmt::format(
-      "within {} of the light and of the heavy payload, which the robot has in {} of {} transitions: squared error {} (it is at {:.2f} ± {:.1g}), "
+      "within {} of the light and of the heavy payload, which the robot has in {} of {} "
+      "transitions: squared error {} (it is at {:.2f} ± {:.1g}), "
       "energy distance {}, mixture {}\n",
-      kNear, Percent(1 - kHeavyShare, kHeavyShare), transitions.size(), percent("squared_error"), squared[4], squared[5], percent("population"),
-      percent("mixture"));
+      kNear, Percent(1 - kHeavyShare, kHeavyShare), transitions.size(), percent("squared_error"),
+      squared[4], squared[5], percent("population"), percent("mixture"));
   return 0;
 }
 
@@ -260,10 +287,12 @@ int main(int argc, char** argv) {
   uint64_t seed = 1;
   bool quick = false;
   return plumb::Run(
-      "plumb-figure-1", "Which simulators three methods find for a robot whose payload is light or heavy.",
-      argc, argv,
+      "plumb-figure-1",
+      "Which simulators three methods find for a robot whose payload is light or heavy.", argc,
+      argv,
       [&](CLI::App& app) {
-        app.add_option("--output", output, "folder for figure_1.csv and figure_1.svg")->capture_default_str();
+        app.add_option("--output", output, "folder for figure_1.csv and figure_1.svg")
+            ->capture_default_str();
         app.add_option("--seed", seed, "of all random numbers")->capture_default_str();
         app.add_flag("--quick", quick, "a twentieth of the transitions, in a second");
       },

@@ -1,13 +1,16 @@
-// Figure 2: how far calibrated simulators are from the "real" robot after n steps, step-based against original SimOpt.
+// Figure 2: how far calibrated simulators are from the "real" robot after n steps, step-based
+// against original SimOpt.
 //
-// For each run the robot is the simulator itself (gym's Pendulum and Hopper) with parameters drawn anew, its states read with noise. A policy
-// trained on the prior moves it. The two SimOpts see the same roll-outs, one an iteration, and simulate the same number of steps: 25 simulators,
-// one update an iteration. Plumbline's default gets as many transitions of the same roll-outs as it can fit within the same number of
-// simulated steps, and within a hundredth of it. Other roll-outs of the same policy judge.
+// For each run the robot is the simulator itself (gym's Pendulum and Hopper) with parameters drawn
+// anew, its states read with noise. A policy trained on the prior moves it. The two SimOpts see the
+// same roll-outs, one an iteration, and simulate the same number of steps: 25 simulators, one
+// update an iteration. Plumbline's default gets as many transitions of the same roll-outs as it can
+// fit within the same number of simulated steps, and within a hundredth of it. Other roll-outs of
+// the same policy judge.
 //
 //   plumb-figure-2 robots --output figure_2
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <filesystem>
 #include <iostream>
@@ -30,11 +33,12 @@ struct Method {
   Way way;
   int64_t share;  // of the budget: one so-manieth
 };
-const std::vector<Method> kMethods{{"original", Label(Way::kOriginal), Way::kOriginal, 1},
-                                   {"step", Label(Way::kStep), Way::kStep, 1},
-                                   {"default", Label(Way::kDefault) + ", same budget", Way::kDefault, 1},
-                                   {"default-100", Label(Way::kDefault) + ", a hundredth", Way::kDefault, 100},
-                                   {"prior", "the prior", Way::kPrior, 1}};
+const std::vector<Method> kMethods{
+    {"original", Label(Way::kOriginal), Way::kOriginal, 1},
+    {"step", Label(Way::kStep), Way::kStep, 1},
+    {"default", Label(Way::kDefault) + ", same budget", Way::kDefault, 1},
+    {"default-100", Label(Way::kDefault) + ", a hundredth", Way::kDefault, 100},
+    {"prior", "the prior", Way::kPrior, 1}};
 
 struct Options {
   std::string robots, output = ".";
@@ -44,7 +48,9 @@ struct Options {
   bool quick = false;
 };
 
-std::string KeyOf(const PaperTask& task, const Method& method, int run) { return fmt::format("{},{},{}", task.name, method.key, run); }
+std::string KeyOf(const PaperTask& task, const Method& method, int run) {
+  return fmt::format("{},{},{}", task.name, method.key, run);
+}
 
 // What a run's methods have in common.
 struct Remembered {
@@ -53,21 +59,26 @@ struct Remembered {
   int64_t budget = 0;  // simulated steps
 };
 
-Remembered RecordRun(const Options& options, const PaperTask& task, int run, const std::function<void(double)>& progress) {
+Remembered RecordRun(const Options& options, const PaperTask& task, int run,
+                     const std::function<void(double)>& progress) {
   const int updates = options.quick ? 40 : task.first_updates;
-  const RecordingSettings settings{updates, options.iterations, options.noise, options.hidden, static_cast<uint64_t>(run), options.threads};
-  Remembered remembered{fmt::format("{} {}", task.name, run), Record(LoadTask(options.robots, task), settings, progress)};
+  const RecordingSettings settings{updates,        options.iterations,         options.noise,
+                                   options.hidden, static_cast<uint64_t>(run), options.threads};
+  Remembered remembered{fmt::format("{} {}", task.name, run),
+                        Record(LoadTask(options.robots, task), settings, progress)};
   remembered.budget = 25 * static_cast<int64_t>(CountTransitions(remembered.recording.seen));
   return remembered;
 }
 
-Results::Rows Measure(const Options& options, const Remembered& remembered, const Method& method, int run) {
+Results::Rows Measure(const Options& options, const Remembered& remembered, const Method& method,
+                      int run) {
   const auto seed = static_cast<uint64_t>(run);
   const RobotDescription& robot = remembered.recording.robot;
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   int64_t simulated = 0;
   if (method.way == Way::kDefault) {
-    const BudgetedFit fit = FitWithin(robot, remembered.recording.seen, remembered.budget / method.share, seed, options.threads);
+    const BudgetedFit fit = FitWithin(robot, remembered.recording.seen,
+                                      remembered.budget / method.share, seed, options.threads);
     distribution = fit.distribution, simulated = fit.simulated_steps;
   } else if (Learns(method.way)) {
     const auto simopt = MakeSimOpt(method.way, robot, seed, options.threads);
@@ -77,9 +88,11 @@ Results::Rows Measure(const Options& options, const Remembered& remembered, cons
     }
     distribution = DistributionOf(*simopt, robot), simulated = remembered.budget;
   }
-  const Eigen::VectorXd errors = NStepErrors(robot, distribution, remembered.recording.held_out, kHorizon, kSimulators, 10, seed);
+  const Eigen::VectorXd errors = NStepErrors(robot, distribution, remembered.recording.held_out,
+                                             kHorizon, kSimulators, 10, seed);
   Results::Rows rows;
-  for (int n = 1; n <= kHorizon; ++n) rows.push_back({static_cast<double>(n), errors(n - 1), static_cast<double>(simulated)});
+  for (int n = 1; n <= kHorizon; ++n)
+    rows.push_back({static_cast<double>(n), errors(n - 1), static_cast<double>(simulated)});
   return rows;
 }
 
@@ -89,9 +102,11 @@ Panel Draw(const Options& options, const PaperTask& task, const Results& results
     Curve curve{method.label, {}, {}, {}, {}};
     for (size_t n = 0; n < kHorizon; ++n) {
       std::vector<double> errors;
-      for (int run = 1; run <= options.runs; ++run) errors.push_back(results.Of(KeyOf(task, method, run))[n][1]);
+      for (int run = 1; run <= options.runs; ++run)
+        errors.push_back(results.Of(KeyOf(task, method, run))[n][1]);
       const Band band = ConfidenceBand(errors, true);
-      curve.x.push_back(static_cast<double>(n + 1)), curve.middle.push_back(band.middle), curve.low.push_back(band.low), curve.high.push_back(band.high);
+      curve.x.push_back(static_cast<double>(n + 1)), curve.middle.push_back(band.middle),
+          curve.low.push_back(band.low), curve.high.push_back(band.high);
     }
     panel.curves.push_back(std::move(curve));
   }
@@ -109,33 +124,42 @@ std::string Below(const Panel& panel, size_t first, size_t second) {
   return fmt::format("at {} of n = 1 ... {}, bands apart at {}", below, kJudged, apart);
 }
 
-std::string Sentence(const Options& options, const PaperTask& task, const Panel& panel, const Results& results) {
-  std::string text = fmt::format("{}, {} runs, error after 1, 10, 20, 50 steps, simulated steps:", task.name, options.runs);
+std::string Sentence(const Options& options, const PaperTask& task, const Panel& panel,
+                     const Results& results) {
+  std::string text = fmt::format(
+      "{}, {} runs, error after 1, 10, 20, 50 steps, simulated steps:", task.name, options.runs);
   for (size_t m = 0; m < kMethods.size(); ++m) {
     double simulated = 0;
-    for (int run = 1; run <= options.runs; ++run) simulated += results.Of(KeyOf(task, kMethods[m], run))[0][2] / options.runs;
+    for (int run = 1; run <= options.runs; ++run)
+      simulated += results.Of(KeyOf(task, kMethods[m], run))[0][2] / options.runs;
     const auto& middle = panel.curves[m].middle;
-    text += fmt::format("\n  {:<42}{:10.2g}{:10.2g}{:10.2g}{:10.2g}{:12.0f}", kMethods[m].label, middle[0], middle[9], middle[19], middle[49], simulated);
+    text += fmt::format("\n  {:<42}{:10.2g}{:10.2g}{:10.2g}{:10.2g}{:12.0f}", kMethods[m].label,
+                        middle[0], middle[9], middle[19], middle[49], simulated);
   }
-  text += fmt::format("\n  step-based below original {}; default with a hundredth below step-based {}, below original {}", Below(panel, 1, 0),
-                      Below(panel, 3, 1), Below(panel, 3, 0));
+  text += fmt::format(
+      "\n  step-based below original {}; default with a hundredth below step-based {}, below "
+      "original {}",
+      Below(panel, 1, 0), Below(panel, 3, 1), Below(panel, 3, 0));
   return text;
 }
 
 std::string SettingsOf(const Options& options) {
-  return fmt::format("iterations {}, noise {}, hidden {}{}", options.iterations, options.noise, Key(options.hidden), options.quick ? ", quick" : "");
+  return fmt::format("iterations {}, noise {}, hidden {}{}", options.iterations, options.noise,
+                     Key(options.hidden), options.quick ? ", quick" : "");
 }
 
 int MakeFigure(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
-  Results results(folder / "figure_2.csv", SettingsOf(options), {"task", "method", "run"}, {"n", "error", "simulated_steps"});
+  Results results(folder / "figure_2.csv", SettingsOf(options), {"task", "method", "run"},
+                  {"n", "error", "simulated_steps"});
   std::vector<Job> jobs;
   Remembered remembered;
   for (const PaperTask& task : kPaperTasks) {
     for (int run = 1; run <= options.runs; ++run) {
       for (const Method& method : kMethods) {
         jobs.push_back({KeyOf(task, method, run), 1, [&, run](const auto& progress) {
-                          if (remembered.of != fmt::format("{} {}", task.name, run)) remembered = RecordRun(options, task, run, progress);
+                          if (remembered.of != fmt::format("{} {}", task.name, run))
+                            remembered = RecordRun(options, task, run, progress);
                           return Measure(options, remembered, method, run);
                         }});
       }
@@ -147,8 +171,11 @@ int MakeFigure(Process& process, const Options& options) {
     panels.push_back(Draw(options, task, results));
     std::cout << Sentence(options, task, panels.back(), results) << "\n";
   }
-  WriteAtomically(folder / "figure_2.svg",
-                  DrawCurves(fmt::format("error of simulators after n steps, mean of {} runs and its 95 % band", options.runs), panels));
+  WriteAtomically(
+      folder / "figure_2.svg",
+      DrawCurves(fmt::format("error of simulators after n steps, mean of {} runs and its 95 % band",
+                             options.runs),
+                 panels));
   return 0;
 }
 
@@ -158,18 +185,28 @@ int MakeFigure(Process& process, const Options& options) {
 int main(int argc, char** argv) {
   plumb::Options options;
   return plumb::Run(
-      "plumb-figure-2", "How far calibrated simulators are from a robot after n steps, by each way of calibrating.", argc, argv,
+      "plumb-figure-2",
+      "How far calibrated simulators are from a robot after n steps, by each way of calibrating.",
+      argc, argv,
       [&](CLI::App& app) {
         app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output, "folder for figure_2.csv and figure_2.svg")->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
-        app.add_option("--iterations", options.iterations, "roll-outs, and updates of both SimOpts")->check(CLI::Range(1, 1000))->capture_default_str();
+        app.add_option("--output", options.output, "folder for figure_2.csv and figure_2.svg")
+            ->capture_default_str();
+        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
+            ->check(CLI::Range(1, 1000))
+            ->capture_default_str();
+        app.add_option("--iterations", options.iterations, "roll-outs, and updates of both SimOpts")
+            ->check(CLI::Range(1, 1000))
+            ->capture_default_str();
         app.add_option("--noise", options.noise, "of the readings: a factor; the paper's are exact")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();
         plumb::AddHiddenFlag(app, options.hidden);
-        app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick, "a policy that has hardly been trained: looks whether it runs");
+        app.add_option("--threads", options.threads,
+                       "0 = one per core; the result does not depend on it")
+            ->check(CLI::Range(0, 1024));
+        app.add_flag("--quick", options.quick,
+                     "a policy that has hardly been trained: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::MakeFigure(process, options); });
 }

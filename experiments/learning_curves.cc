@@ -2,10 +2,11 @@
 //
 //   plumb-learning-curves robots/hopper/gym.toml --steps 1e6 --output curves
 //
-// A seed that the table already has is not run again: an interrupted experiment goes on with the others.
-#include <CLI/CLI.hpp>
+// A seed that the table already has is not run again: an interrupted experiment goes on with the
+// others.
 #include <fmt/format.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -49,24 +50,29 @@ struct Curve {
 
   double Smoothed(size_t i) const {
     const size_t first = i + 1 < kSmoothed ? 0 : i + 1 - kSmoothed;
-    return std::accumulate(returns.begin() + static_cast<ptrdiff_t>(first), returns.begin() + static_cast<ptrdiff_t>(i) + 1, 0.) /
+    return std::accumulate(returns.begin() + static_cast<ptrdiff_t>(first),
+                           returns.begin() + static_cast<ptrdiff_t>(i) + 1, 0.) /
            static_cast<double>(i + 1 - first);
   }
   double last() const {
     const size_t count = std::min<size_t>(kLastBatches, returns.size());
-    return std::accumulate(returns.end() - static_cast<ptrdiff_t>(count), returns.end(), 0.) / static_cast<double>(count);
+    return std::accumulate(returns.end() - static_cast<ptrdiff_t>(count), returns.end(), 0.) /
+           static_cast<double>(count);
   }
-  /// The first number of steps at which the smoothed return is at least that; infinite if it never is.
+  /// The first number of steps at which the smoothed return is at least that; infinite if it never
+  /// is.
   double Reached(double threshold) const {
     for (size_t i = kSmoothed - 1; i < returns.size(); ++i) {
       if (Smoothed(i) >= threshold) return steps[i];
     }
     return std::numeric_limits<double>::infinity();
   }
-  /// Smoothed return at some number of steps, interpolated; NaN before the first and after the last.
+  /// Smoothed return at some number of steps, interpolated; NaN before the first and after the
+  /// last.
   double At(double step) const {
     const auto above = std::lower_bound(steps.begin(), steps.end(), step);
-    if (above == steps.begin() || above == steps.end()) return std::numeric_limits<double>::quiet_NaN();
+    if (above == steps.begin() || above == steps.end())
+      return std::numeric_limits<double>::quiet_NaN();
     const auto i = static_cast<size_t>(above - steps.begin());
     const double share = (step - steps[i - 1]) / (steps[i] - steps[i - 1]);
     return (1 - share) * Smoothed(i - 1) + share * Smoothed(i);
@@ -83,7 +89,9 @@ std::map<int, Curve> ReadTable(const std::filesystem::path& file) {
     const char* next = line.c_str();
     for (char* end; fields.size() < 5; next = *end == ',' ? end + 1 : end) {
       fields.push_back(std::strtod(next, &end));
-      if (end == next) throw std::runtime_error(file.string() + ": not a table of mine: delete it, or give another --output");
+      if (end == next)
+        throw std::runtime_error(file.string() +
+                                 ": not a table of mine: delete it, or give another --output");
     }
     Curve& curve = curves[static_cast<int>(fields[0])];
     curve.steps.push_back(fields[1]), curve.returns.push_back(fields[2]);
@@ -97,7 +105,8 @@ std::string Print(const std::map<int, Curve>& curves) {
   for (const auto& [seed, curve] : curves) {
     for (size_t i = 0; i < curve.steps.size(); ++i) {
       const bool last = i + 1 == curve.steps.size();
-      text += fmt::format("{},{:.0f},{:.6g},{},{}\n", seed, curve.steps[i], curve.returns[i], last ? fmt::format("{:.6g}", curve.evaluation) : "nan",
+      text += fmt::format("{},{:.0f},{:.6g},{},{}\n", seed, curve.steps[i], curve.returns[i],
+                          last ? fmt::format("{:.6g}", curve.evaluation) : "nan",
                           last ? fmt::format("{:.2f}", curve.seconds) : "nan");
     }
   }
@@ -105,8 +114,10 @@ std::string Print(const std::map<int, Curve>& curves) {
 }
 
 /// @return an incomplete curve if the process was asked to stop.
-Curve Train(const RobotDescription& robot, const ParameterDistribution& distribution, int64_t steps, int seed, int threads, Process& process) {
-  Trainer trainer(robot.training, SimulateRobot(robot), robot.effort_limits(), static_cast<uint64_t>(seed), threads);
+Curve Train(const RobotDescription& robot, const ParameterDistribution& distribution, int64_t steps,
+            int seed, int threads, Process& process) {
+  Trainer trainer(robot.training, SimulateRobot(robot), robot.effort_limits(),
+                  static_cast<uint64_t>(seed), threads);
   const ParameterSampler sample = [&](Random& random) { return distribution.Sample(random); };
   const auto start = std::chrono::steady_clock::now();
   Curve curve;
@@ -114,7 +125,11 @@ Curve Train(const RobotDescription& robot, const ParameterDistribution& distribu
     curve.returns.push_back(trainer.Update(sample).mean_return);
     curve.steps.push_back(static_cast<double>(trainer.steps()));
     if (trainer.updates() % 25 == 0 && isatty(STDERR_FILENO)) {
-      std::cerr << fmt::format("\r\033[Kseed {}: {:.0f} %, return {:.5g}", seed, 100. * static_cast<double>(trainer.steps()) / static_cast<double>(steps), curve.returns.back()) << std::flush;
+      std::cerr << fmt::format(
+                       "\r\033[Kseed {}: {:.0f} %, return {:.5g}", seed,
+                       100. * static_cast<double>(trainer.steps()) / static_cast<double>(steps),
+                       curve.returns.back())
+                << std::flush;
     }
   }
   if (isatty(STDERR_FILENO)) std::cerr << "\r\033[K" << std::flush;
@@ -126,8 +141,10 @@ Curve Train(const RobotDescription& robot, const ParameterDistribution& distribu
 constexpr char kStyle[] = R"(<style>
 text { font: 12px system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #1b2330; }
 text.tick { font-size: 11px; fill: #5b6676; } text.muted { fill: #5b6676; }
-.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; } .grid { fill: none; stroke: #e8ecf1; }
-.band { fill: #1f5fbf; fill-opacity: 0.14; stroke: none; } .seed { fill: none; stroke: #1f5fbf; stroke-opacity: 0.35; }
+.paper { fill: #ffffff; } .frame { fill: none; stroke: #d8dee6; }
+.grid { fill: none; stroke: #e8ecf1; }
+.band { fill: #1f5fbf; fill-opacity: 0.14; stroke: none; }
+.seed { fill: none; stroke: #1f5fbf; stroke-opacity: 0.35; }
 .mean { fill: none; stroke: #1f5fbf; stroke-width: 2.2; }
 </style>
 )";
@@ -144,13 +161,16 @@ std::string Draw(const std::map<int, Curve>& curves, double steps, const std::st
       sum += value, least = std::min(least, value), most = std::max(most, value);
     }
     if (!std::isfinite(sum)) continue;
-    grid.push_back(at), low.push_back(least), high.push_back(most), mean.push_back(sum / static_cast<double>(curves.size()));
+    grid.push_back(at), low.push_back(least), high.push_back(most),
+        mean.push_back(sum / static_cast<double>(curves.size()));
   }
   if (grid.empty()) return {};
   Svg svg(kWidth, kHeight, title);
   svg.Rectangle(0, 0, kWidth, kHeight, "paper");
   svg.Text(kLeft, 20, title, "label", Svg::Anchor::kStart);
-  const Axis x(0, steps, kLeft, kRight), y(std::min(0., *std::min_element(low.begin(), low.end())), std::max(0., *std::max_element(high.begin(), high.end())), kBottom, kTop);
+  const Axis x(0, steps, kLeft, kRight),
+      y(std::min(0., *std::min_element(low.begin(), low.end())),
+        std::max(0., *std::max_element(high.begin(), high.end())), kBottom, kTop);
   svg.Frame(x, y, "simulated steps", "return", 6, 6);
   std::vector<Vector2d> band, line;
   for (size_t i = 0; i < grid.size(); ++i) band.emplace_back(x.Pixel(grid[i]), y.Pixel(high[i]));
@@ -170,7 +190,8 @@ std::string Draw(const std::map<int, Curve>& curves, double steps, const std::st
 template <class F>
 std::string Each(const std::map<int, Curve>& curves, const std::string& format, F&& value) {
   std::string text;
-  for (const auto& [seed, curve] : curves) text += (text.empty() ? "" : " ") + fmt::format(fmt::runtime(format), value(curve));
+  for (const auto& [seed, curve] : curves)
+    text += (text.empty() ? "" : " ") + fmt::format(fmt::runtime(format), value(curve));
   return text;
 }
 
@@ -179,7 +200,8 @@ int RunSeeds(Process& process, const Options& options) {
   if (options.paper) robot.training = AsThePaper(robot.training);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   if (options.distribution == "nominal") distribution.components[0].covariance.setZero();
-  const auto steps = options.steps > 0 ? static_cast<int64_t>(options.steps) : int64_t{robot.training.updates} * robot.training.batch;
+  const auto steps = options.steps > 0 ? static_cast<int64_t>(options.steps)
+                                       : int64_t{robot.training.updates} * robot.training.batch;
 
   const std::filesystem::path folder = options.output, table = folder / "learning_curves.csv";
   std::filesystem::create_directories(folder);
@@ -191,19 +213,28 @@ int RunSeeds(Process& process, const Options& options) {
     curves[seed] = std::move(curve);
     WriteAtomically(table, Print(curves));
   }
-  const std::string title = fmt::format("{}, {} simulators, {} seeds{}: mean return of a batch, band from the worst to the best seed", robot.name,
-                                        options.distribution, curves.size(), options.paper ? ", the paper's settings" : "");
+  const std::string title = fmt::format(
+      "{}, {} simulators, {} seeds{}: mean return of a batch, band from the worst to the best seed",
+      robot.name, options.distribution, curves.size(),
+      options.paper ? ", the paper's settings" : "");
   WriteAtomically(folder / "learning_curves.svg", Draw(curves, static_cast<double>(steps), title));
 
   double mean = 0;
-  for (const auto& [seed, curve] : curves) mean += curve.evaluation / static_cast<double>(curves.size());
-  std::cout << fmt::format("{}, {} steps, {} seeds: return without exploration {:.0f} (each {}); of the last {} batches {}", robot.name, steps,
-                           curves.size(), mean, Each(curves, "{:.0f}", [](const Curve& c) { return c.evaluation; }), kLastBatches,
-                           Each(curves, "{:.0f}", [](const Curve& c) { return c.last(); }));
+  for (const auto& [seed, curve] : curves)
+    mean += curve.evaluation / static_cast<double>(curves.size());
+  std::cout << fmt::format(
+      "{}, {} steps, {} seeds: return without exploration {:.0f} (each {}); of the last {} batches "
+      "{}",
+      robot.name, steps, curves.size(), mean,
+      Each(curves, "{:.0f}", [](const Curve& c) { return c.evaluation; }), kLastBatches,
+      Each(curves, "{:.0f}", [](const Curve& c) { return c.last(); }));
   if (std::isfinite(options.threshold)) {
-    std::cout << fmt::format("; {} reached after {} steps", options.threshold, Each(curves, "{:.0f}", [&](const Curve& c) { return c.Reached(options.threshold); }));
+    std::cout << fmt::format(
+        "; {} reached after {} steps", options.threshold,
+        Each(curves, "{:.0f}", [&](const Curve& c) { return c.Reached(options.threshold); }));
   }
-  std::cout << fmt::format("; {} s\n", Each(curves, "{:.1f}", [](const Curve& c) { return c.seconds; }));
+  std::cout << fmt::format("; {} s\n",
+                           Each(curves, "{:.1f}", [](const Curve& c) { return c.seconds; }));
   return 0;
 }
 
@@ -216,12 +247,23 @@ int main(int argc, char** argv) {
       "plumb-learning-curves", "How training goes, over several seeds.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", options.robot, "robot folder or TOML file")->required();
-        app.add_option("--output", options.output, "folder for learning_curves.csv and learning_curves.svg")->capture_default_str();
-        app.add_option("--seeds", options.seeds, "how many, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
-        app.add_option("--steps", options.steps, "to simulate; default: updates x batch of robot.toml")->check(CLI::Range(1.0, 1e15));
-        app.add_option("--distribution", options.distribution, "of simulators")->check(CLI::IsMember({"nominal", "prior"}))->capture_default_str();
-        app.add_option("--threshold", options.threshold, "return to say when it is reached, over 5 batches");
-        app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
+        app.add_option("--output", options.output,
+                       "folder for learning_curves.csv and learning_curves.svg")
+            ->capture_default_str();
+        app.add_option("--seeds", options.seeds, "how many, from 1")
+            ->check(CLI::Range(1, 1000))
+            ->capture_default_str();
+        app.add_option("--steps", options.steps,
+                       "to simulate; default: updates x batch of robot.toml")
+            ->check(CLI::Range(1.0, 1e15));
+        app.add_option("--distribution", options.distribution, "of simulators")
+            ->check(CLI::IsMember({"nominal", "prior"}))
+            ->capture_default_str();
+        app.add_option("--threshold", options.threshold,
+                       "return to say when it is reached, over 5 batches");
+        app.add_option("--threads", options.threads,
+                       "0 = one per core; the result does not depend on it")
+            ->check(CLI::Range(0, 1024));
         app.add_flag("--paper", options.paper, "the paper's settings");
       },
       [&](plumb::Process& process) { return plumb::RunSeeds(process, options); });

@@ -17,9 +17,12 @@ namespace plumb {
 struct LoopSettings {
   Way way = Way::kDefault;
   int iterations = 5;
-  int steps_per_iteration = 750;  ///< of the robot, at most; episodes follow each other until there are as many
-  int first_updates = 0, next_updates = 0;  ///< TRPO updates of the first policy and of each later one
-  int evaluation_episodes = 20;   ///< on the robot, without exploration: they judge, and nobody learns from them
+  /// of the robot, at most; episodes follow each other until there are as many
+  int steps_per_iteration = 750;
+  /// TRPO updates of the first policy and of each later one
+  int first_updates = 0, next_updates = 0;
+  /// on the robot, without exploration: they judge, and nobody learns from them
+  int evaluation_episodes = 20;
   uint64_t seed = 1;
   int threads = 0;
 };
@@ -27,12 +30,12 @@ struct LoopSettings {
 /// Iteration 0 is the policy before the robot has been used.
 struct LoopRow {
   int iteration;
-  double robot_return;      ///< mean without exploration
-  double simulated_return;  ///< the same on simulators of the distribution that it was trained on
-  double discrepancy;       ///< see CalibrationReport; NaN where nothing is learnt
-  int64_t transitions;      ///< of the robot so far
-  double robot_seconds;     ///< likewise
-  Eigen::VectorXd mean, sd; ///< of the parameters, physical units
+  double robot_return;       ///< mean without exploration
+  double simulated_return;   ///< the same on simulators of the distribution that it was trained on
+  double discrepancy;        ///< see CalibrationReport; NaN where nothing is learnt
+  int64_t transitions;       ///< of the robot so far
+  double robot_seconds;      ///< likewise
+  Eigen::VectorXd mean, sd;  ///< of the parameters, physical units
 };
 
 struct LoopResult {
@@ -40,20 +43,27 @@ struct LoopResult {
   std::vector<Rollout> rollouts;  ///< that were calibrated with
 };
 
-/// Trains policies, one way after the other. The first policy of a distribution is trained once for all ways that begin with it.
+/// Trains policies, one way after the other. The first policy of a distribution is trained once for
+/// all ways that begin with it.
 class Loop {
  public:
-  /// @param model what is calibrated and trained in. @param truth physical units, for the oracle; empty if there is none.
+  /// @param model what is calibrated and trained in. @param truth physical units, for the oracle;
+  /// empty if there is none.
   Loop(RobotDescription model, Eigen::VectorXd truth);
 
-  /// @param real used for roll-outs and judgement. @param progress told the share that is done; may throw to break off.
-  LoopResult Run(RealSystem& real, const LoopSettings& settings, const std::function<void(double)>& progress);
+  /// @param real used for roll-outs and judgement. @param progress told the share that is done; may
+  /// throw to break off.
+  LoopResult Run(RealSystem& real, const LoopSettings& settings,
+                 const std::function<void(double)>& progress);
 
   /// Return without exploration, mean of some episodes.
   static double Judge(RealSystem& real, const GaussianPolicy& policy, int steps, int episodes);
 
-  /// A trainer that has made so many updates on a distribution; from the one that made them before, if any.
-  std::unique_ptr<Trainer> TrainFirst(const std::string& name, const ParameterDistribution& distribution, const LoopSettings& settings,
+  /// A trainer that has made so many updates on a distribution; from the one that made them before,
+  /// if any.
+  std::unique_ptr<Trainer> TrainFirst(const std::string& name,
+                                      const ParameterDistribution& distribution,
+                                      const LoopSettings& settings,
                                       const std::function<void(double)>& progress);
 
   const RobotDescription& model() const { return model_; }

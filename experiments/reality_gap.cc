@@ -1,14 +1,16 @@
 // A gap that is really there: the robot is none of the simulators, whatever their parameters.
 //
 //   hopper    MuJoCo's Hopper, with its own contact, stops and integrator
-//   pendulum  Simbody's pendulum, with Coulomb friction, delay and backlash that the model does not have
+//   pendulum  Simbody's pendulum, with Coulomb friction, delay and backlash that the model does not
+//             have
 //
-// Both are behind a CAN bus, with driver, observer and controller, in virtual time. Who still transfers, does the alarm speak, and does it help
-// to let the engine fit friction, delay and contact?
+// Both are behind a CAN bus, with driver, observer and controller, in virtual time. Who still
+// transfers, does the alarm speak, and does it help to let the engine fit friction, delay and
+// contact?
 //
 //   plumb-reality-gap robots --output reality_gap
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <array>
 #include <cmath>
@@ -31,10 +33,13 @@ constexpr double kRobotSeconds = 6;  // of an iteration
 
 struct Gap {
   const char *name, *title;
-  const char *truth, *model, *fitted;  // files below robots/: what is there, what is believed, what is believed with more to fit
+  // files below robots/: what is there, what is believed, what is believed with more to fit
+  const char *truth, *model, *fitted;
 };
-constexpr Gap kGaps[] = {{"pendulum", "worn pendulum", "pendulum/worn.toml", "pendulum/robot.toml", "pendulum/worn_fitted.toml"},
-                         {"hopper", "MuJoCo's hopper", "hopper/mujoco.toml", "hopper/robot.toml", "hopper/mujoco_fitted.toml"}};
+constexpr Gap kGaps[] = {{"pendulum", "worn pendulum", "pendulum/worn.toml", "pendulum/robot.toml",
+                          "pendulum/worn_fitted.toml"},
+                         {"hopper", "MuJoCo's hopper", "hopper/mujoco.toml", "hopper/robot.toml",
+                          "hopper/mujoco_fitted.toml"}};
 
 struct Method {
   const char* key;
@@ -42,13 +47,14 @@ struct Method {
   Way way;
   bool fitted;
 };
-const std::array<Method, 7> kMethods{{{"original", Label(Way::kOriginal), Way::kOriginal, false},
-                                      {"step", Label(Way::kStep), Way::kStep, false},
-                                      {"default", Label(Way::kDefault), Way::kDefault, false},
-                                      {"fitted", Label(Way::kDefault) + ", more parameters", Way::kDefault, true},
-                                      {"prior", Label(Way::kPrior), Way::kPrior, false},
-                                      {"nominal", Label(Way::kNominal), Way::kNominal, false},
-                                      {"oracle", "the robot's masses, in the simulator", Way::kOracle, false}}};
+const std::array<Method, 7> kMethods{
+    {{"original", Label(Way::kOriginal), Way::kOriginal, false},
+     {"step", Label(Way::kStep), Way::kStep, false},
+     {"default", Label(Way::kDefault), Way::kDefault, false},
+     {"fitted", Label(Way::kDefault) + ", more parameters", Way::kDefault, true},
+     {"prior", Label(Way::kPrior), Way::kPrior, false},
+     {"nominal", Label(Way::kNominal), Way::kNominal, false},
+     {"oracle", "the robot's masses, in the simulator", Way::kOracle, false}}};
 
 struct Options {
   std::string robots, output = ".";
@@ -56,10 +62,14 @@ struct Options {
   bool quick = false;
 };
 
-std::string KeyOf(const Gap& gap, const Method& method, int run) { return fmt::format("{},{},{}", gap.name, method.key, run); }
+std::string KeyOf(const Gap& gap, const Method& method, int run) {
+  return fmt::format("{},{},{}", gap.name, method.key, run);
+}
 
-std::filesystem::path AlarmFile(const Options& options, const Gap& gap, const Method& method, int run) {
-  return std::filesystem::path(options.output) / fmt::format("alarm_{}_{}_{}.txt", gap.name, method.key, run);
+std::filesystem::path AlarmFile(const Options& options, const Gap& gap, const Method& method,
+                                int run) {
+  return std::filesystem::path(options.output) /
+         fmt::format("alarm_{}_{}_{}.txt", gap.name, method.key, run);
 }
 
 struct Remembered {
@@ -67,20 +77,25 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
-Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& method, int run, Remembered& remembered,
-                      const std::function<void(double)>& progress) {
-  const auto load = [&](const char* file) { return LoadRobot((std::filesystem::path(options.robots) / file).string()); };
-  const RobotDescription truth = load(gap.truth), model = load(method.fitted ? gap.fitted : gap.model);
+Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& method, int run,
+                      Remembered& remembered, const std::function<void(double)>& progress) {
+  const auto load = [&](const char* file) {
+    return LoadRobot((std::filesystem::path(options.robots) / file).string());
+  };
+  const RobotDescription truth = load(gap.truth),
+                         model = load(method.fitted ? gap.fitted : gap.model);
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = HiddenParameters(truth, seed);
-  if (const std::string of = fmt::format("{} {} {}", gap.name, method.fitted, run); remembered.of != of) {
+  if (const std::string of = fmt::format("{} {} {}", gap.name, method.fitted, run);
+      remembered.of != of) {
     remembered = {of, std::make_unique<Loop>(model, hidden)};
   }
   BusRobot real(truth, model, hidden, seed);
   LoopSettings settings;
   settings.way = method.way;
   settings.iterations = options.iterations;
-  settings.steps_per_iteration = static_cast<int>((options.quick ? 1 : kRobotSeconds) / model.task.period);
+  settings.steps_per_iteration =
+      static_cast<int>((options.quick ? 1 : kRobotSeconds) / model.task.period);
   settings.first_updates = options.quick ? 2 : model.training.updates;
   settings.next_updates = options.quick ? 1 : model.training.updates_again;
   settings.evaluation_episodes = options.quick ? 1 : 5;
@@ -99,28 +114,34 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   }
   Results::Rows rows;
   for (const LoopRow& row : result.rows) {
-    rows.push_back({static_cast<double>(row.iteration), row.robot_return, row.simulated_return, row.discrepancy,
-                    static_cast<double>(row.transitions), row.robot_seconds, alarm});
+    rows.push_back({static_cast<double>(row.iteration), row.robot_return, row.simulated_return,
+                    row.discrepancy, static_cast<double>(row.transitions), row.robot_seconds,
+                    alarm});
   }
   return rows;
 }
 
-double Mean(const Options& options, const Gap& gap, const Method& method, const Results& results, int iteration, size_t column) {
+double Mean(const Options& options, const Gap& gap, const Method& method, const Results& results,
+            int iteration, size_t column) {
   double sum = 0;
-  for (int run = 1; run <= options.runs; ++run) sum += results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column];
+  for (int run = 1; run <= options.runs; ++run)
+    sum += results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column];
   return sum / options.runs;
 }
 
 Panel Draw(const Options& options, const Gap& gap, const Results& results) {
-  Panel panel{gap.title, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
+  Panel panel{
+      gap.title, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
   for (const Method& method : kMethods) {
     Curve curve{method.label, {}, {}, {}, {}};
     for (int k = 0; k <= options.iterations; ++k) {
       std::vector<double> returns;
-      for (int run = 1; run <= options.runs; ++run) returns.push_back(results.Of(KeyOf(gap, method, run))[static_cast<size_t>(k)][1]);
+      for (int run = 1; run <= options.runs; ++run)
+        returns.push_back(results.Of(KeyOf(gap, method, run))[static_cast<size_t>(k)][1]);
       const Band band = ConfidenceBand(returns, false);
       const auto [least, most] = std::minmax_element(returns.begin(), returns.end());
-      curve.x.push_back(k), curve.middle.push_back(band.middle), curve.low.push_back(*least), curve.high.push_back(*most);
+      curve.x.push_back(k), curve.middle.push_back(band.middle), curve.low.push_back(*least),
+          curve.high.push_back(*most);
     }
     panel.curves.push_back(std::move(curve));
   }
@@ -128,11 +149,16 @@ Panel Draw(const Options& options, const Gap& gap, const Results& results) {
 }
 
 std::string Sentence(const Options& options, const Gap& gap, const Results& results) {
-  std::string text = fmt::format("{}, {} runs: return on the robot before and after {} iterations, in simulation, discrepancy, alarms:", gap.title, options.runs,
-                                 options.iterations);
+  std::string text = fmt::format(
+      "{}, {} runs: return on the robot before and after {} iterations, in simulation, "
+      "discrepancy, alarms:",
+      gap.title, options.runs, options.iterations);
   for (const Method& method : kMethods) {
-    const auto mean = [&](int iteration, size_t column) { return Mean(options, gap, method, results, iteration, column); };
-    text += fmt::format("\n  {:<42}{:8.0f}{:8.0f}{:8.0f}{:10.3g}", method.label, mean(0, 1), mean(options.iterations, 1), mean(options.iterations, 2),
+    const auto mean = [&](int iteration, size_t column) {
+      return Mean(options, gap, method, results, iteration, column);
+    };
+    text += fmt::format("\n  {:<42}{:8.0f}{:8.0f}{:8.0f}{:10.3g}", method.label, mean(0, 1),
+                        mean(options.iterations, 1), mean(options.iterations, 2),
                         mean(options.iterations, 3));
     if (method.way != Way::kDefault) continue;
     text += fmt::format("   {:.0f} of {}", options.runs * mean(0, 6), options.runs);
@@ -144,15 +170,21 @@ std::string Sentence(const Options& options, const Gap& gap, const Results& resu
 
 int Compare(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
-  Results results(folder / "reality_gap.csv", fmt::format("iterations {}{}", options.iterations, options.quick ? ", quick" : ""), {"gap", "method", "run"},
-                  {"iteration", "robot_return", "simulated_return", "discrepancy", "transitions", "robot_seconds", "alarm"});
+  Results results(
+      folder / "reality_gap.csv",
+      fmt::format("iterations {}{}", options.iterations, options.quick ? ", quick" : ""),
+      {"gap", "method", "run"},
+      {"iteration", "robot_return", "simulated_return", "discrepancy", "transitions",
+       "robot_seconds", "alarm"});
   std::vector<Job> jobs;
   Remembered remembered;
   for (const Gap& gap : kGaps) {
     for (int run = 1; run <= options.runs; ++run) {
       for (const Method& method : kMethods) {
         jobs.push_back({KeyOf(gap, method, run), gap.name == std::string("hopper") ? 8.0 : 1.0,
-                        [&, run](const auto& progress) { return RunLoop(options, gap, method, run, remembered, progress); }});
+                        [&, run](const auto& progress) {
+                          return RunLoop(options, gap, method, run, remembered, progress);
+                        }});
       }
     }
   }
@@ -163,7 +195,10 @@ int Compare(Process& process, const Options& options) {
     std::cout << Sentence(options, gap, results) << "\n";
   }
   WriteAtomically(folder / "reality_gap.svg",
-                  DrawCurves(fmt::format("return on robots that no simulator is, mean of {} runs, band from the worst to the best", options.runs), panels));
+                  DrawCurves(fmt::format("return on robots that no simulator is, mean of {} runs, "
+                                         "band from the worst to the best",
+                                         options.runs),
+                             panels));
   return 0;
 }
 
@@ -176,10 +211,18 @@ int main(int argc, char** argv) {
       "plumb-reality-gap", "Who transfers to a robot that is none of the simulators.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output, "folder for reality_gap.csv, reality_gap.svg and what the alarms say")->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
-        app.add_option("--iterations", options.iterations, "of SimOpt")->check(CLI::Range(1, 1000))->capture_default_str();
-        app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
+        app.add_option("--output", options.output,
+                       "folder for reality_gap.csv, reality_gap.svg and what the alarms say")
+            ->capture_default_str();
+        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
+            ->check(CLI::Range(1, 1000))
+            ->capture_default_str();
+        app.add_option("--iterations", options.iterations, "of SimOpt")
+            ->check(CLI::Range(1, 1000))
+            ->capture_default_str();
+        app.add_option("--threads", options.threads,
+                       "0 = one per core; the result does not depend on it")
+            ->check(CLI::Range(0, 1024));
         app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::Compare(process, options); });

@@ -9,13 +9,15 @@
 namespace plumb {
 namespace {
 
-constexpr int kHeldOut = 5;               // episodes
+constexpr int kHeldOut = 5;  // episodes
 constexpr uint32_t kHiddenStream = 0x41dde4;
 constexpr uint32_t kHeldOutFirst = 1000;  // number of the first of them
 
 }  // namespace
 
-RobotDescription LoadTask(const std::string& robots, const PaperTask& task) { return LoadRobot((std::filesystem::path(robots) / task.robot).string()); }
+RobotDescription LoadTask(const std::string& robots, const PaperTask& task) {
+  return LoadRobot((std::filesystem::path(robots) / task.robot).string());
+}
 
 std::string Key(Hidden hidden) { return hidden == Hidden::kPaper ? "paper" : "prior"; }
 
@@ -26,27 +28,35 @@ Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_
 }
 
 void AddHiddenFlag(CLI::App& app, Hidden& hidden) {
-  const std::map<std::string, Hidden> names{{Key(Hidden::kPaper), Hidden::kPaper}, {Key(Hidden::kPrior), Hidden::kPrior}};
-  app.add_option("--hidden", hidden, "where the robot's parameters are drawn from: the paper's narrow ranges, or the whole prior")
+  const std::map<std::string, Hidden> names{{Key(Hidden::kPaper), Hidden::kPaper},
+                                            {Key(Hidden::kPrior), Hidden::kPrior}};
+  app.add_option("--hidden", hidden,
+                 "where the robot's parameters are drawn from: the paper's narrow ranges, or the "
+                 "whole prior")
       ->transform(CLI::CheckedTransformer(names, CLI::ignore_case))
       ->default_str("paper");
 }
 
-Recording Record(const RobotDescription& robot, const RecordingSettings& settings, const std::function<void(double)>& progress) {
+Recording Record(const RobotDescription& robot, const RecordingSettings& settings,
+                 const std::function<void(double)>& progress) {
   Recording recording{robot, DrawHidden(robot, settings.hidden, settings.seed), nullptr, {}, {}};
   recording.loop = std::make_shared<Loop>(robot, recording.hidden);
   LoopSettings first;
   first.seed = settings.seed;
   first.threads = settings.threads;
   first.first_updates = settings.updates;
-  const auto trainer = recording.loop->TrainFirst(Key(Way::kPrior), ParameterDistribution::Prior(robot), first, progress);
+  const auto trainer = recording.loop->TrainFirst(
+      Key(Way::kPrior), ParameterDistribution::Prior(robot), first, progress);
   const Eigen::VectorXd noise = settings.noise * ReadingNoise(robot);
-  SimulatedSystem read(robot, recording.hidden, noise, settings.seed), exact(robot, recording.hidden, 0 * noise, settings.seed);
+  SimulatedSystem read(robot, recording.hidden, noise, settings.seed),
+      exact(robot, recording.hidden, 0 * noise, settings.seed);
   for (int i = 0; i < settings.episodes; ++i) {
-    recording.seen.push_back(read.Run(trainer->policy(), true, robot.task.steps, static_cast<uint32_t>(i)).rollout);
+    recording.seen.push_back(
+        read.Run(trainer->policy(), true, robot.task.steps, static_cast<uint32_t>(i)).rollout);
   }
   for (uint32_t i = 0; i < kHeldOut; ++i) {
-    recording.held_out.push_back(exact.Run(trainer->policy(), true, robot.task.steps, kHeldOutFirst + i).rollout);
+    recording.held_out.push_back(
+        exact.Run(trainer->policy(), true, robot.task.steps, kHeldOutFirst + i).rollout);
   }
   return recording;
 }

@@ -19,7 +19,8 @@ struct PaperTask {
   int first_updates;         ///< TRPO's, of a first policy
   int next_updates;          ///< and of each later one
 };
-inline constexpr PaperTask kPaperTasks[] = {{"pendulum", "pendulum/gym.toml", 60, 15}, {"hopper", "hopper/gym.toml", 334, 60}};
+inline constexpr PaperTask kPaperTasks[] = {{"pendulum", "pendulum/gym.toml", 60, 15},
+                                            {"hopper", "hopper/gym.toml", 334, 60}};
 
 RobotDescription LoadTask(const std::string& robots, const PaperTask& task);
 
@@ -55,7 +56,9 @@ struct RecordingSettings {
   int threads = 0;
 };
 
-/// Trains a policy and rolls it out. Episodes are as long as the task's. @param progress told the share that is done; may throw to break off.
-Recording Record(const RobotDescription& robot, const RecordingSettings& settings, const std::function<void(double)>& progress);
+/// Trains a policy and rolls it out. Episodes are as long as the task's. @param progress told the
+/// share that is done; may throw to break off.
+Recording Record(const RobotDescription& robot, const RecordingSettings& settings,
+                 const std::function<void(double)>& progress);
 
 }  // namespace plumb

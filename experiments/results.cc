@@ -19,23 +19,28 @@ struct Stopped {};
 
 std::string Words(double seconds) {
   const auto whole = static_cast<int>(seconds + 0.5);
-  return whole < 60 ? fmt::format("{} s", whole) : fmt::format("{}:{:02} min", whole / 60, whole % 60);
+  return whole < 60 ? fmt::format("{} s", whole)
+                    : fmt::format("{}:{:02} min", whole / 60, whole % 60);
 }
 
 }  // namespace
 
-Results::Results(std::filesystem::path file, const std::string& settings, std::vector<std::string> keys, std::vector<std::string> values)
+Results::Results(std::filesystem::path file, const std::string& settings,
+                 std::vector<std::string> keys, std::vector<std::string> values)
     : file_(std::move(file)) {
   const std::string columns = fmt::format("{},{}", fmt::join(keys, ","), fmt::join(values, ","));
   header_ = "# " + settings + "\n" + columns;
   if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path());
   std::ifstream stream(file_);
   if (!stream) return;
-  const std::runtime_error foreign(file_.string() + ": not a table of this experiment: delete it, or give another --output");
+  const std::runtime_error foreign(
+      file_.string() + ": not a table of this experiment: delete it, or give another --output");
   std::string line;
   if (!std::getline(stream, line) || line.compare(0, 2, "# ") != 0) throw foreign;
   if (line.substr(2) != settings) {
-    throw std::runtime_error(fmt::format("{}: was made with '{}', not '{}': delete it, or give another --output", file_.string(), line.substr(2), settings));
+    throw std::runtime_error(
+        fmt::format("{}: was made with '{}', not '{}': delete it, or give another --output",
+                    file_.string(), line.substr(2), settings));
   }
   if (!std::getline(stream, line) || line != columns) throw foreign;
   while (std::getline(stream, line)) {
@@ -68,7 +73,8 @@ void Results::Add(const std::string& key, Rows rows) {
   groups_.emplace_back(key, std::move(rows));
   std::string text = header_ + "\n";
   for (const auto& [name, group] : groups_) {
-    for (const std::vector<double>& row : group) text += fmt::format("{},{:.8g}\n", name, fmt::join(row, ","));
+    for (const std::vector<double>& row : group)
+      text += fmt::format("{},{:.8g}\n", name, fmt::join(row, ","));
   }
   WriteAtomically(file_, text);
 }
@@ -83,11 +89,14 @@ bool RunJobs(Process& process, const std::vector<Job>& jobs, Results& results) {
     if (results.Has(job.key)) continue;
     const auto progress = [&](double share) {
       if (process.stopping()) throw Stopped();
-      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      const double seconds =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       const double now = done + share * job.weight;
       if (!shown) return;
       const std::string rest = now > 0 ? Words(seconds * (left - now) / now) + " left" : "";
-      std::cerr << fmt::format("\r\033[K{} of {}: {}  {:.0f} %  {}", i + 1, jobs.size(), job.key, 100 * share, rest) << std::flush;
+      std::cerr << fmt::format("\r\033[K{} of {}: {}  {:.0f} %  {}", i + 1, jobs.size(), job.key,
+                               100 * share, rest)
+                << std::flush;
     };
     try {
       progress(0);
@@ -98,8 +107,11 @@ bool RunJobs(Process& process, const std::vector<Job>& jobs, Results& results) {
       return false;
     }
     done += job.weight;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (!shown) std::cerr << fmt::format("{} of {}: {} done, {} left\n", i + 1, jobs.size(), job.key, Words(seconds * (left - done) / done));
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (!shown)
+      std::cerr << fmt::format("{} of {}: {} done, {} left\n", i + 1, jobs.size(), job.key,
+                               Words(seconds * (left - done) / done));
   }
   if (shown) std::cerr << "\r\033[K" << std::flush;
   return true;

@@ -1,14 +1,17 @@
-// What calibration costs, by each way: transitions of the robot until a policy that is trained on what they told earns nearly what the oracle's
-// does, and simulated steps until simulators predict the robot to a given error.
+// What calibration costs, by each way: transitions of the robot until a policy that is trained on
+// what they told earns nearly what the oracle's does, and simulated steps until simulators predict
+// the robot to a given error.
 //
-// A policy trained on the prior moves a robot whose parameters are drawn for each run, as in Figures 2 and 3.
-//   robot: N transitions of it calibrate (both SimOpts make 40 updates of 25 simulators on them); then every way trains as much, from
-//          the same policy on.
-//   simulator: 40 roll-outs calibrate, one an update, or for the default as many of their transitions as the budget allows.
+// A policy trained on the prior moves a robot whose parameters are drawn for each run, as in
+// Figures 2 and 3.
+//   robot: N transitions of it calibrate (both SimOpts make 40 updates of 25 simulators on them);
+//          then every way trains as much, from the same policy on.
+//   simulator: 40 roll-outs calibrate, one an update, or for the default as many of their
+//          transitions as the budget allows.
 //
 //   plumb-sample-efficiency robots --output sample_efficiency
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <cstdint>
@@ -27,8 +30,8 @@ namespace plumb {
 namespace {
 
 constexpr Way kWays[] = {Way::kOriginal, Way::kStep, Way::kDefault};
-constexpr int kUpdates = 40;     // of both SimOpts
-constexpr int kIterations = 5;   // TRPO updates of so many iterations follow
+constexpr int kUpdates = 40;      // of both SimOpts
+constexpr int kIterations = 5;    // TRPO updates of so many iterations follow
 constexpr double kEnough = 0.95;  // of the oracle's return
 constexpr int kHorizon = 10, kSimulators = 20;
 constexpr double kTargets[] = {0.01, 0.001};  // errors after kHorizon steps, standard units
@@ -41,12 +44,17 @@ struct Options {
 };
 
 std::vector<int> TransitionCounts(const Options& options) {
-  return options.quick ? std::vector<int>{50, 200} : std::vector<int>{12, 25, 50, 100, 200, 400, 800};
+  return options.quick ? std::vector<int>{50, 200}
+                       : std::vector<int>{12, 25, 50, 100, 200, 400, 800};
 }
 std::vector<int64_t> Budgets(const Options& options) {
-  return options.quick ? std::vector<int64_t>{4000, 40'000} : std::vector<int64_t>{1000, 2000, 5000, 10'000, 20'000, 50'000, 100'000, 200'000, 500'000};
+  return options.quick ? std::vector<int64_t>{4000, 40'000}
+                       : std::vector<int64_t>{1000,   2000,    5000,    10'000, 20'000,
+                                              50'000, 100'000, 200'000, 500'000};
 }
-std::string KeyOf(const PaperTask& task, Way way, int run) { return fmt::format("{},{},{}", task.name, Key(way), run); }
+std::string KeyOf(const PaperTask& task, Way way, int run) {
+  return fmt::format("{},{},{}", task.name, Key(way), run);
+}
 
 struct Remembered {
   std::string of;
@@ -57,34 +65,43 @@ class Experiment {
  public:
   explicit Experiment(const Options& options) : options_(options) {}
 
-  Results::Rows Robot(const PaperTask& task, Way way, int run, const std::function<void(double)>& progress) {
+  Results::Rows Robot(const PaperTask& task, Way way, int run,
+                      const std::function<void(double)>& progress) {
     Remember(task, run, progress);
     const RobotDescription& robot = now_.recording.robot;
-    const std::vector<int> counts = way == Way::kOracle || way == Way::kPrior ? std::vector<int>{0} : TransitionCounts(options_);
+    const std::vector<int> counts = way == Way::kOracle || way == Way::kPrior
+                                        ? std::vector<int>{0}
+                                        : TransitionCounts(options_);
     Results::Rows rows;
     for (size_t i = 0; i < counts.size(); ++i) {
-      const ParameterDistribution distribution = Learns(way) ? Calibrated(way, counts[i], run) : FirstDistribution(way, robot, now_.recording.hidden);
+      const ParameterDistribution distribution =
+          Learns(way) ? Calibrated(way, counts[i], run)
+                      : FirstDistribution(way, robot, now_.recording.hidden);
       const double share = static_cast<double>(i) / static_cast<double>(counts.size());
-      rows.push_back({static_cast<double>(counts[i]), Trained(task, distribution, run, [&](double part) {
-                        progress(share + part / static_cast<double>(counts.size()));
-                      })});
+      rows.push_back(
+          {static_cast<double>(counts[i]), Trained(task, distribution, run, [&](double part) {
+             progress(share + part / static_cast<double>(counts.size()));
+           })});
     }
     return rows;
   }
 
-  Results::Rows Simulator(const PaperTask& task, Way way, int run, const std::function<void(double)>& progress) {
+  Results::Rows Simulator(const PaperTask& task, Way way, int run,
+                          const std::function<void(double)>& progress) {
     Remember(task, run, progress);
     const auto seed = static_cast<uint64_t>(run);
     const Recording& recording = now_.recording;
     Results::Rows rows;
     const auto judge = [&](int64_t simulated, const ParameterDistribution& distribution) {
-      const Eigen::VectorXd errors = NStepErrors(recording.robot, distribution, recording.held_out, kHorizon, kSimulators, 10, seed);
+      const Eigen::VectorXd errors = NStepErrors(recording.robot, distribution, recording.held_out,
+                                                 kHorizon, kSimulators, 10, seed);
       rows.push_back({static_cast<double>(simulated), errors(kHorizon - 1)});
     };
     if (way == Way::kDefault) {
       for (const int64_t budget : Budgets(options_)) {
         try {
-          const BudgetedFit fit = FitWithin(recording.robot, recording.seen, budget, seed, options_.threads);
+          const BudgetedFit fit =
+              FitWithin(recording.robot, recording.seen, budget, seed, options_.threads);
           judge(fit.simulated_steps, fit.distribution);
         } catch (const std::invalid_argument&) {  // too little for a fit: no point
         }
@@ -109,7 +126,12 @@ class Experiment {
     const std::string of = fmt::format("{} {}", task.name, run);
     if (now_.of == of) return;
     const RobotDescription robot = LoadTask(options_.robots, task);
-    const RecordingSettings settings{options_.quick ? 40 : task.first_updates, kUpdates, 1, options_.hidden, static_cast<uint64_t>(run), options_.threads};
+    const RecordingSettings settings{options_.quick ? 40 : task.first_updates,
+                                     kUpdates,
+                                     1,
+                                     options_.hidden,
+                                     static_cast<uint64_t>(run),
+                                     options_.threads};
     now_ = {of, Record(robot, settings, progress)};
   }
 
@@ -126,13 +148,15 @@ class Experiment {
   }
 
   // Return on the robot of a policy that went on from the first one.
-  double Trained(const PaperTask& task, const ParameterDistribution& distribution, int run, const std::function<void(double)>& progress) {
+  double Trained(const PaperTask& task, const ParameterDistribution& distribution, int run,
+                 const std::function<void(double)>& progress) {
     const RobotDescription& robot = now_.recording.robot;
     LoopSettings settings;
     settings.seed = static_cast<uint64_t>(run);
     settings.threads = options_.threads;
     settings.first_updates = options_.quick ? 40 : task.first_updates;
-    const auto trainer = now_.recording.loop->TrainFirst(Key(Way::kPrior), ParameterDistribution::Prior(robot), settings, progress);
+    const auto trainer = now_.recording.loop->TrainFirst(
+        Key(Way::kPrior), ParameterDistribution::Prior(robot), settings, progress);
     const int updates = options_.quick ? 1 : kIterations * task.next_updates;
     for (int i = 0; i < updates; ++i) {
       trainer->Update([&](Random& random) { return distribution.Sample(random); });
@@ -147,22 +171,26 @@ class Experiment {
 };
 
 // Means over the runs, of each row of a way.
-std::vector<Band> Bands(const Options& options, const PaperTask& task, Way way, const Results& results, bool logarithmic) {
+std::vector<Band> Bands(const Options& options, const PaperTask& task, Way way,
+                        const Results& results, bool logarithmic) {
   std::vector<Band> bands;
   size_t rows = SIZE_MAX;
-  for (int run = 1; run <= options.runs; ++run) rows = std::min(rows, results.Of(KeyOf(task, way, run)).size());
+  for (int run = 1; run <= options.runs; ++run)
+    rows = std::min(rows, results.Of(KeyOf(task, way, run)).size());
   for (size_t i = 0; i < rows; ++i) {
     std::vector<double> values;
     for (int run = 1; run <= options.runs; ++run) {
       const auto& all = results.Of(KeyOf(task, way, run));
-      values.push_back(all[all.size() - rows + i][1]);  // what was too little for a fit in one run is missing at the beginning
+      // what was too little for a fit in one run is missing at the beginning
+      values.push_back(all[all.size() - rows + i][1]);
     }
     bands.push_back(ConfidenceBand(values, logarithmic));
   }
   return bands;
 }
 
-std::vector<double> FirstColumn(const Options& options, const PaperTask& task, Way way, const Results& results) {
+std::vector<double> FirstColumn(const Options& options, const PaperTask& task, Way way,
+                                const Results& results) {
   const size_t rows = Bands(options, task, way, results, false).size();
   std::vector<double> means(rows, 0);
   for (int run = 1; run <= options.runs; ++run) {
@@ -172,34 +200,45 @@ std::vector<double> FirstColumn(const Options& options, const PaperTask& task, W
   return means;
 }
 
-Curve CurveOf(const Options& options, const PaperTask& task, Way way, const Results& results, bool logarithmic) {
+Curve CurveOf(const Options& options, const PaperTask& task, Way way, const Results& results,
+              bool logarithmic) {
   Curve curve{Label(way), FirstColumn(options, task, way, results), {}, {}, {}};
   for (const Band& band : Bands(options, task, way, results, logarithmic)) {
-    curve.middle.push_back(band.middle), curve.low.push_back(band.low), curve.high.push_back(band.high);
+    curve.middle.push_back(band.middle), curve.low.push_back(band.low),
+        curve.high.push_back(band.high);
   }
   return curve;
 }
 
 // The first x from which on y is that good; "never" if it does not end so.
-std::string Needed(const std::vector<double>& x, const std::vector<double>& y, const std::function<bool(double)>& good) {
+std::string Needed(const std::vector<double>& x, const std::vector<double>& y,
+                   const std::function<bool(double)>& good) {
   size_t i = x.size();
   while (i > 0 && good(y[i - 1])) --i;
   return i == x.size() ? "never" : fmt::format("{:.0f}", x[i]);
 }
 
-double ShareOfOracle(double value, double oracle) { return oracle > 0 ? value / oracle : oracle / value; }
+double ShareOfOracle(double value, double oracle) {
+  return oracle > 0 ? value / oracle : oracle / value;
+}
 
-std::string SettingsOf(const Options& options) { return fmt::format("hidden {}{}", Key(options.hidden), options.quick ? ", quick" : ""); }
+std::string SettingsOf(const Options& options) {
+  return fmt::format("hidden {}{}", Key(options.hidden), options.quick ? ", quick" : "");
+}
 
-// A way's share of the oracle's return on the same robot: the median of the runs, for each number of transitions.
-std::vector<double> Shares(const Options& options, const PaperTask& task, Way way, const Results& results) {
+// A way's share of the oracle's return on the same robot: the median of the runs, for each number
+// of transitions.
+std::vector<double> Shares(const Options& options, const PaperTask& task, Way way,
+                           const Results& results) {
   std::vector<double> medians;
   for (size_t i = 0; i < results.Of(KeyOf(task, way, 1)).size(); ++i) {
     std::vector<double> shares;
     for (int run = 1; run <= options.runs; ++run) {
-      shares.push_back(ShareOfOracle(results.Of(KeyOf(task, way, run))[i][1], results.Of(KeyOf(task, Way::kOracle, run))[0][1]));
+      shares.push_back(ShareOfOracle(results.Of(KeyOf(task, way, run))[i][1],
+                                     results.Of(KeyOf(task, Way::kOracle, run))[0][1]));
     }
-    std::nth_element(shares.begin(), shares.begin() + static_cast<ptrdiff_t>(shares.size() / 2), shares.end());
+    std::nth_element(shares.begin(), shares.begin() + static_cast<ptrdiff_t>(shares.size() / 2),
+                     shares.end());
     medians.push_back(shares[shares.size() / 2]);
   }
   return medians;
@@ -207,41 +246,61 @@ std::vector<double> Shares(const Options& options, const PaperTask& task, Way wa
 
 int Measure(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
-  Results robot(folder / "sample_efficiency_robot.csv", SettingsOf(options), {"task", "way", "run"}, {"transitions", "robot_return"});
-  Results simulator(folder / "sample_efficiency_simulator.csv", SettingsOf(options), {"task", "way", "run"}, {"simulated_steps", "error"});
+  Results robot(folder / "sample_efficiency_robot.csv", SettingsOf(options), {"task", "way", "run"},
+                {"transitions", "robot_return"});
+  Results simulator(folder / "sample_efficiency_simulator.csv", SettingsOf(options),
+                    {"task", "way", "run"}, {"simulated_steps", "error"});
   Experiment experiment(options);
   std::vector<Job> robot_jobs, simulator_jobs;
   for (const PaperTask& task : kPaperTasks) {
     for (int run = 1; run <= options.runs; ++run) {
       for (const Way way : {Way::kOriginal, Way::kStep, Way::kDefault, Way::kPrior, Way::kOracle}) {
-        const double weight = Learns(way) ? static_cast<double>(TransitionCounts(options).size()) : 1;
+        const double weight =
+            Learns(way) ? static_cast<double>(TransitionCounts(options).size()) : 1;
         robot_jobs.push_back({KeyOf(task, way, run), weight * task.next_updates,
-                              [&, way, run](const auto& progress) { return experiment.Robot(task, way, run, progress); }});
+                              [&, way, run](const auto& progress) {
+                                return experiment.Robot(task, way, run, progress);
+                              }});
         if (!Learns(way)) continue;
-        simulator_jobs.push_back({KeyOf(task, way, run), 1, [&, way, run](const auto& progress) { return experiment.Simulator(task, way, run, progress); }});
+        simulator_jobs.push_back({KeyOf(task, way, run), 1, [&, way, run](const auto& progress) {
+                                    return experiment.Simulator(task, way, run, progress);
+                                  }});
       }
     }
   }
-  if (!RunJobs(process, simulator_jobs, simulator) || !RunJobs(process, robot_jobs, robot)) return 130;
+  if (!RunJobs(process, simulator_jobs, simulator) || !RunJobs(process, robot_jobs, robot))
+    return 130;
 
   std::vector<Panel> panels;
   for (const PaperTask& task : kPaperTasks) {
-    Panel errors{task.name, "simulated steps", fmt::format("error after {} steps, standard units", kHorizon), true, {}};
+    Panel errors{task.name,
+                 "simulated steps",
+                 fmt::format("error after {} steps, standard units", kHorizon),
+                 true,
+                 {}};
     Panel returns{task.name, "transitions of the robot", "return on the robot", false, {}};
     errors.logarithmic_x = returns.logarithmic_x = true;
-    std::cout << fmt::format("{}, {} runs:\n  {:<40}{:>22}{:>22}{:>22}\n", task.name, options.runs, "", "95 % of the oracle's",
-                             fmt::format("error {} after {}", kTargets[0], kHorizon), fmt::format("error {} after {}", kTargets[1], kHorizon));
+    std::cout << fmt::format("{}, {} runs:\n  {:<40}{:>22}{:>22}{:>22}\n", task.name, options.runs,
+                             "", "95 % of the oracle's",
+                             fmt::format("error {} after {}", kTargets[0], kHorizon),
+                             fmt::format("error {} after {}", kTargets[1], kHorizon));
     for (const Way way : kWays) {
       errors.curves.push_back(CurveOf(options, task, way, simulator, true));
       returns.curves.push_back(CurveOf(options, task, way, robot, false));
-      std::cout << fmt::format("  {:<40}{:>22}", Label(way), Needed(returns.curves.back().x, Shares(options, task, way, robot), [](double share) { return share >= kEnough; }));
-      for (const double target : kTargets) std::cout << fmt::format("{:>22}", Needed(errors.curves.back().x, errors.curves.back().middle, [&](double error) { return error <= target; }));
+      std::cout << fmt::format("  {:<40}{:>22}", Label(way),
+                               Needed(returns.curves.back().x, Shares(options, task, way, robot),
+                                      [](double share) { return share >= kEnough; }));
+      for (const double target : kTargets)
+        std::cout << fmt::format("{:>22}",
+                                 Needed(errors.curves.back().x, errors.curves.back().middle,
+                                        [&](double error) { return error <= target; }));
       std::cout << "\n";
     }
     for (const Way way : {Way::kPrior, Way::kOracle}) {
       const Band band = Bands(options, task, way, robot, false)[0];
       const std::vector<double>& x = returns.curves[0].x;
-      returns.curves.push_back({Label(way), x, std::vector<double>(x.size(), band.middle), std::vector<double>(x.size(), band.low),
+      returns.curves.push_back({Label(way), x, std::vector<double>(x.size(), band.middle),
+                                std::vector<double>(x.size(), band.low),
                                 std::vector<double>(x.size(), band.high)});
       errors.curves.push_back({Label(way), {}, {}, {}, {}});
       std::cout << fmt::format("  {:<40}return {:.0f}\n", Label(way), band.middle);
@@ -249,7 +308,11 @@ int Measure(Process& process, const Options& options) {
     panels.push_back(std::move(returns));
     panels.push_back(std::move(errors));
   }
-  WriteAtomically(folder / "sample_efficiency.svg", DrawCurves(fmt::format("what calibration costs, mean of {} runs and its 95 % band", options.runs), panels));
+  WriteAtomically(
+      folder / "sample_efficiency.svg",
+      DrawCurves(
+          fmt::format("what calibration costs, mean of {} runs and its 95 % band", options.runs),
+          panels));
   return 0;
 }
 
@@ -259,13 +322,21 @@ int Measure(Process& process, const Options& options) {
 int main(int argc, char** argv) {
   plumb::Options options;
   return plumb::Run(
-      "plumb-sample-efficiency", "Transitions of the robot and simulated steps that each way of calibrating needs.", argc, argv,
+      "plumb-sample-efficiency",
+      "Transitions of the robot and simulated steps that each way of calibrating needs.", argc,
+      argv,
       [&](CLI::App& app) {
         app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output, "folder for the tables and sample_efficiency.svg")->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")->check(CLI::Range(1, 1000))->capture_default_str();
+        app.add_option("--output", options.output,
+                       "folder for the tables and sample_efficiency.svg")
+            ->capture_default_str();
+        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
+            ->check(CLI::Range(1, 1000))
+            ->capture_default_str();
         plumb::AddHiddenFlag(app, options.hidden);
-        app.add_option("--threads", options.threads, "0 = one per core; the result does not depend on it")->check(CLI::Range(0, 1024));
+        app.add_option("--threads", options.threads,
+                       "0 = one per core; the result does not depend on it")
+            ->check(CLI::Range(0, 1024));
         app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::Measure(process, options); });

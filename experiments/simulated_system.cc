@@ -17,7 +17,8 @@ Eigen::VectorXd Noisy(const Eigen::VectorXd& x, const Eigen::VectorXd& sd, Rando
 
 }  // namespace
 
-SimulatedSystem::SimulatedSystem(const RobotDescription& robot, const Eigen::VectorXd& hidden, const Eigen::VectorXd& noise, uint64_t seed)
+SimulatedSystem::SimulatedSystem(const RobotDescription& robot, const Eigen::VectorXd& hidden,
+                                 const Eigen::VectorXd& noise, uint64_t seed)
     : environment_(robot),
       q_sd_(noise.head(robot.num_velocities())),
       v_sd_(noise.tail(robot.num_velocities())),
@@ -27,13 +28,15 @@ SimulatedSystem::SimulatedSystem(const RobotDescription& robot, const Eigen::Vec
   environment_.SetParameters(hidden);
 }
 
-RealSystem::Trial SimulatedSystem::Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) {
+RealSystem::Trial SimulatedSystem::Run(const GaussianPolicy& policy, bool explore, int steps,
+                                       uint32_t number) {
   Random random(seed_, {kTrial, number, explore ? 1u : 0u});
   environment_.Reset(random);
   Trial trial;
   trial.rollout.episode = number;
   Eigen::VectorXf observation(environment_.observation_size());
-  Eigen::VectorXd q = Noisy(environment_.q(), q_sd_, random), v = Noisy(environment_.v(), v_sd_, random);
+  Eigen::VectorXd q = Noisy(environment_.q(), q_sd_, random),
+                  v = Noisy(environment_.v(), v_sd_, random);
   for (int step = 0; step < std::min(steps, environment_.steps_per_episode()); ++step) {
     Transition transition;
     transition.step = step;
@@ -41,8 +44,10 @@ RealSystem::Trial SimulatedSystem::Run(const GaussianPolicy& policy, bool explor
     transition.q_sd = transition.next_q_sd = q_sd_;
     transition.v_sd = transition.next_v_sd = v_sd_;
     if (latency_ > 0) transition.efforts.push_back({latency_, environment_.effort()});
-    environment_.task().Observe(q, v, std::span(observation.data(), static_cast<size_t>(observation.size())));
-    const Environment::StepResult result = environment_.Step(explore ? policy.Sample(observation, random) : policy.Mean(observation));
+    environment_.task().Observe(
+        q, v, std::span(observation.data(), static_cast<size_t>(observation.size())));
+    const Environment::StepResult result =
+        environment_.Step(explore ? policy.Sample(observation, random) : policy.Mean(observation));
     transition.efforts.push_back({period_ - latency_, environment_.effort()});
     q = Noisy(environment_.q(), q_sd_, random), v = Noisy(environment_.v(), v_sd_, random);
     if (!q.allFinite() || !v.allFinite()) break;
@@ -58,7 +63,8 @@ RealSystem::Trial SimulatedSystem::Run(const GaussianPolicy& policy, bool explor
 Eigen::VectorXd ReadingNoise(const RobotDescription& robot) {
   constexpr double kPosition = 2 * M_PI / 16384 / 3.4641016151377544, kVelocity = 5e-3;  // sqrt(12)
   Eigen::VectorXd noise(2 * robot.num_velocities());
-  noise << Eigen::VectorXd::Constant(robot.num_velocities(), kPosition), Eigen::VectorXd::Constant(robot.num_velocities(), kVelocity);
+  noise << Eigen::VectorXd::Constant(robot.num_velocities(), kPosition),
+      Eigen::VectorXd::Constant(robot.num_velocities(), kVelocity);
   return noise;
 }
 

@@ -6,13 +6,15 @@
 
 namespace plumb {
 
-/// The "real" robot of the paper: the simulator itself with parameters that nobody is told. Its states are read with
-/// independent noise, which is what the policy sees and what is recorded.
+/// The "real" robot of the paper: the simulator itself with parameters that nobody is told. Its
+/// states are read with independent noise, which is what the policy sees and what is recorded.
 class SimulatedSystem : public RealSystem {
  public:
-  /// @param hidden physical units, order of robot.parameters. @param noise standard deviations of what is read of (q, v), physical
-  /// units; zero = exact. @param seed of initial states, noise and exploration. @throws std::invalid_argument, see Environment.
-  SimulatedSystem(const RobotDescription& robot, const Eigen::VectorXd& hidden, const Eigen::VectorXd& noise, uint64_t seed);
+  /// @param hidden physical units, order of robot.parameters. @param noise standard deviations of
+  /// what is read of (q, v), physical units; zero = exact. @param seed of initial states, noise and
+  /// exploration. @throws std::invalid_argument, see Environment.
+  SimulatedSystem(const RobotDescription& robot, const Eigen::VectorXd& hidden,
+                  const Eigen::VectorXd& noise, uint64_t seed);
 
   Trial Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
 
@@ -23,8 +25,8 @@ class SimulatedSystem : public RealSystem {
   uint64_t seed_;
 };
 
-/// What encoders and an observer leave of noise: positions [rad or m] as exact as a count of a 14-bit encoder, 1.1e-4, velocities [rad/s or m/s]
-/// as the observer's smoother has them, 5e-3.
+/// What encoders and an observer leave of noise: positions [rad or m] as exact as a count of a
+/// 14-bit encoder, 1.1e-4, velocities [rad/s or m/s] as the observer's smoother has them, 5e-3.
 Eigen::VectorXd ReadingNoise(const RobotDescription& robot);
 
 }  // namespace plumb

@@ -31,16 +31,23 @@ std::string Label(Way way) { return kNames.at(static_cast<size_t>(way)).label; }
 
 bool Learns(Way way) { return way == Way::kOriginal || way == Way::kStep || way == Way::kDefault; }
 
-std::unique_ptr<SimOpt> MakeSimOpt(Way way, const RobotDescription& robot, uint64_t seed, int threads) {
+std::unique_ptr<SimOpt> MakeSimOpt(Way way, const RobotDescription& robot, uint64_t seed,
+                                   int threads) {
   switch (way) {
-    case Way::kOriginal: return std::make_unique<SimOpt>(WithPaperSettings(robot), seed, threads, Objective::kTrajectory);
-    case Way::kStep: return std::make_unique<SimOpt>(WithPaperSettings(robot), seed, threads, Objective::kStep);
-    case Way::kDefault: return std::make_unique<SimOpt>(robot, seed, threads, "auto");
-    default: throw std::invalid_argument(Key(way) + " does not learn");
+    case Way::kOriginal:
+      return std::make_unique<SimOpt>(WithPaperSettings(robot), seed, threads,
+                                      Objective::kTrajectory);
+    case Way::kStep:
+      return std::make_unique<SimOpt>(WithPaperSettings(robot), seed, threads, Objective::kStep);
+    case Way::kDefault:
+      return std::make_unique<SimOpt>(robot, seed, threads, "auto");
+    default:
+      throw std::invalid_argument(Key(way) + " does not learn");
   }
 }
 
-ParameterDistribution FirstDistribution(Way way, const RobotDescription& robot, const Eigen::VectorXd& truth) {
+ParameterDistribution FirstDistribution(Way way, const RobotDescription& robot,
+                                        const Eigen::VectorXd& truth) {
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   ParameterDistribution::Component& component = distribution.components.at(0);
   if (way == Way::kOracle) {
@@ -58,7 +65,8 @@ ParameterDistribution DistributionOf(const SimOpt& simopt, const RobotDescriptio
   distribution.iteration = simopt.state().iteration;
   distribution.components.clear();
   for (size_t i = 0; i < mixture.components.size(); ++i) {
-    distribution.components.push_back({mixture.weights[i], mixture.components[i].mean, mixture.components[i].covariance});
+    distribution.components.push_back(
+        {mixture.weights[i], mixture.components[i].mean, mixture.components[i].covariance});
   }
   return distribution;
 }

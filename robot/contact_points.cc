@@ -12,7 +12,8 @@ std::vector<std::pair<Eigen::Vector3d, double>> ContactSpheres(const Shape& shap
     case Shape::Type::kBox: {
       std::vector<std::pair<Eigen::Vector3d, double>> corners;
       for (int corner = 0; corner < 8; ++corner) {
-        const Eigen::Vector3d signs(corner & 1 ? .5 : -.5, corner & 2 ? .5 : -.5, corner & 4 ? .5 : -.5);
+        const Eigen::Vector3d signs(corner & 1 ? .5 : -.5, corner & 2 ? .5 : -.5,
+                                    corner & 4 ? .5 : -.5);
         corners.emplace_back(shape.position + shape.rotation * signs.cwiseProduct(shape.size), 0);
       }
       return corners;
@@ -28,7 +29,8 @@ std::vector<ContactPoint> ContactPoints(const RobotDescription& robot) {
   if (!robot.simulation.contact) return points;
   for (size_t link = 1; link < robot.links.size(); ++link) {
     for (const Shape& shape : robot.links[link].collisions) {
-      for (const auto& [centre, radius] : ContactSpheres(shape)) points.push_back({static_cast<int>(link), centre, radius});
+      for (const auto& [centre, radius] : ContactSpheres(shape))
+        points.push_back({static_cast<int>(link), centre, radius});
     }
   }
   return points;

@@ -8,9 +8,9 @@
 
 namespace plumb {
 
-/// Where a shape can touch the ground: centres [m] of spheres in the link frame and their radii. A sphere and
-/// the ends of a capsule are spheres, the corners of a box have radius zero; a cylinder's rim is not one of
-/// them.
+/// Where a shape can touch the ground: centres [m] of spheres in the link frame and their radii. A
+/// sphere and the ends of a capsule are spheres, the corners of a box have radius zero; a
+/// cylinder's rim is not one of them.
 std::vector<std::pair<Eigen::Vector3d, double>> ContactSpheres(const Shape& shape);
 
 /// A sphere on a link that can touch the ground.
@@ -20,8 +20,8 @@ struct ContactPoint {
   double radius;           ///< [m] >= 0
 };
 
-/// Those of all collision shapes, link by link: the order of ROBOT_STATE's contacts and of the simulator. None if
-/// the robot does not touch the ground ([simulation.contact] is missing).
+/// Those of all collision shapes, link by link: the order of ROBOT_STATE's contacts and of the
+/// simulator. None if the robot does not touch the ground ([simulation.contact] is missing).
 std::vector<ContactPoint> ContactPoints(const RobotDescription& robot);
 
 }  // namespace plumb

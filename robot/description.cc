@@ -83,7 +83,8 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.name = header.String("name");
   const std::string urdf_file = header.String("urdf");
   const std::string urdf_path = (file.parent_path() / urdf_file).string();
-  if (!fs::exists(urdf_path, error)) header.Fail("urdf", fmt::format("= \"{}\": there is no such file", urdf_file));
+  if (!fs::exists(urdf_path, error))
+    header.Fail("urdf", fmt::format("= \"{}\": there is no such file", urdf_file));
   header.Finish();
   UrdfModel urdf = LoadUrdf(urdf_path);
   files.push_back(urdf_path);
@@ -105,7 +106,8 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.estimator = ReadEstimator(root.Table("estimator"), robot);
   robot.warnings = std::move(urdf.warnings);
   if (robot.simulation.contact) {
-    robot.warnings.insert(robot.warnings.end(), urdf.contact_warnings.begin(), urdf.contact_warnings.end());
+    robot.warnings.insert(robot.warnings.end(), urdf.contact_warnings.begin(),
+                          urdf.contact_warnings.end());
   }
   ReadParameters(root, robot.parameters, robot.frozen);
   robot.controller = ReadController(root.Table("controller"));

@@ -15,22 +15,24 @@ struct Shape {
   Type type = Type::kSphere;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< [m] of its centre, in the link frame
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< its axes in the link's
-  /// [m] sphere: (radius, 0, 0); box: edges along x, y, z; capsule and cylinder, which stand along z: (radius,
-  /// length, 0), a capsule's length without its caps.
+  /// [m] sphere: (radius, 0, 0); box: edges along x, y, z; capsule and cylinder, which stand along
+  /// z: (radius, length, 0), a capsule's length without its caps.
   Eigen::Vector3d size = Eigen::Vector3d::Zero();
 };
 
-/// A rigid body. Frames as in URDF: the link frame is at the joint that moves it. What hangs on it by fixed
-/// joints belongs to it. A link may have no mass if links beyond it have.
+/// A rigid body. Frames as in URDF: the link frame is at the joint that moves it. What hangs on it
+/// by fixed joints belongs to it. A link may have no mass if links beyond it have.
 struct LinkDescription {
   std::string name;
-  double mass = 0;                                             ///< [kg]
-  Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();    ///< [m], in the link frame
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();           ///< [kg m^2], about the centre of mass, link axes
+  double mass = 0;                                           ///< [kg]
+  Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();  ///< [m], in the link frame
+  /// [kg m^2], about the centre of mass, link axes
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
   std::vector<Shape> visuals = {}, collisions = {};
 };
 
-/// What a motor of protocol "mit" means by its codes, see drivers/protocols/mit.h. All > 0, at the output shaft.
+/// What a motor of protocol "mit" means by its codes, see drivers/protocols/mit.h. All > 0, at the
+/// output shaft.
 struct MitRanges {
   double position = 12.5;  ///< [rad] positions are in [-position, position]
   double velocity = 0;     ///< [rad/s] likewise
@@ -50,42 +52,49 @@ struct MitDescription {
 struct MotorDescription {
   std::string protocol;  ///< file name in drivers/protocols/, e.g. "cansimple"
   int node = 0;          ///< CAN node id of the protocol
-  double gear = 1;       ///< motor turns per joint turn (or per metre / 2 pi for a prismatic joint), > 0
-  int sign = 1;          ///< +1 or -1
-  double offset = 0;     ///< [rad] or [m] joint position at motor position 0
+  /// motor turns per joint turn (or per metre / 2 pi for a prismatic joint), > 0
+  double gear = 1;
+  int sign = 1;                            ///< +1 or -1
+  double offset = 0;                       ///< [rad] or [m] joint position at motor position 0
   std::optional<MitDescription> mit = {};  ///< of protocol "mit" and no other
 };
 
-/// [estimator]: what the estimator assumes of a coordinate that nothing says more about, in [m] for [rad] where the
-/// joint slides, and how it goes about it. See EstimatorOf for a joint's own.
+/// [estimator]: what the estimator assumes of a coordinate that nothing says more about, in [m] for
+/// [rad] where the joint slides, and how it goes about it. See EstimatorOf for a joint's own.
 struct EstimatorSettings {
   double position_sd;  ///< [rad] of a reading
   double velocity_sd;  ///< [rad/s]
   double jerk;         ///< [rad/s^3 sqrt(s)]
   double effort_step;  ///< [rad/s^2 per Nm]
-  /// sd of the acceleration's step per speed of an impact: of a point with the ground [rad/s^2 per m/s], of a joint with its
-  /// stop [rad/s^2 per rad/s]
+  /// sd of the acceleration's step per speed of an impact: of a point with the ground [rad/s^2 per
+  /// m/s], of a joint with its stop [rad/s^2 per rad/s]
   double ground_impact = 0, stop_impact = 0;
-  double coupling = 1;  ///< of a joint with a motor: share of an effort's or a stop's effect that others' have, 0 to 1
-  double timing_sd;     ///< [s]
+  /// of a joint with a motor: share of an effort's or a stop's effect that others' have, 0 to 1
+  double coupling = 1;
+  double timing_sd;    ///< [s]
   int lag;             ///< [measurements]
   double reset_after;  ///< [rad]
-  double delay = 0;    ///< [s] of a reading on its way: the constant part, which arrivals cannot tell
+  /// [s] of a reading on its way: the constant part, which arrivals cannot tell
+  double delay = 0;
   double outage = 0.05;  ///< [s] that a silent joint is predicted before the state is invalid
-  /// [rad/s^2 sqrt(s)] spectral density^(1/2) of what the accelerations differ by from the simulator's, of the filter on its
-  /// dynamics: [estimator.model]
+  /// [rad/s^2 sqrt(s)] spectral density^(1/2) of what the accelerations differ by from the
+  /// simulator's, of the filter on its dynamics: [estimator.model]
   double model_acceleration = 0.2;
-  /// How the joints of the robot's base are known: as all others, or, if nothing holds it, from its IMU and its legs.
+  /// How the joints of the robot's base are known: as all others, or, if nothing holds it, from its
+  /// IMU and its legs.
   enum class Base { kSensors, kLegs };
   Base base = Base::kSensors;
   double ground_sd = 5e-3;  ///< [m] of kLegs: by which the ground is uneven and gives way
   double slip = 0.01;       ///< [m/sqrt(s)] of kLegs: by which a foot that rests creeps
   // Of an IMU on a link that the joint carries; 0: there is none.
-  double acceleration_sd = 0;  ///< [m/s^2] of a slide's acceleration, averaged over a period of the IMU
-  double bias_sd = 0;          ///< [rad/s] of the gyro, if the joint turns, or [m/s^2] of the accelerometer
+  /// [m/s^2] of a slide's acceleration, averaged over a period of the IMU
+  double acceleration_sd = 0;
+  /// [rad/s] of the gyro, if the joint turns, or [m/s^2] of the accelerometer
+  double bias_sd = 0;
 };
 
-/// What robot.toml says of a joint's or a sensor's noise; NaN = nothing. Units as in EstimatorSettings.
+/// What robot.toml says of a joint's or a sensor's noise; NaN = nothing. Units as in
+/// EstimatorSettings.
 struct NoiseDescription {
   double position_sd = std::numeric_limits<double>::quiet_NaN();
   double velocity_sd = std::numeric_limits<double>::quiet_NaN();
@@ -100,31 +109,36 @@ struct NoiseDescription {
 /// Something on the bus that measures and is no motor.
 struct SensorDescription {
   std::string name;
-  std::string protocol;  ///< file name in drivers/protocols/: "cia406", an encoder, or "xsens", an IMU
-  double period = 0;     ///< [s] > 0 of its readings
+  /// file name in drivers/protocols/: "cia406", an encoder, or "xsens", an IMU
+  std::string protocol;
+  double period = 0;  ///< [s] > 0 of its readings
 
   // Of an encoder. It measures a joint: position = sign * radius * angle + offset.
-  int joint = -1;        ///< index into joints
-  int node = 0;          ///< CANopen node id, 1 to 127
-  double counts = 0;     ///< per turn, > 0
-  double range = 0;      ///< counts after which it begins anew, >= 2, <= 2^32; `counts` of a single-turn one
+  int joint = -1;     ///< index into joints
+  int node = 0;       ///< CANopen node id, 1 to 127
+  double counts = 0;  ///< per turn, > 0
+  /// counts after which it begins anew, >= 2, <= 2^32; `counts` of a single-turn one
+  double range = 0;
   int sign = 1;          ///< +1 or -1
   double offset = 0;     ///< [rad] or [m]
   double radius = 1;     ///< 1 at a joint that turns, [m] > 0 at one that slides: the boom's length
   double max_speed = 0;  ///< [rad/s] > 0 of the shaft; a reading that needs more is a fault
-  /// [rad] or [m] > 0 by which it may differ from the motor of its joint, if that has one; infinite = not compared
+  /// [rad] or [m] > 0 by which it may differ from the motor of its joint, if that has one; infinite
+  /// = not compared
   double tolerance = std::numeric_limits<double>::infinity();
 
   // Of an IMU.
-  int link = -1;                                           ///< index into links: what it is fixed to
+  /// index into links: what it is fixed to
+  int link = -1;
   int base = 0;                                            ///< CAN id added to the factory's
   double tick = 1e-4;                                      ///< [s] unit of its SampleTime
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< its axes in the link's
-  double acceleration_sd = 0;       ///< [m/s^2] > 0
-  double rate_bias_sd = 0;          ///< [rad/s] >= 0
-  double acceleration_bias_sd = 0;  ///< [m/s^2] >= 0
+  double acceleration_sd = 0;                              ///< [m/s^2] > 0
+  double rate_bias_sd = 0;                                 ///< [rad/s] >= 0
+  double acceleration_bias_sd = 0;                         ///< [m/s^2] >= 0
 
-  /// position_sd and velocity_sd of an IMU: of the angle and of the rate of turn. What moves it, the joint knows.
+  /// position_sd and velocity_sd of an IMU: of the angle and of the rate of turn. What moves it,
+  /// the joint knows.
   NoiseDescription noise = {};
 };
 
@@ -132,17 +146,19 @@ struct SensorDescription {
 struct JointDynamics {
   static constexpr double kLongestDelay = 0.5;  ///< [s]
 
-  double armature = 0;      ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
-  double damping = 0;       ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
-  double friction = 0;      ///< [Nm] or [N] >= 0: Coulomb friction
-  double stiffness = 0;     ///< [Nm/rad] or [N/m] >= 0 of a spring
-  double rest = 0;          ///< [rad] or [m] where the spring is relaxed
-  double motor_gain = 1;    ///< effort at the joint per effort commanded, >= 0
-  double delay = 0;         ///< [s] 0 to kLongestDelay between an effort's command and its effect, beyond what was recorded
+  double armature = 0;    ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
+  double damping = 0;     ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
+  double friction = 0;    ///< [Nm] or [N] >= 0: Coulomb friction
+  double stiffness = 0;   ///< [Nm/rad] or [N/m] >= 0 of a spring
+  double rest = 0;        ///< [rad] or [m] where the spring is relaxed
+  double motor_gain = 1;  ///< effort at the joint per effort commanded, >= 0
+  /// [s] 0 to kLongestDelay between an effort's command and its effect, beyond what was recorded
+  double delay = 0;
   double sensor_delay = 0;  ///< [s] 0 to kLongestDelay: a reading is of the state so long ago
   double sensor_bias = 0;   ///< [rad] or [m]: what a reading of the position adds to it
-  /// [rad/s] or [m/s] > 0: speed at which the motor's back-EMF leaves it no effort. At speed w in the effort's own
-  /// direction the effort is at most effort_limit * (1 - w / no_load_speed), as of a DC motor at its full voltage.
+  /// [rad/s] or [m/s] > 0: speed at which the motor's back-EMF leaves it no effort. At speed w in
+  /// the effort's own direction the effort is at most effort_limit * (1 - w / no_load_speed), as of
+  /// a DC motor at its full voltage.
   double no_load_speed = std::numeric_limits<double>::infinity();
 };
 
@@ -150,25 +166,31 @@ struct JointDynamics {
 struct JointLimitSettings {
   double position_margin =
       0;  ///< [rad] or [m] >= 0 before a position limit, in which efforts towards it fade
-  double effort_rate = std::numeric_limits<double>::infinity();  ///< [Nm/s] or [N/s] > 0, away from zero
-  double damping = 0;  ///< [Nm s/rad] or [N s/m] >= 0 of a stop by damping, see DriverSettings::stop
+  /// [Nm/s] or [N/s] > 0, away from zero
+  double effort_rate = std::numeric_limits<double>::infinity();
+  /// [Nm s/rad] or [N s/m] >= 0 of a stop by damping, see DriverSettings::stop
+  double damping = 0;
 };
 
-/// A moving joint, connecting links[parent] to links[child]. URDF's planar and floating joints are several of these:
+/// A moving joint, connecting links[parent] to links[child]. URDF's planar and floating joints are
+/// several of these:
 ///   planar    <name>/x, <name>/y prismatic in the plane, <name>/angle continuous about its normal
 ///   floating  <name>/x, <name>/y, <name>/z prismatic, <name>/rotation spherical
 /// with links without mass in between, named after their joints.
 struct JointDescription {
-  /// kSpherical: q is a unit quaternion (w, x, y, z) that turns link axes into joint axes, v the angular velocity
-  /// in link axes [rad/s], as MuJoCo's ball and free joints have them.
+  /// kSpherical: q is a unit quaternion (w, x, y, z) that turns link axes into joint axes, v the
+  /// angular velocity in link axes [rad/s], as MuJoCo's ball and free joints have them.
   enum class Type { kRevolute, kContinuous, kPrismatic, kSpherical };
   std::string name;
   Type type = Type::kRevolute;
   int parent = 0;  ///< index into links
   int child = 0;   ///< index into links
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();              ///< [m], in the parent link's frame
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();        ///< joint frame's axes in the parent link's
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();               ///< unit vector, in the joint frame
+  /// [m], in the parent link's frame
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  /// joint frame's axes in the parent link's
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  /// unit vector, in the joint frame
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();
   double lower = 0;           ///< [rad] or [m]; -infinity for a continuous joint
   double upper = 0;           ///< [rad] or [m]; +infinity for a continuous joint
   double effort_limit = 0;    ///< [Nm] or [N], > 0; 0 for a passive joint
@@ -184,38 +206,40 @@ struct JointDescription {
 };
 
 struct DriverSettings {
-  /// What is on the joints when a command has expired, until the driver disarms: nothing, the last effort
-  /// that falls linearly to nothing within `ramp`, or -damping * velocity (JointLimitSettings). Faults and
-  /// requests disarm at once, whatever this is.
+  /// What is on the joints when a command has expired, until the driver disarms: nothing, the last
+  /// effort that falls linearly to nothing within `ramp`, or -damping * velocity
+  /// (JointLimitSettings). Faults and requests disarm at once, whatever this is.
   enum class Stop { kZero, kRamp, kDamping };
 
-  double cycle, measurement, expiry, disarm_after, stale_after, heartbeat_timeout, start_guard;  ///< [s], scaled time
+  /// [s], scaled time
+  double cycle, measurement, expiry, disarm_after, stale_after, heartbeat_timeout, start_guard;
   double telemetry = 0.1;  ///< [s] at which each drive is asked for its temperatures and supply
   Stop stop = Stop::kZero;
-  double ramp = 0;  ///< [s] > 0 of kRamp, else 0
+  double ramp = 0;          ///< [s] > 0 of kRamp, else 0
   double effort_delay = 0;  ///< [s] 0 to 0.01, from a torque frame's transmission until it acts
 
   // Beyond these is a fault. What a drive does not report is not judged.
   double max_motor_temperature = 90, max_drive_temperature = 90;     ///< [degC]
   double min_bus_voltage = 0;                                        ///< [V]
   double max_bus_voltage = std::numeric_limits<double>::infinity();  ///< [V]
-  /// [s] for which position and velocity may stay the same bit by bit under an effort; 0 = for ever. Off
-  /// unless asked for: a joint that holds still on coarse codes, or leans against something, looks like a
-  /// dead encoder.
+  /// [s] for which position and velocity may stay the same bit by bit under an effort; 0 = for
+  /// ever. Off unless asked for: a joint that holds still on coarse codes, or leans against
+  /// something, looks like a dead encoder.
   double stuck_after = 0;
 };
-
 
 /// Standard acceleration of free fall, ISO 80000-3 [m/s^2].
 inline constexpr double kStandardGravity = 9.80665;
 
 struct SimulationSettings {
-  /// kSemiImplicit: v += h a(q, v); q += h v, as gym does. kLeapfrog: q += h/2 v; v += h a; q += h/2 v.
+  /// kSemiImplicit: v += h a(q, v); q += h v, as gym does. kLeapfrog: q += h/2 v; v += h a; q +=
+  /// h/2 v.
   enum class Integrator { kSemiImplicit, kLeapfrog };
   Integrator integrator;
-  double substep;    ///< [s] a step is divided evenly into such, or up to a tenth longer ones
-  double latency;    ///< [s] in training: the previous action acts that long into a step
-  double speed_clip; ///< [rad/s] velocities are clipped to this after each substep; infinity = no clip
+  double substep;  ///< [s] a step is divided evenly into such, or up to a tenth longer ones
+  double latency;  ///< [s] in training: the previous action acts that long into a step
+  /// [rad/s] velocities are clipped to this after each substep; infinity = no clip
+  double speed_clip;
   /// gym v0 moves the position with the speed before clipping it; false = with the clipped one.
   bool move_before_clip;
   double gravity = kStandardGravity;  ///< [m/s^2] >= 0, along -z of the base
@@ -237,8 +261,8 @@ struct SimulationSettings {
   std::optional<Stop> stop;        ///< none: joints move on beyond their limits
 };
 
-/// One uncertain simulator parameter, named by a path such as "gravity", "mass/pole", "delay/hip": see
-/// sim/parameters.h.
+/// One uncertain simulator parameter, named by a path such as "gravity", "mass/pole", "delay/hip":
+/// see sim/parameters.h.
 struct ParameterDescription {
   enum class Coordinate { kLinear, kLog, kLogit };
   std::string name;
@@ -246,11 +270,12 @@ struct ParameterDescription {
   Coordinate coordinate;
   double mean;      ///< prior mean, physical units
   double variance;  ///< prior variance, physical units squared
-  double lower = -std::numeric_limits<double>::infinity();  ///< kLogit: bounds, physical units; lower < mean < upper
+  /// kLogit: bounds, physical units; lower < mean < upper
+  double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
   /// Prior in the coordinate. For kLog the Gaussian whose log-normal has that mean and variance:
-  /// s^2 = ln(1 + variance/mean^2), m = ln(mean) - s^2/2. For kLogit, x = ln((p - lower) / (upper - p)), the one
-  /// that has them to first order: m = x(mean), s^2 = variance * x'(mean)^2.
+  /// s^2 = ln(1 + variance/mean^2), m = ln(mean) - s^2/2. For kLogit, x = ln((p - lower) / (upper -
+  /// p)), the one that has them to first order: m = x(mean), s^2 = variance * x'(mean)^2.
   double coordinate_mean() const;
   double coordinate_variance() const;
   double ToPhysical(double coordinate_value) const;
@@ -261,11 +286,13 @@ struct TaskSettings {
   std::string name;  ///< file name in sim/tasks/
   double period;     ///< [s] control period
   int steps;         ///< per episode
-  /// Tasks reach and hold: where to go and how far around it an episode may begin; one each per coordinate of q.
+  /// Tasks reach and hold: where to go and how far around it an episode may begin; one each per
+  /// coordinate of q.
   std::vector<double> target = {}, spread = {};
 };
 
-/// A parameter that is known: not inferred, but other than what the URDF and the TOML file's tables say.
+/// A parameter that is known: not inferred, but other than what the URDF and the TOML file's tables
+/// say.
 struct FrozenParameter {
   std::string name;
   double value;  ///< physical units
@@ -294,10 +321,13 @@ struct TrainingSettings {
   int critic_epochs, critic_minibatch;
   bool normalise_values = true;         ///< the critic's targets, by their running mean and sd
   bool normalise_observations = false;  ///< by their running mean and sd
-  double worst_share = 1;               ///< of the episodes, by return, that an update learns from (EPOpt); 1 = all
-  int worst_after = 100;                ///< updates that learn from all of them
-  double duration = 0;                  ///< [s] >= 0 that an iteration's training takes in virtual time
-  double position_noise = 0, velocity_noise = 0;  ///< sd of what the policy is told [rad or m], [rad/s or m/s]
+  /// of the episodes, by return, that an update learns from (EPOpt); 1 = all
+  double worst_share = 1;
+  int worst_after = 100;  ///< updates that learn from all of them
+  /// [s] >= 0 that an iteration's training takes in virtual time
+  double duration = 0;
+  /// sd of what the policy is told [rad or m], [rad/s or m/s]
+  double position_noise = 0, velocity_noise = 0;
 };
 
 struct HiddenParameter {
@@ -305,13 +335,15 @@ struct HiddenParameter {
   double lower, upper;
 };
 
-/// What a virtual robot's joint with a motor has besides its JointDynamics: none of the models knows of it.
+/// What a virtual robot's joint with a motor has besides its JointDynamics: none of the models
+/// knows of it.
 struct UnmodelledJoint {
   int joint = -1;       ///< index into joints
   double friction = 0;  ///< [Nm] or [N] >= 0 of Coulomb friction
   double delay = 0;     ///< [s] 0 to JointDynamics::kLongestDelay, of efforts
   double backlash = 0;  ///< [rad] or [m] >= 0 between the two ends of the gear's play
-  double rotor = 0;     ///< [kg m^2] or [kg], seen at the joint, of what is before the play; > 0 if there is any
+  /// [kg m^2] or [kg], seen at the joint, of what is before the play; > 0 if there is any
+  double rotor = 0;
 };
 
 struct VirtualRobotSettings {
@@ -327,12 +359,14 @@ struct VirtualRobotSettings {
   std::vector<UnmodelledJoint> joints = {};
 };
 
-/// Everything there is to know about a robot: robot.urdf and robot.toml, validated.
-/// links[0] is the fixed base; joints are in order of URDF depth-first traversal and joint i moves link i + 1.
-/// The generalised coordinates q, v are the joints' one after the other: one each, but for spherical joints.
+/// Everything there is to know about a robot: robot.urdf and robot.toml, validated. links[0] is the
+/// fixed base; joints are in order of URDF depth-first traversal and joint i moves link i + 1. The
+/// generalised coordinates q, v are the joints' one after the other: one each, but for spherical
+/// joints.
 struct RobotDescription {
   std::string file;  ///< the TOML file
-  uint64_t fingerprint = 0;  ///< of the contents of all files (FNV-1a): a checkpoint of other contents is another's
+  /// of the contents of all files (FNV-1a): a checkpoint of other contents is another's
+  uint64_t fingerprint = 0;
   std::string name;
   std::vector<LinkDescription> links;
   std::vector<JointDescription> joints;

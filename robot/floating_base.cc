@@ -18,33 +18,45 @@ constexpr double kParallel = 1e-9;
 // Joints from the world to a link.
 std::vector<int> ChainTo(const RobotDescription& robot, int link) {
   std::vector<int> chain;
-  for (int at = link; at != 0; at = robot.joints[static_cast<size_t>(chain.back())].parent) chain.push_back(at - 1);
+  for (int at = link; at != 0; at = robot.joints[static_cast<size_t>(chain.back())].parent)
+    chain.push_back(at - 1);
   std::reverse(chain.begin(), chain.end());
   return chain;
 }
 
-bool AtRightAngles(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return std::abs(a.dot(b)) < kParallel; }
+bool AtRightAngles(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::abs(a.dot(b)) < kParallel;
+}
 
 void Refuse(const std::string& why) { throw std::invalid_argument(why); }
 
 }  // namespace
 
 bool FloatingBase::Has(int joint) const {
-  return joint == turned || std::any_of(slides.begin(), slides.end(), [&](const auto& slide) { return slide.joint == joint; });
+  return joint == turned || std::any_of(slides.begin(), slides.end(),
+                                        [&](const auto& slide) { return slide.joint == joint; });
 }
 
 FloatingBase FloatingBaseOf(const RobotDescription& robot) {
-  const auto imu = std::find_if(robot.sensors.begin(), robot.sensors.end(), [](const auto& sensor) { return sensor.link >= 0; });
+  const auto imu = std::find_if(robot.sensors.begin(), robot.sensors.end(),
+                                [](const auto& sensor) { return sensor.link >= 0; });
   if (imu == robot.sensors.end()) Refuse("the robot has no IMU");
   const std::string& link = robot.links[static_cast<size_t>(imu->link)].name;
-  FloatingBase base{.imu = static_cast<size_t>(imu - robot.sensors.begin()), .link = imu->link, .slides = {}, .turned = -1,
-                    .axis = Eigen::Vector3d::UnitY(), .zero = {}};
+  FloatingBase base{.imu = static_cast<size_t>(imu - robot.sensors.begin()),
+                    .link = imu->link,
+                    .slides = {},
+                    .turned = -1,
+                    .axis = Eigen::Vector3d::UnitY(),
+                    .zero = {}};
   for (const int index : ChainTo(robot, imu->link)) {
     const JointDescription& joint = robot.joints[static_cast<size_t>(index)];
-    if (base.turned >= 0) Refuse(fmt::format("the IMU is on \"{}\", beyond the first joint that turns", link));
-    if (!joint.passive) Refuse(fmt::format("the IMU is on \"{}\", beyond the motor of \"{}\"", link, joint.name));
+    if (base.turned >= 0)
+      Refuse(fmt::format("the IMU is on \"{}\", beyond the first joint that turns", link));
+    if (!joint.passive)
+      Refuse(fmt::format("the IMU is on \"{}\", beyond the motor of \"{}\"", link, joint.name));
     for (const SensorDescription& sensor : robot.sensors) {
-      if (sensor.joint == index) Refuse(fmt::format("joint \"{}\" has an encoder, \"{}\"", joint.name, sensor.name));
+      if (sensor.joint == index)
+        Refuse(fmt::format("joint \"{}\" has an encoder, \"{}\"", joint.name, sensor.name));
     }
     base.zero.position += base.zero.rotation * joint.origin;
     base.zero.rotation *= joint.rotation;
@@ -53,28 +65,39 @@ FloatingBase FloatingBaseOf(const RobotDescription& robot) {
       continue;
     }
     if (joint.type == Type::kSpherical) {
-      Refuse(fmt::format("joint \"{}\" is spherical, and the state has one coordinate a joint", joint.name));
+      Refuse(fmt::format("joint \"{}\" is spherical, and the state has one coordinate a joint",
+                         joint.name));
     }
     base.turned = index;
     base.axis = joint.axis;
   }
   const Eigen::Vector3d normal = base.normal();
-  const bool in_plane = base.turned >= 0 && base.slides.size() == 2 && std::abs(normal.z()) < kParallel &&
+  const bool in_plane = base.turned >= 0 && base.slides.size() == 2 &&
+                        std::abs(normal.z()) < kParallel &&
                         AtRightAngles(base.slides[0].direction, base.slides[1].direction) &&
-                        AtRightAngles(base.slides[0].direction, normal) && AtRightAngles(base.slides[1].direction, normal);
+                        AtRightAngles(base.slides[0].direction, normal) &&
+                        AtRightAngles(base.slides[1].direction, normal);
   if (!in_plane) {
-    Refuse(fmt::format("\"{}\" does not slide along two axes at right angles in an upright plane and then turn about its normal", link));
+    Refuse(
+        fmt::format("\"{}\" does not slide along two axes at right angles in an upright plane and "
+                    "then turn about its normal",
+                    link));
   }
   const std::vector<ContactPoint> points = ContactPoints(robot);
   const auto moved = [&](const ContactPoint& point) {
     const std::vector<int> chain = ChainTo(robot, point.link);
     return std::find(chain.begin(), chain.end(), base.turned) != chain.end();
   };
-  if (points.empty()) Refuse("nothing of it can touch the ground: no [simulation.contact], or no <collision> of spheres, capsules or boxes");
+  if (points.empty())
+    Refuse(
+        "nothing of it can touch the ground: no [simulation.contact], or no <collision> of "
+        "spheres, capsules or boxes");
   if (points.size() > FloatingBase::kMostPoints) {
-    Refuse(fmt::format("{} points can touch the ground, more than {}", points.size(), FloatingBase::kMostPoints));
+    Refuse(fmt::format("{} points can touch the ground, more than {}", points.size(),
+                       FloatingBase::kMostPoints));
   }
-  if (!std::all_of(points.begin(), points.end(), moved)) Refuse("what touches the ground does not hang on the IMU's link");
+  if (!std::all_of(points.begin(), points.end(), moved))
+    Refuse("what touches the ground does not hang on the IMU's link");
   return base;
 }
 

@@ -9,17 +9,18 @@
 
 namespace plumb {
 
-/// A robot that nothing holds in an upright plane: between the world and the link that carries its IMU are joints with neither
-/// motor nor encoder, two that slide at right angles and a last one that turns about the plane's normal.
+/// A robot that nothing holds in an upright plane: between the world and the link that carries its
+/// IMU are joints with neither motor nor encoder, two that slide at right angles and a last one
+/// that turns about the plane's normal.
 struct FloatingBase {
   static constexpr int kMostPoints = 32;  ///< that can touch the ground
 
-  size_t imu;   ///< index into sensors
-  int link;     ///< index into links: what carries the IMU
+  size_t imu;                              ///< index into sensors
+  int link;                                ///< index into links: what carries the IMU
   std::vector<ImuMounting::Slide> slides;  ///< with their directions in the world
-  int turned;  ///< index into joints of the last one
-  Eigen::Vector3d axis;  ///< that it turns about, in the link's axes
-  Pose zero;    ///< of the link where all these joints are at zero
+  int turned;                              ///< index into joints of the last one
+  Eigen::Vector3d axis;                    ///< that it turns about, in the link's axes
+  Pose zero;                               ///< of the link where all these joints are at zero
 
   /// Whether a joint is one of them.
   bool Has(int joint) const;
@@ -27,8 +28,8 @@ struct FloatingBase {
   Eigen::Vector3d normal() const { return zero.rotation * axis; }
 };
 
-/// That of the robot's first IMU. @throws std::invalid_argument saying what is missing: an IMU, such joints, points that can
-/// touch the ground.
+/// That of the robot's first IMU. @throws std::invalid_argument saying what is missing: an IMU,
+/// such joints, points that can touch the ground.
 FloatingBase FloatingBaseOf(const RobotDescription& robot);
 
 }  // namespace plumb

@@ -10,7 +10,8 @@ ImuMounting MountingOf(const RobotDescription& robot, int link) {
   using Type = JointDescription::Type;
   ImuMounting mounting;
   std::vector<int> chain;  // from the link down to the base
-  for (int at = link; at != 0; at = robot.joints[static_cast<size_t>(chain.back())].parent) chain.push_back(at - 1);
+  for (int at = link; at != 0; at = robot.joints[static_cast<size_t>(chain.back())].parent)
+    chain.push_back(at - 1);
   std::reverse(chain.begin(), chain.end());
 
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // of the joint's axes, in the base's

@@ -8,18 +8,21 @@
 
 namespace plumb {
 
-/// What an IMU on a link tells of joints: all joints from the base up to its link only slide, but for the last one, which
-/// may turn without a motor. Of any other link it tells nothing, and both are empty.
+/// What an IMU on a link tells of joints: all joints from the base up to its link only slide, but
+/// for the last one, which may turn without a motor. Of any other link it tells nothing, and both
+/// are empty.
 struct ImuMounting {
-  /// Index into joints of the one that turns the link: the angle is the twist of the link's orientation about the joint's
-  /// axis, indifferent to a wrong heading where the axis is level. -1: none.
+  /// Index into joints of the one that turns the link: the angle is the twist of the link's
+  /// orientation about the joint's axis, indifferent to a wrong heading where the axis is level.
+  /// -1: none.
   int turned = -1;
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< of that joint, in the link's axes
   /// Link's axes -> base's where that joint is at 0.
   Eigen::Quaterniond unturned = Eigen::Quaterniond::Identity();
 
-  /// A joint that slides and the unit vector along which it does, in the base's axes. Those of a mounting are at right
-  /// angles: otherwise there are none, since one acceleration could then not be told from the other.
+  /// A joint that slides and the unit vector along which it does, in the base's axes. Those of a
+  /// mounting are at right angles: otherwise there are none, since one acceleration could then not
+  /// be told from the other.
   struct Slide {
     int joint;
     Eigen::Vector3d direction;

@@ -36,10 +36,12 @@ MotorDescription ReadMotor(Config& config) {
   if (motor.protocol == "mit") {
     motor.mit = ReadMit(config.Table("mit"));
     if (motor.mit->master == motor.node) {
-      config.Fail("node", fmt::format("= {} is also the id of its replies, mit.master", motor.node));
+      config.Fail("node",
+                  fmt::format("= {} is also the id of its replies, mit.master", motor.node));
     }
   } else if (config.Has("mit")) {
-    config.Fail("mit", fmt::format("is of protocol \"mit\", but the motor's is \"{}\"", motor.protocol));
+    config.Fail("mit",
+                fmt::format("is of protocol \"mit\", but the motor's is \"{}\"", motor.protocol));
   }
   return motor;
 }
@@ -66,7 +68,8 @@ JointDynamics ReadDynamics(Config config, JointDynamics dynamics, const JointDes
   dynamics.delay = config.Number("delay", {0, JointDynamics::kLongestDelay}, 0);
   dynamics.sensor_delay = config.Number("sensor_delay", {0, JointDynamics::kLongestDelay}, 0);
   dynamics.sensor_bias = config.Number("sensor_bias", kSane, 0);
-  if (config.Has("no_load_speed")) dynamics.no_load_speed = config.Number("no_load_speed", {1e-9, HUGE_VAL});
+  if (config.Has("no_load_speed"))
+    dynamics.no_load_speed = config.Number("no_load_speed", {1e-9, HUGE_VAL});
   config.Finish();
   return dynamics;
 }
@@ -109,14 +112,18 @@ NoiseDescription ReadNoise(Config config) {
 // What the joint may do must have a code.
 void CheckMitRanges(const Config& config, const JointDescription& joint) {
   const MitRanges& ranges = joint.motor.mit->ranges;
-  const double torque = joint.effort_limit / joint.motor.gear, velocity = joint.velocity_limit * joint.motor.gear;
+  const double torque = joint.effort_limit / joint.motor.gear,
+               velocity = joint.velocity_limit * joint.motor.gear;
   if (torque > ranges.torque) {
-    config.Fail("mit", fmt::format("has torques up to {} Nm, but the joint's limit is {} Nm at the motor",
-                                   ranges.torque, torque));
+    config.Fail("mit",
+                fmt::format("has torques up to {} Nm, but the joint's limit is {} Nm at the motor",
+                            ranges.torque, torque));
   }
   if (velocity > ranges.velocity) {
-    config.Fail("mit", fmt::format("has velocities up to {} rad/s, but the joint's limit is {} rad/s at the motor",
-                                   ranges.velocity, velocity));
+    config.Fail(
+        "mit",
+        fmt::format("has velocities up to {} rad/s, but the joint's limit is {} rad/s at the motor",
+                    ranges.velocity, velocity));
   }
 }
 
@@ -163,8 +170,8 @@ void ReadTarget(Config& config, const JointDescription& joint, double* target) {
   if (joint.type != JointDescription::Type::kSpherical) {
     *target = config.Number(joint.name, kSane);
     if (*target < joint.lower || *target > joint.upper) {
-      config.Fail(joint.name, fmt::format("= {} is beyond the joint's limits [{}, {}]", *target, joint.lower,
-                                          joint.upper));
+      config.Fail(joint.name, fmt::format("= {} is beyond the joint's limits [{}, {}]", *target,
+                                          joint.lower, joint.upper));
     }
     return;
   }
@@ -196,16 +203,19 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
       if (joint->type == JointDescription::Type::kSpherical) {
         config.Fail(
             "name",
-            fmt::format("= \"{}\" is a spherical joint, which no motor drives: passive = true", name));
+            fmt::format("= \"{}\" is a spherical joint, which no motor drives: passive = true",
+                        name));
       }
       joint->motor = ReadMotor(config);
       CheckMotor(urdf, index);
       joint->limits = ReadLimits(config.Table("limits", false), *joint);
       if (joint->motor.mit) CheckMitRanges(config, *joint);
       for (size_t other = 0; other < joints.size(); ++other) {
-        if (seen[other] && !joints[other].passive && joints[other].motor.protocol == joint->motor.protocol &&
+        if (seen[other] && !joints[other].passive &&
+            joints[other].motor.protocol == joint->motor.protocol &&
             joints[other].motor.node == joint->motor.node) {
-          config.Fail("node", fmt::format("= {} is also joint {}'s", joint->motor.node, joints[other].name));
+          config.Fail("node", fmt::format("= {} is also joint {}'s", joint->motor.node,
+                                          joints[other].name));
         }
       }
     }
@@ -217,8 +227,10 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
   for (size_t i = 0; i < joints.size(); ++i) {
     if (!seen[i]) joints[i].passive = urdf.part[i];
     if (!seen[i] && !joints[i].passive) {
-      root.Fail("joint", fmt::format("does not say how joint \"{}\" of the URDF is driven, or passive = true",
-                                     joints[i].name));
+      root.Fail(
+          "joint",
+          fmt::format("does not say how joint \"{}\" of the URDF is driven, or passive = true",
+                      joints[i].name));
     }
     if (joints[i].passive) joints[i].effort_limit = 0;
   }
@@ -243,9 +255,11 @@ TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints
                 ReadTarget(table, joint, &s.target[at]);
               });
   if (config.IsTable("spread")) {
-    ReadByJoint(config.Table("spread"), joints, [&](Config& table, const JointDescription& joint, size_t at) {
-      std::fill_n(&s.spread[at], joint.num_positions(), table.Number(joint.name, kSaneNotNegative));
-    });
+    ReadByJoint(config.Table("spread"), joints,
+                [&](Config& table, const JointDescription& joint, size_t at) {
+                  std::fill_n(&s.spread[at], joint.num_positions(),
+                              table.Number(joint.name, kSaneNotNegative));
+                });
   } else {
     std::fill(s.spread.begin(), s.spread.end(), config.Number("spread", kSaneNotNegative, 0));
   }

@@ -8,8 +8,8 @@
 
 namespace plumb {
 
-/// Adds what the [[joint]] tables say to the URDF's joints: motors and dynamics. Then every joint is passive
-/// or has a motor, and moves some inertia. @throws ConfigError
+/// Adds what the [[joint]] tables say to the URDF's joints: motors and dynamics. Then every joint
+/// is passive or has a motor, and moves some inertia. @throws ConfigError
 void ReadJoints(Config& root, UrdfModel& urdf);
 
 /// [task], with its tables of joints.

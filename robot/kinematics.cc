@@ -30,7 +30,8 @@ Pose Attach(const Pose& parent, const JointDescription& joint, const double* q) 
 
 }  // namespace
 
-std::vector<Pose> LinkPoses(const RobotDescription& description, const Eigen::Ref<const Eigen::VectorXd>& q) {
+std::vector<Pose> LinkPoses(const RobotDescription& description,
+                            const Eigen::Ref<const Eigen::VectorXd>& q) {
   if (q.size() != description.num_positions()) {
     throw std::invalid_argument("the robot has " + std::to_string(description.num_positions()) +
                                 " coordinates, not " + std::to_string(q.size()));
@@ -38,7 +39,8 @@ std::vector<Pose> LinkPoses(const RobotDescription& description, const Eigen::Re
   std::vector<Pose> poses(description.links.size());
   Eigen::Index next = 0;
   for (const JointDescription& joint : description.joints) {
-    poses.at(static_cast<size_t>(joint.child)) = Attach(poses.at(static_cast<size_t>(joint.parent)), joint, q.data() + next);
+    poses.at(static_cast<size_t>(joint.child)) =
+        Attach(poses.at(static_cast<size_t>(joint.parent)), joint, q.data() + next);
     next += joint.num_positions();
   }
   return poses;
@@ -58,9 +60,10 @@ Kinematics::Kinematics(const RobotDescription& robot)
 
 void Kinematics::Update(const Vector& q, const Vector& v) {
   if (q.size() != num_positions_ || v.size() != num_velocities_) {
-    throw std::invalid_argument("the robot has " + std::to_string(num_positions_) + " coordinates and " +
-                                std::to_string(num_velocities_) + " velocities, not " + std::to_string(q.size()) +
-                                " and " + std::to_string(v.size()));
+    throw std::invalid_argument("the robot has " + std::to_string(num_positions_) +
+                                " coordinates and " + std::to_string(num_velocities_) +
+                                " velocities, not " + std::to_string(q.size()) + " and " +
+                                std::to_string(v.size()));
   }
   Eigen::Index next_q = 0, next_v = 0;
   for (const JointDescription& joint : joints_) {
@@ -91,7 +94,8 @@ Eigen::Vector3d Kinematics::Velocity(int link, const Eigen::Vector3d& point) con
   return at.velocity + at.rate.cross(at.rotation * point);
 }
 
-void Kinematics::Jacobian(int link, const Eigen::Vector3d& point, Eigen::Ref<Eigen::Matrix3Xd> jacobian) const {
+void Kinematics::Jacobian(int link, const Eigen::Vector3d& point,
+                          Eigen::Ref<Eigen::Matrix3Xd> jacobian) const {
   jacobian.setZero();
   const Eigen::Vector3d position = Position(link, point);
   while (link > 0) {

@@ -13,10 +13,12 @@ struct Pose {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< [m] of the link's origin
 };
 
-/// Poses of all links, links[0] (the base) first. For pictures: the simulator has its own, faster kinematics.
+/// Poses of all links, links[0] (the base) first. For pictures: the simulator has its own, faster
+/// kinematics.
 /// @param q as in RobotDescription; a spherical joint's quaternion need not be normalised.
 /// @throws std::invalid_argument if q has the wrong size.
-std::vector<Pose> LinkPoses(const RobotDescription& description, const Eigen::Ref<const Eigen::VectorXd>& q);
+std::vector<Pose> LinkPoses(const RobotDescription& description,
+                            const Eigen::Ref<const Eigen::VectorXd>& q);
 
 /// Where a link is and how it moves, in the base's axes.
 struct LinkMotion : Pose {
@@ -24,8 +26,8 @@ struct LinkMotion : Pose {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s] of the link's origin
 };
 
-/// Positions, velocities and Jacobians of points on a robot's links. Does not allocate after construction. Not
-/// thread-safe.
+/// Positions, velocities and Jacobians of points on a robot's links. Does not allocate after
+/// construction. Not thread-safe.
 class Kinematics {
  public:
   using Vector = Eigen::Ref<const Eigen::VectorXd>;
@@ -42,7 +44,8 @@ class Kinematics {
   /// [m/s] of the same, in the base's axes.
   Eigen::Vector3d Velocity(int link, const Eigen::Vector3d& point) const;
   /// Its velocity per velocity of each coordinate: 3 x num_velocities, written to `jacobian`.
-  void Jacobian(int link, const Eigen::Vector3d& point, Eigen::Ref<Eigen::Matrix3Xd> jacobian) const;
+  void Jacobian(int link, const Eigen::Vector3d& point,
+                Eigen::Ref<Eigen::Matrix3Xd> jacobian) const;
 
  private:
   std::vector<JointDescription> joints_;

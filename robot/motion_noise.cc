@@ -43,7 +43,8 @@ EstimatorSettings EstimatorOf(const RobotDescription& robot, int joint) {
     }
   }
   Override(s, robot.joints[static_cast<size_t>(joint)].noise);
-  if (robot.joints[static_cast<size_t>(joint)].passive) s.coupling = 1;  // none of the efforts is its own
+  // none of the efforts is its own
+  if (robot.joints[static_cast<size_t>(joint)].passive) s.coupling = 1;
   return s;
 }
 

@@ -15,8 +15,8 @@ namespace {
 using Coordinate = ParameterDescription::Coordinate;
 
 constexpr int kMaxComponents = 1000;
-// A covariance that has been through arithmetic: eigenvalues this far below zero, relative to the largest,
-// are zero.
+// A covariance that has been through arithmetic: eigenvalues this far below zero, relative to the
+// largest, are zero.
 constexpr double kRounding = 1e-9;
 
 int8_t ToCode(Coordinate coordinate) {
@@ -40,15 +40,16 @@ void RequireSize(const char* what, int64_t announced, size_t actual, int64_t exp
   }
 }
 
-void RequireSameParameters(const parameter_distribution_t& message, const RobotDescription& description) {
+void RequireSameParameters(const parameter_distribution_t& message,
+                           const RobotDescription& description) {
   const auto count = static_cast<int64_t>(description.parameters.size());
   RequireSize("parameters", message.num_parameters, message.name.size(), count);
   RequireSize("coordinates", message.num_parameters, message.coordinate.size(), count);
   for (size_t i = 0; i < description.parameters.size(); ++i) {
     const ParameterDescription& expected = description.parameters[i];
     if (message.name[i] != expected.name) {
-      Reject(fmt::format("parameter {} is '{}', {} has '{}' there", i, message.name[i].substr(0, 80),
-                         description.name, expected.name));
+      Reject(fmt::format("parameter {} is '{}', {} has '{}' there", i,
+                         message.name[i].substr(0, 80), description.name, expected.name));
     }
     if (message.coordinate[i] != ToCode(expected.coordinate)) {
       Reject(fmt::format("coordinate of '{}' is not that of {}", expected.name, description.name));
@@ -72,9 +73,9 @@ struct Moments {
   double mean, square;
 };
 
-// The moments of a logistic function of a normal variable have no closed form. The trapezoidal rule converges
-// exponentially, as the integrand is analytic and gone at the ends; beyond sd 8, where all is at the bounds,
-// slower.
+// The moments of a logistic function of a normal variable have no closed form. The trapezoidal rule
+// converges exponentially, as the integrand is analytic and gone at the ends; beyond sd 8, where
+// all is at the bounds, slower.
 Moments LogitMoments(double mean, double sd, const ParameterDescription& parameter) {
   constexpr double kEnd = 9, kSpacing = 1. / 16;
   Moments sum{0, 0};
@@ -126,7 +127,8 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
   const int64_t size = message.num_parameters, components = message.num_components;
   RequireSize("weights", components, message.weight.size(), components);
   RequireSize("means", message.num_means, message.mean.size(), components * size);
-  RequireSize("covariances", message.num_covariances, message.covariance.size(), components * size * size);
+  RequireSize("covariances", message.num_covariances, message.covariance.size(),
+              components * size * size);
 
   ParameterDistribution result;
   result.iteration = message.iteration;
@@ -139,8 +141,8 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
     component.mean = Eigen::Map<const Eigen::VectorXd>(message.mean.data() + c * size, size);
     component.covariance =
         Eigen::Map<const RowMajor>(message.covariance.data() + c * size * size, size, size);
-    if (!(component.weight > 0) || !std::isfinite(component.weight) || !component.mean.allFinite() ||
-        !component.covariance.allFinite()) {
+    if (!(component.weight > 0) || !std::isfinite(component.weight) ||
+        !component.mean.allFinite() || !component.covariance.allFinite()) {
       Reject(fmt::format("component {} is not finite or has no weight", c));
     }
     if (size > 0) RequireCovariance(component.covariance);
@@ -148,7 +150,8 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
     result.components.push_back(std::move(component));
   }
   if (std::abs(total - 1) > kRounding) Reject(fmt::format("weights sum to {}", total));
-  if (!result.Mean().allFinite() || !result.Sd().allFinite()) Reject("too wide: its moments overflow");
+  if (!result.Mean().allFinite() || !result.Sd().allFinite())
+    Reject("too wide: its moments overflow");
   return result;
 }
 
@@ -186,7 +189,8 @@ Eigen::VectorXd ParameterDistribution::SampleCoordinates(Random& random) const {
   const Component& component = components[chosen];
   if (size() == 0) return component.mean;
 
-  // Not Cholesky: a parameter known exactly, or exactly tied to another, makes the covariance singular.
+  // Not Cholesky: a parameter known exactly, or exactly tied to another, makes the covariance
+  // singular.
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(component.covariance);
   Eigen::VectorXd normal(size());
   for (double& value : normal) value = random.Normal();
@@ -210,7 +214,8 @@ Eigen::VectorXd ParameterDistribution::Mean() const {
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(size());
   for (Eigen::Index i = 0; i < mean.size(); ++i) {
     for (const Component& component : components) {
-      mean[i] += component.weight * PhysicalMoments(component, i, parameters[static_cast<size_t>(i)]).mean;
+      mean[i] +=
+          component.weight * PhysicalMoments(component, i, parameters[static_cast<size_t>(i)]).mean;
     }
   }
   return mean;
@@ -222,7 +227,8 @@ Eigen::VectorXd ParameterDistribution::Sd() const {
   for (Eigen::Index i = 0; i < sd.size(); ++i) {
     double square = 0;
     for (const Component& component : components) {
-      square += component.weight * PhysicalMoments(component, i, parameters[static_cast<size_t>(i)]).square;
+      square += component.weight *
+                PhysicalMoments(component, i, parameters[static_cast<size_t>(i)]).square;
     }
     sd[i] = std::sqrt(std::max(0., square - mean[i] * mean[i]));
   }

@@ -11,9 +11,9 @@
 
 namespace plumb {
 
-/// Which simulators could have produced a robot's motion: a mixture of Gaussians over the *coordinates* of
-/// the uncertain parameters (the logarithm of a positive one, else itself), in the order of
-/// RobotDescription::parameters. Immutable use is thread-safe.
+/// Which simulators could have produced a robot's motion: a mixture of Gaussians over the
+/// *coordinates* of the uncertain parameters (the logarithm of a positive one, else itself), in the
+/// order of RobotDescription::parameters. Immutable use is thread-safe.
 struct ParameterDistribution {
   struct Component {
     double weight;               ///< > 0; they sum to 1
@@ -30,12 +30,14 @@ struct ParameterDistribution {
   /// The description's prior: one component with a diagonal covariance.
   static ParameterDistribution Prior(const RobotDescription& description);
 
-  /// A message's distribution. @throws std::invalid_argument saying what is wrong: names or coordinates that
-  /// are not the description's, counts that do not fit, numbers that are not finite, weights that do not sum
-  /// to 1, a covariance that is not symmetric and positive semidefinite.
+  /// A message's distribution. @throws std::invalid_argument saying what is wrong: names or
+  /// coordinates that are not the description's, counts that do not fit, numbers that are not
+  /// finite, weights that do not sum to 1, a covariance that is not symmetric and positive
+  /// semidefinite.
   static ParameterDistribution FromMessage(const parameter_distribution_t& message,
                                            const RobotDescription& description);
-  /// The message, except for utime, seed (0) and diagnostics (NaN), which are the sender's to fill in.
+  /// The message, except for utime, seed (0) and diagnostics (NaN), which are the sender's to fill
+  /// in.
   parameter_distribution_t ToMessage() const;
 
   int size() const { return static_cast<int>(parameters.size()); }
@@ -45,8 +47,8 @@ struct ParameterDistribution {
   Eigen::VectorXd SampleCoordinates(Random& random) const;
   Eigen::VectorXd ToPhysical(const Eigen::VectorXd& coordinates) const;
 
-  /// Mean and standard deviation of the mixture, P values in physical units; for a logarithmic coordinate
-  /// those of the log-normal: mean e^(m + s^2/2), variance (e^(s^2) - 1) e^(2m + s^2).
+  /// Mean and standard deviation of the mixture, P values in physical units; for a logarithmic
+  /// coordinate those of the log-normal: mean e^(m + s^2/2), variance (e^(s^2) - 1) e^(2m + s^2).
   Eigen::VectorXd Mean() const;
   Eigen::VectorXd Sd() const;
 };

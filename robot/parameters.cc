@@ -18,14 +18,16 @@ constexpr Range kSane{-1e12, 1e12}, kSanePositive{1e-12, 1e12}, kVariance{1e-30,
 
 // Both are finite, and strictly between the bounds, whatever comes in but NaN.
 double Logit(const ParameterDescription& p, double value) {
-  const double lowest = std::nextafter(p.lower, p.upper), highest = std::nextafter(p.upper, p.lower);
+  const double lowest = std::nextafter(p.lower, p.upper),
+               highest = std::nextafter(p.upper, p.lower);
   const double inside = std::clamp(value, lowest, highest);  // NaN stays
   return std::log(inside - p.lower) - std::log(p.upper - inside);
 }
 
 double FromLogit(const ParameterDescription& p, double x) {
   const double e = std::exp(-std::abs(x)), share = e / (1 + e);  // of the way from the nearer bound
-  const double value = x < 0 ? p.lower + (p.upper - p.lower) * share : p.upper - (p.upper - p.lower) * share;
+  const double value =
+      x < 0 ? p.lower + (p.upper - p.lower) * share : p.upper - (p.upper - p.lower) * share;
   return std::clamp(value, std::nextafter(p.lower, p.upper), std::nextafter(p.upper, p.lower));
 }
 
@@ -43,7 +45,8 @@ ParameterDescription ReadParameter(Config& config, const std::string& name) {
   p.name = name;
   p.unit = config.String("unit");
   constexpr std::array kCoordinates{Coordinate::kLinear, Coordinate::kLog, Coordinate::kLogit};
-  p.coordinate = kCoordinates[static_cast<size_t>(config.Choice("coordinate", {"linear", "log", "logit"}))];
+  p.coordinate =
+      kCoordinates[static_cast<size_t>(config.Choice("coordinate", {"linear", "log", "logit"}))];
   p.mean = config.Number("mean", p.coordinate == Coordinate::kLog ? kSanePositive : kSane);
   p.variance = config.Number("variance", kVariance);
   if (p.coordinate == Coordinate::kLogit) {
@@ -53,8 +56,9 @@ ParameterDescription ReadParameter(Config& config, const std::string& name) {
     if (!(p.mean < p.upper)) config.Fail("upper", "must be above mean");
     // Nothing between the bounds has more: that is what half the robots at either bound would have.
     if (!(p.variance < (p.mean - p.lower) * (p.upper - p.mean))) {
-      config.Fail("variance", fmt::format("= {} is more than a value between the bounds can have, {}",
-                                          p.variance, (p.mean - p.lower) * (p.upper - p.mean)));
+      config.Fail("variance",
+                  fmt::format("= {} is more than a value between the bounds can have, {}",
+                              p.variance, (p.mean - p.lower) * (p.upper - p.mean)));
     }
   } else {
     for (const char* key : {"lower", "upper"}) {
@@ -85,7 +89,8 @@ void ReadParameters(Config& root, std::vector<ParameterDescription>& parameters,
     }
     config.Finish();
   }
-  if (parameters.empty()) root.Fail("parameter", "is missing: at least one [[parameter]] that is not frozen");
+  if (parameters.empty())
+    root.Fail("parameter", "is missing: at least one [[parameter]] that is not frozen");
 }
 
 double ParameterDescription::coordinate_variance() const {

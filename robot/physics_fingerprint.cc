@@ -35,7 +35,8 @@ class Hash {
 };
 
 void AddLink(const LinkDescription& link, Hash* hash) {
-  hash->Add(link.name), hash->Add(link.mass), hash->Add(link.center_of_mass), hash->Add(link.inertia);
+  hash->Add(link.name), hash->Add(link.mass), hash->Add(link.center_of_mass),
+      hash->Add(link.inertia);
   for (const Shape& shape : link.collisions) {
     hash->Add(static_cast<double>(shape.type));
     hash->Add(shape.position), hash->Add(shape.rotation), hash->Add(shape.size);
@@ -47,9 +48,9 @@ void AddJoint(const JointDescription& joint, Hash* hash) {
   hash->Add(joint.origin), hash->Add(joint.rotation), hash->Add(joint.axis);
   const JointDynamics& d = joint.dynamics;
   for (const double number :
-       {static_cast<double>(joint.type), static_cast<double>(joint.parent), joint.lower, joint.upper,
-        joint.effort_limit, d.armature, d.damping, d.friction, d.stiffness, d.rest, d.motor_gain, d.delay,
-        d.sensor_delay, d.sensor_bias, d.no_load_speed}) {
+       {static_cast<double>(joint.type), static_cast<double>(joint.parent), joint.lower,
+        joint.upper, joint.effort_limit, d.armature, d.damping, d.friction, d.stiffness, d.rest,
+        d.motor_gain, d.delay, d.sensor_delay, d.sensor_bias, d.no_load_speed}) {
     hash->Add(number);
   }
 }

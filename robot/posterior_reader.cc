@@ -25,7 +25,9 @@ class Field {
  public:
   Field(const json& value, std::string path) : value_(value), path_(std::move(path)) {}
 
-  [[noreturn]] void Fail(const std::string& what) const { throw std::runtime_error(path_ + ": " + what); }
+  [[noreturn]] void Fail(const std::string& what) const {
+    throw std::runtime_error(path_ + ": " + what);
+  }
   void Require(bool holds, const std::string& what) const {
     if (!holds) Fail(what);
   }
@@ -42,7 +44,8 @@ class Field {
     Require(value_.is_array(), "is not an array");
     Require(value_.size() == size, fmt::format("has {} entries, expected {}", value_.size(), size));
     std::vector<Field> entries;
-    for (size_t i = 0; i < size; ++i) entries.emplace_back(value_[i], fmt::format("{}[{}]", path_, i));
+    for (size_t i = 0; i < size; ++i)
+      entries.emplace_back(value_[i], fmt::format("{}[{}]", path_, i));
     return entries;
   }
   size_t size() const {
@@ -60,8 +63,8 @@ class Field {
     return value_.get<std::string>();
   }
   void RequireText(const std::string& expected, const std::string& otherwise) const {
-    Require(Text() == expected,
-            fmt::format("{}: it is \"{}\", expected \"{}\"", otherwise, Text().substr(0, 80), expected));
+    Require(Text() == expected, fmt::format("{}: it is \"{}\", expected \"{}\"", otherwise,
+                                            Text().substr(0, 80), expected));
   }
   Eigen::VectorXd Vector(size_t size) const {
     Eigen::VectorXd vector(size);
@@ -72,7 +75,8 @@ class Field {
   Eigen::MatrixXd Matrix(size_t size) const {
     const std::vector<Field> rows = Entries(size);
     Eigen::MatrixXd matrix(size, size);
-    for (size_t i = 0; i < size; ++i) matrix.row(static_cast<Eigen::Index>(i)) = rows[i].Vector(size);
+    for (size_t i = 0; i < size; ++i)
+      matrix.row(static_cast<Eigen::Index>(i)) = rows[i].Vector(size);
     return matrix;
   }
 
@@ -83,7 +87,8 @@ class Field {
 
 std::string ReadText(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file)) throw std::runtime_error("there is no such file");
-  if (std::filesystem::file_size(file) > kMaxBytes) throw std::runtime_error("is longer than 256 MB");
+  if (std::filesystem::file_size(file) > kMaxBytes)
+    throw std::runtime_error("is longer than 256 MB");
   std::ifstream stream(file, std::ios::binary);
   std::string text(std::istreambuf_iterator<char>(stream), {});
   if (!stream) throw std::runtime_error("cannot be read");
@@ -103,12 +108,13 @@ void RequireRobot(const Field& root, const RobotDescription& robot) {
     const ParameterDescription& p = robot.parameters[i];
     names[i].RequireText(p.name, "is another robot's");
     units[i].RequireText(p.unit, p.name + " has another unit now");
-    coordinates[i]["kind"].RequireText(CoordinateName(p.coordinate), p.name + " has another coordinate now");
+    coordinates[i]["kind"].RequireText(CoordinateName(p.coordinate),
+                                       p.name + " has another coordinate now");
     if (p.coordinate != ParameterDescription::Coordinate::kLogit) continue;
     for (const auto& [key, bound] : {std::pair{"lower", p.lower}, {"upper", p.upper}}) {
       const double found = coordinates[i][key].Number();
-      coordinates[i][key].Require(found == bound,
-                                  fmt::format("is {}, {} has the bound {} now", found, p.name, bound));
+      coordinates[i][key].Require(
+          found == bound, fmt::format("is {}, {} has the bound {} now", found, p.name, bound));
     }
   }
   root["physics"].RequireText(
@@ -122,15 +128,18 @@ ParameterDistribution::Component ReadComponent(const Field& weight, const Field&
   ParameterDistribution::Component component{weight.Number(), mean.Vector(n), covariance.Matrix(n)};
   weight.Require(component.weight > 0, "is not positive");
   const Eigen::MatrixXd& c = component.covariance;
-  covariance.Require((c - c.transpose()).cwiseAbs().maxCoeff() <= kRounding * c.cwiseAbs().maxCoeff(),
-                     "is not symmetric");
-  covariance.Require(Eigen::LLT<Eigen::MatrixXd>(c).info() == Eigen::Success, "is not positive definite");
+  covariance.Require(
+      (c - c.transpose()).cwiseAbs().maxCoeff() <= kRounding * c.cwiseAbs().maxCoeff(),
+      "is not symmetric");
+  covariance.Require(Eigen::LLT<Eigen::MatrixXd>(c).info() == Eigen::Success,
+                     "is not positive definite");
   return component;
 }
 
 ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& robot) {
   const size_t count = mixture["weights"].size(), n = robot.parameters.size();
-  mixture["weights"].Require(count >= 1 && count <= kMaxComponents, fmt::format("has {} entries", count));
+  mixture["weights"].Require(count >= 1 && count <= kMaxComponents,
+                             fmt::format("has {} entries", count));
   const std::vector<Field> weights = mixture["weights"].Entries(count),
                            means = mixture["means"].Entries(count),
                            covariances = mixture["covariances"].Entries(count);
@@ -142,7 +151,8 @@ ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& 
     distribution.components.push_back(ReadComponent(weights[i], means[i], covariances[i], n));
     total += distribution.components.back().weight;
   }
-  mixture["weights"].Require(std::abs(total - 1) <= kRounding, fmt::format("sum to {}, not to 1", total));
+  mixture["weights"].Require(std::abs(total - 1) <= kRounding,
+                             fmt::format("sum to {}, not to 1", total));
   mixture.Require(distribution.Mean().allFinite() && distribution.Sd().allFinite(),
                   "is too wide: its moments overflow");
   return distribution;
@@ -150,7 +160,8 @@ ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& 
 
 }  // namespace
 
-ParameterDistribution ReadPosterior(const std::filesystem::path& file, const RobotDescription& robot) {
+ParameterDistribution ReadPosterior(const std::filesystem::path& file,
+                                    const RobotDescription& robot) {
   try {
     const json j = json::parse(ReadText(file));
     const Field root(j, "");

@@ -12,17 +12,20 @@ namespace {
 
 constexpr double kMostCounts = 4294967296;  // an unsigned 32-bit position
 constexpr Range kSanePositive{1e-12, 1e12};
-// Of an IMU about which nothing is said, of the size that data sheets of industrial ones give: half a degree of tilt
-// while it moves, and what its vibration adds to the rate's and the force's own noise.
-constexpr double kAngleSd = 0.01, kRateSd = 0.01, kRateBiasSd = 0.01;     // [rad], [rad/s], [rad/s]
-constexpr double kAccelerationSd = 0.3, kAccelerationBiasSd = 0.1;        // [m/s^2]
+// Of an IMU about which nothing is said, of the size that data sheets of industrial ones give: half
+// a degree of tilt while it moves, and what its vibration adds to the rate's and the force's own
+// noise.
+constexpr double kAngleSd = 0.01, kRateSd = 0.01, kRateBiasSd = 0.01;  // [rad], [rad/s], [rad/s]
+constexpr double kAccelerationSd = 0.3, kAccelerationBiasSd = 0.1;     // [m/s^2]
 
 /// Index of what has the name, or an error at the key that gave it.
 template <class T>
 int Find(const Config& config, const char* key, const std::string& name, const std::vector<T>& all,
          const char* what) {
-  const auto at = std::find_if(all.begin(), all.end(), [&](const T& one) { return one.name == name; });
-  if (at == all.end()) config.Fail(key, fmt::format("= \"{}\" is not a {} of the URDF", name, what));
+  const auto at =
+      std::find_if(all.begin(), all.end(), [&](const T& one) { return one.name == name; });
+  if (at == all.end())
+    config.Fail(key, fmt::format("= \"{}\" is not a {} of the URDF", name, what));
   return static_cast<int>(at - all.begin());
 }
 
@@ -32,7 +35,8 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
   s.counts = config.Number("counts", {2, kMostCounts});
   s.range = config.Number("range", {2, kMostCounts}, s.counts);
   for (const auto& [key, counts] : {std::pair{"counts", s.counts}, std::pair{"range", s.range}}) {
-    if (counts != std::floor(counts)) config.Fail(key, fmt::format("= {} is not a whole number", counts));
+    if (counts != std::floor(counts))
+      config.Fail(key, fmt::format("= {} is not a whole number", counts));
   }
   s.sign = config.Integer("sign", {-1, 1}, 1);
   if (s.sign == 0) config.Fail("sign", "must be 1 or -1");
@@ -41,9 +45,10 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
   // Between two readings it must turn by less than half of what it can tell apart.
   const double half = s.range / s.counts * std::acos(-1.);
   if (s.max_speed * s.period >= half) {
-    config.Fail("max_speed",
-                fmt::format("= {} rad/s turns it by {:.3g} rad within a period, half its range or more",
-                            s.max_speed, s.max_speed * s.period));
+    config.Fail(
+        "max_speed",
+        fmt::format("= {} rad/s turns it by {:.3g} rad within a period, half its range or more",
+                    s.max_speed, s.max_speed * s.period));
   }
   // A reading is anywhere within its count: uniform, whose sd is width / sqrt(12).
   const double turn = 2 * std::acos(-1.);
@@ -51,12 +56,14 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
   s.joint = Find(config, "joint", joint, robot.joints, "moving joint");
   const Type type = robot.joints[static_cast<size_t>(s.joint)].type;
   if (type == Type::kSpherical) {
-    config.Fail("joint",
-                fmt::format("= \"{}\" is a spherical joint: an encoder measures one coordinate", joint));
+    config.Fail(
+        "joint",
+        fmt::format("= \"{}\" is a spherical joint: an encoder measures one coordinate", joint));
   }
   if (config.Has("tolerance")) {
     if (robot.joints[static_cast<size_t>(s.joint)].passive) {
-      config.Fail("tolerance", fmt::format("is of two encoders of one joint, but \"{}\" has no motor", joint));
+      config.Fail("tolerance",
+                  fmt::format("is of two encoders of one joint, but \"{}\" has no motor", joint));
     }
     s.tolerance = config.Number("tolerance", {1e-6, 1e6});
   }
@@ -65,7 +72,8 @@ void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescriptio
   } else if (config.Has("radius")) {
     config.Fail("radius", fmt::format("is of a joint that slides, but \"{}\" turns", joint));
   }
-  s.noise.position_sd = config.Number("position_sd", kSanePositive, s.radius * turn / s.counts / std::sqrt(12.));
+  s.noise.position_sd =
+      config.Number("position_sd", kSanePositive, s.radius * turn / s.counts / std::sqrt(12.));
   if (config.Has("velocity_sd")) s.noise.velocity_sd = config.Number("velocity_sd", kSanePositive);
 }
 

@@ -44,7 +44,8 @@ UnmodelledJoint ReadUnmodelledJoint(Config& config, const RobotDescription& robo
     if (robot.joints[static_cast<size_t>(i)].name == name) s.joint = i;
   }
   if (s.joint < 0) config.Fail("name", fmt::format("= \"{}\" is not a joint with a motor", name));
-  if (std::any_of(before.begin(), before.end(), [&](const auto& other) { return other.joint == s.joint; })) {
+  if (std::any_of(before.begin(), before.end(),
+                  [&](const auto& other) { return other.joint == s.joint; })) {
     config.Fail("name", fmt::format("= \"{}\" occurs twice", name));
   }
   s.friction = config.Number("friction", {0, 1e9}, 0);
@@ -53,7 +54,9 @@ UnmodelledJoint ReadUnmodelledJoint(Config& config, const RobotDescription& robo
   if (s.backlash > 0) {
     s.rotor = config.Number("rotor", {1e-9, 1e9});
   } else if (config.Has("rotor")) {
-    config.Fail("rotor", "is what backlash parts from its joint, and there is none; without it write armature");
+    config.Fail(
+        "rotor",
+        "is what backlash parts from its joint, and there is none; without it write armature");
   }
   config.Finish();
   return s;
@@ -83,8 +86,10 @@ DriverSettings ReadDriver(Config config, const std::vector<JointDescription>& jo
                    [](const auto& joint) { return joint.limits.damping > 0; })) {
     config.Fail("stop", "= \"damping\", but no joint has a damping in its [joint.limits]");
   }
-  s.max_motor_temperature = config.Number("max_motor_temperature", {0, HUGE_VAL}, s.max_motor_temperature);
-  s.max_drive_temperature = config.Number("max_drive_temperature", {0, HUGE_VAL}, s.max_drive_temperature);
+  s.max_motor_temperature =
+      config.Number("max_motor_temperature", {0, HUGE_VAL}, s.max_motor_temperature);
+  s.max_drive_temperature =
+      config.Number("max_drive_temperature", {0, HUGE_VAL}, s.max_drive_temperature);
   s.min_bus_voltage = config.Number("min_bus_voltage", kSaneNotNegative, s.min_bus_voltage);
   s.max_bus_voltage = config.Number("max_bus_voltage", {1e-3, HUGE_VAL}, s.max_bus_voltage);
   s.stuck_after = config.Number("stuck_after", {0, 3600}, s.stuck_after);
@@ -95,7 +100,8 @@ DriverSettings ReadDriver(Config config, const std::vector<JointDescription>& jo
   // Rounded as the sum of two decimals may be.
   if (s.ramp > (s.disarm_after - s.expiry) * (1 + 1e-9)) {
     config.Fail("ramp",
-                "must not be longer than disarm_after - expiry: the drives would be disarmed before its end");
+                "must not be longer than disarm_after - expiry: the drives would be disarmed "
+                "before its end");
   }
   if (!(s.min_bus_voltage < s.max_bus_voltage))
     config.Fail("min_bus_voltage", "must be below max_bus_voltage");
@@ -144,7 +150,8 @@ SimulationSettings ReadSimulation(Config config, double period) {
   s.speed_clip = config.Number("speed_clip", {std::numeric_limits<double>::min()}, HUGE_VAL);
   s.move_before_clip = config.Boolean("move_before_clip", false);
   s.gravity = config.Number("gravity", {0, 1000}, kStandardGravity);
-  if (s.substep > period * (1 + 1e-9)) config.Fail("substep", "must not be longer than task.period");
+  if (s.substep > period * (1 + 1e-9))
+    config.Fail("substep", "must not be longer than task.period");
   if (s.latency >= period) config.Fail("latency", "must be shorter than task.period");
   if (config.Has("contact")) s.contact = ReadContact(config.Table("contact"));
   if (config.Has("limit")) s.stop = ReadStop(config.Table("limit"));
@@ -206,7 +213,8 @@ VirtualRobotSettings ReadVirtualRobot(Config config, const RobotDescription& rob
   s.watchdog = config.Number("watchdog", {0, 10});
   s.heartbeat = config.Number("heartbeat", {1e-3, 10});
   s.encoder_bits = config.Integer("encoder_bits", {4, 32});
-  s.engine = static_cast<VirtualRobotSettings::Engine>(config.Choice("engine", {"auto", "mujoco"}, 0));
+  s.engine =
+      static_cast<VirtualRobotSettings::Engine>(config.Choice("engine", {"auto", "mujoco"}, 0));
   s.engine_source = config.Position("engine");
   Config hidden = config.Table("hidden", false);
   for (const std::string& name : hidden.Keys()) {
@@ -215,7 +223,8 @@ VirtualRobotSettings ReadVirtualRobot(Config config, const RobotDescription& rob
     if (robot.FindParameter(name) < 0) hidden.Fail(name, "is not one of the parameters");
     s.hidden.push_back({name, bounds[0], bounds[1]});
   }
-  for (Config& joint : config.Tables("joint")) s.joints.push_back(ReadUnmodelledJoint(joint, robot, s.joints));
+  for (Config& joint : config.Tables("joint"))
+    s.joints.push_back(ReadUnmodelledJoint(joint, robot, s.joints));
   config.Finish();
   return s;
 }

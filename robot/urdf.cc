@@ -56,7 +56,8 @@ class Reader {
     model_.warnings = xml_.warnings;
     Complaints complaints;
     const urdf::ModelInterfaceSharedPtr urdf = urdf::parseURDF(xml_.text);
-    if (!urdf) model_.Fail(xml_.line, complaints.first().empty() ? "is not a URDF" : complaints.first());
+    if (!urdf)
+      model_.Fail(xml_.line, complaints.first().empty() ? "is not a URDF" : complaints.first());
     model_.name = urdf->getName();
     const urdf::LinkConstSharedPtr root = urdf->getRoot();
     if (!root) model_.Fail(xml_.line, "has no root link");
@@ -77,14 +78,16 @@ class Reader {
     if (joint.type != "planar" && joint.type != "floating") return;
     for (const char* part : {"/x", "/y", "/z", "/angle", "/rotation"}) {
       if (xml_.joints.count(name + part))
-        model_.Fail(xml_.joints.at(name + part).line, "joint " + name + part + " is a part of joint " + name);
+        model_.Fail(xml_.joints.at(name + part).line,
+                    "joint " + name + part + " is a part of joint " + name);
       if (xml_.links.count(name + part))
-        model_.Fail(xml_.links.at(name + part).line, "link " + name + part + " is a part of joint " + name);
+        model_.Fail(xml_.links.at(name + part).line,
+                    "link " + name + part + " is a part of joint " + name);
     }
   }
 
-  // `pose` of this URDF link in the frame of our link `index`, to which it is rigidly attached; then what
-  // hangs on it.
+  // `pose` of this URDF link in the frame of our link `index`, to which it is rigidly attached;
+  // then what hangs on it.
   void AddBody(const urdf::Link& link, int index, const Pose& pose) {
     AddInertia(link, index, pose);
     AddShapes(link, index, pose);
@@ -169,7 +172,8 @@ class Reader {
         description.origin = pose.at;
         description.rotation = pose.axes;
       }
-      const bool bound = description.type == Type::kRevolute || joint.type == urdf::Joint::PRISMATIC;
+      const bool bound =
+          description.type == Type::kRevolute || joint.type == urdf::Joint::PRISMATIC;
       description.lower = bound ? xml.lower : -kInfinity;
       description.upper = bound ? xml.upper : kInfinity;
       description.effort_limit = xml.effort;
@@ -181,7 +185,8 @@ class Reader {
       model_.limit_lines.push_back(xml.limit_line);
       model_.part.push_back(parts.size() > 1);
       const bool last = i + 1 == parts.size();
-      AddLink(last ? child.name : description.name, last ? xml_.links.at(child.name).line : xml.line);
+      AddLink(last ? child.name : description.name,
+              last ? xml_.links.at(child.name).line : xml.line);
     }
   }
 
@@ -191,9 +196,10 @@ class Reader {
     LinkDescription& ours = model_.links[static_cast<size_t>(index)];
     const auto warn = [&](int line, const char* what) {
       if (index == 0) return;  // does not move
-      model_.contact_warnings.push_back(fmt::format(
-          "{}:{}: link {}: a collision {} does not touch the ground: only spheres, capsules and boxes do",
-          model_.file, line, link.name, what));
+      model_.contact_warnings.push_back(
+          fmt::format("{}:{}: link {}: a collision {} does not touch the ground: only spheres, "
+                      "capsules and boxes do",
+                      model_.file, line, link.name, what));
     };
     for (size_t i = 0; i < link.visual_array.size(); ++i) {
       const urdf::Visual& visual = *link.visual_array[i];
@@ -201,8 +207,10 @@ class Reader {
     }
     for (size_t i = 0; i < link.collision_array.size(); ++i) {
       const urdf::Collision& collision = *link.collision_array[i];
-      ours.collisions.push_back(ToShape(*collision.geometry, pose * collision.origin, xml.collisions.at(i)));
-      if (ours.collisions.back().type == Shape::Type::kCylinder) warn(xml.collisions[i].line, "cylinder");
+      ours.collisions.push_back(
+          ToShape(*collision.geometry, pose * collision.origin, xml.collisions.at(i)));
+      if (ours.collisions.back().type == Shape::Type::kCylinder)
+        warn(xml.collisions[i].line, "cylinder");
     }
     for (const int line : xml.collision_meshes) warn(line, "mesh");
   }
@@ -235,16 +243,19 @@ class Reader {
     const urdf::Inertial& inertial = *urdf_link.inertial;
     const double mass = inertial.mass;
     const auto fail = [&](const char* what) {
-      model_.Fail(xml_.links.at(urdf_link.name).inertial_line, "link " + urdf_link.name + ": " + what);
+      model_.Fail(xml_.links.at(urdf_link.name).inertial_line,
+                  "link " + urdf_link.name + ": " + what);
     };
     Eigen::Matrix3d inertia;
     inertia << inertial.ixx, inertial.ixy, inertial.ixz,  //
         inertial.ixy, inertial.iyy, inertial.iyz,         //
         inertial.ixz, inertial.iyz, inertial.izz;
     // Principal moments of a body: none negative, none larger than the sum of the others.
-    const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(inertia)).eigenvalues();
+    const Eigen::Vector3d moments =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(inertia)).eigenvalues();
     const double slack = 1e-9 * moments.cwiseAbs().maxCoeff();
-    if (!inertia.allFinite() || moments(0) < -slack || moments(2) > moments(0) + moments(1) + slack) {
+    if (!inertia.allFinite() || moments(0) < -slack ||
+        moments(2) > moments(0) + moments(1) + slack) {
       fail("no body can have this inertia");
     }
     if (mass == 0 && !inertia.isZero(0)) fail("inertia without mass");

@@ -7,22 +7,24 @@
 
 namespace plumb {
 
-/// Links and joints of a URDF file. Links behind fixed joints are merged into the link they are fixed to;
-/// links[0] is the root, which does not move. Planar and floating joints are taken apart as JointDescription
-/// says: a planar joint's x is the joint frame's x axis projected into the plane (its y axis if <axis> is
-/// along x), and (x, y, axis) are right-handed. A <limit>'s lower and upper do not bind the parts, its
-/// effort, and <dynamics>, count for each.
+/// Links and joints of a URDF file. Links behind fixed joints are merged into the link they are
+/// fixed to; links[0] is the root, which does not move. Planar and floating joints are taken apart
+/// as JointDescription says: a planar joint's x is the joint frame's x axis projected into the
+/// plane (its y axis if <axis> is along x), and (x, y, axis) are right-handed. A <limit>'s lower
+/// and upper do not bind the parts, its effort, and <dynamics>, count for each.
 ///
-/// Beyond the URDF standard, <capsule radius="" length=""/> is a solid like <cylinder>, with its caps added
-/// at both ends.
+/// Beyond the URDF standard, <capsule radius="" length=""/> is a solid like <cylinder>, with its
+/// caps added at both ends.
 struct UrdfModel {
   std::string file;
   std::string name;
   std::vector<LinkDescription> links;
-  std::vector<JointDescription> joints;  ///< depth-first, as the file has them; joint i moves link i + 1
+  /// depth-first, as the file has them; joint i moves link i + 1
+  std::vector<JointDescription> joints;
   std::vector<int> link_lines, joint_lines, limit_lines;  ///< of links and joints in the file
-  std::vector<bool> part;             ///< joints[i] is one of those a planar or floating joint is made of
-  std::vector<std::string> warnings;  ///< elements without effect
+  /// joints[i] is one of those a planar or floating joint is made of
+  std::vector<bool> part;
+  std::vector<std::string> warnings;          ///< elements without effect
   std::vector<std::string> contact_warnings;  ///< collision solids that do not touch the ground
 
   /// @throws ConfigError "file:line: what"
@@ -30,8 +32,8 @@ struct UrdfModel {
 };
 
 /// Does not know motors: effort limits may be 0, and links may have no mass.
-/// @throws ConfigError "file:line: ..." for anything missing, unsupported or impossible (an inertia no body
-/// can have, a cycle of joints, a joint without limits).
+/// @throws ConfigError "file:line: ..." for anything missing, unsupported or impossible (an inertia
+/// no body can have, a cycle of joints, a joint without limits).
 UrdfModel LoadUrdf(const std::string& file);
 
 }  // namespace plumb

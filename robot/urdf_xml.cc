@@ -61,7 +61,8 @@ class Checker {
     const std::string name = xml_.Name(element, "name");
     UrdfXml::Link link;
     link.line = element.Row();
-    if (result_.links.size() == kMaxLinks) xml_.Fail(element, fmt::format("more than {} links", kMaxLinks));
+    if (result_.links.size() == kMaxLinks)
+      xml_.Fail(element, fmt::format("more than {} links", kMaxLinks));
     Keep(element, {"inertial", "visual", "collision"}, {"sensor", "gazebo"});
     if (TiXmlElement* inertial = xml_.Child(element, "inertial")) {
       link.inertial_line = inertial->Row();
@@ -69,9 +70,11 @@ class Checker {
       ReadOrigin(*inertial);
       const double mass = xml_.Number(xml_.RequiredChild(*inertial, "mass"), "value", kSane);
       if (mass < 0)
-        xml_.Fail(*xml_.Child(*inertial, "mass"), fmt::format("link {}: mass must not be negative", name));
+        xml_.Fail(*xml_.Child(*inertial, "mass"),
+                  fmt::format("link {}: mass must not be negative", name));
       TiXmlElement& inertia = xml_.RequiredChild(*inertial, "inertia");
-      for (const char* entry : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) xml_.Number(inertia, entry, kSane);
+      for (const char* entry : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"})
+        xml_.Number(inertia, entry, kSane);
     }
     link.visuals = ReadShapes(element, "visual", nullptr);
     link.collisions = ReadShapes(element, "collision", &link.collision_meshes);
@@ -80,7 +83,8 @@ class Checker {
     }
   }
 
-  std::vector<UrdfXml::Shape> ReadShapes(TiXmlElement& link, const char* kind, std::vector<int>* meshes) {
+  std::vector<UrdfXml::Shape> ReadShapes(TiXmlElement& link, const char* kind,
+                                         std::vector<int>* meshes) {
     std::vector<UrdfXml::Shape> shapes;
     for (TiXmlElement *e = link.FirstChildElement(kind), *next; e; e = next) {
       next = e->NextSiblingElement(kind);
@@ -99,7 +103,8 @@ class Checker {
       }
       const auto positive = [&](const char* attribute, size_t count) {
         for (const double size : xml_.Numbers(*solid, attribute, count, kSane)) {
-          if (!(size > 0)) xml_.Fail(*solid, fmt::format("{} of <{}> must be positive", attribute, type));
+          if (!(size > 0))
+            xml_.Fail(*solid, fmt::format("{} of <{}> must be positive", attribute, type));
         }
       };
       if (type == "box") {
@@ -110,8 +115,8 @@ class Checker {
         positive("radius", 1);
         positive("length", 1);
       } else {
-        xml_.Fail(*solid,
-                  fmt::format("<{}> is not one of box, sphere, cylinder, capsule, mesh", type.substr(0, 80)));
+        xml_.Fail(*solid, fmt::format("<{}> is not one of box, sphere, cylinder, capsule, mesh",
+                                      type.substr(0, 80)));
       }
       shapes.push_back({solid->Row(), type == "capsule"});
       if (type == "capsule") solid->SetValue("cylinder");
@@ -126,9 +131,11 @@ class Checker {
     joint.line = joint.limit_line = joint.axis_line = element.Row();
     joint.order = result_.joints.size();
     joint.type = xml_.Name(element, "type");
-    constexpr std::array kTypes{"fixed", "revolute", "continuous", "prismatic", "planar", "floating"};
+    constexpr std::array kTypes{"fixed",     "revolute", "continuous",
+                                "prismatic", "planar",   "floating"};
     if (std::find(kTypes.begin(), kTypes.end(), joint.type) == kTypes.end()) {
-      xml_.Fail(element, label + " is not fixed, revolute, continuous, prismatic, planar or floating");
+      xml_.Fail(element,
+                label + " is not fixed, revolute, continuous, prismatic, planar or floating");
     }
     if (const TiXmlElement* mimic = element.FirstChildElement("mimic")) {
       xml_.Fail(*mimic, label + " is to mimic another: coupled joints are not simulated");
@@ -145,21 +152,23 @@ class Checker {
       for (const auto& [attribute, value] :
            {std::pair{"damping", &joint.damping}, {"friction", &joint.friction}}) {
         if (dynamics->Attribute(attribute)) *value = xml_.Number(*dynamics, attribute, kSane);
-        if (*value < 0) xml_.Fail(*dynamics, fmt::format("{}: {} must not be negative", label, attribute));
+        if (*value < 0)
+          xml_.Fail(*dynamics, fmt::format("{}: {} must not be negative", label, attribute));
       }
       element.RemoveChild(dynamics);
     }
     const std::string parent = xml_.Name(xml_.RequiredChild(element, "parent"), "link");
     const std::string child = xml_.Name(xml_.RequiredChild(element, "child"), "link");
     for (const std::string& link : {parent, child}) {
-      if (!result_.links.count(link)) xml_.Fail(element, fmt::format("{}: there is no link {}", label, link));
+      if (!result_.links.count(link))
+        xml_.Fail(element, fmt::format("{}: there is no link {}", label, link));
     }
     if (!result_.joints.emplace(name, joint).second) {
       xml_.Fail(element, fmt::format("a second joint is called {}", name));
     }
     if (!joint_of_.emplace(child, name).second) {
-      xml_.Fail(element,
-                fmt::format("link {} is moved by joint {} and by joint {}", child, joint_of_[child], name));
+      xml_.Fail(element, fmt::format("link {} is moved by joint {} and by joint {}", child,
+                                     joint_of_[child], name));
     }
     children_[parent].push_back(child);
   }
@@ -197,7 +206,8 @@ class Checker {
       if (!joint_of_.count(name)) roots.push_back(name);
     }
     const auto line = [&](const std::string& link) { return result_.links.at(link).line; };
-    std::sort(roots.begin(), roots.end(), [&](const auto& a, const auto& b) { return line(a) < line(b); });
+    std::sort(roots.begin(), roots.end(),
+              [&](const auto& a, const auto& b) { return line(a) < line(b); });
     if (roots.size() > 1) {
       xml_.Fail(line(roots[1]),
                 fmt::format("link {} hangs on no joint, nor does link {}", roots[1], roots[0]));
@@ -225,6 +235,8 @@ class Checker {
 
 }  // namespace
 
-UrdfXml ReadUrdfXml(const std::string& text, const std::string& file) { return Checker(text, file).Read(); }
+UrdfXml ReadUrdfXml(const std::string& text, const std::string& file) {
+  return Checker(text, file).Read();
+}
 
 }  // namespace plumb

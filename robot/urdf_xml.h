@@ -7,8 +7,8 @@
 
 namespace plumb {
 
-/// What a URDF's text says beside the numbers that urdfdom reads: lines for error messages, and what urdfdom
-/// has no notion of.
+/// What a URDF's text says beside the numbers that urdfdom reads: lines for error messages, and
+/// what urdfdom has no notion of.
 struct UrdfXml {
   struct Shape {
     int line = 0;
@@ -18,7 +18,8 @@ struct UrdfXml {
     int line = 0;
     int inertial_line = 0;
     std::vector<Shape> visuals = {},
-                       collisions = {};      ///< in the file's order, as urdfdom has them; without meshes
+                       /// in the file's order, as urdfdom has them; without meshes
+        collisions = {};
     std::vector<int> collision_meshes = {};  ///< lines
   };
   struct Joint {
@@ -32,14 +33,16 @@ struct UrdfXml {
     int limit_line = 0;  ///< the joint's if it has no <limit>
     int axis_line = 0;   ///< the joint's if it has no <axis>
   };
-  std::string text;  ///< the same robot for urdfdom: without what we do not use, every number a finite one
-  int line = 1;      ///< of <robot>
+  /// the same robot for urdfdom: without what we do not use, every number a finite one
+  std::string text;
+  int line = 1;  ///< of <robot>
   std::map<std::string, Link> links;
   std::map<std::string, Joint> joints;
   std::vector<std::string> warnings;  ///< elements that nothing reads
 };
 
-/// Checks a URDF element by element: every element and number that we use, and that the links form one tree.
+/// Checks a URDF element by element: every element and number that we use, and that the links form
+/// one tree.
 /// @throws ConfigError "file:line: ..."
 UrdfXml ReadUrdfXml(const std::string& text, const std::string& file);
 

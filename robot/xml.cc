@@ -18,10 +18,12 @@ bool IsAscii(char c) { return static_cast<unsigned char>(c) < 127; }
 
 bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-bool IsName(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || !IsAscii(c); }
+bool IsName(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || !IsAscii(c);
+}
 
-// TinyXML descends into elements by recursion: how deep is known before. @return the line where it gets too
-// deep, or 0.
+// TinyXML descends into elements by recursion: how deep is known before. @return the line where it
+// gets too deep, or 0.
 int LineTooDeep(const std::string& text, int limit) {
   int depth = 0;
   size_t at = 0;
@@ -36,7 +38,8 @@ int LineTooDeep(const std::string& text, int limit) {
       ++at;
     } else if (at + 1 < text.size() && IsName(text[at + 1])) {
       if (++depth > limit)
-        return 1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<long>(at), '\n'));
+        return 1 + static_cast<int>(
+                       std::count(text.begin(), text.begin() + static_cast<long>(at), '\n'));
       for (char quote = 0; at < text.size() && (quote != 0 || text[at] != '>'); ++at) {
         if (quote != 0 ? text[at] == quote : text[at] == '"' || text[at] == '\'')
           quote = quote ? '\0' : text[at];
@@ -52,7 +55,8 @@ int LineTooDeep(const std::string& text, int limit) {
 }  // namespace
 
 Xml::Xml(const std::string& text, std::string file) : file_(std::move(file)) {
-  const auto odd = std::find_if(text.begin(), text.end(), [](char c) { return IsControl(c) && !IsSpace(c); });
+  const auto odd =
+      std::find_if(text.begin(), text.end(), [](char c) { return IsControl(c) && !IsSpace(c); });
   if (odd != text.end()) {
     Fail(1 + static_cast<int>(std::count(text.begin(), odd, '\n')),
          fmt::format("contains the byte {:#04x}", *odd));
@@ -100,12 +104,13 @@ TiXmlElement& Xml::RequiredChild(TiXmlElement& parent, const char* name) const {
 
 std::string Xml::Name(const TiXmlElement& element, const char* attribute) const {
   const char* value = element.Attribute(attribute);
-  if (!value || !*value) Fail(element, fmt::format("<{}> has no {}=\"...\"", element.Value(), attribute));
+  if (!value || !*value)
+    Fail(element, fmt::format("<{}> has no {}=\"...\"", element.Value(), attribute));
   const std::string name = value;
   if (name.size() > 200 ||
       std::any_of(name.begin(), name.end(), [](char c) { return IsControl(c) || !IsAscii(c); })) {
-    Fail(element, fmt::format("{} of <{}> is longer than 200 bytes or not printable ASCII", attribute,
-                              element.Value()));
+    Fail(element, fmt::format("{} of <{}> is longer than 200 bytes or not printable ASCII",
+                              attribute, element.Value()));
   }
   return name;
 }
@@ -116,8 +121,9 @@ std::vector<double> Xml::Numbers(TiXmlElement& element, const char* attribute, s
   if (!value) Fail(element, fmt::format("<{}> has no {}=\"...\"", element.Value(), attribute));
   const std::string text = value;
   const auto fail = [&] {
-    Fail(element, fmt::format("{}=\"{}\" of <{}> is not {}", attribute, text.substr(0, 80), element.Value(),
-                              count == 1 ? "a number" : fmt::format("{} numbers", count)));
+    Fail(element,
+         fmt::format("{}=\"{}\" of <{}> is not {}", attribute, text.substr(0, 80), element.Value(),
+                     count == 1 ? "a number" : fmt::format("{} numbers", count)));
   };
   std::vector<double> numbers;
   for (const char *at = text.data(), *end = at + text.size();;) {
@@ -126,7 +132,8 @@ std::vector<double> Xml::Numbers(TiXmlElement& element, const char* attribute, s
     if (*at == '+' && at + 1 != end && at[1] != '-') ++at;
     double number = 0;
     const auto [after, error] = std::from_chars(at, end, number);
-    if (error != std::errc() || (after != end && !IsSpace(*after)) || numbers.size() == count) fail();
+    if (error != std::errc() || (after != end && !IsSpace(*after)) || numbers.size() == count)
+      fail();
     if (!(std::abs(number) <= magnitude)) {
       Fail(element, fmt::format("{}=\"{}\" of <{}> is not finite or beyond {:g}", attribute,
                                 text.substr(0, 80), element.Value(), magnitude));

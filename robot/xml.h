@@ -11,8 +11,8 @@ namespace plumb {
 /// An XML file in which every complaint has its line.
 class Xml {
  public:
-  /// @throws ConfigError "file:line: ..." if the text is not XML, nests deeper than kMaxDepth or contains
-  /// bytes that XML may not.
+  /// @throws ConfigError "file:line: ..." if the text is not XML, nests deeper than kMaxDepth or
+  /// contains bytes that XML may not.
   Xml(const std::string& text, std::string file);
 
   static constexpr int kMaxDepth = 100;
@@ -31,14 +31,16 @@ class Xml {
   TiXmlElement& RequiredChild(TiXmlElement& parent, const char* name) const;
   /// Printable ASCII, 1 to 200 bytes: names go to logs, messages and web pages.
   std::string Name(const TiXmlElement& element, const char* attribute) const;
-  /// `count` numbers of at most `magnitude`; writes them back so that other readers cannot read others.
+  /// `count` numbers of at most `magnitude`; writes them back so that other readers cannot read
+  /// others.
   std::vector<double> Numbers(TiXmlElement& element, const char* attribute, size_t count,
                               double magnitude) const;
   double Number(TiXmlElement& element, const char* attribute, double magnitude) const {
     return Numbers(element, attribute, 1, magnitude)[0];
   }
   /// Removes the children whose names are not known. @return their "file:line: <name> in <parent>".
-  std::vector<std::string> RemoveOthers(TiXmlElement& parent, std::initializer_list<const char*> known) const;
+  std::vector<std::string> RemoveOthers(TiXmlElement& parent,
+                                        std::initializer_list<const char*> known) const;
 
  private:
   std::string file_;

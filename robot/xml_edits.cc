@@ -20,7 +20,8 @@ XmlEdits::XmlEdits(std::string text) : text_(std::move(text)) {
   document_.SetTabSize(1);  // columns are characters
   document_.Parse(text_.c_str(), nullptr, TIXML_ENCODING_UTF8);
   if (document_.Error() || !document_.RootElement()) {
-    throw std::invalid_argument(fmt::format("line {}: {}", document_.ErrorRow(), document_.ErrorDesc()));
+    throw std::invalid_argument(
+        fmt::format("line {}: {}", document_.ErrorRow(), document_.ErrorDesc()));
   }
 }
 
@@ -54,7 +55,8 @@ size_t XmlEdits::EndOfOpeningTag(const TiXmlElement& element) const {
   throw std::logic_error("an opening tag without an end");
 }
 
-void XmlEdits::SetAttribute(const TiXmlElement& element, const char* attribute, const std::string& value) {
+void XmlEdits::SetAttribute(const TiXmlElement& element, const char* attribute,
+                            const std::string& value) {
   for (const TiXmlAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
     if (a->NameTStr() != attribute) continue;
     const size_t name = Offset(*a);
@@ -71,7 +73,8 @@ void XmlEdits::SetAttribute(const TiXmlElement& element, const char* attribute, 
     }
     return;
   }
-  edits_[Offset(element) + 1 + element.ValueStr().size()].text += fmt::format(" {}=\"{}\"", attribute, value);
+  edits_[Offset(element) + 1 + element.ValueStr().size()].text +=
+      fmt::format(" {}=\"{}\"", attribute, value);
 }
 
 void XmlEdits::AddChild(const TiXmlElement& element, const std::string& child) {
@@ -86,13 +89,15 @@ void XmlEdits::AddChild(const TiXmlElement& element, const std::string& child) {
 
 void XmlEdits::AddComment(const std::string& words) {
   std::string plain = words;
-  for (size_t at = 0; (at = plain.find("--", at)) != std::string::npos;) plain.replace(at, 2, "- -");
+  for (size_t at = 0; (at = plain.find("--", at)) != std::string::npos;)
+    plain.replace(at, 2, "- -");
   std::replace_if(
       plain.begin(), plain.end(), [](char c) { return static_cast<unsigned char>(c) > 126; }, '?');
   size_t at = text_.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
   const bool declared = text_.compare(at, 5, "<?xml") == 0;
   if (declared) at = text_.find("?>", at) + 2;
-  edits_[at].text += fmt::format("{}<!-- {} -->{}", declared ? "\n" : "", plain, declared ? "" : "\n");
+  edits_[at].text +=
+      fmt::format("{}<!-- {} -->{}", declared ? "\n" : "", plain, declared ? "" : "\n");
 }
 
 std::string XmlEdits::Print() const {

@@ -7,8 +7,8 @@
 
 namespace plumb {
 
-/// An XML text in which single attributes are set: every other byte of it stays, comments and layout
-/// included.
+/// An XML text in which single attributes are set: every other byte of it stays, comments and
+/// layout included.
 class XmlEdits {
  public:
   /// @param text that Xml accepts. @throws std::invalid_argument otherwise.
@@ -19,10 +19,11 @@ class XmlEdits {
 
   /// Replaces the attribute's value, or adds the attribute. The value must need no escaping.
   void SetAttribute(const TiXmlElement& element, const char* attribute, const std::string& value);
-  /// Adds a first child to an element that has children, on a line of its own if the present one is.
+  /// Adds a first child to an element that has children, on a line of its own if the present one
+  /// is.
   void AddChild(const TiXmlElement& element, const std::string& child);
-  /// Adds a comment before the root and all other comments. Two hyphens in a row, which XML does not allow
-  /// there, and bytes beyond ASCII are replaced.
+  /// Adds a comment before the root and all other comments. Two hyphens in a row, which XML does
+  /// not allow there, and bytes beyond ASCII are replaced.
   void AddComment(const std::string& words);
 
   std::string Print() const;

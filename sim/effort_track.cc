@@ -37,7 +37,9 @@ void EffortTrack::Advance() {
   const double now = ends_.back();
   for (double& end : ends_) end -= now;
   size_t old = 0;
-  while (old + 1 < ends_.size() && (ends_[old] < -remembered_ || ends_.size() - old > kMostSegments)) ++old;
+  while (old + 1 < ends_.size() &&
+         (ends_[old] < -remembered_ || ends_.size() - old > kMostSegments))
+    ++old;
   ends_.erase(ends_.begin(), ends_.begin() + static_cast<std::ptrdiff_t>(old));
   efforts_.erase(efforts_.begin(), efforts_.begin() + static_cast<std::ptrdiff_t>(old * n_));
 }

@@ -14,16 +14,16 @@ struct EffortSegment {
   Eigen::VectorXd effort;  ///< [Nm or N] per velocity; zero at passive joints
 };
 
-/// In how many equal substeps a duration > 0 is divided: of about `substep` seconds, at most a tenth more, so
-/// that a recorded step of 8.05 ms has as many of 2 ms as one of 8 ms.
+/// In how many equal substeps a duration > 0 is divided: of about `substep` seconds, at most a
+/// tenth more, so that a recorded step of 8.05 ms has as many of 2 ms as one of 8 ms.
 inline double SubstepCount(double duration, double substep) {
   return std::max(1.0, std::ceil(duration / substep - 0.1));
 }
 
-/// Efforts as they were commanded over time, piecewise constant, seen through a delay that need not be a
-/// whole number of steps: the delayed effort's mean over a substep, and its first moment about the middle,
-/// which together move the joints as the steps within it do, to second order. Not thread-safe. Apart from
-/// construction nothing allocates.
+/// Efforts as they were commanded over time, piecewise constant, seen through a delay that need not
+/// be a whole number of steps: the delayed effort's mean over a substep, and its first moment about
+/// the middle, which together move the joints as the steps within it do, to second order. Not
+/// thread-safe. Apart from construction nothing allocates.
 class EffortTrack {
  public:
   /// @param remembered [s] how far back efforts are known after Advance.
@@ -40,7 +40,8 @@ class EffortTrack {
     double mean;   ///< of u over the interval
     double first;  ///< integral of (middle - t) u(t) dt; exactly zero where u is constant
   };
-  /// Of the effort of velocity i over [begin, end] minus delay. Beyond the end of the track, its last effort.
+  /// Of the effort of velocity i over [begin, end] minus delay. Beyond the end of the track, its
+  /// last effort.
   Moments Over(size_t i, double begin, double end, double delay) const;
 
   /// The effort that arrives at time t. @param i velocity.

@@ -5,7 +5,8 @@
 
 namespace plumb {
 
-Environment::Environment(const RobotDescription& description) : Environment(std::make_shared<Model>(description)) {}
+Environment::Environment(const RobotDescription& description)
+    : Environment(std::make_shared<Model>(description)) {}
 
 Environment::Environment(std::shared_ptr<const Model> model)
     : task_(MakeTask(model->description())),
@@ -40,7 +41,8 @@ Environment::StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf
   simulator_.Step(next_effort_, period_ - latency_);
   effort_.swap(next_effort_);
   Read();
-  return {task_->Reward(start_q_, start_v_, effort_, q(), v()), !simulator_.finite() || task_->Terminated(q(), v())};
+  return {task_->Reward(start_q_, start_v_, effort_, q(), v()),
+          !simulator_.finite() || task_->Terminated(q(), v())};
 }
 
 void Environment::Read() {
@@ -50,7 +52,8 @@ void Environment::Read() {
 }
 
 void Environment::Observe(Eigen::Ref<Eigen::VectorXf> observation) const {
-  task_->Observe(reading_q_, reading_v_, std::span(observation.data(), static_cast<size_t>(observation.size())));
+  task_->Observe(reading_q_, reading_v_,
+                 std::span(observation.data(), static_cast<size_t>(observation.size())));
 }
 
 }  // namespace plumb

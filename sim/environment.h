@@ -10,8 +10,9 @@
 
 namespace plumb {
 
-/// A task on a simulated robot, in control steps. One per worker; not thread-safe. After construction nothing
-/// allocates. Equal parameters, state and actions give equal bits in any thread.
+/// A task on a simulated robot, in control steps. One per worker; not thread-safe. After
+/// construction nothing allocates. Equal parameters, state and actions give equal bits in any
+/// thread.
 class Environment {
  public:
   /// Has the prior means as parameters and the zero state until told otherwise.
@@ -34,18 +35,20 @@ class Environment {
   /// Draws a state of the task's initial distribution. No effort has been applied yet.
   void Reset(Random& random);
   /// @throws std::invalid_argument if the state is not finite.
-  void SetState(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& v);
+  void SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
+                const Eigen::Ref<const Eigen::VectorXd>& v);
 
   struct StepResult {
     double reward;    ///< of this step
     bool terminated;  ///< by the task, or because the simulation is no longer finite
   };
-  /// One control period. During its first description.simulation.latency seconds the previous action still
-  /// acts: on the robot, too, an effort arrives some time after the state it answers.
+  /// One control period. During its first description.simulation.latency seconds the previous
+  /// action still acts: on the robot, too, an effort arrives some time after the state it answers.
   /// @param action policy units, [-1, 1] = effort limits; clipped here.
   StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action);
 
-  /// Writes what the policy sees of the sensors' readings (JointDynamics), observation_size() entries.
+  /// Writes what the policy sees of the sensors' readings (JointDynamics), observation_size()
+  /// entries.
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const;
 
   const Eigen::VectorXd& q() const { return simulator_.q(); }
@@ -65,8 +68,10 @@ class Environment {
   int steps_per_episode_;
   double period_;
   double latency_;
-  Eigen::VectorXd start_q_, start_v_;  // work space of Reset and Step: where an episode or a step begins
-  Eigen::VectorXd effort_;             // of the latest action: what acts at the beginning of the next step
+  // work space of Reset and Step: where an episode or a step begins
+  Eigen::VectorXd start_q_, start_v_;
+  // of the latest action: what acts at the beginning of the next step
+  Eigen::VectorXd effort_;
   Eigen::VectorXd next_effort_;
   Eigen::VectorXd reading_q_, reading_v_;
 };

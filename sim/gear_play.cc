@@ -22,8 +22,9 @@ GearPlay::GearPlay(const RobotDescription& robot) {
     const auto index = static_cast<size_t>(unmodelled.joint);
     const JointDynamics& d = robot.joints[index].dynamics;
     if (d.motor_gain != 1 || d.delay != 0 || std::isfinite(d.no_load_speed)) {
-      throw std::invalid_argument("joint '" + robot.joints[index].name +
-                                  "' has backlash: its motor_gain, delay and no_load_speed have no place");
+      throw std::invalid_argument(
+          "joint '" + robot.joints[index].name +
+          "' has backlash: its motor_gain, delay and no_load_speed have no place");
     }
     Gear gear{.position = 0,
               .velocity = 0,
@@ -45,13 +46,15 @@ GearPlay::GearPlay(const RobotDescription& robot) {
   const Eigen::MatrixXd mobility = Inverse(simulator.MassMatrix());
   for (Gear& gear : gears_) {
     const double reduced = 1 / (1 / gear.rotor + mobility(gear.velocity, gear.velocity));
-    const double rate = std::max(2 * std::numbers::pi * kToothFrequency, std::sqrt(gear.stiffness / reduced));
+    const double rate =
+        std::max(2 * std::numbers::pi * kToothFrequency, std::sqrt(gear.stiffness / reduced));
     gear.stiffness = reduced * rate * rate;
     gear.damping = 2 * kToothDamping * reduced * rate;
     longest_step_ = std::min(longest_step_, kPhase / rate);
   }
   if (longest_step_ < kShortestStep) {
-    throw std::invalid_argument("a gear's backlash is too narrow, or its rotor too light, to be simulated");
+    throw std::invalid_argument(
+        "a gear's backlash is too narrow, or its rotor too light, to be simulated");
   }
   Place(simulator.q(), simulator.v());
 }
@@ -75,7 +78,8 @@ bool GearPlay::Advance(const MotionEngine::Vector& effort, double duration, Moti
       const double offset = gear.angle - engine.q()[gear.position] + h / 2 * rate;
       const double side = offset > 0 ? 1 : -1;
       const double depth = side * offset - gear.half;
-      const double push = depth > 0 ? std::max(0.0, gear.stiffness * depth + gear.damping * side * rate) : 0;
+      const double push =
+          depth > 0 ? std::max(0.0, gear.stiffness * depth + gear.damping * side * rate) : 0;
       effort_[gear.velocity] = side * push;
     }
     if (!effort_.allFinite() || !engine.Advance(effort_, h)) {

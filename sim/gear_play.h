@@ -8,11 +8,12 @@
 
 namespace plumb {
 
-/// Backlash: the rotor of a motor and the joint that it drives are two masses, and between them lies a gap in
-/// which neither feels the other. At its ends they push each other with max(0, stiffness x depth + damping x
-/// depth'). The teeth are so stiff that rotor and robot swing against each other at kToothFrequency at least,
-/// and that the joint's effort limit bends them by kBend of the gap at most; they have kToothDamping of
-/// critical damping. The motor's effort acts on the rotor alone. Not thread-safe.
+/// Backlash: the rotor of a motor and the joint that it drives are two masses, and between them
+/// lies a gap in which neither feels the other. At its ends they push each other with max(0,
+/// stiffness x depth + damping x depth'). The teeth are so stiff that rotor and robot swing against
+/// each other at kToothFrequency at least, and that the joint's effort limit bends them by kBend of
+/// the gap at most; they have kToothDamping of critical damping. The motor's effort acts on the
+/// rotor alone. Not thread-safe.
 class GearPlay {
  public:
   static constexpr double kToothFrequency = 200;  ///< [Hz]
@@ -22,9 +23,9 @@ class GearPlay {
   static constexpr double kLongestStep = 2e-4, kShortestStep = 1e-6;
 
   /// Of description.virtual_robot.joints. @param robot with known parameters.
-  /// @throws std::invalid_argument if one with backlash has a motor gain, a delay or a no-load speed in its
-  /// dynamics: those would act on what the teeth exert. Or if its rotor is so light, or its gap so narrow,
-  /// that no step is short enough.
+  /// @throws std::invalid_argument if one with backlash has a motor gain, a delay or a no-load
+  /// speed in its dynamics: those would act on what the teeth exert. Or if its rotor is so light,
+  /// or its gap so narrow, that no step is short enough.
   explicit GearPlay(const RobotDescription& robot);
 
   bool any() const { return !gears_.empty(); }

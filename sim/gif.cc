@@ -64,14 +64,15 @@ class Gif {
   Gif(int width, int height, const GifColorType* colors) : width_(width), height_(height) {
     int error = 0;
     const auto append = [](GifFileType* file, const GifByteType* data, int size) {
-      static_cast<std::string*>(file->UserData)->append(reinterpret_cast<const char*>(data), static_cast<size_t>(size));
+      static_cast<std::string*>(file->UserData)
+          ->append(reinterpret_cast<const char*>(data), static_cast<size_t>(size));
       return size;
     };
     file_ = EGifOpen(&bytes_, append, &error);
     if (!file_) throw std::runtime_error("cannot encode a GIF film");
     EGifSetGifVersion(file_, true);
-    const std::unique_ptr<ColorMapObject, void (*)(ColorMapObject*)> map(GifMakeMapObject(kColors, colors),
-                                                                         GifFreeMapObject);
+    const std::unique_ptr<ColorMapObject, void (*)(ColorMapObject*)> map(
+        GifMakeMapObject(kColors, colors), GifFreeMapObject);
     Check(EGifPutScreenDesc(file_, width, height, 8, 0, map.get()));
     // Netscape's extension: repeat for ever.
     Check(EGifPutExtensionLeader(file_, APPLICATION_EXT_FUNC_CODE));
@@ -96,7 +97,8 @@ class Gif {
     std::vector<GifPixelType> line(static_cast<size_t>(width_));
     for (int row = 0; row < height_; ++row) {
       const auto begin = pixels.begin() + static_cast<std::ptrdiff_t>(row) * width_;
-      std::transform(begin, begin + width_, line.begin(), [&](uint32_t color) { return palette.Nearest(color); });
+      std::transform(begin, begin + width_, line.begin(),
+                     [&](uint32_t color) { return palette.Nearest(color); });
       Check(EGifPutLine(file_, line.data(), width_));
     }
   }

@@ -1,6 +1,7 @@
-// plumb-robot: a robot that is not there. Speaks its drives' side of the CAN bus and obeys PLACE_ROBOT.
-#include <CLI/CLI.hpp>
+// plumb-robot: a robot that is not there. Speaks its drives' side of the CAN bus and obeys
+// PLACE_ROBOT.
 #include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
@@ -25,13 +26,15 @@ namespace {
 constexpr uint32_t kStandStream = 0x5374616E;  // of random numbers; "Stan"
 
 /// "gravity=9.8" replaces one of the hidden parameters.
-void Set(const std::string& assignment, const RobotDescription& description, Eigen::VectorXd& physical) {
+void Set(const std::string& assignment, const RobotDescription& description,
+         Eigen::VectorXd& physical) {
   const size_t equals = assignment.find('=');
   const std::string name = assignment.substr(0, equals);
   const int index = description.FindParameter(name);
   if (index < 0) {
     std::string known;
-    for (const ParameterDescription& parameter : description.parameters) known += " " + parameter.name;
+    for (const ParameterDescription& parameter : description.parameters)
+      known += " " + parameter.name;
     throw std::invalid_argument("--set " + assignment + ": no parameter '" + name +
                                 "'; the robot's are:" + known);
   }
@@ -41,7 +44,8 @@ void Set(const std::string& assignment, const RobotDescription& description, Eig
     const auto [rest, error] = std::from_chars(assignment.data() + equals + 1, end, value);
     if (error != std::errc() || rest != end) value = NAN;
   }
-  if (!std::isfinite(value)) throw std::invalid_argument("--set " + assignment + ": expected NAME=NUMBER");
+  if (!std::isfinite(value))
+    throw std::invalid_argument("--set " + assignment + ": expected NAME=NUMBER");
   physical[index] = value;
 }
 
@@ -63,21 +67,25 @@ void Stand(const RobotDescription& description, uint64_t seed, VirtualRobot& rob
   robot.Place(0, q, v);
 }
 
-int Serve(Process& process, const RobotDescription& description, const Eigen::VectorXd& physical, uint64_t seed,
-          const std::string& bus_url) {
+int Serve(Process& process, const RobotDescription& description, const Eigen::VectorXd& physical,
+          uint64_t seed, const std::string& bus_url) {
   constexpr int64_t kReopenPeriod = 200'000;  // [us]
-  constexpr int kBursts = 16;                 // of frames per wake, so that a flood cannot stop time
+  constexpr int kBursts = 16;  // of frames per wake, so that a flood cannot stop time
   const Clock& clock = process.clock();
   VirtualRobot robot(description, physical, clock.Utime());
   Stand(description, seed, robot);
-  const std::unique_ptr<Transport> transport = OpenTransport(
-      bus_url, robot.filters(), {process.participant(), std::llround(description.estimator.delay * 1e6)});
-  Subscriber<place_robot_t> places(process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
-    const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(), static_cast<Eigen::Index>(wish.q.size()));
-    const Eigen::Map<const Eigen::VectorXd> v(wish.v.data(), static_cast<Eigen::Index>(wish.v.size()));
-    if (!robot.Place(wish.utime, q, v))
-      spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
-  });
+  const std::unique_ptr<Transport> transport =
+      OpenTransport(bus_url, robot.filters(),
+                    {process.participant(), std::llround(description.estimator.delay * 1e6)});
+  Subscriber<place_robot_t> places(
+      process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
+        const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(),
+                                                  static_cast<Eigen::Index>(wish.q.size()));
+        const Eigen::Map<const Eigen::VectorXd> v(wish.v.data(),
+                                                  static_cast<Eigen::Index>(wish.v.size()));
+        if (!robot.Place(wish.utime, q, v))
+          spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
+      });
   for (const std::string& warning : transport->warnings()) spdlog::warn("{}", warning);
   spdlog::info("{} is on {}", description.name, bus_url);
 
@@ -86,9 +94,13 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
   LinkState link = LinkState::kUp;
   int64_t next_reopen = 0;
   int64_t now = clock.Utime();
-  const auto until_frame = [&] { return std::max(transport->NextEvent(), clock.Now()) - clock.Now(); };
-  while (process.Wait(std::min({robot.NextEvent() - now, kReopenPeriod, until_frame()}), transport->fd())) {
-    // First the time, then the frames: what arrives in between must not find the robot already past it.
+  const auto until_frame = [&] {
+    return std::max(transport->NextEvent(), clock.Now()) - clock.Now();
+  };
+  while (process.Wait(std::min({robot.NextEvent() - now, kReopenPeriod, until_frame()}),
+                      transport->fd())) {
+    // First the time, then the frames: what arrives in between must not find the robot already past
+    // it.
     now = clock.Utime();
     transport->SetTime(clock.Now());
     for (int burst = 0; burst < kBursts; ++burst) {
@@ -97,7 +109,8 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
       answers.Clear();
       for (int i = 0; i < count; ++i) {
         const Frame& frame = frames[static_cast<size_t>(i)];
-        const int64_t arrival = frame.receive_ns == 0 ? now : clock.UtimeFromRealtimeNs(frame.receive_ns);
+        const int64_t arrival =
+            frame.receive_ns == 0 ? now : clock.UtimeFromRealtimeNs(frame.receive_ns);
         robot.Receive(frame, std::min(arrival, now), answers);
       }
       transport->Send(answers.frames());
@@ -133,16 +146,20 @@ int main(int argc, char** argv) {
         app.add_option("--bus", bus_url, "CAN bus; default: the robot's");
         plumb::AddRealtimeFlag(app, priority);
         app.add_option("--seed", seed, "draws the hidden parameters")
-            ->check(CLI::Range(0.0, 18446744073709551615.0))  // else -1 would be the greatest of them
+            ->check(
+                CLI::Range(0.0, 18446744073709551615.0))  // else -1 would be the greatest of them
             ->capture_default_str();
-        app.add_option("--set", assignments, "NAME=VALUE: this parameter is not drawn, may be repeated");
+        app.add_option("--set", assignments,
+                       "NAME=VALUE: this parameter is not drawn, may be repeated");
       },
       [&](plumb::Process& process) {
         process.BecomeFast(priority);
         const plumb::RobotDescription description = plumb::LoadRobot(robot_path);
         Eigen::VectorXd physical = plumb::HiddenParameters(description, seed);
-        for (const std::string& assignment : assignments) plumb::Set(assignment, description, physical);
+        for (const std::string& assignment : assignments)
+          plumb::Set(assignment, description, physical);
         plumb::LogTruth(description, physical, seed);
-        return plumb::Serve(process, description, physical, seed, bus_url.empty() ? description.bus_url : bus_url);
+        return plumb::Serve(process, description, physical, seed,
+                            bus_url.empty() ? description.bus_url : bus_url);
       });
 }

@@ -46,16 +46,18 @@ class FineSimulator : public MotionEngine {
 std::unique_ptr<MotionEngine> MakeEngine(const RobotDescription& robot) {
   for (const JointDescription& joint : robot.joints) {
     if (joint.dynamics.sensor_delay != 0 || joint.dynamics.sensor_bias != 0) {
-      throw std::invalid_argument("the virtual robot's encoders are right and on time, not like joint '" +
-                                  joint.name + "' of the simulator's");
+      throw std::invalid_argument(
+          "the virtual robot's encoders are right and on time, not like joint '" + joint.name +
+          "' of the simulator's");
     }
   }
   if (robot.virtual_robot.engine == VirtualRobotSettings::Engine::kMujoco) {
     try {
       return MakeMujocoEngine(robot);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(robot.virtual_robot.engine_source +
-                                  "virtual_robot.engine = \"mujoco\" is not possible: " + error.what());
+      throw std::invalid_argument(
+          robot.virtual_robot.engine_source +
+          "virtual_robot.engine = \"mujoco\" is not possible: " + error.what());
     }
   }
   if (Plant::Lacks(robot).empty()) return std::make_unique<Plant>(robot);
@@ -80,7 +82,8 @@ void Mechanism::SetState(const Vector& q, const Vector& v) {
 }
 
 bool Mechanism::Advance(const Vector& effort, double duration) {
-  return play_.any() ? play_.Advance(effort, duration, *engine_) : engine_->Advance(effort, duration);
+  return play_.any() ? play_.Advance(effort, duration, *engine_)
+                     : engine_->Advance(effort, duration);
 }
 
 }  // namespace plumb

@@ -10,13 +10,12 @@
 namespace plumb {
 
 /// What moves in a virtual robot. By description.virtual_robot.engine:
-///   auto    a Plant, or, where the robot has something that a Plant has not (armature, stops, contact), a
-///   Simulator
-///           with substeps a tenth as long as calibration's and at most kLongestSubstep: then reality has the
-///           simulator's equations, but not its integration errors: what a model of contact gets wrong does
-///           not show there
-///   mujoco  MuJoCo (see MakeMujocoEngine): another contact, other stops, another integrator than any model
-///   has
+///   auto    a Plant, or, where the robot has something that a Plant has not (armature, stops,
+///           contact), a Simulator with substeps a tenth as long as calibration's and at most
+///           kLongestSubstep: then reality has the simulator's equations, but not its integration
+///           errors: what a model of contact gets wrong does not show there
+///   mujoco  MuJoCo (see MakeMujocoEngine): another contact, other stops, another integrator than
+///           any model has
 /// Coulomb friction and backlash of description.virtual_robot.joints come on top. Not thread-safe.
 class Mechanism {
  public:
@@ -29,7 +28,8 @@ class Mechanism {
 
   /// @throws std::invalid_argument if an entry is not finite or the size is wrong.
   void SetState(const Vector& q, const Vector& v);
-  /// Holds the motors' efforts for `duration` [s] >= 0. A state that would not be finite is not taken on.
+  /// Holds the motors' efforts for `duration` [s] >= 0. A state that would not be finite is not
+  /// taken on.
   /// @return false then.
   bool Advance(const Vector& effort, double duration);
 

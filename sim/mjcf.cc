@@ -26,9 +26,9 @@ std::string Turn(const Eigen::Matrix3d& rotation) {
 /// MuJoCo knows no rods that are infinitely thin.
 Eigen::Matrix3d Solid(const Eigen::Matrix3d& inertia) {
   const double least = 1e-9 * inertia.trace();
-  const bool thin =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(inertia), Eigen::EigenvaluesOnly).eigenvalues()[0] <
-      least;
+  const bool thin = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(inertia),
+                                                                   Eigen::EigenvaluesOnly)
+                        .eigenvalues()[0] < least;
   return inertia + (thin ? least : 0) * Eigen::Matrix3d::Identity();
 }
 
@@ -59,10 +59,12 @@ class Writer {
         -robot_.simulation.gravity);
     if (const auto& contact = robot_.simulation.contact) {
       surface_ = fmt::format(
-          "condim=\"3\" friction=\"{:.17g} 0.005 0.0001\" margin=\"0.001\" solref=\"0.02 1\" solimp=\"0.8 "
+          "condim=\"3\" friction=\"{:.17g} 0.005 0.0001\" margin=\"0.001\" solref=\"0.02 1\" "
+          "solimp=\"0.8 "
           "0.8 0.01\"",
           contact->friction);
-      text_ += "<geom type=\"plane\" size=\"0 0 1\" contype=\"0\" conaffinity=\"1\" " + surface_ + "/>\n";
+      text_ += "<geom type=\"plane\" size=\"0 0 1\" contype=\"0\" conaffinity=\"1\" " + surface_ +
+               "/>\n";
     }
     WriteChildren(0);
     return text_ + "</worldbody></mujoco>\n";
@@ -88,15 +90,16 @@ class Writer {
       placed.push_back({last, frame});
       if (!Weightless(last)) break;
     }
-    text_ += fmt::format("<body pos=\"{}\" quat=\"{}\">\n", Words(frame.translation()), Turn(frame.linear()));
+    text_ += fmt::format("<body pos=\"{}\" quat=\"{}\">\n", Words(frame.translation()),
+                         Turn(frame.linear()));
     for (const Placed& p : placed) WriteJoint(joint(p.joint), frame.inverse() * p.frame);
     const LinkDescription& link = robot_.links[last + 1];
     const Eigen::Matrix3d inertia = Solid(link.inertia);
     text_ += fmt::format(
         "<inertial pos=\"{}\" mass=\"{:.17g}\" "
         "fullinertia=\"{:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\"/>\n",
-        Words(link.center_of_mass), link.mass, inertia(0, 0), inertia(1, 1), inertia(2, 2), inertia(0, 1),
-        inertia(0, 2), inertia(1, 2));
+        Words(link.center_of_mass), link.mass, inertia(0, 0), inertia(1, 1), inertia(2, 2),
+        inertia(0, 1), inertia(0, 2), inertia(1, 2));
     if (robot_.simulation.contact) {
       for (const Shape& shape : link.collisions) WriteShape(shape);
     }
@@ -119,9 +122,10 @@ class Writer {
         "frictionloss=\"{:.17g}\" "
         "stiffness=\"{:.17g}\" springref=\"{:.17g}\"",
         j.type == Type::kPrismatic ? "slide" : "hinge", Words(in_body.translation()),
-        Words(in_body.linear() * j.axis), j.dynamics.armature, j.dynamics.damping, j.dynamics.friction,
-        j.dynamics.stiffness, j.dynamics.rest);
-    if (limited) text_ += fmt::format(" limited=\"true\" range=\"{:.17g} {:.17g}\"", j.lower, j.upper);
+        Words(in_body.linear() * j.axis), j.dynamics.armature, j.dynamics.damping,
+        j.dynamics.friction, j.dynamics.stiffness, j.dynamics.rest);
+    if (limited)
+      text_ += fmt::format(" limited=\"true\" range=\"{:.17g} {:.17g}\"", j.lower, j.upper);
     text_ += "/>\n";
   }
 
@@ -141,8 +145,9 @@ class Writer {
         return;  // the robot's warnings say so
     }
     text_ += fmt::format(
-        "<geom type=\"{}\" size=\"{}\" pos=\"{}\" quat=\"{}\" contype=\"1\" conaffinity=\"0\" {}/>\n", type,
-        size, Words(shape.position), Turn(shape.rotation), surface_);
+        "<geom type=\"{}\" size=\"{}\" pos=\"{}\" quat=\"{}\" contype=\"1\" conaffinity=\"0\" "
+        "{}/>\n",
+        type, size, Words(shape.position), Turn(shape.rotation), surface_);
   }
 
   const RobotDescription& robot_;

@@ -19,7 +19,8 @@ std::string JointOfVelocity(const Model& model, Eigen::Index velocity) {
   return name;
 }
 
-std::unique_ptr<Engine> WithPhysics(std::unique_ptr<Engine> engine, const Physics<double>& physics) {
+std::unique_ptr<Engine> WithPhysics(std::unique_ptr<Engine> engine,
+                                    const Physics<double>& physics) {
   engine->SetPhysics(physics);
   return engine;
 }
@@ -61,7 +62,8 @@ void Model::RequireInertia() const {
   }
   // In units of the diagonal, so that metres and radians compare.
   const Eigen::VectorXd scale = mass.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(Eigen::MatrixXd(scale.asDiagonal() * mass * scale.asDiagonal()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(
+      Eigen::MatrixXd(scale.asDiagonal() * mass * scale.asDiagonal()));
   if (modes.info() != Eigen::Success || !(modes.eigenvalues()(0) > 1e-12)) {
     Eigen::Index worst = 0;
     if (modes.info() == Eigen::Success) modes.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);
@@ -92,10 +94,12 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
         now.inertia[4], now.inertia[5], now.inertia[2];
     link.inertia = axes.transpose() * inertia * axes;
     JointDescription& joint = robot.joints[i];
-    joint.origin = topology_.link_axes[static_cast<size_t>(joint.parent)].transpose() * vector(now.origin);
+    joint.origin =
+        topology_.link_axes[static_cast<size_t>(joint.parent)].transpose() * vector(now.origin);
     const Physics<double>::Axis& axis = physics.axes[velocity];
-    joint.dynamics = {axis.armature, axis.damping, axis.friction,     axis.stiffness,   axis.rest,
-                      axis.gain,     axis.delay,   axis.sensor_delay, axis.sensor_bias, 1 / axis.slowing};
+    joint.dynamics = {axis.armature,    axis.damping,    axis.friction, axis.stiffness,
+                      axis.rest,        axis.gain,       axis.delay,    axis.sensor_delay,
+                      axis.sensor_bias, 1 / axis.slowing};
     velocity += static_cast<size_t>(joint.num_velocities());
   }
   SimulationSettings& settings = robot.simulation;
@@ -106,7 +110,8 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
     settings.contact->friction = physics.globals.contact_friction;
     for (size_t i = 1; i < robot.links.size(); ++i) {
       std::vector<Shape> spheres;
-      while (point < topology_.points.size() && topology_.points[point].link == static_cast<int>(i)) {
+      while (point < topology_.points.size() &&
+             topology_.points[point].link == static_cast<int>(i)) {
         const Physics<double>::Point& now = physics.points[point++];
         Shape sphere;
         sphere.position = topology_.link_axes[i].transpose() * vector(now.position);

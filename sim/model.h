@@ -10,12 +10,12 @@
 
 namespace plumb {
 
-/// A robot that can be simulated: how it hangs together, and what its parameters do to it. Immutable, hence
-/// thread-safe: one for all workers.
+/// A robot that can be simulated: how it hangs together, and what its parameters do to it.
+/// Immutable, hence thread-safe: one for all workers.
 class Model {
  public:
-  /// @throws std::invalid_argument if the joints do not form a tree, a parameter is unknown or not physical,
-  /// or a joint moves neither mass nor armature.
+  /// @throws std::invalid_argument if the joints do not form a tree, a parameter is unknown or not
+  /// physical, or a joint moves neither mass nor armature.
   explicit Model(const RobotDescription& description);
 
   const RobotDescription& description() const { return description_; }
@@ -24,11 +24,13 @@ class Model {
   int num_positions() const { return topology_.positions; }
   int num_velocities() const { return topology_.velocities; }
 
-  /// What steps the robot, with the prior means as parameters in all lanes. The model must outlive it.
+  /// What steps the robot, with the prior means as parameters in all lanes. The model must outlive
+  /// it.
   std::unique_ptr<Engine> NewEngine() const;
   std::unique_ptr<Engine> NewWideEngine() const;
 
-  /// The description of the robot with these parameters: what another simulator of it has to be built from.
+  /// The description of the robot with these parameters: what another simulator of it has to be
+  /// built from.
   /// @throws std::invalid_argument, see Parameters::Apply.
   RobotDescription Describe(const Eigen::Ref<const Eigen::VectorXd>& physical) const;
 

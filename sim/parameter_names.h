@@ -9,12 +9,13 @@
 namespace plumb {
 
 /// Numbers of Physics::Axis and Physics::Globals in their order.
-inline constexpr const char* kAxisNames[] = {"armature",     "damping",    "friction",      "stiffness",
-                                             "rest",         "gain",       "no_load_speed", "delay",
-                                             "sensor_delay", "sensor_bias"};
+inline constexpr const char* kAxisNames[] = {
+    "armature", "damping",       "friction", "stiffness",    "rest",
+    "gain",     "no_load_speed", "delay",    "sensor_delay", "sensor_bias"};
 inline constexpr size_t kSlowing = 6;
-inline constexpr const char* kGlobalNames[] = {"gravity",          "contact/stiffness", "contact/damping",
-                                               "contact/friction", "limit/stiffness",   "limit/damping"};
+inline constexpr const char* kGlobalNames[] = {"gravity",         "contact/stiffness",
+                                               "contact/damping", "contact/friction",
+                                               "limit/stiffness", "limit/damping"};
 static_assert(sizeof(Physics<double>::Axis) == std::size(kAxisNames) * sizeof(double));
 static_assert(sizeof(Physics<double>::Globals) == std::size(kGlobalNames) * sizeof(double));
 

@@ -31,14 +31,17 @@ Matrix3d Root(const Matrix3d& s) {
     const double pivot = s(j, j) - l.row(j).head(j).squaredNorm();
     if (!(pivot > nothing)) continue;
     l(j, j) = std::sqrt(pivot);
-    for (int i = j + 1; i < 3; ++i) l(i, j) = (s(i, j) - l.row(i).head(j).dot(l.row(j).head(j))) / l(j, j);
+    for (int i = j + 1; i < 3; ++i)
+      l(i, j) = (s(i, j) - l.row(i).head(j).dot(l.row(j).head(j))) / l(j, j);
   }
   return l;
 }
 
 // The inertia of second moments of mass s, and back.
 Matrix3d FromMoments(const Matrix3d& s) { return s.trace() * Matrix3d::Identity() - s; }
-Matrix3d ToMoments(const Matrix3d& inertia) { return inertia.trace() / 2 * Matrix3d::Identity() - inertia; }
+Matrix3d ToMoments(const Matrix3d& inertia) {
+  return inertia.trace() / 2 * Matrix3d::Identity() - inertia;
+}
 
 }  // namespace
 
@@ -56,7 +59,8 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
     physics.mass = link.mass;
     Vector3d::Map(physics.center) = axes * link.center_of_mass;
     Write(axes * link.inertia * axes.transpose(), physics.inertia);
-    Vector3d::Map(physics.origin) = topology.link_axes[static_cast<size_t>(joint.parent)] * joint.origin;
+    Vector3d::Map(physics.origin) =
+        topology.link_axes[static_cast<size_t>(joint.parent)] * joint.origin;
     base_.links.push_back(physics);
     const JointDynamics& d = joint.dynamics;
     Check("delay/" + joint.name, Domain::kDelay, d.delay);
@@ -119,7 +123,8 @@ void Parameters::Check(const std::string& name, Domain domain, double value) {
       fits = fits && std::abs(value) <= kLargestExponent;
       break;
   }
-  if (!fits) throw std::invalid_argument("parameter '" + name + "' cannot be " + std::to_string(value));
+  if (!fits)
+    throw std::invalid_argument("parameter '" + name + "' cannot be " + std::to_string(value));
 }
 
 void Parameters::Freeze(const Binding& binding, double value) {
@@ -173,10 +178,11 @@ Physics<double> Parameters::Nominal() const {
   return physics;
 }
 
-void Parameters::Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, Physics<double>* physics) const {
+void Parameters::Apply(const Eigen::Ref<const Eigen::VectorXd>& physical,
+                       Physics<double>* physics) const {
   if (physical.size() != size()) {
-    throw std::invalid_argument("the simulator has " + std::to_string(size()) + " parameters, not " +
-                                std::to_string(physical.size()));
+    throw std::invalid_argument("the simulator has " + std::to_string(size()) +
+                                " parameters, not " + std::to_string(physical.size()));
   }
   for (int i = 0; i < size(); ++i) {
     Check(names_[static_cast<size_t>(i)], bindings_[static_cast<size_t>(i)].domain, physical[i]);
@@ -211,11 +217,13 @@ void Parameters::Set(const Binding& binding, double value, Physics<double>* phys
   }
 }
 
-void Parameters::SetInertia(const Inertia& inertia, const Eigen::Ref<const Eigen::VectorXd>& physical,
+void Parameters::SetInertia(const Inertia& inertia,
+                            const Eigen::Ref<const Eigen::VectorXd>& physical,
                             Physics<double>* physics) const {
   Matrix3d c = Matrix3d::Zero();
   for (size_t k = 0; k < 6; ++k) {
-    const double value = inertia.parameter[k] >= 0 ? physical[inertia.parameter[k]] : inertia.value[k];
+    const double value =
+        inertia.parameter[k] >= 0 ? physical[inertia.parameter[k]] : inertia.value[k];
     c(kEntries[k].row, kEntries[k].column) = k < 3 ? std::exp(value) : value;
   }
   const Matrix3d root = roots_[inertia.link] * c;
@@ -259,10 +267,11 @@ Eigen::VectorXd HiddenParameters(const RobotDescription& description, uint64_t s
   }
   for (const HiddenParameter& hidden : description.virtual_robot.hidden) {
     const int index = description.FindParameter(hidden.name);
-    if (index < 0) throw std::invalid_argument("hidden '" + hidden.name + "' is not one of the parameters");
+    if (index < 0)
+      throw std::invalid_argument("hidden '" + hidden.name + "' is not one of the parameters");
     // One stream per parameter: hiding one more does not change the others.
-    physical[index] =
-        Random(seed, {kHiddenStream, static_cast<uint32_t>(index)}).Uniform(hidden.lower, hidden.upper);
+    physical[index] = Random(seed, {kHiddenStream, static_cast<uint32_t>(index)})
+                          .Uniform(hidden.lower, hidden.upper);
   }
   return physical;
 }

@@ -15,34 +15,38 @@ namespace plumb {
 
 /// Turns a description's uncertain and frozen parameters into a robot's physics. The paths:
 ///   gravity                 [m/s^2] >= 0
-///   mass/<link>             [kg] > 0: scales mass and inertia; the shape stays. The base's has no effect.
+///   mass/<link>             [kg] > 0: scales mass and inertia; the shape stays. The base's has no
+///                           effect.
 ///   com/<link>/{x,y,z}      [m] centre of mass in the link frame
-///   inertia/<link>          > 0: scales the inertia about the centre of mass; 1 = as the URDF has it
-///   inertia/<link>/{xx,yy,zz,xy,xz,yz}  log-Cholesky coordinates of it, 0 = as the URDF has it: see below
-///   length/<link>           [m] > 0: stretches the link with all that is on it, its further joints too, at
-///   equal
-///                           mass: positions times l/l0, inertia about the centre of mass times (l/l0)^2. l0
-///                           is the distance to the first further joint, or, of a link that carries none, the
-///                           length that the URDF implies for a uniform rod: twice that of the centre of
-///                           mass.
-///   {armature,damping,friction,stiffness,rest,gain,delay,sensor_delay,sensor_bias,no_load_speed}/<joint>
+///   inertia/<link>          > 0: scales the inertia about the centre of mass; 1 = as the URDF has
+///                           it
+///   inertia/<link>/{xx,yy,zz,xy,xz,yz}
+///                           log-Cholesky coordinates of it, 0 = as the URDF has it: see below
+///   length/<link>           [m] > 0: stretches the link with all that is on it, its further joints
+///                           too, at equal mass: positions times l/l0, inertia about the centre of
+///                           mass times (l/l0)^2. l0 is the distance to the first further joint,
+///                           or, of a link that carries none, the length that the URDF implies for
+///                           a uniform rod: twice that of the centre of mass.
+///   {armature,damping,friction,stiffness,rest,gain,delay,sensor_delay,sensor_bias,
+///    no_load_speed}/<joint>
 ///                           as in JointDynamics; a spherical joint has the first three, for all of
 ///                           its axes, and a passive one no gain, delay and no_load_speed
-///   contact/{stiffness,damping,friction}, limit/{stiffness,damping}   as in SimulationSettings
+///   contact/{stiffness,damping,friction}, limit/{stiffness,damping}
+///                           as in SimulationSettings
 ///
-/// Only inertias that a body can have can be expressed: with S = tr(I)/2 - I, the second moment of mass about
-/// the centre (I is physical exactly where S is positive semidefinite: Wensing, Kim, Slotine, RA-L 3, 2018),
-/// and L L^T that of the URDF's inertia in link axes,
-///   S = L C C^T L^T,  C lower triangular with exp(xx), exp(yy), exp(zz) on its diagonal and xy, xz, yz below
-///   it:
+/// Only inertias that a body can have can be expressed. With S = tr(I)/2 - I, the second moment of
+/// mass about the centre (I is physical exactly where S is positive semidefinite: Wensing, Kim,
+/// Slotine, RA-L 3, 2018), and L L^T that of the URDF's inertia in link axes,
+///   S = L C C^T L^T,
+/// with C lower triangular, exp(xx), exp(yy), exp(zz) on its diagonal and xy, xz, yz below it:
 /// log-Cholesky coordinates (Rucker, Wensing, RA-L 7, 2022) of the deviation from the URDF.
 ///
-/// Values set absolutely come first, then what scales, so the order of the parameters does not matter.
-/// Immutable, hence thread-safe.
+/// Values set absolutely come first, then what scales, so the order of the parameters does not
+/// matter. Immutable, hence thread-safe.
 class Parameters {
  public:
-  /// @throws std::invalid_argument for a path that is none of the above, naming the nearest that is, or a
-  /// value that is not physical.
+  /// @throws std::invalid_argument for a path that is none of the above, naming the nearest that
+  /// is, or a value that is not physical.
   Parameters(const RobotDescription& description, const Topology& topology);
 
   int size() const { return static_cast<int>(bindings_.size()); }
@@ -57,19 +61,30 @@ class Parameters {
   /// Writes the physics with these parameters. Does not allocate.
   /// @param physical in the order of description.parameters, physical units.
   /// @param physics one that Nominal returned, whatever was written to it since.
-  /// @throws std::invalid_argument if a value is not finite or not physical, or the size is wrong; `physics`
-  /// is then unchanged.
+  /// @throws std::invalid_argument if a value is not finite or not physical, or the size is wrong;
+  /// `physics` is then unchanged.
   void Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, Physics<double>* physics) const;
 
  private:
   enum class Domain { kAny, kZeroOrMore, kMoreThanZero, kDelay, kExponent };
-  enum class Effect { kNone, kGlobal, kAxis, kSpeedLimit, kCenter, kCholesky, kMass, kInertia, kLength };
+  enum class Effect {
+    kNone,
+    kGlobal,
+    kAxis,
+    kSpeedLimit,
+    kCenter,
+    kCholesky,
+    kMass,
+    kInertia,
+    kLength
+  };
   struct Binding {
     Effect effect;
     Domain domain;
     size_t index = 0;  // of the link's joint, or the first velocity
-    size_t slot = 0;   // which of the globals, of the axis' numbers, of the centre's or the factor's entries
-    size_t count = 1;  // of velocities
+    // which of the globals, of the axis' numbers, of the centre's or the factor's entries
+    size_t slot = 0;
+    size_t count = 1;      // of velocities
     double reference = 1;  // what the files imply
   };
   struct Fixed {
@@ -110,8 +125,8 @@ class Parameters {
   bool delays_ = false;
 };
 
-/// The truth behind a virtual robot: the prior means, with description.virtual_robot.hidden drawn uniformly
-/// from their ranges. Equal seeds give equal robots, in any process.
+/// The truth behind a virtual robot: the prior means, with description.virtual_robot.hidden drawn
+/// uniformly from their ranges. Equal seeds give equal robots, in any process.
 /// @return physical units, order of description.parameters.
 /// @throws std::invalid_argument if a hidden parameter is not one of the parameters.
 Eigen::VectorXd HiddenParameters(const RobotDescription& description, uint64_t seed);

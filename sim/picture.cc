@@ -19,15 +19,18 @@ namespace {
 struct Color {
   double red, green, blue;
 };
-constexpr Color kPaper{1, 1, 1}, kInk{0.25, 0.27, 0.30}, kGround{0.93, 0.92, 0.90}, kLine{0.62, 0.62, 0.62};
+constexpr Color kPaper{1, 1, 1}, kInk{0.25, 0.27, 0.30}, kGround{0.93, 0.92, 0.90},
+    kLine{0.62, 0.62, 0.62};
 constexpr Color kBase{0.72, 0.74, 0.76};
-// Of the links that move, in turn: told apart by everybody (Okabe and Ito, "Color Universal Design", 2008).
+// Of the links that move, in turn: told apart by everybody (Okabe and Ito, "Color Universal
+// Design", 2008).
 constexpr Color kLinks[] = {{0.34, 0.71, 0.91}, {0.90, 0.62, 0.00}, {0.00, 0.62, 0.45},
                             {0.80, 0.47, 0.65}, {0.00, 0.45, 0.70}, {0.84, 0.37, 0.00}};
 
 /// [m], to the right and up.
 struct Box {
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity()),
+                  high = -low;
   void Add(const Eigen::Vector2d& point) {
     low = low.cwiseMin(point);
     high = high.cwiseMax(point);
@@ -76,8 +79,9 @@ class Stage {
       for (size_t i = 1; i < poses.size(); ++i) {
         const Eigen::Vector3d far = robot.links[i].center_of_mass;
         travel = travel.cwiseMax((poses[i].position - first[i].position).cwiseAbs());
-        travel = travel.cwiseMax(
-            (poses[i].position + poses[i].rotation * far - first[i].position - first[i].rotation * far).cwiseAbs());
+        travel = travel.cwiseMax((poses[i].position + poses[i].rotation * far - first[i].position -
+                                  first[i].rotation * far)
+                                     .cwiseAbs());
       }
     }
     return travel.y() > travel.x() ? 1 : 0;
@@ -103,8 +107,10 @@ class Stage {
 class Canvas {
  public:
   Canvas(int width, int height)
-      : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)), cairo_(cairo_create(surface_)) {
-    if (cairo_status(cairo_) != CAIRO_STATUS_SUCCESS) throw std::runtime_error("cannot make a picture");
+      : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)),
+        cairo_(cairo_create(surface_)) {
+    if (cairo_status(cairo_) != CAIRO_STATUS_SUCCESS)
+      throw std::runtime_error("cannot make a picture");
     Fill(kPaper);
     cairo_paint(cairo_);
     cairo_select_font_face(cairo_, "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
@@ -116,7 +122,9 @@ class Canvas {
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
-  void Fill(const Color& c, double opacity = 1) { cairo_set_source_rgba(cairo_, c.red, c.green, c.blue, opacity); }
+  void Fill(const Color& c, double opacity = 1) {
+    cairo_set_source_rgba(cairo_, c.red, c.green, c.blue, opacity);
+  }
   void Text(const std::string& text, double x, double y, double size) {
     cairo_set_font_size(cairo_, size);
     cairo_text_extents_t extents;
@@ -125,7 +133,8 @@ class Canvas {
     cairo_show_text(cairo_, text.c_str());
   }
   /// A snapshot in the rectangle at x, 0. @param scale [pixel/m].
-  void Draw(const Stage& stage, const Snapshot& snapshot, double x, double width, double height, double scale);
+  void Draw(const Stage& stage, const Snapshot& snapshot, double x, double width, double height,
+            double scale);
 
   std::string Png() const {
     std::string png;
@@ -150,7 +159,8 @@ class Canvas {
   cairo_t* cairo_;
 };
 
-void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double width, double height, double scale) {
+void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double width,
+                  double height, double scale) {
   const double middle = stage.Middle(snapshot), bottom = stage.bottom();
   const auto to_x = [&](double across) { return x + width / 2 + (across - middle) * scale; };
   const auto to_y = [&](double up) { return height - (up - bottom) * scale; };
@@ -166,7 +176,8 @@ void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double
   cairo_move_to(cairo_, x, ground);
   cairo_line_to(cairo_, x + width, ground);
   if (stage.follows()) {  // half metres, to see how far it has got
-    for (double mark = std::ceil((middle - width / scale / 2) * 2) / 2; to_x(mark) < x + width; mark += 0.5) {
+    for (double mark = std::ceil((middle - width / scale / 2) * 2) / 2; to_x(mark) < x + width;
+         mark += 0.5) {
       const bool whole = mark == std::round(mark);
       cairo_move_to(cairo_, std::floor(to_x(mark)) + 0.5, ground);
       cairo_rel_line_to(cairo_, 0, whole ? 7 : 4);
@@ -176,7 +187,8 @@ void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double
 
   cairo_set_line_join(cairo_, CAIRO_LINE_JOIN_ROUND);
   for (const Silhouette& silhouette : stage.scene().Look(snapshot.q)) {
-    for (const Eigen::Vector2d& point : silhouette.outline) cairo_line_to(cairo_, to_x(point.x()), to_y(point.y()));
+    for (const Eigen::Vector2d& point : silhouette.outline)
+      cairo_line_to(cairo_, to_x(point.x()), to_y(point.y()));
     cairo_close_path(cairo_);
     // Links without a shape take no colour.
     int moving = 0;
@@ -184,7 +196,8 @@ void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double
       const LinkDescription& other = stage.robot().links[static_cast<size_t>(link)];
       if (!other.visuals.empty() || !other.collisions.empty()) ++moving;
     }
-    const Color color = silhouette.link == 0 ? kBase : kLinks[static_cast<size_t>(moving) % std::size(kLinks)];
+    const Color color =
+        silhouette.link == 0 ? kBase : kLinks[static_cast<size_t>(moving) % std::size(kLinks)];
     Fill(color);
     cairo_fill_preserve(cairo_);
     Fill({color.red * 0.6, color.green * 0.6, color.blue * 0.6});
@@ -206,7 +219,8 @@ constexpr double kTextHeight = 26;  // [pixel], below a picture
 
 }  // namespace
 
-std::string DrawStrip(const RobotDescription& robot, const std::vector<Snapshot>& film, int panels) {
+std::string DrawStrip(const RobotDescription& robot, const std::vector<Snapshot>& film,
+                      int panels) {
   const Stage stage(robot, film);
   constexpr double kHeight = 220, kNarrowest = 84, kWidest = 180;
   const double scale = std::min(kHeight / (stage.top() - stage.bottom()), kWidest / stage.width());
@@ -216,10 +230,13 @@ std::string DrawStrip(const RobotDescription& robot, const std::vector<Snapshot>
   Canvas canvas(static_cast<int>(width) * count, static_cast<int>(height + kTextHeight));
   const int digits = film.back().time - film.front().time < 0.1 * count ? 3 : 2;
   for (int i = 0; i < count; ++i) {
-    const size_t at = count == 1 ? 0 : static_cast<size_t>(i) * (film.size() - 1) / static_cast<size_t>(count - 1);
+    const size_t at =
+        count == 1 ? 0
+                   : static_cast<size_t>(i) * (film.size() - 1) / static_cast<size_t>(count - 1);
     canvas.Draw(stage, film[at], i * width, width, height, scale);
     canvas.Fill(kInk);
-    canvas.Text(fmt::format("{:.{}f} s", film[at].time, digits), (i + 0.5) * width, height + 18, 13);
+    canvas.Text(fmt::format("{:.{}f} s", film[at].time, digits), (i + 0.5) * width, height + 18,
+                13);
   }
   return canvas.Png();
 }
@@ -233,7 +250,8 @@ std::string DrawFilm(const RobotDescription& robot, const std::vector<Snapshot>&
   const double width = std::clamp(std::ceil(scale * stage.width()), kNarrowest, kWidest);
   std::vector<const Snapshot*> frames;
   for (const Snapshot& snapshot : film) {
-    if (snapshot.time >= static_cast<double>(frames.size()) * kFrame - 1e-9) frames.push_back(&snapshot);
+    if (snapshot.time >= static_cast<double>(frames.size()) * kFrame - 1e-9)
+      frames.push_back(&snapshot);
   }
   const auto columns = static_cast<int>(width), rows = static_cast<int>(height + kTextHeight);
   const auto draw = [&](int frame, std::vector<uint32_t>& pixels) {
@@ -243,9 +261,11 @@ std::string DrawFilm(const RobotDescription& robot, const std::vector<Snapshot>&
     canvas.Fill(kInk);
     canvas.Text(fmt::format("{:.2f} s", snapshot.time), width / 2, height + 18, 13);
     pixels.clear();
-    for (int row = 0; row < rows; ++row) pixels.insert(pixels.end(), canvas.Row(row), canvas.Row(row) + columns);
+    for (int row = 0; row < rows; ++row)
+      pixels.insert(pixels.end(), canvas.Row(row), canvas.Row(row) + columns);
   };
-  return EncodeGif(columns, rows, static_cast<int>(frames.size()), static_cast<int>(100 * kFrame), draw);
+  return EncodeGif(columns, rows, static_cast<int>(frames.size()), static_cast<int>(100 * kFrame),
+                   draw);
 }
 
 }  // namespace plumb

@@ -19,8 +19,8 @@ using Eigen::VectorXd;
 SimTK::Vec3 ToSimbody(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
 SimTK::Rotation ToSimbody(const Eigen::Matrix3d& m) {
-  return SimTK::Rotation(
-      SimTK::Mat33(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)));
+  return SimTK::Rotation(SimTK::Mat33(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0),
+                                      m(2, 1), m(2, 2)));
 }
 
 SimTK::MassProperties ToSimbody(const LinkDescription& link) {
@@ -47,8 +47,10 @@ class Plant::Impl {
     std::vector<SimTK::MobilizedBody> links{matter_.Ground()};
     for (size_t i = 0; i < joints_.size(); ++i) {
       const JointDescription& joint = joints_[i];
-      if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 || joint.parent > static_cast<int>(i)) {
-        throw std::invalid_argument("joint '" + joint.name + "' is not in depth-first order of a tree");
+      if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 ||
+          joint.parent > static_cast<int>(i)) {
+        throw std::invalid_argument("joint '" + joint.name +
+                                    "' is not in depth-first order of a tree");
       }
       const SimTK::Body::Rigid body(ToSimbody(robot.links[i + 1]));
       SimTK::MobilizedBody& parent = links[static_cast<size_t>(joint.parent)];
@@ -109,7 +111,8 @@ class Plant::Impl {
     matter_.calcM(state_, mass);
     MatrixXd result(v_.size(), v_.size());
     for (int row = 0; row < result.rows(); ++row) {
-      for (int column = 0; column < result.cols(); ++column) result(row, column) = mass(row, column);
+      for (int column = 0; column < result.cols(); ++column)
+        result(row, column) = mass(row, column);
     }
     const MatrixXd turn = Turn(q_);
     return turn.transpose() * result * turn;
@@ -157,7 +160,8 @@ class Plant::Impl {
     Eigen::Index position = 0, velocity = 0;
     for (const JointDescription& joint : joints_) {
       if (joint.type == Type::kSpherical) {
-        const Eigen::Quaterniond rotation(q[position], q[position + 1], q[position + 2], q[position + 3]);
+        const Eigen::Quaterniond rotation(q[position], q[position + 1], q[position + 2],
+                                          q[position + 3]);
         turn.block<3, 3>(velocity, velocity) = rotation.normalized().toRotationMatrix();
       }
       position += joint.num_positions();
@@ -224,7 +228,8 @@ std::string Plant::Lacks(const RobotDescription& robot) {
     if (joint.type == Type::kSpherical) return "the free rotation" + of;
     if (d.armature != 0) return "the armature" + of;
     if (robot.simulation.stop && std::isfinite(joint.upper)) return "the stops" + of;
-    if (d.delay != 0 || d.sensor_delay != 0 || d.sensor_bias != 0) return "delays and sensor errors" + of;
+    if (d.delay != 0 || d.sensor_delay != 0 || d.sensor_bias != 0)
+      return "delays and sensor errors" + of;
     if (std::isfinite(d.no_load_speed)) return "the no-load speed" + of;
   }
   return "";
@@ -237,7 +242,8 @@ void Plant::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const
     throw std::invalid_argument("a state has " + std::to_string(impl_->q_.size()) +
                                 " positions and velocities");
   }
-  if (!q.allFinite() || !v.allFinite()) throw std::invalid_argument("a plant's state must be finite");
+  if (!q.allFinite() || !v.allFinite())
+    throw std::invalid_argument("a plant's state must be finite");
   impl_->q_ = q;
   impl_->v_ = v;
 }

@@ -17,11 +17,14 @@ double Turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vec
 
 /// A stick from the link's origin to `end`.
 Shape Stick(const Eigen::Vector3d& end) {
-  // Not Quaterniond::FromTwoVectors: for vectors that are opposite it decomposes a matrix, which the compiler needs ten seconds for.
+  // Not Quaterniond::FromTwoVectors: for vectors that are opposite it decomposes a matrix, which
+  // the compiler needs ten seconds for.
   const Eigen::Vector3d across = Eigen::Vector3d::UnitZ().cross(end);
   const double aside = across.norm();
-  const Eigen::Vector3d axis = aside > 0 ? Eigen::Vector3d(across / aside) : Eigen::Vector3d::UnitX();
-  return {Shape::Type::kCapsule, end / 2, Eigen::AngleAxisd(std::atan2(aside, end.z()), axis).toRotationMatrix(),
+  const Eigen::Vector3d axis =
+      aside > 0 ? Eigen::Vector3d(across / aside) : Eigen::Vector3d::UnitX();
+  return {Shape::Type::kCapsule, end / 2,
+          Eigen::AngleAxisd(std::atan2(aside, end.z()), axis).toRotationMatrix(),
           Eigen::Vector3d(kStick, end.norm(), 0)};
 }
 
@@ -52,7 +55,8 @@ std::vector<Eigen::Vector2d> ConvexHull(std::vector<Eigen::Vector2d> points) {
   const auto walk = [&](auto begin, auto end) {
     const size_t first = hull.size();
     for (auto point = begin; point != end; ++point) {
-      while (hull.size() >= first + 2 && Turn(hull[hull.size() - 2], hull.back(), *point) <= 0) hull.pop_back();
+      while (hull.size() >= first + 2 && Turn(hull[hull.size() - 2], hull.back(), *point) <= 0)
+        hull.pop_back();
       hull.push_back(*point);
     }
     hull.pop_back();  // where the other half begins
@@ -77,12 +81,15 @@ std::vector<Silhouette> Scene::Look(const Eigen::Ref<const Eigen::VectorXd>& q) 
       const auto add_ball = [&](const Eigen::Vector3d& at, double radius) {
         for (int i = 0; i < kCirclePoints; ++i) {
           const double angle = 2 * std::numbers::pi * i / kCirclePoints;
-          points.push_back(Project(at) + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+          points.push_back(Project(at) +
+                           radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
         }
       };
       const Eigen::Vector3d half_axis = axes.col(2) * shape.size[1] / 2;
       switch (shape.type) {
-        case Shape::Type::kSphere: add_ball(center, shape.size[0]); break;
+        case Shape::Type::kSphere:
+          add_ball(center, shape.size[0]);
+          break;
         case Shape::Type::kCapsule:
           add_ball(center + half_axis, shape.size[0]);
           add_ball(center - half_axis, shape.size[0]);
@@ -98,7 +105,8 @@ std::vector<Silhouette> Scene::Look(const Eigen::Ref<const Eigen::VectorXd>& q) 
           break;
         case Shape::Type::kBox:
           for (int corner = 0; corner < 8; ++corner) {
-            const Eigen::Vector3d sign(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, corner & 4 ? 0.5 : -0.5);
+            const Eigen::Vector3d sign(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
+                                       corner & 4 ? 0.5 : -0.5);
             points.push_back(Project(center + axes * shape.size.cwiseProduct(sign)));
           }
           break;
@@ -108,9 +116,9 @@ std::vector<Silhouette> Scene::Look(const Eigen::Ref<const Eigen::VectorXd>& q) 
       silhouettes.push_back({static_cast<int>(link), depth, ConvexHull(std::move(points))});
     }
   }
-  std::stable_sort(silhouettes.begin(), silhouettes.end(), [](const Silhouette& a, const Silhouette& b) {
-    return a.depth > b.depth + 1e-9;
-  });
+  std::stable_sort(
+      silhouettes.begin(), silhouettes.end(),
+      [](const Silhouette& a, const Silhouette& b) { return a.depth > b.depth + 1e-9; });
   return silhouettes;
 }
 
@@ -119,7 +127,8 @@ std::vector<Eigen::Vector2d> Scene::Hinges(const Eigen::Ref<const Eigen::VectorX
   const std::vector<Pose> poses = LinkPoses(*robot_, q);
   for (const JointDescription& joint : robot_->joints) {
     if (joint.type == JointDescription::Type::kPrismatic) continue;
-    if (shapes_[static_cast<size_t>(joint.parent)].empty() && joint.passive) continue;  // hangs in the air
+    // hangs in the air
+    if (shapes_[static_cast<size_t>(joint.parent)].empty() && joint.passive) continue;
     hinges.push_back(Project(poses[static_cast<size_t>(joint.child)].position));
   }
   return hinges;

@@ -28,7 +28,8 @@ Simulator::Simulator(std::shared_ptr<const Model> model)
   Take();
 }
 
-Simulator::Simulator(const RobotDescription& description) : Simulator(std::make_shared<Model>(description)) {}
+Simulator::Simulator(const RobotDescription& description)
+    : Simulator(std::make_shared<Model>(description)) {}
 Simulator::Simulator(Simulator&&) noexcept = default;
 Simulator& Simulator::operator=(Simulator&&) noexcept = default;
 Simulator::~Simulator() = default;
@@ -40,10 +41,12 @@ void Simulator::SetParameters(const Vector& physical) {
 
 void Simulator::SetState(const Vector& q, const Vector& v) {
   if (q.size() != num_positions() || v.size() != num_velocities()) {
-    throw std::invalid_argument("a state has " + std::to_string(num_positions()) + " positions and " +
-                                std::to_string(num_velocities()) + " velocities");
+    throw std::invalid_argument("a state has " + std::to_string(num_positions()) +
+                                " positions and " + std::to_string(num_velocities()) +
+                                " velocities");
   }
-  if (!q.allFinite() || !v.allFinite()) throw std::invalid_argument("a simulator's state must be finite");
+  if (!q.allFinite() || !v.allFinite())
+    throw std::invalid_argument("a simulator's state must be finite");
   std::copy(q.begin(), q.end(), engine_->q());
   std::copy(v.begin(), v.end(), engine_->v());
   track_.Clear();
@@ -62,7 +65,8 @@ void Simulator::SetReading(const Vector& q, const Vector& v, const Vector& effor
 
 void Simulator::Recall(std::span<const EffortSegment> before) {
   for (const EffortSegment& segment : before) RequireSize(segment.effort.size());
-  for (const EffortSegment& segment : before) track_.Append(segment.effort.data(), segment.duration);
+  for (const EffortSegment& segment : before)
+    track_.Append(segment.effort.data(), segment.duration);
   track_.Advance();
 }
 
@@ -91,20 +95,22 @@ void Simulator::Step(std::span<const EffortSegment> profile) {
   RequireEnd(duration);
   if (!finite_) return;
   if (!model_->parameters().delays()) track_.Clear();
-  for (const EffortSegment& segment : profile) track_.Append(segment.effort.data(), segment.duration);
+  for (const EffortSegment& segment : profile)
+    track_.Append(segment.effort.data(), segment.duration);
   if (duration > 0) Run(duration);
 }
 
 void Simulator::RequireEnd(double duration) const {
   if (duration > kMostSubsteps * model_->description().simulation.substep) {
-    throw std::invalid_argument("a step of " + std::to_string(duration) + " s would never come to an end");
+    throw std::invalid_argument("a step of " + std::to_string(duration) +
+                                " s would never come to an end");
   }
 }
 
 void Simulator::RequireSize(Eigen::Index size) const {
   if (size != num_velocities()) {
-    throw std::invalid_argument("an effort has " + std::to_string(num_velocities()) + " entries, not " +
-                                std::to_string(size));
+    throw std::invalid_argument("an effort has " + std::to_string(num_velocities()) +
+                                " entries, not " + std::to_string(size));
   }
 }
 
@@ -115,7 +121,8 @@ void Simulator::Run(double duration) {
   for (double i = 0; i < count; ++i) {
     bool steady = true;
     for (size_t k = 0; k < mean_.size(); ++k) {
-      const EffortTrack::Moments moments = track_.Over(k, i * h, (i + 1) * h, physics_.axes[k].delay);
+      const EffortTrack::Moments moments =
+          track_.Over(k, i * h, (i + 1) * h, physics_.axes[k].delay);
       mean_[k] = moments.mean;
       moment_[k] = moments.first;
       steady = steady && moments.first == 0;
@@ -123,7 +130,8 @@ void Simulator::Run(double duration) {
     engine_->Substep(&h, mean_.data(), steady ? nullptr : moment_.data());
   }
   track_.Advance();
-  for (size_t k = 0; k < arriving_.size(); ++k) arriving_[k] = track_.At(k, 0, physics_.axes[k].delay);
+  for (size_t k = 0; k < arriving_.size(); ++k)
+    arriving_[k] = track_.At(k, 0, physics_.axes[k].delay);
   Take();
 }
 
@@ -150,10 +158,13 @@ Eigen::VectorXd Simulator::Acceleration(const Vector& effort) {
 
 Eigen::MatrixXd Simulator::MassMatrix() {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const Eigen::MatrixXd lower = RowMajor::Map(engine_->MassMatrix(), num_velocities(), num_velocities());
+  const Eigen::MatrixXd lower =
+      RowMajor::Map(engine_->MassMatrix(), num_velocities(), num_velocities());
   return lower.selfadjointView<Eigen::Lower>();
 }
 
-Eigen::VectorXd Simulator::Bias() { return Eigen::VectorXd::Map(engine_->Bias(), num_velocities()); }
+Eigen::VectorXd Simulator::Bias() {
+  return Eigen::VectorXd::Map(engine_->Bias(), num_velocities());
+}
 
 }  // namespace plumb

@@ -12,12 +12,14 @@ namespace plumb {
 
 /// A robot as a simulator with exchangeable parameters: reset to any state, apply an effort, step.
 ///
-/// Trees of revolute, continuous, prismatic and spherical joints with armature, damping, Coulomb friction,
-/// springs, stops, contact with the ground, delays and sensors (see RobotDescription); composite rigid bodies
-/// and linearly implicit integration (see Stepper). New parameters need no rebuild, not even new lengths.
+/// Trees of revolute, continuous, prismatic and spherical joints with armature, damping, Coulomb
+/// friction, springs, stops, contact with the ground, delays and sensors (see RobotDescription);
+/// composite rigid bodies and linearly implicit integration (see Stepper). New parameters need no
+/// rebuild, not even new lengths.
 ///
-/// One per worker; not thread-safe. Equal inputs give equal bits, in any thread, on any x86-64 processor.
-/// Apart from construction nothing allocates, but a first profile longer than all before it.
+/// One per worker; not thread-safe. Equal inputs give equal bits, in any thread, on any x86-64
+/// processor. Apart from construction nothing allocates, but a first profile longer than all before
+/// it.
 class Simulator {
  public:
   using Vector = Eigen::Ref<const Eigen::VectorXd>;
@@ -35,25 +37,28 @@ class Simulator {
   int num_velocities() const { return model_->num_velocities(); }
   int parameter_count() const { return model_->parameters().size(); }
 
-  /// @param physical in the order of description.parameters, physical units. Takes effect at once; the state
-  /// stays. @throws std::invalid_argument, see Parameters::Apply.
+  /// @param physical in the order of description.parameters, physical units. Takes effect at once;
+  /// the state stays. @throws std::invalid_argument, see Parameters::Apply.
   void SetParameters(const Vector& physical);
   /// Forgets what was commanded before. Quaternions need not have length one, but more than zero.
   /// @throws std::invalid_argument if an entry is not finite or the size is wrong.
   void SetState(const Vector& q, const Vector& v);
-  /// The same for the readings of the robot's sensors, of which some may be late or biased: JointDynamics.
+  /// The same for the readings of the robot's sensors, of which some may be late or biased:
+  /// JointDynamics.
   /// @param effort that acts at that time.
   void SetReading(const Vector& q, const Vector& v, const Vector& effort);
-  /// What had been commanded before the present, in order of time: where an effort is delayed, it is still to
-  /// come.
+  /// What had been commanded before the present, in order of time: where an effort is delayed, it
+  /// is still to come.
   void Recall(std::span<const EffortSegment> before);
 
-  /// Holds `effort` (num_velocities) for `duration` [s] >= 0, in equal substeps of at most settings.substep:
+  /// Holds `effort` (num_velocities) for `duration` [s] >= 0, in equal substeps of at most
+  /// settings.substep:
   ///   semi-implicit  v += h a(q, v), q += h v: of first order, as gym and MuJoCo's Euler do
-  ///   leapfrog       q += h/2 v, v += h a(q, v), q += h/2 v: of second order but for stops, contacts and
-  ///   friction
-  /// Velocities are clipped to settings.speed_clip after each substep (settings.move_before_clip: after the
-  /// move). If the state ceases to be finite it stays so until the next SetState, without any exception.
+  ///   leapfrog       q += h/2 v, v += h a(q, v), q += h/2 v: of second order but for stops,
+  ///                  contacts and friction
+  /// Velocities are clipped to settings.speed_clip after each substep (settings.move_before_clip:
+  /// after the move). If the state ceases to be finite it stays so until the next SetState, without
+  /// any exception.
   /// @throws std::invalid_argument if the duration is infinite or the size is wrong.
   void Step(const Vector& effort, double duration);
   /// The same for efforts one after the other: the profile that was really applied to a robot.
@@ -61,8 +66,9 @@ class Simulator {
 
   const Eigen::VectorXd& q() const { return q_; }  ///< [rad or m]
   const Eigen::VectorXd& v() const { return v_; }  ///< [rad/s or m/s]
-  /// What the sensors say: of the past, extrapolated to second order in their delay by the accelerations that
-  /// the efforts arriving now and all stops and contacts would give. Valid until the next call.
+  /// What the sensors say: of the past, extrapolated to second order in their delay by the
+  /// accelerations that the efforts arriving now and all stops and contacts would give. Valid until
+  /// the next call.
   struct State {
     const Eigen::VectorXd& q;
     const Eigen::VectorXd& v;
@@ -71,7 +77,8 @@ class Simulator {
   /// False once the state has blown up, or an effort was not finite.
   bool finite() const { return finite_; }
 
-  /// At the current state under `effort` [rad/s^2 or m/s^2], without stops, contacts and Coulomb friction.
+  /// At the current state under `effort` [rad/s^2 or m/s^2], without stops, contacts and Coulomb
+  /// friction.
   Eigen::VectorXd Acceleration(const Vector& effort);
   /// With armature [kg m^2 or kg].
   Eigen::MatrixXd MassMatrix();

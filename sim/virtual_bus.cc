@@ -6,8 +6,7 @@
 namespace plumb {
 
 VirtualBus::VirtualBus(const RobotDescription& robot, const Eigen::VectorXd& physical,
-                       const RobotDescription& driven, int64_t start, Wire wire,
-                       int64_t phase)
+                       const RobotDescription& driven, int64_t start, Wire wire, int64_t phase)
     : start_(start), wire_(wire), robot_(robot, physical, start), driver_(driven, 0, start) {
   driver_.set_virtual(true);
   next_cycle_ = driver_.cycle() + phase;

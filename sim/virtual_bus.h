@@ -13,19 +13,20 @@
 
 namespace plumb {
 
-/// A virtual robot and its driver on one bus, on a clock that nobody waits for: from event to event, to the
-/// microsecond. Equal calls give equal bits. Not thread-safe.
+/// A virtual robot and its driver on one bus, on a clock that nobody waits for: from event to
+/// event, to the microsecond. Equal calls give equal bits. Not thread-safe.
 class VirtualBus {
  public:
   struct Wire {
     int64_t to_robot, to_driver;  ///< [us] >= 0
   };
-  /// @param robot that is there, with these parameters. @param driven what the driver believes to be there.
+  /// @param robot that is there, with these parameters. @param driven what the driver believes to
+  /// be there.
   /// @param start utime of the beginning [us]. @param wire how long frames are on their way.
   /// @param phase [us] >= 0 by which the driver's cycles come after the drives' measurements.
   /// @throws std::invalid_argument, see VirtualRobot and Driver.
-  VirtualBus(const RobotDescription& robot, const Eigen::VectorXd& physical, const RobotDescription& driven,
-             int64_t start, Wire wire = {0, 0}, int64_t phase = 0);
+  VirtualBus(const RobotDescription& robot, const Eigen::VectorXd& physical,
+             const RobotDescription& driven, int64_t start, Wire wire = {0, 0}, int64_t phase = 0);
 
   /// Whatever happens until then, and nothing after it: `now` is then `until`.
   void Advance(int64_t until);

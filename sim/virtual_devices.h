@@ -15,7 +15,8 @@ namespace plumb {
 struct RobotMotion {
   int64_t time;  ///< [us]
   const Eigen::VectorXd &q, &v;
-  const Eigen::VectorXd &motor_q, &motor_v;  ///< of the joints as their motors have them, before any backlash
+  /// of the joints as their motors have them, before any backlash
+  const Eigen::VectorXd &motor_q, &motor_v;
 };
 
 /// A drive or a sensor of a virtual robot: what speaks on its bus and feels how it moves. Times are
@@ -25,8 +26,8 @@ class VirtualDevice {
   virtual ~VirtualDevice() = default;
 
   virtual std::vector<Filter> filters() const = 0;
-  /// Obeys a frame. @return true if the motion at this instant matters for that: an answer is due, or another
-  /// effort.
+  /// Obeys a frame. @return true if the motion at this instant matters for that: an answer is due,
+  /// or another effort.
   virtual bool OnFrame(const Frame& frame, int64_t now) = 0;
   /// Does what is due at motion.time.
   virtual void Tick(const RobotMotion& motion, FrameBatch& out) = 0;
@@ -45,14 +46,15 @@ class VirtualDevice {
   /// [Nm] or [N] on its joint from the last OnFrame or Tick on, within the joint's limit.
   virtual double Effort() const { return 0; }
   virtual bool armed() const { return false; }
-  /// Why it disarmed itself, frames it could make nothing of: as its protocol numbers and counts them.
+  /// Why it disarmed itself, frames it could make nothing of: as its protocol numbers and counts
+  /// them.
   virtual uint32_t disarm_reason() const { return 0; }
   virtual int64_t rejected() const { return 0; }
 };
 
 /// The drives in order of their joints, then the sensors in order.
-/// @throws std::invalid_argument if there is no virtual device of a protocol, or a device cannot have its
-/// settings.
+/// @throws std::invalid_argument if there is no virtual device of a protocol, or a device cannot
+/// have its settings.
 std::vector<std::unique_ptr<VirtualDevice>> VirtualDevices(const RobotDescription& robot);
 
 /// One each.

@@ -41,15 +41,20 @@ class VirtualDrive : public VirtualDevice {
     Place(motion);
   }
   void Track(const RobotMotion& from, const RobotMotion& to) override {
-    encoder_.Track({from.time, to.time, Turns(from), Turns(to), TurnsPerSecond(from), TurnsPerSecond(to)});
+    encoder_.Track(
+        {from.time, to.time, Turns(from), Turns(to), TurnsPerSecond(from), TurnsPerSecond(to)});
   }
-  void Place(const RobotMotion& motion) override { encoder_.Reset(Turns(motion), TurnsPerSecond(motion)); }
+  void Place(const RobotMotion& motion) override {
+    encoder_.Reset(Turns(motion), TurnsPerSecond(motion));
+  }
 
  protected:
   virtual double Torque() const = 0;  ///< [Nm] of the motor
   virtual void Restart(int64_t now) = 0;
 
-  double Turns(const RobotMotion& motion) const { return map_.MotorPosition(motion.motor_q[q_index_]) / kTurn; }
+  double Turns(const RobotMotion& motion) const {
+    return map_.MotorPosition(motion.motor_q[q_index_]) / kTurn;
+  }
   double TurnsPerSecond(const RobotMotion& motion) const {
     return map_.MotorVelocity(motion.motor_v[v_index_]) / kTurn;
   }
@@ -120,7 +125,8 @@ class VirtualMitMotor : public VirtualDrive {
   bool OnFrame(const Frame& frame, int64_t now) override {
     device_->OnFrame(frame, now);
     torque_ = device_->Torque(sample_);
-    return !frame.remote && frame.id == static_cast<uint32_t>(settings_.node);  // it answers everything
+    // it answers everything
+    return !frame.remote && frame.id == static_cast<uint32_t>(settings_.node);
   }
   void Tick(const RobotMotion& motion, FrameBatch& out) override {
     sample_ = {ReadTurns(motion) * kTurn, ReadTurnsPerSecond() * kTurn};
@@ -152,8 +158,8 @@ std::unique_ptr<VirtualDevice> MakeVirtualDrive(const RobotDescription& robot, i
   const std::string& protocol = description.motor.protocol;
   if (protocol == "cansimple") return std::make_unique<VirtualOdrive>(robot, joint);
   if (protocol == "mit") return std::make_unique<VirtualMitMotor>(robot, joint);
-  throw std::invalid_argument("joint '" + description.name + "': no virtual drive speaks '" + protocol +
-                              "'; known: cansimple, mit");
+  throw std::invalid_argument("joint '" + description.name + "': no virtual drive speaks '" +
+                              protocol + "'; known: cansimple, mit");
 }
 
 }  // namespace plumb

@@ -15,7 +15,8 @@ RobotDescription TrueRobot(const RobotDescription& description, const Eigen::Vec
 
 }  // namespace
 
-VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical, int64_t now)
+VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical,
+                           int64_t now)
     : mechanism_(TrueRobot(description, physical)),
       devices_(VirtualDevices(description)),
       efforts_(description) {
@@ -84,7 +85,8 @@ void VirtualRobot::MoveTo(int64_t time) {
     last_v_ = v();
     last_motor_q_ = mechanism_.motor_q();
     last_motor_v_ = mechanism_.motor_v();
-    // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a crash.
+    // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a
+    // crash.
     if (!mechanism_.Advance(efforts_.acting(), static_cast<double>(end - begin) * 1e-6))
       mechanism_.SetState(q(), 0 * v());
     time_ = end;
@@ -97,7 +99,8 @@ void VirtualRobot::MoveTo(int64_t time) {
 
 bool VirtualRobot::Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& wish_q,
                          const Eigen::Ref<const Eigen::VectorXd>& wish_v) {
-  const auto within_reach = [](const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::VectorXd& now) {
+  const auto within_reach = [](const Eigen::Ref<const Eigen::VectorXd>& x,
+                               const Eigen::VectorXd& now) {
     return x.size() == now.size() && (x.array().abs() <= kFarthest).all();  // NaN is not
   };
   if (!within_reach(wish_q, q()) || !within_reach(wish_v, v())) return false;

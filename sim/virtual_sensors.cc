@@ -19,7 +19,8 @@ class VirtualEncoder : public VirtualDevice {
  public:
   VirtualEncoder(const RobotDescription& robot, const SensorDescription& sensor)
       : scale_(sensor.sign * sensor.radius), offset_(sensor.offset) {
-    for (int i = 0; i < sensor.joint; ++i) index_ += robot.joints[static_cast<size_t>(i)].num_positions();
+    for (int i = 0; i < sensor.joint; ++i)
+      index_ += robot.joints[static_cast<size_t>(i)].num_positions();
     settings_.node = sensor.node;
     settings_.counts = sensor.counts;
     settings_.range = sensor.range;
@@ -50,12 +51,15 @@ class VirtualEncoder : public VirtualDevice {
   std::optional<Cia406Device> device_;
 };
 
-/// At its link's origin. It measures as such sensors do, by the change of its velocity in a period: the force
-/// of an impact is spread over one.
+/// At its link's origin. It measures as such sensors do, by the change of its velocity in a period:
+/// the force of an impact is spread over one.
 class VirtualImu : public VirtualDevice {
  public:
   VirtualImu(const RobotDescription& robot, const SensorDescription& sensor)
-      : kinematics_(robot), gravity_(robot.simulation.gravity), link_(sensor.link), to_link_(sensor.rotation) {
+      : kinematics_(robot),
+        gravity_(robot.simulation.gravity),
+        link_(sensor.link),
+        to_link_(sensor.rotation) {
     settings_.base = sensor.base;
     settings_.period = Microseconds(sensor.period);
     settings_.tick = Microseconds(sensor.tick);
@@ -70,7 +74,8 @@ class VirtualImu : public VirtualDevice {
     const LinkMotion& link = kinematics_.link(link_);
     const double elapsed = static_cast<double>(motion.time - last_time_) * 1e-6;
     const Eigen::Vector3d acceleration =
-        elapsed > 0 ? Eigen::Vector3d((link.velocity - last_velocity_) / elapsed) : Eigen::Vector3d::Zero();
+        elapsed > 0 ? Eigen::Vector3d((link.velocity - last_velocity_) / elapsed)
+                    : Eigen::Vector3d::Zero();
     last_time_ = motion.time;
     last_velocity_ = link.velocity;
     const Eigen::Matrix3d axes = link.rotation * to_link_;  // the sensor's -> the base's
@@ -111,16 +116,18 @@ std::unique_ptr<VirtualDevice> MakeVirtualSensor(const RobotDescription& robot,
                                                  const SensorDescription& sensor) {
   if (sensor.protocol == "cia406") return std::make_unique<VirtualEncoder>(robot, sensor);
   if (sensor.protocol == "xsens") return std::make_unique<VirtualImu>(robot, sensor);
-  throw std::invalid_argument("sensor '" + sensor.name + "': no virtual sensor speaks '" + sensor.protocol +
-                              "'; known: cia406, xsens");
+  throw std::invalid_argument("sensor '" + sensor.name + "': no virtual sensor speaks '" +
+                              sensor.protocol + "'; known: cia406, xsens");
 }
 
 std::vector<std::unique_ptr<VirtualDevice>> VirtualDevices(const RobotDescription& robot) {
   std::vector<std::unique_ptr<VirtualDevice>> devices;
   for (int i = 0; i < robot.num_joints(); ++i) {
-    if (!robot.joints[static_cast<size_t>(i)].passive) devices.push_back(MakeVirtualDrive(robot, i));
+    if (!robot.joints[static_cast<size_t>(i)].passive)
+      devices.push_back(MakeVirtualDrive(robot, i));
   }
-  for (const SensorDescription& sensor : robot.sensors) devices.push_back(MakeVirtualSensor(robot, sensor));
+  for (const SensorDescription& sensor : robot.sensors)
+    devices.push_back(MakeVirtualSensor(robot, sensor));
   return devices;
 }
 

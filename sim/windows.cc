@@ -19,9 +19,10 @@ constexpr size_t kLargestBlock = 16;
 constexpr double kMostSubsteps = 1e5;
 
 double Duration(std::span<const EffortSegment> step) {
-  return std::accumulate(step.begin(), step.end(), 0.0, [](double sum, const EffortSegment& segment) {
-    return sum + std::max(0.0, segment.duration);
-  });
+  return std::accumulate(step.begin(), step.end(), 0.0,
+                         [](double sum, const EffortSegment& segment) {
+                           return sum + std::max(0.0, segment.duration);
+                         });
 }
 
 void Require(const Window& window, const Model& model) {
@@ -30,8 +31,9 @@ void Require(const Window& window, const Model& model) {
       return segment.effort.size() == model.num_velocities();
     });
   };
-  bool good = window.q.size() == model.num_positions() && window.v.size() == model.num_velocities() &&
-              window.q.allFinite() && window.v.allFinite() && !window.steps.empty();
+  bool good = window.q.size() == model.num_positions() &&
+              window.v.size() == model.num_velocities() && window.q.allFinite() &&
+              window.v.allFinite() && !window.steps.empty();
   for (const auto& step : window.before) good = good && sized(step);
   double substeps = 0;
   for (const auto& step : window.steps) {
@@ -43,13 +45,14 @@ void Require(const Window& window, const Model& model) {
     throw std::invalid_argument(
         "a window needs a finite state, and steps of some duration with efforts for all joints");
   }
-  if (!(substeps <= kMostSubsteps)) throw std::invalid_argument("a window is too long to be simulated");
+  if (!(substeps <= kMostSubsteps))
+    throw std::invalid_argument("a window is too long to be simulated");
 }
 
 }  // namespace
 
-// As many windows as there are lanes, all with the same numbers of substeps; the last group of a kind may
-// repeat one.
+// As many windows as there are lanes, all with the same numbers of substeps; the last group of a
+// kind may repeat one.
 struct Windows::Group {
   std::vector<size_t> windows;
   std::vector<int> counts;  // substeps of each step
@@ -78,7 +81,8 @@ struct Windows::Worker {
 
   void MakePlan(const Group& group, std::span<const Window> windows, Plan* plan) {
     const auto n = static_cast<size_t>(model.num_velocities());
-    const auto substeps = static_cast<size_t>(std::accumulate(group.counts.begin(), group.counts.end(), 0));
+    const auto substeps =
+        static_cast<size_t>(std::accumulate(group.counts.begin(), group.counts.end(), 0));
     plan->lengths.resize(group.counts.size() * lanes);
     plan->means.resize(substeps * n * lanes);
     plan->moments.resize(plan->means.size());
@@ -100,7 +104,8 @@ struct Windows::Worker {
         plan->lengths[step * lanes + lane] = h;
         for (int k = 0; k < group.counts[step]; ++k, ++substep) {
           for (size_t i = 0; i < n; ++i) {
-            const EffortTrack::Moments moments = track.Over(i, k * h, (k + 1) * h, physics.axes[i].delay);
+            const EffortTrack::Moments moments =
+                track.Over(i, k * h, (k + 1) * h, physics.axes[i].delay);
             const size_t at = (substep * n + i) * lanes + lane;
             plan->means[at] = moments.mean;
             plan->moments[at] = moments.first;
@@ -117,11 +122,12 @@ struct Windows::Worker {
   }
 
   void Append(std::span<const EffortSegment> segments) {
-    for (const EffortSegment& segment : segments) track.Append(segment.effort.data(), segment.duration);
+    for (const EffortSegment& segment : segments)
+      track.Append(segment.effort.data(), segment.duration);
   }
 
-  void Simulate(Eigen::Index sample, const Group& group, std::span<const Window> windows, const Plan& plan,
-                const Visit& visit, bool last_only) {
+  void Simulate(Eigen::Index sample, const Group& group, std::span<const Window> windows,
+                const Plan& plan, const Visit& visit, bool last_only) {
     const auto n = static_cast<size_t>(model.num_velocities());
     const bool sensors = model.parameters().terms().sensors;
     for (size_t lane = 0; lane < lanes; ++lane) {
@@ -143,10 +149,12 @@ struct Windows::Worker {
       if (last_only && !last) continue;
       if (sensors) Read(plan, step);
       for (size_t lane = 0; lane < group.used; ++lane) {
-        for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = engine->q()[static_cast<size_t>(i) * lanes + lane];
-        for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = engine->v()[static_cast<size_t>(i) * lanes + lane];
-        const bool good = q.cwiseAbs().maxCoeff() < kFarthest && v.cwiseAbs().maxCoeff() < kFarthest &&
-                          q.allFinite() && v.allFinite();
+        for (Eigen::Index i = 0; i < q.size(); ++i)
+          q[i] = engine->q()[static_cast<size_t>(i) * lanes + lane];
+        for (Eigen::Index i = 0; i < v.size(); ++i)
+          v[i] = engine->v()[static_cast<size_t>(i) * lanes + lane];
+        const bool good = q.cwiseAbs().maxCoeff() < kFarthest &&
+                          v.cwiseAbs().maxCoeff() < kFarthest && q.allFinite() && v.allFinite();
         if (!good) failed[lane] = 1;  // and remains so
         if (failed[lane]) Fail();
         failures.diverged += last && failed[lane];
@@ -176,8 +184,8 @@ struct Windows::Worker {
 
   // Samples [first, end) of these groups.
   void Run(const Eigen::MatrixXd& parameters, Eigen::Index first, Eigen::Index end,
-           std::span<const Window> windows, std::span<const Group* const> groups, const Visit& visit,
-           bool last_only) {
+           std::span<const Window> windows, std::span<const Group* const> groups,
+           const Visit& visit, bool last_only) {
     const bool delays = model.parameters().delays();
     for (size_t begin = 0; begin < groups.size(); begin += kLargestBlock) {
       const size_t size = std::min(kLargestBlock, groups.size() - begin);
@@ -202,7 +210,8 @@ struct Windows::Worker {
   void Refuse(Eigen::Index sample, const Group& group, const Visit& visit, bool last_only) {
     for (size_t lane = 0; lane < group.used; ++lane) {
       ++failures.impossible;
-      for (size_t step = last_only ? group.counts.size() - 1 : 0; step < group.counts.size(); ++step) {
+      for (size_t step = last_only ? group.counts.size() - 1 : 0; step < group.counts.size();
+           ++step) {
         visit(sample, group.windows[lane], step, q, v);
       }
     }
@@ -221,7 +230,8 @@ struct Windows::Worker {
 };
 
 Windows::Windows(std::shared_ptr<const Model> model, int threads) : model_(std::move(model)) {
-  for (int i = 0; i < std::max(1, threads); ++i) workers_.push_back(std::make_unique<Worker>(*model_));
+  for (int i = 0; i < std::max(1, threads); ++i)
+    workers_.push_back(std::make_unique<Worker>(*model_));
 }
 
 Windows::Windows(Windows&&) noexcept = default;
@@ -254,15 +264,17 @@ std::vector<Windows::Group> Windows::Arrange(std::span<const Window> windows) co
   return groups;
 }
 
-Windows::Failures Windows::Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
-                                   const Visit& visit, bool last_only) {
+Windows::Failures Windows::Predict(const Eigen::MatrixXd& parameters,
+                                   std::span<const Window> windows, const Visit& visit,
+                                   bool last_only) {
   if (parameters.rows() != model_->parameters().size()) {
     throw std::invalid_argument("the simulator has " + std::to_string(model_->parameters().size()) +
                                 " parameters, not " + std::to_string(parameters.rows()));
   }
   const std::vector<Group> groups = Arrange(windows);
   const size_t count = workers_.size();
-  // Every count-th group, as the long ones come last; or, where there are too few, some of the samples.
+  // Every count-th group, as the long ones come last; or, where there are too few, some of the
+  // samples.
   const bool by_group = groups.size() >= count;
   std::vector<std::exception_ptr> errors(count);
   const auto work = [&](size_t worker) {
@@ -273,10 +285,12 @@ Windows::Failures Windows::Predict(const Eigen::MatrixXd& parameters, std::span<
         mine.push_back(&groups[i]);
       const auto share = [&](size_t i) {
         return by_group ? 0
-                        : static_cast<Eigen::Index>(i) * parameters.cols() / static_cast<Eigen::Index>(count);
+                        : static_cast<Eigen::Index>(i) * parameters.cols() /
+                              static_cast<Eigen::Index>(count);
       };
-      workers_[worker]->Run(parameters, share(worker), by_group ? parameters.cols() : share(worker + 1),
-                            windows, mine, visit, last_only);
+      workers_[worker]->Run(parameters, share(worker),
+                            by_group ? parameters.cols() : share(worker + 1), windows, mine, visit,
+                            last_only);
     } catch (...) {
       errors[worker] = std::current_exception();
     }

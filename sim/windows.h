@@ -12,22 +12,22 @@
 
 namespace plumb {
 
-/// A piece of a recorded motion: a state, and what was applied from there on. What it refers to must outlive
-/// it.
+/// A piece of a recorded motion: a state, and what was applied from there on. What it refers to
+/// must outlive it.
 struct Window {
   Eigen::VectorXd q, v;  ///< readings with which it begins; finite
-  /// Control step by control step, at least one; efforts of num_velocities entries, of positive duration
-  /// together.
+  /// Control step by control step, at least one; efforts of num_velocities entries, of positive
+  /// duration together.
   std::vector<std::span<const EffortSegment>> steps;
-  /// What had been commanded before, the latest last: where efforts are delayed, some of it is still to come.
-  /// Before all that is known there was no effort.
+  /// What had been commanded before, the latest last: where efforts are delayed, some of it is
+  /// still to come. Before all that is known there was no effort.
   std::vector<std::span<const EffortSegment>> before = {};
 };
 
-/// Predicts windows with simulators of many parameters: f_xi over n steps, the inner loop of inference.
-/// Windows are simulated side by side in the lanes of an engine and by several threads, each with a fixed
-/// share of them, so that results have the same bits for any number of threads, lanes and companions. Not
-/// thread-safe itself.
+/// Predicts windows with simulators of many parameters: f_xi over n steps, the inner loop of
+/// inference. Windows are simulated side by side in the lanes of an engine and by several threads,
+/// each with a fixed share of them, so that results have the same bits for any number of threads,
+/// lanes and companions. Not thread-safe itself.
 class Windows {
  public:
   /// Beyond this many rad, m, rad/s or m/s a simulation has failed.
@@ -38,11 +38,11 @@ class Windows {
   Windows(Windows&&) noexcept;
   ~Windows();
 
-  /// Told of the readings at the end of each control step, in their order for each sample and window; from
-  /// several threads at once, but never of the same sample and window. Where the simulation has failed all
-  /// entries are NaN.
-  using Visit = std::function<void(Eigen::Index sample, size_t window, size_t step, const Eigen::VectorXd& q,
-                                   const Eigen::VectorXd& v)>;
+  /// Told of the readings at the end of each control step, in their order for each sample and
+  /// window; from several threads at once, but never of the same sample and window. Where the
+  /// simulation has failed all entries are NaN.
+  using Visit = std::function<void(Eigen::Index sample, size_t window, size_t step,
+                                   const Eigen::VectorXd& q, const Eigen::VectorXd& v)>;
   /// Simulations, not steps.
   struct Failures {
     int64_t impossible = 0;  ///< there is no simulator with these parameters
@@ -50,12 +50,12 @@ class Windows {
     int64_t total() const { return impossible + diverged; }
   };
 
-  /// @param parameters one column per sample, physical units. @param last_only visit the end of each window
-  /// only.
-  /// @throws std::invalid_argument if a window is not as it should be, or a column not of the model's
-  /// parameters; and what a visit throws, when all threads have ended.
-  Failures Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows, const Visit& visit,
-                   bool last_only = true);
+  /// @param parameters one column per sample, physical units. @param last_only visit the end of
+  /// each window only.
+  /// @throws std::invalid_argument if a window is not as it should be, or a column not of the
+  /// model's parameters; and what a visit throws, when all threads have ended.
+  Failures Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
+                   const Visit& visit, bool last_only = true);
 
   const Model& model() const { return *model_; }
 

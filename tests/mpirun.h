@@ -19,7 +19,8 @@ inline bool HaveMpirun() {
 
 /// A command as several ranks on this machine, however few processors it has.
 inline std::string Mpirun(int ranks, const std::string& command) {
-  return "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 timeout 110 mpirun --oversubscribe -n " +
+  return "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 timeout 110 mpirun "
+         "--oversubscribe -n " +
          std::to_string(ranks) + " " + command;
 }
 

@@ -9,13 +9,14 @@
 
 namespace plumb {
 
-/// A new folder of the test's own, so that tests may run side by side. At the end it is removed, with
-/// all that is in it.
+/// A new folder of the test's own, so that tests may run side by side. At the end it is removed,
+/// with all that is in it.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "plumbline-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::system_error(errno, std::generic_category(), name);
+    if (mkdtemp(name.data()) == nullptr)
+      throw std::system_error(errno, std::generic_category(), name);
     path_ = name;
   }
   ~TemporaryFolder() {

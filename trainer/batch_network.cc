@@ -7,8 +7,8 @@ namespace plumb {
 namespace {
 
 // Wide enough that the kernels run at full speed and that handing work to another thread (tens of
-// microseconds) pays. A critic's minibatch is one group: shared by two threads it would take as long, and
-// twice the processor.
+// microseconds) pays. A critic's minibatch is one group: shared by two threads it would take as
+// long, and twice the processor.
 constexpr int kGroupWidth = 150;
 constexpr int kMaxGroups = 64;
 constexpr size_t kSlice = 2048;  // elements of a sum: small enough to stay in the first-level cache
@@ -20,7 +20,11 @@ std::span<const float> AsSpan(const Eigen::Ref<const Eigen::VectorXf>& vector) {
 }  // namespace
 
 BatchNetwork::BatchNetwork(std::vector<int> sizes, Workers& workers, const Ranks& ranks)
-    : sizes_(std::move(sizes)), workers_(&workers), ranks_(&ranks), network_(sizes_), direction_(sizes_) {}
+    : sizes_(std::move(sizes)),
+      workers_(&workers),
+      ranks_(&ranks),
+      network_(sizes_),
+      direction_(sizes_) {}
 
 void BatchNetwork::Set(const Eigen::Ref<const Eigen::VectorXf>& parameters) {
   network_.Set(AsSpan(parameters));
@@ -51,7 +55,8 @@ void BatchNetwork::Divide(int columns) {
   }
 }
 
-void BatchNetwork::ForGroups(const float* inputs, const std::function<void(Group& group, int number)>& work) {
+void BatchNetwork::ForGroups(const float* inputs,
+                             const std::function<void(Group& group, int number)>& work) {
   workers_->Run(own_groups_, [&](int task, int) {
     Group& group = groups_[static_cast<size_t>(task)];
     group.tape.Forward(network_, inputs + ptrdiff_t{group.first} * network_.inputs(), group.count,
@@ -72,11 +77,14 @@ void BatchNetwork::Forward(const float* inputs, int columns, float* outputs) {
   ranks_->AllGather(outputs, static_cast<size_t>(network_.outputs()) * sizeof(float), bounds);
 }
 
-void BatchNetwork::Sum(const float* inputs, int columns, const Summand& summand, std::span<double> sums) {
+void BatchNetwork::Sum(const float* inputs, int columns, const Summand& summand,
+                       std::span<double> sums) {
   Divide(columns);
-  Eigen::MatrixXd summands = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sums.size()), all_groups_);
+  Eigen::MatrixXd summands =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sums.size()), all_groups_);
   ForGroups(inputs, [&](Group& group, int number) {
-    summand(group.first, group.count, group.outputs.data(), {summands.col(number).data(), sums.size()});
+    summand(group.first, group.count, group.outputs.data(),
+            {summands.col(number).data(), sums.size()});
   });
   SumOverGroups(summands, sums);
 }
@@ -84,7 +92,8 @@ void BatchNetwork::Sum(const float* inputs, int columns, const Summand& summand,
 void BatchNetwork::Gradient(const float* inputs, int columns, const Loss& loss,
                             Eigen::Ref<Eigen::VectorXf> gradient, std::span<double> sums) {
   Divide(columns);
-  Eigen::MatrixXd summands = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sums.size()), all_groups_);
+  Eigen::MatrixXd summands =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sums.size()), all_groups_);
   ForGroups(inputs, [&](Group& group, int number) {
     loss(group.first, group.count, group.outputs.data(), group.output_gradient.data(),
          {summands.col(number).data(), sums.size()});
@@ -106,8 +115,9 @@ void BatchNetwork::GaussNewtonProduct(const Eigen::Ref<const Eigen::VectorXf>& d
   workers_->Run(own_groups_, [&](int task, int) {
     Group& group = groups_[static_cast<size_t>(task)];
     group.tape.Tangent(network_, direction_, group.outputs.data());
-    Eigen::Map<Eigen::MatrixXf>(group.outputs.data(), network_.outputs(), group.count).array().colwise() *=
-        metric.array();
+    Eigen::Map<Eigen::MatrixXf>(group.outputs.data(), network_.outputs(), group.count)
+        .array()
+        .colwise() *= metric.array();
     group.tape.Backward(network_, group.outputs.data(), group.gradient.data());
   });
   SumGradients(product);

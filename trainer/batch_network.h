@@ -12,10 +12,10 @@
 
 namespace plumb {
 
-/// A multilayer perceptron over a batch of samples (columns), several threads and ranks at work. The batch is
-/// cut into groups whose number depends on its size alone, and sums over groups are taken in a fixed order:
-/// the bits are the same for any number of threads and ranks. All ranks call the same methods with the same
-/// arguments and get the same results. Not thread-safe itself.
+/// A multilayer perceptron over a batch of samples (columns), several threads and ranks at work.
+/// The batch is cut into groups whose number depends on its size alone, and sums over groups are
+/// taken in a fixed order: the bits are the same for any number of threads and ranks. All ranks
+/// call the same methods with the same arguments and get the same results. Not thread-safe itself.
 class BatchNetwork {
  public:
   /// @param sizes inputs, hidden..., outputs. @param workers,ranks must outlive this.
@@ -29,26 +29,27 @@ class BatchNetwork {
   /// @param inputs inputs x columns. @param outputs outputs x columns, written.
   void Forward(const float* inputs, int columns, float* outputs);
 
-  /// Adds what is asked of the samples [first, first + count) to sums. Called concurrently, for groups that
-  /// do not overlap; not on every rank for each.
+  /// Adds what is asked of the samples [first, first + count) to sums. Called concurrently, for
+  /// groups that do not overlap; not on every rank for each.
   /// @param outputs outputs x count.
-  using Summand = std::function<void(int first, int count, const float* outputs, std::span<double> sums)>;
+  using Summand =
+      std::function<void(int first, int count, const float* outputs, std::span<double> sums)>;
   /// Evaluates the network. @param sums over the samples, written.
   void Sum(const float* inputs, int columns, const Summand& summand, std::span<double> sums);
 
   /// As Summand; also fills output_gradient (outputs x count).
-  using Loss = std::function<void(int first, int count, const float* outputs, float* output_gradient,
-                                  std::span<double> sums)>;
+  using Loss = std::function<void(int first, int count, const float* outputs,
+                                  float* output_gradient, std::span<double> sums)>;
   /// The gradient of a loss in the parameters.
   /// @param gradient parameter_count() values, written. @param sums as of Sum.
-  void Gradient(const float* inputs, int columns, const Loss& loss, Eigen::Ref<Eigen::VectorXf> gradient,
-                std::span<double> sums = {});
+  void Gradient(const float* inputs, int columns, const Loss& loss,
+                Eigen::Ref<Eigen::VectorXf> gradient, std::span<double> sums = {});
 
   /// Evaluates the network, for GaussNewtonProduct.
   /// @param inputs inputs x columns; read again by GaussNewtonProduct.
   void Linearize(const float* inputs, int columns);
-  /// sum over the samples of the last Linearize of J' M J v, with J the Jacobian of the outputs in the
-  /// parameters and M the diagonal `metric` (outputs values).
+  /// sum over the samples of the last Linearize of J' M J v, with J the Jacobian of the outputs in
+  /// the parameters and M the diagonal `metric` (outputs values).
   /// @param direction v and @param product both of parameter_count() values.
   void GaussNewtonProduct(const Eigen::Ref<const Eigen::VectorXf>& direction,
                           const Eigen::Ref<const Eigen::VectorXf>& metric,
@@ -63,8 +64,8 @@ class BatchNetwork {
   };
 
   void Divide(int columns);
-  /// Evaluates the network for this rank's groups, and does the work on each; `number` counts all ranks'
-  /// groups.
+  /// Evaluates the network for this rank's groups, and does the work on each; `number` counts all
+  /// ranks' groups.
   void ForGroups(const float* inputs, const std::function<void(Group& group, int number)>& work);
   void SumGradients(Eigen::Ref<Eigen::VectorXf> sum);
   /// @param summands sums x groups; this rank's columns are filled.

@@ -18,8 +18,8 @@
 namespace plumb {
 namespace {
 
-// File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a checkpoint stays
-// where it was written.
+// File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a
+// checkpoint stays where it was written.
 constexpr char kMagic[8] = {'P', 'L', 'U', 'M', 'B', 'T', 'R', 'N'};
 constexpr uint32_t kVersion = 2;
 constexpr size_t kHeader = sizeof kMagic + 2 * sizeof(uint32_t);
@@ -145,12 +145,15 @@ std::string EncodeCheckpoint(const Checkpoint& checkpoint) {
 }
 
 Checkpoint DecodeCheckpoint(std::string_view bytes) {
-  if (bytes.size() < kHeader || !IsCheckpoint(bytes)) throw CheckpointError("is not a trainer's checkpoint");
+  if (bytes.size() < kHeader || !IsCheckpoint(bytes))
+    throw CheckpointError("is not a trainer's checkpoint");
   uint32_t version = 0, crc = 0;
   std::memcpy(&version, bytes.data() + sizeof kMagic, sizeof version);
   std::memcpy(&crc, bytes.data() + sizeof kMagic + sizeof version, sizeof crc);
-  if (version != kVersion) throw CheckpointError(fmt::format("has version {}, not {}", version, kVersion));
-  if (crc != Crc(bytes.data() + kHeader, bytes.size() - kHeader)) throw CheckpointError("is damaged");
+  if (version != kVersion)
+    throw CheckpointError(fmt::format("has version {}, not {}", version, kVersion));
+  if (crc != Crc(bytes.data() + kHeader, bytes.size() - kHeader))
+    throw CheckpointError("is damaged");
   Reader body(bytes.data() + kHeader, bytes.size() - kHeader);
   Checkpoint checkpoint;
   Transfer(body, checkpoint);
@@ -169,20 +172,24 @@ void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
   }
 }
 
-bool IsCheckpoint(std::string_view bytes) { return bytes.starts_with(std::string_view(kMagic, sizeof kMagic)); }
+bool IsCheckpoint(std::string_view bytes) {
+  return bytes.starts_with(std::string_view(kMagic, sizeof kMagic));
+}
 
 std::optional<Checkpoint> LoadCheckpoint(const std::string& file) {
   std::error_code ignored;  // whatever is wrong, opening the file tells
   const std::filesystem::file_status status = std::filesystem::status(file, ignored);
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw CheckpointError(fmt::format("checkpoint {} is not a regular file", file));  // a pipe would keep us waiting
+    // a pipe would keep us waiting
+    throw CheckpointError(fmt::format("checkpoint {} is not a regular file", file));
   }
   std::ifstream stream(file, std::ios::binary);
   if (!stream) {
     if (status.type() == std::filesystem::file_type::not_found) return {};
     throw CheckpointError(fmt::format("cannot read checkpoint {}: {}", file, std::strerror(errno)));
   }
-  const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)),
+                                std::istreambuf_iterator<char>());
   try {
     return DecodeCheckpoint({bytes.data(), bytes.size()});
   } catch (const CheckpointError& error) {

@@ -13,34 +13,36 @@
 
 namespace plumb {
 
-/// A checkpoint that cannot be used: damaged, of another version, or not writable. The message names the
-/// file.
+/// A checkpoint that cannot be used: damaged, of another version, or not writable. The message
+/// names the file.
 struct CheckpointError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Where training stands. Everything that shapes its future is here, so that a resumed run gives the same
-/// bits.
+/// Where training stands. Everything that shapes its future is here, so that a resumed run gives
+/// the same bits.
 struct Checkpoint {
   uint64_t seed = 0;
-  uint64_t identity = 0;  ///< of all that a run of `plumb train` depends on; 0 in the trainer process
+  /// of all that a run of `plumb train` depends on; 0 in the trainer process
+  uint64_t identity = 0;
   int64_t updates = 0, steps = 0, dropped_episodes = 0;  ///< as in TrainerState
   int32_t iteration = 0;          ///< of SimOpt; the one under way or, if complete, just done
   int32_t iteration_updates = 0;  ///< TRPO updates done in it
   bool complete = false;
-  Evaluation evaluation;         ///< of the policy, once it is complete
-  double training_return = 0;    ///< of the last batch
+  Evaluation evaluation;       ///< of the policy, once it is complete
+  double training_return = 0;  ///< of the last batch
   policy_t policy;
   parameter_distribution_t distribution;  ///< of the iteration
   CriticState critic;
   ObservationMoments observations;  ///< as in TrainerState
 };
 
-/// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint or the new
-/// one: a temporary file, fsync, rename, fsync of the folder. @throws CheckpointError.
+/// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint
+/// or the new one: a temporary file, fsync, rename, fsync of the folder. @throws CheckpointError.
 void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint);
 
-/// The same as bytes, e.g. for another process of this machine's kind. @throws CheckpointError if they are not what was encoded.
+/// The same as bytes, e.g. for another process of this machine's kind. @throws CheckpointError if
+/// they are not what was encoded.
 std::string EncodeCheckpoint(const Checkpoint& checkpoint);
 Checkpoint DecodeCheckpoint(std::string_view bytes);
 

@@ -6,8 +6,9 @@
 
 namespace plumb {
 
-LinearSolution ConjugateGradient(const std::function<void(const Eigen::VectorXd&, Eigen::VectorXd&)>& product,
-                                 const Eigen::VectorXd& b, int iterations, double tolerance) {
+LinearSolution ConjugateGradient(
+    const std::function<void(const Eigen::VectorXd&, Eigen::VectorXd&)>& product,
+    const Eigen::VectorXd& b, int iterations, double tolerance) {
   LinearSolution solution{Eigen::VectorXd::Zero(b.size()), b, 0, {}};
   Eigen::VectorXd direction = b, image(b.size());
   double square = b.squaredNorm();
@@ -17,7 +18,8 @@ LinearSolution ConjugateGradient(const std::function<void(const Eigen::VectorXd&
     product(direction, image);
     const double curvature = direction.dot(image);
     if (!std::isfinite(curvature) || curvature <= 0) {
-      solution.failure = fmt::format("curvature {} after {} iterations", curvature, solution.iterations);
+      solution.failure =
+          fmt::format("curvature {} after {} iterations", curvature, solution.iterations);
       break;
     }
     const double step = square / curvature;

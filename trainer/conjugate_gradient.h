@@ -14,9 +14,9 @@ struct LinearSolution {
   std::string failure;  ///< why there is no solution; empty = x is good
 };
 
-/// Solves A x = b for symmetric positive definite A by conjugate gradients (Hestenes and Stiefel, 1952),
-/// starting from x = 0. Gives up, saying so, at the first direction whose curvature is not positive or not
-/// finite.
+/// Solves A x = b for symmetric positive definite A by conjugate gradients (Hestenes and Stiefel,
+/// 1952), starting from x = 0. Gives up, saying so, at the first direction whose curvature is not
+/// positive or not finite.
 /// @param product writes A v to its second argument.
 /// @param tolerance stops when |residual|^2 <= tolerance * |b|^2.
 LinearSolution ConjugateGradient(

@@ -18,8 +18,8 @@ std::vector<int> Sizes(const TrainingSettings& settings, int observations) {
   return sizes;
 }
 
-// A minibatch is shared by so many tasks, whatever the number of threads: sums over them are taken in order. More would be too
-// small to be worth handing to another thread.
+// A minibatch is shared by so many tasks, whatever the number of threads: sums over them are taken
+// in order. More would be too small to be worth handing to another thread.
 constexpr int kShares = 2;
 
 void Shuffle(std::vector<int>& order, Random& random) {
@@ -30,7 +30,8 @@ void Shuffle(std::vector<int>& order, Random& random) {
 
 }  // namespace
 
-Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers, const Ranks& ranks)
+Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers,
+               const Ranks& ranks)
     : settings_(settings),
       observations_(observations),
       workers_(&workers),
@@ -40,7 +41,11 @@ Critic::Critic(const TrainingSettings& settings, int observations, Random random
   state_.second_moment.setZero(state_.parameters.size());
   const std::vector<int> sizes = Sizes(settings, observations);
   for (int i = 0; i < kShares; ++i) {
-    shares_.push_back({kernels::Tape(sizes, settings.critic_minibatch / kShares + 1), {}, {}, {}, Eigen::VectorXf(state_.parameters.size())});
+    shares_.push_back({kernels::Tape(sizes, settings.critic_minibatch / kShares + 1),
+                       {},
+                       {},
+                       {},
+                       Eigen::VectorXf(state_.parameters.size())});
   }
   for (int i = 0; i < workers.size(); ++i) copies_.push_back({kernels::Network(sizes)});
 }
@@ -61,7 +66,8 @@ std::vector<double> Critic::Values(std::span<const float> observations) {
   network_.Forward(observations.data(), static_cast<int>(count), outputs.data());
   std::vector<double> values(count);
   const double mean = state_.targets.mean, sd = state_.targets.sd();
-  std::transform(outputs.begin(), outputs.end(), values.begin(), [&](float y) { return mean + sd * y; });
+  std::transform(outputs.begin(), outputs.end(), values.begin(),
+                 [&](float y) { return mean + sd * y; });
   return values;
 }
 
@@ -72,14 +78,15 @@ void Critic::Rescale(std::span<const double> targets) {
   const double mean = state_.targets.mean, sd = state_.targets.sd();
   if (first) return;  // a fresh network's values are nothing worth keeping
   // The output layer is the tail: one weight per unit below it, then the bias.
-  auto output =
-      state_.parameters.tail(settings_.hidden.empty() ? observations_ + 1 : settings_.hidden.back() + 1);
+  auto output = state_.parameters.tail(settings_.hidden.empty() ? observations_ + 1
+                                                                : settings_.hidden.back() + 1);
   output *= static_cast<float>(old_sd / sd);
   state_.parameters.tail(1).array() += static_cast<float>((old_mean - mean) / sd);
 }
 
 // One step of Adam. Both halves, gradient and step, are shared by the threads.
-void Critic::Descend(std::span<const float> observations, std::span<const float> targets, std::span<const int> samples, float l2) {
+void Critic::Descend(std::span<const float> observations, std::span<const float> targets,
+                     std::span<const int> samples, float l2) {
   const int size = static_cast<int>(samples.size());
   workers_->Run(kShares, [&](int task, int worker) {
     Copy& copy = copies_[static_cast<size_t>(worker)];
@@ -93,12 +100,14 @@ void Critic::Descend(std::span<const float> observations, std::span<const float>
     share.outputs.resize(static_cast<size_t>(count));
     share.output_gradient.resize(static_cast<size_t>(count));
     for (int i = 0; i < count; ++i) {
-      std::copy_n(observations.begin() + ptrdiff_t{samples[static_cast<size_t>(first + i)]} * observations_, observations_,
-                  share.inputs.begin() + ptrdiff_t{i} * observations_);
+      std::copy_n(
+          observations.begin() + ptrdiff_t{samples[static_cast<size_t>(first + i)]} * observations_,
+          observations_, share.inputs.begin() + ptrdiff_t{i} * observations_);
     }
     share.tape.Forward(copy.network, share.inputs.data(), count, share.outputs.data());
     for (int i = 0; i < count; ++i) {
-      const float error = share.outputs[static_cast<size_t>(i)] - targets[static_cast<size_t>(samples[static_cast<size_t>(first + i)])];
+      const float error = share.outputs[static_cast<size_t>(i)] -
+                          targets[static_cast<size_t>(samples[static_cast<size_t>(first + i)])];
       share.output_gradient[static_cast<size_t>(i)] = 2 * error / static_cast<float>(size);
     }
     share.tape.Backward(copy.network, share.output_gradient.data(), share.gradient.data());
@@ -106,13 +115,17 @@ void Critic::Descend(std::span<const float> observations, std::span<const float>
   ++state_.adam_steps;
   const auto parameters = static_cast<int>(state_.parameters.size());
   workers_->Run(kShares, [&](int task, int) {
-    const int first = parameters * task / kShares, count = parameters * (task + 1) / kShares - first;
+    const int first = parameters * task / kShares,
+              count = parameters * (task + 1) / kShares - first;
     kernels::AdamStep(count, state_.adam_steps, static_cast<float>(settings_.critic_rate), l2,
-                      {shares_[0].gradient.data() + first, shares_[1].gradient.data() + first}, state_.parameters.data() + first, state_.first_moment.data() + first, state_.second_moment.data() + first);
+                      {shares_[0].gradient.data() + first, shares_[1].gradient.data() + first},
+                      state_.parameters.data() + first, state_.first_moment.data() + first,
+                      state_.second_moment.data() + first);
   });
 }
 
-bool Critic::Fit(std::span<const float> observations, std::span<const double> targets, Random& random) {
+bool Critic::Fit(std::span<const float> observations, std::span<const double> targets,
+                 Random& random) {
   const CriticState before = state_;
   if (settings_.normalise_values) Rescale(targets);
   const double mean = state_.targets.mean, sd = state_.targets.sd();
@@ -120,15 +133,18 @@ bool Critic::Fit(std::span<const float> observations, std::span<const double> ta
   const auto l2 = static_cast<float>(2 * settings_.critic_l2 / (sd * sd));
 
   std::vector<float> normalised(targets.size());
-  std::transform(targets.begin(), targets.end(), normalised.begin(), [&](double t) { return static_cast<float>((t - mean) / sd); });
+  std::transform(targets.begin(), targets.end(), normalised.begin(),
+                 [&](double t) { return static_cast<float>((t - mean) / sd); });
 
   for (Copy& copy : copies_) copy.adam_steps = -1;
   std::vector<int> order(targets.size());
   std::iota(order.begin(), order.end(), 0);
   for (int epoch = 0; epoch < settings_.critic_epochs; ++epoch) {
     Shuffle(order, random);
-    for (size_t first = 0; first < order.size(); first += static_cast<size_t>(settings_.critic_minibatch)) {
-      const size_t size = std::min(static_cast<size_t>(settings_.critic_minibatch), order.size() - first);
+    for (size_t first = 0; first < order.size();
+         first += static_cast<size_t>(settings_.critic_minibatch)) {
+      const size_t size =
+          std::min(static_cast<size_t>(settings_.critic_minibatch), order.size() - first);
       Descend(observations, normalised, {&order[first], size}, l2);
     }
   }

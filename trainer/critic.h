@@ -16,16 +16,18 @@ namespace plumb {
 struct CriticState {
   Eigen::VectorXf parameters, first_moment, second_moment;  ///< of the network, and Adam's
   int32_t adam_steps = 0;
-  RunningMoments targets;  ///< of all value targets seen, the unit of the network's output; none: units of return
+  /// of all value targets seen, the unit of the network's output; none: units of return
+  RunningMoments targets;
 };
 
-/// The value function: a tanh network fitted to value targets by Adam. With normalise_values the network predicts
-/// targets normalised by their running mean and standard deviation; when these move, its output layer is rescaled so
-/// that the predicted values stay (van Hasselt et al., 2016, "Pop-Art"). Not thread-safe.
+/// The value function: a tanh network fitted to value targets by Adam. With normalise_values the
+/// network predicts targets normalised by their running mean and standard deviation; when these
+/// move, its output layer is rescaled so that the predicted values stay (van Hasselt et al., 2016,
+/// "Pop-Art"). Not thread-safe.
 class Critic {
  public:
-  /// @param observations length of an input. @param random for the initial weights. @param workers,ranks
-  /// must outlive it.
+  /// @param observations length of an input. @param random for the initial weights. @param
+  /// workers,ranks must outlive it.
   Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers,
          const Ranks& ranks = Ranks::Alone());
 
@@ -36,8 +38,9 @@ class Critic {
   /// V of each observation. @param observations inputs x count, column-major.
   std::vector<double> Values(std::span<const float> observations);
 
-  /// critic_epochs passes over the samples in random order, in minibatches; l2 * |parameters|^2 is added to
-  /// the mean squared error (in units of return). If the result is not finite, the old state is kept.
+  /// critic_epochs passes over the samples in random order, in minibatches; l2 * |parameters|^2 is
+  /// added to the mean squared error (in units of return). If the result is not finite, the old
+  /// state is kept.
   /// @return false in that case.
   bool Fit(std::span<const float> observations, std::span<const double> targets, Random& random);
 
@@ -55,7 +58,8 @@ class Critic {
   };
 
   void Rescale(std::span<const double> targets);
-  void Descend(std::span<const float> observations, std::span<const float> targets, std::span<const int> samples, float l2);
+  void Descend(std::span<const float> observations, std::span<const float> targets,
+               std::span<const int> samples, float l2);
 
   TrainingSettings settings_;
   int observations_;

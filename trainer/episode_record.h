@@ -9,16 +9,18 @@
 
 namespace plumb {
 
-/// One episode as it was played. The observations and actions are those that are learnt from: as the network
-/// saw them, observations x steps, and as drawn, actions x steps; empty if nothing is.
+/// One episode as it was played. The observations and actions are those that are learnt from: as
+/// the network saw them, observations x steps, and as drawn, actions x steps; empty if nothing is.
 struct EpisodeRecord {
   std::vector<float> observations, actions;
   std::vector<double> rewards;        ///< one per step
   Eigen::VectorXf final_observation;  ///< after the last step
-  ObservationMoments moments;         ///< of the observations as the task gives them, if it is learnt from
-  double sum = 0;                     ///< of the rewards
-  bool terminated = false;            ///< false: cut off by the time limit
-  bool usable = false;                ///< false: something was not finite, or there is no such simulator
+  /// of the observations as the task gives them, if it is learnt from
+  ObservationMoments moments;
+  double sum = 0;           ///< of the rewards
+  bool terminated = false;  ///< false: cut off by the time limit
+  /// false: something was not finite, or there is no such simulator
+  bool usable = false;
 
   int steps() const { return static_cast<int>(rewards.size()); }
 };

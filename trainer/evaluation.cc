@@ -12,13 +12,15 @@ namespace plumb {
 
 Evaluation Evaluate(std::span<const double> returns) {
   std::vector<double> ordered;
-  std::copy_if(returns.begin(), returns.end(), std::back_inserter(ordered), [](double x) { return std::isfinite(x); });
+  std::copy_if(returns.begin(), returns.end(), std::back_inserter(ordered),
+               [](double x) { return std::isfinite(x); });
   std::sort(ordered.begin(), ordered.end());
   Evaluation evaluation;
   evaluation.episodes = static_cast<int>(returns.size());
   evaluation.failed = static_cast<int>(returns.size() - ordered.size());
   if (ordered.empty()) return evaluation;
-  evaluation.mean = std::accumulate(ordered.begin(), ordered.end(), 0.) / static_cast<double>(ordered.size());
+  evaluation.mean =
+      std::accumulate(ordered.begin(), ordered.end(), 0.) / static_cast<double>(ordered.size());
   const double at = 0.1 * static_cast<double>(ordered.size() - 1);
   const auto below = static_cast<size_t>(at);
   const double above = ordered[std::min(below + 1, ordered.size() - 1)];
@@ -28,8 +30,10 @@ Evaluation Evaluate(std::span<const double> returns) {
 }
 
 std::string Words(const Evaluation& evaluation) {
-  std::string words = fmt::format("{:.1f} mean, {:.1f} 10th percentile, {:.1f} worst", evaluation.mean, evaluation.tenth, evaluation.worst);
-  if (evaluation.failed > 0) words += fmt::format(" ({} of {} failed)", evaluation.failed, evaluation.episodes);
+  std::string words = fmt::format("{:.1f} mean, {:.1f} 10th percentile, {:.1f} worst",
+                                  evaluation.mean, evaluation.tenth, evaluation.worst);
+  if (evaluation.failed > 0)
+    words += fmt::format(" ({} of {} failed)", evaluation.failed, evaluation.episodes);
   return words;
 }
 

@@ -9,14 +9,15 @@ namespace plumb {
 /// A policy without exploration, in simulators that training has not seen.
 struct Evaluation {
   int episodes = 0;
-  int failed = 0;    ///< of these: not finite, or no simulator; left out below
+  int failed = 0;  ///< of these: not finite, or no simulator; left out below
   // Returns; NaN if there are none.
   double mean = std::numeric_limits<double>::quiet_NaN();
   double tenth = std::numeric_limits<double>::quiet_NaN();  ///< 10th percentile
   double worst = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// Of returns, NaN where an episode failed. The percentile is interpolated linearly between the ordered returns.
+/// Of returns, NaN where an episode failed. The percentile is interpolated linearly between the
+/// ordered returns.
 Evaluation Evaluate(std::span<const double> returns);
 
 /// "-142.1 mean, -263.3 10th percentile, -370.2 worst", and how many failed.

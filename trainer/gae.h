@@ -18,9 +18,10 @@ struct Advantages {
   std::vector<double> target;  ///< of V: advantage + value
 };
 
-/// Generalised advantage estimation (Schulman et al., 2016): with d_t = r_t + gamma V(s_{t+1}) - V(s_t),
-/// A_t = sum over l of (gamma lambda)^l d_{t+l} to the episode's end. After a terminal step V(s_{t+1}) is 0;
-/// at a time limit it is the value of the observation then, because the limit is no part of the task.
+/// Generalised advantage estimation (Schulman et al., 2016): with d_t = r_t + gamma V(s_{t+1}) -
+/// V(s_t), A_t = sum over l of (gamma lambda)^l d_{t+l} to the episode's end. After a terminal step
+/// V(s_{t+1}) is 0; at a time limit it is the value of the observation then, because the limit is
+/// no part of the task.
 /// @param rewards,values one per step of the batch. @param episodes together cover the batch.
 Advantages EstimateAdvantages(std::span<const double> rewards, std::span<const double> values,
                               std::span<const EpisodeSpan> episodes, double gamma, double lambda);

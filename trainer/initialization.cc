@@ -8,8 +8,8 @@
 namespace plumb {
 namespace {
 
-/// Q of the QR decomposition of a matrix of normal deviates, with signs such that R's diagonal is positive:
-/// then Q is uniformly distributed (Mezzadri, 2007).
+/// Q of the QR decomposition of a matrix of normal deviates, with signs such that R's diagonal is
+/// positive: then Q is uniformly distributed (Mezzadri, 2007).
 Eigen::MatrixXd RandomOrthogonal(Eigen::Index rows, Eigen::Index columns, Random& random) {
   const Eigen::Index tall = std::max(rows, columns), narrow = std::min(rows, columns);
   Eigen::MatrixXd normal(tall, narrow);
@@ -24,7 +24,8 @@ Eigen::MatrixXd RandomOrthogonal(Eigen::Index rows, Eigen::Index columns, Random
 
 }  // namespace
 
-Eigen::VectorXf OrthogonalParameters(const std::vector<int>& sizes, double output_gain, Random& random) {
+Eigen::VectorXf OrthogonalParameters(const std::vector<int>& sizes, double output_gain,
+                                     Random& random) {
   Eigen::Index count = 0;
   for (size_t l = 1; l < sizes.size(); ++l) count += Eigen::Index{sizes[l - 1] + 1} * sizes[l];
   Eigen::VectorXf parameters = Eigen::VectorXf::Zero(count);

@@ -1,5 +1,5 @@
-#include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
 
 #include <optional>
 #include <string>
@@ -64,8 +64,8 @@ class TrainerProcess {
     const std::optional<Checkpoint> checkpoint = LoadCheckpoint(checkpoint_file_);
     if (!checkpoint) return;
     session_.Restore(*checkpoint);
-    spdlog::info("resumed iteration {} after update {} of {}", session_.iteration(), session_.update(),
-                 session_.updates());
+    spdlog::info("resumed iteration {} after update {} of {}", session_.iteration(),
+                 session_.update(), session_.updates());
     Publish();
   }
 
@@ -74,9 +74,12 @@ class TrainerProcess {
     const bool newer = session_.training() && message.iteration == session_.iteration();
     if (message.iteration != session_.awaited() && !newer) return;
     try {
-      const ParameterDistribution distribution = ParameterDistribution::FromMessage(message, robot_);
+      const ParameterDistribution distribution =
+          ParameterDistribution::FromMessage(message, robot_);
       if (newer) {
-        if (session_.Replace(distribution)) spdlog::info("iteration {}: a newer distribution from update {} on", session_.iteration(), session_.update() + 1);
+        if (session_.Replace(distribution))
+          spdlog::info("iteration {}: a newer distribution from update {} on", session_.iteration(),
+                       session_.update() + 1);
         return;
       }
       session_.Begin(distribution);
@@ -92,16 +95,21 @@ class TrainerProcess {
   void Train() {
     const UpdateReport report = session_.Advance();
     seconds_ = Seconds();
-    spdlog::debug("update {}: return {:.1f}, KL {:.4f}, explained variance {:.3f}", session_.update(),
-                  report.mean_return, report.step.kl, report.explained_variance);
-    if (!report.step.accepted) spdlog::warn("update {} skipped: {}", session_.update(), report.step.failure);
-    if (!report.critic_fitted) spdlog::warn("update {}: the critic's fit was not finite", session_.update());
+    spdlog::debug("update {}: return {:.1f}, KL {:.4f}, explained variance {:.3f}",
+                  session_.update(), report.mean_return, report.step.kl, report.explained_variance);
+    if (!report.step.accepted)
+      spdlog::warn("update {} skipped: {}", session_.update(), report.step.failure);
+    if (!report.critic_fitted)
+      spdlog::warn("update {}: the critic's fit was not finite", session_.update());
     if (report.dropped_episodes > 0) {
-      spdlog::warn("update {}: {} episodes dropped, not finite", session_.update(), report.dropped_episodes);
+      spdlog::warn("update {}: {} episodes dropped, not finite", session_.update(),
+                   report.dropped_episodes);
     }
     if (session_.complete()) {
-      spdlog::info("iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s", session_.iteration(),
-                   session_.evaluation().episodes, Words(session_.evaluation()), seconds_);
+      spdlog::info(
+          "iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s",
+          session_.iteration(), session_.evaluation().episodes, Words(session_.evaluation()),
+          seconds_);
       Save();
       process_.TakeVirtualTime(robot_.training.duration);
       Publish();
@@ -155,8 +163,8 @@ int main(int argc, char** argv) {
   plumb::Options options;
   return plumb::Run(
       "plumb-trainer",
-      "Trains a policy on simulators drawn from each PARAMETER_DISTRIBUTION and sends it as POLICY", argc,
-      argv,
+      "Trains a policy on simulators drawn from each PARAMETER_DISTRIBUTION and sends it as POLICY",
+      argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", options.robot, "robot folder or TOML file")->required();
         app.add_option("--iterations", options.iterations,
@@ -164,11 +172,13 @@ int main(int argc, char** argv) {
             ->check(CLI::Range(0, 10000))
             ->capture_default_str();
         app.add_option("--seed", options.seed, "of all random numbers")->capture_default_str();
-        app.add_option("--checkpoint", options.checkpoint, "folder to checkpoint in and to resume from");
+        app.add_option("--checkpoint", options.checkpoint,
+                       "folder to checkpoint in and to resume from");
         app.add_option("--threads", options.threads, "0 = all processors")
             ->check(CLI::Range(0, 1024))
             ->capture_default_str();
-        app.add_option("--evaluation-episodes", options.evaluation_episodes, "roll-outs of the last policy")
+        app.add_option("--evaluation-episodes", options.evaluation_episodes,
+                       "roll-outs of the last policy")
             ->check(CLI::Range(1, 1000000))
             ->capture_default_str();
       },

@@ -20,7 +20,8 @@ struct ObservationMoments {
   Eigen::VectorXd mean, squares;  ///< sum of squares about the mean; empty until the first
 
   void Add(const Eigen::Ref<const Eigen::VectorXf>& observation);
-  /// Takes in others, in one step (Chan, Golub and LeVeque, 1979). The bits depend on the order of merging.
+  /// Takes in others, in one step (Chan, Golub and LeVeque, 1979). The bits depend on the order of
+  /// merging.
   void Merge(const ObservationMoments& other);
   /// Standard deviations; 1 where an entry never varies.
   Eigen::VectorXd sd() const;

@@ -17,7 +17,8 @@ static_assert(std::endian::native == std::endian::little, "ONNX keeps numbers so
 constexpr int kIrVersion = 7;
 constexpr int kOperatorSet = 13;
 
-void AddTensor(GraphProto& graph, const std::string& name, std::initializer_list<int64_t> shape, const float* values) {
+void AddTensor(GraphProto& graph, const std::string& name, std::initializer_list<int64_t> shape,
+               const float* values) {
   TensorProto& tensor = *graph.add_initializer();
   tensor.set_name(name);
   tensor.set_data_type(TensorProto::FLOAT);
@@ -30,8 +31,8 @@ void AddTensor(GraphProto& graph, const std::string& name, std::initializer_list
 }
 
 /// Returns the output's name, which is the node's, too.
-std::string AddNode(GraphProto& graph, const char* operation, std::initializer_list<std::string> inputs,
-                    const std::string& output) {
+std::string AddNode(GraphProto& graph, const char* operation,
+                    std::initializer_list<std::string> inputs, const std::string& output) {
   onnx::NodeProto& node = *graph.add_node();
   node.set_op_type(operation);
   node.set_name(output);
@@ -78,7 +79,8 @@ ModelProto MakeOnnxModel(const GaussianPolicy& policy) {
   AddTensor(graph, "normalised_max", {}, &kBounds[1]);
   AddNode(graph, "Sub", {"observation", "observation_mean"}, "centred");
   AddNode(graph, "Div", {"centred", "observation_scale"}, "scaled");
-  std::string activation = AddNode(graph, "Clip", {"scaled", "normalised_min", "normalised_max"}, "normalised");
+  std::string activation =
+      AddNode(graph, "Clip", {"scaled", "normalised_min", "normalised_max"}, "normalised");
 
   const std::vector<int> sizes = policy.shape().sizes();
   const float* next = policy.parameters.data();
@@ -86,11 +88,13 @@ ModelProto MakeOnnxModel(const GaussianPolicy& policy) {
     const int in = sizes[layer - 1], out = sizes[layer];
     const bool last = layer + 1 == sizes.size();
     const std::string name = LayerName(layer);
-    // The parameters' columns of W (out x in) are rows of its transpose, and Gemm multiplies from the right.
+    // The parameters' columns of W (out x in) are rows of its transpose, and Gemm multiplies from
+    // the right.
     AddTensor(graph, name + ".weight", {in, out}, next);
     AddTensor(graph, name + ".bias", {out}, next + in * out);
     next += in * out + out;
-    activation = AddNode(graph, "Gemm", {activation, name + ".weight", name + ".bias"}, last ? "action" : name + ".sum");
+    activation = AddNode(graph, "Gemm", {activation, name + ".weight", name + ".bias"},
+                         last ? "action" : name + ".sum");
     if (!last) activation = AddNode(graph, "Tanh", {activation}, name);
   }
 

@@ -11,12 +11,15 @@ class ModelProto;
 
 namespace plumb {
 
-/// The one ONNX model that computes a policy, without a record; trainer/onnx_policy.h says what it takes and gives.
+/// The one ONNX model that computes a policy, without a record; trainer/onnx_policy.h says what it
+/// takes and gives.
 ///
-///   observation -> Sub mean -> Div scale -> Clip -> Gemm -> Tanh -> ... -> Gemm -> action -> Clip -> Mul action_scale -> effort
+///   observation -> Sub mean -> Div scale -> Clip -> Gemm -> Tanh -> ... -> Gemm -> action -> Clip
+///   -> Mul action_scale -> effort
 ///
-/// Initializers, all of them raw floats: observation_mean, observation_scale, normalised_min, normalised_max; for each layer
-/// <layer>.weight [in, out] and <layer>.bias [out]; action_min, action_max, action_scale, log_std_value.
+/// Initializers, all of them raw floats: observation_mean, observation_scale, normalised_min,
+/// normalised_max; for each layer <layer>.weight [in, out] and <layer>.bias [out]; action_min,
+/// action_max, action_scale, log_std_value.
 onnx::ModelProto MakeOnnxModel(const GaussianPolicy& policy);
 
 /// What the tensors of a layer begin with: "layer1" is the first.

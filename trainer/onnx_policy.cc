@@ -35,7 +35,8 @@ constexpr size_t kLongestDifference = 200;          // [characters] of a graph, 
 
 [[noreturn]] void Fail(const std::string& what) { throw std::invalid_argument(what); }
 
-/// Adds the lengths of the fields at the end of a path of nested messages. @return false if the bytes are no messages.
+/// Adds the lengths of the fields at the end of a path of nested messages. @return false if the
+/// bytes are no messages.
 bool AddLengths(CodedInputStream& input, std::span<const int> path, size_t& sum) {
   while (const uint32_t tag = input.ReadTag()) {
     if (tag != WireFormatLite::MakeTag(path.front(), WireFormatLite::WIRETYPE_LENGTH_DELIMITED)) {
@@ -62,19 +63,22 @@ ModelProto Parse(std::string_view bytes) {
   const int size = static_cast<int>(bytes.size());
   CodedInputStream input(data, size);
   const CodedInputStream::Limit none = input.PushLimit(size);
-  const int weights[] = {ModelProto::kGraphFieldNumber, GraphProto::kInitializerFieldNumber, TensorProto::kRawDataFieldNumber};
+  const int weights[] = {ModelProto::kGraphFieldNumber, GraphProto::kInitializerFieldNumber,
+                         TensorProto::kRawDataFieldNumber};
   size_t of_weights = 0;
   if (!AddLengths(input, weights, of_weights)) Fail("is not an ONNX model, or damaged");
   input.PopLimit(none);
   // Two bytes of an empty message become two hundred in memory; weights remain as long as they are.
-  if (bytes.size() - of_weights > kMostStructure) Fail("is not a policy: it is too large besides its weights");
+  if (bytes.size() - of_weights > kMostStructure)
+    Fail("is not a policy: it is too large besides its weights");
   const google::protobuf::LogSilencer silent;
   ModelProto model;
   if (!model.ParseFromArray(data, size)) Fail("is not an ONNX model, or damaged");
   return model;
 }
 
-/// The numbers of a graph's tensors by name. Shapes are not looked at: the comparison of the graphs does that.
+/// The numbers of a graph's tensors by name. Shapes are not looked at: the comparison of the graphs
+/// does that.
 class Tensors {
  public:
   explicit Tensors(const GraphProto& graph) {
@@ -87,7 +91,8 @@ class Tensors {
     const auto found = tensors_.find(name);
     if (found == tensors_.end()) Fail("is not a policy: it has no tensor '" + name + "'");
     const TensorProto& tensor = *found->second;
-    if (tensor.data_location() != TensorProto::DEFAULT) Fail("keeps tensor '" + name + "' in another file");
+    if (tensor.data_location() != TensorProto::DEFAULT)
+      Fail("keeps tensor '" + name + "' in another file");
     const std::string& raw = tensor.raw_data();
     if (tensor.data_type() != TensorProto::FLOAT || raw.size() % sizeof(float) != 0) {
       Fail("has numbers in tensor '" + name + "' that are not raw floats");
@@ -138,7 +143,8 @@ void RequireSameGraph(ModelProto model, const GaussianPolicy& policy) {
   model.mutable_graph()->set_name("policy");
   std::string differences;
   MessageDifferencer differencer;
-  differencer.set_message_field_comparison(MessageDifferencer::EQUIVALENT);  // a default may be written or not
+  // a default may be written or not
+  differencer.set_message_field_comparison(MessageDifferencer::EQUIVALENT);
   differencer.ReportDifferencesToString(&differences);
   if (differencer.Compare(MakeOnnxModel(policy), model)) return;
   const size_t end = std::min(differences.find('\n'), kLongestDifference);
@@ -152,7 +158,8 @@ PolicyRecord MakeRecord(const ModelProto& model, const PolicyShape& shape) {
   }
   PolicyRecord record = FromProperties(properties);
   const auto require = [](const char* what, size_t found, int expected) {
-    if (found != static_cast<size_t>(expected)) Fail(fmt::format("has {} {}, not {}", found, what, expected));
+    if (found != static_cast<size_t>(expected))
+      Fail(fmt::format("has {} {}, not {}", found, what, expected));
   };
   require("names of observations", record.observation_names.size(), shape.observations);
   require("names of actions", record.action_names.size(), shape.actions);
@@ -186,7 +193,8 @@ OnnxPolicy DecodeOnnxPolicy(std::string_view bytes) {
 
 // Every writer of protobuf begins with the first field, ModelProto.ir_version.
 bool IsOnnx(std::string_view bytes) {
-  constexpr uint32_t kTag = WireFormatLite::MakeTag(ModelProto::kIrVersionFieldNumber, WireFormatLite::WIRETYPE_VARINT);
+  constexpr uint32_t kTag =
+      WireFormatLite::MakeTag(ModelProto::kIrVersionFieldNumber, WireFormatLite::WIRETYPE_VARINT);
   return !bytes.empty() && static_cast<unsigned char>(bytes.front()) == kTag;
 }
 

@@ -8,11 +8,11 @@
 
 namespace plumb {
 
-/// Reads a policy from a file: a trainer's checkpoint or an ONNX model that Plumbline has written (trainer/onnx_policy.h),
-/// whichever it is by its contents.
-/// @throws std::invalid_argument or CheckpointError, naming the file, if there is none, it is damaged, or the policy is
-/// another robot's or another task's: it sees or does something else, has other effort limits or, as far as the file says,
-/// other names or another control period.
+/// Reads a policy from a file: a trainer's checkpoint or an ONNX model that Plumbline has written
+/// (trainer/onnx_policy.h), whichever it is by its contents.
+/// @throws std::invalid_argument or CheckpointError, naming the file, if there is none, it is
+/// damaged, or the policy is another robot's or another task's: it sees or does something else, has
+/// other effort limits or, as far as the file says, other names or another control period.
 GaussianPolicy LoadPolicy(const std::string& file, const RobotDescription& robot, const Task& task);
 
 }  // namespace plumb

@@ -20,14 +20,17 @@ constexpr size_t kLongestExcerpt = 300;  // [characters] of a property, in an er
 std::vector<std::string> ActionUnits(const RobotDescription& robot) {
   std::vector<std::string> units;
   for (const int i : robot.driven()) {
-    const bool slides = robot.joints[static_cast<size_t>(i)].type == JointDescription::Type::kPrismatic;
+    const bool slides =
+        robot.joints[static_cast<size_t>(i)].type == JointDescription::Type::kPrismatic;
     units.push_back(slides ? "N" : "Nm");
   }
   return units;
 }
 
 // Names come from files of any encoding; JSON is UTF-8.
-std::string Text(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
+std::string Text(const json& value) {
+  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+}
 
 std::string Excerpt(const json& value) {
   const std::string text = Text(value);
@@ -44,7 +47,8 @@ class Reader {
   void operator()(const char* name, Number& number) const {
     const std::string& text = Find(name);
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error != std::errc() || end != text.data() + text.size()) Fail(name, "is no number that fits");
+    if (error != std::errc() || end != text.data() + text.size())
+      Fail(name, "is no number that fits");
     if (!std::isfinite(static_cast<double>(number))) Fail(name, "is not finite");
   }
   void operator()(const char* name, std::optional<double>& number) const {
@@ -88,8 +92,12 @@ class Reader {
 class Writer {
  public:
   void operator()(const char* name, const std::string& text) { properties[name] = text; }
-  void operator()(const char* name, const std::vector<std::string>& list) { properties[name] = Text(list); }
-  void operator()(const char* name, const std::map<std::string, double>& figures) { properties[name] = Text(figures); }
+  void operator()(const char* name, const std::vector<std::string>& list) {
+    properties[name] = Text(list);
+  }
+  void operator()(const char* name, const std::map<std::string, double>& figures) {
+    properties[name] = Text(figures);
+  }
   void operator()(const char* name, const std::optional<double>& number) {
     if (number) (*this)(name, *number);
   }
@@ -134,8 +142,8 @@ PolicyRecord MakePolicyRecord(const RobotDescription& robot, const Task& task) {
 void RequireSameTask(const PolicyRecord& record, const RobotDescription& robot, const Task& task) {
   const auto require = [](const char* what, const auto& of_policy, const auto& expected) {
     if (Text(of_policy) == Text(expected)) return;
-    throw std::invalid_argument(
-        fmt::format("the policy is for another {}: {}, not {}", what, Excerpt(of_policy), Excerpt(expected)));
+    throw std::invalid_argument(fmt::format("the policy is for another {}: {}, not {}", what,
+                                            Excerpt(of_policy), Excerpt(expected)));
   };
   require("robot", record.robot, robot.name);
   require("task", record.task, robot.task.name);

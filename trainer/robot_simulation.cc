@@ -27,7 +27,8 @@ class RobotSimulation : public Simulation {
     Read();
   }
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override {
-    environment_.task().Observe(q_, v_, {observation.data(), static_cast<size_t>(observation.size())});
+    environment_.task().Observe(q_, v_,
+                                {observation.data(), static_cast<size_t>(observation.size())});
   }
   Outcome Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
     const Environment::StepResult result = environment_.Step(action);
@@ -56,9 +57,13 @@ class RobotSimulation : public Simulation {
 SimulationFactory SimulateRobot(const RobotDescription& description) {
   const bool noisy = description.training.position_noise > 0;
   if (noisy && description.num_positions() != description.num_velocities()) {
-    throw std::invalid_argument("position_noise: not for robots with spherical joints, whose positions are no numbers to add to");
+    throw std::invalid_argument(
+        "position_noise: not for robots with spherical joints, whose positions are no numbers to "
+        "add to");
   }
-  return [model = std::make_shared<const Model>(description)] { return std::make_unique<RobotSimulation>(model); };
+  return [model = std::make_shared<const Model>(description)] {
+    return std::make_unique<RobotSimulation>(model);
+  };
 }
 
 }  // namespace plumb

@@ -11,8 +11,8 @@
 namespace plumb {
 namespace {
 
-// Episodes side by side: the kernels gain little from more columns. Tasks: enough for as many threads, in a number that two
-// and four of them share evenly.
+// Episodes side by side: the kernels gain little from more columns. Tasks: enough for as many
+// threads, in a number that two and four of them share evenly.
 constexpr int kMostTogether = 8, kTasks = 8;
 
 }  // namespace
@@ -53,9 +53,11 @@ struct RolloutSampler::Player {
   }
 
   /// @param action the mean in, what was done out.
-  void Step(const float* observation, Eigen::Ref<Eigen::VectorXf> action, const Eigen::ArrayXf& sd, bool explore) {
+  void Step(const float* observation, Eigen::Ref<Eigen::VectorXf> action, const Eigen::ArrayXf& sd,
+            bool explore) {
     if (explore) {
-      for (Eigen::Index a = 0; a < action.size(); ++a) action[a] += sd[a] * static_cast<float>(random.Normal());
+      for (Eigen::Index a = 0; a < action.size(); ++a)
+        action[a] += sd[a] * static_cast<float>(random.Normal());
     }
     if (!action.allFinite()) {
       record = nullptr;
@@ -82,8 +84,9 @@ struct RolloutSampler::Worker {
             const std::function<void(int, Player&)>& begin);
 };
 
-void RolloutSampler::Worker::Play(const GaussianPolicy& policy, const kernels::Network& network, int count, bool explore,
-                           const std::function<void(int, Player&)>& begin) {
+void RolloutSampler::Worker::Play(const GaussianPolicy& policy, const kernels::Network& network,
+                                  int count, bool explore,
+                                  const std::function<void(int, Player&)>& begin) {
   const Eigen::ArrayXf sd = policy.log_std().array().exp();
   std::vector<Player*> playing;
   for (int i = 0; i < count; ++i) {
@@ -102,18 +105,21 @@ void RolloutSampler::Worker::Play(const GaussianPolicy& policy, const kernels::N
     if (playing.empty()) return;
     tape.Forward(network, observations.data(), column, actions.data());
     for (column = 0; column < static_cast<int>(playing.size()); ++column) {
-      playing[static_cast<size_t>(column)]->Step(observations.col(column).data(), actions.col(column), sd, explore);
+      playing[static_cast<size_t>(column)]->Step(observations.col(column).data(),
+                                                 actions.col(column), sd, explore);
     }
   }
 }
 
-RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape& shape, Workers& workers,
-                               const Ranks& ranks)
+RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape& shape,
+                               Workers& workers, const Ranks& ranks)
     : workers_(&workers), ranks_(&ranks), network_(shape.sizes()) {
   for (int i = 0; i < workers.size(); ++i) {
-    auto worker = std::make_unique<Worker>(Worker{{}, kernels::Tape(shape.sizes(), kMostTogether),
-                                                  Eigen::MatrixXf(shape.observations, kMostTogether),
-                                                  Eigen::MatrixXf(shape.actions, kMostTogether)});
+    auto worker =
+        std::make_unique<Worker>(Worker{{},
+                                        kernels::Tape(shape.sizes(), kMostTogether),
+                                        Eigen::MatrixXf(shape.observations, kMostTogether),
+                                        Eigen::MatrixXf(shape.actions, kMostTogether)});
     for (int k = 0; k < kMostTogether; ++k) {
       worker->players.push_back({.simulation = make(), .raw = Eigen::VectorXf(shape.observations)});
     }
@@ -124,8 +130,9 @@ RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape&
 
 RolloutSampler::~RolloutSampler() = default;
 
-std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first,
-                                               int count, bool explore, uint64_t seed, uint32_t stream,
+std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy,
+                                               const ParameterSampler& sample, int first, int count,
+                                               bool explore, uint64_t seed, uint32_t stream,
                                                uint32_t number) {
   network_.Set({policy.parameters.data(), static_cast<size_t>(policy.parameters.size())});
   const std::vector<int> bounds = ranks_->Bounds(count);
@@ -137,28 +144,33 @@ std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy, con
   tasks = std::min(own, (tasks + kTasks - 1) / kTasks * kTasks);
   workers_->Run(tasks, [&](int task, int worker) {
     const int begin = own * task / tasks, end = own * (task + 1) / tasks;
-    state_[static_cast<size_t>(worker)]->Play(policy, network_, end - begin, explore, [&](int i, Player& player) {
-      const int episode = begin + i;
-      player.Begin(sample, Random(seed, {stream, number, static_cast<uint32_t>(first + episode)}),
-                   records[static_cast<size_t>(episode)]);
-    });
+    state_[static_cast<size_t>(worker)]->Play(
+        policy, network_, end - begin, explore, [&](int i, Player& player) {
+          const int episode = begin + i;
+          player.Begin(sample,
+                       Random(seed, {stream, number, static_cast<uint32_t>(first + episode)}),
+                       records[static_cast<size_t>(episode)]);
+        });
   });
   return Gather(*ranks_, std::move(records));
 }
 
-Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps, double worst_share,
-                       uint64_t seed, uint32_t stream, uint32_t number) {
+Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampler& sample,
+                              int steps, double worst_share, uint64_t seed, uint32_t stream,
+                              uint32_t number) {
   Batch batch;
   std::vector<EpisodeRecord> records;
   std::vector<size_t> kept;  // of the records, by number
   int kept_steps = 0;
   double sum = 0;
   while (kept_steps < steps) {
-    // As many episodes as are missing if they last as long as those so far: known before they are played, so
-    // that the number of threads cannot matter.
-    const double length = kept.empty() ? time_limit_ : 1. * kept_steps / static_cast<double>(kept.size());
+    // As many episodes as are missing if they last as long as those so far: known before they are
+    // played, so that the number of threads cannot matter.
+    const double length =
+        kept.empty() ? time_limit_ : 1. * kept_steps / static_cast<double>(kept.size());
     const int wanted = static_cast<int>(std::ceil((steps - kept_steps) / length / worst_share));
-    for (EpisodeRecord& record : Run(policy, sample, batch.played, wanted, true, seed, stream, number)) {
+    for (EpisodeRecord& record :
+         Run(policy, sample, batch.played, wanted, true, seed, stream, number)) {
       if (!record.usable) {
         ++batch.dropped;
         continue;
@@ -170,15 +182,18 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
     }
     batch.played += wanted;
     if (2 * batch.dropped > batch.played && batch.played >= 10) {
-      throw std::runtime_error(fmt::format(
-          "{} of {} simulated episodes were not finite or had impossible parameters: nothing to learn from",
-          batch.dropped, batch.played));
+      throw std::runtime_error(
+          fmt::format("{} of {} simulated episodes were not finite or had impossible parameters: "
+                      "nothing to learn from",
+                      batch.dropped, batch.played));
     }
     kept.resize(records.size());
     std::iota(kept.begin(), kept.end(), 0);
     if (worst_share < 1) {
-      std::stable_sort(kept.begin(), kept.end(), [&](size_t a, size_t b) { return records[a].sum < records[b].sum; });
-      kept.resize(static_cast<size_t>(std::ceil(worst_share * static_cast<double>(records.size()))));
+      std::stable_sort(kept.begin(), kept.end(),
+                       [&](size_t a, size_t b) { return records[a].sum < records[b].sum; });
+      kept.resize(
+          static_cast<size_t>(std::ceil(worst_share * static_cast<double>(records.size()))));
       std::sort(kept.begin(), kept.end());
     }
     kept_steps = 0;
@@ -187,10 +202,12 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
   for (const size_t i : kept) {
     const EpisodeRecord& record = records[i];
     const int begin = batch.size();
-    batch.observations.insert(batch.observations.end(), record.observations.begin(), record.observations.end());
+    batch.observations.insert(batch.observations.end(), record.observations.begin(),
+                              record.observations.end());
     batch.actions.insert(batch.actions.end(), record.actions.begin(), record.actions.end());
     batch.rewards.insert(batch.rewards.end(), record.rewards.begin(), record.rewards.end());
-    batch.final_observations.insert(batch.final_observations.end(), record.final_observation.begin(),
+    batch.final_observations.insert(batch.final_observations.end(),
+                                    record.final_observation.begin(),
                                     record.final_observation.end());
     batch.episodes.push_back({begin, batch.size(), record.terminated, record.sum});
   }
@@ -198,10 +215,12 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
   return batch;
 }
 
-std::vector<double> RolloutSampler::Returns(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes,
-                                     uint64_t seed, uint32_t stream, uint32_t number) {
+std::vector<double> RolloutSampler::Returns(const GaussianPolicy& policy,
+                                            const ParameterSampler& sample, int episodes,
+                                            uint64_t seed, uint32_t stream, uint32_t number) {
   std::vector<double> returns;
-  for (const EpisodeRecord& record : Run(policy, sample, 0, episodes, false, seed, stream, number)) {
+  for (const EpisodeRecord& record :
+       Run(policy, sample, 0, episodes, false, seed, stream, number)) {
     returns.push_back(record.usable ? record.sum : std::numeric_limits<double>::quiet_NaN());
   }
   return returns;

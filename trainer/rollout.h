@@ -8,8 +8,8 @@
 
 #include "common/random.h"
 #include "controller/policy.h"
-#include "trainer/kernels/network.h"
 #include "trainer/episode_record.h"
+#include "trainer/kernels/network.h"
 #include "trainer/moments.h"
 #include "trainer/workers.h"
 
@@ -50,19 +50,23 @@ struct Batch {
     double sum;       ///< of the rewards, undiscounted
   };
   std::vector<Episode> episodes;
-  std::vector<float> final_observations;  ///< after the last step (before any reset), observations x episodes
-  ObservationMoments moments;  ///< of the observations as the task gives them, of all episodes played
-  int played = 0;              ///< episodes, also those that were too good to be learnt from
-  int dropped = 0;  ///< episodes thrown away because something was not finite, or the simulator impossible
-  int64_t steps = 0;           ///< of all episodes played, but for those dropped
-  double mean_return = 0;      ///< of all episodes played, but for those dropped
+  /// after the last step (before any reset), observations x episodes
+  std::vector<float> final_observations;
+  /// of the observations as the task gives them, of all episodes played
+  ObservationMoments moments;
+  int played = 0;  ///< episodes, also those that were too good to be learnt from
+  /// episodes thrown away because something was not finite, or the simulator impossible
+  int dropped = 0;
+  int64_t steps = 0;       ///< of all episodes played, but for those dropped
+  double mean_return = 0;  ///< of all episodes played, but for those dropped
 
   int size() const { return static_cast<int>(rewards.size()); }
 };
 
-/// Rolls a policy out in simulators drawn one per episode. Ranks and threads share the episodes; a thread plays several
-/// side by side, so that the network is evaluated for all of them at once. Random numbers are named by seed, stream and
-/// episode: the batch is the same for any number of threads and ranks, and every rank gets all of it. Not thread-safe itself.
+/// Rolls a policy out in simulators drawn one per episode. Ranks and threads share the episodes; a
+/// thread plays several side by side, so that the network is evaluated for all of them at once.
+/// Random numbers are named by seed, stream and episode: the batch is the same for any number of
+/// threads and ranks, and every rank gets all of it. Not thread-safe itself.
 class RolloutSampler {
  public:
   /// @param make called several times per worker. @param workers,ranks must outlive this.
@@ -71,22 +75,25 @@ class RolloutSampler {
   ~RolloutSampler();
 
   /// Whole episodes of at least `steps` steps together.
-  /// @param worst_share of the episodes, those of lowest return, are kept: what is learnt from them guards against the
-  /// worst simulators of the distribution (Rajeswaran et al., "EPOpt", ICLR 2017). 1 = all.
+  /// @param worst_share of the episodes, those of lowest return, are kept: what is learnt from them
+  /// guards against the worst simulators of the distribution (Rajeswaran et al., "EPOpt", ICLR
+  /// 2017). 1 = all.
   /// @param stream,number name the random numbers, together with the episode's number.
   /// @throws std::runtime_error if most episodes have to be dropped.
-  Batch Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps, double worst_share, uint64_t seed,
-                uint32_t stream, uint32_t number);
-  /// Return of the mean action's policy in each of some episodes; NaN where something was not finite.
-  std::vector<double> Returns(const GaussianPolicy& policy, const ParameterSampler& sample, int episodes, uint64_t seed,
-                              uint32_t stream, uint32_t number);
+  Batch Collect(const GaussianPolicy& policy, const ParameterSampler& sample, int steps,
+                double worst_share, uint64_t seed, uint32_t stream, uint32_t number);
+  /// Return of the mean action's policy in each of some episodes; NaN where something was not
+  /// finite.
+  std::vector<double> Returns(const GaussianPolicy& policy, const ParameterSampler& sample,
+                              int episodes, uint64_t seed, uint32_t stream, uint32_t number);
 
  private:
   struct Player;
   struct Worker;
   /// The episodes [first, first + count), shared out among ranks and threads.
-  std::vector<EpisodeRecord> Run(const GaussianPolicy& policy, const ParameterSampler& sample, int first, int count,
-                                 bool explore, uint64_t seed, uint32_t stream, uint32_t number);
+  std::vector<EpisodeRecord> Run(const GaussianPolicy& policy, const ParameterSampler& sample,
+                                 int first, int count, bool explore, uint64_t seed, uint32_t stream,
+                                 uint32_t number);
 
   Workers* workers_;
   const Ranks* ranks_;

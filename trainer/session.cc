@@ -42,7 +42,9 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
 }
 
 bool TrainingSession::Replace(const ParameterDistribution& distribution) {
-  if (!training() || distribution.iteration != iteration_ || distribution.components == distribution_.components) return false;
+  if (!training() || distribution.iteration != iteration_ ||
+      distribution.components == distribution_.components)
+    return false;
   distribution_ = distribution;
   return true;
 }
@@ -93,8 +95,10 @@ Checkpoint TrainingSession::MakeCheckpoint() const {
   const TrainerState state = trainer_.state();
   Checkpoint checkpoint;
   checkpoint.seed = seed_;
-  checkpoint.updates = state.updates, checkpoint.steps = state.steps, checkpoint.dropped_episodes = state.dropped_episodes;
-  checkpoint.iteration = iteration_, checkpoint.iteration_updates = update_, checkpoint.complete = complete_;
+  checkpoint.updates = state.updates, checkpoint.steps = state.steps,
+  checkpoint.dropped_episodes = state.dropped_episodes;
+  checkpoint.iteration = iteration_, checkpoint.iteration_updates = update_,
+  checkpoint.complete = complete_;
   checkpoint.evaluation = evaluation_;
   checkpoint.policy = state.policy.ToMessage(), checkpoint.distribution = distribution_.ToMessage();
   checkpoint.critic = state.critic, checkpoint.observations = state.observations;
@@ -107,15 +111,17 @@ void TrainingSession::Restore(const Checkpoint& checkpoint) {
         fmt::format("the checkpoint is of a run with seed {}, not {}", checkpoint.seed, seed_));
   }
   if (checkpoint.iteration < 0 || checkpoint.iteration > iterations_) {
-    throw CheckpointError(
-        fmt::format("the checkpoint stands at iteration {}, beyond {}", checkpoint.iteration, iterations_));
+    throw CheckpointError(fmt::format("the checkpoint stands at iteration {}, beyond {}",
+                                      checkpoint.iteration, iterations_));
   }
   try {
     distribution_ = ParameterDistribution::FromMessage(checkpoint.distribution, description_);
-    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint.policy), checkpoint.critic, checkpoint.observations,
-                      checkpoint.updates, checkpoint.steps, checkpoint.dropped_episodes});
+    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint.policy), checkpoint.critic,
+                      checkpoint.observations, checkpoint.updates, checkpoint.steps,
+                      checkpoint.dropped_episodes});
   } catch (const std::invalid_argument& error) {
-    throw CheckpointError(fmt::format("the checkpoint is of another robot or network: {}", error.what()));
+    throw CheckpointError(
+        fmt::format("the checkpoint is of another robot or network: {}", error.what()));
   }
   begun_ = true;
   iteration_ = checkpoint.iteration;

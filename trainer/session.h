@@ -10,28 +10,31 @@
 
 namespace plumb {
 
-/// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains from
-/// scratch, each later one from where the last ended. Knows neither messages nor clocks. Not thread-safe.
+/// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains
+/// from scratch, each later one from where the last ended. Knows neither messages nor clocks. Not
+/// thread-safe.
 class TrainingSession {
  public:
-  /// @param iterations number N of distributions that follow the prior: the policy of iteration N is the
-  /// last.
+  /// @param iterations number N of distributions that follow the prior: the policy of iteration N
+  /// is the last.
   /// @param make makes simulations. @param threads 0 = as many as the machine has.
-  TrainingSession(const RobotDescription& description, const SimulationFactory& make, int iterations,
-                  uint64_t seed, int threads);
+  TrainingSession(const RobotDescription& description, const SimulationFactory& make,
+                  int iterations, uint64_t seed, int threads);
 
-  /// Goes on where a checkpoint stands. @throws CheckpointError if it is of another run: seed, robot or
-  /// network.
+  /// Goes on where a checkpoint stands. @throws CheckpointError if it is of another run: seed,
+  /// robot or network.
   void Restore(const Checkpoint& checkpoint);
   Checkpoint MakeCheckpoint() const;
 
   /// The iteration whose distribution is awaited; -1 while training and after the last.
   int awaited() const;
-  /// Begins the iteration. @return false, and nothing happens, if it is not the one that is awaited.
+  /// Begins the iteration. @return false, and nothing happens, if it is not the one that is
+  /// awaited.
   bool Begin(const ParameterDistribution& distribution);
 
-  /// Goes on training with another distribution of the same iteration, from the next batch on. @return false, and nothing
-  /// happens, if there is no training, or it is of another iteration, or no other.
+  /// Goes on training with another distribution of the same iteration, from the next batch on.
+  /// @return false, and nothing happens, if there is no training, or it is of another iteration, or
+  /// no other.
   bool Replace(const ParameterDistribution& distribution);
 
   bool training() const { return begun_ && !complete_; }
@@ -50,7 +53,8 @@ class TrainingSession {
   /// Of the complete iteration's policy.
   const Evaluation& evaluation() const { return evaluation_; }
 
-  /// The complete iteration's policy, its purpose and how many roll-outs are wanted; utime is the sender's.
+  /// The complete iteration's policy, its purpose and how many roll-outs are wanted; utime is the
+  /// sender's.
   /// @param evaluation_episodes roll-outs of the last policy; of any other one is wanted.
   policy_t Policy(int evaluation_episodes) const;
   /// utime and seconds are the sender's.

@@ -13,7 +13,8 @@
 namespace plumb {
 namespace {
 
-/// Names of the trainer's streams of random numbers; the other words are the update and the episode.
+/// Names of the trainer's streams of random numbers; the other words are the update and the
+/// episode.
 enum Stream : uint32_t {
   kPolicyStream = 0x7472'0000,
   kCriticStream,
@@ -24,12 +25,13 @@ enum Stream : uint32_t {
 };
 
 constexpr double kTrustedBatches = 10;  // that a normaliser to begin with counts for
-constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
+constexpr double kOutputGain = 0.01;    // of a fresh policy: every mean action is near 0
 
 GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFactory& make,
                            const Eigen::VectorXd& action_scale, uint64_t seed) {
   const std::unique_ptr<Simulation> simulation = make();
-  GaussianPolicy policy({simulation->observation_size(), settings.hidden, simulation->action_size()});
+  GaussianPolicy policy(
+      {simulation->observation_size(), settings.hidden, simulation->action_size()});
   if (action_scale.size() != simulation->action_size())
     throw std::invalid_argument("trainer: size of action scale");
   policy.action_scale = action_scale.cast<float>();
@@ -49,7 +51,8 @@ TrainingSettings AsThePaper(TrainingSettings settings) {
 }
 
 Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make,
-                 const Eigen::VectorXd& action_scale, uint64_t seed, int threads, const Ranks& ranks)
+                 const Eigen::VectorXd& action_scale, uint64_t seed, int threads,
+                 const Ranks& ranks)
     : settings_(settings),
       seed_(seed),
       ranks_(&ranks),
@@ -57,7 +60,8 @@ Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make
       policy_(FreshPolicy(settings, make, action_scale, seed)),
       rollout_(make, policy_.shape(), workers_, ranks),
       trpo_(settings, policy_.shape(), workers_, ranks),
-      critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_, ranks) {}
+      critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_,
+              ranks) {}
 
 TrainerState Trainer::state() const {
   return {policy_, critic_.state(), observations_, updates_, steps_, dropped_episodes_};
@@ -67,7 +71,8 @@ void Trainer::Restore(TrainerState state) {
   if (state.policy.shape() != policy_.shape())
     throw std::invalid_argument("trainer: state of another network");
   const Eigen::Index seen = state.observations.mean.size();
-  if (state.observations.squares.size() != seen || (seen != 0 && seen != policy_.shape().observations)) {
+  if (state.observations.squares.size() != seen ||
+      (seen != 0 && seen != policy_.shape().observations)) {
     throw std::invalid_argument("trainer: state of other observations");
   }
   critic_.Restore(std::move(state.critic));
@@ -79,7 +84,8 @@ void Trainer::Restore(TrainerState state) {
 }
 
 void Trainer::Start(const GaussianPolicy& policy) {
-  if (policy.shape() != policy_.shape()) throw std::invalid_argument("trainer: the policy to begin with is another network");
+  if (policy.shape() != policy_.shape())
+    throw std::invalid_argument("trainer: the policy to begin with is another network");
   policy_ = policy;
   if (!settings_.normalise_observations) return;
   observations_.count = kTrustedBatches * settings_.batch;
@@ -91,12 +97,14 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   const auto update = static_cast<uint32_t>(updates_);
   // Who cannot yet do it at all learns nothing from the worst of its failures.
   const double share = updates_ < settings_.worst_after ? 1 : settings_.worst_share;
-  const Batch batch = rollout_.Collect(policy_, sample, settings_.batch, share, seed_, kRolloutStream, update);
+  const Batch batch =
+      rollout_.Collect(policy_, sample, settings_.batch, share, seed_, kRolloutStream, update);
   const std::vector<double> values = critic_.Values(batch.observations);
   const std::vector<double> final_values = critic_.Values(batch.final_observations);
   std::vector<EpisodeSpan> episodes;
   for (const Batch::Episode& episode : batch.episodes) {
-    episodes.push_back({episode.begin, episode.end, episode.terminated, final_values[episodes.size()]});
+    episodes.push_back(
+        {episode.begin, episode.end, episode.terminated, final_values[episodes.size()]});
   }
   Advantages advantages =
       EstimateAdvantages(batch.rewards, values, episodes, settings_.gamma, settings_.lambda);
@@ -109,13 +117,17 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   report.explained_variance = ExplainedVariance(values, advantages.target);
   // Neither needs the other's result.
   workers_.Together(
-      [&] { report.step = trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage}); },
+      [&] {
+        report.step =
+            trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage});
+      },
       [&] {
         Random random(seed_, {kFitStream, update});
         report.critic_fitted = critic_.Fit(batch.observations, advantages.target, random);
       });
   report.entropy = Entropy(policy_);
-  if (settings_.normalise_observations) {  // after the step: its batch was seen through the old normaliser
+  // after the step: its batch was seen through the old normaliser
+  if (settings_.normalise_observations) {
     observations_.Merge(batch.moments);
     policy_.observation_mean = observations_.mean.cast<float>();
     policy_.observation_scale = observations_.sd().cast<float>();
@@ -131,21 +143,22 @@ void Trainer::CompareRanks() const {
   struct Sums {
     double policy, critic;  // of the parameters: one bit's difference in one of them shows
   };
-  const std::vector<Sums> sums = ranks_->Collect(
-      Sums{policy_.parameters.cast<double>().sum(), critic_.state().parameters.cast<double>().sum()});
+  const std::vector<Sums> sums = ranks_->Collect(Sums{
+      policy_.parameters.cast<double>().sum(), critic_.state().parameters.cast<double>().sum()});
   for (size_t r = 1; r < sums.size(); ++r) {
     if (std::memcmp(&sums[r], &sums[0], sizeof(Sums)) != 0) {
-      throw std::runtime_error(fmt::format(
-          "rank {} has come to another policy or critic than rank 0 by update {}: do all have the same files and "
-          "processors with the same instruction set (this one's: {})?",
-          r, updates_, kernels::InstructionSet()));
+      throw std::runtime_error(
+          fmt::format("rank {} has come to another policy or critic than rank 0 by update {}: do "
+                      "all have the same files and "
+                      "processors with the same instruction set (this one's: {})?",
+                      r, updates_, kernels::InstructionSet()));
     }
   }
 }
 
 Evaluation Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
-  return plumb::Evaluate(
-      rollout_.Returns(policy_, sample, episodes, seed_, kEvaluationStream, static_cast<uint32_t>(updates_)));
+  return plumb::Evaluate(rollout_.Returns(policy_, sample, episodes, seed_, kEvaluationStream,
+                                          static_cast<uint32_t>(updates_)));
 }
 
 Evaluation Trainer::EvaluateHeldOut(const ParameterSampler& sample, int episodes) {

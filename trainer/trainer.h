@@ -13,15 +13,17 @@
 
 namespace plumb {
 
-/// The settings as the paper has them, where ours learn faster: value targets in units of return, the whole batch for Fisher's matrix.
-/// The paper does not say how long its critic is fitted; targets so large need 20 passes, 10 leave one seed in ten behind.
+/// The settings as the paper has them, where ours learn faster: value targets in units of return,
+/// the whole batch for Fisher's matrix. The paper does not say how long its critic is fitted;
+/// targets so large need 20 passes, 10 leave one seed in ten behind.
 TrainingSettings AsThePaper(TrainingSettings settings);
 
 /// All that training has learnt: what a checkpoint keeps.
 struct TrainerState {
   GaussianPolicy policy;
   CriticState critic;
-  ObservationMoments observations{};  ///< of all that was seen, if the policy's normaliser follows them
+  /// of all that was seen, if the policy's normaliser follows them
+  ObservationMoments observations{};
   int64_t updates = 0;           ///< since the beginning
   int64_t steps = 0;             ///< simulated steps since the beginning, those not learnt from too
   int64_t dropped_episodes = 0;  ///< since the beginning
@@ -38,15 +40,16 @@ struct UpdateReport {
   bool critic_fitted = false;     ///< false: the fit was not finite and has been undone
 };
 
-/// Trains a policy in simulation: roll out, estimate advantages, step the policy, fit the critic. Its random
-/// numbers are named by (seed, update, episode): the same bits for any number of threads and ranks, and for a
-/// run that was interrupted and resumed. Not thread-safe itself.
+/// Trains a policy in simulation: roll out, estimate advantages, step the policy, fit the critic.
+/// Its random numbers are named by (seed, update, episode): the same bits for any number of threads
+/// and ranks, and for a run that was interrupted and resumed. Not thread-safe itself.
 class Trainer {
  public:
-  /// @param make makes simulations; called once per thread. @param action_scale effort of action 1, per
-  /// action.
+  /// @param make makes simulations; called once per thread. @param action_scale effort of action 1,
+  /// per action.
   /// @param threads 0 = as many as the machine has.
-  /// @param ranks must outlive this. All of them make the same trainer and call the same methods, in the same order.
+  /// @param ranks must outlive this. All of them make the same trainer and call the same methods,
+  /// in the same order.
   Trainer(const TrainingSettings& settings, const SimulationFactory& make,
           const Eigen::VectorXd& action_scale, uint64_t seed, int threads,
           const Ranks& ranks = Ranks::Alone());
@@ -54,18 +57,20 @@ class Trainer {
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.
   void Restore(TrainerState state);
-  /// Begins with another policy, before the first update; its normaliser counts as much as ten batches. @throws std::invalid_argument if its network is another's.
+  /// Begins with another policy, before the first update; its normaliser counts as much as ten
+  /// batches. @throws std::invalid_argument if its network is another's.
   void Start(const GaussianPolicy& policy);
   const GaussianPolicy& policy() const { return policy_; }
   int64_t updates() const { return updates_; }
   int64_t steps() const { return steps_; }
 
-  /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used, or if ranks have come
-  /// to different results.
+  /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used,
+  /// or if ranks have come to different results.
   UpdateReport Update(const ParameterSampler& sample);
   /// The policy without exploration on simulators drawn anew. Changes nothing.
   Evaluation Evaluate(const ParameterSampler& sample, int episodes);
-  /// The same on simulators and initial states that are always the same for a seed: what makes policies comparable.
+  /// The same on simulators and initial states that are always the same for a seed: what makes
+  /// policies comparable.
   Evaluation EvaluateHeldOut(const ParameterSampler& sample, int episodes);
 
  private:

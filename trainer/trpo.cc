@@ -19,24 +19,27 @@ int Count(const PolicySamples& samples) { return static_cast<int>(samples.advant
 
 }  // namespace
 
-Trpo::Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers, const Ranks& ranks)
+Trpo::Trpo(const TrainingSettings& settings, const PolicyShape& shape, Workers& workers,
+           const Ranks& ranks)
     : settings_(settings),
       shape_(shape),
       network_(shape.sizes(), workers, ranks),
       fisher_network_(shape.sizes(), workers, ranks) {}
 
-Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples, std::vector<float>& means) {
+Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples,
+                                        std::vector<float>& means) {
   const int actions = shape_.actions, count = Count(samples);
   const Eigen::ArrayXf precision = (-2 * policy.log_std().array()).exp();
   means.resize(samples.actions.size());
   Eigen::VectorXf gradient(shape_.parameter_count());
   Eigen::VectorXd log_std_gradient(actions);
   network_.Set(policy.parameters);
-  // ln p(a) = -((a - mu) / sd)^2 / 2 - log_std + const: d/dmu = (a - mu) / sd^2, d/dlog_std = ((a - mu) /
-  // sd)^2 - 1.
+  // ln p(a) = -((a - mu) / sd)^2 / 2 - log_std + const: d/dmu = (a - mu) / sd^2, d/dlog_std = ((a -
+  // mu) / sd)^2 - 1.
   network_.Gradient(
       samples.observations.data(), count,
-      [&](int first, int columns, const float* outputs, float* output_gradient, std::span<double> sums) {
+      [&](int first, int columns, const float* outputs, float* output_gradient,
+          std::span<double> sums) {
         for (int i = 0; i < columns; ++i) {
           const double weight = samples.advantages[static_cast<size_t>(first + i)] / count;
           for (int a = 0; a < actions; ++a) {
@@ -48,7 +51,8 @@ Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const Poli
           }
         }
       },
-      gradient.head(network_.parameter_count()), {log_std_gradient.data(), static_cast<size_t>(actions)});
+      gradient.head(network_.parameter_count()),
+      {log_std_gradient.data(), static_cast<size_t>(actions)});
   gradient.tail(actions) = log_std_gradient.cast<float>();
   return gradient;
 }
@@ -80,9 +84,10 @@ Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const flo
   const Eigen::ArrayXd log_std = before.log_std().cast<double>(),
                        new_log_std = after.log_std().cast<double>();
   const Eigen::ArrayXd precision = (-2 * log_std).exp(), new_precision = (-2 * new_log_std).exp();
-  // KL of two Gaussians: ln(s'/s) + (s^2 + (mu - mu')^2) / (2 s'^2) - 1/2; the part that is the same for all
-  // samples:
-  const double spread = (new_log_std - log_std + (2 * (log_std - new_log_std)).exp() / 2 - .5).sum();
+  // KL of two Gaussians: ln(s'/s) + (s^2 + (mu - mu')^2) / (2 s'^2) - 1/2; the part that is the
+  // same for all samples:
+  const double spread =
+      (new_log_std - log_std + (2 * (log_std - new_log_std)).exp() / 2 - .5).sum();
   std::array<double, 2> sums;  // KL and gain
   network_.Set(after.parameters);
   network_.Sum(
@@ -96,10 +101,12 @@ Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const flo
             const double offset = double{samples.actions[at]} - means[at];
             const double new_offset = double{samples.actions[at]} - new_mean;
             const double moved = new_mean - means[at];
-            log_ratio += (offset * offset * precision[a] - new_offset * new_offset * new_precision[a]) / 2;
+            log_ratio +=
+                (offset * offset * precision[a] - new_offset * new_offset * new_precision[a]) / 2;
             group_sums[0] += moved * moved * new_precision[a] / 2;
           }
-          group_sums[1] += std::expm1(log_ratio) * samples.advantages[static_cast<size_t>(first + i)];
+          group_sums[1] +=
+              std::expm1(log_ratio) * samples.advantages[static_cast<size_t>(first + i)];
         }
       },
       sums);
@@ -134,7 +141,8 @@ Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {
   while (step.tries < kLineSearchTries) {
     ++step.tries;
     policy.parameters = before.parameters + (fraction * full_step).cast<float>();
-    policy.parameters.tail(shape_.actions) = policy.parameters.tail(shape_.actions).cwiseMax(kMinLogStd);
+    policy.parameters.tail(shape_.actions) =
+        policy.parameters.tail(shape_.actions).cwiseMax(kMinLogStd);
     const Comparison comparison = Compare(before, means, policy, samples);
     // Written so that NaN is refused.
     if (comparison.kl <= settings_.kl && comparison.gain > 0 && std::isfinite(comparison.gain)) {
@@ -146,7 +154,8 @@ Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {
     fraction *= kLineSearchFactor;
   }
   policy.parameters = before.parameters;
-  step.failure = fmt::format("line search: no improvement within the trust region in {} tries", step.tries);
+  step.failure =
+      fmt::format("line search: no improvement within the trust region in {} tries", step.tries);
   return step;
 }
 

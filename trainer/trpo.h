@@ -18,8 +18,9 @@ struct PolicySamples {
   std::span<const double> advantages;   ///< normalised, N
 };
 
-/// Trust region policy optimisation (Schulman et al., 2015) of a GaussianPolicy: one natural gradient step,
-/// its length bounded by the Kullback-Leibler divergence between old and new policy. Not thread-safe.
+/// Trust region policy optimisation (Schulman et al., 2015) of a GaussianPolicy: one natural
+/// gradient step, its length bounded by the Kullback-Leibler divergence between old and new policy.
+/// Not thread-safe.
 class Trpo {
  public:
   /// @param workers,ranks must outlive this.
@@ -39,15 +40,19 @@ class Trpo {
   /// Improves the policy that took the samples' actions.
   Step Improve(GaussianPolicy& policy, const PolicySamples& samples);
 
-  /// Gradient of the surrogate mean(ratio * advantage) at ratio = 1, in all parameters of the policy.
-  /// @param means of the policy at the samples, actions x N, written: those of the samples that this rank looks at.
-  Eigen::VectorXf SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples, std::vector<float>& means);
+  /// Gradient of the surrogate mean(ratio * advantage) at ratio = 1, in all parameters of the
+  /// policy.
+  /// @param means of the policy at the samples, actions x N, written: those of the samples that
+  /// this rank looks at.
+  Eigen::VectorXf SurrogateGradient(const GaussianPolicy& policy, const PolicySamples& samples,
+                                    std::vector<float>& means);
 
-  /// Takes the samples at which FisherProduct averages: every n-th of these, n = 1 / fisher_fraction.
+  /// Takes the samples at which FisherProduct averages: every n-th of these, n = 1 /
+  /// fisher_fraction.
   void PrepareFisher(const GaussianPolicy& policy, const PolicySamples& samples);
   /// F v, without damping. F is the Fisher information of the policy, which for a Gaussian is the
-  /// Gauss-Newton matrix of its mean, J' diag(1 / sd^2) J, averaged over the samples, and 2 for each log_std.
-  /// It is also the Hessian of the mean KL at the old policy.
+  /// Gauss-Newton matrix of its mean, J' diag(1 / sd^2) J, averaged over the samples, and 2 for
+  /// each log_std. It is also the Hessian of the mean KL at the old policy.
   Eigen::VectorXf FisherProduct(const Eigen::Ref<const Eigen::VectorXf>& v);
 
   /// Mean KL(before || after) and mean of (ratio - 1) * advantage.
@@ -55,8 +60,8 @@ class Trpo {
     double kl, gain;
   };
   /// @param means of `before`, as SurrogateGradient gives them.
-  Comparison Compare(const GaussianPolicy& before, std::span<const float> means, const GaussianPolicy& after,
-                     const PolicySamples& samples);
+  Comparison Compare(const GaussianPolicy& before, std::span<const float> means,
+                     const GaussianPolicy& after, const PolicySamples& samples);
 
   /// Lower bound of log_std: exploration must not die out.
   static constexpr float kMinLogStd = -3;
@@ -64,8 +69,10 @@ class Trpo {
  private:
   TrainingSettings settings_;
   PolicyShape shape_;
-  BatchNetwork network_;         // at the policy's own and, in the line search, at candidate parameters
-  BatchNetwork fisher_network_;  // at the policy's parameters, with the activations of Fisher's samples
+  // at the policy's own and, in the line search, at candidate parameters
+  BatchNetwork network_;
+  // at the policy's parameters, with the activations of Fisher's samples
+  BatchNetwork fisher_network_;
   std::vector<float> fisher_inputs_;
   Eigen::VectorXf fisher_metric_;  // 1 / (sd^2 * number of samples), per action
 };

@@ -8,8 +8,8 @@
 namespace plumb {
 namespace {
 
-// Jobs follow each other within microseconds: falling asleep in between would cost more. Some 10 us; for
-// longer, a spinning thread would only be in the way of other processes.
+// Jobs follow each other within microseconds: falling asleep in between would cost more. Some 10
+// us; for longer, a spinning thread would only be in the way of other processes.
 constexpr int kSpins = 600;
 
 template <class T>
@@ -23,8 +23,8 @@ void WaitWhile(const std::atomic<T>& value, T old) {
   value.wait(old, std::memory_order_acquire);
 }
 
-// What a thread is to the Workers it serves: to all others it is the caller, worker 0. The job it gives out is the second one
-// within Together's second.
+// What a thread is to the Workers it serves: to all others it is the caller, worker 0. The job it
+// gives out is the second one within Together's second.
 struct Role {
   const Workers* workers = nullptr;
   int worker = 0, job = 0;
@@ -36,9 +36,11 @@ Role RoleIn(const Workers* workers) { return role.workers == workers ? role : Ro
 }  // namespace
 
 Workers::Workers(int threads)
-    : size_(threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()))) {
+    : size_(threads > 0 ? threads
+                        : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()))) {
   for (Job& job : jobs_) job.claims = std::make_unique<Claims[]>(static_cast<size_t>(size_));
-  for (int worker = 1; worker < size_; ++worker) threads_.emplace_back([this, worker] { Serve(worker); });
+  for (int worker = 1; worker < size_; ++worker)
+    threads_.emplace_back([this, worker] { Serve(worker); });
 }
 
 Workers::~Workers() {
@@ -63,7 +65,8 @@ void Workers::Run(int tasks, const std::function<void(int, int)>& work) {
   ++job.number;
   for (int w = 0; w < size(); ++w) {
     const int share = tasks * (w + 1) / size() - tasks * w / size();
-    job.claims[static_cast<size_t>(w)].ticket.store(uint64_t{job.number} << 32 | static_cast<uint32_t>(share), std::memory_order_release);
+    job.claims[static_cast<size_t>(w)].ticket.store(
+        uint64_t{job.number} << 32 | static_cast<uint32_t>(share), std::memory_order_release);
   }
   if (tasks > 1) Wake();
   while (DoTask(job, worker)) {
@@ -135,7 +138,8 @@ bool Workers::DoTask(Job& job, int worker) {
       claimed = claims.compare_exchange_weak(ticket, ticket - 1, std::memory_order_acq_rel);
     }
     if (!claimed) continue;
-    const int task = job.tasks * from / size() + static_cast<int>(static_cast<uint32_t>(ticket)) - 1;
+    const int task =
+        job.tasks * from / size() + static_cast<int>(static_cast<uint32_t>(ticket)) - 1;
     try {
       (*job.work)(task, worker);
     } catch (...) {

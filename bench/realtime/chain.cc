@@ -84,17 +84,20 @@ class Chain {
                 [this](const joint_state_t& s) {
                   states_heard_.push_back({s.sequence, s.position.at(0), s.velocity.at(0)});
                 }),
-        commands_(messenger_, "JOINT_COMMAND",
-                  [this](const joint_command_t& c) {
-                    if (c.episode >= 0 && c.step >= 0)
-                      commands_heard_.push_back({c.state_sequence, static_cast<float>(c.effort.at(0))});
-                  }),
+        commands_(
+            messenger_, "JOINT_COMMAND",
+            [this](const joint_command_t& c) {
+              if (c.episode >= 0 && c.step >= 0)
+                commands_heard_.push_back({c.state_sequence, static_cast<float>(c.effort.at(0))});
+            }),
         requests_(messenger_, "DRIVER_REQUEST"),
         policies_(messenger_, "POLICY") {
     // All of them before the rest of the machine, and the driver before the others.
-    const std::vector<std::string> behind{"--realtime-priority", std::to_string(std::max(priority - 5, 0))};
+    const std::vector<std::string> behind{"--realtime-priority",
+                                          std::to_string(std::max(priority - 5, 0))};
     Start("plumb-robot", {"--bus", bus_url_, "--seed", "1", behind[0], behind[1]});
-    Start("plumb-driver", {"--bus", bus_url_, "--virtual", "--realtime-priority", std::to_string(priority)});
+    Start("plumb-driver",
+          {"--bus", bus_url_, "--virtual", "--realtime-priority", std::to_string(priority)});
     Start("plumb-estimator", behind);
     Start("plumb-controller", behind);
   }
@@ -150,8 +153,8 @@ class Chain {
   };
 
   void Start(const std::string& name, std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {binaries_ + "/" + name, robot_, "--lcm-url", lcm_url_, "--parent",
-                                         std::to_string(getpid())});
+    arguments.insert(arguments.begin(), {binaries_ + "/" + name, robot_, "--lcm-url", lcm_url_,
+                                         "--parent", std::to_string(getpid())});
     children_.emplace_back(name, arguments, folder_ / (name + ".log"));
   }
 
@@ -269,8 +272,8 @@ class Chain {
 
 }  // namespace
 
-ChainTimes MeasureChain(const std::string& source, const std::string& binaries, double seconds, int priority,
-                        int load) {
+ChainTimes MeasureChain(const std::string& source, const std::string& binaries, double seconds,
+                        int priority, int load) {
   // Before there are threads.
   const Load burning(load);
   Chain chain(source, binaries, priority);

@@ -44,8 +44,8 @@ joint_state_t Message() {
   message.num_joints = 1;
   message.measured.resize(1);
   message.valid.resize(1);
-  for (auto* values : {&message.position, &message.velocity, &message.effort_measured, &message.effort_sent,
-                       &message.effort_applied}) {
+  for (auto* values : {&message.position, &message.velocity, &message.effort_measured,
+                       &message.effort_sent, &message.effort_applied}) {
     values->resize(1);
   }
   return message;
@@ -76,8 +76,10 @@ Load::~Load() {
 Realtime::Realtime(int priority) {
   if (priority == 0) return;
   const sched_param parameter{.sched_priority = priority};
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &parameter) != 0) {
-    throw std::runtime_error(std::string("SCHED_FIFO: ") + std::strerror(errno) + "; cure: run as root");
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 ||
+      sched_setscheduler(0, SCHED_FIFO, &parameter) != 0) {
+    throw std::runtime_error(std::string("SCHED_FIFO: ") + std::strerror(errno) +
+                             "; cure: run as root");
   }
 }
 
@@ -111,7 +113,9 @@ Times BarePingPong(double seconds, const std::string& lcm_url) {
     Publisher<joint_state_t> ping(messenger, "PING");
     Subscriber<joint_state_t> pong(messenger, "PONG");
     joint_state_t message = Message();
-    const auto answered = [&] { return pong.received() > 0 && pong.newest().sequence == message.sequence; };
+    const auto answered = [&] {
+      return pong.received() > 0 && pong.newest().sequence == message.sequence;
+    };
     const int64_t begin = clock.Now(), end = begin + static_cast<int64_t>(seconds * 1e6);
     for (Periodic cycle(kPeriod, begin); clock.Now() < end;) {
       const timespec wait = clock.RealDuration(cycle.Remaining(clock.Now()));

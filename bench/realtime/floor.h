@@ -11,7 +11,8 @@ namespace plumb {
 /// Times in microseconds, in no order.
 using Times = std::vector<int64_t>;
 
-/// One process per core that does nothing but use it, at ordinary priority, until this is destroyed.
+/// One process per core that does nothing but use it, at ordinary priority, until this is
+/// destroyed.
 class Load {
  public:
   /// Call it before this process has threads or another scheduling policy: they are inherited.
@@ -34,11 +35,12 @@ class Realtime {
   Realtime& operator=(const Realtime&) = delete;
 };
 
-/// How late a loop that does nothing else wakes from ppoll, every millisecond at absolute deadlines.
+/// How late a loop that does nothing else wakes from ppoll, every millisecond at absolute
+/// deadlines.
 Times BareTimer(double seconds);
 
-/// From sending an LCM message of a JOINT_STATE's size, one a millisecond, to the answer of a process that
-/// only sends it back.
+/// From sending an LCM message of a JOINT_STATE's size, one a millisecond, to the answer of a
+/// process that only sends it back.
 Times BarePingPong(double seconds, const std::string& lcm_url);
 
 }  // namespace plumb

@@ -1,5 +1,5 @@
-// How punctual the driver's cycle and the whole chain are on this machine, and the floor beneath them: bare
-// timers and bare LCM. One Markdown table, for docs/measurements.md.
+// How punctual the driver's cycle and the whole chain are on this machine, and the floor beneath
+// them: bare timers and bare LCM. One Markdown table, for docs/measurements.md.
 
 #include <fmt/format.h>
 
@@ -22,8 +22,8 @@ constexpr std::array kShares = {0.5, 0.99, 0.999};
 void Row(const std::string& what, int priority, int load, size_t count, const std::string& times,
          const std::string& notes) {
   fmt::print("| {} | {} | {} | {} | {} | {} |\n", what,
-             priority > 0 ? fmt::format("FIFO {}", priority) : "OTHER", load > 0 ? "cores loaded" : "alone",
-             count, times, notes);
+             priority > 0 ? fmt::format("FIFO {}", priority) : "OTHER",
+             load > 0 ? "cores loaded" : "alone", count, times, notes);
   std::fflush(stdout);
 }
 
@@ -33,8 +33,9 @@ std::string Quantiles(Times times) {
   std::ranges::sort(times);
   std::string text;
   for (const double share : kShares) {
-    text += fmt::format("{} | ",
-                        times[static_cast<size_t>(std::ceil(share * static_cast<double>(times.size()))) - 1]);
+    text += fmt::format(
+        "{} | ",
+        times[static_cast<size_t>(std::ceil(share * static_cast<double>(times.size()))) - 1]);
   }
   return text + std::to_string(times.back());
 }
@@ -66,19 +67,22 @@ void MeasureFloor(double seconds, int priority, int load) {
   const Times timer = BareTimer(seconds);
   Row("bare timer: lateness", priority, load, timer.size(), Quantiles(timer),
       fmt::format("{} overruns", Overruns(timer)));
-  const Times round = BarePingPong(seconds, "udpm://239.255.76.67:17691?ttl=0&recv_buf_size=2097152");
+  const Times round =
+      BarePingPong(seconds, "udpm://239.255.76.67:17691?ttl=0&recv_buf_size=2097152");
   Row("bare LCM: there and back", priority, load, round.size(), Quantiles(round), "");
 }
 
-void MeasureAll(const std::string& source, const std::string& binaries, double seconds, double floor_seconds,
-                int priority, int load) {
+void MeasureAll(const std::string& source, const std::string& binaries, double seconds,
+                double floor_seconds, int priority, int load) {
   MeasureFloor(floor_seconds, priority, load);
   const ChainTimes chain = MeasureChain(source, binaries, seconds, priority, load);
   const std::string stops =
-      chain.stops == 0 ? "" : fmt::format(", stopped {} times, last: {}", chain.stops, chain.reason);
+      chain.stops == 0 ? ""
+                       : fmt::format(", stopped {} times, last: {}", chain.stops, chain.reason);
   Row("driver's cycle: lateness", priority, load, static_cast<size_t>(chain.cycles),
       Quantiles(chain.lateness, chain.cycles), fmt::format("{} overruns{}", chain.overruns, stops));
-  Row("encoder frame to torque frame", priority, load, chain.answers.size(), Quantiles(chain.answers),
+  Row("encoder frame to torque frame", priority, load, chain.answers.size(),
+      Quantiles(chain.answers),
       fmt::format("{} of {} commands superseded", chain.superseded, chain.commands));
 }
 
@@ -89,19 +93,23 @@ int main(int argc, char** argv) {
   double seconds = 60, floor_seconds = 20;
   std::string source = PLUMBLINE_SOURCE, binaries = PLUMBLINE_BINARIES;
   CLI::App app(
-      "Measures how punctual this machine, the driver and the whole chain are, and prints a Markdown table");
+      "Measures how punctual this machine, the driver and the whole chain are, and prints a "
+      "Markdown table");
   app.add_option("--seconds", seconds, "of each measurement of the chain; there are four")
       ->check(CLI::Range(1., 3600.))
       ->capture_default_str();
-  app.add_option("--floor-seconds", floor_seconds, "of each measurement of timers and LCM; there are eight")
+  app.add_option("--floor-seconds", floor_seconds,
+                 "of each measurement of timers and LCM; there are eight")
       ->check(CLI::Range(1., 3600.))
       ->capture_default_str();
   app.add_option("--source", source, "folder with robots/")->capture_default_str();
-  app.add_option("--binaries", binaries, "folder with plumb-driver and the others")->capture_default_str();
+  app.add_option("--binaries", binaries, "folder with plumb-driver and the others")
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   fmt::print(
-      "| {} s of the chain, {} s of the floor, 1 kHz, times in us | driver's scheduling | machine, {} cores | n | p50 | p99 | p99.9 | "
+      "| {} s of the chain, {} s of the floor, 1 kHz, times in us | driver's scheduling | machine, "
+      "{} cores | n | p50 | p99 | p99.9 | "
       "max | |\n"
       "|---|---|---|---|---|---|---|---|---|\n",
       seconds, floor_seconds, cores);

@@ -38,12 +38,13 @@ Posterior InferByRejection(const Problem& problem, const RejectionOptions& optio
     outcomes.middleCols(first, count) =
         problem.simulate(problem.prior.FromStandard(u.middleCols(first, count)), first);
   }
-  const VectorXd distances =
-      Distances(options.distance, outcomes, problem.observed, RobustScale(outcomes, problem.observed));
+  const VectorXd distances = Distances(options.distance, outcomes, problem.observed,
+                                       RobustScale(outcomes, problem.observed));
 
   std::vector<Index> order(static_cast<size_t>(total));
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return distances(a) < distances(b); });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Index a, Index b) { return distances(a) < distances(b); });
   order.resize(static_cast<size_t>(std::ceil(options.fraction * static_cast<double>(total))));
   while (!order.empty() && !std::isfinite(distances(order.back()))) order.pop_back();
   const VectorXd equal = VectorXd::Ones(static_cast<Index>(order.size()));
@@ -54,15 +55,16 @@ Posterior InferByRejection(const Problem& problem, const RejectionOptions& optio
   } else {
     AdjustedSamples kept{u(Eigen::all, order), equal};
     if (options.adjust) {
-      kept = AdjustByRegression(kept.samples, outcomes(Eigen::all, order), problem.observed, distances(order),
-                                equal);
+      kept = AdjustByRegression(kept.samples, outcomes(Eigen::all, order), problem.observed,
+                                distances(order), equal);
     }
     const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMostKernels, random);
     posterior.samples = problem.prior.FromStandard(Sample(density, options.samples, random));
   }
   const Index some = std::min<Index>(options.samples, kMostFitted);
   posterior.mixture =
-      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMostComponents, random).mixture;
+      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMostComponents, random)
+          .mixture;
   posterior.simulations = total;
   for (const auto column : outcomes.colwise()) posterior.failures += !column.allFinite();
   if (diagnostics) {

@@ -55,9 +55,10 @@ GaussianMixture Kernels(const Population& population, bool local) {
     }
     const VectorXd squared = (population.u.colwise() - population.u.col(i)).colwise().squaredNorm();
     std::vector<Index> near = all;
-    std::nth_element(near.begin(), near.begin() + (neighbours - 1), near.end(), [&](Index a, Index b) {
-      return squared(a) != squared(b) ? squared(a) < squared(b) : a < b;
-    });
+    std::nth_element(near.begin(), near.begin() + (neighbours - 1), near.end(),
+                     [&](Index a, Index b) {
+                       return squared(a) != squared(b) ? squared(a) < squared(b) : a < b;
+                     });
     near.resize(static_cast<size_t>(neighbours));
     std::sort(near.begin(), near.end());
     kernels.components.push_back({population.u.col(i), spread(near, population.u.col(i))});
@@ -67,7 +68,8 @@ GaussianMixture Kernels(const Population& population, bool local) {
 
 // Importance weights of draws u from the kernels, against the standard normal prior.
 VectorXd ImportanceWeights(const MatrixXd& u, const GaussianMixture& kernels) {
-  const VectorXd log_weights = -0.5 * u.colwise().squaredNorm().transpose() - LogDensities(kernels, u);
+  const VectorXd log_weights =
+      -0.5 * u.colwise().squaredNorm().transpose() - LogDensities(kernels, u);
   const VectorXd weights = (log_weights.array() - log_weights.maxCoeff()).max(-700).exp();
   return weights / weights.sum();
 }
@@ -102,16 +104,19 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
     Random random(seed, {kProposals, t});
     while (static_cast<int>(generation.accepted.size()) < options.population &&
            posterior.simulations < options.simulations) {
-      const Index batch = std::min<Index>(options.population, options.simulations - posterior.simulations);
-      const MatrixXd u = t == 0 ? StandardNormals(n, batch, random) : Sample(kernels, batch, random);
-      const MatrixXd outcomes = problem.simulate(problem.prior.FromStandard(u), posterior.simulations);
+      const Index batch =
+          std::min<Index>(options.population, options.simulations - posterior.simulations);
+      const MatrixXd u =
+          t == 0 ? StandardNormals(n, batch, random) : Sample(kernels, batch, random);
+      const MatrixXd outcomes =
+          problem.simulate(problem.prior.FromStandard(u), posterior.simulations);
       const Index before = generation.u.cols();
       generation.u.conservativeResize(Eigen::NoChange, before + batch);
       generation.outcomes.conservativeResize(Eigen::NoChange, before + batch);
       generation.u.rightCols(batch) = u;
       generation.outcomes.rightCols(batch) = outcomes;
-      const VectorXd d =
-          Distances(options.distance, outcomes, observed, t == 0 ? VectorXd::Ones(observed.size()) : scale);
+      const VectorXd d = Distances(options.distance, outcomes, observed,
+                                   t == 0 ? VectorXd::Ones(observed.size()) : scale);
       for (Index j = 0; j < batch; ++j) {
         posterior.failures += !outcomes.col(j).allFinite();
         if (d(j) <= epsilon && static_cast<int>(generation.accepted.size()) < options.population) {
@@ -128,14 +133,17 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
     const VectorXd weights =
         t == 0 ? VectorXd::Constant(accepted, 1. / accepted) : ImportanceWeights(u, kernels);
     population = {u, generation.outcomes(Eigen::all, generation.accepted), weights};
-    report.generations.push_back({epsilon, generation.u.cols(), accepted, 1 / weights.squaredNorm()});
+    report.generations.push_back(
+        {epsilon, generation.u.cols(), accepted, 1 / weights.squaredNorm()});
     scale = RobustScale(generation.outcomes, observed);
     distances = Distances(options.distance, population.outcomes, observed, scale);
     const double next = Quantile(distances, options.quantile);
-    // A change of scale changes the unit of epsilon, too: compared is the quantile with the largest distance
-    // now.
-    const double acceptance = static_cast<double>(accepted) / static_cast<double>(generation.u.cols());
-    if (acceptance < options.min_acceptance || !(next < (1 - options.min_change) * distances.maxCoeff()))
+    // A change of scale changes the unit of epsilon, too: compared is the quantile with the largest
+    // distance now.
+    const double acceptance =
+        static_cast<double>(accepted) / static_cast<double>(generation.u.cols());
+    if (acceptance < options.min_acceptance ||
+        !(next < (1 - options.min_change) * distances.maxCoeff()))
       break;
     epsilon = next;
     kernels = Kernels(population, options.local_kernels);
@@ -147,14 +155,16 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
   } else {
     AdjustedSamples kept{population.u, population.weights};
     if (options.adjust) {
-      kept = AdjustByRegression(population.u, population.outcomes, observed, distances, population.weights);
+      kept = AdjustByRegression(population.u, population.outcomes, observed, distances,
+                                population.weights);
     }
     const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMostKernels, random);
     posterior.samples = problem.prior.FromStandard(Sample(density, options.samples, random));
   }
   const Index some = std::min<Index>(options.samples, kMostFitted);
   posterior.mixture =
-      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMostComponents, random).mixture;
+      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMostComponents, random)
+          .mixture;
   if (diagnostics) *diagnostics = std::move(report);
   return posterior;
 }

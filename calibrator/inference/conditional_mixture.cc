@@ -31,8 +31,8 @@ struct Simulations {
 
 double EffectiveNumber(const VectorXd& w) { return w.sum() * w.sum() / w.squaredNorm(); }
 
-// Covariance of the outcomes (rows x N), of which a few may be absurd: they are pulled in to 5 scaled median
-// deviations from the median before.
+// Covariance of the outcomes (rows x N), of which a few may be absurd: they are pulled in to 5
+// scaled median deviations from the median before.
 MatrixXd RobustCovariance(MatrixXd outcomes) {
   const Index count = outcomes.cols();
   for (auto row : outcomes.rowwise()) {
@@ -54,8 +54,8 @@ MatrixXd RobustCovariance(MatrixXd outcomes) {
   return covariance;
 }
 
-// Gaussian kernel of the width that gives an effective number of `target`, or equal weights if that cannot
-// be.
+// Gaussian kernel of the width that gives an effective number of `target`, or equal weights if that
+// cannot be.
 VectorXd KernelWeights(const VectorXd& squared, double target) {
   if (target >= static_cast<double>(squared.size())) return VectorXd::Ones(squared.size());
   const double nearest = squared.minCoeff();
@@ -84,9 +84,10 @@ std::vector<Index> Weighty(const VectorXd& weights) {
   return columns;
 }
 
-// Linear pool, in equal parts, of the estimates that are hardly worse than the best: their errors differ, and
-// the scores cannot tell them apart.
-GaussianMixture Pool(const std::vector<GaussianMixture>& estimates, const std::vector<double>& scores) {
+// Linear pool, in equal parts, of the estimates that are hardly worse than the best: their errors
+// differ, and the scores cannot tell them apart.
+GaussianMixture Pool(const std::vector<GaussianMixture>& estimates,
+                     const std::vector<double>& scores) {
   constexpr double kHardlyWorse = 0.06;  // nat
   const double best = *std::max_element(scores.begin(), scores.end());
   const auto good = [&](size_t i) { return scores[i] >= best - kHardlyWorse; };
@@ -109,8 +110,9 @@ class Inference {
     for (Index i = 0; i < problem.observed.size(); ++i) {
       if (!std::isnan(problem.observed(i))) compared_.push_back(i);
     }
-    if (compared_.empty() || options.simulations < 1 || options.rounds < 1 || options.max_components < 1 ||
-        options.samples < 1 || !(options.local_share > 0 && options.local_share <= 1)) {
+    if (compared_.empty() || options.simulations < 1 || options.rounds < 1 ||
+        options.max_components < 1 || options.samples < 1 ||
+        !(options.local_share > 0 && options.local_share <= 1)) {
       throw std::invalid_argument(
           "nothing was observed, or a budget, round, component or sample is less than one");
     }
@@ -167,7 +169,8 @@ class Inference {
   // Truncates the prior to the neighbourhood of what was observed.
   ConditionalMixtureDiagnostics::Round Truncate(int round) {
     const Simulations inside = Inside();
-    ConditionalMixtureDiagnostics::Round report{made_, inside.joint.cols(), 0, 0, region_.has_value()};
+    ConditionalMixtureDiagnostics::Round report{made_, inside.joint.cols(), 0, 0,
+                                                region_.has_value()};
     if (static_cast<double>(inside.joint.cols()) < Fewest()) return report;
     const VectorXd weights = KernelWeights(inside.squared, Effective(inside, options_.local_share));
     report.effective = EffectiveNumber(weights);
@@ -185,7 +188,8 @@ class Inference {
     return report;
   }
 
-  // p(standard parameters | observed) by the kernels' widths that predict simulations left out best.
+  // p(standard parameters | observed) by the kernels' widths that predict simulations left out
+  // best.
   GaussianMixture Estimate(ConditionalMixtureDiagnostics& diagnostics) const {
     constexpr int kFolds = 3;
     const Simulations inside = Inside();
@@ -193,7 +197,8 @@ class Inference {
       return {{1}, {{VectorXd::Zero(n_), MatrixXd::Identity(n_, n_)}}};
     }
     const std::vector<double> shares = {1, 0.5, 0.25, 0.125, 0.0625};
-    // Simulations that judge have weight in all kernels, or widths would be judged by different ones.
+    // Simulations that judge have weight in all kernels, or widths would be judged by different
+    // ones.
     VectorXd judged = KernelWeights(inside.squared, Effective(inside, shares.back()));
     judged = (judged.array() > kNegligible * judged.maxCoeff()).select(judged, 0).eval();
     std::vector<GaussianMixture> estimates;
@@ -212,8 +217,9 @@ class Inference {
       const MixtureFit fit = SelectMixture(samples, w, options_.max_components, random, fine);
       double score = 0;
       for (int fold = 0; fold < kFolds; ++fold) {
-        score += HeldOutScore(samples, w, score_weights, static_cast<int>(fit.mixture.components.size()),
-                              fold, kFolds, random, fine);
+        score +=
+            HeldOutScore(samples, w, score_weights, static_cast<int>(fit.mixture.components.size()),
+                         fold, kFolds, random, fine);
       }
       diagnostics.held_out.push_back(score / score_weights.sum());
       estimates.push_back(Condition(fit.mixture, observed_));
@@ -234,10 +240,11 @@ class Inference {
   }
 
  private:
-  // Sum over the simulations of one fold of ln p(parameters | outcome) by a mixture fitted to the others.
-  double HeldOutScore(const MatrixXd& samples, const VectorXd& weights, const VectorXd& score_weights,
-                      int components, int fold, int folds, Random& random,
-                      const MixtureOptions& options) const {
+  // Sum over the simulations of one fold of ln p(parameters | outcome) by a mixture fitted to the
+  // others.
+  double HeldOutScore(const MatrixXd& samples, const VectorXd& weights,
+                      const VectorXd& score_weights, int components, int fold, int folds,
+                      Random& random, const MixtureOptions& options) const {
     std::vector<Index> train, test;
     for (Index j = 0; j < samples.cols(); ++j) (j % folds == fold ? test : train).push_back(j);
     const MatrixXd left_out = samples(Eigen::all, test);
@@ -245,8 +252,8 @@ class Inference {
         FitMixture(samples(Eigen::all, train), weights(train), components, random, options).mixture;
     std::vector<Index> outcome(static_cast<size_t>(m_));
     std::iota(outcome.begin(), outcome.end(), n_);
-    const VectorXd logs =
-        LogDensities(joint, left_out) - LogDensities(Marginal(joint, outcome), left_out.bottomRows(m_));
+    const VectorXd logs = LogDensities(joint, left_out) -
+                          LogDensities(Marginal(joint, outcome), left_out.bottomRows(m_));
     return score_weights(test).dot(logs);
   }
 

@@ -59,7 +59,8 @@ double Wasserstein(VectorXd x, VectorXd y) {
   const double per_x = 1 / static_cast<double>(x.size()), per_y = 1 / static_cast<double>(y.size());
   double integral = 0, from = 0;
   for (Index i = 0, j = 0; i < x.size() && j < y.size();) {
-    const double x_ends = static_cast<double>(i + 1) * per_x, y_ends = static_cast<double>(j + 1) * per_y;
+    const double x_ends = static_cast<double>(i + 1) * per_x,
+                 y_ends = static_cast<double>(j + 1) * per_y;
     const double to = std::min(x_ends, y_ends), difference = x(i) - y(j);
     integral += (to - from) * difference * difference;
     from = to;
@@ -80,7 +81,8 @@ Whitening MakeWhitening(const MatrixXd& recorded) {
   Whitening whitening{recorded.rowwise().mean(), {}};
   const MatrixXd centred = recorded.colwise() - whitening.mean;
   MatrixXd covariance = centred * centred.transpose() / static_cast<double>(recorded.cols());
-  // What never varied is compared in the units it comes in, nearly: there is nothing else to scale it by.
+  // What never varied is compared in the units it comes in, nearly: there is nothing else to scale
+  // it by.
   const double largest = covariance.diagonal().maxCoeff();
   covariance.diagonal().array() += largest > 0 ? 1e-6 * largest : 1.;
   whitening.root.compute(covariance);
@@ -125,7 +127,8 @@ SetDistance MakeDistance(const std::string& name, const MatrixXd& recorded, uint
   const MatrixXd y = whiten(recorded);
   const auto comparable = [](const MatrixXd& x) { return x.cols() > 0 && x.allFinite(); };
   if (name == "energy") {
-    return [=](const MatrixXd& x) { return comparable(x) ? EnergyDistance(whiten(x), y) : kInfinity; };
+    return
+        [=](const MatrixXd& x) { return comparable(x) ? EnergyDistance(whiten(x), y) : kInfinity; };
   }
   if (name == "mmd") {
     const double scale = MedianDistance(y);
@@ -136,18 +139,21 @@ SetDistance MakeDistance(const std::string& name, const MatrixXd& recorded, uint
   if (name == "sliced-wasserstein") {
     constexpr Index kDirections = 64;
     Random random(seed);
-    const MatrixXd directions = StandardNormals(recorded.rows(), kDirections, random).colwise().normalized();
+    const MatrixXd directions =
+        StandardNormals(recorded.rows(), kDirections, random).colwise().normalized();
     return [=](const MatrixXd& x) {
       return comparable(x) ? SlicedWasserstein(whiten(x), y, directions) : kInfinity;
     };
   }
-  throw std::invalid_argument("no distance \"" + name + "\"; there are energy, mmd and sliced-wasserstein");
+  throw std::invalid_argument("no distance \"" + name +
+                              "\"; there are energy, mmd and sliced-wasserstein");
 }
 
 VectorXd Distances(const std::string& name, const MatrixXd& outcomes, const VectorXd& observed,
                    const VectorXd& scale) {
   if (name != "squared" && name != "absolute" && name != "mahalanobis") {
-    throw std::invalid_argument("no distance \"" + name + "\"; there are squared, absolute and mahalanobis");
+    throw std::invalid_argument("no distance \"" + name +
+                                "\"; there are squared, absolute and mahalanobis");
   }
   VectorXd result(outcomes.cols());
   for (Index j = 0; j < outcomes.cols(); ++j) {
@@ -157,7 +163,9 @@ VectorXd Distances(const std::string& name, const MatrixXd& outcomes, const Vect
       const double offset = std::abs(outcomes(i, j) - observed(i)) / scale(i);
       sum += name == "absolute" ? offset : offset * offset;
     }
-    result(j) = !outcomes.col(j).allFinite() ? kInfinity : name == "mahalanobis" ? std::sqrt(sum) : sum;
+    result(j) = !outcomes.col(j).allFinite() ? kInfinity
+                : name == "mahalanobis"      ? std::sqrt(sum)
+                                             : sum;
   }
   return result;
 }
@@ -187,7 +195,8 @@ VectorXd RobustScale(const MatrixXd& outcomes, const VectorXd& observed) {
     }
     if (finite.empty()) continue;
     offset(i) = std::abs(
-        Median(Eigen::Map<const VectorXd>(finite.data(), static_cast<Index>(finite.size()))) - observed(i));
+        Median(Eigen::Map<const VectorXd>(finite.data(), static_cast<Index>(finite.size()))) -
+        observed(i));
     far += offset(i) > 2 * deviation(i);
     ++compared;
   }

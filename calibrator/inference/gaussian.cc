@@ -10,7 +10,8 @@ namespace {
 
 Eigen::LLT<Eigen::MatrixXd> Factor(const Gaussian& p) {
   Eigen::LLT<Eigen::MatrixXd> factor(p.covariance);
-  if (factor.info() != Eigen::Success) throw std::invalid_argument("covariance is not positive definite");
+  if (factor.info() != Eigen::Success)
+    throw std::invalid_argument("covariance is not positive definite");
   return factor;
 }
 
@@ -23,15 +24,16 @@ double LogDeterminant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
 double LogDensity(const Gaussian& p, const Eigen::VectorXd& x) {
   const auto factor = Factor(p);
   const double n = static_cast<double>(x.size());
-  return -0.5 * (factor.matrixL().solve(x - p.mean).squaredNorm() + LogDeterminant(factor) + n * std::log(2 * M_PI));
+  return -0.5 * (factor.matrixL().solve(x - p.mean).squaredNorm() + LogDeterminant(factor) +
+                 n * std::log(2 * M_PI));
 }
 
 double KlDivergence(const Gaussian& p, const Gaussian& q) {
   const auto p_factor = Factor(p), q_factor = Factor(q);
   const double n = static_cast<double>(p.mean.size());
   const Eigen::VectorXd difference = q.mean - p.mean;
-  return 0.5 * (q_factor.solve(p.covariance).trace() + difference.dot(q_factor.solve(difference)) - n +
-                LogDeterminant(q_factor) - LogDeterminant(p_factor));
+  return 0.5 * (q_factor.solve(p.covariance).trace() + difference.dot(q_factor.solve(difference)) -
+                n + LogDeterminant(q_factor) - LogDeterminant(p_factor));
 }
 
 Eigen::MatrixXd Precision(const Gaussian& p) {
@@ -50,7 +52,8 @@ Gaussian Moments(const GaussianMixture& mixture) {
   }
   for (size_t i = 0; i < mixture.components.size(); ++i) {
     const Eigen::VectorXd offset = mixture.components[i].mean - moments.mean;
-    moments.covariance += mixture.weights[i] * (mixture.components[i].covariance + offset * offset.transpose());
+    moments.covariance +=
+        mixture.weights[i] * (mixture.components[i].covariance + offset * offset.transpose());
   }
   return moments;
 }
@@ -66,8 +69,10 @@ Eigen::MatrixXd StandardNormals(Eigen::Index rows, Eigen::Index columns, Random&
 Eigen::VectorXd Sample(const GaussianMixture& mixture, Random& random) {
   double left = random.Uniform();
   size_t i = 0;
-  while (i + 1 < mixture.components.size() && left >= mixture.weights[i]) left -= mixture.weights[i++];
-  return Transform(mixture.components[i], StandardNormals(mixture.components[i].mean.size(), 1, random));
+  while (i + 1 < mixture.components.size() && left >= mixture.weights[i])
+    left -= mixture.weights[i++];
+  return Transform(mixture.components[i],
+                   StandardNormals(mixture.components[i].mean.size(), 1, random));
 }
 
 }  // namespace plumb

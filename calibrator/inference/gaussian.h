@@ -22,13 +22,15 @@ struct GaussianMixture {
 /// ln p(x). @throws std::invalid_argument if the covariance is not positive definite (also below).
 double LogDensity(const Gaussian& p, const Eigen::VectorXd& x);
 
-/// D_KL(p || q) [nat] = (tr(S_q^-1 S_p) + d' S_q^-1 d - n + ln det S_q - ln det S_p) / 2, d = m_q - m_p.
+/// D_KL(p || q) [nat] = (tr(S_q^-1 S_p) + d' S_q^-1 d - n + ln det S_q - ln det S_p) / 2, d = m_q -
+/// m_p.
 double KlDivergence(const Gaussian& p, const Gaussian& q);
 
 /// Inverse of the covariance.
 Eigen::MatrixXd Precision(const Gaussian& p);
 
-/// n x N matrix of samples from a matrix of standard normal deviates: mean + chol(covariance) * normals.
+/// n x N matrix of samples from a matrix of standard normal deviates: mean + chol(covariance) *
+/// normals.
 Eigen::MatrixXd Transform(const Gaussian& p, const Eigen::MatrixXd& normals);
 
 /// The Gaussian with the mixture's mean and covariance.

@@ -14,17 +14,19 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // ln N(x; p) of every column.
 Eigen::VectorXd ComponentLogDensities(const Gaussian& p, const Eigen::MatrixXd& points) {
   const Eigen::LLT<Eigen::MatrixXd> factor(p.covariance);
-  if (factor.info() != Eigen::Success) throw std::invalid_argument("covariance is not positive definite");
+  if (factor.info() != Eigen::Success)
+    throw std::invalid_argument("covariance is not positive definite");
   const Eigen::Index n = p.mean.size();
-  const double log_normaliser =
-      factor.matrixLLT().diagonal().array().log().sum() + 0.5 * static_cast<double>(n) * std::log(2 * M_PI);
+  const double log_normaliser = factor.matrixLLT().diagonal().array().log().sum() +
+                                0.5 * static_cast<double>(n) * std::log(2 * M_PI);
   const Eigen::MatrixXd inverse_root = factor.matrixL().solve(Eigen::MatrixXd::Identity(n, n));
   const Eigen::MatrixXd whitened = inverse_root * (points.colwise() - p.mean);
   return -0.5 * whitened.colwise().squaredNorm().transpose().array() - log_normaliser;
 }
 
 // N x K: ln(w_k N(x_i; k)).
-Eigen::MatrixXd WeightedLogDensities(const GaussianMixture& mixture, const Eigen::MatrixXd& points) {
+Eigen::MatrixXd WeightedLogDensities(const GaussianMixture& mixture,
+                                     const Eigen::MatrixXd& points) {
   Eigen::MatrixXd result(points.cols(), static_cast<Eigen::Index>(mixture.components.size()));
   for (size_t k = 0; k < mixture.components.size(); ++k) {
     result.col(static_cast<Eigen::Index>(k)) =
@@ -58,8 +60,10 @@ Eigen::MatrixXd Cluster(const Eigen::MatrixXd& scaled, const Eigen::VectorXd& we
   Eigen::MatrixXd centres(scaled.rows(), clusters);
   Eigen::ArrayXd nearest = Eigen::ArrayXd::Constant(count, kInfinity);
   for (int k = 0; k < clusters; ++k) {
-    centres.col(k) = scaled.col(Draw(k == 0 ? Eigen::ArrayXd(weights) : weights.array() * nearest, random));
-    nearest = nearest.min((scaled.colwise() - centres.col(k)).colwise().squaredNorm().transpose().array());
+    centres.col(k) =
+        scaled.col(Draw(k == 0 ? Eigen::ArrayXd(weights) : weights.array() * nearest, random));
+    nearest = nearest.min(
+        (scaled.colwise() - centres.col(k)).colwise().squaredNorm().transpose().array());
   }
   Eigen::MatrixXd members;
   for (int step = 0; step <= kLloydSteps; ++step) {
@@ -119,7 +123,8 @@ Eigen::MatrixXd Sample(const GaussianMixture& mixture, Eigen::Index count, Rando
   std::vector<Eigen::MatrixXd> roots;
   for (const Gaussian& component : mixture.components) {
     const Eigen::LLT<Eigen::MatrixXd> factor(component.covariance);
-    if (factor.info() != Eigen::Success) throw std::invalid_argument("covariance is not positive definite");
+    if (factor.info() != Eigen::Success)
+      throw std::invalid_argument("covariance is not positive definite");
     roots.emplace_back(factor.matrixL());
   }
   const Eigen::Map<const Eigen::ArrayXd> weights(mixture.weights.data(),
@@ -132,7 +137,8 @@ Eigen::MatrixXd Sample(const GaussianMixture& mixture, Eigen::Index count, Rando
   return draws;
 }
 
-GaussianMixture Marginal(const GaussianMixture& mixture, const std::vector<Eigen::Index>& coordinates) {
+GaussianMixture Marginal(const GaussianMixture& mixture,
+                         const std::vector<Eigen::Index>& coordinates) {
   GaussianMixture marginal{mixture.weights, {}};
   for (const Gaussian& c : mixture.components) {
     marginal.components.push_back({c.mean(coordinates), c.covariance(coordinates, coordinates)});
@@ -140,7 +146,8 @@ GaussianMixture Marginal(const GaussianMixture& mixture, const std::vector<Eigen
   return marginal;
 }
 
-GaussianMixture Condition(const GaussianMixture& joint, const Eigen::VectorXd& y, double negligible) {
+GaussianMixture Condition(const GaussianMixture& joint, const Eigen::VectorXd& y,
+                          double negligible) {
   const Eigen::Index m = y.size(), n = joint.components.at(0).mean.size() - m;
   std::vector<double> log_weights;
   std::vector<Gaussian> conditionals;
@@ -150,9 +157,11 @@ GaussianMixture Condition(const GaussianMixture& joint, const Eigen::VectorXd& y
     const Gaussian of_y{c.mean.tail(m), c.covariance.bottomRightCorner(m, m)};
     const Eigen::LLT<Eigen::MatrixXd> factor(of_y.covariance);
     const Eigen::MatrixXd gain = factor.solve(c.covariance.bottomLeftCorner(m, n)).transpose();
-    Gaussian conditional{c.mean.head(n) + gain * (y - of_y.mean),
-                         c.covariance.topLeftCorner(n, n) - gain * c.covariance.bottomLeftCorner(m, n)};
-    conditional.covariance = (conditional.covariance + conditional.covariance.transpose()).eval() / 2;
+    Gaussian conditional{
+        c.mean.head(n) + gain * (y - of_y.mean),
+        c.covariance.topLeftCorner(n, n) - gain * c.covariance.bottomLeftCorner(m, n)};
+    conditional.covariance =
+        (conditional.covariance + conditional.covariance.transpose()).eval() / 2;
     conditionals.push_back(std::move(conditional));
     log_weights.push_back(std::log(joint.weights[k]) + LogDensity(of_y, y));
     largest = std::max(largest, log_weights.back());
@@ -170,11 +179,11 @@ GaussianMixture Condition(const GaussianMixture& joint, const Eigen::VectorXd& y
   return result;
 }
 
-MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, int components,
-                      Random& random, const MixtureOptions& options) {
+MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights,
+                      int components, Random& random, const MixtureOptions& options) {
   const double sum = weights.sum();
-  if (samples.cols() == 0 || samples.cols() != weights.size() || !(weights.minCoeff() >= 0) || !(sum > 0) ||
-      !std::isfinite(sum) || !samples.allFinite() || components < 1) {
+  if (samples.cols() == 0 || samples.cols() != weights.size() || !(weights.minCoeff() >= 0) ||
+      !(sum > 0) || !std::isfinite(sum) || !samples.allFinite() || components < 1) {
     throw std::invalid_argument(
         "a mixture is fitted to finite samples with weights >= 0 and has a component at least");
   }
@@ -182,8 +191,8 @@ MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& wei
   const double effective = 1 / w.squaredNorm();
   const double n = static_cast<double>(samples.rows());
   const Eigen::VectorXd mean = samples * w;
-  const Eigen::VectorXd variance =
-      ((samples.colwise() - mean).array().square().matrix() * w).cwiseMax(std::numeric_limits<double>::min());
+  const Eigen::VectorXd variance = ((samples.colwise() - mean).array().square().matrix() * w)
+                                       .cwiseMax(std::numeric_limits<double>::min());
   // A coordinate that never changes must leave the covariance invertible.
   const Eigen::VectorXd floor =
       (options.regularisation * variance).cwiseMax(1e-12 * std::max(variance.maxCoeff(), 1e-12));
@@ -191,8 +200,8 @@ MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& wei
   const double least = (n + 1) / effective;
 
   const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * (samples.colwise() - mean);
-  Eigen::MatrixXd responsibilities =
-      components == 1 ? Eigen::MatrixXd::Ones(samples.cols(), 1) : Cluster(scaled, w, components, random);
+  Eigen::MatrixXd responsibilities = components == 1 ? Eigen::MatrixXd::Ones(samples.cols(), 1)
+                                                     : Cluster(scaled, w, components, random);
   MixtureFit fit;
   fit.mixture = Maximise(samples, w, responsibilities, floor, components == 1 ? 0 : least);
   if (fit.mixture.components.empty()) {  // too few samples for any cluster
@@ -203,8 +212,10 @@ MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& wei
     fit.log_likelihood.push_back(w.dot(NormaliseRows(responsibilities)));
     const size_t steps = fit.log_likelihood.size();
     const bool converged =
-        steps > 1 && fit.log_likelihood[steps - 1] - fit.log_likelihood[steps - 2] < options.tolerance;
-    if (converged || iteration == options.max_iterations || fit.mixture.components.size() == 1) break;
+        steps > 1 &&
+        fit.log_likelihood[steps - 1] - fit.log_likelihood[steps - 2] < options.tolerance;
+    if (converged || iteration == options.max_iterations || fit.mixture.components.size() == 1)
+      break;
     GaussianMixture next = Maximise(samples, w, responsibilities, floor, least);
     if (next.components.empty()) break;
     fit.mixture = std::move(next);
@@ -215,13 +226,14 @@ MixtureFit FitMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& wei
   return fit;
 }
 
-MixtureFit SelectMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, int max_components,
-                         Random& random, const MixtureOptions& options) {
+MixtureFit SelectMixture(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights,
+                         int max_components, Random& random, const MixtureOptions& options) {
   MixtureFit best = FitMixture(samples, weights, 1, random, options);
   int failures = 0;
   for (int base = 2; base <= max_components && failures < 2; base *= 2) {
     for (const int components : {base, base + base / 2}) {
-      if ((components == base + base / 2 && base < 2) || components > max_components || failures == 2)
+      if ((components == base + base / 2 && base < 2) || components > max_components ||
+          failures == 2)
         continue;
       MixtureFit fit = FitMixture(samples, weights, components, random, options);
       failures = fit.bic < best.bic ? 0 : failures + 1;

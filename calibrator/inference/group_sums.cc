@@ -15,10 +15,12 @@ constexpr double kSettled = 1e-12;  // change of the mode, and of the scales rel
 
 GroupSums::GroupSums(int groups, const Eigen::VectorXd& reference)
     : reference_(reference),
-      sums_(static_cast<size_t>(groups), Eigen::MatrixXd::Zero(reference.size() + 1, reference.size() + 1)),
+      sums_(static_cast<size_t>(groups),
+            Eigen::MatrixXd::Zero(reference.size() + 1, reference.size() + 1)),
       rows_(Eigen::VectorXd::Zero(groups)) {}
 
-void GroupSums::Add(std::span<const int> group, const Eigen::MatrixXd& errors, const Eigen::VectorXd& at, double sign) {
+void GroupSums::Add(std::span<const int> group, const Eigen::MatrixXd& errors,
+                    const Eigen::VectorXd& at, double sign) {
   const Eigen::Index n = reference_.size();
   const Eigen::VectorXd offset = reference_ - at;
   Eigen::VectorXd row(1 + n);
@@ -44,12 +46,14 @@ GroupSums::Fit GroupSums::Solve(bool scale_known) const {
     }
     const Eigen::VectorXd scale = rule.Estimate(squares, effective);
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(1 + n, 1 + n);
-    for (size_t g = 0; g < sums_.size(); ++g) sum += sums_[g] / (scale(static_cast<Eigen::Index>(g)) * scale(static_cast<Eigen::Index>(g)));
+    for (size_t g = 0; g < sums_.size(); ++g)
+      sum += sums_[g] / (scale(static_cast<Eigen::Index>(g)) * scale(static_cast<Eigen::Index>(g)));
     fit.information = sum.bottomRightCorner(n, n);
     const Eigen::LLT<Eigen::MatrixXd> precision(Eigen::MatrixXd(fit.information + identity));
     const Eigen::VectorXd step = -precision.solve(sum.col(0).tail(n) + reference_);
     effective = precision.solve(fit.information).trace();
-    const bool settled = iteration > 0 && (step - point.tail(n)).cwiseAbs().maxCoeff() <= kSettled &&
+    const bool settled = iteration > 0 &&
+                         (step - point.tail(n)).cwiseAbs().maxCoeff() <= kSettled &&
                          ((scale - fit.scale).array().abs() <= kSettled * scale.array()).all();
     point.tail(n) = step;
     fit.scale = scale;

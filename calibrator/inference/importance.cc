@@ -11,18 +11,20 @@
 namespace plumb {
 namespace {
 
-constexpr double kWide = 4;         // variance of the wide half, relative to the narrow one
+constexpr double kWide = 4;  // variance of the wide half, relative to the narrow one
 constexpr double kLeastWeight = 1e-3;
-constexpr double kDoubt = 0.5;      // about the guess's weights
+constexpr double kDoubt = 0.5;  // about the guess's weights
 
-// Each component as it is, and wide. @param doubt share of the draws that go to all components alike.
+// Each component as it is, and wide. @param doubt share of the draws that go to all components
+// alike.
 GaussianMixture Proposal(const GaussianMixture& mixture, double doubt) {
   GaussianMixture proposal;
   const double alike = doubt / static_cast<double>(mixture.components.size());
   for (size_t i = 0; i < mixture.components.size(); ++i) {
     for (const double factor : {1.0, kWide}) {
       proposal.weights.push_back(((1 - doubt) * mixture.weights[i] + alike) / 2);
-      proposal.components.push_back({mixture.components[i].mean, factor * mixture.components[i].covariance});
+      proposal.components.push_back(
+          {mixture.components[i].mean, factor * mixture.components[i].covariance});
     }
   }
   return proposal;
@@ -34,9 +36,11 @@ Eigen::MatrixXd ComponentDensities(const GaussianMixture& mixture, const Eigen::
   for (size_t k = 0; k < mixture.components.size(); ++k) {
     const Gaussian& p = mixture.components[k];
     const Eigen::LLT<Eigen::MatrixXd> factor(p.covariance);
-    const double constant = -0.5 * static_cast<double>(x.rows()) * std::log(2 * M_PI) - factor.matrixLLT().diagonal().array().log().sum();
+    const double constant = -0.5 * static_cast<double>(x.rows()) * std::log(2 * M_PI) -
+                            factor.matrixLLT().diagonal().array().log().sum();
     const Eigen::MatrixXd white = factor.matrixL().solve(x.colwise() - p.mean);
-    densities.col(static_cast<Eigen::Index>(k)) = constant - 0.5 * white.colwise().squaredNorm().array();
+    densities.col(static_cast<Eigen::Index>(k)) =
+        constant - 0.5 * white.colwise().squaredNorm().array();
   }
   return densities;
 }
@@ -47,12 +51,14 @@ Eigen::VectorXd LogSumExp(const Eigen::MatrixXd& rows) {
 }
 
 Eigen::MatrixXd Weighted(const GaussianMixture& mixture, Eigen::MatrixXd densities) {
-  for (Eigen::Index k = 0; k < densities.cols(); ++k) densities.col(k).array() += std::log(mixture.weights[static_cast<size_t>(k)]);
+  for (Eigen::Index k = 0; k < densities.cols(); ++k)
+    densities.col(k).array() += std::log(mixture.weights[static_cast<size_t>(k)]);
   return densities;
 }
 
 // One step of expectation-maximisation on weighted samples.
-GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x, const Eigen::VectorXd& weights) {
+GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x,
+                      const Eigen::VectorXd& weights) {
   const Eigen::MatrixXd joint = Weighted(mixture, ComponentDensities(mixture, x));
   const Eigen::MatrixXd share = (joint.colwise() - LogSumExp(joint)).array().exp();
   const Eigen::Index n = x.rows();
@@ -67,7 +73,9 @@ GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x, 
     const Eigen::MatrixXd centred = x.colwise() - p.mean;
     const double ess = total * total / w.squaredNorm();
     const double d = static_cast<double>(n);
-    p.covariance = (ess * (centred * (w / total).asDiagonal() * centred.transpose()) + d * old.covariance) / (ess + d);
+    p.covariance =
+        (ess * (centred * (w / total).asDiagonal() * centred.transpose()) + d * old.covariance) /
+        (ess + d);
     adapted.weights.push_back(total);
     adapted.components.push_back(std::move(p));
   }
@@ -79,16 +87,19 @@ GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x, 
 
 Eigen::VectorXd Normalised(const Eigen::VectorXd& log_weights) {
   const double top = log_weights.maxCoeff();
-  if (!std::isfinite(top)) throw std::invalid_argument("no sample of the proposal can be explained at all");
+  if (!std::isfinite(top))
+    throw std::invalid_argument("no sample of the proposal can be explained at all");
   // Eigen's vectorised exp(-infinity) is tiny, not zero.
-  const Eigen::VectorXd weights = log_weights.array().isFinite().select((log_weights.array() - top).exp(), 0.0);
+  const Eigen::VectorXd weights =
+      log_weights.array().isFinite().select((log_weights.array() - top).exp(), 0.0);
   return weights / weights.sum();
 }
 
 }  // namespace
 
-ImportanceFit FitByImportance(const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& log_density,
-                              const GaussianMixture& guess, const ImportanceOptions& options) {
+ImportanceFit FitByImportance(
+    const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& log_density,
+    const GaussianMixture& guess, const ImportanceOptions& options) {
   ImportanceFit fit;
   fit.mixture = guess;
   const Eigen::Index n = guess.components.at(0).mean.size();
@@ -111,7 +122,8 @@ ImportanceFit FitByImportance(const std::function<Eigen::VectorXd(const Eigen::M
     target.tail(density.size()) = density;
     Eigen::MatrixXd proposed(fit.samples.cols(), static_cast<Eigen::Index>(proposals.size()));
     for (size_t p = 0; p < proposals.size(); ++p) {
-      proposed.col(static_cast<Eigen::Index>(p)) = LogSumExp(Weighted(proposals[p], ComponentDensities(proposals[p], fit.samples)));
+      proposed.col(static_cast<Eigen::Index>(p)) =
+          LogSumExp(Weighted(proposals[p], ComponentDensities(proposals[p], fit.samples)));
     }
     fit.weights = Normalised(target - LogSumExp(proposed));
     fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights);
@@ -121,7 +133,8 @@ ImportanceFit FitByImportance(const std::function<Eigen::VectorXd(const Eigen::M
   return fit;
 }
 
-Eigen::MatrixXd Resample(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, Eigen::Index count, Random& random) {
+Eigen::MatrixXd Resample(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights,
+                         Eigen::Index count, Random& random) {
   Eigen::MatrixXd drawn(samples.rows(), count);
   double at = random.Uniform() / static_cast<double>(count), below = weights(0);
   Eigen::Index from = 0;

@@ -15,24 +15,29 @@ struct ImportanceOptions {
 };
 
 struct ImportanceFit {
-  GaussianMixture mixture;   ///< adapted to the target
-  Eigen::MatrixXd samples;   ///< n x N of all rounds, newest last
-  Eigen::VectorXd weights;   ///< of the samples, sum to 1
-  double ess = 0;            ///< effective number of samples, 1 / sum w^2
-  double heaviest = 0;       ///< largest weight
+  GaussianMixture mixture;  ///< adapted to the target
+  Eigen::MatrixXd samples;  ///< n x N of all rounds, newest last
+  Eigen::VectorXd weights;  ///< of the samples, sum to 1
+  double ess = 0;           ///< effective number of samples, 1 / sum w^2
+  double heaviest = 0;      ///< largest weight
   int64_t simulations = 0;
 };
 
-/// A density known up to its constant, from guesses of its modes: population Monte Carlo with a mixture of Gaussians as
-/// proposal (Cappe et al., Statistics and Computing 18, 2008, eq. 11-13), its samples weighted by the deterministic mixture of all
-/// rounds' proposals (Cornuet et al., Scand. J. Stat. 39, 2012: AMIS). The proposals have twice the components' variance for
-/// half of the draws, so that tails are seen, too; the first trusts the guess's weights by half only. Everything that is not finite has density zero.
+/// A density known up to its constant, from guesses of its modes: population Monte Carlo with a
+/// mixture of Gaussians as proposal (Cappe et al., Statistics and Computing 18, 2008, eq. 11-13),
+/// its samples weighted by the deterministic mixture of all rounds' proposals (Cornuet et al.,
+/// Scand. J. Stat. 39, 2012: AMIS). The proposals have twice the components' variance for half of
+/// the draws, so that tails are seen, too; the first trusts the guess's weights by half only.
+/// Everything that is not finite has density zero.
 /// @param log_density of n x N points.
 /// @throws std::invalid_argument if no sample has any density.
-ImportanceFit FitByImportance(const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& log_density,
-                              const GaussianMixture& guess, const ImportanceOptions& options = {});
+ImportanceFit FitByImportance(
+    const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& log_density,
+    const GaussianMixture& guess, const ImportanceOptions& options = {});
 
-/// n x count points drawn from weighted ones, systematically: each as often as its weight says, up to one.
-Eigen::MatrixXd Resample(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights, Eigen::Index count, Random& random);
+/// n x count points drawn from weighted ones, systematically: each as often as its weight says, up
+/// to one.
+Eigen::MatrixXd Resample(const Eigen::MatrixXd& samples, const Eigen::VectorXd& weights,
+                         Eigen::Index count, Random& random);
 
 }  // namespace plumb

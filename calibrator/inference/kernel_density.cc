@@ -17,8 +17,9 @@ VectorXd SystematicCounts(const VectorXd& weights, int draws, Random& random) {
   double reached = 0, drawn = 0;
   for (Index i = 0; i < weights.size(); ++i) {
     reached += weights(i) * draws;
-    const double until =
-        i + 1 == weights.size() ? draws : std::clamp(std::ceil(reached - offset), drawn, draws + 0.);
+    const double until = i + 1 == weights.size()
+                             ? draws
+                             : std::clamp(std::ceil(reached - offset), drawn, draws + 0.);
     counts(i) = weights(i) > 0 ? until - drawn : 0;
     drawn += counts(i);
   }
@@ -36,9 +37,10 @@ double Bandwidth(double effective, Index n, BandwidthRule rule) {
 GaussianMixture KernelDensity(const MatrixXd& samples, const VectorXd& weights, int max_components,
                               Random& random, BandwidthRule rule) {
   const double sum = weights.sum();
-  if (samples.cols() == 0 || samples.cols() != weights.size() || !(weights.minCoeff() >= 0) || !(sum > 0) ||
-      !std::isfinite(sum) || max_components < 1) {
-    throw std::invalid_argument("a kernel density needs samples, weights >= 0 and a component at least");
+  if (samples.cols() == 0 || samples.cols() != weights.size() || !(weights.minCoeff() >= 0) ||
+      !(sum > 0) || !std::isfinite(sum) || max_components < 1) {
+    throw std::invalid_argument(
+        "a kernel density needs samples, weights >= 0 and a component at least");
   }
   VectorXd w = weights / sum;
   std::vector<Index> weighty;

@@ -14,30 +14,39 @@ namespace plumb {
 namespace {
 
 constexpr double kDifference = kSlopeDifference;
-// Of the best-known direction's information in the least known one: below, forward differences will not do, or rounding has made it.
+// Of the best-known direction's information in the least known one: below, forward differences will
+// not do, or rounding has made it.
 constexpr double kLopsided = 1e-6, kRounding = 1e-15;
 // No step leads further than that many of the prior's standard deviations.
 constexpr double kLongestStep = 2;
 // Within that many posterior standard deviations the slope changes little.
 constexpr double kNear = 10;
-// Times the tolerance: where so short a step is a good one by its slope and yet a bad one, the errors jump (a contact that is made
-// or not). To creep up to the edge gains 0.02 nat at most.
+// Times the tolerance: where so short a step is a good one by its slope and yet a bad one, the
+// errors jump (a contact that is made or not). To creep up to the edge gains 0.02 nat at most.
 constexpr double kRough = 10;
 
 class Fit {
  public:
   Fit(const LeastSquares& problem, const LaplaceOptions& options)
-      : problem_(problem), options_(options), n_(problem.prior.size()), noise_(problem.group, problem.block, problem.scale_known) {}
+      : problem_(problem),
+        options_(options),
+        n_(problem.prior.size()),
+        noise_(problem.group, problem.block, problem.scale_known) {}
 
   LaplaceFit Run(const Eigen::VectorXd& start) {
     u_ = problem_.prior.ToStandard(start);
-    if (!u_.allFinite()) throw std::invalid_argument("the fit begins on or beyond a bound of the prior");
+    if (!u_.allFinite())
+      throw std::invalid_argument("the fit begins on or beyond a bound of the prior");
     errors_ = Evaluate(u_);
     const auto rows = static_cast<Eigen::Index>(problem_.group.size());
-    if (errors_.rows() != rows) throw std::invalid_argument("errors, groups, blocks and clusters must be equally many");
-    if (!errors_.allFinite()) throw std::invalid_argument("the simulation fails with the parameters that the fit begins with");
+    if (errors_.rows() != rows)
+      throw std::invalid_argument("errors, groups, blocks and clusters must be equally many");
+    if (!errors_.allFinite())
+      throw std::invalid_argument(
+          "the simulation fails with the parameters that the fit begins with");
     if (!problem_.scale_known && rows < n_ + 3) {
-      throw std::invalid_argument("only " + std::to_string(rows) + " numbers were observed: too few to tell noise from " +
+      throw std::invalid_argument("only " + std::to_string(rows) +
+                                  " numbers were observed: too few to tell noise from " +
                                   std::to_string(n_) + " parameters");
     }
     noise_.Estimate(errors_, 0);
@@ -58,22 +67,28 @@ class Fit {
 
   // All parameters in one batch. Where one step forward is no simulator, one backward has to do.
   void Differentiate() {
-    const Eigen::MatrixXd at = u_.replicate(1, n_) + kDifference * Eigen::MatrixXd::Identity(n_, n_);
+    const Eigen::MatrixXd at =
+        u_.replicate(1, n_) + kDifference * Eigen::MatrixXd::Identity(n_, n_);
     jacobian_ = (Evaluate(at).colwise() - errors_) / kDifference;
     for (Eigen::Index i = 0; i < n_; ++i) {
       if (jacobian_.col(i).allFinite()) continue;
-      jacobian_.col(i) = (errors_ - Evaluate(u_ - kDifference * Eigen::VectorXd::Unit(n_, i))) / kDifference;
+      jacobian_.col(i) =
+          (errors_ - Evaluate(u_ - kDifference * Eigen::VectorXd::Unit(n_, i))) / kDifference;
       if (!jacobian_.col(i).allFinite()) jacobian_.col(i).setZero();  // nothing can be told of it
     }
     fresh_ = near_ = true;
   }
 
-  // Forward differences err by the curvature, relative to the slope by about kDifference. Where some directions are known
-  // much less well than others this would pass for knowledge; central differences err by its square only.
+  // Forward differences err by the curvature, relative to the slope by about kDifference. Where
+  // some directions are known much less well than others this would pass for knowledge; central
+  // differences err by its square only.
   void Symmetrise() {
-    const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Curvature(), Eigen::EigenvaluesOnly).eigenvalues();
+    const Eigen::VectorXd values =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Curvature(), Eigen::EigenvaluesOnly)
+            .eigenvalues();
     if (values(0) > kLopsided * values(n_ - 1)) return;
-    const Eigen::MatrixXd at = u_.replicate(1, n_) - kDifference * Eigen::MatrixXd::Identity(n_, n_);
+    const Eigen::MatrixXd at =
+        u_.replicate(1, n_) - kDifference * Eigen::MatrixXd::Identity(n_, n_);
     const Eigen::MatrixXd backward = -(Evaluate(at).colwise() - errors_) / kDifference;
     for (Eigen::Index i = 0; i < n_; ++i) {
       if (backward.col(i).allFinite()) jacobian_.col(i) = (jacobian_.col(i) + backward.col(i)) / 2;
@@ -110,7 +125,8 @@ class Fit {
       const double effective = EffectiveParameters();
       noise_.Estimate(errors_, effective);
       const Eigen::VectorXd weights = noise_.Weights(errors_);
-      const Eigen::MatrixXd curvature = jacobian_.transpose() * weights.asDiagonal() * jacobian_ + Eigen::MatrixXd::Identity(n_, n_);
+      const Eigen::MatrixXd curvature = jacobian_.transpose() * weights.asDiagonal() * jacobian_ +
+                                        Eigen::MatrixXd::Identity(n_, n_);
       const Eigen::VectorXd slope = jacobian_.transpose() * weights.cwiseProduct(errors_) + u_;
       const double cost = Cost(errors_, u_, effective);
       for (;;) {
@@ -128,7 +144,8 @@ class Fit {
         const Eigen::VectorXd errors = Evaluate(u);
         if (errors.allFinite() && Cost(errors, u, effective) <= cost) {
           // Broyden's update: what a short step has taught of the slope is enough for the next one.
-          jacobian_ += (errors - errors_ - jacobian_ * step) * step.transpose() / step.squaredNorm();
+          jacobian_ +=
+              (errors - errors_ - jacobian_ * step) * step.transpose() / step.squaredNorm();
           u_ = u, errors_ = errors, fresh_ = false;
           near_ = in_sds < kNear;
           damping = damping > 1e-3 ? damping / 10 : 0;
@@ -159,14 +176,17 @@ class Fit {
     Eigen::MatrixXd honest = information;
     if (options_.sandwich) {
       const Eigen::VectorXd weighted = noise_.Weights(errors_).cwiseProduct(errors_);
-      const Sandwich wider = WidenBySandwich(information, weighted.asDiagonal() * jacobian_, problem_.cluster);
+      const Sandwich wider =
+          WidenBySandwich(information, weighted.asDiagonal() * jacobian_, problem_.cluster);
       honest = wider.information, fit.inflation = wider.inflation;
     }
     fit.standard = {u_, Eigen::MatrixXd(honest + identity).llt().solve(identity)};
-    fit.standard.covariance = (fit.standard.covariance + fit.standard.covariance.transpose()).eval() / 2;
+    fit.standard.covariance =
+        (fit.standard.covariance + fit.standard.covariance.transpose()).eval() / 2;
     // dx/du: exact for normal priors.
     const Eigen::VectorXd width = (problem_.prior.FromStandard(u_.array() + kDifference) -
-                                   problem_.prior.FromStandard(u_.array() - kDifference)) / (2 * kDifference);
+                                   problem_.prior.FromStandard(u_.array() - kDifference)) /
+                                  (2 * kDifference);
     fit.posterior = {fit.mode, width.asDiagonal() * fit.standard.covariance * width.asDiagonal()};
     const Eigen::VectorXd narrow = width.cwiseInverse();
     fit.information = narrow.asDiagonal() * information * narrow.asDiagonal();
@@ -195,15 +215,19 @@ class Fit {
 
 }  // namespace
 
-LaplaceFit FitLaplace(const LeastSquares& problem, const Eigen::VectorXd& start, const LaplaceOptions& options) {
-  if (start.size() != problem.prior.size()) throw std::invalid_argument("the start has another number of parameters than the prior");
-  if (problem.block.size() != problem.group.size() || problem.cluster.size() != problem.group.size()) {
+LaplaceFit FitLaplace(const LeastSquares& problem, const Eigen::VectorXd& start,
+                      const LaplaceOptions& options) {
+  if (start.size() != problem.prior.size())
+    throw std::invalid_argument("the start has another number of parameters than the prior");
+  if (problem.block.size() != problem.group.size() ||
+      problem.cluster.size() != problem.group.size()) {
     throw std::invalid_argument("errors, groups, blocks and clusters must be equally many");
   }
   return Fit(problem, options).Run(start);
 }
 
-Eigen::VectorXd LogLikelihood(const LeastSquares& problem, const Eigen::MatrixXd& parameters, double degrees_of_freedom) {
+Eigen::VectorXd LogLikelihood(const LeastSquares& problem, const Eigen::MatrixXd& parameters,
+                              double degrees_of_freedom) {
   const Eigen::MatrixXd errors = problem.errors(parameters);
   Noise noise(problem.group, problem.block, problem.scale_known, degrees_of_freedom);
   Eigen::VectorXd values(errors.cols());
@@ -218,7 +242,8 @@ Eigen::VectorXd LogLikelihood(const LeastSquares& problem, const Eigen::MatrixXd
   return values;
 }
 
-Eigen::MatrixXd Draw(const LaplaceFit& fit, const Prior& prior, Eigen::Index count, Random& random) {
+Eigen::MatrixXd Draw(const LaplaceFit& fit, const Prior& prior, Eigen::Index count,
+                     Random& random) {
   return prior.FromStandard(Transform(fit.standard, StandardNormals(prior.size(), count, random)));
 }
 

@@ -7,17 +7,20 @@
 namespace plumb {
 namespace {
 
-constexpr double kFewRows = 20;    // of a group, for a scale of its own
-constexpr double kPriorRows = 20;  // that a known scale is worth
+constexpr double kFewRows = 20;          // of a group, for a scale of its own
+constexpr double kPriorRows = 20;        // that a known scale is worth
 constexpr int kTailIterations = 500;     // at most
 constexpr double kTailTolerance = 1e-7;  // of a scale
-constexpr double kWorthwhile = 4;  // [nat] that heavier tails must gain
+constexpr double kWorthwhile = 4;        // [nat] that heavier tails must gain
 constexpr std::array<double, 5> kDegreesOfFreedom{2, 4, 8, 16, 32};
 
 }  // namespace
 
 NoiseScale::NoiseScale(const Eigen::VectorXd& rows, bool known)
-    : known_(known), all_rows_(rows.sum()), shared_(static_cast<size_t>(rows.size())), rows_(Eigen::VectorXd::Zero(rows.size())) {
+    : known_(known),
+      all_rows_(rows.sum()),
+      shared_(static_cast<size_t>(rows.size())),
+      rows_(Eigen::VectorXd::Zero(rows.size())) {
   // The first of the small groups stands for all of them.
   int pool = -1;
   for (int g = 0; g < static_cast<int>(rows.size()); ++g) {
@@ -28,14 +31,17 @@ NoiseScale::NoiseScale(const Eigen::VectorXd& rows, bool known)
   }
 }
 
-Eigen::VectorXd NoiseScale::Estimate(const Eigen::VectorXd& squares, double effective, double surplus) const {
+Eigen::VectorXd NoiseScale::Estimate(const Eigen::VectorXd& squares, double effective,
+                                     double surplus) const {
   const double left = std::max(1 - effective / all_rows_, 0.1);
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(rows_.size());
   for (int g = 0; g < static_cast<int>(rows_.size()); ++g) {
     const int from = shared(g);
     if (rows_(from) == 0) continue;  // nothing of it was observed
     // Whoever knows the noise does not know it to be less: smaller errors are correlated ones.
-    const double variance = known_ ? std::max(1.0, (squares(from) + kPriorRows) / (rows_(from) * left + kPriorRows)) : squares(from) / (rows_(from) * left * surplus);
+    const double variance =
+        known_ ? std::max(1.0, (squares(from) + kPriorRows) / (rows_(from) * left + kPriorRows))
+               : squares(from) / (rows_(from) * left * surplus);
     scale(g) = std::max(std::sqrt(variance), kLeast);
   }
   return scale;
@@ -44,7 +50,8 @@ Eigen::VectorXd NoiseScale::Estimate(const Eigen::VectorXd& squares, double effe
 namespace {
 
 Eigen::VectorXd RowsOf(const std::vector<int>& group) {
-  Eigen::VectorXd rows = Eigen::VectorXd::Zero(group.empty() ? 0 : *std::max_element(group.begin(), group.end()) + 1);
+  Eigen::VectorXd rows =
+      Eigen::VectorXd::Zero(group.empty() ? 0 : *std::max_element(group.begin(), group.end()) + 1);
   for (const int g : group) rows(g) += 1;
   return rows;
 }
@@ -53,7 +60,11 @@ Eigen::VectorXd RowsOf(const std::vector<int>& group) {
 
 Noise::Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known,
              double degrees_of_freedom)
-    : group_(group), block_(block), scale_known_(scale_known), rule_(RowsOf(group), scale_known), degrees_of_freedom_(degrees_of_freedom) {
+    : group_(group),
+      block_(block),
+      scale_known_(scale_known),
+      rule_(RowsOf(group), scale_known),
+      degrees_of_freedom_(degrees_of_freedom) {
   groups_ = group.empty() ? 0 : *std::max_element(group.begin(), group.end()) + 1;
   block_size_ = Eigen::VectorXd::Zero(block.empty() ? 0 : block.back() + 1);
   for (const int b : block) block_size_(b) += 1;
@@ -71,8 +82,9 @@ void Noise::Estimate(const Eigen::VectorXd& errors, double effective) {
   // From the same beginning whatever the scales were before.
   update(Eigen::VectorXd::Ones(errors.size()), 1);
   if (std::isinf(degrees_of_freedom_)) return;
-  // Expectation-maximisation, as weights depend on scales; that of Liu, Rubin & Wu (Biometrika 85, 1998), whose weights have mean
-  // one, is many times faster where nothing else is known of the scales.
+  // Expectation-maximisation, as weights depend on scales; that of Liu, Rubin & Wu (Biometrika 85,
+  // 1998), whose weights have mean one, is many times faster where nothing else is known of the
+  // scales.
   for (int i = 0; i < kTailIterations; ++i) {
     const Eigen::VectorXd before = scale_;
     const Eigen::ArrayXd of_block = BlockWeights(errors);
@@ -103,7 +115,8 @@ bool Noise::ChooseTails(const Eigen::VectorXd& errors, double effective) {
 
 Eigen::VectorXd Noise::RowScale() const {
   Eigen::VectorXd scale(static_cast<Eigen::Index>(group_.size()));
-  for (size_t i = 0; i < group_.size(); ++i) scale(static_cast<Eigen::Index>(i)) = scale_(group_[i]);
+  for (size_t i = 0; i < group_.size(); ++i)
+    scale(static_cast<Eigen::Index>(i)) = scale_(group_[i]);
   return scale;
 }
 
@@ -117,12 +130,14 @@ Eigen::VectorXd Noise::BlockSquares(const Eigen::VectorXd& errors) const {
 }
 
 Eigen::ArrayXd Noise::BlockWeights(const Eigen::VectorXd& errors) const {
-  return (degrees_of_freedom_ + block_size_.array()) / (degrees_of_freedom_ + BlockSquares(errors).array());
+  return (degrees_of_freedom_ + block_size_.array()) /
+         (degrees_of_freedom_ + BlockSquares(errors).array());
 }
 
 Eigen::VectorXd Noise::OfRows(const Eigen::ArrayXd& of_block) const {
   Eigen::VectorXd weights(static_cast<Eigen::Index>(block_.size()));
-  for (Eigen::Index i = 0; i < weights.size(); ++i) weights(i) = of_block(block_[static_cast<size_t>(i)]);
+  for (Eigen::Index i = 0; i < weights.size(); ++i)
+    weights(i) = of_block(block_[static_cast<size_t>(i)]);
   return weights;
 }
 
@@ -146,16 +161,19 @@ double Noise::LogLikelihood(const Eigen::VectorXd& errors) const {
   const Eigen::VectorXd squares = BlockSquares(errors);
   double sum = 0;
   for (size_t i = 0; i < group_.size(); ++i) sum -= std::log(scale_(group_[i]));
-  if (scale_known_) {  // the scale's own prior, as if kPriorRows errors of variance one had been seen
+  // the scale's own prior, as if kPriorRows errors of variance one had been seen
+  if (scale_known_) {
     for (int g = 0; g < groups_; ++g) {
-      if (rule_.shared(g) == g) sum -= kPriorRows * (std::log(scale_(g)) + 0.5 / (scale_(g) * scale_(g)));
+      if (rule_.shared(g) == g)
+        sum -= kPriorRows * (std::log(scale_(g)) + 0.5 / (scale_(g) * scale_(g)));
     }
   }
   if (std::isinf(degrees_of_freedom_)) return sum - 0.5 * squares.sum();
   const double f = degrees_of_freedom_;
   for (Eigen::Index b = 0; b < squares.size(); ++b) {
     const double k = block_size_(b);
-    sum += std::lgamma((f + k) / 2) - std::lgamma(f / 2) - k / 2 * std::log(f / 2) - (f + k) / 2 * std::log1p(squares(b) / f);
+    sum += std::lgamma((f + k) / 2) - std::lgamma(f / 2) - k / 2 * std::log(f / 2) -
+           (f + k) / 2 * std::log1p(squares(b) / f);
   }
   return sum;
 }

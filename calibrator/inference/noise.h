@@ -6,8 +6,8 @@
 
 namespace plumb {
 
-/// How large the noise of groups of errors is, from the sums of their squares. Groups of fewer than 20 rows share one scale.
-/// Immutable.
+/// How large the noise of groups of errors is, from the sums of their squares. Groups of fewer than
+/// 20 rows share one scale. Immutable.
 class NoiseScale {
  public:
   static constexpr double kLeast = 1e-9;  ///< smaller errors are a simulation's rounding
@@ -17,11 +17,14 @@ class NoiseScale {
 
   /// The group that stands for those that share the scale of group g.
   int shared(int g) const { return shared_[static_cast<size_t>(g)]; }
-  /// The scale s of each group, s^2 = sum r^2 / (N - effective N / N_all); where it is known, it counts as 20 errors of variance
-  /// one, and is one at least. 1 for groups that nothing was observed of. @param squares sum of r^2, in the entries that stand for others: of all that
-  /// share it. @param effective number of parameters that the errors were fitted with. @param surplus by which robust
-  /// weights exceed one on average; counts only where the scale is not known.
-  Eigen::VectorXd Estimate(const Eigen::VectorXd& squares, double effective, double surplus = 1) const;
+  /// The scale s of each group, s^2 = sum r^2 / (N - effective N / N_all); where it is known, it
+  /// counts as 20 errors of variance one, and is one at least. 1 for groups that nothing was
+  /// observed of. @param squares sum of r^2, in the entries that stand for others: of all that
+  /// share it. @param effective number of parameters that the errors were fitted with. @param
+  /// surplus by which robust weights exceed one on average; counts only where the scale is not
+  /// known.
+  Eigen::VectorXd Estimate(const Eigen::VectorXd& squares, double effective,
+                           double surplus = 1) const;
 
  private:
   bool known_;
@@ -30,8 +33,8 @@ class NoiseScale {
   Eigen::VectorXd rows_;  // of each group, those that share its scale included
 };
 
-/// The distribution of errors around zero: each row of a group has the same scale, and each block of k rows is normal or
-/// Student's t in k dimensions. See FitLaplace. Not thread-safe.
+/// The distribution of errors around zero: each row of a group has the same scale, and each block
+/// of k rows is normal or Student's t in k dimensions. See FitLaplace. Not thread-safe.
 class Noise {
  public:
   static constexpr double kLeastScale = NoiseScale::kLeast;
@@ -40,7 +43,8 @@ class Noise {
   Noise(const std::vector<int>& group, const std::vector<int>& block, bool scale_known,
         double degrees_of_freedom = std::numeric_limits<double>::infinity());
 
-  /// Scales that maximise the likelihood, or nearly so. @param effective number of parameters that the errors were fitted with.
+  /// Scales that maximise the likelihood, or nearly so. @param effective number of parameters that
+  /// the errors were fitted with.
   void Estimate(const Eigen::VectorXd& errors, double effective);
   /// Chooses the degrees of freedom by likelihood. @return true if they have changed.
   bool ChooseTails(const Eigen::VectorXd& errors, double effective);
@@ -49,7 +53,8 @@ class Noise {
   double LogLikelihood(const Eigen::VectorXd& errors) const;
   /// Of each row in a weighted least-squares step: robust weight / scale^2.
   Eigen::VectorXd Weights(const Eigen::VectorXd& errors) const;
-  /// Expected Fisher information of parameters with this Jacobian: J' J / s^2, times (f + k) / (f + k + 2) for Student's t.
+  /// Expected Fisher information of parameters with this Jacobian: J' J / s^2, times (f + k) / (f +
+  /// k + 2) for Student's t.
   Eigen::MatrixXd Information(const Eigen::MatrixXd& jacobian) const;
 
   const Eigen::VectorXd& scale() const { return scale_; }  ///< of each group

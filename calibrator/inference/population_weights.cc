@@ -21,7 +21,8 @@ Quadratic MeanDistances(const std::vector<MatrixXd>& predictions, const MatrixXd
   for (size_t t = 0; t < predictions.size(); ++t) {
     const MatrixXd x = predictions[t](Eigen::all, simulators);
     mean.a += (x.colwise() - outcomes.col(static_cast<Index>(t))).colwise().norm().transpose();
-    for (Index n = 0; n < count; ++n) mean.k.col(n) += (x.colwise() - x.col(n)).colwise().norm().transpose();
+    for (Index n = 0; n < count; ++n)
+      mean.k.col(n) += (x.colwise() - x.col(n)).colwise().norm().transpose();
   }
   mean.a /= static_cast<double>(predictions.size());
   mean.k /= static_cast<double>(predictions.size());
@@ -34,7 +35,8 @@ PopulationWeights FitPopulation(const std::vector<MatrixXd>& predictions, const 
                                 double tolerance) {
   if (predictions.empty() || static_cast<Index>(predictions.size()) != outcomes.cols() ||
       !outcomes.allFinite()) {
-    throw std::invalid_argument("a population needs a finite outcome for every transition, and one at least");
+    throw std::invalid_argument(
+        "a population needs a finite outcome for every transition, and one at least");
   }
   const Index count = predictions[0].cols();
   std::vector<Index> simulators;

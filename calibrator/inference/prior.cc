@@ -23,7 +23,8 @@ double NormalQuantile(double p) {
 double ToStandard(const Prior::Marginal& marginal, double x) {
   if (marginal.kind == Prior::Marginal::Kind::kNormal) return (x - marginal.a) / marginal.b;
   const double below = (x - marginal.a) / (marginal.b - marginal.a);
-  return below < 0.5 ? NormalQuantile(below) : -NormalQuantile((marginal.b - x) / (marginal.b - marginal.a));
+  return below < 0.5 ? NormalQuantile(below)
+                     : -NormalQuantile((marginal.b - x) / (marginal.b - marginal.a));
 }
 
 double FromStandard(const Prior::Marginal& marginal, double u) {
@@ -37,15 +38,19 @@ double FromStandard(const Prior::Marginal& marginal, double u) {
 Prior::Prior(std::vector<Marginal> marginals) : marginals_(std::move(marginals)) {
   if (marginals_.empty()) throw std::invalid_argument("a prior needs at least one parameter");
   for (const Marginal& m : marginals_) {
-    const bool good = std::isfinite(m.a) && std::isfinite(m.b) && (m.kind == Marginal::Kind::kNormal ? m.b > 0 : m.a < m.b);
-    if (!good) throw std::invalid_argument("a prior needs finite numbers, a positive spread or bounds in order");
+    const bool good = std::isfinite(m.a) && std::isfinite(m.b) &&
+                      (m.kind == Marginal::Kind::kNormal ? m.b > 0 : m.a < m.b);
+    if (!good)
+      throw std::invalid_argument(
+          "a prior needs finite numbers, a positive spread or bounds in order");
   }
 }
 
 Eigen::MatrixXd Prior::ToStandard(const Eigen::MatrixXd& x) const {
   Eigen::MatrixXd u(x.rows(), x.cols());
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    for (Eigen::Index j = 0; j < x.cols(); ++j) u(i, j) = plumb::ToStandard(marginals_[static_cast<size_t>(i)], x(i, j));
+    for (Eigen::Index j = 0; j < x.cols(); ++j)
+      u(i, j) = plumb::ToStandard(marginals_[static_cast<size_t>(i)], x(i, j));
   }
   return u;
 }
@@ -53,7 +58,8 @@ Eigen::MatrixXd Prior::ToStandard(const Eigen::MatrixXd& x) const {
 Eigen::MatrixXd Prior::FromStandard(const Eigen::MatrixXd& u) const {
   Eigen::MatrixXd x(u.rows(), u.cols());
   for (Eigen::Index i = 0; i < u.rows(); ++i) {
-    for (Eigen::Index j = 0; j < u.cols(); ++j) x(i, j) = plumb::FromStandard(marginals_[static_cast<size_t>(i)], u(i, j));
+    for (Eigen::Index j = 0; j < u.cols(); ++j)
+      x(i, j) = plumb::FromStandard(marginals_[static_cast<size_t>(i)], u(i, j));
   }
   return x;
 }

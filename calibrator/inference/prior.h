@@ -7,9 +7,9 @@
 
 namespace plumb {
 
-/// What was known before: independent distributions of n parameters. In *standard* coordinates
-/// u = Phi^-1(F(x)), F the prior's distribution function, every prior is a standard normal and no parameter has
-/// bounds: methods may work there. Immutable, hence thread-safe.
+/// What was known before: independent distributions of n parameters. In *standard* coordinates u =
+/// Phi^-1(F(x)), F the prior's distribution function, every prior is a standard normal and no
+/// parameter has bounds: methods may work there. Immutable, hence thread-safe.
 class Prior {
  public:
   struct Marginal {
@@ -18,7 +18,9 @@ class Prior {
     double a, b;  ///< kNormal: mean and standard deviation > 0; kUniform: bounds a < b
   };
   static Marginal Normal(double mean, double sd) { return {Marginal::Kind::kNormal, mean, sd}; }
-  static Marginal Uniform(double lower, double upper) { return {Marginal::Kind::kUniform, lower, upper}; }
+  static Marginal Uniform(double lower, double upper) {
+    return {Marginal::Kind::kUniform, lower, upper};
+  }
 
   /// @throws std::invalid_argument for none, or one that is not a distribution.
   explicit Prior(std::vector<Marginal> marginals);

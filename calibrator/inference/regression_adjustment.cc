@@ -11,7 +11,8 @@ namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
-// Epanechnikov's kernel times the given weights; its width reaches just beyond the farthest finite distance.
+// Epanechnikov's kernel times the given weights; its width reaches just beyond the farthest finite
+// distance.
 VectorXd KernelWeights(const VectorXd& distances, const VectorXd& weights) {
   double farthest = 0;
   for (Index i = 0; i < distances.size(); ++i) {
@@ -35,7 +36,8 @@ VectorXd KernelWeights(const VectorXd& distances, const VectorXd& weights) {
 // Weighted least squares of `targets` (k x N) on `design` (p x N): k x p.
 MatrixXd Regress(const MatrixXd& design, const MatrixXd& targets, const VectorXd& w) {
   MatrixXd normal = design * w.asDiagonal() * design.transpose();
-  // Statistics that depend on each other leave the adjustment as it is but not its coefficients unique.
+  // Statistics that depend on each other leave the adjustment as it is but not its coefficients
+  // unique.
   normal.diagonal().tail(normal.rows() - 1).array() += 1e-9;
   return normal.ldlt().solve(design * w.asDiagonal() * targets.transpose()).transpose();
 }

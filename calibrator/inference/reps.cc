@@ -18,7 +18,8 @@ RepsWeights AtTemperature(const Eigen::ArrayXd& shifted, double temperature) {
   result.weights = unnormalised / unnormalised.sum();
   result.temperature = temperature;
   const Eigen::ArrayXd w = result.weights.array();
-  const double entropy = -(w > 0).select(w * w.max(std::numeric_limits<double>::min()).log(), 0.0).sum();
+  const double entropy =
+      -(w > 0).select(w * w.max(std::numeric_limits<double>::min()).log(), 0.0).sum();
   result.kl = std::log(static_cast<double>(w.size())) - entropy;
   result.ess = 1 / w.square().sum();
   return result;
@@ -35,8 +36,8 @@ RepsWeights SolveReps(const Eigen::VectorXd& returns, double kl_bound, double mi
   // With ties among the best the bound may be out of reach; then the minimum temperature rules.
   if (sharpest.kl <= kl_bound) return sharpest;
 
-  // KL falls from above the bound at the minimum temperature towards 0 as the temperature grows; samples of
-  // return -infinity never get weight, so it may not fall below the bound at all.
+  // KL falls from above the bound at the minimum temperature towards 0 as the temperature grows;
+  // samples of return -infinity never get weight, so it may not fall below the bound at all.
   double lower = std::log(min_temperature), upper = lower;
   constexpr double kHottest = 700;
   do {
@@ -48,16 +49,19 @@ RepsWeights SolveReps(const Eigen::VectorXd& returns, double kl_bound, double mi
   const auto excess = [&](double log_temperature) {
     return AtTemperature(shifted, std::exp(log_temperature)).kl - kl_bound;
   };
-  const auto bracket = boost::math::tools::bisect(excess, lower, upper, boost::math::tools::eps_tolerance<double>(48));
+  const auto bracket = boost::math::tools::bisect(excess, lower, upper,
+                                                  boost::math::tools::eps_tolerance<double>(48));
   return AtTemperature(shifted, std::exp(bracket.second));  // the side within the bound
 }
 
-Gaussian FitGaussian(const Eigen::MatrixXd& samples, const RepsWeights& weights, const Gaussian& prior) {
+Gaussian FitGaussian(const Eigen::MatrixXd& samples, const RepsWeights& weights,
+                     const Gaussian& prior) {
   Gaussian fit;
   fit.mean = samples * weights.weights;
   const Eigen::MatrixXd centred = samples.colwise() - fit.mean;
   const double bias = std::max(1 - weights.weights.squaredNorm(), 0.1);
-  const Eigen::MatrixXd spread = centred * weights.weights.asDiagonal() * centred.transpose() / bias;
+  const Eigen::MatrixXd spread =
+      centred * weights.weights.asDiagonal() * centred.transpose() / bias;
   const double n = static_cast<double>(samples.rows());
   fit.covariance = (weights.ess * spread + n * prior.covariance) / (weights.ess + n);
   return fit;
@@ -72,7 +76,8 @@ Gaussian LimitKl(const Gaussian& old, const Gaussian& target, double kl_bound) {
     const Eigen::MatrixXd precision = a * target_precision + (1 - a) * old_precision;
     const Eigen::LLT<Eigen::MatrixXd> factor(precision);
     Gaussian p;
-    p.mean = factor.solve(a * (target_precision * target.mean) + (1 - a) * (old_precision * old.mean));
+    p.mean =
+        factor.solve(a * (target_precision * target.mean) + (1 - a) * (old_precision * old.mean));
     p.covariance = factor.solve(identity);
     p.covariance = (p.covariance + p.covariance.transpose()).eval() / 2;
     return p;

@@ -27,13 +27,15 @@ Eigen::VectorXd Features(const Eigen::VectorXd& x) {
 }
 
 // The Gaussian exp(quadratic) near `about`, from points with log-densities; empty if it is none.
-std::optional<Gaussian> QuadraticFit(const Eigen::MatrixXd& points, const Eigen::VectorXd& values, const Gaussian& about) {
+std::optional<Gaussian> QuadraticFit(const Eigen::MatrixXd& points, const Eigen::VectorXd& values,
+                                     const Gaussian& about) {
   const Eigen::Index n = points.rows();
   const Eigen::LLT<Eigen::MatrixXd> factor(about.covariance);
   const Eigen::MatrixXd white = factor.matrixL().solve(points.colwise() - about.mean);
   std::vector<Eigen::Index> near;
   for (Eigen::Index i = 0; i < white.cols(); ++i) {
-    if (std::isfinite(values(i)) && white.col(i).squaredNorm() < 3 * static_cast<double>(n + 2)) near.push_back(i);
+    if (std::isfinite(values(i)) && white.col(i).squaredNorm() < 3 * static_cast<double>(n + 2))
+      near.push_back(i);
   }
   const Eigen::Index count = FeatureCount(n), rows = static_cast<Eigen::Index>(near.size());
   if (rows < count + 3) return {};
@@ -51,13 +53,15 @@ std::optional<Gaussian> QuadraticFit(const Eigen::MatrixXd& points, const Eigen:
   Eigen::MatrixXd precision(n, n);
   Eigen::Index at = n + 1;
   for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = i; j < n; ++j, ++at) precision(i, j) = precision(j, i) = i == j ? -2 * c(at) : -c(at);
+    for (Eigen::Index j = i; j < n; ++j, ++at)
+      precision(i, j) = precision(j, i) = i == j ? -2 * c(at) : -c(at);
   }
   const Eigen::LLT<Eigen::MatrixXd> curvature(precision);
   if (curvature.info() != Eigen::Success) return {};
   const Eigen::VectorXd mean = curvature.solve(c.segment(1, n));
   const Eigen::MatrixXd root = factor.matrixL();
-  const Eigen::MatrixXd covariance = root * curvature.solve(Eigen::MatrixXd::Identity(n, n)) * root.transpose();
+  const Eigen::MatrixXd covariance =
+      root * curvature.solve(Eigen::MatrixXd::Identity(n, n)) * root.transpose();
   return Gaussian{about.mean + root * mean, (covariance + covariance.transpose()) / 2};
 }
 
@@ -93,7 +97,8 @@ class Search {
   Eigen::MatrixXd Draw(int update) const {
     Eigen::MatrixXd normals(n_, options_.samples);
     for (Eigen::Index i = 0; i < normals.cols(); ++i) {
-      Random random(options_.seed, {0x4e95, static_cast<uint32_t>(update), static_cast<uint32_t>(i)});
+      Random random(options_.seed,
+                    {0x4e95, static_cast<uint32_t>(update), static_cast<uint32_t>(i)});
       for (Eigen::Index j = 0; j < n_; ++j) normals(j, i) = random.Normal();
     }
     return Transform(run_.distribution, normals);
@@ -113,9 +118,11 @@ class Search {
     if (options_.returns == RepsReturns::kUnitRange) returns = UnitRange(values);
     std::optional<Gaussian> target;
     if (likelihood) {
-      for (Eigen::Index i = 0; i < values.size(); ++i) values(i) += LogDensity(prior_, samples.col(i));
+      for (Eigen::Index i = 0; i < values.size(); ++i)
+        values(i) += LogDensity(prior_, samples.col(i));
       returns = values;
-      for (Eigen::Index i = 0; i < values.size(); ++i) returns(i) -= LogDensity(run_.distribution, samples.col(i));
+      for (Eigen::Index i = 0; i < values.size(); ++i)
+        returns(i) -= LogDensity(run_.distribution, samples.col(i));
       if (options_.surrogate) {
         Remember(samples, values);
         target = QuadraticFit(points_, densities_, run_.distribution);
@@ -125,10 +132,12 @@ class Search {
     if (!target) target = FitGaussian(samples, weights, run_.distribution);
     const Gaussian before = run_.distribution;
     if (options_.damping > 0) {
-      const double ratio = (Precision(before) * target->covariance).trace() / static_cast<double>(n_);
+      const double ratio =
+          (Precision(before) * target->covariance).trace() / static_cast<double>(n_);
       target->covariance = std::pow(ratio, 1 / options_.damping) * before.covariance;
     }
-    run_.distribution = options_.bound_distribution ? LimitKl(before, *target, options_.kl) : *target;
+    run_.distribution =
+        options_.bound_distribution ? LimitKl(before, *target, options_.kl) : *target;
     run_.kl += KlDivergence(run_.distribution, before);
     run_.samples = samples, run_.weights = weights.weights;
     run_.temperature = weights.temperature, run_.ess = weights.ess;
@@ -155,7 +164,8 @@ class Search {
 
 }  // namespace
 
-RepsRun RepsSearch(const Prior& prior, const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& evaluate,
+RepsRun RepsSearch(const Prior& prior,
+                   const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& evaluate,
                    const RepsOptions& options, const std::function<void(int)>& progress) {
   Search search(prior, options);
   for (int update = 0; update < options.updates; ++update) {

@@ -6,7 +6,8 @@
 
 namespace plumb {
 
-Sandwich WidenBySandwich(const Eigen::MatrixXd& information, const Eigen::MatrixXd& scores, const std::vector<int>& cluster) {
+Sandwich WidenBySandwich(const Eigen::MatrixXd& information, const Eigen::MatrixXd& scores,
+                         const std::vector<int>& cluster) {
   Sandwich result{information, 1};
   const Eigen::Index n = information.rows();
   const int clusters = cluster.empty() ? 0 : cluster.back() + 1;
@@ -20,9 +21,11 @@ Sandwich WidenBySandwich(const Eigen::MatrixXd& information, const Eigen::Matrix
   const Eigen::VectorXd root = eigen.eigenvalues().tail(rank).cwiseSqrt();
   const Eigen::MatrixXd whiten = directions * root.cwiseInverse().asDiagonal();
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(clusters, rank);
-  for (size_t i = 0; i < cluster.size(); ++i) sums.row(cluster[i]) += scores.row(static_cast<Eigen::Index>(i)) * whiten;
+  for (size_t i = 0; i < cluster.size(); ++i)
+    sums.row(cluster[i]) += scores.row(static_cast<Eigen::Index>(i)) * whiten;
   const double c = clusters;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> scatter(Eigen::MatrixXd(sums.transpose() * sums * (c / (c - 1))));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> scatter(
+      Eigen::MatrixXd(sums.transpose() * sums * (c / (c - 1))));
   const double edge = 1 + std::sqrt(static_cast<double>(rank) / c);
   const double chance = edge * edge + 3 * std::sqrt(2 / c);
   Eigen::VectorXd kept = Eigen::VectorXd::Ones(rank);

@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMostBins = 20;
-constexpr int kFewestPerBin = 5;       // expected; fewer, and the statistic is not chi-squared distributed
+// expected; fewer, and the statistic is not chi-squared distributed
+constexpr int kFewestPerBin = 5;
 constexpr int kMostPoints = 100;       // at which distribution functions are compared
 constexpr double kNegligible = 1e-20;  // a probability
 constexpr double kSignificant = 0.01;
@@ -38,7 +39,8 @@ class BinomialPmf {
   std::vector<double> log_factorial_;
 };
 
-// Two-sided tail probability of each count from 0 to n; sums from either end, so that small ones are exact.
+// Two-sided tail probability of each count from 0 to n; sums from either end, so that small ones
+// are exact.
 std::vector<double> TailProbabilities(int n, double share, const BinomialPmf& pmf) {
   const auto size = static_cast<size_t>(n) + 1;
   std::vector<double> at_most(size), at_least(size), tail(size);
@@ -54,7 +56,8 @@ int CountBelow(const std::vector<int>& ranks, int bound) {
   return static_cast<int>(std::lower_bound(ranks.begin(), ranks.end(), bound) - ranks.begin());
 }
 
-// Share of the quantile interval [rank, rank + 1] / (draws + 1) that the central interval of a level holds.
+// Share of the quantile interval [rank, rank + 1] / (draws + 1) that the central interval of a
+// level holds.
 double Covered(int rank, int draws, double level) {
   const double lower = (1 - level) / 2 * (draws + 1), upper = (1 + level) / 2 * (draws + 1);
   return std::clamp(std::min(upper, rank + 1.0) - std::max<double>(lower, rank), 0.0, 1.0);
@@ -118,17 +121,19 @@ double UniformityByChi2(const std::vector<int>& ranks, int draws) {
     return static_cast<size_t>(static_cast<int64_t>(rank) * bins / (draws + 1));
   };
   std::vector<double> expected(static_cast<size_t>(bins)), observed(expected);
-  for (int rank = 0; rank <= draws; ++rank) expected[bin(rank)] += static_cast<double>(n) / (draws + 1);
+  for (int rank = 0; rank <= draws; ++rank)
+    expected[bin(rank)] += static_cast<double>(n) / (draws + 1);
   for (const int rank : ranks) observed[bin(rank)] += 1;
   double chi2 = 0;
-  for (size_t i = 0; i < expected.size(); ++i) chi2 += std::pow(observed[i] - expected[i], 2) / expected[i];
+  for (size_t i = 0; i < expected.size(); ++i)
+    chi2 += std::pow(observed[i] - expected[i], 2) / expected[i];
   return ChiSquaredTail(bins - 1, chi2);
 }
 
-// At each point the number of ranks below it is binomial. The statistic is the least tail probability of
-// these numbers; its own distribution follows from the probability of a path of counts that nowhere has so
-// small a one. Counts are a Markov chain: of those not below one point, each is below the next with the same
-// probability.
+// At each point the number of ranks below it is binomial. The statistic is the least tail
+// probability of these numbers; its own distribution follows from the probability of a path of
+// counts that nowhere has so small a one. Counts are a Markov chain: of those not below one point,
+// each is below the next with the same probability.
 double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
   std::vector<int> sorted = ranks;
   std::sort(sorted.begin(), sorted.end());
@@ -161,7 +166,8 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
         const double p = pmf(to - from, n - from, step);
         if (p < kNegligible && to - from > (n - from) * step) break;
         // The observed path is an excursion itself, whatever the rounding.
-        if (tail[static_cast<size_t>(to)] > least * (1 + 1e-9)) next[static_cast<size_t>(to)] += here * p;
+        if (tail[static_cast<size_t>(to)] > least * (1 + 1e-9))
+          next[static_cast<size_t>(to)] += here * p;
       }
     }
     inside = std::move(next);
@@ -172,16 +178,18 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
   return std::clamp(1 - stays, 0.0, 1.0);
 }
 
-SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQuantity>& quantities, int runs,
-                 uint64_t seed) {
+SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQuantity>& quantities,
+                 int runs, uint64_t seed) {
   if (runs < 1) throw std::invalid_argument("simulation-based calibration needs at least one run");
-  if (quantities.empty()) throw std::invalid_argument("simulation-based calibration needs a quantity");
+  if (quantities.empty())
+    throw std::invalid_argument("simulation-based calibration needs a quantity");
   const auto k = static_cast<Eigen::Index>(quantities.size());
   SbcResult result;
   result.runs = runs;
   result.ranks.setConstant(runs, k, SbcResult::kFailed);
   for (int run = 0; run < runs; ++run) {
-    Random random(seed, {static_cast<uint32_t>(run)}), ties(seed, {static_cast<uint32_t>(run), kTieStream});
+    Random random(seed, {static_cast<uint32_t>(run)}),
+        ties(seed, {static_cast<uint32_t>(run), kTieStream});
     const Eigen::VectorXd truth = prior.Sample(1, random);
     const std::optional<Eigen::MatrixXd> posterior = fit(truth, random);
     if (!posterior || !posterior->allFinite()) {
@@ -189,7 +197,8 @@ SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQua
       continue;
     }
     const auto draws = static_cast<int>(posterior->cols());
-    if (posterior->rows() != prior.size() || draws < 1 || (result.draws > 0 && draws != result.draws)) {
+    if (posterior->rows() != prior.size() || draws < 1 ||
+        (result.draws > 0 && draws != result.draws)) {
       throw std::invalid_argument(fmt::format(
           "a posterior of {} parameters with {} draws: {} were expected", posterior->rows(), draws,
           result.draws > 0 ? fmt::format("{} with {}", prior.size(), result.draws)
@@ -213,7 +222,8 @@ SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQua
     for (const int rank : result.ranks.col(i)) {
       if (rank != SbcResult::kFailed) ranks.push_back(rank);
     }
-    result.quantities.push_back(Judge(quantities[static_cast<size_t>(i)].name, ranks, result.draws));
+    result.quantities.push_back(
+        Judge(quantities[static_cast<size_t>(i)].name, ranks, result.draws));
   }
   return result;
 }
@@ -221,16 +231,19 @@ SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQua
 std::string Words(const SbcResult& result) {
   const int posteriors = result.runs - result.failures;
   size_t width = 8;
-  for (const SbcUniformity& quantity : result.quantities) width = std::max(width, quantity.name.size());
+  for (const SbcUniformity& quantity : result.quantities)
+    width = std::max(width, quantity.name.size());
   std::string text =
       fmt::format("{} posteriors of {} draws each; {} of {} runs failed ({:.1f} %){}\n", posteriors,
                   result.draws, result.failures, result.runs, 100.0 * result.failures / result.runs,
                   result.failures > 0 ? ": of these nothing is known" : "");
-  text += fmt::format("{:<{}}  {:>8}  {:>8}  {:>6}  {:>6}  {:>6}  posterior\n", "quantity", width, "chi2 p",
-                      "ECDF p", "50 %", "80 %", "95 %");
+  text += fmt::format("{:<{}}  {:>8}  {:>8}  {:>6}  {:>6}  {:>6}  posterior\n", "quantity", width,
+                      "chi2 p", "ECDF p", "50 %", "80 %", "95 %");
   for (const SbcUniformity& quantity : result.quantities) {
-    text += fmt::format("{:<{}}  {:>8.2g}  {:>8.2g}", quantity.name, width, quantity.chi2_p, quantity.ecdf_p);
-    for (const double coverage : quantity.coverage) text += fmt::format("  {:>6.1f}", 100 * coverage);
+    text += fmt::format("{:<{}}  {:>8.2g}  {:>8.2g}", quantity.name, width, quantity.chi2_p,
+                        quantity.ecdf_p);
+    for (const double coverage : quantity.coverage)
+      text += fmt::format("  {:>6.1f}", 100 * coverage);
     text += "  " + Verdict(quantity, posteriors, 2 * result.quantities.size()) + "\n";
   }
   return text;

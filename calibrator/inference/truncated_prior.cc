@@ -20,13 +20,15 @@ TruncatedPrior::TruncatedPrior(const GaussianMixture& region, double outside) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const Gaussian& component : region.components) {
     const Eigen::LLT<Eigen::MatrixXd> factor(Eigen::MatrixXd(scale * component.covariance));
-    if (factor.info() != Eigen::Success) throw std::invalid_argument("covariance is not positive definite");
+    if (factor.info() != Eigen::Success)
+      throw std::invalid_argument("covariance is not positive definite");
     ellipsoids_.push_back({component.mean, factor.matrixL(),
                            factor.matrixL().solve(Eigen::MatrixXd::Identity(n, n)),
                            factor.matrixLLT().diagonal().prod()});
     volume_ += ellipsoids_.back().volume;
     // The Frobenius norm bounds the longest half-axis.
-    nearest = std::min(nearest, std::max(component.mean.norm() - ellipsoids_.back().root.norm(), 0.));
+    nearest =
+        std::min(nearest, std::max(component.mean.norm() - ellipsoids_.back().root.norm(), 0.));
   }
   least_squared_ = nearest * nearest;
 }
@@ -44,17 +46,19 @@ Eigen::VectorXd TruncatedPrior::Uniform(Random& random) const {
   for (;;) {
     double left = random.Uniform() * volume_;
     size_t k = 0;
-    while (k + 1 < ellipsoids_.size() && left >= ellipsoids_[k].volume) left -= ellipsoids_[k++].volume;
+    while (k + 1 < ellipsoids_.size() && left >= ellipsoids_[k].volume)
+      left -= ellipsoids_[k++].volume;
     Eigen::VectorXd in_ball = StandardNormals(n, 1, random);
     in_ball *= std::pow(random.Uniform(), 1 / static_cast<double>(n)) / in_ball.norm();
     const Eigen::VectorXd u = ellipsoids_[k].root * in_ball + ellipsoids_[k].centre;
-    // Where ellipsoids overlap, each would count its points. (At least 1: rounding can put u just outside of
-    // its own.)
+    // Where ellipsoids overlap, each would count its points. (At least 1: rounding can put u just
+    // outside of its own.)
     if (random.Uniform() * std::max(Multiplicity(u), 1) < 1) return u;
   }
 }
 
-std::optional<Eigen::MatrixXd> TruncatedPrior::Sample(Eigen::Index count, Random& random, int tries) const {
+std::optional<Eigen::MatrixXd> TruncatedPrior::Sample(Eigen::Index count, Random& random,
+                                                      int tries) const {
   const Eigen::Index n = ellipsoids_[0].centre.size();
   const auto from_prior = [&](Eigen::VectorXd& u) {
     u = StandardNormals(n, 1, random);

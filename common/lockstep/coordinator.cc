@@ -37,7 +37,9 @@ struct Coordinator::Member {
     kReported,  // its turn is over, and what it reports not yet made known
     kWaiting,
   };
-  bool settled() const { return state == State::kAbsent || state == State::kReported || state == State::kWaiting; }
+  bool settled() const {
+    return state == State::kAbsent || state == State::kReported || state == State::kWaiting;
+  }
   bool heard(int64_t now) const { return !mail.empty() && mail.front().arrival <= now; }
   /// @return kNever if nothing is due unless something is heard.
   int64_t NextMoment() const {
@@ -70,7 +72,9 @@ class Coordinator::Owner : public Participant {
  public:
   explicit Owner(Coordinator& coordinator) : coordinator_(coordinator) { SetNow(kBeginning); }
 
-  void Listen(const lockstep_topic_t& topic) override { coordinator_.listeners_[Key(topic)].push_back(&seat); }
+  void Listen(const lockstep_topic_t& topic) override {
+    coordinator_.listeners_[Key(topic)].push_back(&seat);
+  }
   void Say(const lockstep_topic_t& topic, std::vector<uint8_t> data, int64_t way) override {
     lockstep_post_t post;
     post.topic = topic;
@@ -79,7 +83,8 @@ class Coordinator::Owner : public Participant {
     post.data = std::move(data);
     coordinator_.Route(post, seat);
   }
-  void Wait(int64_t until, Wake wake, int stop_fd, const std::function<void()>& meanwhile) override {
+  void Wait(int64_t until, Wake wake, int stop_fd,
+            const std::function<void()>& meanwhile) override {
     if (meanwhile) meanwhile();
     seat.until = wake == Wake::kWhenHeard && heard() ? now() : until;
     seat.wakes = wake == Wake::kWhenHeard;
@@ -99,7 +104,9 @@ class Coordinator::Owner : public Participant {
 };
 
 Coordinator::Coordinator(std::string path)
-    : path_(std::move(path)), listener_(PacketSocket::Listen(path_)), owner_(std::make_unique<Owner>(*this)) {}
+    : path_(std::move(path)),
+      listener_(PacketSocket::Listen(path_)),
+      owner_(std::make_unique<Owner>(*this)) {}
 
 Coordinator::~Coordinator() { unlink(path_.c_str()); }
 
@@ -108,7 +115,8 @@ Participant& Coordinator::participant() { return *owner_; }
 int64_t Coordinator::now() const { return owner_->now(); }
 
 Coordinator::Member* Coordinator::Find(const std::string& name) const {
-  const auto found = std::ranges::find_if(members_, [&](const auto& member) { return member->name == name; });
+  const auto found =
+      std::ranges::find_if(members_, [&](const auto& member) { return member->name == name; });
   return found == members_.end() ? nullptr : found->get();
 }
 
@@ -169,7 +177,8 @@ void Coordinator::TakeTurns(int stop_fd) {
     } else {
       int64_t moment = owner.NextMoment();
       for (const auto& member : members_) {
-        if (member->state == Member::State::kWaiting) moment = std::min(moment, member->NextMoment());
+        if (member->state == Member::State::kWaiting)
+          moment = std::min(moment, member->NextMoment());
       }
       if (!MoveOn(moment, stop_fd)) return;
     }
@@ -195,7 +204,8 @@ bool Coordinator::MoveOn(int64_t moment, int stop_fd) {
 bool Coordinator::HasTurn(const Member& member) const {
   if (&member == &owner_->seat) return member.NextMoment() <= now();
   if (member.state != Member::State::kWaiting) return false;
-  return member.NextMoment() <= now() || (member.stop && !member.told && member.stalled_until <= now());
+  return member.NextMoment() <= now() ||
+         (member.stop && !member.told && member.stalled_until <= now());
 }
 
 void Coordinator::Grant(Member& member) {
@@ -203,7 +213,8 @@ void Coordinator::Grant(Member& member) {
   grant.number = ++member.grants;
   grant.now = now();
   grant.stop = member.stop;
-  for (; member.heard(now()); member.mail.pop_front()) grant.post.push_back(std::move(member.mail.front()));
+  for (; member.heard(now()); member.mail.pop_front())
+    grant.post.push_back(std::move(member.mail.front()));
   grant.num_posts = static_cast<int32_t>(grant.post.size());
   member.told = member.stop;
   member.state = Member::State::kWorking;
@@ -250,7 +261,8 @@ void Coordinator::WatchProgress() {
     }
     const std::string note = member->watch.Look();
     if (note.empty()) continue;
-    const char* const whose = member->state == Member::State::kExpected ? "has not joined the run" : "has its turn";
+    const char* const whose =
+        member->state == Member::State::kExpected ? "has not joined the run" : "has its turn";
     const std::string line = fmt::format("{} {} at {:.6f} s: {}", member->name, whose,
                                          static_cast<double>(now() - kBeginning) * 1e-6, note);
     if (member->watch.idle() > kPatience) throw std::runtime_error("given up: " + line);
@@ -290,7 +302,8 @@ void Coordinator::Admit(PacketSocket& stranger) {
   if (!Decode(packet, hello)) {
     welcome.refusal = "the run is another version's";
   } else if (hello.version != ProgramVersion()) {
-    welcome.refusal = fmt::format("{} is {}, the run is {}: build both together", hello.name, hello.version, ProgramVersion());
+    welcome.refusal = fmt::format("{} is {}, the run is {}: build both together", hello.name,
+                                  hello.version, ProgramVersion());
   } else if (const Member* known = Find(hello.name); known && known->socket.open()) {
     welcome.refusal = fmt::format("there is a {} in the run already", hello.name);
   }
@@ -317,7 +330,8 @@ void Coordinator::Read(Member& member, PacketSocket::When when) {
       on_note(member.name + " says what is no report");
       return Leave(member);
     }
-    if (report.grant != member.grants) continue;  // it asked for a turn that it has been given meanwhile
+    // it asked for a turn that it has been given meanwhile
+    if (report.grant != member.grants) continue;
     if (member.state == Member::State::kWaiting) {
       member.until = std::min(member.until, now());  // a signal has come: it wants to look at it
     } else {
@@ -326,7 +340,8 @@ void Coordinator::Read(Member& member, PacketSocket::When when) {
     }
   }
   if (there || (member.state == Member::State::kReported && member.report.leaves)) return;
-  on_note(fmt::format("{} has died at {:.6f} s", member.name, static_cast<double>(now() - kBeginning) * 1e-6));
+  on_note(fmt::format("{} has died at {:.6f} s", member.name,
+                      static_cast<double>(now() - kBeginning) * 1e-6));
   Leave(member);
 }
 

@@ -18,11 +18,12 @@
 
 namespace plumb {
 
-/// Keeps the time of a run in virtual time (docs/virtual-time.md). Participants take turns: whoever has something due,
-/// or has heard something, may work while everybody else waits; always in the same cyclic order, that of Expect, the
-/// owner of the coordinator last. When nobody has anything left to do, time moves on to the next moment at which
-/// somebody has. So the same processes with the same seeds say the same things in the same order, however fast the
-/// machine is and whatever else it does.
+/// Keeps the time of a run in virtual time (docs/virtual-time.md). Participants take turns: whoever
+/// has something due, or has heard something, may work while everybody else waits; always in the
+/// same cyclic order, that of Expect, the owner of the coordinator last. When nobody has anything
+/// left to do, time moves on to the next moment at which somebody has. So the same processes with
+/// the same seeds say the same things in the same order, however fast the machine is and whatever
+/// else it does.
 ///
 /// It works while its owner waits, in the owner's thread: participant().Wait(). Not thread-safe.
 class Coordinator {
@@ -51,19 +52,24 @@ class Coordinator {
   void Stop(const std::string& name);
   /// A fault: it has no turn for that long [us], whatever it hears.
   void Stall(const std::string& name, int64_t duration);
-  /// Waits, in real time, until a participant that was killed is gone: it is dead at this moment of the run.
+  /// Waits, in real time, until a participant that was killed is gone: it is dead at this moment of
+  /// the run.
   /// @return false if go_on has ended the wait.
   bool AwaitEnd(const std::string& name);
   /// Whether it is in the run, or is expected.
   bool present(const std::string& name) const;
 
-  /// Virtual seconds that may pass in a second of real time, for somebody who looks on; 0 = as many as can be.
+  /// Virtual seconds that may pass in a second of real time, for somebody who looks on; 0 = as many
+  /// as can be.
   double most_speed = 0;
   /// Called, in order, with all that is said, when it is said.
-  std::function<void(const lockstep_post_t&, const std::string& speaker)> on_post = [](const auto&, const auto&) {};
-  /// Called about every tenth of a second of real time while a participant is at work; false ends the wait.
+  std::function<void(const lockstep_post_t&, const std::string& speaker)> on_post =
+      [](const auto&, const auto&) {};
+  /// Called about every tenth of a second of real time while a participant is at work; false ends
+  /// the wait.
   std::function<bool()> go_on = [] { return true; };
-  /// Called with a line for people: somebody was refused, has left without a word, or makes no progress.
+  /// Called with a line for people: somebody was refused, has left without a word, or makes no
+  /// progress.
   std::function<void(const std::string&)> on_note = [](const auto&) {};
 
  private:
@@ -97,7 +103,8 @@ class Coordinator {
   std::vector<uint8_t> buffer_;
   std::vector<pollfd> polled_;
   std::chrono::steady_clock::time_point next_glance_{};
-  std::chrono::steady_clock::time_point allowed_{};  // before then most_speed does not let time move on
+  // before then most_speed does not let time move on
+  std::chrono::steady_clock::time_point allowed_{};
 };
 
 }  // namespace plumb

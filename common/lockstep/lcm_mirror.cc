@@ -11,14 +11,15 @@
 namespace plumb {
 namespace {
 
-constexpr int kNap = 2;       // [ms] of real time for which there was nothing to do
-constexpr int kMostRead = 10'000;                               // messages in one go
-constexpr size_t kMostMessages = 400, kMostBytes = 500'000;  // on their way
-constexpr size_t kMostBehind = 20'000, kMostStrangers = 1000;   // messages
+constexpr int kNap = 2;            // [ms] of real time for which there was nothing to do
+constexpr int kMostRead = 10'000;  // messages in one go
+constexpr size_t kMostMessages = 400, kMostBytes = 500'000;    // on their way
+constexpr size_t kMostBehind = 20'000, kMostStrangers = 1000;  // messages
 constexpr char kSelfTest[] = "LCM_SELF_TEST";  // which liblcm says to itself when it starts
 
 size_t Hash(std::span<const uint8_t> message) {
-  return std::hash<std::string_view>{}({reinterpret_cast<const char*>(message.data()), message.size()});
+  return std::hash<std::string_view>{}(
+      {reinterpret_cast<const char*>(message.data()), message.size()});
 }
 
 }  // namespace
@@ -83,8 +84,9 @@ void LcmMirror::Nap() {
   pollfd readable{messenger_.fd(), POLLIN, 0};
   poll(&readable, 1, kNap);
   if (said_.empty() || said_.front().naps++ < patience_ * (100 / kNap)) return;
-  throw std::runtime_error(fmt::format("lost on LCM: {}, number {} on its channel, has not come back",
-                                       said_.front().channel, said_.front().number));
+  throw std::runtime_error(
+      fmt::format("lost on LCM: {}, number {} on its channel, has not come back",
+                  said_.front().channel, said_.front().number));
 }
 
 void LcmMirror::Say(const Message& message) {
@@ -94,11 +96,12 @@ void LcmMirror::Say(const Message& message) {
       messenger_.Drain(kMostRead);
     }
   }
-  said_.push_back({message.channel, ++numbers_[message.channel], message.bytes.size(), Hash(message.bytes), 0});
+  said_.push_back(
+      {message.channel, ++numbers_[message.channel], message.bytes.size(), Hash(message.bytes), 0});
   said_bytes_ += message.bytes.size();
   if (!messenger_.Publish(message.channel, message.bytes)) {
-    throw std::runtime_error(
-        fmt::format("LCM: {}, number {} on its channel, could not be sent", message.channel, said_.back().number));
+    throw std::runtime_error(fmt::format("LCM: {}, number {} on its channel, could not be sent",
+                                         message.channel, said_.back().number));
   }
 }
 
@@ -113,7 +116,8 @@ void LcmMirror::OnMessage(const std::string& channel, std::span<const uint8_t> m
     --unfinished_;
   } else if (channel != kSelfTest) {
     const std::lock_guard lock(mutex_);
-    if (strangers_.size() < kMostStrangers) strangers_.push_back({channel, {message.begin(), message.end()}});
+    if (strangers_.size() < kMostStrangers)
+      strangers_.push_back({channel, {message.begin(), message.end()}});
   }
 }
 

@@ -16,9 +16,10 @@
 
 namespace plumb {
 
-/// Says on LCM what is said in a run in virtual time, so that lcm-spy, lcm-logger and others see it as ever; and hears
-/// what comes back. It waits for it, so that nobody with a buffer as large as ours (2 MB) loses anything, and what does
-/// not come back has been lost. A thread of its own does so, that the run need not wait. Its calls are one thread's.
+/// Says on LCM what is said in a run in virtual time, so that lcm-spy, lcm-logger and others see it
+/// as ever; and hears what comes back. It waits for it, so that nobody with a buffer as large as
+/// ours (2 MB) loses anything, and what does not come back has been lost. A thread of its own does
+/// so, that the run need not wait. Its calls are one thread's.
 class LcmMirror {
  public:
   struct Message {
@@ -33,8 +34,8 @@ class LcmMirror {
   LcmMirror(const LcmMirror&) = delete;
   LcmMirror& operator=(const LcmMirror&) = delete;
 
-  /// Soon. Waits where it is far behind. @throws std::runtime_error naming channel and number, if an earlier message
-  /// has not come back.
+  /// Soon. Waits where it is far behind. @throws std::runtime_error naming channel and number, if
+  /// an earlier message has not come back.
   void Publish(const std::string& channel, std::span<const uint8_t> message);
   /// What somebody outside the run has said since the last call.
   std::vector<Message> TakeStrangers();
@@ -46,7 +47,7 @@ class LcmMirror {
     std::string channel;
     int64_t number;  // on the channel
     size_t bytes, hash;
-    int naps;        // for which it has been the oldest
+    int naps;  // for which it has been the oldest
   };
   void Work();
   void Say(const Message& message);
@@ -58,8 +59,8 @@ class LcmMirror {
   // Of the thread.
   Messenger messenger_;
   std::unique_ptr<Messenger::Subscription> subscription_;
-  std::deque<Said> said_;    // that has not come back yet
-  size_t said_bytes_ = 0;    // of it
+  std::deque<Said> said_;  // that has not come back yet
+  size_t said_bytes_ = 0;  // of it
   std::map<std::string, int64_t> numbers_;
   // Of both.
   std::mutex mutex_;

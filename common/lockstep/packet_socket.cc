@@ -24,14 +24,16 @@ constexpr int kSoon = 100;                  // [ms] for which a Read waits, at m
   throw std::runtime_error(fmt::format("{}: {} ({})", path, what, std::strerror(errno)));
 }
 
-/// An address has room for 107 bytes only, a path may be longer: its folder is opened, and named by number.
+/// An address has room for 107 bytes only, a path may be longer: its folder is opened, and named by
+/// number.
 struct Address {
   explicit Address(const std::string& path) {
     const std::filesystem::path file(path);
     const std::string folder = file.has_parent_path() ? file.parent_path().string() : ".";
     directory = open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
     if (directory < 0) Fail(folder, "cannot open the folder");
-    const std::string text = fmt::format("/proc/self/fd/{}/{}", directory, file.filename().string());
+    const std::string text =
+        fmt::format("/proc/self/fd/{}/{}", directory, file.filename().string());
     if (text.size() >= sizeof name.sun_path) {
       errno = ENAMETOOLONG;
       Fail(path, "cannot name a socket");
@@ -101,7 +103,8 @@ bool PacketSocket::Send(std::span<const uint8_t> packet, const std::function<boo
   std::memcpy(out_.data(), &length, kHead);
   if (!packet.empty()) std::memcpy(out_.data() + kHead, packet.data(), packet.size());
   for (size_t sent = 0; sent < out_.size();) {
-    const ssize_t n = send(fd_, out_.data() + sent, out_.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+    const ssize_t n =
+        send(fd_, out_.data() + sent, out_.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (n > 0) {
       sent += static_cast<size_t>(n);
     } else if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) {
@@ -115,7 +118,8 @@ bool PacketSocket::Send(std::span<const uint8_t> packet, const std::function<boo
 }
 
 bool PacketSocket::Read(When when) {
-  // Rather than with a blocking recv: that is woken, for nothing, when the other end reads what we have sent.
+  // Rather than with a blocking recv: that is woken, for nothing, when the other end reads what we
+  // have sent.
   pollfd readable{fd_, POLLIN, 0};
   if (when == When::kSoon && poll(&readable, 1, kSoon) == 0) return true;
   for (bool more = true; more;) {

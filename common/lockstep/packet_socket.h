@@ -11,7 +11,8 @@ namespace plumb {
 /// Packets on a Unix stream socket: four bytes of length, then the packet. Not thread-safe.
 class PacketSocket {
  public:
-  static constexpr size_t kLongest = size_t{64} << 20;  ///< [bytes] a longer packet is not one of ours
+  /// [bytes] a longer packet is not one of ours
+  static constexpr size_t kLongest = size_t{64} << 20;
 
   PacketSocket() = default;
   explicit PacketSocket(int fd) : fd_(fd) {}
@@ -30,14 +31,16 @@ class PacketSocket {
   int fd() const { return fd_; }
   void Close();
 
-  /// Sends all of it, waiting for a receiver that does not read. @param waiting called every tenth of a second
-  /// meanwhile; false gives up. @return false if the other end is gone, or it was given up.
+  /// Sends all of it, waiting for a receiver that does not read. @param waiting called every tenth
+  /// of a second meanwhile; false gives up. @return false if the other end is gone, or it was given
+  /// up.
   bool Send(std::span<const uint8_t> packet, const std::function<bool()>& waiting = {});
   enum class When { kNow, kSoon };
-  /// Reads what there is, or, kSoon, waits for it, but for a tenth of a second at most. @return false if the other end is
-  /// gone or sends no packets.
+  /// Reads what there is, or, kSoon, waits for it, but for a tenth of a second at most. @return
+  /// false if the other end is gone or sends no packets.
   bool Read(When when);
-  /// The next complete packet of what has been read; empty if there is none. Valid until the next call.
+  /// The next complete packet of what has been read; empty if there is none. Valid until the next
+  /// call.
   std::span<const uint8_t> Next();
 
  private:

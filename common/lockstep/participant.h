@@ -13,10 +13,10 @@
 
 namespace plumb {
 
-/// A process's place in a run in virtual time (docs/virtual-time.md). Time stands still while the process works, and
-/// moves on in Wait, when everybody has done what was due. What it says and hears goes through here, in one order that
-/// is the same in every run. Clock, Messenger and OpenTransport know of it; other code need not. Not thread-safe, but
-/// for now() and time().
+/// A process's place in a run in virtual time (docs/virtual-time.md). Time stands still while the
+/// process works, and moves on in Wait, when everybody has done what was due. What it says and
+/// hears goes through here, in one order that is the same in every run. Clock, Messenger and
+/// OpenTransport know of it; other code need not. Not thread-safe, but for now() and time().
 class Participant {
  public:
   enum class Wake {
@@ -35,13 +35,16 @@ class Participant {
   virtual void Listen(const lockstep_topic_t& topic) = 0;
   /// Says something, which arrives after `way` >= 0 microseconds, zero meaning: still now.
   virtual void Say(const lockstep_topic_t& topic, std::vector<uint8_t> data, int64_t way = 0) = 0;
-  /// Gives the others their turn. Ends at `until`, when something has been heard (if wanted), or when the process is
-  /// asked to stop. @param stop_fd becomes readable when it is asked by a signal; -1: there is none.
-  /// @param meanwhile is done while the others go on: work that says and hears nothing, and whose results are of `until`.
+  /// Gives the others their turn. Ends at `until`, when something has been heard (if wanted), or
+  /// when the process is asked to stop. @param stop_fd becomes readable when it is asked by a
+  /// signal; -1: there is none.
+  /// @param meanwhile is done while the others go on: work that says and hears nothing, and whose
+  /// results are of `until`.
   /// @throws std::runtime_error if the run is over or cannot go on.
-  virtual void Wait(int64_t until, Wake wake, int stop_fd = -1, const std::function<void()>& meanwhile = {}) = 0;
-  /// From now on this process's main thread works on the processor on which the coordinator does: handing over is much
-  /// faster there than between two. For those whose turns are many and short.
+  virtual void Wait(int64_t until, Wake wake, int stop_fd = -1,
+                    const std::function<void()>& meanwhile = {}) = 0;
+  /// From now on this process's main thread works on the processor on which the coordinator does:
+  /// handing over is much faster there than between two. For those whose turns are many and short.
   virtual void ShareProcessor() = 0;
   /// A line for whoever watches the run.
   virtual void Note(const std::string& line) = 0;
@@ -72,8 +75,9 @@ class Participant {
 lockstep_topic_t ChannelTopic(const std::string& channel);
 lockstep_topic_t BusTopic(const std::string& url);
 
-/// Joins the run that is coordinated at a path. @param name of this process. @return its place, which it leaves when
-/// that is destroyed. @throws std::runtime_error, one line, if nobody is there or the run will not have us.
+/// Joins the run that is coordinated at a path. @param name of this process. @return its place,
+/// which it leaves when that is destroyed. @throws std::runtime_error, one line, if nobody is there
+/// or the run will not have us.
 std::unique_ptr<Participant> JoinRun(const std::string& path, const std::string& name);
 
 }  // namespace plumb

@@ -63,7 +63,8 @@ std::string ProcessWatch::Look() {
   if (stopped) return fmt::format("stopped by a signal, waited for since {:.0f} s", waited);
   if (computes) return fmt::format("computing since {:.0f} s", waited);
   const std::string where = SleepsIn(pid_);
-  return fmt::format("asleep{}{}, waited for since {:.0f} s", where.empty() ? "" : " in ", where, waited);
+  return fmt::format("asleep{}{}, waited for since {:.0f} s", where.empty() ? "" : " in ", where,
+                     waited);
 }
 
 bool ProcessWatch::dead() const {

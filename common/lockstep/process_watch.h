@@ -7,15 +7,17 @@
 
 namespace plumb {
 
-/// Looks from outside whether a process that is being waited for gets on: it may compute for minutes, but not sleep.
-/// A debugger's and SIGSTOP's stops may last for ever. Real time. Not thread-safe.
+/// Looks from outside whether a process that is being waited for gets on: it may compute for
+/// minutes, but not sleep. A debugger's and SIGSTOP's stops may last for ever. Real time. Not
+/// thread-safe.
 class ProcessWatch {
  public:
   explicit ProcessWatch(pid_t pid = 0) : pid_(pid) {}
 
   /// The wait begins.
   void Begin();
-  /// What keeps it, for people, now and then: once it has been waited for long. Empty: nothing to say.
+  /// What keeps it, for people, now and then: once it has been waited for long. Empty: nothing to
+  /// say.
   std::string Look();
   /// Whether there is no such process any more; looks.
   bool dead() const;

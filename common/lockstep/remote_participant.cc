@@ -48,7 +48,8 @@ class RemoteParticipant : public Participant {
     post.data = std::move(data);
   }
 
-  void Wait(int64_t until, Wake wake, int stop_fd, const std::function<void()>& meanwhile) override {
+  void Wait(int64_t until, Wake wake, int stop_fd,
+            const std::function<void()>& meanwhile) override {
     // What has been heard and not been read yet is read first; time does not pass meanwhile.
     if (wake == Wake::kWhenHeard && heard()) until = now();
     Report(until, wake);
@@ -57,7 +58,9 @@ class RemoteParticipant : public Participant {
   }
 
   void ShareProcessor() override { report_.shares_processor = 1; }
-  void Note(const std::string& line) override { report_.note += (report_.note.empty() ? "" : "; ") + line; }
+  void Note(const std::string& line) override {
+    report_.note += (report_.note.empty() ? "" : "; ") + line;
+  }
   void Fail(const std::string& why) override { report_.failure = why; }
 
  private:

@@ -20,8 +20,9 @@ long long Waited() {
   return waited;
 }
 
-/// @param policy SCHED_BATCH: whoever is woken waits until the one who wakes it has gone to sleep, which is what it does
-/// next. With SCHED_OTHER it would be interrupted for that, and have to be resumed later.
+/// @param policy SCHED_BATCH: whoever is woken waits until the one who wakes it has gone to sleep,
+/// which is what it does next. With SCHED_OTHER it would be interrupted for that, and have to be
+/// resumed later.
 void Bind(pid_t pid, const cpu_set_t& processors, int policy) {
   const sched_param none{};
   sched_setscheduler(pid, policy, &none);
@@ -66,8 +67,10 @@ void SharedProcessor::Balance() {
   const auto now = std::chrono::steady_clock::now();
   if (processor_ < 0 || now - looked_ < kPeriod) return;
   const long long waited = Waited();
-  const double share = static_cast<double>(waited - waited_) /
-                       static_cast<double>(std::chrono::duration_cast<std::chrono::nanoseconds>(now - looked_).count());
+  const double share =
+      static_cast<double>(waited - waited_) /
+      static_cast<double>(
+          std::chrono::duration_cast<std::chrono::nanoseconds>(now - looked_).count());
   const bool first = looked_ == std::chrono::steady_clock::time_point{};
   looked_ = now;
   waited_ = waited;

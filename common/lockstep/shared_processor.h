@@ -8,9 +8,10 @@
 
 namespace plumb {
 
-/// Keeps the calling thread and other processes' main threads, who work one at a time, on one processor: waking somebody
-/// on another one takes ten times as long where that has fallen asleep, as virtual machines' do. Moves all of them
-/// to another one where that has more room. Errors are of no consequence. Not thread-safe.
+/// Keeps the calling thread and other processes' main threads, who work one at a time, on one
+/// processor: waking somebody on another one takes ten times as long where that has fallen asleep,
+/// as virtual machines' do. Moves all of them to another one where that has more room. Errors are
+/// of no consequence. Not thread-safe.
 class SharedProcessor {
  public:
   SharedProcessor();

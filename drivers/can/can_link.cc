@@ -24,7 +24,8 @@ std::optional<Value> Read(Bytes bytes) {
   return value;
 }
 
-/// The payload of the first attribute of that type among those that fill the bytes; empty if there is none.
+/// The payload of the first attribute of that type among those that fill the bytes; empty if there
+/// is none.
 Bytes Attribute(Bytes bytes, int type) {
   while (const auto header = Read<rtattr>(bytes)) {
     if (header->rta_len < sizeof(rtattr) || header->rta_len > bytes.size()) break;
@@ -45,7 +46,8 @@ std::optional<CanLink> ParseCanLink(Bytes message) {
       header->nlmsg_len < kAttributes) {
     return {};
   }
-  const Bytes info = Attribute(message.subspan(kAttributes, header->nlmsg_len - kAttributes), IFLA_LINKINFO);
+  const Bytes info =
+      Attribute(message.subspan(kAttributes, header->nlmsg_len - kAttributes), IFLA_LINKINFO);
   const Bytes kind = Attribute(info, IFLA_INFO_KIND);
   const Bytes data = Attribute(info, IFLA_INFO_DATA);
   CanLink link;
@@ -73,7 +75,8 @@ std::optional<CanLink> ReadCanLink(int interface_index) {
   request.interface.ifi_index = interface_index;
   // The kernel answers at once, within the call of send.
   std::array<uint8_t, 16384> answer;
-  if (!netlink.valid() || send(netlink.get(), &request, sizeof request, 0) != sizeof request) return {};
+  if (!netlink.valid() || send(netlink.get(), &request, sizeof request, 0) != sizeof request)
+    return {};
   const ssize_t size = recv(netlink.get(), answer.data(), answer.size(), MSG_DONTWAIT);
   if (size <= 0) return {};
   return ParseCanLink(Bytes(answer).first(static_cast<size_t>(size)));

@@ -9,9 +9,10 @@ namespace plumb {
 
 /// How a CAN interface is set up, as far as its kind tells (vcan has no bit rate, nor restarts).
 struct CanLink {
-  std::string kind;                    ///< "can", "vcan", "vxcan"
-  std::optional<uint32_t> restart_ms;  ///< [ms] after bus-off until the controller tries again; 0 = never
-  std::optional<uint32_t> bit_rate;    ///< [bit/s]
+  std::string kind;  ///< "can", "vcan", "vxcan"
+  /// [ms] after bus-off until the controller tries again; 0 = never
+  std::optional<uint32_t> restart_ms;
+  std::optional<uint32_t> bit_rate;  ///< [bit/s]
 };
 
 /// Asks the kernel (RTM_GETLINK); needs no privilege. @return nothing if it does not answer.

@@ -29,7 +29,8 @@ bool ParseTime(std::string_view text, int64_t& time) {
   text = text.substr(1, text.size() - 2);
   const size_t point = text.find('.');
   int64_t seconds, decimals;
-  // Ten digits of seconds last until the year 2286, and in 64 bits of nanoseconds until 9,223,372,036 s.
+  // Ten digits of seconds last until the year 2286, and in 64 bits of nanoseconds until
+  // 9,223,372,036 s.
   if (point == std::string_view::npos || !ParseDigits(text.substr(0, point), seconds) ||
       seconds > 9'000'000'000) {
     return false;
@@ -50,7 +51,8 @@ std::optional<LoggedFrame> ParseCandump(std::string_view line) noexcept {
   const auto frame = FrameFromText(Word(line));
   if (!frame) return {};
   const std::string_view direction = Word(line);
-  if ((!direction.empty() && direction != "R" && direction != "T") || !Word(line).empty()) return {};
+  if ((!direction.empty() && direction != "R" && direction != "T") || !Word(line).empty())
+    return {};
   logged.frame = *frame;
   logged.frame.receive_ns = logged.time_ns;
   return logged;

@@ -19,7 +19,8 @@ struct LoggedFrame {
 ///
 ///   (1700000000.263847) can0 02E#0000C03F00000000
 ///
-/// with frames of every kind (see FrameFromText), up to nine decimals, and a direction "R" or "T" behind.
+/// with frames of every kind (see FrameFromText), up to nine decimals, and a direction "R" or "T"
+/// behind.
 /// @return nothing if the line is not exactly that.
 std::optional<LoggedFrame> ParseCandump(std::string_view line) noexcept;
 

@@ -23,7 +23,8 @@ int DatagramTransport::Send(std::span<const Frame> frames) noexcept {
     for (size_t i = 0; i < size; ++i) {
       sent_.parts[i].iov_len = Encode(frames[sent + i], sent_.buffers[i]);
     }
-    const int accepted = sendmmsg(sender(), sent_.messages.data(), static_cast<unsigned>(size), MSG_NOSIGNAL);
+    const int accepted =
+        sendmmsg(sender(), sent_.messages.data(), static_cast<unsigned>(size), MSG_NOSIGNAL);
     if (accepted < 0) {
       OnSendError(errno);
       break;
@@ -49,7 +50,8 @@ int DatagramTransport::Receive(std::span<Frame> frames) noexcept {
       header.msg_controllen = sizeof controls_[i].bytes;
       header.msg_flags = 0;
     }
-    const int got = recvmmsg(receiver(), received_.messages.data(), static_cast<unsigned>(room), 0, nullptr);
+    const int got =
+        recvmmsg(receiver(), received_.messages.data(), static_cast<unsigned>(room), 0, nullptr);
     if (got < 0) {
       OnReceiveError(errno);
       break;
@@ -69,8 +71,8 @@ bool DatagramTransport::Take(size_t index, Frame& frame) noexcept {
   const mmsghdr& message = received_.messages[index];
   const ReceiveControl control = ReadControl(message.msg_hdr);
   if (control.overflow) stats_.lost = lost_before_ + *control.overflow;
-  const Datagram datagram{std::span(received_.buffers[index]).first(message.msg_len), sources_[index],
-                          message.msg_hdr.msg_flags};
+  const Datagram datagram{std::span(received_.buffers[index]).first(message.msg_len),
+                          sources_[index], message.msg_hdr.msg_flags};
   if (IsEcho(datagram)) {
     ++stats_.echoes;
     return false;

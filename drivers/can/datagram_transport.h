@@ -14,8 +14,9 @@
 
 namespace plumb {
 
-/// What SocketCAN and UDP have in common: a frame is a datagram, and many of them travel in one system call.
-/// Counts, stamps and sorts out; what is left to the kinds of bus is what a datagram looks like.
+/// What SocketCAN and UDP have in common: a frame is a datagram, and many of them travel in one
+/// system call. Counts, stamps and sorts out; what is left to the kinds of bus is what a datagram
+/// looks like.
 class DatagramTransport : public Transport {
  public:
   int Send(std::span<const Frame> frames) noexcept final;

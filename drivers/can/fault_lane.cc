@@ -10,7 +10,8 @@ FaultLane::FaultLane(const Faults::Side& side, uint64_t seed, uint32_t stream)
     : side_(side), random_(seed, {stream}), ring_(kCapacity) {}
 
 void FaultLane::Add(const Frame& frame, int64_t now) noexcept {
-  // As many draws for every frame: what happens to the next must not depend on what happens to this one.
+  // As many draws for every frame: what happens to the next must not depend on what happens to this
+  // one.
   const bool lost = random_.Uniform() < side_.loss;
   const bool doubled = random_.Uniform() < side_.duplicate;
   const bool held = random_.Uniform() < side_.reorder;
@@ -34,7 +35,8 @@ void FaultLane::Add(const Frame& frame, int64_t now) noexcept {
     ++injected_;
     return;
   }
-  const int64_t due = now + side_.delay + static_cast<int64_t>(late * static_cast<double>(side_.jitter));
+  const int64_t due =
+      now + side_.delay + static_cast<int64_t>(late * static_cast<double>(side_.jitter));
   Append(changed, due);
   if (doubled) Append(changed, due);
   for (; copies_ > 0; --copies_) Append(held_, due);
@@ -50,7 +52,9 @@ void FaultLane::Append(const Frame& frame, int64_t due) noexcept {
   ++size_;
 }
 
-int64_t FaultLane::next() const noexcept { return size_ == 0 ? Transport::kNever : ring_[first_].due; }
+int64_t FaultLane::next() const noexcept {
+  return size_ == 0 ? Transport::kNever : ring_[first_].due;
+}
 
 const Frame* FaultLane::Arrived(int64_t now) const noexcept {
   return next() <= now ? &ring_[first_].frame : nullptr;

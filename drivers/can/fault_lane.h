@@ -9,8 +9,8 @@
 
 namespace plumb {
 
-/// Frames under way in one direction of a faulty bus, with what happens to them. Allocates only when it is
-/// constructed. Times are microseconds. Not thread-safe.
+/// Frames under way in one direction of a faulty bus, with what happens to them. Allocates only
+/// when it is constructed. Times are microseconds. Not thread-safe.
 class FaultLane {
  public:
   static constexpr size_t kCapacity = 4096;
@@ -18,11 +18,13 @@ class FaultLane {
   /// @param stream names the random numbers together with the seed.
   FaultLane(const Faults::Side& side, uint64_t seed, uint32_t stream);
 
-  /// Frames that may be added with Add, whatever happens to them; each counts twice, as it may be doubled.
+  /// Frames that may be added with Add, whatever happens to them; each counts twice, as it may be
+  /// doubled.
   size_t room() const noexcept { return size_ + 2 > kCapacity ? 0 : (kCapacity - size_ - 2) / 2; }
   /// A frame sets out, and meets its fate. Needs room.
   void Add(const Frame& frame, int64_t now) noexcept;
-  /// A frame that nothing happens to, not before those already under way. Dropped if there is no room.
+  /// A frame that nothing happens to, not before those already under way. Dropped if there is no
+  /// room.
   void Append(const Frame& frame, int64_t due) noexcept;
 
   /// When the next frame arrives; Transport::kNever if none is under way.

@@ -51,7 +51,8 @@ Outcome SetSide(Faults::Side& side, std::string_view name, std::string_view valu
                                 : name == "jitter" ? &Faults::Side::jitter
                                                    : nullptr;
   if (probability == nullptr && time == nullptr) return Outcome::kUnknown;
-  const bool good = probability ? ParseProbability(value, side.*probability) : ParseTime(value, side.*time);
+  const bool good =
+      probability ? ParseProbability(value, side.*probability) : ParseTime(value, side.*time);
   return good ? Outcome::kSet : Outcome::kBadValue;
 }
 
@@ -63,7 +64,8 @@ Outcome Set(Faults& faults, std::string_view name, std::string_view value) {
                         : bare == "errors" && !send ? &faults.errors
                         : bare == "busoff" && !send ? &faults.busoff
                                                     : nullptr;
-  if (probability) return ParseProbability(value, *probability) ? Outcome::kSet : Outcome::kBadValue;
+  if (probability)
+    return ParseProbability(value, *probability) ? Outcome::kSet : Outcome::kBadValue;
   const Outcome outcome = SetSide(receive ? faults.receive : faults.send, bare, value);
   if (outcome == Outcome::kSet && !receive && !send) return SetSide(faults.receive, bare, value);
   return outcome;
@@ -85,15 +87,15 @@ Faults ParseFaults(const std::string& text) {
       case Outcome::kSet:
         break;
       case Outcome::kUnknown:
-        throw std::invalid_argument(
-            fmt::format("'{}': there is loss, duplicate, reorder, corrupt, delay, jitter (of rx. and tx., or "
-                        "both), full (tx.), errors, busoff (rx.) and seed",
-                        fault));
+        throw std::invalid_argument(fmt::format(
+            "'{}': there is loss, duplicate, reorder, corrupt, delay, jitter (of rx. and tx., or "
+            "both), full (tx.), errors, busoff (rx.) and seed",
+            fault));
       case Outcome::kBadValue:
-        throw std::invalid_argument(
-            fmt::format("'{}': probabilities are 0 to 1, times such as 500us or 2ms up to a minute, the seed "
-                        "a whole number",
-                        fault));
+        throw std::invalid_argument(fmt::format(
+            "'{}': probabilities are 0 to 1, times such as 500us or 2ms up to a minute, the seed "
+            "a whole number",
+            fault));
     }
   }
   return faults;

@@ -5,7 +5,8 @@
 
 namespace plumb {
 
-/// What goes wrong on a bus, see faulty.h. Probabilities are per frame, in [0, 1]; times in microseconds.
+/// What goes wrong on a bus, see faulty.h. Probabilities are per frame, in [0, 1]; times in
+/// microseconds.
 struct Faults {
   /// One direction.
   struct Side {

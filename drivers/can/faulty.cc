@@ -55,7 +55,8 @@ class Faulty : public Transport {
   }
 
   int64_t NextEvent() const noexcept override {
-    return std::min({bus_->NextEvent(), receiving_.next(), sending_.next(), bus_off_ ? bus_back_ : kNever});
+    return std::min(
+        {bus_->NextEvent(), receiving_.next(), sending_.next(), bus_off_ ? bus_back_ : kNever});
   }
 
   int Send(std::span<const Frame> frames) noexcept override {
@@ -112,8 +113,8 @@ class Faulty : public Transport {
     }
     if (error) {
       ++mishaps_;
-      const std::array<Frame, 4> errors = {ErrorFrame(0x20), ErrorFrame(0x04, 0x08), ErrorFrame(0x04, 0x20),
-                                           ErrorFrame(0x08, 0, 0x04)};
+      const std::array<Frame, 4> errors = {ErrorFrame(0x20), ErrorFrame(0x04, 0x08),
+                                           ErrorFrame(0x04, 0x20), ErrorFrame(0x08, 0, 0x04)};
       receiving_.Append(errors[which], now_);
     }
     receiving_.Add(frame, now_);
@@ -152,18 +153,18 @@ class Faulty : public Transport {
 
 }  // namespace
 
-std::unique_ptr<Transport> OpenFaulty(const std::string& faults_and_bus, std::vector<Filter> filters,
-                                      LockstepBus run) {
+std::unique_ptr<Transport> OpenFaulty(const std::string& faults_and_bus,
+                                      std::vector<Filter> filters, LockstepBus run) {
   const size_t colon = faults_and_bus.find(':');
   if (colon == std::string::npos) {
-    throw std::runtime_error(
-        fmt::format("faulty:{}: faults and a bus are wanted, such as faulty:loss=0.1:udp:239.74.163.2:43113",
-                    faults_and_bus));
+    throw std::runtime_error(fmt::format(
+        "faulty:{}: faults and a bus are wanted, such as faulty:loss=0.1:udp:239.74.163.2:43113",
+        faults_and_bus));
   }
   try {
     const Faults faults = ParseFaults(faults_and_bus.substr(0, colon));
-    return std::make_unique<Faulty>(faults,
-                                    OpenTransport(faults_and_bus.substr(colon + 1), std::move(filters), run));
+    return std::make_unique<Faulty>(
+        faults, OpenTransport(faults_and_bus.substr(colon + 1), std::move(filters), run));
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("faulty: {}", error.what()));
   }

@@ -9,8 +9,8 @@ constexpr uint32_t kErrorBit = 0x20000000;
 constexpr char kDigits[] = "0123456789ABCDEF";
 
 bool IsFdLength(int length) {
-  return length <= 8 || length == 12 || length == 16 || length == 20 || length == 24 || length == 32 ||
-         length == 48 || length == 64;
+  return length <= 8 || length == 12 || length == 16 || length == 20 || length == 24 ||
+         length == 32 || length == 48 || length == 64;
 }
 
 int HexDigit(char c) {

@@ -14,14 +14,15 @@
 namespace plumb {
 namespace {
 
-constexpr int kGlance = 100;         // [ms] of real time between two looks for a frame on its way
-constexpr int64_t kEarly = 100'000;  // [us] by which a frame may be on the bus before the run says that it arrives
-constexpr int64_t kLook = 10'000;    // [us] between two looks at what nobody waits for
+constexpr int kGlance = 100;  // [ms] of real time between two looks for a frame on its way
+// [us] by which a frame may be on the bus before the run says that it arrives
+constexpr int64_t kEarly = 100'000;
+constexpr int64_t kLook = 10'000;  // [us] between two looks at what nobody waits for
 
 class LockstepTransport : public Transport {
  public:
-  LockstepTransport(const std::string& url, std::unique_ptr<Transport> bus, std::vector<Filter> filters,
-                    LockstepBus run)
+  LockstepTransport(const std::string& url, std::unique_ptr<Transport> bus,
+                    std::vector<Filter> filters, LockstepBus run)
       : Transport(std::move(filters)),
         topic_(BusTopic(url)),
         bus_(std::move(bus)),
@@ -54,7 +55,8 @@ class LockstepTransport : public Transport {
     size_t count = 0;
     for (; count < frames.size() && !heard_.empty(); heard_.pop_front()) {
       const lockstep_post_t& post = heard_.front();
-      const auto frame = FrameFromText({reinterpret_cast<const char*>(post.data.data()), post.data.size()});
+      const auto frame =
+          FrameFromText({reinterpret_cast<const char*>(post.data.data()), post.data.size()});
       if (!frame || !Passes(*frame) || !Arrives(*frame)) continue;
       Frame& out = frames[count++] = *frame;
       out.receive_ns = post.arrival * 1000;
@@ -94,8 +96,8 @@ class LockstepTransport : public Transport {
     if (!bus_) return true;
     ++expected_;
     for (int glance = 0; glance <= patience_; ++glance) {
-      const auto found =
-          std::ranges::find_if(early_, [&](const Early& early) { return SameOnWire(early.frame, frame); });
+      const auto found = std::ranges::find_if(
+          early_, [&](const Early& early) { return SameOnWire(early.frame, frame); });
       if (found != early_.end()) {
         early_.erase(found);
         return true;
@@ -106,7 +108,8 @@ class LockstepTransport : public Transport {
       if (glance > 0) poll(&readable, 1, kGlance);
       ReadBus();
     }
-    run_.Fail(fmt::format("lost on {}: {}, frame {} for this process", topic_.name, ToText(frame), expected_));
+    run_.Fail(fmt::format("lost on {}: {}, frame {} for this process", topic_.name, ToText(frame),
+                          expected_));
     return false;
   }
 

@@ -35,9 +35,11 @@ int64_t RealtimeNs() noexcept {
 /// Frames wait in a socket pair: the kernel gives us a bounded queue that can be polled.
 class Loop : public Transport {
  public:
-  Loop(const std::string& name, std::vector<Filter> filters) : Transport(std::move(filters)), name_(name) {
+  Loop(const std::string& name, std::vector<Filter> filters)
+      : Transport(std::move(filters)), name_(name) {
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, sockets_) != 0) {
-      throw std::runtime_error("loop:" + name + ": cannot create a socket pair (too many open files?)");
+      throw std::runtime_error("loop:" + name +
+                               ": cannot create a socket pair (too many open files?)");
     }
     const int bytes = 1 << 20;
     setsockopt(sockets_[1], SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
@@ -78,7 +80,8 @@ class Loop : public Transport {
   int Receive(std::span<Frame> frames) noexcept override {
     int count = 0;
     while (static_cast<size_t>(count) < frames.size() &&
-           recv(sockets_[0], &frames[static_cast<size_t>(count)], sizeof(Frame), 0) == sizeof(Frame)) {
+           recv(sockets_[0], &frames[static_cast<size_t>(count)], sizeof(Frame), 0) ==
+               sizeof(Frame)) {
       Frame& frame = frames[static_cast<size_t>(count++)];
       frame.foreign = IsOurs(frame);
       if (frame.foreign) ++stats_.foreign;
@@ -90,7 +93,8 @@ class Loop : public Transport {
 
  private:
   void Deliver(const Frame& frame) noexcept {
-    if (Passes(frame) && send(sockets_[1], &frame, sizeof frame, MSG_NOSIGNAL) != sizeof frame) ++overflows_;
+    if (Passes(frame) && send(sockets_[1], &frame, sizeof frame, MSG_NOSIGNAL) != sizeof frame)
+      ++overflows_;
   }
 
   std::string name_;

@@ -17,15 +17,19 @@ struct ControlBuffer {
 
 /// What it said.
 struct ReceiveControl {
-  int64_t receive_ns = 0;           ///< CLOCK_REALTIME of arrival in the kernel; 0 = not stamped
-  std::optional<int64_t> overflow;  ///< datagrams this socket has lost since it was opened (SO_RXQ_OVFL)
+  int64_t receive_ns = 0;  ///< CLOCK_REALTIME of arrival in the kernel; 0 = not stamped
+  /// datagrams this socket has lost since it was opened (SO_RXQ_OVFL)
+  std::optional<int64_t> overflow;
 };
 
 inline ReceiveControl ReadControl(const msghdr& message) noexcept {
-  const auto nanoseconds = [](const timespec& t) { return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec; };
+  const auto nanoseconds = [](const timespec& t) {
+    return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+  };
   ReceiveControl result;
   msghdr& header = const_cast<msghdr&>(message);  // CMSG_NXTHDR wants it so
-  for (cmsghdr* control = CMSG_FIRSTHDR(&header); control; control = CMSG_NXTHDR(&header, control)) {
+  for (cmsghdr* control = CMSG_FIRSTHDR(&header); control;
+       control = CMSG_NXTHDR(&header, control)) {
     if (control->cmsg_level != SOL_SOCKET) continue;
     if (control->cmsg_type == SO_TIMESTAMPNS) {
       timespec stamp;

@@ -21,12 +21,14 @@ class Replay : public Transport {
  public:
   Replay(const std::string& file, std::vector<Filter> filters)
       : Transport(std::move(filters)), readable_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-    if (!readable_.valid()) throw std::runtime_error(fmt::format("replay:{}: too many open files", file));
+    if (!readable_.valid())
+      throw std::runtime_error(fmt::format("replay:{}: too many open files", file));
     Read(file);
     if (frames_.empty() && stats_.echoes == 0 && unwanted_ == 0) {
-      throw std::runtime_error(fmt::format(
-          "replay:{}: no line of it is a frame; record with candump -l can0, or can_logger -f run.log",
-          file));
+      throw std::runtime_error(
+          fmt::format("replay:{}: no line of it is a frame; record with candump -l can0, or "
+                      "can_logger -f run.log",
+                      file));
     }
     Signal();
   }
@@ -52,7 +54,8 @@ class Replay : public Transport {
 
   int Receive(std::span<Frame> frames) noexcept override {
     size_t count = 0;
-    for (; count < frames.size() && NextEvent() <= now_; ++count) frames[count] = frames_[next_++].frame;
+    for (; count < frames.size() && NextEvent() <= now_; ++count)
+      frames[count] = frames_[next_++].frame;
     stats_.received += static_cast<int64_t>(count);
     Signal();
     return static_cast<int>(count);
@@ -93,11 +96,13 @@ class Replay : public Transport {
       }
     }
     if (stats_.malformed > static_cast<int64_t>(kMostNamed)) {
-      warnings_.push_back(fmt::format("{}: {} lines in all are not of candump -l", file, stats_.malformed));
+      warnings_.push_back(
+          fmt::format("{}: {} lines in all are not of candump -l", file, stats_.malformed));
     }
     if (interfaces.size() > 1) {
-      warnings_.push_back(fmt::format("{}: frames of {} interfaces are replayed as of one; cure: grep ' {} '",
-                                      file, interfaces.size(), *interfaces.begin()));
+      warnings_.push_back(
+          fmt::format("{}: frames of {} interfaces are replayed as of one; cure: grep ' {} '", file,
+                      interfaces.size(), *interfaces.begin()));
     }
   }
 

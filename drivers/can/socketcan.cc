@@ -67,13 +67,15 @@ class SocketCan : public DatagramTransport {
   SocketCan(const std::string& interface, std::vector<Filter> filters)
       : DatagramTransport(std::move(filters)), interface_(interface) {
     if (interface.empty() || interface.size() >= IFNAMSIZ) {
-      throw std::runtime_error(fmt::format("socketcan:{}: not an interface name, such as can0", interface));
+      throw std::runtime_error(
+          fmt::format("socketcan:{}: not an interface name, such as can0", interface));
     }
-    // Remote frames of our ids, 29-bit ids with the same low bits: without the flag bits in the mask they
-    // pass.
+    // Remote frames of our ids, 29-bit ids with the same low bits: without the flag bits in the
+    // mask they pass.
     for (const Filter& filter : filters_) {
       kernel_filters_.push_back(
-          {.can_id = filter.id, .can_mask = filter.mask | CAN_EFF_FLAG | (filter.remote ? 0 : CAN_RTR_FLAG)});
+          {.can_id = filter.id,
+           .can_mask = filter.mask | CAN_EFF_FLAG | (filter.remote ? 0 : CAN_RTR_FLAG)});
     }
     epoll_ = FileDescriptor(epoll_create1(EPOLL_CLOEXEC));
     socket_ = OpenSocket();
@@ -84,10 +86,11 @@ class SocketCan : public DatagramTransport {
       case EPROTONOSUPPORT:
         Fail("this kernel has no CAN; cure: modprobe can_raw, or use udp:239.74.163.2:43113");
       case ENODEV:
-        Fail(fmt::format(
-            "no such interface; cure: ip link add {0} type vcan && ip link set {0} up for a virtual "
-            "one, or use udp:239.74.163.2:43113",
-            interface_));
+        Fail(
+            fmt::format("no such interface; cure: ip link add {0} type vcan && ip link set {0} up "
+                        "for a virtual "
+                        "one, or use udp:239.74.163.2:43113",
+                        interface_));
       case EPROTOTYPE:
         Fail("not a CAN interface");
       default:
@@ -102,8 +105,8 @@ class SocketCan : public DatagramTransport {
 
   LinkState Reopen() noexcept override {
     const LinkState state = InterfaceState();
-    // After a removal the old socket is dead, even if an interface of the same name has come, and binding it
-    // again does not bring its filters back: a new one takes its place.
+    // After a removal the old socket is dead, even if an interface of the same name has come, and
+    // binding it again does not bring its filters back: a new one takes its place.
     if (state != LinkState::kGone && (link_ == LinkState::kGone || InterfaceIndex() != index_)) {
       FileDescriptor fresh = OpenSocket();
       if (!fresh.valid()) return link_ = LinkState::kGone;
@@ -159,15 +162,18 @@ class SocketCan : public DatagramTransport {
     }
     // Not lost arbitration, which is normal traffic, nor bus errors, which come in floods.
     set(SOL_CAN_RAW, CAN_RAW_ERR_FILTER,
-        CAN_ERR_TX_TIMEOUT | CAN_ERR_CRTL | CAN_ERR_PROT | CAN_ERR_TRX | CAN_ERR_ACK | CAN_ERR_BUSOFF |
-            CAN_ERR_RESTARTED | 0x200 /* CAN_ERR_CNT, newer than Debian 12's header */);
+        CAN_ERR_TX_TIMEOUT | CAN_ERR_CRTL | CAN_ERR_PROT | CAN_ERR_TRX | CAN_ERR_ACK |
+            CAN_ERR_BUSOFF | CAN_ERR_RESTARTED |
+            0x200 /* CAN_ERR_CNT, newer than Debian 12's header */);
     set(SOL_CAN_RAW, CAN_RAW_LOOPBACK, 1);       // candump on this machine sees our commands
     set(SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, 1);  // counted as echoes, not handed out
     set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1);
-    // The default receive buffer holds 278 frames: 35 ms of a busy bus. Beyond rmem_max needs CAP_NET_ADMIN.
-    if (!set(SOL_SOCKET, SO_RCVBUFFORCE, kReceiveBuffer)) set(SOL_SOCKET, SO_RCVBUF, kReceiveBuffer);
-    // The least the kernel allows: about ten frames in flight, then EAGAIN. A long queue of torques would be
-    // sent to the motors when a dead bus comes back.
+    // The default receive buffer holds 278 frames: 35 ms of a busy bus. Beyond rmem_max needs
+    // CAP_NET_ADMIN.
+    if (!set(SOL_SOCKET, SO_RCVBUFFORCE, kReceiveBuffer))
+      set(SOL_SOCKET, SO_RCVBUF, kReceiveBuffer);
+    // The least the kernel allows: about ten frames in flight, then EAGAIN. A long queue of torques
+    // would be sent to the motors when a dead bus comes back.
     set(SOL_SOCKET, SO_SNDBUF, 0);
     set(SOL_SOCKET, SO_RXQ_OVFL, 1);
     set(SOL_SOCKET, SO_TIMESTAMPING, SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE);
@@ -175,7 +181,8 @@ class SocketCan : public DatagramTransport {
     sockaddr_can address{};
     address.can_family = AF_CAN;
     address.can_ifindex = index;
-    if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 || !Watch(fd)) return {};
+    if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 || !Watch(fd))
+      return {};
     index_ = index;
     return fresh;
   }
@@ -187,7 +194,8 @@ class SocketCan : public DatagramTransport {
 
   /// The kernel's notes on interfaces that come, go and change. Without them only Reopen finds out.
   void WatchLinks() {
-    links_ = FileDescriptor(socket(AF_NETLINK, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, NETLINK_ROUTE));
+    links_ =
+        FileDescriptor(socket(AF_NETLINK, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, NETLINK_ROUTE));
     sockaddr_nl address{};
     address.nl_family = AF_NETLINK;
     address.nl_groups = RTMGRP_LINK;
@@ -198,7 +206,8 @@ class SocketCan : public DatagramTransport {
     }
   }
 
-  /// True if there have been notes. What they say does not matter: the interface itself is looked at.
+  /// True if there have been notes. What they say does not matter: the interface itself is looked
+  /// at.
   bool LinksChanged() noexcept {
     bool changed = false;
     char any;
@@ -212,19 +221,20 @@ class SocketCan : public DatagramTransport {
   void AddWarnings() {
     const auto link = ReadCanLink(index_);
     if (link && link->restart_ms == 0u) {
-      warnings_.push_back(
-          fmt::format("socketcan:{0}: restart-ms is 0: once bus-off, the controller stays off; cure: ip link "
-                      "set {0} down && "
-                      "ip link set {0} type can restart-ms 100 && ip link set {0} up",
-                      interface_));
+      warnings_.push_back(fmt::format(
+          "socketcan:{0}: restart-ms is 0: once bus-off, the controller stays off; cure: ip link "
+          "set {0} down && "
+          "ip link set {0} type can restart-ms 100 && ip link set {0} up",
+          interface_));
     }
     int bytes = 0;
     socklen_t size = sizeof bytes;
     getsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &bytes, &size);
     if (bytes < kReceiveBuffer) {
-      warnings_.push_back(fmt::format(
-          "socketcan:{}: the receive buffer holds about {} frames only; cure: sysctl -w net.core.rmem_max={}",
-          interface_, bytes / kBytesPerFrame, kReceiveBuffer));
+      warnings_.push_back(
+          fmt::format("socketcan:{}: the receive buffer holds about {} frames only; cure: sysctl "
+                      "-w net.core.rmem_max={}",
+                      interface_, bytes / kBytesPerFrame, kReceiveBuffer));
     }
   }
 
@@ -250,14 +260,16 @@ class SocketCan : public DatagramTransport {
     return (datagram.flags & MSG_CONFIRM) != 0;  // sent by this very socket
   }
 
-  /// ENETDOWN and ENODEV come once; afterwards a dead socket looks like a quiet bus. So the state is kept.
+  /// ENETDOWN and ENODEV come once; afterwards a dead socket looks like a quiet bus. So the state
+  /// is kept.
   void OnSendError(int error) noexcept override {
     if (error == ENETDOWN) link_ = LinkState::kDown;
     if (error == ENODEV || error == ENXIO) link_ = LinkState::kGone;
   }
   void OnReceiveError(int error) noexcept override {
     OnSendError(error);
-    // Not before the socket has told that it failed: who asks for link() must see that the bus was away.
+    // Not before the socket has told that it failed: who asks for link() must see that the bus was
+    // away.
     if (error == EAGAIN && links_.valid() && LinksChanged()) Reopen();
   }
 
@@ -274,7 +286,8 @@ class SocketCan : public DatagramTransport {
 
 }  // namespace
 
-std::unique_ptr<Transport> OpenSocketCan(const std::string& interface, std::vector<Filter> filters) {
+std::unique_ptr<Transport> OpenSocketCan(const std::string& interface,
+                                         std::vector<Filter> filters) {
   return std::make_unique<SocketCan>(interface, std::move(filters));
 }
 

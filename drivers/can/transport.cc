@@ -24,16 +24,18 @@ bool Matches(const Filter& filter, const Frame& frame) noexcept {
 
 bool Transport::Passes(const Frame& frame) const noexcept {
   if (filters_.empty() || frame.error) return true;
-  return std::ranges::any_of(filters_, [&](const Filter& filter) { return Matches(filter, frame); });
+  return std::ranges::any_of(filters_,
+                             [&](const Filter& filter) { return Matches(filter, frame); });
 }
 
 bool Transport::IsOurs(const Frame& frame) const noexcept {
   if (frame.error) return false;
-  return std::ranges::any_of(filters_,
-                             [&](const Filter& filter) { return filter.own && Matches(filter, frame); });
+  return std::ranges::any_of(
+      filters_, [&](const Filter& filter) { return filter.own && Matches(filter, frame); });
 }
 
-std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters, LockstepBus run) {
+std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters,
+                                         LockstepBus run) {
   const auto colon = url.find(':');
   const std::string scheme = url.substr(0, colon);
   const std::string rest = colon == std::string::npos ? "" : url.substr(colon + 1);
@@ -45,7 +47,8 @@ std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Fil
   if (scheme == "loop") return OpenLoop(rest, std::move(filters));
   if (scheme == "socketcan") bus = OpenSocketCan(rest, filters);
   if (scheme == "udp") bus = OpenUdp(rest, filters, lockstep);
-  if (bus) return lockstep ? OpenLockstep(url, std::move(bus), std::move(filters), run) : std::move(bus);
+  if (bus)
+    return lockstep ? OpenLockstep(url, std::move(bus), std::move(filters), run) : std::move(bus);
   throw std::runtime_error(
       fmt::format("bus '{}' is not socketcan:INTERFACE, udp:GROUP:PORT, loop:NAME, replay:FILE or "
                   "faulty:FAULTS:BUS",

@@ -13,8 +13,8 @@ namespace plumb {
 
 class Participant;
 
-/// Standard (11-bit) frames a transport lets in: those with (frame.id & mask) == (id & mask). Remote frames
-/// pass only with `remote`; extended frames never do; error frames always do.
+/// Standard (11-bit) frames a transport lets in: those with (frame.id & mask) == (id & mask).
+/// Remote frames pass only with `remote`; extended frames never do; error frames always do.
 struct Filter {
   uint32_t id;
   uint32_t mask = 0x7FF;
@@ -44,33 +44,38 @@ struct TransportStats {
 struct LockstepBus {
   Participant* participant = nullptr;  ///< null: there is no such run
   int64_t way = 0;                     ///< [us] that frames sent by this transport are on their way
-  int patience = 100;                  ///< [0.1 s] of real time until a frame that has not arrived is lost
+  /// [0.1 s] of real time until a frame that has not arrived is lost
+  int patience = 100;
 };
 
-/// A connection to a CAN bus. Send and Receive do not block, throw or allocate, and one's own frames are not
-/// received. No transport has a clock; where frames wait for a time (faulty:, replay:), SetTime tells it and
-/// NextEvent says when to come again. Not thread-safe.
+/// A connection to a CAN bus. Send and Receive do not block, throw or allocate, and one's own
+/// frames are not received. No transport has a clock; where frames wait for a time (faulty:,
+/// replay:), SetTime tells it and NextEvent says when to come again. Not thread-safe.
 class Transport {
  public:
   virtual ~Transport() = default;
 
-  /// Readable when frames wait. Stays the same number for the transport's life, Reopen included. A frame that
-  /// waits for a time does not show here.
+  /// Readable when frames wait. Stays the same number for the transport's life, Reopen included. A
+  /// frame that waits for a time does not show here.
   virtual int fd() const noexcept = 0;
-  /// Tells the time; call it before Send and Receive. The same calls with the same times have the same
-  /// outcome. @param now scaled monotonic [us]; one before the latest counts as the latest.
+  /// Tells the time; call it before Send and Receive. The same calls with the same times have the
+  /// same outcome. @param now scaled monotonic [us]; one before the latest counts as the latest.
   virtual void SetTime(int64_t) noexcept {}
-  /// The time of SetTime at which a frame becomes due, in the past if one is; kNever: none waits for a time.
+  /// The time of SetTime at which a frame becomes due, in the past if one is; kNever: none waits
+  /// for a time.
   virtual int64_t NextEvent() const noexcept { return kNever; }
-  /// Sends the frames in order. @return how many were accepted; the rest is dropped and counted, because a
-  /// command that waits is a stale command.
+  /// Sends the frames in order. @return how many were accepted; the rest is dropped and counted,
+  /// because a command that waits is a stale command.
   virtual int Send(std::span<const Frame> frames) noexcept = 0;
-  /// Takes up to frames.size() received frames. @return how many; 0 = none waits, or there is so much else
-  /// (own frames, malformed ones) that looking on would take too long: fd() is readable still.
+  /// Takes up to frames.size() received frames. @return how many; 0 = none waits, or there is so
+  /// much else (own frames, malformed ones) that looking on would take too long: fd() is readable
+  /// still.
   virtual int Receive(std::span<Frame> frames) noexcept = 0;
-  /// Tries to bring the link back; call it now and then while link() is not kUp. @return link() afterwards.
+  /// Tries to bring the link back; call it now and then while link() is not kUp. @return link()
+  /// afterwards.
   virtual LinkState Reopen() noexcept { return link_; }
-  /// True if what is received is a recording: no drive hears what is sent, so nothing must be armed.
+  /// True if what is received is a recording: no drive hears what is sent, so nothing must be
+  /// armed.
   virtual bool is_replay() const noexcept { return false; }
 
   LinkState link() const noexcept { return link_; }
@@ -95,13 +100,16 @@ class Transport {
 
 /// Opens a bus by URL:
 ///   socketcan:can0           Linux SocketCAN
-///   udp:239.74.163.2:43113   UDP multicast on this machine (python-can's "udp_multicast" format, IPv4)
+///   udp:239.74.163.2:43113   UDP multicast on this machine (python-can's "udp_multicast" format,
+///                            IPv4)
 ///   loop:name                in this process: all transports of one name hear each other
 ///   replay:run.log           a log of candump -l, or of python-can, in its own time; sends nothing
 ///   faulty:loss=0.1:URL      another bus with faults, see faulty.h
 /// docs/transports.md says more of each.
-/// @param run of a process that takes part in one: its bus is in virtual time, too, see lockstep_transport.h.
+/// @param run of a process that takes part in one: its bus is in virtual time, too, see
+/// lockstep_transport.h.
 /// @throws std::runtime_error: one line that names the cause and the cure.
-std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters = {}, LockstepBus run = {});
+std::unique_ptr<Transport> OpenTransport(const std::string& url, std::vector<Filter> filters = {},
+                                         LockstepBus run = {});
 
 }  // namespace plumb

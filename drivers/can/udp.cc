@@ -77,7 +77,9 @@ class Udp : public DatagramTransport {
     SetOption(out, IPPROTO_IP, IP_MULTICAST_TTL, 0);
     SetOption(out, IPPROTO_IP, IP_MULTICAST_LOOP, 1);
     if (connect(out, reinterpret_cast<const sockaddr*>(&group_), sizeof group_) != 0) {
-      Fail("no route for multicast; cure: ip link set lo up multicast on && ip route add 239.0.0.0/8 dev lo");
+      Fail(
+          "no route for multicast; cure: ip link set lo up multicast on && ip route add "
+          "239.0.0.0/8 dev lo");
     }
     // Our own datagrams come back to us; this source address tells them from others'.
     socklen_t length = sizeof own_;
@@ -106,7 +108,8 @@ class Udp : public DatagramTransport {
     if (told_time_) return EncodeUdp(frame, 1e-6 * static_cast<double>(now_), datagram);
     timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
-    const double timestamp = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+    const double timestamp =
+        static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
     return EncodeUdp(frame, timestamp, datagram);
   }
   bool Decode(std::span<const uint8_t> datagram, Frame& frame) noexcept override {
@@ -131,7 +134,8 @@ class Udp : public DatagramTransport {
 
 }  // namespace
 
-std::unique_ptr<Transport> OpenUdp(const std::string& address, std::vector<Filter> filters, bool told_time) {
+std::unique_ptr<Transport> OpenUdp(const std::string& address, std::vector<Filter> filters,
+                                   bool told_time) {
   return std::make_unique<Udp>(address, std::move(filters), told_time);
 }
 

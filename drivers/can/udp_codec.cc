@@ -23,9 +23,17 @@ enum Key {
   kEsi,
   kKeys
 };
-constexpr std::array<std::string_view, kKeys> kNames = {
-    "timestamp", "arbitration_id", "is_extended_id", "is_remote_frame", "is_error_frame",       "channel",
-    "dlc",       "data",           "is_fd",          "bitrate_switch",  "error_state_indicator"};
+constexpr std::array<std::string_view, kKeys> kNames = {"timestamp",
+                                                        "arbitration_id",
+                                                        "is_extended_id",
+                                                        "is_remote_frame",
+                                                        "is_error_frame",
+                                                        "channel",
+                                                        "dlc",
+                                                        "data",
+                                                        "is_fd",
+                                                        "bitrate_switch",
+                                                        "error_state_indicator"};
 
 /// The few msgpack forms that the format needs (github.com/msgpack/msgpack/blob/master/spec.md).
 class Writer {
@@ -48,10 +56,13 @@ class Writer {
     Byte(bytes == 1 ? 0xCC : bytes == 2 ? 0xCD : 0xCE);
     BigEndian(value, bytes);
   }
-  void Float(Key key, double value) { Name(key), Byte(0xCB), BigEndian(std::bit_cast<uint64_t>(value), 8); }
+  void Float(Key key, double value) {
+    Name(key), Byte(0xCB), BigEndian(std::bit_cast<uint64_t>(value), 8);
+  }
   void Nil(Key key) { Name(key), Byte(0xC0); }
   void Binary(Key key, std::span<const uint8_t> bytes) {
-    Name(key), Byte(0xC4), Byte(static_cast<uint8_t>(bytes.size())), Bytes(bytes.data(), bytes.size());
+    Name(key), Byte(0xC4), Byte(static_cast<uint8_t>(bytes.size())),
+        Bytes(bytes.data(), bytes.size());
   }
 
  private:
@@ -60,7 +71,8 @@ class Writer {
     out_ += count;
   }
   void BigEndian(uint64_t value, int bytes) {
-    for (int shift = 8 * (bytes - 1); shift >= 0; shift -= 8) Byte(static_cast<uint8_t>(value >> shift));
+    for (int shift = 8 * (bytes - 1); shift >= 0; shift -= 8)
+      Byte(static_cast<uint8_t>(value >> shift));
   }
 
   uint8_t* begin_;
@@ -153,7 +165,8 @@ class Reader {
   std::span<const uint8_t> in_;
 };
 
-/// @param expected the key that comes next if the sender keeps python-can's order: saves ten comparisons.
+/// @param expected the key that comes next if the sender keeps python-can's order: saves ten
+/// comparisons.
 Key FindKey(std::string_view name, size_t expected) {
   if (name == kNames[expected]) return static_cast<Key>(expected);
   for (size_t i = 0; i < kKeys; ++i) {

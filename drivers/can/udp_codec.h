@@ -16,8 +16,8 @@ inline constexpr size_t kMaxUdpDatagram = 512;
 /// @return its length in bytes.
 size_t EncodeUdp(const Frame& frame, double timestamp, std::span<uint8_t> datagram) noexcept;
 
-/// Reads one datagram, strictly: all eleven keys once each in any order, nothing else and nothing after,
-/// a well-formed frame, dlc equal to the number of data bytes (none in a remote frame).
+/// Reads one datagram, strictly: all eleven keys once each in any order, nothing else and nothing
+/// after, a well-formed frame, dlc equal to the number of data bytes (none in a remote frame).
 /// @return false, with `frame` unspecified, for anything else.
 bool DecodeUdp(std::span<const uint8_t> datagram, Frame& frame) noexcept;
 

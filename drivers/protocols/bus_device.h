@@ -22,12 +22,16 @@ struct BusMessage {
   int64_t period = 0;  ///< [us]; 0 = now and then, not while the robot moves
   int64_t jitter = 0;  ///< [us] by which it may be queued late
   int answers =
-      -1;  ///< it is the answer to that message of the device, whose response time adds to the jitter
-  /// The driver asks for it, and for one such message of the whole bus at a time; or it is that question.
+      /// it is the answer to that message of the device, whose response time adds to the jitter
+      -1;
+  /// The driver asks for it, and for one such message of the whole bus at a time; or it is that
+  /// question.
   bool polled = false;
-  /// Other devices of the protocol may have it, too: broadcasts, and replies that say whose they are.
+  /// Other devices of the protocol may have it, too: broadcasts, and replies that say whose they
+  /// are.
   bool shared = false;
-  int selector = -1;  ///< of a shared one from the device: value of its first field that says whose it is
+  /// of a shared one from the device: value of its first field that says whose it is
+  int selector = -1;
 };
 
 /// Ids [first, last] that are a device's own, whatever of them it uses.

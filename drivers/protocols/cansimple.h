@@ -6,10 +6,11 @@
 
 #include "drivers/protocols/fields.h"
 
-/// ODrive's CANSimple, firmware 0.6: 11-bit ids `node << 5 | command`, little-endian payloads, positions in
-/// revolutions and torques in Nm at the motor's shaft. Layouts from ODrive Robotics' "CAN Protocol" manual
-/// (docs.odriverobotics.com/v/latest/manual/can-protocol.html). Host and virtual drive share these tables;
-/// tests/drivers/cansimple_test.cc checks them against frames written by hand.
+/// ODrive's CANSimple, firmware 0.6: 11-bit ids `node << 5 | command`, little-endian payloads,
+/// positions in revolutions and torques in Nm at the motor's shaft. Layouts from ODrive Robotics'
+/// "CAN Protocol" manual (docs.odriverobotics.com/v/latest/manual/can-protocol.html). Host and
+/// virtual drive share these tables; tests/drivers/cansimple_test.cc checks them against frames
+/// written by hand.
 namespace plumb::cansimple {
 
 inline constexpr int kMaxNode = 0x3E;
@@ -17,7 +18,8 @@ inline constexpr int kBroadcastNode = 0x3F;
 
 namespace detail {
 constexpr Field U(std::string_view name, int bit, int bits, std::string_view unit = "") {
-  return {name, static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kUnsigned, 1, unit};
+  return {name, static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kUnsigned, 1,
+          unit};
 }
 constexpr Field I16(std::string_view name, int bit, double scale, std::string_view unit) {
   return {name, static_cast<uint8_t>(bit), 16, Field::Kind::kSigned, scale, unit};
@@ -44,10 +46,12 @@ inline constexpr Layout kGetError{0x03, "Get_Error", 8,
     {{U("Active_Errors", 0, 32), U("Disarm_Reason", 32, 32)}}};
 inline constexpr Layout kTxSdo{0x05, "TxSdo", 8,
     {{U("Reserved0", 0, 8), U("Endpoint_ID", 8, 16), U("Reserved1", 24, 8), F("Value", 32, "")}}};
-inline constexpr Layout kAddress{0x06, "Address", 7, {{U("Node_ID", 0, 8), U("Serial_Number", 8, 48)}}};
+inline constexpr Layout kAddress{
+    0x06, "Address", 7, {{U("Node_ID", 0, 8), U("Serial_Number", 8, 48)}}};
 inline constexpr Layout kGetEncoderEstimates{0x09, "Get_Encoder_Estimates", 8,
     {{F("Pos_Estimate", 0, "rev"), F("Vel_Estimate", 32, "rev/s")}}};
-inline constexpr Layout kGetIq{0x14, "Get_Iq", 8, {{F("Iq_Setpoint", 0, "A"), F("Iq_Measured", 32, "A")}}};
+inline constexpr Layout kGetIq{
+    0x14, "Get_Iq", 8, {{F("Iq_Setpoint", 0, "A"), F("Iq_Measured", 32, "A")}}};
 inline constexpr Layout kGetTemperature{0x15, "Get_Temperature", 8,
     {{F("FET_Temperature", 0, "degC"), F("Motor_Temperature", 32, "degC")}}};
 inline constexpr Layout kGetBusVoltageCurrent{0x17, "Get_Bus_Voltage_Current", 8,
@@ -63,16 +67,20 @@ inline constexpr Layout kRxSdo{0x04, "RxSdo", 8,
     {{U("Opcode", 0, 8), U("Endpoint_ID", 8, 16), U("Reserved", 24, 8), F("Value", 32, "")}}};
 inline constexpr Layout kRxSdoRead{0x04, "RxSdo", 4,
     {{U("Opcode", 0, 8), U("Endpoint_ID", 8, 16), U("Reserved", 24, 8)}}};
-inline constexpr Layout kSetAxisState{0x07, "Set_Axis_State", 8, {{U("Axis_Requested_State", 0, 32)}}};
+inline constexpr Layout kSetAxisState{
+    0x07, "Set_Axis_State", 8, {{U("Axis_Requested_State", 0, 32)}}};
 inline constexpr Layout kSetControllerMode{0x0B, "Set_Controller_Mode", 8,
     {{U("Control_Mode", 0, 32), U("Input_Mode", 32, 32)}}};
 inline constexpr Layout kSetInputPos{0x0C, "Set_Input_Pos", 8,
-    {{F("Input_Pos", 0, "rev"), I16("Vel_FF", 32, 0.001, "rev/s"), I16("Torque_FF", 48, 0.001, "Nm")}}};
+    {{F("Input_Pos", 0, "rev"), I16("Vel_FF", 32, 0.001, "rev/s"),
+      I16("Torque_FF", 48, 0.001, "Nm")}}};
 inline constexpr Layout kSetInputVel{0x0D, "Set_Input_Vel", 8,
     {{F("Input_Vel", 0, "rev/s"), F("Input_Torque_FF", 32, "Nm")}}};
-inline constexpr Layout kSetInputTorque{0x0E, "Set_Input_Torque", 8, {{F("Input_Torque", 0, "Nm")}}};
+inline constexpr Layout kSetInputTorque{
+    0x0E, "Set_Input_Torque", 8, {{F("Input_Torque", 0, "Nm")}}};
 /// The same in 95 bits at worst instead of 135: what comes after the torque may be left out.
-inline constexpr Layout kSetInputTorqueShort{0x0E, "Set_Input_Torque", 4, {{F("Input_Torque", 0, "Nm")}}};
+inline constexpr Layout kSetInputTorqueShort{
+    0x0E, "Set_Input_Torque", 4, {{F("Input_Torque", 0, "Nm")}}};
 inline constexpr Layout kClearErrors{0x18, "Clear_Errors", 1, {{U("Identify", 0, 8)}}};
 // clang-format on
 
@@ -87,7 +95,13 @@ enum ControlMode : uint8_t {
   kPositionControl = 3
 };
 enum InputMode : uint8_t { kInactive = 0, kPassthrough = 1 };
-enum ProcedureResult : uint8_t { kSuccess = 0, kBusy = 1, kCancelled = 2, kDisarmed = 3, kInvalidState = 13 };
+enum ProcedureResult : uint8_t {
+  kSuccess = 0,
+  kBusy = 1,
+  kCancelled = 2,
+  kDisarmed = 3,
+  kInvalidState = 13
+};
 inline constexpr uint32_t kWatchdogTimerExpired = 1u << 24;
 inline constexpr uint32_t kEstopRequested = 1u << 25;
 

@@ -159,7 +159,8 @@ void CanSimpleDevice::Reboot(int64_t now) noexcept {
 }
 
 void CanSimpleDevice::CheckWatchdog(int64_t now) noexcept {
-  if (armed() && settings_.watchdog > 0 && now - fed_ >= settings_.watchdog) FallIdle(kWatchdogTimerExpired);
+  if (armed() && settings_.watchdog > 0 && now - fed_ >= settings_.watchdog)
+    FallIdle(kWatchdogTimerExpired);
 }
 
 double CanSimpleDevice::Torque() const noexcept {
@@ -179,12 +180,13 @@ Frame CanSimpleDevice::Report(uint8_t command, const Sample& sample) const noexc
     case kGetVersion.command: {
       const auto& v = settings_.version;
       return Make(kGetVersion, node,
-                  {double(v[0]), double(v[1]), double(v[2]), double(v[3]), double(v[4]), double(v[5]),
-                   double(v[6]), double(v[7])});
+                  {double(v[0]), double(v[1]), double(v[2]), double(v[3]), double(v[4]),
+                   double(v[5]), double(v[6]), double(v[7])});
     }
     case kHeartbeat.command:
-      return Make(kHeartbeat, node,
-                  {double(active_errors_ | disarm_reason_), double(state_), double(procedure_result_)});
+      return Make(
+          kHeartbeat, node,
+          {double(active_errors_ | disarm_reason_), double(state_), double(procedure_result_)});
     case kGetError.command:
       return Make(kGetError, node, {double(active_errors_), double(disarm_reason_)});
     case kAddress.command:
@@ -192,7 +194,8 @@ Frame CanSimpleDevice::Report(uint8_t command, const Sample& sample) const noexc
     case kGetEncoderEstimates.command:
       return Make(kGetEncoderEstimates, node, {sample.position, sample.velocity});
     case kGetIq.command:
-      return Make(kGetIq, node, {torque / settings_.torque_constant, torque / settings_.torque_constant});
+      return Make(kGetIq, node,
+                  {torque / settings_.torque_constant, torque / settings_.torque_constant});
     case kGetTemperature.command:
       return Make(kGetTemperature, node, {settings_.temperature, settings_.temperature});
     case kGetBusVoltageCurrent.command:
@@ -209,7 +212,8 @@ void CanSimpleDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) n
     next = NextMultiple(period, now);
     return true;
   };
-  if (due(next_encoder_, settings_.encoder_period)) requested_ |= 1u << kGetEncoderEstimates.command;
+  if (due(next_encoder_, settings_.encoder_period))
+    requested_ |= 1u << kGetEncoderEstimates.command;
   if (due(next_torques_, settings_.torques_period)) requested_ |= 1u << kGetTorques.command;
   if (due(next_telemetry_, settings_.telemetry_period)) {
     requested_ |= 1u << kGetTemperature.command | 1u << kGetBusVoltageCurrent.command;

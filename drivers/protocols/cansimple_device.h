@@ -9,8 +9,8 @@
 
 namespace plumb {
 
-/// A virtual drive that speaks CANSimple as an ODrive with firmware 0.6 does: pure logic. Its use, with a
-/// plant that it drives (times in scaled microseconds of any one clock, never decreasing):
+/// A virtual drive that speaks CANSimple as an ODrive with firmware 0.6 does: pure logic. Its use,
+/// with a plant that it drives (times in scaled microseconds of any one clock, never decreasing):
 ///
 ///   CanSimpleDevice drive(settings, start);
 ///   for (;;) {
@@ -22,8 +22,8 @@ namespace plumb {
 ///     transport->Send(batch.frames());
 ///   }
 ///
-/// Simplifications of the real one: torque control only (position and velocity setpoints feed the watchdog
-/// and move nothing), no SDO, no calibration states. Not thread-safe. Does not allocate.
+/// Simplifications of the real one: torque control only (position and velocity setpoints feed the
+/// watchdog and move nothing), no SDO, no calibration states. Not thread-safe. Does not allocate.
 class CanSimpleDevice {
  public:
   struct Settings {
@@ -32,12 +32,16 @@ class CanSimpleDevice {
     int64_t encoder_period = 10'000;     ///< [us]; 0 = on request only
     int64_t torques_period = 0;          ///< [us] of Get_Torques; 0 = on request only
     int64_t watchdog = 0;  ///< [us] without a setpoint after which the armed drive disarms; 0 = off
-    std::array<uint8_t, 8> version = {2, 4, 4, 58, 0, 6, 10, 0};  ///< protocol, hardware (3), firmware (4)
-    uint64_t serial_number = 0;                                   ///< 48 bits, for the Address message
-    double torque_constant = 0.0827;                              ///< [Nm/A] for Get_Iq
-    double bus_voltage = 24;                                      ///< [V] for Get_Bus_Voltage_Current
-    int64_t telemetry_period = 0;  ///< [us] of Get_Temperature and Get_Bus_Voltage_Current; 0 = on request only
-    double temperature = 25;       ///< [degC] of motor and power stage
+    /// protocol, hardware (3), firmware (4)
+    std::array<uint8_t, 8> version = {2, 4, 4, 58, 0, 6, 10, 0};
+    /// 48 bits, for the Address message
+    uint64_t serial_number = 0;
+    double torque_constant = 0.0827;  ///< [Nm/A] for Get_Iq
+    /// [V] for Get_Bus_Voltage_Current
+    double bus_voltage = 24;
+    /// [us] of Get_Temperature and Get_Bus_Voltage_Current; 0 = on request only
+    int64_t telemetry_period = 0;
+    double temperature = 25;  ///< [degC] of motor and power stage
   };
   struct Sample {
     double position = 0;  ///< [rev] at the motor's shaft
@@ -52,9 +56,9 @@ class CanSimpleDevice {
   /// Obeys a frame; others' are ignored. Answers wait for the next Tick.
   void OnFrame(const Frame& frame, int64_t now) noexcept;
 
-  /// Brings the drive to `now`: watchdog first, then answers, then what is due by the schedule. Cyclic
-  /// messages are due at exact multiples of their periods; one tick sends each of them at most once, so a
-  /// tick that comes late skips the instants it has missed.
+  /// Brings the drive to `now`: watchdog first, then answers, then what is due by the schedule.
+  /// Cyclic messages are due at exact multiples of their periods; one tick sends each of them at
+  /// most once, so a tick that comes late skips the instants it has missed.
   void Tick(int64_t now, const Sample& sample, FrameBatch& out) noexcept;
 
   /// The next instant at which Tick has something to do of its own accord.

@@ -15,13 +15,16 @@ using namespace cansimple;
 
 constexpr int64_t kRetry = 50'000;      // [us] between repetitions of an unanswered frame
 constexpr int kDisarmsBeforeEstop = 5;  // a drive that ignores these gets its emergency stop
-constexpr int kBeatsToArm = 4;  // heartbeats a drive has to enter closed loop; the first may be on its way
+// heartbeats a drive has to enter closed loop; the first may be on its way
+constexpr int kBeatsToArm = 4;
 
 class CanSimpleMotor : public Motor {
  public:
   CanSimpleMotor(int node, const MotorTiming& timing) : node_(node), timing_(timing) {}
 
-  Filter filter() const override { return {.id = static_cast<uint32_t>(node_) << 5, .mask = 0x7E0}; }
+  Filter filter() const override {
+    return {.id = static_cast<uint32_t>(node_) << 5, .mask = 0x7E0};
+  }
 
   FrameUse OnFrame(const Frame& frame, int64_t now) noexcept override {
     if (frame.extended || frame.remote || frame.error || frame.fd ||
@@ -32,11 +35,13 @@ class CanSimpleMotor : public Motor {
     const FrameUse use = command == kHeartbeat.command  ? OnHeartbeat(frame, now)
                          : command == kGetError.command ? OnError(frame)
                                                         : reports_.OnFrame(frame, now);
-    if (command == kAddress.command && reports_.two_drives()) Fail(now, "two drives have its node id");
+    if (command == kAddress.command && reports_.two_drives())
+      Fail(now, "two drives have its node id");
     if (const auto restart = reports_.TakeRestart()) {
       lost_place_ = true;
       Fail(now,
-           "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): home the "
+           "the drive has restarted (silent for {} ms, then its position jumped by {:.3g} turns): "
+           "home the "
            "joint anew",
            restart->silence / 1000, restart->jump);
     }
@@ -91,7 +96,8 @@ class CanSimpleMotor : public Motor {
       Fail(now, "no heartbeat for {} ms", (now - heartbeat_) / 1000);
     }
     const auto& firmware = reports_.firmware();
-    if (step_ == Step::kVersion && present_ && firmware && Spoken(*firmware)) Enter(Step::kClear, now);
+    if (step_ == Step::kVersion && present_ && firmware && Spoken(*firmware))
+      Enter(Step::kClear, now);
     const bool late = now - entered_ >= timing_.heartbeat_timeout;
     switch (step_) {
       case Step::kRest:
@@ -100,7 +106,8 @@ class CanSimpleMotor : public Motor {
         break;
       case Step::kVersion:
         if (firmware && !Spoken(*firmware)) {
-          Fail(now, "its firmware is {}.{}, this driver speaks 0.6", firmware->major, firmware->minor);
+          Fail(now, "its firmware is {}.{}, this driver speaks 0.6", firmware->major,
+               firmware->minor);
         } else if (late && firmware) {
           Fail(now, "it answers, but sends no heartbeat");
         } else if (late) {
@@ -171,7 +178,8 @@ class CanSimpleMotor : public Motor {
     return step_ == Step::kArmed ? DriveState::kArmed : DriveState::kIdle;
   }
   std::string_view reason() const noexcept override {
-    if (reason_.text().empty() && !present_) return heard_ ? "no heartbeat any more" : "no heartbeat yet";
+    if (reason_.text().empty() && !present_)
+      return heard_ ? "no heartbeat any more" : "no heartbeat yet";
     return reason_.text();
   }
   bool confirmed_idle() const noexcept override {
@@ -194,7 +202,8 @@ class CanSimpleMotor : public Motor {
 
   std::string_view Words(uint32_t errors) noexcept { return DescribeErrors(errors, words_); }
 
-  // A drive that has lost its power since the first mode would run in the one it wakes up in, which holds a position.
+  // A drive that has lost its power since the first mode would run in the one it wakes up in, which
+  // holds a position.
   void PushArmingFrames(FrameBatch& out) noexcept {
     if (out.room() < 2) return;
     if (step_ == Step::kClear) {
@@ -250,7 +259,8 @@ class CanSimpleMotor : public Motor {
       Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_), Words(axis_error_),
            DescribeProcedureResult(procedure_result_));
       ask_error_ =
-          true;  // and tell it to stop nevertheless: it may be another with its node id that has spoken
+          // and tell it to stop nevertheless: it may be another with its node id that has spoken
+          true;
     }
     return FrameUse::kConsumed;
   }
@@ -291,7 +301,8 @@ class CanSimpleMotor : public Motor {
 
 }  // namespace
 
-std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description, const MotorTiming& timing) {
+std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description,
+                                          const MotorTiming& timing) {
   if (description.node < 0 || description.node > kMaxNode) {
     throw std::invalid_argument(
         fmt::format("CANSimple node {} is not in [0, {}]", description.node, kMaxNode));

@@ -13,7 +13,8 @@ BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings
   const auto block = static_cast<uint32_t>(motor.node) << 5;
   const int64_t heartbeat = microseconds(driver.heartbeat_timeout) / kBeatsPerTimeout;
   const int64_t telemetry = microseconds(driver.telemetry);
-  BusDevice device{.name = "", .protocol = "cansimple", .messages = {}, .claims = {{block, block + 0x1F}}};
+  BusDevice device{
+      .name = "", .protocol = "cansimple", .messages = {}, .claims = {{block, block + 0x1F}}};
   const auto add = [&](const Layout& layout, Direction direction, int64_t period) {
     BusMessage message;
     message.layout = layout;

@@ -91,7 +91,8 @@ FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexce
   if (estimated_) {
     const double seconds = static_cast<double>(now - estimated_at_) * 1e-6;
     const double turned = std::abs(next.position - estimate_.position) / kRadiansPerTurn;
-    const double fastest = std::max(std::abs(next.velocity), std::abs(estimate_.velocity)) / kRadiansPerTurn;
+    const double fastest =
+        std::max(std::abs(next.velocity), std::abs(estimate_.velocity)) / kRadiansPerTurn;
     // Twice: it may have been faster in between.
     if (!may_jump_ && turned > kLeastJump + 2 * fastest * seconds) {
       jump_ = {now, (next.position - estimate_.position) / kRadiansPerTurn, true};

@@ -9,11 +9,12 @@
 
 namespace plumb {
 
-/// What an ODrive reports besides heartbeats and errors, remembered; and the signs that it has restarted.
-/// Pure logic; free of exceptions and allocation. Not thread-safe.
+/// What an ODrive reports besides heartbeats and errors, remembered; and the signs that it has
+/// restarted. Pure logic; free of exceptions and allocation. Not thread-safe.
 class CanSimpleReports {
  public:
-  /// @param frame of the drive's id, not remote. kRejected for what is too short, not finite or unknown.
+  /// @param frame of the drive's id, not remote. kRejected for what is too short, not finite or
+  /// unknown.
   FrameUse OnFrame(const Frame& frame, int64_t now) noexcept;
   /// Call it with each heartbeat.
   void OnHeartbeat(int axis_state, int64_t now) noexcept;
@@ -40,8 +41,8 @@ class CanSimpleReports {
     int64_t silence;  ///< [us] between two heartbeats
     double jump;      ///< [turns] of the position
   };
-  /// Heartbeats stayed away, then said IDLE, and about that time the position jumped farther than it can have
-  /// turned: the drive lost its power, and with it its place. Told once.
+  /// Heartbeats stayed away, then said IDLE, and about that time the position jumped farther than
+  /// it can have turned: the drive lost its power, and with it its place. Told once.
   std::optional<Restart> TakeRestart() noexcept;
 
  private:

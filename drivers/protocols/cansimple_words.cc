@@ -90,13 +90,15 @@ std::string_view DescribeErrors(uint32_t errors, std::span<char> buffer) noexcep
 }
 
 std::string_view DescribeAxisState(int state) noexcept {
-  return state >= 0 && static_cast<size_t>(state) < kStates.size() ? kStates[static_cast<size_t>(state)]
-                                                                   : "unknown state";
+  return state >= 0 && static_cast<size_t>(state) < kStates.size()
+             ? kStates[static_cast<size_t>(state)]
+             : "unknown state";
 }
 
 std::string_view DescribeProcedureResult(int result) noexcept {
-  return result >= 0 && static_cast<size_t>(result) < kResults.size() ? kResults[static_cast<size_t>(result)]
-                                                                      : "unknown result";
+  return result >= 0 && static_cast<size_t>(result) < kResults.size()
+             ? kResults[static_cast<size_t>(result)]
+             : "unknown result";
 }
 
 }  // namespace plumb::cansimple

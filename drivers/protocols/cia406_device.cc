@@ -15,20 +15,24 @@ constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
 // SDO abort codes of CiA 301.
 constexpr double kNoSuchObject = 0x06020000, kValueOutOfRange = 0x06090030;
 
-int64_t Next(int64_t period, int64_t now) { return period > 0 ? now - now % period + period : kNever; }
+int64_t Next(int64_t period, int64_t now) {
+  return period > 0 ? now - now % period + period : kNever;
+}
 
 }  // namespace
 
 Cia406Device::Cia406Device(const Settings& settings, int64_t now) : settings_(settings) {
-  if (settings.node < 1 || settings.node > 127 || !(settings.counts >= 1) || !(settings.range >= 2) ||
-      settings.range > 4294967296. || settings.event_timer < 1000) {
-    throw std::invalid_argument("an encoder needs a node in [1, 127], counts, a range and an event timer");
+  if (settings.node < 1 || settings.node > 127 || !(settings.counts >= 1) ||
+      !(settings.range >= 2) || settings.range > 4294967296. || settings.event_timer < 1000) {
+    throw std::invalid_argument(
+        "an encoder needs a node in [1, 127], counts, a range and an event timer");
   }
   Reboot(now);
 }
 
 std::array<Filter, 2> Cia406Device::filters() const {
-  return {{{.id = kNmt.command}, {.id = kSdoRequest.command + static_cast<uint32_t>(settings_.node)}}};
+  return {
+      {{.id = kNmt.command}, {.id = kSdoRequest.command + static_cast<uint32_t>(settings_.node)}}};
 }
 
 void Cia406Device::Reboot(int64_t now) noexcept {
@@ -46,7 +50,8 @@ void Cia406Device::Emergency(int code) noexcept {
 
 void Cia406Device::OnFrame(const Frame& frame, int64_t now) noexcept {
   if (frame.extended || frame.error || frame.fd || frame.remote) return;
-  if (frame.id == kSdoRequest.command + static_cast<uint32_t>(settings_.node)) return OnSdo(frame, now);
+  if (frame.id == kSdoRequest.command + static_cast<uint32_t>(settings_.node))
+    return OnSdo(frame, now);
   if (frame.id != kNmt.command) return;
   const auto values = DecodePayload(kNmt, frame);
   if (!values) {
@@ -85,7 +90,8 @@ void Cia406Device::OnSdo(const Frame& frame, int64_t now) noexcept {
     answer_ = Make(kSdoAnswer, settings_.node, {double(specifier), index, subindex, code});
     answer_due_ = true;
   };
-  if (static_cast<int>((*values)[0]) != kWrite2 || index != kPdoParameter || subindex != kEventTimer)
+  if (static_cast<int>((*values)[0]) != kWrite2 || index != kPdoParameter ||
+      subindex != kEventTimer)
     return answer(kAbort, kNoSuchObject);
   if (settings_.refuses_timer || data < 1 || data > 65535) return answer(kAbort, kValueOutOfRange);
   settings_.event_timer = 1000 * static_cast<int64_t>(data);
@@ -105,9 +111,11 @@ void Cia406Device::Tick(int64_t now, double position, FrameBatch& out) noexcept 
   emergency_ = false;
   if (now >= next_position_) {
     next_position_ = Next(settings_.event_timer, now);
-    // Where within a code zero lies is a matter of mounting: in its middle, so that readings are right on average.
+    // Where within a code zero lies is a matter of mounting: in its middle, so that readings are
+    // right on average.
     const double counts = std::floor(position / (2 * std::numbers::pi) * settings_.counts + 0.5);
-    out.Push(Make(kPosition, node, {counts - std::floor(counts / settings_.range) * settings_.range}));
+    out.Push(
+        Make(kPosition, node, {counts - std::floor(counts / settings_.range) * settings_.range}));
   }
   if (now >= next_heartbeat_) {
     next_heartbeat_ = Next(settings_.heartbeat_period, now);

@@ -8,9 +8,9 @@
 
 namespace plumb {
 
-/// A virtual CANopen absolute encoder: boot-up, NMT, heartbeat, TPDO1 on its event timer, which SDO can
-/// change, emergency messages. Pure logic, used like CanSimpleDevice. No other SDO, no SYNC. Not thread-safe.
-/// Does not allocate.
+/// A virtual CANopen absolute encoder: boot-up, NMT, heartbeat, TPDO1 on its event timer, which SDO
+/// can change, emergency messages. Pure logic, used like CanSimpleDevice. No other SDO, no SYNC.
+/// Not thread-safe. Does not allocate.
 class Cia406Device {
  public:
   struct Settings {

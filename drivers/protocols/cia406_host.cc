@@ -67,9 +67,10 @@ class Cia406Encoder : public Sensor {
         Fail("it is there, but has sent no position for {} ms", (now - position_at_) / 1000);
       }
     }
-    // One that is sending already may do so with another period: a stopped one, say, is started by what we send, but
-    // has no SDO until then.
-    const bool tell = state_ == SensorState::kStarting || (state_ == SensorState::kRunning && !agreed_);
+    // One that is sending already may do so with another period: a stopped one, say, is started by
+    // what we send, but has no SDO until then.
+    const bool tell =
+        state_ == SensorState::kStarting || (state_ == SensorState::kRunning && !agreed_);
     if (!tell || now < retry_ || out.room() < 2) return;
     retry_ = now + kRetry;
     out.Push(Make(kSdoRequest, node_,
@@ -113,7 +114,8 @@ class Cia406Encoder : public Sensor {
       counts_ = std::remainder(raw, range_);
     } else {
       const double step = std::remainder(raw - raw_, range_);
-      const int64_t dt = std::max(now - position_at_, period_);  // two may come at once after a delay
+      // two may come at once after a delay
+      const int64_t dt = std::max(now - position_at_, period_);
       const double most = counts_per_microsecond_ * static_cast<double>(dt) + 1;
       if (most >= range_ / 2) {
         Fail("no position for {} ms, in which it may have turned anywhere", dt / 1000);
@@ -153,7 +155,8 @@ class Cia406Encoder : public Sensor {
     const auto values = DecodePayload(kEmergency, frame);
     if (!values) return SensorUse::kRejected;
     const int code = static_cast<int>((*values)[0]);
-    if (code != 0) Fail("it reports error {:#06x} (register {:#04x})", code, static_cast<int>((*values)[1]));
+    if (code != 0)
+      Fail("it reports error {:#06x} (register {:#04x})", code, static_cast<int>((*values)[1]));
     return SensorUse::kConsumed;
   }
 
@@ -193,7 +196,8 @@ std::unique_ptr<Sensor> MakeCia406Encoder(const SensorDescription& d, const Sens
   if (d.node < 1 || d.node > 127) {
     throw std::invalid_argument(fmt::format("CANopen node {} is not in [1, 127]", d.node));
   }
-  if (!(d.counts >= 1 && d.range >= 2 && d.range <= 4294967296. && d.period > 0 && d.max_speed > 0)) {
+  if (!(d.counts >= 1 && d.range >= 2 && d.range <= 4294967296. && d.period > 0 &&
+        d.max_speed > 0)) {
     throw std::invalid_argument(
         "an encoder needs counts, a range of 2 to 2^32, a period and a greatest speed");
   }

@@ -17,9 +17,12 @@ namespace plumb {
 /// Where a number lies in a classic CAN payload, and what it means: value = raw * scale + offset.
 ///
 /// `bit` counts in the order in which the field's bytes follow each other:
-///   kLittleEndian (Intel)     from bit 0 of byte 0, its least significant; the field's least significant bit
-///   kBigEndian    (Motorola)  from bit 7 of byte 0, its most significant; the field's most significant bit
-/// so that in either order a field covers the bits [bit, bit + bits) of byte bit / 8 and those that follow.
+///   kLittleEndian (Intel)     from bit 0 of byte 0, its least significant; the field's least
+///                             significant bit
+///   kBigEndian    (Motorola)  from bit 7 of byte 0, its most significant; the field's most
+///                             significant bit
+/// so that in either order a field covers the bits [bit, bit + bits) of byte bit / 8 and those that
+/// follow.
 struct Field {
   enum class Kind : uint8_t { kUnsigned, kSigned, kFloat };
   enum class Order : uint8_t { kLittleEndian, kBigEndian };
@@ -27,7 +30,8 @@ struct Field {
   std::string_view name;
   uint8_t bit = 0;
   uint8_t bits =
-      0;  ///< width; 32 for kFloat (IEEE 754 binary32); at most 48, so that a double holds it exactly
+      /// width; 32 for kFloat (IEEE 754 binary32); at most 48, so that a double holds it exactly
+      0;
   Kind kind = Kind::kUnsigned;
   double scale = 1;
   std::string_view unit = "";
@@ -39,7 +43,8 @@ struct Field {
   /// The ends of what an integer field can say; of a float, the largest finite numbers.
   constexpr double lowest() const {
     if (kind == Kind::kFloat) return -std::numeric_limits<float>::max() * scale + offset;
-    return kind == Kind::kSigned ? -(static_cast<double>(mask() >> 1) + 1) * scale + offset : offset;
+    return kind == Kind::kSigned ? -(static_cast<double>(mask() >> 1) + 1) * scale + offset
+                                 : offset;
   }
   constexpr double highest() const {
     if (kind == Kind::kFloat) return std::numeric_limits<float>::max() * scale + offset;
@@ -50,7 +55,8 @@ struct Field {
 
   /// @param payload the payload's bytes as a little-endian number.
   constexpr double Decode(uint64_t payload) const {
-    const uint64_t raw = (order == Order::kBigEndian ? SwapBytes(payload) : payload) >> shift() & mask();
+    const uint64_t raw =
+        (order == Order::kBigEndian ? SwapBytes(payload) : payload) >> shift() & mask();
     if (kind == Kind::kFloat)
       return static_cast<double>(std::bit_cast<float>(static_cast<uint32_t>(raw))) * scale + offset;
     if (kind == Kind::kSigned && (raw >> (bits - 1) & 1) != 0) {
@@ -59,9 +65,9 @@ struct Field {
     return static_cast<double>(raw) * scale + offset;
   }
 
-  /// Rounds to the nearest representable value (an unsigned field half-way between two: to the lower one);
-  /// saturates integers at the ends of their range. Not-a-number becomes, in an integer, what is nearest to
-  /// 0.
+  /// Rounds to the nearest representable value (an unsigned field half-way between two: to the
+  /// lower one); saturates integers at the ends of their range. Not-a-number becomes, in an
+  /// integer, what is nearest to 0.
   /// @return the field's bits in place, in a payload as Decode takes it.
   constexpr uint64_t Encode(double value) const {
     const uint64_t raw = Raw(value) << shift();
@@ -86,18 +92,21 @@ struct Field {
     const double bottom = kind == Kind::kSigned ? -top - 1 : 0;
     if (raw < bottom) raw = bottom;
     if (raw > top) raw = top;
-    // A range without a code for 0 has it half-way between two, but for the last bits of this division.
+    // A range without a code for 0 has it half-way between two, but for the last bits of this
+    // division.
     const double half = kind == Kind::kSigned ? 0.5 : 0.5 - 1e-6;
     return static_cast<uint64_t>(static_cast<int64_t>(raw < 0 ? raw - half : raw + half)) & mask();
   }
 };
 
-/// An unsigned field whose codes divide [min, max] evenly, both ends included, as the MIT protocol has them:
-/// value = raw * (max - min) / (2^bits - 1) + min.
+/// An unsigned field whose codes divide [min, max] evenly, both ends included, as the MIT protocol
+/// has them: value = raw * (max - min) / (2^bits - 1) + min.
 constexpr Field RangeField(std::string_view name, int bit, int bits, double min, double max,
-                           std::string_view unit = "", Field::Order order = Field::Order::kBigEndian) {
-  Field field{name, static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kUnsigned, 1, unit,
-              order};
+                           std::string_view unit = "",
+                           Field::Order order = Field::Order::kBigEndian) {
+  Field field{
+      name, static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kUnsigned, 1, unit,
+      order};
   field.scale = (max - min) / static_cast<double>(field.mask());
   field.offset = min;
   return field;
@@ -132,7 +141,8 @@ struct Layout {
 using FieldValues = std::array<double, Layout::kMaxFields>;
 
 /// Fills a frame's payload. Missing values are 0.
-constexpr void EncodePayload(const Layout& layout, std::initializer_list<double> values, Frame& frame) {
+constexpr void EncodePayload(const Layout& layout, std::initializer_list<double> values,
+                             Frame& frame) {
   uint64_t payload = 0;
   size_t i = 0;
   for (const double value : values) payload |= layout.fields[i++].Encode(value);
@@ -141,12 +151,13 @@ constexpr void EncodePayload(const Layout& layout, std::initializer_list<double>
     frame.data[byte] = static_cast<uint8_t>(payload >> (8 * byte));
 }
 
-/// Reads a frame's payload. @return nothing if it is too short or too long for a classic frame. The values
-/// may not be finite.
+/// Reads a frame's payload. @return nothing if it is too short or too long for a classic frame. The
+/// values may not be finite.
 constexpr std::optional<FieldValues> DecodePayload(const Layout& layout, const Frame& frame) {
   if (frame.remote || frame.length < layout.needed() || frame.length > 8) return {};
   uint64_t payload = 0;
-  for (size_t byte = 0; byte < frame.length; ++byte) payload |= uint64_t{frame.data[byte]} << (8 * byte);
+  for (size_t byte = 0; byte < frame.length; ++byte)
+    payload |= uint64_t{frame.data[byte]} << (8 * byte);
   FieldValues values{};
   for (size_t i = 0; i < layout.count(); ++i) values[i] = layout.fields[i].Decode(payload);
   return values;

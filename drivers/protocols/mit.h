@@ -6,21 +6,23 @@
 #include "drivers/protocols/fields.h"
 #include "robot/description.h"
 
-/// The protocol of MIT's mini-cheetah actuator, which T-Motor's and CubeMars' AK series and others speak,
-/// too: one 8-byte command to the motor's id, one reply to the master's id, both packed big-endian in codes
-/// that divide ranges evenly. Nothing in a frame says which ranges: they are configuration (MitRanges), since
-/// the sources disagree even about one and the same motor. Positions and torques are the output shaft's.
+/// The protocol of MIT's mini-cheetah actuator, which T-Motor's and CubeMars' AK series and others
+/// speak, too: one 8-byte command to the motor's id, one reply to the master's id, both packed
+/// big-endian in codes that divide ranges evenly. Nothing in a frame says which ranges: they are
+/// configuration (MitRanges), since the sources disagree even about one and the same motor.
+/// Positions and torques are the output shaft's.
 ///
-/// Layouts and behaviour from bgkatz/motorcontrol (Core/Src/can.c, fsm.c, stm32f4xx_it.c), the firmware by
-/// the actuator's author; lengths 6 and 8 of the reply from CubeMars' AK series manual.
+/// Layouts and behaviour from bgkatz/motorcontrol (Core/Src/can.c, fsm.c, stm32f4xx_it.c), the
+/// firmware by the actuator's author; lengths 6 and 8 of the reply from CubeMars' AK series manual.
 namespace plumb::mit {
 
-/// Of a command frame, sent at all times: byte 7 of a frame whose bytes 0 to 6 are 0xFF. The motor looks for
-/// these in the data of any command.
+/// Of a command frame, sent at all times: byte 7 of a frame whose bytes 0 to 6 are 0xFF. The motor
+/// looks for these in the data of any command.
 enum Special : uint8_t {
   kEnter = 0xFC,  ///< motor mode: obey commands
   kExit = 0xFD,   ///< rest mode
-  kZero = 0xFE,   ///< make the present position 0. We never send it: it destroys what was calibrated
+  /// make the present position 0. We never send it: it destroys what was calibrated
+  kZero = 0xFE,
 };
 
 /// Error codes in byte 7 of an 8-byte reply.
@@ -36,10 +38,12 @@ enum Error : uint8_t {
 std::string_view DescribeError(int error) noexcept;
 
 namespace detail {
-constexpr Field Symmetric(std::string_view name, int bit, int bits, double most, std::string_view unit) {
+constexpr Field Symmetric(std::string_view name, int bit, int bits, double most,
+                          std::string_view unit) {
   return RangeField(name, bit, bits, -most, most, unit);
 }
-constexpr Field Byte(std::string_view name, int bit, Field::Kind kind, double scale, std::string_view unit) {
+constexpr Field Byte(std::string_view name, int bit, Field::Kind kind, double scale,
+                     std::string_view unit) {
   return {name, static_cast<uint8_t>(bit), 8, kind, scale, unit, Field::Order::kBigEndian};
 }
 constexpr Layout Reply(const MitRanges& ranges, std::string_view name, uint8_t length) {
@@ -56,14 +60,14 @@ constexpr Layout Reply(const MitRanges& ranges, std::string_view name, uint8_t l
 /// Torque = Kp (Position - position) + Kd (Velocity - velocity) + Torque_FF.
 constexpr Layout CommandLayout(const MitRanges& ranges) {
   using detail::Symmetric;
-  return {
-      0,
-      "Command",
-      8,
-      {{Symmetric("Position", 0, 16, ranges.position, "rad"),
-        Symmetric("Velocity", 16, 12, ranges.velocity, "rad/s"),
-        RangeField("Kp", 28, 12, 0, ranges.kp, "Nm/rad"), RangeField("Kd", 40, 12, 0, ranges.kd, "Nm s/rad"),
-        Symmetric("Torque_FF", 52, 12, ranges.torque, "Nm")}}};
+  return {0,
+          "Command",
+          8,
+          {{Symmetric("Position", 0, 16, ranges.position, "rad"),
+            Symmetric("Velocity", 16, 12, ranges.velocity, "rad/s"),
+            RangeField("Kp", 28, 12, 0, ranges.kp, "Nm/rad"),
+            RangeField("Kd", 40, 12, 0, ranges.kd, "Nm s/rad"),
+            Symmetric("Torque_FF", 52, 12, ranges.torque, "Nm")}}};
 }
 
 /// A reply's length tells its kind.
@@ -84,8 +88,8 @@ constexpr Layout ReplyLayout(const MitRanges& ranges, uint8_t length) {
   return layout;
 }
 
-/// [rad] after which the position in a reply begins anew: the firmware packs more turns into 16 bits than
-/// they hold, and the codes go round.
+/// [rad] after which the position in a reply begins anew: the firmware packs more turns into 16
+/// bits than they hold, and the codes go round.
 constexpr double Period(const MitRanges& ranges) { return 2 * ranges.position * 65536. / 65535.; }
 
 /// What a command asks for.
@@ -100,11 +104,13 @@ struct Setpoint {
 /// True if all of it is finite and within the ranges.
 constexpr bool Holds(const Layout& command, const Setpoint& s) {
   return command.fields[0].Holds(s.position) && command.fields[1].Holds(s.velocity) &&
-         command.fields[2].Holds(s.kp) && command.fields[3].Holds(s.kd) && command.fields[4].Holds(s.torque);
+         command.fields[2].Holds(s.kp) && command.fields[3].Holds(s.kd) &&
+         command.fields[4].Holds(s.torque);
 }
 
-/// A command's frame, to the nearest code, saturated at the ranges' ends. Never one of the special ones:
-/// their neighbours are, in words, "everything at its most"; such a command gets one position code less.
+/// A command's frame, to the nearest code, saturated at the ranges' ends. Never one of the special
+/// ones: their neighbours are, in words, "everything at its most"; such a command gets one position
+/// code less.
 /// @param command CommandLayout. @param s finite.
 constexpr Frame MakeCommand(const Layout& command, int node, const Setpoint& s) {
   Frame frame;

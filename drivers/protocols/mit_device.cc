@@ -9,15 +9,18 @@ namespace {
 
 using namespace mit;
 
-// As the firmware does it: single precision, towards zero, and no look at the range. What is beyond 16 bits
-// is lost; velocity and torque would spill over into their neighbours, from which we refrain. Its processor makes
-// of too large a number the largest integer, and of not-a-number 0.
+// As the firmware does it: single precision, towards zero, and no look at the range. What is beyond
+// 16 bits is lost; velocity and torque would spill over into their neighbours, from which we
+// refrain. Its processor makes of too large a number the largest integer, and of not-a-number 0.
 uint32_t Truncate(const Field& field, double value) {
   const auto least = static_cast<float>(field.lowest()), most = static_cast<float>(field.highest());
-  const float code = (static_cast<float>(value) - least) * static_cast<float>(field.mask()) / (most - least);
+  const float code =
+      (static_cast<float>(value) - least) * static_cast<float>(field.mask()) / (most - least);
   if (std::isnan(code)) return 0;
   if (field.bits == 16) {
-    return static_cast<uint32_t>(static_cast<int64_t>(std::floor(std::clamp(code, -0x1p31f, 0x1p31f)))) & 0xFFFF;
+    return static_cast<uint32_t>(
+               static_cast<int64_t>(std::floor(std::clamp(code, -0x1p31f, 0x1p31f)))) &
+           0xFFFF;
   }
   return static_cast<uint32_t>(std::clamp(code, 0.f, static_cast<float>(field.mask())));
 }
@@ -31,21 +34,26 @@ MitDevice::MitDevice(const Settings& settings)
   const auto positive = [](double range) { return range > 0 && std::isfinite(range); };
   const MitRanges& r = settings.ranges;
   if (settings.node < 1 || settings.node > 0xFF || settings.master < 0 || settings.master > 0x7FF ||
-      settings.reply_length < kPlain || settings.reply_length > kWithTemperature || !positive(r.position) ||
-      !positive(r.velocity) || !positive(r.torque) || !positive(r.kp) || !positive(r.kd)) {
-    throw std::invalid_argument("a MIT motor needs an id in [1, 0xFF], replies of 6 to 8 bytes, and ranges");
+      settings.reply_length < kPlain || settings.reply_length > kWithTemperature ||
+      !positive(r.position) || !positive(r.velocity) || !positive(r.torque) || !positive(r.kp) ||
+      !positive(r.kd)) {
+    throw std::invalid_argument(
+        "a MIT motor needs an id in [1, 0xFF], replies of 6 to 8 bytes, and ranges");
   }
 }
 
 void MitDevice::OnFrame(const Frame& frame, int64_t now) noexcept {
-  if (frame.extended || frame.error || frame.fd || frame.id != static_cast<uint32_t>(settings_.node)) return;
+  if (frame.extended || frame.error || frame.fd ||
+      frame.id != static_cast<uint32_t>(settings_.node))
+    return;
   if (frame.remote || frame.length != 8) {
     ++rejected_;
     return;
   }
   CheckWatchdog(now);
   if (due_count_ < due_.size()) due_[due_count_++] = armed_ ? setpoint_ : Setpoint{};
-  if (std::all_of(frame.data.begin(), frame.data.begin() + 7, [](uint8_t byte) { return byte == 0xFF; })) {
+  if (std::all_of(frame.data.begin(), frame.data.begin() + 7,
+                  [](uint8_t byte) { return byte == 0xFF; })) {
     switch (frame.data[7]) {
       case kEnter:
         if (error_ != kNoError) return;
@@ -110,7 +118,8 @@ Frame MitDevice::Reply(const Sample& sample, double torque) const noexcept {
   if (frame.length == kWithVoltage) {
     frame.data[6] = static_cast<uint8_t>(std::clamp(settings_.bus_voltage / 40 * 255, 0., 255.));
   } else if (frame.length == kWithTemperature) {
-    frame.data[6] = static_cast<uint8_t>(static_cast<int8_t>(std::clamp(settings_.temperature, -128., 127.)));
+    frame.data[6] =
+        static_cast<uint8_t>(static_cast<int8_t>(std::clamp(settings_.temperature, -128., 127.)));
     frame.data[7] = error_;
   }
   return frame;
@@ -121,8 +130,8 @@ void MitDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) noexcep
   if (error_ != kNoError) armed_ = false;
   for (size_t i = 0; i < due_count_; ++i) {
     const Setpoint& s = due_[i];
-    const double torque =
-        s.kp * (s.position - (sample.position - zero_)) + s.kd * (s.velocity - sample.velocity) + s.torque;
+    const double torque = s.kp * (s.position - (sample.position - zero_)) +
+                          s.kd * (s.velocity - sample.velocity) + s.torque;
     out.Push(Reply(sample, torque));
   }
   due_count_ = 0;

@@ -8,10 +8,11 @@
 
 namespace plumb {
 
-/// A virtual motor that speaks the MIT mini-cheetah protocol as bgkatz' firmware does, its traps included:
+/// A virtual motor that speaks the MIT mini-cheetah protocol as bgkatz' firmware does, its traps
+/// included:
 ///  - a command is remembered in rest mode, too, and obeyed as soon as the motor is switched on;
-///  - without a command for `watchdog` its gains and torque become zero, but it stays switched on; special
-///    frames do not count as commands;
+///  - without a command for `watchdog` its gains and torque become zero, but it stays switched on;
+///    special frames do not count as commands;
 ///  - the reply to a frame is what was before that frame, and the position in it goes round;
 ///  - codes are truncated in single precision, not rounded.
 /// Pure logic, used like CanSimpleDevice. Not thread-safe. Does not allocate.
@@ -51,7 +52,8 @@ class MitDevice {
   int zeroed() const noexcept { return zeroed_; }  ///< times its position was made 0
   int64_t rejected() const noexcept { return rejected_; }
   void set_error(mit::Error error) noexcept { error_ = error; }  ///< an error also switches it off
-  void Reboot(double position) noexcept;  ///< power lost and back; the position then counts from there [rad]
+  /// power lost and back; the position then counts from there [rad]
+  void Reboot(double position) noexcept;
 
  private:
   Frame Reply(const Sample& sample, double torque) const noexcept;

@@ -103,7 +103,8 @@ class MitMotor : public Motor {
           Fail(now, "the bus has not taken its arming frames for {} ms", (now - entered_) / 1000);
         } else if (may_arm) {
           if (step_ == Step::kEnter) may_run_ = true;
-          out.Push(step_ == Step::kEnter ? MakeSpecial(node_, kEnter) : MakeCommand(command_, node_, {}));
+          out.Push(step_ == Step::kEnter ? MakeSpecial(node_, kEnter)
+                                         : MakeCommand(command_, node_, {}));
         }
         break;
       case Step::kAwait:
@@ -153,7 +154,9 @@ class MitMotor : public Motor {
     if (reason_.text().empty() && !present_) return heard_ ? "no reply any more" : "no reply yet";
     return reason_.text();
   }
-  bool confirmed_idle() const noexcept override { return step_ == Step::kRest || (!present_ && !may_run_); }
+  bool confirmed_idle() const noexcept override {
+    return step_ == Step::kRest || (!present_ && !may_run_);
+  }
 
  private:
   enum class Step { kRest, kZeros, kEnter, kAwait, kArmed, kDisarming };
@@ -180,8 +183,8 @@ class MitMotor : public Motor {
     if (Arming() || step_ == Step::kArmed) Disarm(now);
   }
 
-  /// @param raw [rad] position of a reply. @param dt [us] since the one before, -1 = too long ago to count
-  /// turns from there.
+  /// @param raw [rad] position of a reply. @param dt [us] since the one before, -1 = too long ago
+  /// to count turns from there.
   void Track(double raw, int64_t dt, int64_t now) noexcept {
     const double step = std::remainder(raw - raw_, Period(ranges_));
     raw_ = raw;
@@ -189,10 +192,12 @@ class MitMotor : public Motor {
       estimate_.position = raw;
       return;
     }
-    if (!may_jump_ && std::abs(step) > ranges_.velocity * (static_cast<double>(dt) * 1e-6 + kUneven)) {
+    if (!may_jump_ &&
+        std::abs(step) > ranges_.velocity * (static_cast<double>(dt) * 1e-6 + kUneven)) {
       lost_place_ = true;
-      Fail(now, "its position jumped by {:.3g} rad in {:.3g} ms: it has restarted, or lost its place", step,
-           static_cast<double>(dt) * 1e-3);
+      Fail(now,
+           "its position jumped by {:.3g} rad in {:.3g} ms: it has restarted, or lost its place",
+           step, static_cast<double>(dt) * 1e-3);
       estimate_.position = raw;
       return;
     }
@@ -228,7 +233,8 @@ class MitMotor : public Motor {
 };
 
 bool Positive(const MitRanges& ranges) {
-  for (const double range : {ranges.position, ranges.velocity, ranges.torque, ranges.kp, ranges.kd}) {
+  for (const double range :
+       {ranges.position, ranges.velocity, ranges.torque, ranges.kp, ranges.kd}) {
     if (!(range > 0) || !std::isfinite(range)) return false;
   }
   return true;
@@ -257,11 +263,13 @@ std::string_view mit::DescribeError(int error) noexcept {
   }
 }
 
-std::unique_ptr<Motor> MakeMitMotor(const MotorDescription& description, const MotorTiming& timing) {
+std::unique_ptr<Motor> MakeMitMotor(const MotorDescription& description,
+                                    const MotorTiming& timing) {
   if (!description.mit) throw std::invalid_argument("a MIT motor needs ranges");
   const MitDescription& mit = *description.mit;
   if (description.node < 1 || description.node > 0xFF) {
-    throw std::invalid_argument(fmt::format("MIT motor id {} is not in [1, 255]", description.node));
+    throw std::invalid_argument(
+        fmt::format("MIT motor id {} is not in [1, 255]", description.node));
   }
   if (mit.master < 0 || mit.master > 0x7FF || mit.master == description.node) {
     throw std::invalid_argument(

@@ -5,23 +5,23 @@
 
 namespace plumb {
 
-/// The host's side of a motor that speaks the MIT mini-cheetah protocol (see mit.h). It is used for torque
-/// only: all gains are zero in everything we send.
+/// The host's side of a motor that speaks the MIT mini-cheetah protocol (see mit.h). It is used for
+/// torque only: all gains are zero in everything we send.
 ///
-/// A motor speaks only when spoken to, so it is polled: in each Tick at rest with a frame of zero gains and
-/// zero torque, every 20 ms while it is silent.
+/// A motor speaks only when spoken to, so it is polled: in each Tick at rest with a frame of zero
+/// gains and zero torque, every 20 ms while it is silent.
 ///
-/// Arming: three such frames accepted and one answered, because a motor obeys, the instant it is switched on,
-/// whatever it was told last -> "enter", twice, since no reply tells whether it has been obeyed -> armed
-/// after two more replies without an error. The driver sends zero torque meanwhile; until it is armed, Torque
-/// gives zero whatever it is asked for. Disarming, and at the start: "exit" until the second one has been
-/// answered.
+/// Arming: three such frames accepted and one answered, because a motor obeys, the instant it is
+/// switched on, whatever it was told last -> "enter", twice, since no reply tells whether it has
+/// been obeyed -> armed after two more replies without an error. The driver sends zero torque
+/// meanwhile; until it is armed, Torque gives zero whatever it is asked for. Disarming, and at the
+/// start: "exit" until the second one has been answered.
 ///
-/// The zero of the position is never touched. Replies wrap every 25 rad (of +-12.5): the position is
-/// unwrapped, and a step that the greatest velocity does not explain is a fault. After a silence of
-/// heartbeat_timeout, as at the start, the turns are unknown and counted anew.
-/// @throws std::invalid_argument if the node is not in [1, 0xFF], the id of the replies not in [0, 0x7FF] or
-/// equal to the node, a range is not positive, or there is none (MotorDescription::mit).
+/// The zero of the position is never touched. Replies wrap every 25 rad (of +-12.5): the position
+/// is unwrapped, and a step that the greatest velocity does not explain is a fault. After a silence
+/// of heartbeat_timeout, as at the start, the turns are unknown and counted anew.
+/// @throws std::invalid_argument if the node is not in [1, 0xFF], the id of the replies not in [0,
+/// 0x7FF] or equal to the node, a range is not positive, or there is none (MotorDescription::mit).
 std::unique_ptr<Motor> MakeMitMotor(const MotorDescription& description, const MotorTiming& timing);
 
 /// A command and a reply, in every cycle.

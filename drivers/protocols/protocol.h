@@ -24,12 +24,14 @@ struct MotorEstimate {
   double velocity = 0;  ///< [rad/s]
 };
 
-/// What else a drive reports, for whoever watches over it. NaN = it does not report that, or has not yet.
+/// What else a drive reports, for whoever watches over it. NaN = it does not report that, or has
+/// not yet.
 struct MotorReadings {
   double motor_temperature = std::numeric_limits<double>::quiet_NaN();  ///< [degC]
-  double drive_temperature = std::numeric_limits<double>::quiet_NaN();  ///< [degC] of its power stage
-  double bus_voltage = std::numeric_limits<double>::quiet_NaN();        ///< [V] of its supply
-  double bus_current = std::numeric_limits<double>::quiet_NaN();        ///< [A] from its supply
+  /// [degC] of its power stage
+  double drive_temperature = std::numeric_limits<double>::quiet_NaN();
+  double bus_voltage = std::numeric_limits<double>::quiet_NaN();  ///< [V] of its supply
+  double bus_current = std::numeric_limits<double>::quiet_NaN();  ///< [A] from its supply
   int64_t temperatures_at = 0;  ///< [us] when it reported temperatures last; 0 before it has
 };
 
@@ -44,9 +46,10 @@ enum class FrameUse {
 /// The most frames of the arming sequence that a drive is given in a Tick.
 inline constexpr size_t kMostArmingFrames = 2;
 
-/// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All methods
-/// but the constructor are free of exceptions and allocation; times are scaled monotonic microseconds. Frames
-/// to send go into a batch. Units are SI at the motor's shaft; drives' own units end here. Not thread-safe.
+/// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All
+/// methods but the constructor are free of exceptions and allocation; times are scaled monotonic
+/// microseconds. Frames to send go into a batch. Units are SI at the motor's shaft; drives' own
+/// units end here. Not thread-safe.
 class Motor {
  public:
   virtual ~Motor() = default;
@@ -60,7 +63,8 @@ class Motor {
   virtual double torque_estimate() const noexcept = 0;
   /// The newest of each.
   virtual MotorReadings readings() const noexcept { return {}; }
-  /// What the drive says it is, such as "firmware 0.6.10, hardware 4.4.58"; empty if it has not said.
+  /// What the drive says it is, such as "firmware 0.6.10, hardware 4.4.58"; empty if it has not
+  /// said.
   virtual std::string_view identity() const noexcept { return {}; }
 
   /// Begins the arming sequence, from any state but armed. state() tells how it goes.
@@ -69,7 +73,8 @@ class Motor {
   virtual void Disarm(int64_t now) noexcept = 0;
   /// The drive's own emergency stop.
   virtual void Estop(int64_t now) noexcept = 0;
-  /// True if the drive has restarted and counts its position from elsewhere: until a person has homed the joint.
+  /// True if the drive has restarted and counts its position from elsewhere: until a person has
+  /// homed the joint.
   virtual bool lost_place() const noexcept { return false; }
   /// A person has.
   virtual void Homed() noexcept {}
@@ -78,38 +83,44 @@ class Motor {
   /// Once per cycle: deadlines, and the next frames of the sequence under way.
   /// @param may_arm false: no room for kMostArmingFrames in this cycle, the sequence waits.
   virtual void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept = 0;
-  /// How many readings it asks for in turn: with telemetry that comes unasked, all drives' would sometimes come at once.
+  /// How many readings it asks for in turn: with telemetry that comes unasked, all drives' would
+  /// sometimes come at once.
   virtual int num_polled() const noexcept { return 0; }
   /// The question for the next of them.
   virtual void Poll(FrameBatch&) noexcept {}
-  /// After each Tick. @param all whether the transport took all frames of that Tick. If not, they count as
-  /// not sent, and the next Tick gives them again: no step follows one that did not happen.
+  /// After each Tick. @param all whether the transport took all frames of that Tick. If not, they
+  /// count as not sent, and the next Tick gives them again: no step follows one that did not
+  /// happen.
   virtual void Transmitted(bool all, int64_t now) noexcept = 0;
-  /// The frame of a torque setpoint [Nm]. Sent in every cycle while arming (zero) and armed. Whatever the number,
-  /// it is a setpoint a drive can obey: 0 for one that is not finite, the nearest for one beyond its range.
+  /// The frame of a torque setpoint [Nm]. Sent in every cycle while arming (zero) and armed.
+  /// Whatever the number, it is a setpoint a drive can obey: 0 for one that is not finite, the
+  /// nearest for one beyond its range.
   virtual Frame Torque(double torque) noexcept = 0;
-  /// Of a virtual robot only, which is put elsewhere at once between episodes: while true, a position that jumps is no
-  /// fault. A real one cannot jump.
+  /// Of a virtual robot only, which is put elsewhere at once between episodes: while true, a
+  /// position that jumps is no fault. A real one cannot jump.
   virtual void LetJump(bool) noexcept {}
   /// Setpoints that the protocol could not say as they were: beyond its range, or not finite.
   virtual int64_t saturations() const noexcept { return 0; }
 
   virtual DriveState state() const noexcept = 0;
-  /// Why it is not armed: decoded errors, the step at which arming failed. Empty if there is nothing to say.
+  /// Why it is not armed: decoded errors, the step at which arming failed. Empty if there is
+  /// nothing to say.
   virtual std::string_view reason() const noexcept = 0;
-  /// True once the drive has confirmed that it is not armed, or if it is absent and was never armed since.
+  /// True once the drive has confirmed that it is not armed, or if it is absent and was never armed
+  /// since.
   virtual bool confirmed_idle() const noexcept = 0;
 };
 
 /// What a motor needs to know of the driver's settings.
 struct MotorTiming {
   int64_t
-      heartbeat_timeout;  ///< [us] silence after which a drive counts as absent; also for each arming step
+      /// [us] silence after which a drive counts as absent; also for each arming step
+      heartbeat_timeout;
 };
 
 /// A motor of the named protocol (MotorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known), or a node or
-/// settings it cannot have.
+/// @throws std::invalid_argument for an unknown protocol (the message lists those known), or a node
+/// or settings it cannot have.
 std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const MotorTiming& timing);
 
 /// What that motor and its host say on the bus; without a name.

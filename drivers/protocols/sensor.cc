@@ -31,7 +31,8 @@ const Protocol& Find(std::string_view name) {
 
 }  // namespace
 
-std::unique_ptr<Sensor> MakeSensor(const SensorDescription& description, const SensorTiming& timing) {
+std::unique_ptr<Sensor> MakeSensor(const SensorDescription& description,
+                                   const SensorTiming& timing) {
   if (timing.timeout <= 0) throw std::invalid_argument("a sensor's timeout must be positive");
   return Find(description.protocol).make(description, timing);
 }

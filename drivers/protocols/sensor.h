@@ -22,8 +22,8 @@ enum class SensorState : int8_t {
   kFault = 3,     ///< it failed, and stays so until Start
 };
 
-/// Of an encoder, at its shaft. Turns are counted from the first reading after Start, which is within half a turn (or half
-/// the turns that it can tell apart) of 0.
+/// Of an encoder, at its shaft. Turns are counted from the first reading after Start, which is
+/// within half a turn (or half the turns that it can tell apart) of 0.
 struct EncoderReading {
   double position = 0;                                         ///< [rad]
   double velocity = std::numeric_limits<double>::quiet_NaN();  ///< [rad/s]; NaN if it reports none
@@ -31,12 +31,13 @@ struct EncoderReading {
 
 /// Of an inertial measurement unit, in its own axes, all of one instant.
 struct ImuSample {
-  int64_t sample_time = 0;              ///< [us] by the sensor's clock, which counts from anywhere
-  std::array<double, 3> rate{};         ///< [rad/s] angular velocity
-  std::array<double, 3> force{};        ///< [m/s^2] specific force: +9.81 upwards at rest
-  std::array<double, 4> orientation{};  ///< unit quaternion (w, x, y, z): its axes -> the world's, z up
-  bool orientation_valid = false;       ///< the sensor's filter trusts the orientation
-  bool clipped = false;                 ///< rate or force was beyond what it can measure
+  int64_t sample_time = 0;        ///< [us] by the sensor's clock, which counts from anywhere
+  std::array<double, 3> rate{};   ///< [rad/s] angular velocity
+  std::array<double, 3> force{};  ///< [m/s^2] specific force: +9.81 upwards at rest
+  /// unit quaternion (w, x, y, z): its axes -> the world's, z up
+  std::array<double, 4> orientation{};
+  bool orientation_valid = false;  ///< the sensor's filter trusts the orientation
+  bool clipped = false;            ///< rate or force was beyond what it can measure
 };
 
 /// What a sensor made of a frame.
@@ -47,9 +48,9 @@ enum class SensorUse {
   kReading,  ///< completed a new reading
 };
 
-/// The driver's side of one sensor: what a protocol must offer. Pure logic, as Motor: no sockets, no clock;
-/// all methods but the constructor and filters() are free of exceptions and allocation; times are scaled
-/// monotonic microseconds. Frames to send go into a batch. Not thread-safe.
+/// The driver's side of one sensor: what a protocol must offer. Pure logic, as Motor: no sockets,
+/// no clock; all methods but the constructor and filters() are free of exceptions and allocation;
+/// times are scaled monotonic microseconds. Frames to send go into a batch. Not thread-safe.
 class Sensor {
  public:
   virtual ~Sensor() = default;
@@ -73,7 +74,8 @@ class Sensor {
   /// Readings that were thrown away because a part of them was missing, since it was made.
   virtual int64_t incomplete() const noexcept { return 0; }
 
-  /// The newest reading, also of one that is not running any more; null of a sensor of another kind.
+  /// The newest reading, also of one that is not running any more; null of a sensor of another
+  /// kind.
   virtual const EncoderReading* encoder() const noexcept { return nullptr; }
   virtual const ImuSample* imu() const noexcept { return nullptr; }
 };
@@ -84,9 +86,10 @@ struct SensorTiming {
 };
 
 /// A sensor of the named protocol (SensorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or settings it
-/// cannot have.
-std::unique_ptr<Sensor> MakeSensor(const SensorDescription& description, const SensorTiming& timing);
+/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or
+/// settings it cannot have.
+std::unique_ptr<Sensor> MakeSensor(const SensorDescription& description,
+                                   const SensorTiming& timing);
 
 /// What that sensor and the driver say on the bus, under its name.
 /// @throws std::invalid_argument for an unknown protocol.

@@ -25,7 +25,8 @@ void XsensDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) noexc
   error_ = 0;
   if (now < next_) return;
   next_ = now - now % settings_.period + settings_.period;
-  const auto ticks = settings_.first_tick + static_cast<uint32_t>((now - started_) / settings_.tick);
+  const auto ticks =
+      settings_.first_tick + static_cast<uint32_t>((now - started_) / settings_.tick);
   const auto& [w, x, y, z] = sample.orientation;
   out.Push(Make(kSampleTime, base, {double(ticks)}));
   if (settings_.group_counter) out.Push(Make(kGroupCounter, base, {double(counter_++)}));

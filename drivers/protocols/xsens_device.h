@@ -8,8 +8,8 @@
 
 namespace plumb {
 
-/// A virtual Xsens MTi that sends a sample per period, its messages in the order of their ids. Pure logic,
-/// used like CanSimpleDevice; it listens to nothing. Not thread-safe. Does not allocate.
+/// A virtual Xsens MTi that sends a sample per period, its messages in the order of their ids. Pure
+/// logic, used like CanSimpleDevice; it listens to nothing. Not thread-safe. Does not allocate.
 class XsensDevice {
  public:
   struct Settings {

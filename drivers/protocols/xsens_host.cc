@@ -24,8 +24,8 @@ class XsensImu : public Sensor {
 
   std::vector<Filter> filters() const override {
     std::vector<Filter> filters;
-    for (const Layout& layout : {kError, kWarning, kSampleTime, kGroupCounter, kStatusWord, kQuaternion,
-                                 kRateOfTurn, kAcceleration}) {
+    for (const Layout& layout : {kError, kWarning, kSampleTime, kGroupCounter, kStatusWord,
+                                 kQuaternion, kRateOfTurn, kAcceleration}) {
       filters.push_back({.id = base_ + layout.command});
     }
     return filters;
@@ -124,8 +124,8 @@ class XsensImu : public Sensor {
     return SensorUse::kConsumed;
   }
 
-  // It follows SampleTime. A step other than 1 says that whole samples were lost, which is none of ours to
-  // mend; one of 0 that this SampleTime was not its own.
+  // It follows SampleTime. A step other than 1 says that whole samples were lost, which is none of
+  // ours to mend; one of 0 that this SampleTime was not its own.
   SensorUse OnGroupCounter(const Frame& frame) noexcept {
     const auto values = DecodePayload(kGroupCounter, frame);
     if (!values) return SensorUse::kRejected;
@@ -186,7 +186,8 @@ class XsensImu : public Sensor {
     const auto values = DecodePayload(kError, frame);
     if (!values) return SensorUse::kRejected;
     // Code 1 of either says that it could not send all it had: incomplete samples will tell.
-    if (frame.id - base_ == kError.command) Fail("it reports error {}", static_cast<int>((*values)[0]));
+    if (frame.id - base_ == kError.command)
+      Fail("it reports error {}", static_cast<int>((*values)[0]));
     return SensorUse::kConsumed;
   }
 
@@ -213,9 +214,11 @@ class XsensImu : public Sensor {
 
 std::unique_ptr<Sensor> MakeXsensImu(const SensorDescription& d, const SensorTiming& timing) {
   if (d.base < 0 || d.base > 0x7FF - kHighestId) {
-    throw std::invalid_argument(fmt::format("base {} is not in [0, {:#x}]", d.base, 0x7FF - kHighestId));
+    throw std::invalid_argument(
+        fmt::format("base {} is not in [0, {:#x}]", d.base, 0x7FF - kHighestId));
   }
-  if (!(d.period > 0) || !(d.tick > 0)) throw std::invalid_argument("an IMU needs a period and a tick");
+  if (!(d.period > 0) || !(d.tick > 0))
+    throw std::invalid_argument("an IMU needs a period and a tick");
   return std::make_unique<XsensImu>(d, timing);
 }
 

@@ -35,14 +35,16 @@ bool UnscentedFilter::Predict(const Motion& motion, const Eigen::MatrixXd& noise
   for (Eigen::Index i = 0; i < points_.cols(); ++i) {
     if (!motion(points_.col(i))) return false;
   }
-  const double lambda = spread * spread - L, others = 0.5 / (L + lambda), first = lambda / (L + lambda);
+  const double lambda = spread * spread - L, others = 0.5 / (L + lambda),
+               first = lambda / (L + lambda);
   mean_ = first * points_.col(0);
   for (Eigen::Index i = 1; i < points_.cols(); ++i) mean_ += others * points_.col(i);
   points_.colwise() -= mean_;
   points_.col(0) *= std::sqrt(first + 1 - kAlpha * kAlpha + kBeta);
   points_.rightCols(2 * n) *= std::sqrt(others);
   covariance_ = noise;
-  covariance_ += points_.lazyProduct(points_.transpose());  // a product of this size by blocks would allocate
+  // a product of this size by blocks would allocate
+  covariance_ += points_.lazyProduct(points_.transpose());
   return true;
 }
 
@@ -56,7 +58,8 @@ void UnscentedFilter::Correct(const Eigen::VectorXd& row, double value, double v
   const Innovation innovation = Expect(row, value, variance);
   gain_ = shared_ / innovation.variance;
   mean_ += gain_ * innovation.value;
-  // (1 - K h') P (1 - K h')' + K R K', one factor after the other, for a reading that is one number.
+  // (1 - K h') P (1 - K h')' + K R K', one factor after the other, for a reading that is one
+  // number.
   covariance_.noalias() -= gain_ * shared_.transpose();
   shared_.noalias() = covariance_ * row;
   covariance_.noalias() -= shared_ * gain_.transpose();

@@ -16,8 +16,8 @@ constexpr double Square(double x) { return x * x; }
 
 double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
 
-// A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as long as
-// gym's, its error would be greater than the noise.
+// A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as
+// long as gym's, its error would be greater than the noise.
 RobotDescription ForFilter(RobotDescription robot) {
   robot.simulation.integrator = SimulationSettings::Integrator::kLeapfrog;
   for (const JointDescription& joint : robot.joints) {
@@ -39,7 +39,8 @@ Eigen::Index StateSize(const RobotDescription& robot) {
 
 size_t EffortsOnTheirWay(const RobotDescription& robot) {
   double longest = 0;
-  for (const JointDescription& joint : robot.joints) longest = std::max(longest, joint.dynamics.delay);
+  for (const JointDescription& joint : robot.joints)
+    longest = std::max(longest, joint.dynamics.delay);
   return longest > 0 ? static_cast<size_t>(std::ceil(longest / robot.driver.measurement)) + 1 : 0;
 }
 
@@ -90,11 +91,12 @@ bool UnscentedObserver::Predict(double elapsed) {
     noise_(n_ + i, n_ + i) = density * elapsed;
     const Joint& joint = joints_[static_cast<size_t>(i)];
     if (joint.bias < 0) continue;
-    noise_(joint.bias, joint.bias) = Square(joint.settings.bias_sd) * elapsed / KinematicFilter::kBiasWanders;
+    noise_(joint.bias, joint.bias) =
+        Square(joint.settings.bias_sd) * elapsed / KinematicFilter::kBiasWanders;
   }
   acceleration_ = -filter_.mean().segment(n_, n_) / elapsed;
-  const bool predicted =
-      filter_.Predict([this, elapsed](Eigen::Ref<Eigen::VectorXd> x) { return Move(x, elapsed); }, noise_);
+  const bool predicted = filter_.Predict(
+      [this, elapsed](Eigen::Ref<Eigen::VectorXd> x) { return Move(x, elapsed); }, noise_);
   acceleration_ += filter_.mean().segment(n_, n_) / elapsed;
   return predicted;
 }
@@ -109,10 +111,11 @@ bool UnscentedObserver::UseReading(const joint_state_t& measured, size_t i) {
   row_(q) = 1;
   row_(v) = -age;
   const double position = measured.position[i] - acceleration_(q) * age * age / 2;
-  const double position_variance =
-      Square(s.position_sd) + Square(filter_.mean()(v) * s.timing_sd) + density * span * span * span / 3;
+  const double position_variance = Square(s.position_sd) + Square(filter_.mean()(v) * s.timing_sd) +
+                                   density * span * span * span / 3;
   const auto [innovation, variance] = filter_.Expect(row_, position, position_variance);
-  if (!(std::abs(innovation) <= std::max(s.reset_after, kSurely * std::sqrt(variance)))) return false;
+  if (!(std::abs(innovation) <= std::max(s.reset_after, kSurely * std::sqrt(variance))))
+    return false;
   filter_.Correct(row_, position, position_variance);
   if (!std::isfinite(measured.velocity[i])) return true;
   row_.setZero();
@@ -154,7 +157,8 @@ void UnscentedObserver::Remember(double elapsed) {
   past_.back().effort = last_effort_;
 }
 
-void UnscentedObserver::OnJointState(const joint_state_t& measured, const robot_state_t& kinematic) {
+void UnscentedObserver::OnJointState(const joint_state_t& measured,
+                                     const robot_state_t& kinematic) {
   const double elapsed = started_ ? Seconds(measured.utime - state_.utime) : 0;
   for (Eigen::Index i = 0; i < n_; ++i) {
     const auto joint = static_cast<size_t>(i);

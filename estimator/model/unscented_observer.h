@@ -12,17 +12,18 @@
 
 namespace plumb {
 
-/// The causal state by an unscented Kalman filter on the simulator's dynamics, for control only: what
-/// calibration would learn from it is what it has been told. It stands on a StateObserver, whose state it
-/// takes over where its own prediction cannot be had, and which decides what readings are acceptable at all.
+/// The causal state by an unscented Kalman filter on the simulator's dynamics, for control only:
+/// what calibration would learn from it is what it has been told. It stands on a StateObserver,
+/// whose state it takes over where its own prediction cannot be had, and which decides what
+/// readings are acceptable at all.
 ///
-/// The state is q and v of all joints, as sensors read them, and the biases of gyros. From measurement to
-/// measurement it moves as the simulator says, by leapfrog whatever robot.toml's integrator is, under the
-/// effort that JOINT_STATE says was applied. Accelerations that the simulator does not know of are white, of
-/// spectral density [estimator.model] acceleration, squared, and independent. A new reading of a drive, an
-/// encoder, or an IMU's orientation and rate counts at its own time, by the prediction's mean acceleration,
-/// with the noise that EstimatorOf says; accelerometers, and an IMU's readings between those of JOINT_STATE,
-/// are not used.
+/// The state is q and v of all joints, as sensors read them, and the biases of gyros. From
+/// measurement to measurement it moves as the simulator says, by leapfrog whatever robot.toml's
+/// integrator is, under the effort that JOINT_STATE says was applied. Accelerations that the
+/// simulator does not know of are white, of spectral density [estimator.model] acceleration,
+/// squared, and independent. A new reading of a drive, an encoder, or an IMU's orientation and rate
+/// counts at its own time, by the prediction's mean acceleration, with the noise that EstimatorOf
+/// says; accelerometers, and an IMU's readings between those of JOINT_STATE, are not used.
 ///
 /// OnJointState does not allocate after the first call. Not thread-safe.
 class UnscentedObserver {
@@ -36,16 +37,16 @@ class UnscentedObserver {
   explicit UnscentedObserver(const RobotDescription& robot);
 
   /// @param measured one that the StateObserver has accepted.
-  /// @param kinematic the StateObserver's state after it. While that is not valid, or an effort is not known,
-  /// it is taken over.
+  /// @param kinematic the StateObserver's state after it. While that is not valid, or an effort is
+  /// not known, it is taken over.
   void OnJointState(const joint_state_t& measured, const robot_state_t& kinematic);
 
-  /// After the last measurement: as the kinematic one, but for q, v, their standard deviations, model_based,
-  /// which is always true, and restarted.
+  /// After the last measurement: as the kinematic one, but for q, v, their standard deviations,
+  /// model_based, which is always true, and restarted.
   const robot_state_t& state() const { return state_; }
-  /// How often a kinematic state was taken over because the filter had failed: a prediction was not finite or
-  /// out of reach, a covariance not positive definite, or a position further than reset_after, and five
-  /// standard deviations, from what was expected.
+  /// How often a kinematic state was taken over because the filter had failed: a prediction was not
+  /// finite or out of reach, a covariance not positive definite, or a position further than
+  /// reset_after, and five standard deviations, from what was expected.
   int64_t restarts() const { return restarts_; }
 
  private:

@@ -11,18 +11,20 @@
 
 namespace plumb {
 
-/// What acts on a robot only sometimes, or not in proportion: joint stops, Coulomb friction, contact with the
-/// ground. All of it is taken at the end of a substep of h seconds, linear in the velocity v + dv there:
-/// force = f - b (v + dv) adds h b to the matrix and h (f - b v) to the right-hand side of  matrix dv = rhs.
+/// What acts on a robot only sometimes, or not in proportion: joint stops, Coulomb friction,
+/// contact with the ground. All of it is taken at the end of a substep of h seconds, linear in the
+/// velocity v + dv there: force = f - b (v + dv) adds h b to the matrix and h (f - b v) to the
+/// right-hand side of  matrix dv = rhs.
 ///
-/// Whether something pushes, and by which speed friction is to be divided (Coulomb's force is mu f_n v / |v|,
-/// viscous below a small speed), is found by trial: Find with the free motion; then Foresee, Assemble, solve
-/// and Judge until that has settled. Work space of one Stepper; not thread-safe. The topology must outlive
-/// it.
+/// Whether something pushes, and by which speed friction is to be divided (Coulomb's force is mu
+/// f_n v / |v|, viscous below a small speed), is found by trial: Find with the free motion; then
+/// Foresee, Assemble, solve and Judge until that has settled. Work space of one Stepper; not
+/// thread-safe. The topology must outlive it.
 template <class Real, template <class> class Tree>
 class Constraints {
  public:
-  static constexpr double kStickSpeed = 0.01;  ///< [rad/s] or [m/s] below which joint friction is viscous
+  /// [rad/s] or [m/s] below which joint friction is viscous
+  static constexpr double kStickSpeed = 0.01;
 
   Constraints(const Topology& topology, const SimulationSettings& settings, const Terms& terms)
       : topology_(topology),
@@ -35,8 +37,8 @@ class Constraints {
         contacts_(topology.points.size()),
         rows_(topology.points.size() * kRows * n_) {}
 
-  /// Where the substep stands. Positions are those at which forces are evaluated, `ahead` seconds before its
-  /// end.
+  /// Where the substep stands. Positions are those at which forces are evaluated, `ahead` seconds
+  /// before its end.
   struct Substep {
     const Physics<Real>& physics;
     const Real* q;
@@ -44,8 +46,8 @@ class Constraints {
     Real h, ahead;
   };
 
-  /// Looks which constraints act if the velocities become `trial`. False: none does, and nothing need be
-  /// assembled.
+  /// Looks which constraints act if the velocities become `trial`. False: none does, and nothing
+  /// need be assembled.
   bool Find(const Substep& now, const Tree<Real>& tree, const Real* trial) {
     bool any = terms_.friction;
     std::fill(rubbed_.begin(), rubbed_.end(), Real{});
@@ -67,16 +69,17 @@ class Constraints {
     return any;
   }
 
-  /// Friction divides by the speed that it will leave, so that what slides slows evenly and what sticks
-  /// sticks at once: the trial's, changed by what friction at its full force takes beyond what it took in the
-  /// trial.
+  /// Friction divides by the speed that it will leave, so that what slides slows evenly and what
+  /// sticks sticks at once: the trial's, changed by what friction at its full force takes beyond
+  /// what it took in the trial.
   /// @param factors of the trial's matrix.
   void Foresee(const Substep& now, const Real* trial, const SparseCholesky<Real>& cholesky,
                const Real* factors) {
     std::fill(shift_.begin(), shift_.end(), Real{});
     bool rubs = terms_.friction;
     for (size_t i = 0; terms_.friction && i < n_; ++i) {
-      const Real full = trial[i] < 0 ? Real(-now.physics.axes[i].friction) : now.physics.axes[i].friction;
+      const Real full =
+          trial[i] < 0 ? Real(-now.physics.axes[i].friction) : now.physics.axes[i].friction;
       shift_[i] = now.h * (full - rubbed_[i] * trial[i]);
     }
     for (size_t p = 0; p < contacts_.size(); ++p) {
@@ -88,7 +91,8 @@ class Constraints {
       for (size_t t = 1; t < kRows; ++t) {
         const Real force = contact.active ? Real(now.h * more * contact.along[t]) : Real{};
         const Real* row = Row(p, t);
-        for (int i = Last(p); i >= 0; i = Ancestor(i)) shift_[static_cast<size_t>(i)] += row[i] * force;
+        for (int i = Last(p); i >= 0; i = Ancestor(i))
+          shift_[static_cast<size_t>(i)] += row[i] * force;
       }
     }
     if (!rubs) return;
@@ -139,17 +143,19 @@ class Constraints {
     }
   }
 
-  /// What became of the contacts at the velocities `trial`: the next trial starts from there. True where it
-  /// may be the last, because the same contacts act as in it and none of their forces is outside the cone of
-  /// friction.
+  /// What became of the contacts at the velocities `trial`: the next trial starts from there. True
+  /// where it may be the last, because the same contacts act as in it and none of their forces is
+  /// outside the cone of friction.
   Mask<Real> Judge(const Substep& now, const Real* trial) {
     constexpr double kSlack = 1.02;
     Truth settled = Real{} < 1;
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
-      // One that was far may be pushed into the ground by another, one that pushed may have been pushed out.
+      // One that was far may be pushed into the ground by another, one that pushed may have been
+      // pushed out.
       const Real rising = Along(p, 0, trial);
-      const Real force = now.physics.globals.contact_stiffness * contact.depth - Slope(now) * rising;
+      const Real force =
+          now.physics.globals.contact_stiffness * contact.depth - Slope(now) * rising;
       const Truth acts = (contact.depth - now.ahead * rising > 0) & (force > 0);
       settled = settled & (acts == contact.active);
       contact.active = acts;
@@ -166,8 +172,10 @@ class Constraints {
         contact.along[t] = contact.speed > 0 ? Real(contact.along[t] / contact.speed) : Real{};
       }
       contact.gripped *= contact.speed;
-      // Not: is inside. What is not finite will not settle, and must not look unsettled only beside others.
-      const Truth beyond = contact.gripped > kSlack * now.physics.globals.contact_friction * contact.pressure;
+      // Not: is inside. What is not finite will not settle, and must not look unsettled only beside
+      // others.
+      const Truth beyond =
+          contact.gripped > kSlack * now.physics.globals.contact_friction * contact.pressure;
       settled = settled & (beyond == 0);
     }
     return settled;
@@ -189,7 +197,9 @@ class Constraints {
   };
 
   int Ancestor(int velocity) const { return topology_.ancestors[static_cast<size_t>(velocity)]; }
-  const Real* Row(size_t point, size_t direction) const { return &rows_[(point * kRows + direction) * n_]; }
+  const Real* Row(size_t point, size_t direction) const {
+    return &rows_[(point * kRows + direction) * n_];
+  }
 
   // The last velocity that moves the point.
   int Last(size_t point) const {
@@ -225,8 +235,8 @@ class Constraints {
   }
 
   // force = at_rest - slope * row . (v + dv), acting along the row
-  void AddForce(const Substep& now, size_t point, size_t direction, const Real& at_rest, const Real& slope,
-                Real* matrix, Real* rhs) const {
+  void AddForce(const Substep& now, size_t point, size_t direction, const Real& at_rest,
+                const Real& slope, Real* matrix, Real* rhs) const {
     const Real* row = Row(point, direction);
     const Real force = now.h * (at_rest - slope * Along(point, direction, now.v));
     for (int i = Last(point); i >= 0; i = Ancestor(i)) {

@@ -88,15 +88,15 @@ class EngineOf : public Engine {
 template <class Real>
 std::unique_ptr<Engine> Make(const Topology& topology, const SimulationSettings& settings,
                              const Terms& terms) {
-  if (topology.planar) return std::make_unique<EngineOf<Real, PlanarTree>>(topology, settings, terms);
+  if (topology.planar)
+    return std::make_unique<EngineOf<Real, PlanarTree>>(topology, settings, terms);
   return std::make_unique<EngineOf<Real, SpatialTree>>(topology, settings, terms);
 }
 
 }  // namespace
 
-__attribute__((visibility("default"))) std::unique_ptr<Engine> MakeEngine(const Topology& topology,
-                                                                          const SimulationSettings& settings,
-                                                                          const Terms& terms) {
+__attribute__((visibility("default"))) std::unique_ptr<Engine> MakeEngine(
+    const Topology& topology, const SimulationSettings& settings, const Terms& terms) {
   return Make<double>(topology, settings, terms);
 }
 

@@ -7,9 +7,10 @@
 
 namespace plumb {
 
-/// One robot, or several with other parameters side by side ("lanes"), that are stepped together. Arrays hold
-/// for each coordinate its value in every lane: [coordinate * lanes() + lane]. Not thread-safe. Apart from
-/// its making nothing allocates, and nothing throws: what is not finite stays so.
+/// One robot, or several with other parameters side by side ("lanes"), that are stepped together.
+/// Arrays hold for each coordinate its value in every lane: [coordinate * lanes() + lane]. Not
+/// thread-safe. Apart from its making nothing allocates, and nothing throws: what is not finite
+/// stays so.
 class Engine {
  public:
   virtual ~Engine() = default;
@@ -34,8 +35,8 @@ class Engine {
 /// The topology must outlive the engine; the physics is to be set. One lane.
 std::unique_ptr<Engine> MakeEngine(const Topology& topology, const SimulationSettings& settings,
                                    const Terms& terms);
-/// As many lanes as this processor computes at once: 2, 4 or 8. Every lane's results have the bits of
-/// MakeEngine's.
+/// As many lanes as this processor computes at once: 2, 4 or 8. Every lane's results have the bits
+/// of MakeEngine's.
 std::unique_ptr<Engine> MakeWideEngine(const Topology& topology, const SimulationSettings& settings,
                                        const Terms& terms);
 

@@ -12,9 +12,9 @@ struct Terms {
   bool springs = false, friction = false, slowing = false, stops = false, sensors = false;
 };
 
-/// The numbers of a robot that may differ from one simulator to the next. All vectors are in working axes:
-/// those that every link's axes are parallel to where q = 0 (see Topology), hence constant in the link. Real
-/// is double, or a pack with one robot per lane.
+/// The numbers of a robot that may differ from one simulator to the next. All vectors are in
+/// working axes: those that every link's axes are parallel to where q = 0 (see Topology), hence
+/// constant in the link. Real is double, or a pack with one robot per lane.
 template <class Real>
 struct Physics {
   struct Link {
@@ -26,8 +26,9 @@ struct Physics {
   struct Axis {  ///< one degree of freedom; units of the joint or its angle. See JointDynamics.
     Real armature, damping, friction, stiffness, rest;
     Real gain;
-    Real slowing;                           ///< 1 / no_load_speed
-    Real delay, sensor_delay, sensor_bias;  ///< not the equations' of motion, but their surroundings'
+    Real slowing;  ///< 1 / no_load_speed
+    /// not the equations' of motion, but their surroundings'
+    Real delay, sensor_delay, sensor_bias;
   };
   struct Point {       ///< a sphere that may touch the ground
     Real position[3];  ///< [m] from its link's origin
@@ -52,7 +53,8 @@ void SetLane(Wide* wide, const Narrow* narrow, size_t count, int lane) {
   constexpr size_t kLaneCount = sizeof(Wide) / sizeof(Narrow);
   auto* to = reinterpret_cast<double*>(wide) + lane;
   const auto* from = reinterpret_cast<const double*>(narrow);
-  for (size_t i = 0; i < count * (sizeof(Narrow) / sizeof(double)); ++i) to[i * kLaneCount] = from[i];
+  for (size_t i = 0; i < count * (sizeof(Narrow) / sizeof(double)); ++i)
+    to[i * kLaneCount] = from[i];
 }
 }  // namespace internal
 

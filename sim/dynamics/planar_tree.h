@@ -7,10 +7,10 @@
 
 namespace plumb {
 
-/// Equations of motion of a tree whose joints all move in one plane: composite rigid bodies for the mass
-/// matrix, recursive Newton-Euler for the bias (Featherstone, "Rigid Body Dynamics Algorithms", 2008,
-/// sections 6.2 and 5.3) with three-dimensional instead of six-dimensional vectors, all in working axes about
-/// the anchor. Not thread-safe. The topology must outlive it.
+/// Equations of motion of a tree whose joints all move in one plane: composite rigid bodies for the
+/// mass matrix, recursive Newton-Euler for the bias (Featherstone, "Rigid Body Dynamics
+/// Algorithms", 2008, sections 6.2 and 5.3) with three-dimensional instead of six-dimensional
+/// vectors, all in working axes about the anchor. Not thread-safe. The topology must outlive it.
 template <class Real>
 class PlanarTree {
  public:
@@ -96,7 +96,8 @@ class PlanarTree {
       const Composite& all = composites_[j + 1];
       const int parent = topology_.joints[j].parent;
       // Momentum of everything beyond joint j when it moves with unit velocity.
-      Real px = all.mass * moved.lx, py = all.mass * moved.ly, spin = all.x * moved.ly - all.y * moved.lx;
+      Real px = all.mass * moved.lx, py = all.mass * moved.ly,
+           spin = all.x * moved.ly - all.y * moved.lx;
       if (topology_.joints[j].turns()) {
         const double axis = topology_.joints[j].axis[2];
         px -= axis * all.y;
@@ -104,7 +105,8 @@ class PlanarTree {
         spin += axis * all.inertia;
       }
       Real* row = matrix + j * n;
-      for (int i = static_cast<int>(j); i >= 0; i = topology_.joints[static_cast<size_t>(i)].parent - 1) {
+      for (int i = static_cast<int>(j); i >= 0;
+           i = topology_.joints[static_cast<size_t>(i)].parent - 1) {
         const Link& ancestor = links_[static_cast<size_t>(i) + 1];
         const Topology::Joint& joint = topology_.joints[static_cast<size_t>(i)];
         row[i] = ancestor.lx * px + ancestor.ly * py;
@@ -120,10 +122,12 @@ class PlanarTree {
     }
   }
 
-  /// Efforts that hold zero joint accelerations against gravity and inertia, at the velocities of MoveAt.
+  /// Efforts that hold zero joint accelerations against gravity and inertia, at the velocities of
+  /// MoveAt.
   void Bias(const Physics<Real>& physics, Real* bias) {
     const size_t n = topology_.joints.size();
-    const Real gx = physics.globals.gravity * topology_.up[0], gy = physics.globals.gravity * topology_.up[1];
+    const Real gx = physics.globals.gravity * topology_.up[0],
+               gy = physics.globals.gravity * topology_.up[1];
     for (size_t i = 0; i < n; ++i) {
       const Link& link = links_[i + 1];
       const Real mass = physics.links[i].mass, squared = link.spin * link.spin;
@@ -150,19 +154,22 @@ class PlanarTree {
   Real Height(const Physics<Real>& physics, size_t point) const {
     const Link& link = links_[static_cast<size_t>(topology_.points[point].link)];
     const auto& sphere = physics.points[point];
-    return link.y + (link.sine * sphere.position[0] + link.cosine * sphere.position[1]) - sphere.radius;
+    return link.y + (link.sine * sphere.position[0] + link.cosine * sphere.position[1]) -
+           sphere.radius;
   }
 
-  /// Jacobian of that spot: rows of n, upwards and along the ground. Writes only the joints that carry the
-  /// point.
+  /// Jacobian of that spot: rows of n, upwards and along the ground. Writes only the joints that
+  /// carry the point.
   void Jacobian(const Physics<Real>& physics, size_t point, Real* rows) const {
     const size_t n = topology_.joints.size();
     const int carrier = topology_.points[point].link;
     const Link& link = links_[static_cast<size_t>(carrier)];
     const Link& anchor = links_[static_cast<size_t>(topology_.anchor)];
     const auto& sphere = physics.points[point];
-    const Real x = link.x - anchor.x + (link.cosine * sphere.position[0] - link.sine * sphere.position[1]);
-    const Real y = link.y - anchor.y + (link.sine * sphere.position[0] + link.cosine * sphere.position[1]) -
+    const Real x =
+        link.x - anchor.x + (link.cosine * sphere.position[0] - link.sine * sphere.position[1]);
+    const Real y = link.y - anchor.y +
+                   (link.sine * sphere.position[0] + link.cosine * sphere.position[1]) -
                    sphere.radius;
     for (int i = carrier - 1; i >= 0; i = topology_.joints[static_cast<size_t>(i)].parent - 1) {
       const auto at = static_cast<size_t>(i);

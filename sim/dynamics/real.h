@@ -7,8 +7,9 @@
 
 namespace plumb {
 
-/// N doubles side by side: N simulations that go through the same equations together. Operators are GCC's,
-/// one IEEE operation per element, so that every element has the bits a double on its own would have.
+/// N doubles side by side: N simulations that go through the same equations together. Operators are
+/// GCC's, one IEEE operation per element, so that every element has the bits a double on its own
+/// would have.
 template <int N>
 struct PackOf {
   typedef double Type __attribute__((vector_size(N * sizeof(double))));
@@ -16,8 +17,8 @@ struct PackOf {
 template <int N>
 using Pack = typename PackOf<N>::Type;
 
-/// What follows is the same for double and for packs. Comparisons give a Mask; mask ? a : b chooses by
-/// element.
+/// What follows is the same for double and for packs. Comparisons give a Mask; mask ? a : b chooses
+/// by element.
 template <class Real>
 using Mask = decltype(Real() < Real());
 
@@ -77,8 +78,8 @@ inline constexpr double kFar = 1e5;
 template <class Real>
 inline __attribute__((always_inline)) void SinCosNear(const Real& x, Real* sine, Real* cosine) {
   constexpr double kTwoOverPi = 0.63661977236758134308;
-  // pi/2 = first + second + third; the first two have 33 bits, so that k times them is exact. fdlibm's
-  // e_rem_pio2.c.
+  // pi/2 = first + second + third; the first two have 33 bits, so that k times them is exact.
+  // fdlibm's e_rem_pio2.c.
   constexpr double kFirst = 1.57079632673412561417e+00, kSecond = 6.07710050630396597660e-11,
                    kThird = 2.02226624879595063154e-21;
   constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer
@@ -91,15 +92,16 @@ inline __attribute__((always_inline)) void SinCosNear(const Real& x, Real* sine,
               (-1.66666666666666324348e-01 +
                z * (8.33333333332248946124e-03 +
                     z * (-1.98412698298579493134e-04 +
-                         z * (2.75573137070700676789e-06 +
-                              z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-  const Real c = (1 - 0.5 * z) +
-                 z * z *
-                     (4.16666666666666019037e-02 +
-                      z * (-1.38888888888741095749e-03 +
-                           z * (2.48015872894767294178e-05 +
-                                z * (-2.75573143513906633035e-07 +
-                                     z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
+                         z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 +
+                                                                z * 1.58969099521155010221e-10)))));
+  const Real c =
+      (1 - 0.5 * z) +
+      z * z *
+          (4.16666666666666019037e-02 +
+           z * (-1.38888888888741095749e-03 +
+                z * (2.48015872894767294178e-05 +
+                     z * (-2.75573143513906633035e-07 +
+                          z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
   if constexpr (std::is_same_v<Real, double>) {
     const auto quadrant = std::bit_cast<int64_t>(shifted);
     const double first = quadrant & 1 ? c : s, second = quadrant & 1 ? s : c;
@@ -128,9 +130,10 @@ __attribute__((noinline)) void SinCosFar(const Real& x, Real* sine, Real* cosine
 
 }  // namespace internal
 
-/// Sine and cosine to 1e-16, without branches up to 1e5 rad: Cody and Waite's reduction by multiples of pi/2
-/// in three parts, then the polynomials of fdlibm's k_sin.c and k_cos.c (Sun Microsystems, 1993). Of our own,
-/// because a library's vector sine has other bits than its scalar one.
+/// Sine and cosine to 1e-16, without branches up to 1e5 rad: Cody and Waite's reduction by
+/// multiples of pi/2 in three parts, then the polynomials of fdlibm's k_sin.c and k_cos.c (Sun
+/// Microsystems, 1993). Of our own, because a library's vector sine has other bits than its scalar
+/// one.
 template <class Real>
 inline __attribute__((always_inline)) void SinCos(const Real& x, Real* sine, Real* cosine) {
   if (Any(Abs(x) > internal::kFar)) [[unlikely]] {

@@ -7,10 +7,10 @@
 
 namespace plumb {
 
-/// L^T D L factorisation of a symmetric positive definite matrix whose rows differ from zero only at a
-/// coordinate's ancestors: nothing fills in (Featherstone, "Rigid Body Dynamics Algorithms", 2008,
-/// section 6.5). In place, lower triangle, row by row. A matrix that is not positive definite gives a
-/// solution that is not one.
+/// L^T D L factorisation of a symmetric positive definite matrix whose rows differ from zero only
+/// at a coordinate's ancestors: nothing fills in (Featherstone, "Rigid Body Dynamics Algorithms",
+/// 2008, section 6.5). In place, lower triangle, row by row. A matrix that is not positive definite
+/// gives a solution that is not one.
 template <class Real>
 class SparseCholesky {
  public:

@@ -12,12 +12,18 @@ template <class Real>
 struct Vector {
   Real x, y, z;
 
-  friend Vector operator+(const Vector& a, const Vector& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-  friend Vector operator-(const Vector& a, const Vector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend Vector operator+(const Vector& a, const Vector& b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  }
+  friend Vector operator-(const Vector& a, const Vector& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+  }
   friend Vector operator*(const Real& s, const Vector& a) { return {s * a.x, s * a.y, s * a.z}; }
   void operator+=(const Vector& b) { x += b.x, y += b.y, z += b.z; }
   Real Dot(const Vector& b) const { return x * b.x + y * b.y + z * b.z; }
-  Vector Cross(const Vector& b) const { return {y * b.z - z * b.y, z * b.x - x * b.z, x * b.y - y * b.x}; }
+  Vector Cross(const Vector& b) const {
+    return {y * b.z - z * b.y, z * b.x - x * b.z, x * b.y - y * b.x};
+  }
   template <class Other>
   static Vector From(const Other* numbers) {
     Vector vector{};
@@ -41,15 +47,16 @@ struct Symmetric {
   Real xx, yy, zz, xy, xz, yz;
 
   Vector<Real> operator*(const Vector<Real>& a) const {
-    return {xx * a.x + xy * a.y + xz * a.z, xy * a.x + yy * a.y + yz * a.z, xz * a.x + yz * a.y + zz * a.z};
+    return {xx * a.x + xy * a.y + xz * a.z, xy * a.x + yy * a.y + yz * a.z,
+            xz * a.x + yz * a.y + zz * a.z};
   }
   void operator+=(const Symmetric& b) {
     xx += b.xx, yy += b.yy, zz += b.zz, xy += b.xy, xz += b.xz, yz += b.yz;
   }
 };
 
-/// Equations of motion of a tree in space: as PlanarTree, in three dimensions. Not thread-safe. The topology
-/// must outlive it.
+/// Equations of motion of a tree in space: as PlanarTree, in three dimensions. Not thread-safe. The
+/// topology must outlive it.
 template <class Real>
 class SpatialTree {
  public:
@@ -146,8 +153,9 @@ class SpatialTree {
       own.moment = own.mass * c;
       const Vector<Real>& m = own.moment;
       own.inertia = link.inertia;
-      own.inertia += Symmetric<Real>{m.y * c.y + m.z * c.z, m.x * c.x + m.z * c.z, m.x * c.x + m.y * c.y,
-                                     -(m.x * c.y),          -(m.x * c.z),          -(m.y * c.z)};
+      own.inertia +=
+          Symmetric<Real>{m.y * c.y + m.z * c.z, m.x * c.x + m.z * c.z, m.x * c.x + m.y * c.y,
+                          -(m.x * c.y),          -(m.x * c.z),          -(m.y * c.z)};
     }
     for (size_t j = topology_.joints.size(); j-- > 0;) {
       const Topology::Joint& joint = topology_.joints[j];
@@ -207,7 +215,8 @@ class SpatialTree {
   Real Height(const Physics<Real>& physics, size_t point) const {
     const Link& link = links_[static_cast<size_t>(topology_.points[point].link)];
     const auto& sphere = physics.points[point];
-    return link.position.z + (link.rotation * Vector<Real>::From(sphere.position)).z - sphere.radius;
+    return link.position.z + (link.rotation * Vector<Real>::From(sphere.position)).z -
+           sphere.radius;
   }
 
   void Jacobian(const Physics<Real>& physics, size_t point, Real* rows) const {
@@ -271,9 +280,12 @@ class SpatialTree {
                            quaternion[2] * Vector<Real>::From(joint.link_axes + 3) +
                            quaternion[3] * Vector<Real>::From(joint.link_axes + 6);
     const Real two = 2 / (w * w + v.Dot(v));
-    return {{1 - two * (v.y * v.y + v.z * v.z), two * (v.x * v.y + w * v.z), two * (v.x * v.z - w * v.y)},
-            {two * (v.x * v.y - w * v.z), 1 - two * (v.x * v.x + v.z * v.z), two * (v.y * v.z + w * v.x)},
-            {two * (v.x * v.z + w * v.y), two * (v.y * v.z - w * v.x), 1 - two * (v.x * v.x + v.y * v.y)}};
+    return {{1 - two * (v.y * v.y + v.z * v.z), two * (v.x * v.y + w * v.z),
+             two * (v.x * v.z - w * v.y)},
+            {two * (v.x * v.y - w * v.z), 1 - two * (v.x * v.x + v.z * v.z),
+             two * (v.y * v.z + w * v.x)},
+            {two * (v.x * v.z + w * v.y), two * (v.y * v.z - w * v.x),
+             1 - two * (v.x * v.x + v.y * v.y)}};
   }
 
   // R I R^T

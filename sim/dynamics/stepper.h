@@ -11,12 +11,12 @@
 
 namespace plumb {
 
-/// Integrates a robot over substeps of given length, with joint damping, springs, friction, stops and
-/// contacts taken at the end of the substep and linearised in the velocity there ("linearly implicit"), so
-/// that stiff ones need no shorter substeps:
+/// Integrates a robot over substeps of given length, with joint damping, springs, friction, stops
+/// and contacts taken at the end of the substep and linearised in the velocity there ("linearly
+/// implicit"), so that stiff ones need no shorter substeps:
 ///   (M + h D + ...) dv = h (effort - bias - D v + ...)
-/// Stops, friction and contacts are settled in two to four trials after the free motion, see Constraints. Not
-/// thread-safe. The topology must outlive it.
+/// Stops, friction and contacts are settled in two to four trials after the free motion, see
+/// Constraints. Not thread-safe. The topology must outlive it.
 ///
 /// Real is double or a pack. Every lane has the bits it would have alone.
 template <class Real, template <class> class Tree>
@@ -46,8 +46,9 @@ class Stepper {
 
   /// One substep of h > 0 seconds, which may differ from lane to lane. Arrays of one per velocity:
   /// @param effort mean over the substep of what is commanded.
-  /// @param moment integral over the substep of (h/2 - t) effort(t) dt, or null where effort is constant: it
-  /// moves the joints as an effort early in the substep moves them farther than a late one. [Nm s^2]
+  /// @param moment integral over the substep of (h/2 - t) effort(t) dt, or null where effort is
+  /// constant: it moves the joints as an effort early in the substep moves them farther than a late
+  /// one. [Nm s^2]
   void Substep(const Real& h, const Real* effort, const Real* moment) {
     if (leapfrog_) Move(Real(h / 2), v.data());
     tree_.MoveTo(physics, q.data());
@@ -99,8 +100,8 @@ class Stepper {
     return bias_.data();
   }
 
-  /// q, v are readings of sensors (JointDynamics): makes them the state that these are of, to second order in
-  /// the delay, and back.
+  /// q, v are readings of sensors (JointDynamics): makes them the state that these are of, to
+  /// second order in the delay, and back.
   void FromReading(const Real* effort) {
     const Real* acceleration = Felt(effort);
     ForEachReading([&](Real& position, Real& velocity, const auto& axis, size_t i) {
@@ -154,7 +155,8 @@ class Stepper {
     tree_.MoveAt(v.data());
     tree_.MassMatrix(physics, smooth_.data());
     tree_.Bias(physics, bias_.data());
-    const double share = leapfrog_ ? 0.5 : 1;  // of the substep's end in the velocity that damping sees
+    // of the substep's end in the velocity that damping sees
+    const double share = leapfrog_ ? 0.5 : 1;
     for (size_t i = 0; i < n_; ++i) {
       const auto& axis = physics.axes[i];
       drive_[i] = axis.gain * effort[i] - bias_[i] - axis.damping * v[i];
@@ -198,8 +200,8 @@ class Stepper {
     return change_.data();
   }
 
-  // Changes the free motion into that with stops, friction and contacts, if any of them acts. A lane whose
-  // trial has settled keeps it, however long others try.
+  // Changes the free motion into that with stops, friction and contacts, if any of them acts. A
+  // lane whose trial has settled keeps it, however long others try.
   void Constrain(const Real& h) {
     const typename Constraints<Real, Tree>::Substep now{physics, q.data(), v.data(), h, Ahead(h)};
     for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
@@ -228,7 +230,8 @@ class Stepper {
     if (!(settings_.speed_clip < std::numeric_limits<double>::infinity())) return;
     for (Real& speed : v) {
       // What has become infinite must not look like a bounded speed again: inf - inf is NaN.
-      speed = Clamp(speed, Real{} - settings_.speed_clip, Real{} + settings_.speed_clip) + (speed - speed);
+      speed = Clamp(speed, Real{} - settings_.speed_clip, Real{} + settings_.speed_clip) +
+              (speed - speed);
     }
   }
 
@@ -249,8 +252,8 @@ class Stepper {
     }
   }
 
-  // Quaternion times the exponential of half the angle turned: exact for constant angular velocity in link
-  // axes.
+  // Quaternion times the exponential of half the angle turned: exact for constant angular velocity
+  // in link axes.
   static void Turn(const Real& h, const Real* spin, Real* quaternion) {
     const Real speed = Sqrt(Real(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2]));
     const Real half = 0.5 * h * speed;

@@ -47,8 +47,9 @@ Vector3d FindNormal(const RobotDescription& robot, const std::vector<Matrix3d>& 
   }
   for (size_t i = 0; i < robot.joints.size(); ++i) {
     const Vector3d axis = axes[i + 1] * robot.joints[i].axis;
-    const bool fits = robot.joints[i].type == Type::kPrismatic ? std::abs(axis.dot(normal)) < kParallel
-                                                               : axis.cross(normal).norm() < kParallel;
+    const bool fits = robot.joints[i].type == Type::kPrismatic
+                          ? std::abs(axis.dot(normal)) < kParallel
+                          : axis.cross(normal).norm() < kParallel;
     if (!fits) return Vector3d::Zero();
   }
   return normal;
@@ -69,8 +70,10 @@ Topology::Topology(const RobotDescription& robot) {
   const size_t n = robot.joints.size();
   for (size_t i = 0; i < n; ++i) {
     const JointDescription& joint = robot.joints[i];
-    if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 || joint.parent > static_cast<int>(i)) {
-      throw std::invalid_argument("joint '" + joint.name + "' is not in depth-first order of a tree");
+    if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 ||
+        joint.parent > static_cast<int>(i)) {
+      throw std::invalid_argument("joint '" + joint.name +
+                                  "' is not in depth-first order of a tree");
     }
   }
   link_axes = AxesAtZero(robot);

@@ -13,9 +13,9 @@ namespace {
 constexpr int kCoordinates = 6;
 constexpr double kStandingHeight = 1.25;  // [m]
 constexpr double kStartNoise = 0.005;
-constexpr double kLowest = 0.7;           // [m]
-constexpr double kSteepest = 0.2;         // [rad]
-constexpr double kWildest = 100;          // any unit
+constexpr double kLowest = 0.7;    // [m]
+constexpr double kSteepest = 0.2;  // [rad]
+constexpr double kWildest = 100;   // any unit
 constexpr double kSpeedClip = 10;
 constexpr double kAliveBonus = 1;
 constexpr double kActionCost = 1e-3;
@@ -32,7 +32,8 @@ bool IsHopper(const RobotDescription& description) {
 }
 
 Eigen::VectorXd StateScale() {
-  return (Eigen::VectorXd(2 * kCoordinates) << 1, 0.5, 0.2, 1, 1, 1, 2, 2, 2, 10, 10, 10).finished();
+  return (Eigen::VectorXd(2 * kCoordinates) << 1, 0.5, 0.2, 1, 1, 1, 2, 2, 2, 10, 10, 10)
+      .finished();
 }
 
 /// Of any robot: it is looked at more closely afterwards.
@@ -40,7 +41,8 @@ std::vector<std::string> ObservationNames(const RobotDescription& description) {
   std::vector<std::string> names;
   for (size_t i = 1; i < description.joints.size(); ++i) {
     const JointDescription& joint = description.joints[i];
-    names.push_back("q/" + joint.name + (joint.type == JointDescription::Type::kPrismatic ? " [m]" : " [rad]"));
+    names.push_back("q/" + joint.name +
+                    (joint.type == JointDescription::Type::kPrismatic ? " [m]" : " [rad]"));
   }
   for (std::string& name : VelocityNames(description)) names.push_back(std::move(name));
   return names;
@@ -53,13 +55,15 @@ HopperTask::HopperTask(const RobotDescription& description)
       period_(description.task.period) {
   if (!IsHopper(description)) {
     throw std::invalid_argument(
-        "task 'hopper' needs two slides and a turning joint without motors, then three turning joints with; '" +
+        "task 'hopper' needs two slides and a turning joint without motors, then three turning "
+        "joints with; '" +
         description.name + "' has others");
   }
 }
 
 void HopperTask::Observe(const State& q, const State& v, std::span<float> observation) const {
-  for (int i = 1; i < kCoordinates; ++i) observation[static_cast<size_t>(i - 1)] = static_cast<float>(q[i]);
+  for (int i = 1; i < kCoordinates; ++i)
+    observation[static_cast<size_t>(i - 1)] = static_cast<float>(q[i]);
   for (int i = 0; i < kCoordinates; ++i) {
     observation[static_cast<size_t>(kCoordinates - 1 + i)] =
         static_cast<float>(std::clamp(v[i], -kSpeedClip, kSpeedClip));
@@ -79,7 +83,8 @@ double HopperTask::Reward(const State& q, const State&, const State& effort, con
 bool HopperTask::Terminated(const State& q, const State& v) const {
   // Written so that what is not a number is no healthy state either.
   const bool tame = (q.tail(kCoordinates - 2).array().abs() < kWildest).all() &&
-                    (v.array().abs() < kWildest).all() && std::isfinite(q[0]) && std::isfinite(q[1]);
+                    (v.array().abs() < kWildest).all() && std::isfinite(q[0]) &&
+                    std::isfinite(q[1]);
   return !(tame && q[1] > kLowest && std::abs(q[2]) < kSteepest);
 }
 

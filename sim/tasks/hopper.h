@@ -11,12 +11,13 @@ namespace plumb {
 ///   terminated   unless z > 0.7, |pitch| < 0.2, and all entries but x and z within +-100
 /// gym's own action is charged as the policy gives it; here it is clipped first.
 ///
-/// Errors of predicted states are measured in units of what a hop makes of each: 1 m forward, 0.5 m up, 0.2 rad of
-/// the torso (where it falls) and 1 rad of the others; 2 m/s, 2 rad/s of the torso, and 10 rad/s of the others.
+/// Errors of predicted states are measured in units of what a hop makes of each: 1 m forward, 0.5 m
+/// up, 0.2 rad of the torso (where it falls) and 1 rad of the others; 2 m/s, 2 rad/s of the torso,
+/// and 10 rad/s of the others.
 class HopperTask : public Task {
  public:
-  /// @throws std::invalid_argument unless the robot has gym's six joints: two slides and a turning joint without
-  /// motors, then three turning ones with.
+  /// @throws std::invalid_argument unless the robot has gym's six joints: two slides and a turning
+  /// joint without motors, then three turning ones with.
   explicit HopperTask(const RobotDescription& description);
 
   void Observe(const State& q, const State& v, std::span<float> observation) const override;

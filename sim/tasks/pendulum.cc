@@ -29,8 +29,9 @@ PendulumTask::PendulumTask(const RobotDescription& description)
   using Type = JointDescription::Type;
   if (description.num_joints() != 1 || description.joints[0].type == Type::kPrismatic ||
       description.joints[0].type == Type::kSpherical || description.joints[0].passive) {
-    throw std::invalid_argument("task 'pendulum' needs a robot with one turning joint and its motor; '" + description.name +
-                                "' is none");
+    throw std::invalid_argument(
+        "task 'pendulum' needs a robot with one turning joint and its motor; '" + description.name +
+        "' is none");
   }
 }
 

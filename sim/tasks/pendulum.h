@@ -6,10 +6,12 @@ namespace plumb {
 
 /// Swing-up of OpenAI gym's Pendulum: q = 0 is upright.
 ///   observation  (cos q, sin q, v)
-///   reward       -(wrap(q)^2 + 0.1 v^2 + 0.001 u^2) of the state before the step, wrap to [-pi, pi), u [Nm]
+///   reward       -(wrap(q)^2 + 0.1 v^2 + 0.001 u^2) of the state before the step, wrap to
+///                [-pi, pi), u [Nm]
 ///   start        q ~ U(-pi, pi), v ~ U(-1, 1)
-/// Never terminates. Errors are measured in units of 1 rad and 8 rad/s, gym's bound of the speed: about what
-/// a 1 m rod reaches at the bottom when it falls from the top, sqrt(6 g / l) = 7.7 rad/s.
+/// Never terminates. Errors are measured in units of 1 rad and 8 rad/s, gym's bound of the speed:
+/// about what a 1 m rod reaches at the bottom when it falls from the top, sqrt(6 g / l) = 7.7
+/// rad/s.
 class PendulumTask : public Task {
  public:
   /// @throws std::invalid_argument unless the robot has exactly one joint and that one turns.

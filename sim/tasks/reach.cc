@@ -139,7 +139,8 @@ void ReachTask::Observe(const State& q, const State& v, std::span<float> observa
   for (const double speed : v) observation[next++] = static_cast<float>(speed);
 }
 
-double ReachTask::Reward(const State& q, const State& v, const State& effort, const State&, const State&) const {
+double ReachTask::Reward(const State& q, const State& v, const State& effort, const State&,
+                         const State&) const {
   double cost = 0;
   for (const Joint& joint : joints_) {
     if (joint.type == Type::kSpherical) {
@@ -147,7 +148,8 @@ double ReachTask::Reward(const State& q, const State& v, const State& effort, co
       continue;
     }
     const double difference = q[joint.q] - joint.target;
-    const double error = (joint.type == Type::kContinuous ? WrapAngle(difference) : difference) / joint.scale;
+    const double error =
+        (joint.type == Type::kContinuous ? WrapAngle(difference) : difference) / joint.scale;
     const double speed = v[joint.v] / joint.scale;
     cost += error * error + kSpeedWeight * speed * speed;
   }

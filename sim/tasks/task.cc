@@ -8,14 +8,16 @@
 
 namespace plumb {
 
-Task::Task(const RobotDescription& description, std::vector<std::string> observation_names, Eigen::VectorXd state_scale)
+Task::Task(const RobotDescription& description, std::vector<std::string> observation_names,
+           Eigen::VectorXd state_scale)
     : observation_names_(std::move(observation_names)),
       state_scale_(std::move(state_scale)),
       effort_limits_(description.effort_limits()) {
   for (const JointDescription& joint : description.joints) {
     if (!joint.passive) {
       if (joint.num_velocities() != 1) {
-        throw std::invalid_argument("joint '" + joint.name + "' cannot be driven: one motor turns about one axis");
+        throw std::invalid_argument("joint '" + joint.name +
+                                    "' cannot be driven: one motor turns about one axis");
       }
       action_names_.push_back(joint.name);
       action_indices_.push_back(num_efforts_);
@@ -30,7 +32,8 @@ bool Task::Terminated(const State&, const State&) const { return false; }
 
 void Task::Effort(std::span<const float> action, Eigen::Ref<Eigen::VectorXd> effort) const {
   if (static_cast<int>(action.size()) != action_size() || effort.size() != num_efforts_) {
-    throw std::invalid_argument("an action has one entry per driven joint: " + std::to_string(action_size()));
+    throw std::invalid_argument("an action has one entry per driven joint: " +
+                                std::to_string(action_size()));
   }
   effort.setZero();
   for (int i = 0; i < action_size(); ++i) {
@@ -49,9 +52,11 @@ std::vector<std::string> VelocityNames(const RobotDescription& description) {
   std::vector<std::string> names;
   for (const JointDescription& joint : description.joints) {
     if (joint.type == JointDescription::Type::kSpherical) {
-      for (const char* axis : {"/x", "/y", "/z"}) names.push_back("v/" + joint.name + axis + " [rad/s]");
+      for (const char* axis : {"/x", "/y", "/z"})
+        names.push_back("v/" + joint.name + axis + " [rad/s]");
     } else {
-      names.push_back("v/" + joint.name + (joint.type == JointDescription::Type::kPrismatic ? " [m/s]" : " [rad/s]"));
+      names.push_back("v/" + joint.name +
+                      (joint.type == JointDescription::Type::kPrismatic ? " [m/s]" : " [rad/s]"));
     }
   }
   return names;

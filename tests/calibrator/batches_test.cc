@@ -32,13 +32,15 @@ Inference Infer(Journal* journal, int most = 4) {
   Inference inference;
   Eigen::MatrixXd x = Eigen::MatrixXd::Constant(2, 3, 0.5);
   for (int i = 0; i < most; ++i) {
-    x = batches.Run(Hash(x, Hash("step")), 2 + i % 2, 3, [&](Eigen::Index first, Eigen::Index count) {
-      ++inference.computed;
-      Eigen::MatrixXd y(2 + i % 2, count);
-      for (Eigen::Index j = 0; j < count; ++j) y.col(j).setConstant(std::sin(x.sum() + static_cast<double>(first + j)) / 3);
-      if (i == 1) y(0, 0) = std::nan("");  // a failed simulation is an outcome, too
-      return y;
-    });
+    x = batches.Run(
+        Hash(x, Hash("step")), 2 + i % 2, 3, [&](Eigen::Index first, Eigen::Index count) {
+          ++inference.computed;
+          Eigen::MatrixXd y(2 + i % 2, count);
+          for (Eigen::Index j = 0; j < count; ++j)
+            y.col(j).setConstant(std::sin(x.sum() + static_cast<double>(first + j)) / 3);
+          if (i == 1) y(0, 0) = std::nan("");  // a failed simulation is an outcome, too
+          return y;
+        });
     inference.batches.push_back(x);
     x = x.unaryExpr([](double v) { return std::isnan(v) ? 0.0 : v; });
   }
@@ -59,16 +61,21 @@ TEST_CASE("without a journal, and alone, batches are just computed") {
   CHECK(plain.computed == 4);
   CHECK(plain.batches[0](0, 0) == Approx(std::sin(3.0) / 3));
   Batches here;
-  CHECK_THROWS_AS(here.Run(1, 2, 2, [](auto, auto) { return Eigen::MatrixXd(2, 1); }), std::logic_error);
+  CHECK_THROWS_AS(here.Run(1, 2, 2, [](auto, auto) { return Eigen::MatrixXd(2, 1); }),
+                  std::logic_error);
 }
 
 TEST_CASE("an inference killed at any byte of its journal comes to the same bits") {
   const Inference truth = Infer(nullptr);
   const TemporaryFile file("", "_journal");
-  { Journal journal(file.path(), 77); CHECK(Infer(&journal).computed == 4); }
+  {
+    Journal journal(file.path(), 77);
+    CHECK(Infer(&journal).computed == 4);
+  }
   const std::string whole = Contents(file.path());
   // Head, and for each batch header and numbers.
-  const std::vector<size_t> ends{16, 16 + 32 + 48, 16 + 64 + 48 + 72, 16 + 96 + 96 + 72, 16 + 128 + 96 + 144};
+  const std::vector<size_t> ends{16, 16 + 32 + 48, 16 + 64 + 48 + 72, 16 + 96 + 96 + 72,
+                                 16 + 128 + 96 + 144};
   REQUIRE(whole.size() == ends.back());
   for (size_t length = 0; length <= whole.size(); ++length) {
     file.Write(whole.substr(0, length));
@@ -89,7 +96,10 @@ TEST_CASE("an inference killed at any byte of its journal comes to the same bits
 TEST_CASE("damage at any byte of a journal is found out") {
   const Inference truth = Infer(nullptr);
   const TemporaryFile file("", "_journal_damage");
-  { Journal journal(file.path(), 77); Infer(&journal); }
+  {
+    Journal journal(file.path(), 77);
+    Infer(&journal);
+  }
   const std::string whole = Contents(file.path());
   const std::vector<size_t> ends{16, 96, 200, 280, 384};
   for (size_t at = 0; at < whole.size(); ++at) {
@@ -125,7 +135,10 @@ TEST_CASE("killed and resumed again and again, an inference gets through") {
 
 TEST_CASE("another inference's journal is begun anew") {
   const TemporaryFile file("", "_journal_other");
-  { Journal journal(file.path(), 77); Infer(&journal); }
+  {
+    Journal journal(file.path(), 77);
+    Infer(&journal);
+  }
   {
     Journal journal(file.path(), 78);
     const Inference again = Infer(&journal);
@@ -148,7 +161,9 @@ TEST_CASE("another inference's journal is begun anew") {
   CHECK_FALSE(once_more.Read(12345, &other));
 }
 
-TEST_CASE("a complete inference leaves no journal, and one that cannot be written is an error with its name") {
+TEST_CASE(
+    "a complete inference leaves no journal, and one that cannot be written is an error with its "
+    "name") {
   const TemporaryFile file("", "_journal_done");
   {
     Journal journal(file.path(), 77);
@@ -156,7 +171,8 @@ TEST_CASE("a complete inference leaves no journal, and one that cannot be writte
     journal.Finish();
   }
   CHECK_FALSE(std::filesystem::exists(file.path()));
-  CHECK_THROWS_WITH(Journal("/no/such/folder/journal", 1), Catch::Contains("/no/such/folder/journal"));
+  CHECK_THROWS_WITH(Journal("/no/such/folder/journal", 1),
+                    Catch::Contains("/no/such/folder/journal"));
 }
 
 TEST_CASE("hashes tell shapes, values and order") {

@@ -1,6 +1,7 @@
-// Three biases that step-based calibration invites, each designed out and each shown to come back when the design
-// is undone. The robot here is the virtual robot's own plant (its own equations and integrator) behind a 14-bit
-// encoder, an effort that arrives 7 ms after the state it answers, and the real estimator.
+// Three biases that step-based calibration invites, each designed out and each shown to come back
+// when the design is undone. The robot here is the virtual robot's own plant (its own equations and
+// integrator) behind a 14-bit encoder, an effort that arrives 7 ms after the state it answers, and
+// the real estimator.
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -31,18 +32,21 @@ Recording Record(const RobotDescription& robot, uint32_t episode) {
   Recording recording;
 
   const double turn = 2 * M_PI;
-  plant.SetState(Eigen::VectorXd::Constant(1, random.Uniform(-3, 3)), Eigen::VectorXd::Constant(1, random.Uniform(-1, 1)));
+  plant.SetState(Eigen::VectorXd::Constant(1, random.Uniform(-3, 3)),
+                 Eigen::VectorXd::Constant(1, random.Uniform(-1, 1)));
   encoder.Reset(plant.q()(0) / turn, plant.v()(0) / turn);
   Eigen::VectorXd effort = Eigen::VectorXd::Zero(1), next = effort;
   for (int64_t t = 0, k = 0; t <= 201 * kPeriod; t += kMeasurement, ++k) {
-    // The command that answers the state at a multiple of the period reaches the motor kLatency later.
+    // The command that answers the state at a multiple of the period reaches the motor kLatency
+    // later.
     double impulse = 0;
     for (int64_t at = t; at < t + kMeasurement; at += 1000) {
       if (at % kPeriod == kLatency) effort = next;
       const double q0 = plant.q()(0), v0 = plant.v()(0);
       if (t > 0 || at > 0) {
         plant.Advance(effort, 1e-3);
-        encoder.Track({at, at + 1000, q0 / turn, plant.q()(0) / turn, v0 / turn, plant.v()(0) / turn});
+        encoder.Track(
+            {at, at + 1000, q0 / turn, plant.q()(0) / turn, v0 / turn, plant.v()(0) / turn});
       }
       impulse += effort(0) * 1e-3;
     }
@@ -58,7 +62,8 @@ Recording Record(const RobotDescription& robot, uint32_t episode) {
     measured.valid = {1};
     observer.OnJointState(measured);
     recording.causal.push_back(observer.state());
-    recording.smoothed.insert(recording.smoothed.end(), observer.smoothed().begin(), observer.smoothed().end());
+    recording.smoothed.insert(recording.smoothed.end(), observer.smoothed().begin(),
+                              observer.smoothed().end());
     if ((t + kMeasurement) % kPeriod == 0 && t >= 2 * kPeriod) {
       joint_command_t command{};
       command.state_sequence = k;
@@ -76,8 +81,8 @@ Recording Record(const RobotDescription& robot, uint32_t episode) {
 }
 
 struct Undone {
-  bool latency = false;     // each step is replayed with its command from beginning to end
-  bool smoothing = false;   // the causal states are used
+  bool latency = false;    // each step is replayed with its command from beginning to end
+  bool smoothing = false;  // the causal states are used
 };
 
 std::vector<Rollout> Rollouts(const RobotDescription& robot, Undone undone = {}) {
@@ -85,13 +90,16 @@ std::vector<Rollout> Rollouts(const RobotDescription& robot, Undone undone = {})
   for (uint32_t episode = 0; episode < 4; ++episode) {
     const Recording recording = Record(robot, episode);
     TransitionJoiner joiner(robot);
-    for (const robot_state_t& state : undone.smoothing ? recording.causal : recording.smoothed) joiner.OnState(state);
+    for (const robot_state_t& state : undone.smoothing ? recording.causal : recording.smoothed)
+      joiner.OnState(state);
     for (const joint_command_t& command : recording.commands) joiner.OnCommand(command);
-    Rollout rollout = joiner.Join(episode, recording.commands.back().state_sequence + kPeriod / kMeasurement);
+    Rollout rollout =
+        joiner.Join(episode, recording.commands.back().state_sequence + kPeriod / kMeasurement);
     REQUIRE(rollout.transitions.size() > 150);
     if (undone.latency) {
       for (Transition& t : rollout.transitions) {
-        for (EffortSegment& segment : t.efforts) segment.effort(0) = recording.commands[static_cast<size_t>(t.step)].effort[0];
+        for (EffortSegment& segment : t.efforts)
+          segment.effort(0) = recording.commands[static_cast<size_t>(t.step)].effort[0];
       }
     }
     rollouts.push_back(std::move(rollout));
@@ -108,15 +116,17 @@ Errors Calibrate(const RobotDescription& robot, const std::vector<Rollout>& roll
   const Eigen::Vector3d truth = kTruth.array().log();
   const Gaussian posterior = LaplacePosterior(robot, rollouts, truth);
   const Eigen::Vector3d a(1, 0, -1), b(0, 1, 2);
-  return {a.dot(posterior.mean - truth), b.dot(posterior.mean - truth), std::sqrt(a.dot(posterior.covariance * a)),
-          std::sqrt(b.dot(posterior.covariance * b))};
+  return {a.dot(posterior.mean - truth), b.dot(posterior.mean - truth),
+          std::sqrt(a.dot(posterior.covariance * a)), std::sqrt(b.dot(posterior.covariance * b))};
 }
 
-TEST_CASE("through encoder, latency and estimator the parameters are found within half a percent, and honestly") {
+TEST_CASE(
+    "through encoder, latency and estimator the parameters are found within half a percent, and "
+    "honestly") {
   const RobotDescription robot = Pendulum();
   const Errors found = Calibrate(robot, Rollouts(robot));
-  INFO("g/l " << found.gravity_over_length << " +- " << found.sd_gravity << ", m l^2 " << found.mass_length_squared
-              << " +- " << found.sd_mass);
+  INFO("g/l " << found.gravity_over_length << " +- " << found.sd_gravity << ", m l^2 "
+              << found.mass_length_squared << " +- " << found.sd_mass);
   CHECK(std::abs(found.gravity_over_length) < 0.005);
   CHECK(std::abs(found.mass_length_squared) < 0.005);
   CHECK(std::abs(found.gravity_over_length) < 3 * found.sd_gravity);
@@ -133,7 +143,8 @@ TEST_CASE("what the live calibrator claims to know of smoothed states is true") 
     REQUIRE(report);
     const Gaussian found = Moments(simopt.state().distribution);
     for (const Eigen::Vector3d& power : {Eigen::Vector3d(1, 0, -1), Eigen::Vector3d(0, 1, 2)}) {
-      const double error = power.dot(found.mean - truth), sd = std::sqrt(power.dot(found.covariance * power));
+      const double error = power.dot(found.mean - truth),
+                   sd = std::sqrt(power.dot(found.covariance * power));
       INFO("after " << report->iteration << " roll-outs: " << error << " +- " << sd);
       CHECK(std::abs(error) < 2.5 * sd);
       CHECK(sd < 0.01);
@@ -165,18 +176,22 @@ TEST_CASE("with corners rounded off by the filter, or lagging states, the effort
     const Errors open = Calibrate(robot, Rollouts(robot));
     robot.estimator.effort_step = 0;
     const Errors found = Calibrate(robot, Rollouts(robot));
-    INFO("m l^2 " << found.mass_length_squared << ", with the corners left open " << open.mass_length_squared);
+    INFO("m l^2 " << found.mass_length_squared << ", with the corners left open "
+                  << open.mass_length_squared);
     CHECK(std::abs(found.mass_length_squared) > 0.01);
     CHECK(std::abs(open.mass_length_squared) < 0.005);
   }
   SECTION("causal") {
     const Errors found = Calibrate(robot, Rollouts(robot, {.smoothing = true}));
     INFO("g/l " << found.gravity_over_length << ", m l^2 " << found.mass_length_squared);
-    CHECK(std::max(std::abs(found.gravity_over_length), std::abs(found.mass_length_squared)) > 0.005);
+    CHECK(std::max(std::abs(found.gravity_over_length), std::abs(found.mass_length_squared)) >
+          0.005);
   }
 }
 
-TEST_CASE("through encoder, latency and estimator a right model raises no alarm, and one without the latency does") {
+TEST_CASE(
+    "through encoder, latency and estimator a right model raises no alarm, and one without the "
+    "latency does") {
   const RobotDescription robot = Pendulum();
   const Misspecification right = FittedLog(robot, Rollouts(robot)).Find();
   INFO(right.words);

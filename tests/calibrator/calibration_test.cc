@@ -17,19 +17,23 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 const Eigen::Vector3d kTruth(9.5, 1.1, 0.95);
 
-Log Swinging(const std::string& name, const Eigen::VectorXd& truth, int rollouts, uint32_t stream, int steps = 60) {
+Log Swinging(const std::string& name, const Eigen::VectorXd& truth, int rollouts, uint32_t stream,
+             int steps = 60) {
   Log log;
   log.name = name;
   for (int i = 0; i < rollouts; ++i) {
-    log.rollouts.push_back(SyntheticRollout(Pendulum(), truth, steps, 1e-3, 5e-3, stream + static_cast<uint32_t>(i)));
+    log.rollouts.push_back(
+        SyntheticRollout(Pendulum(), truth, steps, 1e-3, 5e-3, stream + static_cast<uint32_t>(i)));
     for (Transition& t : log.rollouts.back().transitions) {  // nobody says what the noise is
-      for (Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd}) sd->setConstant(kNaN);
+      for (Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
+        sd->setConstant(kNaN);
     }
   }
   return log;
 }
 
-Findings Of(const std::vector<Log>& logs, const std::string& method = "auto", int64_t budget = 20'000) {
+Findings Of(const std::vector<Log>& logs, const std::string& method = "auto",
+            int64_t budget = 20'000) {
   CalibrationOptions options;
   options.method = method;
   options.budget = budget;
@@ -47,17 +51,20 @@ TEST_CASE("a pendulum's calibration finds what the motion tells, and names what 
   for (const Eigen::Vector3d& known : {slow, heavy}) {
     const double sd = std::sqrt(known.dot(posterior.covariance * known));
     CHECK(sd < 0.02);
-    CHECK(std::abs(known.dot(posterior.mean) - known.dot(Eigen::Vector3d(kTruth.array().log()))) < 4 * sd);
+    CHECK(std::abs(known.dot(posterior.mean) - known.dot(Eigen::Vector3d(kTruth.array().log()))) <
+          4 * sd);
   }
   REQUIRE(f.identifiability.null.size() == 1);
-  CHECK((f.identifiability.null[0].normalized().cwiseAbs() - null.normalized().cwiseAbs()).norm() < 0.02);
+  CHECK((f.identifiability.null[0].normalized().cwiseAbs() - null.normalized().cwiseAbs()).norm() <
+        0.02);
   REQUIRE(f.identifiability.combinations.size() == 2);
   CHECK(f.cramer_rao.array().isInf().all());
   // Along the null direction, relative to the prior's metric, samples are the prior's.
   const Eigen::Vector3d across = f.prior.covariance.inverse() * null;
   const Eigen::VectorXd along = (f.samples.array().log().matrix().transpose() * across).eval();
   CHECK(f.samples.cols() == 1000);
-  CHECK(KolmogorovSmirnov(along, across.dot(f.prior.mean), std::sqrt(across.dot(f.prior.covariance * across))) > 0.01);
+  CHECK(KolmogorovSmirnov(along, across.dot(f.prior.mean),
+                          std::sqrt(across.dot(f.prior.covariance * across))) > 0.01);
   // Noise that nobody had told, and errors down to it.
   CHECK(f.noise_sd(0) == Approx(1e-3).epsilon(0.2));
   CHECK(f.noise_sd(1) == Approx(5e-3).epsilon(0.2));
@@ -92,8 +99,10 @@ TEST_CASE("the world's mass has no effect, which is said, and keeps its prior") 
   CHECK(Moments(f.posterior).mean(0) == Approx(mean).margin(0.02 * sd));
   CHECK(std::isinf(f.cramer_rao(0)));
   CHECK(f.cramer_rao.tail(4).maxCoeff() < 0.1);
-  const Eigen::ArrayXd off = Moments(f.posterior).mean.tail(4).array() - truth.tail(4).array().log();
-  CHECK((off.abs() / Moments(f.posterior).covariance.diagonal().tail(4).array().sqrt()).maxCoeff() < 4);
+  const Eigen::ArrayXd off =
+      Moments(f.posterior).mean.tail(4).array() - truth.tail(4).array().log();
+  CHECK((off.abs() / Moments(f.posterior).covariance.diagonal().tail(4).array().sqrt()).maxCoeff() <
+        4);
 }
 
 TEST_CASE("noise alone raises the alarm, and teaches hardly anything") {
@@ -109,7 +118,8 @@ TEST_CASE("noise alone raises the alarm, and teaches hardly anything") {
   CAPTURE(f.holdout.words);
   CHECK((f.misspecification.alarm || !f.holdout.better));
   CHECK(f.holdout.errors[0].posterior == Approx(f.holdout.errors[0].prior).epsilon(0.03));
-  CHECK(f.noise_sd(0) == Approx(6 / std::sqrt(12)).epsilon(0.5));  // of a uniform reading, or of two
+  // of a uniform reading, or of two
+  CHECK(f.noise_sd(0) == Approx(6 / std::sqrt(12)).epsilon(0.5));
 }
 
 TEST_CASE("logs of one robot agree, logs of two do not") {
@@ -119,7 +129,8 @@ TEST_CASE("logs of one robot agree, logs of two do not") {
   CHECK(same.agreement.agree);
   REQUIRE(same.agreement.logs.size() == 2);
   CHECK(same.agreement.logs[0].log == "a");
-  CHECK(same.agreement.logs[0].p == Approx(same.agreement.logs[1].p));  // of two, each is the other's judge
+  // of two, each is the other's judge
+  CHECK(same.agreement.logs[0].p == Approx(same.agreement.logs[1].p));
   const Findings odd = Of({a, b, other});
   CHECK_FALSE(odd.agreement.agree);
   REQUIRE(odd.agreement.logs.size() == 3);
@@ -135,8 +146,10 @@ TEST_CASE("logs of one robot seldom disagree by chance") {
     CalibrationOptions options;
     options.method = "laplace";
     options.horizons = {1};
-    const std::vector<Log> logs{Swinging("a", kTruth, 2, 1000 + 10 * i, 30), Swinging("b", kTruth, 2, 1005 + 10 * i, 30)};
-    p_below += Calibrate(Pendulum(), logs, options).agreement.logs[0].p < 0.2;  // which is 0.1, for two logs
+    const std::vector<Log> logs{Swinging("a", kTruth, 2, 1000 + 10 * i, 30),
+                                Swinging("b", kTruth, 2, 1005 + 10 * i, 30)};
+    // which is 0.1, for two logs
+    p_below += Calibrate(Pendulum(), logs, options).agreement.logs[0].p < 0.2;
   }
   CHECK(p_below <= 11);  // of 4 expected
 }
@@ -146,21 +159,25 @@ TEST_CASE("a log that cannot be fitted on its own is named, and leaves nothing t
   const Log tiny = Swinging("tiny", kTruth, 1, 60, 1);
   const Findings f = Of({a, tiny});
   REQUIRE_FALSE(f.warnings.empty());
-  CHECK(std::any_of(f.warnings.begin(), f.warnings.end(), [](const auto& w) { return w.find("tiny") != std::string::npos; }));
+  CHECK(std::any_of(f.warnings.begin(), f.warnings.end(),
+                    [](const auto& w) { return w.find("tiny") != std::string::npos; }));
   CHECK(f.agreement.words.find("the 1 logs") == std::string::npos);
   CHECK(f.agreement.agree);
 }
 
 TEST_CASE("an unknown method is an error that names the nearest") {
   const std::vector<Log> logs{Swinging("a", kTruth, 1, 0)};
-  CHECK_THROWS_WITH(Of(logs, "laplas"), Catch::Contains("'laplas'") && Catch::Contains("'laplace'"));
+  CHECK_THROWS_WITH(Of(logs, "laplas"),
+                    Catch::Contains("'laplas'") && Catch::Contains("'laplace'"));
   CHECK_THROWS_AS(Of(logs, "laplas"), std::invalid_argument);
 }
 
 TEST_CASE("what is no data, or hardly any, is refused or believed as little as it deserves") {
   CHECK_THROWS_AS(Of({}), std::invalid_argument);
   CHECK_THROWS_AS(Of({Log{}}), std::invalid_argument);
-  SECTION("one transition") { CHECK_THROWS_WITH(Of({Swinging("a", kTruth, 1, 0, 1)}), Catch::Contains("too few")); }
+  SECTION("one transition") {
+    CHECK_THROWS_WITH(Of({Swinging("a", kTruth, 1, 0, 1)}), Catch::Contains("too few"));
+  }
   SECTION("one transition whose noise is known") {
     Log log = Swinging("a", kTruth, 1, 0, 1);
     for (Transition& t : log.rollouts[0].transitions) {
@@ -170,8 +187,11 @@ TEST_CASE("what is no data, or hardly any, is refused or believed as little as i
     const Findings f = Of({log});
     CHECK_FALSE(f.holdout.better);
     const Gaussian posterior = Moments(f.posterior);
-    CHECK((posterior.covariance.diagonal().array() <= 1.001 * f.prior.covariance.diagonal().array()).all());
-    CHECK(((posterior.mean - Eigen::Vector3d(kTruth.array().log())).array().abs() < 4 * posterior.covariance.diagonal().array().sqrt()).all());
+    CHECK((posterior.covariance.diagonal().array() <= 1.001 * f.prior.covariance.diagonal().array())
+              .all());
+    CHECK(((posterior.mean - Eigen::Vector3d(kTruth.array().log())).array().abs() <
+           4 * posterior.covariance.diagonal().array().sqrt())
+              .all());
     CHECK(f.noise_sd(0) == Approx(1e-3).epsilon(0.3));
   }
   SECTION("a pendulum at rest tells nothing but that it hangs") {
@@ -179,7 +199,8 @@ TEST_CASE("what is no data, or hardly any, is refused or believed as little as i
     for (Rollout& rollout : log.rollouts) {
       for (Transition& t : rollout.transitions) {
         for (Eigen::VectorXd* x : {&t.q, &t.v, &t.next_q, &t.next_v}) x->setConstant(0);
-        t.q(0) = t.next_q(0) = M_PI;  // hanging is an equilibrium of all pendulums, at whichever end it is
+        // hanging is an equilibrium of all pendulums, at whichever end it is
+        t.q(0) = t.next_q(0) = M_PI;
         for (EffortSegment& e : t.efforts) e.effort.setZero();
       }
     }
@@ -194,7 +215,8 @@ TEST_CASE("what is no data, or hardly any, is refused or believed as little as i
 TEST_CASE("noise that the record knows is what is reported") {
   Log log;
   log.name = "known";
-  for (uint32_t i = 0; i < 5; ++i) log.rollouts.push_back(SyntheticRollout(Pendulum(), kTruth, 40, 2e-3, 8e-3, 70 + i));
+  for (uint32_t i = 0; i < 5; ++i)
+    log.rollouts.push_back(SyntheticRollout(Pendulum(), kTruth, 40, 2e-3, 8e-3, 70 + i));
   for (const char* method : {"laplace", "reps"}) {
     const Findings f = Of({log}, method, 400'000);
     CAPTURE(method);
@@ -222,7 +244,8 @@ TEST_CASE("each method runs and comes near") {
     CHECK(f.errors.size() == 120);
     CHECK(f.errors.allFinite());
     CHECK(f.discrepancy > 0);
-    CHECK(heavy.dot(Moments(f.posterior).mean) == Approx(truth).margin(method == "simopt" ? 0.2 : 0.05));
+    CHECK(heavy.dot(Moments(f.posterior).mean) ==
+          Approx(truth).margin(method == "simopt" ? 0.2 : 0.05));
     CHECK(f.holdout.better);
   }
 }

@@ -56,7 +56,8 @@ std::string SimulatedTable(const RobotDescription& robot, int episodes, int step
       for (float& a : action) a = static_cast<float>(random.Uniform(-1.2, 1.2));
       const Environment::StepResult result = environment.Step(action);
       for (int k = 0; k < task.action_size(); ++k) {
-        append(environment.effort()[task.action_indices()[static_cast<size_t>(k)]] / task.action_unit(k));
+        append(environment.effort()[task.action_indices()[static_cast<size_t>(k)]] /
+               task.action_unit(k));
       }
       csv += fmt::format(",{},0,{:d}\n", result.reward, i + 1 == steps);
     }
@@ -84,7 +85,9 @@ double WorstPrediction(const Log& log, const RobotDescription& robot) {
   return worst;
 }
 
-TEST_CASE("a table recorded in the simulator leads, transition by transition, to the simulator's own bits") {
+TEST_CASE(
+    "a table recorded in the simulator leads, transition by transition, to the simulator's own "
+    "bits") {
   for (const char* name : {"pendulum/gym.toml", "hopper/gym.toml"}) {
     const RobotDescription robot = Robot(name);
     const Log log = Read(SimulatedTable(robot, 3, 40), robot);
@@ -93,8 +96,10 @@ TEST_CASE("a table recorded in the simulator leads, transition by transition, to
     CHECK(log.warnings.empty());
     for (size_t i = 0; i < 3; ++i) {
       CHECK(log.rollouts[i].episode == static_cast<int64_t>(i));
-      REQUIRE(log.rollouts[i].transitions.size() == 39);  // where the last action led is not in the table
-      for (size_t k = 0; k < 39; ++k) CHECK(log.rollouts[i].transitions[k].step == static_cast<int>(k));
+      // where the last action led is not in the table
+      REQUIRE(log.rollouts[i].transitions.size() == 39);
+      for (size_t k = 0; k < 39; ++k)
+        CHECK(log.rollouts[i].transitions[k].step == static_cast<int>(k));
     }
     const Transition& t = log.rollouts[0].transitions[5];
     REQUIRE(t.efforts.size() == 1);
@@ -126,7 +131,8 @@ TEST_CASE("an action acts as late as in the simulator that recorded it") {
 
 TEST_CASE("columns may be in any order, quoted, with further ones beside them") {
   const Log log = Read(
-      "\xef\xbb\xbf\"u/pivot\",\"next \"\"best\"\", or so\",v/pivot,next_v/pivot, q/pivot ,t,next_q/pivot\r\n"
+      "\xef\xbb\xbf\"u/pivot\",\"next \"\"best\"\", or so\",v/pivot,next_v/pivot, q/pivot "
+      ",t,next_q/pivot\r\n"
       "# recorded on a Tuesday\r\n"
       "+1,x,0.5,\"0.6\",0.1,0,0.125\r\n"
       "-5,\"a,b\",0.9, 1 ,1e-1,0.4,nan\r\n"
@@ -155,13 +161,15 @@ TEST_CASE("numbers have a decimal point in every locale") {
   for (const char* locale : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8"}) {
     if (std::setlocale(LC_ALL, locale)) break;
   }
-  CHECK(Read("t,q/pivot,v/pivot,u/pivot\n0,1.5,0,0\n0.05,1.25,0,0\n").rollouts[0].transitions[0].next_q(0) ==
-        1.25);
+  CHECK(Read("t,q/pivot,v/pivot,u/pivot\n0,1.5,0,0\n0.05,1.25,0,0\n")
+            .rollouts[0]
+            .transitions[0]
+            .next_q(0) == 1.25);
   std::setlocale(LC_ALL, old.c_str());
 }
 
-/// A table with next_ columns of a robot that is seen with noise, from `rows` of t; each row ends near where
-/// the next begins.
+/// A table with next_ columns of a robot that is seen with noise, from `rows` of t; each row ends
+/// near where the next begins.
 std::string NextTable(double interval, int rows, double noise, bool random_starts = false) {
   Random random(3);
   std::string csv = "t,q/pivot,v/pivot,u/pivot,next_q/pivot,next_v/pivot\n";
@@ -172,8 +180,8 @@ std::string NextTable(double interval, int rows, double noise, bool random_start
                  start_v = random_starts ? random.Uniform(-8, 8) : v(i);
     const double end_q = random_starts ? start_q + 0.1 : q(i + 1) + noise * random.Normal();
     const double end_v = random_starts ? start_v - 0.1 : v(i + 1) + noise * random.Normal();
-    csv += fmt::format("{},{},{},{},{},{}\n", i * interval, start_q, start_v, random.Uniform(-2, 2), end_q,
-                       end_v);
+    csv += fmt::format("{},{},{},{},{},{}\n", i * interval, start_q, start_v, random.Uniform(-2, 2),
+                       end_q, end_v);
   }
   return csv;
 }
@@ -211,11 +219,14 @@ TEST_CASE("rows follow each other if a state is what the row before led to, nois
   }
 }
 
-TEST_CASE("what cannot be used is dropped and counted, and splits an episode or leaves a gap in its steps") {
+TEST_CASE(
+    "what cannot be used is dropped and counted, and splits an episode or leaves a gap in its "
+    "steps") {
   const std::string head = "t,q/pivot,v/pivot,u/pivot\n";
   SECTION("states and actions that are not known") {
     const Log log = Read(
-        head + "0,0.1,0,1\n0.05,0.2,nan,1\n0.1,0.3,0,1\n0.15,0.4,0,\n0.2,0.5,0,0\n0.25,,,0\n0.3,1,0,0\n");
+        head +
+        "0,0.1,0,1\n0.05,0.2,nan,1\n0.1,0.3,0,1\n0.15,0.4,0,\n0.2,0.5,0,0\n0.25,,,0\n0.3,1,0,0\n");
     REQUIRE(log.rollouts.size() == 1);
     REQUIRE(log.rollouts[0].transitions.size() == 2);
     CHECK(log.rollouts[0].transitions[0].step == 0);
@@ -232,8 +243,8 @@ TEST_CASE("what cannot be used is dropped and counted, and splits an episode or 
     CHECK(log.drops.late == 1);
   }
   SECTION("what was applied before a gap in time, where actions act late") {
-    const Log log =
-        Read(head + "0,0.1,0,1\n0.05,0.2,0,1\n0.25,0.3,0,1\n0.3,0.4,0,0\n0.35,0.5,0,0\n", Pendulum());
+    const Log log = Read(
+        head + "0,0.1,0,1\n0.05,0.2,0,1\n0.25,0.3,0,1\n0.3,0.4,0,0\n0.35,0.5,0,0\n", Pendulum());
     REQUIRE(log.rollouts.size() == 2);
     CHECK(log.rollouts[1].transitions[0].step == 1);
     CHECK(log.rollouts[1].transitions[0].efforts[0].effort(0) == 1);
@@ -241,13 +252,15 @@ TEST_CASE("what cannot be used is dropped and counted, and splits an episode or 
     CHECK(log.drops.gap == 1);
   }
   SECTION("a part at another rate") {
-    const Log log = Read(head + "0,0.1,0,1\n0.05,0.2,0,1\n0.06,0.3,0,1\n0.07,0.4,0,0\n0.12,0.5,0,0\n");
+    const Log log =
+        Read(head + "0,0.1,0,1\n0.05,0.2,0,1\n0.06,0.3,0,1\n0.07,0.4,0,0\n0.12,0.5,0,0\n");
     CHECK(log.rollouts.size() == 2);
     CHECK(log.drops.late == 2);
   }
   SECTION("ends of episodes") {
     const Log log = Read(
-        "t,q/pivot,v/pivot,u/pivot,terminated,truncated\n0,1,0,1,0,0\n0.05,2,0,1,1,0\n0.1,3,0,1,0,0\n"
+        "t,q/pivot,v/pivot,u/"
+        "pivot,terminated,truncated\n0,1,0,1,0,0\n0.05,2,0,1,1,0\n0.1,3,0,1,0,0\n"
         "0.15,4,0,0,False,True\n0.15,5,0,0,,0\n0.2,6,0,0,0,0\n");
     REQUIRE(log.rollouts.size() == 3);
     CHECK(log.rollouts[2].transitions[0].next_q(0) == 6);
@@ -273,7 +286,8 @@ TEST_CASE("a joint without a motor has no action, and a spherical one a quaterni
   std::string with_root = SimulatedTable(robot, 1, 5);
   with_root.replace(with_root.find("reward"), 6, "u/rootx");
   CHECK(Refusal(with_root, robot) ==
-        ":1: column 'u/rootx' is of no joint with a motor of robot 'hopper'; the nearest is 'q/rootx'");
+        ":1: column 'u/rootx' is of no joint with a motor of robot 'hopper'; the nearest is "
+        "'q/rootx'");
 
   robot = GymPendulum();
   JointDescription ball = robot.joints[0];
@@ -304,11 +318,13 @@ TEST_CASE("a table that cannot be right is refused with its line and the reason"
       {"only blank lines", "\n\n  \n# nothing\n", ": is empty"},
       {"header only", head, ": has a head but no rows"},
       {"one row", head + "0,1,0,0\n",
-       ": no transition can be used: no row is followed by another of its episode, and there are no next_ "
+       ": no transition can be used: no row is followed by another of its episode, and there are "
+       "no next_ "
        "columns"},
       {"truncated line", two + "0.1,1", ":4: has 2 fields where the head has 4"},
       {"too many fields", two + "0.1,1,2,3,4\n", ":4: has 5 fields where the head has 4"},
-      {"semicolons", "t;q/pivot;v/pivot;u/pivot\n0;1;0;0\n", ":1: columns must be separated by commas"},
+      {"semicolons", "t;q/pivot;v/pivot;u/pivot\n0;1;0;0\n",
+       ":1: columns must be separated by commas"},
       {"tabs", "t\tq/pivot\n0\t1\n", ":1: columns must be separated by commas"},
       {"prose", "It was a dark and stormy night\n", ":1: is no head of a table: it has no comma"},
       {"no number", head + "0,1,0,x1\n", ":2: 'u/pivot' is 'x1': that is no number"},
@@ -331,11 +347,14 @@ TEST_CASE("a table that cannot be right is refused with its line and the reason"
        ":1: column 'v/pivto' is of no joint of robot 'pendulum'; the nearest is 'v/pivot'"},
       {"column twice", "t,q/pivot,v/pivot,u/pivot,t\n0,1,0,0,0\n", ":1: column 't' is there twice"},
       {"open quotation", "t,\"q/pivot,v/pivot,u/pivot\n0,1,0,0\n", ":1: a quotation has no end"},
-      {"text after a quotation", "t,\"q/pivot\"x,v/pivot,u/pivot\n", ":1: something follows a quotation"},
+      {"text after a quotation", "t,\"q/pivot\"x,v/pivot,u/pivot\n",
+       ":1: something follows a quotation"},
       {"other rate", head + "0,1,0,0\n0.02,1,0,0\n0.04,1,0,0\n",
-       ": no transition can be used: its rows are 0.02 s apart, but the task's control period is 0.05 s"},
+       ": no transition can be used: its rows are 0.02 s apart, but the task's control period is "
+       "0.05 s"},
       {"other rate with s'", NextTable(0.01, 20, 0.01),
-       ": no transition can be used: its rows are 0.01 s apart, but the task's control period is 0.05 s"},
+       ": no transition can be used: its rows are 0.01 s apart, but the task's control period is "
+       "0.05 s"},
       {"nothing observed", head + "0,nan,0,0\n0.05,nan,0,0\n",
        ": no transition can be used: 0 gaps, 0 late, 1 not finite, 0 across restarts"},
       {"a zero byte", zero, ":1: is no text: it has a zero byte"},
@@ -347,14 +366,16 @@ TEST_CASE("a table that cannot be right is refused with its line and the reason"
       {"garbage", "\x93\xff\xfe\x81,\xd0\x01\n\x80,\x90\n",
        ":1: has no column 't'; the nearest is '?"
        "?'"},
-      {"one endless line", std::string((size_t{1} << 20) + 1, 'x'), ":1: is longer than a megabyte"},
+      {"one endless line", std::string((size_t{1} << 20) + 1, 'x'),
+       ":1: is longer than a megabyte"},
   };
   for (const Case& c : cases) {
     INFO(c.name);
     CHECK(Refusal(c.contents) == c.refusal);
   }
   const RobotDescription robot = GymPendulum();
-  CHECK_THROWS_WITH(ReadCsvLog("/nonexistent/log.csv", robot), "/nonexistent/log.csv: cannot be opened");
+  CHECK_THROWS_WITH(ReadCsvLog("/nonexistent/log.csv", robot),
+                    "/nonexistent/log.csv: cannot be opened");
   CHECK_THROWS_WITH(ReadCsvLog("/tmp", robot), "/tmp: is a folder");
 }
 

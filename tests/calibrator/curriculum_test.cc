@@ -14,14 +14,16 @@ namespace {
 
 constexpr double kNoise = 1e-5;  // variance of each entry of s'
 
-// The Cramer-Rao bound on masses of windows with exact beginnings: sd of each, from central differences of what plain
-// windows predict and the noise as it was made.
-Eigen::VectorXd Bound(const std::shared_ptr<const Model>& model, const std::vector<Rollout>& rollouts, const Eigen::VectorXd& masses,
+// The Cramer-Rao bound on masses of windows with exact beginnings: sd of each, from central
+// differences of what plain windows predict and the noise as it was made.
+Eigen::VectorXd Bound(const std::shared_ptr<const Model>& model,
+                      const std::vector<Rollout>& rollouts, const Eigen::VectorXd& masses,
                       size_t horizon) {
   std::vector<Window> windows;
   for (const Rollout& rollout : rollouts) {
     for (size_t i = 0; i < rollout.transitions.size(); ++i) {
-      if (i % horizon == 0) windows.push_back({rollout.transitions[i].q, rollout.transitions[i].v, {}});
+      if (i % horizon == 0)
+        windows.push_back({rollout.transitions[i].q, rollout.transitions[i].v, {}});
       windows.back().steps.emplace_back(rollout.transitions[i].efforts);
     }
   }
@@ -29,20 +31,31 @@ Eigen::VectorXd Bound(const std::shared_ptr<const Model>& model, const std::vect
   constexpr double kStep = 1e-5;
   Eigen::MatrixXd moved = masses.replicate(1, 2 * p);
   for (Eigen::Index k = 0; k < p; ++k) moved(k, 2 * k) += kStep, moved(k, 2 * k + 1) -= kStep;
-  std::vector<Eigen::MatrixXd> ends(static_cast<size_t>(2 * p), Eigen::MatrixXd(2 * n, static_cast<Eigen::Index>(windows.size() * horizon)));
+  std::vector<Eigen::MatrixXd> ends(
+      static_cast<size_t>(2 * p),
+      Eigen::MatrixXd(2 * n, static_cast<Eigen::Index>(windows.size() * horizon)));
   for (Eigen::MatrixXd& end : ends) end.setZero();
   Windows simulate(model, 1);
-  simulate.Predict(moved, windows, [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto& v) {
-    ends[static_cast<size_t>(sample)].col(static_cast<Eigen::Index>(window * horizon + step)) << q, v;
-  }, false);
+  simulate.Predict(
+      moved, windows,
+      [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto& v) {
+        ends[static_cast<size_t>(sample)].col(static_cast<Eigen::Index>(window * horizon + step))
+            << q,
+            v;
+      },
+      false);
   Eigen::MatrixXd slopes(ends[0].size(), p);
   for (Eigen::Index k = 0; k < p; ++k) {
-    slopes.col(k) = ((ends[static_cast<size_t>(2 * k)] - ends[static_cast<size_t>(2 * k + 1)]) / (2 * kStep)).reshaped();
+    slopes.col(k) =
+        ((ends[static_cast<size_t>(2 * k)] - ends[static_cast<size_t>(2 * k + 1)]) / (2 * kStep))
+            .reshaped();
   }
   return (slopes.transpose() * slopes / kNoise).inverse().diagonal().cwiseSqrt();
 }
 
-Eigen::VectorXd StartNear(const RobotDescription& robot, uint32_t stream) { return RandomMasses(robot, stream).array().log(); }
+Eigen::VectorXd StartNear(const RobotDescription& robot, uint32_t stream) {
+  return RandomMasses(robot, stream).array().log();
+}
 
 // Whether 95 % intervals hold the truth, over the four masses.
 int Inside(const CurriculumFit& fit, const Eigen::VectorXd& truth) {
@@ -73,8 +86,10 @@ TEST_CASE("masses of the hopper come out as exactly as the data allow, in so man
   std::sort(steps.begin(), steps.end());
   std::sort(one_step_steps.begin(), one_step_steps.end());
   // Root mean squares over sets and masses.
-  CAPTURE(std::sqrt(squared / (4 * kSets)), std::sqrt(bound / (4 * kSets)), steps[kSets / 2], steps.back());
-  CAPTURE(std::sqrt(one_step_squared / (4 * kSets)), std::sqrt(one_step_bound / (4 * kSets)), one_step_steps[kSets / 2], one_step_steps.back());
+  CAPTURE(std::sqrt(squared / (4 * kSets)), std::sqrt(bound / (4 * kSets)), steps[kSets / 2],
+          steps.back());
+  CAPTURE(std::sqrt(one_step_squared / (4 * kSets)), std::sqrt(one_step_bound / (4 * kSets)),
+          one_step_steps[kSets / 2], one_step_steps.back());
   CHECK(squared < 1.5 * 1.5 * bound);
   CHECK(squared > 0.7 * 0.7 * bound);  // or the bound is none
   CHECK(one_step_squared < 1.5 * 1.5 * one_step_bound);
@@ -116,7 +131,8 @@ TEST_CASE("without noise, a hundred transitions give the masses to all digits, i
 }
 
 // One long episode: whoever falls lies on the ground and goes on.
-std::vector<Rollout> Onwards(const RobotDescription& robot, const Eigen::VectorXd& truth, int steps, uint32_t stream, double amplitude) {
+std::vector<Rollout> Onwards(const RobotDescription& robot, const Eigen::VectorXd& truth, int steps,
+                             uint32_t stream, double amplitude) {
   Environment environment(robot);
   environment.SetParameters(truth);
   Random random(47, {stream});
@@ -135,7 +151,8 @@ std::vector<Rollout> Onwards(const RobotDescription& robot, const Eigen::VectorX
     for (double& x : t.next_q) x += std::sqrt(kNoise) * random.Normal();
     for (double& x : t.next_v) x += std::sqrt(kNoise) * random.Normal();
     t.q_sd = t.v_sd = Eigen::VectorXd::Zero(n);
-    t.next_q_sd = t.next_v_sd = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
+    t.next_q_sd = t.next_v_sd =
+        Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
     rollout.transitions.push_back(t);
   }
   return {rollout};
@@ -143,14 +160,18 @@ std::vector<Rollout> Onwards(const RobotDescription& robot, const Eigen::VectorX
 
 // Root mean square of the errors in units of their own standard deviations.
 double Off(const LaplaceFit& fit, const Eigen::VectorXd& truth) {
-  return std::sqrt(((fit.mode.array() - truth.array().log()) / fit.posterior.covariance.diagonal().array().sqrt()).square().mean());
+  return std::sqrt(((fit.mode.array() - truth.array().log()) /
+                    fit.posterior.covariance.diagonal().array().sqrt())
+                       .square()
+                       .mean());
 }
 
 TEST_CASE("from one step to fifty, the masses are found wherever the search begins") {
   const RobotDescription robot = Hopper();
   const auto model = std::make_shared<Model>(robot);
   const Eigen::VectorXd truth = RandomMasses(robot, 7);
-  const std::vector<Rollout> rollouts = Onwards(robot, truth, 2000, 7, 1);  // 40 windows of 50 steps
+  // 40 windows of 50 steps
+  const std::vector<Rollout> rollouts = Onwards(robot, truth, 2000, 7, 1);
   CurriculumOptions options;
   options.starts = 1;
   int good = 0, long_windows = 0;
@@ -159,8 +180,11 @@ TEST_CASE("from one step to fifty, the masses are found wherever the search begi
     good += Off(fit.fit, truth) < 1.5;
     long_windows += fit.horizon == 50;
     // And it is not modest about it.
-    const Eigen::ArrayXd bound = Bound(model, rollouts, truth, static_cast<size_t>(fit.horizon)).array() / truth.array();
-    if (i == 0) CHECK(((fit.fit.posterior.covariance.diagonal().array().sqrt() / bound).log().abs() < 0.2).all());
+    const Eigen::ArrayXd bound =
+        Bound(model, rollouts, truth, static_cast<size_t>(fit.horizon)).array() / truth.array();
+    if (i == 0)
+      CHECK(((fit.fit.posterior.covariance.diagonal().array().sqrt() / bound).log().abs() < 0.2)
+                .all());
   }
   CHECK(good >= 19);
   CHECK(long_windows >= 19);
@@ -175,7 +199,9 @@ TEST_CASE("long windows at once lead astray, and step by step they do not") {
   options.starts = 1;
   options.horizons = {1, 5, 10, 50, 200};
   int direct = 0, by_steps = 0;
-  const auto error = [&](const LaplaceFit& fit) { return (fit.mode.array().exp() - truth.array()).abs().maxCoeff(); };
+  const auto error = [&](const LaplaceFit& fit) {
+    return (fit.mode.array().exp() - truth.array()).abs().maxCoeff();
+  };
   for (uint32_t i = 0; i < 4; ++i) {
     const Eigen::VectorXd start = StartNear(robot, 200 + i);
     WindowErrors errors(model, rollouts, 200, 1);
@@ -192,7 +218,8 @@ TEST_CASE("long windows at once lead astray, and step by step they do not") {
 TEST_CASE("a curriculum has the same bits with any number of threads") {
   const RobotDescription robot = Hopper();
   const auto model = std::make_shared<Model>(robot);
-  const std::vector<Rollout> rollouts = RandomRollouts(robot, RandomMasses(robot, 8), 200, kNoise, 8);
+  const std::vector<Rollout> rollouts =
+      RandomRollouts(robot, RandomMasses(robot, 8), 200, kNoise, 8);
   CurriculumOptions options;
   const CurriculumFit one = FitCurriculum(model, rollouts, options);
   options.workforce = 2;
@@ -229,7 +256,9 @@ TEST_CASE("stages say what they did") {
   // One-step errors at the final mode, by their own noise.
   WindowErrors errors(model, rollouts, 1, 1);
   const Eigen::VectorXd raw = errors.Raw(robot.ToPhysical(fit.fit.mode));
-  CHECK((fit.one_step.errors.array() * fit.noise_sd.replicate(400, 1).array() - raw.array()).abs().maxCoeff() < 1e-12);
+  CHECK((fit.one_step.errors.array() * fit.noise_sd.replicate(400, 1).array() - raw.array())
+            .abs()
+            .maxCoeff() < 1e-12);
 }
 
 }  // namespace

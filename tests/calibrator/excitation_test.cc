@@ -23,7 +23,8 @@ ExcitationSettings Few(int candidates, double seconds) {
 }  // namespace
 
 TEST_CASE(
-    "excitations keep to the effort limits, differ from joint to joint, and come again with their seed") {
+    "excitations keep to the effort limits, differ from joint to joint, and come again with their "
+    "seed") {
   const RobotDescription robot = Robot("double_pendulum");
   const auto a = MakeExcitations(robot, Few(61, 1)), b = MakeExcitations(robot, Few(61, 1));
   REQUIRE(a.size() == 61);
@@ -32,7 +33,8 @@ TEST_CASE(
     CHECK(a[i].action.rows() == std::lround(1 / robot.task.period));
     CHECK(a[i].action.cols() == 2);
     CHECK(a[i].action.cwiseAbs().maxCoeff() <= 1);
-    if (a[i].name.find("impulses") == std::string::npos) {  // of a low rate there may be none in a second
+    // of a low rate there may be none in a second
+    if (a[i].name.find("impulses") == std::string::npos) {
       CHECK(a[i].action.cwiseAbs().maxCoeff() > 0.01);
       CHECK(a[i].action.col(0) != a[i].action.col(1));
     }
@@ -44,7 +46,8 @@ TEST_CASE(
 }
 
 TEST_CASE(
-    "the best excitation tells more than random actions, and what it tells of the pendulum is two numbers") {
+    "the best excitation tells more than random actions, and what it tells of the pendulum is two "
+    "numbers") {
   const RobotDescription robot = Robot("pendulum");
   const Gaussian prior = PriorGaussian(robot);
   const auto rated = RateExcitations(robot, prior, Few(16, 5));
@@ -56,8 +59,8 @@ TEST_CASE(
   CHECK(rated[0].gain > random->gain + 0.5);
   for (size_t i = 1; i < rated.size(); ++i) CHECK(rated[i - 1].gain >= rated[i].gain);
   const RatedExcitation& best = rated[0];
-  // gravity, mass and length along (1, -2, 1) are not told: a third of the prior's variance stays with each
-  // at least.
+  // gravity, mass and length along (1, -2, 1) are not told: a third of the prior's variance stays
+  // with each at least.
   const Eigen::Vector3d null = Eigen::Vector3d(1, -2, 1).normalized();
   CHECK(null.dot(best.information * null) < 1e-6 * best.information.trace());
   const Eigen::Vector3d sd = prior.covariance.diagonal().cwiseSqrt();
@@ -67,7 +70,8 @@ TEST_CASE(
   }
   // The gain is that of the information: 1/2 ln det(I + S F S).
   const Eigen::Matrix3d scaled =
-      Eigen::Matrix3d::Identity() + Eigen::Matrix3d(sd.asDiagonal() * best.information * sd.asDiagonal());
+      Eigen::Matrix3d::Identity() +
+      Eigen::Matrix3d(sd.asDiagonal() * best.information * sd.asDiagonal());
   CHECK(best.gain == Approx(0.5 * std::log(scaled.determinant())).epsilon(1e-6));
   CHECK_FALSE(DescribeGain(robot, prior, best).empty());
 }
@@ -156,7 +160,8 @@ TEST_CASE("smoothed states are better known than measured ones, and worse with a
   robot.estimator.position_sd *= 10;
   CHECK(SmoothedNoise(robot)(0) > 2 * noise(0));
   CHECK(SmoothedNoise(robot)(1) > noise(1));
-  robot.joints[0].noise.position_sd = robot.estimator.position_sd / 10;  // the joint's word is the last
+  // the joint's word is the last
+  robot.joints[0].noise.position_sd = robot.estimator.position_sd / 10;
   CHECK(SmoothedNoise(robot).isApprox(noise, 1e-9));
 }
 
@@ -164,8 +169,10 @@ TEST_CASE("of a joint without a drive the velocity is less well known") {
   RobotDescription robot = Robot("hopper");
   robot.estimator.velocity_sd = 0.01;
   const int slide = robot.sensors[0].joint, thigh = robot.driven()[0];
-  robot.joints[static_cast<size_t>(slide)].noise = {.position_sd = 1e-4, .jerk = 300, .effort_step = 1};
-  robot.joints[static_cast<size_t>(thigh)].noise = {.position_sd = 1e-4, .jerk = 300, .effort_step = 1};
+  robot.joints[static_cast<size_t>(slide)].noise = {
+      .position_sd = 1e-4, .jerk = 300, .effort_step = 1};
+  robot.joints[static_cast<size_t>(thigh)].noise = {
+      .position_sd = 1e-4, .jerk = 300, .effort_step = 1};
   const Eigen::VectorXd noise = SmoothedNoise(robot);
   CHECK(noise(6 + thigh) < 0.7 * noise(6 + slide));
 }

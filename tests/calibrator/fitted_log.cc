@@ -17,9 +17,11 @@ RobotDescription Robot(const std::string& name) {
   return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name);
 }
 
-RobotDescription Changed(RobotDescription robot, const std::vector<std::pair<std::string, double>>& changed) {
+RobotDescription Changed(RobotDescription robot,
+                         const std::vector<std::pair<std::string, double>>& changed) {
   for (const auto& [path, value] : changed) {
-    std::erase_if(robot.frozen, [&, p = path](const FrozenParameter& frozen) { return frozen.name == p; });
+    std::erase_if(robot.frozen,
+                  [&, p = path](const FrozenParameter& frozen) { return frozen.name == p; });
     robot.parameters.push_back({path, "", ParameterDescription::Coordinate::kLinear, value, 1});
   }
   return robot;
@@ -37,7 +39,8 @@ std::vector<Rollout> RandomLog(const RobotDescription& fitted, const Truth& trut
   }();
   Environment environment(robot);
   environment.SetParameters(physical);
-  Simulator simulator(robot);  // what is delayed reaches over control steps: one simulator for an episode
+  // what is delayed reaches over control steps: one simulator for an episode
+  Simulator simulator(robot);
   simulator.SetParameters(physical);
   const Eigen::Index n = simulator.num_velocities();
   Random random(seed, {1});
@@ -51,7 +54,8 @@ std::vector<Rollout> RandomLog(const RobotDescription& fitted, const Truth& trut
     environment.Reset(random);
     simulator.SetState(environment.q(), environment.v());
     rollouts.emplace_back().episode = static_cast<int64_t>(rollouts.size());
-    Eigen::VectorXd q = noisy(simulator.q(), truth.start_sd), v = noisy(simulator.v(), truth.start_sd);
+    Eigen::VectorXd q = noisy(simulator.q(), truth.start_sd),
+                    v = noisy(simulator.v(), truth.start_sd);
     for (int step = 0; step < robot.task.steps && count < transitions; ++step, ++count) {
       Transition t;
       t.step = step;
@@ -59,7 +63,8 @@ std::vector<Rollout> RandomLog(const RobotDescription& fitted, const Truth& trut
       Eigen::VectorXf action(environment.action_size());
       for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
       Eigen::VectorXd effort(n);
-      environment.task().Effort(std::span(action.data(), static_cast<size_t>(action.size())), effort);
+      environment.task().Effort(std::span(action.data(), static_cast<size_t>(action.size())),
+                                effort);
       t.efforts.push_back({robot.task.period, effort});
       simulator.Step(t.efforts);
       t.next_q = noisy(simulator.q(), truth.end_sd), t.next_v = noisy(simulator.v(), truth.end_sd);
@@ -77,7 +82,8 @@ std::vector<Rollout> RandomLog(const RobotDescription& fitted, const Truth& trut
   return rollouts;
 }
 
-FittedLog::FittedLog(const RobotDescription& robot, std::vector<Rollout> log) : rollouts(std::move(log)) {
+FittedLog::FittedLog(const RobotDescription& robot, std::vector<Rollout> log)
+    : rollouts(std::move(log)) {
   Discrepancy discrepancy(robot);
   Eigen::VectorXd x(robot.parameters.size());
   for (size_t i = 0; i < robot.parameters.size(); ++i)
@@ -99,7 +105,8 @@ FittedLog::FittedLog(const RobotDescription& robot, std::vector<Rollout> log) : 
       jacobian.col(k) = (errors.col(2 * k) - errors.col(2 * k + 1)) / (2 * h);
     if (iteration == 6) break;
     // A prior far weaker than the data would hardly matter.
-    x -= Eigen::MatrixXd(jacobian.transpose() * jacobian + Eigen::MatrixXd::Identity(x.size(), x.size()))
+    x -= Eigen::MatrixXd(jacobian.transpose() * jacobian +
+                         Eigen::MatrixXd::Identity(x.size(), x.size()))
              .ldlt()
              .solve(jacobian.transpose() * r);
   }
@@ -111,7 +118,8 @@ FittedLog::FittedLog(const RobotDescription& robot, std::vector<Rollout> log) : 
       for (int c = 0; c < n;
            ++c) {  // as Discrepancy::Residuals has them: speed, then position, joint by joint
         for (const int coordinate : {n + c, c}) {
-          rows.push_back({static_cast<int>(window), static_cast<int>(i), static_cast<int>(k), coordinate});
+          rows.push_back(
+              {static_cast<int>(window), static_cast<int>(i), static_cast<int>(k), coordinate});
         }
       }
     }
@@ -124,8 +132,8 @@ FittedLog::FittedLog(const RobotDescription& robot, std::vector<Rollout> log) : 
   leftover.candidates = FindCandidates(own);
   Discrepancy extended(WithCandidates(robot, leftover.candidates));
   leftover.columns =
-      CandidateColumns([&](const Eigen::MatrixXd& p) { return extended.Residuals(p, rollouts); }, physical,
-                       leftover.candidates);
+      CandidateColumns([&](const Eigen::MatrixXd& p) { return extended.Residuals(p, rollouts); },
+                       physical, leftover.candidates);
 }
 
 Misspecification FittedLog::Find() {

@@ -24,9 +24,12 @@ inline Eigen::VectorXd RandomMasses(const RobotDescription& robot, uint32_t stre
   return masses;
 }
 
-/// Episodes under random actions until there are so many transitions: states exact, noise of known variance on s'.
-inline std::vector<Rollout> RandomRollouts(const RobotDescription& robot, const Eigen::VectorXd& truth, int transitions,
-                                           double noise_variance, uint32_t stream, int longest = 1000, double amplitude = 1) {
+/// Episodes under random actions until there are so many transitions: states exact, noise of known
+/// variance on s'.
+inline std::vector<Rollout> RandomRollouts(const RobotDescription& robot,
+                                           const Eigen::VectorXd& truth, int transitions,
+                                           double noise_variance, uint32_t stream,
+                                           int longest = 1000, double amplitude = 1) {
   Environment environment(robot);
   environment.SetParameters(truth);
   Random random(43, {stream});

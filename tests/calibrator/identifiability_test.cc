@@ -15,8 +15,8 @@ namespace {
 
 using Coordinate = ParameterDescription::Coordinate;
 
-/// Of the pendulum's gravity, mass and length, and one more parameter whose mean is on its border or beyond
-/// sense.
+/// Of the pendulum's gravity, mass and length, and one more parameter whose mean is on its border
+/// or beyond sense.
 Identifiability Find(const ParameterDescription& extra, const Eigen::VectorXd& truth) {
   RobotDescription robot = Pendulum();
   robot.parameters.push_back(extra);
@@ -26,7 +26,8 @@ Identifiability Find(const ParameterDescription& extra, const Eigen::VectorXd& t
   return FindIdentifiability(robot, discrepancy, rollouts, PriorGaussian(robot));
 }
 
-/// A robot of n parameters a0, a1, ... with logarithmic coordinates: only their description matters.
+/// A robot of n parameters a0, a1, ... with logarithmic coordinates: only their description
+/// matters.
 RobotDescription WithParameters(int n) {
   RobotDescription robot;
   for (int i = 0; i < n; ++i)
@@ -37,7 +38,8 @@ RobotDescription WithParameters(int n) {
 /// Information of random errors that depend on these combinations only, one a row.
 Eigen::MatrixXd InformationOf(const Eigen::MatrixXd& combinations, double size) {
   Random random(3);
-  const Eigen::MatrixXd jacobian = size * StandardNormals(500, combinations.rows(), random) * combinations;
+  const Eigen::MatrixXd jacobian =
+      size * StandardNormals(500, combinations.rows(), random) * combinations;
   return jacobian.transpose() * jacobian;
 }
 
@@ -53,19 +55,21 @@ Eigen::VectorXd Powers(Eigen::Index n, const std::vector<std::pair<int, double>>
 }
 
 bool Has(const std::vector<Eigen::VectorXd>& vectors, const Eigen::VectorXd& vector) {
-  return std::any_of(vectors.begin(), vectors.end(), [&](const Eigen::VectorXd& v) { return v == vector; });
+  return std::any_of(vectors.begin(), vectors.end(),
+                     [&](const Eigen::VectorXd& v) { return v == vector; });
 }
 
 }  // namespace
 
 TEST_CASE("of forty parameters those coupled are found, and nothing else is said of them") {
-  // a3 has no effect; a5 a7^2 and a7 / a11 are all of three; eight from a20 on act as seven products of
-  // neighbours.
+  // a3 has no effect; a5 a7^2 and a7 / a11 are all of three; eight from a20 on act as seven
+  // products of neighbours.
   const Eigen::Index n = 40;
   std::vector<Eigen::VectorXd> rows = {Powers(n, {{5, 1}, {7, 2}}), Powers(n, {{7, 1}, {11, -1}})};
   for (int i = 20; i < 27; ++i) rows.push_back(Powers(n, {{i, 1}, {i + 1, 1}}));
   for (int i = 0; i < n; ++i) {
-    if (i != 3 && i != 5 && i != 7 && i != 11 && (i < 20 || i > 27)) rows.push_back(Powers(n, {{i, 1}}));
+    if (i != 3 && i != 5 && i != 7 && i != 11 && (i < 20 || i > 27))
+      rows.push_back(Powers(n, {{i, 1}}));
   }
   Eigen::MatrixXd combinations(static_cast<Eigen::Index>(rows.size()), n);
   for (size_t i = 0; i < rows.size(); ++i) combinations.row(static_cast<Eigen::Index>(i)) = rows[i];
@@ -74,8 +78,9 @@ TEST_CASE("of forty parameters those coupled are found, and nothing else is said
   REQUIRE(found.null.size() == 3);
   CHECK(Has(found.null, Powers(n, {{3, 1}})));
   CHECK(Has(found.null, Powers(n, {{5, 2}, {7, -1}, {11, -1}})));
-  CHECK(Has(found.null,
-            Powers(n, {{20, 1}, {21, -1}, {22, 1}, {23, -1}, {24, 1}, {25, -1}, {26, 1}, {27, -1}})));
+  CHECK(
+      Has(found.null,
+          Powers(n, {{20, 1}, {21, -1}, {22, 1}, {23, -1}, {24, 1}, {25, -1}, {26, 1}, {27, -1}})));
   CHECK(found.combinations.size() == 37);
   CHECK(found.weak.empty());
   for (const Combination& combination : found.combinations) {
@@ -95,7 +100,8 @@ TEST_CASE("of forty parameters those coupled are found, and nothing else is said
 }
 
 TEST_CASE("two null directions of eight parameters come with as few entries as there are") {
-  const Eigen::VectorXd a = Powers(8, {{0, 1}, {3, -2}, {6, 1}}), b = Powers(8, {{1, 1}, {3, 1}, {7, 3}});
+  const Eigen::VectorXd a = Powers(8, {{0, 1}, {3, -2}, {6, 1}}),
+                        b = Powers(8, {{1, 1}, {3, 1}, {7, 3}});
   Eigen::MatrixXd space(8, 2);
   space << a + 0.3 * b, 0.7 * a - 2 * b;
   const auto belongs = [&](const Eigen::VectorXd& x) {
@@ -120,7 +126,8 @@ TEST_CASE("what is hardly determined is told, with what is left of the prior's s
     REQUIRE(found.weak.size() == 1);
     CHECK(found.weak[0].direction == Powers(3, {{2, 1}}));
     CHECK(found.weak[0].sd_ratio == Approx(1 / std::sqrt(1.16)));
-    CHECK_THAT(found.words, Catch::Contains("a2 is hardly determined: posterior sd is 93 % of the prior's"));
+    CHECK_THAT(found.words,
+               Catch::Contains("a2 is hardly determined: posterior sd is 93 % of the prior's"));
     CHECK(found.cramer_rao(2) == Approx(std::sqrt(variance / 0.16)));
   }
   SECTION("a direction") {
@@ -144,14 +151,16 @@ TEST_CASE("what is hardly determined is told, with what is left of the prior's s
     const Identifiability found = FindFrom(robot, Eigen::Matrix3d::Zero());
     CHECK(found.null.size() == 3);
     CHECK(found.combinations.empty());
-    CHECK(found.words == "nothing can be known from this motion; a0, a1, a2 have no effect on this motion");
+    CHECK(found.words ==
+          "nothing can be known from this motion; a0, a1, a2 have no effect on this motion");
   }
 }
 
 TEST_CASE("a little information is no null direction for being small beside much") {
   const double variance = WithParameters(2).parameters[0].coordinate_variance();
   const Identifiability found = FindFrom(
-      WithParameters(2), (Eigen::Vector2d(1e9, 50) / variance).asDiagonal());  // 50 times the prior's
+      // 50 times the prior's
+      WithParameters(2), (Eigen::Vector2d(1e9, 50) / variance).asDiagonal());
   CHECK(found.null.empty());
   CHECK(found.weak.empty());
 }
@@ -175,9 +184,11 @@ TEST_CASE("the base's mass has no effect on the hopper, and all others are known
   REQUIRE(world >= 0);
   Discrepancy discrepancy(robot);
   const std::vector<Rollout> rollouts = RandomLog(robot, {}, 60, 4);
-  const Identifiability found = FindIdentifiability(robot, discrepancy, rollouts, PriorGaussian(robot));
+  const Identifiability found =
+      FindIdentifiability(robot, discrepancy, rollouts, PriorGaussian(robot));
   CHECK(found.words ==
-        "every other parameter is determined by this motion; mass/world has no effect on this motion");
+        "every other parameter is determined by this motion; mass/world has no effect on this "
+        "motion");
   REQUIRE(found.null.size() == 1);
   CHECK(found.null[0] == Powers(5, {{world, 1}}));
   CHECK(found.combinations.size() == 4);
@@ -191,7 +202,8 @@ TEST_CASE("a parameter at the border of what is physical does not hide what cann
     INFO(name << ": " << found.words);
     CHECK(found.information.allFinite());
     CHECK(found.null.size() == 1);
-    CHECK_THAT(found.words, Catch::Contains("gravity, mass, length are not identifiable separately"));
+    CHECK_THAT(found.words,
+               Catch::Contains("gravity, mass, length are not identifiable separately"));
   }
 }
 
@@ -215,10 +227,12 @@ TEST_CASE("where simulation fails nothing is said to be known") {
       Find({"rest/pivot", "", Coordinate::kLinear, 0, 1}, Eigen::Vector4d(10, 1, 1, 0));
   CHECK(found.null.size() >= 1);  // a spring without stiffness rests anywhere
   RobotDescription robot = Pendulum();
-  std::vector<Rollout> rollouts = {SyntheticRollout(robot, Eigen::Vector3d(10, 1, 1), 20, 1e-4, 1e-3, 1)};
+  std::vector<Rollout> rollouts = {
+      SyntheticRollout(robot, Eigen::Vector3d(10, 1, 1), 20, 1e-4, 1e-3, 1)};
   rollouts[0].transitions[3].v(0) = 1e200;
   Discrepancy discrepancy(robot);
-  const Identifiability blind = FindIdentifiability(robot, discrepancy, rollouts, PriorGaussian(robot));
+  const Identifiability blind =
+      FindIdentifiability(robot, discrepancy, rollouts, PriorGaussian(robot));
   CHECK(blind.combinations.empty());
   CHECK_THAT(blind.words, Catch::Contains("fails"));
 }

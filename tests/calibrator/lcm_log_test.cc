@@ -65,12 +65,13 @@ class Recording {
     s.returns = {0};
     Add("CONTROLLER_STATUS", s);
   }
-  /// An episode of so many steps from a state on, states coming 20 later than the commands that answer them,
-  /// and the command of no episode after it.
+  /// An episode of so many steps from a state on, states coming 20 later than the commands that
+  /// answer them, and the command of no episode after it.
   void Episode(int64_t id, int64_t first_state, int steps) {
     for (int64_t i = 0; i <= 10 * steps; ++i) {
       if (i % 10 == 0) {
-        Command(first_state + i, i < 10 * steps ? id : -1, i < 10 * steps ? static_cast<int>(i / 10) : -1);
+        Command(first_state + i, i < 10 * steps ? id : -1,
+                i < 10 * steps ? static_cast<int>(i / 10) : -1);
       }
       if (first_state + i >= 20) State(first_state + i - 20);
     }
@@ -235,7 +236,8 @@ TEST_CASE("hostile numbers in messages do no harm") {
     INFO(huge);
     try {
       for (const Rollout& rollout : Read(r.bytes).rollouts) {
-        for (const Transition& t : rollout.transitions) CHECK(t.duration() == Approx(0.05).epsilon(0.21));
+        for (const Transition& t : rollout.transitions)
+          CHECK(t.duration() == Approx(0.05).epsilon(0.21));
       }
     } catch (const std::runtime_error&) {
     }
@@ -265,17 +267,22 @@ TEST_CASE("a log that is of no use is refused with the reason") {
   const std::string none = ": no transition can be used: ";
   const std::vector<Case> cases{
       {"empty", "",
-       none + "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
+       none +
+           "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
       {"cut off in the first head", damaged.bytes.substr(0, 20),
-       none + "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
+       none +
+           "none of its 0 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
       {"other channels", other.bytes,
-       none + "none of its 1 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
+       none +
+           "none of its 1 messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS"},
       {"no command", states.bytes, none + "it holds no command of an episode"},
       {"no state", commands.bytes, none + "2 gaps, 0 late, 0 not finite, 0 across restarts"},
-      {"wrong robot", foreign.bytes, none + "10 messages are of a robot with 3 joints, 'pendulum' has 1"},
+      {"wrong robot", foreign.bytes,
+       none + "10 messages are of a robot with 3 joints, 'pendulum' has 1"},
       {"another rate", late.bytes, none + "0 gaps, 5 late, 0 not finite, 0 across restarts"},
       {"a state from the simulator's dynamics", assumed.bytes,
-       ": its states are model-based: calibration would find the parameters that the estimator assumed. ROBOT_STATE_SMOOTHED "
+       ": its states are model-based: calibration would find the parameters that the estimator "
+       "assumed. ROBOT_STATE_SMOOTHED "
        "has to be a kinematic estimator's"},
       {"a table", "t,q/pivot,v/pivot,u/pivot\n0,1,0,0\n0.05,1,0,0\n", ": is no LCM log"},
       {"garbage", std::string(5000, '\xa7'), ": is no LCM log"},
@@ -308,7 +315,8 @@ TEST_CASE("whatever happens to a log, it is refused or read as finite transition
     try {
       for (const Rollout& rollout : ReadLcmLog(file.path(), robot).rollouts) {
         for (const Transition& t : rollout.transitions) {
-          REQUIRE((t.q.allFinite() && t.v.allFinite() && t.next_q.allFinite() && t.next_v.allFinite()));
+          REQUIRE(
+              (t.q.allFinite() && t.v.allFinite() && t.next_q.allFinite() && t.next_v.allFinite()));
           REQUIRE(t.duration() == Approx(0.05).epsilon(0.21));
         }
       }

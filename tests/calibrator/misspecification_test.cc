@@ -24,14 +24,18 @@ struct Wrong {
 
 /// What the hopper's masses, the only parameters fitted, cannot absorb.
 std::vector<Wrong> WrongModels() {
-  return {
-      {"inertia/torso", {{{"inertia/torso", 1.2}}}}, {"inertia/thigh", {{{"inertia/thigh", 1.2}}}},
-      {"inertia/leg", {{{"inertia/leg", 1.2}}}},     {"inertia/foot", {{{"inertia/foot", 1.2}}}},
-      {"friction/leg", {{{"friction/leg", 5}}}},     {"delay/thigh", {{{"delay/thigh", 0.002}}}},
-      {"gravity", {{{"gravity", 9.81 * 1.02}}}},     {"contact/stiffness", {{{"contact/stiffness", 7500}}}}};
+  return {{"inertia/torso", {{{"inertia/torso", 1.2}}}},
+          {"inertia/thigh", {{{"inertia/thigh", 1.2}}}},
+          {"inertia/leg", {{{"inertia/leg", 1.2}}}},
+          {"inertia/foot", {{{"inertia/foot", 1.2}}}},
+          {"friction/leg", {{{"friction/leg", 5}}}},
+          {"delay/thigh", {{{"delay/thigh", 0.002}}}},
+          {"gravity", {{{"gravity", 9.81 * 1.02}}}},
+          {"contact/stiffness", {{{"contact/stiffness", 7500}}}}};
 }
 
-Misspecification Diagnose(const RobotDescription& robot, const Truth& truth, int transitions, uint64_t seed) {
+Misspecification Diagnose(const RobotDescription& robot, const Truth& truth, int transitions,
+                          uint64_t seed) {
   return FittedLog(robot, RandomLog(robot, truth, transitions, seed)).Find();
 }
 
@@ -70,7 +74,8 @@ TEST_CASE("how much larger a parameter would have to be is told") {
 }
 
 TEST_CASE(
-    "p values are uniform where the model is right, and a little larger at most where states are shared") {
+    "p values are uniform where the model is right, and a little larger at most where states are "
+    "shared") {
   const RobotDescription robot = Robot("hopper");
   for (const bool shared : {false, true}) {
     const Truth truth{{}, shared ? 1e-3 : 0, 1e-3};
@@ -79,12 +84,15 @@ TEST_CASE(
     log.leftover.rows = log.rows;
     std::map<std::string, std::vector<double>> p;
     Random random(5, {shared});
-    const auto n = static_cast<Eigen::Index>(log.rows.size()), width = static_cast<Eigen::Index>(12);
+    const auto n = static_cast<Eigen::Index>(log.rows.size()),
+               width = static_cast<Eigen::Index>(12);
     for (int trial = 0; trial < 40; ++trial) {
-      // Of a state that two transitions share each coordinate's error appears in both: -1/2 of the variance.
+      // Of a state that two transitions share each coordinate's error appears in both: -1/2 of the
+      // variance.
       const Eigen::MatrixXd noise = StandardNormals(n + width, 1, random);
-      log.leftover.errors =
-          shared ? ((noise.topRows(n) - noise.bottomRows(n)) / std::sqrt(2)).eval() : noise.topRows(n).eval();
+      log.leftover.errors = shared
+                                ? ((noise.topRows(n) - noise.bottomRows(n)) / std::sqrt(2)).eval()
+                                : noise.topRows(n).eval();
       log.leftover.jacobian = StandardNormals(n, 4, random);
       for (const bool known : {true, false}) {
         log.leftover.noise_known.assign(12, known);
@@ -93,7 +101,8 @@ TEST_CASE(
         for (const Misfit& test : TestScale(errors, log.leftover.noise_known)) {
           p[known ? "scale" : "heteroscedasticity"].push_back(test.p);
         }
-        for (const auto& tests : {TestWhiteness(errors), TestBias(errors), TestRegression(errors)}) {
+        for (const auto& tests :
+             {TestWhiteness(errors), TestBias(errors), TestRegression(errors)}) {
           for (const Misfit& test : tests) p[test.test].push_back(test.p);
         }
         const Eigen::VectorXd column = errors.Project(StandardNormals(n, 1, random));
@@ -105,12 +114,12 @@ TEST_CASE(
       if (shared && (test == "scale" || test == "heteroscedasticity"))
         continue;  // rows correlate: not these tests' matter
       const auto below = [&](double limit) {
-        return static_cast<double>(
-                   std::count_if(values.begin(), values.end(), [&](double x) { return x < limit; })) /
+        return static_cast<double>(std::count_if(values.begin(), values.end(),
+                                                 [&](double x) { return x < limit; })) /
                static_cast<double>(values.size());
       };
-      INFO(test << (shared ? ", shared states" : "") << ", " << values.size() << " values: " << below(0.1)
-                << ", " << below(0.5));
+      INFO(test << (shared ? ", shared states" : "") << ", " << values.size()
+                << " values: " << below(0.1) << ", " << below(0.5));
       CHECK(below(0.1) < 0.17);
       if (shared) continue;
       CHECK(below(0.1) > 0.03);
@@ -123,8 +132,8 @@ TEST_CASE(
 /// A right model's log whose errors a test can spoil.
 class Spoilt {
  public:
-  /// @param spoil is given each error, its coordinate (0 ... 11), the step's number and whether it is in
-  /// contact.
+  /// @param spoil is given each error, its coordinate (0 ... 11), the step's number and whether it
+  /// is in contact.
   template <class Spoil>
   Misspecification Find(bool noise_known, const Spoil& spoil) {
     Random random(2);
@@ -132,8 +141,8 @@ class Spoilt {
     log.leftover.noise_known.assign(12, noise_known);
     for (size_t i = 0; i < log.rows.size(); ++i) {
       const WindowErrors::Row& row = log.rows[i];
-      const Transition& t =
-          log.rollouts[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+      const Transition& t = log.rollouts[static_cast<size_t>(row.rollout)]
+                                .transitions[static_cast<size_t>(row.transition)];
       double& error = log.leftover.errors(static_cast<Eigen::Index>(i));
       error = spoil(error, row.coordinate, row.window, FindTouch(log.known, t).any(), random);
     }
@@ -148,8 +157,8 @@ class Spoilt {
 };
 
 TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
-  const auto has = [](const Misspecification& found, const std::string& test, const std::string& joint,
-                      const std::string& condition) {
+  const auto has = [](const Misspecification& found, const std::string& test,
+                      const std::string& joint, const std::string& condition) {
     return std::any_of(found.misfits.begin(), found.misfits.end(), [&](const Misfit& m) {
       return m.test == test && m.joint == joint && m.condition == condition;
     });
@@ -163,17 +172,20 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     }
   }
   SECTION("scale") {
-    const auto found = Find(true, [](double e, int c, auto...) { return c % 6 == 4 ? 1.7 * e : e; });
+    const auto found =
+        Find(true, [](double e, int c, auto...) { return c % 6 == 4 ? 1.7 * e : e; });
     INFO(found.words);
     CHECK(found.alarm);
     CHECK(has(found, "scale", "leg", "free"));
     CHECK_FALSE(has(found, "scale", "thigh", "free"));
     // Noise that was estimated has any scale.
-    CHECK_FALSE(Find(false, [](double e, int c, auto...) { return c % 6 == 4 ? 1.7 * e : e; }).alarm);
+    CHECK_FALSE(
+        Find(false, [](double e, int c, auto...) { return c % 6 == 4 ? 1.7 * e : e; }).alarm);
   }
   SECTION("larger errors in contact than in free motion, with noise estimated") {
-    const auto found =
-        Find(false, [](double e, int c, int, bool contact, auto&) { return c == 3 && contact ? 2 * e : e; });
+    const auto found = Find(false, [](double e, int c, int, bool contact, auto&) {
+      return c == 3 && contact ? 2 * e : e;
+    });
     INFO(found.words);
     CHECK(found.alarm);
     CHECK(has(found, "scale", "thigh", "contact"));
@@ -188,8 +200,8 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
   }
   SECTION("whiteness") {
     double last = 0;
-    const auto found =
-        Find(true, [&](double e, int c, auto...) { return c == 10 ? last = 0.6 * last + 0.8 * e : e; });
+    const auto found = Find(
+        true, [&](double e, int c, auto...) { return c == 10 ? last = 0.6 * last + 0.8 * e : e; });
     INFO(found.words);
     CHECK(found.alarm);
     CHECK(has(found, "whiteness", "leg", ""));
@@ -198,8 +210,9 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     CHECK_FALSE(Find(true, [](double e, auto...) { return 1.05 * e; }).alarm);
   }
   SECTION("knocks: told of, no alarm, and they pass for nothing else") {
-    const auto found = Find(
-        true, [](double e, int c, int step, auto...) { return c == 9 && step % 200 == 17 ? e + 100 : e; });
+    const auto found = Find(true, [](double e, int c, int step, auto...) {
+      return c == 9 && step % 200 == 17 ? e + 100 : e;
+    });
     INFO(found.words);
     CHECK_FALSE(found.alarm);
     REQUIRE(!found.misfits.empty());
@@ -223,8 +236,8 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     log.leftover.columns.resize(log.leftover.errors.size(), 0);
     for (size_t i = 0; i < log.rows.size(); ++i) {
       const WindowErrors::Row& row = log.rows[i];
-      const auto& t =
-          log.rollouts[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+      const auto& t = log.rollouts[static_cast<size_t>(row.rollout)]
+                          .transitions[static_cast<size_t>(row.transition)];
       if (row.coordinate == 9)
         log.leftover.errors(static_cast<Eigen::Index>(i)) += 0.5 * (t.v(3) > 0 ? 1 : -1);
     }
@@ -273,10 +286,9 @@ TEST_CASE("candidates are parameters of every robot's simulator, at the values t
     for (size_t i = 0; i < robot.parameters.size(); ++i)
       own(static_cast<Eigen::Index>(i)) = robot.parameters[i].mean;
     Eigen::VectorXd all(own.size() + static_cast<Eigen::Index>(candidates.size()));
-    all << own,
-        Eigen::VectorXd::NullaryExpr(static_cast<Eigen::Index>(candidates.size()), [&](Eigen::Index i) {
-          return candidates[static_cast<size_t>(i)].value;
-        });
+    all << own, Eigen::VectorXd::NullaryExpr(
+                    static_cast<Eigen::Index>(candidates.size()),
+                    [&](Eigen::Index i) { return candidates[static_cast<size_t>(i)].value; });
     Simulator with(WithCandidates(robot, candidates)), without(robot);
     with.SetParameters(all);
     without.SetParameters(own);
@@ -301,7 +313,8 @@ TEST_CASE("the alarm on logs of right and wrong models, measured", "[.slow]") {
     std::string words;
     const auto begin = std::chrono::steady_clock::now();
     for (int log = 0; log < kLogs; ++log) {
-      const Misspecification found = Diagnose(robot, wrong.truth, 1000, 100 + static_cast<uint64_t>(log));
+      const Misspecification found =
+          Diagnose(robot, wrong.truth, 1000, 100 + static_cast<uint64_t>(log));
       alarms += found.alarm;
       first += !found.misfits.empty() && found.misfits[0].what.starts_with(wrong.name);
       at_contact += !found.misfits.empty() && found.misfits[0].condition == "contact" &&
@@ -313,8 +326,8 @@ TEST_CASE("the alarm on logs of right and wrong models, measured", "[.slow]") {
         words += found.words + "\n";
     }
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-    std::cout << fmt::format("{}: {} alarms of {}, first {}, named {}, {:.1f} s\n{}", wrong.name, alarms,
-                             kLogs, first, named, seconds.count(), words)
+    std::cout << fmt::format("{}: {} alarms of {}, first {}, named {}, {:.1f} s\n{}", wrong.name,
+                             alarms, kLogs, first, named, seconds.count(), words)
               << std::endl;
     if (std::string(wrong.name) == "contact/stiffness") CHECK(at_contact == kLogs);
     CHECK(alarms == (wrong.truth.changed.empty() ? 0 : kLogs));

@@ -17,11 +17,13 @@ enum class States {
   kTrue,      ///< the truth, with next to no uncertainty
   kSmoothed,  ///< as plumb-calibrator is told: the smoother's
   kCausal,    ///< what control is told
-  kCertain,   ///< the smoother's, but taken for exact where a transition begins: no errors in variables
+  /// the smoother's, but taken for exact where a transition begins: no errors in variables
+  kCertain,
 };
 
 /// What of a motion that was controlled every robot.task.period comes into a log, as this episode.
-inline Rollout Observed(const RobotDescription& robot, const Samples& motion, States states, int64_t episode = 0) {
+inline Rollout Observed(const RobotDescription& robot, const Samples& motion, States states,
+                        int64_t episode = 0) {
   const auto n = static_cast<size_t>(robot.num_joints());
   const int64_t per_control = std::llround(robot.task.period * 1e6) / SimulatedReadings::kPeriod;
   StateObserver observer(robot);
@@ -62,7 +64,8 @@ inline Rollout Observed(const RobotDescription& robot, const Samples& motion, St
 }
 
 /// The log of motions, an episode each.
-inline Log ObservedLog(const RobotDescription& robot, const std::vector<Samples>& motions, States states) {
+inline Log ObservedLog(const RobotDescription& robot, const std::vector<Samples>& motions,
+                       States states) {
   Log log;
   log.name = "simulated";
   for (size_t i = 0; i < motions.size(); ++i) {
@@ -74,8 +77,8 @@ inline Log ObservedLog(const RobotDescription& robot, const Samples& motion, Sta
   return ObservedLog(robot, std::vector<Samples>{motion}, states);
 }
 
-/// What of a robot's parameters a motion can tell: a name, and the powers of the parameters whose product it
-/// is.
+/// What of a robot's parameters a motion can tell: a name, and the powers of the parameters whose
+/// product it is.
 struct Knowable {
   std::string name;
   Eigen::VectorXd power;
@@ -85,9 +88,9 @@ inline std::vector<Knowable> KnowableOf(const RobotDescription& robot) {
     return {{"g/l", Eigen::Vector3d(1, 0, -1)}, {"m l^2", Eigen::Vector3d(0, 1, 2)}};
   std::vector<Knowable> masses;
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
-    masses.push_back(
-        {robot.parameters[i].name, Eigen::VectorXd::Unit(static_cast<Eigen::Index>(robot.parameters.size()),
-                                                         static_cast<Eigen::Index>(i))});
+    masses.push_back({robot.parameters[i].name,
+                      Eigen::VectorXd::Unit(static_cast<Eigen::Index>(robot.parameters.size()),
+                                            static_cast<Eigen::Index>(i))});
   }
   return masses;
 }

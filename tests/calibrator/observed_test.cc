@@ -1,5 +1,5 @@
-// Calibration through the whole chain: virtual robot, frames on its bus, driver, observer. Quick form of
-// bench/observed_calibration.
+// Calibration through the whole chain: virtual robot, frames on its bus, driver, observer. Quick
+// form of bench/observed_calibration.
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -16,7 +16,8 @@ struct Answer {
   double discrepancy;         // 1 = down to the noise
 };
 
-Answer Calibrated(const RobotDescription& robot, const Samples& motion, States states, uint32_t seed) {
+Answer Calibrated(const RobotDescription& robot, const Samples& motion, States states,
+                  uint32_t seed) {
   const std::vector<Log> logs{ObservedLog(robot, motion, states)};
   CalibrationOptions options;
   options.method = "laplace";
@@ -28,7 +29,8 @@ Answer Calibrated(const RobotDescription& robot, const Samples& motion, States s
 }
 
 TEST_CASE(
-    "a hopper's masses are found through its bus as well as the posterior says; errors in variables are part of "
+    "a hopper's masses are found through its bus as well as the posterior says; errors in "
+    "variables are part of "
     "the noise") {
   RobotDescription robot = Robot("hopper");
   robot.estimator.delay = 0;  // here frames arrive at once
@@ -46,7 +48,8 @@ TEST_CASE(
     unexplained += found.discrepancy / 2;
     unexplained_if_exact += sure.discrepancy / 2;
   }
-  INFO("mean squared whitened error " << unexplained << ", states taken for exact " << unexplained_if_exact);
+  INFO("mean squared whitened error " << unexplained << ", states taken for exact "
+                                      << unexplained_if_exact);
   CHECK(unexplained < 1);
   CHECK(unexplained_if_exact > 2 * unexplained);
 }
@@ -65,14 +68,16 @@ TEST_CASE("driven into its stops and into the ground a hopper's masses are found
   };
   const Findings found = find();
   const Gaussian posterior = Moments(found.posterior);
-  const Eigen::ArrayXd error = posterior.mean.array() - HiddenParameters(robot, kSeed).array().log();
+  const Eigen::ArrayXd error =
+      posterior.mean.array() - HiddenParameters(robot, kSeed).array().log();
   const Eigen::ArrayXd sd = posterior.covariance.diagonal().cwiseSqrt();
   INFO("errors " << error.transpose() << ", claimed " << sd.transpose());
   CHECK((error.abs() < 4 * sd).all());
   CHECK(sd(0) < 0.01);
   CHECK(found.stages[0].discrepancy < 1.6);
   // Without impacts states are further off than they say.
-  for (JointDescription& joint : robot.joints) joint.noise.ground_impact = joint.noise.stop_impact = 0;
+  for (JointDescription& joint : robot.joints)
+    joint.noise.ground_impact = joint.noise.stop_impact = 0;
   CHECK(find().stages[0].discrepancy > 10);
 }
 

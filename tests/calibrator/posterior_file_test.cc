@@ -67,8 +67,9 @@ TEST_CASE("the file says what was found") {
     CHECK(summary.mean(k) == Approx(findings.samples.row(k).mean()).epsilon(1e-12));
     CHECK(j["covariance"][i][i].get<double>() == Approx(std::pow(j["sd"][i].get<double>(), 2)));
     // As many beyond the quantiles as there should be.
-    const auto outside = (findings.samples.row(k).array() < j["interval_95"][i][0].get<double>()).count() +
-                         (findings.samples.row(k).array() > j["interval_95"][i][1].get<double>()).count();
+    const auto outside =
+        (findings.samples.row(k).array() < j["interval_95"][i][0].get<double>()).count() +
+        (findings.samples.row(k).array() > j["interval_95"][i][1].get<double>()).count();
     CHECK(outside == Approx(75).margin(2));
   }
   CHECK(j["coordinate_covariance"][0][1] == summary.coordinates.covariance(0, 1));
@@ -77,7 +78,8 @@ TEST_CASE("the file says what was found") {
   CHECK(j["alarm"]["misfits"][1]["effect"].is_null());
   CHECK(j["identifiability"]["cramer_rao"][0].is_null());
   CHECK(j["identifiability"]["cramer_rao"][1] == findings.cramer_rao(1));
-  CHECK(j["identifiability"]["null"][0]["moves"]["mass/pole"] == findings.identifiability.null[0](1));
+  CHECK(j["identifiability"]["null"][0]["moves"]["mass/pole"] ==
+        findings.identifiability.null[0](1));
   CHECK(j["identifiability"]["combinations"][0]["sd"] == 0.02);
   CHECK(j["holdout"]["better"] == true);
   CHECK(j["holdout"]["errors"][2]["prior"] == 0.12);
@@ -140,12 +142,14 @@ TEST_CASE("findings that are none are not written") {
              Contains("component 1"));
   CHECK_THAT(why([](Findings& f) { f.posterior.components[0].covariance(1, 1) *= -1; }),
              Contains("positive definite"));
-  CHECK_THAT(why([](Findings& f) { f.posterior.components[0].mean(2) = NAN; }), Contains("not finite"));
+  CHECK_THAT(why([](Findings& f) { f.posterior.components[0].mean(2) = NAN; }),
+             Contains("not finite"));
   CHECK_THAT(why([](Findings& f) { f.posterior.weights[0] = 0.8; }), Contains("sum to 1.1"));
   CHECK_THAT(why([](Findings& f) { f.posterior.weights.pop_back(); }), Contains("1 weights of 2"));
   CHECK_THAT(why([](Findings& f) { f.posterior = {}; }), Contains("0 components"));
   CHECK_THAT(why([](Findings& f) { f.prior.mean.resize(2); }), Contains("the prior"));
-  CHECK_THAT(why([](Findings& f) { f.samples(1, 7) = INFINITY; }), Contains("samples are not finite"));
+  CHECK_THAT(why([](Findings& f) { f.samples(1, 7) = INFINITY; }),
+             Contains("samples are not finite"));
   CHECK_THAT(why([](Findings& f) { f.samples = Eigen::MatrixXd::Ones(2, 9); }),
              Contains("samples are not of 3"));
   CHECK(why([](Findings& f) { f.discrepancy = NAN, f.cramer_rao.setConstant(INFINITY); }) == "");
@@ -170,7 +174,8 @@ TEST_CASE("a posterior that is not this robot's is refused, with the reason") {
   const std::string text = PosteriorJson(SampleFindings(robot), robot, {});
   CHECK(Error(text, robot) == "");
   RobotDescription other = robot;
-  other.training.updates += 1, other.task.steps += 1, other.parameters[0].mean += 1, ++other.fingerprint;
+  other.training.updates += 1, other.task.steps += 1, other.parameters[0].mean += 1,
+      ++other.fingerprint;
   other.links[1].visuals.clear();
   CHECK(Error(text, other) == "");  // a posterior is about physics
   other = robot, other.name = "reacher";
@@ -238,21 +243,26 @@ TEST_CASE("hostile posteriors are refused with file and field") {
   CHECK_THAT(spoilt("/names", "gravity"), Contains(": names: is not an array"));
   CHECK_THAT(spoilt("/names/0", 7), Contains(": names[0]: is not a string"));
   CHECK_THAT(spoilt("/mixture", 7), Contains(": mixture: is not an object"));
-  CHECK_THAT(spoilt("/mixture/weights", json::array()), Contains(": mixture.weights: has 0 entries"));
+  CHECK_THAT(spoilt("/mixture/weights", json::array()),
+             Contains(": mixture.weights: has 0 entries"));
   CHECK_THAT(spoilt("/mixture/weights", std::vector<double>(100000, 1e-5)),
              Contains(": mixture.weights: has 100000"));
   CHECK_THAT(spoilt("/mixture/weights", {0.7, 0.2}), Contains(": mixture.weights: sum to"));
-  CHECK_THAT(spoilt("/mixture/weights", {1.5, -0.5}), Contains(": mixture.weights[1]: is not positive"));
-  CHECK_THAT(spoilt("/mixture/weights/0", nullptr), Contains(": mixture.weights[0]: is not a number"));
+  CHECK_THAT(spoilt("/mixture/weights", {1.5, -0.5}),
+             Contains(": mixture.weights[1]: is not positive"));
+  CHECK_THAT(spoilt("/mixture/weights/0", nullptr),
+             Contains(": mixture.weights[0]: is not a number"));
   CHECK_THAT(spoilt("/mixture/weights/0", true), Contains(": mixture.weights[0]: is not a number"));
-  CHECK_THAT(spoilt("/mixture/means/0", {1, 2}), Contains(": mixture.means[0]: has 2 entries, expected 3"));
+  CHECK_THAT(spoilt("/mixture/means/0", {1, 2}),
+             Contains(": mixture.means[0]: has 2 entries, expected 3"));
   CHECK_THAT(spoilt("/mixture/means/0/1", "1"), Contains(": mixture.means[0][1]: is not a number"));
   CHECK_THAT(spoilt("/mixture/means/0/0", 1e9), Contains(": mixture: is too wide"));
   CHECK_THAT(spoilt("/mixture/covariances", json::array()),
              Contains(": mixture.covariances: has 0 entries, expected 2"));
   CHECK_THAT(spoilt("/mixture/covariances/1/2", {1}),
              Contains(": mixture.covariances[1][2]: has 1 entries, expected 3"));
-  CHECK_THAT(spoilt("/mixture/covariances/1/0/1", 5), Contains(": mixture.covariances[1]: is not symmetric"));
+  CHECK_THAT(spoilt("/mixture/covariances/1/0/1", 5),
+             Contains(": mixture.covariances[1]: is not symmetric"));
   CHECK_THAT(spoilt("/mixture/covariances/1/0/0", -1),
              Contains(": mixture.covariances[1]: is not positive definite"));
   CHECK_THAT(Error("[1]", robot), Contains("is not a posterior"));
@@ -276,7 +286,8 @@ TEST_CASE("a posterior that was cut off or has rotten bytes is refused or read, 
   int refused = 0;
   for (int i = 0; i < 400; ++i) {
     std::string rotten = text;
-    for (int k = 0; k < 3; ++k) rotten[random.Bits() % text.size()] = static_cast<char>(random.Bits());
+    for (int k = 0; k < 3; ++k)
+      rotten[random.Bits() % text.size()] = static_cast<char>(random.Bits());
     if (Error(rotten, robot) != "") ++refused;
   }
   CHECK(refused > 200);

@@ -20,7 +20,8 @@ using Catch::Contains;
 Residuals SampleResiduals(const RobotDescription& robot) {
   Residuals residuals;
   for (const char* kind : {"q ", "v "}) {
-    for (const JointDescription& joint : robot.joints) residuals.coordinates.push_back(kind + joint.name);
+    for (const JointDescription& joint : robot.joints)
+      residuals.coordinates.push_back(kind + joint.name);
   }
   const auto coordinates = static_cast<int>(residuals.coordinates.size());
   Random random(8, {2});
@@ -40,7 +41,8 @@ Residuals SampleResiduals(const RobotDescription& robot) {
 }
 
 RobotDescription ManyParameters(int count) {
-  RobotDescription robot = LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/hopper");
+  RobotDescription robot =
+      LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/hopper");
   while (static_cast<int>(robot.parameters.size()) < count) {
     ParameterDescription p = robot.parameters[robot.parameters.size() % 4];
     p.name = "inertia/body_" + std::to_string(robot.parameters.size()) + "/xx", p.unit = "kg m^2";
@@ -80,8 +82,9 @@ TEST_CASE("the report says in words and drawings what was found") {
        {"Calibration of pendulum", "only gravity / length can be known",
         "The model does not explain the robot", "Predicts better than the prior", "The logs agree",
         "Warning:</b> 12 transitions were late", "10.40 \xc2\xb1 0.57",
-        "only in combination with mass/pole, length/pole", "pivot, at ground contact", "31 %", "tuesday.lcm",
-        "robots/pendulum monday.lcm tuesday.lcm --seed 3", "18364758544493064720", "importance weights"}) {
+        "only in combination with mass/pole, length/pole", "pivot, at ground contact", "31 %",
+        "tuesday.lcm", "robots/pendulum monday.lcm tuesday.lcm --seed 3", "18364758544493064720",
+        "importance weights"}) {
     CHECK_THAT(html, Contains(words));
   }
   CHECK(Count(html, "<svg class=\"plot\"") ==
@@ -103,13 +106,15 @@ TEST_CASE("of many parameters the eight are drawn that the data have told most a
   const std::string html = ReportHtml(findings, robot, SampleProvenance(), SampleResiduals(robot));
   Keep("many.html", html);
   CheckPage(html);
-  CHECK_THAT(html, Contains("Of 12 parameters these are the 8 that the data have told most about."));
-  const std::string pairs = html.substr(html.find("<h2>Prior and posterior"),
-                                        html.find("<h2>What can") - html.find("<h2>Prior and posterior"));
+  CHECK_THAT(html,
+             Contains("Of 12 parameters these are the 8 that the data have told most about."));
+  const std::string pairs =
+      html.substr(html.find("<h2>Prior and posterior"),
+                  html.find("<h2>What can") - html.find("<h2>Prior and posterior"));
   for (const char* there : {">mass/torso", "mass/thigh", "inertia/body_4/xx", "inertia/body_6/xx"})
     CHECK_THAT(html, Contains(there));
-  CHECK_THAT(pairs,
-             !Contains("mass/leg") && !Contains("mass/foot") && !Contains("y_5/xx") && !Contains("y_7/xx"));
+  CHECK_THAT(pairs, !Contains("mass/leg") && !Contains("mass/foot") && !Contains("y_5/xx") &&
+                        !Contains("y_7/xx"));
   CHECK(Count(pairs, "Z\"/>") == 28 * 2 * 3);
 }
 
@@ -127,12 +132,13 @@ TEST_CASE("whatever files call things, the page stays a page") {
   findings.holdout.words = findings.agreement.words = findings.agreement.logs[0].log = evil;
   Residuals residuals = SampleResiduals(robot);
   residuals.coordinates[0] = evil;
-  const std::string html = ReportHtml(findings, robot, {{evil}, {{evil, evil}}, evil, evil}, residuals);
+  const std::string html =
+      ReportHtml(findings, robot, {{evil}, {{evil, evil}}, evil, evil}, residuals);
   CheckPage(html);
   CHECK_THAT(html, !Contains("alert('") && !Contains("\xff") && !Contains("\x01"));
   CHECK(Escape("a<b>&\"'\xc3\xa9\n") == "a&lt;b&gt;&amp;&quot;&#39;\xc3\xa9\n");
-  for (const char* broken :
-       {"\xff", "\xc3", "\xe0\x80\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xef\xbf\xbf", "\x01", "\x7f"}) {
+  for (const char* broken : {"\xff", "\xc3", "\xe0\x80\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80",
+                             "\xef\xbf\xbf", "\x01", "\x7f"}) {
     CHECK(Escape(broken).starts_with("\xef\xbf\xbd"));
   }
 }
@@ -151,7 +157,8 @@ TEST_CASE("findings with little in them still make a report") {
                        Contains("hardly: the motion adds little to the prior") &&
                        Contains("There are none."));
   // What was not examined is not good news.
-  CHECK_THAT(html, Contains("The model was not tested") && Contains("Identifiability was not examined"));
+  CHECK_THAT(html,
+             Contains("The model was not tested") && Contains("Identifiability was not examined"));
   CHECK_THAT(html, !Contains("The logs") && !Contains("verdict good") && !Contains("verdict bad"));
 }
 
@@ -173,9 +180,11 @@ TEST_CASE("numbers that are none are left out of the drawings") {
   residuals.whitened.setConstant(NAN);
   CheckPage(ReportHtml(findings, robot, SampleProvenance(), residuals));
   residuals.rows[0].coordinate = 2;
-  CHECK_THROWS_AS(ReportHtml(findings, robot, SampleProvenance(), residuals), std::invalid_argument);
+  CHECK_THROWS_AS(ReportHtml(findings, robot, SampleProvenance(), residuals),
+                  std::invalid_argument);
   residuals.rows.pop_back();
-  CHECK_THROWS_AS(ReportHtml(findings, robot, SampleProvenance(), residuals), std::invalid_argument);
+  CHECK_THROWS_AS(ReportHtml(findings, robot, SampleProvenance(), residuals),
+                  std::invalid_argument);
 }
 
 TEST_CASE("a posterior much narrower than its prior is drawn with its surroundings, not as a dot") {
@@ -225,7 +234,8 @@ TEST_CASE("autocorrelation is that of an autoregressive process, within roll-out
     CHECK(correlated[static_cast<size_t>(lag - 1)] == Approx(std::pow(0.6, lag)).margin(0.04));
     CHECK(white[static_cast<size_t>(lag - 1)] == Approx(0).margin(0.03));
   }
-  for (size_t i = 0; i < residuals.rows.size(); ++i) residuals.rows[i].rollout = static_cast<int>(i / 2);
+  for (size_t i = 0; i < residuals.rows.size(); ++i)
+    residuals.rows[i].rollout = static_cast<int>(i / 2);
   CHECK(std::isnan(Autocorrelation(residuals, 0, 1)[0]));  // every transition a roll-out of its own
 }
 
@@ -251,7 +261,8 @@ TEST_CASE("an ellipse is where the Mahalanobis distance is its sigma") {
   const Eigen::Vector2d mean(3, -1);
   const auto points = Ellipse(mean, covariance, 2);
   REQUIRE(points.size() == 64);
-  for (const auto& p : points) CHECK((p - mean).dot(covariance.inverse() * (p - mean)) == Approx(4));
+  for (const auto& p : points)
+    CHECK((p - mean).dot(covariance.inverse() * (p - mean)) == Approx(4));
   CHECK(Ellipse(mean, Eigen::Matrix2d::Constant(NAN), 1).empty());
 }
 

@@ -1,4 +1,5 @@
-// Relative-entropy policy search with the paper's budget: 25 samples, 0.1 nat, 40 updates on 100 transitions = 1e5 simulations.
+// Relative-entropy policy search with the paper's budget: 25 samples, 0.1 nat, 40 updates on 100
+// transitions = 1e5 simulations.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <memory>
@@ -29,11 +30,15 @@ class Paper {
     for (int seed = 1; seed <= seeds; ++seed) {
       options.seed = static_cast<uint64_t>(seed);
       const int64_t before = errors_.simulated_steps();
-      const RepsRun run = RepsSearch(problem_.prior, [&](const Eigen::MatrixXd& x) { return Evaluate(options.returns, x); }, options);
+      const RepsRun run = RepsSearch(
+          problem_.prior, [&](const Eigen::MatrixXd& x) { return Evaluate(options.returns, x); },
+          options);
       REQUIRE(errors_.simulated_steps() - before == 100'000);
       const Eigen::VectorXd mean = robot_.ToPhysical(run.distribution.mean);
       accuracy.rms_error += (mean - truth_).squaredNorm() / (4.0 * seeds);
-      accuracy.rms_sd += run.distribution.covariance.diagonal().cwiseProduct(mean.cwiseAbs2()).sum() / (4.0 * seeds);
+      accuracy.rms_sd +=
+          run.distribution.covariance.diagonal().cwiseProduct(mean.cwiseAbs2()).sum() /
+          (4.0 * seeds);
     }
     return {std::sqrt(accuracy.rms_error), std::sqrt(accuracy.rms_sd)};
   }
@@ -43,7 +48,8 @@ class Paper {
     if (returns == RepsReturns::kLogLikelihood) return LogLikelihood(problem_, x);
     Eigen::MatrixXd physical(x.rows(), x.cols());
     for (Eigen::Index i = 0; i < x.cols(); ++i) physical.col(i) = robot_.ToPhysical(x.col(i));
-    return errors_.Raw(physical).colwise().squaredNorm().transpose() / 100;  // mean |s' - f(s, a)|^2
+    // mean |s' - f(s, a)|^2
+    return errors_.Raw(physical).colwise().squaredNorm().transpose() / 100;
   }
 
   RobotDescription robot_;

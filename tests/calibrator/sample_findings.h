@@ -11,8 +11,8 @@
 
 namespace plumb {
 
-/// Findings of a robot that nobody has calibrated: every field holds something, two components, and some
-/// numbers that are not finite where they may be so.
+/// Findings of a robot that nobody has calibrated: every field holds something, two components, and
+/// some numbers that are not finite where they may be so.
 inline Findings SampleFindings(const RobotDescription& robot) {
   const auto n = static_cast<Eigen::Index>(robot.parameters.size());
   Random random(5, {1});
@@ -29,8 +29,8 @@ inline Findings SampleFindings(const RobotDescription& robot) {
   for (Eigen::Index i = 1; i < n; i += 2) null(i) *= -1;
   for (const double shift : {-0.15, 0.25}) {
     const Eigen::MatrixXd covariance = 0.02 * f.prior.covariance + 0.3 * prior_sd.squaredNorm() /
-                                                                       static_cast<double>(n) * null *
-                                                                       null.transpose();
+                                                                       static_cast<double>(n) *
+                                                                       null * null.transpose();
     f.posterior.components.push_back({f.prior.mean + shift * prior_sd, covariance});
   }
   f.posterior.weights = {0.7, 0.3};
@@ -40,24 +40,27 @@ inline Findings SampleFindings(const RobotDescription& robot) {
   f.discrepancy = 1.02;
   f.noise_sd = Eigen::VectorXd::Constant(2 * robot.num_velocities(), 1e-3);
   for (const int horizon : {1, 5, 20}) {
-    f.stages.push_back(
-        {horizon, 995 / horizon, 40000, 1 + 0.5 / horizon, f.prior.mean, prior_sd / (2. + horizon)});
+    f.stages.push_back({horizon, 995 / horizon, 40000, 1 + 0.5 / horizon, f.prior.mean,
+                        prior_sd / (2. + horizon)});
   }
-  f.identifiability.information = Eigen::MatrixXd::Identity(n, n) - null * null.transpose() * (1 - 1e-9);
+  f.identifiability.information =
+      Eigen::MatrixXd::Identity(n, n) - null * null.transpose() * (1 - 1e-9);
   f.identifiability.null = {null / null.cwiseAbs().maxCoeff()};
   f.identifiability.combinations = {{"gravity / length", Eigen::VectorXd::Unit(n, 0), 9.81, 0.02}};
   f.identifiability.words = "only gravity / length can be known from this motion";
   f.cramer_rao = 0.05 * prior_sd;
   f.cramer_rao(0) = std::numeric_limits<double>::infinity();
-  f.holdout = {800,
-               195,
-               {{1, 195, 1e-3, 4e-3}, {5, 39, 4e-3, 2e-2}, {20, 9, 9e-3, 0.12}, {100, 0, NAN, NAN}},
-               true,
-               "predicts better than the prior at every horizon that could be tried (1, 5 and 20 steps)"};
-  f.misspecification = {true,
-                        {{"pivot, at ground contact", "pivot", "contact", "structure", 12.5, 1e-6, 0.31},
-                         {"all joints", "", "", "whiteness", 3.1, 0.004, NAN}},
-                        "the model does not explain the robot: pivot, at ground contact"};
+  f.holdout = {
+      800,
+      195,
+      {{1, 195, 1e-3, 4e-3}, {5, 39, 4e-3, 2e-2}, {20, 9, 9e-3, 0.12}, {100, 0, NAN, NAN}},
+      true,
+      "predicts better than the prior at every horizon that could be tried (1, 5 and 20 steps)"};
+  f.misspecification = {
+      true,
+      {{"pivot, at ground contact", "pivot", "contact", "structure", 12.5, 1e-6, 0.31},
+       {"all joints", "", "", "whiteness", 3.1, 0.004, NAN}},
+      "the model does not explain the robot: pivot, at ground contact"};
   f.agreement = {true,
                  {{"monday.lcm", f.samples.col(0), 0.05 * f.samples.col(0).cwiseAbs(), 1.2, 0.4},
                   {"tuesday.lcm", f.samples.col(1), 0.05 * f.samples.col(1).cwiseAbs(), 0.8, 0.7}},

@@ -16,7 +16,7 @@ namespace plumb {
 namespace {
 
 const Eigen::Vector3d kTruth(9.3, 0.93, 1.07);
-const Eigen::Vector3d kNull(1, -2, 1);          // of (ln g, ln m, ln l), known in closed form
+const Eigen::Vector3d kNull(1, -2, 1);  // of (ln g, ln m, ln l), known in closed form
 const Eigen::Vector3d kGravityOverLength(1, 0, -1), kMassLengthSquared(0, 1, 2);
 
 double LogTruth(const Eigen::Vector3d& power) { return power.dot(kTruth.array().log().matrix()); }
@@ -45,34 +45,42 @@ TEST_CASE("the true parameters explain synthetic transitions down to the noise")
   CHECK(discrepancy.StepError(Eigen::Vector3d(10, 1, 1), rollouts)(0) > 1.5);
   const Eigen::VectorXd r = discrepancy.Residuals(kTruth, rollouts);
   CHECK(discrepancy.StepError(kTruth, rollouts)(0) == Approx(r.squaredNorm() / 4000));
-  double t = 0;  // the density of a two-dimensional Student's t distribution with four degrees of freedom
-  for (Eigen::Index i = 0; i < r.size(); i += 2) t += std::log(std::pow(1 + r.segment(i, 2).squaredNorm() / 4, -3));
+  // the density of a two-dimensional Student's t distribution with four degrees of freedom
+  double t = 0;
+  for (Eigen::Index i = 0; i < r.size(); i += 2)
+    t += std::log(std::pow(1 + r.segment(i, 2).squaredNorm() / 4, -3));
   CHECK(discrepancy.LogLikelihood(kTruth, rollouts)(0) == Approx(t));
 }
 
-TEST_CASE("without noise every horizon is predicted exactly, and errors grow with the horizon otherwise") {
+TEST_CASE(
+    "without noise every horizon is predicted exactly, and errors grow with the horizon "
+    "otherwise") {
   const RobotDescription robot = Pendulum();
   Discrepancy discrepancy(robot);
   std::vector<Rollout> rollouts{SyntheticRollout(robot, kTruth, 60, 0, 0, 1)};
   for (const int n : {1, 5, 20}) CHECK(discrepancy.PredictionError(kTruth, rollouts, n)(0) < 1e-9);
   CHECK(discrepancy.TrajectoryError(kTruth, rollouts)(0) < 1e-9);
   const Eigen::Vector3d wrong(10, 1, 1);
-  CHECK(discrepancy.PredictionError(wrong, rollouts, 5)(0) > 2 * discrepancy.PredictionError(wrong, rollouts, 1)(0));
+  CHECK(discrepancy.PredictionError(wrong, rollouts, 5)(0) >
+        2 * discrepancy.PredictionError(wrong, rollouts, 1)(0));
   CHECK(discrepancy.TrajectoryError(wrong, rollouts)(0) > 0.01);
   CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 61)(0)));
-  rollouts[0].transitions.erase(rollouts[0].transitions.begin() + 30);  // 30 + 29 remain, no window of 31
+  // 30 + 29 remain, no window of 31
+  rollouts[0].transitions.erase(rollouts[0].transitions.begin() + 30);
   CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 31)(0)));
   CHECK(discrepancy.TrajectoryError(kTruth, rollouts)(0) < 1e-9);
 }
 
-TEST_CASE("the distribution comes to rest on the posterior: neither collapsed nor forgetting its prior") {
+TEST_CASE(
+    "the distribution comes to rest on the posterior: neither collapsed nor forgetting its prior") {
   RobotDescription robot = Pendulum();
   robot.calibration.updates = 12;
   SimOpt simopt(robot, 4, 2);
   Iterate(simopt, robot, 6);
   const Gaussian found = Moments(simopt.state().distribution);
 
-  // Independent truth: the Laplace approximation of the same posterior, by Gauss-Newton from the true parameters.
+  // Independent truth: the Laplace approximation of the same posterior, by Gauss-Newton from the
+  // true parameters.
   const Gaussian laplace = LaplacePosterior(robot, simopt.state().rollouts, kTruth.array().log());
   const Eigen::VectorXd& x = laplace.mean;
   const Eigen::MatrixXd& covariance = laplace.covariance;
@@ -116,13 +124,15 @@ TEST_CASE("what the motion determines is found and said in words") {
   CHECK(found.combinations[0].name == "gravity / length");
   CHECK(found.combinations[1].name == "mass length^2");
   CHECK(found.words ==
-        "only gravity / length and mass length^2 can be known from this motion; gravity, mass, length are not "
+        "only gravity / length and mass length^2 can be known from this motion; gravity, mass, "
+        "length are not "
         "identifiable separately: (gravity +1 %, mass -2 %, length +1 %) changes nothing");
 }
 
 TEST_CASE("every update keeps to the KL bound") {
   const RobotDescription robot = Pendulum();
-  for (const Objective objective : {Objective::kPosterior, Objective::kStep, Objective::kTrajectory}) {
+  for (const Objective objective :
+       {Objective::kPosterior, Objective::kStep, Objective::kTrajectory}) {
     SimOpt simopt(robot, 2, 1, objective);
     simopt.Begin({SyntheticRollout(robot, kTruth, 50, 1e-4, 0.01, 1)});
     Gaussian before = Moments(simopt.state().distribution);
@@ -130,15 +140,19 @@ TEST_CASE("every update keeps to the KL bound") {
     for (int update = 0; !last; ++update) {
       REQUIRE(update < 100);
       last = simopt.Update().has_value();
-      CHECK(KlDivergence(Moments(simopt.state().distribution), before) <= robot.calibration.kl * (1 + 1e-9));
+      CHECK(KlDivergence(Moments(simopt.state().distribution), before) <=
+            robot.calibration.kl * (1 + 1e-9));
       before = Moments(simopt.state().distribution);
     }
   }
 }
 
 bool SameBits(const GaussianMixture& a, const GaussianMixture& b) {
-  const auto same = [](const Gaussian& x, const Gaussian& y) { return x.mean == y.mean && x.covariance == y.covariance; };
-  return a.weights == b.weights && std::equal(a.components.begin(), a.components.end(), b.components.begin(), b.components.end(), same);
+  const auto same = [](const Gaussian& x, const Gaussian& y) {
+    return x.mean == y.mean && x.covariance == y.covariance;
+  };
+  return a.weights == b.weights && std::equal(a.components.begin(), a.components.end(),
+                                              b.components.begin(), b.components.end(), same);
 }
 
 TEST_CASE("any number of threads and any interruption give the same bits") {
@@ -177,10 +191,12 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   SECTION("another description's checkpoint is refused") {
     RobotDescription edited = robot;
     edited.fingerprint ^= 1;
-    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), edited, 9).Load(), Catch::Contains("another robot.toml"));
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), edited, 9).Load(),
+                      Catch::Contains("another robot.toml"));
   }
   SECTION("another seed's checkpoint is refused") {
-    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), robot, 10).Load(), Catch::Contains("another seed"));
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), robot, 10).Load(),
+                      Catch::Contains("another seed"));
   }
   SECTION("a damaged checkpoint is refused, naming the file") {
     std::ofstream(folder / "rollout_1.json") << "{\"episode\": 3";
@@ -190,7 +206,8 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
 
 TEST_CASE("an iteration without a usable transition goes by and invents nothing") {
   const RobotDescription robot = Pendulum();
-  for (const Objective objective : {Objective::kPosterior, Objective::kStep, Objective::kTrajectory}) {
+  for (const Objective objective :
+       {Objective::kPosterior, Objective::kStep, Objective::kTrajectory}) {
     SimOpt simopt(robot, 1, 1, objective);
     CHECK_FALSE(simopt.Report());
     simopt.Begin({Rollout{}});
@@ -199,13 +216,18 @@ TEST_CASE("an iteration without a usable transition goes by and invents nothing"
     CHECK(report.iteration == 1);
     CHECK(std::isnan(report.discrepancy));
     CHECK(report.identifiability.combinations.empty());
-    CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) == Approx(0).margin(1e-12));
+    CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) ==
+          Approx(0).margin(1e-12));
   }
 }
 
-Rollout Synthetic(const RobotDescription& robot, uint32_t i) { return SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, i); }
+Rollout Synthetic(const RobotDescription& robot, uint32_t i) {
+  return SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, i);
+}
 
-TEST_CASE("an inference makes one update of all roll-outs, the same bits with any threads and after any interruption") {
+TEST_CASE(
+    "an inference makes one update of all roll-outs, the same bits with any threads and after any "
+    "interruption") {
   const RobotDescription robot = Pendulum();
   const std::string method = GENERATE("auto", "laplace", "mixture");
   INFO(method);
@@ -223,7 +245,8 @@ TEST_CASE("an inference makes one update of all roll-outs, the same bits with an
   CHECK(SameBits(straight.state().distribution, threaded.state().distribution));
   const Gaussian found = Moments(straight.state().distribution);
   for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
-    const double error = power.dot(found.mean) - LogTruth(power), sd = std::sqrt(power.dot(found.covariance * power));
+    const double error = power.dot(found.mean) - LogTruth(power),
+                 sd = std::sqrt(power.dot(found.covariance * power));
     INFO(error << " +- " << sd);
     CHECK(std::abs(error) < 3 * sd);
     CHECK(sd < 0.01);
@@ -235,21 +258,27 @@ TEST_CASE("an inference makes one update of all roll-outs, the same bits with an
       CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
       SimOpt simopt(robot, 9, 2, method);
       if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
-      if (begins) simopt.Begin({Synthetic(robot, i)});
-      else CHECK(simopt.Update());
+      if (begins)
+        simopt.Begin({Synthetic(robot, i)});
+      else
+        CHECK(simopt.Update());
       checkpoint.Save(simopt.state());
     }
   }
-  CHECK(SameBits(straight.state().distribution, CalibrationCheckpoint(folder.path(), robot, 9).Load()->distribution));
+  CHECK(SameBits(straight.state().distribution,
+                 CalibrationCheckpoint(folder.path(), robot, 9).Load()->distribution));
 }
 
-TEST_CASE("an inference lets an iteration without usable transitions go by, and an unknown method is refused") {
+TEST_CASE(
+    "an inference lets an iteration without usable transitions go by, and an unknown method is "
+    "refused") {
   const RobotDescription robot = Pendulum();
   SimOpt simopt(robot, 1, 1, "auto");
   simopt.Begin({Rollout{}});
   auto report = simopt.Update();
   REQUIRE(report);
-  CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) == Approx(0).margin(1e-12));
+  CHECK(KlDivergence(Moments(simopt.state().distribution), PriorGaussian(robot)) ==
+        Approx(0).margin(1e-12));
   Rollout unseen = Synthetic(robot, 1);
   for (Transition& t : unseen.transitions) t.next_q(0) = t.next_v(0) = NAN;
   simopt.Begin({unseen});
@@ -272,7 +301,8 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   second.mean(0) += 0.5;
   state.distribution = {{0.25, 0.75}, {PriorGaussian(robot), second}};
   state.ess = NAN;
-  const ParameterDistribution told = ParameterDistribution::FromMessage(DistributionMessage(robot, state, 1, nullptr), robot);
+  const ParameterDistribution told =
+      ParameterDistribution::FromMessage(DistributionMessage(robot, state, 1, nullptr), robot);
   REQUIRE(told.components.size() == 2);
   CHECK(told.components[1].weight == 0.75);
   CHECK(told.components[1].mean == second.mean);
@@ -283,7 +313,8 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   REQUIRE(loaded);
   CHECK(SameBits(loaded->distribution, state.distribution));
   CHECK(std::isnan(loaded->ess));
-  std::string text = (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
+  std::string text =
+      (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
   text.replace(text.find("\"version\": 2"), 12, "\"version\": 1");
   std::ofstream(folder / "calibration.json") << text;
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));

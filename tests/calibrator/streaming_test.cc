@@ -14,8 +14,10 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// FitLaplace of windows of one step, as exactly as it can: again from its own mode until slopes are those at the mode.
-LaplaceFit Batch(const RobotDescription& robot, const std::vector<Rollout>& rollouts, const Eigen::VectorXd& noise_sd) {
+// FitLaplace of windows of one step, as exactly as it can: again from its own mode until slopes are
+// those at the mode.
+LaplaceFit Batch(const RobotDescription& robot, const std::vector<Rollout>& rollouts,
+                 const Eigen::VectorXd& noise_sd) {
   WindowErrors errors(std::make_shared<Model>(robot), rollouts, 1, 1);
   errors.set_noise_sd(noise_sd);
   LaplaceOptions options;
@@ -38,19 +40,24 @@ StreamingLaplace Stream(const RobotDescription& robot, const std::vector<Rollout
   return stream;
 }
 
-// @param unknown tolerance of the mean along directions that only the prior tells of, [sd]: a forward difference is a small force there.
-void CheckEqual(const StreamingLaplace& stream, const LaplaceFit& batch, double tolerance, double unknown = 1e-6) {
+// @param unknown tolerance of the mean along directions that only the prior tells of, [sd]: a
+// forward difference is a small force there.
+void CheckEqual(const StreamingLaplace& stream, const LaplaceFit& batch, double tolerance,
+                double unknown = 1e-6) {
   const Gaussian found = stream.standard();
   INFO("means\n" << found.mean.transpose() << "\n" << batch.standard.mean.transpose());
   const Eigen::VectorXd offset = found.mean - batch.standard.mean;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(batch.standard.covariance);
   for (Eigen::Index i = 0; i < offset.size(); ++i) {
-    CHECK(std::abs(axes.eigenvectors().col(i).dot(offset)) < (axes.eigenvalues()(i) > 0.5 ? unknown : tolerance));
+    CHECK(std::abs(axes.eigenvectors().col(i).dot(offset)) <
+          (axes.eigenvalues()(i) > 0.5 ? unknown : tolerance));
   }
-  const Eigen::ArrayXd sd = found.covariance.diagonal().cwiseSqrt(), expected = batch.standard.covariance.diagonal().cwiseSqrt();
+  const Eigen::ArrayXd sd = found.covariance.diagonal().cwiseSqrt(),
+                       expected = batch.standard.covariance.diagonal().cwiseSqrt();
   INFO("sds\n" << sd.transpose() << "\n" << expected.transpose());
   CHECK((sd / expected - 1).abs().maxCoeff() < tolerance);
-  CHECK((found.covariance - batch.standard.covariance).cwiseAbs().maxCoeff() < tolerance * batch.standard.covariance.cwiseAbs().maxCoeff());
+  CHECK((found.covariance - batch.standard.covariance).cwiseAbs().maxCoeff() <
+        tolerance * batch.standard.covariance.cwiseAbs().maxCoeff());
   CHECK((stream.scale().array() / batch.scale.array() - 1).abs().maxCoeff() < tolerance);
 }
 
@@ -64,8 +71,13 @@ TEST_CASE("a streamed log of the hopper gives the batch's answer") {
   CHECK(stream.left_out() == 0);
   SECTION("nearly at once") {
     const Gaussian found = stream.standard();
-    CHECK(((found.mean - batch.standard.mean).array() / batch.standard.covariance.diagonal().array().sqrt()).abs().maxCoeff() < 0.02);
-    CHECK((found.covariance.diagonal().array() / batch.standard.covariance.diagonal().array() - 1).abs().maxCoeff() < 0.02);
+    CHECK(((found.mean - batch.standard.mean).array() /
+           batch.standard.covariance.diagonal().array().sqrt())
+              .abs()
+              .maxCoeff() < 0.02);
+    CHECK((found.covariance.diagonal().array() / batch.standard.covariance.diagonal().array() - 1)
+              .abs()
+              .maxCoeff() < 0.02);
   }
   REQUIRE(stream.Settle());
   CheckEqual(stream, batch, 1e-6);
@@ -80,11 +92,14 @@ TEST_CASE("where noise is all the truth leaves, or none, the stream finds the tr
   CHECK((robot.ToPhysical(stream.posterior().mean) - truth).cwiseAbs().maxCoeff() < 1e-6);
 }
 
-TEST_CASE("uncertain starts, entries that nobody saw and noise that nobody knows are treated as the batch does") {
+TEST_CASE(
+    "uncertain starts, entries that nobody saw and noise that nobody knows are treated as the "
+    "batch does") {
   const RobotDescription robot = Pendulum();
   const Eigen::Vector3d truth(9.3, 0.93, 1.07);
   std::vector<Rollout> rollouts;
-  for (uint32_t i = 0; i < 3; ++i) rollouts.push_back(SyntheticRollout(robot, truth, 100, 1e-4, 0.01, i));
+  for (uint32_t i = 0; i < 3; ++i)
+    rollouts.push_back(SyntheticRollout(robot, truth, 100, 1e-4, 0.01, i));
   const auto for_all = [&](const auto& change) {
     for (Rollout& rollout : rollouts) {
       for (Transition& t : rollout.transitions) change(t);
@@ -100,7 +115,8 @@ TEST_CASE("uncertain starts, entries that nobody saw and noise that nobody knows
     for_all([](Transition& t) { t.q_sd(0) = t.v_sd(0) = t.next_q_sd(0) = t.next_v_sd(0) = kNaN; });
   }
   SECTION("noise unknown, starts exact") {
-    for_all([](Transition& t) { t.q_sd(0) = t.v_sd(0) = 0, t.next_q_sd(0) = t.next_v_sd(0) = kNaN; });
+    for_all(
+        [](Transition& t) { t.q_sd(0) = t.v_sd(0) = 0, t.next_q_sd(0) = t.next_v_sd(0) = kNaN; });
   }
   SECTION("few rows share one scale") {
     rollouts.resize(1);
@@ -109,20 +125,24 @@ TEST_CASE("uncertain starts, entries that nobody saw and noise that nobody knows
   }
   StreamingLaplace stream = Stream(robot, rollouts);
   REQUIRE(stream.Settle());
-  // Of few rows the batch's cost, which takes no account of parameters, refuses the last bit of its own steps.
-  CheckEqual(stream, Batch(robot, rollouts, stream.noise_sd()), rollouts.size() == 1 ? 1e-3 : 1e-5, 2e-3);
+  // Of few rows the batch's cost, which takes no account of parameters, refuses the last bit of its
+  // own steps.
+  CheckEqual(stream, Batch(robot, rollouts, stream.noise_sd()), rollouts.size() == 1 ? 1e-3 : 1e-5,
+             2e-3);
   if (rollouts.size() > 1) {
     // (ln g, ln m, ln l) along (1, -2, 1) cannot be told: as wide as the prior there.
     const Gaussian found = stream.posterior();
     const Eigen::Vector3d null = Eigen::Vector3d(1, -2, 1).normalized();
     const Eigen::Vector3d precision = PriorGaussian(robot).covariance.diagonal().cwiseInverse();
-    CHECK(null.dot(found.covariance.inverse() * null) == Approx(null.dot(precision.asDiagonal() * null)).epsilon(1e-3));
+    CHECK(null.dot(found.covariance.inverse() * null) ==
+          Approx(null.dot(precision.asDiagonal() * null)).epsilon(1e-3));
   }
 }
 
 TEST_CASE("the same transitions give the same bits, and too few the prior") {
   const RobotDescription robot = Pendulum();
-  const std::vector<Rollout> rollouts{SyntheticRollout(robot, Eigen::Vector3d(9.3, 0.93, 1.07), 50, 1e-4, 0.01, 1)};
+  const std::vector<Rollout> rollouts{
+      SyntheticRollout(robot, Eigen::Vector3d(9.3, 0.93, 1.07), 50, 1e-4, 0.01, 1)};
   const Gaussian a = Stream(robot, rollouts).standard(), b = Stream(robot, rollouts).standard();
   CHECK(a.mean == b.mean);
   CHECK(a.covariance == b.covariance);
@@ -137,9 +157,12 @@ TEST_CASE("the same transitions give the same bits, and too few the prior") {
   CHECK(few.standard().covariance.isIdentity(0));
 }
 
-TEST_CASE("a transition that cannot be simulated is counted and left out; one that is no window is refused") {
+TEST_CASE(
+    "a transition that cannot be simulated is counted and left out; one that is no window is "
+    "refused") {
   const RobotDescription robot = Pendulum();
-  std::vector<Rollout> rollouts{SyntheticRollout(robot, Eigen::Vector3d(9.3, 0.93, 1.07), 60, 1e-4, 0.01, 1)};
+  std::vector<Rollout> rollouts{
+      SyntheticRollout(robot, Eigen::Vector3d(9.3, 0.93, 1.07), 60, 1e-4, 0.01, 1)};
   const LaplaceFit batch = Batch(robot, rollouts, GuessedNoise(robot));
   StreamingLaplace stream(std::make_shared<Model>(robot));
   int64_t accepted = 0;

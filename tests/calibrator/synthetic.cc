@@ -16,8 +16,8 @@ RobotDescription Pendulum() {
   return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum");
 }
 
-Rollout SyntheticRollout(const RobotDescription& robot, const Eigen::VectorXd& truth, int steps, double q_sd,
-                         double v_sd, uint32_t stream) {
+Rollout SyntheticRollout(const RobotDescription& robot, const Eigen::VectorXd& truth, int steps,
+                         double q_sd, double v_sd, uint32_t stream) {
   Simulator simulator(robot);
   simulator.SetParameters(truth);
   Random random(17, {stream});
@@ -58,7 +58,8 @@ Gaussian LaplacePosterior(const RobotDescription& robot, const std::vector<Rollo
       jacobian.col(k) = (discrepancy.Residuals(y.array().exp(), rollouts) - r) / 1e-6;
     }
     precision = jacobian.transpose() * jacobian + Inverse(prior.covariance);
-    x -= precision.ldlt().solve(jacobian.transpose() * r + Inverse(prior.covariance) * (x - prior.mean));
+    x -= precision.ldlt().solve(jacobian.transpose() * r +
+                                Inverse(prior.covariance) * (x - prior.mean));
   }
   return {x, Inverse(precision)};
 }

@@ -68,7 +68,8 @@ TEST_CASE_METHOD(Fixture, "a transition carries the effort applied, cycle by cyc
 // A staircase that steps from e0 to e1 at some time after state 130, as the driver averages it.
 struct Staircase : Fixture {
   double Mean(int64_t sequence, double e0, double e1, double time) const {
-    const double from = 0.005 * static_cast<double>(sequence - 1 - 130), share = std::clamp((time - from) / 0.005, 0.0, 1.0);
+    const double from = 0.005 * static_cast<double>(sequence - 1 - 130),
+                 share = std::clamp((time - from) / 0.005, 0.0, 1.0);
     return share * e0 + (1 - share) * e1;
   }
   std::vector<EffortSegment> Joined(double e0, double e1, double time, double disturbance = 0) {
@@ -96,12 +97,15 @@ TEST_CASE_METHOD(Staircase, "an effort that steps between two measurements steps
   }
 }
 
-TEST_CASE_METHOD(Staircase, "where it steps with a measurement, at the very end, or more than once, the means stand") {
+TEST_CASE_METHOD(
+    Staircase,
+    "where it steps with a measurement, at the very end, or more than once, the means stand") {
   for (const double time : {0.010, 0.0481, -0.001, 0.060}) {
     joiner = TransitionJoiner(robot);
     const std::vector<EffortSegment> efforts = Joined(0.7, -1.9, time);
     REQUIRE(efforts.size() == 10);
-    for (int i = 0; i < 10; ++i) CHECK(efforts[static_cast<size_t>(i)].effort(0) == Approx(Mean(131 + i, 0.7, -1.9, time)));
+    for (int i = 0; i < 10; ++i)
+      CHECK(efforts[static_cast<size_t>(i)].effort(0) == Approx(Mean(131 + i, 0.7, -1.9, time)));
   }
   joiner = TransitionJoiner(robot);
   CHECK(Joined(0.7, -1.9, 0.0068, 0.01).size() == 10);
@@ -113,7 +117,8 @@ TEST_CASE_METHOD(Fixture, "the order in which the channels interleave does not m
   CHECK(joiner.Join(42, 300).transitions.size() == 20);
 }
 
-TEST_CASE_METHOD(Fixture, "states of a driver that was restarted are not joined with earlier ones") {
+TEST_CASE_METHOD(Fixture,
+                 "states of a driver that was restarted are not joined with earlier ones") {
   States();
   Commands();
   robot_state_t fresh = State(120);  // counts again, later
@@ -167,7 +172,8 @@ TEST_CASE_METHOD(Fixture, "gaps, lateness, restarts and rubbish are dropped and 
     CHECK(joiner.Join(42, 300).transitions.size() == 18);
     CHECK(joiner.drops().model_based == 2);
     CHECK(joiner.drops().total() == 2);
-    CHECK(joiner.drops().words() == "0 gaps, 0 late, 0 not finite, 0 across restarts, 2 model-based");
+    CHECK(joiner.drops().words() ==
+          "0 gaps, 0 late, 0 not finite, 0 across restarts, 2 model-based");
   }
   SECTION("an unknown effort") {
     States();

@@ -36,7 +36,8 @@ std::vector<Rollout> Read(std::vector<Rollout> exact, double q_sd, double v_sd, 
 
 std::vector<Rollout> Swings(int rollouts, int steps, const Eigen::VectorXd& truth) {
   std::vector<Rollout> all;
-  for (int i = 0; i < rollouts; ++i) all.push_back(SyntheticRollout(Pendulum(), truth, steps, 0, 0, static_cast<uint32_t>(i)));
+  for (int i = 0; i < rollouts; ++i)
+    all.push_back(SyntheticRollout(Pendulum(), truth, steps, 0, 0, static_cast<uint32_t>(i)));
   return all;
 }
 
@@ -63,15 +64,18 @@ void CheckWhite(const Eigen::MatrixXd& windows) {
   REQUIRE(count >= 40);
   CAPTURE(k, count);
   CHECK(ChiSquared(windows.squaredNorm(), static_cast<double>(k * count)) > 1e-3);
-  CHECK(ChiSquared(windows.rowwise().sum().squaredNorm() / static_cast<double>(count), static_cast<double>(k)) > 1e-3);
-  const Eigen::MatrixXd products = windows * windows.transpose() / std::sqrt(static_cast<double>(count));
+  CHECK(ChiSquared(windows.rowwise().sum().squaredNorm() / static_cast<double>(count),
+                   static_cast<double>(k)) > 1e-3);
+  const Eigen::MatrixXd products =
+      windows * windows.transpose() / std::sqrt(static_cast<double>(count));
   double sum = 0;
   for (Eigen::Index i = 0; i < k; ++i) {
     for (Eigen::Index j = 0; j < i; ++j) sum += products(i, j) * products(i, j);
   }
   CHECK(ChiSquared(sum, static_cast<double>(k * (k - 1) / 2)) > 1e-3);
   // The sum over each window has one variance, too: positive correlations add up in it.
-  CHECK(ChiSquared(windows.colwise().sum().squaredNorm() / static_cast<double>(k), static_cast<double>(count)) > 1e-3);
+  CHECK(ChiSquared(windows.colwise().sum().squaredNorm() / static_cast<double>(k),
+                   static_cast<double>(count)) > 1e-3);
 }
 
 TEST_CASE("whitened errors of the right simulator are white, with noise at both ends") {
@@ -93,7 +97,8 @@ TEST_CASE("whitened errors of the right simulator are white, with noise at both 
   SECTION("hopper") {
     const RobotDescription robot = Hopper();
     const Eigen::VectorXd truth = RandomMasses(robot, 3);
-    const std::vector<Rollout> rollouts = Read(RandomRollouts(robot, truth, 1000, 0, 3), 1e-6, 1e-5, 2);
+    const std::vector<Rollout> rollouts =
+        Read(RandomRollouts(robot, truth, 1000, 0, 3), 1e-6, 1e-5, 2);
     WindowErrors errors(std::make_shared<Model>(robot), rollouts, horizon, 1);
     CHECK(errors.Linearise(truth));
     CheckWhite(FullWindows(errors, truth, 12 * horizon));
@@ -105,7 +110,8 @@ TEST_CASE("where the noise is not known it is what was set") {
   std::vector<Rollout> rollouts = Read(Swings(10, 60, truth), 1e-3, 5e-3, 4);
   for (Rollout& rollout : rollouts) {
     for (Transition& t : rollout.transitions) {
-      for (Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd}) sd->setConstant(kNaN);
+      for (Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
+        sd->setConstant(kNaN);
     }
   }
   WindowErrors errors(std::make_shared<Model>(Pendulum()), rollouts, 5, 1);
@@ -137,7 +143,8 @@ TEST_CASE("raw errors are what a simulator on its own is off by") {
   int window = -1;
   for (size_t i = 0; i < errors.rows().size(); i += 12) {
     const WindowErrors::Row& row = errors.rows()[i];
-    const Transition& t = rollouts[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+    const Transition& t =
+        rollouts[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
     if (row.window != window) {
       simulator.SetParameters(wrong);
       simulator.SetState(t.q, t.v);
@@ -147,43 +154,63 @@ TEST_CASE("raw errors are what a simulator on its own is off by") {
     Eigen::VectorXd expected(12);
     expected << simulator.q() - t.next_q, simulator.v() - t.next_v;
     REQUIRE(row.coordinate == 0);
-    REQUIRE((raw.col(0).segment(static_cast<Eigen::Index>(i), 12) - expected).cwiseAbs().maxCoeff() < 1e-12);
+    REQUIRE(
+        (raw.col(0).segment(static_cast<Eigen::Index>(i), 12) - expected).cwiseAbs().maxCoeff() <
+        1e-12);
   }
   CHECK(window + 1 == errors.windows());
   // The right one is off by the noise, whose size it may know or not.
   CHECK(raw.col(1).squaredNorm() / 1e-4 == Approx(720).epsilon(0.2));
-  CHECK(errors.Whitened(both).cwiseProduct(errors.noise_sd().replicate(60, 2)).isApprox(raw, 1e-12));
+  CHECK(
+      errors.Whitened(both).cwiseProduct(errors.noise_sd().replicate(60, 2)).isApprox(raw, 1e-12));
   // The same bits with another number of threads.
   WindowErrors alone(std::make_shared<Model>(robot), rollouts, 4, 1);
   CHECK(alone.Raw(both) == raw);
 }
 
-TEST_CASE("windows end at gaps and at the ends of roll-outs, and follow each other without overlap") {
+TEST_CASE(
+    "windows end at gaps and at the ends of roll-outs, and follow each other without overlap") {
   const Eigen::VectorXd truth = Eigen::Vector3d(10, 1.1, 0.9);
   std::vector<Rollout> rollouts = Swings(2, 20, truth);
   // 7 transitions, a gap, 5 more: windows of 3, 3, 1 and 3, 2; the other roll-out: 3 x 6 + 2.
-  rollouts[0].transitions.erase(rollouts[0].transitions.begin() + 7, rollouts[0].transitions.begin() + 15);
+  rollouts[0].transitions.erase(rollouts[0].transitions.begin() + 7,
+                                rollouts[0].transitions.begin() + 15);
   const auto model = std::make_shared<Model>(Pendulum());
   WindowErrors errors(model, rollouts, 3, 1);
   CHECK(errors.windows() == 5 + 7);
   CHECK(errors.steps() == 12 + 20);
   std::vector<std::pair<int, int>> first;
   for (const WindowErrors::Row& row : errors.rows()) {
-    if (row.window == static_cast<int>(first.size())) first.emplace_back(row.rollout, row.transition);
+    if (row.window == static_cast<int>(first.size()))
+      first.emplace_back(row.rollout, row.transition);
   }
-  CHECK(first == std::vector<std::pair<int, int>>{{0, 0}, {0, 3}, {0, 6}, {0, 7}, {0, 10}, {1, 0}, {1, 3}, {1, 6}, {1, 9}, {1, 12}, {1, 15}, {1, 18}});
+  CHECK(first == std::vector<std::pair<int, int>>{{0, 0},
+                                                  {0, 3},
+                                                  {0, 6},
+                                                  {0, 7},
+                                                  {0, 10},
+                                                  {1, 0},
+                                                  {1, 3},
+                                                  {1, 6},
+                                                  {1, 9},
+                                                  {1, 12},
+                                                  {1, 15},
+                                                  {1, 18}});
   CHECK(errors.Raw(truth).cwiseAbs().maxCoeff() < 1e-12);
   SECTION("every other one only") {
     WindowErrors part(model, rollouts, 3, 1, 2);
     CHECK(part.windows() == 6);
     std::vector<std::pair<int, int>> kept;
     for (const WindowErrors::Row& row : part.rows()) {
-      if (row.window == static_cast<int>(kept.size())) kept.emplace_back(row.rollout, row.transition);
+      if (row.window == static_cast<int>(kept.size()))
+        kept.emplace_back(row.rollout, row.transition);
     }
-    CHECK(kept == std::vector<std::pair<int, int>>{{0, 0}, {0, 6}, {0, 10}, {1, 3}, {1, 9}, {1, 15}});
+    CHECK(kept ==
+          std::vector<std::pair<int, int>>{{0, 0}, {0, 6}, {0, 10}, {1, 3}, {1, 9}, {1, 15}});
     CHECK(part.steps() == 3 + 1 + 2 + 9);
     // Their errors are those that they have among all.
-    const Eigen::VectorXd wrong = Eigen::Vector3d(8, 1, 1), all = errors.Raw(wrong), some = part.Raw(wrong);
+    const Eigen::VectorXd wrong = Eigen::Vector3d(8, 1, 1), all = errors.Raw(wrong),
+                          some = part.Raw(wrong);
     Eigen::Index at = 0;
     for (size_t i = 0; i < errors.rows().size(); ++i) {
       const WindowErrors::Row& row = errors.rows()[i];
@@ -194,12 +221,14 @@ TEST_CASE("windows end at gaps and at the ends of roll-outs, and follow each oth
   }
   SECTION("what was not observed has no row") {
     rollouts[0].transitions[1].next_q(0) = kNaN;
-    rollouts[0].transitions[6].next_q(0) = rollouts[0].transitions[6].next_v(0) = kNaN;  // the third window's all
+    // the third window's all
+    rollouts[0].transitions[6].next_q(0) = rollouts[0].transitions[6].next_v(0) = kNaN;
     WindowErrors less(model, rollouts, 3, 1);
     CHECK(less.windows() == 11);
     CHECK(less.rows().size() == errors.rows().size() - 3);
     for (const WindowErrors::Row& row : less.rows()) {
-      CHECK_FALSE((row.rollout == 0 && ((row.transition == 1 && row.coordinate == 0) || row.transition == 6)));
+      CHECK_FALSE((row.rollout == 0 &&
+                   ((row.transition == 1 && row.coordinate == 0) || row.transition == 6)));
     }
     // What follows is predicted all the same.
     CHECK(less.Raw(truth).cwiseAbs().maxCoeff() < 1e-12);
@@ -228,7 +257,8 @@ TEST_CASE("with entries missing, what is left is white as well") {
 TEST_CASE("simulators that fail are counted and have no errors at all") {
   const Eigen::VectorXd truth = Eigen::Vector3d(10, 1.1, 0.9);
   std::vector<Rollout> rollouts = Swings(1, 20, truth);
-  rollouts[0].transitions[13].v(0) = 1e7;  // beyond what can be simulated, in the fourth window's middle: not looked at
+  // beyond what can be simulated, in the fourth window's middle: not looked at
+  rollouts[0].transitions[13].v(0) = 1e7;
   WindowErrors errors(std::make_shared<Model>(Pendulum()), rollouts, 4, 1);
   Eigen::MatrixXd both(3, 2);
   both << truth, Eigen::Vector3d(10, -1, 0.9);  // no pendulum

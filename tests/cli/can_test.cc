@@ -11,8 +11,8 @@ TEST_CASE("can plan: the hopper's bus, and one that cannot work") {
   const Outcome outcome = Shell(Plumb() + "can plan " + Robot("hopper"));
   INFO(outcome.text);
   CHECK(outcome.status == 0);
-  for (const char* word :
-       {"0x06e", "Set_Input_Torque", "boom_yaw", "TPDO1", "0x3b2", "at worst", "all deadlines are met"}) {
+  for (const char* word : {"0x06e", "Set_Input_Torque", "boom_yaw", "TPDO1", "0x3b2", "at worst",
+                           "all deadlines are met"}) {
     CHECK_THAT(outcome.text, Catch::Contains(word));
   }
   const TemporaryFolder folder;
@@ -25,8 +25,9 @@ TEST_CASE("can plan: the hopper's bus, and one that cannot work") {
   const Outcome refused = Shell(Plumb() + "can plan " + folder / "robot.toml");
   INFO(refused.text);
   CHECK(refused.status == 1);
-  CHECK_THAT(refused.text,
-             Catch::Contains("error: CAN id 0x021: 'thigh' sends Heartbeat and 'imu' sends Quaternion"));
+  CHECK_THAT(
+      refused.text,
+      Catch::Contains("error: CAN id 0x021: 'thigh' sends Heartbeat and 'imu' sends Quaternion"));
 }
 
 TEST_CASE("can dbc: to the screen or a file, the same") {
@@ -34,7 +35,8 @@ TEST_CASE("can dbc: to the screen or a file, the same") {
   const Outcome printed = Shell(Plumb() + "can dbc " + Robot("hopper"));
   CHECK(printed.status == 0);
   CHECK_THAT(printed.text, Catch::Contains("BO_ 41 thigh_Get_Encoder_Estimates: 8 thigh"));
-  CHECK(Shell(Plumb() + "can dbc " + Robot("hopper") + " --output " + folder / "bus.dbc").status == 0);
+  CHECK(Shell(Plumb() + "can dbc " + Robot("hopper") + " --output " + folder / "bus.dbc").status ==
+        0);
   CHECK(Read(folder / "bus.dbc") == printed.text);
 }
 

@@ -49,9 +49,10 @@ Finding Signatures(const std::string& lcm_url, const std::string& key = {}) {
 }
 
 TEST_CASE("whether commands are signed, and whether that will do") {
-  const std::string local = "udpm://239.255.76.67:17658?ttl=0", open = "udpm://239.255.76.67:17658?ttl=1";
-  // Unsigned on this machine alone is good; it is not alone where multicast comes in by another interface,
-  // too.
+  const std::string local = "udpm://239.255.76.67:17658?ttl=0",
+                    open = "udpm://239.255.76.67:17658?ttl=1";
+  // Unsigned on this machine alone is good; it is not alone where multicast comes in by another
+  // interface, too.
   const Finding unsigned_here = Signatures(local);
   const Messenger messenger(local);
   const bool alone = OpenInterfaces(local).empty();

@@ -18,15 +18,16 @@ Outcome Excite(const std::string& robot, const std::string& arguments) {
 }  // namespace
 
 TEST_CASE(
-    "excite: a table of efforts within the limits, one row per control step, the same for the same seed") {
+    "excite: a table of efforts within the limits, one row per control step, the same for the same "
+    "seed") {
   const TemporaryFolder folder;
   const std::string few = " --candidates 11 --seconds 3 --output ";
   const Outcome outcome =
       Excite("pendulum", "--seed 3" + few + folder / "a.csv" + " --png " + folder / "a.png");
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
-  for (const char* word :
-       {"gain [nat]", "present sd", "expected sd", "margin", "helps with", "gravity", "it begins at"}) {
+  for (const char* word : {"gain [nat]", "present sd", "expected sd", "margin", "helps with",
+                           "gravity", "it begins at"}) {
     CHECK_THAT(outcome.text, Catch::Contains(word));
   }
   std::istringstream csv(Read(folder / "a.csv"));
@@ -53,7 +54,8 @@ TEST_CASE(
 
 TEST_CASE("excite: of the falling hopper only what comes before the fall, in gym's units") {
   const TemporaryFolder folder;
-  const Outcome outcome = Excite("hopper", "--candidates 6 --seconds 4 --output " + folder / "a.csv");
+  const Outcome outcome =
+      Excite("hopper", "--candidates 6 --seconds 4 --output " + folder / "a.csv");
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
   const std::string csv = Read(folder / "a.csv");

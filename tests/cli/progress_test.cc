@@ -18,7 +18,8 @@ calibration_status_t Calibration(int iteration) {
   c.iteration = iteration;
   c.num_parameters = 3;
   c.mean = {10.2, 1.1, 1.05}, c.sd = {0.4, 0.08, 0.04};
-  c.horizon = {1, 5, 20}, c.error_before = {0.003, 0.01, 0.2}, c.error_after = c.error_prior = c.error_before;
+  c.horizon = {1, 5, 20}, c.error_before = {0.003, 0.01, 0.2},
+  c.error_after = c.error_prior = c.error_before;
   c.num_horizons = 3;
   c.combination = {"gravity / length", "mass length^2"};
   c.num_combinations = 2;
@@ -45,12 +46,14 @@ struct Fixture {
   }
   void Trained(int iteration, double simulated) {
     training_status_t t{};
-    t.iteration = iteration, t.updates = t.update = 60, t.complete = 1, t.evaluation_return = simulated;
+    t.iteration = iteration, t.updates = t.update = 60, t.complete = 1,
+    t.evaluation_return = simulated;
     progress.OnTraining(t);
   }
 };
 
-TEST_CASE_METHOD(Fixture, "a row shows the distribution beside the returns of the policy it was learned from") {
+TEST_CASE_METHOD(
+    Fixture, "a row shows the distribution beside the returns of the policy it was learned from") {
   Trained(0, -210);
   Rollout(0, policy_t::CALIBRATE, {-300});
   progress.Account(12.5, 1.25);
@@ -58,7 +61,8 @@ TEST_CASE_METHOD(Fixture, "a row shows the distribution beside the returns of th
   progress.OnCalibration(Calibration(1));  // repeated at 1 Hz
   const auto rows = progress.TakeRows();
   REQUIRE(rows.size() == 1);
-  for (const char* text : {"   1", "10.200 ± 0.400", "0.50", "0.0030", "0.2000", "0.400", "21.0", "-210", "-300", "12.5"}) {
+  for (const char* text : {"   1", "10.200 ± 0.400", "0.50", "0.0030", "0.2000", "0.400", "21.0",
+                           "-210", "-300", "12.5"}) {
     CHECK_THAT(rows[0], Catch::Contains(text));
   }
   CHECK(progress.TakeRows().empty());
@@ -80,7 +84,8 @@ TEST_CASE_METHOD(Fixture, "what was learned stands beside the truth, combination
   const Eigen::Vector3d truth(10, 1, 1.1);
   const std::string text = progress.Conclusion(truth);
   // 10 / 1.1 = 9.0909, 1 * 1.1^2 = 1.21
-  for (const char* part : {"9.091", "4.50 %", "1.210", "7.44 %", "mean return -150, median -150, worst -200", "only gravity"}) {
+  for (const char* part : {"9.091", "4.50 %", "1.210", "7.44 %",
+                           "mean return -150, median -150, worst -200", "only gravity"}) {
     CHECK_THAT(text, Catch::Contains(part));
   }
   const nlohmann::json summary = progress.Summary(truth);
@@ -101,7 +106,9 @@ TEST_CASE_METHOD(Fixture, "what was learned stands beside the truth, combination
   CHECK(progress.Conclusion({}).find('%') == std::string::npos);
 }
 
-TEST_CASE_METHOD(Fixture, "the run's clock is told apart from real time, and only the former is in the summary") {
+TEST_CASE_METHOD(
+    Fixture,
+    "the run's clock is told apart from real time, and only the former is in the summary") {
   controller_status_t c{};
   c.phase = controller_status_t::RUNNING;
   progress.OnController(c);
@@ -113,7 +120,8 @@ TEST_CASE_METHOD(Fixture, "the run's clock is told apart from real time, and onl
   progress.OnTraining(t);
   progress.Account(60, 11);
   CHECK_THAT(progress.Conclusion({}),
-             Catch::Contains("time: 60 s on the robot, by its clock; 11 s in all: 4 s on the robot, 7 s training, 0 s for the rest"));
+             Catch::Contains("time: 60 s on the robot, by its clock; 11 s in all: 4 s on the "
+                             "robot, 7 s training, 0 s for the rest"));
   const auto seconds = progress.Summary({})["seconds"];
   CHECK(seconds["robot"] == 60);
   CHECK(seconds["training"] == 0);
@@ -130,7 +138,8 @@ TEST_CASE_METHOD(Fixture, "messages whose sizes do not fit are ignored") {
   progress.OnCalibration(Calibration(1));
   const auto rows = progress.TakeRows();
   REQUIRE(rows.size() == 1);
-  CHECK(rows[0].find("nan") == std::string::npos);  // returns of before a resumption are not known: a dash
+  // returns of before a resumption are not known: a dash
+  CHECK(rows[0].find("nan") == std::string::npos);
 }
 
 TEST_CASE_METHOD(Fixture, "the status line says what is waited for") {

@@ -24,7 +24,8 @@ inline Outcome Shell(const std::string& command, const std::string& words = "") 
   std::string quoted;
   for (const char c : command) quoted += c == '\'' ? "'\\''" : std::string(1, c);
   // What hangs is ended, with status 124. timeout passes our signal on to the command.
-  FILE* pipe = popen(("echo $$; exec timeout -k 60 120 sh -c '" + quoted + "' 2>&1 </dev/null").c_str(), "r");
+  FILE* pipe = popen(
+      ("echo $$; exec timeout -k 60 120 sh -c '" + quoted + "' 2>&1 </dev/null").c_str(), "r");
   REQUIRE(pipe);
   std::array<char, 4096> buffer;
   REQUIRE(fgets(buffer.data(), buffer.size(), pipe));
@@ -43,7 +44,9 @@ inline Outcome Shell(const std::string& command, const std::string& words = "") 
 
 /// The program under test, with a space behind it, and the robots it comes with.
 inline std::string Plumb() { return std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb "; }
-inline std::string Robot(const std::string& name) { return std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name; }
+inline std::string Robot(const std::string& name) {
+  return std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name;
+}
 
 inline std::string Read(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);

@@ -26,7 +26,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Outcome Sim(const std::string& arguments) { return Shell("DISPLAY= " + Plumb() + "sim " + arguments); }
+Outcome Sim(const std::string& arguments) {
+  return Shell("DISPLAY= " + Plumb() + "sim " + arguments);
+}
 
 struct Table {
   std::vector<std::string> names;
@@ -43,7 +45,8 @@ Table ReadCsv(const std::string& file) {
   std::ifstream stream(file);
   std::string line, field;
   std::getline(stream, line);
-  for (std::istringstream fields(line); std::getline(fields, field, ',');) table.names.push_back(field);
+  for (std::istringstream fields(line); std::getline(fields, field, ',');)
+    table.names.push_back(field);
   while (std::getline(stream, line)) {
     table.rows.emplace_back();
     for (std::istringstream fields(line); std::getline(fields, field, ',');) {
@@ -58,20 +61,25 @@ Table ReadCsv(const std::string& file) {
 
 TEST_CASE("sim: the pendulum's table, number by number") {
   const TemporaryFolder folder;
-  const Outcome outcome = Sim(Robot("pendulum") + " --random --episodes 2 --seed 7 --csv " + folder / "a.csv");
+  const Outcome outcome =
+      Sim(Robot("pendulum") + " --random --episodes 2 --seed 7 --csv " + folder / "a.csv");
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
   CHECK(outcome.text.find("time limit") != std::string::npos);
   CHECK(outcome.text.find("2 episodes, 400 steps") != std::string::npos);
-  CHECK(Read(folder / "a.csv").rfind("t,q/pivot,v/pivot,u/pivot,reward,terminated,truncated\n", 0) == 0);
+  CHECK(
+      Read(folder / "a.csv").rfind("t,q/pivot,v/pivot,u/pivot,reward,terminated,truncated\n", 0) ==
+      0);
   const Table table = ReadCsv(folder / "a.csv");
   REQUIRE(table.rows.size() == 400);
   for (size_t row = 0; row < 400; ++row) {
     CHECK(table.at(row, "t") == Approx(0.05 * static_cast<double>(row % 200)));
-    const double angle = std::remainder(table.at(row, "q/pivot"), 2 * M_PI), v = table.at(row, "v/pivot");
+    const double angle = std::remainder(table.at(row, "q/pivot"), 2 * M_PI),
+                 v = table.at(row, "v/pivot");
     const double u = table.at(row, "u/pivot");
     CHECK(std::abs(u) <= 2);  // Nm
-    CHECK(table.at(row, "reward") == Approx(-(angle * angle + 0.1 * v * v + 0.001 * u * u)).epsilon(1e-12));
+    CHECK(table.at(row, "reward") ==
+          Approx(-(angle * angle + 0.1 * v * v + 0.001 * u * u)).epsilon(1e-12));
     CHECK(table.at(row, "terminated") == 0);
     CHECK(table.at(row, "truncated") == (row % 200 == 199 ? 1 : 0));
   }
@@ -85,7 +93,8 @@ TEST_CASE("sim: the hopper's table") {
   REQUIRE(outcome.status == 0);
   CHECK(outcome.text.find("terminated by the task") != std::string::npos);
   CHECK(Read(folder / "a.csv")
-            .rfind("t,q/rootx,q/rootz,q/rooty,q/thigh,q/leg,q/foot,v/rootx,v/rootz,v/rooty,v/thigh,v/leg,v/foot,"
+            .rfind("t,q/rootx,q/rootz,q/rooty,q/thigh,q/leg,q/foot,v/rootx,v/rootz,v/rooty,v/"
+                   "thigh,v/leg,v/foot,"
                    "u/thigh,u/leg,u/foot,reward,terminated,truncated\n",
                    0) == 0);
   const Table table = ReadCsv(folder / "a.csv");
@@ -137,7 +146,8 @@ TEST_CASE("sim: a trainer's policy, and whatever is not one") {
   Checkpoint checkpoint{};
   checkpoint.policy = policy.ToMessage();
   SaveCheckpoint(folder / "good", checkpoint);
-  const Outcome good = Sim(Robot("pendulum") + " --csv " + folder / "a.csv" + " --policy " + folder / "good");
+  const Outcome good =
+      Sim(Robot("pendulum") + " --csv " + folder / "a.csv" + " --policy " + folder / "good");
   INFO(good.text);
   REQUIRE(good.status == 0);
   CHECK(ReadCsv(folder / "a.csv").at(17, "u/pivot") == 1);  // half of 2 Nm
@@ -153,24 +163,29 @@ TEST_CASE("sim: a trainer's policy, and whatever is not one") {
   policy.action_scale.setConstant(3);
   checkpoint.policy = policy.ToMessage();
   SaveCheckpoint(folder / "stronger", checkpoint);
-  CHECK_THAT(complaint(Robot("pendulum") + " --policy " + folder / "stronger"), Contains("effort limits"));
-  CHECK_THAT(complaint(Robot("pendulum") + " --policy " + folder / "none"), Contains("there is no such policy"));
-  CHECK_THAT(complaint(Robot("pendulum") + " --policy " + Robot("pendulum/robot.toml")),
-             Contains("robot.toml") && Contains("neither a trainer's checkpoint nor an ONNX model"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --policy " + folder / "stronger"),
+             Contains("effort limits"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --policy " + folder / "none"),
+             Contains("there is no such policy"));
+  CHECK_THAT(
+      complaint(Robot("pendulum") + " --policy " + Robot("pendulum/robot.toml")),
+      Contains("robot.toml") && Contains("neither a trainer's checkpoint nor an ONNX model"));
 }
 
 TEST_CASE("sim: a policy in ONNX does what it does as a checkpoint, on its own robot") {
   const TemporaryFolder folder;
   const RobotDescription robot = LoadRobot(Robot("pendulum"));
   GaussianPolicy policy(PolicyShape{3, {4}, 1});
-  for (Eigen::Index i = 0; i < policy.parameters.size(); ++i) policy.parameters[i] = 0.1f * static_cast<float>(i % 7 - 3);
+  for (Eigen::Index i = 0; i < policy.parameters.size(); ++i)
+    policy.parameters[i] = 0.1f * static_cast<float>(i % 7 - 3);
   policy.action_scale.setConstant(2);
   Checkpoint checkpoint{};
   checkpoint.policy = policy.ToMessage();
   SaveCheckpoint(folder / "checkpoint", checkpoint);
   WriteOnnxPolicy(folder / "policy.onnx", {policy, MakePolicyRecord(robot, *MakeTask(robot))});
   const auto table = [&](const std::string& file) {
-    const Outcome outcome = Sim(Robot("pendulum") + " --csv " + folder / "a.csv" + " --policy " + folder / file);
+    const Outcome outcome =
+        Sim(Robot("pendulum") + " --csv " + folder / "a.csv" + " --policy " + folder / file);
     INFO(outcome.text);
     CHECK(outcome.status == 0);
     return Read(folder / "a.csv");
@@ -178,7 +193,9 @@ TEST_CASE("sim: a policy in ONNX does what it does as a checkpoint, on its own r
   CHECK(table("policy.onnx") == table("checkpoint"));
   const Outcome other = Sim(Robot("hopper") + " --policy " + folder / "policy.onnx");
   CHECK(other.status == 1);
-  CHECK_THAT(other.text, Catch::Contains("policy.onnx: the policy is for another robot: \"pendulum\", not \"hopper\""));
+  CHECK_THAT(other.text,
+             Catch::Contains(
+                 "policy.onnx: the policy is for another robot: \"pendulum\", not \"hopper\""));
 }
 
 TEST_CASE("sim: errors say what to do") {
@@ -188,13 +205,16 @@ TEST_CASE("sim: errors say what to do") {
     return outcome.text;
   };
   using Catch::Contains;
-  CHECK_THAT(complaint(Robot("hopper") + " --set mass/tigh=4"), Contains("'mass/tigh'") && Contains("'mass/thigh'"));
+  CHECK_THAT(complaint(Robot("hopper") + " --set mass/tigh=4"),
+             Contains("'mass/tigh'") && Contains("'mass/thigh'"));
   CHECK_THAT(complaint(Robot("hopper") + " --set mass/thigh=-1"), Contains("mass/thigh"));
   CHECK_THAT(complaint(Robot("hopper") + " --set mass/thigh"), Contains("mass/thigh=4"));
   CHECK_THAT(complaint(Robot("pendulum") + " --set gravity=nine"), Contains("gravity=nine"));
-  CHECK_THAT(complaint(Robot("pendulum") + " --csv /nonexistent/a.csv"), Contains("/nonexistent/a.csv"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --csv /nonexistent/a.csv"),
+             Contains("/nonexistent/a.csv"));
   CHECK_THAT(complaint(Robot("pendulum") + " --png /"), Contains("folder"));
-  CHECK_THAT(complaint(Robot("pendulum") + " --view"), Contains("DISPLAY") && Contains("--png") && Contains("--gif"));
+  CHECK_THAT(complaint(Robot("pendulum") + " --view"),
+             Contains("DISPLAY") && Contains("--png") && Contains("--gif"));
   CHECK_THAT(complaint(Robot("nonesuch")), Contains("no such robot"));
   CHECK(Sim(Robot("pendulum") + " --random --policy x").status != 0);
   CHECK(Sim(Robot("pendulum") + " --episodes 0").status != 0);
@@ -212,9 +232,12 @@ TEST_CASE("sim: outputs that could not be written are refused before anything is
   CHECK_THAT(complaint("--csv " + folder / "a --png " + folder / "a"),
              Contains(folder / "a") && Contains("a file each"));
   CHECK_THAT(complaint("--png " + folder / "a --gif " + folder / "./a"), Contains("a file each"));
-  CHECK_THAT(complaint("--csv " + folder / "a --gif " + folder / "a.part"), Contains("a file each"));
-  fs::create_symlink("/dev/null", folder / "null");  // rather than itself: this may be root, and a rename harm it
-  CHECK_THAT(complaint("--csv " + folder / "null"), Contains("null: cannot be written: it is not a regular file"));
+  CHECK_THAT(complaint("--csv " + folder / "a --gif " + folder / "a.part"),
+             Contains("a file each"));
+  // rather than itself: this may be root, and a rename harm it
+  fs::create_symlink("/dev/null", folder / "null");
+  CHECK_THAT(complaint("--csv " + folder / "null"),
+             Contains("null: cannot be written: it is not a regular file"));
   CHECK(fs::is_symlink(folder / "null"));
   REQUIRE(mkfifo((folder / "pipe").c_str(), 0600) == 0);
   CHECK_THAT(complaint("--gif " + folder / "pipe"), Contains("not a regular file"));
@@ -231,21 +254,26 @@ TEST_CASE("sim: what is not a regular file is no robot and no policy") {
   const std::string pipe = folder / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
   CHECK_THAT(Sim(pipe).text, Contains(pipe + ": is not a regular file"));
-  CHECK_THAT(Sim(Robot("pendulum") + " --policy " + pipe).text, Contains(pipe + " is not a regular file"));
-  CHECK_THAT(Sim(Robot("pendulum") + " --policy /tmp").text, Contains("/tmp is not a regular file"));
+  CHECK_THAT(Sim(Robot("pendulum") + " --policy " + pipe).text,
+             Contains(pipe + " is not a regular file"));
+  CHECK_THAT(Sim(Robot("pendulum") + " --policy /tmp").text,
+             Contains("/tmp is not a regular file"));
 }
 
 TEST_CASE("sim: can be interrupted between short episodes") {
   // Each of the pendulum's has 200 steps.
   const Outcome outcome =
-      Shell("exec " + Plumb() + "sim " + Robot("pendulum") + " --random --episodes 1000000", "time limit");
+      Shell("exec " + Plumb() + "sim " + Robot("pendulum") + " --random --episodes 1000000",
+            "time limit");
   CHECK(outcome.status == 130);
   CHECK_THAT(outcome.text, Catch::EndsWith("interrupted\n"));
 }
 
 TEST_CASE("sim: stop is asked at every step") {
   Environment environment(LoadRobot(Robot("pendulum")));
-  const Actor actor = [](const Eigen::VectorXf&, Random&) { return Eigen::VectorXf::Zero(1).eval(); };
+  const Actor actor = [](const Eigen::VectorXf&, Random&) {
+    return Eigen::VectorXf::Zero(1).eval();
+  };
   int asked = 0;
   const SimulatedEpisode episode = PlayEpisode(
       environment, LoadRobot(Robot("pendulum")), actor, 1, 0, [](const SimulatedStep&) {},
@@ -259,7 +287,8 @@ TEST_CASE("sim: episodes that failed have no return") {
   const SimulatedEpisode good{10, 1, End::kTimeLimit}, better{20, 3, End::kTerminated},
       failed{5, NAN, End::kNotFinite};
   CHECK(Totals({good, failed, better}) ==
-        "3 episodes, 35 steps, mean return 2.0, standard deviation 1.4; 1 failed: no longer finite, left out "
+        "3 episodes, 35 steps, mean return 2.0, standard deviation 1.4; 1 failed: no longer "
+        "finite, left out "
         "of the mean");
   CHECK(Totals({good}) == "1 episode, 10 steps, mean return 1.0");
   CHECK(Totals({failed, failed}) == "2 episodes, 10 steps; 2 failed: no longer finite");
@@ -280,7 +309,9 @@ TEST_CASE("sim: says which parameters are in use") {
   const std::string hopper = Robot("hopper"), csv = " --csv " + folder / "a.csv";
   const std::string prior = Sim(hopper + csv).text;
   const std::string priors_table = Read(folder / "a.csv");
-  CHECK_THAT(prior, Contains("\nparameters: mass/torso 3.8, mass/thigh 3.8, mass/leg 3.8, mass/foot 3.8\n"));
+  CHECK_THAT(
+      prior,
+      Contains("\nparameters: mass/torso 3.8, mass/thigh 3.8, mass/leg 3.8, mass/foot 3.8\n"));
   CHECK_THAT(Sim(hopper + " --set mass/leg=2.5 --set damping/leg=0.7").text,
              Contains("mass/leg 2.5, mass/foot 3.8, damping/leg 0.7\n"));
   // As the URDF has it: not the prior's means.
@@ -301,7 +332,8 @@ TEST_CASE("sim: says which parameters are in use") {
   CHECK(Read(folder / "a.csv") == table);
   CHECK_THAT(Sim(hopper + " --urdf --set gravity=3").text, Contains("parameters: gravity 3\n"));
   for (std::istringstream lines(
-           Sim(hopper + set + " --set damping/leg=0.123456789 --set damping/foot=0.123456789").text);
+           Sim(hopper + set + " --set damping/leg=0.123456789 --set damping/foot=0.123456789")
+               .text);
        std::getline(lines, set);) {
     CHECK(set.size() <= 120);
   }
@@ -325,7 +357,8 @@ TEST_CASE("sim: a spherical joint has four columns in q and three in v") {
   robot.joints[0].passive = true;
   CHECK(CsvHeader(robot) ==
         "t,q/body/rotation/w,q/body/rotation/x,q/body/rotation/y,q/body/rotation/z,q/pivot,"
-        "v/body/rotation/x,v/body/rotation/y,v/body/rotation/z,v/pivot,u/pivot,reward,terminated,truncated\n");
+        "v/body/rotation/x,v/body/rotation/y,v/body/rotation/z,v/pivot,u/"
+        "pivot,reward,terminated,truncated\n");
 }
 
 }  // namespace plumb

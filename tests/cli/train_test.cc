@@ -1,4 +1,5 @@
-// plumb train as people run it: interrupted and resumed, with any number of threads, and given nonsense.
+// plumb train as people run it: interrupted and resumed, with any number of threads, and given
+// nonsense.
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -15,8 +16,10 @@
 namespace plumb {
 namespace {
 
-std::string Train(const TemporaryFolder& folder, const std::string& name, const std::string& flags) {
-  return Plumb() + "train " + Robot("pendulum") + " --held-out 5 --output " + folder / name + " --csv " + folder / (name + ".csv") + " " + flags;
+std::string Train(const TemporaryFolder& folder, const std::string& name,
+                  const std::string& flags) {
+  return Plumb() + "train " + Robot("pendulum") + " --held-out 5 --output " + folder / name +
+         " --csv " + folder / (name + ".csv") + " " + flags;
 }
 
 // All columns but the last, which is the time.
@@ -29,25 +32,34 @@ std::vector<std::string> Rows(const std::string& file) {
 
 TEST_CASE("train writes a policy, a table and what to expect of it") {
   const TemporaryFolder folder;
-  const Outcome outcome = Shell(Train(folder, "policy.onnx", "--steps 12000 --evaluate-every 2 --distribution nominal"));
+  const Outcome outcome = Shell(
+      Train(folder, "policy.onnx", "--steps 12000 --evaluate-every 2 --distribution nominal"));
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
   CHECK(outcome.text.find("12000 steps, 4 updates") != std::string::npos);
-  CHECK(std::regex_search(outcome.text, std::regex("nominal +-[0-9.]+ mean, -[0-9.]+ 10th percentile, -[0-9.]+ worst")));
+  CHECK(std::regex_search(
+      outcome.text,
+      std::regex("nominal +-[0-9.]+ mean, -[0-9.]+ 10th percentile, -[0-9.]+ worst")));
   CHECK(std::regex_search(outcome.text, std::regex("prior +-[0-9.]+ mean")));
-  CHECK(std::regex_search(outcome.text, std::regex("return -[0-9]+.*KL 0.*gain.*explained.*entropy.*steps/s.*left")));
+  CHECK(std::regex_search(
+      outcome.text, std::regex("return -[0-9]+.*KL 0.*gain.*explained.*entropy.*steps/s.*left")));
   CHECK(outcome.text.find("wrote " + folder / "policy.onnx") != std::string::npos);
   const OnnxPolicy written = ReadOnnxPolicy(folder / "policy.onnx");
-  CHECK(written.policy.ToMessage().weight == LoadCheckpoint(folder / "policy.onnx.checkpoint")->policy.weight);
+  CHECK(written.policy.ToMessage().weight ==
+        LoadCheckpoint(folder / "policy.onnx.checkpoint")->policy.weight);
   CHECK(written.record.robot == "pendulum");
   CHECK(written.record.posterior == "nominal");
   CHECK(written.record.steps == 12000);
   CHECK(written.record.evaluation.at("simulators") == 5);
   CHECK(written.record.evaluation.at("worst") <= written.record.evaluation.at("mean"));
-  CHECK(Shell(Plumb() + "sim " + Robot("pendulum") + " --policy " + folder / "policy.onnx").status == 0);
+  CHECK(
+      Shell(Plumb() + "sim " + Robot("pendulum") + " --policy " + folder / "policy.onnx").status ==
+      0);
   const auto rows = Rows(folder / "policy.onnx.csv");
   REQUIRE(rows.size() == 5);
-  CHECK(rows[0] == "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,accepted,dropped_episodes");
+  CHECK(rows[0] ==
+        "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,"
+        "accepted,dropped_episodes");
   CHECK(rows[1].find("1,3000,-") == 0);
   CHECK(rows[1].find(",nan,") != std::string::npos);
   CHECK(rows[2].find(",nan,") == std::string::npos);
@@ -68,7 +80,8 @@ TEST_CASE("an interrupted training goes on to the same bits, with any number of 
   }
   CHECK(runs > 1);
   CHECK(Rows(folder / "resumed.csv") == Rows(folder / "straight.csv"));
-  const auto straight = LoadCheckpoint(folder / "straight.checkpoint"), resumed = LoadCheckpoint(folder / "resumed.checkpoint");
+  const auto straight = LoadCheckpoint(folder / "straight.checkpoint"),
+             resumed = LoadCheckpoint(folder / "resumed.checkpoint");
   REQUIRE(straight);
   REQUIRE(resumed);
   CHECK(resumed->policy.weight == straight->policy.weight);
@@ -77,7 +90,8 @@ TEST_CASE("an interrupted training goes on to the same bits, with any number of 
   SECTION("and further, if asked for more steps") {
     REQUIRE(Shell(Train(folder, "resumed", "--steps 60000")).status == 0);
     REQUIRE(Shell(Train(folder, "long", "--steps 60000")).status == 0);
-    CHECK(LoadCheckpoint(folder / "resumed.checkpoint")->policy.weight == LoadCheckpoint(folder / "long.checkpoint")->policy.weight);
+    CHECK(LoadCheckpoint(folder / "resumed.checkpoint")->policy.weight ==
+          LoadCheckpoint(folder / "long.checkpoint")->policy.weight);
   }
   SECTION("but not as another run") {
     const Outcome outcome = Shell(Train(folder, "resumed", "--steps 45000 --seed 2"));
@@ -93,11 +107,13 @@ TEST_CASE("ranks give the same bits as one process, file by file") {
     WARN("openmpi-bin is not installed: ranks are not tested");
     return;
   }
-  const std::string mpirun = "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n 3 ";
+  const std::string mpirun =
+      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n 3 ";
   const Outcome begun = Shell(mpirun + Train(folder, "three", "--steps 6000 --threads 1"));
   INFO(begun.text);
   REQUIRE(begun.status == 0);
-  const Outcome outcome = Shell(mpirun + Train(folder, "three", "--steps 12000 --threads 1"));  // from its checkpoint
+  // from its checkpoint
+  const Outcome outcome = Shell(mpirun + Train(folder, "three", "--steps 12000 --threads 1"));
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
   CHECK(Read(folder / "three") == Read(folder / "one"));
@@ -107,13 +123,16 @@ TEST_CASE("ranks give the same bits as one process, file by file") {
 
 TEST_CASE("the paper's settings are another run, and so is a guarded one") {
   const TemporaryFolder folder;
-  for (const std::string flags : {"--steps 6000", "--steps 6000 --paper", "--steps 6000 --worst-share 0.5 --worst-after 1"}) {
+  for (const std::string flags :
+       {"--steps 6000", "--steps 6000 --paper", "--steps 6000 --worst-share 0.5 --worst-after 1"}) {
     const std::string name = "p" + std::to_string(flags.size());
     const Outcome outcome = Shell(Train(folder, name, flags));
     INFO(outcome.text);
     REQUIRE(outcome.status == 0);
   }
-  const auto weights = [&](const std::string& name) { return LoadCheckpoint(folder / name + ".checkpoint")->policy.weight; };
+  const auto weights = [&](const std::string& name) {
+    return LoadCheckpoint(folder / name + ".checkpoint")->policy.weight;
+  };
   CHECK(weights("p12") != weights("p20"));
   CHECK(weights("p12") != weights("p46"));
 }
@@ -121,10 +140,12 @@ TEST_CASE("the paper's settings are another run, and so is a guarded one") {
 TEST_CASE("a policy to begin with") {
   const TemporaryFolder folder;
   REQUIRE(Shell(Train(folder, "first", "--steps 15000")).status == 0);
-  const Outcome outcome = Shell(Train(folder, "second", "--steps 3000 --seed 2 --from " + folder / "first"));
+  const Outcome outcome =
+      Shell(Train(folder, "second", "--steps 3000 --seed 2 --from " + folder / "first"));
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
-  const auto first = LoadCheckpoint(folder / "first.checkpoint")->policy, second = LoadCheckpoint(folder / "second.checkpoint")->policy;
+  const auto first = LoadCheckpoint(folder / "first.checkpoint")->policy,
+             second = LoadCheckpoint(folder / "second.checkpoint")->policy;
   double moved = 0, size = 0;
   for (size_t i = 0; i < first.weight.size(); ++i) {
     moved += std::pow(second.weight[i] - first.weight[i], 2);

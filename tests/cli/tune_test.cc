@@ -15,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string WriteLog(const TemporaryFolder& folder, const std::vector<SimulatedReadings::Sample>& samples) {
+std::string WriteLog(const TemporaryFolder& folder,
+                     const std::vector<SimulatedReadings::Sample>& samples) {
   const std::string file = folder / "run.lcmlog";
   lcm::LogFile log(file, "w");
   REQUIRE(log.good());
@@ -36,13 +37,15 @@ std::string WriteLog(const TemporaryFolder& folder, const std::vector<SimulatedR
   return file;
 }
 
-double Deviance(const RobotDescription& robot, const std::vector<SimulatedReadings::Sample>& samples) {
+double Deviance(const RobotDescription& robot,
+                const std::vector<SimulatedReadings::Sample>& samples) {
   StateObserver observer(robot);
   Play({samples}, observer);
   return observer.deviance(0) / static_cast<double>(observer.readings(0));
 }
 
-TEST_CASE("plumb estimate tune prints settings under which another motion's readings are likelier") {
+TEST_CASE(
+    "plumb estimate tune prints settings under which another motion's readings are likelier") {
   const TemporaryFolder folder;
   const RobotDescription shipped = LoadRobot(Robot("pendulum"));
   const std::string log = WriteLog(folder, Swing(shipped, 1));
@@ -68,7 +71,8 @@ TEST_CASE("plumb estimate tune prints settings under which another motion's read
 
 TEST_CASE("plumb estimate tune says what a log lacks") {
   const TemporaryFolder folder;
-  const std::vector<SimulatedReadings::Sample> samples = Swing(LoadRobot(Robot("pendulum")), 1, 0.1);
+  const std::vector<SimulatedReadings::Sample> samples =
+      Swing(LoadRobot(Robot("pendulum")), 1, 0.1);
   const Outcome little =
       Shell(Plumb() + "estimate tune " + Robot("pendulum") + " --log " + WriteLog(folder, samples));
   INFO(little.text);

@@ -33,15 +33,18 @@ TEST_CASE("values are read with their type and range") {
 }
 
 TEST_CASE("every mistake is named with file, line and column") {
-  Config config = Read("a = \"1.5\"\nb = -3\nc = 2.5\n[f]\ng = 1\n\n[[h]]\nx = 1\n[[h]]\nx = nan\n");
+  Config config =
+      Read("a = \"1.5\"\nb = -3\nc = 2.5\n[f]\ng = 1\n\n[[h]]\nx = 1\n[[h]]\nx = nan\n");
   CHECK_THROWS_WITH(config.Number("a"), Equals("robot.toml:1:5: a is not a number"));
-  CHECK_THROWS_WITH(config.Number("b", kPositive), Equals("robot.toml:2:5: b = -3 is not a positive finite number"));
+  CHECK_THROWS_WITH(config.Number("b", kPositive),
+                    Equals("robot.toml:2:5: b = -3 is not a positive finite number"));
   CHECK_THROWS_WITH(config.Integer("c", {0, 9}), Equals("robot.toml:3:5: c is not an integer"));
   CHECK_THROWS_WITH(config.Integer("b", {0, 9}), Equals("robot.toml:2:5: b = -3 is not in [0, 9]"));
   CHECK_THROWS_WITH(config.Table("f").Number("z"), Equals("robot.toml:4:1: f.z is missing"));
   CHECK_THROWS_WITH(config.Table("b"), Equals("robot.toml:2:5: b is not a table"));
   CHECK_THROWS_WITH(config.Tables("f"), Catch::Contains("[[f]]"));
-  CHECK_THROWS_WITH(config.Tables("h")[1].Number("x"), Equals("robot.toml:10:5: h[1].x = nan is not a finite number"));
+  CHECK_THROWS_WITH(config.Tables("h")[1].Number("x"),
+                    Equals("robot.toml:10:5: h[1].x = nan is not a finite number"));
   CHECK_THROWS_AS(config.Number("nothing"), ConfigError);
 }
 
@@ -49,12 +52,14 @@ TEST_CASE("a key that nobody knows is an error that names the nearest") {
   Config config = Read("gravity = 1\nlenght = 2\n");
   config.Number("gravity");
   config.Number("length", kFinite, 1);
-  CHECK_THROWS_WITH(config.Finish(), Equals("robot.toml:2:10: lenght is not a known key; did you mean length?"));
+  CHECK_THROWS_WITH(config.Finish(),
+                    Equals("robot.toml:2:10: lenght is not a known key; did you mean length?"));
 }
 
 TEST_CASE("what is not TOML is located") {
   CHECK_THROWS_WITH(Read("a = 1\nb = = 2\n"), Catch::StartsWith("robot.toml:2:5: "));
-  CHECK_THROWS_WITH(Config::Load("/nowhere/robot.toml"), Equals("/nowhere/robot.toml: cannot be opened"));
+  CHECK_THROWS_WITH(Config::Load("/nowhere/robot.toml"),
+                    Equals("/nowhere/robot.toml: cannot be opened"));
 }
 
 TEST_CASE("what is no file of text is refused, however long") {
@@ -64,7 +69,8 @@ TEST_CASE("what is no file of text is refused, however long") {
   const TemporaryFolder folder;
   const std::string file = folder / "file";
   REQUIRE(mkfifo(file.c_str(), 0600) == 0);
-  CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": is not a regular file"));  // nor does it wait for a writer
+  // nor does it wait for a writer
+  CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": is not a regular file"));
   fs::remove(file);
   CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": cannot be opened"));
   std::ofstream(file).close();
@@ -74,10 +80,13 @@ TEST_CASE("what is no file of text is refused, however long") {
 }
 
 struct Folder : TemporaryFolder {
-  void Write(const std::string& name, const std::string& text) const { std::ofstream(*this / name) << text; }
+  void Write(const std::string& name, const std::string& text) const {
+    std::ofstream(*this / name) << text;
+  }
 };
 
-TEST_CASE("a file that extends another stands in its place, key by key, table by table, name by name") {
+TEST_CASE(
+    "a file that extends another stands in its place, key by key, table by table, name by name") {
   const Folder folder;
   folder.Write("base.toml",
                "a = 1\nb = 2\nlist = [1, 2]\n[t]\nx = 1\ny = 2\n[t.deep]\nz = 3\n"
@@ -88,7 +97,8 @@ TEST_CASE("a file that extends another stands in its place, key by key, table by
   folder.Write("last.toml", "extends = \"own.toml\"\nc = 300\n");
   std::vector<std::string> files;
   Config config = Config::Load(folder / "last.toml", &files);
-  CHECK(files == std::vector<std::string>{folder / "last.toml", folder / "own.toml", folder / "base.toml"});
+  CHECK(files ==
+        std::vector<std::string>{folder / "last.toml", folder / "own.toml", folder / "base.toml"});
   CHECK(config.Number("a") == 1);
   CHECK(config.Number("b") == 20);
   CHECK(config.Number("c") == 300);
@@ -112,30 +122,38 @@ TEST_CASE("mistakes in files that extend each other are named in the file where 
   const Folder folder;
   folder.Write("base.toml", "a = \"x\"\n[t]\nb = 1\n[[j]]\nname = \"hip\"\n");
   folder.Write("own.toml",
-               "extends = \"base.toml\"\n[t]\nc = -1\nd = 1\n[[j]]\nname = \"hip\"\nm = -1\n[[j]]\nname = \"hip\"\n");
+               "extends = \"base.toml\"\n[t]\nc = -1\nd = 1\n[[j]]\nname = \"hip\"\nm = "
+               "-1\n[[j]]\nname = \"hip\"\n");
   Config config = Config::Load(folder / "own.toml");
   CHECK_THROWS_WITH(config.Number("a"), Equals((folder / "base.toml") + ":1:5: a is not a number"));
   Config t = config.Table("t");
   CHECK_THROWS_WITH(t.Number("e"), Equals((folder / "base.toml") + ":2:1: t.e is missing"));
-  CHECK_THROWS_WITH(t.Number("c", kPositive), Equals((folder / "own.toml") + ":3:5: t.c = -1 is not a positive finite number"));
+  CHECK_THROWS_WITH(
+      t.Number("c", kPositive),
+      Equals((folder / "own.toml") + ":3:5: t.c = -1 is not a positive finite number"));
   CHECK(t.Number("b") == 1);
-  CHECK_THROWS_WITH(t.Finish(), Catch::Contains((folder / "own.toml") + ":4:5: t.d is not a known key"));
+  CHECK_THROWS_WITH(t.Finish(),
+                    Catch::Contains((folder / "own.toml") + ":4:5: t.d is not a known key"));
   CHECK(t.Position("d") == (folder / "own.toml") + ":4:5: ");
   std::vector<Config> joints = config.Tables("j");
   REQUIRE(joints.size() == 2);  // of the same name: for the reader to refuse
-  CHECK_THROWS_WITH(joints[0].Number("m", kPositive),
-                    Equals((folder / "own.toml") + ":7:5: j[0].m = -1 is not a positive finite number"));
+  CHECK_THROWS_WITH(
+      joints[0].Number("m", kPositive),
+      Equals((folder / "own.toml") + ":7:5: j[0].m = -1 is not a positive finite number"));
 
   const auto refused = [&](const std::string& text, const std::string& why) {
     folder.Write("bad.toml", text);
-    CHECK_THROWS_WITH(Config::Load(folder / "bad.toml"), Catch::Contains((folder / "bad.toml") + why));
+    CHECK_THROWS_WITH(Config::Load(folder / "bad.toml"),
+                      Catch::Contains((folder / "bad.toml") + why));
   };
   refused("extends = 3\n", ":1:11: extends is not a string");
-  refused("a = 1\nextends = \"none.toml\"\n", ":2:11: extends = \"none.toml\": there is no such file");
+  refused("a = 1\nextends = \"none.toml\"\n",
+          ":2:11: extends = \"none.toml\": there is no such file");
   refused("extends = \"bad.toml\"\n", ":1:11: extends a file that extends a file");
   folder.Write("folder.toml", "extends = \".\"\n");
   CHECK_THROWS_WITH(Config::Load(folder / "folder.toml"), Catch::Contains("is a folder"));
-  CHECK_THROWS_WITH(Read("extends = \"base.toml\"\n").Finish(), Catch::Contains("extends is not a known key"));
+  CHECK_THROWS_WITH(Read("extends = \"base.toml\"\n").Finish(),
+                    Catch::Contains("extends is not a known key"));
 }
 
 TEST_CASE("a key may hold a table or something else") {

@@ -13,7 +13,8 @@ namespace {
 using Catch::Contains;
 
 std::string Url() {
-  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0&recv_buf_size=2097152";
+  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) +
+         "?ttl=0&recv_buf_size=2097152";
 }
 
 std::span<const uint8_t> Bytes(const std::string& text) {
@@ -34,11 +35,13 @@ TEST_CASE("others hear all of it, and are heard apart from it") {
   }
   other.Publish("JOINT_COMMAND", Bytes("mine"));
   mirror.Flush();
-  for (int i = 0; i < 1000 && strangers.empty(); ++i) usleep(10'000), strangers = mirror.TakeStrangers();
+  for (int i = 0; i < 1000 && strangers.empty(); ++i)
+    usleep(10'000), strangers = mirror.TakeStrangers();
   REQUIRE(strangers.size() == 1);
   CHECK(strangers[0].channel == "JOINT_COMMAND");
   CHECK(std::string(strangers[0].bytes.begin(), strangers[0].bytes.end()) == "mine");
-  for (int i = 0; i < 100 && heard.size() < 2000; ++i) other.lcm().handleTimeout(100), other.Drain();
+  for (int i = 0; i < 100 && heard.size() < 2000; ++i)
+    other.lcm().handleTimeout(100), other.Drain();
   REQUIRE(heard.size() == 2000);
   CHECK(heard[1999] == "ROBOT_STATE 1999");
 }

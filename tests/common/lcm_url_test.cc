@@ -17,12 +17,14 @@ TEST_CASE("which LCM URLs stay on this machine") {
   for (const char* url :
        {kDefaultLcmUrl, "memq://", "file:///tmp/x.log", "udpm://", "udpm://239.255.76.67:7667",
         "udpm://?ttl=0", "udpm://239.255.76.67:7667?recv_buf_size=1&ttl=0",
-        "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=1", "udpm://239.255.76.67:7667?ttl=0&ttl=0"}) {
+        "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=1",
+        "udpm://239.255.76.67:7667?ttl=0&ttl=0"}) {
     INFO(url);
     CHECK(StaysOnMachine(url));
     CHECK_NOTHROW(RequireKey(url, false, false));
   }
-  // liblcm reads numbers as strtol does, in any base, takes the last of several, and has other providers.
+  // liblcm reads numbers as strtol does, in any base, takes the last of several, and has other
+  // providers.
   for (const char* url :
        {"udpm://239.255.76.67:7667?ttl=1", "udpm://239.255.76.67:7667?recv_buf_size=1&ttl=32",
         "udpm://?ttl=0&ttl=1", "udpm://?ttl=1&ttl=0", "udpm://?ttl=0?ttl=1", "udpm://?ttl=0x1",
@@ -30,8 +32,9 @@ TEST_CASE("which LCM URLs stay on this machine") {
         "tcpq://localhost:7700", "mpudpm://239.255.76.67:7667", "nonsense", "UDPM://?ttl=0"}) {
     INFO(url);
     CHECK_FALSE(StaysOnMachine(url));
-    CHECK_THROWS_WITH(RequireKey(url, false, false),
-                      Catch::Contains(url) && Catch::Contains("--key FILE") && Catch::Contains("--unsigned"));
+    CHECK_THROWS_WITH(RequireKey(url, false, false), Catch::Contains(url) &&
+                                                         Catch::Contains("--key FILE") &&
+                                                         Catch::Contains("--unsigned"));
     CHECK_NOTHROW(RequireKey(url, true, false));
     CHECK_NOTHROW(RequireKey(url, false, true));
   }
@@ -53,12 +56,12 @@ TEST_CASE("an empty URL is what liblcm makes of it") {
 
 TEST_CASE("the interfaces through which others reach a multicast group") {
   const int own = getpid() % 60'000;
-  const std::string url =
-      "udpm://239.254." + std::to_string(own / 250) + "." + std::to_string(own % 250 + 1) + ":17657?ttl=0";
+  const std::string url = "udpm://239.254." + std::to_string(own / 250) + "." +
+                          std::to_string(own % 250 + 1) + ":17657?ttl=0";
   CHECK(OpenInterfaces(url).empty());  // nobody listens
   const Messenger messenger(url);
-  // The same question to the kernel's routing table, where the group's route is plain: no line for multicast,
-  // hence the default route's interface; or all of multicast to the loopback.
+  // The same question to the kernel's routing table, where the group's route is plain: no line for
+  // multicast, hence the default route's interface; or all of multicast to the loopback.
   const std::vector<std::string> interfaces = OpenInterfaces(url);
   std::ifstream table("/proc/net/route");
   std::string line, route_default, route_multicast;

@@ -34,8 +34,9 @@ class Run {
   Run() {
     coordinator.emplace((folder / "clock").string());
     coordinator->on_post = [this](const lockstep_post_t& post, const std::string& speaker) {
-      transcript += std::to_string(coordinator->now() - kStart) + " " + (speaker.empty() ? "owner" : speaker) + " " +
-                    post.topic.name + " " + Text(post) + "\n";
+      transcript += std::to_string(coordinator->now() - kStart) + " " +
+                    (speaker.empty() ? "owner" : speaker) + " " + post.topic.name + " " +
+                    Text(post) + "\n";
     };
     coordinator->on_note = [this](const std::string& line) { notes += line + "\n"; };
   }
@@ -169,16 +170,19 @@ TEST_CASE("a stalled participant has no turn; then it hears all of it") {
   run.coordinator->Stall("c", 20);
   run.transcript.clear();
   run.Pass(25);
-  CHECK(run.transcript == "20 a A tick\n30 a A tick\n35 c C to tick\n35 c C to tick\n40 a A tick\n40 c C to tick\n");
+  CHECK(run.transcript ==
+        "20 a A tick\n30 a A tick\n35 c C to tick\n35 c C to tick\n40 a A tick\n40 c C to tick\n");
 }
 
-TEST_CASE("one that dies is gone at that moment, and the others go on; one of its name may come again") {
+TEST_CASE(
+    "one that dies is gone at that moment, and the others go on; one of its name may come again") {
   Run run;
   run.Start("a", Ticker("A", 10));
   const auto die_at = [](int64_t moment) {
     return [moment](Participant& self) {
       self.Listen(ChannelTopic("A"));
-      while (self.now() < kStart + moment) self.Wait(kStart + moment, Wake::kWhenHeard), self.messages().clear();
+      while (self.now() < kStart + moment)
+        self.Wait(kStart + moment, Wake::kWhenHeard), self.messages().clear();
       self.Say(ChannelTopic("C"), Bytes("last words"));
     };
   };
@@ -187,8 +191,9 @@ TEST_CASE("one that dies is gone at that moment, and the others go on; one of it
   CHECK_FALSE(run.coordinator->present("c"));
   run.Start("c", die_at(40));
   run.Pass(30);
-  CHECK(run.transcript == "10 a A tick\n20 a A tick\n20 c C last words\n30 a A tick\n40 a A tick\n40 c C last words\n"
-                          "50 a A tick\n60 a A tick\n");
+  CHECK(run.transcript ==
+        "10 a A tick\n20 a A tick\n20 c C last words\n30 a A tick\n40 a A tick\n40 c C last words\n"
+        "50 a A tick\n60 a A tick\n");
 }
 
 TEST_CASE("one that is asked to stop ends at that moment") {
@@ -249,7 +254,8 @@ TEST_CASE("who does not belong is refused with one line") {
              Contains(" "));
   CHECK_THAT(run.notes, Contains("refused: old is 0.0.1 (abc), the run is "));
   // Whatever else is written there ends the connection and nothing else.
-  for (const std::string& garbage : {std::string("\xff\xff\xff\xff garbage"), std::string(8, '\0'), std::string("\4\0\0\0abcd", 8)}) {
+  for (const std::string& garbage : {std::string("\xff\xff\xff\xff garbage"), std::string(8, '\0'),
+                                     std::string("\4\0\0\0abcd", 8)}) {
     refusal([&] {
       PacketSocket socket = PacketSocket::Connect(path);
       send(socket.fd(), garbage.data(), garbage.size(), MSG_NOSIGNAL);
@@ -263,10 +269,13 @@ TEST_CASE("who does not belong is refused with one line") {
 
 TEST_CASE("where nobody keeps time there is one clear line") {
   Run run;
-  CHECK_THROWS_WITH(JoinRun((run.folder / "nothing").string(), "a"), Contains("nobody keeps a run's time there"));
-  CHECK_THROWS_WITH(JoinRun("/nowhere/at/all", "a"), Contains("/nowhere/at: cannot open the folder"));
+  CHECK_THROWS_WITH(JoinRun((run.folder / "nothing").string(), "a"),
+                    Contains("nobody keeps a run's time there"));
+  CHECK_THROWS_WITH(JoinRun("/nowhere/at/all", "a"),
+                    Contains("/nowhere/at: cannot open the folder"));
   std::ofstream(run.folder / "file") << "text";
-  CHECK_THROWS_WITH(JoinRun((run.folder / "file").string(), "a"), Contains("nobody keeps a run's time there"));
+  CHECK_THROWS_WITH(JoinRun((run.folder / "file").string(), "a"),
+                    Contains("nobody keeps a run's time there"));
 }
 
 TEST_CASE("a path longer than a socket's address will do") {
@@ -276,7 +285,8 @@ TEST_CASE("a path longer than a socket's address will do") {
   std::filesystem::create_directories(deep);
   Coordinator coordinator((deep / "clock").string());
   coordinator.Expect("a", getpid());
-  std::thread thread([&] { JoinRun((deep / "clock").string(), "a")->Wait(kStart + 5, Wake::kOnTime); });
+  std::thread thread(
+      [&] { JoinRun((deep / "clock").string(), "a")->Wait(kStart + 5, Wake::kOnTime); });
   coordinator.participant().Wait(kStart + 10, Wake::kOnTime);
   CHECK(coordinator.now() == kStart + 10);
   thread.join();

@@ -41,7 +41,9 @@ TEST_CASE("messages arrive in order, and none is lost to a bounded queue") {
 TEST_CASE("a subscriber that is gone is not called") {
   Messenger messenger("memq://");
   int calls = 0;
-  { Subscriber<joint_state_t> subscriber(messenger, "X", [&](const joint_state_t&) { ++calls; }); }
+  {
+    Subscriber<joint_state_t> subscriber(messenger, "X", [&](const joint_state_t&) { ++calls; });
+  }
   Subscriber<joint_state_t> other(messenger, "X");
   Publisher<joint_state_t> publisher(messenger, "X");
   publisher.Publish(Message(1));
@@ -50,7 +52,8 @@ TEST_CASE("a subscriber that is gone is not called") {
   CHECK(calls == 0);
 }
 
-// Every message with up to four bytes changed, and lengths an attacker would choose: all of them may arrive.
+// Every message with up to four bytes changed, and lengths an attacker would choose: all of them
+// may arrive.
 TEST_CASE("hostile messages are rejected, counted, and cost no memory") {
   Messenger messenger("memq://");
   Subscriber<parameter_distribution_t> subscriber(messenger, "X");
@@ -69,7 +72,8 @@ TEST_CASE("hostile messages are rejected, counted, and cost no memory") {
   };
   for (int i = 0; i < 20000; ++i) {
     std::vector<uint8_t> bad = good;
-    for (uint32_t k = 0; k <= i % 4u; ++k) bad[8 + random.Bits() % (bad.size() - 8)] = static_cast<uint8_t>(random.Bits());
+    for (uint32_t k = 0; k <= i % 4u; ++k)
+      bad[8 + random.Bits() % (bad.size() - 8)] = static_cast<uint8_t>(random.Bits());
     send(bad);
   }
   // the count of parameters: negative, 2^27, 2^29, largest
@@ -80,7 +84,8 @@ TEST_CASE("hostile messages are rejected, counted, and cost no memory") {
     send(bad);
   }
   // cut off everywhere
-  for (size_t length = 0; length < good.size(); ++length) send({good.begin(), good.begin() + static_cast<long>(length)});
+  for (size_t length = 0; length < good.size(); ++length)
+    send({good.begin(), good.begin() + static_cast<long>(length)});
   REQUIRE(subscriber.received() + subscriber.rejected() == sent);
   CHECK(subscriber.rejected() > static_cast<int64_t>(good.size()));
   CHECK(subscriber.newest().num_components <= 1);
@@ -107,7 +112,8 @@ TEST_CASE("a message that does not decode leaves the newest good one alone") {
 
 TEST_CASE("a callback's exception does not cross LCM's C frames") {
   Messenger messenger("memq://");
-  Subscriber<joint_state_t> subscriber(messenger, "X", [](const joint_state_t&) { throw std::runtime_error("mine"); });
+  Subscriber<joint_state_t> subscriber(
+      messenger, "X", [](const joint_state_t&) { throw std::runtime_error("mine"); });
   Publisher<joint_state_t> publisher(messenger, "X");
   for (int i = 0; i < 3; ++i) {
     publisher.Publish(Message(i));
@@ -121,7 +127,8 @@ TEST_CASE("a callback's exception does not cross LCM's C frames") {
 // Without the filter a single one of these datagrams makes liblcm 1.3.1 write 4 GB out of bounds.
 TEST_CASE("malformed LCM datagrams do not reach liblcm") {
   const int port = 20'000 + getpid() % 12'000;  // so that tests may run side by side
-  const std::string url = "udpm://239.255.76.61:" + std::to_string(port) + "?ttl=0&recv_buf_size=2097152";
+  const std::string url =
+      "udpm://239.255.76.61:" + std::to_string(port) + "?ttl=0&recv_buf_size=2097152";
   Messenger messenger(url);
   Subscriber<joint_state_t> subscriber(messenger, "JOINT_STATE");
   const int fd = socket(AF_INET, SOCK_DGRAM, 0);
@@ -134,19 +141,24 @@ TEST_CASE("malformed LCM datagrams do not reach liblcm") {
   const auto send = [&](const std::vector<uint8_t>& bytes) {
     sendto(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to);
   };
-  const auto fragment = [](uint32_t size, uint32_t offset, uint16_t number, uint16_t count, size_t payload,
-                           bool named) {
+  const auto fragment = [](uint32_t size, uint32_t offset, uint16_t number, uint16_t count,
+                           size_t payload, bool named) {
     std::vector<uint8_t> p(20);
-    const auto put = [&](size_t at, uint32_t x) { x = htonl(x); std::memcpy(&p[at], &x, 4); };
-    put(0, 0x4c433033), put(4, 7), put(8, size), put(12, offset), put(16, uint32_t{number} << 16 | count);
-    if (named) for (const char c : std::string("JOINT_STATE") + '\0') p.push_back(static_cast<uint8_t>(c));
+    const auto put = [&](size_t at, uint32_t x) {
+      x = htonl(x);
+      std::memcpy(&p[at], &x, 4);
+    };
+    put(0, 0x4c433033), put(4, 7), put(8, size), put(12, offset),
+        put(16, uint32_t{number} << 16 | count);
+    if (named)
+      for (const char c : std::string("JOINT_STATE") + '\0') p.push_back(static_cast<uint8_t>(c));
     p.resize(p.size() + payload, 0x55);
     return p;
   };
   send(fragment(1000, 0, 0, 2, 500, true));
   send(fragment(1000, 0xffffff00, 1, 2, 512, false));  // offset + length wraps
   send(fragment(0xffffffff, 0, 0, 2, 500, true));
-  send(fragment(100, 0, 0, 1, 5000, true));            // longer than it says
+  send(fragment(100, 0, 0, 1, 5000, true));  // longer than it says
   send(fragment(100, 0, 0, 0, 10, true));
   Random random(3);
   for (int i = 0; i < 2000; ++i) {

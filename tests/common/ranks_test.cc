@@ -27,12 +27,14 @@ std::vector<float> Sum(const Ranks& ranks, int count, size_t size) {
   const std::vector<int> bounds = ranks.Bounds(count);
   const auto rank = static_cast<size_t>(ranks.rank());
   for (int i = 0; i < count; ++i) {
-    if (i < bounds[rank] || i >= bounds[rank + 1]) terms[static_cast<size_t>(i)].assign(size, std::nanf(""));
+    if (i < bounds[rank] || i >= bounds[rank + 1])
+      terms[static_cast<size_t>(i)].assign(size, std::nanf(""));
   }
   std::vector<PartialSum> branches;
   for (const auto& [begin, end] : Branches(count, bounds[rank], bounds[rank + 1])) {
     std::vector<PartialSum> parts;
-    for (int i = begin; i < end; ++i) parts.push_back({i, i + 1, terms[static_cast<size_t>(i)].data()});
+    for (int i = begin; i < end; ++i)
+      parts.push_back({i, i + 1, terms[static_cast<size_t>(i)].data()});
     branches.push_back(AddUp(parts, 0, size));
   }
   std::vector<float> sum(size);
@@ -93,8 +95,8 @@ TEST_CASE("ranks exchange what they should", "[.exchange]") {
 TEST_CASE("any number of ranks") {
   if (!HaveMpirun()) return;
   for (int ranks = 1; ranks <= 4; ++ranks) {
-    const Outcome outcome =
-        Shell("PLUMBLINE_RANKS=" + std::to_string(ranks) + " " + Mpirun(ranks, HiddenTest("exchange")));
+    const Outcome outcome = Shell("PLUMBLINE_RANKS=" + std::to_string(ranks) + " " +
+                                  Mpirun(ranks, HiddenTest("exchange")));
     INFO(outcome.text);
     CHECK(outcome.status == 0);
   }

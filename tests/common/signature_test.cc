@@ -81,8 +81,8 @@ std::string WhatIsWrong(const fs::path& file) {
   }
 }
 
-// Appendix E of RFC 7693: a hash of hashes with and without keys, of which those of 32 bytes with a key of 32
-// bytes are what we use.
+// Appendix E of RFC 7693: a hash of hashes with and without keys, of which those of 32 bytes with a
+// key of 32 bytes are what we use.
 TEST_CASE("the hash is RFC 7693's BLAKE2b") {
   const auto sequence = [](size_t length) {
     Bytes bytes(length);
@@ -119,7 +119,8 @@ TEST_CASE("the hash is the reference implementation's") {
   std::iota(text.begin(), text.end(), uint8_t{0});
   crypto_generichash(hash.data(), 64, text.data(), text.size(), key.data(), key.size());
   CHECK(Hex(hash) ==
-        "142709d62e28fcccd0af97fad0f8465b971e82201dc51070faa0372aa43e92484be1c1e73ba10906d5d1853db6a4106e0a7b"
+        "142709d62e28fcccd0af97fad0f8465b971e82201dc51070faa0372aa43e92484be1c1e73ba10906d5d1853db6"
+        "a4106e0a7b"
         "f9800d373d6dee2d46d62ef2a461");
 }
 
@@ -208,7 +209,8 @@ TEST_CASE("of several messages only later ones are taken, by whomever they were 
   CHECK_THAT(std::string(verifier.Judge(second, kNow + 1)), Catch::Contains("repetition"));
   CHECK(verifier.Judge(third, kNow + 2).empty());
   CHECK(
-      verifier.Judge(old, kNow + 2).empty());  // the same signer's counter rises although the clock went back
+      // the same signer's counter rises although the clock went back
+      verifier.Judge(old, kNow + 2).empty());
   CHECK_THAT(std::string(verifier.Judge(first, kNow + 2)), Catch::Contains("repetition"));
 }
 
@@ -219,8 +221,10 @@ TEST_CASE("what was recorded, withheld or dated ahead is not taken") {
   const Bytes recorded = Signed(signer, kNow - 1), withheld = Signed(signer, kNow + 1),
               ahead = Signed(signer, kNow + 4'000'000), greatest = Signed(signer, INT64_MAX - 1);
   Verifier verifier(key, "JOINT_COMMAND", kNow);  // a driver that starts now
-  CHECK_THAT(std::string(verifier.Judge(recorded, kNow)), Catch::Contains("before the driver's start"));
-  CHECK_THAT(std::string(verifier.Judge(withheld, kNow + 10'000'002)), Catch::Contains("too long ago"));
+  CHECK_THAT(std::string(verifier.Judge(recorded, kNow)),
+             Catch::Contains("before the driver's start"));
+  CHECK_THAT(std::string(verifier.Judge(withheld, kNow + 10'000'002)),
+             Catch::Contains("too long ago"));
   CHECK_THAT(std::string(verifier.Judge(ahead, kNow)), Catch::Contains("in the future"));
   CHECK_THAT(std::string(verifier.Judge(greatest, kNow)), Catch::Contains("in the future"));
   // It has not been shut out by them, nor by a moment's delay.
@@ -258,7 +262,8 @@ TEST_CASE("a new key file is its owner's alone, random, and never replaces anoth
   const Signature before = SigningKey(file).Sign("X", body);
   CHECK_THROWS_WITH(MakeKeyFile(file), Catch::Contains("never replaced"));
   CHECK(SigningKey(file).Sign("X", body) == before);
-  CHECK_THROWS_WITH(MakeKeyFile(folder.path() / "no folder" / "key"), Catch::Contains("cannot be written"));
+  CHECK_THROWS_WITH(MakeKeyFile(folder.path() / "no folder" / "key"),
+                    Catch::Contains("cannot be written"));
 }
 
 TEST_CASE("a key that others may read, or that is none, is refused with the cure") {
@@ -266,15 +271,15 @@ TEST_CASE("a key that others may read, or that is none, is refused with the cure
   const std::string digits(64, 'a');
   for (const mode_t mode : {0640, 0604, 0620, 0602, 0644, 0601}) {
     const fs::path file = folder.Write("open", digits, mode);
-    CHECK_THAT(WhatIsWrong(file),
-               Catch::Contains(file.string()) && Catch::Contains("cure: chmod 600 " + file.string()));
+    CHECK_THAT(WhatIsWrong(file), Catch::Contains(file.string()) &&
+                                      Catch::Contains("cure: chmod 600 " + file.string()));
   }
   CHECK(WhatIsWrong(folder.Write("good", digits)) == "nothing");
   CHECK(WhatIsWrong(folder.Write("line", digits + "\n", 0400)) == "nothing");
   for (const std::string& text :
-       {std::string(), std::string("\n"), digits.substr(1), digits + "a", digits + "\n\n", digits + " \n",
-        " " + digits.substr(1), digits.substr(1) + "g", digits.substr(2) + "0x", std::string(64, '\0'),
-        digits + digits, std::string(1 << 20, 'a')}) {
+       {std::string(), std::string("\n"), digits.substr(1), digits + "a", digits + "\n\n",
+        digits + " \n", " " + digits.substr(1), digits.substr(1) + "g", digits.substr(2) + "0x",
+        std::string(64, '\0'), digits + digits, std::string(1 << 20, 'a')}) {
     CHECK_THAT(WhatIsWrong(folder.Write("bad", text)),
                Catch::Contains("64 hexadecimal digits") && Catch::Contains("plumb key"));
   }

@@ -22,7 +22,8 @@ Vectors RandomTerms(int count) {
   return terms;
 }
 
-/// The sum when each of `owners` adds up its branches and one adds up those, in pieces of `slice` elements.
+/// The sum when each of `owners` adds up its branches and one adds up those, in pieces of `slice`
+/// elements.
 std::vector<float> Sum(Vectors terms, int owners, size_t slice) {
   const int count = static_cast<int>(terms.size());
   std::vector<float> sum;
@@ -30,9 +31,11 @@ std::vector<float> Sum(Vectors terms, int owners, size_t slice) {
     const size_t elements = std::min(slice, kSize - first);
     std::vector<PartialSum> branches;
     for (int owner = 0; owner < owners; ++owner) {
-      for (const auto& [begin, end] : Branches(count, count * owner / owners, count * (owner + 1) / owners)) {
+      for (const auto& [begin, end] :
+           Branches(count, count * owner / owners, count * (owner + 1) / owners)) {
         std::vector<PartialSum> parts;
-        for (int i = begin; i < end; ++i) parts.push_back({i, i + 1, terms[static_cast<size_t>(i)].data()});
+        for (int i = begin; i < end; ++i)
+          parts.push_back({i, i + 1, terms[static_cast<size_t>(i)].data()});
         branches.push_back(AddUp(parts, first, elements));
       }
     }
@@ -47,7 +50,8 @@ std::vector<float> Sum(Vectors terms, int owners, size_t slice) {
 TEST_CASE("a sum has the same bits whoever has the terms, and however it is sliced") {
   for (const int terms : {1, 2, 3, 7, 8, 20, 64, 100}) {
     const std::vector<float> sum = Sum(RandomTerms(terms), 1, kSize);
-    for (int owners = 2; owners <= 9; ++owners) CHECK(Sum(RandomTerms(terms), owners, kSize) == sum);
+    for (int owners = 2; owners <= 9; ++owners)
+      CHECK(Sum(RandomTerms(terms), owners, kSize) == sum);
     CHECK(Sum(RandomTerms(terms), 3, 10) == sum);
   }
 }

@@ -11,7 +11,9 @@ namespace {
 /// The world around a controller, in steps of one measurement (5 ms).
 class World {
  public:
-  World() : robot(LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum")), controller(robot, 1) {
+  World()
+      : robot(LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum")),
+        controller(robot, 1) {
     robot_state.num_joints = 1;
     robot_state.q = robot_state.v = robot_state.q_sd = robot_state.v_sd = robot_state.effort = {0};
     robot_state.valid = 1;
@@ -23,7 +25,8 @@ class World {
     controller.OnDriverStatus(status, now);
   }
 
-  policy_t Policy(int iteration, int episodes = 1, float bias = 0, int8_t purpose = policy_t::EVALUATE) {
+  policy_t Policy(int iteration, int episodes = 1, float bias = 0,
+                  int8_t purpose = policy_t::EVALUATE) {
     GaussianPolicy policy(PolicyShape{3, {4}, 1});
     policy.parameters(policy.parameters.size() - 2) = bias;  // of the output
     policy.action_scale.setConstant(2);
@@ -35,12 +38,14 @@ class World {
     return message;
   }
 
-  /// One measurement; the robot is wherever it was last asked to be placed. @return the command, if any.
+  /// One measurement; the robot is wherever it was last asked to be placed. @return the command, if
+  /// any.
   std::optional<joint_command_t> Step() {
     now += 5000, utime += 5000;
     ++robot_state.sequence;
     robot_state.utime = utime;
-    if (controller.place()) robot_state.q = controller.place()->q, robot_state.v = controller.place()->v;
+    if (controller.place())
+      robot_state.q = controller.place()->q, robot_state.v = controller.place()->v;
     auto command = controller.OnState(robot_state, now, utime + 300);
     const auto halt = controller.Tick(now, utime);
     if (halt) command = halt;
@@ -105,7 +110,8 @@ TEST_CASE_METHOD(World, "an episode has its number of steps, one control period 
   CHECK(status.returns[1] == Approx(-200 * (q * q + 0.1 * v * v + 0.001 * 0.25)));
 }
 
-TEST_CASE_METHOD(World, "a return is that of the steps taken: each is paid when the state after it is there") {
+TEST_CASE_METHOD(
+    World, "a return is that of the steps taken: each is paid when the state after it is there") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0, 1, 0.25f));
   StepUntil(S::RUNNING);
@@ -113,7 +119,9 @@ TEST_CASE_METHOD(World, "a return is that of the steps taken: each is paid when 
   int steps = 0;
   const auto task = MakeTask(robot);
   Eigen::VectorXd q, v, effort, next_q, next_v;
-  const auto map = [](const std::vector<double>& values) { return Eigen::Map<const Eigen::VectorXd>(values.data(), 1); };
+  const auto map = [](const std::vector<double>& values) {
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), 1);
+  };
   q = map(robot_state.q), v = map(robot_state.v), effort = Eigen::VectorXd::Constant(1, 0.5);
   for (int i = 1; controller.phase() == S::RUNNING; ++i) {
     robot_state.q[0] += 0.01, robot_state.v[0] -= 0.02;
@@ -169,7 +177,8 @@ TEST_CASE_METHOD(World, "a policy that does not fit is refused and the old one s
   CHECK(controller.status().policy_iteration == 0);
 }
 
-TEST_CASE_METHOD(World, "doubtful states halt it: zero effort, silence, and only a re-arming leads out") {
+TEST_CASE_METHOD(World,
+                 "doubtful states halt it: zero effort, silence, and only a re-arming leads out") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0, 1, 0.5f));
   StepUntil(S::RUNNING);
@@ -215,7 +224,8 @@ TEST_CASE_METHOD(World, "doubtful states halt it: zero effort, silence, and only
   CHECK(controller.status().num_episodes == 1);
 }
 
-TEST_CASE_METHOD(World, "a driver that disarms ends the episode; a silent driver counts as absent") {
+TEST_CASE_METHOD(World,
+                 "a driver that disarms ends the episode; a silent driver counts as absent") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0));
   StepUntil(S::RUNNING);

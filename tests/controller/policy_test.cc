@@ -21,7 +21,8 @@ GaussianPolicy SmallPolicy() {
 std::vector<double> MeanByHand(const GaussianPolicy& policy, const Eigen::VectorXf& observation) {
   std::vector<double> x;
   for (Eigen::Index i = 0; i < observation.size(); ++i) {
-    x.push_back((double{observation[i]} - policy.observation_mean[i]) / policy.observation_scale[i]);
+    x.push_back((double{observation[i]} - policy.observation_mean[i]) /
+                policy.observation_scale[i]);
   }
   const std::vector<int> sizes = policy.shape().sizes();
   Eigen::Index next = 0;
@@ -94,7 +95,9 @@ TEST_CASE("Hostile policies are refused with a reason") {
   SECTION("iteration") { message.iteration = -1, refused_for("iteration -1"); }
   SECTION("purpose") { message.purpose = 2, refused_for("purpose 2"); }
   SECTION("episodes") { message.episodes = -1, refused_for("-1 episodes"); }
-  SECTION("more episodes than anybody wants") { message.episodes = 1 << 30, refused_for("episodes"); }
+  SECTION("more episodes than anybody wants") {
+    message.episodes = 1 << 30, refused_for("episodes");
+  }
   SECTION("layers announced") { message.num_layers = 3, refused_for("layers"); }
   SECTION("negative layers") { message.num_layers = -1, refused_for("layers"); }
   SECTION("no hidden or output layer") {
@@ -103,11 +106,15 @@ TEST_CASE("Hostile policies are refused with a reason") {
   SECTION("empty layer") { message.size[1] = 0, refused_for("a layer of 0"); }
   SECTION("negative layer") { message.size[1] = -5, refused_for("a layer of -5"); }
   SECTION("huge layer") { message.size[1] = 1 << 30, refused_for("a layer of"); }
-  SECTION("huge network") { message.num_layers = 9, message.size.assign(9, 4096), refused_for("parameters"); }
+  SECTION("huge network") {
+    message.num_layers = 9, message.size.assign(9, 4096), refused_for("parameters");
+  }
   SECTION("weights missing") { message.weight.pop_back(), refused_for("weights, expected 56"); }
   SECTION("weights announced") { message.num_weights = 1, refused_for("1 weights, expected 56"); }
   SECTION("NaN weight") { message.weight[7] = NAN, refused_for("weights are not finite"); }
-  SECTION("observation means") { message.observation_mean[0] = INFINITY, refused_for("observation means"); }
+  SECTION("observation means") {
+    message.observation_mean[0] = INFINITY, refused_for("observation means");
+  }
   SECTION("observation count") { message.num_observations = 2, refused_for("2 observation means"); }
   SECTION("zero scale") {
     message.observation_scale[2] = 0, refused_for("observation scales are not positive");

@@ -1,4 +1,5 @@
-// What the transport does not take has not been sent: arming and stopping over a bus that refuses frames.
+// What the transport does not take has not been sent: arming and stopping over a bus that refuses
+// frames.
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -28,7 +29,8 @@ TEST_CASE("a mode that the transport refused is given again before the loop is c
   int refusals = 0;
   rig.accept = [&](const std::vector<Frame>& frames) {
     const int count = UpTo(frames, 0x2B);
-    if (count == static_cast<int>(frames.size()) || ++refusals > 3) return static_cast<int>(frames.size());
+    if (count == static_cast<int>(frames.size()) || ++refusals > 3)
+      return static_cast<int>(frames.size());
     return count;
   };
   bool wrong = false;
@@ -88,7 +90,8 @@ TEST_CASE("a drive that restarts while it is armed does not run in the mode it w
   bool restarted = false, wrong = false;
   rig.Start();
   rig.on_step = [&] {
-    wrong = wrong || (rig.drives[0].armed() && rig.drives[0].control_mode() != cansimple::kTorqueControl);
+    wrong = wrong ||
+            (rig.drives[0].armed() && rig.drives[0].control_mode() != cansimple::kTorqueControl);
     if (modes == after && !std::exchange(restarted, true)) rig.drives[0].Reboot(rig.now);
   };
   rig.Arm();
@@ -117,7 +120,8 @@ TEST_CASE("many joints arm with few frames in each cycle") {
   for (const CanSimpleDevice& drive : rig.drives) CHECK(drive.Torque() == 1);
 }
 
-TEST_CASE("a stop that was refused is given again in the next cycle, to those who have not got it") {
+TEST_CASE(
+    "a stop that was refused is given again in the next cycle, to those who have not got it") {
   Rig rig(6);
   rig.settings.watchdog = 0;
   rig.settings.heartbeat_period = 100'000;
@@ -178,7 +182,9 @@ TEST_CASE("a heartbeat from before the order to run was obeyed does not confirm 
   rig.Start();
   rig.Run(300);
   rig.Request(driver_request_t::ARM);
-  const auto has_order = [&] { return std::ranges::any_of(rig.sent, [](const Frame& frame) { return frame.id == 0x27; }); };
+  const auto has_order = [&] {
+    return std::ranges::any_of(rig.sent, [](const Frame& frame) { return frame.id == 0x27; });
+  };
   for (int i = 0; i < 1000 && !has_order(); ++i) rig.Step();
   REQUIRE(has_order());
   rig.Request(driver_request_t::DISARM);

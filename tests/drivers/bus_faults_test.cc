@@ -41,9 +41,10 @@ TEST_CASE("fault 5: error-warning and error-passive", "[fault]") {
                  .happens =
                      [](BusRig& rig) {
                        rig.each_millisecond.push_back([&rig] {
-                         for (const char* text : {"20000004#000400000000C800", "20000004#001000000000FF60",
-                                                  "20000004#002000000000FF60", "20000008#0000081900000000",
-                                                  "20000002#0500000000000000"}) {
+                         for (const char* text :
+                              {"20000004#000400000000C800", "20000004#001000000000FF60",
+                               "20000004#002000000000FF60", "20000008#0000081900000000",
+                               "20000002#0500000000000000"}) {
                            rig.ControllerSays(text);
                          }
                        });
@@ -56,9 +57,9 @@ TEST_CASE("fault 6: the interface goes down, or is removed", "[fault]") {
     LinkState link;
     const char *name, *reason;
   };
-  const auto [link, name, reason] = GENERATE(
-      values<Case>({{LinkState::kDown, "the CAN interface goes down", "the CAN interface is down"},
-                    {LinkState::kGone, "the CAN adapter is unplugged", "the CAN interface is gone"}}));
+  const auto [link, name, reason] = GENERATE(values<Case>(
+      {{LinkState::kDown, "the CAN interface goes down", "the CAN interface is down"},
+       {LinkState::kGone, "the CAN adapter is unplugged", "the CAN interface is gone"}}));
   ExpectStop({.number = "6",
               .name = name,
               .detection = "the kernel says so; the drives' watchdogs",
@@ -105,58 +106,63 @@ TEST_CASE("fault 8: frames come faster than they are read", "[fault]") {
 }
 
 TEST_CASE("fault 9: frames are lost, late, doubled and exchanged", "[fault]") {
-  ExpectToRunOn({.number = "9",
-                 .name = "5 % of the frames are lost, others late by up to 3 ms, doubled or exchanged",
-                 .detection = "DRIVER_STATUS.measurements_lost",
-                 .happens =
-                     [](BusRig& rig) {
-                       rig.Connect(
-                           fmt::format("loss=0.05,delay=1ms,jitter=2ms,duplicate=0.05,reorder=0.05,seed={}",
-                                       rig.now / 1000));
-                     },
-                 .is_over = [](BusRig& rig) { CHECK(rig.Status().measurements_lost > 0); },
-                 .within = 40});
+  ExpectToRunOn(
+      {.number = "9",
+       .name = "5 % of the frames are lost, others late by up to 3 ms, doubled or exchanged",
+       .detection = "DRIVER_STATUS.measurements_lost",
+       .happens =
+           [](BusRig& rig) {
+             rig.Connect(
+                 fmt::format("loss=0.05,delay=1ms,jitter=2ms,duplicate=0.05,reorder=0.05,seed={}",
+                             rig.now / 1000));
+           },
+       .is_over = [](BusRig& rig) { CHECK(rig.Status().measurements_lost > 0); },
+       .within = 40});
 }
 
 TEST_CASE("fault 9: a third of the frames is lost", "[fault]") {
-  ExpectToRunOn({.number = "9",
-                 .name = "30 % of the frames are lost",
-                 .detection = "DRIVER_STATUS.measurements_lost",
-                 .happens = [](BusRig& rig) { rig.Connect(fmt::format("loss=0.3,seed={}", rig.now / 1000)); },
-                 .is_over = [](BusRig& rig) { CHECK(rig.Status().measurements_lost > 0); },
-                 .within = 60});
+  ExpectToRunOn(
+      {.number = "9",
+       .name = "30 % of the frames are lost",
+       .detection = "DRIVER_STATUS.measurements_lost",
+       .happens = [](BusRig& rig) { rig.Connect(fmt::format("loss=0.3,seed={}", rig.now / 1000)); },
+       .is_over = [](BusRig& rig) { CHECK(rig.Status().measurements_lost > 0); },
+       .within = 60});
 }
 
 TEST_CASE("fault 9: most frames are lost", "[fault]") {
-  ExpectStop({.number = "9",
-              .name = "90 % of the frames are lost",
-              .detection = "no encoder estimate for `stale_after`, or the drives' watchdogs",
-              .happens = [](BusRig& rig) { rig.Connect(fmt::format("loss=0.9,seed={}", rig.now / 1000)); },
-              .is_over = [](BusRig& rig) { rig.Connect(""); },
-              .reason = "",
-              .within = 300});
+  ExpectStop(
+      {.number = "9",
+       .name = "90 % of the frames are lost",
+       .detection = "no encoder estimate for `stale_after`, or the drives' watchdogs",
+       .happens = [](BusRig& rig) { rig.Connect(fmt::format("loss=0.9,seed={}", rig.now / 1000)); },
+       .is_over = [](BusRig& rig) { rig.Connect(""); },
+       .reason = "",
+       .within = 300});
 }
 
 TEST_CASE("fault 10: frames that are not what they look like", "[fault]") {
-  ExpectToRunOn({.number = "10",
-                 .name = "frames too short, not a number, remote, 29-bit, FD, unknown, of other nodes",
-                 .detection = "DRIVER_STATUS.frames_rejected",
-                 .happens =
-                     [](BusRig& rig) {
-                       rig.each_millisecond.push_back([&rig] {
-                         for (const char* text :
-                              {"029#000080BE", "029#0000C07F00006040", "029#00008040000080FF",
-                               "029#FFFFFFFFFFFFFFFF", "021#000000000800", "03F#", "00000029#0000803F0000803F", "029##00000803F0000803F",
-                               "00000021#0000000001000000", "021##00000000001000000", "0A9#0000803F0000803F",
-                               "0A1#0000000001000000", "7FF#01", "123#DEADBEEF"}) {
-                           rig.StrangerSends(text);
-                         }
-                         // Which is answered: more often, and it would look like a second drive.
-                         if (rig.now % 20'000 == 0) rig.StrangerSends("029#R8");
-                       });
-                     },
-                 .is_over = [](BusRig& rig) { CHECK(rig.Status().frames_rejected > 1000); },
-                 .within = 5});
+  ExpectToRunOn(
+      {.number = "10",
+       .name = "frames too short, not a number, remote, 29-bit, FD, unknown, of other nodes",
+       .detection = "DRIVER_STATUS.frames_rejected",
+       .happens =
+           [](BusRig& rig) {
+             rig.each_millisecond.push_back([&rig] {
+               for (const char* text :
+                    {"029#000080BE", "029#0000C07F00006040", "029#00008040000080FF",
+                     "029#FFFFFFFFFFFFFFFF", "021#000000000800", "03F#",
+                     "00000029#0000803F0000803F", "029##00000803F0000803F",
+                     "00000021#0000000001000000", "021##00000000001000000", "0A9#0000803F0000803F",
+                     "0A1#0000000001000000", "7FF#01", "123#DEADBEEF"}) {
+                 rig.StrangerSends(text);
+               }
+               // Which is answered: more often, and it would look like a second drive.
+               if (rig.now % 20'000 == 0) rig.StrangerSends("029#R8");
+             });
+           },
+       .is_over = [](BusRig& rig) { CHECK(rig.Status().frames_rejected > 1000); },
+       .within = 5});
 }
 
 }  // namespace

@@ -17,7 +17,8 @@ namespace {
 using Catch::Contains;
 using Direction = BusMessage::Direction;
 
-BusMessage Message(const Layout& layout, uint32_t id, int64_t period, uint8_t length, int64_t jitter = 0) {
+BusMessage Message(const Layout& layout, uint32_t id, int64_t period, uint8_t length,
+                   int64_t jitter = 0) {
   BusMessage message;
   message.layout = layout;
   message.layout.length = length;
@@ -31,7 +32,9 @@ BusMessage Message(const Layout& layout, uint32_t id, int64_t period, uint8_t le
 /// An ODrive with torque setpoints of 4 bytes and without telemetry but its current.
 BusDevice Drive(int node, int64_t period) {
   using namespace cansimple;
-  const auto id = [&](const Layout& layout) { return static_cast<uint32_t>(node) << 5 | layout.command; };
+  const auto id = [&](const Layout& layout) {
+    return static_cast<uint32_t>(node) << 5 | layout.command;
+  };
   return {"drive" + std::to_string(node),
           "cansimple",
           {Message(kHeartbeat, id(kHeartbeat), 100'000, 8),
@@ -48,11 +51,13 @@ BusDevice Encoder(int node, int64_t period) {
 }
 BusDevice Imu(uint32_t base, int64_t period) {
   using namespace xsens;
-  return {"imu",
-          "xsens",
-          {Message(kSampleTime, base + 0x05, period, 4), Message(kQuaternion, base + 0x21, period, 8),
-           Message(kRateOfTurn, base + 0x32, period, 6), Message(kAcceleration, base + 0x34, period, 6)},
-          {}};
+  return {
+      "imu",
+      "xsens",
+      {Message(kSampleTime, base + 0x05, period, 4), Message(kQuaternion, base + 0x21, period, 8),
+       Message(kRateOfTurn, base + 0x32, period, 6),
+       Message(kAcceleration, base + 0x34, period, 6)},
+      {}};
 }
 std::vector<BusDevice> Leg(int64_t motors, int64_t encoders, int64_t imu, uint32_t base = 0x380) {
   return {Drive(1, motors),     Drive(2, motors),     Drive(3, motors),
@@ -103,8 +108,8 @@ TEST_CASE("a leg at 500 Hz fits: loads and response times as computed by hand") 
   CHECK(plan.errors.empty());
   CHECK(plan.warnings.empty());
   CHECK(100 * plan.worst_load == Approx(57.655));
-  // Node 1's torque waits for any frame (135), heartbeat and estimates (135 each), takes 95, and is up to 200
-  // us late; each further node's for a node's 500 us more.
+  // Node 1's torque waits for any frame (135), heartbeat and estimates (135 each), takes 95, and is
+  // up to 200 us late; each further node's for a node's 500 us more.
   CHECK(Response(plan, 0x02E) == Approx(700));
   CHECK(Response(plan, 0x04E) == Approx(1200));
   CHECK(Response(plan, 0x06E) == Approx(1700));
@@ -149,9 +154,12 @@ TEST_CASE("loads of table rows: ODrives and MIT motors at 1 kHz") {
 }
 
 TEST_CASE("the revised analysis: the first instance is not always the last to be late") {
-  // Table 3 of Davis et al.: three messages of cost 1, periods 2.5, 3.5, 3.5. The third is in time at the
-  // first instance (3) and late at the second (3.5 - 2 rounds on): its response time is 3.5, not 3.
-  const auto message = [](uint32_t id, int64_t period) { return Message(cansimple::kGetIq, id, period, 8); };
+  // Table 3 of Davis et al.: three messages of cost 1, periods 2.5, 3.5, 3.5. The third is in time
+  // at the first instance (3) and late at the second (3.5 - 2 rounds on): its response time is 3.5,
+  // not 3.
+  const auto message = [](uint32_t id, int64_t period) {
+    return Message(cansimple::kGetIq, id, period, 8);
+  };
   const std::vector<BusDevice> devices = {{"a", "x", {message(1, 2500)}, {}},
                                           {"b", "x", {message(2, 3500)}, {}},
                                           {"c", "x", {message(3, 3500)}, {}}};
@@ -163,8 +171,8 @@ TEST_CASE("the revised analysis: the first instance is not always the last to be
 
 TEST_CASE("an answer is as late as its question, and then some") {
   const BusPlan plan = PlanBus(Motors({MitMotor(0x11, 0x10)}), 1e6);
-  // The reply has the higher priority: it waits for the command (135) and takes 135, after the command's own
-  // 200 + 135 + 135.
+  // The reply has the higher priority: it waits for the command (135) and takes 135, after the
+  // command's own 200 + 135 + 135.
   CHECK(Response(plan, 0x11) == Approx(200 + 135 + 135));
   CHECK(Response(plan, 0x10) == Approx(470 + 135 + 135));
 }
@@ -188,7 +196,8 @@ TEST_CASE("collisions name both and the id") {
     devices.push_back({"encoder", "cia406", {Message(cia406::kEmergency, 0x08A, 0, 8)}, {}});
     const BusPlan plan = PlanBus(devices, 1e6);
     REQUIRE(plan.errors.size() == 1);
-    CHECK(plan.errors[0] == "CAN id 0x08a: 'encoder' sends EMCY, but ids 0x080 to 0x09f are 'motor4's");
+    CHECK(plan.errors[0] ==
+          "CAN id 0x08a: 'encoder' sends EMCY, but ids 0x080 to 0x09f are 'motor4's");
   }
   SECTION("two drives of one node, two motors of one id") {
     MotorDescription motor;
@@ -239,13 +248,15 @@ TEST_CASE("the robots we ship fit their buses") {
   const char* source = std::getenv("PLUMBLINE_SOURCE");
   for (const char* name : {"pendulum", "double_pendulum", "cartpole", "hopper"}) {
     INFO(name);
-    const RobotDescription robot = LoadRobot(std::string(source ? source : ".") + "/robots/" + name);
+    const RobotDescription robot =
+        LoadRobot(std::string(source ? source : ".") + "/robots/" + name);
     const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
     INFO(ToText(plan));
     CHECK(plan.errors.empty());
     CHECK(plan.warnings.empty());
   }
-  CHECK_THROWS_AS(MotorBusDevice(MotorDescription{"nonsense"}, DriverSettings{}), std::invalid_argument);
+  CHECK_THROWS_AS(MotorBusDevice(MotorDescription{"nonsense"}, DriverSettings{}),
+                  std::invalid_argument);
 }
 
 TEST_CASE("of what is asked for in turn one message waits at a time") {
@@ -257,7 +268,8 @@ TEST_CASE("of what is asked for in turn one message waits at a time") {
       answer.polled = polled;
       devices.push_back({"drive" + std::to_string(i), "", {answer}, {}});
     }
-    devices.push_back({"sensor", "", {Message(cansimple::kGetEncoderEstimates, 0x100, 1'000, 8)}, {}});
+    devices.push_back(
+        {"sensor", "", {Message(cansimple::kGetEncoderEstimates, 0x100, 1'000, 8)}, {}});
     return PlanBus(devices, 1e6);
   };
   CHECK_THAT(plan(false).errors.at(0), Contains("'sensor'"));

@@ -12,9 +12,9 @@
 
 namespace plumb {
 
-/// A rig with two drives whose frames go over a loop bus: the driver's end can be made faulty or cut off,
-/// strangers can join, and a witness notes when torque was last asked for by the driver and last produced by
-/// a drive.
+/// A rig with two drives whose frames go over a loop bus: the driver's end can be made faulty or
+/// cut off, strangers can join, and a witness notes when torque was last asked for by the driver
+/// and last produced by a drive.
 struct BusRig : Rig {
   static constexpr char kBus[] = "loop:bus_rig";
   static bool Nothing(const Frame&) { return false; }
@@ -25,7 +25,8 @@ struct BusRig : Rig {
         if (drive.Torque() != 0) torque_produced = now;
       }
       for (const auto& event : each_millisecond) event();
-      for (Transport* end : {drivers_end_.get(), drives_end_.get(), stranger.get()}) end->SetTime(now);
+      for (Transport* end : {drivers_end_.get(), drives_end_.get(), stranger.get()})
+        end->SetTime(now);
       DeliverToDrives();
       DeliverToDriver();
     };
@@ -66,7 +67,9 @@ struct BusRig : Rig {
     stranger->Send({&frame, 1});
   }
   /// The driver's own controller says something: an error frame, which is on nobody's bus.
-  void ControllerSays(const std::string& text) { driver->OnFrame(FrameFromText(text).value(), now, utime()); }
+  void ControllerSays(const std::string& text) {
+    driver->OnFrame(FrameFromText(text).value(), now, utime());
+  }
   const driver_status_t& Status() {
     stats = drivers_end_->stats();
     return Rig::Status();

@@ -21,8 +21,8 @@ Bytes Raw(const Value& value) {
 }
 
 Bytes Attribute(int type, const Bytes& payload) {
-  Bytes bytes =
-      Raw(rtattr{static_cast<uint16_t>(sizeof(rtattr) + payload.size()), static_cast<uint16_t>(type)});
+  Bytes bytes = Raw(
+      rtattr{static_cast<uint16_t>(sizeof(rtattr) + payload.size()), static_cast<uint16_t>(type)});
   bytes.insert(bytes.end(), payload.begin(), payload.end());
   bytes.resize((bytes.size() + 3) / 4 * 4);
   return bytes;
@@ -37,10 +37,11 @@ Bytes operator+(Bytes a, const Bytes& b) {
 Bytes Message(const char* kind) {
   can_bittiming timing{};
   timing.bitrate = 1'000'000;
-  const Bytes data =
-      Attribute(IFLA_CAN_BITTIMING, Raw(timing)) + Attribute(IFLA_CAN_RESTART_MS, Raw(uint32_t{100}));
+  const Bytes data = Attribute(IFLA_CAN_BITTIMING, Raw(timing)) +
+                     Attribute(IFLA_CAN_RESTART_MS, Raw(uint32_t{100}));
   const Bytes name(kind, kind + std::strlen(kind) + 1);
-  const Bytes info = Attribute(IFLA_INFO_KIND, name) + Attribute(IFLA_INFO_DATA | NLA_F_NESTED, data);
+  const Bytes info =
+      Attribute(IFLA_INFO_KIND, name) + Attribute(IFLA_INFO_DATA | NLA_F_NESTED, data);
   Bytes message = Raw(nlmsghdr{}) + Raw(ifinfomsg{}) + Attribute(IFLA_TXQLEN, Raw(uint32_t{10})) +
                   Attribute(IFLA_IFNAME, {'c', 'a', 'n', '0', 0}) + Attribute(IFLA_LINKINFO, info);
   nlmsghdr header{};

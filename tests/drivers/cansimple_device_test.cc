@@ -35,7 +35,9 @@ struct Bench {
     for (const char* text : texts) drive.OnFrame(*FrameFromText(text), now);
     return Tick(now);
   }
-  void Arm() { Send({"038#00", "02B#0100000001000000", "02E#0000000000000000", "027#0800000000000000"}); }
+  void Arm() {
+    Send({"038#00", "02B#0100000001000000", "02E#0000000000000000", "027#0800000000000000"});
+  }
 
   CanSimpleDevice drive;
   int64_t now = 1'000'000;
@@ -65,7 +67,8 @@ TEST_CASE("the virtual drive answers requests, remote or empty") {
   CHECK(bench.Send({"037#R"}) == Texts{"037#0000C04100000000"});
   CHECK(bench.Send({"03C#R"}) == Texts{"03C#0000000000000000"});
   CHECK(bench.Send({"7E6#R"}) == Texts{"7E6#013234563D5E33"});
-  CHECK(bench.Send({"029#R", "020#R", "029#R8"}) == Texts{"029#000080BE00006040", "020#0204043A00060A00"});
+  CHECK(bench.Send({"029#R", "020#R", "029#R8"}) ==
+        Texts{"029#000080BE00006040", "020#0204043A00060A00"});
   CHECK(bench.Send({"049#R", "00000029#", "20000029#0000000000000000"})
             .empty());  // other node, extended, error
   CHECK(bench.drive.rejected() == 0);

@@ -1,5 +1,5 @@
-// What an ODrive reports besides its position, and a restart told from a fault: the host's side against the
-// virtual drive, in virtual time.
+// What an ODrive reports besides its position, and a restart told from a fault: the host's side
+// against the virtual drive, in virtual time.
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -50,9 +50,11 @@ struct Bench {
   }
   std::unique_ptr<Motor> motor = MakeCanSimpleMotor(Describe(), {500'000});
   int64_t now = 1'000'000;
-  CanSimpleDevice drive{
-      {.heartbeat_period = 20'000, .encoder_period = 5'000, .watchdog = 50'000, .telemetry_period = 100'000},
-      now};
+  CanSimpleDevice drive{{.heartbeat_period = 20'000,
+                         .encoder_period = 5'000,
+                         .watchdog = 50'000,
+                         .telemetry_period = 100'000},
+                        now};
   CanSimpleDevice::Sample sample{3.25, 0};
   bool powered = true;
   std::function<bool(const Frame&)> tap;
@@ -115,8 +117,8 @@ TEST_CASE("a restart: silence, IDLE, and another position") {
   bench.powered = true;
   bench.Run(50);
   CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK_THAT(bench.Reason(),
-             Contains("has restarted") && Contains("jumped by -3.15 turns") && Contains("home the joint"));
+  CHECK_THAT(bench.Reason(), Contains("has restarted") && Contains("jumped by -3.15 turns") &&
+                                 Contains("home the joint"));
 }
 
 TEST_CASE("what is no restart") {
@@ -163,7 +165,8 @@ TEST_CASE("a drive that sends no heartbeat is asked who it is, and told nothing 
   bench.Run(499);
   CHECK(bench.motor->identity() == "firmware 0.6.10, hardware 4.4.58");
   CHECK(bench.motor->state() == DriveState::kAbsent);
-  CHECK(bench.drive.control_mode() == cansimple::kPositionControl);  // as it was when its power came on
+  // as it was when its power came on
+  CHECK(bench.drive.control_mode() == cansimple::kPositionControl);
   bench.Run(2);
   CHECK(bench.Reason() == "it answers, but sends no heartbeat");
   CHECK_FALSE(bench.drive.armed());

@@ -8,8 +8,8 @@
 namespace plumb::cansimple {
 namespace {
 
-// Frames of node 1, written by hand from the protocol's documentation and checked with python3-canmatrix:
-// they share nothing with our tables.
+// Frames of node 1, written by hand from the protocol's documentation and checked with
+// python3-canmatrix: they share nothing with our tables.
 struct Row {
   const Layout* layout;
   std::vector<double> values;
@@ -86,7 +86,8 @@ TEST_CASE("requests are remote frames, the address is unaddressed, short setpoin
 TEST_CASE("what must be rejected") {
   CHECK_FALSE(DecodePayload(kGetEncoderEstimates, *FrameFromText("029#000080BE")));
   CHECK_FALSE(DecodePayload(kGetEncoderEstimates, *FrameFromText("029#R8")));
-  CHECK_FALSE(DecodePayload(kGetEncoderEstimates, *FrameFromText("029##0000080BE00006040000080BE")));
+  CHECK_FALSE(
+      DecodePayload(kGetEncoderEstimates, *FrameFromText("029##0000080BE00006040000080BE")));
   const auto nan = DecodePayload(kGetEncoderEstimates, *FrameFromText("029#0000C07F00006040"));
   REQUIRE(nan);
   CHECK_FALSE(AllFinite(kGetEncoderEstimates, *nan));

@@ -28,9 +28,11 @@ TEST_CASE("CANopen messages have the documented bytes") {
   CHECK(ToText(Make(kHeartbeat, 2, {kInPreOperational})) == "702#7F");
   CHECK(ToText(Make(kPosition, 1, {123456})) == "181#40E20100");
   CHECK(ToText(Make(kPosition, 2, {4294967295.})) == "182#FFFFFFFF");
-  CHECK(ToText(Make(kSdoRequest, 1, {kWrite2, kPdoParameter, kEventTimer, 2})) == "601#2B00180502000000");
+  CHECK(ToText(Make(kSdoRequest, 1, {kWrite2, kPdoParameter, kEventTimer, 2})) ==
+        "601#2B00180502000000");
   CHECK(ToText(Make(kSdoRequest, 1, {kWrite4, kPreset, 0, 0})) == "601#2303600000000000");
-  CHECK(ToText(Make(kSdoAnswer, 1, {kWritten, kPdoParameter, kEventTimer, 0})) == "581#6000180500000000");
+  CHECK(ToText(Make(kSdoAnswer, 1, {kWritten, kPdoParameter, kEventTimer, 0})) ==
+        "581#6000180500000000");
   CHECK(ToText(Make(kEmergency, 1, {0x5000, 1, 0})) == "081#0050010000000000");
   const auto position = DecodePayload(kPosition, *FrameFromText("181#40E20100"));
   REQUIRE(position);
@@ -101,7 +103,8 @@ TEST_CASE("an encoder is told its period and to start, and then read") {
 
 TEST_CASE("one that sends too seldom is told its period until it says that it has it") {
   Bench bench;
-  // Somebody has given it 50 ms, and stopped it: it starts when it is told to, but does not hear its period before.
+  // Somebody has given it 50 ms, and stopped it: it starts when it is told to, but does not hear
+  // its period before.
   bench.device.OnFrame(*FrameFromText("601#2B00180532000000"), bench.now);
   bench.device.OnFrame(*FrameFromText("000#0201"), bench.now);
   bench.tap = [](const Frame& frame) { return frame.id != 0x701 && frame.id != 0x581; };
@@ -238,7 +241,8 @@ TEST_CASE("a restart, a stop and an emergency are faults") {
     bench.device.Emergency(0);  // error reset: the fault stays
     bench.Run(1);
   }
-  CHECK((bench.sensor->state() == SensorState::kFault || bench.sensor->state() == SensorState::kRunning));
+  CHECK((bench.sensor->state() == SensorState::kFault ||
+         bench.sensor->state() == SensorState::kRunning));
 }
 
 TEST_CASE("a period that it refuses is a fault") {
@@ -250,7 +254,9 @@ TEST_CASE("a period that it refuses is a fault") {
 
 TEST_CASE("what an encoder's frames must be") {
   Bench bench({}, Describe(65536, 65536));
-  const auto use = [&](const char* text) { return bench.sensor->OnFrame(*FrameFromText(text), bench.now); };
+  const auto use = [&](const char* text) {
+    return bench.sensor->OnFrame(*FrameFromText(text), bench.now);
+  };
   CHECK(use("182#00000000") == SensorUse::kNotMine);
   CHECK(use("00000181#00000000") == SensorUse::kNotMine);
   CHECK(use("181#R4") == SensorUse::kNotMine);

@@ -63,8 +63,9 @@ TEST_CASE("what is no command") {
   CHECK(rejects(Command(1, 0, 1)));
   CHECK(rejects(Command(1, kNan)));
   CHECK(rejects(Command(1, INFINITY)));
-  for (const auto member : {&joint_command_t::effort, &joint_command_t::position, &joint_command_t::velocity,
-                            &joint_command_t::kp, &joint_command_t::kd}) {
+  for (const auto member :
+       {&joint_command_t::effort, &joint_command_t::position, &joint_command_t::velocity,
+        &joint_command_t::kp, &joint_command_t::kd}) {
     joint_command_t command = Command(1, 0);
     (command.*member)[1] = -INFINITY;
     CHECK(rejects(command));
@@ -74,8 +75,9 @@ TEST_CASE("what is no command") {
   joint_command_t command = Command(1, 0);
   command.kp[0] = -1;
   CHECK(rejects(command));
-  for (const int64_t utime : {kUtime - 100'001, kUtime + 100'001, std::numeric_limits<int64_t>::min(),
-                              std::numeric_limits<int64_t>::max()}) {
+  for (const int64_t utime :
+       {kUtime - 100'001, kUtime + 100'001, std::numeric_limits<int64_t>::min(),
+        std::numeric_limits<int64_t>::max()}) {
     command = Command(1, 0);
     command.utime = utime;
     CHECK(rejects(command));

@@ -99,13 +99,15 @@ void CheckDecodes(const std::vector<BusDevice>& devices) {
       file << one.frame.id << " " << ToText(one.frame).substr(4) << "\n";
     }
   }
-  FILE* pipe = popen(
-      ("timeout 60 /usr/bin/python3 " + Source() + "/tests/drivers/decode_dbc.py " + dbc + " " + list + " 2>&1").c_str(),
-      "r");
+  FILE* pipe = popen(("timeout 60 /usr/bin/python3 " + Source() + "/tests/drivers/decode_dbc.py " +
+                      dbc + " " + list + " 2>&1")
+                         .c_str(),
+                     "r");
   REQUIRE(pipe);
   std::string text;
   std::array<char, 4096> buffer;
-  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), count);
+  while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe))
+    text.append(buffer.data(), count);
   const int status = pclose(pipe);
   INFO(text.substr(text.size() > 2000 ? text.size() - 2000 : 0));
   REQUIRE(status == 0);
@@ -114,7 +116,8 @@ void CheckDecodes(const std::vector<BusDevice>& devices) {
   std::string line;
   size_t at = 0;
   while (std::getline(lines, line)) {
-    if (line.find('=') == std::string::npos) continue;  // what canmatrix has to say about its formats
+    // what canmatrix has to say about its formats
+    if (line.find('=') == std::string::npos) continue;
     REQUIRE(at < sent.size());
     const auto& [message, frame] = sent[at++];
     std::istringstream words(line);
@@ -141,7 +144,9 @@ void CheckDecodes(const std::vector<BusDevice>& devices) {
   CHECK(at == sent.size());
 }
 
-TEST_CASE("canmatrix decodes every message of every protocol as we do") { CheckDecodes(Menagerie()); }
+TEST_CASE("canmatrix decodes every message of every protocol as we do") {
+  CheckDecodes(Menagerie());
+}
 
 TEST_CASE("canmatrix decodes every message of the hopper as we do") {
   CheckDecodes(BusDevices(LoadRobot(Source() + "/robots/hopper")));
@@ -154,8 +159,10 @@ TEST_CASE("a DBC's lines") {
                            " SG_ Pos_Estimate : 0|32@1- (1,0) [0|0] \"rev\" driver\n"
                            " SG_ Vel_Estimate : 32|32@1- (1,0) [0|0] \"rev/s\" driver\n"));
   CHECK_THAT(dbc, Contains("SIG_VALTYPE_ 73 Pos_Estimate : 1;\n"));
-  CHECK_THAT(dbc,
-             Contains("BO_ 16 mit_Reply: 8 left_hip\n SG_ Motor_ID M : 7|8@0+ (1,0) [0|255] \"\" driver\n"));
+  CHECK_THAT(
+      dbc,
+      Contains(
+          "BO_ 16 mit_Reply: 8 left_hip\n SG_ Motor_ID M : 7|8@0+ (1,0) [0|255] \"\" driver\n"));
   CHECK_THAT(dbc, Contains(" SG_ left_hip_Position m17 : 15|16@0+ ("));
   CHECK_THAT(dbc, Contains(" SG_ left_hip_2_Velocity m18 : 31|12@0+ ("));
   CHECK_THAT(dbc, Contains("BO_ 946 imu_RateOfTurn: 6 imu\n SG_ Gyr_X : 7|16@0- (0.001953125,0) "

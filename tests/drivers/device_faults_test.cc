@@ -23,22 +23,26 @@ TEST_CASE("fault 1: a drive falls silent", "[fault]") {
 }
 
 TEST_CASE("fault 2: a drive goes idle and reports no error", "[fault]") {
-  ExpectStop({.number = "2",
-              .name = "a drive goes idle and reports no error",
-              .detection = "the state in its heartbeat",
-              .happens = [](BusRig& rig) { rig.drives[1].OnFrame(*FrameFromText("047#01000000"), rig.now); },
-              .reason = "knee1: the drive went to IDLE: no error",
-              .within = 25});
+  ExpectStop(
+      {.number = "2",
+       .name = "a drive goes idle and reports no error",
+       .detection = "the state in its heartbeat",
+       .happens =
+           [](BusRig& rig) { rig.drives[1].OnFrame(*FrameFromText("047#01000000"), rig.now); },
+       .reason = "knee1: the drive went to IDLE: no error",
+       .within = 25});
 }
 
 TEST_CASE("fault 3: a drive's watchdog expires", "[fault]") {
-  ExpectStop({.number = "3",
-              .name = "torques do not reach a drive",
-              .detection = "its watchdog; error and state in its heartbeat",
-              .happens = [](BusRig& rig) { rig.deaf = [](const Frame& frame) { return frame.id == 0x4E; }; },
-              .is_over = [](BusRig& rig) { rig.deaf = BusRig::Nothing; },
-              .reason = "knee1: the drive went to IDLE: watchdog timer expired",
-              .within = 130});
+  ExpectStop(
+      {.number = "3",
+       .name = "torques do not reach a drive",
+       .detection = "its watchdog; error and state in its heartbeat",
+       .happens =
+           [](BusRig& rig) { rig.deaf = [](const Frame& frame) { return frame.id == 0x4E; }; },
+       .is_over = [](BusRig& rig) { rig.deaf = BusRig::Nothing; },
+       .reason = "knee1: the drive went to IDLE: watchdog timer expired",
+       .within = 130});
 }
 
 TEST_CASE("fault 4: the driver's process stands still", "[fault]") {
@@ -55,7 +59,8 @@ TEST_CASE("fault 4: the driver's process stands still", "[fault]") {
               .within = 105});
 }
 
-TEST_CASE("fault 4: the driver's process stands still for a shorter time than the watchdog", "[fault]") {
+TEST_CASE("fault 4: the driver's process stands still for a shorter time than the watchdog",
+          "[fault]") {
   ExpectToRunOn({.number = "4",
                  .name = "it stands still for less than the watchdog and `stale_after`",
                  .detection = "DRIVER_STATUS.overruns",
@@ -63,7 +68,8 @@ TEST_CASE("fault 4: the driver's process stands still for a shorter time than th
                  .within = 50});
 }
 
-TEST_CASE("an ARM that waited while the driver's process stood still is older than what stopped it") {
+TEST_CASE(
+    "an ARM that waited while the driver's process stood still is older than what stopped it") {
   BusRig rig;
   Bring(rig, 0);
   rig.driver_stopped = true;
@@ -111,7 +117,8 @@ TEST_CASE("fault 11: a drive with the same node id joins, and says the same", "[
   };
   ExpectStop({.number = "11",
               .name = "another drive has the same node id and says the same",
-              .detection = "more than 150 encoder estimates in 100 periods; ARM is refused while they come",
+              .detection =
+                  "more than 150 encoder estimates in 100 periods; ARM is refused while they come",
               .happens = estimates,
               .is_over = [](BusRig& rig) { rig.each_millisecond.clear(); },
               .reason = "knee1: 151 encoder estimates in 3",
@@ -119,30 +126,31 @@ TEST_CASE("fault 11: a drive with the same node id joins, and says the same", "[
 }
 
 TEST_CASE("fault 12: a drive restarts", "[fault]") {
-  ExpectStop(
-      {.number = "12",
-       .name = "a drive loses its power and restarts elsewhere",
-       .detection =
-           "no encoder estimate for `stale_after`; then silence, IDLE and a jump: \"home the joint anew\"",
-       .happens =
-           [](BusRig& rig) {
-             rig.drives[1].Reboot(rig.now);
-             rig.silent = FromKnee;
-             rig.Run(300);
-             rig.silent = BusRig::Nothing;
-             rig.samples[1].position += 0.4;
-           },
-       .is_over =
-           [](BusRig& rig) {
-             CHECK_THAT(rig.Status().joint_reason[1],
-                        Contains("restarted") && Contains("home the joint anew"));
-             CHECK_FALSE(rig.Arm(1));
-             CHECK_THAT(rig.Reason(), Contains("ARM refused") && Contains("home the joint, then plumb arm --homed"));
-             rig.commanding = false;
-           },
-       .reason = "knee1: no encoder estimate for 5",
-       .arm = driver_request_t::ARM_HOMED,
-       .within = 60});
+  ExpectStop({.number = "12",
+              .name = "a drive loses its power and restarts elsewhere",
+              .detection = "no encoder estimate for `stale_after`; then silence, IDLE and a jump: "
+                           "\"home the joint anew\"",
+              .happens =
+                  [](BusRig& rig) {
+                    rig.drives[1].Reboot(rig.now);
+                    rig.silent = FromKnee;
+                    rig.Run(300);
+                    rig.silent = BusRig::Nothing;
+                    rig.samples[1].position += 0.4;
+                  },
+              .is_over =
+                  [](BusRig& rig) {
+                    CHECK_THAT(rig.Status().joint_reason[1],
+                               Contains("restarted") && Contains("home the joint anew"));
+                    CHECK_FALSE(rig.Arm(1));
+                    CHECK_THAT(rig.Reason(),
+                               Contains("ARM refused") &&
+                                   Contains("home the joint, then plumb arm --homed"));
+                    rig.commanding = false;
+                  },
+              .reason = "knee1: no encoder estimate for 5",
+              .arm = driver_request_t::ARM_HOMED,
+              .within = 60});
 }
 
 TEST_CASE("fault 13: heartbeats stay away, encoder estimates do not", "[fault]") {
@@ -150,7 +158,8 @@ TEST_CASE("fault 13: heartbeats stay away, encoder estimates do not", "[fault]")
       {.number = "13",
        .name = "a drive's heartbeats stay away, its encoder estimates do not",
        .detection = "no heartbeat for `heartbeat_timeout`",
-       .happens = [](BusRig& rig) { rig.silent = [](const Frame& frame) { return frame.id == 0x41; }; },
+       .happens =
+           [](BusRig& rig) { rig.silent = [](const Frame& frame) { return frame.id == 0x41; }; },
        .is_over = [](BusRig& rig) { rig.silent = BusRig::Nothing; },
        .reason = "knee1: no heartbeat for 50",
        .within = 510});
@@ -168,31 +177,35 @@ TEST_CASE("fault 13: an encoder jumps", "[fault]") {
 TEST_CASE("fault 13: an encoder is stuck", "[fault]") {
   const auto tremble = [](BusRig& rig) {  // as healthy ones do
     rig.each_millisecond.push_back([&rig] {
-      for (auto& sample : rig.samples) sample.velocity = 1e-4 * static_cast<double>(rig.now / 1000 % 7);
+      for (auto& sample : rig.samples)
+        sample.velocity = 1e-4 * static_cast<double>(rig.now / 1000 % 7);
     });
   };
-  ExpectStop({.number = "13",
-              .name = "an encoder is stuck, or the joint blocked",
-              .detection = "the same bits under an effort for `stuck_after` (off unless set), here 200 ms",
-              .happens = [](BusRig& rig) { rig.each_millisecond.clear(); },
-              .is_over = tremble,
-              .reason = "pivot: encoder stuck, or the joint is blocked",
-              .within = 205,
-              .prepare =
-                  [&](BusRig& rig) {
-                    rig.robot.driver.stuck_after = 0.2;
-                    tremble(rig);
-                  }});
+  ExpectStop(
+      {.number = "13",
+       .name = "an encoder is stuck, or the joint blocked",
+       .detection = "the same bits under an effort for `stuck_after` (off unless set), here 200 ms",
+       .happens = [](BusRig& rig) { rig.each_millisecond.clear(); },
+       .is_over = tremble,
+       .reason = "pivot: encoder stuck, or the joint is blocked",
+       .within = 205,
+       .prepare =
+           [&](BusRig& rig) {
+             rig.robot.driver.stuck_after = 0.2;
+             tremble(rig);
+           }});
 }
 
 TEST_CASE("fault 13: position and velocity contradict each other", "[fault]") {
-  ExpectStop({.number = "13",
-              .name = "a position stands still while its velocity says 1 rad/s",
-              .detection = "position and integral of the velocity differ by more than lags and losses explain",
-              .happens = [](BusRig& rig) { rig.samples[1].velocity = 1 / (2 * std::acos(-1.)); },
-              .is_over = [](BusRig& rig) { rig.samples[1].velocity = 0; },
-              .reason = "knee1: position and velocity disagree: it moved by 0 in",
-              .within = 500});
+  ExpectStop(
+      {.number = "13",
+       .name = "a position stands still while its velocity says 1 rad/s",
+       .detection =
+           "position and integral of the velocity differ by more than lags and losses explain",
+       .happens = [](BusRig& rig) { rig.samples[1].velocity = 1 / (2 * std::acos(-1.)); },
+       .is_over = [](BusRig& rig) { rig.samples[1].velocity = 0; },
+       .reason = "knee1: position and velocity disagree: it moved by 0 in",
+       .within = 500});
 }
 
 }  // namespace

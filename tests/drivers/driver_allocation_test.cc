@@ -1,5 +1,5 @@
-// No allocation in the driver's cycle, whatever happens in it. This binary counts what operator new is asked
-// for.
+// No allocation in the driver's cycle, whatever happens in it. This binary counts what operator new
+// is asked for.
 
 #include <unistd.h>
 
@@ -31,7 +31,9 @@ void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   ++allocations;
   return std::malloc(size ? size : 1);
 }
-void* operator new[](std::size_t size, const std::nothrow_t& tag) noexcept { return operator new(size, tag); }
+void* operator new[](std::size_t size, const std::nothrow_t& tag) noexcept {
+  return operator new(size, tag);
+}
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete[](void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
@@ -49,7 +51,8 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   rig.Start();
   REQUIRE(rig.Arm(1));
   // The wire is a real transport, so that its Send and Receive are counted, too.
-  const auto driver_end = OpenTransport("loop:allocation"), drive_end = OpenTransport("loop:allocation");
+  const auto driver_end = OpenTransport("loop:allocation"),
+             drive_end = OpenTransport("loop:allocation");
   joint_command_t command = rig.MakeCommand(1);
   driver_request_t arm{};
   arm.request = driver_request_t::ARM_HOMED;
@@ -60,12 +63,15 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
   for (int cycle = 0; cycle < 1000; ++cycle) {
     rig.now += 5000;
     FrameBatch batch;
-    for (CanSimpleDevice& drive : rig.drives) drive.Tick(rig.now, {cycle % 300 == 140 ? 5.0 : 0.0, 0}, batch);  // jumps
+    // jumps
+    for (CanSimpleDevice& drive : rig.drives)
+      drive.Tick(rig.now, {cycle % 300 == 140 ? 5.0 : 0.0, 0}, batch);
     drive_end->Send(batch.frames());
     command.utime = arm.utime = rig.utime();
     ++command.sequence;
     command.effort[0] = cycle % 7 == 0 ? NAN : 0.5;
-    Frame event = *FrameFromText(cycle % 200 == 50 ? "021#0000000101030000" : "20000040#0000000000000000");
+    Frame event =
+        *FrameFromText(cycle % 200 == 50 ? "021#0000000101030000" : "20000040#0000000000000000");
 
     const long before = allocations;
     while (const int count = driver_end->Receive(frames)) {
@@ -85,7 +91,8 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
     armed += rig.driver->state() == DriveState::kArmed;
     while (const int count = drive_end->Receive(frames)) {
       for (int i = 0; i < count; ++i) {
-        for (CanSimpleDevice& drive : rig.drives) drive.OnFrame(frames[static_cast<size_t>(i)], rig.now);
+        for (CanSimpleDevice& drive : rig.drives)
+          drive.OnFrame(frames[static_cast<size_t>(i)], rig.now);
       }
     }
   }
@@ -142,8 +149,9 @@ TEST_CASE("an open transport allocates nothing, faults or not") {
   for (const std::string& url :
        {std::string("loop:open"), "udp:239.74.163.79:" + std::to_string(20'000 + getpid() % 12'000),
         "replay:" + name,
-        std::string("faulty:loss=0.1,duplicate=0.1,reorder=0.1,corrupt=0.1,delay=1ms,jitter=1ms,full=0.01,"
-                    "errors=0.1,busoff=0.0001:loop:open")}) {
+        std::string(
+            "faulty:loss=0.1,duplicate=0.1,reorder=0.1,corrupt=0.1,delay=1ms,jitter=1ms,full=0.01,"
+            "errors=0.1,busoff=0.0001:loop:open")}) {
     INFO(url);
     const auto one = OpenTransport(url), other = OpenTransport(url);
     const long before = allocations;

@@ -1,4 +1,5 @@
-// What drives and encoders report that cannot be true, or must not be: each stops the robot, with the reason.
+// What drives and encoders report that cannot be true, or must not be: each stops the robot, with
+// the reason.
 
 #include <catch2/catch.hpp>
 #include <numbers>
@@ -14,8 +15,8 @@ using Catch::Matchers::StartsWith;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-/// It stops the robot within so many ms, with the reason, without a torque from the same cycle on, and for
-/// good.
+/// It stops the robot within so many ms, with the reason, without a torque from the same cycle on,
+/// and for good.
 void CheckStops(Rig& rig, int64_t within, const std::string& reason) {
   REQUIRE(rig.drives[0].Torque() != 0);
   const int64_t took = rig.RunUntil(DriveState::kFault, within);
@@ -61,7 +62,8 @@ TEST_CASE("an encoder that cannot be right stops the robot") {
     CheckStops(rig, 500, "pivot: encoder stuck, or the joint is blocked");
   }
   SECTION("second drive of the same id") {
-    CanSimpleDevice second({.node = 2, .heartbeat_period = 20'000, .encoder_period = 5'000}, rig.now);
+    CanSimpleDevice second({.node = 2, .heartbeat_period = 20'000, .encoder_period = 5'000},
+                           rig.now);
     const auto step = rig.on_step;
     rig.on_step = [&] {
       step();

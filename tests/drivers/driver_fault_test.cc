@@ -125,7 +125,8 @@ TEST_CASE("a drive that falls idle without an error is asked why") {
   CHECK(rig.driver->state() == DriveState::kFault);
   CHECK_THAT(rig.Reason(), Equals("pivot: the drive went to IDLE: no error (success)"));
   rig.Run(20);
-  CHECK_THAT(rig.Status().joint_reason[0], Equals("the drive disarmed itself: watchdog timer expired"));
+  CHECK_THAT(rig.Status().joint_reason[0],
+             Equals("the drive disarmed itself: watchdog timer expired"));
 }
 
 TEST_CASE("commands that are none change nothing and feed nobody") {
@@ -140,7 +141,8 @@ TEST_CASE("commands that are none change nothing and feed nobody") {
   rig.Run(20);
   CHECK(rig.drives[0].Torque() == 0);
   CHECK(rig.RunUntil(DriveState::kFault) >= 0);
-  CHECK_THAT(rig.Reason(), StartsWith("commands refused: an effort is not a number (none taken for 25"));
+  CHECK_THAT(rig.Reason(),
+             StartsWith("commands refused: an effort is not a number (none taken for 25"));
 }
 
 TEST_CASE("a controller that began anew is taken up after the robot is armed again") {
@@ -255,16 +257,16 @@ TEST_CASE("frames that only look like ours are not") {
   rig.Run(20);
   const size_t states = rig.states.size();
   const int64_t rejected = rig.Status().frames_rejected;
-  for (const char* text :
-       {"029#R8", "00000029#0000803F0000803F", "029##00000803F0000803F", "20000001#0000000001000000", "021#R",
-        "00000021#0000000001000000", "021##00000000001000000"}) {
+  for (const char* text : {"029#R8", "00000029#0000803F0000803F", "029##00000803F0000803F",
+                           "20000001#0000000001000000", "021#R", "00000021#0000000001000000",
+                           "021##00000000001000000"}) {
     rig.Inject(text);
   }
   while (rig.driver->NextState()) FAIL("a state from frames that are not ours");
   CHECK(rig.driver->state() == DriveState::kArmed);
   CHECK(rig.Status().frames_rejected == rejected + 6);  // error frames are no frames
-  for (const char* text :
-       {"029#000080BE", "029#0000C07F00006040", "029#00008040000080FF", "021#000000000800", "03F#", "029#"}) {
+  for (const char* text : {"029#000080BE", "029#0000C07F00006040", "029#00008040000080FF",
+                           "021#000000000800", "03F#", "029#"}) {
     rig.Inject(text);
   }
   while (rig.driver->NextState()) FAIL("a state from malformed frames");

@@ -23,7 +23,8 @@ TEST_CASE("JOINT_STATE comes once per measurement, with regular times and the ef
   rig.on_step = [&] {
     ++step;
     rig.effort = std::sin(0.013 * static_cast<double>(step));
-    for (size_t i = 0; i < 2; ++i) rig.samples[i] = {0.001 * static_cast<double>(step) / kTwoPi, 1.0 / kTwoPi};
+    for (size_t i = 0; i < 2; ++i)
+      rig.samples[i] = {0.001 * static_cast<double>(step) / kTwoPi, 1.0 / kTwoPi};
   };
   REQUIRE(rig.Arm());
   // What was sent when, noted by the receiver's side.
@@ -57,7 +58,8 @@ TEST_CASE("JOINT_STATE comes once per measurement, with regular times and the ef
       const int64_t end = std::min(to, k + 1 < setpoints.size() ? setpoints[k + 1].utime : to);
       if (end > begin) integral += setpoints[k].effort * static_cast<double>(end - begin);
     }
-    CHECK(state.effort_applied[1] == Approx(integral / static_cast<double>(to - from)).margin(1e-6));
+    CHECK(state.effort_applied[1] ==
+          Approx(integral / static_cast<double>(to - from)).margin(1e-6));
   }
 }
 
@@ -71,7 +73,8 @@ TEST_CASE("an effort acts as much later than it was sent as its frame is on its 
   rig.states.clear();
   rig.effort = -1;
   rig.Run(20);
-  const auto first = std::ranges::find_if(rig.states, [](const joint_state_t& state) { return state.effort_applied[0] != 1; });
+  const auto first = std::ranges::find_if(
+      rig.states, [](const joint_state_t& state) { return state.effort_applied[0] != 1; });
   REQUIRE(first != rig.states.end());
   REQUIRE(first != rig.states.begin());
   // Between two measurements, 5 ms apart, it was 1 for 3 ms and -1 for 2 ms.
@@ -174,7 +177,8 @@ TEST_CASE("the status message counts") {
   CHECK(status.lateness[1] == 10);
   CHECK(status.lateness[12] == 1);
   std::vector<uint8_t> buffer(static_cast<size_t>(status.getEncodedSize()));
-  CHECK(status.encode(buffer.data(), 0, static_cast<int>(buffer.size())) == static_cast<int>(buffer.size()));
+  CHECK(status.encode(buffer.data(), 0, static_cast<int>(buffer.size())) ==
+        static_cast<int>(buffer.size()));
 }
 
 TEST_CASE("robots it cannot drive") {
@@ -203,7 +207,8 @@ TEST_CASE("temperatures and supplies are asked for, one at a time") {
     }
     CHECK(questions <= 1);
   }
-  CHECK(asked == std::map<std::string, int>{{"035#R", 10}, {"037#R", 10}, {"055#R", 10}, {"057#R", 10}});
+  CHECK(asked ==
+        std::map<std::string, int>{{"035#R", 10}, {"037#R", 10}, {"055#R", 10}, {"057#R", 10}});
   for (size_t i = 0; i < 2; ++i) {
     CHECK(rig.Status().motor_temperature[i] == 25);
     CHECK(rig.Status().drive_temperature[i] == 25);

@@ -30,8 +30,8 @@ TEST_CASE("arming follows the protocol's sequence and ends in torque control") {
   CHECK(rig.Reason().empty());
   if (all.back() == "037#R") all.pop_back();  // armed, it asks for the supply's voltage
   all.erase(std::remove(all.begin(), all.end(), "02E#00000000"), all.end());
-  CHECK(all == std::vector<std::string>{"020#R", "038#00", "02B#0100000001000000", "02B#0100000001000000",
-                                        "027#0800000000000000"});
+  CHECK(all == std::vector<std::string>{"020#R", "038#00", "02B#0100000001000000",
+                                        "02B#0100000001000000", "027#0800000000000000"});
   CHECK(rig.drives[0].armed());
   CHECK(rig.drives[0].Torque() == 0);
 }
@@ -72,8 +72,8 @@ TEST_CASE("efforts are limited, geared and turned") {
   REQUIRE(rig.Arm(9));
   rig.samples[0] = {0, 0};  // joint at 0.5
   rig.Run(20);
-  CHECK(rig.drives[0].Torque() == -0.5);    // 2 Nm at the joint
-  for (int i = 1; i <= 10; ++i) {  // joint to 1.1, at 12 rad/s
+  CHECK(rig.drives[0].Torque() == -0.5);  // 2 Nm at the joint
+  for (int i = 1; i <= 10; ++i) {         // joint to 1.1, at 12 rad/s
     rig.samples[0] = {-4 * 0.06 * i / kTwoPi, -4 * 12 / kTwoPi};
     rig.Run(5);
   }
@@ -162,8 +162,8 @@ TEST_CASE("an ARM whose maker's clock is ahead counts once") {
   rig.driver->OnRequest(arm, rig.now, rig.utime());
   rig.Run(10);
   CHECK(rig.driver->state() == DriveState::kFault);
-  CHECK_THAT(rig.Reason(),
-             StartsWith("no command for") && Contains("; ARM refused: it, or a newer one, was obeyed"));
+  CHECK_THAT(rig.Reason(), StartsWith("no command for") &&
+                               Contains("; ARM refused: it, or a newer one, was obeyed"));
 }
 
 TEST_CASE("an ARM from the far future is refused and does no harm") {
@@ -181,7 +181,8 @@ TEST_CASE("an ARM from the far future is refused and does no harm") {
   rig.Request(driver_request_t::DISARM);
   rig.Run(200);
   rig.Request(driver_request_t::ARM, 300'000);
-  CHECK_THAT(rig.Reason(), Equals("disarmed on request; ARM refused: it was made before the driver stopped"));
+  CHECK_THAT(rig.Reason(),
+             Equals("disarmed on request; ARM refused: it was made before the driver stopped"));
 }
 
 TEST_CASE("an ARM from before the driver's start is not for it") {

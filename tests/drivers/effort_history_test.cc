@@ -74,7 +74,8 @@ TEST_CASE("averages equal the closed form for random staircases") {
   for (size_t i = 0; i < 64; ++i) {
     time[i] = i == 0 ? 1'700'000'000'000'000 : time[i - 1] + 1 + random.Bits() % 9000;
     level[i] = random.Uniform(-2, 2);
-    integral[i] = i == 0 ? 0 : integral[i - 1] + level[i - 1] * static_cast<double>(time[i] - time[i - 1]);
+    integral[i] =
+        i == 0 ? 0 : integral[i - 1] + level[i - 1] * static_cast<double>(time[i] - time[i - 1]);
     Record(history, time[i], level[i], -level[i]);
   }
   const auto antiderivative = [&](int64_t t) {
@@ -84,9 +85,11 @@ TEST_CASE("averages equal the closed form for random staircases") {
   };
   for (int trial = 0; trial < 1000; ++trial) {
     const int64_t span = time[63] - time[0] + 5000;
-    const int64_t from = time[0] + static_cast<int64_t>(random.Uniform() * static_cast<double>(span));
+    const int64_t from =
+        time[0] + static_cast<int64_t>(random.Uniform() * static_cast<double>(span));
     const int64_t to = from + 1 + random.Bits() % 30'000;
-    const double expected = (antiderivative(to) - antiderivative(from)) / static_cast<double>(to - from);
+    const double expected =
+        (antiderivative(to) - antiderivative(from)) / static_cast<double>(to - from);
     const auto average = Average(history, from, to);
     REQUIRE(average[0] == Approx(expected).margin(1e-9));
     REQUIRE(average[1] == Approx(-expected).margin(1e-9));

@@ -10,7 +10,8 @@
 namespace plumb {
 namespace {
 
-/// Commands that come at instants of their own, in no relation to the driver's cycle, and a wire to look at.
+/// Commands that come at instants of their own, in no relation to the driver's cycle, and a wire to
+/// look at.
 struct Commander : Rig {
   Commander() {
     on_step = [this] {
@@ -32,12 +33,14 @@ struct Commander : Rig {
   }
 
   int64_t period = 5000, next_command = 0, last_command_due = 0, own_expiry = 0;  // [us]
-  int64_t arrived = 0;                                                            // the last command
+  // the last command
+  int64_t arrived = 0;
   int64_t torque_at = 0, zero_at = 0;  // the last torque frames with and without torque
 };
 
 TEST_CASE(
-    "from the last command to zero torque on the wire: at most expiry and one cycle, in 1000 of 1000 "
+    "from the last command to zero torque on the wire: at most expiry and one cycle, in 1000 of "
+    "1000 "
     "trials") {
   Commander rig;
   rig.settings.watchdog = 0;  // nobody but the driver ends the torque
@@ -50,8 +53,11 @@ TEST_CASE(
     rig.cycle_phase = 1000 * (random.Bits() % 5);
     rig.period = 1000 + random.Bits() % 50'000;
     // A command may ask for less time than the driver's expiry, and cannot have more.
-    rig.own_expiry = trial % 3 == 0 ? 0 : trial % 3 == 1 ? 20'000 + random.Bits() % 80'000 : 1'000'000;
-    const int64_t expiry = rig.own_expiry == 0 ? 100'000 : std::min<int64_t>(rig.own_expiry, 100'000);
+    rig.own_expiry = trial % 3 == 0   ? 0
+                     : trial % 3 == 1 ? 20'000 + random.Bits() % 80'000
+                                      : 1'000'000;
+    const int64_t expiry =
+        rig.own_expiry == 0 ? 100'000 : std::min<int64_t>(rig.own_expiry, 100'000);
     rig.next_command = rig.now + 1 + random.Bits() % 5000;
     rig.last_command_due = rig.now + 60'000 + random.Bits() % 20'000;
     rig.Run(82 + 100 + 10);

@@ -12,10 +12,11 @@
 
 namespace plumb {
 
-/// Something that goes wrong while the robot is armed and both drives produce torque, and what must come of
-/// it.
+/// Something that goes wrong while the robot is armed and both drives produce torque, and what must
+/// come of it.
 ///
-/// With PLUMBLINE_FAULT_TABLE=1 in the environment each fault prints its row of the table in docs/safety.md:
+/// With PLUMBLINE_FAULT_TABLE=1 in the environment each fault prints its row of the table in
+/// docs/safety.md:
 ///
 ///   PLUMBLINE_FAULT_TABLE=1 drivers_test '[fault]' | grep '^|' | sort -t'|' -k2n -s
 struct Fault {
@@ -26,18 +27,20 @@ struct Fault {
   std::function<void(BusRig&)> is_over = [](BusRig&) {};  ///< and what else is to be seen by then
   const char* reason = "";  ///< DRIVER_STATUS says, from its beginning; "" if the robot runs on
   int8_t arm = driver_request_t::ARM;  ///< what leads back
-  int64_t within = 0;       ///< [ms] until no torque is asked for or produced any more, at the latest
+  /// [ms] until no torque is asked for or produced any more, at the latest
+  int64_t within = 0;
   std::function<void(BusRig&)> prepare = [](BusRig&) {};  ///< before it starts
 
   void PrintRow(const std::string& reaction, const std::string& time) const {
     if (std::getenv("PLUMBLINE_FAULT_TABLE") == nullptr) return;
-    std::printf("| %s | %s | %s | %s | %s |\n", number, name, detection, reaction.c_str(), time.c_str());
+    std::printf("| %s | %s | %s | %s | %s |\n", number, name, detection, reaction.c_str(),
+                time.c_str());
     std::fflush(stdout);
   }
 };
 
-/// Both drives are armed and produce 1 Nm; the driver's cycle and the drives' messages are `phase` [ms]
-/// further.
+/// Both drives are armed and produce 1 Nm; the driver's cycle and the drives' messages are `phase`
+/// [ms] further.
 inline void Bring(BusRig& rig, int64_t phase) {
   rig.Start();
   REQUIRE(rig.Arm(1));
@@ -45,8 +48,8 @@ inline void Bring(BusRig& rig, int64_t phase) {
   for (const CanSimpleDevice& drive : rig.drives) REQUIRE(drive.Torque() == 1);
 }
 
-/// The robot is stopped in time in whatever phase of cycle and heartbeats the fault comes, says why, and
-/// stays so until a person arms it after the fault is over.
+/// The robot is stopped in time in whatever phase of cycle and heartbeats the fault comes, says
+/// why, and stays so until a person arms it after the fault is over.
 inline void ExpectStop(const Fault& fault) {
   constexpr int64_t kPhases = 20;  // [ms] of a heartbeat
   int64_t worst = 0;
@@ -83,8 +86,8 @@ inline void ExpectStop(const Fault& fault) {
   fault.PrintRow("stops: " + reason, fmt::format("{} ms", worst));
 }
 
-/// The robot goes on as if nothing were. `within` is the greatest age [ms] of a torque that a drive produces,
-/// from the time it was commanded.
+/// The robot goes on as if nothing were. `within` is the greatest age [ms] of a torque that a drive
+/// produces, from the time it was commanded.
 inline void ExpectToRunOn(const Fault& fault) {
   constexpr double kStep = 0.001;  // [Nm] more in each cycle: a torque tells when it was commanded
   int64_t oldest = 0;

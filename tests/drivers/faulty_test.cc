@@ -222,7 +222,8 @@ std::string History(const std::string& faults) {
 
 TEST_CASE("the same seed and the same calls have the same faults") {
   const std::string faults =
-      "loss=0.1,duplicate=0.1,reorder=0.1,corrupt=0.1,delay=1ms,jitter=2ms,full=0.05,errors=0.05,busoff=0.01,"
+      "loss=0.1,duplicate=0.1,reorder=0.1,corrupt=0.1,delay=1ms,jitter=2ms,full=0.05,errors=0.05,"
+      "busoff=0.01,"
       "seed=";
   CHECK(History(faults + "1") == History(faults + "1"));
   CHECK(History(faults + "1") != History(faults + "2"));
@@ -260,7 +261,8 @@ TEST_CASE("faults nest, and pass on what the bus says") {
                                     {{.id = 0x29}, {.id = 0x2E, .own = true}});
   const auto sound = OpenTransport("loop:nested");
   faulty->SetTime(0);
-  const std::array<Frame, 3> frames = {Numbered(1), *FrameFromText("02E#00"), *FrameFromText("100#00")};
+  const std::array<Frame, 3> frames = {Numbered(1), *FrameFromText("02E#00"),
+                                       *FrameFromText("100#00")};
   sound->Send(frames);
   CHECK(ReceiveAll(*faulty).empty());
   faulty->SetTime(2000);
@@ -287,10 +289,12 @@ TEST_CASE("faults that are none are named") {
   CHECK_THAT(error("faulty:lost=0.1:loop:x"), Contains("'lost=0.1'") && Contains("duplicate"));
   CHECK_THAT(error("faulty:rx.full=0.1:loop:x"), Contains("'rx.full=0.1'"));
   CHECK_THAT(error("faulty:tx.errors=0.1:loop:x"), Contains("'tx.errors=0.1'"));
-  for (const char* bad : {"loss=1.1", "loss=-0.1", "loss=nan", "loss=", "loss=x", "delay=2", "delay=-1ms",
-                          "delay=2h", "delay=61s", "jitter=nans", "seed=-1", "seed=1.5"}) {
+  for (const char* bad :
+       {"loss=1.1", "loss=-0.1", "loss=nan", "loss=", "loss=x", "delay=2", "delay=-1ms", "delay=2h",
+        "delay=61s", "jitter=nans", "seed=-1", "seed=1.5"}) {
     INFO(bad);
-    CHECK_THAT(error("faulty:" + std::string(bad) + ":loop:x"), Contains("'" + std::string(bad) + "'"));
+    CHECK_THAT(error("faulty:" + std::string(bad) + ":loop:x"),
+               Contains("'" + std::string(bad) + "'"));
   }
   CHECK_THAT(error("faulty:loss:loop:x"), Contains("'loss' is not NAME=VALUE"));
   CHECK_THAT(error("faulty:loss=0.1:nothing"), Contains("'nothing' is not socketcan:INTERFACE"));

@@ -24,7 +24,8 @@ constexpr Field kBig{"x", 12, 12, Kind::kUnsigned, 1, "", Order::kBigEndian};
 static_assert(kBig.Encode(0xABC) == 0xBC0A00);  // bytes 00 0A BC
 static_assert(kBig.Decode(0xBC0A00) == 0xABC);
 constexpr Field kRange = RangeField("t", 52, 12, -18, 18, "Nm");
-static_assert(kRange.Decode(kRange.Encode(18)) > 17.999999 && kRange.Holds(18) && !kRange.Holds(18.1));
+static_assert(kRange.Decode(kRange.Encode(18)) > 17.999999 && kRange.Holds(18) &&
+              !kRange.Holds(18.1));
 static_assert(Layout{0, "", 8, {{kBig, kRange}}}.needed() == 8);
 
 TEST_CASE("big-endian fields: bytes written by hand") {
@@ -37,13 +38,14 @@ TEST_CASE("big-endian fields: bytes written by hand") {
   CHECK(Text({0, "", 3, {{field(12, 12, Kind::kUnsigned)}}}, {0xABC}) == "000#000ABC");
   CHECK(Text({0, "", 4, {{field(0, 32, Kind::kUnsigned)}}}, {123456}) == "000#0001E240");
   CHECK(Text({0, "", 1, {{field(3, 2, Kind::kUnsigned)}}}, {3}) == "000#18");
-  CHECK(Text({0, "", 8, {{field(16, 48, Kind::kUnsigned)}}}, {0x010203040506}) == "000#0000010203040506");
+  CHECK(Text({0, "", 8, {{field(16, 48, Kind::kUnsigned)}}}, {0x010203040506}) ==
+        "000#0000010203040506");
   CHECK(Text({0, "", 2, {{field(0, 16, Kind::kSigned, 1. / 256)}}}, {-48.996}) == "000#CF01");
   CHECK(Text({0, "", 2, {{field(0, 16, Kind::kSigned)}}}, {-1}) == "000#FFFF");
   CHECK(Text({0, "", 4, {{field(0, 32, Kind::kFloat)}}}, {1.5}) == "000#3FC00000");
   // Neighbours do not touch.
-  CHECK(Text({0, "", 3, {{field(0, 12, Kind::kUnsigned), field(12, 12, Kind::kUnsigned)}}}, {0x123, 0x456}) ==
-        "000#123456");
+  CHECK(Text({0, "", 3, {{field(0, 12, Kind::kUnsigned), field(12, 12, Kind::kUnsigned)}}},
+             {0x123, 0x456}) == "000#123456");
 }
 
 TEST_CASE("a field covers the same bytes in either order, and leaves others alone") {
@@ -51,12 +53,16 @@ TEST_CASE("a field covers the same bytes in either order, and leaves others alon
     for (const Kind kind : {Kind::kUnsigned, Kind::kSigned}) {
       for (int bits = 1; bits <= 48; ++bits) {
         for (int bit = 0; bit + bits <= 64; ++bit) {
-          const Field field{"x", static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), kind, 1, "", order};
-          const uint64_t all = kind == Kind::kSigned ? field.Encode(-1) : field.Encode(field.highest());
+          const Field field{
+              "x", static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), kind, 1, "", order};
+          const uint64_t all =
+              kind == Kind::kSigned ? field.Encode(-1) : field.Encode(field.highest());
           if (std::popcount(all) != bits) FAIL(bit << " " << bits);
           for (const double value : {field.lowest(), field.highest(), 0.0}) {
-            if (field.Decode(field.Encode(value)) != value) FAIL(bit << " " << bits << " " << value);
-            if (field.Decode(field.Encode(value) | ~all) != value) FAIL(bit << " " << bits << " " << value);
+            if (field.Decode(field.Encode(value)) != value)
+              FAIL(bit << " " << bits << " " << value);
+            if (field.Decode(field.Encode(value) | ~all) != value)
+              FAIL(bit << " " << bits << " " << value);
           }
           const size_t needed = Layout{0, "", 8, {{field}}}.needed();
           if (needed < 8 && all >> (8 * needed) != 0) FAIL(bit << " " << bits);
@@ -74,11 +80,12 @@ TEST_CASE("every code of a range survives decoding and encoding") {
         const Field field = RangeField("x", 0, bits, least, most);
         for (uint64_t code = 0; code <= field.mask(); ++code) {
           Frame frame;
-          EncodePayload({0, "", 2, {{field}}}, {least + (most - least) * double(code) / double(field.mask())},
-                        frame);
+          EncodePayload({0, "", 2, {{field}}},
+                        {least + (most - least) * double(code) / double(field.mask())}, frame);
           const uint64_t got = (uint64_t{frame.data[0]} << 8 | frame.data[1]) >> (16 - bits);
           const uint64_t payload = uint64_t{frame.data[0]} | uint64_t{frame.data[1]} << 8;
-          if (got != code || field.Encode(field.Decode(payload)) != payload) FAIL(most << " " << code);
+          if (got != code || field.Encode(field.Decode(payload)) != payload)
+            FAIL(most << " " << code);
         }
         CHECK(field.Decode(field.Encode(most)) == Approx(most).epsilon(1e-14));
         CHECK(field.lowest() == least);

@@ -24,7 +24,9 @@ TEST_CASE("what was on the bus before a fault is written as candump writes, olde
   const TemporaryFolder folder;
   std::string written, error;
   {
-    FlightRecorder recorder(folder.path() / "new", "udp:239.74.163.2:43113", 4, [&](const std::string& file, const std::string& what) { written = file, error = what; });
+    FlightRecorder recorder(
+        folder.path() / "new", "udp:239.74.163.2:43113", 4,
+        [&](const std::string& file, const std::string& what) { written = file, error = what; });
     for (int i = 0; i < 6; ++i) recorder.Record(Text("02E#0000C03F00000000"), true, 1'000'000 + i);
     recorder.Record(Text("029#R8"), false, 1'500'000);
     REQUIRE(recorder.Dump(1'000'004, 2'000'000, "pivot: no encoder estimate for 50 ms"));
@@ -42,9 +44,11 @@ TEST_CASE("each dump begins anew, and one at a time") {
   const TemporaryFolder folder;
   int reports = 0, dumps = 0;
   {
-    FlightRecorder recorder(folder.path(), "can0", 20000, [&](const std::string&, const std::string&) { ++reports; });
+    FlightRecorder recorder(folder.path(), "can0", 20000,
+                            [&](const std::string&, const std::string&) { ++reports; });
     for (int round = 0; round < 20; ++round) {
-      for (int i = 0; i < 5000; ++i) recorder.Record(Text("181#40E20100"), false, round * 10'000 + i);
+      for (int i = 0; i < 5000; ++i)
+        recorder.Record(Text("181#40E20100"), false, round * 10'000 + i);
       dumps += recorder.Dump(0, round, "again");
     }
   }
@@ -65,10 +69,12 @@ TEST_CASE("without a folder nothing is recorded, and one that cannot be is an er
   CHECK_FALSE(recorder.Dump(0, 2, "reason"));
   const TemporaryFolder folder;
   std::ofstream(folder.path() / "file") << "x";
-  CHECK_THROWS_AS(FlightRecorder(folder.path() / "file" / "below", "can0", 100, {}), std::runtime_error);
+  CHECK_THROWS_AS(FlightRecorder(folder.path() / "file" / "below", "can0", 100, {}),
+                  std::runtime_error);
   std::string error;
   {
-    FlightRecorder gone(folder.path() / "gone", "can0", 100, [&](const std::string&, const std::string& what) { error = what; });
+    FlightRecorder gone(folder.path() / "gone", "can0", 100,
+                        [&](const std::string&, const std::string& what) { error = what; });
     gone.Record(Text("181#40E20100"), false, 1);
     fs::remove_all(folder.path() / "gone");
     CHECK(gone.Dump(0, 2, "reason"));

@@ -1,4 +1,5 @@
-// Commands and ARM requests whose signature is wrong: they are counted and said, and do nothing else.
+// Commands and ARM requests whose signature is wrong: they are counted and said, and do nothing
+// else.
 
 #include <catch2/catch.hpp>
 
@@ -21,12 +22,14 @@ TEST_CASE("nothing but forged commands disarm as silence does, and the reason sa
   CHECK(rig.driver->state() == DriveState::kArmed);
   CHECK(rig.drives[0].Torque() == 0);
   CHECK(rig.RunUntil(DriveState::kFault) <= 260 - 110);
-  CHECK_THAT(rig.Reason(),
-             Catch::StartsWith("commands refused: not signed with the driver's key (none taken for 25"));
+  CHECK_THAT(
+      rig.Reason(),
+      Catch::StartsWith("commands refused: not signed with the driver's key (none taken for 25"));
   CHECK(rig.Status().commands_forged >= 110);
 }
 
-TEST_CASE("forged commands beside genuine ones change nothing, and are not blamed for a later silence") {
+TEST_CASE(
+    "forged commands beside genuine ones change nothing, and are not blamed for a later silence") {
   Rig rig;
   rig.Start();
   REQUIRE(rig.Arm(1));
@@ -54,7 +57,8 @@ TEST_CASE("a forged ARM arms nothing, and says why") {
   CHECK(rig.driver->state() == DriveState::kIdle);
   CHECK(rig.Reason() == "ARM refused: not signed with the driver's key");
   CHECK(rig.Status().commands_forged == 1);
-  // Beside an armed robot it is only counted; nor does it lead out of a fault, whose cause stays in sight.
+  // Beside an armed robot it is only counted; nor does it lead out of a fault, whose cause stays in
+  // sight.
   REQUIRE(rig.Arm());
   rig.driver->OnForgedArm(kWhy);
   CHECK(rig.Reason().empty());

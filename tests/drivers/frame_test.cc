@@ -7,9 +7,9 @@ namespace {
 
 TEST_CASE("frames are written and read as candump does") {
   // Each text is what candump -L or cansend calls the frame.
-  const auto text =
-      GENERATE(as<std::string>{}, "02E#0000C03F00000000", "029#R", "029#R8", "022#", "7FF#00",
-               "1ABCDEF0#0001020304050607", "00000029#11", "124##1112233", "20000040#0000000000000000");
+  const auto text = GENERATE(as<std::string>{}, "02E#0000C03F00000000", "029#R", "029#R8", "022#",
+                             "7FF#00", "1ABCDEF0#0001020304050607", "00000029#11", "124##1112233",
+                             "20000040#0000000000000000");
   INFO(text);
   const auto frame = FrameFromText(text);
   REQUIRE(frame);
@@ -53,9 +53,10 @@ TEST_CASE("the parts of a frame's text") {
 }
 
 TEST_CASE("texts that are no frame") {
-  const auto text = GENERATE(as<std::string>{}, "", "#", "02E", "2E#00", "02E#0", "02E#000000000000000000",
-                             "02G#00", "02E#0G", "800#00", "3FFFFFFF1#", "029#R9", "029#RR", "029#R88",
-                             "124##", "124##8", "124##11122334455667788AA", "02E#00 ", "-2E#00");
+  const auto text =
+      GENERATE(as<std::string>{}, "", "#", "02E", "2E#00", "02E#0", "02E#000000000000000000",
+               "02G#00", "02E#0G", "800#00", "3FFFFFFF1#", "029#R9", "029#RR", "029#R88", "124##",
+               "124##8", "124##11122334455667788AA", "02E#00 ", "-2E#00");
   INFO(text);
   CHECK_FALSE(FrameFromText(text));
 }

@@ -9,9 +9,11 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity(),
                  kNan = std::numeric_limits<double>::quiet_NaN();
 
-double Limited(double wish, double position, double velocity, const JointLimits& limits, double sent = 0) {
+double Limited(double wish, double position, double velocity, const JointLimits& limits,
+               double sent = 0) {
   const auto effort = LimitEffort(
-      wish, {.position = position, .velocity = velocity, .effort_sent = sent, .elapsed = 0.01}, limits);
+      wish, {.position = position, .velocity = velocity, .effort_sent = sent, .elapsed = 0.01},
+      limits);
   REQUIRE(effort);
   return *effort;
 }
@@ -22,10 +24,14 @@ TEST_CASE("effort, position and velocity limits") {
     double effort, position, velocity, expected;
   };
   for (const Case& c : {
-           Case{1, 0, 0, 1}, Case{5, 0, 0, 3}, Case{-5, 0, 0, -3}, Case{1, 2.1, 0, 0}, Case{-1, 2.1, 0, -1},
-           Case{-5, 2.1, 0, -3},                                               // above: only downwards
-           Case{-1, -1.1, 0, 0}, Case{1, -1.1, 0, 1},                          // below: only upwards
-           Case{1, 0, 10.1, 0}, Case{-1, 0, 10.1, -1}, Case{-1, 0, -10.1, 0},  // too fast: only brake
+           Case{1, 0, 0, 1}, Case{5, 0, 0, 3}, Case{-5, 0, 0, -3}, Case{1, 2.1, 0, 0},
+           Case{-1, 2.1, 0, -1},
+           // above: only downwards
+           Case{-5, 2.1, 0, -3},
+           // below: only upwards
+           Case{-1, -1.1, 0, 0}, Case{1, -1.1, 0, 1},
+           // too fast: only brake
+           Case{1, 0, 10.1, 0}, Case{-1, 0, 10.1, -1}, Case{-1, 0, -10.1, 0},
            Case{1, 2.1, -10.1, 0}, Case{-1, 2.1, -10.1, 0},  // coming back too fast: nothing
            Case{3, 2, 0, 3}, Case{-3, -1, 0, -3},            // at the limit is within
        }) {
@@ -87,7 +93,8 @@ TEST_CASE("efforts that make a joint faster fade before its velocity limit") {
 }
 
 TEST_CASE("an effort grows at its rate and falls at once") {
-  const JointLimits limits{.lower = -kInf, .upper = kInf, .velocity = kInf, .effort = 3, .effort_rate = 50};
+  const JointLimits limits{
+      .lower = -kInf, .upper = kInf, .velocity = kInf, .effort = 3, .effort_rate = 50};
   struct Case {
     double wish, sent, expected;
   };

@@ -1,4 +1,5 @@
-// A bus in virtual time: the coordinator says when and in which order frames arrive, the bus that they do.
+// A bus in virtual time: the coordinator says when and in which order frames arrive, the bus that
+// they do.
 #include "drivers/can/lockstep_transport.h"
 
 #include <array>
@@ -19,9 +20,12 @@ class MadeUpRun : public Participant {
  public:
   void Listen(const lockstep_topic_t& topic) override { listens = topic.name; }
   void Say(const lockstep_topic_t& topic, std::vector<uint8_t> data, int64_t way) override {
-    said += topic.name + " " + std::string(data.begin(), data.end()) + " " + std::to_string(now() + way) + "\n";
+    said += topic.name + " " + std::string(data.begin(), data.end()) + " " +
+            std::to_string(now() + way) + "\n";
   }
-  void Wait(int64_t until, Wake, int = -1, const std::function<void()>& = {}) override { SetNow(until); }
+  void Wait(int64_t until, Wake, int = -1, const std::function<void()>& = {}) override {
+    SetNow(until);
+  }
   void ShareProcessor() override {}
   void Note(const std::string& line) override { noted += line + "\n"; }
   void Fail(const std::string& why) override { failed += why + "\n"; }
@@ -57,7 +61,8 @@ struct Rig {
   std::unique_ptr<Transport> others, transport;
 };
 
-TEST_CASE("frames are handed out in the run's order and at its time, once the bus has brought them") {
+TEST_CASE(
+    "frames are handed out in the run's order and at its time, once the bus has brought them") {
   Rig rig;
   CHECK(rig.run.listens == kBus);
   rig.SendByOthers("029#01");
@@ -99,7 +104,8 @@ TEST_CASE("who is outside the run is named once, and not heard") {
   rig.run.Wait(200'000, Participant::Wake::kOnTime, -1);
   CHECK(rig.Receive().empty());
   CHECK(rig.run.noted ==
-        "029#66 on " + std::string(kBus) + " is from outside the run, and ignored: --real-time hears everybody\n");
+        "029#66 on " + std::string(kBus) +
+            " is from outside the run, and ignored: --real-time hears everybody\n");
   rig.run.Arrives("029#66", 200'000);
   rig.SendByOthers("029#66");
   CHECK(rig.Receive() == "029#66@200000000 ");

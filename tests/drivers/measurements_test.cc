@@ -76,12 +76,14 @@ TEST_CASE("lost estimates never pair what was measured more than 0.6 periods apa
         const double measured0 = set[0].position * kPeriod;
         const double measured1 = (set[1].position - 0.1) * kPeriod + static_cast<double>(phase);
         REQUIRE(std::abs(measured0 - measured1) < 0.6 * kPeriod + 100);
-        REQUIRE(static_cast<double>(utime - kStart) == Approx(std::max(measured0, measured1)).margin(210));
+        REQUIRE(static_cast<double>(utime - kStart) ==
+                Approx(std::max(measured0, measured1)).margin(210));
         ++complete;
       }
     };
     for (int k = 0; k < 5000; ++k) {
-      if (random.Uniform() >= 0.05) measurements.Add(0, At(k, 0), kStart + kPeriod * k + random.Bits() % 200);
+      if (random.Uniform() >= 0.05)
+        measurements.Add(0, At(k, 0), kStart + kPeriod * k + random.Bits() % 200);
       take_all();
       if (random.Uniform() >= 0.05)
         measurements.Add(1, At(k, 1), kStart + kPeriod * k + phase + random.Bits() % 200);

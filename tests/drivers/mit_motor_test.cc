@@ -24,8 +24,8 @@ MotorDescription Describe(int node = 0x11, int master = 0x10) {
   return description;
 }
 
-/// Host and motor, a millisecond at a time. The driver's part is played here: zero torque while arming,
-/// `torque` when armed.
+/// Host and motor, a millisecond at a time. The driver's part is played here: zero torque while
+/// arming, `torque` when armed.
 struct Bench {
   explicit Bench(uint8_t reply_length = mit::kWithTemperature)
       : device({.node = 0x11, .master = 0x10, .ranges = kAk80, .reply_length = reply_length}) {
@@ -63,7 +63,8 @@ struct Bench {
   }
   int Count(uint8_t special) const {
     int count = 0;
-    for (const Frame& frame : sent) count += SameOnWire(frame, mit::MakeSpecial(0x11, mit::Special(special)));
+    for (const Frame& frame : sent)
+      count += SameOnWire(frame, mit::MakeSpecial(0x11, mit::Special(special)));
     return count;
   }
 
@@ -133,8 +134,8 @@ TEST_CASE("arming: zeros, enter, an answer, and only then torque") {
 TEST_CASE("no kick: what a motor was told before it was switched on is not obeyed") {
   Bench bench;
   // Another master's last words, to a motor at rest: it would obey them on "enter".
-  bench.device.OnFrame(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.position = 5, .kp = 500}),
-                       bench.now);
+  bench.device.OnFrame(
+      mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.position = 5, .kp = 500}), bench.now);
   CHECK(bench.device.Torque(bench.sample) == 0);
   bench.applied = 0;
   CHECK(bench.Arm());
@@ -228,13 +229,16 @@ TEST_CASE("a restart, seen by its position, is a fault") {
 TEST_CASE("nothing but finite torques within the range is sent, and the others are counted") {
   Bench bench;
   CHECK(bench.Arm());
-  const std::string most = ToText(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.torque = 18}));
+  const std::string most =
+      ToText(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.torque = 18}));
   CHECK(ToText(bench.motor->Torque(18)) == most);
   CHECK(bench.motor->saturations() == 0);
   CHECK(ToText(bench.motor->Torque(99)) == most);
   CHECK(ToText(bench.motor->Torque(-99)) == "011#7FFF7FF000000000");
-  CHECK(ToText(bench.motor->Torque(std::numeric_limits<double>::quiet_NaN())) == "011#7FFF7FF0000007FF");
-  CHECK(ToText(bench.motor->Torque(std::numeric_limits<double>::infinity())) == "011#7FFF7FF0000007FF");
+  CHECK(ToText(bench.motor->Torque(std::numeric_limits<double>::quiet_NaN())) ==
+        "011#7FFF7FF0000007FF");
+  CHECK(ToText(bench.motor->Torque(std::numeric_limits<double>::infinity())) ==
+        "011#7FFF7FF0000007FF");
   CHECK(bench.motor->saturations() == 4);
 }
 
@@ -261,7 +265,8 @@ TEST_CASE("one lost frame of any kind does not spoil arming; a bus that takes no
   }
 }
 
-TEST_CASE("the first exit may be lost: the motor does not count as idle before the second is answered") {
+TEST_CASE(
+    "the first exit may be lost: the motor does not count as idle before the second is answered") {
   Bench bench;
   CHECK(bench.Arm());
   int seen = 0;
@@ -304,7 +309,9 @@ TEST_CASE("an emergency stop exits and says so") {
 
 TEST_CASE("frames of other motors and other kinds are not mine, others are rejected") {
   Bench bench;
-  const auto use = [&](const char* text) { return bench.motor->OnFrame(*FrameFromText(text), bench.now); };
+  const auto use = [&](const char* text) {
+    return bench.motor->OnFrame(*FrameFromText(text), bench.now);
+  };
   const MotorEstimate before = bench.motor->estimate();
   CHECK(use("010#127FFF7FF7FF") == FrameUse::kNotMine);  // motor 0x12
   CHECK(use("011#117FFF7FF7FF") == FrameUse::kNotMine);  // another id

@@ -2,8 +2,8 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <cstring>
+#include <limits>
 #include <optional>
 
 #include "drivers/protocols/mit_device.h"
@@ -20,8 +20,8 @@ uint32_t FirmwareCode(float x, float least, float most, int bits) {
   return static_cast<uint32_t>((x - least) * static_cast<float>((1 << bits) - 1) / (most - least));
 }
 
-// Commands as a mini-cheetah's own master encodes them, and what is nearest, which is what we send. Written
-// by hand from the firmware's source; they share nothing with our tables.
+// Commands as a mini-cheetah's own master encodes them, and what is nearest, which is what we send.
+// Written by hand from the firmware's source; they share nothing with our tables.
 struct Row {
   double velocity, torque;
   Setpoint s;
@@ -44,8 +44,10 @@ TEST_CASE("MIT commands have the documented bytes, both ways") {
     CHECK(ToText(MakeCommand(layout, 1, row.s)) == std::string("001#") + row.nearest);
     const auto v = DecodePayload(layout, *FrameFromText(std::string("001#") + row.truncated));
     REQUIRE(v);
-    const std::array<double, 5> values = {row.s.position, row.s.velocity, row.s.kp, row.s.kd, row.s.torque};
-    for (size_t i = 0; i < 5; ++i) CHECK(std::abs((*v)[i] - values[i]) <= 1.001 * layout.fields[i].scale);
+    const std::array<double, 5> values = {row.s.position, row.s.velocity, row.s.kp, row.s.kd,
+                                          row.s.torque};
+    for (size_t i = 0; i < 5; ++i)
+      CHECK(std::abs((*v)[i] - values[i]) <= 1.001 * layout.fields[i].scale);
     CHECK(FirmwareCode(float(row.s.position), -12.5f, 12.5f, 16) ==
           std::stoul(std::string(row.truncated).substr(0, 4), nullptr, 16));
   }
@@ -70,24 +72,25 @@ TEST_CASE("MIT replies have the documented bytes") {
     CHECK((*v)[2] == Approx(row.velocity_got).margin(2e-5));
     CHECK((*v)[3] == Approx(row.torque_got).margin(2e-5));
   }
-  const auto voltage =
-      DecodePayload(ReplyLayout(Ranges(50, 18), kWithVoltage), *FrameFromText("000#017FFF7FF7FF99"));
+  const auto voltage = DecodePayload(ReplyLayout(Ranges(50, 18), kWithVoltage),
+                                     *FrameFromText("000#017FFF7FF7FF99"));
   REQUIRE(voltage);
   CHECK((*voltage)[4] == Approx(24));
-  const auto error =
-      DecodePayload(ReplyLayout(Ranges(50, 18), kWithTemperature), *FrameFromText("000#017FFF7FF7FFF603"));
+  const auto error = DecodePayload(ReplyLayout(Ranges(50, 18), kWithTemperature),
+                                   *FrameFromText("000#017FFF7FF7FFF603"));
   REQUIRE(error);
   CHECK((*error)[4] == -10);
   CHECK((*error)[5] == 3);
-  CHECK_FALSE(
-      DecodePayload(ReplyLayout(Ranges(50, 18), kWithTemperature), *FrameFromText("000#017FFF7FF7FF99")));
+  CHECK_FALSE(DecodePayload(ReplyLayout(Ranges(50, 18), kWithTemperature),
+                            *FrameFromText("000#017FFF7FF7FF99")));
   CHECK_FALSE(DecodePayload(ReplyLayout(Ranges(50, 18), kPlain), *FrameFromText("000#017FFF7FF7")));
 }
 
 TEST_CASE("the virtual motor replies with the firmware's bytes") {
   const auto reply = [](double velocity, double torque, Setpoint s, MitDevice::Sample sample,
                         uint8_t length) {
-    MitDevice motor({.node = 1, .master = 0, .ranges = Ranges(velocity, torque), .reply_length = length});
+    MitDevice motor(
+        {.node = 1, .master = 0, .ranges = Ranges(velocity, torque), .reply_length = length});
     const Layout layout = CommandLayout(Ranges(velocity, torque));
     FrameBatch out;
     motor.OnFrame(MakeSpecial(1, kEnter), 0);
@@ -99,8 +102,8 @@ TEST_CASE("the virtual motor replies with the firmware's bytes") {
     REQUIRE(out.size() == 1);
     return ToText(out.frames()[0]);
   };
-  // 1.5 Nm have no code: the nearest is a little more, which truncation turns into the code itself or the one
-  // before.
+  // 1.5 Nm have no code: the nearest is a little more, which truncation turns into the code itself
+  // or the one before.
   CHECK(reply(76, 12, {.torque = 1.5}, {0.75, -3.25}, 6).substr(0, 13) == "000#0187AD7A7");
   CHECK(reply(50, 18, {.torque = 1.5}, {0.75, -3.25}, 6).substr(0, 13) == "000#0187AD77A");
   CHECK(reply(50, 18, {}, {0, 0}, 7).substr(0, 13) == "000#017FFF7FF");
@@ -108,7 +111,8 @@ TEST_CASE("the virtual motor replies with the firmware's bytes") {
   CHECK(reply(50, 18, {}, {0, 0}, 8).substr(16) == "1900");
   // Beyond the range the position goes round.
   CHECK(reply(50, 18, {}, {12.5 + 25. / 65535 * 1.5, 0}, 6).substr(0, 10) == "000#010000");
-  // A simulation that has come apart: numbers as the firmware's processor converts them, and no torque of them.
+  // A simulation that has come apart: numbers as the firmware's processor converts them, and no
+  // torque of them.
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK(reply(50, 18, {.kp = 1}, {nan, nan}, 6) == "000#010000000000");
   CHECK(reply(50, 18, {}, {1e300, 1e300}, 6).substr(0, 13) == "000#010000FFF");
@@ -127,7 +131,8 @@ TEST_CASE("every position, velocity, gain and torque code can be sent and comes 
       Setpoint s;
       *std::array{&s.position, &s.velocity, &s.kp, &s.kd, &s.torque}[field] = value;
       const auto v = DecodePayload(layout, MakeCommand(layout, 1, s));
-      if (!v || (*v)[field] != value || !Holds(layout, s)) FAIL(layout.fields[field].name << " " << code);
+      if (!v || (*v)[field] != value || !Holds(layout, s))
+        FAIL(layout.fields[field].name << " " << code);
     }
   }
 }

@@ -28,8 +28,10 @@ TEST_CASE("temperatures and supply have limits") {
              Equals("the drive has 91.0 degC, more than max_drive_temperature = 90"));
   settings.min_bus_voltage = 20;
   settings.max_bus_voltage = 28.5;
-  CHECK_THAT(complaint(20, 20, 19.9), Equals("its supply has 19.9 V, less than min_bus_voltage = 20"));
-  CHECK_THAT(complaint(20, 20, 30), Equals("its supply has 30.0 V, more than max_bus_voltage = 28.5"));
+  CHECK_THAT(complaint(20, 20, 19.9),
+             Equals("its supply has 19.9 V, less than min_bus_voltage = 20"));
+  CHECK_THAT(complaint(20, 20, 30),
+             Equals("its supply has 30.0 V, more than max_bus_voltage = 28.5"));
   readings.bus_voltage = kNan;
   CHECK(WithinOperatingLimits(readings, settings, why));
 }

@@ -40,7 +40,8 @@ struct Errors {
   bool increasing = true;
 };
 
-/// Samples measured every (1 + rate) periods, each with a constant and an exponential delay, some lost.
+/// Samples measured every (1 + rate) periods, each with a constant and an exponential delay, some
+/// lost.
 Errors Simulate(double rate, double mean_delay, double loss, uint64_t seed) {
   Random random(seed, {1});
   Feed feed;
@@ -112,13 +113,14 @@ TEST_CASE("samples that were held up are told from lost ones by what comes behin
 
   SECTION("one loss: five samples agree") {
     for (int k = 8; k < 12; ++k) CHECK(feed.Add({kStart + 5000 * k + 10}).empty());
-    CHECK(feed.Add({kStart + 60'010}) ==
-          Times{kStart + 40'000, kStart + 45'000, kStart + 50'000, kStart + 55'000, kStart + 60'000});
+    CHECK(feed.Add({kStart + 60'010}) == Times{kStart + 40'000, kStart + 45'000, kStart + 50'000,
+                                               kStart + 55'000, kStart + 60'000});
     CHECK(feed.Add({kStart + 65'020}) == Times{kStart + 65'000});
     CHECK(feed.sync.lost() == 1);
   }
   SECTION("several losses in a row") {
-    CHECK(feed.Add({kStart + 60'010, kStart + 65'020, kStart + 70'030, kStart + 75'020, kStart + 80'020})
+    CHECK(feed.Add({kStart + 60'010, kStart + 65'020, kStart + 70'030, kStart + 75'020,
+                    kStart + 80'020})
               .size() == 5);
     CHECK(feed.sync.lost() == 5);
   }
@@ -165,7 +167,8 @@ TEST_CASE("a clock that is set back by little is followed, too") {
   }
   REQUIRE(times.size() == 40);
   for (int k = 0; k < 40; ++k) {
-    CHECK(times[static_cast<size_t>(k)] == Approx(kStart + 5000 * k + (k < 20 ? 0 : step)).margin(20));
+    CHECK(times[static_cast<size_t>(k)] ==
+          Approx(kStart + 5000 * k + (k < 20 ? 0 : step)).margin(20));
   }
   CHECK(feed.sync.resets() == 1);
 }

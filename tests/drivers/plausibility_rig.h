@@ -13,8 +13,8 @@
 
 namespace plumb {
 
-/// A joint that is accelerated as hard as it can be, forwards and backwards, its virtual ODrive (14 bit), a
-/// bus, and the driver's side of both, in virtual time by milliseconds.
+/// A joint that is accelerated as hard as it can be, forwards and backwards, its virtual ODrive (14
+/// bit), a bus, and the driver's side of both, in virtual time by milliseconds.
 struct PlausibilityRig {
   struct Robot {
     double velocity_limit, acceleration;  ///< [rad/s], [rad/s^2]
@@ -23,7 +23,8 @@ struct PlausibilityRig {
   static constexpr Robot kPendulum{20, 100, 5'000, 50'000}, kHopper{100, 2'000, 2'000, 20'000};
   static constexpr double kResolution = 0.05, kTurn = 2 * std::numbers::pi;
 
-  PlausibilityRig(const Robot& r, const std::string& faults, int64_t stuck_after = 100'000, uint32_t seed = 1)
+  PlausibilityRig(const Robot& r, const std::string& faults, int64_t stuck_after = 100'000,
+                  uint32_t seed = 1)
       : robot(r),
         device({.node = 1, .heartbeat_period = 100'000, .encoder_period = r.period}, now),
         motor(MakeMotor({.protocol = "cansimple", .node = 1}, {500'000})),
@@ -39,11 +40,12 @@ struct PlausibilityRig {
       turn_at = now + std::uniform_int_distribution<int64_t>(1'000, 400'000)(random);
     }
     if (still) acceleration = velocity = 0;
-    if (std::abs(velocity + acceleration * 1e-3) > robot.velocity_limit) acceleration = -acceleration;
+    if (std::abs(velocity + acceleration * 1e-3) > robot.velocity_limit)
+      acceleration = -acceleration;
     const double next = velocity + acceleration * 1e-3;
     const double moved = (velocity + next) / 2 * 1e-3;
-    encoder.Track(
-        {now, now + 1000, position / kTurn, (position + moved) / kTurn, velocity / kTurn, next / kTurn});
+    encoder.Track({now, now + 1000, position / kTurn, (position + moved) / kTurn, velocity / kTurn,
+                   next / kTurn});
     position += moved;
     velocity = next;
     now += 1000;
@@ -65,7 +67,8 @@ struct PlausibilityRig {
     }
   }
   void Run(double seconds) {
-    for (const int64_t end = now + std::llround(seconds * 1e6); now < end && watch.complaint().empty();)
+    for (const int64_t end = now + std::llround(seconds * 1e6);
+         now < end && watch.complaint().empty();)
       Step();
   }
   /// Whether something is found within the time. @return after how many estimates, -1 = not.

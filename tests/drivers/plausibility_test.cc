@@ -43,14 +43,14 @@ TEST_CASE("what an encoder does wrong is found") {
     if (std::isnan(frozen.position)) frozen = sample;
     sample = frozen;
   };
-  // On the bad bus the first estimates with the fault may be lost, or wait behind others. What a velocity
-  // that is none explains last may be a jump or a disagreement.
-  const auto fault =
-      GENERATE_COPY(EncoderFault{"jump", [](Sample& s) { s.position += 6 / PlausibilityRig::kTurn; },
-                                 "the position jumped", 10},
-                    EncoderFault{"velocity reversed", [](Sample& s) { s.velocity *= -1; }, "", 300},
-                    EncoderFault{"velocity dead", [](Sample& s) { s.velocity = 0; }, "", 150},
-                    EncoderFault{"stuck", freeze, "", 60});
+  // On the bad bus the first estimates with the fault may be lost, or wait behind others. What a
+  // velocity that is none explains last may be a jump or a disagreement.
+  const auto fault = GENERATE_COPY(
+      EncoderFault{"jump", [](Sample& s) { s.position += 6 / PlausibilityRig::kTurn; },
+                   "the position jumped", 10},
+      EncoderFault{"velocity reversed", [](Sample& s) { s.velocity *= -1; }, "", 300},
+      EncoderFault{"velocity dead", [](Sample& s) { s.velocity = 0; }, "", 150},
+      EncoderFault{"stuck", freeze, "", 60});
   for (const auto& robot : {PlausibilityRig::kPendulum, PlausibilityRig::kHopper}) {
     for (const char* bus : {"", kBadBus}) {
       for (uint32_t seed = 1; seed <= 10; ++seed) {
@@ -59,8 +59,8 @@ TEST_CASE("what an encoder does wrong is found") {
         REQUIRE(rig.watch.complaint() == "");
         rig.change = fault.change;
         const int64_t found = rig.Found(10);
-        INFO(fault.name << " on '" << bus << "', " << robot.period << " us, seed " << seed << ": " << found
-                        << ", " << rig.watch.complaint());
+        INFO(fault.name << " on '" << bus << "', " << robot.period << " us, seed " << seed << ": "
+                        << found << ", " << rig.watch.complaint());
         CHECK(found > 0);
         CHECK(found <= fault.within);
         CHECK_THAT(std::string(rig.watch.complaint()), StartsWith(fault.complaint));
@@ -85,7 +85,8 @@ TEST_CASE("at rest small jumps are found, and a second device") {
     }
     SECTION("second device that says the same") {
       rig.second = std::make_unique<CanSimpleDevice>(
-          CanSimpleDevice::Settings{.node = 1, .heartbeat_period = 100'000, .encoder_period = 5'000},
+          CanSimpleDevice::Settings{
+              .node = 1, .heartbeat_period = 100'000, .encoder_period = 5'000},
           rig.now);
       CHECK(rig.Found(5) > 0);
       CHECK_THAT(std::string(rig.watch.complaint()),
@@ -119,14 +120,16 @@ TEST_CASE("a jump is what the velocity limit does not allow") {
     CHECK(joint.Add(1 + 20 * 0.010 + 0.0099, 100) == "");
   }
   SECTION("farther") {
-    CHECK_THAT(joint.Add(1 + 20 * 0.010 + 0.0102, 100),
-               Equals("the position jumped by 0.21 in 5 ms, at a velocity limit of 20 it can do 0.21"));
+    CHECK_THAT(
+        joint.Add(1 + 20 * 0.010 + 0.0102, 100),
+        Equals("the position jumped by 0.21 in 5 ms, at a velocity limit of 20 it can do 0.21"));
   }
   SECTION("in the time of ten losses") { CHECK(joint.Add(1 - 20 * 0.055, -200, 0, 50'000) == ""); }
   SECTION("late ones arrive together") {
     joint.Add(1.02, 4, 0, 5'000);
     CHECK(joint.Add(1.02 + 20 * 0.005 + 4 * 0.05, 4, 0, 0) == "");
-    CHECK_THAT(joint.Add(1.02, 4, 0, 0), StartsWith("the position jumped by -0.3 in 0 ms"));  // and not back
+    // and not back
+    CHECK_THAT(joint.Add(1.02, 4, 0, 0), StartsWith("the position jumped by -0.3 in 0 ms"));
   }
   SECTION("no velocity") {
     joint.Add(1, kNan);

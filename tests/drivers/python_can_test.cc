@@ -29,7 +29,8 @@ class Peer {
     const char* source = std::getenv("PLUMBLINE_SOURCE");
     std::string python = "/usr/bin/python3",
                 script = std::string(source ? source : ".") + "/tests/drivers/python_can_peer.py";
-    const std::array<char*, 5> argv = {python.data(), script.data(), group.data(), port.data(), nullptr};
+    const std::array<char*, 5> argv = {python.data(), script.data(), group.data(), port.data(),
+                                       nullptr};
     REQUIRE(posix_spawn(&pid_, python.c_str(), nullptr, nullptr, argv.data(), environ) == 0);
     end_ = static_cast<int>(syscall(SYS_pidfd_open, pid_, 0));
     REQUIRE(end_ >= 0);

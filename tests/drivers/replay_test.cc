@@ -94,8 +94,10 @@ TEST_CASE("with a time it comes in its own, stamped as it was") {
 
 TEST_CASE("filters hold for a log, and our own frames in it are echoes") {
   const Log log(
-      "(1.0) can0 029#11\n(1.1) can0 02E#22\n(1.2) can0 029#R\n(1.3) can0 049#33\n(1.4) can0 00000029#44\n");
-  const auto replay = OpenTransport(log.url(), {{.id = 0x20, .mask = 0x7E0}, {.id = 0x2E, .own = true}});
+      "(1.0) can0 029#11\n(1.1) can0 02E#22\n(1.2) can0 029#R\n(1.3) can0 049#33\n(1.4) can0 "
+      "00000029#44\n");
+  const auto replay =
+      OpenTransport(log.url(), {{.id = 0x20, .mask = 0x7E0}, {.id = 0x2E, .own = true}});
   CHECK(ReceiveAll(*replay) == Texts{"029#11"});
   CHECK(replay->stats().echoes == 1);
   CHECK(replay->stats().foreign == 0);
@@ -136,7 +138,8 @@ TEST_CASE("logs that are none") {
   CHECK_THROWS_WITH(OpenTransport("replay:"), Contains("cannot be read"));
   CHECK_THROWS_WITH(OpenTransport("replay:/"), Contains("no line of it is a frame"));
   const Log log("# nothing\n");
-  CHECK_THROWS_WITH(OpenTransport(log.url()), Contains("no line of it is a frame") && Contains("candump -l"));
+  CHECK_THROWS_WITH(OpenTransport(log.url()),
+                    Contains("no line of it is a frame") && Contains("candump -l"));
 }
 
 TEST_CASE("a log behind faults is a log still") {
@@ -150,10 +153,10 @@ TEST_CASE("a log behind faults is a log still") {
 }
 
 TEST_CASE("lines of candump and python-can") {
-  for (const char* line :
-       {"(1700000000.263847) can0 02E#0000C03F00000000", "(1700000000.263847) can0 02E#0000C03F00000000 R",
-        "(1700000000.263847)  can0  02E#0000C03F00000000 T\r",
-        "(1700000000.263847000) can0 02e#0000c03f00000000"}) {
+  for (const char* line : {"(1700000000.263847) can0 02E#0000C03F00000000",
+                           "(1700000000.263847) can0 02E#0000C03F00000000 R",
+                           "(1700000000.263847)  can0  02E#0000C03F00000000 T\r",
+                           "(1700000000.263847000) can0 02e#0000c03f00000000"}) {
     INFO(line);
     const auto logged = ParseCandump(line);
     REQUIRE(logged);

@@ -12,8 +12,8 @@
 
 namespace plumb {
 
-/// A driver and its virtual drives in virtual time: milliseconds pass one by one, the driver cycles every
-/// five. Everything on the wire passes through the two taps, which may drop or change it.
+/// A driver and its virtual drives in virtual time: milliseconds pass one by one, the driver cycles
+/// every five. Everything on the wire passes through the two taps, which may drop or change it.
 struct Rig {
   static constexpr int64_t kEpoch = 1'700'000'000'000'000;  ///< utime - now
 

@@ -15,16 +15,19 @@ Frame Foreign(const char* text) {
   return frame;
 }
 
-TEST_CASE("a second master on the bus stops the robot within the cycle, and keeps it from being armed") {
+TEST_CASE(
+    "a second master on the bus stops the robot within the cycle, and keeps it from being armed") {
   Rig rig(2);
   rig.Start();
-  const auto obeyed = GENERATE("02E#0000C03F", "04E#0000C03F00000000", "027#08000000", "02C#0000003F24FAFA00");
+  const auto obeyed =
+      GENERATE("02E#0000C03F", "04E#0000C03F00000000", "027#08000000", "02C#0000003F24FAFA00");
   SECTION("armed") {
     REQUIRE(rig.Arm(1));
     rig.Run(50);
     rig.driver->OnFrame(Foreign(obeyed), rig.now, rig.utime());
     CHECK(rig.driver->state() == DriveState::kFault);
-    CHECK_THAT(rig.Reason(), Contains("second master") && Contains(fmt::format("{:#05x}", FrameFromText(obeyed)->id)));
+    CHECK_THAT(rig.Reason(), Contains("second master") &&
+                                 Contains(fmt::format("{:#05x}", FrameFromText(obeyed)->id)));
     rig.Run(300);
     CHECK_FALSE(rig.drives[0].armed());
     CHECK(rig.driver->confirmed_idle());
@@ -65,8 +68,11 @@ TEST_CASE("an emergency stop that somebody sends on the bus is everybody's, and 
 TEST_CASE("the transport is asked to tell another's commands from ours, for every drive") {
   Rig rig(2);
   rig.Start();
-  const auto driver_end = OpenTransport("loop:second_master", rig.driver->filters()), other = OpenTransport("loop:second_master");
-  const Frame sent[] = {FrameFromText("02E#0000C03F").value(), FrameFromText("047#0800000000000000").value(), FrameFromText("029#000080BE00006040").value()};
+  const auto driver_end = OpenTransport("loop:second_master", rig.driver->filters()),
+             other = OpenTransport("loop:second_master");
+  const Frame sent[] = {FrameFromText("02E#0000C03F").value(),
+                        FrameFromText("047#0800000000000000").value(),
+                        FrameFromText("029#000080BE00006040").value()};
   REQUIRE(other->Send(sent) == 3);
   std::array<Frame, 8> received;
   REQUIRE(driver_end->Receive(received) == 3);
@@ -88,7 +94,8 @@ TEST_CASE("a bus that cannot work is refused with the names and the numbers") {
   Rig rig(2);
   SECTION("two drives of one node") {
     rig.robot.joints[1].motor.node = 1;
-    CHECK_THROWS_WITH(rig.Start(), Contains("pivot") && Contains("knee1") && Contains("CAN id 0x02"));
+    CHECK_THROWS_WITH(rig.Start(),
+                      Contains("pivot") && Contains("knee1") && Contains("CAN id 0x02"));
   }
   SECTION("more than it carries") {
     rig.robot.driver.cycle = rig.robot.driver.measurement = 0.0003;

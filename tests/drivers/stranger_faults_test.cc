@@ -14,7 +14,8 @@ using Catch::Matchers::Contains;
 TEST_CASE("fault 0: commands stay away", "[fault]") {
   ExpectStop({.number = "0",
               .name = "commands stay away: controller, estimator or their connection stopped",
-              .detection = "the last one is older than `expiry`: zero torque; than `disarm_after`: disarmed",
+              .detection =
+                  "the last one is older than `expiry`: zero torque; than `disarm_after`: disarmed",
               .happens = [](BusRig& rig) { rig.commanding = false; },
               .reason = "no command for 25",
               .within = 105});
@@ -52,9 +53,10 @@ TEST_CASE("fault 16: the real-time clock is set", "[fault]") {
     int64_t back;
     const char* name;
   };
-  const auto [by, name] = GENERATE(values<Case>({{3'600'000'000, "the clock is set back by an hour"},
-                                                 {30'000, "the clock is set back by 30 ms"},
-                                                 {-3'600'000'000, "the clock is set forward by an hour"}}));
+  const auto [by, name] =
+      GENERATE(values<Case>({{3'600'000'000, "the clock is set back by an hour"},
+                             {30'000, "the clock is set back by 30 ms"},
+                             {-3'600'000'000, "the clock is set forward by an hour"}}));
   const int64_t back = by;
   ExpectToRunOn({.number = "16",
                  .name = name,
@@ -73,23 +75,24 @@ TEST_CASE("fault 16: the real-time clock is set", "[fault]") {
 
 TEST_CASE("fault 16: the controller's clock is another", "[fault]") {
   const int64_t ahead = GENERATE(-1'000'000, 1'000'000);
-  ExpectStop({.number = "16",
-              .name = ahead < 0 ? "the controller's clock is behind the driver's"
-                                : "the controller's clock is ahead of the driver's",
-              .detection = "its commands look older than `expiry`, or from the future: they are refused",
-              .happens =
-                  [ahead](BusRig& rig) {
-                    rig.commanding = false;
-                    rig.each_millisecond.push_back([&rig, ahead] {
-                      joint_command_t command = rig.MakeCommand(1);
-                      command.utime += ahead;
-                      rig.driver->OnCommand(command, rig.now, rig.utime());
-                    });
-                  },
-              .is_over = [](BusRig& rig) { rig.each_millisecond.clear(); },
-              .reason = ahead < 0 ? "commands refused: they were computed too long ago"
-                                  : "commands refused: they are dated in the future",
-              .within = 105});
+  ExpectStop(
+      {.number = "16",
+       .name = ahead < 0 ? "the controller's clock is behind the driver's"
+                         : "the controller's clock is ahead of the driver's",
+       .detection = "its commands look older than `expiry`, or from the future: they are refused",
+       .happens =
+           [ahead](BusRig& rig) {
+             rig.commanding = false;
+             rig.each_millisecond.push_back([&rig, ahead] {
+               joint_command_t command = rig.MakeCommand(1);
+               command.utime += ahead;
+               rig.driver->OnCommand(command, rig.now, rig.utime());
+             });
+           },
+       .is_over = [](BusRig& rig) { rig.each_millisecond.clear(); },
+       .reason = ahead < 0 ? "commands refused: they were computed too long ago"
+                           : "commands refused: they are dated in the future",
+       .within = 105});
 }
 
 TEST_CASE("fault 17: a log is played on the live bus", "[fault]") {
@@ -100,7 +103,8 @@ TEST_CASE("fault 17: a log is played on the live bus", "[fault]") {
        .happens =
            [](BusRig& rig) {
              rig.each_millisecond.push_back([&rig] {
-               for (const char* text : {"029#0000803E00000000", "02E#0000803F", "021#0000000008000000"})
+               for (const char* text :
+                    {"029#0000803E00000000", "02E#0000803F", "021#0000000008000000"})
                  rig.StrangerSends(text);
              });
            },
@@ -123,7 +127,8 @@ TEST_CASE("fault 17: a recording instead of a bus", "[fault]") {
     for (int i = 0; i < 400; ++i) {
       file << fmt::format("({}.{:06}) can0 029#0000803E00000000\n", i / 200, i % 200 * 5000);
       if (i % 4 == 0)
-        file << fmt::format("({}.{:06}) can0 021#0000000008000000\n", i / 200, i % 200 * 5000 + 100);
+        file << fmt::format("({}.{:06}) can0 021#0000000008000000\n", i / 200,
+                            i % 200 * 5000 + 100);
     }
   }
   Rig rig;
@@ -135,13 +140,16 @@ TEST_CASE("fault 17: a recording instead of a bus", "[fault]") {
     recording->SetTime(rig.now);
     std::array<Frame, 8> frames;
     const int count = recording->Receive(frames);
-    for (int i = 0; i < count; ++i) rig.driver->OnFrame(frames[static_cast<size_t>(i)], rig.now, rig.utime());
+    for (int i = 0; i < count; ++i)
+      rig.driver->OnFrame(frames[static_cast<size_t>(i)], rig.now, rig.utime());
   };
   CHECK_FALSE(rig.Arm(1));
   CHECK(rig.states.size() > 50);  // it plays
   CHECK_THAT(rig.Reason(), Contains("ARM refused: the bus is a recording"));
-  const Fault row{
-      .number = "17", .name = "a recording instead of a bus", .detection = "`replay:`", .happens = {}};
+  const Fault row{.number = "17",
+                  .name = "a recording instead of a bus",
+                  .detection = "`replay:`",
+                  .happens = {}};
   row.PrintRow("refuses to arm: the bus is a recording", "0 ms");
 }
 

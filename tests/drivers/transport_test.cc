@@ -127,8 +127,8 @@ TEST_CASE("filters let in what they name") {
   const auto host = OpenTransport("loop:filters", {{.id = 0x20, .mask = 0x7E0}});
   const auto device =
       OpenTransport("loop:filters", {{.id = 0x20, .mask = 0x7E0, .remote = true}, {.id = 0x7E6}});
-  for (const char* text :
-       {"029#11", "029#R", "049#11", "00000029#11", "7E6#R", "7E6#01", "20000040#0000000000000000"}) {
+  for (const char* text : {"029#11", "029#R", "049#11", "00000029#11", "7E6#R", "7E6#01",
+                           "20000040#0000000000000000"}) {
     const Frame frame = *FrameFromText(text);
     a->Send({&frame, 1});
   }
@@ -140,7 +140,8 @@ TEST_CASE("filters let in what they name") {
     return result;
   };
   CHECK(texts(*host) == std::vector<std::string>{"029#11", "20000040#0000000000000000"});
-  CHECK(texts(*device) == std::vector<std::string>{"029#11", "029#R", "7E6#01", "20000040#0000000000000000"});
+  CHECK(texts(*device) ==
+        std::vector<std::string>{"029#11", "029#R", "7E6#01", "20000040#0000000000000000"});
 }
 
 TEST_CASE("udp multicast carries frames, stamps their arrival and drops the sender's echo") {
@@ -232,7 +233,8 @@ TEST_CASE("a bus that cannot be opened says why") {
   CHECK_THAT(error("udp:239.74.163.2:43113x"), Contains("and a port"));
   CHECK_THAT(error("socketcan:nosuchcan"), Contains("nosuchcan") && Contains("udp:"));
   CHECK_THAT(error("socketcan:averyveryverylongname"), Contains("not an interface name"));
-  for (const char* url : {"can0", "udp:1", "socketcan:x"}) CHECK(error(url).find('\n') == std::string::npos);
+  for (const char* url : {"can0", "udp:1", "socketcan:x"})
+    CHECK(error(url).find('\n') == std::string::npos);
 }
 
 }  // namespace

@@ -161,8 +161,11 @@ TEST_CASE("frames lost at random") {
 
 TEST_CASE("parts that come too late are not of this sample") {
   Bench bench;
-  const auto use = [&](const char* text) { return bench.sensor->OnFrame(*FrameFromText(text), bench.now); };
-  for (const char* text : {"385#00000001", "391#00000002", "3A1#7FFF000000000000", "3B2#000000000000"}) {
+  const auto use = [&](const char* text) {
+    return bench.sensor->OnFrame(*FrameFromText(text), bench.now);
+  };
+  for (const char* text :
+       {"385#00000001", "391#00000002", "3A1#7FFF000000000000", "3B2#000000000000"}) {
     CHECK(use(text) == SensorUse::kConsumed);
   }
   bench.now += 6000;
@@ -179,8 +182,11 @@ TEST_CASE("the status word says what a sample is worth") {
   bench.Run(10);
   CHECK(bench.sensor->imu()->orientation_valid);
   CHECK(bench.sensor->imu()->clipped);
-  const auto use = [&](const char* text) { return bench.sensor->OnFrame(*FrameFromText(text), bench.now); };
-  for (const char* text : {"385#7F000001", "391#00000002", "3A1#0000000000000000", "3B2#000000000000"})
+  const auto use = [&](const char* text) {
+    return bench.sensor->OnFrame(*FrameFromText(text), bench.now);
+  };
+  for (const char* text :
+       {"385#7F000001", "391#00000002", "3A1#0000000000000000", "3B2#000000000000"})
     use(text);
   CHECK(use("3B4#000000000000") == SensorUse::kReading);
   CHECK_FALSE(bench.sensor->imu()->orientation_valid);  // no unit quaternion
@@ -223,7 +229,9 @@ TEST_CASE("a restart and an error are faults, silence is absence, missing messag
 
 TEST_CASE("what an IMU's frames must be") {
   Bench bench;
-  const auto use = [&](const char* text) { return bench.sensor->OnFrame(*FrameFromText(text), bench.now); };
+  const auto use = [&](const char* text) {
+    return bench.sensor->OnFrame(*FrameFromText(text), bench.now);
+  };
   CHECK(use("005#0001E240") == SensorUse::kNotMine);  // the factory's id
   CHECK(use("00000385#0001E240") == SensorUse::kNotMine);
   CHECK(use("385#R4") == SensorUse::kNotMine);

@@ -13,7 +13,12 @@ TEST_CASE("a thousand steps with noise, outages, lies, restarts and rubbish allo
   RobotDescription robot;
   robot.joints.resize(3);
   for (JointDescription& joint : robot.joints) joint.effort_limit = 2;
-  robot.estimator = {.position_sd = 1.2e-4, .velocity_sd = 0.5, .jerk = 100, .effort_step = 30, .timing_sd = 0, .lag = 20,
+  robot.estimator = {.position_sd = 1.2e-4,
+                     .velocity_sd = 0.5,
+                     .jerk = 100,
+                     .effort_step = 30,
+                     .timing_sd = 0,
+                     .lag = 20,
                      .reset_after = 0.2};
   robot.links.resize(1);
   SensorDescription sensor;

@@ -12,24 +12,32 @@
 namespace plumb {
 namespace {
 
-RobotDescription Free() { return WithSimulatedNoise(LoadRobot(SourceFile("robots/hopper/free.toml"))); }
+RobotDescription Free() {
+  return WithSimulatedNoise(LoadRobot(SourceFile("robots/hopper/free.toml")));
+}
 
-/// Stands for 0.6 s, then hops on its foot, which bounces, creeps and hangs in the air in turn. 3 s.
-std::vector<SimulatedReadings::Sample> HopUpright(const RobotDescription& robot, uint32_t seed, double height = 0.1) {
+/// Stands for 0.6 s, then hops on its foot, which bounces, creeps and hangs in the air in turn. 3
+/// s.
+std::vector<SimulatedReadings::Sample> HopUpright(const RobotDescription& robot, uint32_t seed,
+                                                  double height = 0.1) {
   Random random(seed, {44});
   Eigen::VectorXd q(6), v = Eigen::VectorXd::Zero(6);
   q << 0, 1.22, 0, -0.05, -0.1, 0.1;
   const double frequency = random.Uniform(1.5, 2.5);
-  return SimulatedReadings(robot, seed).Run(q, v, 3, 8000, [=](double t, const auto& q_now, const auto& v_now) {
-    const double bend = t < 0.6 ? 0 : 0.5 - 0.5 * std::cos(2 * std::numbers::pi * frequency * (t - 0.6));
-    Eigen::Vector3d target(-0.1 - height * bend, -0.2 - 2 * height * bend, 0.1 + height * bend);
-    target[2] = std::clamp(target[2] - 2 * q_now[2] - 0.3 * v_now[2], -0.7, 0.7);  // keeps its balance
-    return Eigen::VectorXd(600 * (target - q_now.template tail<3>()) - 30 * v_now.template tail<3>());
-  });
+  return SimulatedReadings(robot, seed)
+      .Run(q, v, 3, 8000, [=](double t, const auto& q_now, const auto& v_now) {
+        const double bend =
+            t < 0.6 ? 0 : 0.5 - 0.5 * std::cos(2 * std::numbers::pi * frequency * (t - 0.6));
+        Eigen::Vector3d target(-0.1 - height * bend, -0.2 - 2 * height * bend, 0.1 + height * bend);
+        // keeps its balance
+        target[2] = std::clamp(target[2] - 2 * q_now[2] - 0.3 * v_now[2], -0.7, 0.7);
+        return Eigen::VectorXd(600 * (target - q_now.template tail<3>()) -
+                               30 * v_now.template tail<3>());
+      });
 }
 
 struct BaseErrors {
-  StateErrors base[3];  // x, z, pitch
+  StateErrors base[3];           // x, z, pitch
   double valid = 0, flying = 0;  // shares
   int64_t restarts = 0;
 };
@@ -51,7 +59,8 @@ BaseErrors ErrorsOf(const RobotDescription& robot, const Recordings& recordings,
       errors.flying += state.contact == std::vector<int8_t>{0, 0};
       for (size_t i = 0; i < 3; ++i) {
         const auto at = static_cast<Eigen::Index>(i);
-        errors.base[i].Add(state.q[i] - sample.q[at], state.v[i] - sample.v[at], state.q_sd[i], state.v_sd[i]);
+        errors.base[i].Add(state.q[i] - sample.q[at], state.v[i] - sample.v[at], state.q_sd[i],
+                           state.v_sd[i]);
       }
     }
     errors.restarts += observer.restarts();
@@ -64,8 +73,9 @@ BaseErrors ErrorsOf(const RobotDescription& robot, const Recordings& recordings,
 std::string Describe(const BaseErrors& e) {
   std::string text;
   for (const StateErrors& joint : e.base) {
-    text += "| " + std::to_string(joint.q()) + " | " + std::to_string(joint.v()) + " | " + std::to_string(joint.nees_q()) + " | " +
-            std::to_string(joint.nees_v()) + " | " + std::to_string(joint.covered_v()) + "\n";
+    text += "| " + std::to_string(joint.q()) + " | " + std::to_string(joint.v()) + " | " +
+            std::to_string(joint.nees_q()) + " | " + std::to_string(joint.nees_v()) + " | " +
+            std::to_string(joint.covered_v()) + "\n";
   }
   return text + "valid " + std::to_string(e.valid) + ", in the air " + std::to_string(e.flying);
 }
@@ -79,7 +89,9 @@ TEST_CASE("a hopper without a boom knows its height, pitch and velocities") {
   const RobotDescription boom = WithSimulatedNoise(LoadRobot(SourceFile("robots/hopper")));
   for (uint32_t seed = 1; seed <= 8; ++seed) on_boom.push_back(HopUpright(boom, seed));
   const BaseErrors beside = ErrorsOf(boom, on_boom);
-  INFO("x, z, pitch: q, v, NEES q, NEES v, within 95 %\n" << Describe(legs) << "\non the boom\n" << Describe(beside));
+  INFO("x, z, pitch: q, v, NEES q, NEES v, within 95 %\n"
+       << Describe(legs) << "\non the boom\n"
+       << Describe(beside));
   CHECK(legs.valid > 0.95);
   CHECK(legs.flying > 0.2);
   CHECK(legs.base[0].v() < 0.15);
@@ -100,9 +112,10 @@ TEST_CASE("placed a few centimetres above the ground it is known at once, and wh
   const RobotDescription robot = Free();
   Eigen::VectorXd q(6), v = Eigen::VectorXd::Zero(6);
   q << 0, 1.25, 0, 0, 0, 0;  // gym's hopper begins like that
-  const auto recording = SimulatedReadings(robot, 4).Run(q, v, 0.5, 8000, [](double, const auto& q_now, const auto& v_now) {
-    return Eigen::VectorXd(-600 * q_now.template tail<3>() - 30 * v_now.template tail<3>());
-  });
+  const auto recording = SimulatedReadings(robot, 4).Run(
+      q, v, 0.5, 8000, [](double, const auto& q_now, const auto& v_now) {
+        return Eigen::VectorXd(-600 * q_now.template tail<3>() - 30 * v_now.template tail<3>());
+      });
   StateObserver observer(robot);
   int valid = 0;
   for (size_t k = 0; k < recording.size(); ++k) {
@@ -119,7 +132,9 @@ TEST_CASE("placed a few centimetres above the ground it is known at once, and wh
   CHECK(valid > 220);
 }
 
-TEST_CASE("dropped from higher than it was told, bouncing and tumbling, it finds its height within 0.6 s") {
+TEST_CASE(
+    "dropped from higher than it was told, bouncing and tumbling, it finds its height within 0.6 "
+    "s") {
   const RobotDescription robot = Free();
   const BaseErrors legs = ErrorsOf(robot, Record(robot, 1, 6), 300);
   INFO("x, z, pitch: q, v, NEES q, NEES v, within 95 %\n" << Describe(legs));
@@ -149,19 +164,22 @@ TEST_CASE("a pitch guessed wrong is found, and a heading wrong from the start do
   RobotDescription robot = Free();
   for (SensorDescription& sensor : robot.sensors) sensor.noise.position_sd = 0.08;
   auto recording = HopUpright(robot, 5, 0);
-  const Eigen::Quaterniond wrong = Eigen::Quaterniond(Eigen::AngleAxisd(1.3, Eigen::Vector3d::UnitZ())) *
-                                   Eigen::Quaterniond(Eigen::AngleAxisd(0.08, Eigen::Vector3d::UnitY()));
+  const Eigen::Quaterniond wrong =
+      Eigen::Quaterniond(Eigen::AngleAxisd(1.3, Eigen::Vector3d::UnitZ())) *
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.08, Eigen::Vector3d::UnitY()));
   StateObserver observer(robot);
   double at_first = 0;
   for (SimulatedReadings::Sample& sample : recording) {
     for (imu_t& imu : sample.imus) {
       const auto& [w, x, y, z] = imu.orientation;
       const Eigen::Quaterniond told = wrong * Eigen::Quaterniond(w, x, y, z);
-      imu.orientation[0] = told.w(), imu.orientation[1] = told.x(), imu.orientation[2] = told.y(), imu.orientation[3] = told.z();
+      imu.orientation[0] = told.w(), imu.orientation[1] = told.x(), imu.orientation[2] = told.y(),
+      imu.orientation[3] = told.z();
       observer.OnImu(imu);
     }
     observer.OnJointState(sample.joints);
-    if (at_first == 0 && std::isfinite(observer.state().q[2])) at_first = observer.state().q[2] - sample.q[2];
+    if (at_first == 0 && std::isfinite(observer.state().q[2]))
+      at_first = observer.state().q[2] - sample.q[2];
   }
   CHECK(at_first > 0.05);
   REQUIRE(observer.state().valid);
@@ -190,7 +208,8 @@ TEST_CASE("without its IMU for longer than an outage the base is not known, and 
 TEST_CASE("noise is learnt of the legs' joints, the base's are left alone") {
   const RobotDescription robot = Free();
   const Recordings recordings = {HopUpright(robot, 11)};
-  const TunedNoise noise = TuneNoise(robot, [&](StateObserver& observer) { Play(recordings, observer); });
+  const TunedNoise noise =
+      TuneNoise(robot, [&](StateObserver& observer) { Play(recordings, observer); });
   for (size_t i = 0; i < 6; ++i) CHECK((noise.after[i] < noise.before[i]) == (i >= 3));
 }
 

@@ -1,6 +1,6 @@
-// Where motion and readings are as the filter has them, it knows how far off it is: the normalised estimation
-// error squared (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation",
-// 2001, section 5.4.2) of independent runs is chi-square, causal and smoothed.
+// Where motion and readings are as the filter has them, it knows how far off it is: the normalised
+// estimation error squared (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking
+// and Navigation", 2001, section 5.4.2) of independent runs is chi-square, causal and smoothed.
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -32,7 +32,8 @@ double Nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
   return error.dot(covariance.ldlt().solve(error));
 }
 
-// Position, velocity and acceleration under white jerk (section 6.2.3) and steps of the acceleration.
+// Position, velocity and acceleration under white jerk (section 6.2.3) and steps of the
+// acceleration.
 class Motion {
  public:
   Motion(const EstimatorSettings& settings, Random& random) : settings_(settings), random_(random) {
@@ -59,7 +60,8 @@ class Motion {
   Eigen::Vector3d state_;
 };
 
-TEST_CASE("errors are as large as the covariances say: NEES within the 95 % band of independent runs") {
+TEST_CASE(
+    "errors are as large as the covariances say: NEES within the 95 % band of independent runs") {
   const EstimatorSettings settings = Settings();
   const bool accelerometer = GENERATE(false, true);
   double causal = 0, smoothed = 0;
@@ -77,12 +79,15 @@ TEST_CASE("errors are as large as the covariances say: NEES within the 95 % band
       motion.Advance(effort_step);
       truth.push_back(motion.state());
       filter.Predict(kDt, effort_step);
-      filter.Correct(Quantity::kPosition, motion.state()(0) + settings.position_sd * random.Normal(), 0);
-      filter.Correct(Quantity::kVelocity, motion.state()(1) + settings.velocity_sd * random.Normal(), 0);
+      filter.Correct(Quantity::kPosition,
+                     motion.state()(0) + settings.position_sd * random.Normal(), 0);
+      filter.Correct(Quantity::kVelocity,
+                     motion.state()(1) + settings.velocity_sd * random.Normal(), 0);
       if (accelerometer && i % kPerAcceleration == 0) {
         if (i > 0) {
           const double mean = (motion.state()(1) - marked) / (kPerAcceleration * kDt);
-          filter.Correct(Quantity::kAcceleration, mean + bias + settings.acceleration_sd * random.Normal(), 0);
+          filter.Correct(Quantity::kAcceleration,
+                         mean + bias + settings.acceleration_sd * random.Normal(), 0);
         }
         marked = motion.state()(1);
         filter.Mark(0);
@@ -93,7 +98,8 @@ TEST_CASE("errors are as large as the covariances say: NEES within the 95 % band
     const auto at = truth.size() - static_cast<size_t>(filter.pending());
     const KinematicFilter::Smoothed oldest = filter.TakeOldest();
     smoothed += Nees(truth[at].head<2>() - oldest.mean, oldest.covariance);
-    causal += Nees(motion.state() - filter.mean().head<3>(), filter.covariance().topLeftCorner<3, 3>());
+    causal +=
+        Nees(motion.state() - filter.mean().head<3>(), filter.covariance().topLeftCorner<3, 3>());
   }
   // Chi-square of so many degrees is normal to a part in a hundred; 95 % of it is within 1.96 sd.
   INFO("causal " << causal / (3 * kRuns) << ", smoothed " << smoothed / (2 * kRuns));

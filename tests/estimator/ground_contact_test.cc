@@ -12,10 +12,12 @@
 namespace plumb {
 namespace {
 
-/// Whether the ground pushes one of a robot's points: the simulator's next velocities are not those of a robot without it.
+/// Whether the ground pushes one of a robot's points: the simulator's next velocities are not those
+/// of a robot without it.
 class PushedPoint {
  public:
-  PushedPoint(RobotDescription robot, size_t point) : with_(Only(robot, point)), without_(Only(robot, SIZE_MAX)) {}
+  PushedPoint(RobotDescription robot, size_t point)
+      : with_(Only(robot, point)), without_(Only(robot, SIZE_MAX)) {}
 
   bool operator()(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
     constexpr double kShort = 1e-5;  // [s]
@@ -63,20 +65,23 @@ TEST_CASE("contact flags agree with the simulator's forces") {
     for (size_t point = 0; point < num_points; ++point) {
       PushedPoint pushed(robot, point);
       std::vector<bool> truth;
-      for (const SimulatedReadings::Sample& sample : recording) truth.push_back(pushed(sample.q, sample.v));
+      for (const SimulatedReadings::Sample& sample : recording)
+        truth.push_back(pushed(sample.q, sample.v));
       for (size_t k = 10; k < truth.size(); ++k) {
         const bool right = (states[k].contact[point] == 1) == truth[k];
         ++count;
         agree += right;
         bool near = false;
         constexpr size_t kNear = kAround / SimulatedReadings::kPeriod;
-        for (size_t other = k - kNear; other <= std::min(k + kNear, truth.size() - 1); ++other) near = near || truth[other] != truth[k];
+        for (size_t other = k - kNear; other <= std::min(k + kNear, truth.size() - 1); ++other)
+          near = near || truth[other] != truth[k];
         far += !near;
         far_agree += !near && right;
         if (!truth[k] || truth[k - 1]) continue;
         ++touchdowns;
         int cycles = 0;
-        while (k + static_cast<size_t>(cycles) < truth.size() && truth[k + static_cast<size_t>(cycles)] &&
+        while (k + static_cast<size_t>(cycles) < truth.size() &&
+               truth[k + static_cast<size_t>(cycles)] &&
                states[k + static_cast<size_t>(cycles)].contact[point] != 1) {
           ++cycles;
         }
@@ -85,10 +90,12 @@ TEST_CASE("contact flags agree with the simulator's forces") {
       }
     }
   }
-  const double share = static_cast<double>(agree) / count, far_share = static_cast<double>(far_agree) / far;
+  const double share = static_cast<double>(agree) / count,
+               far_share = static_cast<double>(far_agree) / far;
   const double mean_latency = static_cast<double>(latency) / touchdowns;
-  INFO(count << " flags, " << 100 * share << " % agree, " << 100 * far_share << " % away from changes; " << touchdowns
-             << " touchdowns seen after " << mean_latency << " cycles, at most " << slowest);
+  INFO(count << " flags, " << 100 * share << " % agree, " << 100 * far_share
+             << " % away from changes; " << touchdowns << " touchdowns seen after " << mean_latency
+             << " cycles, at most " << slowest);
   CHECK(touchdowns > 10);
   CHECK(share > 0.94);
   CHECK(far_share > 0.95);
@@ -100,23 +107,26 @@ TEST_CASE("resting is judged by height and velocity, with hysteresis") {
   using Motion = ContactTest::Motion;
   ContactTest test;
   const auto rests = [&](double height, double rise, double height_sd = 0, double rise_sd = 0) {
-    return test.Judge(Motion{.height = height, .height_sd = height_sd, .rise = rise, .rise_sd = rise_sd});
+    return test.Judge(
+        Motion{.height = height, .height_sd = height_sd, .rise = rise, .rise_sd = rise_sd});
   };
-  CHECK_FALSE(rests(0.05, 0));   // in the air
-  CHECK_FALSE(rests(0.001, -2)); // about to land
-  CHECK(rests(-0.005, -1.5));    // lands on what gives way
+  CHECK_FALSE(rests(0.05, 0));    // in the air
+  CHECK_FALSE(rests(0.001, -2));  // about to land
+  CHECK(rests(-0.005, -1.5));     // lands on what gives way
   CHECK(rests(-0.01, 0.1));
   CHECK_FALSE(rests(-0.01, 1));  // has pushed off
   CHECK_FALSE(rests(0.0025, 0));
   CHECK(rests(0.0015, 0));
-  CHECK(rests(0.0025, 0));       // stays what it was
+  CHECK(rests(0.0025, 0));  // stays what it was
   // What is not known speaks neither for nor against: 2 cm is not far if it may as well be none.
   CHECK(rests(0.02, 0, 0.02));
   CHECK_FALSE(rests(0.02, 2, 0.02));
   CHECK(rests(0.02, 1.5, 0.02, 1.5));
 }
 
-TEST_CASE("a robot that does not touch the ground has no contacts, and a spherical joint none in ROBOT_STATE") {
+TEST_CASE(
+    "a robot that does not touch the ground has no contacts, and a spherical joint none in "
+    "ROBOT_STATE") {
   CHECK(GroundContact(LoadPendulum("robot.toml")).num_points() == 0);
   RobotDescription robot = LoadRobot(SourceFile("robots/hopper"));
   robot.joints[2].type = JointDescription::Type::kSpherical;

@@ -1,5 +1,5 @@
-// Impacts are not white jerk. Independent truth: joints that bounce off a stop made of a spring and a damper,
-// by its exact solution.
+// Impacts are not white jerk. Independent truth: joints that bounce off a stop made of a spring and
+// a damper, by its exact solution.
 
 #include "estimator/impact.h"
 
@@ -106,13 +106,14 @@ Nees NeesOf(const RobotDescription& robot) {
 }
 
 TEST_CASE(
-    "where a joint meets its stop the velocity's error is as large as it says, with the impact left open") {
+    "where a joint meets its stop the velocity's error is as large as it says, with the impact "
+    "left open") {
   RobotDescription robot = Robot();
   const Nees without = NeesOf(robot);
   robot.estimator.stop_impact = kStopImpact;
   const Nees with = NeesOf(robot);
-  INFO("at impacts " << without.impact << " and " << with.impact << ", elsewhere " << without.free << " and "
-                     << with.free);
+  INFO("at impacts " << without.impact << " and " << with.impact << ", elsewhere " << without.free
+                     << " and " << with.free);
   CHECK(without.impact > 20);
   CHECK(with.impact > 0.5);
   CHECK(with.impact < 1.5);
@@ -160,7 +161,8 @@ TEST_CASE("a speed counts from shortly before the impact until it rests") {
 std::vector<double> VelocitySds(double coupling, bool effort, bool stop) {
   RobotDescription robot;
   robot.joints.resize(2);
-  for (JointDescription& joint : robot.joints) joint.effort_limit = 2, joint.lower = -1, joint.upper = 1;
+  for (JointDescription& joint : robot.joints)
+    joint.effort_limit = 2, joint.lower = -1, joint.upper = 1;
   robot.estimator = {.position_sd = 1e-4,
                      .velocity_sd = 0.5,
                      .jerk = 1,

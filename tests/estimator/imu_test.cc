@@ -30,7 +30,12 @@ RobotDescription Torso() {
   add("pitch", Type::kRevolute, Eigen::Vector3d::UnitY(), 2);
   robot.joints[0].passive = false;  // somebody must drive
   robot.joints[0].effort_limit = 1;
-  robot.estimator = {.position_sd = 1e-3, .velocity_sd = 0.5, .jerk = 50, .effort_step = 0, .timing_sd = 0, .lag = 10,
+  robot.estimator = {.position_sd = 1e-3,
+                     .velocity_sd = 0.5,
+                     .jerk = 50,
+                     .effort_step = 0,
+                     .timing_sd = 0,
+                     .lag = 10,
                      .reset_after = 0.5};
   SensorDescription imu;
   imu.name = "imu";
@@ -48,9 +53,13 @@ RobotDescription Torso() {
 struct Rig {
   explicit Rig(const RobotDescription& description) : robot(description), observer(description) {}
 
-  static Eigen::Vector3d Q(double t) { return {0.3 * std::sin(5 * t), 1 + 0.2 * std::cos(7 * t), 0.4 * std::sin(4 * t)}; }
+  static Eigen::Vector3d Q(double t) {
+    return {0.3 * std::sin(5 * t), 1 + 0.2 * std::cos(7 * t), 0.4 * std::sin(4 * t)};
+  }
   static Eigen::Vector3d Rates(double t) { return (Q(t + 1e-5) - Q(t - 1e-5)) / 2e-5; }
-  Eigen::Vector3d Accelerations(double t) const { return (Rates(t + 1e-4) - Rates(t - 1e-4)) / 2e-4; }
+  Eigen::Vector3d Accelerations(double t) const {
+    return (Rates(t + 1e-4) - Rates(t - 1e-4)) / 2e-4;
+  }
 
   joint_state_t State(int k) {
     const double t = 0.002 * k;
@@ -82,8 +91,10 @@ struct Rig {
     imu.link = "torso";
     imu.utime = 1'000'000 + 5000 * k;
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(Q(t)[2], Eigen::Vector3d::UnitY()));
-    const Eigen::Vector3d a = (Accelerations(t) + Accelerations(t - 0.005)) / 2;  // averaged over a period
-    const Eigen::Vector3d force = turn.conjugate() * Eigen::Vector3d(a[0], 0, a[1] + robot.simulation.gravity);
+    // averaged over a period
+    const Eigen::Vector3d a = (Accelerations(t) + Accelerations(t - 0.005)) / 2;
+    const Eigen::Vector3d force =
+        turn.conjugate() * Eigen::Vector3d(a[0], 0, a[1] + robot.simulation.gravity);
     for (int i = 0; i < 3; ++i) imu.force[i] = force[i] + 0.2 * random.Normal() + force_offset[i];
     imu.rate[1] = rate;
     imu.orientation[0] = turn.w();
@@ -91,7 +102,9 @@ struct Rig {
     imu.orientation_valid = true;
     return imu;
   }
-  struct Errors { Eigen::Vector3d q = Eigen::Vector3d::Zero(), v = q, nees = q; };
+  struct Errors {
+    Eigen::Vector3d q = Eigen::Vector3d::Zero(), v = q, nees = q;
+  };
   /// rms and mean normalised squared error of v of the last part.
   Errors Run(int steps, bool with_imu) {
     Errors e;
@@ -104,7 +117,8 @@ struct Rig {
       ++n;
       for (int i = 0; i < 3; ++i) {
         const auto at = static_cast<size_t>(i);
-        const double dq = observer.state().q[at] - Q(0.002 * k)[i], dv = observer.state().v[at] - Rates(0.002 * k)[i];
+        const double dq = observer.state().q[at] - Q(0.002 * k)[i],
+                     dv = observer.state().v[at] - Rates(0.002 * k)[i];
         e.q[i] += dq * dq;
         e.v[i] += dv * dv;
         e.nees[i] += std::pow(dv / observer.state().v_sd[at], 2);
@@ -140,7 +154,8 @@ TEST_CASE("an accelerometer makes the velocities of slides better, whatever the 
   Rig with(Torso()), without(Torso());
   const auto better = with.Run(4000, true), worse = without.Run(4000, false);
   for (int i = 0; i < 2; ++i) {
-    INFO("joint " << i << ": " << better.v[i] << " instead of " << worse.v[i] << ", NEES " << better.nees[i]);
+    INFO("joint " << i << ": " << better.v[i] << " instead of " << worse.v[i] << ", NEES "
+                  << better.nees[i]);
     CHECK(better.v[i] < 0.85 * worse.v[i]);
     CHECK(better.nees[i] < 2);
   }

@@ -11,7 +11,12 @@ namespace plumb {
 namespace {
 
 EstimatorSettings Settings() {
-  return {.position_sd = 1.2e-4, .velocity_sd = 0.5, .jerk = 100, .effort_step = 30, .timing_sd = 0, .lag = 20,
+  return {.position_sd = 1.2e-4,
+          .velocity_sd = 0.5,
+          .jerk = 100,
+          .effort_step = 30,
+          .timing_sd = 0,
+          .lag = 20,
           .reset_after = 0.2};
 }
 
@@ -52,8 +57,8 @@ TEST_CASE("what is late, sometimes missing and of the position alone is followed
   CHECK(filter.pending() == 22);
 }
 
-// Independent truth: the batch weighted least-squares solution of the same linear-Gaussian model, which a
-// Kalman filter with a Rauch-Tung-Striebel smoother must reproduce.
+// Independent truth: the batch weighted least-squares solution of the same linear-Gaussian model,
+// which a Kalman filter with a Rauch-Tung-Striebel smoother must reproduce.
 TEST_CASE("the smoother equals batch least squares") {
   EstimatorSettings settings = Settings();
   settings.position_sd = 0.1;
@@ -62,7 +67,8 @@ TEST_CASE("the smoother equals batch least squares") {
   settings.effort_step = 3;
   constexpr int kSteps = 6;
   const double dt = 0.1;
-  const std::vector<double> position{0.1, 0.25, 0.2, 0.5, 0.4, 0.9}, velocity{1, 0.5, 1.5, 2, 0.1, 1};
+  const std::vector<double> position{0.1, 0.25, 0.2, 0.5, 0.4, 0.9},
+      velocity{1, 0.5, 1.5, 2, 0.1, 1};
   const std::vector<double> step{0, 0.5, 0, 1.0, 0, 0.25};
 
   KinematicFilter filter(settings);
@@ -106,8 +112,8 @@ TEST_CASE("the smoother equals batch least squares") {
   }
 }
 
-// Steps of effort make corners in the velocity. With the allowance for them the smoothed velocity is unbiased
-// where the step happens; without it the corner is rounded off.
+// Steps of effort make corners in the velocity. With the allowance for them the smoothed velocity
+// is unbiased where the step happens; without it the corner is rounded off.
 TEST_CASE("effort steps do not bias the smoothed velocity") {
   const double dt = 0.005;
   for (const bool allow : {true, false}) {
@@ -131,7 +137,8 @@ TEST_CASE("effort steps do not bias the smoothed velocity") {
       v += a * dt;
       filter.Predict(dt, effort - previous_effort);
       const double quantum = 2 * M_PI / 16384;
-      Update(filter, std::round((q + 1e-3 * random.Uniform()) / quantum) * quantum - 5e-4, v + 0.3 * random.Normal());
+      Update(filter, std::round((q + 1e-3 * random.Uniform()) / quantum) * quantum - 5e-4,
+             v + 0.3 * random.Normal());
       true_v.push_back(v);
       corner.push_back((i + 1) % 20 == 10);  // the velocity's upper corners
       previous_effort = effort;

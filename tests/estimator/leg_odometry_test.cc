@@ -1,7 +1,8 @@
-// A body in space that sways above its feet, after formulas; its feet creep and sink in as the filter takes them to.
+// A body in space that sways above its feet, after formulas; its feet creep and sink in as the
+// filter takes them to.
 
-#include "common/decompositions.h"
 #include "estimator/leg_odometry.h"
+#include "common/decompositions.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -18,8 +19,15 @@ using Eigen::Vector3d;
 constexpr double kPeriod = 0.005, kRadius = 0.02, kGravity = 9.81;
 
 LegOdometry::Settings Settings() {
-  return {.rate_sd = 0.01, .rate_bias_sd = 0.01, .acceleration_sd = 0.1, .acceleration_bias_sd = 0.05, .period = kPeriod,
-          .angle_sd = 0.02, .ground_sd = 3e-3, .slip = 5e-3, .gravity = kGravity};
+  return {.rate_sd = 0.01,
+          .rate_bias_sd = 0.01,
+          .acceleration_sd = 0.1,
+          .acceleration_bias_sd = 0.05,
+          .period = kPeriod,
+          .angle_sd = 0.02,
+          .ground_sd = 3e-3,
+          .slip = 5e-3,
+          .gravity = kGravity};
 }
 
 Matrix3d Variance(double sd) { return sd * sd * Matrix3d::Identity(); }
@@ -27,19 +35,27 @@ Matrix3d Variance(double sd) { return sd * sd * Matrix3d::Identity(); }
 class Walker {
  public:
   Walker(uint64_t seed, int num_feet, LegOdometry::Settings settings = Settings())
-      : s(settings), random(seed, {77}), filter(s, static_cast<size_t>(num_feet)), places(static_cast<size_t>(num_feet)) {
+      : s(settings),
+        random(seed, {77}),
+        filter(s, static_cast<size_t>(num_feet)),
+        places(static_cast<size_t>(num_feet)) {
     for (size_t i = 0; i < places.size(); ++i) {
       const double around = 2 * M_PI * static_cast<double>(i) / num_feet;
-      places[i] << 0.3 * std::cos(around), 0.3 * std::sin(around), kRadius + s.ground_sd * random.Normal();
+      places[i] << 0.3 * std::cos(around), 0.3 * std::sin(around),
+          kRadius + s.ground_sd * random.Normal();
     }
     rate_bias = s.rate_bias_sd * Normal();
     acceleration_bias = s.acceleration_bias_sd * Normal();
   }
 
   Vector3d Normal() { return {random.Normal(), random.Normal(), random.Normal()}; }
-  Vector3d Position(double t) const { return {0.05 * sway * std::sin(3 * t), 0.04 * sway * std::sin(2 * t), 0.5 + 0.05 * sway * std::sin(4 * t)}; }
+  Vector3d Position(double t) const {
+    return {0.05 * sway * std::sin(3 * t), 0.04 * sway * std::sin(2 * t),
+            0.5 + 0.05 * sway * std::sin(4 * t)};
+  }
   Vector3d Velocity(double t) const {
-    return {0.15 * sway * std::cos(3 * t), 0.08 * sway * std::cos(2 * t), 0.2 * sway * std::cos(4 * t)};
+    return {0.15 * sway * std::cos(3 * t), 0.08 * sway * std::cos(2 * t),
+            0.2 * sway * std::cos(4 * t)};
   }
   Quaterniond Orientation(double t) const {
     return Quaterniond(Eigen::AngleAxisd(0.3 * sway * std::sin(0.7 * t), Vector3d::UnitZ()) *
@@ -58,7 +74,8 @@ class Walker {
     for (size_t i = 0; i < feet.size(); ++i) {
       feet[i].radius = kRadius;
       feet[i].centre = to_body * (places[i] - Position(now)) + 1e-3 * Normal();
-      feet[i].velocity = -to_body * Velocity(now) - Rate(now).cross(feet[i].centre) + 0.01 * Normal();
+      feet[i].velocity =
+          -to_body * Velocity(now) - Rate(now).cross(feet[i].centre) + 0.01 * Normal();
       feet[i].rate = -Rate(now);
       feet[i].centre_variance = Matrix3d::Zero();  // a millimetre is what the filter allows any leg
       feet[i].velocity_variance = Variance(0.01);
@@ -69,7 +86,8 @@ class Walker {
   void Start(const Quaterniond& wrong = Quaterniond::Identity()) {
     const Vector3d off = s.angle_sd * Normal();
     const Quaterniond noise(Eigen::AngleAxisd(off.norm(), off.normalized()));
-    filter.Restart(LegOdometry::Beginning::kStands, Position(0), wrong * noise * Orientation(0), Feet());
+    filter.Restart(LegOdometry::Beginning::kStands, Position(0), wrong * noise * Orientation(0),
+                   Feet());
   }
   void Step() {
     const double before = now;
@@ -77,11 +95,14 @@ class Walker {
     const double keeps = std::exp(-kPeriod / 0.05);
     for (Vector3d& place : places) {
       place.head<2>() += s.slip * std::sqrt(kPeriod) * Normal().head<2>();
-      place.z() = kRadius + keeps * (place.z() - kRadius) + s.ground_sd * std::sqrt(1 - keeps * keeps) * random.Normal();
+      place.z() = kRadius + keeps * (place.z() - kRadius) +
+                  s.ground_sd * std::sqrt(1 - keeps * keeps) * random.Normal();
     }
-    const Vector3d acceleration = (Velocity(now) - Velocity(before)) / kPeriod + kGravity * Vector3d::UnitZ();
+    const Vector3d acceleration =
+        (Velocity(now) - Velocity(before)) / kPeriod + kGravity * Vector3d::UnitZ();
     filter.Predict(kPeriod, Rate(now) + rate_bias + s.rate_sd * Normal(),
-                   Orientation((now + before) / 2).conjugate() * acceleration + acceleration_bias + s.acceleration_sd * Normal());
+                   Orientation((now + before) / 2).conjugate() * acceleration + acceleration_bias +
+                       s.acceleration_sd * Normal());
     filter.Correct(Feet());
   }
   void Run(double duration) {
@@ -91,7 +112,8 @@ class Walker {
   Eigen::Matrix<double, 9, 1> Error() const {
     Eigen::Matrix<double, 9, 1> e;
     const Eigen::AngleAxisd turn(Orientation(now) * filter.orientation().conjugate());
-    e << Position(now) - filter.position(), Velocity(now) - filter.velocity(), turn.angle() * turn.axis();
+    e << Position(now) - filter.position(), Velocity(now) - filter.velocity(),
+        turn.angle() * turn.axis();
     return e;
   }
 
@@ -126,8 +148,9 @@ TEST_CASE("feet and IMU tell height, tilt and velocity of a body in space, and h
     }
     CHECK(walker.filter.slips() <= 10);  // of 3200 corrections at 99.9 %
   }
-  INFO("rms height " << std::sqrt(height / count) << " m, tilt " << std::sqrt(tilt / count) << " rad, velocity "
-                     << std::sqrt(velocity / count) << " m/s; NEES " << nees / count);
+  INFO("rms height " << std::sqrt(height / count) << " m, tilt " << std::sqrt(tilt / count)
+                     << " rad, velocity " << std::sqrt(velocity / count) << " m/s; NEES "
+                     << nees / count);
   CHECK(nees / count > 0.75);
   CHECK(nees / count < 1.5);
   CHECK(std::sqrt(height / count) < 3e-3);
@@ -140,8 +163,9 @@ TEST_CASE("heading and horizontal position are not known, and the less the longe
   walker.Start();
   walker.Run(2);
   const LegOdometry& f = walker.filter;
-  const double heading = f.angle_sd(Vector3d::UnitZ()), x = f.position_sd(Vector3d::UnitX()), y = f.position_sd(Vector3d::UnitY()),
-               z = f.position_sd(Vector3d::UnitZ()), roll = f.angle_sd(Vector3d::UnitX()), pitch = f.angle_sd(Vector3d::UnitY());
+  const double heading = f.angle_sd(Vector3d::UnitZ()), x = f.position_sd(Vector3d::UnitX()),
+               y = f.position_sd(Vector3d::UnitY()), z = f.position_sd(Vector3d::UnitZ()),
+               roll = f.angle_sd(Vector3d::UnitX()), pitch = f.angle_sd(Vector3d::UnitY());
   walker.Run(20);
   CHECK(f.angle_sd(Vector3d::UnitZ()) > heading);
   CHECK(f.position_sd(Vector3d::UnitX()) > 1.5 * x);
@@ -217,7 +241,8 @@ TEST_CASE("in a plane nothing leaves it") {
   s.normal = Vector3d::UnitY();
   Walker walker(11, 2, s);
   walker.sway = 0;
-  walker.filter.Restart(LegOdometry::Beginning::kStands, Vector3d::Zero(), Quaterniond::Identity(), walker.Feet());
+  walker.filter.Restart(LegOdometry::Beginning::kStands, Vector3d::Zero(), Quaterniond::Identity(),
+                        walker.Feet());
   walker.Run(2);
   constexpr double kRounding = 1e-6;
   CHECK(std::abs(walker.filter.position().y()) < kRounding);

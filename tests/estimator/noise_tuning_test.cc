@@ -13,7 +13,12 @@ RobotDescription Robot() {
   robot.joints.resize(1);
   robot.joints[0].name = "pivot";
   robot.joints[0].effort_limit = 2;
-  robot.estimator = {.position_sd = 1e-2, .velocity_sd = 1, .jerk = 1000, .effort_step = 0, .timing_sd = 0, .lag = 4,
+  robot.estimator = {.position_sd = 1e-2,
+                     .velocity_sd = 1,
+                     .jerk = 1000,
+                     .effort_step = 0,
+                     .timing_sd = 0,
+                     .lag = 4,
                      .reset_after = 100};
   return robot;
 }
@@ -27,7 +32,8 @@ void Play(StateObserver& observer, double position_sd, double velocity_sd, doubl
     for (int i = 0; i < 50; ++i) {
       q += kSub * v;
       v += kSub * a;
-      a += jerk * std::sqrt(kSub) * random.Normal() - kSub * (20 * a + 100 * v + 100 * q);  // stays within reach
+      // stays within reach
+      a += jerk * std::sqrt(kSub) * random.Normal() - kSub * (20 * a + 100 * v + 100 * q);
     }
     joint_state_t m{};
     m.utime = 1'000'000 + 5000 * k;
@@ -43,7 +49,8 @@ void Play(StateObserver& observer, double position_sd, double velocity_sd, doubl
 }
 
 TEST_CASE("known noise is found, far from where the search begins") {
-  const TunedNoise tuned = TuneNoise(Robot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 6000); });
+  const TunedNoise tuned =
+      TuneNoise(Robot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 6000); });
   CHECK(tuned.joints[0].position_sd == Approx(1e-3).epsilon(0.15));
   CHECK(tuned.joints[0].velocity_sd == Approx(0.05).epsilon(0.15));
   CHECK(tuned.joints[0].jerk == Approx(40).epsilon(0.3));
@@ -52,8 +59,9 @@ TEST_CASE("known noise is found, far from where the search begins") {
 }
 
 TEST_CASE("too little to learn from is refused by name") {
-  CHECK_THROWS_WITH(TuneNoise(Robot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 50); }),
-                    Catch::Contains("joint pivot") && Catch::Contains("too few"));
+  CHECK_THROWS_WITH(
+      TuneNoise(Robot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 50); }),
+      Catch::Contains("joint pivot") && Catch::Contains("too few"));
 }
 
 }  // namespace

@@ -27,7 +27,8 @@ class StateErrors {
   double v() const { return std::sqrt(v2_ / count_); }
   double nees_q() const { return nees_q_ / count_; }  ///< 1 if honest
   double nees_v() const { return nees_v_ / count_; }
-  double covered_v() const { return covered_v_ / count_; }  ///< share of errors within 1.96 sd: 0.95 if honest
+  /// share of errors within 1.96 sd: 0.95 if honest
+  double covered_v() const { return covered_v_ / count_; }
 
  private:
   double count_ = 0, q2_ = 0, v2_ = 0, nees_q_ = 0, nees_v_ = 0, covered_v_ = 0;
@@ -35,7 +36,8 @@ class StateErrors {
 
 struct JointErrors {
   StateErrors differencing;  ///< of the newest two readings
-  StateErrors filtered;      ///< the same through a first-order filter, of the time constant that suits it best
+  /// the same through a first-order filter, of the time constant that suits it best
+  StateErrors filtered;
   StateErrors causal, smoothed;
 };
 
@@ -51,7 +53,8 @@ inline RobotDescription WithSimulatedNoise(RobotDescription robot) {
     if (sensor.link < 0) continue;
     sensor.noise.position_sd = S::kAngleNoise;
     sensor.noise.velocity_sd = S::kRateNoise;
-    const int turned = MountingOf(robot, sensor.link).turned;  // what it says of its IMU is of another one
+    // what it says of its IMU is of another one
+    const int turned = MountingOf(robot, sensor.link).turned;
     if (turned >= 0) robot.joints[static_cast<size_t>(turned)].noise.position_sd = S::kAngleNoise;
     if (turned >= 0) robot.joints[static_cast<size_t>(turned)].noise.velocity_sd = S::kRateNoise;
     sensor.rate_bias_sd = S::kRateBias;
@@ -64,7 +67,8 @@ inline RobotDescription WithSimulatedNoise(RobotDescription robot) {
 inline Recordings Record(const RobotDescription& robot, uint32_t first_seed, int runs) {
   Recordings recordings;
   for (uint32_t i = 0; i < static_cast<uint32_t>(runs); ++i) {
-    recordings.push_back(robot.num_joints() == 6 ? Hop(robot, first_seed + i) : Swing(robot, first_seed + i));
+    recordings.push_back(robot.num_joints() == 6 ? Hop(robot, first_seed + i)
+                                                 : Swing(robot, first_seed + i));
   }
   return recordings;
 }
@@ -104,19 +108,23 @@ inline ObserverErrors Observe(const RobotDescription& robot, const Recordings& r
       const SimulatedReadings::Sample& sample = recording[k];
       for (const imu_t& imu : sample.imus) observer.OnImu(imu);
       observer.OnJointState(sample.joints);
-      const auto error = [&](const robot_state_t& state, const SimulatedReadings::Sample& truth, size_t i, StateErrors& into) {
+      const auto error = [&](const robot_state_t& state, const SimulatedReadings::Sample& truth,
+                             size_t i, StateErrors& into) {
         const auto at = static_cast<Eigen::Index>(i);
         into.Add(state.q[i] - truth.q[at], state.v[i] - truth.v[at], state.q_sd[i], state.v_sd[i]);
       };
       for (size_t i = 0; i < n; ++i) {
         const auto at = static_cast<Eigen::Index>(i);
         const int64_t elapsed = sample.joints.measured[i] - last_time[i];
-        if (elapsed > 0) difference[i] = (sample.joints.position[i] - last[i]) / (1e-6 * static_cast<double>(elapsed));
+        if (elapsed > 0)
+          difference[i] =
+              (sample.joints.position[i] - last[i]) / (1e-6 * static_cast<double>(elapsed));
         last_time[i] = sample.joints.measured[i];
         last[i] = sample.joints.position[i];
         for (size_t f = 0; f < 8; ++f) {
           const double constant = 1e-3 * std::pow(2, f);  // [s] 1 to 128 ms
-          filtered[i][f] += (difference[i] - filtered[i][f]) * -std::expm1(-1e-6 * SimulatedReadings::kPeriod / constant);
+          filtered[i][f] += (difference[i] - filtered[i][f]) *
+                            -std::expm1(-1e-6 * SimulatedReadings::kPeriod / constant);
         }
         if (k < kSettle) continue;
         const double dq = last[i] - sample.q[at];
@@ -126,15 +134,17 @@ inline ObserverErrors Observe(const RobotDescription& robot, const Recordings& r
       }
       for (const robot_state_t& state : observer.smoothed()) {
         if (next_smoothed >= kSettle) {
-          for (size_t i = 0; i < n; ++i) error(state, recording[next_smoothed], i, errors.joints[i].smoothed);
+          for (size_t i = 0; i < n; ++i)
+            error(state, recording[next_smoothed], i, errors.joints[i].smoothed);
         }
         ++next_smoothed;
       }
     }
   }
   for (size_t i = 0; i < n; ++i) {
-    errors.joints[i].filtered = *std::min_element(first_order[i].begin(), first_order[i].end(),
-                                                  [](const StateErrors& a, const StateErrors& b) { return a.v() < b.v(); });
+    errors.joints[i].filtered =
+        *std::min_element(first_order[i].begin(), first_order[i].end(),
+                          [](const StateErrors& a, const StateErrors& b) { return a.v() < b.v(); });
   }
   return errors;
 }

@@ -17,8 +17,13 @@ RobotDescription Robot(int joints) {
   robot.joints.resize(static_cast<size_t>(joints));
   for (JointDescription& joint : robot.joints) joint.effort_limit = 2;
   robot.joints[0].name = "first";
-  robot.estimator = {.position_sd = 1.2e-4, .velocity_sd = 0.1, .jerk = 100, .effort_step = 30, .timing_sd = 0,
-                     .lag = 4, .reset_after = 0.2};
+  robot.estimator = {.position_sd = 1.2e-4,
+                     .velocity_sd = 0.1,
+                     .jerk = 100,
+                     .effort_step = 30,
+                     .timing_sd = 0,
+                     .lag = 4,
+                     .reset_after = 0.2};
   return robot;
 }
 
@@ -55,7 +60,9 @@ struct Motion {
   Random random{5, {1}};
 };
 
-TEST_CASE("a silent joint is predicted with growing uncertainty, then the state is invalid, then it is back") {
+TEST_CASE(
+    "a silent joint is predicted with growing uncertainty, then the state is invalid, then it is "
+    "back") {
   Motion motion(2);
   motion.Run(100);
   CHECK(motion.observer.state().valid);
@@ -162,10 +169,15 @@ TEST_CASE("a lying sensor is named") {
   bool seen = false;
   for (int i = 0; i < 150; ++i) {
     joint_state_t m = motion.Next();
-    if (lie == 0) m.position[0] += 0.004 * i, expected = "position and velocity disagree";  // drifts by 0.8 rad/s
+    // drifts by 0.8 rad/s
+    if (lie == 0) m.position[0] += 0.004 * i, expected = "position and velocity disagree";
     if (lie == 1) m.position[0] += 0.19, expected = "position jumped by 0.1";
-    if (lie == 2) m.position[0] = stuck = std::isnan(stuck) ? m.position[0] : stuck, expected = "position stuck at";
-    if (lie == 3) m.velocity[0] = stuck = std::isnan(stuck) ? m.velocity[0] : stuck, expected = "velocity stuck";
+    if (lie == 2)
+      m.position[0] = stuck = std::isnan(stuck) ? m.position[0] : stuck,
+      expected = "position stuck at";
+    if (lie == 3)
+      m.velocity[0] = stuck = std::isnan(stuck) ? m.velocity[0] : stuck,
+      expected = "velocity stuck";
     REQUIRE(motion.observer.OnJointState(m));
     seen = seen || motion.observer.Status().joint_reason[0].find(expected) == 0;
   }

@@ -19,21 +19,24 @@
 
 namespace plumb {
 
-/// What a driver would publish of a simulated robot, with imperfections of real sensors, and the truth at every time that
-/// is a message's: for tests and bench/observer.
+/// What a driver would publish of a simulated robot, with imperfections of real sensors, and the
+/// truth at every time that is a message's: for tests and bench/observer.
 ///
-/// Drives have an encoder and its tracking loop (sim/encoder.h) plus white noise on the velocity; joints with an encoder of
-/// their own are quantised by its counts; an IMU has white noise, a constant bias, and forces averaged over its period. All
-/// messages are labelled with the time of their arrival, kDelay after the measurement, as a driver would that cannot know the
-/// constant part of the delay.
+/// Drives have an encoder and its tracking loop (sim/encoder.h) plus white noise on the velocity;
+/// joints with an encoder of their own are quantised by its counts; an IMU has white noise, a
+/// constant bias, and forces averaged over its period. All messages are labelled with the time of
+/// their arrival, kDelay after the measurement, as a driver would that cannot know the constant
+/// part of the delay.
 class SimulatedReadings {
  public:
   static constexpr int64_t kStep = 500;                    ///< [us] of the truth
   static constexpr int64_t kPeriod = 2000, kDelay = 1000;  ///< [us]
   static constexpr int64_t kStart = 1'000'000;             ///< [us] utime of the beginning
   static constexpr double kVelocityNoise = 0.1;            ///< [rad/s] on a drive's velocity
-  static constexpr double kAngleNoise = 2e-3, kRateNoise = 0.01, kForceNoise = 0.1;  ///< [rad], [rad/s], [m/s^2]
-  static constexpr double kRateBias = 0.01, kForceBias = 0.1;                        ///< [rad/s], [m/s^2]
+  /// [rad], [rad/s], [m/s^2]
+  static constexpr double kAngleNoise = 2e-3, kRateNoise = 0.01, kForceNoise = 0.1;
+  /// [rad/s], [m/s^2]
+  static constexpr double kRateBias = 0.01, kForceBias = 0.1;
   static constexpr double kTiming = 2e-5;  ///< [s] error of a regularised time
 
   struct Sample {
@@ -44,8 +47,11 @@ class SimulatedReadings {
 
   /// @param truth the robot's parameters; nothing = the prior's mean.
   SimulatedReadings(const RobotDescription& robot, uint32_t seed, const Eigen::VectorXd& truth = {})
-      : robot_(robot), random_(seed, {41}), mechanism_(Model(robot).Describe(truth.size() > 0 ? truth : PriorMean(robot))) {
-    for (int i = 0; i < robot.num_joints(); ++i) encoders_.emplace_back(robot.virtual_robot.encoder_bits);
+      : robot_(robot),
+        random_(seed, {41}),
+        mechanism_(Model(robot).Describe(truth.size() > 0 ? truth : PriorMean(robot))) {
+    for (int i = 0; i < robot.num_joints(); ++i)
+      encoders_.emplace_back(robot.virtual_robot.encoder_bits);
     bias_ = kForceBias * Eigen::Vector3d(random_.Normal(), random_.Normal(), random_.Normal());
     rate_bias_ = kRateBias * random_.Normal();
     for (const SensorDescription& sensor : robot.sensors) {
@@ -55,9 +61,12 @@ class SimulatedReadings {
     }
   }
 
-  /// @param effort of the driven joints from time [s], q, v; asked every `control` [us], it acts a measurement later.
-  std::vector<Sample> Run(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double duration, int64_t control,
-                          const std::function<Eigen::VectorXd(double, const Eigen::VectorXd&, const Eigen::VectorXd&)>& effort) {
+  /// @param effort of the driven joints from time [s], q, v; asked every `control` [us], it acts a
+  /// measurement later.
+  std::vector<Sample> Run(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double duration,
+                          int64_t control,
+                          const std::function<Eigen::VectorXd(double, const Eigen::VectorXd&,
+                                                              const Eigen::VectorXd&)>& effort) {
     mechanism_.SetState(q, v);
     for (size_t i = 0; i < encoders_.size(); ++i) encoders_[i].Reset(Turns(q, i), Turns(v, i));
     Eigen::VectorXd applied = Eigen::VectorXd::Zero(robot_.num_velocities()), impulse = applied;
@@ -80,7 +89,8 @@ class SimulatedReadings {
       if (imu_ && t % std::llround(imu_->period * 1e6) == 0) ReadImu(t, last_v, imus);
       if (t % kPeriod == 0) reading = Read(t);
       if (t % control == 0) {
-        Eigen::VectorXd wish = effort(1e-6 * static_cast<double>(t), mechanism_.q(), mechanism_.v());
+        Eigen::VectorXd wish =
+            effort(1e-6 * static_cast<double>(t), mechanism_.q(), mechanism_.v());
         Eigen::Index k = 0;
         for (const int i : robot_.driven()) {
           const double limit = robot_.joints[static_cast<size_t>(i)].effort_limit;
@@ -91,7 +101,8 @@ class SimulatedReadings {
       mechanism_.Advance(applied, 1e-6 * kStep);
       impulse += applied * (1e-6 * kStep);
       for (size_t i = 0; i < encoders_.size(); ++i) {
-        encoders_[i].Track({t, t + kStep, Turns(q0, i), Turns(mechanism_.q(), i), Turns(v0, i), Turns(mechanism_.v(), i)});
+        encoders_[i].Track({t, t + kStep, Turns(q0, i), Turns(mechanism_.q(), i), Turns(v0, i),
+                            Turns(mechanism_.v(), i)});
       }
     }
     return samples;
@@ -100,10 +111,13 @@ class SimulatedReadings {
  private:
   static Eigen::VectorXd PriorMean(const RobotDescription& robot) {
     Eigen::VectorXd mean(static_cast<Eigen::Index>(robot.parameters.size()));
-    for (size_t i = 0; i < robot.parameters.size(); ++i) mean[static_cast<Eigen::Index>(i)] = robot.parameters[i].coordinate_mean();
+    for (size_t i = 0; i < robot.parameters.size(); ++i)
+      mean[static_cast<Eigen::Index>(i)] = robot.parameters[i].coordinate_mean();
     return robot.ToPhysical(mean);
   }
-  static double Turns(const Eigen::VectorXd& x, size_t i) { return x[static_cast<Eigen::Index>(i)] / (2 * std::numbers::pi); }
+  static double Turns(const Eigen::VectorXd& x, size_t i) {
+    return x[static_cast<Eigen::Index>(i)] / (2 * std::numbers::pi);
+  }
 
   joint_state_t Read(int64_t t) {
     joint_state_t m{};
@@ -118,7 +132,8 @@ class SimulatedReadings {
     m.valid.assign(n, 1);
     for (size_t i = 0; i < n; ++i) {
       m.position[i] = encoders_[i].Quantise(Turns(mechanism_.q(), i)) * 2 * std::numbers::pi;
-      m.velocity[i] = encoders_[i].velocity() * 2 * std::numbers::pi + kVelocityNoise * random_.Normal();
+      m.velocity[i] =
+          encoders_[i].velocity() * 2 * std::numbers::pi + kVelocityNoise * random_.Normal();
     }
     for (const SensorDescription& sensor : robot_.sensors) {
       if (sensor.link >= 0) continue;
@@ -146,18 +161,23 @@ class SimulatedReadings {
     imu.link = robot_.links[static_cast<size_t>(imu_->link)].name;
     Eigen::Vector3d acceleration = robot_.simulation.gravity * Eigen::Vector3d::UnitZ();
     for (const auto& slide : mounting_.slides) {
-      acceleration += slide.direction * (mechanism_.v()[slide.joint] - last_v[slide.joint]) / imu_->period;
+      acceleration +=
+          slide.direction * (mechanism_.v()[slide.joint] - last_v[slide.joint]) / imu_->period;
     }
     last_v = mechanism_.v();
     const Eigen::Quaterniond truth =
-        mounting_.unturned * Eigen::Quaterniond(Eigen::AngleAxisd(mechanism_.q()[mounting_.turned], mounting_.axis));
-    const Eigen::Quaterniond told = mounting_.unturned * Eigen::Quaterniond(Eigen::AngleAxisd(angle_, mounting_.axis));
+        mounting_.unturned *
+        Eigen::Quaterniond(Eigen::AngleAxisd(mechanism_.q()[mounting_.turned], mounting_.axis));
+    const Eigen::Quaterniond told =
+        mounting_.unturned * Eigen::Quaterniond(Eigen::AngleAxisd(angle_, mounting_.axis));
     const Eigen::Vector3d force =
-        truth.conjugate() * acceleration + bias_ + kForceNoise * Eigen::Vector3d(random_.Normal(), random_.Normal(), random_.Normal());
+        truth.conjugate() * acceleration + bias_ +
+        kForceNoise * Eigen::Vector3d(random_.Normal(), random_.Normal(), random_.Normal());
     const Eigen::Vector3d rate = mounting_.axis * rate_;
     std::copy_n(force.data(), 3, std::begin(imu.force));
     std::copy_n(rate.data(), 3, std::begin(imu.rate));
-    imu.orientation[0] = told.w(), imu.orientation[1] = told.x(), imu.orientation[2] = told.y(), imu.orientation[3] = told.z();
+    imu.orientation[0] = told.w(), imu.orientation[1] = told.x(), imu.orientation[2] = told.y(),
+    imu.orientation[3] = told.z();
     imu.orientation_valid = true;
     if (t > 0) out.push_back(imu);
   }
@@ -174,28 +194,34 @@ class SimulatedReadings {
 };
 
 /// A pendulum that is pumped, 10 s.
-inline std::vector<SimulatedReadings::Sample> Swing(const RobotDescription& robot, uint32_t seed, double duration = 10,
+inline std::vector<SimulatedReadings::Sample> Swing(const RobotDescription& robot, uint32_t seed,
+                                                    double duration = 10,
                                                     const Eigen::VectorXd& truth = {}) {
   Random random(seed, {42});
-  const Eigen::VectorXd q = Eigen::VectorXd::Constant(1, random.Uniform(-3, 3)), v = Eigen::VectorXd::Constant(1, random.Uniform(-1, 1));
-  return SimulatedReadings(robot, seed, truth).Run(q, v, duration, 50'000, [&](double, const auto&, const auto& now) {
-    return Eigen::VectorXd::Constant(1, (now[0] > 0 ? 1.5 : -1.5) + random.Normal());
-  });
+  const Eigen::VectorXd q = Eigen::VectorXd::Constant(1, random.Uniform(-3, 3)),
+                        v = Eigen::VectorXd::Constant(1, random.Uniform(-1, 1));
+  return SimulatedReadings(robot, seed, truth)
+      .Run(q, v, duration, 50'000, [&](double, const auto&, const auto& now) {
+        return Eigen::VectorXd::Constant(1, (now[0] > 0 ? 1.5 : -1.5) + random.Normal());
+      });
 }
 
 /// A hopper that falls on its foot and pushes off again and again, 2 s.
-inline std::vector<SimulatedReadings::Sample> Hop(const RobotDescription& robot, uint32_t seed, double duration = 2,
+inline std::vector<SimulatedReadings::Sample> Hop(const RobotDescription& robot, uint32_t seed,
+                                                  double duration = 2,
                                                   const Eigen::VectorXd& truth = {}) {
   Random random(seed, {43});
   Eigen::VectorXd q(6), v = Eigen::VectorXd::Zero(6);
   q << 0, 1.35 + random.Uniform(0, 0.1), 0.02 * random.Normal(), -0.2, -0.4, 0.2;
   v[0] = random.Uniform(0, 0.5);
   const double frequency = random.Uniform(1.5, 2.5);
-  return SimulatedReadings(robot, seed, truth).Run(q, v, duration, 8000, [=](double t, const auto& q_now, const auto& v_now) {
-    const double bend = 0.5 + 0.5 * std::sin(2 * std::numbers::pi * frequency * t);
-    const Eigen::Vector3d target(-0.1 - 0.4 * bend, -0.2 - 0.8 * bend, 0.1 + 0.4 * bend);
-    return Eigen::VectorXd(400 * (target - q_now.template tail<3>()) - 20 * v_now.template tail<3>());
-  });
+  return SimulatedReadings(robot, seed, truth)
+      .Run(q, v, duration, 8000, [=](double t, const auto& q_now, const auto& v_now) {
+        const double bend = 0.5 + 0.5 * std::sin(2 * std::numbers::pi * frequency * t);
+        const Eigen::Vector3d target(-0.1 - 0.4 * bend, -0.2 - 0.8 * bend, 0.1 + 0.4 * bend);
+        return Eigen::VectorXd(400 * (target - q_now.template tail<3>()) -
+                               20 * v_now.template tail<3>());
+      });
 }
 
 }  // namespace plumb

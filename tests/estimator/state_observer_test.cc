@@ -11,8 +11,13 @@ RobotDescription Robot() {
   RobotDescription robot;
   robot.joints.resize(1);
   robot.joints[0].effort_limit = 2;
-  robot.estimator = {.position_sd = 1.2e-4, .velocity_sd = 0.5, .jerk = 100, .effort_step = 30, .timing_sd = 0,
-                     .lag = 4, .reset_after = 0.2};
+  robot.estimator = {.position_sd = 1.2e-4,
+                     .velocity_sd = 0.5,
+                     .jerk = 100,
+                     .effort_step = 30,
+                     .timing_sd = 0,
+                     .lag = 4,
+                     .reset_after = 0.2};
   return robot;
 }
 
@@ -84,7 +89,8 @@ TEST_CASE("jumps of time restart it, repeated times and rubbish are refused") {
     CHECK_FALSE(observer.OnJointState(m));
   }
   SECTION("a time that no clock shows") {
-    for (const int64_t utime : {std::numeric_limits<int64_t>::min(), std::numeric_limits<int64_t>::max()}) {
+    for (const int64_t utime :
+         {std::numeric_limits<int64_t>::min(), std::numeric_limits<int64_t>::max()}) {
       m.utime = utime;
       CHECK_FALSE(observer.OnJointState(m));
     }
@@ -95,7 +101,8 @@ TEST_CASE("jumps of time restart it, repeated times and rubbish are refused") {
     CHECK_FALSE(observer.OnJointState(m));
   }
   SECTION("a joint measured in the future, or too long ago") {
-    for (const int64_t measured : {m.utime + 10'001, m.utime - 1'100'000, std::numeric_limits<int64_t>::min()}) {
+    for (const int64_t measured :
+         {m.utime + 10'001, m.utime - 1'100'000, std::numeric_limits<int64_t>::min()}) {
       m.measured[0] = measured;
       CHECK_FALSE(observer.OnJointState(m));
     }

@@ -67,8 +67,8 @@ TEST_CASE("a trial is a function of seed and number, to the bit") {
   CHECK(Sum(one.Run(policy, false, 40, 3).rollout) != Sum(a.rollout));
 }
 
-/// Holds a hopper's leg bent, off its stops, as springs and dampers do: there the observer is as good as it
-/// says.
+/// Holds a hopper's leg bent, off its stops, as springs and dampers do: there the observer is as
+/// good as it says.
 GaussianPolicy Crouch(const RobotDescription& robot, float sd) {
   constexpr float kStiffness = 2, kDamping = 0.1f;  // action per rad, per rad/s
   GaussianPolicy policy = Wanderer(robot, sd);
@@ -99,7 +99,8 @@ TEST_CASE("what a robot without a gap does behind its bus calibrates to its hidd
   BusRobot system(robot, robot, hidden, 1);
   const bool hopper = name == "hopper";
   const GaussianPolicy policy = hopper ? Crouch(robot, 0.2f) : Wanderer(robot, 0.5f);
-  const Gaussian posterior = Moments(Found(robot, Trials(system, policy, hopper ? 20 : 2)).posterior);
+  const Gaussian posterior =
+      Moments(Found(robot, Trials(system, policy, hopper ? 20 : 2)).posterior);
   const Eigen::VectorXd error = posterior.mean - hidden.array().log().matrix();
   const Eigen::VectorXd sd = posterior.covariance.diagonal().cwiseSqrt();
   INFO("errors " << error.transpose() << ", claimed " << sd.transpose());
@@ -130,7 +131,8 @@ TEST_CASE("friction and delay that no model knows are found where the model may 
 }
 
 TEST_CASE("backlash is a gap that the pendulum's parameters do not close") {
-  const RobotDescription truth = Robot("pendulum/worn.toml"), model = Robot("pendulum/worn_fitted.toml");
+  const RobotDescription truth = Robot("pendulum/worn.toml"),
+                         model = Robot("pendulum/worn_fitted.toml");
   BusRobot system(truth, model, HiddenParameters(truth, 2), 1);
   CHECK(Found(model, Trials(system, Wanderer(model, 0.5f), 1)).misspecification.alarm);
 }

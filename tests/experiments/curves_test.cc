@@ -31,8 +31,10 @@ TEST_CASE("one run has no band, none no mean") {
 }
 
 TEST_CASE("a drawing has a line for each curve, in its colour, and leaves out what is not finite") {
-  const Curve first{"one & two", {1, 2, 3}, {1, NAN, 3}, {0, NAN, 2}, {2, NAN, 4}}, second{"three", {1, 2}, {2, 2}, {NAN, NAN}, {NAN, NAN}};
-  const std::string svg = DrawCurves("title", {{"left", "x", "y", false, {first, second}}, {"right", "x", "y", true, {first, second}}});
+  const Curve first{"one & two", {1, 2, 3}, {1, NAN, 3}, {0, NAN, 2}, {2, NAN, 4}},
+      second{"three", {1, 2}, {2, 2}, {NAN, NAN}, {NAN, NAN}};
+  const std::string svg = DrawCurves("title", {{"left", "x", "y", false, {first, second}},
+                                               {"right", "x", "y", true, {first, second}}});
   CHECK(svg.find("one &amp; two") != std::string::npos);
   CHECK(svg.find("line c1") != std::string::npos);
   CHECK(svg.find("nan") == std::string::npos);

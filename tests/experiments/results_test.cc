@@ -9,9 +9,13 @@
 namespace plumb {
 namespace {
 
-Results Open(const std::filesystem::path& file, const std::string& settings = "runs 2") { return Results(file, settings, {"task", "way"}, {"n", "error"}); }
+Results Open(const std::filesystem::path& file, const std::string& settings = "runs 2") {
+  return Results(file, settings, {"task", "way"}, {"n", "error"});
+}
 
-void Write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
+void Write(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream(file) << text;
+}
 
 TEST_CASE("a table is read as it was written, nan included") {
   const TemporaryFolder folder;
@@ -34,8 +38,10 @@ TEST_CASE("a table of something else is not touched") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "table.csv";
   const std::string right = "# runs 2\ntask,way,n,error\n";
-  for (const std::string text : {"", "x\n", "# runs 2\n", "# runs 2\ntask,way,n\n", "# runs 2\ntask,way,n,error\nhop,step,1\n", "# runs 2\ntask,way,n,error\nhop,step,1,2,3\n",
-                                 "# runs 2\ntask,way,n,error\nhop\n", "# runs 2\ntask,way,n,error\nhop,step,1,two\n"}) {
+  for (const std::string text :
+       {"", "x\n", "# runs 2\n", "# runs 2\ntask,way,n\n",
+        "# runs 2\ntask,way,n,error\nhop,step,1\n", "# runs 2\ntask,way,n,error\nhop,step,1,2,3\n",
+        "# runs 2\ntask,way,n,error\nhop\n", "# runs 2\ntask,way,n,error\nhop,step,1,two\n"}) {
     Write(file, text);
     CHECK_THROWS_WITH(Open(file), Catch::Contains("not a table of this experiment"));
   }

@@ -13,7 +13,9 @@
 namespace plumb {
 namespace {
 
-RobotDescription Pendulum(const std::string& file) { return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum/" + file); }
+RobotDescription Pendulum(const std::string& file) {
+  return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum/" + file);
+}
 
 GaussianPolicy Policy(const RobotDescription& robot) {
   GaussianPolicy policy({3, {4}, 1});
@@ -28,7 +30,8 @@ ParameterDistribution Certain(const RobotDescription& robot, const Eigen::Vector
 }
 
 TEST_CASE("what is recorded without noise is what the simulator does, latency included") {
-  // Where an effort changes within a control step, the task's substeps begin anew, a transition's do not.
+  // Where an effort changes within a control step, the task's substeps begin anew, a transition's
+  // do not.
   const std::map<std::string, double> tolerances{{"gym.toml", 1e-12}, {"robot.toml", 1e-5}};
   for (const auto& [file, tolerance] : tolerances) {
     const RobotDescription robot = Pendulum(file);
@@ -47,8 +50,10 @@ TEST_CASE("what is recorded without noise is what the simulator does, latency in
       CHECK(simulator.v()(0) == Approx(transition.next_v(0)).margin(tolerance));
     }
     // The truth errs by nothing, another robot by more the further it looks ahead.
-    CHECK(NStepErrors(robot, Certain(robot, hidden), {trial.rollout}, 20, 2, 5, 1).maxCoeff() < 1e3 * tolerance);
-    const Eigen::VectorXd wrong = NStepErrors(robot, Certain(robot, 1.1 * hidden), {trial.rollout}, 20, 2, 5, 1);
+    CHECK(NStepErrors(robot, Certain(robot, hidden), {trial.rollout}, 20, 2, 5, 1).maxCoeff() <
+          1e3 * tolerance);
+    const Eigen::VectorXd wrong =
+        NStepErrors(robot, Certain(robot, 1.1 * hidden), {trial.rollout}, 20, 2, 5, 1);
     CHECK(wrong(0) > 1e-4);
     CHECK(wrong(19) > 5 * wrong(0));
   }
@@ -61,11 +66,13 @@ TEST_CASE("trials are functions of seed and number; noise has the size that is c
   SimulatedSystem system(robot, hidden, noise, 1), twin(robot, hidden, noise, 1);
   const GaussianPolicy policy = Policy(robot);
   twin.Run(policy, true, 10, 1);  // what was before does not matter
-  const Rollout first = system.Run(policy, true, 200, 2).rollout, again = twin.Run(policy, true, 200, 2).rollout;
+  const Rollout first = system.Run(policy, true, 200, 2).rollout,
+                again = twin.Run(policy, true, 200, 2).rollout;
   REQUIRE(first.transitions.size() == again.transitions.size());
   CHECK(first.transitions.back().next_q == again.transitions.back().next_q);
   CHECK(system.Run(policy, true, 5, 3).rollout.transitions[0].q != first.transitions[0].q);
-  // s' - f(s) with both readings noisy, by the simulator's own sensitivity: its sum of squares is chi^2.
+  // s' - f(s) with both readings noisy, by the simulator's own sensitivity: its sum of squares is
+  // chi^2.
   Simulator simulator(robot);
   simulator.SetParameters(hidden);
   double sum = 0;
@@ -81,7 +88,8 @@ TEST_CASE("trials are functions of seed and number; noise has the size that is c
     Eigen::Matrix2d sensitivity;
     sensitivity << (end(1e-6, 0) - middle) / 1e-6, (end(0, 1e-6) - middle) / 1e-6;
     const Eigen::Matrix2d covariance =
-        sensitivity * noise.cwiseAbs2().asDiagonal() * sensitivity.transpose() + Eigen::Matrix2d(noise.cwiseAbs2().asDiagonal());
+        sensitivity * noise.cwiseAbs2().asDiagonal() * sensitivity.transpose() +
+        Eigen::Matrix2d(noise.cwiseAbs2().asDiagonal());
     const Eigen::Vector2d error = middle - Eigen::Vector2d(t.next_q(0), t.next_v(0));
     sum += error.dot(covariance.inverse() * error);
     count += 2;
@@ -95,7 +103,8 @@ TEST_CASE("a budget is kept, and transitions are spread or the first") {
   const Eigen::VectorXd hidden = DrawHidden(robot, Hidden::kPaper, 2);
   SimulatedSystem system(robot, hidden, ReadingNoise(robot), 2);
   std::vector<Rollout> rollouts;
-  for (uint32_t i = 0; i < 4; ++i) rollouts.push_back(system.Run(Policy(robot), true, 200, i).rollout);
+  for (uint32_t i = 0; i < 4; ++i)
+    rollouts.push_back(system.Run(Policy(robot), true, 200, i).rollout);
   CHECK(CountTransitions(FirstTransitions(rollouts, 250)) == 250);
   CHECK(FirstTransitions(rollouts, 250).size() == 2);
   const auto spread = SpreadTransitions(rollouts, 150);

@@ -1,5 +1,5 @@
-// libFuzzer: any file is refused as a log, or replayed from the first frame to the last: each of them
-// well-formed and the same after a way through text, all of them counted, none of them late.
+// libFuzzer: any file is refused as a log, or replayed from the first frame to the last: each of
+// them well-formed and the same after a way through text, all of them counted, none of them late.
 
 #include <sys/mman.h>
 #include <unistd.h>

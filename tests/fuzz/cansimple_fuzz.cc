@@ -33,7 +33,8 @@ class Drive : public VirtualDrive {
   std::vector<uint32_t> ids() const override {
     std::vector<uint32_t> ids;
     for (uint32_t command = 0; command < 32; ++command) ids.push_back(kNode << 5 | command);
-    for (const Layout& layout : {kEstop, kAddress}) ids.push_back(kBroadcastNode << 5 | layout.command);
+    for (const Layout& layout : {kEstop, kAddress})
+      ids.push_back(kBroadcastNode << 5 | layout.command);
     return ids;
   }
   void OnFrame(const Frame& frame, int64_t now) override {
@@ -102,7 +103,9 @@ class Drive : public VirtualDrive {
             is(Make(kSetAxisState, kNode, {kClosedLoopControl})));
   }
   bool Agrees(const MotorEstimate& estimate) const override {
-    const auto near = [](double a, double b) { return std::abs(a - b) <= 1e-6 * (1 + std::abs(b)); };
+    const auto near = [](double a, double b) {
+      return std::abs(a - b) <= 1e-6 * (1 + std::abs(b));
+    };
     return near(estimate.position, sample_.position * kTurn) &&
            near(estimate.velocity, sample_.velocity * kTurn);
   }

@@ -46,7 +46,8 @@ class Encoder : public VirtualSensor {
   }
   bool Agrees(const Sensor& host) const override {
     const double count = kTurn / settings_.counts;
-    const double difference = std::remainder(host.encoder()->position - position_, settings_.range * count);
+    const double difference =
+        std::remainder(host.encoder()->position - position_, settings_.range * count);
     return std::abs(difference) <= count * 1.01 + 1e-9 * std::abs(position_);
   }
 
@@ -78,6 +79,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   description.range = settings.range;
   description.period = (kind & 8) != 0 ? 0.002 : 0.01;
   description.max_speed = Encoder::kMaxSpeed;
-  SensorGame(MakeCia406Encoder(description, {100'000}), std::make_unique<Encoder>(settings), bytes).Play();
+  SensorGame(MakeCia406Encoder(description, {100'000}), std::make_unique<Encoder>(settings), bytes)
+      .Play();
   return 0;
 }

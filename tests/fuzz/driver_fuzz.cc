@@ -1,7 +1,7 @@
-// libFuzzer: the driver's state machine with two virtual ODrives and a boom encoder, a wire that may spoil
-// what it carries, strangers, clocks that are set and people who ask for anything at any time. Whatever
-// happens: no torque unless the robot is armed, the command and the measurements are fresh, and limits are
-// kept; and once nothing is wrong any more it can be armed again.
+// libFuzzer: the driver's state machine with two virtual ODrives and a boom encoder, a wire that
+// may spoil what it carries, strangers, clocks that are set and people who ask for anything at any
+// time. Whatever happens: no torque unless the robot is armed, the command and the measurements are
+// fresh, and limits are kept; and once nothing is wrong any more it can be armed again.
 
 #include <cmath>
 #include <numbers>
@@ -26,12 +26,14 @@ constexpr int kSlide = 2;  // the passive joint
 
 class DriverGame {
  public:
-  explicit DriverGame(Bytes& bytes) : bytes_(bytes), robot_(Leg()), driver_(robot_, kStart, kEpoch + kStart) {
+  explicit DriverGame(Bytes& bytes)
+      : bytes_(bytes), robot_(Leg()), driver_(robot_, kStart, kEpoch + kStart) {
     for (int node = 1; node <= static_cast<int>(kMotors); ++node) {
-      drives_.emplace_back(
-          CanSimpleDevice::Settings{
-              .node = node, .heartbeat_period = 20'000, .encoder_period = 5'000, .watchdog = 50'000},
-          kStart);
+      drives_.emplace_back(CanSimpleDevice::Settings{.node = node,
+                                                     .heartbeat_period = 20'000,
+                                                     .encoder_period = 5'000,
+                                                     .watchdog = 50'000},
+                           kStart);
     }
     boom_.emplace(Cia406Device::Settings{.event_timer = 5'000}, kStart);
     // As a rule the fuzzer begins with a robot that runs.
@@ -129,17 +131,19 @@ class DriverGame {
     for (size_t i = 0; i < kMotors; ++i) {
       const JointMap map(robot_.joints[i].motor);
       drives_[i].Tick(
-          now_, {map.MotorPosition(position_[i]) / kTurn, map.MotorVelocity(velocity_[i]) / kTurn}, said);
+          now_, {map.MotorPosition(position_[i]) / kTurn, map.MotorVelocity(velocity_[i]) / kTurn},
+          said);
     }
     boom_->Tick(now_, position_[kSlide], said);
-    for (const Frame& frame : said.frames()) wire_.Carry(frame, [this](const Frame& f) { ToDriver(f); });
+    for (const Frame& frame : said.frames())
+      wire_.Carry(frame, [this](const Frame& f) { ToDriver(f); });
   }
 
   void ToDriver(const Frame& frame) {
     for (size_t i = 0; i < kMotors; ++i) {
-      const bool estimates = frame.id == ((i + 1) << 5 | kGetEncoderEstimates.command) && !frame.extended &&
-                             !frame.remote && !frame.error && !frame.fd && !frame.foreign &&
-                             frame.length >= 8;
+      const bool estimates = frame.id == ((i + 1) << 5 | kGetEncoderEstimates.command) &&
+                             !frame.extended && !frame.remote && !frame.error && !frame.fd &&
+                             !frame.foreign && frame.length >= 8;
       const auto values = estimates ? DecodePayload(kGetEncoderEstimates, frame) : std::nullopt;
       if (!values) continue;
       const JointMap map(robot_.joints[i].motor);
@@ -191,7 +195,8 @@ class DriverGame {
     const DriveState state = driver_.state();
     // Only an order to arm leads out of a fault.
     if (fault_ && !asked_to_arm_)
-      Require(state == DriveState::kFault || state == DriveState::kIdle || state == DriveState::kAbsent);
+      Require(state == DriveState::kFault || state == DriveState::kIdle ||
+              state == DriveState::kAbsent);
     if (state == DriveState::kFault) may_run_ = asked_to_arm_ = false;
     fault_ = state == DriveState::kFault;
     Require((state == DriveState::kArmed) == driver_.reason().empty());
@@ -209,7 +214,8 @@ class DriverGame {
     }
     if (anything) {
       const uint8_t kind = bytes_.Byte();
-      for (auto* values : {&command.effort, &command.position, &command.velocity, &command.kp, &command.kd}) {
+      for (auto* values :
+           {&command.effort, &command.position, &command.velocity, &command.kp, &command.kd}) {
         for (double& value : *values) value = (kind & 1) != 0 ? bytes_.Number() : bytes_.Modest(5);
       }
       if ((kind & 2) != 0) command.sequence = bytes_.Value<int64_t>();
@@ -294,9 +300,9 @@ class DriverGame {
     return driver_.state() == DriveState::kArmed;
   }
 
-  static constexpr uint32_t kIds[] = {0x20,  0x21, 0x23,  0x26,  0x29,  0x2E, 0x34, 0x35, 0x37, 0x3C,
-                                      0x41,  0x43, 0x49,  0x4E,  0x55,  0x57, 0x5C, 0x22, 0x42, 0x27,
-                                      0x7E2, 0x81, 0x181, 0x581, 0x701, 0x00, 0x40, 0x100};
+  static constexpr uint32_t kIds[] = {
+      0x20, 0x21, 0x23, 0x26, 0x29, 0x2E, 0x34,  0x35, 0x37,  0x3C,  0x41,  0x43, 0x49, 0x4E,
+      0x55, 0x57, 0x5C, 0x22, 0x42, 0x27, 0x7E2, 0x81, 0x181, 0x581, 0x701, 0x00, 0x40, 0x100};
 
   Bytes& bytes_;
   const RobotDescription robot_;

@@ -6,8 +6,8 @@
 
 namespace plumb {
 
-/// Two joints on ODrives, one of them behind a gear and turned round, and a slide on the boom that an encoder
-/// measures; short times, so that much happens in few cycles.
+/// Two joints on ODrives, one of them behind a gear and turned round, and a slide on the boom that
+/// an encoder measures; short times, so that much happens in few cycles.
 inline RobotDescription Leg() {
   RobotDescription robot;
   robot.links.resize(4);

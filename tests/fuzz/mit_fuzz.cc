@@ -22,7 +22,8 @@ MitRanges Ranges(uint8_t kind) {
 
 bool IsSpecial(const Frame& frame) {
   return frame.length == 8 && frame.data[7] >= kEnter &&
-         std::all_of(frame.data.begin(), frame.data.begin() + 7, [](uint8_t byte) { return byte == 0xFF; });
+         std::all_of(frame.data.begin(), frame.data.begin() + 7,
+                     [](uint8_t byte) { return byte == 0xFF; });
 }
 
 class Drive : public VirtualDrive {
@@ -41,7 +42,8 @@ class Drive : public VirtualDrive {
   }
   void Tick(int64_t now, FrameBatch& out) override {
     device_.Tick(now, sample_, out);
-    if (settings_.watchdog > 0 && now - fed_ >= settings_.watchdog) Require(device_.Torque(sample_) == 0);
+    if (settings_.watchdog > 0 && now - fed_ >= settings_.watchdog)
+      Require(device_.Torque(sample_) == 0);
   }
   int64_t NextDue() const override { return device_.NextDue(); }
   bool armed() const override { return device_.armed(); }
@@ -87,7 +89,8 @@ class Drive : public VirtualDrive {
   bool Agrees(const MotorEstimate& estimate) const override {
     const double position = sample_.position - zero_;
     if (std::abs(position) > 1e5) return true;  // where single precision has no more codes
-    const double difference = std::remainder(estimate.position - position, Period(settings_.ranges));
+    const double difference =
+        std::remainder(estimate.position - position, Period(settings_.ranges));
     // A code is cut off, in single precision.
     return std::abs(difference) <= Period(settings_.ranges) / 65535 + 1e-6 * std::abs(position) &&
            std::abs(estimate.velocity - sample_.velocity) <= 2.1 * settings_.ranges.velocity / 4095;
@@ -95,7 +98,9 @@ class Drive : public VirtualDrive {
 
  private:
   /// [rad/s] It must not go round half its period while one may be silent.
-  double Slowest() const { return std::min(settings_.ranges.velocity, 2 * settings_.ranges.position); }
+  double Slowest() const {
+    return std::min(settings_.ranges.velocity, 2 * settings_.ranges.position);
+  }
 
   const MitDevice::Settings settings_;
   const Layout command_;

@@ -7,11 +7,14 @@ namespace {
 
 bool NotInfinite(double value) { return !std::isinf(value); }
 
-bool Active(DriveState state) { return state == DriveState::kArming || state == DriveState::kArmed; }
+bool Active(DriveState state) {
+  return state == DriveState::kArming || state == DriveState::kArmed;
+}
 
 }  // namespace
 
-MotorGame::MotorGame(std::unique_ptr<Motor> motor, std::unique_ptr<VirtualDrive> drive, Bytes& bytes)
+MotorGame::MotorGame(std::unique_ptr<Motor> motor, std::unique_ptr<VirtualDrive> drive,
+                     Bytes& bytes)
     : bytes_(bytes),
       motor_(std::move(motor)),
       drive_(std::move(drive)),
@@ -112,7 +115,8 @@ void MotorGame::TellHost(const Frame& frame) {
   if (!IsWellFormed(frame)) return;
   const FrameUse use = motor_->OnFrame(frame, now_);
   if (clean_) Require(use == FrameUse::kConsumed || use == FrameUse::kEstimate);
-  if (clean_ && latency_ == 0 && use == FrameUse::kEstimate) Require(drive_->Agrees(motor_->estimate()));
+  if (clean_ && latency_ == 0 && use == FrameUse::kEstimate)
+    Require(drive_->Agrees(motor_->estimate()));
 }
 
 // Any number is a valid frame, of that torque or the nearest there is.
@@ -160,7 +164,8 @@ void MotorGame::ComeToRestAndArm() {
   may_arm_ = true;
   motor_->Disarm(now_);
   run(1'000'000);
-  // A shaft that turns a thousand times within a cycle may look like a restart just now, which it stops once more.
+  // A shaft that turns a thousand times within a cycle may look like a restart just now, which it
+  // stops once more.
   for (int i = 0; i < 100 && !motor_->confirmed_idle(); ++i) Cycle(kStep);
   Require(motor_->confirmed_idle() && !drive_->armed());
   drive_->Heal();

@@ -45,9 +45,10 @@ class VirtualDrive {
   virtual bool Agrees(const MotorEstimate& estimate) const = 0;
 };
 
-/// Plays what the input says between a protocol's host, a virtual drive, and a wire that may spoil what it
-/// carries; requires at all times what must hold. The input's first byte: bit 0 = the wire is clean and
-/// nobody else speaks, then more must hold; bits 1 and 2 = cycles that the drive's frames take to the host.
+/// Plays what the input says between a protocol's host, a virtual drive, and a wire that may spoil
+/// what it carries; requires at all times what must hold. The input's first byte: bit 0 = the wire
+/// is clean and nobody else speaks, then more must hold; bits 1 and 2 = cycles that the drive's
+/// frames take to the host.
 class MotorGame {
  public:
   static constexpr int64_t kStart = 1'000'000;

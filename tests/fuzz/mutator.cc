@@ -21,7 +21,8 @@ const auto& Any(const List& list, Random& random) {
 }
 
 bool IsWord(char c) {
-  return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '.' || c == '-' || c == '+';
+  return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '.' || c == '-' ||
+         c == '+';
 }
 
 // Words that begin like a number, or those that do not.
@@ -30,8 +31,8 @@ std::vector<Span> Words(const std::string& text, bool numbers) {
   for (size_t i = 0; i < text.size();) {
     size_t end = i;
     while (end < text.size() && IsWord(text[end])) ++end;
-    if (end > i &&
-        (std::isdigit(static_cast<unsigned char>(text[i])) || std::strchr("+-.", text[i])) == numbers) {
+    if (end > i && (std::isdigit(static_cast<unsigned char>(text[i])) ||
+                    std::strchr("+-.", text[i])) == numbers) {
       spans.push_back({i, end - i});
     }
     i = std::max(end, i + 1);
@@ -49,7 +50,8 @@ std::vector<Span> Lines(const std::string& text) {
   return spans;
 }
 
-// XML elements with what is in them, and TOML tables with their header; single lines where there are none.
+// XML elements with what is in them, and TOML tables with their header; single lines where there
+// are none.
 std::vector<Span> Elements(const std::string& text) {
   std::vector<Span> spans;
   for (size_t i = 0; i + 1 < text.size(); ++i) {
@@ -143,7 +145,8 @@ void RenameWord(std::string& text, Random& random) {
       break;
     }
     case 2:
-      text.insert(span.begin + Below(span.size, random), 1, static_cast<char>('a' + random.Bits() % 26));
+      text.insert(span.begin + Below(span.size, random), 1,
+                  static_cast<char>('a' + random.Bits() % 26));
       break;
     default:
       text.erase(span.begin + Below(span.size, random), 1);

@@ -1,5 +1,6 @@
-// Robots with mistakes in their files: each is read, and simulated a little, or refused with one line that
-// says where. Anything else ends the program. A mutant has a number: --first 1234 --count 1 makes it again.
+// Robots with mistakes in their files: each is read, and simulated a little, or refused with one
+// line that says where. Anything else ends the program. A mutant has a number: --first 1234 --count
+// 1 makes it again.
 
 #include <fmt/format.h>
 
@@ -29,8 +30,10 @@ struct Files {
 };
 
 struct Counts {
-  int64_t refused = 0, with_line = 0, refused_simulator = 0, not_finite = 0, simulated = 0, failed = 0;
-  std::map<std::string, int64_t> refusals, without_line, simulator;  // by message, without what varies
+  int64_t refused = 0, with_line = 0, refused_simulator = 0, not_finite = 0, simulated = 0,
+          failed = 0;
+  // by message, without what varies
+  std::map<std::string, int64_t> refusals, without_line, simulator;
 };
 
 std::vector<Files> Originals(const std::string& source) {
@@ -57,15 +60,15 @@ void RequireValid(const RobotDescription& robot) {
   require(!robot.parameters.empty(), "parameters are none");
   for (size_t i = 0; i < robot.joints.size(); ++i) {
     const JointDescription& joint = robot.joints[i];
-    require(
-        joint.child == static_cast<int>(i) + 1 && joint.parent >= 0 && joint.parent <= static_cast<int>(i),
-        "joints are no tree");
+    require(joint.child == static_cast<int>(i) + 1 && joint.parent >= 0 &&
+                joint.parent <= static_cast<int>(i),
+            "joints are no tree");
     require(joint.origin.allFinite() && joint.rotation.allFinite(), "joints are nowhere");
     require(std::abs(joint.axis.norm() - 1) < 1e-9, "axes have no length");
     require(joint.lower < joint.upper, "limits exclude everything");
-    require(
-        joint.passive ? joint.effort_limit == 0 : joint.effort_limit > 0 && std::isfinite(joint.effort_limit),
-        "efforts are none");
+    require(joint.passive ? joint.effort_limit == 0
+                          : joint.effort_limit > 0 && std::isfinite(joint.effort_limit),
+            "efforts are none");
     require(joint.velocity_limit > 0, "velocities are none");
   }
   for (const LinkDescription& link : robot.links) {
@@ -110,7 +113,8 @@ bool Try(const RobotFolder& folder, Counts& counts) {
     const std::string rest = text.substr(folder.path().size() + 1);
     const bool line = std::regex_search(rest.substr(0, 40), kLine);
     counts.with_line += line;
-    std::string kind = std::regex_replace(rest.substr(0, 200), std::regex("[0-9]+"), "#").substr(0, 70);
+    std::string kind =
+        std::regex_replace(rest.substr(0, 200), std::regex("[0-9]+"), "#").substr(0, 70);
     ++counts.refusals[kind];
     if (!line) ++counts.without_line[kind];
     return true;
@@ -147,23 +151,27 @@ int main(int argc, char** argv) {
     const Files& original = originals[static_cast<size_t>(i) % originals.size()];
     const uint32_t which = random.Bits() % 4;
     const std::string urdf = which == 0 ? original.urdf : Mutate(original.urdf, random);
-    const std::string toml = which == 0 || which == 3 ? Mutate(original.toml, random) : original.toml;
+    const std::string toml =
+        which == 0 || which == 3 ? Mutate(original.toml, random) : original.toml;
     folder.Write(urdf, toml);
     if (verbose) fmt::print(stderr, "mutant {} of {}\n", i, original.name);
     if (keep && i == first + count - 1) fmt::print("{}\n{}\n", urdf, toml);
     const auto start = std::chrono::steady_clock::now();
     if (!Try(folder, counts)) {
-      fmt::print(stderr, "mutant {} of {}: --seed {} --first {} --count 1\n", i, original.name, seed, i);
+      fmt::print(stderr, "mutant {} of {}: --seed {} --first {} --count 1\n", i, original.name,
+                 seed, i);
       ++counts.failed;
     }
-    const double duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double duration =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (duration > slowest) {
       slowest = duration;
       if (verbose) fmt::print(stderr, "slowest until now: mutant {}, {:.3f} s\n", i, slowest);
     }
   }
   fmt::print(
-      "{} mutants of {} robots: {} refused, {:.2f} % of them with a line; {} simulated, {} of them not "
+      "{} mutants of {} robots: {} refused, {:.2f} % of them with a line; {} simulated, {} of them "
+      "not "
       "finite; "
       "{} refused by the simulator; {} failed; the slowest took {:.3f} s\n",
       count, originals.size(), counts.refused,

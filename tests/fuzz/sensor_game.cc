@@ -11,7 +11,8 @@ bool Finite(std::span<const double> values) {
 
 }  // namespace
 
-SensorGame::SensorGame(std::unique_ptr<Sensor> host, std::unique_ptr<VirtualSensor> sensor, Bytes& bytes)
+SensorGame::SensorGame(std::unique_ptr<Sensor> host, std::unique_ptr<VirtualSensor> sensor,
+                       Bytes& bytes)
     : bytes_(bytes),
       host_(std::move(host)),
       sensor_(std::move(sensor)),
@@ -67,7 +68,8 @@ void SensorGame::Cycle(int64_t dt) {
   Require(sensor_->NextDue() > now_);
   for (const Frame& frame : said_.frames()) {
     Require(IsWellFormed(frame) && !frame.fd && !frame.extended && !frame.error);
-    Require(std::ranges::any_of(filters_, [&](const Filter& f) { return f.id == (frame.id & f.mask); }));
+    Require(std::ranges::any_of(filters_,
+                                [&](const Filter& f) { return f.id == (frame.id & f.mask); }));
     wire_.Carry(frame, [this](const Frame& arrived) { TellHost(arrived); });
   }
   host_->Tick(now_, told_);
@@ -117,7 +119,8 @@ void SensorGame::StartAnew() {
   host_->Start(now_);
   const int64_t before = readings_;
   for (int i = 0; i < 80; ++i) Cycle(10'000);  // it may have to be told twice
-  Require(host_->state() == SensorState::kRunning && readings_ > before + 10 && sensor_->Agrees(*host_));
+  Require(host_->state() == SensorState::kRunning && readings_ > before + 10 &&
+          sensor_->Agrees(*host_));
 }
 
 }  // namespace plumb

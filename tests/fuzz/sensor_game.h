@@ -30,7 +30,8 @@ class VirtualSensor {
   virtual bool Agrees(const Sensor& host) const = 0;
 };
 
-/// As MotorGame, for a sensor. The input's first byte: bit 0 = the wire is clean and nobody else speaks.
+/// As MotorGame, for a sensor. The input's first byte: bit 0 = the wire is clean and nobody else
+/// speaks.
 class SensorGame {
  public:
   static constexpr int64_t kStart = 1'000'000;

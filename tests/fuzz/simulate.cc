@@ -17,8 +17,9 @@ SimulatorOutcome Simulate(const RobotDescription& robot) {
     if (reason.empty()) throw std::logic_error("the simulator does not say what is wrong");
     return {reason};
   }
-  simulator->SetState(Eigen::Map<const Eigen::VectorXd>(robot.task.target.data(), robot.num_positions()),
-                      Eigen::VectorXd::Constant(robot.num_velocities(), 0.1));
+  simulator->SetState(
+      Eigen::Map<const Eigen::VectorXd>(robot.task.target.data(), robot.num_positions()),
+      Eigen::VectorXd::Constant(robot.num_velocities(), 0.1));
   const Eigen::VectorXd effort = Eigen::VectorXd::Constant(robot.num_velocities(), 0.5);
   // Ten seconds in substeps of a microsecond are allowed, but not waited for.
   const double duration = std::min(robot.task.period, 5 * robot.simulation.substep);

@@ -12,8 +12,8 @@ struct SimulatorOutcome {
   bool finite = true;   ///< the state in the end
 };
 
-/// Builds a simulator of the robot, puts it at the task's target and moves it a little. Throws nothing, as
-/// the simulator must not: whatever comes through is a mistake of its.
+/// Builds a simulator of the robot, puts it at the task's target and moves it a little. Throws
+/// nothing, as the simulator must not: whatever comes through is a mistake of its.
 SimulatorOutcome Simulate(const RobotDescription& robot);
 
 }  // namespace plumb

@@ -18,8 +18,8 @@ class Imu : public VirtualSensor {
 
   std::vector<uint32_t> ids() const override {
     std::vector<uint32_t> ids;
-    for (const Layout& layout : {kError, kWarning, kSampleTime, kGroupCounter, kStatusWord, kQuaternion,
-                                 kEulerAngles, kRateOfTurn, kAcceleration}) {
+    for (const Layout& layout : {kError, kWarning, kSampleTime, kGroupCounter, kStatusWord,
+                                 kQuaternion, kEulerAngles, kRateOfTurn, kAcceleration}) {
       ids.push_back(base_ + layout.command);
     }
     return ids;

@@ -22,11 +22,14 @@ void StartAll(Stage& stage, const std::string& drivers_bus) {
 
 TEST_CASE("on a bus that loses one frame in twenty, and delays all, the robot runs on") {
   Stage stage(70);
-  StartAll(stage, "faulty:loss=0.05,delay=500us,jitter=1ms,duplicate=0.02,reorder=0.02:" + stage.bus_url);
+  StartAll(stage,
+           "faulty:loss=0.05,delay=500us,jitter=1ms,duplicate=0.02,reorder=0.02:" + stage.bus_url);
   const bool begun = stage.BeginEpisode();
-  INFO(stage.drivers.newest().reason << "; " << stage.controllers.newest().reason << int{stage.controllers.newest().phase});
+  INFO(stage.drivers.newest().reason << "; " << stage.controllers.newest().reason
+                                     << int{stage.controllers.newest().phase});
   REQUIRE(begun);
-  const bool stopped = stage.WaitUntil([&] { return stage.drivers.newest().state != driver_status_t::ARMED; }, 10);
+  const bool stopped =
+      stage.WaitUntil([&] { return stage.drivers.newest().state != driver_status_t::ARMED; }, 10);
   INFO(stage.drivers.newest().reason);
   CHECK_FALSE(stopped);
   CHECK(stage.drivers.newest().measurements_lost > 10);
@@ -59,7 +62,8 @@ TEST_CASE("with a recording for a bus the driver plays it and refuses to arm") {
     for (int i = 0; i < 4000; ++i) {
       file << fmt::format("({}.{:06}) can0 029#0000803E00000000\n", i / 200, i % 200 * 5000);
       if (i % 4 == 0)
-        file << fmt::format("({}.{:06}) can0 021#0000000008000000\n", i / 200, i % 200 * 5000 + 100);
+        file << fmt::format("({}.{:06}) can0 021#0000000008000000\n", i / 200,
+                            i % 200 * 5000 + 100);
     }
   }
   stage.Start("plumb-driver", {"--bus", "replay:" + log.string()});

@@ -1,5 +1,5 @@
-// The whole loop with the real processes: plumb launch from the prior to an evaluated policy, and the same
-// calibration again from its log.
+// The whole loop with the real processes: plumb launch from the prior to an evaluated policy, and
+// the same calibration again from its log.
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -28,8 +28,8 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   Stage stage(30, "pendulum", Stage::Time::kReal);
   const fs::path summary_file = stage.folder / "summary.json", log = stage.folder / "run.lcmlog",
                  can_log = stage.folder / "can.log";
-  Child launch = Launch(stage, {"--iterations", "2", "--evaluation-episodes", "2", "--seed", "3", "--log", log,
-                                "--can-log", can_log, "--summary", summary_file});
+  Child launch = Launch(stage, {"--iterations", "2", "--evaluation-episodes", "2", "--seed", "3",
+                                "--log", log, "--can-log", can_log, "--summary", summary_file});
   Finish(stage, launch);
   CHECK(Left(stage) == 0);
   // At the end the drive is disarmed: its last heartbeat says so.
@@ -44,7 +44,8 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   CHECK(summary.at("hidden").size() == 3);
   CHECK(summary.at("evaluation_returns").size() == 2);
   for (const auto& iteration : summary.at("iterations")) {
-    for (const char* key : {"mean", "sd", "discrepancy", "error", "kl", "simulated_return", "robot_return", "seconds"}) {
+    for (const char* key : {"mean", "sd", "discrepancy", "error", "kl", "simulated_return",
+                            "robot_return", "seconds"}) {
       INFO(key);
       CHECK(iteration.contains(key));
       CHECK_FALSE(iteration.at(key).is_null());
@@ -52,8 +53,8 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
     CHECK(iteration.at("kl") > 0);
     CHECK(iteration.at("transitions") >= 150);
   }
-  // Two iterations may not reach the truth, but they go towards it: more than halfway from the prior. Which is known better, and
-  // comes first, depends on the motion.
+  // Two iterations may not reach the truth, but they go towards it: more than halfway from the
+  // prior. Which is known better, and comes first, depends on the motion.
   const auto& p = stage.robot.parameters;
   const std::map<std::string, double> prior{
       {"gravity / length", std::exp(p[0].coordinate_mean() - p[2].coordinate_mean())},
@@ -65,13 +66,16 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
     const std::string name = combination.at("name");
     INFO(name);
     REQUIRE(prior.count(name) == 1);
-    const double before = prior.at(name), learned = combination.at("mean"), hidden = combination.at("hidden");
+    const double before = prior.at(name), learned = combination.at("mean"),
+                 hidden = combination.at("hidden");
     INFO("prior " << before << ", learned " << learned << ", hidden " << hidden);
     CHECK(std::abs(learned - hidden) < 0.5 * std::abs(before - hidden));
   }
-  CHECK(summary.at("identifiability").get<std::string>().find("not identifiable separately") != std::string::npos);
+  CHECK(summary.at("identifiability").get<std::string>().find("not identifiable separately") !=
+        std::string::npos);
 
-  const std::vector<std::string> calibrator{Stage::Binary("plumb-calibrator"), stage.robot_folder, "--seed", "3"};
+  const std::vector<std::string> calibrator{Stage::Binary("plumb-calibrator"), stage.robot_folder,
+                                            "--seed", "3"};
   const auto same = [&](const fs::path& folder) {
     for (int k = 1; k <= 2; ++k) {
       const std::string name = "distribution_" + std::to_string(k) + ".json";
@@ -83,8 +87,9 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   };
   // From the log file, with another number of threads.
   auto arguments = calibrator;
-  for (const std::string& flag : {std::string("--log"), log.string(), std::string("--checkpoint"),
-                                  (stage.folder / "offline").string(), std::string("--threads"), std::string("1")}) {
+  for (const std::string& flag :
+       {std::string("--log"), log.string(), std::string("--checkpoint"),
+        (stage.folder / "offline").string(), std::string("--threads"), std::string("1")}) {
     arguments.push_back(flag);
   }
   Child offline("offline", arguments, stage.folder / "offline.log");
@@ -92,13 +97,14 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   INFO(offline.Tail(10));
   REQUIRE_FALSE(offline.failed());
   same(stage.folder / "offline");
-
 }
 
 /// All that a run leaves behind which must be the same, one after the other.
 std::string Traces(const Stage& stage, const std::string& output) {
-  std::string traces = Read(stage.folder / (output + ".lcmlog")) + Read(stage.folder / (output + ".can"));
-  for (const char* file : {"summary.json", "calibration/distribution_1.json", "training/trainer.checkpoint"}) {
+  std::string traces =
+      Read(stage.folder / (output + ".lcmlog")) + Read(stage.folder / (output + ".can"));
+  for (const char* file :
+       {"summary.json", "calibration/distribution_1.json", "training/trainer.checkpoint"}) {
     const std::string trace = Read(stage.folder / output / file);
     INFO(file);
     REQUIRE_FALSE(trace.empty());
@@ -111,8 +117,16 @@ TEST_CASE("the same run, every time: beside others, stopped now and then, withou
   Stage stage(35, "pendulum", Stage::Time::kReal);
   LearnLittle(stage);
   const auto flags = [&](const std::string& output, std::vector<std::string> more = {}) {
-    std::vector<std::string> all{"--iterations", "1", "--evaluation-episodes", "1", "--log", stage.folder / (output + ".lcmlog"),
-                                 "--can-log", stage.folder / (output + ".can"), "--summary", stage.folder / output / "summary.json"};
+    std::vector<std::string> all{"--iterations",
+                                 "1",
+                                 "--evaluation-episodes",
+                                 "1",
+                                 "--log",
+                                 stage.folder / (output + ".lcmlog"),
+                                 "--can-log",
+                                 stage.folder / (output + ".can"),
+                                 "--summary",
+                                 stage.folder / output / "summary.json"};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   };
@@ -127,7 +141,9 @@ TEST_CASE("the same run, every time: beside others, stopped now and then, withou
       std::vector<pid_t> processes;
       for (const auto& entry : fs::directory_iterator("/proc")) {
         const pid_t pid = std::atoi(entry.path().filename().c_str());
-        if (pid != 0 && Read(entry.path() / "cmdline").find(stage.folder / "again") != std::string::npos) processes.push_back(pid);
+        if (pid != 0 &&
+            Read(entry.path() / "cmdline").find(stage.folder / "again") != std::string::npos)
+          processes.push_back(pid);
       }
       if (processes.empty()) continue;
       const pid_t victim = processes[static_cast<size_t>(round) % processes.size()];
@@ -142,7 +158,9 @@ TEST_CASE("the same run, every time: beside others, stopped now and then, withou
   SECTION("beside processes that want the machine for themselves") {
     std::vector<std::unique_ptr<Child>> others;
     for (int i = 0; i < 4; ++i) {
-      others.push_back(std::make_unique<Child>("sh", std::vector<std::string>{"sh", "-c", "while :; do :; done"}, stage.folder / "others.log"));
+      others.push_back(
+          std::make_unique<Child>("sh", std::vector<std::string>{"sh", "-c", "while :; do :; done"},
+                                  stage.folder / "others.log"));
     }
     Child again = Launch(stage, flags("again"), "again");
     Finish(stage, again);
@@ -156,7 +174,8 @@ TEST_CASE("the same run, every time: beside others, stopped now and then, withou
     Finish(stage, again);
     // Only what names the bus is another.
     CHECK(Read(stage.folder / "again.can") == Read(stage.folder / "first.can"));
-    CHECK(Read(stage.folder / "again/calibration/distribution_1.json") == Read(stage.folder / "first/calibration/distribution_1.json"));
+    CHECK(Read(stage.folder / "again/calibration/distribution_1.json") ==
+          Read(stage.folder / "first/calibration/distribution_1.json"));
     stage.bus_url = bus;
   }
   SECTION("another seed is another run") {
@@ -200,7 +219,9 @@ TEST_CASE("a process that is killed ends the run, which says so") {
   REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
   for (const auto& entry : fs::directory_iterator("/proc")) {
     const std::string line = Read(entry.path() / "cmdline");
-    if (line.find(stage.lcm_url) == std::string::npos || line.find("plumb-estimator") == std::string::npos) continue;
+    if (line.find(stage.lcm_url) == std::string::npos ||
+        line.find("plumb-estimator") == std::string::npos)
+      continue;
     kill(std::atoi(entry.path().filename().c_str()), SIGKILL);
   }
   REQUIRE(stage.WaitUntil([&] { return !launch.running(); }, kLong));
@@ -226,7 +247,8 @@ TEST_CASE("what a person stops, the launcher does not start again") {
       INFO(stop);
       run({stop, "--clock", clock});
       const int64_t stopped = stage.drivers.newest().utime;
-      REQUIRE(stage.WaitUntil([&] { return stage.drivers.newest().utime > stopped + 2'000'000; }, kLong));
+      REQUIRE(stage.WaitUntil([&] { return stage.drivers.newest().utime > stopped + 2'000'000; },
+                              kLong));
       CHECK(stage.axis_state == 1);
       CHECK(stage.drivers.newest().state != driver_status_t::ARMED);
       run({"arm", "--clock", clock});
@@ -237,7 +259,8 @@ TEST_CASE("what a person stops, the launcher does not start again") {
   }
   SECTION("from outside: for good") {
     const char* stop = GENERATE("disarm", "estop");
-    Child request("plumb", {Stage::Binary("plumb"), stop, "--lcm-url", stage.lcm_url}, stage.folder / "stop.log");
+    Child request("plumb", {Stage::Binary("plumb"), stop, "--lcm-url", stage.lcm_url},
+                  stage.folder / "stop.log");
     REQUIRE(stage.WaitUntil([&] { return !launch.running(); }, kLong));
     CHECK(launch.ending() == "exit status 1");
     CHECK_THAT(launch.Tail(5), Contains("somebody outside the run has asked for a stop"));
@@ -266,15 +289,18 @@ TEST_CASE("who speaks from outside is named once, and not heard") {
   }
   const std::string output = Finish(stage, launch);
   CHECK_THAT(output, Contains("somebody outside the run says JOINT_COMMAND: not heard"));
-  CHECK_THAT(output, Contains("029#0000000000000000 on " + stage.bus_url + " is from outside the run, and ignored"));
+  CHECK_THAT(output, Contains("029#0000000000000000 on " + stage.bus_url +
+                              " is from outside the run, and ignored"));
   CHECK(output.find("not heard") == output.rfind("not heard"));
 }
 
 TEST_CASE("a second run beside the first, and a bus that may carry a real robot, are refused") {
   Stage stage(34, "pendulum", Stage::Time::kReal);
-  const auto refusal = [&](const std::string& lcm_url, const std::string& bus_url, const std::string& output) {
-    Child second("plumb", {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", lcm_url, "--bus", bus_url,
-                           "--output", stage.folder / output},
+  const auto refusal = [&](const std::string& lcm_url, const std::string& bus_url,
+                           const std::string& output) {
+    Child second("plumb",
+                 {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", lcm_url,
+                  "--bus", bus_url, "--output", stage.folder / output},
                  stage.folder / ("second" + std::to_string(stage.frames) + ".log"));
     stage.WaitUntil([&] { return !second.running(); }, kLong);
     REQUIRE_FALSE(second.running());
@@ -285,9 +311,11 @@ TEST_CASE("a second run beside the first, and a bus that may carry a real robot,
   Child launch = Launch(stage, {"--real-time"});
   REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
   stage.Listen(0.1);
-  CHECK_THAT(refusal(stage.lcm_url, "udp:239.74.163.2:23260", "second"), Contains("another run is under way"));
+  CHECK_THAT(refusal(stage.lcm_url, "udp:239.74.163.2:23260", "second"),
+             Contains("another run is under way"));
   stage.Listen(0.1);
-  CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", stage.bus_url, "second"), Contains("somebody talks on"));
+  CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", stage.bus_url, "second"),
+             Contains("somebody talks on"));
   stage.Listen(0.1);
   CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", "udp:239.74.163.2:23260", "run"),
              Contains("in use by process " + std::to_string(launch.pid())));

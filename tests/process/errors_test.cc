@@ -20,7 +20,9 @@ std::string FailureOf(const fs::path& folder, std::vector<std::string> arguments
   return child.Tail(50);
 }
 
-size_t Lines(const std::string& text) { return static_cast<size_t>(std::count(text.begin(), text.end(), '\n')); }
+size_t Lines(const std::string& text) {
+  return static_cast<size_t>(std::count(text.begin(), text.end(), '\n'));
+}
 
 TEST_CASE("a typo in robot.toml stops every process with the same line") {
   Stage stage(20);
@@ -30,14 +32,18 @@ TEST_CASE("a typo in robot.toml stops every process with the same line") {
   std::string text{std::istreambuf_iterator<char>(in), {}};
   text.replace(text.find("expiry ="), 8, "expirey =");
   std::ofstream(robot / "robot.toml") << text;
-  for (const char* name : {"plumb-driver", "plumb-estimator", "plumb-controller", "plumb-calibrator", "plumb-trainer",
-                           "plumb-robot"}) {
+  for (const char* name : {"plumb-driver", "plumb-estimator", "plumb-controller",
+                           "plumb-calibrator", "plumb-trainer", "plumb-robot"}) {
     INFO(name);
-    const std::string output = FailureOf(stage.folder, {Stage::Binary(name), robot, "--lcm-url", stage.lcm_url});
+    const std::string output =
+        FailureOf(stage.folder, {Stage::Binary(name), robot, "--lcm-url", stage.lcm_url});
     CHECK(Lines(output) == 1);
-    CHECK_THAT(output, Contains("robot.toml:13:11: driver.expirey is not a known key; did you mean expiry?"));
+    CHECK_THAT(
+        output,
+        Contains("robot.toml:13:11: driver.expirey is not a known key; did you mean expiry?"));
   }
-  const std::string output = FailureOf(stage.folder, {Stage::Binary("plumb"), "launch", robot, "--lcm-url", stage.lcm_url});
+  const std::string output = FailureOf(
+      stage.folder, {Stage::Binary("plumb"), "launch", robot, "--lcm-url", stage.lcm_url});
   CHECK(Lines(output) == 1);
   CHECK_THAT(output, Contains("did you mean expiry?"));
 }
@@ -53,8 +59,9 @@ TEST_CASE("a CAN interface that is not there") {
     CHECK(Lines(output) == 1);
     CHECK_THAT(output, Contains("vcan7") || Contains("udp:") || Contains("--real"));
   }
-  const std::string output = FailureOf(
-      stage.folder, {Stage::Binary("plumb-driver"), stage.robot_folder, "--bus", "canbus:0", "--lcm-url", stage.lcm_url});
+  const std::string output =
+      FailureOf(stage.folder, {Stage::Binary("plumb-driver"), stage.robot_folder, "--bus",
+                               "canbus:0", "--lcm-url", stage.lcm_url});
   CHECK(Lines(output) == 1);
   CHECK_THAT(output, Contains("canbus:0"));
 }
@@ -71,26 +78,33 @@ TEST_CASE("a machine without a multicast route") {
   }
   for (const char* name : {"plumb-estimator", "plumb-controller", "plumb-driver"}) {
     INFO(name);
-    const std::string output =
-        FailureOf(stage.folder, {"unshare", "-n", Stage::Binary(name), stage.robot_folder, "--lcm-url", stage.lcm_url});
+    const std::string output = FailureOf(
+        stage.folder,
+        {"unshare", "-n", Stage::Binary(name), stage.robot_folder, "--lcm-url", stage.lcm_url});
     CHECK_THAT(output, Contains("multicast"));
-    CHECK_THAT(output, Contains("ip route add 224.0.0.0/4 dev lo") || Contains("ip link set lo up"));
+    CHECK_THAT(output,
+               Contains("ip route add 224.0.0.0/4 dev lo") || Contains("ip link set lo up"));
   }
-  const std::string doctor = FailureOf(stage.folder, {"unshare", "-n", Stage::Binary("plumb"), "doctor"});
+  const std::string doctor =
+      FailureOf(stage.folder, {"unshare", "-n", Stage::Binary("plumb"), "doctor"});
   CHECK_THAT(doctor, Contains("BAD"));
   CHECK_THAT(doctor, Contains("cure: ip link set lo up multicast on"));
 }
 
 TEST_CASE("wrong flags are usage errors") {
   Stage stage(23);
-  for (const std::vector<std::string>& flags : std::vector<std::vector<std::string>>{
-           {"plumb", "launch", "--iterations", "0"}, {"plumb", "lunch"}, {"plumb-driver"}, {"plumb-trainer", "x", "--y"}}) {
+  for (const std::vector<std::string>& flags :
+       std::vector<std::vector<std::string>>{{"plumb", "launch", "--iterations", "0"},
+                                             {"plumb", "lunch"},
+                                             {"plumb-driver"},
+                                             {"plumb-trainer", "x", "--y"}}) {
     std::vector<std::string> arguments = flags;
     arguments[0] = Stage::Binary(arguments[0]);
     FailureOf(stage.folder, arguments);
   }
-  const std::string output = FailureOf(stage.folder, {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url",
-                                                      stage.lcm_url, "--clock", "fast"});
+  const std::string output =
+      FailureOf(stage.folder, {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url",
+                               stage.lcm_url, "--clock", "fast"});
   CHECK_THAT(output, Contains("'fast' is not SCALE"));
 }
 
@@ -99,7 +113,8 @@ TEST_CASE("a clock that nobody keeps") {
   for (const char* name : {"plumb-driver", "plumb-estimator", "plumb-controller", "plumb-robot"}) {
     INFO(name);
     const std::string output =
-        FailureOf(stage.folder, {Stage::Binary(name), stage.robot_folder, "--clock", "virtual:" + (stage.folder / "none").string()});
+        FailureOf(stage.folder, {Stage::Binary(name), stage.robot_folder, "--clock",
+                                 "virtual:" + (stage.folder / "none").string()});
     CHECK(Lines(output) == 1);
     CHECK_THAT(output, Contains("none: nobody keeps a run's time there"));
   }

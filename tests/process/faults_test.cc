@@ -1,5 +1,6 @@
-// What must never hurt anybody, with real processes: whatever dies, stops or talks rubbish, the torque goes to zero
-// within the configured time, the drive is disarmed, the driver says why, and only a deliberate request re-arms.
+// What must never hurt anybody, with real processes: whatever dies, stops or talks rubbish, the
+// torque goes to zero within the configured time, the drive is disarmed, the driver says why, and
+// only a deliberate request re-arms.
 
 #include <cmath>
 #include <cstring>
@@ -20,13 +21,14 @@ int64_t Us(double seconds) { return std::llround(seconds * 1e6); }
 
 int64_t Cycle(const Stage& stage) { return Us(stage.robot.driver.cycle); }
 
-// After the event: the last torque comes no later than `most` [us] after `since`, the drive is idle, the driver in FAULT
-// with a reason.
+// After the event: the last torque comes no later than `most` [us] after `since`, the drive is
+// idle, the driver in FAULT with a reason.
 void ExpectSafe(Stage& stage, int64_t since, int64_t most) {
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
   CHECK_FALSE(stage.drivers.newest().reason.empty());
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 2));
-  INFO(stage.drivers.newest().reason << "; last torque " << stage.last_torque_time - since << " us after the event");
+  INFO(stage.drivers.newest().reason << "; last torque " << stage.last_torque_time - since
+                                     << " us after the event");
   CHECK(stage.last_torque_time - since <= most);
   // It stays so, although everything that was well still is.
   const int64_t last_torque = stage.last_torque_time;
@@ -44,7 +46,8 @@ TEST_CASE("a killed estimator") {
   Stage stage(1);
   stage.RunWithTorque();
   stage.Kill("plumb-estimator");
-  REQUIRE(stage.WaitUntil([&] { return stage.controllers.newest().phase == controller_status_t::HALTED; }, 3));
+  REQUIRE(stage.WaitUntil(
+      [&] { return stage.controllers.newest().phase == controller_status_t::HALTED; }, 3));
   const int64_t timeout = Us(stage.robot.controller.state_timeout);
   CHECK(stage.Now() - stage.last_state > timeout);
   CHECK(stage.Now() - stage.last_state <= timeout + kTick);
@@ -86,10 +89,12 @@ TEST_CASE("a killed driver: the drive's own watchdog ends it") {
   stage.Kill("plumb-driver");
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 5));
   CHECK(stage.last_torque_time <= killed);
-  const int64_t watchdog = Us(stage.robot.virtual_robot.watchdog), heartbeat = Us(stage.robot.virtual_robot.heartbeat);
+  const int64_t watchdog = Us(stage.robot.virtual_robot.watchdog),
+                heartbeat = Us(stage.robot.virtual_robot.heartbeat);
   CHECK(stage.Now() - stage.last_torque_time >= watchdog);
   CHECK(stage.Now() - stage.last_torque_time <= watchdog + heartbeat);
-  // A driver that is started beside a running controller does not arm, and takes no old command for a new one.
+  // A driver that is started beside a running controller does not arm, and takes no old command for
+  // a new one.
   stage.Start("plumb-driver", {"--bus", stage.bus_url, "--virtual"});
   stage.Listen(1.5);
   CHECK(stage.axis_state == kIdle);
@@ -136,8 +141,9 @@ TEST_CASE("garbage on the bus") {
   Random random(1);
   const int64_t rejected = stage.drivers.newest().frames_rejected;
   const auto send = [&](const Frame& frame) { stage.bus->Send({&frame, 1}); };
-  // Short and not-a-number encoder frames of the very drive, and random frames; not what is well-formed and means
-  // something (a real heartbeat of the drive's own id would be a second drive, a real Estop an emergency stop).
+  // Short and not-a-number encoder frames of the very drive, and random frames; not what is
+  // well-formed and means something (a real heartbeat of the drive's own id would be a second
+  // drive, a real Estop an emergency stop).
   for (int round = 0; round < 40; ++round) {
     send(*FrameFromText("029#000080BE"));
     send(*FrameFromText("029#0000C07F00006040"));
@@ -149,7 +155,8 @@ TEST_CASE("garbage on the bus") {
       frame.id = random.Bits() & (frame.extended ? 0x1fffffffu : 0x7ffu);
       if (!frame.extended && (frame.id >> 5 == 1 || frame.id >> 5 == 0x3f)) continue;
       frame.length = static_cast<uint8_t>(random.Bits() % 9);
-      for (int k = 0; k < frame.length; ++k) frame.data[static_cast<size_t>(k)] = static_cast<uint8_t>(random.Bits());
+      for (int k = 0; k < frame.length; ++k)
+        frame.data[static_cast<size_t>(k)] = static_cast<uint8_t>(random.Bits());
       send(frame);
     }
     stage.Listen(0.01);
@@ -176,7 +183,12 @@ TEST_CASE("an effort beyond the limit is clipped before it reaches the bus") {
     command.sequence = i;
     command.utime = stage.Now();
     publisher.Publish(command);
-    stage.WaitUntil([&] { greatest = std::max(greatest, std::abs(stage.torque)); return false; }, 0.02);
+    stage.WaitUntil(
+        [&] {
+          greatest = std::max(greatest, std::abs(stage.torque));
+          return false;
+        },
+        0.02);
   }
   CHECK(greatest == 2);
 }
@@ -193,12 +205,8 @@ TEST_CASE("an emergency stop") {
 TEST_CASE("the driver disarms when it is asked to stop") {
   Stage stage(10);
   stage.RunWithTorque();
-  SECTION("by a signal") {
-    stage.children.at("plumb-driver")->Signal(SIGTERM);
-  }
-  SECTION("by the run") {
-    stage.coordinator->Stop("plumb-driver");
-  }
+  SECTION("by a signal") { stage.children.at("plumb-driver")->Signal(SIGTERM); }
+  SECTION("by the run") { stage.coordinator->Stop("plumb-driver"); }
   REQUIRE(stage.WaitUntil([&] { return !stage.coordinator->present("plumb-driver"); }, 600));
   CHECK(stage.children.at("plumb-driver")->WaitFor(60));
   CHECK_FALSE(stage.children.at("plumb-driver")->failed());

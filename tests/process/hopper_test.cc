@@ -1,5 +1,5 @@
-// A robot with three motors, two boom encoders and an IMU on one bus: real processes, both protocols of
-// motors.
+// A robot with three motors, two boom encoders and an IMU on one bus: real processes, both
+// protocols of motors.
 
 #include <cmath>
 
@@ -26,7 +26,8 @@ TEST_CASE("a log through the estimator gives the recorded states, bit for bit") 
   {
     LcmLogWriter writer(log);
     stage.coordinator->on_post = [&](const lockstep_post_t& post, const std::string&) {
-      if (post.topic.kind == lockstep_topic_t::MESSAGE) writer.Write(post.arrival, post.topic.name, post.data);
+      if (post.topic.kind == lockstep_topic_t::MESSAGE)
+        writer.Write(post.arrival, post.topic.name, post.data);
     };
     stage.StartAll();
     REQUIRE(stage.Arm(20));
@@ -48,11 +49,13 @@ TEST_CASE("a log through the estimator gives the recorded states, bit for bit") 
       REQUIRE(joints.decode(data, 0, size) == size);
       if (!observer.OnJointState(joints)) return true;
       expected.push_back(Bytes(observer.state()));
-      for (const robot_state_t& state : observer.smoothed()) expected_smoothed.push_back(Bytes(state));
+      for (const robot_state_t& state : observer.smoothed())
+        expected_smoothed.push_back(Bytes(state));
     } else if (channel == "ROBOT_STATE" || channel == "ROBOT_STATE_SMOOTHED") {
       robot_state_t state;
       REQUIRE(state.decode(data, 0, size) == size);
-      (channel == "ROBOT_STATE" ? recorded : recorded_smoothed).emplace_back(static_cast<const char*>(data), static_cast<size_t>(size));
+      (channel == "ROBOT_STATE" ? recorded : recorded_smoothed)
+          .emplace_back(static_cast<const char*>(data), static_cast<size_t>(size));
     }
     return true;
   });
@@ -81,12 +84,15 @@ void Stand(const std::string& robot, int number, const std::vector<uint32_t>& fr
   CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
 
   // Each period once in 2 s, one more or less where it begins in between.
-  const auto about = [](int64_t count, int64_t expected) { return std::abs(count - expected) <= 1; };
+  const auto about = [](int64_t count, int64_t expected) {
+    return std::abs(count - expected) <= 1;
+  };
   const auto frames = [&](uint32_t id) { return stage.frames_by_id[id]; };
   for (const uint32_t id : from_motors) CHECK(about(frames(id), 1000));
   for (const uint32_t id : to_motors) CHECK(about(frames(id), 1000));
   for (const uint32_t boom : {0x181u, 0x182u}) CHECK(about(frames(boom), 1000));
-  for (const uint32_t imu : {0x385u, 0x391u, 0x3A1u, 0x3B2u, 0x3B4u}) CHECK(about(frames(imu), 400));
+  for (const uint32_t imu : {0x385u, 0x391u, 0x3A1u, 0x3B2u, 0x3B4u})
+    CHECK(about(frames(imu), 400));
   CHECK(about(joints.received() - joints_before, 1000));
   CHECK(about(imus.received() - imus_before, 400));
 
@@ -97,8 +103,8 @@ void Stand(const std::string& robot, int number, const std::vector<uint32_t>& fr
     CHECK(std::isfinite(state.position[i]));
     CHECK(std::abs(state.utime - state.measured[i]) <= 20'000);
   }
-  // It has fallen, since nobody held it, as far as its foot on the ground lets it: the rest of it goes
-  // through.
+  // It has fallen, since nobody held it, as far as its foot on the ground lets it: the rest of it
+  // goes through.
   CHECK(std::abs(state.position[1]) < 1.3);
   const imu_t& imu = imus.newest();
   CHECK(imu.link == "torso");
@@ -114,14 +120,16 @@ void Stand(const std::string& robot, int number, const std::vector<uint32_t>& fr
   REQUIRE(status.num_phases == 5);
   for (const auto& phase : status.phase_duration) {
     CHECK(phase[0] > 0);
-    CHECK(std::all_of(phase.begin() + 1, phase.end(), [](int64_t count) { return count == 0; }));  // they take no time
+    // they take no time
+    CHECK(std::all_of(phase.begin() + 1, phase.end(), [](int64_t count) { return count == 0; }));
   }
 
   // Without its boom nobody knows where it is.
   const int64_t stalled = stage.Now();
   stage.Stall("plumb-robot", 1);
   CHECK(stage.WaitForDriver(driver_status_t::FAULT, 5));
-  CHECK(stage.Now() - stalled <= std::llround((stage.robot.driver.stale_after + stage.robot.driver.cycle) * 1e6));
+  CHECK(stage.Now() - stalled <=
+        std::llround((stage.robot.driver.stale_after + stage.robot.driver.cycle) * 1e6));
 }
 
 TEST_CASE("a hopper on ODrives") { Stand("hopper", 45, {0x29, 0x49, 0x69}, {0x2E, 0x4E, 0x6E}); }

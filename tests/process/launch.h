@@ -13,9 +13,11 @@
 namespace plumb {
 
 /// `plumb launch` of a robot, watched from outside by a stage in real time.
-inline Child Launch(Stage& stage, std::vector<std::string> flags, const std::string& output = "run") {
-  std::vector<std::string> arguments{Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", stage.lcm_url,
-                                     "--bus", stage.bus_url, "--output", stage.folder / output};
+inline Child Launch(Stage& stage, std::vector<std::string> flags,
+                    const std::string& output = "run") {
+  std::vector<std::string> arguments{
+      Stage::Binary("plumb"), "launch",   stage.robot_folder,   "--lcm-url", stage.lcm_url, "--bus",
+      stage.bus_url,          "--output", stage.folder / output};
   arguments.insert(arguments.end(), flags.begin(), flags.end());
   return Child("plumb", arguments, stage.folder / (output + ".log"));
 }
@@ -24,7 +26,8 @@ inline Child Launch(Stage& stage, std::vector<std::string> flags, const std::str
 inline void LearnLittle(Stage& stage) {
   const std::filesystem::path file = stage.folder / "robot.toml";
   std::ofstream(file) << fmt::format(
-      "extends = \"{0}/robot.toml\"\n[robot]\nurdf = \"{0}/robot.urdf\"\n[training]\nupdates = 3\nupdates_again = 1\n",
+      "extends = \"{0}/robot.toml\"\n[robot]\nurdf = \"{0}/robot.urdf\"\n[training]\nupdates = "
+      "3\nupdates_again = 1\n",
       stage.robot_folder);
   stage.robot_folder = file;
 }

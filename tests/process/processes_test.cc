@@ -1,5 +1,5 @@
-// Whichever other process stands still or is killed: no torque is on the bus for longer than expiry and one cycle
-// after the last command was made, whoever lives on.
+// Whichever other process stands still or is killed: no torque is on the bus for longer than expiry
+// and one cycle after the last command was made, whoever lives on.
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,5 @@
-// What is about the wall clock: the loop as a real robot has it, and witnesses who play and disturb at their own pace.
+// What is about the wall clock: the loop as a real robot has it, and witnesses who play and disturb
+// at their own pace.
 
 #include <arpa/inet.h>
 #include <sys/socket.h>
@@ -22,8 +23,9 @@ TEST_CASE("the loop closes in real time") {
   Stage stage(50, "pendulum", Stage::Time::kReal);
   LearnLittle(stage);
   const fs::path summary_file = stage.folder / "summary.json", log = stage.folder / "run.lcmlog";
-  Child launch = Launch(stage, {"--real-time", "--speed", "2", "--iterations", "1", "--evaluation-episodes", "1", "--seed", "3",
-                                "--log", log, "--summary", summary_file});
+  Child launch =
+      Launch(stage, {"--real-time", "--speed", "2", "--iterations", "1", "--evaluation-episodes",
+                     "1", "--seed", "3", "--log", log, "--summary", summary_file});
   stage.WaitUntil([&] { return !launch.running(); }, 120);
   INFO(launch.Tail(30));
   REQUIRE_FALSE(launch.running());
@@ -34,20 +36,24 @@ TEST_CASE("the loop closes in real time") {
   REQUIRE(summary.at("iterations").size() == 1);
   CHECK(summary.at("iterations")[0].at("transitions") >= 150);
 
-  // The same calibration from its log, played by lcm-logplayer, without the run's own distributions, which would come in between.
+  // The same calibration from its log, played by lcm-logplayer, without the run's own
+  // distributions, which would come in between.
   const std::string url = "udpm://239.255.76.67:17751?ttl=0&recv_buf_size=2097152";
   Messenger listener(url);
   Subscriber<parameter_distribution_t> distributions(listener, "PARAMETER_DISTRIBUTION");
-  Child replayed("replayed", {Stage::Binary("plumb-calibrator"), stage.robot_folder, "--seed", "3", "--lcm-url", url, "--checkpoint",
-                              stage.folder / "replayed"}, stage.folder / "replayed.log");
+  Child replayed("replayed",
+                 {Stage::Binary("plumb-calibrator"), stage.robot_folder, "--seed", "3", "--lcm-url",
+                  url, "--checkpoint", stage.folder / "replayed"},
+                 stage.folder / "replayed.log");
   const auto until = [&](const std::function<bool()>& so, double seconds) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
     while (!so() && std::chrono::steady_clock::now() < deadline) listener.lcm().handleTimeout(10);
     return so();
   };
   REQUIRE(until([&] { return distributions.received() > 0; }, 60));  // it listens
-  Child player("lcm-logplayer", {"lcm-logplayer", "--lcm-url=" + url, "--speed=4",
-                                 "--regexp=ROBOT_STATE_SMOOTHED|JOINT_COMMAND|CONTROLLER_STATUS", log},
+  Child player("lcm-logplayer",
+               {"lcm-logplayer", "--lcm-url=" + url, "--speed=4",
+                "--regexp=ROBOT_STATE_SMOOTHED|JOINT_COMMAND|CONTROLLER_STATUS", log},
                stage.folder / "player.log");
   CHECK(until([&] { return distributions.newest().iteration == 1; }, 120));
   replayed.Signal(SIGTERM);
@@ -67,7 +73,8 @@ TEST_CASE("Ctrl-C stops everything within a second") {
   launch.Signal(SIGINT);
   const auto start = std::chrono::steady_clock::now();
   CHECK(stage.WaitUntil([&] { return !launch.running(); }, 60));
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   INFO(seconds << " s");
   CHECK(seconds < 1);
   CHECK(stage.axis_state == 1);
@@ -75,7 +82,9 @@ TEST_CASE("Ctrl-C stops everything within a second") {
   CHECK(Left(stage) == 0);
 }
 
-TEST_CASE("a launch that is stopped changes nothing; one that is killed takes all with it, and the drive ends up idle") {
+TEST_CASE(
+    "a launch that is stopped changes nothing; one that is killed takes all with it, and the drive "
+    "ends up idle") {
   Stage stage(52, "pendulum", Stage::Time::kReal);
   Child launch = Launch(stage, {"--real-time"});
   // It has the robot move as soon as the first policy is trained; a policy of ours need not be.

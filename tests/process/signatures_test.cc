@@ -1,5 +1,5 @@
-// Signed commands, with real processes: a loop that signs moves the robot, and nobody else does; stopping
-// needs no key.
+// Signed commands, with real processes: a loop that signs moves the robot, and nobody else does;
+// stopping needs no key.
 
 #include <algorithm>
 #include <cmath>
@@ -47,7 +47,8 @@ struct Stranger {
       : stage(s), commands(s.messenger, "JOINT_COMMAND"), requests(s.messenger, "DRIVER_REQUEST") {}
   void Command() {
     joint_command_t command =
-        stage.commands.received() > 0 ? stage.commands.newest() : joint_command_t{};  // its signature, too
+        // its signature, too
+        stage.commands.received() > 0 ? stage.commands.newest() : joint_command_t{};
     command.utime = stage.Now();
     command.counter = stage.Now();
     command.sequence += 1000;
@@ -121,8 +122,7 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
   CHECK_THAT(InTheRun(stage, {"arm"}, true), Contains("--key FILE"));
   stage.Listen(0.3);
   CHECK(stage.axis_state == kIdle);
-  CHECK_THAT(InTheRun(stage, {"arm", "--key", key}, false),
-             Contains("armed"));
+  CHECK_THAT(InTheRun(stage, {"arm", "--key", key}, false), Contains("armed"));
   REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 2));
 
   // Alone, the stranger is heard and not obeyed, and the driver says so.
@@ -132,15 +132,16 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
     stage.Listen(0.005);
   }
   REQUIRE(stage.drivers.newest().state == driver_status_t::FAULT);
-  CHECK_THAT(stage.drivers.newest().reason, StartsWith("commands refused: not signed with the driver's key"));
+  CHECK_THAT(stage.drivers.newest().reason,
+             StartsWith("commands refused: not signed with the driver's key"));
   stage.Listen(2);
   REQUIRE(stage.Arm());
-  CHECK_THAT(InTheRun(stage, {"estop"}, false),
-             Contains("emergency stop requested"));
+  CHECK_THAT(InTheRun(stage, {"estop"}, false), Contains("emergency stop requested"));
   CHECK(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 2));
 }
 
-TEST_CASE("what was recorded is worth nothing, to the same driver and to one that is started again") {
+TEST_CASE(
+    "what was recorded is worth nothing, to the same driver and to one that is started again") {
   Stage stage(81);
   stage.UseKey();
   Recorder recorder(stage);
@@ -172,9 +173,9 @@ TEST_CASE("what was recorded is worth nothing, to the same driver and to one tha
   replay();
   CHECK(stage.drivers.newest().state == driver_status_t::IDLE);
   CHECK(stage.drivers.newest().commands_forged == forged);
-  CHECK_THAT(
-      stage.drivers.newest().reason,
-      Contains("ARM refused") && Contains("signed, but a repetition, or from before the driver's start"));
+  CHECK_THAT(stage.drivers.newest().reason,
+             Contains("ARM refused") &&
+                 Contains("signed, but a repetition, or from before the driver's start"));
   // Nor when a person arms.
   REQUIRE(stage.Arm());
   replay();
@@ -189,15 +190,15 @@ TEST_CASE("a driver that others could command does not start without a key") {
   const std::string open = "udpm://239.255.76.67:17782?ttl=1";
   for (const std::vector<std::string>& program :
        {std::vector<std::string>{"plumb-driver", stage.robot_folder, "--bus", stage.bus_url},
-        std::vector<std::string>{"plumb", "launch", stage.robot_folder, "--bus", stage.bus_url, "--output",
-                                 stage.folder / "run"}}) {
+        std::vector<std::string>{"plumb", "launch", stage.robot_folder, "--bus", stage.bus_url,
+                                 "--output", stage.folder / "run"}}) {
     std::vector<std::string> arguments = program;
     arguments.insert(arguments.end(), {"--lcm-url", open});
     const std::string output = Output(stage, arguments, true);
     INFO(output);
     CHECK(std::count(output.begin(), output.end(), '\n') == 1);
-    CHECK_THAT(output,
-               Contains(open + " leaves this machine") && Contains("--key FILE") && Contains("--unsigned"));
+    CHECK_THAT(output, Contains(open + " leaves this machine") && Contains("--key FILE") &&
+                           Contains("--unsigned"));
   }
   // Allowed: it gets as far as opening LCM, at an address where nobody is.
   CHECK_THAT(Output(stage,
@@ -208,8 +209,8 @@ TEST_CASE("a driver that others could command does not start without a key") {
   const fs::path key = stage.UseKey();
   fs::permissions(key, fs::perms::group_read, fs::perm_options::add);
   for (const char* program : {"plumb-driver", "plumb-controller"}) {
-    const std::string output =
-        Output(stage, {program, stage.robot_folder, "--lcm-url", stage.lcm_url, "--key", key}, true);
+    const std::string output = Output(
+        stage, {program, stage.robot_folder, "--lcm-url", stage.lcm_url, "--key", key}, true);
     CHECK_THAT(output, Contains("mode 0640") && Contains("chmod 600 " + key.string()));
   }
   CHECK_THAT(Output(stage, {"plumb-driver", stage.robot_folder, "--key", key, "--unsigned"}, true),

@@ -1,6 +1,6 @@
-// Faults that the kernel makes, to the real driver and the real virtual robot: on a pair of vxcan interfaces,
-// a cable with the driver at one end (vx0) and the drive and the witness at the other (vx1). Run by
-// tests/with-vcan.
+// Faults that the kernel makes, to the real driver and the real virtual robot: on a pair of vxcan
+// interfaces, a cable with the driver at one end (vx0) and the drive and the witness at the other
+// (vx1). Run by tests/with-vcan.
 
 #include <cmath>
 #include <cstdio>
@@ -29,15 +29,16 @@ bool Try(const std::string& command) {
   return done;
 }
 
-/// robots/pendulum with more patience, for a machine that stands still now and then: what is looked for must
-/// come first.
+/// robots/pendulum with more patience, for a machine that stands still now and then: what is looked
+/// for must come first.
 std::string PatientRobot(const Stage& stage) {
   const std::filesystem::path folder = stage.folder / "patient";
   std::filesystem::copy(stage.robot_folder, folder);
   std::string text = Read(folder / "robot.toml");
   for (const auto& [key, value] : std::map<std::string, std::string>{
            {"stale_after", "0.4"}, {"disarm_after", "0.6"}, {"watchdog", "0.3"}}) {
-    text = std::regex_replace(text, std::regex("\n" + key + " *= [0-9.]+"), "\n" + key + " = " + value);
+    text = std::regex_replace(text, std::regex("\n" + key + " *= [0-9.]+"),
+                              "\n" + key + " = " + value);
   }
   std::ofstream(folder / "robot.toml") << text;
   return folder;
@@ -45,7 +46,8 @@ std::string PatientRobot(const Stage& stage) {
 
 /// The driver, the virtual robot, and a controller that asks for 1 Nm every 5 ms.
 struct Cable {
-  explicit Cable(int number) : stage(number, "pendulum", Stage::Time::kReal), publisher(stage.messenger, "JOINT_COMMAND") {
+  explicit Cable(int number)
+      : stage(number, "pendulum", Stage::Time::kReal), publisher(stage.messenger, "JOINT_COMMAND") {
     stage.robot_folder = PatientRobot(stage);
     stage.bus = OpenTransport("socketcan:vx1");
     stage.Start("plumb-robot", {"--bus", "socketcan:vx1", "--seed", "1"});
@@ -55,7 +57,8 @@ struct Cable {
   bool Until(const std::function<bool()>& so, double seconds) {
     return stage.WaitUntil(
         [&] {
-          commanding = commanding || In(driver_status_t::ARMED);  // not while it starts: it would mind
+          // not while it starts: it would mind
+          commanding = commanding || In(driver_status_t::ARMED);
           if (commanding) Command();
           return so();
         },
@@ -77,8 +80,8 @@ struct Cable {
   const driver_status_t& Status() { return stage.drivers.newest(); }
   bool In(int8_t state) { return stage.drivers.received() > 0 && Status().state == state; }
 
-  /// Armed by a person, with a torque on the drive's end of the cable. Again, where a busy machine has
-  /// stopped it.
+  /// Armed by a person, with a torque on the drive's end of the cable. Again, where a busy machine
+  /// has stopped it.
   bool Arm() {
     for (int attempt = 0; attempt < 10; ++attempt) {
       stage.torque = 0;
@@ -105,12 +108,13 @@ struct Cable {
   bool RunsOn() {
     for (int attempt = 0; attempt < 5; ++attempt) {
       const int64_t before = stage.frames;
-      if (Arm() && !Until([&] { return !In(driver_status_t::ARMED); }, 1)) return stage.frames > before + 200;
+      if (Arm() && !Until([&] { return !In(driver_status_t::ARMED); }, 1))
+        return stage.frames > before + 200;
     }
     return false;
   }
-  /// Stopped for that reason, in that time [us] since it happened, the drive idle, and not by itself back
-  /// when it is over.
+  /// Stopped for that reason, in that time [us] since it happened, the drive idle, and not by
+  /// itself back when it is over.
   void ExpectStopped(int64_t happened, int64_t within, const std::string& reason,
                      const std::string& over = "") {
     REQUIRE(Until([&] { return In(driver_status_t::FAULT); }, 5));
@@ -128,7 +132,8 @@ struct Cable {
     CHECK(stage.axis_state == kIdle);
     CHECK(In(driver_status_t::FAULT));
     if (std::getenv("PLUMBLINE_FAULT_TABLE")) {
-      std::printf("| %s | %lld ms |\n", said.c_str(), static_cast<long long>(last_torque - happened) / 1000);
+      std::printf("| %s | %lld ms |\n", said.c_str(),
+                  static_cast<long long>(last_torque - happened) / 1000);
       std::fflush(stdout);
     }
     REQUIRE(Arm());
@@ -140,7 +145,8 @@ struct Cable {
   bool commanding = false;
 };
 
-TEST_CASE("what the kernel does to the bus stops the robot, says why, and a person may arm it again") {
+TEST_CASE(
+    "what the kernel does to the bus stops the robot, says why, and a person may arm it again") {
   if (!Try(kNewCable)) {
     WARN("not tested: this kernel has no vxcan");
     return;
@@ -148,8 +154,8 @@ TEST_CASE("what the kernel does to the bus stops the robot, says why, and a pers
   Cable cable(42);
   REQUIRE(cable.Arm());
 
-  // Of the end of the commands, which take a moment, too. Through the full queue ten torques still go, at 64 ms
-  // each, before the first stop.
+  // Of the end of the commands, which take a moment, too. Through the full queue ten torques still
+  // go, at 64 ms each, before the first stop.
   constexpr int64_t kSoon = 600'000, kQueue = 1'500'000;  // [us]
   struct Fault {
     const char *happens, *reason, *over;
@@ -163,10 +169,12 @@ TEST_CASE("what the kernel does to the bus stops the robot, says why, and a pers
            Fault{"tc qdisc add dev vx0 root tbf rate 2kbit burst 32 limit 1600", "",
                  "tc qdisc del dev vx0 root", kQueue},
            Fault{"tc qdisc add dev vx0 root netem loss 100%",
-                 "the drive went to IDLE: watchdog timer expired", "tc qdisc del dev vx0 root", kSoon},
+                 "the drive went to IDLE: watchdog timer expired", "tc qdisc del dev vx0 root",
+                 kSoon},
            Fault{"tc qdisc add dev vx1 root netem loss 100%", "no encoder estimate",
                  "tc qdisc del dev vx1 root", kSoon},
-           Fault{"cansend vx1 02E#0000A03F", "second master: somebody else sends frame 0x02e", "", kSoon},
+           Fault{"cansend vx1 02E#0000A03F", "second master: somebody else sends frame 0x02e", "",
+                 kSoon},
            Fault{"cansend vx1 022#", "emergency stop from the bus", "", kSoon},
            Fault{"cansend vx1 7E2#", "emergency stop from the bus", "", kSoon},
        }) {
@@ -195,12 +203,15 @@ TEST_CASE("what a bus does every day does not stop the robot") {
   }
   Cable cable(43);
   for (const char* happens :
-       {"for frame in 20000004#000400000000C800 20000004#001000000000FF60 20000004#002000000000FF60 "
+       {"for frame in 20000004#000400000000C800 20000004#001000000000FF60 "
+        "20000004#002000000000FF60 "
         "20000002#0500000000000000; do cansend vx0 $frame || exit 1; done",
-        "for end in vx0 vx1; do tc qdisc add dev $end root netem loss 5% delay 1ms 500us duplicate 5% "
+        "for end in vx0 vx1; do tc qdisc add dev $end root netem loss 5% delay 1ms 500us duplicate "
+        "5% "
         "reorder 10% || exit 1; done",
         // A bus of 1 Mbit/s in either direction, and another program that fills a good part of it.
-        "for end in vx0 vx1; do tc qdisc replace dev $end root tbf rate 1mbit burst 32 limit 160 || exit 1; "
+        "for end in vx0 vx1; do tc qdisc replace dev $end root tbf rate 1mbit burst 32 limit 160 "
+        "|| exit 1; "
         "done; "
         "cangen vx0 -g 1 -I 001 -L 8 -n 2000 -p 10 &"}) {
     REQUIRE(cable.Arm());

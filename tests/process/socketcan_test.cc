@@ -1,5 +1,5 @@
-// The same processes over the kernel's own CAN: run by tests/with-vcan, in user-mode-linux where this machine's kernel
-// has none.
+// The same processes over the kernel's own CAN: run by tests/with-vcan, in user-mode-linux where
+// this machine's kernel has none.
 
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -16,18 +16,20 @@ constexpr int kRate = 200;  // [Hz] of torques and estimates
 
 size_t Count(const std::string& text, const std::string& pattern) {
   const std::regex regex(pattern);
-  return static_cast<size_t>(std::distance(std::sregex_iterator(text.begin(), text.end(), regex), {}));
+  return static_cast<size_t>(
+      std::distance(std::sregex_iterator(text.begin(), text.end(), regex), {}));
 }
 
 TEST_CASE("the loop closes over SocketCAN, and candump sees it") {
   Stage stage(40, "pendulum", Stage::Time::kReal);
   REQUIRE(stage.bus_url == "socketcan:vcan0");
   // A foreign witness.
-  Child candump("candump", {"candump", "-L", "-r", "8000000", "vcan0"}, stage.folder / "candump.log");
+  Child candump("candump", {"candump", "-L", "-r", "8000000", "vcan0"},
+                stage.folder / "candump.log");
   const fs::path summary_file = stage.folder / "summary.json", can_log = stage.folder / "can.log";
   LearnLittle(stage);
-  Child launch = Launch(stage, {"--iterations", "1", "--evaluation-episodes", "1", "--summary", summary_file,
-                                "--can-log", can_log});
+  Child launch = Launch(stage, {"--iterations", "1", "--evaluation-episodes", "1", "--summary",
+                                summary_file, "--can-log", can_log});
   stage.WaitUntil([&] { return !launch.running(); }, 250);
   INFO(launch.Tail(30));
   REQUIRE_FALSE(launch.running());
@@ -37,7 +39,8 @@ TEST_CASE("the loop closes over SocketCAN, and candump sees it") {
   const auto summary = nlohmann::json::parse(Read(summary_file));
   REQUIRE(summary.at("iterations").size() == 1);
   CHECK(summary.at("iterations")[0].at("transitions") >= 150);
-  CHECK(summary.at("iterations")[0].at("discrepancy") < summary.at("iterations")[0].at("prior_discrepancy"));
+  CHECK(summary.at("iterations")[0].at("discrepancy") <
+        summary.at("iterations")[0].at("prior_discrepancy"));
   CHECK(summary.at("evaluation_returns").size() == 1);
 
   candump.Signal(SIGINT);
@@ -48,18 +51,21 @@ TEST_CASE("the loop closes over SocketCAN, and candump sees it") {
                     said = std::regex_replace(Read(can_log), time, "");
   CHECK(seen == said);
   // And it is the same run as without any such bus.
-  Child again("plumb", {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", "memq://", "--bus", "loop:", "--output",
-                        stage.folder / "again", "--iterations", "1", "--evaluation-episodes", "1", "--can-log", stage.folder / "again.log"},
+  Child again("plumb",
+              {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", "memq://",
+               "--bus", "loop:", "--output", stage.folder / "again", "--iterations", "1",
+               "--evaluation-episodes", "1", "--can-log", stage.folder / "again.log"},
               stage.folder / "again.output");
   stage.WaitUntil([&] { return !again.running(); }, 250);
   INFO(again.Tail(30));
   REQUIRE_FALSE(again.running());
   CHECK(std::regex_replace(said, std::regex("vcan0 "), "can0 ") ==
         std::regex_replace(Read(stage.folder / "again.log"), time, ""));
-  CHECK(Count(said, "vcan0 027#0800000000000000") >= 1);        // closed-loop control is asked for
-  CHECK(Count(said, "vcan0 02E#[0-9A-F]{8}") > 2 * 10 * kRate);  // torques, for more than two roll-outs
+  CHECK(Count(said, "vcan0 027#0800000000000000") >= 1);  // closed-loop control is asked for
+  // torques, for more than two roll-outs
+  CHECK(Count(said, "vcan0 02E#[0-9A-F]{8}") > 2 * 10 * kRate);
   CHECK(Count(said, "vcan0 029#[0-9A-F]{16}") > 2 * 10 * kRate);  // encoder estimates
-  CHECK(Count(said, "vcan0 021#[0-9A-F]{8}08") > 100);          // heartbeats of an armed drive
+  CHECK(Count(said, "vcan0 021#[0-9A-F]{8}08") > 100);            // heartbeats of an armed drive
 }
 
 TEST_CASE("a bus that is taken down: fault with a reason, and back only by arming") {

@@ -7,14 +7,15 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 #include <iterator>
+#include <sstream>
 
 #include "controller/policy.h"
 
 namespace plumb {
 std::string Read(const std::filesystem::path& file) {
-  // Empty where it cannot be read, as of a process that ends meanwhile, whose file in /proc fails while it is being read.
+  // Empty where it cannot be read, as of a process that ends meanwhile, whose file in /proc fails
+  // while it is being read.
   std::ostringstream text;
   text << std::ifstream(file).rdbuf();
   return text.str();
@@ -33,17 +34,22 @@ std::string Stage::Environment(const char* name, const std::string& fallback) {
   return value && *value ? value : fallback;
 }
 
-std::string Stage::Binary(const std::string& name) { return Environment("PLUMBLINE_BUILD", "build") + "/bin/" + name; }
+std::string Stage::Binary(const std::string& name) {
+  return Environment("PLUMBLINE_BUILD", "build") + "/bin/" + name;
+}
 
 // Ports below 32768: from there on the kernel gives them to anybody who asks for none.
 Stage::Stage(int number, const std::string& robot_file, Time time)
-    : lcm_url("udpm://239.255.76.67:" + std::to_string(17700 + number) + "?ttl=0&recv_buf_size=2097152"),
-      bus_url(Environment("PLUMBLINE_TEST_BUS", "udp:239.74.163.2:" + std::to_string(23200 + number))),
+    : lcm_url("udpm://239.255.76.67:" + std::to_string(17700 + number) +
+              "?ttl=0&recv_buf_size=2097152"),
+      bus_url(
+          Environment("PLUMBLINE_TEST_BUS", "udp:239.74.163.2:" + std::to_string(23200 + number))),
       robot_folder(Environment("PLUMBLINE_SOURCE", ".") + "/robots/" + robot_file),
       robot(LoadRobot(robot_folder)),
       folder(temporary_.path()),
-      coordinator(time == Time::kVirtual ? std::optional<Coordinator>(std::in_place, (folder / "clock").string())
-                                         : std::nullopt),
+      coordinator(time == Time::kVirtual
+                      ? std::optional<Coordinator>(std::in_place, (folder / "clock").string())
+                      : std::nullopt),
       clock(coordinator ? Clock(coordinator->participant().time()) : Clock()),
       messenger(coordinator ? Messenger(coordinator->participant()) : Messenger(lcm_url)),
       bus(OpenTransport(bus_url, {}, {coordinator ? &coordinator->participant() : nullptr, 0})),
@@ -63,19 +69,21 @@ Stage::Stage(int number, const std::string& robot_file, Time time)
 Stage::~Stage() { children.clear(); }
 
 Child& Stage::Start(const std::string& name, std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(),
-                   {Binary(name), robot_folder, "--lcm-url", lcm_url, "--parent", std::to_string(getpid())});
+  arguments.insert(arguments.begin(), {Binary(name), robot_folder, "--lcm-url", lcm_url, "--parent",
+                                       std::to_string(getpid())});
   if (coordinator) arguments.insert(arguments.end(), {"--clock", coordinator->clock()});
   if (children.contains(name)) Kill(name);
   children.erase(name);
   Child& child =
-      *children.emplace(name, std::make_unique<Child>(name, arguments, folder / (name + ".log"))).first->second;
+      *children.emplace(name, std::make_unique<Child>(name, arguments, folder / (name + ".log")))
+           .first->second;
   if (coordinator) coordinator->Expect(name, child.pid());
   return child;
 }
 
 void Stage::StartDriver() {
-  std::vector<std::string> arguments{"--bus", bus_url, "--virtual", "--flight-recorder", folder / "faults"};
+  std::vector<std::string> arguments{"--bus", bus_url, "--virtual", "--flight-recorder",
+                                     folder / "faults"};
   arguments.insert(arguments.end(), key_arguments_.begin(), key_arguments_.end());
   Start("plumb-driver", arguments);
 }
@@ -125,7 +133,8 @@ bool Stage::WaitUntil(const std::function<bool()>& so, double seconds) {
 }
 
 bool Stage::WaitForDriver(int8_t state, double seconds) {
-  return WaitUntil([&] { return drivers.received() > 0 && drivers.newest().state == state; }, seconds);
+  return WaitUntil([&] { return drivers.received() > 0 && drivers.newest().state == state; },
+                   seconds);
 }
 
 void Stage::Request(int8_t what) {
@@ -143,7 +152,8 @@ bool Stage::Arm(double seconds) {
         if (drivers.received() == 0) return false;
         const int8_t state = drivers.newest().state;
         if (state == driver_status_t::ARMED) return true;
-        if (state != driver_status_t::ABSENT && state != driver_status_t::ARMING && Now() - asked > 500'000) {
+        if (state != driver_status_t::ABSENT && state != driver_status_t::ARMING &&
+            Now() - asked > 500'000) {
           Request(driver_request_t::ARM);
           asked = Now();
         }
@@ -177,13 +187,15 @@ void Stage::RunWithTorque() {
   StartAll();
   REQUIRE(WaitUntil([&] { return controllers.received() > 0; }, 20));
   const bool moving = BeginEpisode();
-  INFO("driver: " << int{drivers.newest().state} << " " << drivers.newest().reason << "; controller: "
-                  << int{controllers.newest().phase} << " " << controllers.newest().reason);
+  INFO("driver: " << int{drivers.newest().state} << " " << drivers.newest().reason
+                  << "; controller: " << int{controllers.newest().phase} << " "
+                  << controllers.newest().reason);
   REQUIRE(moving);
 }
 
 void Stage::Witness() {
-  // Independent of the driver's own tables: node 1's Set_Input_Torque is 0x02E, its Heartbeat 0x021.
+  // Independent of the driver's own tables: node 1's Set_Input_Torque is 0x02E, its Heartbeat
+  // 0x021.
   std::array<Frame, 64> frames_now;
   for (int n; (n = bus->Receive(frames_now)) > 0;) {
     for (const Frame& frame : std::span(frames_now).first(static_cast<size_t>(n))) {

@@ -31,13 +31,14 @@ namespace plumb {
 /// A file's contents; empty if there is none.
 std::string Read(const std::filesystem::path& file);
 
-/// Waits, while the run's time stands still, for something that is the machine's: a file, a foreign process. Generously
-/// bounded. @return whether it came to be.
+/// Waits, while the run's time stands still, for something that is the machine's: a file, a foreign
+/// process. Generously bounded. @return whether it came to be.
 bool AwaitReally(const std::function<bool()>& so);
 
-/// Real processes on a bus, and a witness who listens to it and to their messages. In virtual time: what happens, happens
-/// at a moment, and what must follow is there to the cycle, however busy the machine is. Every stage has a number of
-/// its own, so that tests run side by side. The bus is $PLUMBLINE_TEST_BUS where that is set.
+/// Real processes on a bus, and a witness who listens to it and to their messages. In virtual time:
+/// what happens, happens at a moment, and what must follow is there to the cycle, however busy the
+/// machine is. Every stage has a number of its own, so that tests run side by side. The bus is
+/// $PLUMBLINE_TEST_BUS where that is set.
 class Stage {
  public:
   enum class Time {
@@ -46,7 +47,8 @@ class Stage {
   };
 
   /// @param robot_file folder or TOML file in robots/
-  explicit Stage(int number, const std::string& robot_file = "pendulum", Time time = Time::kVirtual);
+  explicit Stage(int number, const std::string& robot_file = "pendulum",
+                 Time time = Time::kVirtual);
   ~Stage();
 
   static std::string Environment(const char* name, const std::string& fallback);
@@ -62,10 +64,11 @@ class Stage {
   void StartAll();
   /// It is dead at this moment.
   void Kill(const std::string& name);
-  /// A fault: it stands still for that long [s of virtual time], and hears afterwards what it has missed.
+  /// A fault: it stands still for that long [s of virtual time], and hears afterwards what it has
+  /// missed.
   void Stall(const std::string& name, double seconds);
-  /// From now on the driver wants, and the controller and Request give, signatures with a new key. @return
-  /// its file.
+  /// From now on the driver wants, and the controller and Request give, signatures with a new key.
+  /// @return its file.
   std::filesystem::path UseKey();
   std::string Log(const std::string& name) { return children.at(name)->Tail(20); }
 
@@ -73,7 +76,8 @@ class Stage {
   void Listen(double seconds) {
     WaitUntil([] { return false; }, seconds);
   }
-  /// Listens until something is so; looks whenever something has been heard. @return whether it came to be in time.
+  /// Listens until something is so; looks whenever something has been heard. @return whether it
+  /// came to be in time.
   bool WaitUntil(const std::function<bool()>& so, double seconds);
   bool WaitForDriver(int8_t state, double seconds);
 
@@ -91,7 +95,8 @@ class Stage {
   float torque = 0;
   int axis_state = 0;
   int64_t last_torque_time = 0;  ///< of the last frame that asked for torque
-  int64_t longest_alone = 0;     ///< that a torque was asked for after the last command had been made
+  /// that a torque was asked for after the last command had been made
+  int64_t longest_alone = 0;
   int64_t frames = 0;
   std::map<uint32_t, int64_t> frames_by_id;  ///< standard data frames
   /// Called with every frame.

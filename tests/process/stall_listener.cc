@@ -1,5 +1,5 @@
-// For tests that are about the wall clock: where they fail and the machine itself has stood still, nothing can be told.
-// Exit status 77, "skipped".
+// For tests that are about the wall clock: where they fail and the machine itself has stood still,
+// nothing can be told. Exit status 77, "skipped".
 #define CATCH_CONFIG_EXTERNAL_INTERFACES
 #include <catch2/catch.hpp>
 #include <cstdio>
@@ -10,7 +10,8 @@
 namespace plumb {
 namespace {
 
-constexpr double kMost = 20;  // [ms] less than the shortest time that any of these tests gives anybody
+// [ms] less than the shortest time that any of these tests gives anybody
+constexpr double kMost = 20;
 
 class StallListener : public Catch::TestEventListenerBase {
  public:

@@ -6,8 +6,9 @@
 
 namespace plumb {
 
-/// What the machine does to somebody who only sleeps: by how much a bare timer of a millisecond comes late, at worst. A
-/// test in real time can tell nothing of us where that is more than what we are given. Ends with its destruction.
+/// What the machine does to somebody who only sleeps: by how much a bare timer of a millisecond
+/// comes late, at worst. A test in real time can tell nothing of us where that is more than what we
+/// are given. Ends with its destruction.
 class StallMeter {
  public:
   StallMeter() : thread_([this] { Measure(); }) {}
@@ -26,7 +27,8 @@ class StallMeter {
     while (!ended_) {
       const auto begin = Clock::now();
       std::this_thread::sleep_for(kPeriod);
-      const double late = std::chrono::duration<double, std::milli>(Clock::now() - begin - kPeriod).count();
+      const double late =
+          std::chrono::duration<double, std::milli>(Clock::now() - begin - kPeriod).count();
       if (late > worst_) worst_ = late;
     }
   }

@@ -1,5 +1,5 @@
-// A foreign witness on the bus, python-can, or candump where the bus is the kernel's, sees every frame of a run: as the
-// run has it, and as the driver counts and records it.
+// A foreign witness on the bus, python-can, or candump where the bus is the kernel's, sees every
+// frame of a run: as the run has it, and as the driver counts and records it.
 
 #include <algorithm>
 #include <regex>
@@ -14,17 +14,22 @@ namespace fs = std::filesystem;
 
 constexpr char kPython[] = R"(
 import can, sys
-bus = can.Bus(interface='udp_multicast', channel=sys.argv[1], port=int(sys.argv[2]), hop_limit=0, receive_own_messages=False)
+bus = can.Bus(interface='udp_multicast', channel=sys.argv[1], port=int(sys.argv[2]),
+              hop_limit=0, receive_own_messages=False)
 print('ready', flush=True)
 for m in bus:
-    print('%03X#%s' % (m.arbitration_id, 'R' if m.is_remote_frame else m.data.hex().upper()), flush=True)
+    print('%03X#%s' % (m.arbitration_id,
+                       'R' if m.is_remote_frame else m.data.hex().upper()), flush=True)
 )";
 
 Child StartWitness(const Stage& stage, const fs::path& log) {
   if (stage.bus_url.starts_with("socketcan:"))
     return Child("candump", {"candump", "-L", "-r", "8000000", stage.bus_url.substr(10)}, log);
   const size_t colon = stage.bus_url.rfind(':');
-  return Child("python3", {"/usr/bin/python3", "-c", kPython, stage.bus_url.substr(4, colon - 4), stage.bus_url.substr(colon + 1)}, log);
+  return Child("python3",
+               {"/usr/bin/python3", "-c", kPython, stage.bus_url.substr(4, colon - 4),
+                stage.bus_url.substr(colon + 1)},
+               log);
 }
 
 /// What candump and the run write of a remote frame differs by its length.
@@ -56,7 +61,8 @@ TEST_CASE("a foreign witness sees every frame of a run") {
   };
   Child witness = StartWitness(stage, log);
   const bool python = !stage.bus_url.starts_with("socketcan:");
-  // In real time, while the run's stands still: until it is there, and until it has seen what there is to see.
+  // In real time, while the run's stands still: until it is there, and until it has seen what there
+  // is to see.
   const auto await = [&](const std::function<bool()>& so) {
     const bool seen = AwaitReally([&] { return so() || !witness.running(); }) && so();
     INFO(witness.Tail(5));
@@ -112,7 +118,8 @@ TEST_CASE("a foreign witness sees every frame of a run") {
   CHECK(stage.drivers.newest().frames_dropped == 0);
   size_t recorded = 0;
   for (const auto& file : fs::directory_iterator(stage.folder / "faults")) {
-    const std::vector<std::string> record = Frames(std::regex_replace(Read(file), std::regex("[^\n]* R\n"), ""));
+    const std::vector<std::string> record =
+        Frames(std::regex_replace(Read(file), std::regex("[^\n]* R\n"), ""));
     CHECK(std::ranges::search(sent_by_driver, record).size() == record.size());
     recorded += record.size();
   }

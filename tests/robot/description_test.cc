@@ -42,7 +42,8 @@ class Edited {
 };
 
 TEST_CASE("impacts and coupling of the estimator are read and checked") {
-  const Edited good("robot.toml", "[estimator]\n", "[estimator]\nground_impact = 9.0\nstop_impact = 70.0\ncoupling = 0.1\n");
+  const Edited good("robot.toml", "[estimator]\n",
+                    "[estimator]\nground_impact = 9.0\nstop_impact = 70.0\ncoupling = 0.1\n");
   const EstimatorSettings settings = LoadRobot(good.path()).estimator;
   CHECK(settings.ground_impact == 9);
   CHECK(settings.stop_impact == 70);
@@ -83,7 +84,8 @@ TEST_CASE("the log-normal prior has the mean and variance asked for") {
   CHECK(p.ToCoordinate(p.ToPhysical(0.3)) == Approx(0.3));
 }
 
-TEST_CASE("what a virtual robot has and no model knows is read, and refused where it makes no sense") {
+TEST_CASE(
+    "what a virtual robot has and no model knows is read, and refused where it makes no sense") {
   const RobotDescription worn = LoadRobot(kPendulum + "/worn.toml");
   REQUIRE(worn.virtual_robot.joints.size() == 1);
   const UnmodelledJoint& pivot = worn.virtual_robot.joints[0];
@@ -101,13 +103,15 @@ TEST_CASE("what a virtual robot has and no model knows is read, and refused wher
 
   const auto refused = [](const std::string& line, const std::string& why) {
     const Edited robot("worn.toml", "rotor = 0.01            # [kg m^2] before it", line);
-    CHECK_THROWS_WITH(LoadRobot(robot.path() + "/worn.toml"), Contains("worn.toml:") && Contains(why));
+    CHECK_THROWS_WITH(LoadRobot(robot.path() + "/worn.toml"),
+                      Contains("worn.toml:") && Contains(why));
   };
   refused("", "virtual_robot.joint[0].rotor is missing");
   refused("rotor = 0", "virtual_robot.joint[0].rotor = 0 is not");
   refused("rotor = 0.01\nmass = 1", "virtual_robot.joint[0].mass is not a known key");
   refused("rotor = 0.01\n[[virtual_robot.joint]]\nname = \"pivot\"", "occurs twice");
-  refused("rotor = 0.01\n[[virtual_robot.joint]]\nname = \"pole\"", "\"pole\" is not a joint with a motor");
+  refused("rotor = 0.01\n[[virtual_robot.joint]]\nname = \"pole\"",
+          "\"pole\" is not a joint with a motor");
   refused("rotor = 0.01\n[virtual_robot]\nengine = \"bullet\"", "is not one of auto, mujoco");
 }
 
@@ -124,21 +128,28 @@ TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
     }
     return std::string("no error");
   };
-  CHECK_THAT(message("expiry = 0.1", "expirey = 0.1"), Contains("robot.toml:13:11: driver.expirey is not a known key; did you mean expiry?"));
+  CHECK_THAT(message("expiry = 0.1", "expirey = 0.1"),
+             Contains("robot.toml:13:11: driver.expirey is not a known key; did you mean expiry?"));
   CHECK_THAT(message("expiry = 0.1", ""), Contains("robot.toml:10:1: driver.expiry is missing"));
-  CHECK_THAT(message("latency =", "latencey ="), Contains("latencey is not a known key; did you mean latency?"));
+  CHECK_THAT(message("latency =", "latencey ="),
+             Contains("latencey is not a known key; did you mean latency?"));
   CHECK_THAT(message("node = 1", "node = \"1\""), Contains("joint[0].node is not an integer"));
-  CHECK_THAT(message("name = \"pivot\"", "name = \"pivto\""), Contains("\"pivto\" is not a moving joint of the URDF"));
+  CHECK_THAT(message("name = \"pivot\"", "name = \"pivto\""),
+             Contains("\"pivto\" is not a moving joint of the URDF"));
   CHECK_THAT(message("variance = 0.33", "variance = -0.33"), Contains("parameter[0].variance"));
-  CHECK_THAT(message("disarm_after = 0.25", "disarm_after = 0.05"), Contains("disarm_after must not be shorter"));
-  CHECK_THAT(message("coordinate = \"log\"", "coordinate = \"logg\""), Contains("is not one of linear, log"));
-  CHECK_THAT(message("gravity = [9.0, 11.0]", "gravty = [9.0, 11.0]"), Contains("gravty is not one of the parameters"));
+  CHECK_THAT(message("disarm_after = 0.25", "disarm_after = 0.05"),
+             Contains("disarm_after must not be shorter"));
+  CHECK_THAT(message("coordinate = \"log\"", "coordinate = \"logg\""),
+             Contains("is not one of linear, log"));
+  CHECK_THAT(message("gravity = [9.0, 11.0]", "gravty = [9.0, 11.0]"),
+             Contains("gravty is not one of the parameters"));
   CHECK_THAT(message("[task]", "[tsk]"), Contains("tsk is not a known key; did you mean task?"));
   CHECK_THAT(message("substep = 0.005", "substep = nan"), Contains("simulation.substep"));
   CHECK_THAT(message("steps = 200", "steps = 1e99"), Contains("task.steps"));
   CHECK_THAT(message("gear = 1.0", "gear = 0.0"), Contains("gear"));
   CHECK_THAT(message("[robot]", "[robot"), Contains("robot.toml:3:"));
-  CHECK_THAT(message("robot.urdf\"", "robot.xml\""), Contains("robot.toml:5:8: robot.urdf = \"robot.xml\": there is no such file"));
+  CHECK_THAT(message("robot.urdf\"", "robot.xml\""),
+             Contains("robot.toml:5:8: robot.urdf = \"robot.xml\": there is no such file"));
 }
 
 TEST_CASE("mistakes in robot.urdf name the file and the element") {
@@ -156,13 +167,14 @@ TEST_CASE("mistakes in robot.urdf name the file and the element") {
   CHECK_THAT(message("izz=\"0\"", "izz=\"1\""), Contains("no body can have this inertia"));
   CHECK_THAT(message("effort=\"2.0\"", "effort=\"0\""), Contains("joint pivot: limit effort"));
   CHECK_THAT(message("<parent link=\"base\"/>", "<parent link=\"bse\"/>"), Contains("bse"));
-  CHECK_THAT(message("type=\"continuous\"", "type=\"helical\""), Contains("joint pivot is not fixed"));
+  CHECK_THAT(message("type=\"continuous\"", "type=\"helical\""),
+             Contains("joint pivot is not fixed"));
   CHECK_THAT(message("</robot>", ""), Contains("robot.urdf"));
   CHECK_THROWS_WITH(LoadRobot("/nowhere"), Contains("there is no such robot"));
 }
 
-// Two 1 kg points 2 m apart, the second behind a fixed joint turned by 90 degrees: their common centre is in the
-// middle, the inertia about it is that of a dumbbell.
+// Two 1 kg points 2 m apart, the second behind a fixed joint turned by 90 degrees: their common
+// centre is in the middle, the inertia about it is that of a dumbbell.
 TEST_CASE("links behind fixed joints are merged by the parallel axis theorem") {
   const TemporaryFolder folder;
   const std::string file = folder / "dumbbell.urdf";

@@ -48,7 +48,8 @@ TEST_CASE("floating base: the hopper's torso without its boom") {
 
 TEST_CASE("floating base: who cannot do without a boom is told why, and where") {
   const std::string toml = Text("free.toml"), urdf = Text("robot.urdf");
-  const auto refused = [&](const std::string& other_toml, const std::string& other_urdf, const std::string& what) {
+  const auto refused = [&](const std::string& other_toml, const std::string& other_urdf,
+                           const std::string& what) {
     INFO(what);
     CHECK_THROWS_WITH(Load(other_toml, other_urdf), Contains("robot.toml:") && Contains(what));
   };
@@ -61,9 +62,11 @@ TEST_CASE("floating base: who cannot do without a boom is told why, and where") 
   refused(Replaced(toml, "link = \"torso\"", "link = \"thigh\""), urdf, "beyond");
   refused(Replaced(toml, "link = \"torso\"", "link = \"root_z\""), urdf, "upright plane");
   refused(without(toml, "[simulation.contact]", "[simulation.limit]"), urdf, "touch the ground");
-  refused(toml, without(urdf, "<collision>", "</link>\n  <joint name=\"rootx\""), "touch the ground");
+  refused(toml, without(urdf, "<collision>", "</link>\n  <joint name=\"rootx\""),
+          "touch the ground");
   refused(toml, Replaced(urdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"1 0 0\"/>"), "upright plane");
-  refused(toml, Replaced(urdf, "<axis xyz=\"1 0 0\"/>", "<axis xyz=\"0.6 0 0.8\"/>"), "right angles");
+  refused(toml, Replaced(urdf, "<axis xyz=\"1 0 0\"/>", "<axis xyz=\"0.6 0 0.8\"/>"),
+          "right angles");
   refused(Replaced(toml, "base = \"legs\"", "base = \"feet\""), urdf, "base");
   refused(Replaced(toml, "ground_sd = 0.018", "ground_sd = 0"), urdf, "ground_sd");
   refused(Replaced(toml, "base = \"legs\"", "base = \"sensors\""), urdf, "ground_sd");

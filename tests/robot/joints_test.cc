@@ -66,7 +66,8 @@ TEST_CASE("joints have motors or are passive, with their dynamics") {
 
 TEST_CASE("limits of a joint with a motor") {
   const std::string table =
-      "[joint.limits]\nposition_margin = 0.2\neffort_rate = 400\ndamping = 1.5\n[joint.dynamics]\narmature = "
+      "[joint.limits]\nposition_margin = 0.2\neffort_rate = 400\ndamping = "
+      "1.5\n[joint.dynamics]\narmature = "
       "0.01";
   const RobotDescription zoo = Load(Replaced(kZooToml, "[joint.dynamics]\narmature = 0.01", table));
   CHECK(zoo.joints[3].limits.position_margin == 0.2);
@@ -76,7 +77,8 @@ TEST_CASE("limits of a joint with a motor") {
   CHECK(std::isinf(zoo.joints[9].limits.effort_rate));
   CHECK(zoo.joints[9].limits.damping == 0);
 
-  const auto refused = [&](const std::string& keys, const std::string& what) {  // the hip has [-1, 1.5]
+  // the hip has [-1, 1.5]
+  const auto refused = [&](const std::string& keys, const std::string& what) {
     Refused("[joint.dynamics]\narmature = 0.01",
             "[joint.limits]\n" + keys + "\n[joint.dynamics]\narmature = 0.01", what);
   };
@@ -86,9 +88,10 @@ TEST_CASE("limits of a joint with a motor") {
   refused("damping = -1", "limits.damping");
   refused("damping = nan", "limits.damping");
   refused("dampng = 1", "did you mean damping?");
-  Refused("name = \"disc\"\nprotocol = \"cansimple\"\nnode = 2",
-          "name = \"disc\"\nprotocol = \"cansimple\"\nnode = 2\n[joint.limits]\nposition_margin = 0.1",
-          "the joint has none");
+  Refused(
+      "name = \"disc\"\nprotocol = \"cansimple\"\nnode = 2",
+      "name = \"disc\"\nprotocol = \"cansimple\"\nnode = 2\n[joint.limits]\nposition_margin = 0.1",
+      "the joint has none");
   Refused("name = \"spring\"\npassive = true",
           "name = \"spring\"\npassive = true\n[joint.limits]\ndamping = 1",
           "limits is of a motor, but the joint is passive");
@@ -112,7 +115,8 @@ TEST_CASE("what the driver watches, and how it stops") {
   CHECK(ramp.stop == Stop::kRamp);
   CHECK(ramp.ramp == 0.15);
   const DriverSettings limits = driver(
-      "max_motor_temperature = 70\nmax_drive_temperature = inf\nmin_bus_voltage = 20\nmax_bus_voltage = "
+      "max_motor_temperature = 70\nmax_drive_temperature = inf\nmin_bus_voltage = "
+      "20\nmax_bus_voltage = "
       "28\nstuck_after = 0.5");
   CHECK(limits.max_motor_temperature == 70);
   CHECK(std::isinf(limits.max_drive_temperature));
@@ -121,7 +125,8 @@ TEST_CASE("what the driver watches, and how it stops") {
   CHECK(limits.stuck_after == 0.5);
   const std::string damped = Replaced(kZooToml, "[joint.dynamics]\narmature = 0.01",
                                       "[joint.limits]\ndamping = 2\n[joint.dynamics]");
-  CHECK(Load(Replaced(damped, "[driver]", "[driver]\nstop = \"damping\"")).driver.stop == Stop::kDamping);
+  CHECK(Load(Replaced(damped, "[driver]", "[driver]\nstop = \"damping\"")).driver.stop ==
+        Stop::kDamping);
 
   const auto refused = [](const std::string& keys, const std::string& what) {
     Refused("[driver]", "[driver]\n" + keys, what);
@@ -146,25 +151,30 @@ TEST_CASE("a target per coordinate, and a spread") {
   const std::string spread = "spread = {hip = 0.2, \"free/rotation\" = 0.1}";
   const RobotDescription even = Load(Replaced(kZooToml, spread, "spread = 0.3"));
   CHECK(even.task.spread == std::vector<double>(13, 0.3));
-  const std::string target = "target = {hip = 0.5, \"rail/x\" = -1, \"free/rotation\" = [0.6, 0, 0.8, 0]}";
+  const std::string target =
+      "target = {hip = 0.5, \"rail/x\" = -1, \"free/rotation\" = [0.6, 0, 0.8, 0]}";
   const RobotDescription none = Load(Replaced(Replaced(kZooToml, target, ""), spread, ""));
   CHECK(none.task.target == std::vector<double>{0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0});
   CHECK(none.task.spread == std::vector<double>(13, 0.0));
 }
 
 TEST_CASE("warnings tell what does not touch the ground, if there is one") {
-  CHECK(Load(kZooToml).warnings.size() == 2);  // the thigh's mesh and cylinder; the base does not move
+  // the thigh's mesh and cylinder; the base does not move
+  CHECK(Load(kZooToml).warnings.size() == 2);
   const std::string contact =
-      "[simulation.contact]\nstiffness = 20000.0\ndamping = 100.0\nfriction = 0.8\nslip_speed = 0.01\n";
+      "[simulation.contact]\nstiffness = 20000.0\ndamping = 100.0\nfriction = 0.8\nslip_speed = "
+      "0.01\n";
   const RobotDescription floating = Load(Replaced(kZooToml, contact, ""));
   CHECK(floating.warnings.empty());
   CHECK_FALSE(floating.simulation.contact);
 }
 
 TEST_CASE("a part of a planar joint may have a motor") {
-  const std::string motor = "[[joint]]\nname = \"rail/x\"\nprotocol = \"cansimple\"\nnode = 3\n[estimator]";
+  const std::string motor =
+      "[[joint]]\nname = \"rail/x\"\nprotocol = \"cansimple\"\nnode = 3\n[estimator]";
   const std::string toml = Replaced(kZooToml, "[estimator]", motor);
-  CHECK_THROWS_WITH(Load(toml), Contains("robot.urdf:42: joint rail/x: limit effort must be positive"));
+  CHECK_THROWS_WITH(Load(toml),
+                    Contains("robot.urdf:42: joint rail/x: limit effort must be positive"));
   const std::string urdf = Replaced(kZooUrdf, "<axis xyz=\"0 0 3\"/>",
                                     "<axis xyz=\"0 0 3\"/><limit effort=\"7\" velocity=\"1\"/>");
   const RobotDescription zoo = Load(toml, urdf);
@@ -181,21 +191,24 @@ TEST_CASE("mistakes about joints are at their lines") {
           "32:8: joint[1].gear is of a motor, but the joint is passive");
   Refused("passive = true\n[joint.dynamics]", "passive = true\n[joint.dynamics]\ndelay = 0.1",
           "33:9: joint[1].dynamics.delay needs a motor");
-  Refused("[[joint]]\nname = \"spring\"\npassive = true\n[joint.dynamics]\nstiffness = 5000.0\n", "",
-          "joint \"spring\" of the URDF is driven, or passive = true");
+  Refused("[[joint]]\nname = \"spring\"\npassive = true\n[joint.dynamics]\nstiffness = 5000.0\n",
+          "", "joint \"spring\" of the URDF is driven, or passive = true");
   Refused("name = \"disc\"", "name = \"free/rotation\"",
           "\"free/rotation\" is a spherical joint, which no motor drives");
   Refused("[estimator]",
-          "[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\nrest = 1.0\n[estimator]",
+          "[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\nrest = "
+          "1.0\n[estimator]",
           "rest has no meaning for a spherical joint");
   for (const char* key : {"stiffness", "sensor_delay", "sensor_bias"}) {
     Refused("[estimator]",
-            std::string("[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\n") + key + " = 0.1\n[estimator]",
+            std::string("[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\n") +
+                key + " = 0.1\n[estimator]",
             std::string(key) + " has no meaning for a spherical joint");
   }
   for (const char* key : {"motor_gain", "delay", "no_load_speed"}) {
     Refused("[estimator]",
-            std::string("[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\n") + key + " = 0.1\n[estimator]",
+            std::string("[[joint]]\nname = \"free/rotation\"\npassive = true\n[joint.dynamics]\n") +
+                key + " = 0.1\n[estimator]",
             std::string(key) + " needs a motor");
   }
   // The simulator remembers no further back.
@@ -230,8 +243,9 @@ TEST_CASE("mistakes about targets are at their lines") {
 }
 
 TEST_CASE("a robot of passive joints only is none") {
-  std::string toml = Replaced(kZooToml, "[[joint]]\nname = \"disc\"\nprotocol = \"cansimple\"\nnode = 2",
-                              "[[joint]]\nname = \"disc\"\npassive = true");
+  std::string toml =
+      Replaced(kZooToml, "[[joint]]\nname = \"disc\"\nprotocol = \"cansimple\"\nnode = 2",
+               "[[joint]]\nname = \"disc\"\npassive = true");
   const size_t begin = toml.find("protocol"), end = toml.find("[joint.dynamics]");
   toml.replace(begin, end - begin, "passive = true\n");
   for (const char* key : {"motor_gain = 0.9\n", "delay = 0.004\n", "no_load_speed = 12.0\n"})

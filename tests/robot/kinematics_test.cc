@@ -43,7 +43,7 @@ TEST_CASE("poses: the hopper stands, bows, and bends its leg") {
   CHECK(Near(at("leg").position, {3, 0, 0.6}));
   CHECK(Near(at("foot").position, {3, 0, 0.1}));
 
-  q[2] = M_PI / 2;  // bows forward: its head to +x, its feet to -x
+  q[2] = M_PI / 2;   // bows forward: its head to +x, its feet to -x
   q[4] = -M_PI / 2;  // the leg bends backwards: about -y by a negative angle is about +y
   poses = LinkPoses(hopper, q);
   CHECK(Near(at("thigh").position, {2.8, 0, 1.25}));
@@ -82,8 +82,9 @@ TEST_CASE("kinematics: velocities and Jacobians are the positions' derivatives")
     Eigen::VectorXd at = q;
     at.head<3>() += t * v.head<3>();
     const Eigen::Vector3d turn = t * v.tail<3>();
-    const Eigen::Quaterniond to = Eigen::Quaterniond(q[3], q[4], q[5], q[6]) *
-                                  Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
+    const Eigen::Quaterniond to =
+        Eigen::Quaterniond(q[3], q[4], q[5], q[6]) *
+        Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
     at.tail<4>() << to.w(), to.vec();
     return LinkPoses(tree, at);
   };
@@ -94,8 +95,9 @@ TEST_CASE("kinematics: velocities and Jacobians are the positions' derivatives")
   Eigen::Matrix3Xd jacobian(3, 6);
   for (int link = 0; link < 5; ++link) {
     const auto at = static_cast<size_t>(link);
-    const Eigen::Vector3d velocity = (after[at].position + after[at].rotation * point - before[at].position -
-                                      before[at].rotation * point) / (2 * h);
+    const Eigen::Vector3d velocity = (after[at].position + after[at].rotation * point -
+                                      before[at].position - before[at].rotation * point) /
+                                     (2 * h);
     INFO("link " << link);
     CHECK(Near(kinematics.Position(link, point), now[at].position + now[at].rotation * point));
     CHECK((kinematics.Velocity(link, point) - velocity).norm() < 1e-8);

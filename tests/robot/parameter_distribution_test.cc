@@ -37,7 +37,8 @@ TEST_CASE("The prior has the description's mean and variance in physical units")
 }
 
 TEST_CASE("Samples have the distribution's moments, also those of a correlated mixture") {
-  const ParameterDistribution distribution = ParameterDistribution::FromMessage(TwoComponents(), Robot());
+  const ParameterDistribution distribution =
+      ParameterDistribution::FromMessage(TwoComponents(), Robot());
   const int count = 100000;
   Random random(7, {1});
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(2), squares = Eigen::VectorXd::Zero(2);
@@ -51,12 +52,14 @@ TEST_CASE("Samples have the distribution's moments, also those of a correlated m
   const Eigen::VectorXd mean = sum / count;
   const Eigen::VectorXd sd = (squares / count - mean.cwiseAbs2()).cwiseSqrt();
   for (int i = 0; i < 2; ++i) {
-    CHECK(mean[i] == Approx(distribution.Mean()[i]).margin(4 * distribution.Sd()[i] / std::sqrt(count)));
+    CHECK(mean[i] ==
+          Approx(distribution.Mean()[i]).margin(4 * distribution.Sd()[i] / std::sqrt(count)));
     CHECK(sd[i] == Approx(distribution.Sd()[i]).epsilon(.02));
   }
   // E[xy] = sum of weight * (covariance + product of means), in coordinates.
   const double prior_mean = Robot().parameters[0].coordinate_mean();
-  CHECK(product / count == Approx(.25 * prior_mean * -.2 + .75 * (.006 + std::log(9.) * .3)).margin(.02));
+  CHECK(product / count ==
+        Approx(.25 * prior_mean * -.2 + .75 * (.006 + std::log(9.) * .3)).margin(.02));
 }
 
 TEST_CASE("Equal names of the generator give equal simulators") {
@@ -71,7 +74,8 @@ TEST_CASE("Equal names of the generator give equal simulators") {
 // p(y) = N(logit y; m, s) / (y (1 - y)).
 TEST_CASE("A logit parameter's moments, samples and code") {
   RobotDescription robot = Robot();
-  robot.parameters[1] = {"friction", "", ParameterDescription::Coordinate::kLogit, .7, .02, .2, 1.2};
+  robot.parameters[1] = {"friction", "", ParameterDescription::Coordinate::kLogit, .7, .02,
+                         .2,         1.2};
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   CHECK(distribution.ToMessage().coordinate[1] == 2);
   for (const double sd : {.01, .5, 2.}) {
@@ -96,7 +100,8 @@ TEST_CASE("A logit parameter's moments, samples and code") {
   const parameter_distribution_t message = distribution.ToMessage();
   CHECK(ParameterDistribution::FromMessage(message, robot).Mean()[1] == distribution.Mean()[1]);
   robot.parameters[1].coordinate = ParameterDescription::Coordinate::kLinear;
-  CHECK_THROWS_WITH(ParameterDistribution::FromMessage(message, robot), Catch::Contains("coordinate of 'friction'"));
+  CHECK_THROWS_WITH(ParameterDistribution::FromMessage(message, robot),
+                    Catch::Contains("coordinate of 'friction'"));
 }
 
 TEST_CASE("A singular covariance is sampled on its subspace") {
@@ -105,14 +110,16 @@ TEST_CASE("A singular covariance is sampled on its subspace") {
   const ParameterDistribution distribution = ParameterDistribution::FromMessage(message, Robot());
   Random random(5);
   for (int i = 0; i < 20; ++i) {
-    const Eigen::VectorXd offset = distribution.SampleCoordinates(random) - distribution.components[0].mean;
+    const Eigen::VectorXd offset =
+        distribution.SampleCoordinates(random) - distribution.components[0].mean;
     CHECK(offset[0] == Approx(2 * offset[1]).margin(1e-7));
   }
 }
 
 TEST_CASE("A message survives the round trip bit by bit") {
   const parameter_distribution_t message = TwoComponents();
-  const parameter_distribution_t again = ParameterDistribution::FromMessage(message, Robot()).ToMessage();
+  const parameter_distribution_t again =
+      ParameterDistribution::FromMessage(message, Robot()).ToMessage();
   CHECK(again.iteration == 3);
   CHECK(again.name == message.name);
   CHECK(again.coordinate == message.coordinate);
@@ -125,14 +132,17 @@ TEST_CASE("A message survives the round trip bit by bit") {
 TEST_CASE("Hostile distributions are refused with a reason") {
   parameter_distribution_t message = TwoComponents();
   const auto refused_for = [&](const std::string& reason) {
-    CHECK_THROWS_WITH(ParameterDistribution::FromMessage(message, Robot()), Catch::Contains(reason));
+    CHECK_THROWS_WITH(ParameterDistribution::FromMessage(message, Robot()),
+                      Catch::Contains(reason));
   };
   ParameterDistribution::FromMessage(message, Robot());
   SECTION("name") { message.name[1] = "ofset", refused_for("'ofset', test robot has 'offset'"); }
   SECTION("coordinate") {
     message.coordinate[0] = parameter_distribution_t::LINEAR, refused_for("'gravity'");
   }
-  SECTION("fewer parameters") { message.num_parameters = 1, refused_for("1 parameters, expected 2"); }
+  SECTION("fewer parameters") {
+    message.num_parameters = 1, refused_for("1 parameters, expected 2");
+  }
   SECTION("shorter than announced") { message.name.pop_back(), refused_for("parameters"); }
   SECTION("no components") { message.num_components = 0, refused_for("0 components"); }
   SECTION("too many components") { message.num_components = 1 << 30, refused_for("components"); }
@@ -149,7 +159,9 @@ TEST_CASE("Hostile distributions are refused with a reason") {
   SECTION("not positive semidefinite") {
     message.covariance[5] = message.covariance[6] = .03, refused_for("not positive semidefinite");
   }
-  SECTION("negative variance") { message.covariance[3] = -.01, refused_for("not positive semidefinite"); }
+  SECTION("negative variance") {
+    message.covariance[3] = -.01, refused_for("not positive semidefinite");
+  }
   SECTION("overflow") { message.mean[0] = 1e5, refused_for("overflow"); }
 }
 

@@ -38,8 +38,8 @@ ParameterDescription Bounded(double lower, double upper, double mean, double var
 }
 
 TEST_CASE("a logit coordinate goes there and back") {
-  for (const auto& p : {Bounded(0, 1, .3, .01), Bounded(-5, -4, -4.1, .01), Bounded(0, .02, .004, 1e-6),
-                        Bounded(1e6, 1e6 + 1, 1e6 + .5, .01)}) {
+  for (const auto& p : {Bounded(0, 1, .3, .01), Bounded(-5, -4, -4.1, .01),
+                        Bounded(0, .02, .004, 1e-6), Bounded(1e6, 1e6 + 1, 1e6 + .5, .01)}) {
     for (double x = -8; x <= 8; x += .25) {
       const double value = p.ToPhysical(x);
       CHECK(value > p.lower);
@@ -58,7 +58,8 @@ TEST_CASE("a logit coordinate goes there and back") {
 
 TEST_CASE("the bounds themselves are finite coordinates, and nothing leads to them") {
   const double infinity = std::numeric_limits<double>::infinity();
-  for (const auto& p : {Bounded(0, 1, .3, .01), Bounded(-5, -4, -4.1, .01), Bounded(-1e12, 1e12, 0, 1)}) {
+  for (const auto& p :
+       {Bounded(0, 1, .3, .01), Bounded(-5, -4, -4.1, .01), Bounded(-1e12, 1e12, 0, 1)}) {
     for (const double x : {-infinity, -1e300, -1000., 1000., 1e300, infinity}) {
       const double value = p.ToPhysical(x);
       CHECK((value > p.lower && value < p.upper));
@@ -78,8 +79,10 @@ TEST_CASE("the bounds themselves are finite coordinates, and nothing leads to th
   }
 }
 
-TEST_CASE("a logit prior has its variance to first order: the derivative is that of finite differences") {
-  for (const auto& p : {Bounded(0, 1, .3, .01), Bounded(-5, -4, -4.1, .002), Bounded(0, .02, .004, 1e-7)}) {
+TEST_CASE(
+    "a logit prior has its variance to first order: the derivative is that of finite differences") {
+  for (const auto& p :
+       {Bounded(0, 1, .3, .01), Bounded(-5, -4, -4.1, .002), Bounded(0, .02, .004, 1e-7)}) {
     const double h = 1e-6 * (p.upper - p.lower);
     const double derivative = (p.ToCoordinate(p.mean + h) - p.ToCoordinate(p.mean - h)) / (2 * h);
     CHECK(p.coordinate_variance() == Approx(p.variance * derivative * derivative).epsilon(1e-6));
@@ -105,13 +108,16 @@ TEST_CASE("mistakes in a parameter are at their lines") {
     CHECK_THROWS_WITH(Read(text), Contains("robot.toml:") && Contains(what));
   };
   refused(Logit("0.5", "0.01", "lower = 0.0\n"), "upper is missing");
-  refused(Logit("0.5", "0.01", "lower = 0.5\nupper = 1.0"), "7:9: parameter[0].lower must be below mean");
-  refused(Logit("0.5", "0.01", "lower = 0.0\nupper = 0.5"), "8:9: parameter[0].upper must be above mean");
+  refused(Logit("0.5", "0.01", "lower = 0.5\nupper = 1.0"),
+          "7:9: parameter[0].lower must be below mean");
+  refused(Logit("0.5", "0.01", "lower = 0.0\nupper = 0.5"),
+          "8:9: parameter[0].upper must be above mean");
   refused(Logit("0.5", "0.25", "lower = 0.0\nupper = 1.0"),
           "6:12: parameter[0].variance = 0.25 is more than");
   refused(Logit("0.5", "0.01", "lower = nan\nupper = 1.0"), "7:9: parameter[0].lower");
   refused(kGravity + "lower = 1.0\n", "7:9: parameter[0].lower is for coordinate = \"logit\" only");
-  refused(kGravity + "frozen = true\n", "4:14: parameter[0].coordinate has no effect on a frozen parameter");
+  refused(kGravity + "frozen = true\n",
+          "4:14: parameter[0].coordinate has no effect on a frozen parameter");
   refused("[[parameter]]\nname = \"g\"\nfrozen = true\nmean = 1.0\n",
           "at least one [[parameter]] that is not frozen");
   refused("[[parameter]]\nname = \"g\"\nfrozen = true\nmean = inf\n", "4:8: parameter[0].mean");
@@ -119,8 +125,10 @@ TEST_CASE("mistakes in a parameter are at their lines") {
           "meen is not a known key; did you mean mean?");
   refused(kGravity + "[[parameter]]\nname = \"gravity\"\nfrozen = true\nmean = 1.0\n",
           "8:8: parameter[1].name = \"gravity\" occurs twice");
-  refused("[[parameter]]\nname = \"g\"\nunit = \"\"\ncoordinate = \"linear\"\nmean = 1e300\nvariance = 1.0\n",
-          "5:8: parameter[0].mean");
+  refused(
+      "[[parameter]]\nname = \"g\"\nunit = \"\"\ncoordinate = \"linear\"\nmean = 1e300\nvariance = "
+      "1.0\n",
+      "5:8: parameter[0].mean");
 }
 
 }  // namespace

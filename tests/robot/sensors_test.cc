@@ -55,10 +55,13 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-RobotDescription Load(const std::string& toml) { return LoadRobot(RobotFolder(kZooUrdf, toml).path()); }
+RobotDescription Load(const std::string& toml) {
+  return LoadRobot(RobotFolder(kZooUrdf, toml).path());
+}
 
 std::string WithMit(const std::string& mit) {
-  return Replaced(kZooToml, "protocol = \"cansimple\"\nnode = 1\ngear = 6.0\n", "gear = 6.0\n" + mit);
+  return Replaced(kZooToml, "protocol = \"cansimple\"\nnode = 1\ngear = 6.0\n",
+                  "gear = 6.0\n" + mit);
 }
 
 TEST_CASE("sensors: encoders and an IMU") {
@@ -107,8 +110,8 @@ TEST_CASE("sensors: what is refused") {
   refused("counts = 4096", "counts = 40.5", "whole number");
   refused("range = 268435456", "range = 4294967297", "range");
   refused("sign = -1", "sign = 0", "1 or -1");
-  refused("max_speed = 10.0\n[[sensor]]\nname = \"imu\"", "max_speed = 1600.0\n[[sensor]]\nname = \"imu\"",
-          "half its range");
+  refused("max_speed = 10.0\n[[sensor]]\nname = \"imu\"",
+          "max_speed = 1600.0\n[[sensor]]\nname = \"imu\"", "half its range");
   refused("link = \"carriage\"", "link = \"carrige\"", "not a link");
   refused("base = 0x380", "base = 0x7C0", "base");
   refused("rpy = [0, 0, 1.5707963267948966]", "rpy = [0, 0]", "rpy");
@@ -125,28 +128,35 @@ TEST_CASE("noise: of a count, of an IMU, of a joint") {
   CHECK(robot.estimator.delay == 0);
   CHECK(robot.estimator.outage == 0.05);
   CHECK(robot.estimator.model_acceleration == 0.2);
-  CHECK(Load(Replaced(kZooToml, "reset_after = 0.2", "reset_after = 0.2\nmodel = {acceleration = 3.0}")).estimator.model_acceleration == 3);
-  const std::string imu = Replaced(kSensors, "base = 0x380", "base = 0x380\nangle_sd = 0.003\nrate_bias_sd = 0.2\ndelay = 0.001");
+  CHECK(Load(Replaced(kZooToml, "reset_after = 0.2",
+                      "reset_after = 0.2\nmodel = {acceleration = 3.0}"))
+            .estimator.model_acceleration == 3);
+  const std::string imu =
+      Replaced(kSensors, "base = 0x380",
+               "base = 0x380\nangle_sd = 0.003\nrate_bias_sd = 0.2\ndelay = 0.001");
   const RobotDescription told = Load(kZooToml + imu);
   CHECK(told.sensors[2].noise.position_sd == 0.003);
   CHECK(told.sensors[2].rate_bias_sd == 0.2);
   CHECK(told.sensors[2].noise.delay == 0.001);
   const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
     INFO(from << " -> " << to);
-    CHECK_THROWS_WITH(Load(Replaced(kZooToml + kSensors, from, to)), Contains("robot.toml:") && Contains(what));
+    CHECK_THROWS_WITH(Load(Replaced(kZooToml + kSensors, from, to)),
+                      Contains("robot.toml:") && Contains(what));
   };
   refused("base = 0x380", "base = 0x380\nangle_sd = 0", "angle_sd");
   refused("base = 0x380", "base = 0x380\nposition_sd = 0.1", "position_sd");
   refused("node = 2\nperiod", "angle_sd = 0.1\nnode = 2\nperiod", "angle_sd");
   refused("reset_after = 0.2", "reset_after = 0.2\noutage = 0", "outage");
   refused("reset_after = 0.2", "reset_after = 0.2\ndelay = 0.2", "delay");
-  refused("reset_after = 0.2", "reset_after = 0.2\nmodel = {acceleration = 0.0}", "estimator.model.acceleration");
+  refused("reset_after = 0.2", "reset_after = 0.2\nmodel = {acceleration = 0.0}",
+          "estimator.model.acceleration");
   refused("reset_after = 0.2", "reset_after = 0.2\nmodel = {jerk = 1.0}", "estimator.model.jerk");
   refused("name = \"disc\"\n", "name = \"disc\"\nestimator = {jerk = -1.0}\n", "jerk");
   refused("name = \"disc\"\n", "name = \"disc\"\nestimator = {lag = 3}\n", "lag");
-  const RobotDescription joint =
-      Load(Replaced(kZooToml, "name = \"disc\"\n", "name = \"disc\"\nestimator = {jerk = 5.0, delay = 0.002}\n"));
-  const auto disc = std::find_if(joint.joints.begin(), joint.joints.end(), [](const auto& j) { return j.name == "disc"; });
+  const RobotDescription joint = Load(Replaced(
+      kZooToml, "name = \"disc\"\n", "name = \"disc\"\nestimator = {jerk = 5.0, delay = 0.002}\n"));
+  const auto disc = std::find_if(joint.joints.begin(), joint.joints.end(),
+                                 [](const auto& j) { return j.name == "disc"; });
   REQUIRE(disc != joint.joints.end());
   CHECK(disc->noise.jerk == 5);
   CHECK(disc->noise.delay == 0.002);
@@ -172,7 +182,8 @@ TEST_CASE("MIT motors: ranges with their source") {
 TEST_CASE("MIT motors: what is refused") {
   const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
     INFO(from << " -> " << to);
-    CHECK_THROWS_WITH(Load(WithMit(Replaced(kMit, from, to))), Contains("robot.toml:") && Contains(what));
+    CHECK_THROWS_WITH(Load(WithMit(Replaced(kMit, from, to))),
+                      Contains("robot.toml:") && Contains(what));
   };
   refused(kMit.substr(kMit.find("[joint.mit]")), "", "mit");
   refused("protocol = \"mit\"", "protocol = \"cansimple\"", "is of protocol \"mit\"");
@@ -189,8 +200,10 @@ TEST_CASE("MIT motors: what is refused") {
 TEST_CASE("an encoder on a joint with a motor may differ from it by a tolerance") {
   const std::string hip = "node = 2\nperiod = 0.002\n", boom = "node = 1\nperiod = 0.002\n";
   CHECK(std::isinf(Load(kZooToml + kSensors).sensors[1].tolerance));
-  CHECK(Load(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0.05\n")).sensors[1].tolerance == 0.05);
-  CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0\n")), Contains("tolerance"));
+  CHECK(Load(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0.05\n")).sensors[1].tolerance ==
+        0.05);
+  CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0\n")),
+                    Contains("tolerance"));
   CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, boom, boom + "tolerance = 0.05\n")),
                     Contains("\"rail/x\" has no motor"));
 }
@@ -198,9 +211,10 @@ TEST_CASE("an encoder on a joint with a motor may differ from it by a tolerance"
 TEST_CASE("the bus has a bit rate, and drives a telemetry period") {
   CHECK(Load(kZooToml).bus_bit_rate == 1e6);
   CHECK(Load(kZooToml).driver.telemetry == 0.1);
-  CHECK(Load(Replaced(kZooToml, "[driver]", "bit_rate = 500000\n[driver]\ntelemetry = 0.02")).bus_bit_rate ==
-        5e5);
-  CHECK_THROWS_WITH(Load(Replaced(kZooToml, "[driver]", "bit_rate = 2e6\n[driver]")), Contains("bit_rate"));
+  CHECK(Load(Replaced(kZooToml, "[driver]", "bit_rate = 500000\n[driver]\ntelemetry = 0.02"))
+            .bus_bit_rate == 5e5);
+  CHECK_THROWS_WITH(Load(Replaced(kZooToml, "[driver]", "bit_rate = 2e6\n[driver]")),
+                    Contains("bit_rate"));
 }
 
 TEST_CASE("the hopper's boom and IMU have the ids of its plan") {

@@ -55,8 +55,8 @@ TEST_CASE("broken XML is an error with its row") {
 }
 
 TEST_CASE("every number is one, finite and within reason") {
-  for (const char* number :
-       {"", "nan", "inf", "-inf", "1e308", "1e999", "x", "1,5", "2 3", "0x10", "1e", "--1", "+-1"}) {
+  for (const char* number : {"", "nan", "inf", "-inf", "1e308", "1e999", "x", "1,5", "2 3", "0x10",
+                             "1e", "--1", "+-1"}) {
     Check("mass value=\"2\"", std::string("mass value=\"") + number + "\"", "");
     Check("effort=\"20\"", std::string("effort=\"") + number + "\"", "");
     Check("upper=\"1.5\"", std::string("upper=\"") + number + "\"", "");
@@ -84,28 +84,33 @@ TEST_CASE("every mistake is at its line") {
         "link lost hangs on no joint");
   Check("<capsule ", "<cone ", "<cone> is not one of box, sphere, cylinder, capsule, mesh");
   Check("<sphere radius=\"0.03\"/>", "", "<geometry> is empty");
-  Check("<sphere radius=\"0.03\"/>", "<sphere radius=\"1\"/><sphere radius=\"1\"/>", "a second solid");
+  Check("<sphere radius=\"0.03\"/>", "<sphere radius=\"1\"/><sphere radius=\"1\"/>",
+        "a second solid");
   Check("size=\"0.3 0.2 0.1\"", "size=\"0.3 0 0.1\"", "size of <box> must be positive");
   Check("radius=\"0.05\" length=\"0.2\"", "radius=\"0.05\"", "<cylinder> has no length");
   Check("type=\"revolute\"", "type=\"ball\"", "joint hip is not fixed");
   Check("type=\"revolute\"", "", "<joint> has no type");
-  Check("<parent link=\"thigh\"/>", "<parent link=\"shank\"/>", "joint spring: there is no link shank",
-        "<joint name=\"spring\"");
+  Check("<parent link=\"thigh\"/>", "<parent link=\"shank\"/>",
+        "joint spring: there is no link shank", "<joint name=\"spring\"");
   Check("<child link=\"thigh\"/>", "", "<joint> has no <child>", "<joint name=\"hip\"");
   Check("<child link=\"rotor\"/>", "<child link=\"foot\"/>",
         "link foot is moved by joint weld and by joint disc", "<joint name=\"disc\"");
   Check("<joint name=\"spring\"", "<joint name=\"hip\"", "a second joint is called hip",
         "<joint name=\"hip\" type=\"prismatic\"");
-  Check("<limit lower=\"-0.1\" upper=\"0.1\"/>", "", "joint spring has no <limit>", "<joint name=\"spring\"");
+  Check("<limit lower=\"-0.1\" upper=\"0.1\"/>", "", "joint spring has no <limit>",
+        "<joint name=\"spring\"");
   Check("lower=\"-0.1\"", "lower=\"0.1\"", "joint spring: limit lower must be below upper");
   Check("effort=\"20\"", "effort=\"-20\"", "joint hip: limit effort must not be negative");
-  Check("effort=\"20\"", "effort=\"0\"", "joint hip: limit effort must be positive: it has a motor");
+  Check("effort=\"20\"", "effort=\"0\"",
+        "joint hip: limit effort must be positive: it has a motor");
   Check("effort=\"20\"", "", "joint hip: limit effort must be positive: it has a motor");
   Check("velocity=\"10\"", "velocity=\"0\"", "joint hip: limit velocity must be positive");
   Check("velocity=\"10\"", "", "joint hip: limit velocity is missing: it has a motor");
-  Check("<limit effort=\"3\" velocity=\"30\"/>", "", "joint disc: limit effort", "<joint name=\"disc\"");
+  Check("<limit effort=\"3\" velocity=\"30\"/>", "", "joint disc: limit effort",
+        "<joint name=\"disc\"");
   Check("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 0\"/>", "joint hip has no axis");
-  Check("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 0\"/><axis xyz=\"0 1 0\"/>", "a second <axis> in <joint>");
+  Check("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 0\"/><axis xyz=\"0 1 0\"/>",
+        "a second <axis> in <joint>");
   Check("damping=\"0.1\"", "damping=\"-0.1\"", "joint hip: damping must not be negative");
   Check("<axis xyz=\"0 1 0\"/>", "<mimic joint=\"spring\"/>", "joint hip is to mimic another");
   Check("<link name=\"slider\"/>",
@@ -144,15 +149,15 @@ TEST_CASE("absurd sizes are refused") {
   std::string chain, deep;
   for (int i = 0; i < 5000; ++i) {
     const std::string a = std::to_string(i), b = std::to_string(i + 1);
-    chain += "<link name='l" + a + "'/><joint name='j" + a + "' type='continuous'><parent link='l" + a +
-             "'/><child link='l" + b + "'/></joint>\n";
+    chain += "<link name='l" + a + "'/><joint name='j" + a + "' type='continuous'><parent link='l" +
+             a + "'/><child link='l" + b + "'/></joint>\n";
   }
   CHECK_THAT(Error("<robot name='r'>" + chain + "<link name='l5000'/></robot>"),
              Contains("robot.urdf:1001: more than 1000 links"));
   for (int i = 0; i < 200; ++i) {
     const std::string a = std::to_string(i), b = std::to_string(i + 1);
-    deep += "<link name='l" + a + "'/><joint name='j" + a + "' type='floating'><parent link='l" + a +
-            "'/><child link='l" + b + "'/></joint>\n";
+    deep += "<link name='l" + a + "'/><joint name='j" + a + "' type='floating'><parent link='l" +
+            a + "'/><child link='l" + b + "'/></joint>\n";
   }
   CHECK_THAT(Error("<robot name='r'>" + deep + "<link name='l200'/></robot>"),
              Contains("robot.urdf:126: more than 500 moving joints"));

@@ -21,8 +21,8 @@ UrdfModel Load(const std::string& urdf) { return LoadUrdf(RobotFolder(urdf, "").
 
 // Base, one body behind a joint of that type.
 UrdfModel LoadJoint(const std::string& type, const std::string& inside) {
-  return Load("<robot name='r'><link name='base'/><link name='body'/><joint name='j' type='" + type +
-              "'><parent link='base'/><child link='body'/>" + inside + "</joint></robot>");
+  return Load("<robot name='r'><link name='base'/><link name='body'/><joint name='j' type='" +
+              type + "'><parent link='base'/><child link='body'/>" + inside + "</joint></robot>");
 }
 
 TEST_CASE("every kind of joint is read, depth first, in the file's order") {
@@ -62,7 +62,8 @@ TEST_CASE("every kind of joint is read, depth first, in the file's order") {
     const bool intermediate = zoo.links[i + 1].name.find('/') != std::string::npos;
     if (intermediate) CHECK(zoo.links[i + 1].mass == 0);
   }
-  // The first of the parts is at the origin of the whole, the others where the one before has moved to.
+  // The first of the parts is at the origin of the whole, the others where the one before has moved
+  // to.
   CHECK(zoo.joints[0].origin == Vector3d(0, 0, 1));
   CHECK(zoo.joints[5].origin == Vector3d(1, 2, 3));
   CHECK((zoo.joints[5].rotation * Vector3d::UnitX() - Vector3d::UnitY()).norm() < 1e-15);
@@ -120,27 +121,34 @@ TEST_CASE("a planar joint's axes are right-handed, and x stays near x") {
     CHECK((m.transpose() * m - Matrix3d::Identity()).norm() < 1e-12);
     CHECK(m.determinant() == Approx(1));
   }
-  CHECK((LoadJoint("planar", "").joints[2].axis - Vector3d::UnitX()).norm() < 1e-15);  // URDF's default
+  // URDF's default
+  CHECK((LoadJoint("planar", "").joints[2].axis - Vector3d::UnitX()).norm() < 1e-15);
 }
 
-// A link welded on at (1, 0, 0) and turned by 90 degrees about z; on it another at (0, 2, 0), turned by 90
-// degrees about x. Where things are, by hand: R1 = [-y for y -> ...]: R1 (x, y, z) = (-y, x, z), R2 (x, y, z)
-// = (x, -z, y). The second frame's origin is (1, 0, 0) + R1 (0, 2, 0) = (-1, 0, 0), its axes R1 R2 (x, y, z)
-// = (z, x, y).
+// A link welded on at (1, 0, 0) and turned by 90 degrees about z; on it another at (0, 2, 0),
+// turned by 90 degrees about x. Where things are, by hand: R1 = [-y for y -> ...]: R1 (x, y, z) =
+// (-y, x, z), R2 (x, y, z) = (x, -z, y). The second frame's origin is (1, 0, 0) + R1 (0, 2, 0) =
+// (-1, 0, 0), its axes R1 R2 (x, y, z) = (z, x, y).
 TEST_CASE("solids, masses and joints are carried through rotated welds") {
-  const UrdfModel model = Load(R"(<robot name="r"><link name="base"/><link name="a"/><link name="b"/>
+  const UrdfModel model =
+      Load(R"(<robot name="r"><link name="base"/><link name="a"/><link name="b"/>
     <link name="c"><inertial><origin xyz="1 2 3"/><mass value="4"/>
         <inertia ixx="0.5" ixy="0.01" ixz="0.02" iyy="0.6" iyz="0.03" izz="0.7"/></inertial>
       <visual><origin xyz="1 2 3" rpy="0 0 0"/><geometry><box size="1 2 3"/></geometry></visual>
-      <collision><origin xyz="0 0 5"/><geometry><capsule radius="0.1" length="0.4"/></geometry></collision>
+      <collision><origin xyz="0 0 5"/><geometry><capsule radius="0.1" length="0.4"/></geometry>
+        </collision>
       <collision><geometry><mesh filename="m"/></geometry></collision>
-      <collision><origin xyz="0 1 0"/><geometry><cylinder radius="0.2" length="0.3"/></geometry></collision>
+      <collision><origin xyz="0 1 0"/><geometry><cylinder radius="0.2" length="0.3"/></geometry>
+        </collision>
       <collision><origin xyz="0 1 0"/><geometry><sphere radius="0.7"/></geometry></collision>
     </link><link name="d"/>
     <joint name="turn" type="continuous"><parent link="base"/><child link="a"/></joint>
-    <joint name="w1" type="fixed"><parent link="a"/><child link="b"/><origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/></joint>
-    <joint name="w2" type="fixed"><parent link="b"/><child link="c"/><origin xyz="0 2 0" rpy="1.5707963267948966 0 0"/></joint>
-    <joint name="last" type="prismatic"><parent link="c"/><child link="d"/><origin xyz="0 0 1"/><axis xyz="1 0 0"/>
+    <joint name="w1" type="fixed"><parent link="a"/><child link="b"/>
+      <origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/></joint>
+    <joint name="w2" type="fixed"><parent link="b"/><child link="c"/>
+      <origin xyz="0 2 0" rpy="1.5707963267948966 0 0"/></joint>
+    <joint name="last" type="prismatic"><parent link="c"/><child link="d"/><origin xyz="0 0 1"/>
+      <axis xyz="1 0 0"/>
       <limit lower="0" upper="1"/></joint></robot>)");
   Matrix3d axes;
   axes << 0, 0, 1, 1, 0, 0, 0, 1, 0;
@@ -169,7 +177,8 @@ TEST_CASE("solids, masses and joints are carried through rotated welds") {
   CHECK((model.joints[1].origin - Vector3d(0, 0, 0)).norm() < 1e-14);
   CHECK((model.joints[1].rotation - axes).norm() < 1e-14);
   REQUIRE(model.contact_warnings.size() == 2);
-  CHECK_THAT(model.contact_warnings[0], Catch::Contains("robot.urdf:7: link c: a collision cylinder"));
+  CHECK_THAT(model.contact_warnings[0],
+             Catch::Contains("robot.urdf:7: link c: a collision cylinder"));
   CHECK_THAT(model.contact_warnings[1], Catch::Contains("robot.urdf:6: link c: a collision mesh"));
 }
 
@@ -180,7 +189,8 @@ TEST_CASE("what nothing reads is said") {
 }
 
 TEST_CASE("joints in the order of the file, not of the alphabet") {
-  const UrdfModel model = Load(R"(<robot name="r"><link name="base"/><link name="a"/><link name="b"/>
+  const UrdfModel model =
+      Load(R"(<robot name="r"><link name="base"/><link name="a"/><link name="b"/>
     <joint name="z" type="continuous"><parent link="base"/><child link="b"/></joint>
     <joint name="y" type="continuous"><parent link="base"/><child link="a"/></joint></robot>)");
   CHECK(model.joints[0].name == "z");

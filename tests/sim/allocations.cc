@@ -7,8 +7,8 @@ namespace {
 thread_local int64_t allocations = 0;
 }
 
-// All ways to memory; glibc's own are beneath. GCC makes calloc of malloc and memset, and of new for what is over-aligned
-// aligned_alloc.
+// All ways to memory; glibc's own are beneath. GCC makes calloc of malloc and memset, and of new
+// for what is over-aligned aligned_alloc.
 extern "C" {
 void* __libc_malloc(size_t size);
 void* __libc_calloc(size_t count, size_t size);

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/dynamics/planar_tree.h"
 #include "sim/dynamics/constraints.h"
+#include "sim/dynamics/planar_tree.h"
 #include "sim/simulator.h"
 #include "tests/sim/trees.h"
 
@@ -21,11 +21,13 @@ constexpr double kGravity = 9.81;
 constexpr double kStickSpeed = Constraints<double, PlanarTree>::kStickSpeed;
 
 // One body of 2 kg on a joint (or, with a floating joint, free), its frame at its centre of mass.
-RobotDescription Body(const std::string& type, const std::string& axis, double substep, Integrator integrator) {
+RobotDescription Body(const std::string& type, const std::string& axis, double substep,
+                      Integrator integrator) {
   RobotDescription robot = FromUrdf(
       "<robot name='body'><link name='base'/><link name='body'><inertial><mass value='2'/>"
       "<inertia ixx='.05' iyy='.05' izz='.05' ixy='0' ixz='0' iyz='0'/></inertial></link>"
-      "<joint name='j' type='" + type + "'><parent link='base'/><child link='body'/><axis xyz='" + axis +
+      "<joint name='j' type='" +
+      type + "'><parent link='base'/><child link='body'/><axis xyz='" + axis +
       "'/><limit lower='-1' upper='1' effort='10' velocity='9'/></joint></robot>");
   robot.simulation.gravity = kGravity;
   robot.simulation.substep = substep;
@@ -35,7 +37,8 @@ RobotDescription Body(const std::string& type, const std::string& axis, double s
 
 RobotDescription Ball(double substep, Integrator integrator) {
   RobotDescription robot = Body("floating", "1 0 0", substep, integrator);
-  robot.simulation.contact = {.stiffness = 5000, .damping = 150, .friction = 0.5, .slip_speed = 0.01};
+  robot.simulation.contact = {
+      .stiffness = 5000, .damping = 150, .friction = 0.5, .slip_speed = 0.01};
   Shape shape;
   shape.size = Vector3d(0.1, 0, 0);
   robot.links.back().collisions = {shape};
@@ -180,7 +183,8 @@ TEST_CASE("contact: a sliding ball begins to roll, at five sevenths of its speed
   simulator.SetState(BallState(0.1 - 2 * kGravity / 5000), v);
   simulator.Step(VectorXd::Zero(6), 0.5);
   CHECK(simulator.v()[0] == Approx(1.0).epsilon(0.002));
-  CHECK(simulator.v()[4] == Approx(10.0).epsilon(0.002));  // about y, in link axes that have turned about y only
+  // about y, in link axes that have turned about y only
+  CHECK(simulator.v()[4] == Approx(10.0).epsilon(0.002));
 }
 
 TEST_CASE("contact: the hopper survives any actions on any ground at any substep") {
@@ -198,7 +202,9 @@ TEST_CASE("contact: the hopper survives any actions on any ground at any substep
         q[1] = 1.25;
         simulator.SetState(q, VectorXd::Zero(6));
         for (int i = 0; i < 2000; ++i) {
-          for (int k = 3; k < 6; ++k) effort[k] = random.Uniform() < 0.5 ? random.Uniform(-200, 200) : (random.Uniform() < 0.5 ? 200 : -200);
+          for (int k = 3; k < 6; ++k)
+            effort[k] = random.Uniform() < 0.5 ? random.Uniform(-200, 200)
+                                               : (random.Uniform() < 0.5 ? 200 : -200);
           if (i % 100 == 99) simulator.SetState(q, DrawNumbers(6, random, 3));
           simulator.Step(effort, 0.008);
           REQUIRE(simulator.finite());

@@ -16,7 +16,8 @@ using Integrator = SimulationSettings::Integrator;
 
 constexpr double kPeriod = 0.01;
 
-RobotDescription Arm(double first_delay, double second_delay, double substep, Integrator integrator = Integrator::kLeapfrog) {
+RobotDescription Arm(double first_delay, double second_delay, double substep,
+                     Integrator integrator = Integrator::kLeapfrog) {
   RobotDescription robot = Frictionless(LoadExample("double_pendulum"));
   robot.joints[0].dynamics.delay = first_delay;
   robot.joints[1].dynamics.delay = second_delay;
@@ -46,7 +47,8 @@ Vector4d RunDelayed(const RobotDescription& robot, bool as_profile = false) {
   return Whole(simulator);
 }
 
-// The truth: without delays in the simulator, each effort held from the moment when it arrives; tiny steps.
+// The truth: without delays in the simulator, each effort held from the moment when it arrives;
+// tiny steps.
 Vector4d RunShifted(double first_delay, double second_delay) {
   Simulator simulator(Arm(0, 0, 1e-5));
   simulator.SetState(Vector2d(0.5, -1), Vector2d(2, 1));
@@ -54,7 +56,8 @@ Vector4d RunShifted(double first_delay, double second_delay) {
   const double end = kPeriod * static_cast<double>(commands.size());
   std::vector<double> times{0, end};
   for (size_t i = 0; i < commands.size(); ++i) {
-    for (const double delay : {first_delay, second_delay}) times.push_back(std::min(end, static_cast<double>(i) * kPeriod + delay));
+    for (const double delay : {first_delay, second_delay})
+      times.push_back(std::min(end, static_cast<double>(i) * kPeriod + delay));
   }
   std::sort(times.begin(), times.end());
   for (size_t i = 1; i < times.size(); ++i) {
@@ -63,7 +66,8 @@ Vector4d RunShifted(double first_delay, double second_delay) {
       const double command = std::floor((middle - delay) / kPeriod);
       return command < 0 ? 0 : commands[static_cast<size_t>(command)][joint];
     };
-    simulator.Step(Vector2d(arrived(first_delay, 0), arrived(second_delay, 1)), times[i] - times[i - 1]);
+    simulator.Step(Vector2d(arrived(first_delay, 0), arrived(second_delay, 1)),
+                   times[i] - times[i - 1]);
   }
   return Whole(simulator);
 }
@@ -78,11 +82,13 @@ TEST_CASE("delay: efforts arrive when they should, to second order of the subste
     const Vector4d truth = RunShifted(first, second);
     coarse += (RunDelayed(Arm(first, second, 0.005)) - truth).norm() / 40;
     fine += (RunDelayed(Arm(first, second, 0.00125)) - truth).norm() / 40;
-    CHECK((RunDelayed(Arm(first, second, 0.005)) - RunDelayed(Arm(first, second, 0.005), true)).norm() < 1e-12);
+    CHECK((RunDelayed(Arm(first, second, 0.005)) - RunDelayed(Arm(first, second, 0.005), true))
+              .norm() < 1e-12);
   }
   CHECK(coarse < 5e-3);
   CHECK(coarse / fine == Approx(16).margin(5));
-  CHECK((RunDelayed(Arm(0, 0, 1e-5)) - RunDelayed(Arm(0.003, 0, 1e-5))).norm() > 0.1);  // it does matter
+  // it does matter
+  CHECK((RunDelayed(Arm(0, 0, 1e-5)) - RunDelayed(Arm(0.003, 0, 1e-5))).norm() > 0.1);
 }
 
 TEST_CASE("delay: no delay is none, and as long as one control step the previous one's effort") {
@@ -101,11 +107,14 @@ TEST_CASE("delay: no delay is none, and as long as one control step the previous
 TEST_CASE("delay: the end of a motion is smooth in the delay, also where substeps begin") {
   for (const auto integrator : {Integrator::kLeapfrog, Integrator::kSemiImplicit}) {
     const double substep = 0.002, step = 1e-7;
-    const auto end = [&](double delay) { return RunDelayed(Arm(delay, 0.5 * delay, substep, integrator)); };
+    const auto end = [&](double delay) {
+      return RunDelayed(Arm(delay, 0.5 * delay, substep, integrator));
+    };
     double jump = 0, kink = 0;
     Vector4d slope = Vector4d::Zero();
     for (int k = 1; k < 8; ++k) {
-      if (k == 5) continue;  // one control step: there the truth has a kink, as the last effort arrives no more
+      // one control step: there the truth has a kink, as the last effort arrives no more
+      if (k == 5) continue;
       const double at = k * substep;
       const Vector4d before = end(at - step), there = end(at), after = end(at + step);
       const Vector4d left = (there - before) / step, right = (after - there) / step;
@@ -165,35 +174,42 @@ TEST_CASE("delay: a track's mean and moment are its integrals") {
     track.Advance();
     const double zero = now;
     for (int i = 0; i < 5; ++i) append();
-    const double begin = random.Uniform(0, now - zero), end = begin + random.Uniform(0.001, 0.03), delay = random.Uniform(0, 0.2);
+    const double begin = random.Uniform(0, now - zero), end = begin + random.Uniform(0.001, 0.03),
+                 delay = random.Uniform(0, 0.2);
     // Midpoint sums over small cells, with the borders on cells of their own.
     std::vector<double> cuts{begin, end};
     for (const auto& [time, effort] : until) {
-      if (time - zero + delay > begin && time - zero + delay < end) cuts.push_back(time - zero + delay);
+      if (time - zero + delay > begin && time - zero + delay < end)
+        cuts.push_back(time - zero + delay);
     }
     std::sort(cuts.begin(), cuts.end());
     double impulse = 0, first = 0;
     for (size_t i = 1; i < cuts.size(); ++i) {
       const double middle = (cuts[i - 1] + cuts[i]) / 2, time = middle - delay + zero;
-      const auto at = std::find_if(until.begin(), until.end(), [&](const auto& segment) { return time < segment.first; });
+      const auto at = std::find_if(until.begin(), until.end(),
+                                   [&](const auto& segment) { return time < segment.first; });
       const double effort = at == until.end() ? until.back().second : at->second;
       impulse += effort * (cuts[i] - cuts[i - 1]);
       first += effort * (cuts[i] - cuts[i - 1]) * ((begin + end) / 2 - middle);
     }
     const EffortTrack::Moments moments = track.Over(1, begin, end, delay);
-    worst = std::max({worst, std::abs(moments.mean - impulse / (end - begin)), std::abs(moments.first - first) * 1e3});
+    worst = std::max({worst, std::abs(moments.mean - impulse / (end - begin)),
+                      std::abs(moments.first - first) * 1e3});
   }
   CHECK(worst < 1e-10);
 }
 
-TEST_CASE("delay: a track of thousands of short efforts is remembered as long as any delay, and one profile whole") {
+TEST_CASE(
+    "delay: a track of thousands of short efforts is remembered as long as any delay, and one "
+    "profile whole") {
   // 3000 efforts of 10 us: 30 ms, all within one step, the first one strong.
   RobotDescription robot = Arm(0, 0, 0.03);
   for (const double delay : {0.0, 1e-9}) {
     robot.joints[0].dynamics.delay = delay;
     Simulator simulator(robot);
     std::vector<EffortSegment> profile;
-    for (int i = 0; i < 3000; ++i) profile.push_back({1e-5, Vector2d(i < 300 ? 10 : 1e-3 * (i % 2), 0)});
+    for (int i = 0; i < 3000; ++i)
+      profile.push_back({1e-5, Vector2d(i < 300 ? 10 : 1e-3 * (i % 2), 0)});
     simulator.Step(profile);
     Simulator mean(robot);
     mean.Step(Vector2d(1 + 0.45e-3, 0), 0.03);
@@ -225,7 +241,8 @@ TEST_CASE("delay: sensors tell of the state as it was, and of their bias") {
     CHECK(Whole(simulator) == state);
     simulator.SetReading(q, v, effort);
     const Vector4d guess = Whole(simulator);
-    return std::array{position, speed, (guess - state).head<2>().norm(), (guess - state).tail<2>().norm()};
+    return std::array{position, speed, (guess - state).head<2>().norm(),
+                      (guess - state).tail<2>().norm()};
   };
   const auto coarse = errors(0.004), fine = errors(0.002);
   const double orders[] = {3, 2, 3, 2};
@@ -241,7 +258,8 @@ TEST_CASE("delay: sensors tell of the state as it was, and of their bias") {
 TEST_CASE("delay: sensors that are late see efforts when these arrive") {
   RobotDescription robot = Arm(0, 0, 0.001);
   robot.simulation.gravity = 0;
-  for (JointDescription& joint : robot.joints) joint.dynamics.delay = 0.1, joint.dynamics.sensor_delay = 0.02;
+  for (JointDescription& joint : robot.joints)
+    joint.dynamics.delay = 0.1, joint.dynamics.sensor_delay = 0.02;
   Simulator simulator(robot);
   simulator.SetState(Vector2d(0.3, 0.2), Vector2d::Zero());
   simulator.Step(Vector2d(2, 1), 0.05);

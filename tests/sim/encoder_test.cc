@@ -21,7 +21,8 @@ TEST_CASE("a shaft's motion between instants is the cubic") {
   const ShaftMotion motion{1'002'000,       1'007'000,       position(0.002),
                            position(0.007), velocity(0.002), velocity(0.007)};
   for (const int64_t us : {2000, 3125, 5000, 6999, 7000}) {
-    CHECK(motion.Position(1'000'000 + us) == Approx(position(static_cast<double>(us) * 1e-6)).epsilon(1e-13));
+    CHECK(motion.Position(1'000'000 + us) ==
+          Approx(position(static_cast<double>(us) * 1e-6)).epsilon(1e-13));
   }
   CHECK(ShaftMotion{5, 5, 3, 3, 1, 1}.Position(5) == 3);
 }

@@ -23,9 +23,12 @@ double KineticEnergy(Simulator& simulator) {
   return 0.5 * simulator.v().dot(simulator.MassMatrix() * simulator.v());
 }
 
-// How far the energy strays within 10 s, as a share of what moves back and forth between its two kinds.
+// How far the energy strays within 10 s, as a share of what moves back and forth between its two
+// kinds.
 double Drift(const RobotDescription& robot, Simulator& simulator) {
-  const auto energy = [&] { return KineticEnergy(simulator) + PotentialEnergy(robot, simulator.q()); };
+  const auto energy = [&] {
+    return KineticEnergy(simulator) + PotentialEnergy(robot, simulator.q());
+  };
   const double start = energy();
   double worst = 0, most = KineticEnergy(simulator), least = most;
   const VectorXd none = VectorXd::Zero(robot.num_velocities());
@@ -43,16 +46,21 @@ double Drift(const RobotDescription& robot, Simulator& simulator) {
 // Three bodies that float: hinge and ball joint between them, in axes of their own.
 std::string FloatingChain() {
   const auto body = [](const std::string& name, const std::string& inertia) {
-    return "<link name='" + name + "'><inertial><origin xyz='.05 -.1 .2' rpy='.3 .2 .1'/><mass value='1.5'/><inertia " + inertia +
-           "/></inertial></link>";
+    return "<link name='" + name +
+           "'><inertial><origin xyz='.05 -.1 .2' rpy='.3 .2 .1'/><mass value='1.5'/><inertia " +
+           inertia + "/></inertial></link>";
   };
-  return "<robot name='chain'><link name='base'/>" + body("a", "ixx='.05' iyy='.06' izz='.03' ixy='.01' ixz='0' iyz='.004'") +
+  return "<robot name='chain'><link name='base'/>" +
+         body("a", "ixx='.05' iyy='.06' izz='.03' ixy='.01' ixz='0' iyz='.004'") +
          body("b", "ixx='.02' iyy='.03' izz='.02' ixy='0' ixz='.003' iyz='0'") +
          body("c", "ixx='.01' iyy='.012' izz='.02' ixy='0' ixz='0' iyz='0'") +
-         "<joint name='free' type='floating'><parent link='base'/><child link='a'/><origin xyz='0 0 1' rpy='.5 -.4 1'/></joint>"
-         "<joint name='hinge' type='continuous'><parent link='a'/><child link='b'/><origin xyz='.1 .1 .4' rpy='1 .2 0'/>"
+         "<joint name='free' type='floating'><parent link='base'/><child link='a'/><origin xyz='0 "
+         "0 1' rpy='.5 -.4 1'/></joint>"
+         "<joint name='hinge' type='continuous'><parent link='a'/><child link='b'/><origin xyz='.1 "
+         ".1 .4' rpy='1 .2 0'/>"
          "<axis xyz='1 2 -1'/><limit effort='0' velocity='9'/></joint>"
-         "<joint name='slide' type='prismatic'><parent link='b'/><child link='c'/><origin xyz='.2 0 .3' rpy='0 1 2'/>"
+         "<joint name='slide' type='prismatic'><parent link='b'/><child link='c'/><origin xyz='.2 "
+         "0 .3' rpy='0 1 2'/>"
          "<axis xyz='0 1 1'/><limit lower='-9' upper='9' effort='0' velocity='9'/></joint></robot>";
 }
 
@@ -61,7 +69,8 @@ RobotDescription Top(const Vector3d& moments) {
   RobotDescription robot = FromUrdf(
       "<robot name='top'><link name='base'/><link name='top'><inertial><mass value='2'/>"
       "<inertia ixx='.02' iyy='.02' izz='.02' ixy='0' ixz='0' iyz='0'/></inertial></link>"
-      "<joint name='free' type='floating'><parent link='base'/><child link='top'/><origin xyz='1 2 3' rpy='.5 -.4 1'/></joint></robot>");
+      "<joint name='free' type='floating'><parent link='base'/><child link='top'/><origin xyz='1 2 "
+      "3' rpy='.5 -.4 1'/></joint></robot>");
   robot.links.back().inertia = moments.asDiagonal();
   return robot;
 }
@@ -87,7 +96,8 @@ TEST_CASE("energy: the examples keep it to a millionth over ten seconds") {
     const RobotDescription robot = Leaping(Frictionless(LoadExample(name)), 1e-4);
     Simulator simulator(robot);
     Random random(1);
-    simulator.SetState(DrawPosition(robot, random, 2), DrawNumbers(robot.num_velocities(), random, 1));
+    simulator.SetState(DrawPosition(robot, random, 2),
+                       DrawNumbers(robot.num_velocities(), random, 1));
     const double drift = Drift(robot, simulator);
     CHECK(drift < 1e-6);
   }
@@ -101,7 +111,8 @@ TEST_CASE("energy: a floating chain in space keeps it, on springs, too") {
     robot.joints[robot.joints.size() - 2].dynamics.stiffness = stiffness;
     Simulator simulator(robot);
     Random random(2);
-    simulator.SetState(DrawPosition(robot, random, .1), DrawNumbers(robot.num_velocities(), random, 2));
+    simulator.SetState(DrawPosition(robot, random, .1),
+                       DrawNumbers(robot.num_velocities(), random, 2));
     const double drift = Drift(robot, simulator);
     CHECK(drift < 1e-6);
   }
@@ -111,17 +122,21 @@ TEST_CASE("energy: momentum of a floating chain is its weight's impulse") {
   const RobotDescription robot = Leaping(FromUrdf(FloatingChain()), 1e-3);
   Simulator simulator(robot);
   Random random(3);
-  simulator.SetState(DrawPosition(robot, random, .1), DrawNumbers(robot.num_velocities(), random, 2));
+  simulator.SetState(DrawPosition(robot, random, .1),
+                     DrawNumbers(robot.num_velocities(), random, 2));
   // Of the whole robot along a slide of its own: the row of the mass matrix; base axes.
   const Eigen::Matrix3d axes = robot.joints[0].rotation;
-  const auto momentum = [&] { return Vector3d(axes * (simulator.MassMatrix().topRows<3>() * simulator.v())); };
+  const auto momentum = [&] {
+    return Vector3d(axes * (simulator.MassMatrix().topRows<3>() * simulator.v()));
+  };
   const Vector3d before = momentum();
   simulator.Step(VectorXd::Zero(robot.num_velocities()), 1);
   const Vector3d gained = momentum() - before;
   CHECK((gained - Vector3d(0, 0, -4.5 * robot.simulation.gravity)).norm() < 2e-4);
 }
 
-TEST_CASE("energy: a tumbling body keeps angular momentum, energy and the length of its quaternion") {
+TEST_CASE(
+    "energy: a tumbling body keeps angular momentum, energy and the length of its quaternion") {
   const RobotDescription shape = Top({.01, .02, .025});
   double errors[2];
   for (const int fine : {0, 1}) {
@@ -161,7 +176,8 @@ TEST_CASE("energy: a symmetric top precesses as the closed form says, and falls 
     VectorXd v(6);
     v << .1, .2, .3, 2, -1, 6;
     simulator.SetState(TopState(robot), v);
-    const Vector3d momentum = SpinMomentum(robot, simulator), start = LinkPoses(robot, simulator.q()).back().translation();
+    const Vector3d momentum = SpinMomentum(robot, simulator),
+                   start = LinkPoses(robot, simulator.q()).back().translation();
     const Eigen::Matrix3d before = LinkPoses(robot, simulator.q()).back().linear();
     const Vector3d velocity = robot.joints[0].rotation * v.head<3>();
     simulator.Step(VectorXd::Zero(6), time);
@@ -170,19 +186,23 @@ TEST_CASE("energy: a symmetric top precesses as the closed form says, and falls 
       const Vector3d fall(0, 0, -robot.simulation.gravity / 2 * time * time);
       CHECK((pose.translation() - start - velocity * time - fall).norm() < 1e-9);
     }
-    const Eigen::Matrix3d expected = Eigen::AngleAxisd(time * momentum.norm() / across, momentum.normalized()).matrix() * before *
-                                     Eigen::AngleAxisd(time * (1 - along / across) * 6, Vector3d::UnitZ()).matrix();
+    const Eigen::Matrix3d expected =
+        Eigen::AngleAxisd(time * momentum.norm() / across, momentum.normalized()).matrix() *
+        before * Eigen::AngleAxisd(time * (1 - along / across) * 6, Vector3d::UnitZ()).matrix();
     return (pose.linear() - expected).norm();
   };
   CHECK(error(Integrator::kLeapfrog, 1e-4) < 1e-5);
-  CHECK(error(Integrator::kLeapfrog, 2e-3) / error(Integrator::kLeapfrog, 1e-3) == Approx(4).margin(0.3));
-  CHECK(error(Integrator::kSemiImplicit, 2e-4) / error(Integrator::kSemiImplicit, 1e-4) == Approx(2).margin(0.2));
+  CHECK(error(Integrator::kLeapfrog, 2e-3) / error(Integrator::kLeapfrog, 1e-3) ==
+        Approx(4).margin(0.3));
+  CHECK(error(Integrator::kSemiImplicit, 2e-4) / error(Integrator::kSemiImplicit, 1e-4) ==
+        Approx(2).margin(0.2));
 }
 
 TEST_CASE("energy: leapfrog is of second order with Coriolis terms, semi-implicit of first") {
   RobotDescription robot = Frictionless(LoadExample("double_pendulum"));
   for (JointDescription& joint : robot.joints) joint.dynamics.damping = 0.02;
-  for (const auto& [integrator, order] : {std::pair{Integrator::kLeapfrog, 2}, {Integrator::kSemiImplicit, 1}}) {
+  for (const auto& [integrator, order] :
+       {std::pair{Integrator::kLeapfrog, 2}, {Integrator::kSemiImplicit, 1}}) {
     const auto run = [&](double substep) {
       robot.simulation.integrator = integrator;
       robot.simulation.substep = substep;

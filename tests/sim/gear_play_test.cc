@@ -42,18 +42,20 @@ Energy Of(const Mechanism& m, double inertia) {
 
 }  // namespace
 
-TEST_CASE("play: within the gap the rotor is alone, and pushed from end to end it shows the whole gap") {
+TEST_CASE(
+    "play: within the gap the rotor is alone, and pushed from end to end it shows the whole gap") {
   const RobotDescription robot = Loose();
   Mechanism mechanism(robot);
   mechanism.SetState(Scalar(0), Scalar(0));
   CHECK(mechanism.motor_q()[0] == 0);
-  // From the middle to one end: half the gap under constant acceleration; the link does not know yet.
+  // From the middle to one end: half the gap under constant acceleration; the link does not know
+  // yet.
   const double effort = 0.1, reach = std::sqrt(2 * (kGap / 2) * kRotor / effort);
   REQUIRE(mechanism.Advance(Scalar(effort), 0.98 * reach));
   CHECK(mechanism.motor_q()[0] == Approx(kGap / 2 * 0.98 * 0.98).epsilon(1e-9));
   CHECK(mechanism.q()[0] == 0);
-  // Held against a link that is heavy by comparison: the difference of rests is the gap and the bend of the
-  // teeth.
+  // Held against a link that is heavy by comparison: the difference of rests is the gap and the
+  // bend of the teeth.
   RobotDescription held = robot;
   held.joints[0].dynamics.friction = 1;  // that no push of 0.1 Nm overcomes: it creeps
   Mechanism stiff(held);

@@ -14,13 +14,15 @@ TEST_CASE("contact: the ground holds what stands on it, also in the eyes of late
   for (JointDescription& joint : robot.joints) joint.dynamics.sensor_delay = 0.01;
   for (size_t i = 2; i < 6; ++i) robot.joints[i].dynamics.damping = 1e6;  // a statue
   Simulator simulator(robot);
-  simulator.SetState((Eigen::VectorXd(6) << 0, 1.21, 0, 0, 0, 0).finished(), Eigen::VectorXd::Zero(6));
+  simulator.SetState((Eigen::VectorXd(6) << 0, 1.21, 0, 0, 0, 0).finished(),
+                     Eigen::VectorXd::Zero(6));
   simulator.Step(Eigen::VectorXd::Zero(6), 2);
   CHECK(std::abs(simulator.v()[1]) < 1e-3);
   CHECK(std::abs(simulator.Reading().v[1]) < 5e-3);
 }
 
-// The ground's force is what the equations of motion lack without it: M dv/h + bias - efforts, along rootx and rootz.
+// The ground's force is what the equations of motion lack without it: M dv/h + bias - efforts,
+// along rootx and rootz.
 TEST_CASE("contact: the ground pushes within the cone, whatever heel and toe do") {
   RobotDescription robot = LoadExample("hopper/gym.toml");
   robot.parameters.clear();
@@ -50,8 +52,8 @@ TEST_CASE("contact: the ground pushes within the cone, whatever heel and toe do"
       outside += along > 1.05 * friction * std::max(up, 0.0) + 1;
     }
   }
-  INFO(touching << " substeps on the ground, " << outside << " outside the cone, worst pull " << worst_pull
-                << " N, worst excess " << worst_beyond << " N");
+  INFO(touching << " substeps on the ground, " << outside << " outside the cone, worst pull "
+                << worst_pull << " N, worst excess " << worst_beyond << " N");
   CHECK(touching > 3000);
   CHECK(worst_pull < 5);
   CHECK(outside < touching / 500);

@@ -18,7 +18,8 @@ struct HopperBus {
   static constexpr int64_t kStart = 1'700'000'000'000'000;  ///< [us]
 
   explicit HopperBus(const RobotDescription& hopper, uint64_t seed = 3, int64_t phase = 0)
-      : description(hopper), bus(description, HiddenParameters(description, seed), description, kStart, {0, 0}, phase) {
+      : description(hopper),
+        bus(description, HiddenParameters(description, seed), description, kStart, {0, 0}, phase) {
     bus.on_state = [this](const joint_state_t& state) {
       states.push_back(state);
       truth_q.push_back(robot.q());
@@ -70,7 +71,8 @@ struct HopperBus {
     joint_command_t command{};
     command.utime = bus.utime();
     command.sequence = sequence_++;
-    command.episode = command.step = command.policy_iteration = -1;  // between episodes, where a robot may be placed
+    // between episodes, where a robot may be placed
+    command.episode = command.step = command.policy_iteration = -1;
     command.num_joints = description.num_joints();
     const auto n = static_cast<size_t>(description.num_joints());
     command.effort.assign(n, 0);

@@ -1,4 +1,5 @@
-// Numbers that nobody means: the simulator's answer to them is defined, and the next episode does not know of them.
+// Numbers that nobody means: the simulator's answer to them is defined, and the next episode does
+// not know of them.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -25,16 +26,21 @@ std::vector<RobotDescription> Robots() {
     hopper.joints[i].dynamics.sensor_delay = 0.001;
   }
   RobotDescription spatial = FromUrdf(TreeWriter(11).Spatial(8));
-  const bool turns = std::any_of(spatial.joints.begin(), spatial.joints.end(), [](const JointDescription& joint) {
-    return joint.type == JointDescription::Type::kSpherical;
-  });
+  const bool turns =
+      std::any_of(spatial.joints.begin(), spatial.joints.end(), [](const JointDescription& joint) {
+        return joint.type == JointDescription::Type::kSpherical;
+      });
   REQUIRE(turns);
   spatial.simulation.contact = hopper.simulation.contact;
   spatial.simulation.stop = hopper.simulation.stop;
   Shape ball;
   ball.size = {0.2, 0, 0};
   for (size_t i = 1; i < spatial.links.size(); ++i) spatial.links[i].collisions.push_back(ball);
-  spatial.parameters = {{.name = "gravity", .unit = "", .coordinate = ParameterDescription::Coordinate::kLog, .mean = 9.81, .variance = 1}};
+  spatial.parameters = {{.name = "gravity",
+                         .unit = "",
+                         .coordinate = ParameterDescription::Coordinate::kLog,
+                         .mean = 9.81,
+                         .variance = 1}};
   return {hopper, spatial};
 }
 
@@ -54,7 +60,8 @@ VectorXd Episode(Simulator& simulator) {
   simulator.SetParameters(simulator.model().parameters().means());
   simulator.SetState(RestPosition(robot), VectorXd::Zero(robot.num_velocities()));
   Random random(1);
-  for (int i = 0; i < 20; ++i) simulator.Step(DrawNumbers(robot.num_velocities(), random, 5), 0.008);
+  for (int i = 0; i < 20; ++i)
+    simulator.Step(DrawNumbers(robot.num_velocities(), random, 5), 0.008);
   VectorXd end(robot.num_positions() + robot.num_velocities());
   end << simulator.q(), simulator.v();
   return end;
@@ -125,13 +132,15 @@ TEST_CASE("hostile: durations") {
     }
     // There is no end to it: refused.
     CHECK_THROWS_AS(simulator.Step(still, kInfinity), std::invalid_argument);
-    CHECK_THROWS_AS(simulator.Step(std::vector<EffortSegment>{{0.001, still}, {kInfinity, still}}), std::invalid_argument);
+    CHECK_THROWS_AS(simulator.Step(std::vector<EffortSegment>{{0.001, still}, {kInfinity, still}}),
+                    std::invalid_argument);
     CHECK(simulator.q() == before);
     for (const double tiny : {5e-324, 1e-300, 1e-20}) {
       simulator.Step(still, tiny);
       CHECK(simulator.finite());
       CHECK((simulator.q() - before).norm() < 1e-12);
-      simulator.Step(std::vector<EffortSegment>{{tiny, still}, {2 * tiny, VectorXd::Ones(still.size())}});
+      simulator.Step(
+          std::vector<EffortSegment>{{tiny, still}, {2 * tiny, VectorXd::Ones(still.size())}});
       CHECK(simulator.finite());
     }
     REQUIRE(Episode(simulator) == expected);
@@ -142,7 +151,8 @@ TEST_CASE("hostile: parameters") {
   for (const RobotDescription& robot : Robots()) {
     Simulator simulator(robot);
     const VectorXd expected = Episode(simulator);
-    const VectorXd means = simulator.model().parameters().means(), still = VectorXd::Zero(robot.num_velocities());
+    const VectorXd means = simulator.model().parameters().means(),
+                   still = VectorXd::Zero(robot.num_velocities());
     for (Eigen::Index i = 0; i < means.size(); ++i) {
       for (const double bad : {kNaN, kInfinity, -kInfinity, -1.0}) {
         VectorXd physical = means;
@@ -166,7 +176,8 @@ TEST_CASE("hostile: nothing allocates while the robot moves") {
     robot.simulation.substep = 0.002;
     Simulator simulator(robot);
     const int n = robot.num_velocities();
-    const VectorXd rest = RestPosition(robot), still = VectorXd::Zero(n), means = simulator.model().parameters().means();
+    const VectorXd rest = RestPosition(robot), still = VectorXd::Zero(n),
+                   means = simulator.model().parameters().means();
     std::vector<EffortSegment> profile;
     for (int i = 0; i < 5; ++i) profile.push_back({0.0017, VectorXd::Constant(n, i % 3 - 1.0)});
     VectorXd effort = VectorXd::Ones(n);

@@ -13,8 +13,8 @@ using Type = JointDescription::Type;
 inline constexpr double kPi = std::numbers::pi;
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-inline JointDescription Joint(const std::string& name, JointDescription::Type type, double lower, double upper,
-                       double effort_limit) {
+inline JointDescription Joint(const std::string& name, JointDescription::Type type, double lower,
+                              double upper, double effort_limit) {
   JointDescription joint = LoadPendulum("robot.toml").joints[0];
   joint.name = name;
   joint.type = type;
@@ -28,7 +28,8 @@ inline JointDescription Joint(const std::string& name, JointDescription::Type ty
 inline RobotDescription CartAndPole(const std::string& task) {
   RobotDescription description = LoadPendulum("robot.toml");
   description.task = {task, 0.02, 500};
-  description.joints = {Joint("slide", Type::kPrismatic, -2, 2, 10), Joint("hinge", Type::kContinuous, -kInfinity, kInfinity, 0)};
+  description.joints = {Joint("slide", Type::kPrismatic, -2, 2, 10),
+                        Joint("hinge", Type::kContinuous, -kInfinity, kInfinity, 0)};
   return description;
 }
 

@@ -37,7 +37,8 @@ TEST_CASE("a mechanism with armature moves as the simulator does, but for its in
   RobotDescription robot = Known("double_pendulum");
   REQUIRE_FALSE(Plant::Lacks(robot).empty());
   Mechanism mechanism(robot);
-  const VectorXd q = Eigen::Vector2d(0.4, -1), v = Eigen::Vector2d(2, -1), effort = Eigen::Vector2d(0.3, -0.2);
+  const VectorXd q = Eigen::Vector2d(0.4, -1), v = Eigen::Vector2d(2, -1),
+                 effort = Eigen::Vector2d(0.3, -0.2);
   mechanism.SetState(q, v);
   for (int i = 0; i < 50; ++i) REQUIRE(mechanism.Advance(effort, 0.0041));
   const auto error = [&](double substep) {
@@ -49,7 +50,8 @@ TEST_CASE("a mechanism with armature moves as the simulator does, but for its in
   };
   robot.simulation.integrator = SimulationSettings::Integrator::kSemiImplicit;
   CHECK(error(1e-4) < 1e-3);
-  CHECK(error(1e-5) / error(1e-4) == Approx(0.1).epsilon(0.2));  // towards the mechanism, at first order
+  // towards the mechanism, at first order
+  CHECK(error(1e-5) / error(1e-4) == Approx(0.1).epsilon(0.2));
 }
 
 TEST_CASE("a mechanism stays where it is rather than leave the finite") {
@@ -57,11 +59,13 @@ TEST_CASE("a mechanism stays where it is rather than leave the finite") {
     Mechanism mechanism(Known(name));
     const VectorXd state = VectorXd::Constant(mechanism.q().size(), 0.5);
     mechanism.SetState(state, state);
-    CHECK_FALSE(mechanism.Advance(VectorXd::Constant(state.size(), std::numeric_limits<double>::quiet_NaN()), 0.01));
+    CHECK_FALSE(mechanism.Advance(
+        VectorXd::Constant(state.size(), std::numeric_limits<double>::quiet_NaN()), 0.01));
     CHECK_FALSE(mechanism.Advance(VectorXd::Constant(state.size(), 1e308), 10));
     CHECK(mechanism.q().allFinite());
     CHECK(mechanism.Advance(0 * state, 0.01));
-    CHECK_THROWS_AS(mechanism.SetState(state * std::numeric_limits<double>::infinity(), state), std::invalid_argument);
+    CHECK_THROWS_AS(mechanism.SetState(state * std::numeric_limits<double>::infinity(), state),
+                    std::invalid_argument);
   }
 }
 

@@ -73,7 +73,8 @@ TEST_CASE("mass and length act as in gym's formula") {
     simulator.SetParameters(physical);
     simulator.SetState(Scalar(q), Scalar(v));
     const double expected = Gym{physical[0], physical[1], physical[2], false}.Acceleration(q, u);
-    REQUIRE(std::abs(simulator.Acceleration(Scalar(u))[0] - expected) < 1e-11 * (1 + std::abs(expected)));
+    REQUIRE(std::abs(simulator.Acceleration(Scalar(u))[0] - expected) <
+            1e-11 * (1 + std::abs(expected)));
   }
 }
 
@@ -97,8 +98,10 @@ TEST_CASE("leapfrog is of second order, semi-implicit of first") {
 }
 
 TEST_CASE("a double pendulum meets the closed form") {
-  // Two point-like links of length l1, l2 about parallel axes y. With absolute angles a, b from upright:
-  //   (m1 + m2) l1^2 a'' + m2 l1 l2 cos(a-b) b'' + m2 l1 l2 sin(a-b) b'^2 - (m1 + m2) g l1 sin a = u1 - u2
+  // Two point-like links of length l1, l2 about parallel axes y. With absolute angles a, b from
+  // upright:
+  //   (m1 + m2) l1^2 a'' + m2 l1 l2 cos(a-b) b'' + m2 l1 l2 sin(a-b) b'^2
+  //     - (m1 + m2) g l1 sin a = u1 - u2
   //   m2 l2^2 b'' + m2 l1 l2 cos(a-b) a'' - m2 l1 l2 sin(a-b) a'^2 - m2 g l2 sin b = u2
   const double m1 = 1.2, m2 = 0.7, l1 = 0.9, l2 = 0.6, g = 9.80665;
   RobotDescription description = LoadPendulum("robot.toml");
@@ -131,7 +134,8 @@ TEST_CASE("a double pendulum meets the closed form") {
 }
 
 TEST_CASE("a profile moves the robot as its segments one after the other, to second order") {
-  const std::vector<EffortSegment> profile = {{0.003, Scalar(2)}, {0, Scalar(99)}, {0.0171, Scalar(-2)}};
+  const std::vector<EffortSegment> profile = {
+      {0.003, Scalar(2)}, {0, Scalar(99)}, {0.0171, Scalar(-2)}};
   const auto error = [&](double substep) {
     RobotDescription description = LoadPendulum("robot.toml");
     description.simulation.substep = substep;

@@ -86,7 +86,8 @@ TEST_CASE("mujoco's engine: on the ground and at its stops the hopper is gym's, 
   const auto engine = MakeMujocoEngine(Known("hopper"));
   MujocoHopper theirs;
   const RobotDescription hopper = Known("hopper");
-  theirs.SetMasses({hopper.links[3].mass, hopper.links[4].mass, hopper.links[5].mass, hopper.links[6].mass});
+  theirs.SetMasses(
+      {hopper.links[3].mass, hopper.links[4].mass, hopper.links[5].mass, hopper.links[6].mass});
   VectorXd q(6);
   q << 0, 1.25, 0, 0, 0, 0;
   theirs.SetState(q, 0 * q);
@@ -94,7 +95,8 @@ TEST_CASE("mujoco's engine: on the ground and at its stops the hopper is gym's, 
   int touched = 0, step = 0;
   for (; theirs.q()[1] > 0.9; ++step) {  // until it lies down
     const double phase = 0.05 * step;
-    const Eigen::Vector3d action(0.3 * std::sin(phase), 0.2 * std::sin(2 * phase), 0.1 * std::sin(3 * phase));
+    const Eigen::Vector3d action(0.3 * std::sin(phase), 0.2 * std::sin(2 * phase),
+                                 0.1 * std::sin(3 * phase));
     VectorXd effort = VectorXd::Zero(6);
     effort.tail<3>() = 200 * action;
     theirs.Step(action);
@@ -153,15 +155,17 @@ TEST_CASE("mujoco's engine: friction, stops and numbers that are none") {
   CHECK_THROWS_AS(engine->SetState(VectorXd::Ones(2), one), std::invalid_argument);
 }
 
-TEST_CASE("mujoco's engine: a robot that it cannot be told is refused, with the line that asks for it") {
+TEST_CASE(
+    "mujoco's engine: a robot that it cannot be told is refused, with the line that asks for it") {
   RobotDescription hopper = Known("hopper");
   hopper.virtual_robot.engine = VirtualRobotSettings::Engine::kMujoco;
   hopper.virtual_robot.engine_source = "robot.toml:7:1: ";
   CHECK_NOTHROW(Mechanism(hopper));
   hopper.joints[4].dynamics.delay = 0.01;
-  CHECK_THROWS_WITH(Mechanism(hopper),
-                    Catch::Equals("robot.toml:7:1: virtual_robot.engine = \"mujoco\" is not possible: "
-                                  "delays and sensor errors of joint 'leg'"));
+  CHECK_THROWS_WITH(
+      Mechanism(hopper),
+      Catch::Equals("robot.toml:7:1: virtual_robot.engine = \"mujoco\" is not possible: "
+                    "delays and sensor errors of joint 'leg'"));
   hopper.joints[4].dynamics.delay = 0;
   hopper.links[6].inertia *= -1;
   CHECK_THROWS_WITH(Mechanism(hopper), Catch::Contains("MuJoCo refuses the robot"));

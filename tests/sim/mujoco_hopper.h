@@ -12,16 +12,18 @@
 
 namespace plumb {
 
-/// gym's Hopper in MuJoCo itself, the simulator that it was published for: what robots/hopper is measured against.
-/// q = rootx, rootz (the torso's height), rooty, thigh, leg, foot, as there. Not thread-safe.
+/// gym's Hopper in MuJoCo itself, the simulator that it was published for: what robots/hopper is
+/// measured against. q = rootx, rootz (the torso's height), rooty, thigh, leg, foot, as there. Not
+/// thread-safe.
 class MujocoHopper {
  public:
   enum class Integrator { kEuler, kRungeKutta };
   using State = Eigen::Matrix<double, 6, 1>;
-  static constexpr int kFrames = 4;         ///< time steps per control step, as in gym
+  static constexpr int kFrames = 4;           ///< time steps per control step, as in gym
   static constexpr double kTimeStep = 0.002;  ///< [s]
 
-  /// @param integrator gym's is Runge-Kutta's. Euler's takes joint damping at the end of the step, as Simulator does.
+  /// @param integrator gym's is Runge-Kutta's. Euler's takes joint damping at the end of the step,
+  /// as Simulator does.
   explicit MujocoHopper(Integrator integrator = Integrator::kRungeKutta) : model_(Load()) {
     model_->opt.integrator = integrator == Integrator::kEuler ? mjINT_EULER : mjINT_RK4;
     data_.reset(mj_makeData(model_.get()));
@@ -30,7 +32,8 @@ class MujocoHopper {
 
   /// As published: of the geometry, at 1000 kg/m^3. Torso, thigh, leg, foot [kg].
   const Eigen::Vector4d& published_masses() const { return masses_; }
-  /// Principal moments about the centre of mass as MuJoCo has them now [kg m^2], one column per link.
+  /// Principal moments about the centre of mass as MuJoCo has them now [kg m^2], one column per
+  /// link.
   Eigen::Matrix<double, 3, 4> inertias() const {
     return Eigen::Matrix<double, 3, 4>::Map(model_->body_inertia + 3 * kTorso);
   }
@@ -73,7 +76,8 @@ class MujocoHopper {
 
   State q() const { return State::Map(data_->qpos); }
   State v() const { return State::Map(data_->qvel); }
-  /// Rows of the constraint problem in the latest time step: 0 = nothing touched and no joint was at its limit.
+  /// Rows of the constraint problem in the latest time step: 0 = nothing touched and no joint was
+  /// at its limit.
   int active_constraints() const { return data_->nefc; }
   /// Contacts in the latest time step, with the ground or of the robot with itself.
   int contacts() const { return data_->ncon; }
@@ -95,8 +99,8 @@ class MujocoHopper {
     void operator()(mjData* data) const { mj_deleteData(data); }
   };
 
-  // Each link's frame at its joint. What touches what, and how hard, as published: the foot grips the floor twice as
-  // well as the others, and limbs that are not neighbours collide.
+  // Each link's frame at its joint. What touches what, and how hard, as published: the foot grips
+  // the floor twice as well as the others, and limbs that are not neighbours collide.
   static constexpr const char* kXml = R"(
     <mujoco model="hopper">
       <compiler angle="degree" inertiafromgeom="true"/>

@@ -48,8 +48,8 @@ TEST_CASE("mujoco: in flight a time step is MuJoCo's own") {
     Eigen::Vector4d masses;
     for (double& mass : masses) mass = random.Uniform(1, 9);
     State q = State::Zero(), v;
-    q << random.Uniform(-5, 5), random.Uniform(5, 9), random.Uniform(-3, 3), random.Uniform(-2.5, -0.1),
-        random.Uniform(-2.5, -0.1), random.Uniform(-0.7, 0.7);
+    q << random.Uniform(-5, 5), random.Uniform(5, 9), random.Uniform(-3, 3),
+        random.Uniform(-2.5, -0.1), random.Uniform(-2.5, -0.1), random.Uniform(-0.7, 0.7);
     for (double& speed : v) speed = random.Uniform(-10, 10);
     Eigen::Vector3d action;
     for (double& entry : action) entry = random.Uniform(-1, 1);
@@ -63,7 +63,8 @@ TEST_CASE("mujoco: in flight a time step is MuJoCo's own") {
     ours.SetParameters(masses);
     ours.SetState(q, v);
     ours.Step(effort, MujocoHopper::kTimeStep);
-    worst = std::max({worst, (ours.q() - theirs.q()).cwiseAbs().maxCoeff(), (ours.v() - theirs.v()).cwiseAbs().maxCoeff()});
+    worst = std::max({worst, (ours.q() - theirs.q()).cwiseAbs().maxCoeff(),
+                      (ours.v() - theirs.v()).cwiseAbs().maxCoeff()});
   }
   CHECK(worst < 1e-12);
 }
@@ -84,7 +85,9 @@ TEST_CASE("mujoco: a flight of a second is MuJoCo's") {
   int steps = 0;
   for (; steps < 500; ++steps) {
     Eigen::Vector3d action;
-    for (int k = 0; k < 3; ++k) action[k] = 0.2 * (std::array{-1.2, -1.2, 0.0}[static_cast<size_t>(k)] - ours.q()[3 + k]) + random.Uniform(-0.2, 0.2);
+    for (int k = 0; k < 3; ++k)
+      action[k] = 0.2 * (std::array{-1.2, -1.2, 0.0}[static_cast<size_t>(k)] - ours.q()[3 + k]) +
+                  random.Uniform(-0.2, 0.2);
     effort.tail<3>() = 200 * action;
     theirs.Step(action);
     ours.Step(effort, MujocoHopper::kTimeStep);
@@ -110,7 +113,8 @@ TEST_CASE("mujoco: a hopper at rest on the ground is held by it") {
 
 namespace {
 
-/// How far one control step of ours is from MuJoCo's own (Runge-Kutta), root mean square over the six velocities.
+/// How far one control step of ours is from MuJoCo's own (Runge-Kutta), root mean square over the
+/// six velocities.
 struct Gap {
   double squared = 0, moved = 0;
   int steps = 0;
@@ -122,7 +126,8 @@ struct Gaps {
   Gap contact, limit, free;
 };
 
-// From states that MuJoCo visits under random actions of this amplitude; episodes end with a fall, or after 100 steps.
+// From states that MuJoCo visits under random actions of this amplitude; episodes end with a fall,
+// or after 100 steps.
 Gaps MeasureGaps(double amplitude, bool end_with_fall) {
   MujocoHopper theirs;
   RobotDescription description = Hopper();
@@ -133,7 +138,8 @@ Gaps MeasureGaps(double amplitude, bool end_with_fall) {
   for (int episode = 0; episode < 40; ++episode) {
     State q = State::Zero(), v;
     q[1] = 1.25;
-    for (int i = 0; i < 6; ++i) q[i] += random.Uniform(-.005, .005), v[i] = random.Uniform(-.005, .005);
+    for (int i = 0; i < 6; ++i)
+      q[i] += random.Uniform(-.005, .005), v[i] = random.Uniform(-.005, .005);
     for (int step = 0; step < 100; ++step) {
       Eigen::Vector3d action;
       for (double& entry : action) entry = random.Uniform(-amplitude, amplitude);
@@ -143,7 +149,9 @@ Gaps MeasureGaps(double amplitude, bool end_with_fall) {
       theirs.ControlStep(action);
       ours.SetState(q, v);
       ours.Step(effort, 0.008);
-      Gap& gap = theirs.contacts() > 0 ? gaps.contact : theirs.active_constraints() > 0 ? gaps.limit : gaps.free;
+      Gap& gap = theirs.contacts() > 0             ? gaps.contact
+                 : theirs.active_constraints() > 0 ? gaps.limit
+                                                   : gaps.free;
       ++gap.steps;
       gap.squared += (ours.v() - theirs.v()).squaredNorm();
       gap.moved += (theirs.v() - v).squaredNorm();
@@ -157,8 +165,9 @@ Gaps MeasureGaps(double amplitude, bool end_with_fall) {
 
 }  // namespace
 
-// Contact is another model than MuJoCo's, so there is a gap. These bounds are what a simulator of linearly implicit
-// contact was measured to differ by when its constants were chosen on a coarse grid; ours must not be further away.
+// Contact is another model than MuJoCo's, so there is a gap. These bounds are what a simulator of
+// linearly implicit contact was measured to differ by when its constants were chosen on a coarse
+// grid; ours must not be further away.
 TEST_CASE("mujoco: in contact and at the stops ours is near") {
   const struct {
     double amplitude, contact, limit, free;
@@ -166,10 +175,12 @@ TEST_CASE("mujoco: in contact and at the stops ours is near") {
   for (const auto& bound : bounds) {
     for (const bool end_with_fall : {true, false}) {
       const Gaps gaps = MeasureGaps(bound.amplitude, end_with_fall);
-      INFO("amplitude " << bound.amplitude << (end_with_fall ? ", until the fall" : ", lying on the ground, too"));
-      INFO("contact " << gaps.contact.rms() << " of " << gaps.contact.rms_change() << ", limit " << gaps.limit.rms()
-                      << " of " << gaps.limit.rms_change() << ", free " << gaps.free.rms() << " of "
-                      << gaps.free.rms_change() << " m/s or rad/s per control step");
+      INFO("amplitude " << bound.amplitude
+                        << (end_with_fall ? ", until the fall" : ", lying on the ground, too"));
+      INFO("contact " << gaps.contact.rms() << " of " << gaps.contact.rms_change() << ", limit "
+                      << gaps.limit.rms() << " of " << gaps.limit.rms_change() << ", free "
+                      << gaps.free.rms() << " of " << gaps.free.rms_change()
+                      << " m/s or rad/s per control step");
       CHECK(gaps.contact.steps > 300);
       CHECK(gaps.contact.rms() < bound.contact);
       CHECK(gaps.limit.rms() < bound.limit);

@@ -18,7 +18,8 @@ using Eigen::VectorXd;
 
 RobotDescription WithParameters(RobotDescription robot, const std::vector<std::string>& paths) {
   robot.parameters.clear();
-  for (const std::string& path : paths) robot.parameters.push_back({path, "", Coordinate::kLinear, 0.5, 0.1});
+  for (const std::string& path : paths)
+    robot.parameters.push_back({path, "", Coordinate::kLinear, 0.5, 0.1});
   return robot;
 }
 
@@ -45,8 +46,9 @@ TEST_CASE("parameters that are not physical are refused and change nothing") {
   Physics<double> physics = model.parameters().Nominal();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
-  for (const Vector3d& bad : {Vector3d(9, 0, 1), Vector3d(9, 1, -1), Vector3d(-1, 1, 1), Vector3d(9, nan, 1),
-                              Vector3d(infinity, 1, 1), Vector3d(9, 1, infinity)}) {
+  for (const Vector3d& bad :
+       {Vector3d(9, 0, 1), Vector3d(9, 1, -1), Vector3d(-1, 1, 1), Vector3d(9, nan, 1),
+        Vector3d(infinity, 1, 1), Vector3d(9, 1, infinity)}) {
     CHECK_THROWS_AS(model.parameters().Apply(bad, &physics), std::invalid_argument);
     CHECK(physics.globals.gravity == 10.4);
   }
@@ -61,8 +63,10 @@ TEST_CASE("an unknown parameter is answered with the nearest known one") {
   CHECK_THROWS_WITH(Model(WithParameters(robot, {"mass/pol"})),
                     Catch::Contains("'mass/pol'") && Catch::Contains("'mass/pole'"));
   CHECK_THROWS_WITH(Model(WithParameters(robot, {"gravty"})), Catch::Contains("'gravity'"));
-  CHECK_THROWS_WITH(Model(WithParameters(robot, {"contact/stiffness"})), Catch::Contains("[simulation.contact]"));
-  CHECK_THROWS_WITH(Model(WithParameters(robot, {"limit/damping"})), Catch::Contains("[simulation.limit]"));
+  CHECK_THROWS_WITH(Model(WithParameters(robot, {"contact/stiffness"})),
+                    Catch::Contains("[simulation.contact]"));
+  CHECK_THROWS_WITH(Model(WithParameters(robot, {"limit/damping"})),
+                    Catch::Contains("[simulation.limit]"));
 }
 
 TEST_CASE("the base's mass is a parameter without any effect") {
@@ -79,7 +83,8 @@ TEST_CASE("the base's mass is a parameter without any effect") {
 
 TEST_CASE("a link is stretched with all that is on it") {
   RobotDescription tree = MakeTree();
-  const RobotDescription longer = Describe(tree, {"length/upper", "length/lower"}, Eigen::Vector2d(1.2, 0.3));
+  const RobotDescription longer =
+      Describe(tree, {"length/upper", "length/lower"}, Eigen::Vector2d(1.2, 0.3));
   const double upper = 1.2 / tree.joints[2].origin.norm();
   CHECK(longer.joints[2].origin.isApprox(upper * tree.joints[2].origin, 1e-14));
   CHECK(longer.links[2].center_of_mass.isApprox(upper * tree.links[2].center_of_mass, 1e-14));
@@ -89,16 +94,20 @@ TEST_CASE("a link is stretched with all that is on it") {
   CHECK(longer.links[3].center_of_mass.isApprox(lower * tree.links[3].center_of_mass, 1e-14));
   CHECK(longer.joints[1].origin.isApprox(tree.joints[1].origin, 1e-14));
   tree.links[4].center_of_mass.setZero();
-  CHECK_THROWS_WITH(Describe(tree, {"length/arm"}, VectorXd::Ones(1)), Catch::Contains("no length"));
+  CHECK_THROWS_WITH(Describe(tree, {"length/arm"}, VectorXd::Ones(1)),
+                    Catch::Contains("no length"));
 }
 
 TEST_CASE("log-Cholesky coordinates reach inertias that a body can have, and no others") {
   const RobotDescription tree = MakeTree();
   std::vector<std::string> paths;
-  for (const char* entry : {"xx", "yy", "zz", "xy", "xz", "yz"}) paths.push_back(std::string("inertia/upper/") + entry);
+  for (const char* entry : {"xx", "yy", "zz", "xy", "xz", "yz"})
+    paths.push_back(std::string("inertia/upper/") + entry);
   const Matrix3d nominal = tree.links[2].inertia;
   CHECK(Describe(tree, paths, VectorXd::Zero(6)).links[2].inertia.isApprox(nominal, 1e-13));
-  const auto moments = [](const Matrix3d& i) -> Matrix3d { return i.trace() / 2 * Matrix3d::Identity() - i; };
+  const auto moments = [](const Matrix3d& i) -> Matrix3d {
+    return i.trace() / 2 * Matrix3d::Identity() - i;
+  };
   const Matrix3d root = moments(nominal).llt().matrixL();
   Random random(3);
   for (int i = 0; i < 100; ++i) {
@@ -120,13 +129,27 @@ TEST_CASE("every kind of parameter arrives where it belongs, in any order, froze
   RobotDescription tree = MakeTree();
   tree.simulation.contact = {1e4, 100, 0.8, 0.1};
   tree.simulation.stop = {1e3, 10};
-  const std::vector<std::pair<std::string, double>> values = {
-      {"gravity", 3},          {"mass/lower", 0.9},      {"com/lower/x", 0.11},     {"com/lower/z", -0.2},
-      {"inertia/lower", 2},    {"length/upper", 0.8},    {"armature/elbow", 0.07},  {"damping/elbow", 0.3},
-      {"friction/rail", 4},    {"stiffness/other", 5},   {"rest/other", -0.4},      {"gain/shoulder", 0.9},
-      {"delay/shoulder", .01}, {"sensor_delay/rail", .004}, {"sensor_bias/elbow", -.02}, {"no_load_speed/rail", 9},
-      {"contact/stiffness", 2e4}, {"contact/damping", 50}, {"contact/friction", 1.1}, {"limit/stiffness", 500},
-      {"limit/damping", 3}};
+  const std::vector<std::pair<std::string, double>> values = {{"gravity", 3},
+                                                              {"mass/lower", 0.9},
+                                                              {"com/lower/x", 0.11},
+                                                              {"com/lower/z", -0.2},
+                                                              {"inertia/lower", 2},
+                                                              {"length/upper", 0.8},
+                                                              {"armature/elbow", 0.07},
+                                                              {"damping/elbow", 0.3},
+                                                              {"friction/rail", 4},
+                                                              {"stiffness/other", 5},
+                                                              {"rest/other", -0.4},
+                                                              {"gain/shoulder", 0.9},
+                                                              {"delay/shoulder", .01},
+                                                              {"sensor_delay/rail", .004},
+                                                              {"sensor_bias/elbow", -.02},
+                                                              {"no_load_speed/rail", 9},
+                                                              {"contact/stiffness", 2e4},
+                                                              {"contact/damping", 50},
+                                                              {"contact/friction", 1.1},
+                                                              {"limit/stiffness", 500},
+                                                              {"limit/damping", 3}};
   std::vector<std::string> paths;
   VectorXd physical(values.size());
   for (size_t i = 0; i < values.size(); ++i) {
@@ -187,7 +210,8 @@ TEST_CASE("hidden parameters lie in their ranges and depend on the seed alone") 
 
   RobotDescription fewer = description;
   fewer.virtual_robot.hidden = {{"length/pole", 0.9, 1.1}};
-  CHECK(HiddenParameters(fewer, 4) == Eigen::Vector3d(10.4, 1.04, HiddenParameters(description, 4)[2]));
+  CHECK(HiddenParameters(fewer, 4) ==
+        Eigen::Vector3d(10.4, 1.04, HiddenParameters(description, 4)[2]));
 }
 
 }  // namespace plumb

@@ -71,7 +71,8 @@ TEST_CASE("the plant keeps its energy") {
   CHECK(std::abs(energy() - before) < 1e-7);
 }
 
-TEST_CASE("the plant's integrator is of fourth order and at its default far below an encoder's count") {
+TEST_CASE(
+    "the plant's integrator is of fourth order and at its default far below an encoder's count") {
   const RobotDescription description = LoadPendulum("robot.toml");
   const RobotDescription robot = WithPriorMeans(description);
   const auto run = [&](Plant&& plant, double duration) {
@@ -83,8 +84,7 @@ TEST_CASE("the plant's integrator is of fourth order and at its default far belo
   const double coarse = run(Plant(robot, 0.02), 0.4) - reference;
   const double fine = run(Plant(robot, 0.01), 0.4) - reference;
   CHECK(std::log2(coarse / fine) == Approx(4).margin(0.3));
-  const double step =
-      run(Plant(robot), 0.005) - run(Plant(robot, 0.001), 0.005);
+  const double step = run(Plant(robot), 0.005) - run(Plant(robot, 0.001), 0.005);
   CHECK(std::abs(step) < 1e-10);
 }
 
@@ -131,8 +131,9 @@ TEST_CASE("at the pendulum's substep the simulator errs far less than the sensor
     v_square += std::pow(simulator.v()[0] - plant.v()[0], 2) / 500;
     finer_q_error = std::max(finer_q_error, std::abs(finer.q()[0] - plant.q()[0]));
   }
-  INFO("one-step errors: worst " << q_error << " rad, " << v_error << " rad/s, rms " << std::sqrt(q_square)
-                                 << " rad, " << std::sqrt(v_square) << " rad/s");
+  INFO("one-step errors: worst " << q_error << " rad, " << v_error << " rad/s, rms "
+                                 << std::sqrt(q_square) << " rad, " << std::sqrt(v_square)
+                                 << " rad/s");
   CHECK(q_error < 1.2e-4 / 8);  // the encoder's sd
   CHECK(std::sqrt(q_square) < 1.2e-4 / 15);
   CHECK(v_error < 1e-2 / 100);  // what filtering makes of the drive's velocity

@@ -27,7 +27,8 @@ TEST_CASE("reach: errors to the target, the short way round; a quadratic price")
   // The slide's unit is half its range, 2 m; the effort is half its limit.
   const double price = 0.25 + turn * turn + 0.01 * (0.125 * 0.125 + 49) + 0.01 * 0.25;
   CHECK(task->Reward(q, v, Eigen::Vector2d(5, 0), q, v) == Approx(-price).epsilon(1e-12));
-  CHECK(task->Reward(Eigen::Vector2d(0.5, 3 + 4 * kPi), 0 * v, 0 * v, q, v) == Approx(0).margin(1e-20));
+  CHECK(task->Reward(Eigen::Vector2d(0.5, 3 + 4 * kPi), 0 * v, 0 * v, q, v) ==
+        Approx(0).margin(1e-20));
   CHECK(task->state_scale() == Eigen::Vector4d(2, 1, 16, 8));
   CHECK_FALSE(task->Terminated(q, v));
 }
@@ -53,7 +54,8 @@ TEST_CASE("reach starts anywhere, hold near the target, a spread rules both") {
   reach.task.spread = {0, 0.1};
   CHECK((extremes(reach) - Eigen::Vector4d(-2, 2, 2.9, 3.1)).norm() < 0.02);
   hold.task.spread = {1.75, 0.2};
-  CHECK((extremes(hold) - Eigen::Vector4d(-1.25, 2, 2.8, 3.2)).norm() < 0.02);  // not beyond the limit
+  // not beyond the limit
+  CHECK((extremes(hold) - Eigen::Vector4d(-1.25, 2, 2.8, 3.2)).norm() < 0.02);
 }
 
 namespace {
@@ -66,7 +68,8 @@ RobotDescription FloatingBody(const std::string& task) {
   description.simulation.gravity = 0;
   description.task = {task, 0.02, 100};
   const auto link = [](const std::string& name, double mass) {
-    return LinkDescription{name, mass, Eigen::Vector3d::Zero(), 0.1 * mass * Eigen::Matrix3d::Identity()};
+    return LinkDescription{name, mass, Eigen::Vector3d::Zero(),
+                           0.1 * mass * Eigen::Matrix3d::Identity()};
   };
   description.links = {{"base"}, {"x"}, {"y"}, {"z"}, link("body", 2), link("wheel", 0.5)};
   description.joints = {Joint("free/x", Type::kPrismatic, -kInfinity, kInfinity, 0),
@@ -87,25 +90,30 @@ RobotDescription FloatingBody(const std::string& task) {
 }
 
 Eigen::Vector4d Turned(const Eigen::Quaterniond& target, const Eigen::Vector3d& vector) {
-  const Eigen::Quaterniond q = target * Eigen::Quaterniond(Eigen::AngleAxisd(vector.norm(), vector.normalized()));
+  const Eigen::Quaterniond q =
+      target * Eigen::Quaterniond(Eigen::AngleAxisd(vector.norm(), vector.normalized()));
   return {q.w(), q.x(), q.y(), q.z()};
 }
 
 }  // namespace
 
-TEST_CASE("reach: of a spherical joint the rotation vector to the target counts, whatever the quaternion's sign") {
+TEST_CASE(
+    "reach: of a spherical joint the rotation vector to the target counts, whatever the "
+    "quaternion's sign") {
   RobotDescription description = FloatingBody("hold");
   const Eigen::Quaterniond target(0.6, 0, 0.8, 0);
   description.task.target = {1, 2, 3, 0.6, 0, 0.8, 0, 0};
   const auto task = MakeTask(description);
   CHECK(task->observation_names() ==
-        std::vector<std::string>{"e/free/x [m]", "e/free/y [m]", "e/free/z [m]", "e/free/rotation/x [rad]",
-                                 "e/free/rotation/y [rad]", "e/free/rotation/z [rad]", "sin(e/wheel)", "cos(e/wheel)",
-                                 "v/free/x [m/s]", "v/free/y [m/s]", "v/free/z [m/s]", "v/free/rotation/x [rad/s]",
-                                 "v/free/rotation/y [rad/s]", "v/free/rotation/z [rad/s]", "v/wheel [rad/s]"});
+        std::vector<std::string>{
+            "e/free/x [m]", "e/free/y [m]", "e/free/z [m]", "e/free/rotation/x [rad]",
+            "e/free/rotation/y [rad]", "e/free/rotation/z [rad]", "sin(e/wheel)", "cos(e/wheel)",
+            "v/free/x [m/s]", "v/free/y [m/s]", "v/free/z [m/s]", "v/free/rotation/x [rad/s]",
+            "v/free/rotation/y [rad/s]", "v/free/rotation/z [rad/s]", "v/wheel [rad/s]"});
   REQUIRE(task->observation_size() == 3 + 3 + 2 + 7);
   CHECK(task->action_indices() == std::vector<int>{6});
-  CHECK(task->state_scale() == (Eigen::VectorXd(15) << 1, 1, 1, 1, 1, 1, 1, 1, 8, 8, 8, 8, 8, 8, 8).finished());
+  CHECK(task->state_scale() ==
+        (Eigen::VectorXd(15) << 1, 1, 1, 1, 1, 1, 1, 1, 8, 8, 8, 8, 8, 8, 8).finished());
 
   const Eigen::VectorXd still = Eigen::VectorXd::Zero(7);
   Eigen::VectorXd q(8), v = still;
@@ -145,7 +153,8 @@ TEST_CASE("reach turns a spherical joint anywhere, hold as far as its spread") {
     REQUIRE(q.segment<4>(3).norm() == Approx(1).epsilon(1e-12));
     moments += q.segment<4>(3) * q.segment<4>(3).transpose() / 10000;
   }
-  CHECK((moments - Eigen::Matrix4d::Identity() / 4).cwiseAbs().maxCoeff() < 0.01);  // uniform on the sphere
+  // uniform on the sphere
+  CHECK((moments - Eigen::Matrix4d::Identity() / 4).cwiseAbs().maxCoeff() < 0.01);
 
   description.task.name = "hold";
   const auto hold = MakeTask(description);
@@ -194,7 +203,8 @@ TEST_CASE("hold: a floating body in an environment") {
 TEST_CASE("reach refuses what it cannot start from") {
   RobotDescription description = CartAndPole("reach");
   description.joints[0].lower = -kInfinity;
-  CHECK_THROWS_WITH(MakeTask(description), Catch::Contains("'slide'") && Catch::Contains("task.spread"));
+  CHECK_THROWS_WITH(MakeTask(description),
+                    Catch::Contains("'slide'") && Catch::Contains("task.spread"));
   description.task.spread = {0.1, 0};
   CHECK_NOTHROW(MakeTask(description));
 }

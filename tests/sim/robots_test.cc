@@ -55,8 +55,8 @@ TEST_CASE("the hopper is gym's") {
       const LinkDescription& link = hopper.links[i + 3];
       CHECK(link.mass == Approx(masses[i]).epsilon(2e-5));
       CHECK(link.collisions.size() == (link.name == "foot" ? 1 : 0));
-      // Whatever is drawn weighs what it should: a capsule of water. Its caps are half spheres, whose own moments
-      // across are 83/320 m r^2 about a centre 3/8 r outside the cylinder's end.
+      // Whatever is drawn weighs what it should: a capsule of water. Its caps are half spheres,
+      // whose own moments across are 83/320 m r^2 about a centre 3/8 r outside the cylinder's end.
       REQUIRE(link.visuals.size() == 1);
       const Shape& shape = link.visuals[0];
       REQUIRE(shape.type == Shape::Type::kCapsule);
@@ -67,8 +67,9 @@ TEST_CASE("the hopper is gym's") {
                             caps * (83.0 / 320 * r * r + std::pow(l / 2 + 3.0 / 8 * r, 2));
       CHECK(link.mass == Approx(cylinder + caps).epsilon(1e-14));
       CHECK((link.center_of_mass - shape.position).norm() < 1e-15);
-      const Eigen::Matrix3d inertia =
-          shape.rotation * Eigen::Vector3d(across, across, along).asDiagonal() * shape.rotation.transpose();
+      const Eigen::Matrix3d inertia = shape.rotation *
+                                      Eigen::Vector3d(across, across, along).asDiagonal() *
+                                      shape.rotation.transpose();
       CHECK((link.inertia - inertia).norm() < 1e-14);
     }
   }
@@ -102,14 +103,19 @@ TEST_CASE("the other examples load, and their tasks fit") {
 }
 
 TEST_CASE("every observation has a name of its own, with its unit") {
-  const auto names = [](const std::string& robot) { return MakeTask(LoadExample(robot))->observation_names(); };
+  const auto names = [](const std::string& robot) {
+    return MakeTask(LoadExample(robot))->observation_names();
+  };
   CHECK(names("pendulum") == Names{"cos(q/pivot)", "sin(q/pivot)", "v/pivot [rad/s]"});
-  CHECK(names("cartpole") == Names{"e/cart [m]", "sin(e/hinge)", "cos(e/hinge)", "v/cart [m/s]", "v/hinge [rad/s]"});
-  CHECK(names("hopper") == Names{"q/rootz [m]", "q/rooty [rad]", "q/thigh [rad]", "q/leg [rad]", "q/foot [rad]",
-                                 "v/rootx [m/s]", "v/rootz [m/s]", "v/rooty [rad/s]", "v/thigh [rad/s]",
-                                 "v/leg [rad/s]", "v/foot [rad/s]"});
+  CHECK(names("cartpole") ==
+        Names{"e/cart [m]", "sin(e/hinge)", "cos(e/hinge)", "v/cart [m/s]", "v/hinge [rad/s]"});
+  CHECK(names("hopper") == Names{"q/rootz [m]", "q/rooty [rad]", "q/thigh [rad]", "q/leg [rad]",
+                                 "q/foot [rad]", "v/rootx [m/s]", "v/rootz [m/s]",
+                                 "v/rooty [rad/s]", "v/thigh [rad/s]", "v/leg [rad/s]",
+                                 "v/foot [rad/s]"});
   int files = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots")) {
+  for (const auto& entry :
+       fs::recursive_directory_iterator(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots")) {
     if (entry.path().extension() != ".toml") continue;
     ++files;
     INFO(entry.path());
@@ -117,14 +123,16 @@ TEST_CASE("every observation has a name of its own, with its unit") {
     const auto task = MakeTask(robot);
     const size_t size = task->observation_names().size();
     CHECK(static_cast<int>(size) == task->observation_size());
-    CHECK(std::set<std::string>(task->observation_names().begin(), task->observation_names().end()).size() == size);
+    CHECK(std::set<std::string>(task->observation_names().begin(), task->observation_names().end())
+              .size() == size);
     // As many are written, and no more.
     std::vector<float> observation(size + 1, NAN);
     Random random(1);
     Eigen::VectorXd q(robot.num_positions()), v(robot.num_velocities());
     task->InitialState(random, q, v);
     task->Observe(q, v, {observation.data(), size});
-    CHECK(std::count_if(observation.begin(), observation.end(), [](float x) { return std::isnan(x); }) == 1);
+    CHECK(std::count_if(observation.begin(), observation.end(),
+                        [](float x) { return std::isnan(x); }) == 1);
     CHECK(std::isnan(observation.back()));
   }
   CHECK(files >= 4);

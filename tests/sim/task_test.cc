@@ -10,14 +10,12 @@
 namespace plumb {
 namespace {
 
-
 Eigen::VectorXd Scalar(double x) { return Eigen::VectorXd::Constant(1, x); }
 
 // Wherever the step leads: gym's Pendulum is paid for where it was.
 double PendulumReward(const Task& task, double q, double v, double u) {
   return task.Reward(Scalar(q), Scalar(v), Scalar(u), Scalar(q + 1), Scalar(v - 1));
 }
-
 
 /// gym's Hopper as far as tasks know robots.
 RobotDescription HopperJoints() {
@@ -31,7 +29,6 @@ RobotDescription HopperJoints() {
                         Joint("foot", Type::kRevolute, -0.8, 0.8, 200)};
   return description;
 }
-
 
 }  // namespace
 
@@ -91,7 +88,8 @@ TEST_CASE("actions are clipped to the effort limits, and NaN is no effort") {
   CHECK_THROWS_AS(task->Effort(two, effort), std::invalid_argument);
 }
 
-TEST_CASE("an unknown task is answered with the nearest known one; one that does not fit is refused") {
+TEST_CASE(
+    "an unknown task is answered with the nearest known one; one that does not fit is refused") {
   RobotDescription description = LoadPendulum("robot.toml");
   description.task.name = "pendulun";
   CHECK_THROWS_WITH(MakeTask(description), Catch::Contains("'pendulum'"));
@@ -117,10 +115,15 @@ TEST_CASE("only what has a motor is driven") {
   arm.joints[0] = Joint("ball", Type::kSpherical, 0, 0, 0);
   arm.joints[1] = Joint("elbow", Type::kRevolute, -1, 1, 3);
   struct Blind : Task {
-    explicit Blind(const RobotDescription& description) : Task(description, {"nothing"}, Eigen::VectorXd::Ones(9)) {}
+    explicit Blind(const RobotDescription& description)
+        : Task(description, {"nothing"}, Eigen::VectorXd::Ones(9)) {}
     void Observe(const State&, const State&, std::span<float>) const override {}
-    double Reward(const State&, const State&, const State&, const State&, const State&) const override { return 0; }
-    void InitialState(Random&, Eigen::Ref<Eigen::VectorXd>, Eigen::Ref<Eigen::VectorXd>) const override {}
+    double Reward(const State&, const State&, const State&, const State&,
+                  const State&) const override {
+      return 0;
+    }
+    void InitialState(Random&, Eigen::Ref<Eigen::VectorXd>,
+                      Eigen::Ref<Eigen::VectorXd>) const override {}
   };
   const Blind blind(arm);
   Eigen::VectorXd four(4);
@@ -138,7 +141,8 @@ TEST_CASE("the hopper's observation, reward and end are gym's") {
   v << 1, -11, 3, 12, -4, 10;
   std::array<float, 11> observation{};
   task->Observe(q, v, observation);
-  CHECK(observation == std::array<float, 11>{1.1f, 0.1f, -0.4f, -0.3f, 0.2f, 1, -10, 3, 10, -4, 10});
+  CHECK(observation ==
+        std::array<float, 11>{1.1f, 0.1f, -0.4f, -0.3f, 0.2f, 1, -10, 3, 10, -4, 10});
 
   // 8 mm in 8 ms, one for being alive, and a thousandth of 0.5^2 + 1 + 0
   Eigen::VectorXd effort(6), next = q;

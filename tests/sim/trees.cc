@@ -57,7 +57,8 @@ std::vector<Eigen::Isometry3d> LinkPoses(const RobotDescription& robot, const Ei
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
     switch (joint.type) {
       case JointDescription::Type::kSpherical:
-        motion.linear() = Eigen::Quaterniond(q[at], q[at + 1], q[at + 2], q[at + 3]).normalized().matrix();
+        motion.linear() =
+            Eigen::Quaterniond(q[at], q[at + 1], q[at + 2], q[at + 3]).normalized().matrix();
         break;
       case JointDescription::Type::kPrismatic:
         motion.translation() = q[at] * joint.axis;
@@ -126,17 +127,21 @@ std::string TreeWriter::Origin(const Eigen::Vector3d& xyz, const Eigen::Vector3d
 
 std::string TreeWriter::Inertial() {
   // Moments that a body can have, in axes of their own, seen in yet others.
-  const Eigen::Vector3d squares(random_.Uniform(.01, .1), random_.Uniform(.01, .1), random_.Uniform(.01, .1));
+  const Eigen::Vector3d squares(random_.Uniform(.01, .1), random_.Uniform(.01, .1),
+                                random_.Uniform(.01, .1));
   const double mass = random_.Uniform(0.2, 3);
   const Eigen::Vector3d moments = mass * (squares.sum() * Eigen::Vector3d::Ones() - squares);
-  const Eigen::Matrix3d axes = Eigen::AngleAxisd(random_.Uniform(0, 3), DrawDirection(random_)).matrix();
+  const Eigen::Matrix3d axes =
+      Eigen::AngleAxisd(random_.Uniform(0, 3), DrawDirection(random_)).matrix();
   const Eigen::Matrix3d i = axes * moments.asDiagonal() * axes.transpose();
   char text[300];
-  std::snprintf(text, sizeof text,
-                "<mass value='%.17g'/><inertia ixx='%.17g' ixy='%.17g' ixz='%.17g' iyy='%.17g' iyz='%.17g' "
-                "izz='%.17g'/>",
-                mass, i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2), i(2, 2));
-  return "<inertial>" + Origin(DrawVector(random_, .3), DrawVector(random_, 3)) + text + "</inertial>";
+  std::snprintf(
+      text, sizeof text,
+      "<mass value='%.17g'/><inertia ixx='%.17g' ixy='%.17g' ixz='%.17g' iyy='%.17g' iyz='%.17g' "
+      "izz='%.17g'/>",
+      mass, i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2), i(2, 2));
+  return "<inertial>" + Origin(DrawVector(random_, .3), DrawVector(random_, 3)) + text +
+         "</inertial>";
 }
 
 std::string TreeWriter::Write(int most, const Eigen::Vector3d& normal) {
@@ -147,14 +152,15 @@ std::string TreeWriter::Write(int most, const Eigen::Vector3d& normal) {
   std::string text;
   for (int i = 1; i <= joints; ++i) {
     const char* types[] = {"revolute", "continuous", "prismatic", "fixed", "planar", "floating"};
-    const std::string type =
-        i == 1 ? types[planar ? 1 : 0] : types[static_cast<int>(random_.Uniform(0, planar ? 5 : 6))];
+    const std::string type = i == 1 ? types[planar ? 1 : 0]
+                                    : types[static_cast<int>(random_.Uniform(0, planar ? 5 : 6))];
     const int parent = static_cast<int>(random_.Uniform(std::max(0, i - 4), i));
     const Eigen::Vector3d rpy = DrawVector(random_, 3);
-    axes.push_back(axes[static_cast<size_t>(parent)] * (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-                                                        Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-                                                        Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-                                                           .matrix());
+    axes.push_back(axes[static_cast<size_t>(parent)] *
+                   (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+                    Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+                    Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+                       .matrix());
     Eigen::Vector3d axis = DrawDirection(random_);
     if (planar) {
       axis = type == "prismatic" ? Eigen::Vector3d(axis.cross(normal).normalized())

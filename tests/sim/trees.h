@@ -27,7 +27,8 @@ Eigen::VectorXd DrawPosition(const RobotDescription& robot, Random& random, doub
 
 Eigen::VectorXd DrawNumbers(Eigen::Index count, Random& random, double size);
 
-/// The links' poses in the world by textbook: link frame in parent's = origin, rotation, motion of the joint.
+/// The links' poses in the world by textbook: link frame in parent's = origin, rotation, motion of
+/// the joint.
 std::vector<Eigen::Isometry3d> LinkPoses(const RobotDescription& robot, const Eigen::VectorXd& q);
 
 /// [J] of gravity and the joints' springs.
@@ -36,7 +37,8 @@ double PotentialEnergy(const RobotDescription& robot, const Eigen::VectorXd& q);
 /// The robot with nothing left that takes energy out or puts it in.
 RobotDescription Frictionless(RobotDescription robot);
 
-/// The links and joints of a URDF text, with the pendulum's settings and nothing but gravity and inertia.
+/// The links and joints of a URDF text, with the pendulum's settings and nothing but gravity and
+/// inertia.
 RobotDescription FromUrdf(const std::string& urdf);
 
 /// Writes URDF texts of trees that nobody would build. Equal seeds give equal trees.
@@ -47,9 +49,11 @@ class TreeWriter {
   /// Joints of all of URDF's kinds, frames, axes and inertias askew.
   /// @param most joints, the fixed ones included.
   std::string Spatial(int most) { return Write(most, Eigen::Vector3d::Zero()); }
-  /// The same with joints that only move in the plane of this normal [world axes], though their frames are
-  /// askew.
-  std::string Planar(int most, const Eigen::Vector3d& normal) { return Write(most, normal.normalized()); }
+  /// The same with joints that only move in the plane of this normal [world axes], though their
+  /// frames are askew.
+  std::string Planar(int most, const Eigen::Vector3d& normal) {
+    return Write(most, normal.normalized());
+  }
 
  private:
   static std::string Text(const Eigen::Vector3d& v);

@@ -31,12 +31,14 @@ void Compare(const RobotDescription& robot, int states, Random& random, Differen
   MatrixXd armature = MatrixXd::Zero(robot.num_velocities(), robot.num_velocities());
   Eigen::Index at = 0;
   for (const JointDescription& joint : robot.joints) {
-    for (int k = 0; k < joint.num_velocities(); ++k, ++at) armature(at, at) = joint.dynamics.armature;
+    for (int k = 0; k < joint.num_velocities(); ++k, ++at)
+      armature(at, at) = joint.dynamics.armature;
   }
   double weight = 0;  // [N]: what to measure a bias by that vanishes
   for (const LinkDescription& link : robot.links) weight += link.mass * robot.simulation.gravity;
   for (int i = 0; i < states; ++i) {
-    const VectorXd q = DrawPosition(robot, random), v = DrawNumbers(robot.num_velocities(), random, 5),
+    const VectorXd q = DrawPosition(robot, random),
+                   v = DrawNumbers(robot.num_velocities(), random, 5),
                    effort = DrawNumbers(robot.num_velocities(), random, 20);
     simulator.SetState(q, v);
     plant.SetState(q, v);
@@ -44,12 +46,14 @@ void Compare(const RobotDescription& robot, int states, Random& random, Differen
     const VectorXd bias = plant.Bias();
     worst->mass = std::max(worst->mass, Distance(simulator.MassMatrix(), mass));
     worst->bias = std::max(worst->bias, (simulator.Bias() - bias).norm() / (bias.norm() + weight));
-    // Accelerations by the forces that they are worth: a robot that is all but singular has large ones.
+    // Accelerations by the forces that they are worth: a robot that is all but singular has large
+    // ones.
     const VectorXd acceleration = simulator.Acceleration(effort);
     const double size = effort.norm() + bias.norm();
     worst->force = std::max(worst->force, (mass * acceleration - (effort - bias)).norm() / size);
     if (armature.isZero()) {
-      worst->force = std::max(worst->force, (mass * (acceleration - plant.Acceleration(effort))).norm() / size);
+      worst->force = std::max(worst->force,
+                              (mass * (acceleration - plant.Acceleration(effort))).norm() / size);
     }
   }
 }
@@ -70,7 +74,8 @@ double PlanarAgainstSpatial(const RobotDescription& robot, Random& random) {
   const auto other = MakeEngine(spatial, robot.simulation, parameters.terms());
   const int n = robot.num_velocities();
   const double h = 1e-3;
-  const VectorXd q = DrawPosition(robot, random), v = DrawNumbers(n, random, 5), effort = DrawNumbers(n, random, 20);
+  const VectorXd q = DrawPosition(robot, random), v = DrawNumbers(n, random, 5),
+                 effort = DrawNumbers(n, random, 20);
   for (const auto& engine : {one.get(), other.get()}) {
     engine->SetPhysics(0, parameters.Nominal());
     std::copy(q.begin(), q.end(), engine->q());
@@ -79,8 +84,10 @@ double PlanarAgainstSpatial(const RobotDescription& robot, Random& random) {
   const VectorXd a = VectorXd::Map(one->Bias(), n), b = VectorXd::Map(other->Bias(), n);
   double worst = (a - b).norm() / (b.norm() + 1);
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const MatrixXd left = RowMajor::Map(one->MassMatrix(), n, n), right = RowMajor::Map(other->MassMatrix(), n, n);
-  worst = std::max(worst, Distance(left.selfadjointView<Eigen::Lower>(), right.selfadjointView<Eigen::Lower>()));
+  const MatrixXd left = RowMajor::Map(one->MassMatrix(), n, n),
+                 right = RowMajor::Map(other->MassMatrix(), n, n);
+  worst = std::max(
+      worst, Distance(left.selfadjointView<Eigen::Lower>(), right.selfadjointView<Eigen::Lower>()));
   for (const auto& engine : {one.get(), other.get()}) engine->Substep(&h, effort.data(), nullptr);
   const MatrixXd mass = right.selfadjointView<Eigen::Lower>();
   const VectorXd change = VectorXd::Map(one->v(), n) - VectorXd::Map(other->v(), n);
@@ -91,7 +98,8 @@ double PlanarAgainstSpatial(const RobotDescription& robot, Random& random) {
 }  // namespace
 
 TEST_CASE("trees: the examples move as Simbody's") {
-  for (const char* name : {"pendulum/robot.toml", "pendulum/gym.toml", "cartpole", "double_pendulum", "hopper"}) {
+  for (const char* name :
+       {"pendulum/robot.toml", "pendulum/gym.toml", "cartpole", "double_pendulum", "hopper"}) {
     INFO(name);
     RobotDescription robot = Frictionless(LoadExample(name));
     Random random(1);
@@ -153,9 +161,9 @@ TEST_CASE("trees: in any plane the planar equations are Simbody's and the spatia
   int joints = 0;
   for (uint64_t seed = 0; seed < 150; ++seed) {
     INFO("seed " << seed);
-    Vector3d normal = DrawDirection(random);         // tilted,
-    if (seed % 3 == 0) normal.z() = 0;               // upright,
-    if (seed % 3 == 1) normal = Vector3d::UnitZ();   // level
+    Vector3d normal = DrawDirection(random);        // tilted,
+    if (seed % 3 == 0) normal.z() = 0;              // upright,
+    if (seed % 3 == 1) normal = Vector3d::UnitZ();  // level
     const RobotDescription robot = FromUrdf(TreeWriter(1000 + seed).Planar(12, normal));
     REQUIRE(Topology(robot).planar);
     joints += robot.num_velocities();
@@ -172,7 +180,8 @@ TEST_CASE("trees: armature is added to the joint's own inertia, and to nothing e
   Random random(5);
   for (uint64_t seed = 0; seed < 20; ++seed) {
     RobotDescription robot = FromUrdf(TreeWriter(seed).Spatial(8));
-    const VectorXd q = DrawPosition(robot, random), v = DrawNumbers(robot.num_velocities(), random, 5);
+    const VectorXd q = DrawPosition(robot, random),
+                   v = DrawNumbers(robot.num_velocities(), random, 5);
     Simulator bare(robot);
     bare.SetState(q, v);
     VectorXd armature(robot.num_velocities());
@@ -183,7 +192,8 @@ TEST_CASE("trees: armature is added to the joint's own inertia, and to nothing e
     }
     Simulator geared(robot);
     geared.SetState(q, v);
-    REQUIRE(Distance(geared.MassMatrix(), bare.MassMatrix() + MatrixXd(armature.asDiagonal())) < 1e-14);
+    REQUIRE(Distance(geared.MassMatrix(), bare.MassMatrix() + MatrixXd(armature.asDiagonal())) <
+            1e-14);
     REQUIRE(geared.Bias() == bare.Bias());
   }
 }

@@ -23,7 +23,8 @@ VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
 RobotDescription Pendulum(UnmodelledJoint unmodelled) {
   RobotDescription robot = LoadPendulum("robot.toml");
   robot.simulation.gravity = 0;
-  std::erase_if(robot.parameters, [](const auto& parameter) { return parameter.name == "gravity"; });
+  std::erase_if(robot.parameters,
+                [](const auto& parameter) { return parameter.name == "gravity"; });
   robot.virtual_robot.hidden.clear();
   unmodelled.joint = 0;
   robot.virtual_robot.joints = {unmodelled};
@@ -40,13 +41,17 @@ struct Bench {
   explicit Bench(const RobotDescription& robot)
       : virtual_robot(robot, Model(robot).parameters().means(), kStart) {
     Send(Make(cansimple::kClearErrors, 1), 0);
-    Send(Make(cansimple::kSetControllerMode, 1, {cansimple::kTorqueControl, cansimple::kPassthrough}), 0);
+    Send(Make(cansimple::kSetControllerMode, 1,
+              {cansimple::kTorqueControl, cansimple::kPassthrough}),
+         0);
     Send(Make(cansimple::kSetInputTorque, 1, {0}), 0);
     Send(Make(cansimple::kSetAxisState, 1, {cansimple::kClosedLoopControl}), 0);
     REQUIRE(virtual_robot.devices()[0]->armed());
   }
   void Send(const Frame& frame, int64_t at) { virtual_robot.Receive(frame, kStart + at, out); }
-  void Torque(double torque, int64_t at) { Send(Make(cansimple::kSetInputTorque, 1, {torque}), at); }
+  void Torque(double torque, int64_t at) {
+    Send(Make(cansimple::kSetInputTorque, 1, {torque}), at);
+  }
   /// The position at the latest event until then [rad], and how long that was ago.
   double At(int64_t time) {
     virtual_robot.Advance(kStart + time, out);

@@ -17,12 +17,15 @@ using Eigen::VectorXd;
 
 constexpr int64_t kStart = HopperBus::kStart;
 
-RobotDescription Hopper(const std::string& file) { return LoadRobot(SourceFile("robots/hopper/" + file)); }
+RobotDescription Hopper(const std::string& file) {
+  return LoadRobot(SourceFile("robots/hopper/" + file));
+}
 
 void Wiggle(HopperBus& bus) {
   bus.effort = [&bus] {
     const double phase = 1e-5 * static_cast<double>(bus.now());
-    return Eigen::Vector3d(30 * std::sin(phase + 3), 30 * std::sin(phase + 4), 30 * std::sin(phase + 5));
+    return Eigen::Vector3d(30 * std::sin(phase + 3), 30 * std::sin(phase + 4),
+                           30 * std::sin(phase + 5));
   };
 }
 
@@ -64,12 +67,15 @@ TEST_CASE("a hopper on one bus: every joint is measured as it is, whatever measu
       CHECK(state.utime - state.measured[i] <= 5'100);
       const auto index = static_cast<Eigen::Index>(i);
       const double age = 1e-6 * static_cast<double>(state.utime - state.measured[i]);
-      // Resolutions, and what a joint moves within its reading's age and the tenth of a millisecond of our
-      // steps.
-      const double resolution = i < 2 ? 1.5 * 6.3 / 65536 : i == 2 ? 1e-4 : 25. / 32768 + 6.3 / 16384;
+      // Resolutions, and what a joint moves within its reading's age and the tenth of a millisecond
+      // of our steps.
+      const double resolution = i < 2    ? 1.5 * 6.3 / 65536
+                                : i == 2 ? 1e-4
+                                         : 25. / 32768 + 6.3 / 16384;
       CHECK(std::abs(state.position[i] - bus.truth_q[k][index]) <
             resolution + (age + 2.5e-3) * (std::abs(bus.truth_v[k][index]) + 0.5));
-      moved[index] = std::max(moved[index], std::abs(bus.truth_q[k][index] - bus.truth_q[0][index]));
+      moved[index] =
+          std::max(moved[index], std::abs(bus.truth_q[k][index] - bus.truth_q[0][index]));
     }
     CHECK(state.velocity[2] == Approx(bus.truth_v[k][2]).margin(2.0));
     CHECK(std::isnan(state.effort_measured[0]));
@@ -121,7 +127,8 @@ TEST_CASE("a sensor that goes silent stops the robot") {
   Wiggle(bus);
   bus.Run(10);
   CHECK(bus.driver.state() == DriveState::kFault);
-  CHECK_THAT(std::string(bus.driver.reason()), Catch::Contains("boom_yaw: it reports error 0x5000"));
+  CHECK_THAT(std::string(bus.driver.reason()),
+             Catch::Contains("boom_yaw: it reports error 0x5000"));
   bus.Run(100);
   CHECK_FALSE(bus.robot.devices()[0]->armed());
   // Arming again is a person's word that it is right again: the sensor begins anew.
@@ -131,7 +138,8 @@ TEST_CASE("a sensor that goes silent stops the robot") {
 
 TEST_CASE("a joint that nothing measures is refused by its name") {
   RobotDescription description = Hopper("robot.toml");
-  std::erase_if(description.sensors, [](const SensorDescription& sensor) { return sensor.name == "imu"; });
+  std::erase_if(description.sensors,
+                [](const SensorDescription& sensor) { return sensor.name == "imu"; });
   CHECK_THROWS_WITH(Driver(description, 0, kStart),
                     Catch::Contains("'rooty' has no motor, and no sensor measures it"));
 }

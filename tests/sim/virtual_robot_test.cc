@@ -9,9 +9,9 @@
 
 #include "common/random.h"
 #include "drivers/protocols/cansimple.h"
+#include "sim/parameters.h"
 #include "sim/plant.h"
 #include "sim/simulator.h"
-#include "sim/parameters.h"
 #include "tests/sim/robots.h"
 
 namespace plumb {
@@ -21,7 +21,8 @@ using cansimple::Make;
 using Eigen::VectorXd;
 
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr int64_t kStart = 1'700'000'000'000'000;  // a utime, [us]; a multiple of the measurement period
+// a utime, [us]; a multiple of the measurement period
+constexpr int64_t kStart = 1'700'000'000'000'000;
 constexpr int kNode = 1;
 
 VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
@@ -37,7 +38,8 @@ struct Bench {
   void Advance(int64_t to) { robot.Advance(kStart + to, out); }
   void Arm(int64_t at) {
     Send(Make(cansimple::kClearErrors, kNode), at);
-    Send(Make(cansimple::kSetControllerMode, kNode, {cansimple::kTorqueControl, cansimple::kPassthrough}),
+    Send(Make(cansimple::kSetControllerMode, kNode,
+              {cansimple::kTorqueControl, cansimple::kPassthrough}),
          at);
     Send(Make(cansimple::kSetInputTorque, kNode, {0}), at);
     Send(Make(cansimple::kSetAxisState, kNode, {cansimple::kClosedLoopControl}), at);
@@ -91,7 +93,8 @@ TEST_CASE("a torque acts from the arrival of its frame, however late the process
     return bench.robot.q()[0];
   };
   CHECK(run(true) == run(false));
-  // 24.654 ms at 2 Nm and 12.223 ms at -1 Nm, from rest upright, where gravity has hardly begun to act.
+  // 24.654 ms at 2 Nm and 12.223 ms at -1 Nm, from rest upright, where gravity has hardly begun to
+  // act.
   const Eigen::VectorXd truth = HiddenParameters(Pendulum(), 1);
   const double gain = 3 / (truth[1] * truth[2] * truth[2]), a = 0.024654, b = 0.012223;
   CHECK(run(true) == Approx(gain * (2 * (a * a / 2 + a * b) - b * b / 2)).epsilon(0.01));
@@ -238,7 +241,8 @@ TEST_CASE("garbage on the bus moves nothing") {
     // Ours, but not a setpoint or a request for a state, which would be obeyed.
     if (i % 3 == 1) frame.id = kNode << 5 | (frame.id & 0x1F);
     const uint32_t command = frame.id & 0x1F;
-    if (command == cansimple::kSetInputTorque.command) frame.length = static_cast<uint8_t>(frame.length & 3);
+    if (command == cansimple::kSetInputTorque.command)
+      frame.length = static_cast<uint8_t>(frame.length & 3);
     bench.out.Clear();
     t += random.Bits() & 0xFF;
     bench.Send(frame, t);
@@ -253,7 +257,8 @@ TEST_CASE("equal seeds and frames give equal robots to the bit") {
   const auto run = [] {
     Bench bench;
     bench.Arm(10);
-    for (int i = 1; i < 20; ++i) bench.Send(Make(cansimple::kSetInputTorque, kNode, {0.1 * i}), 1777 * i);
+    for (int i = 1; i < 20; ++i)
+      bench.Send(Make(cansimple::kSetInputTorque, kNode, {0.1 * i}), 1777 * i);
     return bench.robot.q()[0];
   };
   CHECK(run() == run());

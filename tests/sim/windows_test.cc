@@ -22,7 +22,8 @@ RobotDescription LoadHopper() {
   return LoadRobot(std::string(source ? source : ".") + "/robots/hopper/gym.toml");
 }
 
-/// Random states near the ground, and some control steps of uneven segments; windows of different lengths.
+/// Random states near the ground, and some control steps of uneven segments; windows of different
+/// lengths.
 struct Record {
   std::vector<std::vector<EffortSegment>> steps;
   std::vector<Window> windows;
@@ -34,7 +35,8 @@ struct Record {
       lengths.push_back(1 + i % 3);
       for (size_t k = 0; k <= lengths.back(); ++k) {  // one more, for before
         VectorXd first = VectorXd::Zero(6), second = first;
-        for (int j = 3; j < 6; ++j) first[j] = random.Uniform(-200, 200), second[j] = random.Uniform(-200, 200);
+        for (int j = 3; j < 6; ++j)
+          first[j] = random.Uniform(-200, 200), second[j] = random.Uniform(-200, 200);
         const double duration = random.Uniform(0.0075, 0.0085);
         steps.push_back({{0.003, first}, {duration - 0.003, second}});
       }
@@ -42,8 +44,8 @@ struct Record {
     size_t next = 0;
     for (size_t i = 0; i < count; ++i) {
       Window window;
-      window.q = (VectorXd(6) << 0, random.Uniform(1.1, 1.3), random.Uniform(-.2, .2), random.Uniform(-.5, 0),
-                  random.Uniform(-.5, 0), random.Uniform(-.5, .5))
+      window.q = (VectorXd(6) << 0, random.Uniform(1.1, 1.3), random.Uniform(-.2, .2),
+                  random.Uniform(-.5, 0), random.Uniform(-.5, 0), random.Uniform(-.5, .5))
                      .finished();
       window.v = VectorXd::NullaryExpr(6, [&] { return random.Uniform(-2, 2); });
       window.before = {steps[next++]};
@@ -60,12 +62,17 @@ MatrixXd SomeMasses(int count) {
 
 /// Every visit's state in one matrix: a column per sample, window and step.
 MatrixXd Predict(const RobotDescription& robot, int threads, const MatrixXd& parameters,
-                 const std::vector<Window>& windows, bool last_only, Windows::Failures* failures = nullptr) {
+                 const std::vector<Window>& windows, bool last_only,
+                 Windows::Failures* failures = nullptr) {
   Windows simulate(std::make_shared<Model>(robot), threads);
-  MatrixXd all = MatrixXd::Constant(12, parameters.cols() * static_cast<Eigen::Index>(windows.size()) * 3, -77);
-  const auto visit = [&](Eigen::Index sample, size_t window, size_t step, const VectorXd& q, const VectorXd& v) {
-    const auto column = (sample * static_cast<Eigen::Index>(windows.size()) + static_cast<Eigen::Index>(window)) * 3 +
-                        static_cast<Eigen::Index>(step);
+  MatrixXd all = MatrixXd::Constant(
+      12, parameters.cols() * static_cast<Eigen::Index>(windows.size()) * 3, -77);
+  const auto visit = [&](Eigen::Index sample, size_t window, size_t step, const VectorXd& q,
+                         const VectorXd& v) {
+    const auto column =
+        (sample * static_cast<Eigen::Index>(windows.size()) + static_cast<Eigen::Index>(window)) *
+            3 +
+        static_cast<Eigen::Index>(step);
     all.col(column) << q, v;
   };
   const Windows::Failures counted = simulate.Predict(parameters, windows, visit, last_only);
@@ -92,7 +99,8 @@ TEST_CASE("windows are what a simulator gives, to the bit, for any number of thr
     const MatrixXd all = Predict(robot, 1, masses, record.windows, false);
     CHECK(SameBits(all, Predict(robot, 2, masses, record.windows, false)));
     CHECK(SameBits(all, Predict(robot, 5, masses, record.windows, false)));
-    CHECK(SameBits(all.leftCols(13 * 3), Predict(robot, 3, masses.leftCols(1), record.windows, false)));
+    CHECK(SameBits(all.leftCols(13 * 3),
+                   Predict(robot, 3, masses.leftCols(1), record.windows, false)));
 
     Simulator simulator(robot);
     for (Eigen::Index sample = 0; sample < masses.cols(); ++sample) {
@@ -105,7 +113,8 @@ TEST_CASE("windows are what a simulator gives, to the bit, for any number of thr
         if (delayed) simulator.Recall(window.before[0]);
         for (size_t step = 0; step < window.steps.size(); ++step) {
           simulator.Step(window.steps[step]);
-          const auto column = (sample * 13 + static_cast<Eigen::Index>(i)) * 3 + static_cast<Eigen::Index>(step);
+          const auto column =
+              (sample * 13 + static_cast<Eigen::Index>(i)) * 3 + static_cast<Eigen::Index>(step);
           const Simulator::State reading = simulator.Reading();
           CHECK(all.col(column).head(6) == reading.q);
           CHECK(all.col(column).tail(6) == reading.v);
@@ -158,7 +167,8 @@ TEST_CASE("windows that are none are refused") {
     spoil(windows[1]);
     CHECK_THROWS_AS(Predict(LoadHopper(), 1, SomeMasses(1), windows, true), std::invalid_argument);
   };
-  const std::vector<EffortSegment> nothing = {{0.0, VectorXd::Zero(6)}}, narrow = {{0.008, VectorXd::Zero(5)}};
+  const std::vector<EffortSegment> nothing = {{0.0, VectorXd::Zero(6)}},
+                                   narrow = {{0.008, VectorXd::Zero(5)}};
   refused([](Window& w) { w.q[0] = std::numeric_limits<double>::quiet_NaN(); });
   refused([](Window& w) { w.v.resize(5); });
   refused([](Window& w) { w.steps.clear(); });
@@ -187,18 +197,21 @@ TEST_CASE("what a visit throws arrives when all threads have ended") {
       if (window == 31) throw std::out_of_range("thirty-one");
     };
     CHECK_THROWS_AS(windows.Predict(SomeMasses(3), record.windows, visit), std::out_of_range);
-    CHECK(windows.Predict(SomeMasses(3), record.windows, [](auto&&...) {}).total() == 0);  // none the worse
+    // none the worse
+    CHECK(windows.Predict(SomeMasses(3), record.windows, [](auto&&...) {}).total() == 0);
   }
 }
 
 TEST_CASE("parameters of another robot are a mistake, not a simulation that failed") {
   const Record record(2);
   Windows windows(std::make_shared<Model>(LoadHopper()), 1);
-  CHECK_THROWS_AS(windows.Predict(MatrixXd::Ones(3, 2), record.windows, [](auto&&...) {}), std::invalid_argument);
+  CHECK_THROWS_AS(windows.Predict(MatrixXd::Ones(3, 2), record.windows, [](auto&&...) {}),
+                  std::invalid_argument);
   Window endless = record.windows[0];
   const std::vector<EffortSegment> year = {{3e7, VectorXd::Zero(6)}};
   endless.steps = {year};
-  CHECK_THROWS_AS(windows.Predict(SomeMasses(1), std::vector{endless}, [](auto&&...) {}), std::invalid_argument);
+  CHECK_THROWS_AS(windows.Predict(SomeMasses(1), std::vector{endless}, [](auto&&...) {}),
+                  std::invalid_argument);
 }
 
 }  // namespace plumb

@@ -32,7 +32,8 @@ TEST_CASE("Agrees with a dense solve") {
 
 TEST_CASE("The residual is b - A x also when stopped early") {
   const Eigen::MatrixXd factor = RandomMatrix(30, 3);
-  const Eigen::MatrixXd matrix = factor * factor.transpose() + .1 * Eigen::MatrixXd::Identity(30, 30);
+  const Eigen::MatrixXd matrix =
+      factor * factor.transpose() + .1 * Eigen::MatrixXd::Identity(30, 30);
   const Eigen::VectorXd b = RandomMatrix(30, 4).col(0);
   const LinearSolution solution = ConjugateGradient(Product(matrix), b, 5, 0);
   CHECK(solution.iterations == 5);
@@ -46,13 +47,15 @@ TEST_CASE("A negative or non-finite curvature is a failure that says so") {
   const Eigen::MatrixXd broken = std::nan("") * Eigen::MatrixXd::Ones(3, 3);
   CHECK_THAT(ConjugateGradient(Product(broken), Eigen::VectorXd::Ones(3), 5, 1e-10).failure,
              Catch::Contains("nan"));
-  const Eigen::VectorXd infinite = Eigen::VectorXd::Constant(3, std::numeric_limits<double>::infinity());
+  const Eigen::VectorXd infinite =
+      Eigen::VectorXd::Constant(3, std::numeric_limits<double>::infinity());
   CHECK_FALSE(ConjugateGradient(Product(negative), infinite, 5, 1e-10).failure.empty());
 }
 
 TEST_CASE("Nothing to solve is solved") {
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(3, 3);
-  const LinearSolution solution = ConjugateGradient(Product(identity), Eigen::VectorXd::Zero(3), 5, 1e-10);
+  const LinearSolution solution =
+      ConjugateGradient(Product(identity), Eigen::VectorXd::Zero(3), 5, 1e-10);
   CHECK(solution.failure.empty());
   CHECK(solution.iterations == 0);
   CHECK(solution.x.isZero());

@@ -20,7 +20,8 @@ Data SmoothTargets(uint64_t seed, double shift = 0) {
   Random random(seed);
   for (int i = 0; i < 2000; ++i) {
     const double x = random.Uniform(-2, 2), y = random.Uniform(-1, 1);
-    data.observations.insert(data.observations.end(), {static_cast<float>(x), static_cast<float>(y)});
+    data.observations.insert(data.observations.end(),
+                             {static_cast<float>(x), static_cast<float>(y)});
     data.targets.push_back(shift - 500 + 300 * std::sin(x) + 100 * y);
   }
   return data;
@@ -84,7 +85,8 @@ TEST_CASE("A fit that is not finite is undone") {
 
 TEST_CASE("Another network's state is refused") {
   Workers workers(1);
-  Critic two(PendulumSettings(), 2, Random(1), workers), three(PendulumSettings(), 3, Random(1), workers);
+  Critic two(PendulumSettings(), 2, Random(1), workers),
+      three(PendulumSettings(), 3, Random(1), workers);
   CHECK_THROWS_AS(two.Restore(three.state()), std::invalid_argument);
 }
 

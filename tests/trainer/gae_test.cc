@@ -18,8 +18,8 @@ TEST_CASE("Advantages are the sum of discounted differences, written out") {
       double expected = 0;
       for (size_t l = t; l < 4; ++l) {
         const double next = l < 3 ? values[l + 1] : terminated ? 0 : final_value;
-        expected +=
-            std::pow(kGamma * kLambda, static_cast<double>(l - t)) * (rewards[l] + kGamma * next - values[l]);
+        expected += std::pow(kGamma * kLambda, static_cast<double>(l - t)) *
+                    (rewards[l] + kGamma * next - values[l]);
       }
       CHECK(result.advantage[t] == Approx(expected));
       CHECK(result.target[t] == Approx(expected + values[t]));
@@ -28,21 +28,23 @@ TEST_CASE("Advantages are the sum of discounted differences, written out") {
 }
 
 TEST_CASE("Where the values are right, the time limit leaves no trace") {
-  // Reward 1 for ever is worth 1 / (1 - gamma) at every step, also at the last one before the limit.
+  // Reward 1 for ever is worth 1 / (1 - gamma) at every step, also at the last one before the
+  // limit.
   const double value = 1 / (1 - kGamma);
   const std::vector<double> rewards(7, 1), values(7, value);
-  const Advantages cut =
-      EstimateAdvantages(rewards, values, std::vector<EpisodeSpan>{{0, 7, false, value}}, kGamma, kLambda);
+  const Advantages cut = EstimateAdvantages(
+      rewards, values, std::vector<EpisodeSpan>{{0, 7, false, value}}, kGamma, kLambda);
   for (const double advantage : cut.advantage) CHECK(advantage == Approx(0).margin(1e-12));
-  const Advantages ended =
-      EstimateAdvantages(rewards, values, std::vector<EpisodeSpan>{{0, 7, true, value}}, kGamma, kLambda);
+  const Advantages ended = EstimateAdvantages(
+      rewards, values, std::vector<EpisodeSpan>{{0, 7, true, value}}, kGamma, kLambda);
   CHECK(ended.advantage[6] == Approx(1 - value));
 }
 
 TEST_CASE("Nothing flows from one episode into another") {
   const std::vector<double> rewards = {1, 2, 3, 4}, values = {0, 0, 0, 0};
   const Advantages both = EstimateAdvantages(
-      rewards, values, std::vector<EpisodeSpan>{{0, 2, false, 5}, {2, 4, true, 9}}, kGamma, kLambda);
+      rewards, values, std::vector<EpisodeSpan>{{0, 2, false, 5}, {2, 4, true, 9}}, kGamma,
+      kLambda);
   CHECK(both.advantage[1] == Approx(2 + kGamma * 5));
   CHECK(both.advantage[0] == Approx(1 + kGamma * kLambda * both.advantage[1]));
   CHECK(both.advantage[3] == Approx(4));

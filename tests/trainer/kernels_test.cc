@@ -65,8 +65,11 @@ TEST_CASE("The reference's gradient is that of finite differences") {
   const Case c({3, 6, 5, 2}, 4);
   const Eigen::VectorXd p = c.parameters.cast<double>(), v = c.direction.cast<double>();
   const Eigen::MatrixXd x = c.inputs.cast<double>(), g = c.output_gradient.cast<double>();
-  const auto loss = [&](double h) { return g.cwiseProduct(c.reference.Outputs(p + h * v, x)).sum(); };
-  CHECK(c.reference.Backward(p, x, g).dot(v) == Approx((loss(1e-6) - loss(-1e-6)) / 2e-6).epsilon(1e-7));
+  const auto loss = [&](double h) {
+    return g.cwiseProduct(c.reference.Outputs(p + h * v, x)).sum();
+  };
+  CHECK(c.reference.Backward(p, x, g).dot(v) ==
+        Approx((loss(1e-6) - loss(-1e-6)) / 2e-6).epsilon(1e-7));
 }
 
 TEST_CASE("A sample's output has the same bits wherever it stands in the batch") {
@@ -113,14 +116,17 @@ TEST_CASE("tanh is as accurate beside others") {
   for (int unit = 0; unit < kUnits; ++unit) {
     // First layer: c x for some c; the second picks one unit, the third takes it as it is.
     std::vector<float> parameters(static_cast<size_t>(network.parameter_count()));
-    for (int i = 0; i < kUnits; ++i) parameters[static_cast<size_t>(i)] = 3 * std::sin(1.f + static_cast<float>(i));
+    for (int i = 0; i < kUnits; ++i)
+      parameters[static_cast<size_t>(i)] = 3 * std::sin(1.f + static_cast<float>(i));
     parameters[static_cast<size_t>(2 * kUnits + unit * kUnits)] = 1;
     parameters[static_cast<size_t>(2 * kUnits + kUnits * kUnits + kUnits)] = 1;
     network.Set(parameters);
     for (const float x : {-20.f, -3.f, -.7f, -.01f, 0.f, .2f, 1.f, 4.f, 30.f}) {
       float y = 0;
       tape.Forward(network, &x, 1, &y);
-      worst = std::max(worst, std::abs(y - std::tanh(std::tanh(double{parameters[static_cast<size_t>(unit)]} * x))));
+      worst = std::max(
+          worst,
+          std::abs(y - std::tanh(std::tanh(double{parameters[static_cast<size_t>(unit)]} * x))));
     }
   }
   CHECK(worst < 4e-7);  // of two
@@ -129,12 +135,15 @@ TEST_CASE("tanh is as accurate beside others") {
 TEST_CASE("Adam follows its equations") {
   const int count = 37;
   Random random(4);
-  Eigen::VectorXf parameters = RandomMatrix(count, 1, 1, random), m = Eigen::VectorXf::Zero(count), v = m;
-  Eigen::VectorXd expected = parameters.cast<double>(), first = Eigen::VectorXd::Zero(count), second = first;
+  Eigen::VectorXf parameters = RandomMatrix(count, 1, 1, random), m = Eigen::VectorXf::Zero(count),
+                  v = m;
+  Eigen::VectorXd expected = parameters.cast<double>(), first = Eigen::VectorXd::Zero(count),
+                  second = first;
   for (int step = 1; step <= 5; ++step) {
     const Eigen::VectorXf gradient = RandomMatrix(count, 1, 1, random);
     const Eigen::VectorXf part = .3f * gradient, rest = gradient - part;
-    kernels::AdamStep(count, step, 1e-2f, .1f, {part.data(), rest.data()}, parameters.data(), m.data(), v.data());
+    kernels::AdamStep(count, step, 1e-2f, .1f, {part.data(), rest.data()}, parameters.data(),
+                      m.data(), v.data());
     const Eigen::VectorXd g = gradient.cast<double>() + .1 * expected;
     first = .9 * first + .1 * g;
     second = .999 * second + .001 * g.cwiseAbs2();

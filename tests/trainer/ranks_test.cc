@@ -30,7 +30,9 @@ class FragilePendulum : public GymPendulum {
   }
 };
 
-Eigen::VectorXd RandomGravity(Random& random) { return Eigen::Vector3d(random.Uniform(9, 11), 1, 1); }
+Eigen::VectorXd RandomGravity(Random& random) {
+  return Eigen::Vector3d(random.Uniform(9, 11), 1, 1);
+}
 
 /// All that a few updates come to.
 std::vector<double> Train(const Ranks& ranks, int threads) {
@@ -41,16 +43,16 @@ std::vector<double> Train(const Ranks& ranks, int threads) {
   settings.worst_share = .7;
   settings.worst_after = 10;
   Trainer trainer(
-      settings, [] { return std::make_unique<FragilePendulum>(); }, Eigen::VectorXd::Constant(1, 2), 11,
-      threads, ranks);
+      settings, [] { return std::make_unique<FragilePendulum>(); }, Eigen::VectorXd::Constant(1, 2),
+      11, threads, ranks);
   std::vector<double> results;
   for (int i = 0; i < 3; ++i) {
     const UpdateReport report = trainer.Update(RandomGravity);
     REQUIRE(report.step.accepted);
     REQUIRE(report.dropped_episodes > 0);
     results.insert(results.end(),
-                   {report.step.kl, report.step.surrogate_gain, report.mean_return, report.explained_variance,
-                    1. * report.batch, 1. * report.dropped_episodes});
+                   {report.step.kl, report.step.surrogate_gain, report.mean_return,
+                    report.explained_variance, 1. * report.batch, 1. * report.dropped_episodes});
   }
   const TrainerState state = trainer.state();
   const auto append = [&](const auto& values) {
@@ -75,22 +77,26 @@ std::string Environment(const char* name) {
 TEST_CASE("train as one of several ranks", "[.train]") {
   const Ranks ranks;
   const std::vector<double> results = Train(ranks, std::stoi(Environment("PLUMBLINE_THREADS")));
-  const std::string text(reinterpret_cast<const char*>(results.data()), results.size() * sizeof(double));
-  std::ofstream(Environment("PLUMBLINE_RESULTS") + std::to_string(ranks.rank()), std::ios::binary) << text;
+  const std::string text(reinterpret_cast<const char*>(results.data()),
+                         results.size() * sizeof(double));
+  std::ofstream(Environment("PLUMBLINE_RESULTS") + std::to_string(ranks.rank()), std::ios::binary)
+      << text;
 }
 
 TEST_CASE("Training is the same bits for any number of ranks and threads") {
   if (!HaveMpirun()) return;
   const std::vector<double> alone = Train(Ranks::Alone(), 1);
-  const std::string expected(reinterpret_cast<const char*>(alone.data()), alone.size() * sizeof(double));
+  const std::string expected(reinterpret_cast<const char*>(alone.data()),
+                             alone.size() * sizeof(double));
   for (const auto& [ranks, threads] : {std::pair{1, 2}, {2, 1}, {3, 2}, {4, 1}}) {
     const TemporaryFolder folder;
-    const Outcome outcome =
-        Shell("PLUMBLINE_THREADS=" + std::to_string(threads) + " PLUMBLINE_RESULTS=" + folder / "of_rank_" +
-              " " + Mpirun(ranks, HiddenTest("train")));
+    const Outcome outcome = Shell("PLUMBLINE_THREADS=" + std::to_string(threads) +
+                                  " PLUMBLINE_RESULTS=" + folder / "of_rank_" + " " +
+                                  Mpirun(ranks, HiddenTest("train")));
     INFO(ranks << " ranks of " << threads << " threads: " << outcome.text);
     REQUIRE(outcome.status == 0);
-    for (int r = 0; r < ranks; ++r) CHECK(Read(folder / "of_rank_" + std::to_string(r)) == expected);
+    for (int r = 0; r < ranks; ++r)
+      CHECK(Read(folder / "of_rank_" + std::to_string(r)) == expected);
   }
 }
 
@@ -98,8 +104,10 @@ TEST_CASE("Training is the same bits for any number of ranks and threads") {
 TEST_CASE("train from another beginning than the other rank", "[.apart]") {
   const Ranks ranks;
   const auto seed = static_cast<uint64_t>(1 + ranks.rank());
-  Trainer trainer(PendulumSettings(), MakeGymPendulum, Eigen::VectorXd::Constant(1, 2), seed, 1, ranks);
-  CHECK_THROWS_WITH(trainer.Update(GymParameters), Catch::Contains("rank 1 has come to another policy"));
+  Trainer trainer(PendulumSettings(), MakeGymPendulum, Eigen::VectorXd::Constant(1, 2), seed, 1,
+                  ranks);
+  CHECK_THROWS_WITH(trainer.Update(GymParameters),
+                    Catch::Contains("rank 1 has come to another policy"));
 }
 
 TEST_CASE("Ranks that come to different results say so") {

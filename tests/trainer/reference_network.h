@@ -7,7 +7,8 @@
 
 namespace plumb {
 
-/// A tanh multilayer perceptron in double, written for clarity: the truth the kernels are held against.
+/// A tanh multilayer perceptron in double, written for clarity: the truth the kernels are held
+/// against.
 struct ReferenceNetwork {
   std::vector<int> sizes;
 
@@ -62,7 +63,8 @@ struct ReferenceNetwork {
   }
 };
 
-inline Eigen::MatrixXf RandomMatrix(Eigen::Index rows, Eigen::Index columns, double scale, Random& random) {
+inline Eigen::MatrixXf RandomMatrix(Eigen::Index rows, Eigen::Index columns, double scale,
+                                    Random& random) {
   Eigen::MatrixXf matrix(rows, columns);
   for (float& value : matrix.reshaped()) value = static_cast<float>(scale * random.Normal());
   return matrix;

@@ -10,7 +10,8 @@ namespace plumb {
 namespace {
 
 RobotDescription Robot(const std::string& name, double position_noise, double velocity_noise) {
-  RobotDescription robot = LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name);
+  RobotDescription robot =
+      LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name);
   robot.training.position_noise = position_noise;
   robot.training.velocity_noise = velocity_noise;
   return robot;
@@ -34,13 +35,16 @@ Eigen::MatrixXf Observations(const RobotDescription& robot, uint64_t seed, int s
   return observations;
 }
 
-TEST_CASE("what the policy is told scatters about what is as robot.toml says, and only for the policy") {
+TEST_CASE(
+    "what the policy is told scatters about what is as robot.toml says, and only for the policy") {
   const Eigen::MatrixXf clean = Observations(Robot("hopper", 0, 0), 3, 100);
   const Eigen::MatrixXf noisy = Observations(Robot("hopper", 0.01, 0.3), 3, 100);
   CHECK(Observations(Robot("hopper", 0.01, 0.3), 3, 100) == noisy);
   const Eigen::MatrixXf off = noisy - clean;
   // Five positions above six velocities; the motion itself is the same.
-  const auto sd = [](const Eigen::MatrixXf& m) { return std::sqrt(m.cast<double>().squaredNorm() / static_cast<double>(m.size())); };
+  const auto sd = [](const Eigen::MatrixXf& m) {
+    return std::sqrt(m.cast<double>().squaredNorm() / static_cast<double>(m.size()));
+  };
   CHECK(sd(off.topRows(5)) == Approx(0.01).epsilon(0.15));
   CHECK(sd(off.bottomRows(6)) == Approx(0.3).epsilon(0.15));
   CHECK(std::abs(off.topRows(5).mean()) < 0.002);

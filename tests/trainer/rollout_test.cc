@@ -54,7 +54,9 @@ class Fragile : public Simulation {
   int length_ = 0, step_ = 0;
 };
 
-Eigen::VectorXd UniformParameter(Random& random) { return Eigen::VectorXd::Constant(1, random.Uniform()); }
+Eigen::VectorXd UniformParameter(Random& random) {
+  return Eigen::VectorXd::Constant(1, random.Uniform());
+}
 
 TEST_CASE("A batch is the same bits for any number of threads") {
   Batch first;
@@ -72,7 +74,8 @@ TEST_CASE("A batch is the same bits for any number of threads") {
   }
 }
 
-TEST_CASE("Replaying the actions of an episode gives its observations, rewards and last observation") {
+TEST_CASE(
+    "Replaying the actions of an episode gives its observations, rewards and last observation") {
   Workers workers(1);
   RolloutSampler rollout(MakeGymPendulum, kShape, workers);
   const GaussianPolicy policy = SomePolicy();
@@ -89,7 +92,8 @@ TEST_CASE("Replaying the actions of an episode gives its observations, rewards a
       pendulum.Observe(observation);
       REQUIRE(policy.Normalize(observation) ==
               Eigen::Map<const Eigen::Vector3f>(&batch.observations[3 * at]));
-      const Simulation::Outcome outcome = pendulum.Step(Eigen::VectorXf::Constant(1, batch.actions[at]));
+      const Simulation::Outcome outcome =
+          pendulum.Step(Eigen::VectorXf::Constant(1, batch.actions[at]));
       REQUIRE(outcome.reward == batch.rewards[at]);
       sum += outcome.reward;
     }
@@ -121,11 +125,13 @@ TEST_CASE("Actions scatter about the policy's mean by its deviation") {
   CHECK(std::sqrt(squares / batch.size()) == Approx(std::exp(-.5)).epsilon(.03));
 }
 
-TEST_CASE("Episodes that terminate early are followed by more, the same for any number of threads") {
+TEST_CASE(
+    "Episodes that terminate early are followed by more, the same for any number of threads") {
   Batch first;
   for (const int threads : {1, 3}) {
     Workers workers(threads);
-    RolloutSampler rollout([] { return std::make_unique<Fragile>(Fragile::Break::kNever); }, kShape, workers);
+    RolloutSampler rollout([] { return std::make_unique<Fragile>(Fragile::Break::kNever); }, kShape,
+                           workers);
     const Batch batch = rollout.Collect(SomePolicy(), UniformParameter, 300, 1, 7, 1, 2);
     CHECK(batch.size() >= 300);
     CHECK(batch.size() < 450);  // how many were needed had to be guessed from the first few
@@ -139,7 +145,8 @@ TEST_CASE("Episodes that terminate early are followed by more, the same for any 
 }
 
 TEST_CASE("What is not finite is dropped with its episode and counted") {
-  for (const auto kind : {Fragile::Break::kReward, Fragile::Break::kObservation, Fragile::Break::kReset}) {
+  for (const auto kind :
+       {Fragile::Break::kReward, Fragile::Break::kObservation, Fragile::Break::kReset}) {
     Workers workers(2);
     RolloutSampler rollout([kind] { return std::make_unique<Fragile>(kind); }, kShape, workers);
     const Batch batch = rollout.Collect(SomePolicy(), UniformParameter, 1000, 1, 7, 1, 2);
@@ -153,8 +160,11 @@ TEST_CASE("What is not finite is dropped with its episode and counted") {
 
 TEST_CASE("A simulation that mostly breaks is an error, not an endless loop") {
   Workers workers(2);
-  RolloutSampler rollout([] { return std::make_unique<Fragile>(Fragile::Break::kReward); }, kShape, workers);
-  const ParameterSampler broken = [](Random&) -> Eigen::VectorXd { return Eigen::VectorXd::Zero(1); };
+  RolloutSampler rollout([] { return std::make_unique<Fragile>(Fragile::Break::kReward); }, kShape,
+                         workers);
+  const ParameterSampler broken = [](Random&) -> Eigen::VectorXd {
+    return Eigen::VectorXd::Zero(1);
+  };
   CHECK_THROWS_WITH(rollout.Collect(SomePolicy(), broken, 1000, 1, 7, 1, 2),
                     Catch::Contains("nothing to learn from"));
   for (const double sum : rollout.Returns(SomePolicy(), broken, 5, 7, 1, 2)) CHECK(std::isnan(sum));

@@ -19,8 +19,9 @@ RobotDescription Robot() {
   RobotDescription robot;
   robot.name = "test robot";
   const auto log = ParameterDescription::Coordinate::kLog;
-  robot.parameters = {
-      {"gravity", "m/s^2", log, 10, .3}, {"mass/pole", "kg", log, 1, .03}, {"length/pole", "m", log, 1, .03}};
+  robot.parameters = {{"gravity", "m/s^2", log, 10, .3},
+                      {"mass/pole", "kg", log, 1, .03},
+                      {"length/pole", "m", log, 1, .03}};
   robot.joints.resize(1);
   robot.joints[0].effort_limit = 2;
   robot.training = PendulumSettings();
@@ -42,7 +43,9 @@ TrainingSession NewSession(uint64_t seed = 4) {
 }
 
 // In a folder that is still to be made.
-std::string CheckpointIn(const TemporaryFolder& folder) { return folder / "sub/trainer.checkpoint"; }
+std::string CheckpointIn(const TemporaryFolder& folder) {
+  return folder / "sub/trainer.checkpoint";
+}
 
 void TrainToTheEnd(TrainingSession& session) {
   for (int update = 0; session.training(); ++update) {
@@ -57,7 +60,8 @@ std::string ReadAll(const std::string& file) {
 }
 
 void WriteAll(const std::string& file, const std::string& bytes) {
-  std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  std::ofstream(file, std::ios::binary)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 TEST_CASE("Iterations follow one another, each for its own distribution") {
@@ -111,8 +115,8 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(second.Policy(1).weight == straight.Policy(1).weight);
   CHECK(second.evaluation().worst == straight.evaluation().worst);
 
-  // And once more, between iterations: the policy is there to be sent again, the next distribution is
-  // awaited.
+  // And once more, between iterations: the policy is there to be sent again, the next distribution
+  // is awaited.
   SaveCheckpoint(CheckpointIn(folder), second.MakeCheckpoint());
   TrainingSession third = NewSession();
   third.Restore(LoadCheckpoint(CheckpointIn(folder)).value());
@@ -125,7 +129,8 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
     TrainToTheEnd(*session);
   }
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
-  CHECK(third.MakeCheckpoint().critic.second_moment == straight.MakeCheckpoint().critic.second_moment);
+  CHECK(third.MakeCheckpoint().critic.second_moment ==
+        straight.MakeCheckpoint().critic.second_moment);
 }
 
 TEST_CASE("A newer distribution of the iteration takes effect at the next batch") {

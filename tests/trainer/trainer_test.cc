@@ -64,7 +64,9 @@ class Endless : public Simulation {
   void Reset(const Eigen::VectorXd&, Random& random) override {
     observation_ = static_cast<float>(random.Normal());
   }
-  void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override { observation[0] = observation_; }
+  void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override {
+    observation[0] = observation_;
+  }
   Outcome Step(const Eigen::Ref<const Eigen::VectorXf>&) override { return {-1, false}; }
 
  private:
@@ -82,7 +84,8 @@ TEST_CASE("Time limits bootstrap: the value is that of a life without them") {
   Workers workers(1);
   Critic critic(settings, 1, Random(1), workers);
   critic.Restore(trainer.state().critic);
-  // -1 / (1 - .9); were the limit terminal, the mean over an episode would be -6 and its last value -1.
+  // -1 / (1 - .9); were the limit terminal, the mean over an episode would be -6 and its last value
+  // -1.
   CHECK(critic.Values(std::vector<float>{0})[0] == Approx(-10).margin(.5));
 }
 
@@ -133,7 +136,8 @@ TEST_CASE("Returns are summed up by mean, tenth percentile and worst") {
 }
 
 TEST_CASE("Held-out simulators stay the same while the policy changes") {
-  Trainer a(SmallSettings(), MakeGymPendulum, PendulumScale(), 5, 1), b(SmallSettings(), MakeGymPendulum, PendulumScale(), 5, 2);
+  Trainer a(SmallSettings(), MakeGymPendulum, PendulumScale(), 5, 1),
+      b(SmallSettings(), MakeGymPendulum, PendulumScale(), 5, 2);
   std::vector<double> drawn_a, drawn_b;
   const auto remember = [](std::vector<double>& drawn) {
     return [&drawn](Random& random) -> Eigen::VectorXd {
@@ -145,12 +149,14 @@ TEST_CASE("Held-out simulators stay the same while the policy changes") {
   a.Update(GymParameters);
   drawn_a.clear();
   a.EvaluateHeldOut(remember(drawn_a), 5);
-  Trainer(SmallSettings(), MakeGymPendulum, PendulumScale(), 5, 1).EvaluateHeldOut(remember(drawn_b), 5);
+  Trainer(SmallSettings(), MakeGymPendulum, PendulumScale(), 5, 1)
+      .EvaluateHeldOut(remember(drawn_b), 5);
   CHECK(drawn_a == drawn_b);
 }
 
 TEST_CASE("Learning from the worst episodes makes the worst simulators better") {
-  // Half of the simulators pay 2 + 2 a, the others -a: on average a = 1 is best, in the worst case a = -2/3.
+  // Half of the simulators pay 2 + 2 a, the others -a: on average a = 1 is best, in the worst case
+  // a = -2/3.
   class Dilemma : public Endless {
    public:
     void Reset(const Eigen::VectorXd& parameters, Random& random) override {
@@ -166,14 +172,17 @@ TEST_CASE("Learning from the worst episodes makes the worst simulators better") 
    private:
     bool rich_ = false;
   };
-  const ParameterSampler coin = [](Random& random) { return Eigen::VectorXd::Constant(1, random.Uniform()); };
+  const ParameterSampler coin = [](Random& random) {
+    return Eigen::VectorXd::Constant(1, random.Uniform());
+  };
   double action[2];
   for (const int worst : {0, 1}) {
     TrainingSettings settings = SmallSettings();
     settings.batch = 800;
     settings.worst_share = worst ? .4 : 1;
     settings.worst_after = 0;
-    Trainer trainer(settings, [] { return std::make_unique<Dilemma>(); }, Eigen::VectorXd::Ones(1), 3, 1);
+    Trainer trainer(
+        settings, [] { return std::make_unique<Dilemma>(); }, Eigen::VectorXd::Ones(1), 3, 1);
     for (int i = 0; i < 40; ++i) trainer.Update(coin);
     action[worst] = trainer.policy().Mean(Eigen::VectorXf::Ones(1))[0];
     if (worst) CHECK(trainer.steps() > 40 * 800 / .5);  // what was thrown away was simulated, too
@@ -202,7 +211,8 @@ TEST_CASE("Rewards and states beyond all bounds never make weights that are no n
   };
   TrainingSettings settings = SmallSettings();
   settings.normalise_observations = true;
-  Trainer trainer(settings, [] { return std::make_unique<Wild>(); }, Eigen::VectorXd::Ones(1), 3, 1);
+  Trainer trainer(
+      settings, [] { return std::make_unique<Wild>(); }, Eigen::VectorXd::Ones(1), 3, 1);
   for (int i = 0; i < 10; ++i) {
     trainer.Update(GymParameters);
     REQUIRE(trainer.policy().parameters.allFinite());

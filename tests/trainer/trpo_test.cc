@@ -46,12 +46,14 @@ struct Fixture {
 /// mean(exp(ln p(a) - ln p_old(a)) * advantage) in double, as a function of the parameters.
 double Surrogate(const Fixture& f, const Eigen::VectorXd& parameters) {
   const auto log_density = [&](const Eigen::VectorXd& p) -> Eigen::ArrayXd {
-    const Eigen::MatrixXd means = f.reference().Outputs(f.Weights(p), f.observations.cast<double>());
+    const Eigen::MatrixXd means =
+        f.reference().Outputs(f.Weights(p), f.observations.cast<double>());
     const Eigen::VectorXd log_std = p.tail(2);
     Eigen::ArrayXd result = Eigen::ArrayXd::Zero(means.cols());
     for (int a = 0; a < 2; ++a) {
       const Eigen::ArrayXd z =
-          (f.actions.row(a).cast<double>() - means.row(a)).array().transpose() / std::exp(log_std[a]);
+          (f.actions.row(a).cast<double>() - means.row(a)).array().transpose() /
+          std::exp(log_std[a]);
       result -= z.square() / 2 + log_std[a];
     }
     return result;
@@ -74,7 +76,8 @@ Eigen::VectorXd KlGradient(const Fixture& f, const Eigen::VectorXd& parameters) 
   const Eigen::MatrixXd output_gradient =
       variance.cwiseInverse().asDiagonal() * moved / static_cast<double>(x.cols());
   Eigen::VectorXd gradient(parameters.size());
-  gradient.head(parameters.size() - 2) = f.reference().Backward(f.Weights(parameters), x, output_gradient);
+  gradient.head(parameters.size() - 2) =
+      f.reference().Backward(f.Weights(parameters), x, output_gradient);
   for (int a = 0; a < 2; ++a) {
     gradient[parameters.size() - 2 + a] =
         1 - (old_variance[a] + moved.row(a).array().square().mean()) / variance[a];
@@ -87,7 +90,8 @@ TEST_CASE("The surrogate's gradient is that of finite differences in double") {
   Workers workers(1);
   Trpo trpo(f.settings, f.policy.shape(), workers);
   std::vector<float> means;
-  const Eigen::VectorXd gradient = trpo.SurrogateGradient(f.policy, f.samples(), means).cast<double>();
+  const Eigen::VectorXd gradient =
+      trpo.SurrogateGradient(f.policy, f.samples(), means).cast<double>();
   const Eigen::VectorXd p = f.policy.parameters.cast<double>();
   // Every seventh parameter, and the deviations.
   double error = 0, square = 0;
@@ -115,7 +119,8 @@ TEST_CASE("Fisher's product is the derivative of the divergence's gradient") {
   }
 }
 
-TEST_CASE("Fisher's matrix is symmetric and positive semidefinite, also on a fifth of the samples") {
+TEST_CASE(
+    "Fisher's matrix is symmetric and positive semidefinite, also on a fifth of the samples") {
   Fixture f;
   for (const double fraction : {1., .2}) {
     f.settings.fisher_fraction = fraction;
@@ -158,10 +163,12 @@ TEST_CASE("The divergence reported is that of the Gaussians") {
   std::vector<float> means;
   double expected = 0;
   for (int i = 0; i < 3; ++i) {
-    const Eigen::VectorXf m = f.policy.Mean(f.observations.col(i)), n = after.Mean(f.observations.col(i));
+    const Eigen::VectorXf m = f.policy.Mean(f.observations.col(i)),
+                          n = after.Mean(f.observations.col(i));
     means.insert(means.end(), m.begin(), m.end());
     for (int a = 0; a < 2; ++a) {
-      const double s = std::exp(f.policy.log_std()[a]), t = std::exp(after.log_std()[a]), d = m[a] - n[a];
+      const double s = std::exp(f.policy.log_std()[a]), t = std::exp(after.log_std()[a]),
+                   d = m[a] - n[a];
       expected += std::log(t / s) + (s * s + d * d) / (2 * t * t) - .5;
     }
   }
@@ -170,8 +177,8 @@ TEST_CASE("The divergence reported is that of the Gaussians") {
 
 TEST_CASE("When the line search fails the policy is what it was, bit by bit") {
   Fixture f;
-  // The curvature is looked at where the network does nothing, every fifth sample: the step is then far too
-  // long.
+  // The curvature is looked at where the network does nothing, every fifth sample: the step is then
+  // far too long.
   f.settings.fisher_fraction = .2;
   f.settings.damping = 1e-9;
   for (int i = 0; i < f.observations.cols(); i += 5) f.observations.col(i).setZero();

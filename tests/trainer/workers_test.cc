@@ -64,9 +64,13 @@ TEST_CASE("Two go together, each with jobs of its own, and whoever is idle helps
       REQUIRE(second == 3 * others);
       REQUIRE(alone);
     }
-    CHECK_THROWS_WITH(workers.Together([] { throw std::runtime_error("first"); }, [] { throw std::runtime_error("second"); }), "first");
+    CHECK_THROWS_WITH(workers.Together([] { throw std::runtime_error("first"); },
+                                       [] { throw std::runtime_error("second"); }),
+                      "first");
     std::atomic<int> done{0};
-    CHECK_THROWS_WITH(workers.Together([&] { workers.Run(4, [&](int, int) { ++done; }); }, [] { throw std::runtime_error("second"); }), "second");
+    CHECK_THROWS_WITH(workers.Together([&] { workers.Run(4, [&](int, int) { ++done; }); },
+                                       [] { throw std::runtime_error("second"); }),
+                      "second");
     CHECK(done == 4);
   }
 }
@@ -88,7 +92,8 @@ TEST_CASE("The lowest task's exception comes back and the threads live on") {
     CHECK_THROWS_WITH(workers.Run(20,
                                   [&](int task, int) {
                                     ++done;
-                                    if (task % 7 == 3) throw std::runtime_error(std::to_string(task));
+                                    if (task % 7 == 3)
+                                      throw std::runtime_error(std::to_string(task));
                                   }),
                       "3");
   }

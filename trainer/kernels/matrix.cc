@@ -11,8 +11,9 @@ namespace {
 constexpr size_t kCacheLine = 64;
 constexpr ptrdiff_t kLineFloats = kCacheLine / sizeof(float);
 
-// A tile of C is kTileRows packets times kTileColumns and lives in registers during its sum: 12 accumulators,
-// the packets of A and one of B are what 16 registers hold, twice as many what AVX-512's 32 do.
+// A tile of C is kTileRows packets times kTileColumns and lives in registers during its sum: 12
+// accumulators, the packets of A and one of B are what 16 registers hold, twice as many what
+// AVX-512's 32 do.
 #if defined(__AVX512F__)
 constexpr int kTileRows = 2;
 constexpr int kTileColumns = 12;
@@ -23,7 +24,8 @@ constexpr int kTileColumns = 6;
 constexpr int kTileRows = 2;
 constexpr int kTileColumns = 4;
 #endif
-// A single column has too few sums in flight to hide the latency of their additions: it takes taller tiles.
+// A single column has too few sums in flight to hide the latency of their additions: it takes
+// taller tiles.
 constexpr int kTallRows = 8;
 
 struct Problem {
@@ -34,11 +36,11 @@ struct Problem {
   Onto onto;
 };
 
-/// Not to be inlined: among the surrounding loops GCC 12 runs out of registers and keeps half of `sum` in
-/// memory.
+/// Not to be inlined: among the surrounding loops GCC 12 runs out of registers and keeps half of
+/// `sum` in memory.
 template <int kRows, int kColumns>
-__attribute__((noinline)) void Tile(const Problem& problem, const float* a, const float* b, float* c,
-                                    const float* bias) {
+__attribute__((noinline)) void Tile(const Problem& problem, const float* a, const float* b,
+                                    float* c, const float* bias) {
   Packet sum[kColumns][kRows];
 #pragma GCC unroll 16
   for (int j = 0; j < kColumns; ++j) {
@@ -87,8 +89,8 @@ template <int kRows, int kColumns>
 void Band(int n, const Problem& problem, const float* a, float* c, const float* bias) {
   int j = 0;
   for (; j + kColumns <= n; j += kColumns) {
-    Tile<kRows, kColumns>(problem, a, problem.b.data + j * problem.b.column_stride, c + j * problem.c_stride,
-                          bias);
+    Tile<kRows, kColumns>(problem, a, problem.b.data + j * problem.b.column_stride,
+                          c + j * problem.c_stride, bias);
   }
   Remainder<kRows, kColumns - 1>(n - j, problem, a, problem.b.data + j * problem.b.column_stride,
                                  c + j * problem.c_stride, bias);
@@ -115,13 +117,14 @@ Matrix::Matrix(int rows, int columns) : rows_(rows), columns_(columns) {
 }
 
 void Matrix::SetZero() {
-  std::memset(data_.get(), 0, static_cast<size_t>(stride_) * static_cast<size_t>(columns_) * sizeof(float));
+  std::memset(data_.get(), 0,
+              static_cast<size_t>(stride_) * static_cast<size_t>(columns_) * sizeof(float));
 }
 
 void Matrix::Free::operator()(float* data) const { std::free(data); }
 
-void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdiff_t c_stride, Onto onto,
-              const float* bias) {
+void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdiff_t c_stride,
+              Onto onto, const float* bias) {
   const Problem problem{k, a, b, c_stride, onto};
   if (n == 1) {
     const int i = Bands<kTallRows, 1>(0, m, n, problem, c, bias);
@@ -164,8 +167,8 @@ void ScalarProducts(int k, const float* a, const float* b, ptrdiff_t b_stride, f
 
 }  // namespace
 
-void MultiplyFewRows(int rows, int n, const Matrix& transposed, const float* b, ptrdiff_t b_stride, float* c,
-                     ptrdiff_t c_stride, Onto onto, const float* bias) {
+void MultiplyFewRows(int rows, int n, const Matrix& transposed, const float* b, ptrdiff_t b_stride,
+                     float* c, ptrdiff_t c_stride, Onto onto, const float* bias) {
   constexpr int kTogether = 8;
   const int k = transposed.rows();
   for (int i = 0; i < rows; ++i) {
@@ -204,10 +207,14 @@ void Transpose(const Matrix& from, Matrix& to) {
     for (; i + 4 <= from.rows(); i += 4) {
       const Quad a = load(from.column(j) + i), b = load(from.column(j + 1) + i);
       const Quad c = load(from.column(j + 2) + i), d = load(from.column(j + 3) + i);
-      const Quad ab_low = __builtin_shuffle(a, b, Order{0, 4, 1, 5}), ab_high = __builtin_shuffle(a, b, Order{2, 6, 3, 7});
-      const Quad cd_low = __builtin_shuffle(c, d, Order{0, 4, 1, 5}), cd_high = __builtin_shuffle(c, d, Order{2, 6, 3, 7});
-      const Quad row[4] = {__builtin_shuffle(ab_low, cd_low, Order{0, 1, 4, 5}), __builtin_shuffle(ab_low, cd_low, Order{2, 3, 6, 7}),
-                           __builtin_shuffle(ab_high, cd_high, Order{0, 1, 4, 5}), __builtin_shuffle(ab_high, cd_high, Order{2, 3, 6, 7})};
+      const Quad ab_low = __builtin_shuffle(a, b, Order{0, 4, 1, 5}),
+                 ab_high = __builtin_shuffle(a, b, Order{2, 6, 3, 7});
+      const Quad cd_low = __builtin_shuffle(c, d, Order{0, 4, 1, 5}),
+                 cd_high = __builtin_shuffle(c, d, Order{2, 6, 3, 7});
+      const Quad row[4] = {__builtin_shuffle(ab_low, cd_low, Order{0, 1, 4, 5}),
+                           __builtin_shuffle(ab_low, cd_low, Order{2, 3, 6, 7}),
+                           __builtin_shuffle(ab_high, cd_high, Order{0, 1, 4, 5}),
+                           __builtin_shuffle(ab_high, cd_high, Order{2, 3, 6, 7})};
       for (int k = 0; k < 4; ++k) std::memcpy(to.column(i + k) + j, &row[k], sizeof row[k]);
     }
     for (; i < from.rows(); ++i) {

@@ -9,9 +9,10 @@
 
 namespace plumb::kernels {
 
-/// A column-major matrix. Columns begin on cache lines; their rows are padded to whole packets, and the
-/// padding is zero for ever (products, tanh and the rest keep it so). The distance between columns is an odd
-/// number of cache lines: a walk along a row then uses every set of the first-level cache instead of a few.
+/// A column-major matrix. Columns begin on cache lines; their rows are padded to whole packets, and
+/// the padding is zero for ever (products, tanh and the rest keep it so). The distance between
+/// columns is an odd number of cache lines: a walk along a row then uses every set of the
+/// first-level cache instead of a few.
 class Matrix {
  public:
   Matrix() = default;
@@ -37,8 +38,8 @@ class Matrix {
   std::unique_ptr<float[], Free> data_;
 };
 
-/// The right factor of a product: element (k, j) is at data[k * row_stride + j * column_stride]. Any strides
-/// will do, so a transpose costs nothing.
+/// The right factor of a product: element (k, j) is at data[k * row_stride + j * column_stride].
+/// Any strides will do, so a transpose costs nothing.
 struct RightFactor {
   const float* data;
   ptrdiff_t row_stride, column_stride;
@@ -53,19 +54,22 @@ struct LeftFactor {
 /// What the product is added to.
 enum class Onto { kZero, kBias, kItself };
 
-/// C = onto + A B with A (m x k), B (k x n), C (m x n). The sums over k are taken in order, one after the
-/// other, so that an element's bits depend on its row of A and column of B alone, not on n or its place.
-/// @param m rows, a multiple of kWidth (padded). @param bias m values for Onto::kBias, else ignored.
-void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdiff_t c_stride, Onto onto,
-              const float* bias = nullptr);
+/// C = onto + A B with A (m x k), B (k x n), C (m x n). The sums over k are taken in order, one
+/// after the other, so that an element's bits depend on its row of A and column of B alone, not on
+/// n or its place.
+/// @param m rows, a multiple of kWidth (padded). @param bias m values for Onto::kBias, else
+/// ignored.
+void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdiff_t c_stride,
+              Onto onto, const float* bias = nullptr);
 
 /// Whether a matrix has so few rows that padding them to whole packets would be most of the work.
 constexpr bool FewRows(int rows) { return 4 * rows <= kWidth; }
 
-/// The same product for a C of few rows, by scalar products of columns: C(i, j) = onto(i, j) + A'(:, i) . B(:, j).
+/// The same product for a C of few rows, by scalar products of columns: C(i, j) = onto(i, j) +
+/// A'(:, i) . B(:, j).
 /// @param rows of C. @param transposed A' (k x rows). @param b the columns of B.
-void MultiplyFewRows(int rows, int n, const Matrix& transposed, const float* b, ptrdiff_t b_stride, float* c, ptrdiff_t c_stride,
-                     Onto onto, const float* bias = nullptr);
+void MultiplyFewRows(int rows, int n, const Matrix& transposed, const float* b, ptrdiff_t b_stride,
+                     float* c, ptrdiff_t c_stride, Onto onto, const float* bias = nullptr);
 
 /// to = from', both of whole size.
 void Transpose(const Matrix& from, Matrix& to);

@@ -10,12 +10,14 @@
 namespace plumb::kernels {
 namespace {
 
-// Activations of a block and their derivatives stay in the second-level cache between layers. Blocks are
-// whole numbers of the products' tiles, at every level of instruction set.
+// Activations of a block and their derivatives stay in the second-level cache between layers.
+// Blocks are whole numbers of the products' tiles, at every level of instruction set.
 constexpr int kBlock = 192;
 constexpr int kTile = 12;
 
-LeftFactor AsLeft(const Matrix& matrix, int column = 0) { return {matrix.column(column), matrix.stride()}; }
+LeftFactor AsLeft(const Matrix& matrix, int column = 0) {
+  return {matrix.column(column), matrix.stride()};
+}
 RightFactor AsRight(const Matrix& matrix, int column = 0) {
   return {matrix.column(column), 1, matrix.stride()};
 }
@@ -50,7 +52,8 @@ void MultiplyByTanhDerivative(Matrix& d, const Matrix& h, int h_column, int colu
   }
 }
 
-/// sum += the sum of the columns, taken in order; several packets at a time, whose sums do not wait for each other.
+/// sum += the sum of the columns, taken in order; several packets at a time, whose sums do not wait
+/// for each other.
 template <int kPackets>
 int AddColumns(int i, const Matrix& d, int columns, float* sum) {
   for (; i + kPackets * kWidth <= d.padded_rows(); i += kPackets * kWidth) {
@@ -66,7 +69,9 @@ int AddColumns(int i, const Matrix& d, int columns, float* sum) {
   return i;
 }
 
-void AddColumns(const Matrix& d, int columns, float* sum) { AddColumns<1>(AddColumns<8>(0, d, columns, sum), d, columns, sum); }
+void AddColumns(const Matrix& d, int columns, float* sum) {
+  AddColumns<1>(AddColumns<8>(0, d, columns, sum), d, columns, sum);
+}
 
 /// Copies between a dense rows x columns array and the padded columns of a matrix.
 void Pack(const float* dense, int columns, Matrix& matrix) {
@@ -83,18 +88,22 @@ void Unpack(const Matrix& matrix, int columns, float* dense) {
 
 struct Network::Layers {
   struct Layer {
-    Layer(int in, int out, bool few_rows) : weight(out, in), transposed(in, out), bias(out, 1), few(few_rows) {}
+    Layer(int in, int out, bool few_rows)
+        : weight(out, in), transposed(in, out), bias(out, 1), few(few_rows) {}
     Matrix weight;      // out x in
     Matrix transposed;  // in x out
     Matrix bias;        // out x 1
     bool few;           // rows; what is below is then a Matrix
 
     /// to = onto + weight below.
-    void Apply(const RightFactor& below, int columns, float* to, ptrdiff_t stride, Onto onto, const Matrix& what) const {
+    void Apply(const RightFactor& below, int columns, float* to, ptrdiff_t stride, Onto onto,
+               const Matrix& what) const {
       if (few) {
-        MultiplyFewRows(weight.rows(), columns, transposed, below.data, below.column_stride, to, stride, onto, what.column(0));
+        MultiplyFewRows(weight.rows(), columns, transposed, below.data, below.column_stride, to,
+                        stride, onto, what.column(0));
       } else {
-        Multiply(weight.padded_rows(), columns, weight.columns(), AsLeft(weight), below, to, stride, onto, what.column(0));
+        Multiply(weight.padded_rows(), columns, weight.columns(), AsLeft(weight), below, to, stride,
+                 onto, what.column(0));
       }
     }
   };
@@ -102,7 +111,8 @@ struct Network::Layers {
 };
 
 Network::Network(std::span<const int> sizes) : layers_(std::make_unique<Layers>()) {
-  for (size_t i = 1; i < sizes.size(); ++i) layers_->all.emplace_back(sizes[i - 1], sizes[i], i > 1 && FewRows(sizes[i]));
+  for (size_t i = 1; i < sizes.size(); ++i)
+    layers_->all.emplace_back(sizes[i - 1], sizes[i], i > 1 && FewRows(sizes[i]));
 }
 
 Network::Network(Network&&) noexcept = default;
@@ -113,7 +123,8 @@ int Network::outputs() const { return layers_->all.back().weight.rows(); }
 
 int Network::parameter_count() const {
   int count = 0;
-  for (const Layers::Layer& layer : layers_->all) count += layer.weight.rows() * (layer.weight.columns() + 1);
+  for (const Layers::Layer& layer : layers_->all)
+    count += layer.weight.rows() * (layer.weight.columns() + 1);
   return count;
 }
 
@@ -187,7 +198,9 @@ void Tape::Tangent(const Network& network, const Network& direction, float* tang
       const auto& change = direction.layers_->all[l];
       Matrix& dz = s.block[l];
       change.Apply(below, count, dz.column(0), dz.stride(), Onto::kBias, change.bias);
-      if (l > 0) layer.Apply(AsRight(s.block[l - 1]), count, dz.column(0), dz.stride(), Onto::kItself, change.bias);
+      if (l > 0)
+        layer.Apply(AsRight(s.block[l - 1]), count, dz.column(0), dz.stride(), Onto::kItself,
+                    change.bias);
       if (l + 1 < s.block.size()) {
         MultiplyByTanhDerivative(dz, s.hidden[l], first, count);
         below = AsRight(s.hidden[l], first);
@@ -209,16 +222,17 @@ void Tape::Backward(const Network& network, const float* output_gradient, float*
     for (size_t l = s.block.size(); l-- > 0;) {
       // dW += d h_below', db += d 1, d_below = (W' d) (1 - h_below^2)
       Matrix& d = s.block[l];
-      const RightFactor below =
-          l > 0 ? AsRight(s.hidden[l - 1], first)
-                : RightFactor{s.inputs + ptrdiff_t{first} * inputs_per_column, 1, inputs_per_column};
+      const RightFactor below = l > 0 ? AsRight(s.hidden[l - 1], first)
+                                      : RightFactor{s.inputs + ptrdiff_t{first} * inputs_per_column,
+                                                    1, inputs_per_column};
       Matrix& dw = s.weight_gradient[l];
       const Onto onto = first == 0 ? Onto::kZero : Onto::kItself;
       if (network.layers_->all[l].few) {
-        Multiply(dw.padded_rows(), dw.columns(), count, AsLeft(s.hidden[l - 1], first), Transposed(AsRight(d)), dw.column(0),
-                 dw.stride(), onto);
+        Multiply(dw.padded_rows(), dw.columns(), count, AsLeft(s.hidden[l - 1], first),
+                 Transposed(AsRight(d)), dw.column(0), dw.stride(), onto);
       } else {
-        Multiply(dw.padded_rows(), dw.columns(), count, AsLeft(d), Transposed(below), dw.column(0), dw.stride(), onto);
+        Multiply(dw.padded_rows(), dw.columns(), count, AsLeft(d), Transposed(below), dw.column(0),
+                 dw.stride(), onto);
       }
       AddColumns(d, count, s.bias_gradient[l].column(0));
       if (l > 0) {
@@ -245,8 +259,9 @@ void Tape::Backward(const Network& network, const float* output_gradient, float*
   }
 }
 
-void AdamStep(int count, int step, float rate, float l2, const float* const (&gradients)[2], float* __restrict parameters,
-              float* __restrict first_moment, float* __restrict second_moment) {
+void AdamStep(int count, int step, float rate, float l2, const float* const (&gradients)[2],
+              float* __restrict parameters, float* __restrict first_moment,
+              float* __restrict second_moment) {
   const float* __restrict one = gradients[0];
   const float* __restrict other = gradients[1];
   constexpr float kBeta1 = 0.9f, kBeta2 = 0.999f, kEpsilon = 1e-8f;
@@ -257,7 +272,8 @@ void AdamStep(int count, int step, float rate, float l2, const float* const (&gr
     const float g = one[i] + other[i] + l2 * parameters[i];
     first_moment[i] = kBeta1 * first_moment[i] + (1 - kBeta1) * g;
     second_moment[i] = kBeta2 * second_moment[i] + (1 - kBeta2) * g * g;
-    parameters[i] -= scale * first_moment[i] / (std::sqrt(second_moment[i]) * correction + kEpsilon);
+    parameters[i] -=
+        scale * first_moment[i] / (std::sqrt(second_moment[i]) * correction + kEpsilon);
   }
 }
 

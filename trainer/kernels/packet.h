@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <cstring>
 
-/// One vector register of floats, as wide as the compiler's target has them, and what the kernels need of it.
-/// For files of this folder only: included by others it would be another type.
+/// One vector register of floats, as wide as the compiler's target has them, and what the kernels
+/// need of it. For files of this folder only: included by others it would be another type.
 
 namespace plumb::kernels {
 
@@ -27,14 +27,16 @@ inline Packet Load(const float* from) {
 
 inline void Store(float* to, Packet packet) { std::memcpy(to, &packet, sizeof packet); }
 
-/// tanh to 2e-7 absolute: 1 - 2 / (e^(2x) + 1), with e^(2x) = 2^n 2^f, n an integer, |f| <= 1/2, and 2^f by
-/// its Taylor polynomial of degree 6, whose error of 1.2e-7 is halved by the division. NaN gives NaN.
+/// tanh to 2e-7 absolute: 1 - 2 / (e^(2x) + 1), with e^(2x) = 2^n 2^f, n an integer, |f| <= 1/2,
+/// and 2^f by its Taylor polynomial of degree 6, whose error of 1.2e-7 is halved by the division.
+/// NaN gives NaN.
 inline Packet Tanh(Packet x) {
   constexpr float kSaturated = 10.0f;  // 1 - tanh(10) = 4e-9, nothing beside 1
   x = x > kSaturated ? kSaturated + Packet{} : x;
   x = x < -kSaturated ? -kSaturated + Packet{} : x;
   const Packet y = x * 2.8853900817779268f;  // 2 log2(e) x
-  // Adding 1.5 * 2^23 rounds to an integer, which is then in the low bits of the sum's representation.
+  // Adding 1.5 * 2^23 rounds to an integer, which is then in the low bits of the sum's
+  // representation.
   constexpr float kRounder = 12582912.0f;
   const Packet rounded = y + kRounder;
   const Packet f = y - (rounded - kRounder);

@@ -30,7 +30,8 @@ TEST_CASE("rejection finds a linear problem's posterior, and better with regress
   const Posterior plain = InferByRejection(LinearProblem(), options, 1);
   CHECK(SampleMoments(plain.samples).covariance(0, 0) > 0.3);
   options.adjust = true;
-  CHECK(SampleMoments(InferByRejection(LinearProblem(), options, 1).samples).covariance(0, 0) < 0.25);
+  CHECK(SampleMoments(InferByRejection(LinearProblem(), options, 1).samples).covariance(0, 0) <
+        0.25);
 }
 
 TEST_CASE("SMC finds a linear problem's posterior with either kernel") {
@@ -41,15 +42,16 @@ TEST_CASE("SMC finds a linear problem's posterior with either kernel") {
   const Posterior posterior = InferBySmc(LinearProblem(), options, 1, &report);
   CheckPosterior(posterior, 0.1, 0.09);
   REQUIRE(report.generations.size() > 3);
-  // Epsilon is in units of scales that shrink, too, as the simulations gather around the observation.
+  // Epsilon is in units of scales that shrink, too, as the simulations gather around the
+  // observation.
   CHECK(report.generations.back().epsilon < 0.7 * report.generations[1].epsilon);
   CHECK(report.generations.back().effective > 100);
   CHECK(posterior.simulations <= options.simulations);
 }
 
 TEST_CASE("SMC without adjustment weights its population against the prior") {
-  // Without the weights, a few generations at a loose epsilon would tend to the likelihood, of mean 0.8, not
-  // 0.64.
+  // Without the weights, a few generations at a loose epsilon would tend to the likelihood, of mean
+  // 0.8, not 0.64.
   SmcOptions options;
   options.adjust = false;
   options.samples = 4'000;
@@ -85,7 +87,8 @@ TEST_CASE("if everything fails the posterior is the prior, and everything is cou
   const Posterior rejection = InferByRejection(problem, {}, 1), smc = InferBySmc(problem, {}, 1);
   for (const Posterior& posterior : {rejection, smc}) {
     CHECK(posterior.failures == posterior.simulations);
-    CHECK((SampleMoments(posterior.samples).covariance - Eigen::Matrix2d::Identity()).norm() < 0.08);
+    CHECK((SampleMoments(posterior.samples).covariance - Eigen::Matrix2d::Identity()).norm() <
+          0.08);
   }
 }
 
@@ -99,7 +102,8 @@ TEST_CASE("what makes no sense is refused") {
   CHECK_THROWS_AS(InferBySmc(problem, {}, 1), std::invalid_argument);
 }
 
-TEST_CASE("regression adjustment of an exactly linear relation is exact, and rescales growing noise") {
+TEST_CASE(
+    "regression adjustment of an exactly linear relation is exact, and rescales growing noise") {
   Random random(9);
   const Eigen::MatrixXd s = StandardNormals(2, 2'000, random);
   const Eigen::Vector2d observed(0.3, -0.2);
@@ -108,7 +112,8 @@ TEST_CASE("regression adjustment of an exactly linear relation is exact, and res
   Eigen::MatrixXd u = (2 * s.row(0) - s.row(1)).array() + 1;
   const AdjustedSamples exact = AdjustByRegression(u, s, observed, distances, equal);
   for (Eigen::Index i = 0; i < 2'000; ++i) {
-    if (exact.weights(i) > 0) REQUIRE(exact.samples(0, i) == Approx(2 * 0.3 + 0.2 + 1).margin(1e-6));
+    if (exact.weights(i) > 0)
+      REQUIRE(exact.samples(0, i) == Approx(2 * 0.3 + 0.2 + 1).margin(1e-6));
   }
   CHECK(exact.weights.sum() == Approx(1));
 

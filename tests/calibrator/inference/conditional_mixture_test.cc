@@ -26,13 +26,14 @@ TEST_CASE("the mixture finds a linear problem's posterior") {
   }
   CHECK(posterior.simulations == 3'000);
   CHECK(report.rounds.size() == 3);
-  // ln p(t | x) of the exact posterior is on average -1 - ln(2 pi 0.2): no estimate beats it but by chance.
+  // ln p(t | x) of the exact posterior is on average -1 - ln(2 pi 0.2): no estimate beats it but by
+  // chance.
   CHECK(*std::max_element(report.held_out.begin(), report.held_out.end()) ==
         Approx(-1 - std::log(2 * M_PI * 0.2)).margin(0.15));
 }
 
-// x = |t1 + t2| / sqrt 2 + noise, (t2 - t1) / sqrt 2 + noise: two modes, each normal, as far from the bounds
-// as need be.
+// x = |t1 + t2| / sqrt 2 + noise, (t2 - t1) / sqrt 2 + noise: two modes, each normal, as far from
+// the bounds as need be.
 TEST_CASE("both modes of a posterior are found, in equal parts and each of the right width") {
   const auto simulate = [](const Eigen::MatrixXd& t, int64_t first) {
     Eigen::MatrixXd x(2, t.cols());
@@ -43,8 +44,8 @@ TEST_CASE("both modes of a posterior are found, in equal parts and each of the r
     }
     return x;
   };
-  const Problem problem{Prior({Prior::Uniform(-1, 1), Prior::Uniform(-1, 1)}), Eigen::Vector2d(0.5, 0.1),
-                        simulate};
+  const Problem problem{Prior({Prior::Uniform(-1, 1), Prior::Uniform(-1, 1)}),
+                        Eigen::Vector2d(0.5, 0.1), simulate};
   const Posterior posterior = InferConditionalMixture(problem, Few(4'000), 1);
   double above = 0, mean = 0, square = 0;
   for (const auto t : posterior.samples.colwise()) {
@@ -73,7 +74,8 @@ TEST_CASE("the same bits for the same seed, however simulations are spread; fail
   CHECK(InferConditionalMixture(problem, Few(1'500), 3).samples != posterior.samples);
 }
 
-TEST_CASE("without successes the posterior is the prior; a statistic that never varies is harmless") {
+TEST_CASE(
+    "without successes the posterior is the prior; a statistic that never varies is harmless") {
   const Posterior nothing = InferConditionalMixture(LinearProblem(-1e9), Few(500), 1);
   CHECK(nothing.failures == 500);
   CHECK((SampleMoments(nothing.samples).covariance - Eigen::Matrix2d::Identity()).norm() < 0.1);
@@ -94,14 +96,15 @@ TEST_CASE("without successes the posterior is the prior; a statistic that never 
 }
 
 TEST_CASE("a truncated prior is the prior within its region, found either way") {
-  // Two overlapping ellipsoids; far out, and small enough for the prior's own draws to miss them nearly
-  // always.
+  // Two overlapping ellipsoids; far out, and small enough for the prior's own draws to miss them
+  // nearly always.
   const double scale = GENERATE(1., 0.003);
   const Gaussian a{Eigen::Vector2d(1.5, 0), scale * 0.02 * Eigen::Matrix2d::Identity()};
   Gaussian b = a;
   b.mean(0) += 0.3 * std::sqrt(scale);
   const TruncatedPrior prior({{0.9, 0.1}, {a, b}}, 1e-2);
-  const double reach = std::sqrt(scale * 0.02 * 2 * std::log(100));  // chi-squared of two: -2 ln 0.01
+  // chi-squared of two: -2 ln 0.01
+  const double reach = std::sqrt(scale * 0.02 * 2 * std::log(100));
   CHECK(prior.Contains(a.mean + Eigen::Vector2d(0, 0.999 * reach)));
   CHECK(!prior.Contains(a.mean + Eigen::Vector2d(0, 1.001 * reach)));
   Random random(1);
@@ -120,7 +123,8 @@ TEST_CASE("a truncated prior is the prior within its region, found either way") 
     }
   }
   CHECK((draws->rowwise().mean() - mean / mass).norm() < 0.02 * reach);
-  CHECK((draws->row(0).array() > middle).cast<double>().mean() == Approx(right / mass).margin(0.012));
+  CHECK((draws->row(0).array() > middle).cast<double>().mean() ==
+        Approx(right / mass).margin(0.012));
   // Nothing can be found where the prior has no density to speak of.
   const TruncatedPrior nowhere({{0.5, 0.5}, {a, {Eigen::Vector2d(0, 60), a.covariance}}}, 1e-2);
   CHECK_NOTHROW(nowhere.Sample(10, random));

@@ -21,14 +21,15 @@ double MeanAbsolute(double shift, double sd) {
 
 TEST_CASE("energy distance of two normal distributions") {
   const double expected = 2 * MeanAbsolute(1.5, std::sqrt(2)) - 2 * MeanAbsolute(0, std::sqrt(2));
-  CHECK(EnergyDistance(Normals(1, 2'000, 1), Normals(1, 1'500, 2, 1.5)) == Approx(expected).epsilon(0.07));
+  CHECK(EnergyDistance(Normals(1, 2'000, 1), Normals(1, 1'500, 2, 1.5)) ==
+        Approx(expected).epsilon(0.07));
   const Eigen::MatrixXd x = Normals(3, 40, 1);
   CHECK(EnergyDistance(x, x) == Approx(0).margin(1e-12));
 }
 
 TEST_CASE("MMD of two normal distributions, and its lack of bias") {
-  // E k(X, Y) for a Gaussian kernel of bandwidth h and X - Y ~ N(d, 2): h / sqrt(h^2 + 2) exp(-d^2 / 2 (h^2 +
-  // 2)).
+  // E k(X, Y) for a Gaussian kernel of bandwidth h and X - Y ~ N(d, 2): h / sqrt(h^2 + 2) exp(-d^2
+  // / 2 (h^2 + 2)).
   double expected = 0;
   for (const double h : {0.25, 0.5, 1., 2., 4.}) {
     expected += 2 * h / std::sqrt(h * h + 2) * (1 - std::exp(-2.25 / (2 * (h * h + 2)))) / 5;

@@ -24,8 +24,9 @@ TEST_CASE("a mixture's density is the sum of its components', and integrates to 
   }
   CHECK(mass == Approx(1).epsilon(1e-6));
   const Eigen::Vector2d at(0.5, 0.2);
-  CHECK(std::exp(LogDensity(mixture, at)) == Approx(0.3 * std::exp(LogDensity(mixture.components[0], at)) +
-                                                    0.7 * std::exp(LogDensity(mixture.components[1], at))));
+  CHECK(std::exp(LogDensity(mixture, at)) ==
+        Approx(0.3 * std::exp(LogDensity(mixture.components[0], at)) +
+               0.7 * std::exp(LogDensity(mixture.components[1], at))));
 }
 
 TEST_CASE("conditioning and marginals agree with the joint density, by brute force") {
@@ -50,7 +51,9 @@ TEST_CASE("conditioning far from everything leaves the nearest component, finite
   CHECK(conditional.weights[0] == 1);
 }
 
-TEST_CASE("expectation maximisation never loses likelihood, and finds the mixture that made the samples") {
+TEST_CASE(
+    "expectation maximisation never loses likelihood, and finds the mixture that made the "
+    "samples") {
   Random random(3);
   const GaussianMixture truth = Example();
   const Eigen::MatrixXd samples = Sample(truth, 8'000, random);
@@ -65,15 +68,18 @@ TEST_CASE("expectation maximisation never loses likelihood, and finds the mixtur
   CHECK(fit.mixture.weights[left] == Approx(0.3).margin(0.02));
   CHECK((fit.mixture.components[left].mean - truth.components[0].mean).norm() < 0.08);
   CHECK((fit.mixture.components[left].covariance - truth.components[0].covariance).norm() < 0.15);
-  CHECK((fit.mixture.components[1 - left].covariance - truth.components[1].covariance).norm() < 0.06);
+  CHECK((fit.mixture.components[1 - left].covariance - truth.components[1].covariance).norm() <
+        0.06);
 }
 
 TEST_CASE("the number of components with the lowest BIC is the right one") {
   Random random(4);
   const Eigen::MatrixXd two = Sample(Example(), 3'000, random);
-  CHECK(SelectMixture(two, Eigen::VectorXd::Ones(3'000), 16, random).mixture.components.size() == 2);
+  CHECK(SelectMixture(two, Eigen::VectorXd::Ones(3'000), 16, random).mixture.components.size() ==
+        2);
   const Eigen::MatrixXd one = StandardNormals(5, 1'000, random);
-  CHECK(SelectMixture(one, Eigen::VectorXd::Ones(1'000), 16, random).mixture.components.size() == 1);
+  CHECK(SelectMixture(one, Eigen::VectorXd::Ones(1'000), 16, random).mixture.components.size() ==
+        1);
 }
 
 TEST_CASE("weights count as copies do") {

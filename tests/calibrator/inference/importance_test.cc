@@ -18,29 +18,35 @@ double LeftDensity(const Eigen::Vector2d& x) {
   return std::exp(-0.5 * z.squaredNorm()) / (2 * M_PI * 0.5 * 0.2);
 }
 double RightDensity(const Eigen::Vector2d& x) {
-  return std::exp(-0.5 * (x - kRight).dot(RightSpread().inverse() * (x - kRight))) / (2 * M_PI * std::sqrt(RightSpread().determinant()));
+  return std::exp(-0.5 * (x - kRight).dot(RightSpread().inverse() * (x - kRight))) /
+         (2 * M_PI * std::sqrt(RightSpread().determinant()));
 }
 Eigen::VectorXd Bimodal(const Eigen::MatrixXd& points) {
   Eigen::VectorXd density(points.cols());
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    density(i) = std::log(0.3 * LeftDensity(points.col(i)) + 0.7 * RightDensity(points.col(i))) + 700;
+    density(i) =
+        std::log(0.3 * LeftDensity(points.col(i)) + 0.7 * RightDensity(points.col(i))) + 700;
   }
   return density;
 }
 
 GaussianMixture Guess(double left) {
-  return {{left, 1 - left}, {{Eigen::Vector2d(-2.5, 0.3), 0.3 * Eigen::Matrix2d::Identity()},
-                             {Eigen::Vector2d(2.4, 0.8), 0.2 * Eigen::Matrix2d::Identity()}}};
+  return {{left, 1 - left},
+          {{Eigen::Vector2d(-2.5, 0.3), 0.3 * Eigen::Matrix2d::Identity()},
+           {Eigen::Vector2d(2.4, 0.8), 0.2 * Eigen::Matrix2d::Identity()}}};
 }
 
 void CheckMoments(const ImportanceFit& fit) {
   const Eigen::Vector2d mean = 0.3 * kLeft + 0.7 * kRight;
   const Eigen::Vector2d off = kLeft - kRight;
-  const Eigen::Matrix2d covariance = 0.3 * Eigen::Matrix2d(Eigen::Vector2d(0.25, 0.04).asDiagonal()) + 0.7 * RightSpread() + 0.21 * off * off.transpose();
+  const Eigen::Matrix2d covariance =
+      0.3 * Eigen::Matrix2d(Eigen::Vector2d(0.25, 0.04).asDiagonal()) + 0.7 * RightSpread() +
+      0.21 * off * off.transpose();
   const Eigen::Vector2d weighted = fit.samples * fit.weights;
   const Eigen::MatrixXd centred = fit.samples.colwise() - weighted;
   CHECK((weighted - mean).norm() < 0.15);
-  CHECK((centred * fit.weights.asDiagonal() * centred.transpose() - covariance).norm() < 0.06 * covariance.norm());
+  CHECK((centred * fit.weights.asDiagonal() * centred.transpose() - covariance).norm() <
+        0.06 * covariance.norm());
   const Gaussian adapted = Moments(fit.mixture);
   CHECK((adapted.mean - mean).norm() < 0.15);
   CHECK((adapted.covariance - covariance).norm() < 0.08 * covariance.norm());
@@ -62,7 +68,8 @@ TEST_CASE("two modes get the weights, the places and the widths that they have")
   CHECK((fit.mixture.components[0].mean - kLeft).norm() < 0.1);
   CHECK((fit.mixture.components[1].mean - kRight).norm() < 0.1);
   CHECK((fit.mixture.components[1].covariance - RightSpread()).norm() < 0.1);
-  // Weights are target / mixture of all proposals: for a sample's neighbourhood, E[w] is its probability.
+  // Weights are target / mixture of all proposals: for a sample's neighbourhood, E[w] is its
+  // probability.
   double left = 0;
   for (Eigen::Index i = 0; i < 1600; ++i) left += fit.samples(0, i) < -0.5 ? fit.weights(i) : 0;
   CHECK(left == Approx(0.3).margin(0.03));
@@ -93,7 +100,8 @@ TEST_CASE("a guess of one mode too many loses it") {
 }
 
 TEST_CASE("what is not finite has no density, and nothing anywhere is an error") {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(),
+                   kInfinity = std::numeric_limits<double>::infinity();
   const Gaussian one{Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Identity(1, 1)};
   // A standard normal's positive half; +infinity, too, is a failure, not a certainty.
   const ImportanceFit fit = FitByImportance(
@@ -110,7 +118,9 @@ TEST_CASE("what is not finite has no density, and nothing anywhere is an error")
     if (fit.samples(0, i) < 0) REQUIRE(fit.weights(i) == 0);
   }
   for (const double nothing : {kNaN, -kInfinity}) {
-    const auto impossible = [&](const Eigen::MatrixXd& x) -> Eigen::VectorXd { return Eigen::VectorXd::Constant(x.cols(), nothing); };
+    const auto impossible = [&](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
+      return Eigen::VectorXd::Constant(x.cols(), nothing);
+    };
     CHECK_THROWS_AS(FitByImportance(impossible, {{1}, {one}}), std::invalid_argument);
   }
 }

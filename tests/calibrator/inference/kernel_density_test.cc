@@ -22,7 +22,8 @@ TEST_CASE("a kernel density has the samples' moments, wider by the bandwidth, th
     const Gaussian moments = Moments(density);
     const Eigen::VectorXd mean = samples * weights / weights.sum();
     const Eigen::MatrixXd centred = samples.colwise() - mean;
-    const Eigen::MatrixXd covariance = centred * weights.asDiagonal() * centred.transpose() / weights.sum();
+    const Eigen::MatrixXd covariance =
+        centred * weights.asDiagonal() * centred.transpose() / weights.sum();
     CHECK((moments.mean - mean).norm() < (most == 300 ? 0.1 : 1e-9));
     CHECK((moments.covariance - (1 + h * h) * covariance).norm() < (most == 300 ? 0.2 : 1e-9));
     double sum = 0;
@@ -33,8 +34,10 @@ TEST_CASE("a kernel density has the samples' moments, wider by the bandwidth, th
   Eigen::VectorXd heavy = Eigen::VectorXd::Ones(2'000);
   heavy(7) = 1'999;
   const GaussianMixture thinned = KernelDensity(samples, heavy, 100, random);
-  CHECK(*std::max_element(thinned.weights.begin(), thinned.weights.end()) == Approx(0.5).margin(0.011));
-  CHECK_THROWS_AS(KernelDensity(samples, Eigen::VectorXd::Zero(2'000), 10, random), std::invalid_argument);
+  CHECK(*std::max_element(thinned.weights.begin(), thinned.weights.end()) ==
+        Approx(0.5).margin(0.011));
+  CHECK_THROWS_AS(KernelDensity(samples, Eigen::VectorXd::Zero(2'000), 10, random),
+                  std::invalid_argument);
 }
 
 }  // namespace

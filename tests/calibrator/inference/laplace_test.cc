@@ -26,7 +26,8 @@ LeastSquares Fitting(const Prior& prior, const Eigen::VectorXd& y, const Model& 
   return {prior,
           [=](const Eigen::MatrixXd& x) {
             Eigen::MatrixXd errors(y.size(), x.cols());
-            for (Eigen::Index j = 0; j < x.cols(); ++j) errors.col(j) = model(Eigen::VectorXd(x.col(j))) - y;
+            for (Eigen::Index j = 0; j < x.cols(); ++j)
+              errors.col(j) = model(Eigen::VectorXd(x.col(j))) - y;
             return errors;
           },
           std::vector<int>(static_cast<size_t>(y.size()), 0), Numbers(y.size()), Numbers(y.size())};
@@ -41,18 +42,23 @@ Eigen::MatrixXd Normals(Eigen::Index rows, Eigen::Index columns, uint32_t stream
   return StandardNormals(rows, columns, random);
 }
 
-Prior SomePrior() { return Prior({Prior::Normal(1, 2), Prior::Normal(-1, 0.5), Prior::Normal(0, 1)}); }
+Prior SomePrior() {
+  return Prior({Prior::Normal(1, 2), Prior::Normal(-1, 0.5), Prior::Normal(0, 1)});
+}
 
 // Of a normal prior and a normal likelihood with that noise.
-Gaussian Conjugate(const Prior& prior, const Eigen::MatrixXd& a, const Eigen::VectorXd& y, double s) {
+Gaussian Conjugate(const Prior& prior, const Eigen::MatrixXd& a, const Eigen::VectorXd& y,
+                   double s) {
   const Eigen::Index n = prior.size();
   Eigen::VectorXd mean(n), precision(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto& m = prior.marginals()[static_cast<size_t>(i)];
     mean(i) = m.a, precision(i) = 1 / (m.b * m.b);
   }
-  const Eigen::MatrixXd posterior = a.transpose() * a / (s * s) + Eigen::MatrixXd(precision.asDiagonal());
-  return {posterior.inverse() * (a.transpose() * y / (s * s) + precision.cwiseProduct(mean)), posterior.inverse()};
+  const Eigen::MatrixXd posterior =
+      a.transpose() * a / (s * s) + Eigen::MatrixXd(precision.asDiagonal());
+  return {posterior.inverse() * (a.transpose() * y / (s * s) + precision.cwiseProduct(mean)),
+          posterior.inverse()};
 }
 
 TEST_CASE("a line with normal noise has the posterior of the textbook") {
@@ -79,20 +85,26 @@ TEST_CASE("a line with normal noise has the posterior of the textbook") {
   const double squares = (a * truth.mean - y).squaredNorm();
   const double effective = (truth.covariance * a.transpose() * a / (s * s)).trace();
   CHECK(effective < 3);
-  const double variance = known ? (squares + 20) / (200 - effective + 20) : squares / (200 - effective);
+  const double variance =
+      known ? (squares + 20) / (200 - effective + 20) : squares / (200 - effective);
   CHECK(s * s == Approx(variance).epsilon(1e-6));
   CHECK(s == Approx(noise).epsilon(0.15));
   // Draws have these moments.
   Random random(3);
   const Eigen::MatrixXd draws = Draw(fit, prior, 20'000, random);
   const Eigen::MatrixXd centred = draws.colwise() - truth.mean;
-  CHECK((centred.rowwise().mean().array() / truth.covariance.diagonal().array().sqrt()).abs().maxCoeff() < 0.03);
-  CHECK((centred * centred.transpose() / 20'000 - truth.covariance).norm() < 0.03 * truth.covariance.norm());
+  CHECK((centred.rowwise().mean().array() / truth.covariance.diagonal().array().sqrt())
+            .abs()
+            .maxCoeff() < 0.03);
+  CHECK((centred * centred.transpose() / 20'000 - truth.covariance).norm() <
+        0.03 * truth.covariance.norm());
 }
 
-// Mean and covariance of the posterior with an unknown scale s of prior 1 / s, by a sum over a grid in u.
+// Mean and covariance of the posterior with an unknown scale s of prior 1 / s, by a sum over a grid
+// in u.
 template <typename Model>
-Gaussian OnGrid(const Prior& prior, const Eigen::VectorXd& y, const Model& model, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
+Gaussian OnGrid(const Prior& prior, const Eigen::VectorXd& y, const Model& model,
+                const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
   constexpr int kPoints = 300;
   const Eigen::Index n = prior.size();
   const int count = n == 1 ? kPoints : kPoints * kPoints;
@@ -105,7 +117,9 @@ Gaussian OnGrid(const Prior& prior, const Eigen::VectorXd& y, const Model& model
       u(k) = lower(k) + (upper(k) - lower(k)) * (at + 0.5) / kPoints;
     }
     x.col(i) = prior.FromStandard(u);
-    log_density(i) = -0.5 * u.squaredNorm() - 0.5 * static_cast<double>(y.size()) * std::log((model(Eigen::VectorXd(x.col(i))) - y).squaredNorm());
+    log_density(i) =
+        -0.5 * u.squaredNorm() - 0.5 * static_cast<double>(y.size()) *
+                                     std::log((model(Eigen::VectorXd(x.col(i))) - y).squaredNorm());
   }
   Eigen::VectorXd w = (log_density.array() - log_density.maxCoeff()).exp();
   w /= w.sum();
@@ -118,13 +132,16 @@ TEST_CASE("a curve's posterior is that of a sum over a grid") {
   SECTION("one parameter") {
     const Prior prior({Prior::Normal(0.5, 1)});
     const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
-      return Eigen::ArrayXd::LinSpaced(50, 0, 3).unaryExpr([&](double t) { return std::exp(-std::exp(x(0)) * t); });
+      return Eigen::ArrayXd::LinSpaced(50, 0, 3).unaryExpr(
+          [&](double t) { return std::exp(-std::exp(x(0)) * t); });
     };
     const Eigen::VectorXd y = model(Eigen::VectorXd::Constant(1, -0.4)) + 0.1 * Normals(50, 1, 5);
     LaplaceOptions options;
     options.sandwich = false;
-    const LaplaceFit fit = FitLaplace(Fitting(prior, y, model), Eigen::VectorXd::Constant(1, 2.5), options);
-    const Gaussian truth = OnGrid(prior, y, model, Eigen::VectorXd::Constant(1, -2), Eigen::VectorXd::Constant(1, 1));
+    const LaplaceFit fit =
+        FitLaplace(Fitting(prior, y, model), Eigen::VectorXd::Constant(1, 2.5), options);
+    const Gaussian truth =
+        OnGrid(prior, y, model, Eigen::VectorXd::Constant(1, -2), Eigen::VectorXd::Constant(1, 1));
     const double sd = std::sqrt(truth.covariance(0, 0));
     CHECK(std::abs(fit.mode(0) - truth.mean(0)) < 0.1 * sd);
     CHECK(std::sqrt(fit.posterior.covariance(0, 0)) == Approx(sd).epsilon(0.06));
@@ -132,13 +149,16 @@ TEST_CASE("a curve's posterior is that of a sum over a grid") {
   SECTION("two parameters, one of them between bounds") {
     const Prior prior({Prior::Normal(0, 1), Prior::Uniform(0, 2)});
     const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
-      return Eigen::ArrayXd::LinSpaced(80, 0, 4).unaryExpr([&](double t) { return std::exp(x(0)) * std::sin(x(1) * t); });
+      return Eigen::ArrayXd::LinSpaced(80, 0, 4).unaryExpr(
+          [&](double t) { return std::exp(x(0)) * std::sin(x(1) * t); });
     };
     const Eigen::VectorXd y = model(Eigen::Vector2d(0.3, 1.3)) + 0.2 * Normals(80, 1, 6);
     LaplaceOptions options;
     options.sandwich = false;
-    const LaplaceFit fit = FitLaplace(Fitting(prior, y, model), Eigen::Vector2d(-0.5, 0.9), options);
-    const Gaussian truth = OnGrid(prior, y, model, Eigen::Vector2d(0, 0.2), Eigen::Vector2d(0.6, 0.6));
+    const LaplaceFit fit =
+        FitLaplace(Fitting(prior, y, model), Eigen::Vector2d(-0.5, 0.9), options);
+    const Gaussian truth =
+        OnGrid(prior, y, model, Eigen::Vector2d(0, 0.2), Eigen::Vector2d(0.6, 0.6));
     const Eigen::Vector2d sd = truth.covariance.diagonal().cwiseSqrt();
     CHECK(((fit.mode - truth.mean).array() / sd.array()).abs().maxCoeff() < 0.2);
     CHECK((fit.posterior.covariance - truth.covariance).norm() < 0.1 * truth.covariance.norm());
@@ -148,17 +168,21 @@ TEST_CASE("a curve's posterior is that of a sum over a grid") {
 TEST_CASE("where the data lie beyond a uniform prior's bound the posterior leans on it") {
   const Prior prior({Prior::Uniform(0, 1)});
   const Eigen::VectorXd y = Eigen::VectorXd::Constant(40, 1.02) + 0.1 * Normals(40, 1, 7);
-  const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd { return Eigen::VectorXd::Constant(40, x(0)); };
+  const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    return Eigen::VectorXd::Constant(40, x(0));
+  };
   const LaplaceFit fit = FitLaplace(Fitting(prior, y, model), Eigen::VectorXd::Constant(1, 0.2));
   CHECK(fit.converged);
   Random random(3);
   const Eigen::MatrixXd draws = Draw(fit, prior, 20'000, random);
   CHECK(draws.maxCoeff() <= 1);
   CHECK(draws.minCoeff() > 0.7);
-  const Gaussian truth = OnGrid(prior, y, model, Eigen::VectorXd::Constant(1, 0), Eigen::VectorXd::Constant(1, 5));
+  const Gaussian truth =
+      OnGrid(prior, y, model, Eigen::VectorXd::Constant(1, 0), Eigen::VectorXd::Constant(1, 5));
   CHECK(1 - draws.mean() == Approx(1 - truth.mean(0)).epsilon(0.5));
   // On the bound itself there is no way to tell in which direction to go.
-  CHECK_THROWS_AS(FitLaplace(Fitting(prior, y, model), Eigen::VectorXd::Ones(1)), std::invalid_argument);
+  CHECK_THROWS_AS(FitLaplace(Fitting(prior, y, model), Eigen::VectorXd::Ones(1)),
+                  std::invalid_argument);
 }
 
 TEST_CASE("a direction that changes nothing keeps the prior") {
@@ -172,7 +196,8 @@ TEST_CASE("a direction that changes nothing keeps the prior") {
   const Eigen::MatrixXd draws = Draw(fit, prior, 3000, random);
   CHECK(KolmogorovSmirnov((draws.row(0) - draws.row(1)).transpose(), 2, std::sqrt(2)) > 0.01);
   CHECK(KolmogorovSmirnov(draws.row(2).transpose(), 1, 3) > 0.01);
-  CHECK(KolmogorovSmirnov((draws.row(0) + draws.row(1)).transpose(), 3, 1) < 1e-6);  // of which the data do tell
+  // of which the data do tell
+  CHECK(KolmogorovSmirnov((draws.row(0) + draws.row(1)).transpose(), 3, 1) < 1e-6);
   CHECK(fit.mode(2) == Approx(1).margin(1e-9));
   CHECK(fit.posterior.covariance(2, 2) == Approx(9).epsilon(1e-9));
   CHECK(fit.mode(0) - fit.mode(1) == Approx(2).margin(1e-6));
@@ -191,7 +216,9 @@ TEST_CASE("outliers do little harm, and normal errors are taken as such") {
   const LaplaceFit robust = FitLaplace(Line(prior, spoilt, a), Eigen::Vector3d::Zero());
   const LaplaceFit fooled = FitLaplace(Line(prior, spoilt, a), Eigen::Vector3d::Zero(), trusting);
   const Eigen::ArrayXd sd = from_clean.posterior.covariance.diagonal().array().sqrt();
-  const auto distance = [&](const LaplaceFit& fit) { return ((fit.mode - from_clean.mode).array() / sd).abs().maxCoeff(); };
+  const auto distance = [&](const LaplaceFit& fit) {
+    return ((fit.mode - from_clean.mode).array() / sd).abs().maxCoeff();
+  };
   CHECK(from_clean.degrees_of_freedom == kInfinity);
   CHECK(robust.degrees_of_freedom == 2);
   CHECK(fooled.degrees_of_freedom == kInfinity);
@@ -200,7 +227,9 @@ TEST_CASE("outliers do little harm, and normal errors are taken as such") {
   CHECK(robust.scale(0) == Approx(0.1).epsilon(0.25));
   int heavy = 0;
   for (uint32_t i = 0; i < 100; ++i) {
-    heavy += std::isfinite(FitLaplace(Line(prior, a * truth + 0.1 * Normals(300, 1, 1000 + i), a), truth).degrees_of_freedom);
+    heavy +=
+        std::isfinite(FitLaplace(Line(prior, a * truth + 0.1 * Normals(300, 1, 1000 + i), a), truth)
+                          .degrees_of_freedom);
   }
   CHECK(heavy <= 1);
 }
@@ -214,8 +243,8 @@ double StudentT(double f, Random& random) {
 
 // Share of the 95 % intervals of all parameters that hold the truth.
 template <typename MakeNoise>
-double Coverage(const LeastSquares& form, const Eigen::MatrixXd& a, int sets, const LaplaceOptions& options, const MakeNoise& noise,
-                int* widened = nullptr) {
+double Coverage(const LeastSquares& form, const Eigen::MatrixXd& a, int sets,
+                const LaplaceOptions& options, const MakeNoise& noise, int* widened = nullptr) {
   const Eigen::VectorXd truth = Eigen::VectorXd::Ones(a.cols());
   int inside = 0;
   for (int set = 0; set < sets; ++set) {
@@ -260,12 +289,15 @@ TEST_CASE("errors that depend on each other widen the posterior as they must") {
   const auto dependent = [=](uint32_t set) {
     Random random(6, {set});
     Eigen::VectorXd e(kRows);
-    for (int i = 0; i < kRows; ++i) e(i) = i % kCluster == 0 ? random.Normal() : 0.8 * e(i - 1) + 0.6 * random.Normal();
+    for (int i = 0; i < kRows; ++i)
+      e(i) = i % kCluster == 0 ? random.Normal() : 0.8 * e(i - 1) + 0.6 * random.Normal();
     return e;
   };
   CHECK(Coverage(form, a, 600, honest, dependent) == Approx(0.95).margin(0.02));
   CHECK(Coverage(form, a, 300, plain, dependent) < 0.65);
-  const auto independent = [=](uint32_t set) -> Eigen::VectorXd { return Normals(kRows, 1, 50'000 + set); };
+  const auto independent = [=](uint32_t set) -> Eigen::VectorXd {
+    return Normals(kRows, 1, 50'000 + set);
+  };
   int widened = 0;
   CHECK(Coverage(form, a, 600, honest, independent, &widened) == Approx(0.95).margin(0.02));
   CHECK(widened <= 15);
@@ -277,7 +309,8 @@ TEST_CASE("the sandwich takes information away where scores scatter, and nowhere
   Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(kClusters * 4, 2);
   for (int c = 0; c < kClusters; ++c) {
     const double sign = c % 2 ? 1 : -1;
-    for (int i = 0; i < 4; ++i) scores.row(4 * c + i) << (i == c % 4 ? 2 * sign : 0), (c % 4 < 2 ? 1 : -1);
+    for (int i = 0; i < 4; ++i)
+      scores.row(4 * c + i) << (i == c % 4 ? 2 * sign : 0), (c % 4 < 2 ? 1 : -1);
   }
   const Eigen::Matrix2d information = scores.transpose() * scores;
   const Sandwich wider = WidenBySandwich(information, scores, Numbers(kClusters * 4, 4));
@@ -287,13 +320,15 @@ TEST_CASE("the sandwich takes information away where scores scatter, and nowhere
   // Too few clusters, no information at all: nothing changes.
   CHECK(WidenBySandwich(information, scores.topRows(28), Numbers(28, 4)).inflation == 1);
   const Eigen::Matrix2d none = Eigen::Matrix2d::Zero();
-  CHECK(WidenBySandwich(none, Eigen::MatrixXd::Zero(scores.rows(), 2), Numbers(scores.rows(), 4)).information == none);
+  CHECK(WidenBySandwich(none, Eigen::MatrixXd::Zero(scores.rows(), 2), Numbers(scores.rows(), 4))
+            .information == none);
 }
 
 TEST_CASE("data without noise are explained exactly, and the end is found") {
   const Prior prior({Prior::Normal(0, 1), Prior::Normal(0, 1)});
   const auto model = [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
-    return Eigen::ArrayXd::LinSpaced(60, 0, 3).unaryExpr([&](double t) { return std::exp(x(0)) * std::sin(std::exp(x(1)) * t); });
+    return Eigen::ArrayXd::LinSpaced(60, 0, 3).unaryExpr(
+        [&](double t) { return std::exp(x(0)) * std::sin(std::exp(x(1)) * t); });
   };
   const Eigen::Vector2d truth(0.4, 0.3);
   const LaplaceFit fit = FitLaplace(Fitting(prior, model(truth), model), Eigen::Vector2d::Zero());
@@ -316,7 +351,8 @@ TEST_CASE("a border beyond which simulations fail does not stop the fit") {
   options.tolerance = 1e-6;
   const LaplaceFit near = FitLaplace(Fitting(prior, y, model), Eigen::Vector2d(1, 0.5), options);
   CHECK(near.mode(0) == Approx(1).margin(0.02));
-  // From below, the first steps lead across the border; from the border itself, the only slope is the backward one.
+  // From below, the first steps lead across the border; from the border itself, the only slope is
+  // the backward one.
   for (const Eigen::Vector2d& start : {Eigen::Vector2d(0.2, 0), Eigen::Vector2d(1.05, -1)}) {
     const LaplaceFit fit = FitLaplace(Fitting(prior, y, model), start, options);
     CHECK(fit.converged);
@@ -324,7 +360,8 @@ TEST_CASE("a border beyond which simulations fail does not stop the fit") {
   }
   // Right on the border lies the best that can be had.
   const Eigen::VectorXd beyond = (1.2 * Eigen::ArrayXd::LinSpaced(60, 0, 3)).exp();
-  CHECK(FitLaplace(Fitting(prior, beyond, model), Eigen::Vector2d(0, 0)).mode(0) == Approx(1.05).margin(0.1));
+  CHECK(FitLaplace(Fitting(prior, beyond, model), Eigen::Vector2d(0, 0)).mode(0) ==
+        Approx(1.05).margin(0.1));
 }
 
 TEST_CASE("what cannot be fitted is refused") {
@@ -332,11 +369,13 @@ TEST_CASE("what cannot be fitted is refused") {
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
   const Eigen::MatrixXd a = Normals(6, 3, 14);
   CHECK_NOTHROW(FitLaplace(Line(prior, Eigen::VectorXd::Ones(6), a), zero));
-  CHECK_THROWS_AS(FitLaplace(Line(prior, Eigen::VectorXd::Ones(5), a.topRows(5)), zero), std::invalid_argument);
+  CHECK_THROWS_AS(FitLaplace(Line(prior, Eigen::VectorXd::Ones(5), a.topRows(5)), zero),
+                  std::invalid_argument);
   LeastSquares known = Line(prior, Eigen::VectorXd::Ones(5), a.topRows(5));
   known.scale_known = true;
   CHECK_NOTHROW(FitLaplace(known, zero));
-  CHECK_THROWS_AS(FitLaplace(Line(prior, Eigen::VectorXd::Ones(6), a), Eigen::Vector2d::Zero()), std::invalid_argument);
+  CHECK_THROWS_AS(FitLaplace(Line(prior, Eigen::VectorXd::Ones(6), a), Eigen::Vector2d::Zero()),
+                  std::invalid_argument);
   LeastSquares uneven = Line(prior, Eigen::VectorXd::Ones(6), a);
   uneven.block.pop_back();
   CHECK_THROWS_AS(FitLaplace(uneven, zero), std::invalid_argument);
@@ -360,26 +399,31 @@ TEST_CASE("no iteration at all looks at the start as it is") {
   const double s = fit.scale(0);
   CHECK((fit.jacobian * s - a).norm() < 1e-5);
   CHECK((fit.errors * s - errors).norm() < 1e-9);
-  const double effective = (Conjugate(prior, a, y, s).covariance * a.transpose() * a / (s * s)).trace();
+  const double effective =
+      (Conjugate(prior, a, y, s).covariance * a.transpose() * a / (s * s)).trace();
   CHECK(s * s == Approx(errors.squaredNorm() / (100 - effective)).epsilon(0.002));
 }
 
-// ln p of blocks of k rows, normal or Student's t, the scale at its maximum by search, up to a constant of data and tails.
+// ln p of blocks of k rows, normal or Student's t, the scale at its maximum by search, up to a
+// constant of data and tails.
 double Profile(const Eigen::VectorXd& errors, int k, double f) {
   const auto at = [&](double log_s) {
     const double s = std::exp(log_s);
     double sum = -static_cast<double>(errors.size()) * log_s;
     for (Eigen::Index i = 0; i < errors.size(); i += k) {
       const double squared = errors.segment(i, k).squaredNorm() / (s * s);
-      sum += std::isinf(f) ? -0.5 * squared
-                           : std::lgamma((f + k) / 2) - std::lgamma(f / 2) - 0.5 * k * std::log(f / 2) - 0.5 * (f + k) * std::log1p(squared / f);
+      sum += std::isinf(f)
+                 ? -0.5 * squared
+                 : std::lgamma((f + k) / 2) - std::lgamma(f / 2) - 0.5 * k * std::log(f / 2) -
+                       0.5 * (f + k) * std::log1p(squared / f);
     }
     return sum;
   };
   double best = -12;
   for (const double step : {0.05, 1e-3}) {
     const double middle = best;
-    for (double log_s = step == 0.05 ? -12 : middle - 0.05; log_s < (step == 0.05 ? 15 : middle + 0.05); log_s += step) {
+    for (double log_s = step == 0.05 ? -12 : middle - 0.05;
+         log_s < (step == 0.05 ? 15 : middle + 0.05); log_s += step) {
       if (at(log_s) > at(best)) best = log_s;
     }
   }
@@ -392,7 +436,8 @@ TEST_CASE("the likelihood's scale is at its maximum, whatever else is asked in t
   const Prior prior({Prior::Normal(0, 1)});
   const Eigen::VectorXd y = Normals(240, 1, 17);
   LeastSquares problem = Fitting(prior, y, [](const Eigen::VectorXd& x) -> Eigen::VectorXd {
-    return x(0) > 50 ? Eigen::VectorXd::Constant(240, kNaN) : Eigen::VectorXd::Constant(240, x(0) * x(0) * x(0));
+    return x(0) > 50 ? Eigen::VectorXd::Constant(240, kNaN)
+                     : Eigen::VectorXd::Constant(240, x(0) * x(0) * x(0));
   });
   problem.block = Numbers(240, k);
   const Eigen::VectorXd x = Eigen::VectorXd{{0, 30, 0.1, -2, 60, 12}};

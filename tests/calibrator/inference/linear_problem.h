@@ -7,9 +7,9 @@
 
 namespace plumb {
 
-/// x = t + 0.5 normals, t ~ N(0, 1) in two dimensions, observed at (0.8, -0.4), and a third statistic that
-/// nobody observed: the posterior is N(0.8 x, 0.2 I). Simulations whose second parameter exceeds
-/// `fails_above` fail.
+/// x = t + 0.5 normals, t ~ N(0, 1) in two dimensions, observed at (0.8, -0.4), and a third
+/// statistic that nobody observed: the posterior is N(0.8 x, 0.2 I). Simulations whose second
+/// parameter exceeds `fails_above` fail.
 inline Problem LinearProblem(double fails_above = std::numeric_limits<double>::infinity()) {
   const auto simulate = [fails_above](const Eigen::MatrixXd& parameters, int64_t first) {
     Eigen::MatrixXd outcomes = Eigen::MatrixXd::Zero(3, parameters.cols());

@@ -8,8 +8,8 @@
 namespace plumb {
 namespace {
 
-// 21 simulators, n at (n - 10) / 5 in every transition, moved by something that depends on it; the robot is
-// at -1 in three transitions of ten, at 1 in the others.
+// 21 simulators, n at (n - 10) / 5 in every transition, moved by something that depends on it; the
+// robot is at -1 in three transitions of ten, at 1 in the others.
 struct Bimodal {
   std::vector<Eigen::MatrixXd> predictions;
   Eigen::MatrixXd outcomes{1, 400};
@@ -38,7 +38,8 @@ TEST_CASE("a population of two modes is recovered, where least squares lands bet
   for (int n = 0; n < 21; ++n) {
     double sum = 0;
     for (size_t t = 0; t < 400; ++t)
-      sum += std::pow(robot.predictions[t](0, n) - robot.outcomes(0, static_cast<Eigen::Index>(t)), 2);
+      sum +=
+          std::pow(robot.predictions[t](0, n) - robot.outcomes(0, static_cast<Eigen::Index>(t)), 2);
     if (sum < least) best = n, least = sum;
   }
   CHECK(best == 12);  // at 0.4, where the robot never is

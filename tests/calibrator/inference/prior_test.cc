@@ -25,7 +25,8 @@ TEST_CASE("the prior's density integrates to one, and is zero out of bounds") {
   const Prior prior({Prior::Normal(0, 2), Prior::Uniform(1, 4)});
   double sum = 0;
   for (double a = -12; a < 12; a += 0.05) {
-    for (double b = 0.95; b < 4.1; b += 0.1) sum += std::exp(prior.LogDensity(Eigen::Vector2d(a, b))) * 0.05 * 0.1;
+    for (double b = 0.95; b < 4.1; b += 0.1)
+      sum += std::exp(prior.LogDensity(Eigen::Vector2d(a, b))) * 0.05 * 0.1;
   }
   CHECK(sum == Approx(1).epsilon(1e-6));
   CHECK(prior.LogDensity(Eigen::Vector2d(0, 4.01)) == -std::numeric_limits<double>::infinity());

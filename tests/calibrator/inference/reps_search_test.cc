@@ -39,7 +39,9 @@ TEST_CASE("with log-likelihoods, policy search comes to rest at the posterior") 
     const Eigen::Array3d ratio = run.distribution.covariance.diagonal().array().sqrt() / sd;
     CHECK(ratio.maxCoeff() < 1 + width);
     CHECK(ratio.minCoeff() > 1 - width);
-    const double correlation = run.distribution.covariance(0, 1) / std::sqrt(run.distribution.covariance(0, 0) * run.distribution.covariance(1, 1));
+    const double correlation =
+        run.distribution.covariance(0, 1) /
+        std::sqrt(run.distribution.covariance(0, 0) * run.distribution.covariance(1, 1));
     CHECK(correlation == Approx(truth.covariance(0, 1) / (sd(0) * sd(1))).margin(width));
   };
   for (const uint64_t seed : {1, 2, 3, 4, 5}) {
@@ -61,9 +63,15 @@ TEST_CASE("the width at rest is the posterior's even where it is wider than what
   RepsOptions options;
   options.updates = 60;
   const Prior prior({Prior::Normal(2, 3), Prior::Normal(0, 1)});
-  const RepsRun run = RepsSearch(prior, [](const Eigen::MatrixXd& x) -> Eigen::VectorXd { return Eigen::VectorXd::Constant(x.cols(), -7); }, options);
+  const RepsRun run = RepsSearch(
+      prior,
+      [](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
+        return Eigen::VectorXd::Constant(x.cols(), -7);
+      },
+      options);
   CHECK((run.distribution.mean - Eigen::Vector2d(2, 0)).norm() < 1e-6);
-  CHECK((run.distribution.covariance - Eigen::Matrix2d(Eigen::Vector2d(9, 1).asDiagonal())).norm() < 1e-6);
+  CHECK((run.distribution.covariance - Eigen::Matrix2d(Eigen::Vector2d(9, 1).asDiagonal())).norm() <
+        1e-6);
   CHECK(run.kl < 1e-9);
 }
 
@@ -96,11 +104,14 @@ TEST_CASE("no update leads the distribution further than the bound") {
   options.bound_distribution = false;
   const std::vector<Gaussian> free = Path(likelihood, options, 5);
   farthest = 0;
-  for (size_t i = 1; i < free.size(); ++i) farthest = std::max(farthest, KlDivergence(free[i], free[i - 1]));
+  for (size_t i = 1; i < free.size(); ++i)
+    farthest = std::max(farthest, KlDivergence(free[i], free[i - 1]));
   CHECK(farthest > 0.15);
 }
 
-Eigen::VectorXd Bowl(const Eigen::MatrixXd& x) { return (x.colwise() - Eigen::Vector3d(1.8, -2.3, 2)).colwise().squaredNorm().transpose(); }
+Eigen::VectorXd Bowl(const Eigen::MatrixXd& x) {
+  return (x.colwise() - Eigen::Vector3d(1.8, -2.3, 2)).colwise().squaredNorm().transpose();
+}
 
 TEST_CASE("costs in the unit range are free of units, raw ones are not") {
   const Linear likelihood;
@@ -111,15 +122,22 @@ TEST_CASE("costs in the unit range are free of units, raw ones are not") {
   CHECK((run.distribution.mean - Eigen::Vector3d(1.8, -2.3, 2)).norm() < 0.5);
   CHECK(run.distribution.covariance.trace() < 0.5 * 5.25);
   CHECK(run.weights.sum() == Approx(1));
-  const RepsRun other = RepsSearch(likelihood.prior, [](const Eigen::MatrixXd& x) -> Eigen::VectorXd { return 1e-6 * Bowl(x).array() + 3; }, options);
+  const RepsRun other = RepsSearch(
+      likelihood.prior,
+      [](const Eigen::MatrixXd& x) -> Eigen::VectorXd { return 1e-6 * Bowl(x).array() + 3; },
+      options);
   CHECK((run.distribution.mean - other.distribution.mean).norm() < 1e-4);
   // Raw costs far below the least temperature: all samples count alike.
   options.returns = RepsReturns::kRaw;
-  const RepsRun tiny = RepsSearch(likelihood.prior, [](const Eigen::MatrixXd& x) -> Eigen::VectorXd { return 1e-6 * Bowl(x); }, options);
+  const RepsRun tiny = RepsSearch(
+      likelihood.prior, [](const Eigen::MatrixXd& x) -> Eigen::VectorXd { return 1e-6 * Bowl(x); },
+      options);
   CHECK(tiny.ess == Approx(25).margin(1e-3));
   CHECK(tiny.temperature == 0.01);
   // And of a size that suits the temperature, they do select.
-  CHECK((RepsSearch(likelihood.prior, Bowl, options).distribution.mean - Eigen::Vector3d(1.8, -2.3, 2)).norm() < 0.5);
+  CHECK((RepsSearch(likelihood.prior, Bowl, options).distribution.mean -
+         Eigen::Vector3d(1.8, -2.3, 2))
+            .norm() < 0.5);
   options.updates = 1;
   CHECK(RepsSearch(likelihood.prior, Bowl, options).ess < 23);
 }
@@ -161,28 +179,36 @@ TEST_CASE("damping keeps the covariance's shape and scales it as Chebotar does")
 
 TEST_CASE("failures are infinitely bad, counted, and teach nothing when they are all there is") {
   const Linear likelihood;
-  for (const RepsReturns returns : {RepsReturns::kRaw, RepsReturns::kUnitRange, RepsReturns::kLogLikelihood}) {
+  for (const RepsReturns returns :
+       {RepsReturns::kRaw, RepsReturns::kUnitRange, RepsReturns::kLogLikelihood}) {
     RepsOptions options;
     options.returns = returns;
     options.updates = 7;
-    const RepsRun none = RepsSearch(likelihood.prior, [](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
-      return Eigen::VectorXd::Constant(x.cols(), std::nan(""));
-    }, options);
+    const RepsRun none = RepsSearch(
+        likelihood.prior,
+        [](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
+          return Eigen::VectorXd::Constant(x.cols(), std::nan(""));
+        },
+        options);
     CHECK(none.failures == 7 * 25);
     CHECK(none.distribution.mean == Eigen::Vector3d(1, -2, 3));
-    CHECK((none.distribution.covariance - Eigen::Matrix3d(Eigen::Vector3d(1, 0.25, 4).asDiagonal())).norm() < 1e-12);
+    CHECK((none.distribution.covariance - Eigen::Matrix3d(Eigen::Vector3d(1, 0.25, 4).asDiagonal()))
+              .norm() < 1e-12);
     CHECK(none.kl == 0);
     // Below zero the first parameter is no simulator; the weights know.
     int64_t expected = 0;
-    const RepsRun some = RepsSearch(likelihood.prior, [&](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
-      Eigen::VectorXd values = returns == RepsReturns::kLogLikelihood ? likelihood(x) : Bowl(x);
-      for (Eigen::Index i = 0; i < x.cols(); ++i) {
-        if (x(0, i) >= 0) continue;
-        values(i) = i % 3 == 0 ? std::nan("") : i % 3 == 1 ? kInfinity : -kInfinity;
-        ++expected;
-      }
-      return values;
-    }, options);
+    const RepsRun some = RepsSearch(
+        likelihood.prior,
+        [&](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
+          Eigen::VectorXd values = returns == RepsReturns::kLogLikelihood ? likelihood(x) : Bowl(x);
+          for (Eigen::Index i = 0; i < x.cols(); ++i) {
+            if (x(0, i) >= 0) continue;
+            values(i) = i % 3 == 0 ? std::nan("") : i % 3 == 1 ? kInfinity : -kInfinity;
+            ++expected;
+          }
+          return values;
+        },
+        options);
     CHECK(expected > 5);
     CHECK(some.failures == expected);
     for (Eigen::Index i = 0; i < some.weights.size(); ++i) {
@@ -196,7 +222,8 @@ TEST_CASE("the last update's samples and the progress are told") {
   RepsOptions options;
   options.updates = 3;
   std::vector<int> told;
-  const RepsRun run = RepsSearch(likelihood.prior, likelihood, options, [&](int update) { told.push_back(update); });
+  const RepsRun run = RepsSearch(likelihood.prior, likelihood, options,
+                                 [&](int update) { told.push_back(update); });
   CHECK(told == std::vector<int>{1, 2, 3});
   CHECK(run.samples.cols() == 25);
   const auto stop = [](int) { throw std::runtime_error("stop"); };

@@ -73,14 +73,16 @@ TEST_CASE("hard cases of the dual") {
     CHECK(w.ess == Approx(9));
   }
   SECTION("most samples impossible: nothing overflows, the bound cannot be met") {
-    Eigen::VectorXd returns = Eigen::VectorXd::Constant(10, -std::numeric_limits<double>::infinity());
+    Eigen::VectorXd returns =
+        Eigen::VectorXd::Constant(10, -std::numeric_limits<double>::infinity());
     returns(4) = -3;
     CHECK(SolveReps(returns, 0.1, 1).weights(4) == 1);
   }
   SECTION("rubbish is refused") {
     CHECK_THROWS(SolveReps(Eigen::VectorXd(), 0.1, 1));
     CHECK_THROWS(SolveReps(Eigen::VectorXd::Constant(3, std::nan("")), 0.1, 1));
-    CHECK_THROWS(SolveReps(Eigen::VectorXd::Constant(3, -std::numeric_limits<double>::infinity()), 0.1, 1));
+    CHECK_THROWS(
+        SolveReps(Eigen::VectorXd::Constant(3, -std::numeric_limits<double>::infinity()), 0.1, 1));
   }
 }
 
@@ -112,7 +114,8 @@ TEST_CASE("samples have the moments asked for, and fitting them gives the Gaussi
   const Gaussian p = Example();
   Random random(11);
   Eigen::MatrixXd normals(2, 20000);
-  for (Eigen::Index j = 0; j < normals.cols(); ++j) normals.col(j) << random.Normal(), random.Normal();
+  for (Eigen::Index j = 0; j < normals.cols(); ++j)
+    normals.col(j) << random.Normal(), random.Normal();
   const Eigen::MatrixXd samples = Transform(p, normals);
   const RepsWeights equal = SolveReps(Eigen::VectorXd::Zero(20000), 0.1, 1);
   const Gaussian fit = FitGaussian(samples, equal, p);
@@ -128,7 +131,9 @@ TEST_CASE("few samples leave the covariance near the prior's, and unbiased on av
     Random random(5, {trial});
     Eigen::MatrixXd normals(2, 6);
     for (double& x : normals.reshaped()) x = random.Normal();
-    mean += FitGaussian(Transform(p, normals), SolveReps(Eigen::VectorXd::Zero(6), 0.1, 1), p).covariance / kTrials;
+    mean += FitGaussian(Transform(p, normals), SolveReps(Eigen::VectorXd::Zero(6), 0.1, 1), p)
+                .covariance /
+            kTrials;
   }
   CHECK((mean - p.covariance).norm() < 0.06);
 }

@@ -12,8 +12,8 @@ namespace {
 
 constexpr int kRuns = 500, kDraws = 99;
 
-// y = A x + noise with sd 1/2, of a normal x: the posterior is known exactly. A does not see x_0 - x_1: there
-// the posterior is the prior's.
+// y = A x + noise with sd 1/2, of a normal x: the posterior is known exactly. A does not see x_0 -
+// x_1: there the posterior is the prior's.
 struct LinearGaussian {
   Prior prior{{Prior::Normal(1, 2), Prior::Normal(-3, 2)}};
   Eigen::MatrixXd a = (Eigen::MatrixXd(3, 2) << 1, 1, -0.5, -0.5, 2, 2).finished();
@@ -24,14 +24,16 @@ struct LinearGaussian {
     const Eigen::MatrixXd precision =
         Eigen::MatrixXd::Identity(2, 2) / 4 + a.transpose() * a / (noise * noise);
     const Eigen::MatrixXd covariance = precision.inverse();
-    return {covariance * (Eigen::Vector2d(1, -3) / 4 + a.transpose() * y / (noise * noise)), covariance};
+    return {covariance * (Eigen::Vector2d(1, -3) / 4 + a.transpose() * y / (noise * noise)),
+            covariance};
   }
 };
 
 /// A posterior that is wrong: its sd times `width`, its mean moved by `bias` of its sd.
 SbcResult Run(double width, double bias, int runs = kRuns, uint64_t seed = 3) {
   const LinearGaussian problem;
-  const auto fit = [&](const Eigen::VectorXd& truth, Random& random) -> std::optional<Eigen::MatrixXd> {
+  const auto fit = [&](const Eigen::VectorXd& truth,
+                       Random& random) -> std::optional<Eigen::MatrixXd> {
     Gaussian posterior = problem.Posterior(truth, random);
     posterior.mean += bias * posterior.covariance.diagonal().cwiseSqrt();
     posterior.covariance *= width * width;
@@ -127,7 +129,8 @@ TEST_CASE("the test by distribution function is exact where it can be counted") 
 TEST_CASE("failed runs are counted, and tests are of the others") {
   const LinearGaussian problem;
   int run = 0;
-  const auto fit = [&](const Eigen::VectorXd& truth, Random& random) -> std::optional<Eigen::MatrixXd> {
+  const auto fit = [&](const Eigen::VectorXd& truth,
+                       Random& random) -> std::optional<Eigen::MatrixXd> {
     const Gaussian posterior = problem.Posterior(truth, random);
     Eigen::MatrixXd draws = Transform(posterior, StandardNormals(2, 19, random));
     if (++run % 10 == 0) return std::nullopt;
@@ -140,7 +143,9 @@ TEST_CASE("failed runs are counted, and tests are of the others") {
   CHECK(result.quantities[0].ecdf_p > 0.01);
   CHECK(Words(result).find("60 of 300 runs failed (20.0 %)") != std::string::npos);
 
-  const auto never = [](const Eigen::VectorXd&, Random&) -> std::optional<Eigen::MatrixXd> { return {}; };
+  const auto never = [](const Eigen::VectorXd&, Random&) -> std::optional<Eigen::MatrixXd> {
+    return {};
+  };
   const SbcResult nothing = RunSbc(problem.prior, never, Marginals({"a", "b"}), 3, 5);
   CHECK(nothing.failures == 3);
   CHECK(nothing.draws == 0);
@@ -176,7 +181,8 @@ TEST_CASE("what is no calibration is refused") {
   const auto one = [](const Eigen::VectorXd&, Random&) {
     return std::optional(Eigen::MatrixXd::Zero(1, 9).eval());
   };
-  const SbcQuantity undefined{"ln x", [](const Eigen::VectorXd& x) { return std::log(-1 - x(0) * x(0)); }};
+  const SbcQuantity undefined{"ln x",
+                              [](const Eigen::VectorXd& x) { return std::log(-1 - x(0) * x(0)); }};
   CHECK_THROWS_AS(RunSbc(prior, one, {undefined}, 2, 1), std::invalid_argument);
   const auto tall = [](const Eigen::VectorXd&, Random&) {
     return std::optional(Eigen::MatrixXd::Zero(2, 3).eval());

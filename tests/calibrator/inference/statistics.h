@@ -8,7 +8,8 @@
 
 namespace plumb {
 
-/// p of so large a distance between the samples' distribution function and a normal one (Kolmogorov's asymptotic law).
+/// p of so large a distance between the samples' distribution function and a normal one
+/// (Kolmogorov's asymptotic law).
 inline double KolmogorovSmirnov(const Eigen::VectorXd& samples, double mean, double sd) {
   std::vector<double> sorted(samples.begin(), samples.end());
   std::sort(sorted.begin(), sorted.end());
@@ -16,7 +17,8 @@ inline double KolmogorovSmirnov(const Eigen::VectorXd& samples, double mean, dou
   double distance = 0;
   for (size_t i = 0; i < sorted.size(); ++i) {
     const double f = 0.5 * std::erfc(-(sorted[i] - mean) / sd / std::sqrt(2.0));
-    distance = std::max({distance, f - static_cast<double>(i) / n, static_cast<double>(i + 1) / n - f});
+    distance =
+        std::max({distance, f - static_cast<double>(i) / n, static_cast<double>(i + 1) / n - f});
   }
   const double lambda = (std::sqrt(n) + 0.12 + 0.11 / std::sqrt(n)) * distance;
   double p = 0;

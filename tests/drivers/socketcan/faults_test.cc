@@ -1,5 +1,6 @@
-// What goes wrong on a bus, made by the kernel's own means: traffic control on a pair of vxcan interfaces,
-// whose frames really pass a queue, and a serial adapter (slcan) of which we are the adapter.
+// What goes wrong on a bus, made by the kernel's own means: traffic control on a pair of vxcan
+// interfaces, whose frames really pass a queue, and a serial adapter (slcan) of which we are the
+// adapter.
 
 #include <asm/termbits.h>
 #include <fcntl.h>
@@ -24,7 +25,8 @@ namespace {
 using Catch::Matchers::Contains;
 
 constexpr char kFreshPair[] =
-    "ip link del vx0 2>/dev/null; ip link add dev vx0 type vxcan peer name vx1 && ip link set vx0 up && "
+    "ip link del vx0 2>/dev/null; ip link add dev vx0 type vxcan peer name vx1 && ip link set vx0 "
+    "up && "
     "ip link set vx1 up";
 
 Texts Numbered(int count) {
@@ -46,7 +48,8 @@ int64_t RealtimeNs() {
 
 TEST_CASE("a full transmit queue refuses, and what it refused never comes") {
   // A frame in 16 s, but for the first two: nothing leaves the queue while we look.
-  if (!Try(kFreshPair) || !Try("tc qdisc add dev vx0 root tbf rate 8bit burst 32 limit 1600")) return;
+  if (!Try(kFreshPair) || !Try("tc qdisc add dev vx0 root tbf rate 8bit burst 32 limit 1600"))
+    return;
   const auto host = OpenTransport("socketcan:vx0"), drive = OpenTransport("socketcan:vx1");
   const int accepted = Send(*host, Numbered(64));
   CHECK(accepted >= 4);
@@ -64,7 +67,8 @@ TEST_CASE("a full transmit queue refuses, and what it refused never comes") {
 }
 
 TEST_CASE("down and up empties the transmit queue") {
-  if (!Try(kFreshPair) || !Try("tc qdisc add dev vx0 root tbf rate 8bit burst 32 limit 1600")) return;
+  if (!Try(kFreshPair) || !Try("tc qdisc add dev vx0 root tbf rate 8bit burst 32 limit 1600"))
+    return;
   const auto host = OpenTransport("socketcan:vx0"), drive = OpenTransport("socketcan:vx1");
   const int accepted = Send(*host, Numbered(8));
   CHECK(accepted >= 4);
@@ -102,7 +106,9 @@ TEST_CASE("delayed frames are stamped when they arrive") {
 }
 
 TEST_CASE("doubled and exchanged frames are handed out as they come") {
-  if (!Try(kFreshPair) || !Try("tc qdisc add dev vx0 root netem delay 5ms reorder 50% duplicate 20%")) return;
+  if (!Try(kFreshPair) ||
+      !Try("tc qdisc add dev vx0 root netem delay 5ms reorder 50% duplicate 20%"))
+    return;
   const auto host = OpenTransport("socketcan:vx0"), drive = OpenTransport("socketcan:vx1");
   Texts sent;
   for (int i = 0; i < 20; ++i) {
@@ -117,7 +123,8 @@ TEST_CASE("doubled and exchanged frames are handed out as they come") {
 
 TEST_CASE("error frames that are no bus-off change nothing") {
   FreshVcan();
-  const auto bus = OpenTransport("socketcan:vcan0", {{.id = 0x29}}), other = OpenTransport("socketcan:vcan0");
+  const auto bus = OpenTransport("socketcan:vcan0", {{.id = 0x29}}),
+             other = OpenTransport("socketcan:vcan0");
   for (const char* text :
        {"20000004#001000000000FF60", "20000020#0000000000000000", "20000008#0000081900000000"}) {
     Shell("cansend vcan0 " + std::string(text));
@@ -144,7 +151,8 @@ TEST_CASE("bus-off: nothing goes out until the controller is back") {
   }
 }
 
-/// A CAN adapter on a serial line: the kernel's end is an interface of kind "can", the other is ours.
+/// A CAN adapter on a serial line: the kernel's end is an interface of kind "can", the other is
+/// ours.
 struct SerialAdapter {
   SerialAdapter() {
     our_end = FileDescriptor(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK));
@@ -195,7 +203,8 @@ TEST_CASE("an adapter that goes bus-off") {
   }
   const auto bus = OpenTransport("socketcan:" + adapter.name);
   REQUIRE(!bus->warnings().empty());
-  CHECK_THAT(bus->warnings()[0], Contains("restart-ms is 0") && Contains("ip link set " + adapter.name));
+  CHECK_THAT(bus->warnings()[0],
+             Contains("restart-ms is 0") && Contains("ip link set " + adapter.name));
   CHECK(Send(*bus, {"02E#0000C03F"}) == 1);
   CHECK(adapter.Read(1) == "t02E40000C03F\r");
   adapter.Write("t0298000080BE00006040\r");

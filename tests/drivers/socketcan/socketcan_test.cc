@@ -1,6 +1,6 @@
-// Against the kernel's own SocketCAN: run by tests/with-vcan as root of a network namespace, or of a guest,
-// that has vcan0 and ends with the test. Anywhere else every case fails or the whole is skipped; nothing
-// passes untested.
+// Against the kernel's own SocketCAN: run by tests/with-vcan as root of a network namespace, or of
+// a guest, that has vcan0 and ends with the test. Anywhere else every case fails or the whole is
+// skipped; nothing passes untested.
 
 #include <net/if.h>
 #include <poll.h>
@@ -87,11 +87,13 @@ TEST_CASE("can-utils hear us and we hear them") {
   }
 }
 
-TEST_CASE("the kernel filters: other nodes, remote frames and 29-bit ids stay out, errors come in") {
+TEST_CASE(
+    "the kernel filters: other nodes, remote frames and 29-bit ids stay out, errors come in") {
   FreshVcan();
   const auto sender = OpenTransport("socketcan:vcan0");
   const auto host = OpenTransport("socketcan:vcan0", {{.id = 0x20, .mask = 0x7E0}});
-  const auto drive = OpenTransport("socketcan:vcan0", {{.id = 0x20, .mask = 0x7E0, .remote = true}});
+  const auto drive =
+      OpenTransport("socketcan:vcan0", {{.id = 0x20, .mask = 0x7E0, .remote = true}});
   const Texts all = {"029#11", "029#R", "049#11", "00000029#11", "1ABCD029#11", "03F#22"};
   CHECK(Send(*sender, all) == 6);
   Shell("cansend vcan0 20000040#0000000000000000");
@@ -113,7 +115,9 @@ TEST_CASE("another's command is told from our own echo, though it comes from thi
   CheckReceives(*second, {"02E#01", "02E#02"});
   CHECK(second->stats().foreign == 2);
 
-  Shell("cansend vcan0 029#11 && cansend vcan0 02E#22 && cansend vcan0 02E#R && cansend vcan0 0000002E#33");
+  Shell(
+      "cansend vcan0 029#11 && cansend vcan0 02E#22 && cansend vcan0 02E#R && cansend vcan0 "
+      "0000002E#33");
   std::array<Frame, 8> frames;
   REQUIRE(Readable(*master));
   REQUIRE(master->Receive(frames) == 2);
@@ -155,7 +159,8 @@ TEST_CASE("a bus-off error frame stops the driver") {
 
 TEST_CASE("the interface goes down and comes up") {
   FreshVcan();
-  const auto bus = OpenTransport("socketcan:vcan0", {{.id = 0x29}}), other = OpenTransport("socketcan:vcan0");
+  const auto bus = OpenTransport("socketcan:vcan0", {{.id = 0x29}}),
+             other = OpenTransport("socketcan:vcan0");
   const int fd = bus->fd();
   Shell("ip link set vcan0 down");
   CHECK(ReceiveAll(*bus).empty());
@@ -254,8 +259,9 @@ TEST_CASE("a receiver that is too slow learns how much it lost") {
 
 TEST_CASE("interfaces that are none") {
   RequireVcan();
-  CHECK_THROWS_WITH(OpenTransport("socketcan:can7"),
-                    Contains("socketcan:can7: no such interface") && Contains("ip link add can7 type vcan"));
+  CHECK_THROWS_WITH(
+      OpenTransport("socketcan:can7"),
+      Contains("socketcan:can7: no such interface") && Contains("ip link add can7 type vcan"));
   CHECK_THROWS_WITH(OpenTransport("socketcan:lo"), Contains("socketcan:lo: not a CAN interface"));
 }
 

@@ -31,7 +31,8 @@ inline void Shell(const std::string& command) {
   REQUIRE(std::system(command.c_str()) == 0);
 }
 
-/// For what a machine's own kernel need not have. @return true if the command worked; in the guest it must.
+/// For what a machine's own kernel need not have. @return true if the command worked; in the guest
+/// it must.
 inline bool Try(const std::string& command) {
   RequireVcan();
   if (InGuest()) Shell(command);

@@ -11,7 +11,8 @@ namespace {
 
 struct Motion {
   explicit Motion(const std::string& name)
-      : robot(WithSimulatedNoise(LoadRobot(SourceFile("robots/" + name)))), recordings(Record(robot, 1, 2)) {}
+      : robot(WithSimulatedNoise(LoadRobot(SourceFile("robots/" + name)))),
+        recordings(Record(robot, 1, 2)) {}
 
   RobotDescription AssumedWith(double mass, double acceleration) const {
     RobotDescription assumed = Assumed(robot, mass);
@@ -24,14 +25,16 @@ struct Motion {
 };
 
 TEST_CASE(
-    "with the right dynamics, velocities are half as good again as the kinematic filter's or more, through "
+    "with the right dynamics, velocities are half as good again as the kinematic filter's or more, "
+    "through "
     "impacts, too") {
   const Motion motion(GENERATE("pendulum", "hopper", "hopper/gym.toml"));
   const ModelErrors errors = Compare(motion.robot, Assumed(motion.robot), motion.recordings);
   for (size_t i = 0; i < errors.model.size(); ++i) {
     INFO(motion.robot.joints[i].name << ": v " << errors.kinematic[i].v() << ", on the model "
-                                     << errors.model[i].v() << ", NEES " << errors.model[i].nees_v() << "; q "
-                                     << errors.kinematic[i].q() << ", " << errors.model[i].q());
+                                     << errors.model[i].v() << ", NEES " << errors.model[i].nees_v()
+                                     << "; q " << errors.kinematic[i].q() << ", "
+                                     << errors.model[i].q());
     CHECK(1.5 * errors.model[i].v() < errors.kinematic[i].v());
     CHECK(errors.model[i].q() < 1.2 * errors.kinematic[i].q());
     CHECK(errors.model[i].nees_v() < 2);
@@ -41,7 +44,8 @@ TEST_CASE(
 
 // Why calibration may not use it: what it assumed is in its states.
 TEST_CASE(
-    "with masses 30 % too great it is worse than with the right ones, and than what calibration has of some "
+    "with masses 30 % too great it is worse than with the right ones, and than what calibration "
+    "has of some "
     "joint") {
   const Motion motion(GENERATE("pendulum", "hopper"));
   const ObserverErrors observed = Observe(motion.robot, motion.recordings);
@@ -49,11 +53,13 @@ TEST_CASE(
   const ModelErrors wrong = Compare(motion.robot, motion.AssumedWith(1.3, 0.2), motion.recordings);
   double more_than_right = 0, more_than_smoothed = 0;
   for (size_t i = 0; i < wrong.model.size(); ++i) {
-    INFO(motion.robot.joints[i].name << ": v " << right.model[i].v() << ", wrong " << wrong.model[i].v()
-                                     << ", smoothed " << observed.joints[i].smoothed.v());
+    INFO(motion.robot.joints[i].name << ": v " << right.model[i].v() << ", wrong "
+                                     << wrong.model[i].v() << ", smoothed "
+                                     << observed.joints[i].smoothed.v());
     CHECK(wrong.model[i].v() > 1.2 * right.model[i].v());
     more_than_right = std::max(more_than_right, wrong.model[i].v() / right.model[i].v());
-    more_than_smoothed = std::max(more_than_smoothed, wrong.model[i].v() / observed.joints[i].smoothed.v());
+    more_than_smoothed =
+        std::max(more_than_smoothed, wrong.model[i].v() / observed.joints[i].smoothed.v());
   }
   CHECK(more_than_right > 1.5);
   CHECK(more_than_smoothed > 1.4);
@@ -62,10 +68,12 @@ TEST_CASE(
 TEST_CASE("taken at its word, a wrong model is worse than none, a right one better still") {
   const Motion motion(GENERATE("pendulum", "hopper"));
   const ModelErrors right = Compare(motion.robot, motion.AssumedWith(1, 0.005), motion.recordings);
-  const ModelErrors wrong = Compare(motion.robot, motion.AssumedWith(1.3, 0.005), motion.recordings);
+  const ModelErrors wrong =
+      Compare(motion.robot, motion.AssumedWith(1.3, 0.005), motion.recordings);
   for (size_t i = 0; i < wrong.model.size(); ++i) {
     INFO(motion.robot.joints[i].name << ": v " << right.kinematic[i].v() << ", on the right model "
-                                     << right.model[i].v() << ", on the wrong one " << wrong.model[i].v());
+                                     << right.model[i].v() << ", on the wrong one "
+                                     << wrong.model[i].v());
     CHECK(wrong.model[i].v() > 1.2 * wrong.kinematic[i].v());
     CHECK(right.model[i].v() < 0.5 * right.kinematic[i].v());
     CHECK(wrong.model[i].nees_v() > 10);
@@ -73,7 +81,8 @@ TEST_CASE("taken at its word, a wrong model is worse than none, a right one bett
 }
 
 TEST_CASE(
-    "a thousand steps of a hopper, impacts, unknown efforts and failures among them, allocate nothing") {
+    "a thousand steps of a hopper, impacts, unknown efforts and failures among them, allocate "
+    "nothing") {
   const Motion motion("hopper");
   RobotDescription assumed = Assumed(motion.robot);
   assumed.joints[4].dynamics.delay = 0.007;

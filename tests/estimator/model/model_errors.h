@@ -13,14 +13,15 @@ struct ModelErrors {
   int64_t restarts = 0;  ///< of the filter on the model
 };
 
-/// The robot with the parameters that SimulatedReadings has, but for the masses of all links: those times
-/// `mass`.
+/// The robot with the parameters that SimulatedReadings has, but for the masses of all links: those
+/// times `mass`.
 inline RobotDescription Assumed(const RobotDescription& robot, double mass = 1) {
   Eigen::VectorXd parameters(static_cast<Eigen::Index>(robot.parameters.size()));
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
     const ParameterDescription& p = robot.parameters[i];
     const bool heavier = p.name.rfind("mass/", 0) == 0;
-    parameters[static_cast<Eigen::Index>(i)] = p.ToPhysical(p.coordinate_mean()) * (heavier ? mass : 1);
+    parameters[static_cast<Eigen::Index>(i)] =
+        p.ToPhysical(p.coordinate_mean()) * (heavier ? mass : 1);
   }
   return Model(robot).Describe(parameters);
 }
@@ -43,7 +44,8 @@ inline ModelErrors Compare(const RobotDescription& robot, const RobotDescription
       for (size_t i = 0; i < n; ++i) {
         const auto at = static_cast<Eigen::Index>(i);
         const auto add = [&](const robot_state_t& state, StateErrors& into) {
-          into.Add(state.q[i] - sample.q[at], state.v[i] - sample.v[at], state.q_sd[i], state.v_sd[i]);
+          into.Add(state.q[i] - sample.q[at], state.v[i] - sample.v[at], state.q_sd[i],
+                   state.v_sd[i]);
         };
         add(kinematic.state(), errors.kinematic[i]);
         add(model.state(), errors.model[i]);

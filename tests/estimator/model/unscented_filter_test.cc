@@ -19,7 +19,8 @@ Eigen::MatrixXd RandomMatrix(Random& random, Eigen::Index rows, Eigen::Index col
 TEST_CASE("of a linear motion it is the Kalman filter") {
   constexpr Eigen::Index n = 5;
   Random random(1, {7});
-  const Eigen::MatrixXd transition = Eigen::MatrixXd::Identity(n, n) + 0.1 * RandomMatrix(random, n, n);
+  const Eigen::MatrixXd transition =
+      Eigen::MatrixXd::Identity(n, n) + 0.1 * RandomMatrix(random, n, n);
   const Eigen::MatrixXd root = 0.2 * RandomMatrix(random, n, n), noise = root * root.transpose();
   const Eigen::MatrixXd rows = RandomMatrix(random, 2, n);
   const Eigen::Vector2d variances(0.3, 1e-3);
@@ -29,7 +30,8 @@ TEST_CASE("of a linear motion it is the Kalman filter") {
   filter.Restart(mean, sd);
   for (int k = 0; k < 300; ++k) {
     const Eigen::Vector2d reading = RandomMatrix(random, 2, 1);
-    REQUIRE(filter.Predict([&](Eigen::Ref<Eigen::VectorXd> x) { return x = transition * x, true; }, noise));
+    REQUIRE(filter.Predict([&](Eigen::Ref<Eigen::VectorXd> x) { return x = transition * x, true; },
+                           noise));
     mean = transition * mean;
     covariance = transition * covariance * transition.transpose() + noise;
     const Eigen::Matrix2d expected =
@@ -37,7 +39,8 @@ TEST_CASE("of a linear motion it is the Kalman filter") {
     const auto innovation = filter.Expect(rows.row(0).transpose(), reading(0), variances(0));
     CHECK(innovation.value == Approx(reading(0) - rows.row(0).dot(mean)).epsilon(1e-9));
     CHECK(innovation.variance == Approx(expected(0, 0)).epsilon(1e-9));
-    for (Eigen::Index i = 0; i < 2; ++i) filter.Correct(rows.row(i).transpose(), reading(i), variances(i));
+    for (Eigen::Index i = 0; i < 2; ++i)
+      filter.Correct(rows.row(i).transpose(), reading(i), variances(i));
     const Eigen::MatrixXd gain = covariance * rows.transpose() * expected.inverse();
     mean += gain * (reading - rows * mean);
     covariance = (Eigen::MatrixXd::Identity(n, n) - gain * rows) * covariance;
@@ -53,10 +56,12 @@ TEST_CASE("of a square it has the exact mean and variance") {
   for (const double m : {0.0, 0.7, -3.0}) {
     const double s = 0.4;
     filter.Restart(Eigen::VectorXd::Constant(1, m), Eigen::VectorXd::Constant(1, s));
-    REQUIRE(filter.Predict([](Eigen::Ref<Eigen::VectorXd> x) { return x = x.cwiseAbs2().eval(), true; },
-                           Eigen::MatrixXd::Zero(1, 1)));
+    REQUIRE(
+        filter.Predict([](Eigen::Ref<Eigen::VectorXd> x) { return x = x.cwiseAbs2().eval(), true; },
+                       Eigen::MatrixXd::Zero(1, 1)));
     CHECK(filter.mean()(0) == Approx(m * m + s * s).epsilon(1e-12));
-    CHECK(filter.covariance()(0, 0) == Approx(2 * std::pow(s, 4) + 4 * m * m * s * s).epsilon(1e-12));
+    CHECK(filter.covariance()(0, 0) ==
+          Approx(2 * std::pow(s, 4) + 4 * m * m * s * s).epsilon(1e-12));
   }
 }
 
@@ -72,16 +77,19 @@ TEST_CASE("a covariance stays one through a thousand exact readings") {
   CHECK(filter.mean()(1) == Approx(100).epsilon(1e-6));
 }
 
-TEST_CASE("a motion that fails leaves the filter as it was, and so does a covariance that is none") {
+TEST_CASE(
+    "a motion that fails leaves the filter as it was, and so does a covariance that is none") {
   UnscentedFilter filter(2);
   filter.Restart(Eigen::Vector2d(1, 2), Eigen::Vector2d(1, 1));
   int asked = 0;
-  CHECK_FALSE(filter.Predict([&](Eigen::Ref<Eigen::VectorXd> x) { return x.setZero(), ++asked < 4; },
-                             Eigen::Matrix2d::Zero()));
+  CHECK_FALSE(
+      filter.Predict([&](Eigen::Ref<Eigen::VectorXd> x) { return x.setZero(), ++asked < 4; },
+                     Eigen::Matrix2d::Zero()));
   CHECK(filter.mean() == Eigen::Vector2d(1, 2));
   CHECK(filter.covariance() == Eigen::Matrix2d::Identity());
   filter.Restart(Eigen::Vector2d(1, 2), Eigen::Vector2d(NAN, 1));
-  CHECK_FALSE(filter.Predict([](Eigen::Ref<Eigen::VectorXd>) { return true; }, Eigen::Matrix2d::Zero()));
+  CHECK_FALSE(
+      filter.Predict([](Eigen::Ref<Eigen::VectorXd>) { return true; }, Eigen::Matrix2d::Zero()));
 }
 
 }  // namespace

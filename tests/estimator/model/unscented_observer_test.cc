@@ -125,7 +125,8 @@ TEST_CASE("a silent joint moves on as the simulator says, under efforts that are
     // What was applied from (j - 1) to j periods has acted from 2.4 periods later on.
     double v = 0.3;
     for (int j = 1; j <= k; ++j)
-      v += efforts[static_cast<size_t>(j)] / kMass * kPeriod * std::clamp(k - 2.4 - (j - 1), 0.0, 1.0);
+      v += efforts[static_cast<size_t>(j)] / kMass * kPeriod *
+           std::clamp(k - 2.4 - (j - 1), 0.0, 1.0);
     REQUIRE(observer.state().v[0] == Approx(v).margin(1e-9));
   }
 }
