@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "calibrator/report/report_residuals.h"
+#include "plot/svg.h"
 #include "robot/xml.h"
 #include "tests/calibrator/sample_findings.h"
 #include "tests/calibrator/synthetic.h"
