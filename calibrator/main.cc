@@ -44,7 +44,7 @@ class Session {
     if (auto state = checkpoint_.Load()) {
       simopt_.Resume(std::move(*state));
       spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration,
-                   simopt_.state().update);
+                   simopt_.state().search.update);
       report_ = simopt_.Report();
       if (report_) WriteDistribution();  // a kill may have come before it
     }

@@ -91,6 +91,7 @@ Gaussian BySquaredError(const std::vector<Transition>& transitions, uint64_t see
   options.returns = RepsReturns::kUnitRange;
   options.min_temperature = 0.01;
   options.seed = seed;
+  constexpr int kUpdates = 40;
   const auto cost = [&](const Eigen::MatrixXd& xi) {
     VectorXd costs = VectorXd::Zero(xi.cols());
     for (const Transition& t : transitions) {
@@ -102,7 +103,7 @@ Gaussian BySquaredError(const std::vector<Transition>& transitions, uint64_t see
     }
     return costs;
   };
-  return RepsSearch(OfXi(), cost, options).distribution;
+  return SearchByReps(OfXi(), cost, options, kUpdates).distribution;
 }
 
 // Weights of draws of the prior that together predict best, in energy distance.

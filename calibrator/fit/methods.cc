@@ -189,7 +189,7 @@ MethodResult Auto(const MethodInput& input) {
   return mixture;
 }
 
-MethodResult FromSearch(const MethodInput& input, const RepsRun& run, const std::string& name) {
+MethodResult FromSearch(const MethodInput& input, const RepsState& run, const std::string& name) {
   MethodResult result;
   result.used = name;
   result.posterior = {{1}, {run.distribution}};
@@ -224,18 +224,17 @@ MethodResult Reps(const MethodInput& input) {
   const LeastSquares problem = ProblemOf(input.model->description(), errors);
   const int affordable = static_cast<int>(input.options.budget /
                                           std::max<int64_t>(1, options.samples * errors.steps()));
-  options.updates = std::max(1, std::min(affordable, 4 * kFewestUpdates));
-  const RepsRun run = RepsSearch(
+  const int updates = std::max(1, std::min(affordable, 4 * kFewestUpdates));
+  const RepsState run = SearchByReps(
       problem.prior, [&](const Eigen::MatrixXd& x) { return LogLikelihood(problem, x); }, options,
-      [&](int update) {
-        input.options.progress("reps", update / static_cast<double>(options.updates));
-      });
+      updates,
+      [&](int update) { input.options.progress("reps", update / static_cast<double>(updates)); });
   MethodResult result = FromSearch(input, run, "reps");
   result.simulated_steps = errors.simulated_steps();
   if (every > 1) {
     result.warnings.push_back(
         fmt::format("reps looks at each {}th transition only, to make {} updates within its budget",
-                    every, options.updates));
+                    every, updates));
   }
   if (run.temperature > 1.5)
     result.warnings.push_back(
@@ -249,23 +248,21 @@ MethodResult Simopt(const MethodInput& input) {
   options.min_temperature = 0.01;
   options.seed = input.options.seed;
   const auto transitions = static_cast<int64_t>(CountTransitions(input.rollouts));
-  options.updates = static_cast<int>(std::max<int64_t>(
+  const auto updates = static_cast<int>(std::max<int64_t>(
       1, input.options.budget / (options.samples * std::max<int64_t>(1, transitions))));
   const RobotDescription& robot = input.model->description();
   Discrepancy discrepancy(robot, input.options.workforce);
-  const RepsRun run = RepsSearch(
+  const RepsState run = SearchByReps(
       PriorOf(robot),
       [&](const Eigen::MatrixXd& x) {
         Eigen::MatrixXd physical(x.rows(), x.cols());
         for (Eigen::Index i = 0; i < x.cols(); ++i) physical.col(i) = robot.ToPhysical(x.col(i));
         return discrepancy.TrajectoryError(physical, input.rollouts);
       },
-      options,
-      [&](int update) {
-        input.options.progress("simopt", update / static_cast<double>(options.updates));
-      });
+      options, updates,
+      [&](int update) { input.options.progress("simopt", update / static_cast<double>(updates)); });
   MethodResult result = FromSearch(input, run, "simopt");
-  result.simulated_steps = run.simulations * transitions;
+  result.simulated_steps = int64_t{updates} * options.samples * transitions;
   result.warnings.push_back("simopt's distribution is the width of its search, not a posterior");
   return result;
 }

@@ -10,6 +10,7 @@
 #include "calibrator/fit/discrepancy.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/inference/gaussian.h"
+#include "calibrator/inference/reps_search.h"
 #include "calibrator/motion/transitions.h"
 #include "robot/description.h"
 
@@ -60,8 +61,8 @@ struct CalibrationReport {
 ///   auto, laplace, mixture   one update an iteration: the posterior given all roll-outs so far
 ///                            (RunMethod). Windows grow up to the robot's calibration horizons, or
 ///                            50 steps; the search begins at the present mean
-///   reps                     some updates an iteration by step-based SimOpt (Cui & Hensel),
-///                            Objective::kPosterior
+///   reps                     some updates an iteration by step-based SimOpt (Cui & Hensel), a
+///                            RepsSearch with Objective::kPosterior
 ///   simopt                   the same with Objective::kTrajectory
 /// Random numbers are keyed by (seed, iteration, update), so an interrupted calibration resumes to
 /// the same bits, with any number of threads. Not thread-safe; uses `threads` threads inside.
@@ -70,10 +71,12 @@ class SimOpt {
   /// Everything a resumed run needs, apart from the robot.
   struct State {
     int iteration = 0;  ///< completed iterations
-    int update = 0;     ///< completed updates of the running iteration
     GaussianMixture distribution;
     GaussianMixture before;  ///< distribution at the beginning of the running iteration
-    double kl = 0, ess = 0, temperature = 0;
+    /// of the running iteration, else of the last one; without a search its update counts all the
+    /// same
+    RepsState search;
+    double kl = 0, ess = 0, temperature = 0;  ///< see CalibrationReport
     std::vector<Rollout> rollouts;  ///< all so far; an iteration's are added when it begins
     std::vector<int> rollouts_per_iteration;
   };
@@ -100,13 +103,10 @@ class SimOpt {
   /// The report of the iteration completed last, e.g. after Resume; empty for the prior.
   std::optional<CalibrationReport> Report();
 
-  /// n x samples of the distribution's coordinates that update `update` of iteration `iteration`
-  /// evaluates, of reps and simopt.
-  Eigen::MatrixXd Samples(int iteration, int update) const;
-
  private:
   void Search();
-  Eigen::VectorXd Returns(const Eigen::MatrixXd& samples);
+  RepsOptions SearchOptions() const;
+  Eigen::VectorXd Evaluate(const Eigen::MatrixXd& samples);
   void Infer();
   MethodResult RunFromWhereItIs() const;
   std::span<const Rollout> Newest() const;
