@@ -97,7 +97,8 @@ class WindowErrors {
   Eigen::MatrixXd Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows);
   Eigen::MatrixXd FreeMotion() const;
   double WhitenWindow(size_t window, Eigen::MatrixXd* errors) const;
-  double EndSd(const Row& row) const;
+  const Transition& TransitionOf(const Row& row) const;
+  double NoiseOf(const Row& row) const;
 
   Eigen::Index n_;
   std::span<const Rollout> rollouts_;

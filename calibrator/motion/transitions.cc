@@ -51,6 +51,12 @@ void RestoreStep(const Eigen::VectorXd& before, std::vector<EffortSegment>* segm
 
 }  // namespace
 
+size_t CountTransitions(std::span<const Rollout> rollouts) {
+  size_t count = 0;
+  for (const Rollout& rollout : rollouts) count += rollout.transitions.size();
+  return count;
+}
+
 double Transition::duration() const {
   return std::accumulate(
       efforts.begin(), efforts.end(), 0.0,

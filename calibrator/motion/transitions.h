@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct Rollout {
   int policy_iteration = 0;
   std::vector<Transition> transitions;
 };
+
+/// How many transitions there are.
+size_t CountTransitions(std::span<const Rollout> rollouts);
 
 /// Why transitions were left out, counted since the start. Nothing is ever guessed.
 struct DropCounts {
