@@ -126,6 +126,13 @@ int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::v
 
 }  // namespace
 
+std::string MethodHelp() {
+  std::string help = "Methods:";
+  for (const Method& method : Methods())
+    help += fmt::format("\n  {:<15} {}", method.name, method.help);
+  return help;
+}
+
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command) {
   const Ranks ranks;
   const bool speaks = ranks.rank() == 0;

@@ -20,6 +20,9 @@ struct CalibrateFlags {
   bool strict = false;       ///< exit status 3 if the findings should not be trusted
 };
 
+/// What --help says of the methods: a line for each.
+std::string MethodHelp();
+
 /// `plumb calibrate`: learns from logs which simulators could have produced the robot's motion,
 /// writes what it has learned, and says so in words. With mpirun its ranks share the work. An
 /// interrupted run leaves a journal beside the output, from which the same command goes on. @return

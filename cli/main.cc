@@ -183,6 +183,7 @@ int main(int argc, char** argv) {
         calibrate->add_option("--method", calibrate_flags.options.method, "of inference")
             ->check(CLI::IsMember(plumb::CalibrationMethods()))
             ->capture_default_str();
+        calibrate->footer(plumb::MethodHelp());
         calibrate->add_option("--seed", calibrate_flags.options.seed, "of all random numbers")
             ->check(seed)
             ->capture_default_str();
@@ -205,7 +206,7 @@ int main(int argc, char** argv) {
             ->capture_default_str();
         calibrate
             ->add_option("--discrepancy", calibrate_flags.options.discrepancy,
-                         "of abc-rejection and abc-smc")
+                         "of methods that know only simulations")
             ->capture_default_str();
         calibrate
             ->add_option("--threads", calibrate_flags.threads,

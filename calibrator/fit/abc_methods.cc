@@ -1,0 +1,98 @@
+#include "calibrator/fit/abc_methods.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "calibrator/fit/robot_problem.h"
+#include "calibrator/inference/abc_rejection.h"
+#include "calibrator/inference/abc_smc.h"
+#include "calibrator/inference/importance.h"
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kFewestSimulators = 3000;
+
+template <class Infer>
+MethodResult ByApproximation(const MethodInput& input, const std::string& name,
+                             const Infer& infer) {
+  const RobotDescription& robot = input.model->description();
+  CurriculumOptions options = CurriculumOptionsOf(input);
+  options.horizons = {1};
+  MethodResult result =
+      FromCurriculum(input, FitCurriculum(input.model, input.rollouts, options, input.start));
+  const int every = EveryFor(input, kFewestSimulators);
+  WindowErrors errors(input.model, input.rollouts, 1, input.options.workforce, every);
+  errors.set_noise_sd(result.noise_sd);
+  errors.Linearise(robot.ToPhysical(result.curriculum->fit.mode));
+  LaplaceOptions still;
+  still.most_iterations = 0;
+  const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), result.curriculum->fit.mode, still);
+  Problem problem =
+      RobotProblem(robot, errors, view, input.options.discrepancy, input.options.seed);
+  // the first fit counts, too
+  const int64_t left = input.options.budget - result.simulated_steps - errors.simulated_steps();
+  const int64_t simulations = std::max<int64_t>(1, left / errors.steps());
+  const Simulate simulate = problem.simulate;
+  problem.simulate = [&](const Eigen::MatrixXd& parameters, int64_t first) {
+    input.options.progress(
+        name, std::min(1.0, static_cast<double>(first) / static_cast<double>(simulations)));
+    return simulate(parameters, first);
+  };
+  const Posterior posterior = infer(problem, simulations);
+  result.curriculum.reset();  // the first fit is not the answer
+  result.used = name;
+  result.posterior = posterior.mixture;
+  Random random = SampleStream(input);
+  result.samples = posterior.samples;
+  if (result.samples.cols() > kPosteriorSamples) {
+    result.samples =
+        Resample(posterior.samples,
+                 Eigen::VectorXd::Constant(posterior.samples.cols(),
+                                           1.0 / static_cast<double>(posterior.samples.cols())),
+                 kPosteriorSamples, random);
+  }
+  result.simulated_steps += errors.simulated_steps();
+  result.failures += posterior.failures;
+  result.check = fmt::format("approximate Bayesian computation with {} simulators, discrepancy {}",
+                             posterior.simulations, input.options.discrepancy);
+  if (every > 1)
+    result.warnings.push_back(fmt::format(
+        "{} looks at each {}th transition only, to try enough simulators within its budget", name,
+        every));
+  return result;
+}
+
+MethodResult AbcRejection(const MethodInput& input) {
+  return ByApproximation(input, "abc-rejection", [&](const Problem& problem, int64_t simulations) {
+    RejectionOptions options;
+    options.simulations = simulations;
+    options.fraction = 0.05;
+    return InferByRejection(problem, options, input.options.seed);
+  });
+}
+
+MethodResult AbcSmc(const MethodInput& input) {
+  return ByApproximation(input, "abc-smc", [&](const Problem& problem, int64_t simulations) {
+    SmcOptions options;
+    options.simulations = simulations;
+    options.population = static_cast<int>(std::clamp<int64_t>(simulations / 10, 20, 500));
+    return InferBySmc(problem, options, input.options.seed);
+  });
+}
+
+}  // namespace
+
+std::vector<Method> AbcMethods() {
+  return {
+      {"abc-rejection",
+       "approximate Bayesian computation: the nearest of many simulators, by --discrepancy",
+       AbcRejection},
+      {"abc-smc",
+       "approximate Bayesian computation, generation by generation nearer, by --discrepancy",
+       AbcSmc},
+  };
+}
+
+}  // namespace plumb

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <vector>
+
+#include "calibrator/fit/method.h"
+
+namespace plumb {
+
+/// Methods that know only simulations (RobotProblem): approximate Bayesian computation and the like.
+std::vector<Method> AbcMethods();
+
+}  // namespace plumb

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <vector>
+
+#include "calibrator/fit/method.h"
+
+namespace plumb {
+
+/// auto, laplace and mixture: the likelihood of windows, its modes and their shapes.
+std::vector<Method> LikelihoodMethods();
+
+}  // namespace plumb
