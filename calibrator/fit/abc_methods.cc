@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 #include "calibrator/fit/robot_problem.h"
 #include "calibrator/inference/abc_rejection.h"
@@ -14,6 +16,13 @@ namespace {
 
 constexpr int64_t kFewestSimulators = 3000;
 
+// What an inference has made of a problem, and a clause on how it went.
+struct Inferred {
+  Posterior posterior;
+  std::string how;
+};
+
+// @param infer (problem, simulations) -> Inferred.
 template <class Infer>
 MethodResult ByApproximation(const MethodInput& input, const std::string& name,
                              const Infer& infer) {
@@ -40,7 +49,7 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
         name, std::min(1.0, static_cast<double>(first) / static_cast<double>(simulations)));
     return simulate(parameters, first);
   };
-  const Posterior posterior = infer(problem, simulations);
+  const auto [posterior, how] = infer(problem, simulations);
   result.curriculum.reset();  // the first fit is not the answer
   result.used = name;
   result.posterior = posterior.mixture;
@@ -55,8 +64,9 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
   }
   result.simulated_steps += errors.simulated_steps();
   result.failures += posterior.failures;
-  result.check = fmt::format("approximate Bayesian computation with {} simulators, discrepancy {}",
-                             posterior.simulations, input.options.discrepancy);
+  result.check =
+      fmt::format("approximate Bayesian computation with {} simulators, discrepancy {}; {}",
+                  posterior.simulations, input.options.discrepancy, how);
   if (every > 1)
     result.warnings.push_back(fmt::format(
         "{} looks at each {}th transition only, to try enough simulators within its budget", name,
@@ -69,7 +79,11 @@ MethodResult AbcRejection(const MethodInput& input) {
     RejectionOptions options;
     options.simulations = simulations;
     options.fraction = 0.05;
-    return InferByRejection(problem, options, input.options.seed);
+    RejectionDiagnostics found;
+    Posterior posterior = InferByRejection(problem, options, input.options.seed, &found);
+    return Inferred{
+        std::move(posterior),
+        fmt::format("kept the nearest {}, up to a distance of {:.3g}", found.kept, found.epsilon)};
   });
 }
 
@@ -78,7 +92,14 @@ MethodResult AbcSmc(const MethodInput& input) {
     SmcOptions options;
     options.simulations = simulations;
     options.population = static_cast<int>(std::clamp<int64_t>(simulations / 10, 20, 500));
-    return InferBySmc(problem, options, input.options.seed);
+    SmcDiagnostics found;
+    Posterior posterior = InferBySmc(problem, options, input.options.seed, &found);
+    const auto& generations = found.generations;
+    return Inferred{std::move(posterior),
+                    generations.empty()
+                        ? "nothing was accepted"
+                        : fmt::format("{} generations, the last one nearer than {:.3g}",
+                                      generations.size(), generations.back().epsilon)};
   });
 }
 
