@@ -9,6 +9,7 @@
 #include "calibrator/fit/robot_problem.h"
 #include "calibrator/inference/abc_rejection.h"
 #include "calibrator/inference/abc_smc.h"
+#include "calibrator/inference/conditional_mixture.h"
 #include "calibrator/inference/importance.h"
 
 namespace plumb {
@@ -103,6 +104,21 @@ MethodResult AbcSmc(const MethodInput& input) {
   });
 }
 
+MethodResult ConditionalMixture(const MethodInput& input) {
+  return ByApproximation(
+      input, "conditional-mixture", [&](const Problem& problem, int64_t simulations) {
+        ConditionalMixtureOptions options;
+        options.simulations = simulations;
+        ConditionalMixtureDiagnostics found;
+        Posterior posterior = InferConditionalMixture(problem, options, input.options.seed, &found);
+        const auto& rounds = found.rounds;
+        return Inferred{std::move(posterior),
+                        rounds.empty() ? "one round"
+                                       : fmt::format("{} rounds, of {} components towards the end",
+                                                     rounds.size() + 1, rounds.back().components)};
+      });
+}
+
 }  // namespace
 
 std::vector<Method> AbcMethods() {
@@ -113,6 +129,10 @@ std::vector<Method> AbcMethods() {
       {"abc-smc",
        "approximate Bayesian computation, generation by generation nearer, by --discrepancy",
        AbcSmc},
+      {"conditional-mixture",
+       "mixture of Gaussians over parameters and outcomes, conditioned on what was observed, by "
+       "--discrepancy",
+       ConditionalMixture},
   };
 }
 
