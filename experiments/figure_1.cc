@@ -15,9 +15,9 @@
 #include <iostream>
 
 #include "calibrator/inference/conditional_mixture.h"
-#include "calibrator/inference/population_weights.h"
 #include "calibrator/inference/reps_search.h"
 #include "common/atomic_file.h"
+#include "experiments/population_weights.h"
 #include "experiments/results.h"
 #include "plot/svg.h"
 

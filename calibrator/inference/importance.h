@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <functional>
 
 #include "calibrator/inference/gaussian.h"
@@ -20,7 +19,6 @@ struct ImportanceFit {
   Eigen::VectorXd weights;  ///< of the samples, sum to 1
   double ess = 0;           ///< effective number of samples, 1 / sum w^2
   double heaviest = 0;      ///< largest weight
-  int64_t simulations = 0;
 };
 
 /// A density known up to its constant, from guesses of its modes: population Monte Carlo with a

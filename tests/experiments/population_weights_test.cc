@@ -1,4 +1,4 @@
-#include "calibrator/inference/population_weights.h"
+#include "experiments/population_weights.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
