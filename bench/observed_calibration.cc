@@ -17,21 +17,21 @@
 namespace plumb {
 namespace {
 
-struct Way {
+struct CalibrationStrategy {
   const char* name;
   States states;
 };
-constexpr Way kWays[] = {{"true", States::kTrue},
-                         {"smoothed", States::kSmoothed},
-                         {"smoothed, taken for exact", States::kCertain},
-                         {"causal", States::kCausal}};
+constexpr CalibrationStrategy kWays[] = {{"true", States::kTrue},
+                                         {"smoothed", States::kSmoothed},
+                                         {"smoothed, taken for exact", States::kCertain},
+                                         {"causal", States::kCausal}};
 
 using Motion = std::function<std::vector<Samples>(uint32_t seed)>;  // episodes
 
 void Print(const std::string& name, const RobotDescription& robot, const Motion& motion_of,
            uint32_t motions) {
   const std::vector<Knowable> knowable = KnowableOf(robot);
-  for (const Way& way : kWays) {
+  for (const CalibrationStrategy& way : kWays) {
     std::vector<double> square(knowable.size(), 0), sum(knowable.size(), 0),
         claimed(knowable.size(), 0);
     std::vector<int> covered(knowable.size(), 0);

@@ -19,7 +19,7 @@
 #include "calibrator/results/summary.h"
 #include "cli/progress_line.h"
 #include "common/atomic_file.h"
-#include "common/rank_batches.h"
+#include "common/rank_batch_runner.h"
 
 namespace plumb {
 namespace {
@@ -117,7 +117,7 @@ int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::v
   for (const Log& log : logs)
     rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
   RobotSbcOptions sbc;
-  sbc.runs = flags.sbc, sbc.seed = options.seed, sbc.threads = options.workforce.threads;
+  sbc.runs = flags.sbc, sbc.seed = options.seed, sbc.threads = options.execution.threads;
   sbc.progress = [&](double share) { look(), line.Show("simulation-based calibration", share); };
   std::cout << Words(RunRobotSbc(std::make_shared<Model>(robot), rollouts, findings.noise_sd, sbc))
             << std::endl;
@@ -148,7 +148,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const std::vector<Log> logs = ReadLogs(flags, robot);
   if (speaks) PrintLogs(logs);
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  flags.options.workforce.threads =
+  flags.options.execution.threads =
       flags.threads > 0 ? flags.threads : std::max(1, cores / ranks.size());
   const ProgressLine line(speaks);
   const auto look = [&] {
@@ -159,8 +159,8 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
     if (flags.sbc > 0) return Sbc(flags, robot, logs, line, look);
     std::optional<Journal> journal;
     if (speaks) journal.emplace(journal_file, IdentityOf(robot, flags, logs));
-    RankBatches batches(ranks, journal ? &*journal : nullptr);
-    flags.options.workforce.batches = &batches;
+    RankBatchRunner batches(ranks, journal ? &*journal : nullptr);
+    flags.options.execution.batches = &batches;
     flags.options.progress = [&](const std::string& what, double share) {
       look(), line.Show(what, share);
     };

@@ -81,7 +81,7 @@ std::vector<Snapshot> Film(const RobotDescription& robot, const RatedExcitation&
   return film;
 }
 
-Gaussian Known(const std::string& file, const RobotDescription& robot) {
+Gaussian ReadPosteriorMoments(const std::string& file, const RobotDescription& robot) {
   GaussianMixture mixture;
   for (const auto& component : ReadPosterior(file, robot).components) {
     mixture.weights.push_back(component.weight);
@@ -106,7 +106,7 @@ int Excite(Process& process, const ExciteFlags& flags) {
   settings.seconds = flags.seconds;
   settings.seed = flags.seed;
   const Gaussian prior =
-      flags.posterior.empty() ? PriorGaussian(robot) : Known(flags.posterior, robot);
+      flags.posterior.empty() ? PriorGaussian(robot) : ReadPosteriorMoments(flags.posterior, robot);
   const std::vector<RatedExcitation> rated = RateExcitations(robot, prior, settings);
   if (process.stopping()) return 130;
   std::cout << fmt::format("{}, task {}, seed {}: {} of {} excitations keep within the limits\n",

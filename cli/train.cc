@@ -16,7 +16,7 @@
 #include <thread>
 
 #include "common/atomic_file.h"
-#include "common/batches.h"
+#include "common/batch_runner.h"
 #include "common/config.h"
 #include "common/ranks.h"
 #include "robot/posterior_reader.h"

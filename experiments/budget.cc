@@ -55,7 +55,7 @@ BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>&
   const auto model = std::make_shared<const Model>(robot);
   CalibrationOptions options;
   options.seed = seed;
-  options.workforce = threads;
+  options.execution = threads;
   auto count = std::min(static_cast<int64_t>(CountTransitions(rollouts)), budget / kCheapest);
   while (count >= kFewest) {
     const std::vector<Rollout> spread = SpreadTransitions(rollouts, count);

@@ -30,15 +30,17 @@ constexpr int kHorizon = 50, kSimulators = 20;
 struct Method {
   const char* key;
   std::string label;
-  Way way;
+  CalibrationStrategy strategy;
   int64_t share;  // of the budget: one so-manieth
 };
 const std::vector<Method> kMethods{
-    {"original", Label(Way::kOriginal), Way::kOriginal, 1},
-    {"step", Label(Way::kStep), Way::kStep, 1},
-    {"default", Label(Way::kDefault) + ", same budget", Way::kDefault, 1},
-    {"default-100", Label(Way::kDefault) + ", a hundredth", Way::kDefault, 100},
-    {"prior", "the prior", Way::kPrior, 1}};
+    {"original", Label(CalibrationStrategy::kOriginal), CalibrationStrategy::kOriginal, 1},
+    {"step", Label(CalibrationStrategy::kStep), CalibrationStrategy::kStep, 1},
+    {"default", Label(CalibrationStrategy::kDefault) + ", same budget",
+     CalibrationStrategy::kDefault, 1},
+    {"default-100", Label(CalibrationStrategy::kDefault) + ", a hundredth",
+     CalibrationStrategy::kDefault, 100},
+    {"prior", "the prior", CalibrationStrategy::kPrior, 1}};
 
 struct Options {
   std::string robots, output = ".";
@@ -76,12 +78,12 @@ Results::Rows Measure(const Options& options, const Remembered& remembered, cons
   const RobotDescription& robot = remembered.recording.robot;
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   int64_t simulated = 0;
-  if (method.way == Way::kDefault) {
+  if (method.strategy == CalibrationStrategy::kDefault) {
     const BudgetedFit fit = FitWithin(robot, remembered.recording.seen,
                                       remembered.budget / method.share, seed, options.threads);
     distribution = fit.distribution, simulated = fit.simulated_steps;
-  } else if (Learns(method.way)) {
-    const auto simopt = MakeSimOpt(method.way, robot, seed, options.threads);
+  } else if (Learns(method.strategy)) {
+    const auto simopt = MakeSimOpt(method.strategy, robot, seed, options.threads);
     for (const Rollout& rollout : remembered.recording.seen) {
       simopt->Begin({rollout});
       simopt->Update();

@@ -22,8 +22,9 @@
 namespace plumb {
 namespace {
 
-constexpr Way kWays[] = {Way::kOriginal, Way::kStep,    Way::kDefault,
-                         Way::kPrior,    Way::kNominal, Way::kOracle};
+constexpr CalibrationStrategy kStrategies[] = {
+    CalibrationStrategy::kOriginal, CalibrationStrategy::kStep,    CalibrationStrategy::kDefault,
+    CalibrationStrategy::kPrior,    CalibrationStrategy::kNominal, CalibrationStrategy::kOracle};
 constexpr double kRobotSeconds = 6;  // of an iteration: five of them are half a minute
 constexpr double kEnough = 0.95;     // of the oracle's return
 
@@ -34,8 +35,8 @@ struct Options {
   bool quick = false;
 };
 
-std::string KeyOf(const PaperTask& task, Way way, int run) {
-  return fmt::format("{},{},{}", task.name, Key(way), run);
+std::string KeyOf(const PaperTask& task, CalibrationStrategy strategy, int run) {
+  return fmt::format("{},{},{}", task.name, Key(strategy), run);
 }
 
 // The loop of a task and a run, which remembers the first policy.
@@ -44,8 +45,9 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
-Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, int run,
-                      Remembered& remembered, const std::function<void(double)>& progress) {
+Results::Rows RunLoop(const Options& options, const PaperTask& task, CalibrationStrategy strategy,
+                      int run, Remembered& remembered,
+                      const std::function<void(double)>& progress) {
   const RobotDescription robot = LoadTask(options.robots, task);
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = DrawHidden(robot, options.hidden, seed);
@@ -53,7 +55,7 @@ Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, in
     remembered = {of, std::make_unique<Loop>(robot, hidden)};
   SimulatedSystem real(robot, hidden, ReadingNoise(robot), seed);
   LoopSettings settings;
-  settings.way = way;
+  settings.strategy = strategy;
   settings.iterations = options.iterations;
   settings.steps_per_iteration = static_cast<int>(kRobotSeconds / robot.task.period);
   settings.first_updates = options.quick ? 2 : task.first_updates;
@@ -74,12 +76,12 @@ Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, in
 Panel Draw(const Options& options, const PaperTask& task, const Results& results) {
   Panel panel{
       task.name, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
-  for (const Way way : kWays) {
-    Curve curve{Label(way), {}, {}, {}, {}};
+  for (const CalibrationStrategy strategy : kStrategies) {
+    Curve curve{Label(strategy), {}, {}, {}, {}};
     for (int k = 0; k <= options.iterations; ++k) {
       std::vector<double> returns;
       for (int run = 1; run <= options.runs; ++run)
-        returns.push_back(results.Of(KeyOf(task, way, run))[static_cast<size_t>(k)][1]);
+        returns.push_back(results.Of(KeyOf(task, strategy, run))[static_cast<size_t>(k)][1]);
       const Band band = ConfidenceBand(returns, false);
       curve.x.push_back(k), curve.middle.push_back(band.middle), curve.low.push_back(band.low),
           curve.high.push_back(band.high);
@@ -99,24 +101,27 @@ std::string Sentence(const Options& options, const PaperTask& task, const Result
   std::string text = fmt::format(
       "{}: return on the robot after 0, {}, {} iterations (mean of {} runs):", task.name,
       std::min(5, options.iterations), options.iterations, options.runs);
-  const auto mean = [&](Way way, int k) {
+  const auto mean = [&](CalibrationStrategy strategy, int k) {
     double sum = 0;
     for (int run = 1; run <= options.runs; ++run)
-      sum += results.Of(KeyOf(task, way, run))[static_cast<size_t>(k)][1];
+      sum += results.Of(KeyOf(task, strategy, run))[static_cast<size_t>(k)][1];
     return sum / options.runs;
   };
-  for (const Way way : kWays) {
-    text += fmt::format("\n  {:<40}{:8.0f}{:8.0f}{:8.0f}", Label(way), mean(way, 0),
-                        mean(way, std::min(5, options.iterations)), mean(way, options.iterations));
+  for (const CalibrationStrategy strategy : kStrategies) {
+    text += fmt::format("\n  {:<40}{:8.0f}{:8.0f}{:8.0f}", Label(strategy), mean(strategy, 0),
+                        mean(strategy, std::min(5, options.iterations)),
+                        mean(strategy, options.iterations));
   }
-  for (const Way way : {Way::kOriginal, Way::kStep, Way::kDefault}) {
+  for (const CalibrationStrategy strategy :
+       {CalibrationStrategy::kOriginal, CalibrationStrategy::kStep,
+        CalibrationStrategy::kDefault}) {
     int enough = options.iterations + 1;
-    while (enough > 0 &&
-           ShareOfOracle(mean(way, enough - 1), mean(Way::kOracle, enough - 1)) >= kEnough)
+    while (enough > 0 && ShareOfOracle(mean(strategy, enough - 1),
+                                       mean(CalibrationStrategy::kOracle, enough - 1)) >= kEnough)
       --enough;
     text += fmt::format(
         "\n  {} has {:.0f} % of the oracle's return for good after so many iterations: {}",
-        Label(way), 100 * kEnough,
+        Label(strategy), 100 * kEnough,
         enough > options.iterations
             ? "never"
             : fmt::format("{} ({:.0f} s of the robot)", enough, enough * kRobotSeconds));
@@ -138,12 +143,13 @@ int MakeFigure(Process& process, const Options& options) {
   Remembered remembered;
   for (const PaperTask& task : kPaperTasks) {
     for (int run = 1; run <= options.runs; ++run) {
-      for (const Way way : kWays) {
-        const double weight =
-            task.first_updates * (Learns(way) ? 0.5 : 1.0) + options.iterations * task.next_updates;
-        jobs.push_back({KeyOf(task, way, run), weight, [&, run, way](const auto& progress) {
-                          return RunLoop(options, task, way, run, remembered, progress);
-                        }});
+      for (const CalibrationStrategy strategy : kStrategies) {
+        const double weight = task.first_updates * (Learns(strategy) ? 0.5 : 1.0) +
+                              options.iterations * task.next_updates;
+        jobs.push_back(
+            {KeyOf(task, strategy, run), weight, [&, run, strategy](const auto& progress) {
+               return RunLoop(options, task, strategy, run, remembered, progress);
+             }});
       }
     }
   }

@@ -7,15 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "experiments/calibration_strategy.h"
 #include "experiments/real_system.h"
-#include "experiments/ways.h"
 #include "trainer/trainer.h"
 
 namespace plumb {
 
 /// How SimOpt's loop is run: roll out, calibrate, train, judge.
 struct LoopSettings {
-  Way way = Way::kDefault;
+  CalibrationStrategy strategy = CalibrationStrategy::kDefault;
   int iterations = 5;
   /// of the robot, at most; episodes follow each other until there are as many
   int steps_per_iteration = 750;

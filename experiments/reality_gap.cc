@@ -44,17 +44,18 @@ constexpr Gap kGaps[] = {{"pendulum", "worn pendulum", "pendulum/worn.toml", "pe
 struct Method {
   const char* key;
   std::string label;
-  Way way;
+  CalibrationStrategy strategy;
   bool fitted;
 };
 const std::array<Method, 7> kMethods{
-    {{"original", Label(Way::kOriginal), Way::kOriginal, false},
-     {"step", Label(Way::kStep), Way::kStep, false},
-     {"default", Label(Way::kDefault), Way::kDefault, false},
-     {"fitted", Label(Way::kDefault) + ", more parameters", Way::kDefault, true},
-     {"prior", Label(Way::kPrior), Way::kPrior, false},
-     {"nominal", Label(Way::kNominal), Way::kNominal, false},
-     {"oracle", "the robot's masses, in the simulator", Way::kOracle, false}}};
+    {{"original", Label(CalibrationStrategy::kOriginal), CalibrationStrategy::kOriginal, false},
+     {"step", Label(CalibrationStrategy::kStep), CalibrationStrategy::kStep, false},
+     {"default", Label(CalibrationStrategy::kDefault), CalibrationStrategy::kDefault, false},
+     {"fitted", Label(CalibrationStrategy::kDefault) + ", more parameters",
+      CalibrationStrategy::kDefault, true},
+     {"prior", Label(CalibrationStrategy::kPrior), CalibrationStrategy::kPrior, false},
+     {"nominal", Label(CalibrationStrategy::kNominal), CalibrationStrategy::kNominal, false},
+     {"oracle", "the robot's masses, in the simulator", CalibrationStrategy::kOracle, false}}};
 
 struct Options {
   std::string robots, output = ".";
@@ -92,7 +93,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   }
   BusRobot real(truth, model, hidden, seed);
   LoopSettings settings;
-  settings.way = method.way;
+  settings.strategy = method.strategy;
   settings.iterations = options.iterations;
   settings.steps_per_iteration =
       static_cast<int>((options.quick ? 1 : kRobotSeconds) / model.task.period);
@@ -103,10 +104,10 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   settings.threads = options.threads;
   const LoopResult result = remembered.loop->Run(real, settings, progress);
   double alarm = std::nan("");
-  if (method.way == Way::kDefault) {
+  if (method.strategy == CalibrationStrategy::kDefault) {
     CalibrationOptions calibration;
     calibration.seed = seed;
-    calibration.workforce = options.threads;
+    calibration.execution = options.threads;
     const std::vector<Log> logs{{"roll-outs", result.rollouts, {}, {}}};
     const Misspecification found = Calibrate(model, logs, calibration).misspecification;
     alarm = found.alarm;
@@ -160,7 +161,7 @@ std::string Sentence(const Options& options, const Gap& gap, const Results& resu
     text += fmt::format("\n  {:<42}{:8.0f}{:8.0f}{:8.0f}{:10.3g}", method.label, mean(0, 1),
                         mean(options.iterations, 1), mean(options.iterations, 2),
                         mean(options.iterations, 3));
-    if (method.way != Way::kDefault) continue;
+    if (method.strategy != CalibrationStrategy::kDefault) continue;
     text += fmt::format("   {:.0f} of {}", options.runs * mean(0, 6), options.runs);
     std::ifstream file(AlarmFile(options, gap, method, 1));
     for (std::string line; std::getline(file, line);) text += "\n      " + line;

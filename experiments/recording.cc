@@ -46,7 +46,7 @@ Recording Record(const RobotDescription& robot, const RecordingSettings& setting
   first.threads = settings.threads;
   first.first_updates = settings.updates;
   const auto trainer = recording.loop->TrainFirst(
-      Key(Way::kPrior), ParameterDistribution::Prior(robot), first, progress);
+      Key(CalibrationStrategy::kPrior), ParameterDistribution::Prior(robot), first, progress);
   const Eigen::VectorXd noise = settings.noise * ReadingNoise(robot);
   SimulatedSystem read(robot, recording.hidden, noise, settings.seed),
       exact(robot, recording.hidden, 0 * noise, settings.seed);

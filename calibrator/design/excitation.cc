@@ -33,7 +33,7 @@ struct Motion {
   Eigen::MatrixXd q;
 };
 
-// What is left of the limits in a state, as a share of them.
+// The share of its limits that a state leaves unused, the least of all joints.
 double Margin(const RobotDescription& robot, const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   double margin = 1;
   Eigen::Index i = 0;

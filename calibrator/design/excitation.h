@@ -13,7 +13,7 @@
 
 namespace plumb {
 
-/// What an excitation would tell of the parameters.
+/// An excitation, the motion it makes and how much that would tell of the parameters.
 struct RatedExcitation {
   Excitation excitation;  ///< scaled down until all simulators keep within the limits
   double gain;            ///< [nat], the least of the simulators drawn
@@ -26,8 +26,8 @@ struct RatedExcitation {
   Eigen::MatrixXd q;  ///< positions x (steps + 1), of the mean simulator
 };
 
-/// Which of the excitations that MakeExcitations makes tell most. The value of an experiment is its information gain in the
-/// linear-Gaussian model,
+/// Which of the excitations that MakeExcitations makes tell most. The value of an experiment is its
+/// information gain in the linear-Gaussian model,
 ///   1/2 ln det(I + L^T F L),
 /// L L^T the belief's covariance, F the Fisher information of one-step errors
 /// (D-optimality: Chaloner, Verdinelli, Statistical Science 10, 1995, eq. 5), with states as exact

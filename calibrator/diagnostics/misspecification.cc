@@ -108,12 +108,13 @@ double Share(const ProjectedErrors& errors, const Eigen::VectorXd& column, doubl
 }
 
 // Best first.
-std::vector<Explanation> FindExplanations(const ProjectedErrors& errors, const Leftover& leftover) {
+std::vector<Explanation> FindExplanations(const ProjectedErrors& errors,
+                                          const FitResiduals& residuals) {
   std::vector<Explanation> found;
-  for (size_t k = 0; k < leftover.candidates.size(); ++k) {
-    const Candidate& candidate = leftover.candidates[k];
+  for (size_t k = 0; k < residuals.candidates.size(); ++k) {
+    const Candidate& candidate = residuals.candidates[k];
     const Eigen::VectorXd raw =
-        errors.weight.cwiseProduct(leftover.columns.col(static_cast<Eigen::Index>(k)));
+        errors.weight.cwiseProduct(residuals.columns.col(static_cast<Eigen::Index>(k)));
     Eigen::VectorXd column = errors.Project(raw);
     // What fitted parameters do as well, or nothing does, cannot be tested.
     if (!(column.norm() > 1e-4 * raw.norm()) || !(column.norm() * candidate.scale > 1e-3)) continue;
@@ -134,7 +135,7 @@ void Correct(size_t tests, std::vector<Misfit>* misfits) {
   for (Misfit& misfit : *misfits) misfit.p = std::min(1.0, misfit.p * static_cast<double>(tests));
 }
 
-// What share a gain is of the errors beyond the noise, or of all of them where the noise was
+// The share that a gain is of the errors beyond the noise, or of all of them where the noise was
 // estimated from them.
 struct Explained {
   double share;
@@ -158,16 +159,17 @@ std::string Join(const std::vector<std::string>& parts, const std::string& by) {
 
 }  // namespace
 
-Misspecification FindMisspecification(const RobotDescription& robot, const Leftover& leftover) {
+Misspecification FindMisspecification(const RobotDescription& robot,
+                                      const FitResiduals& residuals) {
   Misspecification found;
-  ProjectedErrors errors(robot, leftover);
+  ProjectedErrors errors(robot, residuals);
   if (!errors.r.allFinite()) {
     found.alarm = true;
     found.words = "the simulation fails on this log with the parameters found";
     return found;
   }
-  std::vector<Misfit> tests = TestErrors(errors, leftover.noise_known);
-  std::vector<Explanation> explanations = FindExplanations(errors, leftover);
+  std::vector<Misfit> tests = TestErrors(errors, residuals.noise_known);
+  std::vector<Explanation> explanations = FindExplanations(errors, residuals);
   const size_t count = tests.size() + explanations.size();
   Correct(count, &tests);
   found.alarm = std::any_of(tests.begin(), tests.end(), Counts);
@@ -181,7 +183,7 @@ Misspecification FindMisspecification(const RobotDescription& robot, const Lefto
         std::find_if(explanations.begin(), explanations.end(),
                      [](const Explanation& explanation) { return Counts(explanation.misfit); });
     if (best == explanations.end()) break;
-    const Explained explained = Explain(errors, leftover.noise_known, best->score.gain);
+    const Explained explained = Explain(errors, residuals.noise_known, best->score.gain);
     // No model is linear: a little of what the first candidate is about is always left.
     if (round > 0 && explained.share < kWorthwhile) break;
     found.alarm = true;
@@ -197,11 +199,11 @@ Misspecification FindMisspecification(const RobotDescription& robot, const Lefto
     words.push_back((round == 0 ? "" : "of what is left ") + line);
     found.misfits.push_back(best->misfit);
     errors.Explain(best->column);
-    explanations = FindExplanations(errors, leftover);
+    explanations = FindExplanations(errors, residuals);
   }
 
   if (!found.misfits.empty()) {
-    tests = TestErrors(errors, leftover.noise_known);
+    tests = TestErrors(errors, residuals.noise_known);
     Correct(count, &tests);
   }
   std::erase_if(tests, [](const Misfit& test) {

@@ -13,7 +13,7 @@ namespace plumb {
 struct ProjectedErrors {
   /// @param robot with known parameters. @throws std::invalid_argument if sizes do not fit
   /// together.
-  ProjectedErrors(const RobotDescription& robot, const Leftover& leftover);
+  ProjectedErrors(const RobotDescription& robot, const FitResiduals& residuals);
 
   /// As if the parameter with this (projected) column had been fitted, too.
   void Explain(const Eigen::VectorXd& column);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int64_t kFewestSimulators = 3000;
 
-// What an inference has made of a problem, and a clause on how it went.
+// The posterior that an inference has found, and a clause on how it went.
 struct Inferred {
   Posterior posterior;
   std::string how;
@@ -33,12 +33,13 @@ MethodResult ByApproximation(const MethodInput& input, const std::string& name,
   MethodResult result =
       FromCurriculum(input, FitCurriculum(input.model, input.rollouts, options, input.start));
   const int every = EveryFor(input, kFewestSimulators);
-  WindowErrors errors(input.model, input.rollouts, 1, input.options.workforce, every);
+  WindowErrors errors(input.model, input.rollouts, 1, input.options.execution, every);
   errors.set_noise_sd(result.noise_sd);
   errors.Linearise(robot.ToPhysical(result.curriculum->fit.mode));
-  LaplaceOptions still;
-  still.most_iterations = 0;
-  const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), result.curriculum->fit.mode, still);
+  LaplaceOptions curvature_only;
+  curvature_only.max_iterations = 0;
+  const LaplaceFit view =
+      FitLaplace(ProblemOf(robot, errors), result.curriculum->fit.mode, curvature_only);
   Problem problem =
       RobotProblem(robot, errors, view, input.options.discrepancy, input.options.seed);
   // the first fit counts, too

@@ -6,7 +6,8 @@
 
 namespace plumb {
 
-/// Methods that know only simulations (RobotProblem): approximate Bayesian computation and the like.
+/// Methods that know only simulations (RobotProblem): approximate Bayesian computation and the
+/// like.
 std::vector<Method> AbcMethods();
 
 }  // namespace plumb

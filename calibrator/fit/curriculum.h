@@ -10,7 +10,7 @@
 
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
-#include "common/batches.h"
+#include "common/batch_runner.h"
 
 namespace plumb {
 
@@ -30,7 +30,7 @@ struct CurriculumOptions {
   /// first guesses: the prior's mean, and draws of the prior
   int starts = 4;
   uint64_t seed = 1;
-  Workforce workforce;
+  ExecutionOptions execution;
   /// Told what has just been done, and which share of the work, roughly; may throw to break off.
   std::function<void(const std::string& what, double share)> progress = [](const std::string&,
                                                                            double) {};

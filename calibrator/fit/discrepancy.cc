@@ -45,11 +45,11 @@ Eigen::VectorXd ColumnSums(const Eigen::MatrixXd& values) {
 
 }  // namespace
 
-Discrepancy::Discrepancy(const RobotDescription& robot, Workforce workforce)
+Discrepancy::Discrepancy(const RobotDescription& robot, ExecutionOptions execution)
     : n_(robot.num_velocities()),
-      windows_(std::make_shared<Model>(robot), workforce.threads),
+      windows_(std::make_shared<Model>(robot), execution.threads),
       scale_(MakeTask(robot)->state_scale()),
-      batches_(workforce.batches) {
+      batches_(execution.batches) {
   if (robot.num_positions() != robot.num_velocities()) {
     throw std::invalid_argument("calibration does not know spherical joints yet");
   }
@@ -140,7 +140,7 @@ Eigen::MatrixXd Discrepancy::SquaredStepErrors(const Eigen::MatrixXd& parameters
 template <class Compute>
 Eigen::VectorXd Discrepancy::Batch(uint64_t identity, const Eigen::MatrixXd& parameters,
                                    const Compute& compute) {
-  Batches here;
+  BatchRunner here;
   return (batches_ ? *batches_ : here)
       .Run(Hash(parameters, identity), 1, parameters.cols(),
            [&](Eigen::Index first, Eigen::Index count) -> Eigen::MatrixXd {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calibrator/motion/transitions.h"
-#include "common/batches.h"
+#include "common/batch_runner.h"
 #include "sim/tasks/task.h"
 #include "sim/windows.h"
 
@@ -21,7 +21,7 @@ class Discrepancy {
 
   /// @throws std::invalid_argument if there is no simulator of the robot, or it has spherical
   /// joints.
-  explicit Discrepancy(const RobotDescription& robot, Workforce workforce = {});
+  explicit Discrepancy(const RobotDescription& robot, ExecutionOptions execution = {});
 
   /// Step-based (Cui & Hensel): reset to s, apply what was applied, compare with s'. The squared
   /// error of one transition is whitened by the uncertainty of both states (WhitenWindow, with the
@@ -79,7 +79,7 @@ class Discrepancy {
   Windows windows_;
   Eigen::VectorXd scale_;
   Windows::Failures failures_;
-  Batches* batches_;
+  BatchRunner* batches_;
 };
 
 }  // namespace plumb

@@ -25,7 +25,7 @@ MethodResult Laplace(const MethodInput& input) {
 
 // The windows that a stage of the curriculum was fitted to, as it left them.
 WindowErrors WindowsOf(const MethodInput& input, const CurriculumFit& curriculum, int horizon) {
-  WindowErrors errors(input.model, input.rollouts, horizon, input.options.workforce);
+  WindowErrors errors(input.model, input.rollouts, horizon, input.options.execution);
   errors.set_noise_sd(curriculum.noise_sd);
   errors.Linearise(input.model->description().ToPhysical(curriculum.fit.mode));
   return errors;

@@ -10,7 +10,7 @@ CurriculumOptions CurriculumOptionsOf(const MethodInput& input) {
   CurriculumOptions options;
   options.horizons = input.options.horizons;
   options.seed = input.options.seed;
-  options.workforce = input.options.workforce;
+  options.execution = input.options.execution;
   options.progress = input.options.progress;
   if (input.start.size() > 0) options.starts = 1;
   return options;

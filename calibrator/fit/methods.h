@@ -7,9 +7,8 @@
 
 namespace plumb {
 
-/// All methods, the default first: what there is to parse, run, help with and write about. A new one
-/// is a line in its group, e.g. SearchMethods, and one in docs/inference.md. Thread-safe, as all
-/// below.
+/// All methods, the default first. --method, its help and docs/inference.md are made of this table: a
+/// new method is a line in its group, e.g. SearchMethods. Thread-safe, as all below.
 const std::vector<Method>& Methods();
 
 /// Their names.

@@ -32,7 +32,7 @@ MethodResult Reps(const MethodInput& input) {
   RepsOptions options;
   options.seed = input.options.seed;
   const int every = EveryFor(input, options.samples * kFewestUpdates);
-  WindowErrors errors(input.model, input.rollouts, 1, input.options.workforce, every);
+  WindowErrors errors(input.model, input.rollouts, 1, input.options.execution, every);
   errors.Linearise(input.model->description().ToPhysical(
       PriorOf(input.model->description())
           .FromStandard(Eigen::VectorXd::Zero(errors.parameter_count()))));
@@ -66,7 +66,7 @@ MethodResult Simopt(const MethodInput& input) {
   const auto updates = static_cast<int>(std::max<int64_t>(
       1, input.options.budget / (options.samples * std::max<int64_t>(1, transitions))));
   const RobotDescription& robot = input.model->description();
-  Discrepancy discrepancy(robot, input.options.workforce);
+  Discrepancy discrepancy(robot, input.options.execution);
   const RepsState run = SearchByReps(
       PriorOf(robot),
       [&](const Eigen::MatrixXd& x) {

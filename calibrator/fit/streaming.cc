@@ -182,7 +182,7 @@ void StreamingLaplace::Linearise(const std::vector<size_t>& indices) {
   }
 }
 
-// What the start's entries do to the end's, 2 n x 2 n, of those windows whose start is uncertain;
+// Sensitivities of the ends to the starts, 2 n x 2 n, of those windows whose start is uncertain;
 // by finite differences, or that of free motion where they fail.
 std::vector<Eigen::MatrixXd> StreamingLaplace::StartSensitivities(
     const std::vector<size_t>& indices, const std::vector<Window>& windows,

@@ -20,7 +20,8 @@ double WhitenWindow(std::span<const Eigen::Index> steps, const Eigen::VectorXd& 
                     const Eigen::MatrixXd& sensitivity, const Eigen::VectorXd& end_sd,
                     Eigen::Ref<Eigen::MatrixXd> errors);
 
-/// What entries of (q, v) do to themselves in free motion: q + v duration, 2 n x 2 n.
+/// The sensitivity of (q, v) to what it was `duration` before, in free motion: q + v duration.
+/// @return 2 n x 2 n.
 /// @param duration [s].
 Eigen::MatrixXd FreeMotion(Eigen::Index n, double duration);
 

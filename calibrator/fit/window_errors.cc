@@ -31,11 +31,11 @@ Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd) {
 }
 
 WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
-                           int horizon, Workforce workforce, int every)
+                           int horizon, ExecutionOptions execution, int every)
     : n_(model->num_velocities()),
       rollouts_(rollouts),
-      simulate_(std::move(model), workforce.threads),
-      batches_(workforce.batches) {
+      simulate_(std::move(model), execution.threads),
+      batches_(execution.batches) {
   if (simulate_.model().num_positions() != n_)
     throw std::invalid_argument("calibration does not know spherical joints yet");
   scale_ = MakeTask(simulate_.model().description())->state_scale();
@@ -139,7 +139,7 @@ Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical,
   const auto compute = [&](Eigen::Index first, Eigen::Index count) {
     return Simulate(physical.middleCols(first, count), windows);
   };
-  Batches here;
+  BatchRunner here;
   const Eigen::MatrixXd errors =
       (batches_ ? *batches_ : here)
           .Run(Hash(physical, Hash(&which, sizeof which, identity_)),

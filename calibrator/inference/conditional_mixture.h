@@ -20,7 +20,7 @@ struct ConditionalMixtureOptions {
   int samples = 10'000;     ///< of the posterior, drawn at the end
 };
 
-/// What happened in each round.
+/// The course of an inference, round by round.
 struct ConditionalMixtureDiagnostics {
   struct Round {
     int64_t simulations;  ///< so far

@@ -38,7 +38,7 @@ struct MixtureOptions {
   double regularisation = 1e-6;
 };
 
-/// What expectation maximisation found.
+/// The mixture that expectation maximisation has found.
 struct MixtureFit {
   GaussianMixture mixture;
   std::vector<double> log_likelihood;  ///< mean of a sample [nat], at the start of every iteration

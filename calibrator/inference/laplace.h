@@ -31,7 +31,7 @@ struct LeastSquares {
 inline constexpr double kSlopeDifference = 1e-5;
 
 struct LaplaceOptions {
-  int most_iterations = 50;
+  int max_iterations = 50;
   double tolerance = 0.02;  ///< ends when a step is below that many posterior standard deviations
   bool robust = true;       ///< Student's t where errors have its tails
   bool sandwich = true;     ///< wider where errors of a cluster are correlated

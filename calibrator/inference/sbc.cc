@@ -89,7 +89,7 @@ int Rank(double truth, const Eigen::VectorXd& draws, Random& ties) {
   return below + (equal > 0 ? static_cast<int>(ties.Uniform() * (equal + 1)) : 0);
 }
 
-// What is most wrong, in standard errors of uniform ranks' mean and variance.
+// The quantity that is most wrong, in standard errors of uniform ranks' mean and variance.
 std::string Verdict(const SbcUniformity& quantity, double runs, size_t tests) {
   if (std::isnan(quantity.chi2_p)) return "unknown";
   const double p = std::min(quantity.chi2_p, quantity.ecdf_p);

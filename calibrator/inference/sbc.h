@@ -51,7 +51,7 @@ struct SbcUniformity {
   double mean, variance;
 };
 
-/// What simulation-based calibration has found.
+/// The ranks that simulation-based calibration has found, and their tests.
 struct SbcResult {
   static constexpr int kFailed = -1;
 

@@ -69,7 +69,8 @@ double NumberOrNaN(const json& j) {
   return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
 }
 
-// What cannot be told from the rest of a state. JSON writes -infinity, a failure's density, as null.
+// The samples alone: the rest follows from the state. JSON writes -infinity, a failure's density,
+// as null.
 json ToJson(const RepsState& search) {
   const Eigen::MatrixXd& points = search.points;
   return {{"points", std::vector<double>(points.data(), points.data() + points.size())},

@@ -15,7 +15,7 @@ constexpr double kScaledMinTemperature = 0.01;
 // [control steps] beyond which one-step models of robots do not hold
 constexpr int kLongestWindow = 50;
 
-std::optional<Objective> SearchOf(const std::string& method) {
+std::optional<Objective> ParseObjective(const std::string& method) {
   if (method == "reps") return Objective::kPosterior;
   if (method == "simopt") return Objective::kTrajectory;
   return {};
@@ -38,7 +38,7 @@ SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, const 
       seed_(seed),
       threads_(threads),
       method_(method),
-      objective_(SearchOf(method)),
+      objective_(ParseObjective(method)),
       model_(std::make_shared<Model>(robot)),
       prior_(PriorGaussian(robot)),
       discrepancy_(robot, threads) {
@@ -160,7 +160,7 @@ MethodResult SimOpt::RunFromWhereItIs() const {
   options.horizons.erase(std::unique(options.horizons.begin(), options.horizons.end()),
                          options.horizons.end());
   options.seed = seed_;
-  options.workforce = threads_;
+  options.execution = threads_;
   const bool one_mode = state_.iteration > 0 && state_.before.components.size() == 1;
   if (one_mode) {
     try {

@@ -16,7 +16,7 @@
 
 namespace plumb {
 
-/// What an update by relative-entropy policy search strives for.
+/// The goal of an update by relative-entropy policy search.
 enum class Objective {
   /// R = ln p(transitions | xi) + ln prior(xi) - ln p_phi(xi), temperature >= min_temperature. With
   /// temperature 1 the weighted samples are exactly the Bayesian posterior's, so the distribution
@@ -40,7 +40,7 @@ struct PredictionErrors {
   double prior;   ///< the prior
 };
 
-/// What one iteration found.
+/// The outcome of one iteration.
 struct CalibrationReport {
   int iteration = 0;
   /// D_KL(after || before) of their moments, summed over the updates [nat]

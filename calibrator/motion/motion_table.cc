@@ -19,7 +19,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
 constexpr size_t kLongestName = 200;       // of a column, when the nearest is looked for
 
-/// What the columns are called, in the order of q, v and the actions.
+/// The columns' names, in the order of q, v and the actions.
 struct Names {
   std::vector<std::string> q, v, u;
 

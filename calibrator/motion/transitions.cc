@@ -10,8 +10,8 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kMostStates = 200'000;  // a quarter of an hour at 200 Hz
-constexpr size_t kMostEpisodes = 64;
+constexpr size_t kMaxStates = 200'000;  // a quarter of an hour at 200 Hz
+constexpr size_t kMaxEpisodes = 64;
 constexpr int kMostSteps = 1'000'000;
 
 Eigen::VectorXd ToEigen(const std::vector<double>& values) {
@@ -79,12 +79,12 @@ DropCounts& DropCounts::operator+=(const DropCounts& other) {
 TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
     : n_(robot.num_joints()),
       period_(robot.task.period),
-      most_states_(kMostStates),
-      most_episodes_(kMostEpisodes) {}
+      max_states_(kMaxStates),
+      max_episodes_(kMaxEpisodes) {}
 
 TransitionJoiner TransitionJoiner::Unbounded(const RobotDescription& robot) {
   TransitionJoiner joiner(robot);
-  joiner.most_states_ = joiner.most_episodes_ = std::numeric_limits<size_t>::max();
+  joiner.max_states_ = joiner.max_episodes_ = std::numeric_limits<size_t>::max();
   return joiner;
 }
 
@@ -103,7 +103,7 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
     commands_.clear();
   }
   states_.insert_or_assign(smoothed.sequence, smoothed);
-  if (states_.size() > most_states_) states_.erase(states_.begin());
+  if (states_.size() > max_states_) states_.erase(states_.begin());
 }
 
 void TransitionJoiner::OnCommand(const joint_command_t& command) {
@@ -111,7 +111,7 @@ void TransitionJoiner::OnCommand(const joint_command_t& command) {
       command.step >= kMostSteps)
     return;
   commands_[command.episode].insert_or_assign(command.step, command);
-  if (commands_.size() > most_episodes_) commands_.erase(commands_.begin());
+  if (commands_.size() > max_episodes_) commands_.erase(commands_.begin());
 }
 
 Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {

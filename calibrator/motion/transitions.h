@@ -93,7 +93,7 @@ class TransitionJoiner {
 
   int n_;
   double period_;
-  size_t most_states_, most_episodes_;
+  size_t max_states_, max_episodes_;
   std::map<int64_t, robot_state_t> states_;                     // by sequence
   std::map<int64_t, std::map<int, joint_command_t>> commands_;  // by episode, by step
   DropCounts drops_;

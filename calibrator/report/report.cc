@@ -105,7 +105,7 @@ class Report {
     return found.words.empty() ? "Identifiability was not examined." : found.words;
   }
 
-  // What the motion determines, in numbers, where that is a headline.
+  // The combinations that the motion determines, in numbers, where that is a headline.
   std::string Values() const {
     constexpr size_t kMost = 4;
     const std::vector<Combination>& combinations = findings_.identifiability.combinations;

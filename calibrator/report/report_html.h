@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-// What the report is made of, beside its drawings.
+// The report's HTML: verdicts, tables, figures.
 namespace plumb {
 
 /// A value with as many digits as its standard deviation allows: two significant ones of that. Four

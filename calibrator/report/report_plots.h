@@ -38,7 +38,7 @@ std::string ResidualCorrelation(const std::vector<double>& correlation, size_t c
 std::string ResidualsOverTime(const Eigen::VectorXd& residuals,
                               const std::vector<WindowErrors::Row>& rows);
 
-/// What each log alone says of a parameter, mean and 95 %, and all of them together as a band.
+/// The posterior of a parameter from each log alone, mean and 95 %, and from all as a band.
 std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary,
                           const RobotDescription& robot, Eigen::Index parameter);
 

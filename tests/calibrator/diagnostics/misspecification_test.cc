@@ -81,8 +81,8 @@ TEST_CASE(
   for (const bool shared : {false, true}) {
     const Truth truth{{}, shared ? 1e-3 : 0, 1e-3};
     FittedLog log(robot, RandomLog(robot, truth, 250, 3));
-    log.leftover.rollouts = log.rollouts;
-    log.leftover.rows = log.rows;
+    log.residuals.rollouts = log.rollouts;
+    log.residuals.rows = log.rows;
     std::map<std::string, std::vector<double>> p;
     Random random(5, {shared});
     const auto n = static_cast<Eigen::Index>(log.rows.size()),
@@ -91,15 +91,15 @@ TEST_CASE(
       // Of a state that two transitions share each coordinate's error appears in both: -1/2 of the
       // variance.
       const Eigen::MatrixXd noise = StandardNormals(n + width, 1, random);
-      log.leftover.errors = shared
+      log.residuals.errors = shared
                                 ? ((noise.topRows(n) - noise.bottomRows(n)) / std::sqrt(2)).eval()
                                 : noise.topRows(n).eval();
-      log.leftover.jacobian = StandardNormals(n, 4, random);
+      log.residuals.jacobian = StandardNormals(n, 4, random);
       for (const bool known : {true, false}) {
-        log.leftover.noise_known.assign(12, known);
-        const ProjectedErrors errors(log.known, log.leftover);
+        log.residuals.noise_known.assign(12, known);
+        const ProjectedErrors errors(log.known, log.residuals);
         REQUIRE(errors.conditions);
-        for (const Misfit& test : TestScale(errors, log.leftover.noise_known)) {
+        for (const Misfit& test : TestScale(errors, log.residuals.noise_known)) {
           p[known ? "scale" : "heteroscedasticity"].push_back(test.p);
         }
         for (const auto& tests :
@@ -139,12 +139,12 @@ class Spoilt {
   Misspecification Find(bool noise_known, const Spoil& spoil) {
     Random random(2);
     FittedLog log = Right();
-    log.leftover.noise_known.assign(12, noise_known);
+    log.residuals.noise_known.assign(12, noise_known);
     for (size_t i = 0; i < log.rows.size(); ++i) {
       const WindowErrors::Row& row = log.rows[i];
       const Transition& t = log.rollouts[static_cast<size_t>(row.rollout)]
                                 .transitions[static_cast<size_t>(row.transition)];
-      double& error = log.leftover.errors(static_cast<Eigen::Index>(i));
+      double& error = log.residuals.errors(static_cast<Eigen::Index>(i));
       error = spoil(error, row.coordinate, row.window, FindTouch(log.known, t).any(), random);
     }
     return log.Find();
@@ -233,14 +233,14 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
   }
   SECTION("dependence on the state that no candidate has") {
     FittedLog log = Right();
-    log.leftover.candidates.clear();
-    log.leftover.columns.resize(log.leftover.errors.size(), 0);
+    log.residuals.candidates.clear();
+    log.residuals.columns.resize(log.residuals.errors.size(), 0);
     for (size_t i = 0; i < log.rows.size(); ++i) {
       const WindowErrors::Row& row = log.rows[i];
       const auto& t = log.rollouts[static_cast<size_t>(row.rollout)]
                           .transitions[static_cast<size_t>(row.transition)];
       if (row.coordinate == 9)
-        log.leftover.errors(static_cast<Eigen::Index>(i)) += 0.5 * (t.v(3) > 0 ? 1 : -1);
+        log.residuals.errors(static_cast<Eigen::Index>(i)) += 0.5 * (t.v(3) > 0 ? 1 : -1);
     }
     const auto found = log.Find();
     INFO(found.words);
@@ -252,9 +252,9 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
 TEST_CASE("errors that are not finite are an alarm, and sizes have to fit") {
   FittedLog log(Robot("pendulum"), RandomLog(Robot("pendulum"), {}, 50, 1));
   CHECK_FALSE(log.Find().alarm);
-  log.leftover.errors(3) = std::numeric_limits<double>::quiet_NaN();
+  log.residuals.errors(3) = std::numeric_limits<double>::quiet_NaN();
   CHECK(log.Find().alarm);
-  log.leftover.errors.conservativeResize(7);
+  log.residuals.errors.conservativeResize(7);
   CHECK_THROWS_AS(log.Find(), std::invalid_argument);
 }
 

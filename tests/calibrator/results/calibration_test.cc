@@ -256,7 +256,7 @@ TEST_CASE("the same bits with any number of threads and a journal or none") {
     CalibrationOptions options;
     options.method = method, options.budget = 20'000, options.horizons = {1, 5};
     const Findings one = Calibrate(Pendulum(), logs, options);
-    options.workforce = 2;
+    options.execution = 2;
     const Findings two = Calibrate(Pendulum(), logs, options);
     CHECK(one.samples == two.samples);
     CHECK(one.errors == two.errors);

@@ -1,4 +1,4 @@
-#include "common/batches.h"
+#include "common/batch_runner.h"
 
 #include <array>
 #include <stdexcept>
@@ -37,8 +37,8 @@ uint64_t Hash(const std::string& text, uint64_t from) {
   return Hash(text.data(), text.size(), from);
 }
 
-Eigen::MatrixXd Batches::Run(uint64_t, Eigen::Index rows, Eigen::Index columns,
-                             const Columns& compute) {
+Eigen::MatrixXd BatchRunner::Run(uint64_t, Eigen::Index rows, Eigen::Index columns,
+                                 const Columns& compute) {
   Eigen::MatrixXd batch = compute(0, columns);
   if (batch.rows() != rows || batch.cols() != columns)
     throw std::logic_error("a batch has another size than was announced");

@@ -12,18 +12,18 @@ namespace plumb {
 
 /// How batches of simulations get done. A batch is a matrix whose columns are computed apart from
 /// each other; whoever does them, the result has the same bits. Not thread-safe.
-class Batches {
+class BatchRunner {
  public:
   /// Computes columns first ... first + count - 1 of a batch.
   using Columns = std::function<Eigen::MatrixXd(Eigen::Index first, Eigen::Index count)>;
 
-  virtual ~Batches() = default;
+  virtual ~BatchRunner() = default;
   /// @param identity of what is computed: equal batches have equal ones. @return rows x columns.
   virtual Eigen::MatrixXd Run(uint64_t identity, Eigen::Index rows, Eigen::Index columns,
                               const Columns& compute);
 };
 
-/// Batches that have been computed, in a file: an inference that was killed at any time, begun
+/// BatchRunner that have been computed, in a file: an inference that was killed at any time, begun
 /// anew, goes through the same batches to the same bits, and needs not compute those again. What
 /// follows the first batch that is not the expected one, or is cut off, or damaged, is forgotten.
 /// Not thread-safe.
@@ -38,7 +38,7 @@ class Journal {
   bool Read(uint64_t identity, Eigen::MatrixXd* batch);
   /// @throws std::runtime_error naming the file if it cannot be written.
   void Append(uint64_t identity, const Eigen::MatrixXd& batch);
-  /// Batches that had been computed before.
+  /// BatchRunner that had been computed before.
   int64_t resumed() const { return resumed_; }
   /// The inference is complete: removes the file.
   void Finish();
@@ -56,12 +56,12 @@ uint64_t Hash(const Eigen::MatrixXd& matrix, uint64_t from = 0xcbf29ce484222325)
 uint64_t Hash(const std::string& text, uint64_t from = 0xcbf29ce484222325);
 
 /// With how many threads, and by whom.
-struct Workforce {
-  Workforce(int thread_count = 1, Batches* done_by = nullptr)
+struct ExecutionOptions {
+  ExecutionOptions(int thread_count = 1, BatchRunner* done_by = nullptr)
       : threads(thread_count), batches(done_by) {}
 
   int threads;
-  Batches* batches;  ///< null: here and now
+  BatchRunner* batches;  ///< null: here and now
 };
 
 }  // namespace plumb

@@ -10,7 +10,7 @@
 namespace plumb {
 
 /// Ways of choosing the simulators that a policy is trained on.
-enum class Way {
+enum class CalibrationStrategy {
   kNominal,  ///< no randomisation: the prior's means
   kPrior,    ///< domain randomisation: the prior, whatever the robot does
   /// SimOpt (Chebotar et al., ICRA 2019), settings of Cui & Hensel: 25 samples, one update an
@@ -21,19 +21,19 @@ enum class Way {
   kOracle,   ///< the truth, which no robot tells
 };
 
-std::string Key(Way way);    ///< a word, for tables
-std::string Label(Way way);  ///< for people
+std::string Key(CalibrationStrategy strategy);    ///< a word, for tables
+std::string Label(CalibrationStrategy strategy);  ///< for people
 
 /// Whether it learns from what the robot does.
-bool Learns(Way way);
+bool Learns(CalibrationStrategy strategy);
 
 /// SimOpt by a way that learns. @param robot with its calibration settings; those of the paper
 /// replace them where the way is of the paper.
-std::unique_ptr<SimOpt> MakeSimOpt(Way way, const RobotDescription& robot, uint64_t seed,
-                                   int threads);
+std::unique_ptr<SimOpt> MakeSimOpt(CalibrationStrategy strategy, const RobotDescription& robot,
+                                   uint64_t seed, int threads);
 
 /// Where a way begins. @param truth physical units; for kOracle.
-ParameterDistribution FirstDistribution(Way way, const RobotDescription& robot,
+ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const RobotDescription& robot,
                                         const Eigen::VectorXd& truth);
 
 /// SimOpt's present distribution.

@@ -1,4 +1,4 @@
-#include "common/batches.h"
+#include "common/batch_runner.h"
 
 #include <catch2/catch.hpp>
 #include <filesystem>
@@ -7,7 +7,7 @@
 #include <string>
 
 #include "common/random.h"
-#include "common/rank_batches.h"
+#include "common/rank_batch_runner.h"
 #include "tests/temporary_file.h"
 
 namespace plumb {
@@ -28,7 +28,7 @@ struct Inference {
 Inference Infer(Journal* journal, int most = 4) {
   const Ranks ranks;
   REQUIRE(ranks.size() == 1);
-  RankBatches batches(ranks, journal);
+  RankBatchRunner batches(ranks, journal);
   Inference inference;
   Eigen::MatrixXd x = Eigen::MatrixXd::Constant(2, 3, 0.5);
   for (int i = 0; i < most; ++i) {
@@ -60,7 +60,7 @@ TEST_CASE("without a journal, and alone, batches are just computed") {
   const Inference plain = Infer(nullptr);
   CHECK(plain.computed == 4);
   CHECK(plain.batches[0](0, 0) == Approx(std::sin(3.0) / 3));
-  Batches here;
+  BatchRunner here;
   CHECK_THROWS_AS(here.Run(1, 2, 2, [](auto, auto) { return Eigen::MatrixXd(2, 1); }),
                   std::logic_error);
 }
