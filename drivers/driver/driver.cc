@@ -65,6 +65,7 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
   }
   bus_off_ = false;
   unacknowledged_ = 0;
+  if (MayBeDisplaced()) Displaced();
   if (!UseOfMotor(frame, now, utime) && !UseOfSensor(frame, now, utime)) ++frames_rejected_;
 }
 
@@ -97,6 +98,7 @@ bool Driver::UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept
 
 bool Driver::UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept {
   for (JointSensor& sensor : sensors_) {
+    if (!Active()) sensor.ForgetTurns();
     const SensorUse use = sensor.OnFrame(frame, now, utime);
     if (use != SensorUse::kNotMine) return use != SensorUse::kRejected;
   }
@@ -176,7 +178,6 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
     if (i < torque_frames_ && i < taken) sent = joints_[i].effort;
   }
   history_.Record(utime + effort_delay_, effort_sent_);
-  LetJump();
   for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);
   refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;
   if (refused_cycles_ >= kRefusedCycles && Active()) {
@@ -196,19 +197,20 @@ void Driver::Poll() noexcept {
   }
 }
 
-void Driver::LetJump() noexcept {
+bool Driver::MayBeDisplaced() const noexcept {
   // In an episode a policy, or a limit, may want no effort, too: nobody places the robot then.
-  const bool at_rest = std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
-  const bool let = virtual_ && at_rest && !(Active() && inbox_.in_episode());
-  may_jump_ = let;
+  const bool in_episode = Active() && inbox_.in_episode();
+  return virtual_ && !in_episode &&
+         std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
+}
+
+void Driver::Displaced() noexcept {
+  displaced_at_ = now_;
   for (Joint& joint : joints_) {
-    joint.motor->LetJump(let);
-    joint.watch.LetJump(let);
+    joint.motor->Displaced();
+    joint.watch.Displaced();
   }
-  for (JointSensor& sensor : sensors_) {
-    sensor.device().LetJump(let);
-    sensor.ForgetTurns(let || !Active());
-  }
+  for (JointSensor& sensor : sensors_) sensor.Displaced();
 }
 
 DriveState Driver::state() const noexcept {

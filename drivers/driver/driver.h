@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -88,8 +89,8 @@ class Driver {
   void set_bus(const std::string& url) { status_.bus = url; }
   /// Whether signatures are looked at before OnRequest and OnCommand are called.
   void set_commands_signed(bool commands_signed) { status_.commands_signed = commands_signed; }
-  /// The robot is a virtual one, which is put elsewhere at once: between episodes, while no effort
-  /// is sent, positions may jump.
+  /// The robot is a virtual one, which may be put elsewhere at once (PLACE_ROBOT) between episodes,
+  /// while no effort is sent: every check of its motion then begins anew, as after switching on.
   void set_virtual(bool is_virtual) { virtual_ = is_virtual; }
   /// What it hears is a recording: it refuses to arm.
   void set_replay(bool replay) { replay_ = replay; }
@@ -140,7 +141,9 @@ class Driver {
   /// @param why is set if not.
   bool Agree(const SecondEncoder& second, Reason& why) const noexcept;
   void CommandTorques() noexcept;
-  void LetJump() noexcept;
+  /// Whether the robot may be put elsewhere at this time; a real one never is.
+  bool MayBeDisplaced() const noexcept;
+  void Displaced() noexcept;
   void Poll() noexcept;
   void PrepareMessages();
   void NoteLateness(int64_t lateness) noexcept;
@@ -189,7 +192,8 @@ class Driver {
   LinkState link_ = LinkState::kUp;
   bool bus_off_ = false;
   bool replay_ = false;
-  bool virtual_ = false, may_jump_ = false;
+  bool virtual_ = false;
+  int64_t displaced_at_ = std::numeric_limits<int64_t>::min();  // `now` of the last Displaced()
   int64_t foreign_at_;  // `now` of the last frame that only we may send, and another has sent
   std::vector<Filter> own_;
   int unacknowledged_ = 0;

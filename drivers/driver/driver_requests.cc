@@ -87,8 +87,7 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
     } else if (Reason bad; !WithinOperatingLimits(joint.motor->readings(), settings_, bad)) {
       why.Set("{}: {}", joint.name, bad.text());
     }
-    // A virtual robot's encoders are absolute.
-    if (homed || virtual_) joint.motor->Homed();
+    if (homed) joint.motor->Homed();
     if (joint.motor->lost_place())
       why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed",
               joint.name);

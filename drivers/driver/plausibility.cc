@@ -43,7 +43,7 @@ void Plausibility::Add(int64_t time, double position, double velocity, double ef
   const Estimate next{time, position, velocity};
   CountDevices(time);
   const int64_t since = time - last_.time;
-  if (!seen_ || may_jump_ || since < 0 || Jumped(next) || since > settings_.lateness)
+  if (!seen_ || since < 0 || Jumped(next) || since > settings_.lateness)
     return Begin(next);
   LookForStuck(next, effort);
   Compare(next);
@@ -63,7 +63,7 @@ double Plausibility::Slack(double position) const noexcept {
 
 void Plausibility::CountDevices(int64_t time) noexcept {
   const int64_t since = time - window_;
-  if (!seen_ || since < 0 || since >= kWindow * settings_.period) {
+  if (count_ == 0 || since < 0 || since >= kWindow * settings_.period) {
     crowded_ = count_ > kMostInWindow;
     window_ = time;
     count_ = 0;

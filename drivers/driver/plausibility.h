@@ -56,9 +56,9 @@ class Plausibility {
   /// @param effort [Nm] or [N] last sent.
   void Add(int64_t time, double position, double velocity, double effort) noexcept;
 
-  /// While true, the joint may be put elsewhere at once: nothing but the number of devices is
-  /// judged.
-  void LetJump(bool let) noexcept { may_jump_ = let; }
+  /// The joint may have been put elsewhere at once: all but the number of devices is judged anew
+  /// from the next estimate on.
+  void Displaced() noexcept { seen_ = false; }
 
   /// The first thing that was implausible; empty if nothing was.
   std::string_view complaint() const noexcept { return complaint_.text(); }
@@ -103,7 +103,6 @@ class Plausibility {
   int64_t window_ = 0;     // begin of that in which estimates are counted
   int count_ = 0;
   bool crowded_ = false;
-  bool may_jump_ = false;
 };
 
 }  // namespace plumb

@@ -96,9 +96,9 @@ class Motor {
   /// Whatever the number, it is a setpoint a drive can obey: 0 for one that is not finite, the
   /// nearest for one beyond its range.
   virtual Frame Torque(double torque) noexcept = 0;
-  /// Of a virtual robot only, which is put elsewhere at once between episodes: while true, a
-  /// position that jumps is no fault. A real one cannot jump.
-  virtual void LetJump(bool) noexcept {}
+  /// The robot may have been put elsewhere at once, as happens to a virtual one: the next position
+  /// is not judged by those before, and the drive has not lost its place.
+  virtual void Displaced() noexcept {}
   /// Setpoints that the protocol could not say as they were: beyond its range, or not finite.
   virtual int64_t saturations() const noexcept { return 0; }
 

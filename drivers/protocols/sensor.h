@@ -65,8 +65,8 @@ class Sensor {
   /// Once per cycle: deadlines, and frames that make it send.
   virtual void Tick(int64_t now, FrameBatch& out) noexcept = 0;
 
-  /// See Motor::LetJump.
-  virtual void LetJump(bool) noexcept {}
+  /// As Motor::Displaced.
+  virtual void Displaced() noexcept {}
 
   virtual SensorState state() const noexcept = 0;
   /// Why it is not running; empty if it is.

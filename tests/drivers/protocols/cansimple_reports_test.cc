@@ -141,7 +141,7 @@ TEST_CASE("what is no restart") {
     bench.Run(300);
     bench.powered = true;
     bench.Run(20);
-    bench.motor->LetJump(true);
+    bench.motor->Displaced();
     bench.sample.position = -4;
     bench.Run(100);
     CHECK(bench.motor->state() == DriveState::kIdle);
