@@ -9,8 +9,7 @@
 #include <set>
 
 #include "drivers/bus/bus_collisions.h"
-#include "drivers/protocols/protocol.h"
-#include "drivers/protocols/sensor.h"
+#include "drivers/protocols/registry.h"
 
 namespace plumb {
 namespace {

@@ -16,7 +16,7 @@
 #include "drivers/driver/limits.h"
 #include "drivers/driver/measurements.h"
 #include "drivers/driver/plausibility.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/joint_command_t.hpp"

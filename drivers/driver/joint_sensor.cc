@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/protocols/registry.h"
+
 namespace plumb {
 namespace {
 

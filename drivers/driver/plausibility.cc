@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/protocols/registry.h"
+
 namespace plumb {
 namespace {
 
@@ -43,8 +45,7 @@ void Plausibility::Add(int64_t time, double position, double velocity, double ef
   const Estimate next{time, position, velocity};
   CountDevices(time);
   const int64_t since = time - last_.time;
-  if (!seen_ || since < 0 || Jumped(next) || since > settings_.lateness)
-    return Begin(next);
+  if (!seen_ || since < 0 || Jumped(next) || since > settings_.lateness) return Begin(next);
   LookForStuck(next, effort);
   Compare(next);
   last_ = next;

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "robot/description.h"
 
 namespace plumb {

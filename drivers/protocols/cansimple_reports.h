@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "drivers/protocols/cansimple.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 
 namespace plumb {
 

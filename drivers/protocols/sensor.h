@@ -9,7 +9,7 @@
 
 #include "drivers/can/transport.h"
 #include "drivers/protocols/bus_device.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -84,15 +84,5 @@ class Sensor {
 struct SensorTiming {
   int64_t timeout = 0;  ///< [us] > 0 silence after which a sensor counts as absent
 };
-
-/// A sensor of the named protocol (SensorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or
-/// settings it cannot have.
-std::unique_ptr<Sensor> MakeSensor(const SensorDescription& description,
-                                   const SensorTiming& timing);
-
-/// What that sensor and the driver say on the bus, under its name.
-/// @throws std::invalid_argument for an unknown protocol.
-BusDevice SensorBusDevice(const SensorDescription& description);
 
 }  // namespace plumb

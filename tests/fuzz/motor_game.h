@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "tests/fuzz/bytes.h"
 
 namespace plumb {

@@ -118,13 +118,4 @@ struct MotorTiming {
       heartbeat_timeout;
 };
 
-/// A motor of the named protocol (MotorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known), or a node
-/// or settings it cannot have.
-std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const MotorTiming& timing);
-
-/// What that motor and its host say on the bus; without a name.
-/// @throws std::invalid_argument for an unknown protocol.
-BusDevice MotorBusDevice(const MotorDescription& description, const DriverSettings& driver);
-
 }  // namespace plumb
