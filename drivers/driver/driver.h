@@ -92,7 +92,7 @@ class Driver {
   /// The robot is a virtual one, which may be put elsewhere at once (PLACE_ROBOT) between episodes,
   /// while no effort is sent: every check of its motion then begins anew, as after switching on.
   void set_virtual(bool is_virtual) { virtual_ = is_virtual; }
-  /// What it hears is a recording: it refuses to arm.
+  /// The bus is a recording: the driver refuses to arm.
   void set_replay(bool replay) { replay_ = replay; }
 
  private:
@@ -128,12 +128,12 @@ class Driver {
   /// Of the joints without a motor. @throws std::invalid_argument if nothing measures one.
   void FindMeasuring(const RobotDescription& robot);
   void FindSecondEncoders(const RobotDescription& robot);
-  bool UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept;
-  bool UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept;
+  bool DispatchToMotors(const Frame& frame, int64_t now, int64_t utime) noexcept;
+  bool DispatchToSensors(const Frame& frame, int64_t now, int64_t utime) noexcept;
   void Refuse(std::string_view why) noexcept;
   void Disarm() noexcept;
   void Estop(std::string_view reason) noexcept;
-  void DateStop() noexcept;
+  void StampStopTime() noexcept;
   void RequestArm(int64_t made, bool homed) noexcept;
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;
@@ -181,7 +181,7 @@ class Driver {
   int arms_refused_ = 0;           // since it was armed last
   int64_t now_, utime_;            // latest times given
   int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
-  bool stop_dated_ = true;         // false: that time is the last one known before it
+  bool stop_stamped_ = true;       // false: that time is the last one known before it
   int64_t armed_by_;               // utime of the last ARM request that was obeyed
   int64_t armed_at_ = 0;           // `now`
   bool stray_controller_ = false;  // commanded during the start guard

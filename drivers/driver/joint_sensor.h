@@ -47,7 +47,7 @@ class JointSensor {
 
   SensorUse OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept;
 
-  /// What it measured of the joint last before or at `utime`: effort NaN; velocity NaN if it
+  /// The last measurement of the joint before or at `utime`: effort NaN; velocity NaN if it
   /// reports none. Call it with times that do not decrease.
   const JointMeasurement& At(int64_t utime) noexcept;
   int64_t measured() const noexcept { return measured_; }  ///< utime of what At has given

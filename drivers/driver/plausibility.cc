@@ -65,11 +65,11 @@ double Plausibility::Slack(double position) const noexcept {
 void Plausibility::CountDevices(int64_t time) noexcept {
   const int64_t since = time - window_;
   if (count_ == 0 || since < 0 || since >= kWindow * settings_.period) {
-    crowded_ = count_ > kMostInWindow;
+    crowded_ = count_ > kMaxInWindow;
     window_ = time;
     count_ = 0;
   }
-  if (++count_ > kMostInWindow) {
+  if (++count_ > kMaxInWindow) {
     crowded_ = true;
     Complain(
         "{} encoder estimates in {} ms, where one device sends {}: two devices with one id, or "

@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// What a joint's estimates are judged by.
+/// The bounds by which a joint's estimates are judged.
 struct PlausibilitySettings {
   double velocity_limit;  ///< [rad/s] or [m/s] > 0; infinite: jumps are not looked for
   double effort_limit;    ///< [Nm] or [N] > 0
@@ -44,7 +44,7 @@ PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverS
 class Plausibility {
  public:
   static constexpr int kWindow = 100;            ///< estimates, or periods
-  static constexpr int kMostInWindow = 150;      ///< estimates of one device within kWindow periods
+  static constexpr int kMaxInWindow = 150;       ///< estimates of one device within kWindow periods
   static constexpr double kDisagreement = 0.25;  ///< part of the path
   static constexpr double kEffort = 0.1;         ///< of the limit, under which a joint should move
 
@@ -63,7 +63,7 @@ class Plausibility {
   /// The first thing that was implausible; empty if nothing was.
   std::string_view complaint() const noexcept { return complaint_.text(); }
   /// Takes the complaint back. What is wrong still will be found again.
-  void Forgive() noexcept { complaint_.Clear(); }
+  void ClearComplaint() noexcept { complaint_.Clear(); }
   /// Whether more than one device seems to send estimates; so until 100 T have gone by with no more
   /// than one would.
   bool crowded() const noexcept { return crowded_; }

@@ -9,7 +9,7 @@
 
 namespace plumb {
 
-/// What an ODrive reports besides heartbeats and errors, remembered; and the signs that it has
+/// The latest reports of an ODrive, but for heartbeats and errors; and the signs that it has
 /// restarted. Pure logic; free of exceptions and allocation. Not thread-safe.
 class CanSimpleReports {
  public:

@@ -59,7 +59,7 @@ class Cia406Encoder : public Sensor {
   void Tick(int64_t now, FrameBatch& out) noexcept override {
     present_ = heard_ && now - heard_at_ <= timing_.timeout;
     if (state_ == SensorState::kRunning && now - position_at_ > timing_.timeout) {
-      // What it has turned by then can still be counted, if it is not too long.
+      // Its turns until then can still be counted, if it is not too long.
       if (!present_) {
         state_ = SensorState::kStarting;
         agreed_ = false;

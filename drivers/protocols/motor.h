@@ -24,7 +24,7 @@ struct MotorEstimate {
   double velocity = 0;  ///< [rad/s]
 };
 
-/// What else a drive reports, for whoever watches over it. NaN = it does not report that, or has
+/// A drive's other reports, for whoever watches over it. NaN = it does not report that, or has
 /// not yet.
 struct MotorReadings {
   double motor_temperature = std::numeric_limits<double>::quiet_NaN();  ///< [degC]
@@ -35,7 +35,7 @@ struct MotorReadings {
   int64_t temperatures_at = 0;  ///< [us] when it reported temperatures last; 0 before it has
 };
 
-/// What a motor made of a frame.
+/// A motor's verdict on a frame.
 enum class FrameUse {
   kNotMine,   ///< another id, or not a frame a drive sends: remote, extended, FD, error
   kRejected,  ///< its id, but too short, not finite or of an unknown kind
@@ -44,7 +44,7 @@ enum class FrameUse {
 };
 
 /// The most frames of the arming sequence that a drive is given in a Tick.
-inline constexpr size_t kMostArmingFrames = 2;
+inline constexpr size_t kMaxArmingFrames = 2;
 
 /// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All
 /// methods but the constructor are free of exceptions and allocation; times are scaled monotonic
@@ -63,8 +63,8 @@ class Motor {
   virtual double torque_estimate() const noexcept = 0;
   /// The newest of each.
   virtual MotorReadings readings() const noexcept { return {}; }
-  /// What the drive says it is, such as "firmware 0.6.10, hardware 4.4.58"; empty if it has not
-  /// said.
+  /// The drive's own name for itself, such as "firmware 0.6.10, hardware 4.4.58"; empty if it has
+  /// not said.
   virtual std::string_view identity() const noexcept { return {}; }
 
   /// Begins the arming sequence, from any state but armed. state() tells how it goes.
@@ -81,7 +81,7 @@ class Motor {
   /// Whether the frame is somebody else's emergency stop for this drive, or for all.
   virtual bool IsEstop(const Frame&) const noexcept { return false; }
   /// Once per cycle: deadlines, and the next frames of the sequence under way.
-  /// @param may_arm false: no room for kMostArmingFrames in this cycle, the sequence waits.
+  /// @param may_arm false: no room for kMaxArmingFrames in this cycle, the sequence waits.
   virtual void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept = 0;
   /// How many readings it asks for in turn: with telemetry that comes unasked, all drives' would
   /// sometimes come at once.
@@ -111,7 +111,7 @@ class Motor {
   virtual bool confirmed_idle() const noexcept = 0;
 };
 
-/// What a motor needs to know of the driver's settings.
+/// The driver's settings that concern a motor.
 struct MotorTiming {
   int64_t
       /// [us] silence after which a drive counts as absent; also for each arming step

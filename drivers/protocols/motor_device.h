@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// What a drive reads of its motor's shaft.
+/// A motor's shaft, as its drive's encoder reads it.
 struct ShaftReading {
   double turns = 0;
   double turns_per_second = 0;

@@ -19,7 +19,7 @@ namespace plumb {
 /// or settings it cannot have.
 std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const MotorTiming& timing);
 
-/// What that motor and its host say on the bus; without a name.
+/// The messages of that motor and its host on the bus; without a name.
 /// @throws std::invalid_argument for an unknown protocol.
 BusDevice MotorBusDevice(const MotorDescription& description, const DriverSettings& driver);
 
@@ -34,7 +34,7 @@ std::unique_ptr<MotorDevice> MakeMotorDevice(const RobotDescription& robot, int 
 std::unique_ptr<Sensor> MakeSensor(const SensorDescription& description,
                                    const SensorTiming& timing);
 
-/// What that sensor and the driver say on the bus, under its name.
+/// The messages of that sensor and the driver on the bus, under its name.
 /// @throws std::invalid_argument for an unknown protocol.
 BusDevice SensorBusDevice(const SensorDescription& description);
 

@@ -40,7 +40,7 @@ struct ImuSample {
   bool clipped = false;            ///< rate or force was beyond what it can measure
 };
 
-/// What a sensor made of a frame.
+/// A sensor's verdict on a frame.
 enum class SensorUse {
   kNotMine,   ///< another id, or not a frame a sensor sends: remote, extended, FD, error
   kRejected,  ///< its id, but too short or impossible
@@ -80,7 +80,7 @@ class Sensor {
   virtual const ImuSample* imu() const noexcept { return nullptr; }
 };
 
-/// What a sensor needs to know of the driver's settings.
+/// The driver's settings that concern a sensor.
 struct SensorTiming {
   int64_t timeout = 0;  ///< [us] > 0 silence after which a sensor counts as absent
 };

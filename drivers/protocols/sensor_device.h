@@ -8,7 +8,7 @@
 
 namespace plumb {
 
-/// What there is for a sensor to measure, where it is.
+/// The motion at a sensor's place.
 struct SensedMotion {
   double position = 0;                            ///< [rad] of an encoder's shaft
   std::array<double, 3> rate{};                   ///< [rad/s] of an IMU, in its axes

@@ -153,7 +153,7 @@ TEST_CASE("a complaint stays until it is taken back, and the first one counts") 
   CHECK(first != "");
   CHECK(joint.Add(1, 0) == first);
   CHECK(joint.Add(5, 0) == first);
-  joint.watch.Forgive();
+  joint.watch.ClearComplaint();
   CHECK(joint.Add(5, 0) == "");
 }
 
@@ -210,7 +210,7 @@ TEST_CASE("a second device is remembered until it is gone") {
   Given joint(kSettings);
   for (int i = 0; i < 1000; ++i) joint.Add(0, 0, 0, 2'500);
   CHECK(joint.watch.crowded());
-  joint.watch.Forgive();
+  joint.watch.ClearComplaint();
   for (int i = 0; i < 100; ++i) joint.Add(0, 0);
   CHECK(joint.watch.complaint().empty());
   CHECK(joint.watch.crowded());

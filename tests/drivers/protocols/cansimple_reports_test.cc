@@ -1,4 +1,4 @@
-// What an ODrive reports besides its position, and a restart told from a fault: the host's side
+// The reports of an ODrive besides its position, and a restart told from a fault: the host's side
 // against the virtual drive, in virtual time.
 
 #include <catch2/catch.hpp>
