@@ -10,6 +10,7 @@
 
 #include "drivers/bus/bus_plan.h"
 #include "drivers/driver/driver.h"
+#include "drivers/protocols/registry.h"
 #include "robot/floating_base.h"
 
 namespace plumb {

@@ -24,7 +24,7 @@ struct MotorEstimate {
   double velocity = 0;  ///< [rad/s]
 };
 
-/// What else a drive reports, for whoever watches over it. NaN = it does not report that, or has
+/// A drive's other reports, for whoever watches over it. NaN = it does not report that, or has
 /// not yet.
 struct MotorReadings {
   double motor_temperature = std::numeric_limits<double>::quiet_NaN();  ///< [degC]
@@ -35,7 +35,7 @@ struct MotorReadings {
   int64_t temperatures_at = 0;  ///< [us] when it reported temperatures last; 0 before it has
 };
 
-/// What a motor made of a frame.
+/// A motor's verdict on a frame.
 enum class FrameUse {
   kNotMine,   ///< another id, or not a frame a drive sends: remote, extended, FD, error
   kRejected,  ///< its id, but too short, not finite or of an unknown kind
@@ -44,7 +44,7 @@ enum class FrameUse {
 };
 
 /// The most frames of the arming sequence that a drive is given in a Tick.
-inline constexpr size_t kMostArmingFrames = 2;
+inline constexpr size_t kMaxArmingFrames = 2;
 
 /// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All
 /// methods but the constructor are free of exceptions and allocation; times are scaled monotonic
@@ -63,8 +63,8 @@ class Motor {
   virtual double torque_estimate() const noexcept = 0;
   /// The newest of each.
   virtual MotorReadings readings() const noexcept { return {}; }
-  /// What the drive says it is, such as "firmware 0.6.10, hardware 4.4.58"; empty if it has not
-  /// said.
+  /// The drive's own name for itself, such as "firmware 0.6.10, hardware 4.4.58"; empty if it has
+  /// not said.
   virtual std::string_view identity() const noexcept { return {}; }
 
   /// Begins the arming sequence, from any state but armed. state() tells how it goes.
@@ -81,7 +81,7 @@ class Motor {
   /// Whether the frame is somebody else's emergency stop for this drive, or for all.
   virtual bool IsEstop(const Frame&) const noexcept { return false; }
   /// Once per cycle: deadlines, and the next frames of the sequence under way.
-  /// @param may_arm false: no room for kMostArmingFrames in this cycle, the sequence waits.
+  /// @param may_arm false: no room for kMaxArmingFrames in this cycle, the sequence waits.
   virtual void Tick(int64_t now, bool may_arm, FrameBatch& out) noexcept = 0;
   /// How many readings it asks for in turn: with telemetry that comes unasked, all drives' would
   /// sometimes come at once.
@@ -96,9 +96,9 @@ class Motor {
   /// Whatever the number, it is a setpoint a drive can obey: 0 for one that is not finite, the
   /// nearest for one beyond its range.
   virtual Frame Torque(double torque) noexcept = 0;
-  /// Of a virtual robot only, which is put elsewhere at once between episodes: while true, a
-  /// position that jumps is no fault. A real one cannot jump.
-  virtual void LetJump(bool) noexcept {}
+  /// The robot may have been put elsewhere at once, as happens to a virtual one: the next position
+  /// is not judged by those before, and the drive has not lost its place.
+  virtual void Displaced() noexcept {}
   /// Setpoints that the protocol could not say as they were: beyond its range, or not finite.
   virtual int64_t saturations() const noexcept { return 0; }
 
@@ -111,20 +111,11 @@ class Motor {
   virtual bool confirmed_idle() const noexcept = 0;
 };
 
-/// What a motor needs to know of the driver's settings.
+/// The driver's settings that concern a motor.
 struct MotorTiming {
   int64_t
       /// [us] silence after which a drive counts as absent; also for each arming step
       heartbeat_timeout;
 };
-
-/// A motor of the named protocol (MotorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known), or a node
-/// or settings it cannot have.
-std::unique_ptr<Motor> MakeMotor(const MotorDescription& description, const MotorTiming& timing);
-
-/// What that motor and its host say on the bus; without a name.
-/// @throws std::invalid_argument for an unknown protocol.
-BusDevice MotorBusDevice(const MotorDescription& description, const DriverSettings& driver);
 
 }  // namespace plumb
