@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "calibrator/identifiability.h"
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 #include "robot/description.h"
 
 namespace plumb {

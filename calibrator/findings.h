@@ -2,13 +2,14 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calibrator/identifiability.h"
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/transitions.h"
 #include "calibrator/window_errors.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 
@@ -73,6 +74,15 @@ struct Stage {
   Eigen::VectorXd mean, sd;  ///< coordinates
 };
 
+/// The update of the loop that findings come from.
+struct LoopUpdate {
+  int iteration;       ///< of the distribution; it has seen the roll-outs of earlier policies
+  int64_t utime;       ///< [us] start of the newest roll-out
+  double kl;           ///< D_KL(after || before) of the moments, summed over the updates [nat]
+  double ess;          ///< effective sample size of the last update; NaN = draws no samples
+  double temperature;  ///< of the last update; 1 = Bayes' rule
+};
+
 /// All that a calibration has found.
 struct Findings {
   std::string method;  ///< that was asked for
@@ -103,6 +113,9 @@ struct Findings {
   std::string check;  ///< how the posterior's shape was verified, in words
   std::vector<std::string> warnings;
   double seconds = 0;  ///< wall time
+  /// Of plumb-calibrator only, which fits and looks no further: stages, noise, advice, holdout,
+  /// misspecification, agreement, check and the counts of simulations then say nothing.
+  std::optional<LoopUpdate> loop;
 };
 
 }  // namespace plumb

@@ -7,6 +7,7 @@
 
 #include "calibrator/simopt.h"
 #include "calibrator/state_noise.h"
+#include "robot/parameter_distribution.h"
 #include "sim/simulator.h"
 #include "tests/calibrator/fitted_log.h"
 

@@ -7,6 +7,7 @@
 #include "calibrator/simopt.h"
 #include "calibrator/sparse_basis.h"
 #include "common/decompositions.h"
+#include "robot/parameter_distribution.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/synthetic.h"
 

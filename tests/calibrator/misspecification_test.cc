@@ -9,9 +9,9 @@
 #include <limits>
 #include <map>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/projected_errors.h"
 #include "calibrator/touch.h"
+#include "common/gaussian.h"
 #include "tests/calibrator/fitted_log.h"
 
 namespace plumb {

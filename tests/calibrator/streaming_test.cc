@@ -6,6 +6,7 @@
 
 #include "calibrator/curriculum.h"
 #include "calibrator/simopt.h"
+#include "robot/parameter_distribution.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/synthetic.h"
 

@@ -8,6 +8,7 @@
 #include "calibrator/simopt.h"
 #include "common/decompositions.h"
 #include "common/random.h"
+#include "robot/parameter_distribution.h"
 #include "sim/simulator.h"
 
 namespace plumb {
