@@ -8,10 +8,10 @@
 #include <iostream>
 #include <thread>
 
-#include "calibrator/calibrator.h"
-#include "calibrator/checkpoint.h"
-#include "calibrator/motion_log.h"
-#include "calibrator/posterior_file.h"
+#include "calibrator/live/calibrator.h"
+#include "calibrator/live/checkpoint.h"
+#include "calibrator/motion/motion_log.h"
+#include "calibrator/results/posterior_file.h"
 #include "common/process.h"
 
 namespace plumb {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "calibrator/excitation.h"
+#include "calibrator/design/excitation.h"
 #include "common/atomic_file.h"
 #include "robot/description.h"
 #include "robot/posterior_reader.h"

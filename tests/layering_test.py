@@ -9,21 +9,40 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-BELOW = {
+# Each folder may include the named ones and all that these may.
+STANDS_ON = {
     "common": set(),
+    "plot": {"common"},
     "robot": {"common"},
-    "sim/tasks": {"common", "robot"},
-    "drivers": {"common", "robot"},
-    "estimator": {"common", "robot"},
-    "estimator/model": {"common", "robot", "sim", "estimator"},
-    "controller": {"common", "robot", "sim/tasks"},
-    "sim": {"common", "robot", "sim/tasks"},
+    "sim/tasks": {"robot"},
+    "drivers": {"robot"},
+    "estimator": {"robot"},
+    "estimator/model": {"sim", "estimator"},
+    "controller": {"sim/tasks"},
+    "sim": {"sim/tasks"},
     "calibrator/inference": {"common"},
-    "calibrator": {"common", "robot", "sim", "sim/tasks", "calibrator/inference"},
-    "trainer": {"common", "robot", "sim", "sim/tasks", "controller"},
-    "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "controller", "calibrator", "calibrator/inference", "trainer"},
-    "experiments": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "calibrator", "calibrator/inference", "trainer", "controller"},
+    "calibrator/motion": {"sim"},
+    "calibrator/fit": {"calibrator/motion", "calibrator/inference"},
+    "calibrator/diagnostics": {"calibrator/fit"},
+    "calibrator/design": {"calibrator/diagnostics"},
+    "calibrator/results": {"calibrator/design"},
+    "calibrator/report": {"calibrator/results", "plot"},
+    "calibrator/live": {"calibrator/results"},
+    "calibrator": {"calibrator/report", "calibrator/live"},
+    "trainer": {"sim", "controller"},
+    "cli": {"drivers", "estimator", "controller", "calibrator", "trainer"},
+    "experiments": {"drivers", "estimator", "controller", "calibrator", "trainer"},
 }
+
+
+def all_below(room, path=()):
+    if room in path:
+        sys.exit("a circle: " + " -> ".join((*path, room)))
+    nearest = STANDS_ON[room]
+    return nearest.union(*(all_below(below, (*path, room)) for below in nearest))
+
+
+BELOW = {room: all_below(room) for room in STANDS_ON}
 # The virtual robot speaks the protocols' device side. Only the estimator's process knows its filter on the simulator.
 EXCEPTIONS = {(f"sim/{file}", "drivers") for file in
               ("main.cc", "virtual_bus.h", "virtual_bus.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h", "virtual_drives.cc", "virtual_sensors.cc")} | {("estimator/main.cc", "estimator/model"), ("estimator/main.cc", "sim")}

@@ -4,8 +4,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "calibrator/discrepancy.h"
-#include "calibrator/simopt.h"
+#include "calibrator/fit/discrepancy.h"
 #include "common/decompositions.h"
 #include "common/random.h"
 #include "robot/parameter_distribution.h"

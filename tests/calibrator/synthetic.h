@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "common/gaussian.h"
 #include "robot/description.h"
 

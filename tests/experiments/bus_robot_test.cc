@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "calibrator/calibration.h"
+#include "calibrator/results/calibration.h"
 #include "common/decompositions.h"
 #include "sim/mujoco_engine.h"
 #include "sim/parameters.h"
