@@ -9,6 +9,7 @@
 #include "calibrator/inference/group_sums.h"
 #include "calibrator/inference/prior.h"
 #include "calibrator/motion/transitions.h"
+#include "common/gaussian.h"
 #include "sim/windows.h"
 
 namespace plumb {
