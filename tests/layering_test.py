@@ -34,7 +34,7 @@ STANDS_ON = {
     "calibrator/design": {"calibrator/diagnostics"},
     "calibrator/results": {"calibrator/design"},
     "calibrator/report": {"calibrator/results", "plot"},
-    "calibrator/live": {"calibrator/diagnostics"},
+    "calibrator/live": {"calibrator/results"},
     "calibrator": {"calibrator/report", "calibrator/live"},
     "trainer": {"sim", "controller"},
     "cli": {"drivers", "sim/virtual", "sim/view", "estimator", "controller", "calibrator", "trainer"},

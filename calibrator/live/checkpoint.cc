@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kVersion = 2;  // 1: the distribution was one Gaussian
+constexpr int kVersion = 3;  // 2: without the method used and its warnings
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -155,10 +155,12 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"iteration", state.iteration},
                {"update", state.update},
                {"distribution", ToJson(state.distribution)},
+               {"used", state.used},
                {"before", ToJson(state.before)},
                {"kl", state.kl},
                {"ess", state.ess},
                {"temperature", state.temperature},
+               {"warnings", state.warnings},
                {"rollouts_per_iteration", state.rollouts_per_iteration}};
   WriteAtomically(folder_ / "calibration.json", j.dump(1));
 }
@@ -180,9 +182,11 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     state.iteration = j.at("iteration");
     state.update = j.at("update");
     state.distribution = MixtureFrom(j.at("distribution"));
+    state.used = j.at("used");
     state.before = MixtureFrom(j.at("before"));
     state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
     state.temperature = j.at("temperature");
+    state.warnings = j.at("warnings").get<std::vector<std::string>>();
     state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
     size_t count = 0;
     for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);

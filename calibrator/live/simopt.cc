@@ -38,11 +38,6 @@ Eigen::VectorXd ScaledReturns(const Eigen::VectorXd& costs) {
 
 }  // namespace
 
-Gaussian PriorGaussian(const RobotDescription& robot) {
-  const ParameterDistribution prior = ParameterDistribution::Prior(robot);
-  return {prior.components[0].mean, prior.components[0].covariance};
-}
-
 SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective)
     : SimOpt(robot, seed, threads, "reps") {
   objective_ = objective;
@@ -130,7 +125,7 @@ Eigen::VectorXd SimOpt::Returns(const Eigen::MatrixXd& samples) {
 }
 
 std::optional<CalibrationReport> SimOpt::Update() {
-  warnings_.clear();
+  state_.warnings.clear();
   objective_ ? Search() : Infer();
   if (++state_.update < (objective_ ? robot_.calibration.updates : 1)) return {};
   ++state_.iteration;
@@ -152,6 +147,7 @@ void SimOpt::Search() {
   state_.ess = weights.ess;
   state_.temperature = weights.temperature;
   state_.distribution = {{1}, {limited}};
+  state_.used = method_;
 }
 
 void SimOpt::Infer() {
@@ -162,10 +158,11 @@ void SimOpt::Infer() {
     state_.ess = result.ess;
     state_.temperature = 1;
     state_.distribution = result.posterior;
+    state_.used = result.used;
     failures_ += result.failures;
-    warnings_ = result.warnings;
+    state_.warnings = result.warnings;
   } catch (const std::invalid_argument& error) {
-    warnings_ = {std::string("the distribution stays as it is: ") + error.what()};
+    state_.warnings = {std::string("the distribution stays as it is: ") + error.what()};
   }
 }
 
@@ -215,7 +212,7 @@ std::optional<CalibrationReport> SimOpt::Report() {
       FindIdentifiability(robot_, discrepancy_, state_.rollouts, Moments(state_.distribution));
   report.failures = discrepancy_.failures();
   report.failures.diverged += failures_;
-  report.warnings = warnings_;
+  report.warnings = state_.warnings;
   return report;
 }
 

@@ -11,8 +11,8 @@
 
 #include "calibrator/diagnostics/error_tests.h"
 #include "calibrator/diagnostics/projected_errors.h"
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/motion/touch.h"
+#include "common/gaussian.h"
 #include "tests/calibrator/fitted_log.h"
 
 namespace plumb {

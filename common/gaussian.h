@@ -7,16 +7,20 @@
 
 namespace plumb {
 
-/// A normal distribution over the parameters' coordinates.
+/// A normal distribution of n numbers. All functions of this header are thread-safe.
 struct Gaussian {
   Eigen::VectorXd mean;        ///< n
-  Eigen::MatrixXd covariance;  ///< n x n, positive definite
+  Eigen::MatrixXd covariance;  ///< n x n, symmetric, positive definite
+
+  bool operator==(const Gaussian&) const = default;
 };
 
-/// A sum of normal distributions.
+/// A sum of K normal distributions.
 struct GaussianMixture {
-  std::vector<double> weights;  ///< > 0, sum to 1
-  std::vector<Gaussian> components;
+  std::vector<double> weights;       ///< K, > 0, sum to 1
+  std::vector<Gaussian> components;  ///< K, of the same n
+
+  bool operator==(const GaussianMixture&) const = default;
 };
 
 /// ln p(x). @throws std::invalid_argument if the covariance is not positive definite (also below).
@@ -38,6 +42,9 @@ Gaussian Moments(const GaussianMixture& mixture);
 
 /// A matrix of standard normal deviates, column by column.
 Eigen::MatrixXd StandardNormals(Eigen::Index rows, Eigen::Index columns, Random& random);
+
+/// Draws a component in proportion to the weights. @return its index.
+size_t SampleComponent(const GaussianMixture& mixture, Random& random);
 
 /// One draw.
 Eigen::VectorXd Sample(const GaussianMixture& mixture, Random& random);

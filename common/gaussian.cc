@@ -1,4 +1,4 @@
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 #include <cmath>
 #include <stdexcept>
@@ -66,13 +66,17 @@ Eigen::MatrixXd StandardNormals(Eigen::Index rows, Eigen::Index columns, Random&
   return normals;
 }
 
-Eigen::VectorXd Sample(const GaussianMixture& mixture, Random& random) {
+size_t SampleComponent(const GaussianMixture& mixture, Random& random) {
   double left = random.Uniform();
   size_t i = 0;
   while (i + 1 < mixture.components.size() && left >= mixture.weights[i])
     left -= mixture.weights[i++];
-  return Transform(mixture.components[i],
-                   StandardNormals(mixture.components[i].mean.size(), 1, random));
+  return i;
+}
+
+Eigen::VectorXd Sample(const GaussianMixture& mixture, Random& random) {
+  const Gaussian& component = mixture.components[SampleComponent(mixture, random)];
+  return Transform(component, StandardNormals(component.mean.size(), 1, random));
 }
 
 }  // namespace plumb
