@@ -1,5 +1,5 @@
 // What the observer costs calibration: parameters from estimated states beside those from true
-// states of the same motions. A table for docs/measurements.md. build/bench/observed_calibration
+// states of the same motions. A table for docs/measurements/estimator.md. build/bench/observed_calibration
 // [motions [robot]]
 
 #include <fmt/format.h>

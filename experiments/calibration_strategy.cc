@@ -56,7 +56,7 @@ std::unique_ptr<SimOpt> MakeSimOpt(CalibrationStrategy strategy, const RobotDesc
 ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const RobotDescription& robot,
                                         const Eigen::VectorXd& truth) {
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  ParameterDistribution::Component& component = distribution.components.at(0);
+  Gaussian& component = distribution.mixture.components.at(0);
   if (strategy == CalibrationStrategy::kOracle) {
     for (Eigen::Index i = 0; i < truth.size(); ++i) {
       component.mean(i) = robot.parameters[static_cast<size_t>(i)].ToCoordinate(truth(i));
@@ -68,15 +68,7 @@ ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const Robo
 }
 
 ParameterDistribution DistributionOf(const SimOpt& simopt, const RobotDescription& robot) {
-  ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  const GaussianMixture& mixture = simopt.state().distribution;
-  distribution.iteration = simopt.state().iteration;
-  distribution.components.clear();
-  for (size_t i = 0; i < mixture.components.size(); ++i) {
-    distribution.components.push_back(
-        {mixture.weights[i], mixture.components[i].mean, mixture.components[i].covariance});
-  }
-  return distribution;
+  return {simopt.state().iteration, robot.parameters, simopt.state().distribution};
 }
 
 }  // namespace plumb

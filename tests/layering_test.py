@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Dependencies point down only: which folder may include which. Exit status 1 names every line that does not.
 
-Also: SimTK headers only in sim/*.cc, MuJoCo's only in sim/mujoco_engine.cc, MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in
-main.cc files, common/ and drivers/can/ (tests aside).
+Also: SimTK headers only in sim/*.cc, MuJoCo's only in sim/virtual/mujoco_backend.cc, MPI's only in common/ranks.cc,
+ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in main.cc files, common/ and drivers/can/ (tests aside).
 """
 import pathlib
 import re
@@ -14,12 +14,19 @@ STANDS_ON = {
     "common": set(),
     "plot": {"common"},
     "robot": {"common"},
-    "sim/tasks": {"robot"},
-    "drivers": {"robot"},
+    "drivers/can": {"common"},
+    "drivers/protocols": {"robot", "drivers/can"},
+    "drivers/bus": {"drivers/protocols"},
+    "drivers/driver": {"drivers/bus"},
+    "drivers": {"drivers/driver"},
     "estimator": {"robot"},
     "estimator/model": {"sim", "estimator"},
     "controller": {"sim/tasks"},
-    "sim": {"sim/tasks"},
+    "sim/dynamics": {"robot"},
+    "sim/tasks": {"robot"},
+    "sim": {"sim/dynamics", "sim/tasks"},
+    "sim/virtual": {"sim"},
+    "sim/view": {"sim"},
     "calibrator/inference": {"common"},
     "calibrator/motion": {"sim"},
     "calibrator/fit": {"calibrator/motion", "calibrator/inference"},
@@ -27,11 +34,11 @@ STANDS_ON = {
     "calibrator/design": {"calibrator/diagnostics"},
     "calibrator/results": {"calibrator/design"},
     "calibrator/report": {"calibrator/results", "plot"},
-    "calibrator/live": {"calibrator/diagnostics"},
+    "calibrator/live": {"calibrator/results"},
     "calibrator": {"calibrator/report", "calibrator/live"},
     "trainer": {"sim", "controller"},
-    "cli": {"drivers", "estimator", "controller", "calibrator", "trainer"},
-    "experiments": {"drivers", "estimator", "controller", "calibrator", "trainer"},
+    "cli": {"drivers", "sim/virtual", "sim/view", "estimator", "controller", "calibrator", "trainer"},
+    "experiments": {"drivers", "sim/virtual", "estimator", "controller", "calibrator", "trainer"},
 }
 
 
@@ -43,12 +50,17 @@ def all_below(room, path=()):
 
 
 BELOW = {room: all_below(room) for room in STANDS_ON}
-# The virtual robot speaks the protocols' device side. Only the estimator's process knows its filter on the simulator.
-EXCEPTIONS = {(f"sim/{file}", "drivers") for file in
-              ("main.cc", "virtual_bus.h", "virtual_bus.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h", "virtual_drives.cc", "virtual_sensors.cc")} | {("estimator/main.cc", "estimator/model"), ("estimator/main.cc", "sim")}
+# Of the virtual robot's room only the part on the bus knows drivers: it speaks the protocols' device side.
+ON_THE_BUS = [f"sim/virtual/{file}" for file in
+              ("virtual_bus.h", "virtual_bus.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h",
+               "virtual_drives.cc", "virtual_sensors.cc")]
+# Only the estimator's process knows its filter on the simulator.
+EXCEPTIONS = {(file, room) for file in ON_THE_BUS for room in BELOW if room.startswith("drivers/")} | {
+    ("sim/main.cc", "sim/virtual"), ("sim/main.cc", "drivers/can"),
+    ("estimator/main.cc", "estimator/model"), ("estimator/main.cc", "sim")}
 SYSTEM = {
     r"(SimTK\w*|Simbody)\.h|simbody/": lambda p: p.startswith("sim/") and p.endswith(".cc"),
-    r"mujoco/": lambda p: p == "sim/mujoco_engine.cc",
+    r"mujoco/": lambda p: p == "sim/virtual/mujoco_backend.cc",
     r"onnx/|google/protobuf/": lambda p: p.startswith("trainer/onnx_") and p.endswith(".cc"),
     r"lcm/": lambda p: p.startswith(("common/", "drivers/can/")) or p.endswith("main.cc"),
     r"mpi\.h": lambda p: p == "common/ranks.cc",
@@ -58,6 +70,7 @@ SYSTEM = {
 
 
 def folder(path):
+    """The room of a file."""
     nested = [f for f in BELOW if "/" in f and path.startswith(f + "/")]
     return nested[0] if nested else path.split("/")[0]
 

@@ -8,7 +8,7 @@
 
 #include "calibrator/design/excitation_signals.h"
 #include "calibrator/diagnostics/identifiability.h"
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 #include "robot/description.h"
 
 namespace plumb {

@@ -166,7 +166,9 @@ std::vector<Method> LikelihoodMethods() {
        "estimated on the way; curvature around it",
        Laplace},
       {"mixture",
-       "all modes, weighed and shaped by adaptive importance sampling of the one-step likelihood",
+       "all modes that were found, weighed and shaped by adaptive importance sampling of the "
+       "one-step "
+       "likelihood",
        Mixture},
   };
 }

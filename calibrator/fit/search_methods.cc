@@ -90,7 +90,9 @@ std::vector<Method> SearchMethods() {
        "step-based SimOpt: relative-entropy policy search with a bound on the Gaussian's own KL "
        "divergence",
        Reps},
-      {"simopt", "the original: whole trajectories, smoothed", Simopt},
+      {"simopt",
+       "the original: whole trajectories, smoothed; its width is its search's, not a posterior's",
+       Simopt},
   };
 }
 

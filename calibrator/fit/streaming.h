@@ -6,10 +6,10 @@
 #include <memory>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/group_sums.h"
 #include "calibrator/inference/prior.h"
 #include "calibrator/motion/transitions.h"
+#include "common/gaussian.h"
 #include "sim/windows.h"
 
 namespace plumb {

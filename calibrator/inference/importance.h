@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <functional>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 

@@ -92,13 +92,13 @@ Eigen::MatrixXd RepsSearch::Samples() const {
   return Transform(state_.distribution, normals);
 }
 
-void RepsSearch::Update(const Eigen::VectorXd& values) {
+bool RepsSearch::Update(const Eigen::VectorXd& values) {
   const bool likelihood = options_.returns == RepsReturns::kLogLikelihood;
   const Eigen::MatrixXd samples = Samples();
   ++state_.update;
   const auto finite = values.array().isFinite();
   state_.failures += values.size() - finite.count();
-  if (!finite.any()) return;  // nothing has been learned
+  if (!finite.any()) return false;
   const Gaussian before = state_.distribution;
   Eigen::VectorXd returns;
   std::optional<Gaussian> target;
@@ -120,6 +120,7 @@ void RepsSearch::Update(const Eigen::VectorXd& values) {
   state_.kl += KlDivergence(state_.distribution, before);
   state_.temperature = weights.temperature;
   state_.ess = weights.ess;
+  return true;
 }
 
 void RepsSearch::Remember(const Eigen::MatrixXd& samples, const Eigen::VectorXd& densities) {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/prior.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 
@@ -64,7 +64,8 @@ class RepsSearch {
   /// Parameters that the next update evaluates, n x options.samples.
   Eigen::MatrixXd Samples() const;
   /// @param values of Samples(): costs (kUnitRange) or log-likelihoods (kLogLikelihood).
-  void Update(const Eigen::VectorXd& values);
+  /// @return false if all of them are failures.
+  bool Update(const Eigen::VectorXd& values);
 
   const RepsState& state() const { return state_; }
 

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kVersion = 2;  // 1: the distribution was one Gaussian
+constexpr int kVersion = 3;  // 2: without the method used, its warnings and a search's samples
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -179,11 +179,13 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"iteration", state.iteration},
                {"update", state.search.update},
                {"distribution", ToJson(state.distribution)},
+               {"used", state.used},
                {"before", ToJson(state.before)},
                {"kl", state.kl},
                {"ess", state.ess},
                {"temperature", state.temperature},
                {"search", ToJson(state.search)},
+               {"warnings", state.warnings},
                {"rollouts_per_iteration", state.rollouts_per_iteration}};
   WriteAtomically(folder_ / "calibration.json", j.dump(1));
 }
@@ -204,6 +206,7 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     SimOpt::State state;
     state.iteration = j.at("iteration");
     state.distribution = MixtureFrom(j.at("distribution"));
+    state.used = j.at("used");
     state.before = MixtureFrom(j.at("before"));
     state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
     state.temperature = j.at("temperature");
@@ -212,8 +215,8 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
                     .kl = state.kl,
                     .temperature = state.temperature,
                     .ess = state.ess};
-    // an earlier program's search kept no samples
-    if (j.contains("search")) ReadSamples(j.at("search"), &state.search);
+    ReadSamples(j.at("search"), &state.search);
+    state.warnings = j.at("warnings").get<std::vector<std::string>>();
     state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
     size_t count = 0;
     for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);

@@ -23,11 +23,6 @@ std::optional<Objective> ParseObjective(const std::string& method) {
 
 }  // namespace
 
-Gaussian PriorGaussian(const RobotDescription& robot) {
-  const ParameterDistribution prior = ParameterDistribution::Prior(robot);
-  return {prior.components[0].mean, prior.components[0].covariance};
-}
-
 SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective)
     : SimOpt(robot, seed, threads, "reps") {
   objective_ = objective;
@@ -85,7 +80,7 @@ std::span<const Rollout> SimOpt::Newest() const {
 }
 
 std::optional<CalibrationReport> SimOpt::Update() {
-  warnings_.clear();
+  state_.warnings.clear();
   objective_ ? Search() : Infer();
   if (state_.search.update < (objective_ ? robot_.calibration.updates : 1)) return {};
   ++state_.iteration;
@@ -94,12 +89,14 @@ std::optional<CalibrationReport> SimOpt::Update() {
 
 void SimOpt::Search() {
   RepsSearch search(prior_, SearchOptions(), state_.search);
-  search.Update(Evaluate(search.Samples()));
+  const bool learned = search.Update(Evaluate(search.Samples()));
   state_.search = search.state();
+  if (!learned) return;
   state_.distribution = {{1}, {state_.search.distribution}};
   state_.kl = state_.search.kl;
   state_.ess = state_.search.ess;
   state_.temperature = state_.search.temperature;
+  state_.used = method_;
 }
 
 RepsOptions SimOpt::SearchOptions() const {
@@ -141,10 +138,11 @@ void SimOpt::Infer() {
     state_.ess = result.ess;
     state_.temperature = 1;
     state_.distribution = result.posterior;
+    state_.used = result.used;
     failures_ += result.failures;
-    warnings_ = result.warnings;
+    state_.warnings = result.warnings;
   } catch (const std::invalid_argument& error) {
-    warnings_ = {std::string("the distribution stays as it is: ") + error.what()};
+    state_.warnings = {std::string("the distribution stays as it is: ") + error.what()};
   }
 }
 
@@ -194,7 +192,7 @@ std::optional<CalibrationReport> SimOpt::Report() {
       FindIdentifiability(robot_, discrepancy_, state_.rollouts, Moments(state_.distribution));
   report.failures = discrepancy_.failures();
   report.failures.diverged += failures_;
-  report.warnings = warnings_;
+  report.warnings = state_.warnings;
   return report;
 }
 

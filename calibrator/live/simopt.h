@@ -9,9 +9,9 @@
 #include "calibrator/diagnostics/identifiability.h"
 #include "calibrator/fit/discrepancy.h"
 #include "calibrator/fit/methods.h"
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/reps_search.h"
 #include "calibrator/motion/transitions.h"
+#include "common/gaussian.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -53,7 +53,7 @@ struct CalibrationReport {
   Windows::Failures failures;  ///< simulations that failed, of all since the start of the process
   std::vector<PredictionErrors> errors;
   Identifiability identifiability;
-  std::vector<std::string> warnings;  ///< of the method; empty after Resume
+  std::vector<std::string> warnings;  ///< of the method
 };
 
 /// The loop's inference: the distribution over simulators, from roll-outs that come iteration by
@@ -72,11 +72,14 @@ class SimOpt {
   struct State {
     int iteration = 0;  ///< completed iterations
     GaussianMixture distribution;
+    /// method that gave the distribution, e.g. laplace where auto was asked for; "prior" = none yet
+    std::string used = "prior";
     GaussianMixture before;  ///< distribution at the beginning of the running iteration
     /// of the running iteration, else of the last one; without a search its update counts all the
     /// same
     RepsState search;
     double kl = 0, ess = 0, temperature = 0;  ///< see CalibrationReport
+    std::vector<std::string> warnings;        ///< of the last update
     std::vector<Rollout> rollouts;  ///< all so far; an iteration's are added when it begins
     std::vector<int> rollouts_per_iteration;
   };
@@ -88,6 +91,8 @@ class SimOpt {
   SimOpt(const RobotDescription& robot, uint64_t seed, int threads, const std::string& method);
   ~SimOpt();
 
+  uint64_t seed() const { return seed_; }
+  const std::string& method() const { return method_; }
   const State& state() const { return state_; }
   /// Takes up an earlier state. @throws std::invalid_argument if it is not of this robot.
   void Resume(State state);
@@ -121,10 +126,6 @@ class SimOpt {
   State state_;
   Discrepancy discrepancy_;
   int64_t failures_ = 0;  // simulations of RunMethod that have failed
-  std::vector<std::string> warnings_;
 };
-
-/// The prior over the coordinates, as the description has it.
-Gaussian PriorGaussian(const RobotDescription& robot);
 
 }  // namespace plumb

@@ -124,6 +124,14 @@ json ToJson(const CurriculumStage& s) {
           {"sd", ToJson(s.sd)}};
 }
 
+json ToJson(const LoopUpdate& update) {
+  return {{"iteration", update.iteration},
+          {"utime", update.utime},
+          {"kl", update.kl},
+          {"ess", update.ess},
+          {"temperature", update.temperature}};
+}
+
 json Interval(const Summary& summary) {
   json interval = json::array();
   for (Eigen::Index i = 0; i < summary.lower.size(); ++i)
@@ -155,57 +163,62 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
   std::vector<std::string> names;
   for (const ParameterDescription& p : parameters) names.push_back(p.name);
   const Eigen::VectorXd coordinate_sd = findings.prior.covariance.diagonal().cwiseSqrt();
-  const json j{
-      {"format", kPosteriorFormat},
-      {"version", kPosteriorVersion},
-      {"robot", robot.name},
-      {"fingerprint", Hexadecimal(robot.fingerprint)},
-      {"physics", Hexadecimal(PhysicsFingerprint(robot))},
-      {"logs", provenance.logs},
-      {"options", provenance.options},
-      {"seed", findings.seed},
-      {"method", {{"asked", findings.method}, {"used", findings.used}}},
-      {"names", names},
-      {"units", List(parameters, [](const ParameterDescription& p) { return p.unit; })},
-      {"coordinates", List(parameters, [](const ParameterDescription& p) { return ToJson(p); })},
-      {"prior",
-       {{"mean", ToJson(summary.prior_mean)},
-        {"sd", ToJson(summary.prior_sd)},
-        {"coordinate_mean", ToJson(findings.prior.mean)},
-        {"coordinate_sd", ToJson(coordinate_sd)},
-        {"coordinate_covariance", ToJson(findings.prior.covariance)}}},
-      {"mean", ToJson(summary.mean)},
-      {"sd", ToJson(summary.sd)},
-      {"interval_95", Interval(summary)},
-      {"covariance", ToJson(summary.covariance)},
-      {"coordinate_mean", ToJson(summary.coordinates.mean)},
-      {"coordinate_covariance", ToJson(summary.coordinates.covariance)},
-      {"mixture", ToJson(findings.posterior)},
-      {"check", findings.check},
-      {"alarm", ToJson(findings.misspecification)},
-      {"identifiability", ToJson(findings.identifiability, findings.cramer_rao, names)},
-      {"advice", findings.advice},
-      {"holdout", ToJson(findings.holdout)},
-      {"agreement", ToJson(findings.agreement)},
-      {"discrepancy", findings.discrepancy},
-      {"noise_sd", ToJson(findings.noise_sd)},
-      {"transitions", findings.transitions},
-      {"simulations",
-       {{"fit_steps", findings.simulated_steps},
-        {"diagnostic_steps", findings.diagnostic_steps},
-        {"failures", findings.failures}}},
-      {"stages", List(findings.stages, [](const CurriculumStage& s) { return ToJson(s); })},
-      {"warnings", findings.warnings},
-      {"samples", Samples(summary.samples)},
-      {"versions",
-       {{"plumbline", VersionLine("plumb")},
-        {"eigen",
-         fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
-        {"compiler", __VERSION__}}},
-      {"run",
-       {{"seconds", findings.seconds},
-        {"date", provenance.date},
-        {"command", provenance.command}}}};
+  json j{{"format", kPosteriorFormat},
+         {"version", kPosteriorVersion},
+         {"robot", robot.name},
+         {"fingerprint", Hexadecimal(robot.fingerprint)},
+         {"physics", Hexadecimal(PhysicsFingerprint(robot))},
+         {"logs", provenance.logs},
+         {"options", provenance.options},
+         {"seed", findings.seed},
+         {"method", {{"asked", findings.method}, {"used", findings.used}}},
+         {"names", names},
+         {"units", List(parameters, [](const ParameterDescription& p) { return p.unit; })},
+         {"coordinates", List(parameters, [](const ParameterDescription& p) { return ToJson(p); })},
+         {"prior",
+          {{"mean", ToJson(summary.prior_mean)},
+           {"sd", ToJson(summary.prior_sd)},
+           {"coordinate_mean", ToJson(findings.prior.mean)},
+           {"coordinate_sd", ToJson(coordinate_sd)},
+           {"coordinate_covariance", ToJson(findings.prior.covariance)}}},
+         {"mean", ToJson(summary.mean)},
+         {"sd", ToJson(summary.sd)},
+         {"interval_95", Interval(summary)},
+         {"covariance", ToJson(summary.covariance)},
+         {"coordinate_mean", ToJson(summary.coordinates.mean)},
+         {"coordinate_covariance", ToJson(summary.coordinates.covariance)},
+         {"mixture", ToJson(findings.posterior)},
+         {"check", findings.check},
+         {"alarm", ToJson(findings.misspecification)},
+         {"identifiability", ToJson(findings.identifiability, findings.cramer_rao, names)},
+         {"advice", findings.advice},
+         {"holdout", ToJson(findings.holdout)},
+         {"agreement", ToJson(findings.agreement)},
+         {"discrepancy", findings.discrepancy},
+         {"noise_sd", ToJson(findings.noise_sd)},
+         {"transitions", findings.transitions},
+         {"simulations",
+          {{"fit_steps", findings.simulated_steps},
+           {"diagnostic_steps", findings.diagnostic_steps},
+           {"failures", findings.failures}}},
+         {"stages", List(findings.stages, [](const CurriculumStage& s) { return ToJson(s); })},
+         {"warnings", findings.warnings},
+         {"samples", Samples(summary.samples)},
+         {"versions",
+          {{"plumbline", VersionLine("plumb")},
+           {"eigen",
+            fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+           {"compiler", __VERSION__}}}};
+  if (findings.loop) {
+    for (const char* unknown :
+         {"check", "alarm", "advice", "holdout", "agreement", "noise_sd", "simulations", "stages"})
+      j[unknown] = nullptr;
+    j["loop"] = ToJson(*findings.loop);
+    j["run"] = nullptr;
+  } else {
+    j["run"] = {
+        {"seconds", findings.seconds}, {"date", provenance.date}, {"command", provenance.command}};
+  }
   return Print(j, "") + "\n";
 }
 

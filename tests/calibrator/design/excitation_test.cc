@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "calibrator/live/simopt.h"
 #include "calibrator/motion/state_noise.h"
+#include "robot/parameter_distribution.h"
 #include "sim/simulator.h"
 #include "tests/calibrator/fitted_log.h"
 

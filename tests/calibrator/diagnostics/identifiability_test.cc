@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "calibrator/diagnostics/sparse_basis.h"
-#include "calibrator/live/simopt.h"
 #include "common/decompositions.h"
+#include "robot/parameter_distribution.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/synthetic.h"
 

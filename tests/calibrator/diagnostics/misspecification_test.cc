@@ -11,8 +11,8 @@
 
 #include "calibrator/diagnostics/error_tests.h"
 #include "calibrator/diagnostics/projected_errors.h"
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/motion/touch.h"
+#include "common/gaussian.h"
 #include "tests/calibrator/fitted_log.h"
 
 namespace plumb {
@@ -92,8 +92,8 @@ TEST_CASE(
       // variance.
       const Eigen::MatrixXd noise = StandardNormals(n + width, 1, random);
       log.residuals.errors = shared
-                                ? ((noise.topRows(n) - noise.bottomRows(n)) / std::sqrt(2)).eval()
-                                : noise.topRows(n).eval();
+                                 ? ((noise.topRows(n) - noise.bottomRows(n)) / std::sqrt(2)).eval()
+                                 : noise.topRows(n).eval();
       log.residuals.jacobian = StandardNormals(n, 4, random);
       for (const bool known : {true, false}) {
         log.residuals.noise_known.assign(12, known);

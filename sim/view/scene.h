@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "robot/description.h"
+#include "robot/kinematics.h"
+
+namespace plumb {
+
+/// A solid as seen from the side: the convex outline of its projection, counterclockwise [m].
+struct Silhouette {
+  int link;
+  double depth;  ///< [m] along the line of sight, larger is farther
+  std::vector<Eigen::Vector2d> outline;
+};
+
+/// The contents of a robot's picture, in two dimensions: across (to the right) and up.
+class Scene {
+ public:
+  /// @param across the base's axis that points to the right, 0 or 1 (x or y).
+  Scene(const RobotDescription& robot, int across);
+
+  /// All solids, the farthest first.
+  std::vector<Silhouette> Look(const Eigen::Ref<const Eigen::VectorXd>& q) const;
+  /// Where turning joints are.
+  std::vector<Eigen::Vector2d> Hinges(const Eigen::Ref<const Eigen::VectorXd>& q) const;
+
+ private:
+  Eigen::Vector2d Project(const Eigen::Vector3d& point) const { return {point[across_], point[2]}; }
+
+  const RobotDescription* robot_;
+  int across_;
+  std::vector<std::vector<Shape>> shapes_;  // per link
+};
+
+/// Convex hull, counterclockwise, by Andrew's monotone chain (Inf. Proc. Letters 9, 1979).
+std::vector<Eigen::Vector2d> ConvexHull(std::vector<Eigen::Vector2d> points);
+
+}  // namespace plumb

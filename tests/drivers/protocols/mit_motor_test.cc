@@ -1,0 +1,343 @@
+// The host's side of the MIT protocol against the virtual motor, in virtual time.
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+
+#include "drivers/protocols/mit_device.h"
+#include "drivers/protocols/mit_host.h"
+#include "drivers/protocols/registry.h"
+
+namespace plumb {
+namespace {
+
+using Catch::Contains;
+
+constexpr MitRanges kAk80{.position = 12.5, .velocity = 50, .torque = 18, .kp = 500, .kd = 5};
+
+MotorDescription Describe(int node = 0x11, int master = 0x10) {
+  MotorDescription description;
+  description.protocol = "mit";
+  description.node = node;
+  description.mit = MitDescription{master, kAk80, "a test"};
+  return description;
+}
+
+/// Host and motor, a millisecond at a time. The driver's part is played here: zero torque while
+/// arming, `torque` when armed.
+struct Bench {
+  explicit Bench(uint8_t reply_length = mit::kWithTemperature)
+      : device({.node = 0x11, .master = 0x10, .ranges = kAk80, .reply_length = reply_length}) {
+    while (motor->state() == DriveState::kAbsent && now < 1'200'000) Step();
+    Run(60);
+  }
+  void Step() {
+    now += 1000;
+    sample.position += sample.velocity * 1e-3;
+    FrameBatch frames, replies;
+    const DriveState state = motor->state();
+    if (stream && (state == DriveState::kArming || state == DriveState::kArmed)) {
+      frames.Push(motor->Torque(state == DriveState::kArmed ? torque : 0));
+    }
+    motor->Tick(now, true, frames);
+    motor->Transmitted(!bus_full, now);
+    if (!bus_full) {
+      for (const Frame& frame : frames.frames()) {
+        sent.push_back(frame);
+        if (!to_device || to_device(frame)) device.OnFrame(frame, now);
+        applied = std::max(applied, std::abs(device.Torque(sample)));
+      }
+    }
+    device.Tick(now, sample, replies);
+    if (!powered) return;
+    for (const Frame& frame : replies.frames()) motor->OnFrame(frame, now);
+  }
+  void Run(int milliseconds) {
+    for (int i = 0; i < milliseconds; ++i) Step();
+  }
+  bool Arm() {
+    motor->Arm(now);
+    for (int i = 0; i < 100 && motor->state() != DriveState::kArmed; ++i) Step();
+    return motor->state() == DriveState::kArmed;
+  }
+  int Count(uint8_t special) const {
+    int count = 0;
+    for (const Frame& frame : sent)
+      count += SameOnWire(frame, mit::MakeSpecial(0x11, mit::Special(special)));
+    return count;
+  }
+
+  std::unique_ptr<Motor> motor = MakeMitMotor(Describe(), {200'000});
+  MitDevice device;
+  MitDevice::Sample sample{1, 0};
+  int64_t now = 1'000'000;
+  bool stream = true, bus_full = false, powered = true;
+  double torque = 0, applied = 0;
+  std::function<bool(const Frame&)> to_device;
+  std::vector<Frame> sent;
+};
+
+TEST_CASE("a MIT motor at rest is heard, told to exit, and polled with zeros") {
+  Bench bench;
+  CHECK(bench.motor->state() == DriveState::kIdle);
+  CHECK(bench.motor->confirmed_idle());
+  CHECK(bench.Count(mit::kExit) >= 2);
+  CHECK(bench.Count(mit::kEnter) == 0);
+  CHECK(bench.motor->estimate().position == Approx(1).margin(1e-3));
+  bench.sent.clear();
+  bench.Run(5);
+  REQUIRE(bench.sent.size() == 5);
+  for (const Frame& frame : bench.sent) CHECK(ToText(frame) == "011#7FFF7FF0000007FF");
+  CHECK(bench.motor->readings().motor_temperature == 25);
+  CHECK(std::isnan(bench.motor->readings().bus_voltage));
+}
+
+TEST_CASE("replies of all three kinds are understood") {
+  const uint8_t length = GENERATE(6, 7, 8);
+  Bench bench(length);
+  bench.torque = 1.5;
+  CHECK(bench.Arm());
+  bench.sample.velocity = -3.25;
+  bench.Run(20);
+  CHECK(bench.motor->estimate().velocity == Approx(-3.25).margin(0.03));
+  CHECK(bench.motor->estimate().position == Approx(bench.sample.position).margin(1e-3));
+  CHECK(bench.motor->torque_estimate() == Approx(1.5).margin(0.01));
+  CHECK(std::isnan(bench.motor->readings().bus_voltage) == (length != 7));
+}
+
+TEST_CASE("arming: zeros, enter, an answer, and only then torque") {
+  Bench bench;
+  bench.torque = 2;
+  bench.sent.clear();
+  CHECK(bench.Arm());
+  CHECK(bench.device.armed());
+  CHECK(bench.Count(mit::kEnter) == 2);
+  int zeros = 0;
+  for (const Frame& frame : bench.sent) {
+    if (SameOnWire(frame, mit::MakeSpecial(0x11, mit::kEnter))) break;
+    CHECK(ToText(frame) == "011#7FFF7FF0000007FF");
+    ++zeros;
+  }
+  CHECK(zeros >= 3);
+  bench.Run(5);
+  CHECK(bench.device.Torque(bench.sample) == Approx(2).margin(0.01));
+  bench.motor->Disarm(bench.now);
+  bench.Run(60);
+  CHECK_FALSE(bench.device.armed());
+  CHECK(bench.motor->state() == DriveState::kIdle);
+  CHECK(bench.motor->confirmed_idle());
+  CHECK(bench.device.zeroed() == 0);
+  CHECK(bench.Count(mit::kZero) == 0);
+}
+
+TEST_CASE("no kick: what a motor was told before it was switched on is not obeyed") {
+  Bench bench;
+  // Another master's last words, to a motor at rest: it would obey them on "enter".
+  bench.device.OnFrame(
+      mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.position = 5, .kp = 500}), bench.now);
+  CHECK(bench.device.Torque(bench.sample) == 0);
+  bench.applied = 0;
+  CHECK(bench.Arm());
+  bench.Run(30);
+  CHECK(bench.applied < 0.005);  // the code next to 0
+
+  MitDevice other({.node = 0x11, .master = 0x10, .ranges = kAk80});
+  other.OnFrame(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.position = 5, .kp = 500}), 0);
+  other.OnFrame(mit::MakeSpecial(0x11, mit::kEnter), 0);
+  CHECK(other.Torque({}) == 18);  // the trap is there
+}
+
+TEST_CASE("the motor's watchdog takes the torque away and leaves it switched on") {
+  Bench bench;
+  bench.torque = 3;
+  CHECK(bench.Arm());
+  bench.Run(5);
+  bench.stream = false;
+  bench.Run(23);
+  CHECK(bench.device.Torque(bench.sample) == Approx(3).margin(0.01));
+  bench.Run(3);
+  CHECK(bench.device.Torque(bench.sample) == 0);
+  CHECK(bench.device.armed());
+  FrameBatch out;
+  bench.device.OnFrame(mit::MakeSpecial(0x11, mit::kEnter), bench.now);  // not a command: no food
+  CHECK(bench.device.Torque(bench.sample) == 0);
+  // Without torque frames there are no replies: the motor counts as absent, and "exit" is tried on.
+  bench.Run(300);
+  CHECK_FALSE(bench.device.armed());
+  CHECK_THAT(std::string(bench.motor->reason()), Contains("no reply for"));
+}
+
+TEST_CASE("silence is a fault; the motor is told to exit when it is back") {
+  Bench bench;
+  CHECK(bench.Arm());
+  bench.powered = false;
+  bench.Run(250);
+  CHECK(bench.motor->state() == DriveState::kAbsent);
+  CHECK_THAT(std::string(bench.motor->reason()), Contains("no reply for 20"));
+  bench.powered = true;
+  bench.Run(80);
+  CHECK(bench.motor->state() == DriveState::kFault);
+  CHECK_FALSE(bench.device.armed());
+  CHECK(bench.motor->confirmed_idle());
+  CHECK(bench.Arm());
+}
+
+TEST_CASE("an error in a reply is a fault, and keeps the motor from being armed") {
+  Bench bench;
+  CHECK(bench.Arm());
+  bench.device.set_error(mit::kOverTemperature);
+  bench.Run(2);
+  CHECK(bench.motor->state() == DriveState::kFault);
+  CHECK(bench.motor->reason() == "the motor reports over-temperature (error 1)");
+  CHECK_FALSE(bench.Arm());
+  CHECK(bench.motor->state() == DriveState::kFault);
+  CHECK(bench.Count(mit::kEnter) == 2);  // those of the first time
+}
+
+TEST_CASE("an error that a stranger reports does not stay") {
+  Bench bench(mit::kWithVoltage);  // such replies have no errors
+  REQUIRE(bench.Arm());
+  bench.motor->OnFrame(*FrameFromText("010#118A3D7FF7FF1903"), bench.now);
+  CHECK_THAT(std::string(bench.motor->reason()), Contains("over-voltage"));
+  bench.Run(100);
+  CHECK(bench.motor->confirmed_idle());
+  CHECK(bench.Arm());
+}
+
+TEST_CASE("the position is unwrapped over many turns, both ways") {
+  Bench bench;
+  for (const double velocity : {40.0, -45.0}) {
+    bench.sample.velocity = velocity;
+    bench.Run(3000);
+    CHECK(bench.motor->estimate().position == Approx(bench.sample.position).margin(2e-3));
+  }
+  CHECK(bench.sample.position < -13);
+}
+
+TEST_CASE("a restart, seen by its position, is a fault") {
+  Bench bench;
+  CHECK(bench.Arm());
+  bench.sample.position = 4;
+  bench.Run(2);
+  CHECK(bench.motor->state() == DriveState::kFault);
+  CHECK_THAT(std::string(bench.motor->reason()), Contains("jumped by 3 rad"));
+  bench.Run(60);
+  CHECK_FALSE(bench.device.armed());
+}
+
+TEST_CASE("nothing but finite torques within the range is sent, and the others are counted") {
+  Bench bench;
+  CHECK(bench.Arm());
+  const std::string most =
+      ToText(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.torque = 18}));
+  CHECK(ToText(bench.motor->Torque(18)) == most);
+  CHECK(bench.motor->saturations() == 0);
+  CHECK(ToText(bench.motor->Torque(99)) == most);
+  CHECK(ToText(bench.motor->Torque(-99)) == "011#7FFF7FF000000000");
+  CHECK(ToText(bench.motor->Torque(std::numeric_limits<double>::quiet_NaN())) ==
+        "011#7FFF7FF0000007FF");
+  CHECK(ToText(bench.motor->Torque(std::numeric_limits<double>::infinity())) ==
+        "011#7FFF7FF0000007FF");
+  CHECK(bench.motor->saturations() == 4);
+}
+
+TEST_CASE("one lost frame of any kind does not spoil arming; a bus that takes none ends it") {
+  SECTION("the first enter is lost") {
+    Bench bench;
+    int seen = 0;
+    bench.to_device = [&](const Frame& frame) {
+      return !SameOnWire(frame, mit::MakeSpecial(0x11, mit::kEnter)) || ++seen > 1;
+    };
+    CHECK(bench.Arm());
+    CHECK(bench.device.armed());
+  }
+  SECTION("the bus is full") {
+    Bench bench;
+    bench.bus_full = true;
+    bench.motor->Arm(bench.now);
+    bench.Run(260);
+    CHECK(bench.motor->state() == DriveState::kAbsent);
+    bench.bus_full = false;
+    bench.Run(100);
+    CHECK(bench.motor->state() == DriveState::kFault);
+    CHECK(bench.Arm());
+  }
+}
+
+TEST_CASE(
+    "the first exit may be lost: the motor does not count as idle before the second is answered") {
+  Bench bench;
+  CHECK(bench.Arm());
+  int seen = 0;
+  bench.to_device = [&](const Frame& frame) {
+    return !SameOnWire(frame, mit::MakeSpecial(0x11, mit::kExit)) || ++seen > 1;
+  };
+  bench.motor->Disarm(bench.now);
+  bench.Step();
+  CHECK(bench.device.armed());
+  CHECK_FALSE(bench.motor->confirmed_idle());
+  bench.Run(60);
+  CHECK_FALSE(bench.device.armed());
+  CHECK(bench.motor->confirmed_idle());
+}
+
+TEST_CASE("a motor whose position keeps jumping is told to exit, and believed") {
+  Bench bench;
+  REQUIRE(bench.Arm());
+  bench.sample.velocity = 600;  // twelve times what its range says
+  bench.Run(100);
+  CHECK(bench.motor->state() == DriveState::kFault);
+  CHECK_THAT(std::string(bench.motor->reason()), Contains("its position jumped"));
+  CHECK_FALSE(bench.device.armed());
+  CHECK(bench.motor->confirmed_idle());
+  bench.motor->Estop(bench.now);
+  const int exits = bench.Count(mit::kExit);
+  bench.Run(100);
+  CHECK(bench.Count(mit::kExit) >= exits + 2);
+  CHECK(bench.motor->confirmed_idle());
+}
+
+TEST_CASE("an emergency stop exits and says so") {
+  Bench bench;
+  CHECK(bench.Arm());
+  bench.motor->Estop(bench.now);
+  bench.Step();
+  CHECK_FALSE(bench.device.armed());
+  CHECK(bench.motor->reason() == "emergency stop requested");
+}
+
+TEST_CASE("frames of other motors and other kinds are not mine, others are rejected") {
+  Bench bench;
+  const auto use = [&](const char* text) {
+    return bench.motor->OnFrame(*FrameFromText(text), bench.now);
+  };
+  const MotorEstimate before = bench.motor->estimate();
+  CHECK(use("010#127FFF7FF7FF") == FrameUse::kNotMine);  // motor 0x12
+  CHECK(use("011#117FFF7FF7FF") == FrameUse::kNotMine);  // another id
+  CHECK(use("00000010#117FFF7FF7FF") == FrameUse::kNotMine);
+  CHECK(use("010#R6") == FrameUse::kNotMine);
+  CHECK(use("010##0117FFF7FF7FF") == FrameUse::kNotMine);
+  CHECK(use("010#") == FrameUse::kNotMine);
+  CHECK(use("010#117FFF7FF7") == FrameUse::kRejected);
+  CHECK(bench.motor->estimate().position == before.position);
+  CHECK(use("010#1187AD77A8AA") == FrameUse::kEstimate);
+}
+
+TEST_CASE("motors that cannot be") {
+  CHECK_THROWS_AS(MakeMitMotor(Describe(0), {1}), std::invalid_argument);
+  CHECK_THROWS_AS(MakeMitMotor(Describe(0x100), {1}), std::invalid_argument);
+  CHECK_THROWS_AS(MakeMitMotor(Describe(1, 1), {1}), std::invalid_argument);
+  MotorDescription description = Describe();
+  description.mit->ranges.torque = 0;
+  CHECK_THROWS_AS(MakeMitMotor(description, {1}), std::invalid_argument);
+  description.mit.reset();
+  CHECK_THROWS_AS(MakeMitMotor(description, {1}), std::invalid_argument);
+  CHECK(MakeMotor(Describe(), {1}) != nullptr);
+  MitDevice::Settings settings;
+  CHECK_THROWS_AS(MitDevice(settings), std::invalid_argument);  // no ranges
+}
+
+}  // namespace
+}  // namespace plumb
