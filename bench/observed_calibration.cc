@@ -44,7 +44,8 @@ void Print(const std::string& name, const RobotDescription& robot, const Motion&
       alarms += found.misspecification.alarm;
       discrepancy += found.stages.front().discrepancy / motions;
       if (found.misspecification.alarm)
-        fmt::print(stderr, "\n{} {} {}: {}\n", name, way.name, seed, found.misspecification.words);
+        fmt::print(stderr, "\n{} {} {}: {}\n", name, way.name, seed,
+                   found.misspecification.summary);
       const Gaussian posterior = Moments(found.posterior);
       const Eigen::VectorXd hidden =
           truth.array().log();  // both robots' parameters have logarithms for coordinates

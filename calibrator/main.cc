@@ -59,7 +59,7 @@ class Session {
         spdlog::warn(
             "iteration {} has no usable transition: it goes by with the earlier ones; dropped so "
             "far: {}",
-            simopt_.state().iteration + 1, calibrator.drops().words());
+            simopt_.state().iteration + 1, calibrator.drops().summary());
       }
       checkpoint_.Save(simopt_.state());
     }
@@ -182,7 +182,7 @@ int RunLog(Process& process, Session& session, const RobotDescription& robot,
   });
   const calibration_status_t found = session.Status();
   spdlog::info("{} events, {} undecodable; dropped transitions: {}", counts.events,
-               counts.undecodable, session.calibrator.drops().words());
+               counts.undecodable, session.calibrator.drops().summary());
   if (found.iteration == 0)
     throw std::runtime_error(file + ": holds no complete roll-out to calibrate with");
   std::cout << found.identifiability << std::endl;

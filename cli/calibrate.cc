@@ -39,7 +39,7 @@ void PrintLogs(const std::vector<Log>& logs) {
                              CountTransitions(log.rollouts), log.rollouts.size(),
                              log.rollouts.size() == 1 ? "" : "s");
     if (log.drops.total() > 0) {
-      std::cout << "; dropped: " << log.drops.words();
+      std::cout << "; dropped: " << log.drops.summary();
     }
     std::cout << "\n";
     for (const std::string& warning : log.warnings) std::cout << "  " << warning << "\n";
@@ -63,8 +63,8 @@ void PrintFindings(const Findings& findings, const RobotDescription& robot) {
                              summary.upper(at));
   }
   for (const std::string* words :
-       {&findings.identifiability.words, &findings.advice, &findings.misspecification.words,
-        &findings.holdout.words, &findings.agreement.words, &findings.check}) {
+       {&findings.identifiability.summary, &findings.advice, &findings.misspecification.summary,
+        &findings.holdout.summary, &findings.agreement.summary, &findings.check}) {
     if (!words->empty()) std::cout << "- " << *words << "\n";
   }
   for (const std::string& warning : findings.warnings) std::cout << "! " << warning << "\n";

@@ -111,7 +111,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
     const std::vector<Log> logs{{"roll-outs", result.rollouts, {}, {}}};
     const Misspecification found = Calibrate(model, logs, calibration).misspecification;
     alarm = found.alarm;
-    WriteAtomically(AlarmFile(options, gap, method, run), found.words + "\n");
+    WriteAtomically(AlarmFile(options, gap, method, run), found.summary + "\n");
   }
   Results::Rows rows;
   for (const LoopRow& row : result.rows) {

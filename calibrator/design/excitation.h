@@ -64,7 +64,7 @@ std::string DescribeGain(const RobotDescription& robot, const Gaussian& belief,
 struct MotionAdvice {
   /// best first, by what they tell of the weak directions; maybe none
   std::vector<RatedExcitation> rated;
-  std::string words;
+  std::string summary;
 };
 MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posterior,
                           const Identifiability& found, const ExcitationSettings& settings);

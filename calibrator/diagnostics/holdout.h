@@ -24,7 +24,7 @@ struct Holdout {
   std::vector<HorizonError> errors;
   /// the posterior predicts better than the prior at some horizons, and at none worse, chance apart
   bool better = false;
-  std::string words;
+  std::string summary;
 };
 
 /// Transitions to fit, and those kept back to judge the fit by.

@@ -222,7 +222,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
   found.cramer_rao = Eigen::VectorXd::Constant(n, kInfinity);
   if (!information.allFinite()) {
     found.information.setConstant(std::numeric_limits<double>::quiet_NaN());
-    found.words =
+    found.summary =
         "the simulation fails at the mean parameters, so nothing is known of what can be known";
     return found;
   }
@@ -257,7 +257,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
   }
   found.weak =
       FindWeak(information, prior_sd, eigen.eigenvectors().middleCols(nulls, weak), found.null);
-  found.words = IdentifiabilityWords(robot, distribution.mean, found);
+  found.summary = IdentifiabilityWords(robot, distribution.mean, found);
   return found;
 }
 

@@ -40,7 +40,7 @@ struct Identifiability {
   /// inverse where it has one (Cramer-Rao); infinite for a parameter that a null direction
   /// involves.
   Eigen::VectorXd cramer_rao;
-  std::string words;  ///< for people
+  std::string summary;  ///< for people
 };
 
 /// From the Fisher information of the coordinates. A direction counts as null if the information

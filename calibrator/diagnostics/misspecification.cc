@@ -139,7 +139,7 @@ void Correct(size_t tests, std::vector<Misfit>* misfits) {
 // estimated from them.
 struct Explained {
   double share;
-  std::string words;
+  std::string summary;
 };
 
 Explained Explain(const ProjectedErrors& errors, const std::vector<bool>& noise_known,
@@ -165,7 +165,7 @@ Misspecification FindMisspecification(const RobotDescription& robot,
   ProjectedErrors errors(robot, residuals);
   if (!errors.r.allFinite()) {
     found.alarm = true;
-    found.words = "the simulation fails on this log with the parameters found";
+    found.summary = "the simulation fails on this log with the parameters found";
     return found;
   }
   std::vector<Misfit> tests = TestErrors(errors, residuals.noise_known);
@@ -189,7 +189,7 @@ Misspecification FindMisspecification(const RobotDescription& robot,
     found.alarm = true;
     Locate(errors, *best, &best->misfit);
     places.push_back(errors.Place(best->misfit.joint, best->misfit.condition));
-    std::string line = fmt::format("{} would explain {}", best->misfit.what, explained.words);
+    std::string line = fmt::format("{} would explain {}", best->misfit.what, explained.summary);
     std::vector<std::string> alternatives;
     for (const Explanation& other : explanations) {
       if (&other == &*best || other.score.gain < kNearlyAsGood * best->score.gain) continue;
@@ -225,15 +225,15 @@ Misspecification FindMisspecification(const RobotDescription& robot,
       distinct.push_back(place);
   }
   if (!found.alarm) {
-    found.words = fmt::format("nothing speaks against the model ({} tests of {} errors)", count,
-                              errors.r.size());
-    if (!rest.empty()) found.words += ", but look at " + Join(rest, "; ");
+    found.summary = fmt::format("nothing speaks against the model ({} tests of {} errors)", count,
+                                errors.r.size());
+    if (!rest.empty()) found.summary += ", but look at " + Join(rest, "; ");
     return found;
   }
-  found.words = "the model cannot explain this log: " + Join(distinct, "; ");
-  for (const std::string& line : words) found.words += "; " + line;
+  found.summary = "the model cannot explain this log: " + Join(distinct, "; ");
+  for (const std::string& line : words) found.summary += "; " + line;
   if (!rest.empty())
-    found.words += (words.empty() ? "; " : "; not explained by that: ") + Join(rest, "; ");
+    found.summary += (words.empty() ? "; " : "; not explained by that: ") + Join(rest, "; ");
   return found;
 }
 

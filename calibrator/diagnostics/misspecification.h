@@ -29,7 +29,7 @@ struct Misfit {
 struct Misspecification {
   bool alarm = false;
   std::vector<Misfit> misfits;  ///< those that count, worst first
-  std::string words;
+  std::string summary;
 };
 
 /// The errors that a fit has left, and what they are to be tested for.

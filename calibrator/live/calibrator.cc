@@ -128,7 +128,7 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
       m.combination_mean.push_back(c.mean);
       m.combination_sd.push_back(c.sd);
     }
-    m.identifiability = report->identifiability.words;
+    m.identifiability = report->identifiability.summary;
   }
   m.num_horizons = static_cast<int32_t>(m.horizon.size());
   m.num_powers = static_cast<int32_t>(m.combination_power.size());

@@ -177,7 +177,7 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
   } else if (log.drops.total() == 0) {
     why = "it holds no command of an episode";
   } else {
-    why = log.drops.words();
+    why = log.drops.summary();
   }
   throw std::runtime_error(file + ": no transition can be used: " + why);
 }

@@ -63,7 +63,7 @@ double Transition::duration() const {
       [](double sum, const EffortSegment& segment) { return sum + segment.duration; });
 }
 
-std::string DropCounts::words() const {
+std::string DropCounts::summary() const {
   std::string words = fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap,
                                   gap == 1 ? "" : "s", late, not_finite, restart);
   if (model_based > 0) words += fmt::format(", {} model-based", model_based);

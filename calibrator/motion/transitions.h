@@ -48,7 +48,7 @@ struct DropCounts {
   int64_t total() const { return gap + late + not_finite + restart + model_based; }
   DropCounts& operator+=(const DropCounts& other);
   /// "1 gap, 2 late, 0 not finite, 3 across restarts", and ", 4 model-based" if there are any
-  std::string words() const;
+  std::string summary() const;
 };
 
 /// Joins ROBOT_STATE_SMOOTHED and JOINT_COMMAND by state_sequence: s is the state a command acted

@@ -114,7 +114,7 @@ class Calibration {
     settings.seconds = std::min(settings.seconds, robot_.task.steps * robot_.task.period);
     findings_.advice =
         AdviseMotion(robot_, Moments(findings_.posterior), findings_.identifiability, settings)
-            .words;
+            .summary;
   }
 
   // Tests whether the model can explain the log at all, whatever its parameters.
@@ -122,7 +122,7 @@ class Calibration {
     const Eigen::VectorXd physical = robot_.ToPhysical(mean_);
     if ((findings_.noise_sd.array() <= kNegligible * MakeTask(robot_)->state_scale().array())
             .all()) {
-      findings_.misspecification.words = "the model reproduces this log to five digits";
+      findings_.misspecification.summary = "the model reproduces this log to five digits";
       return;
     }
     const std::vector<Candidate> candidates = FindCandidates(robot_);
@@ -185,7 +185,7 @@ class Calibration {
   void CompareLogs() {
     Agreement& agreement = findings_.agreement;
     if (logs_.size() < 2) {
-      agreement.words = "a single log: nothing to compare it with";
+      agreement.summary = "a single log: nothing to compare it with";
       return;
     }
     std::vector<LaplaceFit> fits;
@@ -205,7 +205,8 @@ class Calibration {
     }
     for (size_t i = 0; i < fits.size(); ++i) agreement.logs.push_back(Against(names[i], fits, i));
     if (fits.size() < 2) {
-      agreement.words = "fewer than two of the logs can be fitted on their own: nothing to compare";
+      agreement.summary =
+          "fewer than two of the logs can be fitted on their own: nothing to compare";
       return;
     }
     std::string against;
@@ -215,10 +216,11 @@ class Calibration {
       against +=
           fmt::format("{}{} ({:.1f} sd)", against.empty() ? "" : ", ", log.log, log.distance);
     }
-    agreement.words = agreement.agree ? fmt::format("the {} logs agree", agreement.logs.size())
-                                      : "the logs do not agree with each other: " + against +
-                                            "; they are of different robots, or the model is wrong "
-                                            "in a way that depends on the motion";
+    agreement.summary = agreement.agree
+                            ? fmt::format("the {} logs agree", agreement.logs.size())
+                            : "the logs do not agree with each other: " + against +
+                                  "; they are of different robots, or the model is wrong "
+                                  "in a way that depends on the motion";
   }
 
   // A log's likelihood against that of the others together, both quadratic: their modes differ by a

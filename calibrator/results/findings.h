@@ -27,7 +27,7 @@ struct LogAgreement {
 struct Agreement {
   bool agree = true;
   std::vector<LogAgreement> logs;  ///< empty for a single log
-  std::string words;
+  std::string summary;
 };
 
 /// The update of the loop that findings come from.

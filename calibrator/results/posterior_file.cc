@@ -61,7 +61,7 @@ json Samples(const Eigen::MatrixXd& samples) {
 
 json ToJson(const Misspecification& found) {
   return {{"raised", found.alarm},
-          {"words", found.words},
+          {"words", found.summary},
           {"misfits", List(found.misfits, [](const Misfit& m) {
              return json{{"what", m.what},           {"joint", m.joint},
                          {"condition", m.condition}, {"test", m.test},
@@ -83,7 +83,7 @@ json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao,
     }
     return json{{"direction", ToJson(d)}, {"moves", moves}};
   };
-  return {{"words", found.words},
+  return {{"words", found.summary},
           {"information", ToJson(found.information)},
           {"null", List(found.null, direction)},
           {"combinations", List(found.combinations, combination)},
@@ -91,7 +91,7 @@ json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao,
 }
 
 json ToJson(const Holdout& holdout) {
-  return {{"words", holdout.words},
+  return {{"words", holdout.summary},
           {"better", holdout.better},
           {"fitted", holdout.fitted},
           {"held_out", holdout.held_out},
@@ -105,7 +105,7 @@ json ToJson(const Holdout& holdout) {
 
 json ToJson(const Agreement& agreement) {
   return {{"agree", agreement.agree},
-          {"words", agreement.words},
+          {"words", agreement.summary},
           {"logs", List(agreement.logs, [](const LogAgreement& l) {
              return json{{"log", l.log},
                          {"mean", ToJson(l.mean)},

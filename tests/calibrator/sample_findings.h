@@ -44,7 +44,7 @@ inline Findings SampleFindings(const RobotDescription& robot) {
       Eigen::MatrixXd::Identity(n, n) - null * null.transpose() * (1 - 1e-9);
   f.identifiability.null = {null / null.cwiseAbs().maxCoeff()};
   f.identifiability.combinations = {{"gravity / length", Eigen::VectorXd::Unit(n, 0), 9.81, 0.02}};
-  f.identifiability.words = "only gravity / length can be known from this motion";
+  f.identifiability.summary = "only gravity / length can be known from this motion";
   f.cramer_rao = 0.05 * prior_sd;
   f.cramer_rao(0) = std::numeric_limits<double>::infinity();
   f.holdout = {

@@ -45,14 +45,14 @@ Misspecification Diagnose(const RobotDescription& robot, const Truth& truth, int
 TEST_CASE("what a model gets wrong is named, and a right model is left in peace") {
   const RobotDescription robot = Robot("hopper");
   const Misspecification right = Diagnose(robot, {}, 400, 7);
-  INFO(right.words);
+  INFO(right.summary);
   CHECK_FALSE(right.alarm);
   CHECK(right.misfits.empty());
   for (const Wrong& wrong : WrongModels()) {
     const Misspecification found = Diagnose(robot, wrong.truth, 400, 7);
-    INFO(wrong.name << ": " << found.words);
+    INFO(wrong.name << ": " << found.summary);
     CHECK(found.alarm);
-    CHECK_THAT(found.words, Catch::StartsWith("the model cannot explain this log: "));
+    CHECK_THAT(found.summary, Catch::StartsWith("the model cannot explain this log: "));
     REQUIRE(!found.misfits.empty());
     CHECK_THAT(found.misfits[0].what, Catch::StartsWith(wrong.name));
     CHECK(found.misfits[0].test == "structure");
@@ -66,12 +66,12 @@ TEST_CASE("what a model gets wrong is named, and a right model is left in peace"
 
 TEST_CASE("how much larger a parameter would have to be is told") {
   const Misspecification found = Diagnose(Robot("hopper"), {{{"inertia/torso", 1.2}}}, 400, 8);
-  INFO(found.words);
-  CHECK_THAT(found.words,
+  INFO(found.summary);
+  CHECK_THAT(found.summary,
              Catch::Matches(".*inertia/torso (19|20|21) % larger would explain [0-9]+ % of it.*"));
   const Misspecification slow = Diagnose(Robot("hopper"), {{{"delay/thigh", 0.002}}}, 400, 8);
-  INFO(slow.words);
-  CHECK_THAT(slow.words, Catch::Matches(".*delay/thigh 0.002[0-9]* s larger would explain.*"));
+  INFO(slow.summary);
+  CHECK_THAT(slow.summary, Catch::Matches(".*delay/thigh 0.002[0-9]* s larger would explain.*"));
 }
 
 TEST_CASE(
@@ -167,7 +167,7 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
   SECTION("nothing wrong") {
     for (const bool known : {true, false}) {
       const auto found = Find(known, [](double e, auto...) { return e; });
-      INFO(found.words);
+      INFO(found.summary);
       CHECK_FALSE(found.alarm);
       CHECK(found.misfits.empty());
     }
@@ -175,7 +175,7 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
   SECTION("scale") {
     const auto found =
         Find(true, [](double e, int c, auto...) { return c % 6 == 4 ? 1.7 * e : e; });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK(has(found, "scale", "leg", "free"));
     CHECK_FALSE(has(found, "scale", "thigh", "free"));
@@ -187,14 +187,14 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     const auto found = Find(false, [](double e, int c, int, bool contact, auto&) {
       return c == 3 && contact ? 2 * e : e;
     });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK(has(found, "scale", "thigh", "contact"));
-    CHECK(found.words.find("position of thigh") != std::string::npos);
+    CHECK(found.summary.find("position of thigh") != std::string::npos);
   }
   SECTION("bias") {
     const auto found = Find(true, [](double e, int c, auto...) { return c == 11 ? e + 0.5 : e; });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK((has(found, "bias", "foot", "free") || has(found, "bias", "foot", "contact") ||
            found.misfits[0].joint == "foot"));
@@ -203,7 +203,7 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     double last = 0;
     const auto found = Find(
         true, [&](double e, int c, auto...) { return c == 10 ? last = 0.6 * last + 0.8 * e : e; });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK(has(found, "whiteness", "leg", ""));
   }
@@ -214,20 +214,20 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     const auto found = Find(true, [](double e, int c, int step, auto...) {
       return c == 9 && step % 200 == 17 ? e + 100 : e;
     });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK_FALSE(found.alarm);
     REQUIRE(!found.misfits.empty());
     for (const Misfit& misfit : found.misfits) {
       CHECK(misfit.test == "outliers");
       CHECK(misfit.joint == "thigh");
     }
-    CHECK_THAT(found.words, Catch::Contains("outliers"));
+    CHECK_THAT(found.summary, Catch::Contains("outliers"));
   }
   SECTION("heavy tails") {
     const auto found = Find(true, [](double e, int c, int, bool, Random& random) {
       return c == 9 && random.Uniform() < 0.1 ? 20 * e : e;
     });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK((has(found, "outliers", "thigh", "free") || has(found, "outliers", "thigh", "contact")));
   }
@@ -243,7 +243,7 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
         log.residuals.errors(static_cast<Eigen::Index>(i)) += 0.5 * (t.v(3) > 0 ? 1 : -1);
     }
     const auto found = log.Find();
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK(has(found, "structure", "thigh", ""));
   }
@@ -321,10 +321,11 @@ TEST_CASE("the alarm on logs of right and wrong models, measured", "[.slow]") {
       at_contact += !found.misfits.empty() && found.misfits[0].condition == "contact" &&
                     std::none_of(found.misfits.begin(), found.misfits.end(),
                                  [](const Misfit& m) { return m.condition == "free"; });
-      named += found.words.find(wrong.name) != std::string::npos;
-      if (log == 0 || (wrong.name[0] != 'r' && found.words.find(wrong.name) == std::string::npos) ||
+      named += found.summary.find(wrong.name) != std::string::npos;
+      if (log == 0 ||
+          (wrong.name[0] != 'r' && found.summary.find(wrong.name) == std::string::npos) ||
           (wrong.name[0] == 'r' && found.alarm))
-        words += found.words + "\n";
+        words += found.summary + "\n";
     }
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     std::cout << fmt::format("{}: {} alarms of {}, first {}, named {}, {:.1f} s\n{}", wrong.name,

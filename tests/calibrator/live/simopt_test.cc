@@ -127,7 +127,7 @@ TEST_CASE("what the motion determines is found and said in words") {
   REQUIRE(found.combinations.size() == 2);
   CHECK(found.combinations[0].name == "gravity / length");
   CHECK(found.combinations[1].name == "mass length^2");
-  CHECK(found.words ==
+  CHECK(found.summary ==
         "only gravity / length and mass length^2 can be known from this motion; gravity, mass, "
         "length are not "
         "identifiable separately: (gravity +1 %, mass -2 %, length +1 %) changes nothing");
@@ -313,7 +313,7 @@ TEST_CASE("what an iteration has found is a posterior, and the same bytes after 
   CHECK(j["loop"]["iteration"] == 1);
   CHECK(j["loop"]["kl"] == report->kl);
   CHECK(j["discrepancy"] == report->discrepancy);
-  CHECK(j["identifiability"]["words"] == report->identifiability.words);
+  CHECK(j["identifiability"]["words"] == report->identifiability.summary);
   CHECK(j["transitions"] == simopt.state().rollouts[0].transitions.size());
   for (const char* unknown : {"alarm", "holdout", "agreement", "simulations", "run"}) {
     INFO(unknown);
