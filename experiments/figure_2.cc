@@ -31,7 +31,7 @@ struct Method {
   const char* key;
   std::string label;
   CalibrationStrategy strategy;
-  int64_t share;  // of the budget: one so-manieth
+  int64_t share;  // k: the k-th part of the budget
 };
 const std::vector<Method> kMethods{
     {"original", Label(CalibrationStrategy::kOriginal), CalibrationStrategy::kOriginal, 1},

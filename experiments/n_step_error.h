@@ -13,7 +13,7 @@ namespace plumb {
 /// over simulators, windows and entries of (q, v), in standard units (Task::state_scale). A
 /// simulation that fails errs by `kFailed`.
 /// @param rollouts with states without noise: that of the judge would count as an error. @param
-/// every so-manieth state begins a window.
+/// every k: each k-th state begins a window.
 /// @return `horizon` numbers; NaN where no roll-out is as long.
 Eigen::VectorXd NStepErrors(const RobotDescription& robot,
                             const ParameterDistribution& distribution,

@@ -13,6 +13,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// An excitation, the motion it makes and how much that would tell of the parameters.
 struct RatedExcitation {
   Excitation excitation;  ///< scaled down until all simulators keep within the limits

@@ -10,6 +10,8 @@
 
 namespace plumb {
 
+// Judge uses the discrepancy's threads, and that alone is not thread-safe.
+
 /// Error of predicting n steps ahead on transitions that the fit has not seen, root mean square
 /// over states and windows, in standard units (Task::state_scale).
 struct HorizonError {

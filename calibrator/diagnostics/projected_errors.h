@@ -8,6 +8,8 @@
 
 namespace plumb {
 
+// The functions here share nothing, and const errors may be read by several threads at once.
+
 /// Errors that no other values of the fitted parameters would explain, sorted by what they are
 /// about.
 struct ProjectedErrors {

@@ -6,6 +6,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// Methods that know only simulations (RobotProblem): approximate Bayesian computation and the
 /// like.
 std::vector<Method> AbcMethods();

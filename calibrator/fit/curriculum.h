@@ -14,6 +14,8 @@
 
 namespace plumb {
 
+// Thread-safe, but for errors that two threads would share; threads as ExecutionOptions says.
+
 /// Of the units of the state (Task::state_scale): an error that nobody needs to explain.
 inline constexpr double kNegligible = 1e-5;
 

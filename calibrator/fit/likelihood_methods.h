@@ -6,6 +6,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// auto, laplace and mixture: the likelihood of windows, its modes and their shapes.
 std::vector<Method> LikelihoodMethods();
 

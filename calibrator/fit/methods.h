@@ -7,8 +7,8 @@
 
 namespace plumb {
 
-/// All methods, the default first. --method, its help and docs/inference.md are made of this table: a
-/// new method is a line in its group, e.g. SearchMethods. Thread-safe, as all below.
+/// All methods, the default first. --method, its help and docs/inference.md are made of this table:
+/// a new method is a line in its group, e.g. SearchMethods. Thread-safe, as all below.
 const std::vector<Method>& Methods();
 
 /// Their names.

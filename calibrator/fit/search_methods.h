@@ -6,6 +6,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// reps and simopt: relative-entropy policy search, see RepsSearch.
 std::vector<Method> SearchMethods();
 

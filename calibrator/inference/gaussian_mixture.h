@@ -8,6 +8,8 @@
 
 namespace plumb {
 
+// The functions here share nothing but a Random that is given: thread-safe apart from that.
+
 /// ln p(x) of every column of `points`. @throws std::invalid_argument if a covariance is not
 /// positive definite.
 Eigen::VectorXd LogDensities(const GaussianMixture& mixture, const Eigen::MatrixXd& points);

@@ -7,6 +7,9 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
+
 struct ImportanceOptions {
   int samples = 400;  ///< a round
   int rounds = 4;

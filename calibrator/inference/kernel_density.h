@@ -7,6 +7,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 enum class BandwidthRule { kSilverman, kScott };
 
 /// Factor on a standard deviation that makes a kernel's (Silverman, "Density estimation", 1986, eq.

@@ -11,6 +11,9 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
+
 /// Data explained up to noise: errors(parameters) would be independent, with mean zero and equal
 /// variance within each group, for the right parameters.
 struct LeastSquares {

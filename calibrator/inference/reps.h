@@ -6,6 +6,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// Weights of episodic relative-entropy policy search (Peters, Muelling, Altun, AAAI 2010):
 ///   w_i = exp((R_i - max R) / eta) / sum
 /// with the temperature eta that minimises the dual

@@ -49,7 +49,8 @@ class Calibrator {
   int next_step_ = 0;  // of it, to be taken
 };
 
-/// SimOpt's distribution as a message. @param report of the iteration that led there; null for the prior.
+/// SimOpt's distribution as a message. @param report of the iteration that led there; null for the
+/// prior.
 parameter_distribution_t DistributionMessage(const RobotDescription& robot,
                                              const SimOpt::State& state, uint64_t seed,
                                              const CalibrationReport* report);
@@ -57,8 +58,8 @@ parameter_distribution_t DistributionMessage(const RobotDescription& robot,
 /// that `simopt` has completed last.
 Findings IterationFindings(const RobotDescription& robot, const SimOpt& simopt,
                            const CalibrationReport& report);
-/// Progress and findings as a message. @param stream of transitions that have arrived since, null if there is
-/// none.
+/// Progress and findings as a message. @param stream of transitions that have arrived since, null
+/// if there is none.
 calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state,
                                    const DropCounts& drops, const CalibrationReport* report,
                                    double seconds, const StreamingLaplace* stream = nullptr);

@@ -6,6 +6,8 @@
 // The report's HTML: verdicts, tables, figures.
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// A value with as many digits as its standard deviation allows: two significant ones of that. Four
 /// significant ones where the sd is not positive or not finite; a dash for NaN.
 std::string Number(double value, double sd);

@@ -13,6 +13,8 @@
 // colours.
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// "mass/pole [kg]"
 inline std::string WithUnit(const ParameterDescription& p) {
   return p.unit.empty() ? p.name : p.name + " [" + p.unit + "]";
