@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-/// Room for what the kernel says about a received datagram.
+/// Room for what the kernel says about a received datagram. Thread-safe.
 struct ControlBuffer {
   alignas(cmsghdr) char bytes[256];
 };

@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// The bounds of a joint; see JointDescription and JointLimitSettings.
+/// The bounds of a joint; see JointDescription and JointLimitSettings. Thread-safe.
 struct JointLimits {
   double lower, upper;  ///< [rad] or [m]; infinite for a continuous joint
   double velocity;      ///< [rad/s] or [m/s]; infinite = none

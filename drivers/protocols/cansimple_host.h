@@ -15,7 +15,7 @@ namespace plumb {
 /// on the bus goes unnoticed: hence twice, in two Ticks, the second time in front of the order to
 /// run, lest a drive that restarts in between runs in the mode it wakes up in. The driver sends
 /// zero torque meanwhile, which feeds the drive's watchdog.
-/// @throws std::invalid_argument if the node is not in [0, 0x3E].
+/// Thread-safe. @throws std::invalid_argument if the node is not in [0, 0x3E].
 std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description,
                                           const MotorTiming& timing);
 

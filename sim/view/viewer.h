@@ -8,7 +8,7 @@
 namespace plumb {
 
 /// A window that shows a robot in three dimensions: Simbody's visualiser. It stays open when this
-/// is destroyed, until its user closes it.
+/// is destroyed, until its user closes it. Not thread-safe.
 class Viewer {
  public:
   /// @throws std::runtime_error if there is no display, or no visualiser is installed.
