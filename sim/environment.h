@@ -56,7 +56,7 @@ class Environment {
   /// The sensors' readings.
   const Eigen::VectorXd& reading_q() const { return reading_q_; }
   const Eigen::VectorXd& reading_v() const { return reading_v_; }
-  /// What the latest action asked the motors for [Nm or N], one per velocity.
+  /// The efforts that the latest action asked the motors for [Nm or N], one per velocity.
   const Eigen::VectorXd& effort() const { return effort_; }
   const Task& task() const { return *task_; }
 

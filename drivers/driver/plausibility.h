@@ -32,7 +32,7 @@ PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverS
 ///   integral of the velocity (trapezoids) is I, and
 ///     |D - I| > resolution + max(path of D, path of I) / 4
 ///               + L (|v first| + |v last| + sum |change of v|).
-///   What the velocity lags, or the times of arrival err, by up to L is within the last term
+///   A lag of the velocity, or an error of the times of arrival, up to L is within the last term
 ///   (summation by parts);
 /// - stuck: position and velocity are the same bit by bit for `stuck_after` while the effort sent
 ///   is a tenth of the limit or more;
