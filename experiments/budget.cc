@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "calibrator/fit/discrepancy.h"
 #include "calibrator/fit/methods.h"
 #include "robot/parameter_distribution.h"
 
