@@ -168,7 +168,6 @@ int main(int argc, char** argv) {
         sim->add_option("--csv", sim_flags.csv, "write every step to this file");
         sim->add_option("--png", sim_flags.png, "draw the first episode as a strip of snapshots");
         sim->add_option("--gif", sim_flags.gif, "draw the first episode as a film");
-        sim->add_flag("--view", sim_flags.view, "show it in a window, in real time");
         calibrate = app.add_subcommand(
             "calibrate", "learn from logs which simulators could have produced the robot's motion");
         calibrate->add_option("robot", calibrate_flags.robot, "robot folder or TOML file")

@@ -8,12 +8,10 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
 #include "sim/picture.h"
-#include "sim/viewer.h"
 #include "trainer/policy_file.h"
 
 namespace plumb {
@@ -132,8 +130,6 @@ int Simulate(Process& process, const SimFlags& flags) {
   Environment environment(robot);
   environment.SetParameters(means);
   const Actor actor = MakeActor(flags, robot, environment.task());
-  std::unique_ptr<Viewer> viewer;
-  if (flags.view) viewer = std::make_unique<Viewer>(robot);
 
   std::cout << fmt::format("{}, task {}, {}, seed {}\n", robot.name, robot.task.name,
                            flags.random           ? "random actions"
@@ -146,9 +142,7 @@ int Simulate(Process& process, const SimFlags& flags) {
   std::vector<Snapshot> film;  // of the first episode
   std::vector<SimulatedEpisode> episodes;
   int64_t asked = 0;
-  const auto stop = [&] {
-    return (flags.view || ++asked % kStepsPerLook == 0) && process.stopping();
-  };
+  const auto stop = [&] { return ++asked % kStepsPerLook == 0 && process.stopping(); };
   const int64_t begin = process.clock().Now();
   for (int number = 0; number < flags.episodes; ++number) {
     if (process.stopping()) {
@@ -158,7 +152,6 @@ int Simulate(Process& process, const SimFlags& flags) {
     const auto see = [&](const SimulatedStep& step) {
       if (!flags.csv.empty()) AppendCsv(step, csv);
       if (number == 0) film.push_back({step.time, step.q});
-      if (viewer) viewer->Show(step.time, step.q);
     };
     episodes.push_back(PlayEpisode(environment, robot, actor, flags.seed,
                                    static_cast<uint32_t>(number), see, stop));

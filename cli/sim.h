@@ -17,7 +17,6 @@ struct SimFlags {
   std::string csv, png, gif;     ///< files; empty = none
   std::vector<std::string> set;  ///< "mass/thigh=4"
   bool urdf = false;             ///< forget the uncertain parameters' prior means
-  bool view = false;
 };
 
 /// `plumb sim`: rolls a policy, random actions or no action out in the simulator, without messages
