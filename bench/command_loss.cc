@@ -27,7 +27,7 @@
 namespace plumb {
 namespace {
 
-/// What passes on the wire: when torque was last asked for, and when first no more.
+/// A listener on the wire: when torque was last asked for, and when first no more.
 struct Wire {
   void Listen() {
     std::array<Frame, 64> frames;

@@ -1,6 +1,6 @@
-// What the observer costs calibration: parameters from estimated states beside those from true
-// states of the same motions. A table for docs/measurements.md. build/bench/observed_calibration
-// [motions [robot]]
+// How much accuracy the observer costs calibration: parameters from estimated states beside those
+// from true states of the same motions. A table for docs/measurements.md.
+// build/bench/observed_calibration [motions [robot]]
 
 #include <fmt/format.h>
 

@@ -20,8 +20,8 @@ struct CalibrateFlags {
   bool strict = false;       ///< exit status 3 if the findings should not be trusted
 };
 
-/// `plumb calibrate`: learns from logs which simulators could have produced the robot's motion,
-/// writes what it has learned, and says so in words. With mpirun its ranks share the work. An
+/// `plumb calibrate`: infers from logs which simulators could have produced the robot's motion,
+/// writes the posterior, and summarises it for people. With mpirun its ranks share the work. An
 /// interrupted run leaves a journal beside the output, from which the same command goes on. @return
 /// exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better
 /// than the prior, the model cannot explain the logs, or they do not agree.

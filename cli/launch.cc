@@ -35,7 +35,7 @@ namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
 // of a virtual robot; a real one is armed by a person, every time
-constexpr int kMostRearms = 20;
+constexpr int kMaxRearms = 20;
 constexpr int64_t kArmAgain = 500'000;  // [us]
 constexpr int64_t kLook = 50'000;       // [us]
 
@@ -43,7 +43,7 @@ double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
 }
 
-// What the driver would say in its log, said before anything starts.
+// Says before anything starts what the driver would otherwise say in its log.
 void RequireDrivable(const RobotDescription& robot) {
   try {
     Driver(robot, 0, 0);
@@ -62,7 +62,7 @@ fs::path MakeFolder(const std::string& wanted) {
   return folder;
 }
 
-/// What is settled before anything starts.
+/// The run's settings, checked before anything starts.
 struct Setting {
   Setting(const Process& process, const LaunchFlags& flags)
       : robot(LoadRobot(flags.robot)), bus(flags.bus.empty() ? robot.bus_url : flags.bus) {
@@ -77,7 +77,7 @@ struct Setting {
     lock.emplace(output);
     if (flags.real || flags.real_time) return;
     virtual_run.emplace(output, process.lcm_url(), VirtualRun::Records{flags.log, flags.can_log});
-    virtual_run->coordinator().most_speed = flags.speed;
+    virtual_run->coordinator().max_speed = flags.speed;
   }
 
   Coordinator* coordinator() { return virtual_run ? &virtual_run->coordinator() : nullptr; }
@@ -123,7 +123,7 @@ class ClosedLoop {
     setting.coordinator()->go_on = [this] { return GoOn(); };
   }
 
-  int Go() {
+  int Run() {
     std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << setting_.bus << ", seed "
               << flags_.seed << ", logs in " << setting_.output.string() << std::endl;
     if (setting_.virtual_run && !setting_.virtual_run->mirror_failure().empty()) {
@@ -250,7 +250,7 @@ class ClosedLoop {
       fault_seen_ = true;
       Print("driver fault: " + driver.reason);
       if (flags_.real) Print("Look at the robot. To go on: " + ArmCommand());
-      if (!flags_.real && ++rearms_ > kMostRearms) {
+      if (!flags_.real && ++rearms_ > kMaxRearms) {
         std::cerr << "plumb: too many faults\n";
         return false;
       }
@@ -341,7 +341,7 @@ class ClosedLoop {
 int Launch(Process& process, const LaunchFlags& flags) {
   Setting setting(process, flags);
   if (setting.virtual_run) process.Enter(setting.coordinator()->participant());
-  return ClosedLoop(process, flags, setting).Go();
+  return ClosedLoop(process, flags, setting).Run();
 }
 
 }  // namespace plumb

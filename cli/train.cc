@@ -47,7 +47,7 @@ class Stopwatch {
 
 RobotDescription ReadRobot(const TrainFlags& flags) {
   RobotDescription robot = LoadRobot(flags.robot);
-  if (flags.paper) robot.training = AsThePaper(robot.training);
+  if (flags.paper) robot.training = PaperSettings(robot.training);
   if (flags.worst_share > 0) robot.training.worst_share = flags.worst_share;
   if (flags.worst_after >= 0) robot.training.worst_after = flags.worst_after;
   return robot;
@@ -60,7 +60,8 @@ ParameterDistribution ReadDistribution(const std::string& name, const RobotDescr
   return distribution;
 }
 
-/// What the result depends on, but for the steps: a longer run may go on from a shorter one.
+/// A fingerprint of all that the result depends on, but for the number of steps: a longer run may
+/// go on from a shorter one.
 uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
                     const ParameterDistribution& distribution,
                     const std::optional<GaussianPolicy>& start) {
@@ -287,9 +288,9 @@ class Training {
     std::cout << fmt::format(
         "{} steps, {} updates, {:.1f} s\nreturn without exploration, {} simulators held out:\n",
         trainer_.steps(), trainer_.updates(), clock_.seconds(), flags_.held_out);
-    std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Words(own));
+    std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Summary(own));
     if (flags_.distribution != "prior")
-      std::cout << fmt::format("  {:24} {}\n", "prior", Words(on_prior));
+      std::cout << fmt::format("  {:24} {}\n", "prior", Summary(on_prior));
     std::cout << "wrote " << flags_.output << std::endl;
   }
 

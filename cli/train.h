@@ -19,7 +19,7 @@ struct TrainFlags {
   std::string csv;         ///< file; empty = none
   /// a policy or checkpoint to begin with; empty = from scratch
   std::string from;
-  bool paper = false;      ///< see AsThePaper
+  bool paper = false;      ///< see PaperSettings
   double worst_share = 0;  ///< 0 = the robot's setting
   int worst_after = -1;    ///< updates; negative = the robot's setting
   int evaluate_every = 0;  ///< updates; 0 = never

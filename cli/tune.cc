@@ -58,7 +58,7 @@ int TuneEstimator(const std::string& robot_path, const std::string& log) {
   const ProgressLine line;
   int played = 0;
   const TunedNoise tuned = TuneNoise(robot, [&](StateObserver& observer) {
-    line.Show("playing the log with other noise", static_cast<double>(played++) / kMostPlays);
+    line.Show("playing the log with other noise", static_cast<double>(played++) / kMaxPlays);
     for (const auto& message : messages) {
       if (const auto* imu = std::get_if<imu_t>(&message))
         observer.OnImu(*imu);

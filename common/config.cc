@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kLongestChain = 8;  // of files that extend each other
 
-// What is merged into a file keeps the name of its own.
+// A value that was merged in from another file is reported with that file's name.
 std::string At(const std::string& file, const toml::source_region& source) {
   if (source.begin.line == 0) return file + ": ";
   return fmt::format("{}:{}:{}: ", source.path ? *source.path : file, source.begin.line,
@@ -313,7 +313,7 @@ std::vector<Config> Config::Tables(const std::string& key) {
 }
 
 std::vector<std::string> Config::Keys() const {
-  // What the file itself says comes after what it extends.
+  // The file's own keys come after those of the file that it extends.
   std::vector<std::tuple<bool, toml::source_position, std::string>> keys;
   for (const auto& [key, node] : table()) {
     const toml::source_region& source = node.source();

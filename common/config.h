@@ -58,7 +58,8 @@ class Config {
   /// A key that may hold a table or something else.
   bool IsTable(const std::string& key) const;
 
-  /// Values; without `fallback` the key is required.
+  /// Values; without `fallback` the key is required. @throws ConfigError naming the key's place, if
+  /// it is missing, of another type or out of range.
   double Number(const std::string& key, Range range = kFinite, std::optional<double> fallback = {});
   int Integer(const std::string& key, Range range, std::optional<int> fallback = {});
   bool Boolean(const std::string& key, std::optional<bool> fallback = {});
@@ -103,7 +104,7 @@ class Config {
 /// 16 MB.
 std::string ReadFile(const std::string& file);
 
-/// Levenshtein's distance, for "did you mean".
+/// Levenshtein's distance, for "did you mean". Thread-safe.
 size_t EditDistance(const std::string& a, const std::string& b);
 
 }  // namespace plumb

@@ -85,7 +85,7 @@ struct Found {
 
 Prior OfXi() { return Prior({Prior::Normal(0, 1)}); }
 
-// What SimOpt does: the mean squared error, and a Gaussian that searches where it is small.
+// SimOpt's way: the mean squared error, and a Gaussian that searches where it is small.
 Gaussian BySquaredError(const std::vector<Transition>& transitions, uint64_t seed) {
   RepsOptions options;
   options.returns = RepsReturns::kUnitRange;

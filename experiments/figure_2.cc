@@ -31,7 +31,7 @@ struct Method {
   const char* key;
   std::string label;
   Way way;
-  int64_t share;  // of the budget: one so-manieth
+  int64_t share;  // of the budget: one part in so many
 };
 const std::vector<Method> kMethods{
     {"original", Label(Way::kOriginal), Way::kOriginal, 1},
@@ -52,7 +52,7 @@ std::string KeyOf(const PaperTask& task, const Method& method, int run) {
   return fmt::format("{},{},{}", task.name, method.key, run);
 }
 
-// What a run's methods have in common.
+// The data that all methods of a run share.
 struct Remembered {
   std::string of;
   Recording recording;

@@ -197,7 +197,7 @@ std::string Each(const std::map<int, Curve>& curves, const std::string& format, 
 
 int RunSeeds(Process& process, const Options& options) {
   RobotDescription robot = LoadRobot(options.robot);
-  if (options.paper) robot.training = AsThePaper(robot.training);
+  if (options.paper) robot.training = PaperSettings(robot.training);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   if (options.distribution == "nominal") distribution.components[0].covariance.setZero();
   const auto steps = options.steps > 0 ? static_cast<int64_t>(options.steps)

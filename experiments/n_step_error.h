@@ -12,8 +12,8 @@ namespace plumb {
 /// what a robot did: reset to a recorded state, apply what was applied, compare. Root mean square
 /// over simulators, windows and entries of (q, v), in standard units (Task::state_scale). A
 /// simulation that fails errs by `kFailed`.
-/// @param rollouts with states without noise: that of the judge would count as an error. @param
-/// every so-manieth state begins a window.
+/// @param rollouts with states without noise: that of the judge would count as an error.
+/// @param every a window begins at every `every`-th state.
 /// @return `horizon` numbers; NaN where no roll-out is as long.
 Eigen::VectorXd NStepErrors(const RobotDescription& robot,
                             const ParameterDistribution& distribution,

@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// What a policy has to work on in the end, and all that may be learnt of it is what it did.
+/// The system that policies are trained for. Nothing may be learnt of it but from its episodes.
 class RealSystem {
  public:
   virtual ~RealSystem() = default;

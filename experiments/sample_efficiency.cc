@@ -1,6 +1,6 @@
-// What calibration costs, by each way: transitions of the robot until a policy that is trained on
-// what they told earns nearly what the oracle's does, and simulated steps until simulators predict
-// the robot to a given error.
+// The cost of calibration, by each method: transitions of the robot until a policy that is trained
+// on their posterior earns nearly as much as the oracle's, and simulated steps until simulators
+// predict the robot to a given error.
 //
 // A policy trained on the prior moves a robot whose parameters are drawn for each run, as in
 // Figures 2 and 3.

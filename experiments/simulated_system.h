@@ -25,8 +25,9 @@ class SimulatedSystem : public RealSystem {
   uint64_t seed_;
 };
 
-/// What encoders and an observer leave of noise: positions [rad or m] as exact as a count of a
-/// 14-bit encoder, 1.1e-4, velocities [rad/s or m/s] as the observer's smoother has them, 5e-3.
+/// Standard deviations of a state as encoders and an observer tell it: positions [rad or m] to a
+/// count of a 14-bit encoder, 1.1e-4, velocities [rad/s or m/s] as the observer's smoother has
+/// them, 5e-3.
 Eigen::VectorXd ReadingNoise(const RobotDescription& robot);
 
 }  // namespace plumb

@@ -32,7 +32,7 @@ void Normalize(std::span<double> advantages) {
     squares += a * a;
   }
   const double sd = std::sqrt(squares / count);
-  // What rounding leaves of equal numbers is not a difference.
+  // Equal numbers differ by rounding, and that is no difference.
   const bool differ = sd > 1e-12 * std::abs(mean) && sd > 0;
   for (double& a : advantages) a = differ ? a / sd : 0;
 }

@@ -5,14 +5,15 @@
 
 namespace plumb {
 
-/// A stretch [begin, end) of a batch, begin < end.
+/// The steps [begin, end) of a batch, begin < end, that are one episode.
 struct EpisodeSpan {
   int begin, end;
   bool terminated;     ///< false: cut off by the time limit, and life would have gone on
   double final_value;  ///< V of the observation after the last step; not used if terminated
 };
 
-/// Advantages and value targets of a batch.
+/// Advantages and value targets of a batch, one per step. All functions of this header are
+/// thread-safe.
 struct Advantages {
   std::vector<double> advantage;
   std::vector<double> target;  ///< of V: advantage + value

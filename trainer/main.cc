@@ -108,7 +108,7 @@ class TrainerProcess {
     if (session_.complete()) {
       spdlog::info(
           "iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s",
-          session_.iteration(), session_.evaluation().episodes, Words(session_.evaluation()),
+          session_.iteration(), session_.evaluation().episodes, Summary(session_.evaluation()),
           seconds_);
       Save();
       process_.TakeVirtualTime(robot_.training.duration);

@@ -15,7 +15,7 @@
 
 namespace plumb {
 
-/// What the trainer needs of a simulated task. Used by one thread at a time.
+/// A simulated task as the trainer sees it: reset, observe, step. Used by one thread at a time.
 class Simulation {
  public:
   virtual ~Simulation() = default;

@@ -43,7 +43,7 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 
 }  // namespace
 
-TrainingSettings AsThePaper(TrainingSettings settings) {
+TrainingSettings PaperSettings(TrainingSettings settings) {
   settings.normalise_values = false;
   settings.fisher_fraction = 1;
   settings.critic_epochs = 20;

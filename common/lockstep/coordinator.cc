@@ -187,12 +187,12 @@ void Coordinator::TakeTurns(int stop_fd) {
 
 /// @return false if stop_fd has become readable meanwhile.
 bool Coordinator::MoveOn(int64_t moment, int stop_fd) {
-  if (most_speed > 0) {
+  if (max_speed > 0) {
     using std::chrono::microseconds;
     constexpr auto kSlack = std::chrono::milliseconds(100);  // that may be made up for
     const auto real_now = std::chrono::steady_clock::now();
     allowed_ = std::max(allowed_, real_now - kSlack) +
-               microseconds(std::llround(static_cast<double>(moment - now()) / most_speed));
+               microseconds(std::llround(static_cast<double>(moment - now()) / max_speed));
     const auto wait = std::chrono::duration_cast<std::chrono::milliseconds>(allowed_ - real_now);
     if (wait.count() > 0 && !Listen(stop_fd, static_cast<int>(wait.count()))) return false;
   }
