@@ -16,8 +16,8 @@
 #include "calibrator/report.h"
 #include "calibrator/robot_sbc.h"
 #include "calibrator/summary.h"
-#include "cli/progress_line.h"
 #include "common/atomic_file.h"
+#include "common/progress_line.h"
 
 namespace plumb {
 namespace {

@@ -23,6 +23,7 @@
 #include "common/atomic_file.h"
 #include "common/lcm_url.h"
 #include "common/signature.h"
+#include "common/time_units.h"
 #include "drivers/driver.h"
 #include "plumb/driver_request_t.hpp"
 #include "robot/description.h"
@@ -142,8 +143,7 @@ class ClosedLoop {
         std::cout << "interrupted" << std::endl;
         return 130;
       }
-      progress_.Account(static_cast<double>(clock_.Now() - start_) * 1e-6,
-                        SecondsSince(really_started_));
+      progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
       if (!AllRunning() || !KeepArmed()) return 1;
       for (const std::string& row : progress_.TakeRows()) Print(row);
       ShowStatus();

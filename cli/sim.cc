@@ -11,6 +11,7 @@
 
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
+#include "common/time_units.h"
 #include "sim/picture.h"
 #include "trainer/policy_file.h"
 
@@ -164,8 +165,8 @@ int Simulate(Process& process, const SimFlags& flags) {
       film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
     }
   }
-  const double seconds = std::max(
-      static_cast<double>(process.clock().Now() - begin) * 1e-6 / process.clock().scale(), 1e-6);
+  const double seconds =
+      std::max(Seconds(process.clock().Now() - begin) / process.clock().scale(), 1e-6);
   double steps = 0;
   for (const SimulatedEpisode& episode : episodes) steps += static_cast<double>(episode.steps);
   std::cout << Totals(episodes)

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calibrator/log_reader.h"
-#include "cli/progress_line.h"
+#include "common/progress_line.h"
 #include "estimator/noise_tuning.h"
 
 namespace plumb {

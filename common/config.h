@@ -104,7 +104,4 @@ class Config {
 /// 16 MB.
 std::string ReadFile(const std::string& file);
 
-/// Levenshtein's distance, for "did you mean". Thread-safe.
-size_t EditDistance(const std::string& a, const std::string& b);
-
 }  // namespace plumb

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calibrator/transitions.h"
+#include "common/time_units.h"
 #include "controller/controller.h"
 #include "estimator/state_observer.h"
 #include "plumb/controller_status_t.hpp"
@@ -27,8 +28,6 @@ constexpr int64_t kBetweenTrials = 1'000'000'000;
 constexpr int64_t kArmAgain = 500'000, kStatus = 100'000;
 constexpr int64_t kPatience = 30'000'000;  // [us] until the episode has begun
 constexpr int64_t kSlice = 10'000;         // [us] in which plumb-controller looks at its clock
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 /// All that is switched on for one trial.
 class Loop {

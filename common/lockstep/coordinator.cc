@@ -14,6 +14,7 @@
 
 #include "common/lockstep/process_watch.h"
 #include "common/program_version.h"
+#include "common/time_units.h"
 #include "plumb/lockstep_grant_t.hpp"
 #include "plumb/lockstep_hello_t.hpp"
 
@@ -264,7 +265,7 @@ void Coordinator::WatchProgress() {
     const char* const whose =
         member->state == Member::State::kExpected ? "has not joined the run" : "has its turn";
     const std::string line = fmt::format("{} {} at {:.6f} s: {}", member->name, whose,
-                                         static_cast<double>(now() - kBeginning) * 1e-6, note);
+                                         Seconds(now() - kBeginning), note);
     if (member->watch.idle() > kPatience) throw std::runtime_error("given up: " + line);
     on_note(line);
   }
@@ -340,8 +341,7 @@ void Coordinator::Read(Member& member, PacketSocket::When when) {
     }
   }
   if (there || (member.state == Member::State::kReported && member.report.leaves)) return;
-  on_note(fmt::format("{} has died at {:.6f} s", member.name,
-                      static_cast<double>(now() - kBeginning) * 1e-6));
+  on_note(fmt::format("{} has died at {:.6f} s", member.name, Seconds(now() - kBeginning)));
   Leave(member);
 }
 

@@ -1,4 +1,5 @@
 #include "common/config.h"
+#include "common/nearest_name.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
