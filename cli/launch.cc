@@ -24,7 +24,7 @@
 #include "common/lcm_url.h"
 #include "common/signature.h"
 #include "common/time_units.h"
-#include "drivers/driver.h"
+#include "drivers/driver/driver.h"
 #include "plumb/driver_request_t.hpp"
 #include "robot/description.h"
 #include "sim/parameters.h"

@@ -12,7 +12,7 @@
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
 #include "common/time_units.h"
-#include "sim/picture.h"
+#include "sim/view/picture.h"
 #include "trainer/policy_file.h"
 
 namespace plumb {

@@ -347,7 +347,7 @@ struct UnmodelledJoint {
 };
 
 struct VirtualRobotSettings {
-  /// What integrates its motion, see Mechanism.
+  /// What integrates its motion, see VirtualPlant.
   enum class Engine { kAuto, kMujoco };
 
   double watchdog;   ///< [s]
