@@ -1,11 +1,11 @@
 // Of virtual_devices.h: drives, each a protocol's device and an encoder on the motor's shaft.
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "drivers/driver/joint_map.h"
 #include "drivers/protocols/cansimple_device.h"
 #include "drivers/protocols/mit_device.h"
@@ -16,8 +16,6 @@ namespace plumb {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 /// What all drives have: a joint, a shaft, an encoder.
 class VirtualDrive : public VirtualDevice {

@@ -1,10 +1,10 @@
 // Of virtual_devices.h: sensors: encoders on joints, IMUs on links.
 
 #include <Eigen/Geometry>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "drivers/protocols/cia406_device.h"
 #include "drivers/protocols/xsens_device.h"
 #include "robot/kinematics.h"
@@ -12,8 +12,6 @@
 
 namespace plumb {
 namespace {
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 class VirtualEncoder : public VirtualDevice {
  public:
@@ -72,7 +70,7 @@ class VirtualImu : public VirtualDevice {
     if (motion.time < device_->NextDue()) return;
     kinematics_.Update(motion.q, motion.v);
     const LinkMotion& link = kinematics_.link(link_);
-    const double elapsed = static_cast<double>(motion.time - last_time_) * 1e-6;
+    const double elapsed = Seconds(motion.time - last_time_);
     const Eigen::Vector3d acceleration =
         elapsed > 0 ? Eigen::Vector3d((link.velocity - last_velocity_) / elapsed)
                     : Eigen::Vector3d::Zero();
