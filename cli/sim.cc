@@ -84,15 +84,15 @@ Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task
   };
 }
 
-const char* Describe(SimulatedEpisode::End end) {
+const char* Describe(EpisodeSummary::End end) {
   switch (end) {
-    case SimulatedEpisode::End::kTimeLimit:
+    case EpisodeSummary::End::kTimeLimit:
       return "time limit";
-    case SimulatedEpisode::End::kTerminated:
+    case EpisodeSummary::End::kTerminated:
       return "terminated by the task";
-    case SimulatedEpisode::End::kNotFinite:
+    case EpisodeSummary::End::kNotFinite:
       return "the simulation is no longer finite";
-    case SimulatedEpisode::End::kInterrupted:
+    case EpisodeSummary::End::kInterrupted:
       return "interrupted";
   }
   return "";
@@ -141,7 +141,7 @@ int Simulate(Process& process, const SimFlags& flags) {
             << fmt::format("{:>7}  {:>6}  {:>10}  ended by\n", "episode", "steps", "return");
   std::string csv = CsvHeader(robot);
   std::vector<Snapshot> film;  // of the first episode
-  std::vector<SimulatedEpisode> episodes;
+  std::vector<EpisodeSummary> episodes;
   int64_t asked = 0;
   const auto stop = [&] { return ++asked % kStepsPerLook == 0 && process.stopping(); };
   const int64_t begin = process.clock().Now();
@@ -156,11 +156,11 @@ int Simulate(Process& process, const SimFlags& flags) {
     };
     episodes.push_back(PlayEpisode(environment, robot, actor, flags.seed,
                                    static_cast<uint32_t>(number), see, stop));
-    const SimulatedEpisode& episode = episodes.back();
+    const EpisodeSummary& episode = episodes.back();
     std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum,
                              Describe(episode.end))
               << std::endl;
-    if (episode.end == SimulatedEpisode::End::kInterrupted) return 130;
+    if (episode.end == EpisodeSummary::End::kInterrupted) return 130;
     if (number == 0 && environment.q().allFinite()) {
       film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
     }
@@ -168,7 +168,7 @@ int Simulate(Process& process, const SimFlags& flags) {
   const double seconds =
       std::max(Seconds(process.clock().Now() - begin) / process.clock().scale(), 1e-6);
   double steps = 0;
-  for (const SimulatedEpisode& episode : episodes) steps += static_cast<double>(episode.steps);
+  for (const EpisodeSummary& episode : episodes) steps += static_cast<double>(episode.steps);
   std::cout << Totals(episodes)
             << fmt::format("\n{:.1f} s simulated in {:.2f} s, {:.0f} steps per second\n",
                            steps * robot.task.period, seconds, steps / seconds);

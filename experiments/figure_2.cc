@@ -55,7 +55,7 @@ std::string KeyOf(const PaperTask& task, const Method& method, int run) {
 // The data that all methods of a run share.
 struct Remembered {
   std::string of;
-  Recording recording;
+  RobotDataset recording;
   int64_t budget = 0;  // simulated steps
 };
 

@@ -37,9 +37,9 @@ void AddHiddenFlag(CLI::App& app, Hidden& hidden) {
       ->default_str("paper");
 }
 
-Recording Record(const RobotDescription& robot, const RecordingSettings& settings,
-                 const std::function<void(double)>& progress) {
-  Recording recording{robot, DrawHidden(robot, settings.hidden, settings.seed), nullptr, {}, {}};
+RobotDataset Record(const RobotDescription& robot, const RecordingSettings& settings,
+                    const std::function<void(double)>& progress) {
+  RobotDataset recording{robot, DrawHidden(robot, settings.hidden, settings.seed), nullptr, {}, {}};
   recording.loop = std::make_shared<Loop>(robot, recording.hidden);
   LoopSettings first;
   first.seed = settings.seed;

@@ -58,7 +58,7 @@ std::string KeyOf(const PaperTask& task, Way way, int run) {
 
 struct Remembered {
   std::string of;
-  Recording recording;
+  RobotDataset recording;
 };
 
 class Experiment {
@@ -90,7 +90,7 @@ class Experiment {
                           const std::function<void(double)>& progress) {
     Remember(task, run, progress);
     const auto seed = static_cast<uint64_t>(run);
-    const Recording& recording = now_.recording;
+    const RobotDataset& recording = now_.recording;
     Results::Rows rows;
     const auto judge = [&](int64_t simulated, const ParameterDistribution& distribution) {
       const Eigen::VectorXd errors = NStepErrors(recording.robot, distribution, recording.held_out,

@@ -16,7 +16,7 @@ class SimulatedSystem : public RealSystem {
   SimulatedSystem(const RobotDescription& robot, const Eigen::VectorXd& hidden,
                   const Eigen::VectorXd& noise, uint64_t seed);
 
-  Trial Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
+  RobotEpisode Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
 
  private:
   Environment environment_;

@@ -63,10 +63,10 @@ struct RolloutSampler::Player {
       record = nullptr;
       return;
     }
-    const Simulation::Outcome outcome = simulation->Step(action);
-    record->rewards.push_back(outcome.reward);
-    record->sum += outcome.reward;
-    record->terminated = outcome.terminated;
+    const StepResult result = simulation->Step(action);
+    record->rewards.push_back(result.reward);
+    record->sum += result.reward;
+    record->terminated = result.terminated;
     if (!explore) return;
     record->observations.insert(record->observations.end(), observation, observation + raw.size());
     record->actions.insert(record->actions.end(), action.begin(), action.end());
@@ -208,7 +208,7 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
     batch.final_observations.insert(batch.final_observations.end(),
                                     record.final_observation.begin(),
                                     record.final_observation.end());
-    batch.episodes.push_back({begin, batch.size(), record.terminated, record.sum});
+    batch.episodes.push_back({begin, batch.size(), record.terminated});
   }
   batch.mean_return = sum / static_cast<double>(records.size());
   return batch;
