@@ -1,5 +1,5 @@
 // How much accuracy the observer costs calibration: parameters from estimated states beside those
-// from true states of the same motions. A table for docs/measurements.md.
+// from true states of the same motions. A table for docs/measurements/estimator.md.
 // build/bench/observed_calibration [motions [robot]]
 
 #include <fmt/format.h>
@@ -9,7 +9,7 @@
 #include <functional>
 #include <string>
 
-#include "calibrator/calibration.h"
+#include "calibrator/results/calibration.h"
 #include "sim/parameters.h"
 #include "tests/calibrator/hop_on_bus.h"
 #include "tests/estimator/observer_errors.h"

@@ -9,8 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "calibrator/excitation.h"
-#include "calibrator/simopt.h"
+#include "calibrator/design/excitation.h"
 #include "common/atomic_file.h"
 #include "robot/description.h"
 #include "robot/posterior_reader.h"
@@ -81,15 +80,6 @@ std::vector<Snapshot> Film(const RobotDescription& robot, const RatedExcitation&
   return film;
 }
 
-Gaussian Known(const std::string& file, const RobotDescription& robot) {
-  GaussianMixture mixture;
-  for (const auto& component : ReadPosterior(file, robot).components) {
-    mixture.weights.push_back(component.weight);
-    mixture.components.push_back({component.mean, component.covariance});
-  }
-  return Moments(mixture);
-}
-
 }  // namespace
 
 int Excite(Process& process, const ExciteFlags& flags) {
@@ -105,8 +95,9 @@ int Excite(Process& process, const ExciteFlags& flags) {
   settings.candidates = flags.candidates;
   settings.seconds = flags.seconds;
   settings.seed = flags.seed;
-  const Gaussian prior =
-      flags.posterior.empty() ? PriorGaussian(robot) : Known(flags.posterior, robot);
+  const Gaussian prior = flags.posterior.empty()
+                             ? PriorGaussian(robot)
+                             : Moments(ReadPosterior(flags.posterior, robot).mixture);
   const std::vector<RatedExcitation> rated = RateExcitations(robot, prior, settings);
   if (process.stopping()) return 130;
   std::cout << fmt::format("{}, task {}, seed {}: {} of {} excitations keep within the limits\n",

@@ -161,10 +161,13 @@ int main(int argc, char** argv) {
         sim->add_option("--episodes", sim_flags.episodes, "how many")
             ->check(CLI::Range(1, 1000000))
             ->capture_default_str();
+        auto* posterior = sim->add_option("--posterior", sim_flags.posterior,
+                                          "a posterior.json: its means instead of the prior's");
         sim->add_option("--set", sim_flags.set,
                         "parameters other than their prior means, e.g. mass/thigh=4");
         sim->add_flag("--urdf", sim_flags.urdf,
-                      "the robot as its URDF and TOML tables have it, without the prior's means");
+                      "the robot as its URDF and TOML tables have it, without the prior's means")
+            ->excludes(posterior);
         sim->add_option("--csv", sim_flags.csv, "write every step to this file");
         sim->add_option("--png", sim_flags.png, "draw the first episode as a strip of snapshots");
         sim->add_option("--gif", sim_flags.gif, "draw the first episode as a film");

@@ -12,6 +12,7 @@
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
 #include "common/time_units.h"
+#include "robot/posterior_reader.h"
 #include "sim/view/picture.h"
 #include "trainer/policy_file.h"
 
@@ -60,6 +61,13 @@ void Set(const std::string& assignment, RobotDescription& robot) {
   } else {
     robot.parameters.push_back({name, "", ParameterDescription::Coordinate::kLinear, value, 1});
   }
+}
+
+/// The posterior's means instead of the prior's.
+void SetMeans(const std::string& posterior, RobotDescription& robot) {
+  const Eigen::VectorXd means = ReadPosterior(posterior, robot).Mean();
+  for (size_t i = 0; i < robot.parameters.size(); ++i)
+    robot.parameters[i].mean = means(static_cast<Eigen::Index>(i));
 }
 
 Eigen::VectorXd Means(const RobotDescription& robot) {
@@ -124,6 +132,7 @@ int Simulate(Process& process, const SimFlags& flags) {
     throw std::invalid_argument("--policy and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
+  if (!flags.posterior.empty()) SetMeans(flags.posterior, robot);
   if (flags.urdf) robot.parameters.clear();
   for (const std::string& assignment : flags.set) Set(assignment, robot);
   RequireOutputs(flags);

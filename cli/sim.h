@@ -15,6 +15,7 @@ struct SimFlags {
   uint64_t seed = 1;
   int episodes = 1;
   std::string csv, png, gif;     ///< files; empty = none
+  std::string posterior;         ///< posterior.json, its means for the prior's; empty = the prior
   std::vector<std::string> set;  ///< "mass/thigh=4"
   bool urdf = false;             ///< forget the uncertain parameters' prior means
 };

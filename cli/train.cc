@@ -15,8 +15,8 @@
 #include <sstream>
 #include <thread>
 
-#include "calibrator/batches.h"
 #include "common/atomic_file.h"
+#include "common/batches.h"
 #include "common/config.h"
 #include "common/ranks.h"
 #include "robot/posterior_reader.h"
@@ -56,7 +56,7 @@ RobotDescription ReadRobot(const TrainFlags& flags) {
 ParameterDistribution ReadDistribution(const std::string& name, const RobotDescription& robot) {
   if (name != "prior" && name != "nominal") return ReadPosterior(name, robot);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  if (name == "nominal") distribution.components[0].covariance.setZero();
+  if (name == "nominal") distribution.mixture.components[0].covariance.setZero();
   return distribution;
 }
 
@@ -69,9 +69,10 @@ uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
   std::ostringstream text;
   text << VersionLine("plumb") << robot.fingerprint << s.normalise_values << s.fisher_fraction
        << ' ' << s.worst_share << ' ' << s.worst_after << ' ' << flags.seed;
-  for (const auto& component : distribution.components) {
-    text.precision(17);
-    text << component.weight << component.mean << component.covariance;
+  text.precision(17);
+  for (size_t i = 0; i < distribution.mixture.components.size(); ++i) {
+    const Gaussian& component = distribution.mixture.components[i];
+    text << distribution.mixture.weights[i] << component.mean << component.covariance;
   }
   if (start) text << start->parameters << start->observation_mean << start->observation_scale;
   return Hash(text.str());

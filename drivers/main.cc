@@ -27,7 +27,7 @@ namespace {
 constexpr int64_t kStatusPeriod = 100'000;  // [us]
 constexpr int64_t kReopenPeriod = 100'000;  // [us]
 // [s] real time that the drives have to confirm a disarm at the end
-constexpr double kFarewell = 0.3;
+constexpr double kDisarmTimeout = 0.3;
 // of frames per wake: a flood must not keep us from our deadlines
 constexpr int kBursts = 8;
 constexpr int64_t kFlight = 2'000'000;    // [us] before a fault whose frames are kept
@@ -47,7 +47,7 @@ std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const s
   return Verifier(*key, channel, clock.SigningUtime());
 }
 
-void SayWhoMayCommand(const std::string& lcm_url, bool commands_signed) {
+void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {
   if (commands_signed) return spdlog::info("takes signed commands only");
   if (!StaysOnMachine(lcm_url))
     return spdlog::warn("takes unsigned commands of anybody on the network");
@@ -90,7 +90,7 @@ class DriverProcess {
     driver_.set_bus(bus);
     driver_.set_virtual(is_virtual);
     driver_.set_commands_signed(key.has_value());
-    SayWhoMayCommand(process.lcm_url(), key.has_value());
+    LogCommandPolicy(process.lcm_url(), key.has_value());
     driver_.set_replay(transport_->is_replay());
     for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
@@ -99,7 +99,7 @@ class DriverProcess {
 
   int Run() {
     while (!process_.stopping()) Step();
-    return Farewell();
+    return DisarmAndStop();
   }
 
  private:
@@ -109,7 +109,7 @@ class DriverProcess {
     const int64_t next = std::max(transport_->NextEvent(), now) - now;
     process_.Doze(std::min(cycle_.Remaining(now), next), transport_->fd());
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
-    // What there was nothing to do for is not timed.
+    // A wake-up with nothing to do is not timed.
     phases_.Mark();
     if (ReceiveFrames()) phases_.End(PhaseTimes::kReceive);
     if (Publish()) phases_.End(PhaseTimes::kPublish);
@@ -208,12 +208,12 @@ class DriverProcess {
 
   /// Zero torque and idle drives, confirmed by their heartbeats. @return 1 if a drive that may be
   /// armed has not confirmed it in time, else 0: one that was never there has nothing to confirm.
-  int Farewell() {
+  int DisarmAndStop() {
     driver_request_t disarm{};
     disarm.utime = clock_.Utime();
     disarm.request = driver_request_t::DISARM;
     driver_.OnRequest(disarm, clock_.Now(), disarm.utime);
-    const auto patience = Microseconds(kFarewell * clock_.scale());
+    const auto patience = Microseconds(kDisarmTimeout * clock_.scale());
     const int64_t begin = clock_.Now();
     do {
       Step();

@@ -23,7 +23,7 @@ struct TunedNoise {
 /// none, too.
 /// @param play gives an observer all messages of the log.
 /// @throws std::invalid_argument if there are fewer than 100 readings of a joint.
-inline constexpr int kMostPlays = 228;  ///< calls of `play`
+inline constexpr int kMaxPlays = 228;  ///< calls of `play`
 TunedNoise TuneNoise(const RobotDescription& robot,
                      const std::function<void(StateObserver&)>& play);
 

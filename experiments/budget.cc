@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "calibrator/methods.h"
-#include "calibrator/simopt.h"
+#include "calibrator/fit/methods.h"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
 namespace {
@@ -64,15 +64,9 @@ BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>&
       count = std::min(count * 9 / 10, count * budget / result.simulated_steps);
       continue;
     }
-    BudgetedFit fit{ParameterDistribution::Prior(robot), result.simulated_steps,
-                    static_cast<int64_t>(CountTransitions(spread))};
-    fit.distribution.components.clear();
-    for (size_t i = 0; i < result.posterior.components.size(); ++i) {
-      const Gaussian& component = result.posterior.components[i];
-      fit.distribution.components.push_back(
-          {result.posterior.weights[i], component.mean, component.covariance});
-    }
-    return fit;
+    return {{0, robot.parameters, result.posterior},
+            result.simulated_steps,
+            static_cast<int64_t>(CountTransitions(spread))};
   }
   throw std::invalid_argument("a budget of " + std::to_string(budget) +
                               " simulated steps is not enough for a fit");

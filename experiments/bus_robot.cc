@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "common/time_units.h"
 #include "controller/controller.h"
 #include "estimator/state_observer.h"

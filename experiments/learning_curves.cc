@@ -19,9 +19,9 @@
 #include <map>
 #include <numeric>
 
-#include "calibrator/svg.h"
 #include "common/atomic_file.h"
 #include "common/process.h"
+#include "plot/svg.h"
 #include "robot/parameter_distribution.h"
 #include "trainer/robot_simulation.h"
 #include "trainer/trainer.h"
@@ -199,7 +199,7 @@ int RunSeeds(Process& process, const Options& options) {
   RobotDescription robot = LoadRobot(options.robot);
   if (options.paper) robot.training = PaperSettings(robot.training);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  if (options.distribution == "nominal") distribution.components[0].covariance.setZero();
+  if (options.distribution == "nominal") distribution.mixture.components[0].covariance.setZero();
   const auto steps = options.steps > 0 ? static_cast<int64_t>(options.steps)
                                        : int64_t{robot.training.updates} * robot.training.batch;
 

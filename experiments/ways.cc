@@ -49,7 +49,7 @@ std::unique_ptr<SimOpt> MakeSimOpt(Way way, const RobotDescription& robot, uint6
 ParameterDistribution FirstDistribution(Way way, const RobotDescription& robot,
                                         const Eigen::VectorXd& truth) {
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  ParameterDistribution::Component& component = distribution.components.at(0);
+  Gaussian& component = distribution.mixture.components.at(0);
   if (way == Way::kOracle) {
     for (Eigen::Index i = 0; i < truth.size(); ++i) {
       component.mean(i) = robot.parameters[static_cast<size_t>(i)].ToCoordinate(truth(i));
@@ -60,15 +60,7 @@ ParameterDistribution FirstDistribution(Way way, const RobotDescription& robot,
 }
 
 ParameterDistribution DistributionOf(const SimOpt& simopt, const RobotDescription& robot) {
-  ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  const GaussianMixture& mixture = simopt.state().distribution;
-  distribution.iteration = simopt.state().iteration;
-  distribution.components.clear();
-  for (size_t i = 0; i < mixture.components.size(); ++i) {
-    distribution.components.push_back(
-        {mixture.weights[i], mixture.components[i].mean, mixture.components[i].covariance});
-  }
-  return distribution;
+  return {simopt.state().iteration, robot.parameters, simopt.state().distribution};
 }
 
 }  // namespace plumb

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 #include "common/random.h"
 
 namespace plumb {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 

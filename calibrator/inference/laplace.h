@@ -6,8 +6,8 @@
 #include <limits>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/prior.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/prior.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 

@@ -5,9 +5,9 @@
 #include <functional>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/prior.h"
 #include "calibrator/inference/reps.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 

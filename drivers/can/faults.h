@@ -5,7 +5,7 @@
 
 namespace plumb {
 
-/// What goes wrong on a bus, see faulty.h. Probabilities are per frame, in [0, 1]; times in
+/// Faults of a bus, see faulty.h. Probabilities are per frame, in [0, 1]; times in
 /// microseconds.
 struct Faults {
   /// One direction.

@@ -15,7 +15,7 @@ struct ControlBuffer {
   alignas(cmsghdr) char bytes[256];
 };
 
-/// What it said.
+/// The answer.
 struct ReceiveControl {
   int64_t receive_ns = 0;  ///< CLOCK_REALTIME of arrival in the kernel; 0 = not stamped
   /// datagrams this socket has lost since it was opened (SO_RXQ_OVFL)

@@ -11,6 +11,7 @@
 #include "common/time_units.h"
 #include "drivers/bus/bus_plan.h"
 #include "drivers/driver/driver.h"
+#include "drivers/protocols/registry.h"
 #include "robot/floating_base.h"
 
 namespace plumb {

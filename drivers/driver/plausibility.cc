@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/time_units.h"
+#include "drivers/protocols/registry.h"
 
 namespace plumb {
 namespace {
@@ -42,8 +43,7 @@ void Plausibility::Add(int64_t time, double position, double velocity, double ef
   const Estimate next{time, position, velocity};
   CountDevices(time);
   const int64_t since = time - last_.time;
-  if (!seen_ || may_jump_ || since < 0 || Jumped(next) || since > settings_.lateness)
-    return Begin(next);
+  if (!seen_ || since < 0 || Jumped(next) || since > settings_.lateness) return Begin(next);
   LookForStuck(next, effort);
   Compare(next);
   last_ = next;
@@ -62,12 +62,12 @@ double Plausibility::Slack(double position) const noexcept {
 
 void Plausibility::CountDevices(int64_t time) noexcept {
   const int64_t since = time - window_;
-  if (!seen_ || since < 0 || since >= kWindow * settings_.period) {
-    crowded_ = count_ > kMostInWindow;
+  if (count_ == 0 || since < 0 || since >= kWindow * settings_.period) {
+    crowded_ = count_ > kMaxInWindow;
     window_ = time;
     count_ = 0;
   }
-  if (++count_ > kMostInWindow) {
+  if (++count_ > kMaxInWindow) {
     crowded_ = true;
     Complain(
         "{} encoder estimates in {} ms, where one device sends {}: two devices with one id, or "

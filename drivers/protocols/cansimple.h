@@ -84,7 +84,7 @@ inline constexpr Layout kSetInputTorqueShort{
 inline constexpr Layout kClearErrors{0x18, "Clear_Errors", 1, {{U("Identify", 0, 8)}}};
 // clang-format on
 
-/// What the driver asks for in turn while the robot moves.
+/// Reports that the driver asks for in turn while the robot moves.
 inline constexpr std::array kPolledReports = {kGetTemperature, kGetBusVoltageCurrent};
 
 enum AxisState : uint8_t { kUndefined = 0, kIdle = 1, kClosedLoopControl = 8 };

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "drivers/protocols/bus_device.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 
 namespace plumb {
 
@@ -22,7 +22,7 @@ std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description,
 /// Heartbeats that are expected within heartbeat_timeout: with the factory's 100 ms, 0.5 s.
 inline constexpr int kBeatsPerTimeout = 5;
 
-/// What such a drive and its host say to each other, the drive configured to send heartbeats with a
+/// The messages between such a drive and its host, the drive configured to send heartbeats with a
 /// fifth of heartbeat_timeout and encoder estimates with `measurement`; all else on request,
 /// temperatures and its supply every `telemetry`.
 BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings& driver);

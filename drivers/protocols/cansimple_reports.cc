@@ -96,7 +96,7 @@ FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexce
     const double fastest =
         std::max(std::abs(next.velocity), std::abs(estimate_.velocity)) / kRadiansPerTurn;
     // Twice: it may have been faster in between.
-    if (!may_jump_ && turned > kLeastJump + 2 * fastest * seconds) {
+    if (turned > kLeastJump + 2 * fastest * seconds) {
       jump_ = {now, (next.position - estimate_.position) / kRadiansPerTurn, true};
       LookForRestart();
     }

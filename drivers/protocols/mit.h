@@ -92,7 +92,7 @@ constexpr Layout ReplyLayout(const MitRanges& ranges, uint8_t length) {
 /// bits than they hold, and the codes go round.
 constexpr double Period(const MitRanges& ranges) { return 2 * ranges.position * 65536. / 65535.; }
 
-/// What a command asks for.
+/// The contents of a command.
 struct Setpoint {
   double position = 0;  ///< [rad]
   double velocity = 0;  ///< [rad/s]

@@ -27,7 +27,7 @@ RobotDescription ForFilter(RobotDescription robot) {
   return robot;
 }
 
-// What a gyro measures is its joint's rate and a bias; no joint that slides has a gyro.
+// A gyro measures its joint's rate and a bias; no joint that slides has a gyro.
 bool HasGyroBias(const EstimatorSettings& s) { return s.bias_sd > 0 && !(s.acceleration_sd > 0); }
 
 Eigen::Index StateSize(const RobotDescription& robot) {

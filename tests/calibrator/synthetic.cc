@@ -4,10 +4,10 @@
 #include <cstdlib>
 #include <string>
 
-#include "calibrator/discrepancy.h"
-#include "calibrator/simopt.h"
+#include "calibrator/fit/discrepancy.h"
 #include "common/decompositions.h"
 #include "common/random.h"
+#include "robot/parameter_distribution.h"
 #include "sim/simulator.h"
 
 namespace plumb {

@@ -3,6 +3,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -16,6 +18,7 @@
 #include "cli/roll_out.h"
 #include "controller/policy.h"
 #include "robot/description.h"
+#include "robot/posterior_reader.h"
 #include "tests/cli/shell.h"
 #include "tests/temporary_folder.h"
 #include "trainer/checkpoint.h"
@@ -335,6 +338,27 @@ TEST_CASE("sim: says which parameters are in use") {
        std::getline(lines, set);) {
     CHECK(set.size() <= 120);
   }
+}
+
+TEST_CASE("sim: a posterior's means instead of the prior's") {
+  using Catch::Contains;
+  const TemporaryFolder folder;
+  const std::string pendulum = Robot("pendulum"), posterior = folder / "posterior.json";
+  Sim(pendulum + " --random --episodes 2 --seed 7 --set mass/pole=1.2 --csv " + folder / "a.csv");
+  const Outcome calibration = Shell(Plumb() + "calibrate " + pendulum + " --csv " +
+                                    folder / "a.csv" + " --method laplace --output " + posterior);
+  INFO(calibration.text);
+  REQUIRE(calibration.status == 0);
+  const Outcome outcome = Sim(pendulum + " --posterior " + posterior);
+  INFO(outcome.text);
+  CHECK(outcome.status == 0);
+  const Eigen::VectorXd means = ReadPosterior(posterior, LoadRobot(pendulum)).Mean();
+  CHECK_THAT(outcome.text, Contains(fmt::format("mass/pole {}", means(1))));
+  CHECK_THAT(Sim(pendulum + " --set gravity=3 --posterior " + posterior).text,
+             Contains(fmt::format("gravity 3, mass/pole {}", means(1))));
+  CHECK_THAT(Sim(Robot("hopper") + " --posterior " + posterior).text,
+             Contains("is another robot's"));
+  CHECK(Sim(pendulum + " --urdf --posterior " + posterior).status == 2);
 }
 
 TEST_CASE("sim: pictures") {
