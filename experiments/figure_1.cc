@@ -18,6 +18,7 @@
 #include "calibrator/inference/population_weights.h"
 #include "calibrator/inference/reps_search.h"
 #include "common/atomic_file.h"
+#include "experiments/options.h"
 #include "experiments/results.h"
 #include "plot/svg.h"
 
@@ -85,7 +86,7 @@ struct Found {
 
 Prior OfXi() { return Prior({Prior::Normal(0, 1)}); }
 
-// SimOpt's way: the mean squared error, and a Gaussian that searches where it is small.
+// SimOpt's strategy: the mean squared error, and a Gaussian that searches where it is small.
 Gaussian BySquaredError(const std::vector<ToyTransition>& transitions, uint64_t seed) {
   RepsOptions options;
   options.returns = RepsReturns::kUnitRange;
@@ -291,8 +292,7 @@ int main(int argc, char** argv) {
       "Which simulators three methods find for a robot whose payload is light or heavy.", argc,
       argv,
       [&](CLI::App& app) {
-        app.add_option("--output", output, "folder for figure_1.csv and figure_1.svg")
-            ->capture_default_str();
+        plumb::AddOutputFlag(app, output, "figure_1.csv and figure_1.svg");
         app.add_option("--seed", seed, "of all random numbers")->capture_default_str();
         app.add_flag("--quick", quick, "a twentieth of the transitions, in a second");
       },

@@ -60,15 +60,16 @@ std::unique_ptr<Trainer> Loop::TrainFirst(const std::string& name,
 
 LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
                      const std::function<void(double)>& progress) {
-  ParameterDistribution distribution = FirstDistribution(settings.way, model_, truth_);
+  ParameterDistribution distribution = FirstDistribution(settings.strategy, model_, truth_);
   const std::unique_ptr<SimOpt> simopt =
-      Learns(settings.way) ? MakeSimOpt(settings.way, model_, settings.seed, settings.threads)
-                           : nullptr;
+      Learns(settings.strategy)
+          ? MakeSimOpt(settings.strategy, model_, settings.seed, settings.threads)
+          : nullptr;
   const double all = settings.first_updates + settings.iterations * settings.next_updates;
   const double first = settings.first_updates / all, next = settings.next_updates / all;
-  const std::unique_ptr<Trainer> trainer =
-      TrainFirst(Learns(settings.way) ? Key(Way::kPrior) : Key(settings.way), distribution,
-                 settings, [&](double share) { progress(first * share); });
+  const std::unique_ptr<Trainer> trainer = TrainFirst(
+      Learns(settings.strategy) ? Key(CalibrationStrategy::kPrior) : Key(settings.strategy),
+      distribution, settings, [&](double share) { progress(first * share); });
   const ParameterSampler sample = [&](Random& random) { return distribution.Sample(random); };
   LoopResult result;
   int64_t transitions = 0;

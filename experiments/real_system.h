@@ -15,6 +15,7 @@ struct RobotEpisode {
 };
 
 /// The system that policies are trained for. Nothing may be learnt of it but from its episodes.
+/// Not thread-safe.
 class RealSystem {
  public:
   virtual ~RealSystem() = default;

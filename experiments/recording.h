@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <string>
@@ -34,9 +33,6 @@ std::string Key(Hidden hidden);  ///< "paper", "prior"
 
 /// Parameters of "the real robot". @return physical units, order of robot.parameters.
 Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_t seed);
-
-/// The flag --hidden of an experiment.
-void AddHiddenFlag(CLI::App& app, Hidden& hidden);
 
 /// The motion of a policy on a robot whose parameters are drawn for each seed.
 struct RobotDataset {

@@ -7,7 +7,8 @@
 namespace plumb {
 
 /// The "real" robot of the paper: the simulator itself with parameters that nobody is told. Its
-/// states are read with independent noise, which is what the policy sees and what is recorded.
+/// states are read with independent noise, by the policy and by the recording alike. Not
+/// thread-safe.
 class SimulatedSystem : public RealSystem {
  public:
   /// @param hidden physical units, order of robot.parameters. @param noise standard deviations of

@@ -26,7 +26,7 @@ GaussianPolicy Policy(const RobotDescription& robot) {
 }
 
 ParameterDistribution Certain(const RobotDescription& robot, const Eigen::VectorXd& physical) {
-  return FirstDistribution(Way::kOracle, robot, physical);
+  return FirstDistribution(CalibrationStrategy::kOracle, robot, physical);
 }
 
 TEST_CASE("what is recorded without noise is what the simulator does, latency included") {

@@ -1,4 +1,4 @@
-#include "experiments/ways.h"
+#include "experiments/calibration_strategy.h"
 
 #include <array>
 #include <stdexcept>
@@ -26,36 +26,44 @@ RobotDescription WithPaperSettings(RobotDescription robot) {
 
 }  // namespace
 
-std::string Key(Way way) { return kNames.at(static_cast<size_t>(way)).key; }
-std::string Label(Way way) { return kNames.at(static_cast<size_t>(way)).label; }
+std::string Key(CalibrationStrategy strategy) {
+  return kNames.at(static_cast<size_t>(strategy)).key;
+}
+std::string Label(CalibrationStrategy strategy) {
+  return kNames.at(static_cast<size_t>(strategy)).label;
+}
 
-bool Learns(Way way) { return way == Way::kOriginal || way == Way::kStep || way == Way::kDefault; }
+bool Learns(CalibrationStrategy strategy) {
+  return strategy == CalibrationStrategy::kOriginal || strategy == CalibrationStrategy::kStep ||
+         strategy == CalibrationStrategy::kDefault;
+}
 
-std::unique_ptr<SimOpt> MakeSimOpt(Way way, const RobotDescription& robot, uint64_t seed,
-                                   int threads) {
-  switch (way) {
-    case Way::kOriginal:
+std::unique_ptr<SimOpt> MakeSimOpt(CalibrationStrategy strategy, const RobotDescription& robot,
+                                   uint64_t seed, int threads) {
+  switch (strategy) {
+    case CalibrationStrategy::kOriginal:
       return std::make_unique<SimOpt>(WithPaperSettings(robot), seed, threads,
                                       Objective::kTrajectory);
-    case Way::kStep:
+    case CalibrationStrategy::kStep:
       return std::make_unique<SimOpt>(WithPaperSettings(robot), seed, threads, Objective::kStep);
-    case Way::kDefault:
+    case CalibrationStrategy::kDefault:
       return std::make_unique<SimOpt>(robot, seed, threads, "auto");
     default:
-      throw std::invalid_argument(Key(way) + " does not learn");
+      throw std::invalid_argument(Key(strategy) + " does not learn");
   }
 }
 
-ParameterDistribution FirstDistribution(Way way, const RobotDescription& robot,
+ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const RobotDescription& robot,
                                         const Eigen::VectorXd& truth) {
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   Gaussian& component = distribution.mixture.components.at(0);
-  if (way == Way::kOracle) {
+  if (strategy == CalibrationStrategy::kOracle) {
     for (Eigen::Index i = 0; i < truth.size(); ++i) {
       component.mean(i) = robot.parameters[static_cast<size_t>(i)].ToCoordinate(truth(i));
     }
   }
-  if (way == Way::kOracle || way == Way::kNominal) component.covariance.setZero();
+  if (strategy == CalibrationStrategy::kOracle || strategy == CalibrationStrategy::kNominal)
+    component.covariance.setZero();
   return distribution;
 }
 
