@@ -3,22 +3,30 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <iostream>
-
 namespace plumb {
 
-ProgressLine::ProgressLine(bool speaks) : shown_(speaks && isatty(STDERR_FILENO)) {}
+ProgressLine::ProgressLine(bool speaks, std::ostream& stream)
+    : stream_(stream),
+      shown_(speaks && isatty(&stream == &std::cout ? STDOUT_FILENO : STDERR_FILENO)) {}
 
-void ProgressLine::Show(const std::string& line) const {
-  if (shown_) std::cerr << "\r\033[K" << line << std::flush;
+void ProgressLine::Show(const std::string& line) {
+  if (!shown_) return;
+  stream_ << "\r\033[K" << line << std::flush;
+  open_ = true;
 }
 
-void ProgressLine::Show(const std::string& what, double share) const {
+void ProgressLine::Show(const std::string& what, double share) {
   Show(fmt::format("{} {:3.0f} %", what, 100 * share));
 }
 
-void ProgressLine::Clear() const {
-  if (shown_) std::cerr << "\r\033[K" << std::flush;
+void ProgressLine::Clear() {
+  if (open_) stream_ << "\r\033[K" << std::flush;
+  open_ = false;
+}
+
+void ProgressLine::Keep() {
+  if (open_) stream_ << "\n";
+  open_ = false;
 }
 
 }  // namespace plumb

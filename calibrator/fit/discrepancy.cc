@@ -7,6 +7,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "common/hash.h"
+
 namespace plumb {
 namespace {
 

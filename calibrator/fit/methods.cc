@@ -15,6 +15,7 @@
 #include "calibrator/inference/reps_search.h"
 #include "common/config.h"
 #include "common/decompositions.h"
+#include "common/nearest_name.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -361,12 +362,8 @@ const std::vector<std::string>& CalibrationMethods() {
 void RequireMethod(const std::string& wanted) {
   const auto& names = CalibrationMethods();
   if (std::find(names.begin(), names.end(), wanted) != names.end()) return;
-  const std::string nearest =
-      *std::min_element(names.begin(), names.end(), [&](const auto& a, const auto& b) {
-        return EditDistance(a, wanted) < EditDistance(b, wanted);
-      });
-  throw std::invalid_argument("there is no method '" + wanted + "'; did you mean '" + nearest +
-                              "'?");
+  throw std::invalid_argument("there is no method '" + wanted + "'; did you mean '" +
+                              NearestName(wanted, names) + "'?");
 }
 
 MethodResult RunMethod(const MethodInput& input) {

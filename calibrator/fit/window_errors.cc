@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "common/hash.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {

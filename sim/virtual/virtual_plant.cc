@@ -44,7 +44,7 @@ class FineSimulator : public PhysicsBackend {
   Eigen::VectorXd q_, v_;  // where it was
 };
 
-std::unique_ptr<PhysicsBackend> MakeEngine(const RobotDescription& robot) {
+std::unique_ptr<PhysicsBackend> MakeBackend(const RobotDescription& robot) {
   for (const JointDescription& joint : robot.joints) {
     if (joint.dynamics.sensor_delay != 0 || joint.dynamics.sensor_bias != 0) {
       throw std::invalid_argument(
@@ -75,7 +75,7 @@ RobotDescription WithFriction(RobotDescription robot) {
 }  // namespace
 
 VirtualPlant::VirtualPlant(RobotDescription robot)
-    : engine_(MakeEngine(robot = WithFriction(std::move(robot)))), play_(robot) {}
+    : engine_(MakeBackend(robot = WithFriction(std::move(robot)))), play_(robot) {}
 
 void VirtualPlant::SetState(const Vector& q, const Vector& v) {
   engine_->SetState(q, v);

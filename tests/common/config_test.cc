@@ -1,5 +1,4 @@
 #include "common/config.h"
-#include "common/nearest_name.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -163,12 +162,6 @@ TEST_CASE("a key may hold a table or something else") {
   CHECK(config.IsTable("b"));
   CHECK_FALSE(config.IsTable("c"));
   config.Finish();
-}
-
-TEST_CASE("edit distance") {
-  CHECK(EditDistance("kitten", "sitting") == 3);
-  CHECK(EditDistance("", "abc") == 3);
-  CHECK(EditDistance("abc", "abc") == 0);
 }
 
 }  // namespace
