@@ -9,6 +9,7 @@
 
 namespace plumb {
 
+/// The flags of `plumb calibrate`.
 struct CalibrateFlags {
   std::string robot;
   std::vector<std::string> logs, tables;  ///< LCM logs, CSV files
@@ -25,6 +26,7 @@ struct CalibrateFlags {
 /// interrupted run leaves a journal beside the output, from which the same command goes on. @return
 /// exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better
 /// than the prior, the model cannot explain the logs, or they do not agree.
+/// @throws std::invalid_argument or std::runtime_error, one line for people: robot, logs, files.
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command);
 
 }  // namespace plumb

@@ -7,6 +7,7 @@
 
 namespace plumb {
 
+/// The flags of `plumb excite`.
 struct ExciteFlags {
   std::string robot;
   std::string output = "excitation.csv";
@@ -21,7 +22,9 @@ struct ExciteFlags {
 /// within its limits, prints what they will tell, and writes the best ones as a table t,
 /// u/<joint>... in the task's units of action, one row per control step. No messages, no buses.
 /// @return exit status: 0; 1 if no excitation keeps within the limits, and no file is written then;
-/// 130 if it was interrupted.
+/// 130 if it was interrupted. Works with a thread per core; call it from one.
+/// @throws std::invalid_argument or std::runtime_error, one line for people: robot, posterior,
+/// files.
 int Excite(Process& process, const ExciteFlags& flags);
 
 }  // namespace plumb

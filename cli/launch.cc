@@ -22,6 +22,7 @@
 #include "cli/virtual_run.h"
 #include "common/atomic_file.h"
 #include "common/lcm_url.h"
+#include "common/progress_line.h"
 #include "common/signature.h"
 #include "common/time_units.h"
 #include "drivers/driver/driver.h"
@@ -139,7 +140,7 @@ class ClosedLoop {
     std::cout << progress_.Header() << std::endl;
     while (!progress_.finished()) {
       if (!process_.Wait(kLook)) {
-        EndLine();
+        line_.Clear();
         std::cout << "interrupted" << std::endl;
         return 130;
       }
@@ -148,7 +149,7 @@ class ClosedLoop {
       for (const std::string& row : progress_.TakeRows()) Print(row);
       ShowStatus();
     }
-    EndLine();
+    line_.Clear();
     processes_.Stop(false);
     if (setting_.virtual_run) setting_.virtual_run->Finish();
     std::cout << progress_.Conclusion(setting_.truth);
@@ -224,13 +225,13 @@ class ClosedLoop {
 
   bool AllRunning() {
     if (stopped_from_outside_) {
-      EndLine();
+      line_.Clear();
       std::cerr << "plumb: somebody outside the run has asked for a stop: the run ends here\n";
       return false;
     }
     Child* const ended = processes_.Ended();
     if (!ended) return true;
-    EndLine();
+    line_.Clear();
     std::cerr << "plumb: " << ended->name() << " ended (" << ended->ending() << "); the end of "
               << ended->log().string() << ":\n"
               << ended->Tail(5);
@@ -294,24 +295,15 @@ class ClosedLoop {
   }
 
   void Print(const std::string& line) {
-    EndLine();
+    line_.Clear();
     std::cout << line << std::endl;
   }
-  void EndLine() {
-    if (line_open_) std::cout << "\r\033[K" << std::flush;
-    line_open_ = false;
-  }
   void ShowStatus() {
-    const bool terminal = isatty(STDOUT_FILENO) != 0;
-    if (SecondsSince(last_status_) < (terminal ? 0.1 : 10)) return;
+    if (SecondsSince(last_status_) < (line_.shown() ? 0.1 : 10)) return;
     last_status_ = SteadyClock::now();
     const std::string line = progress_.StatusLine(SecondsSince(really_started_));
-    if (terminal) {
-      std::cout << "\r\033[K" << line << std::flush;
-      line_open_ = true;
-    } else {
-      std::cout << line << std::endl;
-    }
+    line_.Show(line);
+    if (!line_.shown()) std::cout << line << std::endl;
   }
 
   Process& process_;
@@ -330,7 +322,8 @@ class ClosedLoop {
   const SteadyClock::time_point really_started_ = SteadyClock::now();
   SteadyClock::time_point last_status_ = really_started_;
   int64_t last_request_ = start_;
-  bool line_open_ = false, fault_seen_ = false, stopped_ = false, stopped_from_outside_ = false;
+  ProgressLine line_{true, std::cout};
+  bool fault_seen_ = false, stopped_ = false, stopped_from_outside_ = false;
   int rearms_ = 0;
   std::set<std::string> strange_channels_;
   RunProcesses processes_;  // is stopped first

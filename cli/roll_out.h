@@ -31,7 +31,8 @@ struct EpisodeSummary {
   End end = End::kTimeLimit;
 };
 
-/// Plays one episode of the environment. Equal seeds and numbers give equal episodes.
+/// Plays one episode of the environment. Equal seeds and numbers give equal episodes. One thread
+/// for each environment.
 /// @param see is shown every step, in order. @param stop is asked after every step but the last.
 /// @throws std::runtime_error if an action is not finite.
 EpisodeSummary PlayEpisode(Environment& environment, const RobotDescription& robot,

@@ -8,6 +8,7 @@
 
 namespace plumb {
 
+/// The flags of `plumb sim`.
 struct SimFlags {
   std::string robot;
   std::string policy;  ///< file; empty = none
@@ -22,7 +23,8 @@ struct SimFlags {
 
 /// `plumb sim`: rolls a policy, random actions or no action out in the simulator, without messages
 /// or buses, and says how it went. @return exit status: 0, or 130 if it was interrupted; then it
-/// writes no files.
+/// writes no files. Runs in one thread.
+/// @throws std::invalid_argument or std::runtime_error, one line for people: robot, policy, files.
 int Simulate(Process& process, const SimFlags& flags);
 
 }  // namespace plumb

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -18,6 +17,8 @@
 #include "common/atomic_file.h"
 #include "common/batches.h"
 #include "common/config.h"
+#include "common/hash.h"
+#include "common/progress_line.h"
 #include "common/ranks.h"
 #include "robot/posterior_reader.h"
 #include "trainer/checkpoint.h"
@@ -117,19 +118,16 @@ std::string Clock(double seconds) {
 }
 
 /// One line that is written over where people look at it; into a file, a line now and then.
-class ProgressLine {
+class TrainingProgress {
  public:
-  explicit ProgressLine(bool speaks) : speaks_(speaks) {}
-  ~ProgressLine() {
-    if (terminal_ && shown_) std::cerr << "\n";
-  }
+  explicit TrainingProgress(bool speaks) : speaks_(speaks), line_(speaks) {}
+  ~TrainingProgress() { line_.Keep(); }
   void Show(const Trainer& trainer, const UpdateReport& report, int64_t steps,
             int64_t done_before) {
     if (!speaks_) return;
     const double seconds = clock_.seconds();
     if (seconds < next_ && trainer.steps() < steps) return;
-    next_ = seconds + (terminal_ ? 0.1 : 5);
-    shown_ = true;
+    next_ = seconds + (line_.shown() ? 0.1 : 5);
     const double speed = static_cast<double>(trainer.steps() - done_before) / seconds;
     const std::string line = fmt::format(
         "{:3.0f} %  {:.3g} steps  return {:.5g}  KL {:.4f}  gain {:.3f}  explained {:.2f}  entropy "
@@ -138,12 +136,13 @@ class ProgressLine {
         static_cast<double>(trainer.steps()), report.mean_return, report.step.kl,
         report.step.surrogate_gain, report.explained_variance, report.entropy, speed,
         Clock(static_cast<double>(steps - trainer.steps()) / speed));
-    std::cerr << (terminal_ ? "\r\033[K" : "") << line << (terminal_ ? "" : "\n") << std::flush;
+    line_.Show(line);
+    if (!line_.shown()) std::cerr << line << std::endl;
   }
 
  private:
-  bool speaks_, terminal_ = isatty(STDERR_FILENO);
-  bool shown_ = false;
+  bool speaks_;
+  ProgressLine line_;
   double next_ = 0;
   Stopwatch clock_;
 };
@@ -177,7 +176,7 @@ class Training {
     const ParameterSampler sample = [this](Random& random) { return distribution_.Sample(random); };
     ProgressTable table(speaks() ? flags_.csv : "", trainer_.updates());
     {
-      ProgressLine line(speaks());
+      TrainingProgress line(speaks());
       const int64_t before = trainer_.steps();
       double saved = 0;
       while (trainer_.steps() < steps_) {

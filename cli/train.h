@@ -7,6 +7,7 @@
 
 namespace plumb {
 
+/// The flags of `plumb train`.
 struct TrainFlags {
   std::string robot;
   /// a posterior.json, "prior" or "nominal" (the prior's means)
@@ -30,6 +31,8 @@ struct TrainFlags {
 /// process, and says how it does on simulators held out. An interrupted run leaves a checkpoint,
 /// from which the same command goes on to the same bits.
 /// @return exit status: 0, or 130 if it was interrupted.
+/// @throws std::invalid_argument or std::runtime_error, one line for people: robot, distribution,
+/// files, simulations that cannot be used.
 int Train(Process& process, TrainFlags flags);
 
 }  // namespace plumb

@@ -1,12 +1,12 @@
-// The trainer's kernels beside Eigen and, where it is installed, oneDNN: the networks and batches of
-// robots/pendulum and robots/hopper, one thread, in one run. They take turns, so that whatever else
-// the machine does meets all of them; times are medians, ratios medians of a turn's ratios.
+// The trainer's kernels beside Eigen and, where it is installed, oneDNN: the networks and batches
+// of robots/pendulum and robots/hopper, one thread, in one run. They take turns, so that whatever
+// else the machine does meets all of them; times are medians, ratios medians of a turn's ratios.
 //
 //   OMP_NUM_THREADS=1 build/bench/networks [turns]      (oneDNN would use all processors)
 //
-// The last column is a hash of all results: the same for the same bits. What another processor would
-// give: /lib64/ld-linux-x86-64.so.2 --glibc-hwcaps-mask x86-64-v3 build/bench/networks, and for
-// oneDNN ONEDNN_MAX_CPU_ISA=AVX2 (none and SSE41 for the baseline).
+// The last column is a hash of all results: the same for the same bits. What another processor
+// would give: /lib64/ld-linux-x86-64.so.2 --glibc-hwcaps-mask x86-64-v3 build/bench/networks, and
+// for oneDNN ONEDNN_MAX_CPU_ISA=AVX2 (none and SSE41 for the baseline).
 
 #include <fmt/format.h>
 
