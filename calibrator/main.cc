@@ -13,6 +13,7 @@
 #include "calibrator/motion/motion_log.h"
 #include "calibrator/results/posterior_file.h"
 #include "common/process.h"
+#include "common/time_units.h"
 
 namespace plumb {
 namespace {
@@ -73,7 +74,7 @@ class Session {
     for (const std::string& warning : report->warnings)
       spdlog::warn("iteration {}: {}", report->iteration, warning);
     report_ = std::move(report);
-    seconds_ = static_cast<double>(clock_.Now() - start_) * 1e-6 / clock_.scale();
+    seconds_ = Seconds(clock_.Now() - start_) / clock_.scale();
     WriteFindings();
     return true;
   }

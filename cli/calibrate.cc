@@ -17,8 +17,9 @@
 #include "calibrator/results/identified_urdf.h"
 #include "calibrator/results/posterior_file.h"
 #include "calibrator/results/summary.h"
-#include "cli/progress_line.h"
 #include "common/atomic_file.h"
+#include "common/hash.h"
+#include "common/progress_line.h"
 #include "common/rank_batch_runner.h"
 
 namespace plumb {
@@ -109,7 +110,7 @@ std::string List(const std::vector<int>& numbers) {
 }
 
 int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::vector<Log>& logs,
-        const ProgressLine& line, const std::function<void()>& look) {
+        ProgressLine& line, const std::function<void()>& look) {
   CalibrationOptions options = flags.options;
   options.method = "laplace", options.horizons = {1};
   const Findings findings = Calibrate(robot, logs, options);
@@ -150,7 +151,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   flags.options.execution.threads =
       flags.threads > 0 ? flags.threads : std::max(1, cores / ranks.size());
-  const ProgressLine line(speaks);
+  ProgressLine line(speaks);
   const auto look = [&] {
     if (process.stopping()) throw Interrupted();
   };

@@ -19,7 +19,7 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kMostRows = 10;
+constexpr size_t kMaxRows = 10;
 
 std::string DescribeStart(const RobotDescription& robot, uint64_t seed) {
   const auto [q, v] = ExcitationStart(robot, seed);
@@ -34,7 +34,7 @@ std::string DescribeStart(const RobotDescription& robot, uint64_t seed) {
 std::string Table(const RobotDescription& robot, const std::vector<RatedExcitation>& rated) {
   std::string text =
       fmt::format("{:<44}{:>12}{:>9}{:>9}\n", "excitation", "gain [nat]", "s", "margin");
-  for (size_t i = 0; i < std::min(rated.size(), kMostRows); ++i) {
+  for (size_t i = 0; i < std::min(rated.size(), kMaxRows); ++i) {
     text += fmt::format("{:<44}{:>12.2f}{:>9.2f}{:>7.0f} %\n", rated[i].excitation.name,
                         rated[i].gain, rated[i].steps * robot.task.period, 100 * rated[i].margin);
   }

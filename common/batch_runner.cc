@@ -3,6 +3,8 @@
 #include <array>
 #include <stdexcept>
 
+#include "common/hash.h"
+
 namespace plumb {
 namespace {
 
@@ -20,22 +22,6 @@ uint64_t CheckOf(const Header& header, const Eigen::MatrixXd& batch) {
 }
 
 }  // namespace
-
-uint64_t Hash(const void* data, size_t size, uint64_t from) {
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  for (size_t i = 0; i < size; ++i) from = (from ^ bytes[i]) * 0x100000001b3;
-  return from;
-}
-
-uint64_t Hash(const Eigen::MatrixXd& matrix, uint64_t from) {
-  const std::array<int64_t, 2> shape{matrix.rows(), matrix.cols()};
-  return Hash(matrix.data(), static_cast<size_t>(matrix.size()) * sizeof(double),
-              Hash(shape.data(), sizeof shape, from));
-}
-
-uint64_t Hash(const std::string& text, uint64_t from) {
-  return Hash(text.data(), text.size(), from);
-}
 
 Eigen::MatrixXd BatchRunner::Run(uint64_t, Eigen::Index rows, Eigen::Index columns,
                                  const Columns& compute) {

@@ -50,11 +50,6 @@ class Journal {
   int64_t resumed_ = 0;
 };
 
-/// FNV-1a of bytes, from another hash on.
-uint64_t Hash(const void* data, size_t size, uint64_t from = 0xcbf29ce484222325);
-uint64_t Hash(const Eigen::MatrixXd& matrix, uint64_t from = 0xcbf29ce484222325);
-uint64_t Hash(const std::string& text, uint64_t from = 0xcbf29ce484222325);
-
 /// With how many threads, and by whom.
 struct ExecutionOptions {
   ExecutionOptions(int thread_count = 1, BatchRunner* done_by = nullptr)

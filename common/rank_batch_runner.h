@@ -5,7 +5,7 @@
 
 namespace plumb {
 
-/// Each rank computes some of the columns, and all get all of them.
+/// Each rank computes some of the columns, and all get all of them. Not thread-safe.
 class RankBatchRunner : public BatchRunner {
  public:
   /// @param ranks must outlive this. @param journal of rank 0; null = none, and on the others.

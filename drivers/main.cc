@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 
@@ -15,6 +14,7 @@
 #include "common/process.h"
 #include "common/realtime.h"
 #include "common/signature.h"
+#include "common/time_units.h"
 #include "drivers/driver/driver.h"
 #include "drivers/driver/flight_recorder.h"
 #include "drivers/driver/phase_times.h"
@@ -68,9 +68,8 @@ class DriverProcess {
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
-        transport_(
-            OpenTransport(bus, driver_.filters(),
-                          {process.participant(), std::llround(robot.driver.effort_delay * 1e6)})),
+        transport_(OpenTransport(bus, driver_.filters(),
+                                 {process.participant(), Microseconds(robot.driver.effort_delay)})),
         cycle_(driver_.cycle(), clock_.Now()),
         states_(process.messenger(), "JOINT_STATE"),
         imus_(process.messenger(), "IMU"),
@@ -214,7 +213,7 @@ class DriverProcess {
     disarm.utime = clock_.Utime();
     disarm.request = driver_request_t::DISARM;
     driver_.OnRequest(disarm, clock_.Now(), disarm.utime);
-    const auto patience = static_cast<int64_t>(kDisarmTimeout * 1e6 * clock_.scale());
+    const auto patience = Microseconds(kDisarmTimeout * clock_.scale());
     const int64_t begin = clock_.Now();
     do {
       Step();

@@ -9,7 +9,7 @@
 
 namespace plumb {
 
-/// Ways of choosing the simulators that a policy is trained on.
+/// How the simulators are chosen that a policy is trained on.
 enum class CalibrationStrategy {
   kNominal,  ///< no randomisation: the prior's means
   kPrior,    ///< domain randomisation: the prior, whatever the robot does
@@ -17,7 +17,7 @@ enum class CalibrationStrategy {
   /// iteration, KL 0.1
   kOriginal,
   kStep,     ///< step-based SimOpt (Cui & Hensel), the same settings
-  kDefault,  ///< what Plumbline does if nobody says otherwise
+  kDefault,  ///< Plumbline's default method
   kOracle,   ///< the truth, which no robot tells
 };
 
@@ -27,12 +27,12 @@ std::string Label(CalibrationStrategy strategy);  ///< for people
 /// Whether it learns from what the robot does.
 bool Learns(CalibrationStrategy strategy);
 
-/// SimOpt by a way that learns. @param robot with its calibration settings; those of the paper
-/// replace them where the way is of the paper.
+/// SimOpt by a strategy that learns. @param robot with its calibration settings; those of the paper
+/// replace them where the strategy is of the paper.
 std::unique_ptr<SimOpt> MakeSimOpt(CalibrationStrategy strategy, const RobotDescription& robot,
                                    uint64_t seed, int threads);
 
-/// Where a way begins. @param truth physical units; for kOracle.
+/// The distribution of simulators to begin with. @param truth physical units; for kOracle.
 ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const RobotDescription& robot,
                                         const Eigen::VectorXd& truth);
 

@@ -14,6 +14,7 @@
 #include <iostream>
 
 #include "common/atomic_file.h"
+#include "experiments/options.h"
 #include "experiments/recording.h"
 #include "experiments/results.h"
 #include "experiments/simulated_system.h"
@@ -28,13 +29,6 @@ constexpr CalibrationStrategy kStrategies[] = {
 constexpr double kRobotSeconds = 6;  // of an iteration: five of them are half a minute
 constexpr double kEnough = 0.95;     // of the oracle's return
 
-struct Options {
-  std::string robots, output = ".";
-  int runs = 5, iterations = 10, threads = 0;
-  Hidden hidden = Hidden::kPaper;
-  bool quick = false;
-};
-
 std::string KeyOf(const PaperTask& task, CalibrationStrategy strategy, int run) {
   return fmt::format("{},{},{}", task.name, Key(strategy), run);
 }
@@ -45,8 +39,8 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
-Results::Rows RunLoop(const Options& options, const PaperTask& task, CalibrationStrategy strategy,
-                      int run, Remembered& remembered,
+Results::Rows RunLoop(const ExperimentOptions& options, const PaperTask& task,
+                      CalibrationStrategy strategy, int run, Remembered& remembered,
                       const std::function<void(double)>& progress) {
   const RobotDescription robot = LoadTask(options.robots, task);
   const auto seed = static_cast<uint64_t>(run);
@@ -73,7 +67,7 @@ Results::Rows RunLoop(const Options& options, const PaperTask& task, Calibration
   return rows;
 }
 
-Panel Draw(const Options& options, const PaperTask& task, const Results& results) {
+Panel Draw(const ExperimentOptions& options, const PaperTask& task, const Results& results) {
   Panel panel{
       task.name, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
   for (const CalibrationStrategy strategy : kStrategies) {
@@ -97,7 +91,8 @@ double ShareOfOracle(double value, double oracle) {
   return oracle > 0 ? value / oracle : oracle / value;
 }
 
-std::string Sentence(const Options& options, const PaperTask& task, const Results& results) {
+std::string Sentence(const ExperimentOptions& options, const PaperTask& task,
+                     const Results& results) {
   std::string text = fmt::format(
       "{}: return on the robot after 0, {}, {} iterations (mean of {} runs):", task.name,
       std::min(5, options.iterations), options.iterations, options.runs);
@@ -129,12 +124,12 @@ std::string Sentence(const Options& options, const PaperTask& task, const Result
   return text;
 }
 
-std::string SettingsOf(const Options& options) {
+std::string SettingsOf(const ExperimentOptions& options) {
   return fmt::format("iterations {}, hidden {}{}", options.iterations, Key(options.hidden),
                      options.quick ? ", quick" : "");
 }
 
-int MakeFigure(Process& process, const Options& options) {
+int MakeFigure(Process& process, const ExperimentOptions& options) {
   const std::filesystem::path folder = options.output;
   Results results(folder / "figure_3.csv", SettingsOf(options), {"task", "way", "run"},
                   {"iteration", "robot_return", "simulated_return", "discrepancy", "transitions",
@@ -170,26 +165,15 @@ int MakeFigure(Process& process, const Options& options) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  plumb::Options options;
+  plumb::ExperimentOptions options;
   return plumb::Run(
       "plumb-figure-3",
       "Return on the robot over SimOpt's iterations, by each way of choosing simulators.", argc,
       argv,
       [&](CLI::App& app) {
-        app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output, "folder for figure_3.csv and figure_3.svg")
-            ->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
-        app.add_option("--iterations", options.iterations, "of SimOpt")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
+        plumb::AddExperimentFlags(app, options, "figure_3.csv and figure_3.svg");
+        plumb::AddIterationsFlag(app, options.iterations);
         plumb::AddHiddenFlag(app, options.hidden);
-        app.add_option("--threads", options.threads,
-                       "0 = one per core; the result does not depend on it")
-            ->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::MakeFigure(process, options); });
 }

@@ -16,16 +16,16 @@ constexpr uint32_t kJudges = 1u << 20;
 std::vector<Rollout> RollOut(RealSystem& real, const GaussianPolicy& policy, int steps,
                              int iteration, double* seconds) {
   std::vector<Rollout> rollouts;
-  for (uint32_t episode = 0; steps > 0; ++episode) {
-    RealSystem::Trial trial =
-        real.Run(policy, true, steps, 1000 * static_cast<uint32_t>(iteration) + episode);
-    const auto made = static_cast<int>(trial.rollout.transitions.size());
-    if (made == 0 && episode > 10)
+  for (uint32_t number = 0; steps > 0; ++number) {
+    RobotEpisode episode =
+        real.Run(policy, true, steps, 1000 * static_cast<uint32_t>(iteration) + number);
+    const auto made = static_cast<int>(episode.rollout.transitions.size());
+    if (made == 0 && number > 10)
       throw std::runtime_error("the robot does not move: ten episodes without a transition");
-    trial.rollout.policy_iteration = iteration;
-    *seconds += trial.seconds;
+    episode.rollout.policy_iteration = iteration;
+    *seconds += episode.seconds;
     steps -= made;
-    rollouts.push_back(std::move(trial.rollout));
+    rollouts.push_back(std::move(episode.rollout));
   }
   return rollouts;
 }

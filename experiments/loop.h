@@ -43,8 +43,8 @@ struct LoopResult {
   std::vector<Rollout> rollouts;  ///< that were calibrated with
 };
 
-/// Trains policies, one way after the other. The first policy of a distribution is trained once for
-/// all ways that begin with it.
+/// Runs the loop, one strategy after the other. The first policy of a distribution is trained once
+/// for all strategies that begin with it.
 class Loop {
  public:
   /// @param model what is calibrated and trained in. @param truth physical units, for the oracle;

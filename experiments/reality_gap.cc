@@ -22,6 +22,7 @@
 #include "common/atomic_file.h"
 #include "experiments/bus_robot.h"
 #include "experiments/loop.h"
+#include "experiments/options.h"
 #include "experiments/results.h"
 #include "plot/curves.h"
 #include "sim/parameters.h"
@@ -57,18 +58,12 @@ const std::array<Method, 7> kMethods{
      {"nominal", Label(CalibrationStrategy::kNominal), CalibrationStrategy::kNominal, false},
      {"oracle", "the robot's masses, in the simulator", CalibrationStrategy::kOracle, false}}};
 
-struct Options {
-  std::string robots, output = ".";
-  int runs = 3, iterations = 5, threads = 0;
-  bool quick = false;
-};
-
 std::string KeyOf(const Gap& gap, const Method& method, int run) {
   return fmt::format("{},{},{}", gap.name, method.key, run);
 }
 
-std::filesystem::path AlarmFile(const Options& options, const Gap& gap, const Method& method,
-                                int run) {
+std::filesystem::path AlarmFile(const ExperimentOptions& options, const Gap& gap,
+                                const Method& method, int run) {
   return std::filesystem::path(options.output) /
          fmt::format("alarm_{}_{}_{}.txt", gap.name, method.key, run);
 }
@@ -78,8 +73,9 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
-Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& method, int run,
-                      Remembered& remembered, const std::function<void(double)>& progress) {
+Results::Rows RunLoop(const ExperimentOptions& options, const Gap& gap, const Method& method,
+                      int run, Remembered& remembered,
+                      const std::function<void(double)>& progress) {
   const auto load = [&](const char* file) {
     return LoadRobot((std::filesystem::path(options.robots) / file).string());
   };
@@ -122,15 +118,15 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   return rows;
 }
 
-double Mean(const Options& options, const Gap& gap, const Method& method, const Results& results,
-            int iteration, size_t column) {
+double Mean(const ExperimentOptions& options, const Gap& gap, const Method& method,
+            const Results& results, int iteration, size_t column) {
   double sum = 0;
   for (int run = 1; run <= options.runs; ++run)
     sum += results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column];
   return sum / options.runs;
 }
 
-Panel Draw(const Options& options, const Gap& gap, const Results& results) {
+Panel Draw(const ExperimentOptions& options, const Gap& gap, const Results& results) {
   Panel panel{
       gap.title, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
   for (const Method& method : kMethods) {
@@ -149,7 +145,7 @@ Panel Draw(const Options& options, const Gap& gap, const Results& results) {
   return panel;
 }
 
-std::string Sentence(const Options& options, const Gap& gap, const Results& results) {
+std::string Sentence(const ExperimentOptions& options, const Gap& gap, const Results& results) {
   std::string text = fmt::format(
       "{}, {} runs: return on the robot before and after {} iterations, in simulation, "
       "discrepancy, alarms:",
@@ -169,7 +165,7 @@ std::string Sentence(const Options& options, const Gap& gap, const Results& resu
   return text;
 }
 
-int Compare(Process& process, const Options& options) {
+int Compare(Process& process, const ExperimentOptions& options) {
   const std::filesystem::path folder = options.output;
   Results results(
       folder / "reality_gap.csv",
@@ -207,24 +203,14 @@ int Compare(Process& process, const Options& options) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  plumb::Options options;
+  plumb::ExperimentOptions options;
+  options.runs = 3, options.iterations = 5;
   return plumb::Run(
       "plumb-reality-gap", "Who transfers to a robot that is none of the simulators.", argc, argv,
       [&](CLI::App& app) {
-        app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output,
-                       "folder for reality_gap.csv, reality_gap.svg and what the alarms say")
-            ->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
-        app.add_option("--iterations", options.iterations, "of SimOpt")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
-        app.add_option("--threads", options.threads,
-                       "0 = one per core; the result does not depend on it")
-            ->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
+        plumb::AddExperimentFlags(app, options,
+                                  "reality_gap.csv, reality_gap.svg and what the alarms say");
+        plumb::AddIterationsFlag(app, options.iterations);
       },
       [&](plumb::Process& process) { return plumb::Compare(process, options); });
 }

@@ -1,11 +1,11 @@
-// What calibration costs, by each way: transitions of the robot until a policy that is trained on
-// what they told earns nearly what the oracle's does, and simulated steps until simulators predict
-// the robot to a given error.
+// The cost of calibration, by each method: transitions of the robot until a policy that is trained
+// on their posterior earns nearly as much as the oracle's, and simulated steps until simulators
+// predict the robot to a given error.
 //
 // A policy trained on the prior moves a robot whose parameters are drawn for each run, as in
 // Figures 2 and 3.
 //   robot: N transitions of it calibrate (both SimOpts make 40 updates of 25 simulators on them);
-//          then every way trains as much, from the same policy on.
+//          then every strategy trains as much, from the same policy on.
 //   simulator: 40 roll-outs calibrate, one an update, or for the default as many of their
 //          transitions as the budget allows.
 //
@@ -21,6 +21,7 @@
 #include "common/atomic_file.h"
 #include "experiments/budget.h"
 #include "experiments/n_step_error.h"
+#include "experiments/options.h"
 #include "experiments/recording.h"
 #include "experiments/results.h"
 #include "experiments/simulated_system.h"
@@ -37,18 +38,11 @@ constexpr double kEnough = 0.95;  // of the oracle's return
 constexpr int kHorizon = 10, kSimulators = 20;
 constexpr double kTargets[] = {0.01, 0.001};  // errors after kHorizon steps, standard units
 
-struct Options {
-  std::string robots, output = ".";
-  int runs = 5, threads = 0;
-  Hidden hidden = Hidden::kPaper;
-  bool quick = false;
-};
-
-std::vector<int> TransitionCounts(const Options& options) {
+std::vector<int> TransitionCounts(const ExperimentOptions& options) {
   return options.quick ? std::vector<int>{50, 200}
                        : std::vector<int>{12, 25, 50, 100, 200, 400, 800};
 }
-std::vector<int64_t> Budgets(const Options& options) {
+std::vector<int64_t> Budgets(const ExperimentOptions& options) {
   return options.quick ? std::vector<int64_t>{4000, 40'000}
                        : std::vector<int64_t>{1000,   2000,    5000,    10'000, 20'000,
                                               50'000, 100'000, 200'000, 500'000};
@@ -59,12 +53,12 @@ std::string KeyOf(const PaperTask& task, CalibrationStrategy strategy, int run) 
 
 struct Remembered {
   std::string of;
-  Recording recording;
+  RobotDataset recording;
 };
 
 class Experiment {
  public:
-  explicit Experiment(const Options& options) : options_(options) {}
+  explicit Experiment(const ExperimentOptions& options) : options_(options) {}
 
   Results::Rows Robot(const PaperTask& task, CalibrationStrategy strategy, int run,
                       const std::function<void(double)>& progress) {
@@ -92,7 +86,7 @@ class Experiment {
                           const std::function<void(double)>& progress) {
     Remember(task, run, progress);
     const auto seed = static_cast<uint64_t>(run);
-    const Recording& recording = now_.recording;
+    const RobotDataset& recording = now_.recording;
     Results::Rows rows;
     const auto judge = [&](int64_t simulated, const ParameterDistribution& distribution) {
       const Eigen::VectorXd errors = NStepErrors(recording.robot, distribution, recording.held_out,
@@ -172,9 +166,9 @@ class Experiment {
   Remembered now_;
 };
 
-// Means over the runs, of each row of a way.
-std::vector<Band> Bands(const Options& options, const PaperTask& task, CalibrationStrategy strategy,
-                        const Results& results, bool logarithmic) {
+// Means over the runs, of each row of a strategy.
+std::vector<Band> Bands(const ExperimentOptions& options, const PaperTask& task,
+                        CalibrationStrategy strategy, const Results& results, bool logarithmic) {
   std::vector<Band> bands;
   size_t rows = SIZE_MAX;
   for (int run = 1; run <= options.runs; ++run)
@@ -191,7 +185,7 @@ std::vector<Band> Bands(const Options& options, const PaperTask& task, Calibrati
   return bands;
 }
 
-std::vector<double> FirstColumn(const Options& options, const PaperTask& task,
+std::vector<double> FirstColumn(const ExperimentOptions& options, const PaperTask& task,
                                 CalibrationStrategy strategy, const Results& results) {
   const size_t rows = Bands(options, task, strategy, results, false).size();
   std::vector<double> means(rows, 0);
@@ -202,7 +196,7 @@ std::vector<double> FirstColumn(const Options& options, const PaperTask& task,
   return means;
 }
 
-Curve CurveOf(const Options& options, const PaperTask& task, CalibrationStrategy strategy,
+Curve CurveOf(const ExperimentOptions& options, const PaperTask& task, CalibrationStrategy strategy,
               const Results& results, bool logarithmic) {
   Curve curve{Label(strategy), FirstColumn(options, task, strategy, results), {}, {}, {}};
   for (const Band& band : Bands(options, task, strategy, results, logarithmic)) {
@@ -224,13 +218,13 @@ double ShareOfOracle(double value, double oracle) {
   return oracle > 0 ? value / oracle : oracle / value;
 }
 
-std::string SettingsOf(const Options& options) {
+std::string SettingsOf(const ExperimentOptions& options) {
   return fmt::format("hidden {}{}", Key(options.hidden), options.quick ? ", quick" : "");
 }
 
-// A way's share of the oracle's return on the same robot: the median of the runs, for each number
-// of transitions.
-std::vector<double> Shares(const Options& options, const PaperTask& task,
+// A strategy's share of the oracle's return on the same robot: the median of the runs, for each
+// number of transitions.
+std::vector<double> Shares(const ExperimentOptions& options, const PaperTask& task,
                            CalibrationStrategy strategy, const Results& results) {
   std::vector<double> medians;
   for (size_t i = 0; i < results.Of(KeyOf(task, strategy, 1)).size(); ++i) {
@@ -247,7 +241,7 @@ std::vector<double> Shares(const Options& options, const PaperTask& task,
   return medians;
 }
 
-int Measure(Process& process, const Options& options) {
+int Measure(Process& process, const ExperimentOptions& options) {
   const std::filesystem::path folder = options.output;
   Results robot(folder / "sample_efficiency_robot.csv", SettingsOf(options), {"task", "way", "run"},
                 {"transitions", "robot_return"});
@@ -329,24 +323,14 @@ int Measure(Process& process, const Options& options) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  plumb::Options options;
+  plumb::ExperimentOptions options;
   return plumb::Run(
       "plumb-sample-efficiency",
       "Transitions of the robot and simulated steps that each way of calibrating needs.", argc,
       argv,
       [&](CLI::App& app) {
-        app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output,
-                       "folder for the tables and sample_efficiency.svg")
-            ->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
+        plumb::AddExperimentFlags(app, options, "the tables and sample_efficiency.svg");
         plumb::AddHiddenFlag(app, options.hidden);
-        app.add_option("--threads", options.threads,
-                       "0 = one per core; the result does not depend on it")
-            ->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::Measure(process, options); });
 }

@@ -10,6 +10,12 @@
 
 namespace plumb {
 
+/// The outcome of a control step.
+struct StepResult {
+  double reward;    ///< of this step
+  bool terminated;  ///< by the task, or because the simulation is no longer finite; never by time
+};
+
 /// A task on a simulated robot, in control steps. One per worker; not thread-safe. After
 /// construction nothing allocates. Equal parameters, state and actions give equal bits in any
 /// thread.
@@ -38,10 +44,6 @@ class Environment {
   void SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
                 const Eigen::Ref<const Eigen::VectorXd>& v);
 
-  struct StepResult {
-    double reward;    ///< of this step
-    bool terminated;  ///< by the task, or because the simulation is no longer finite
-  };
   /// One control period. During its first description.simulation.latency seconds the previous
   /// action still acts: on the robot, too, an effort arrives some time after the state it answers.
   /// @param action policy units, [-1, 1] = effort limits; clipped here.

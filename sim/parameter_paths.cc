@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "common/config.h"
+#include "common/nearest_name.h"
 #include "sim/parameter_names.h"
 #include "sim/parameters.h"
 
@@ -72,11 +72,10 @@ Parameters::Paths Parameters::AllPaths(const RobotDescription& description) cons
 }
 
 Parameters::Binding Parameters::Find(const Paths& paths, const std::string& path) {
-  const std::pair<std::string, Binding>* nearest = &paths[0];
-  for (const auto& candidate : paths) {
-    if (candidate.first == path) return candidate.second;
-    if (EditDistance(path, candidate.first) < EditDistance(path, nearest->first))
-      nearest = &candidate;
+  std::vector<std::string> names;
+  for (const auto& [name, binding] : paths) {
+    if (name == path) return binding;
+    names.push_back(name);
   }
   std::string why;
   if (path.starts_with("contact/"))
@@ -85,7 +84,7 @@ Parameters::Binding Parameters::Find(const Paths& paths, const std::string& path
   if (path.starts_with("length/"))
     why = " (a link whose joints and centre of mass coincide has no length)";
   throw std::invalid_argument("the simulator has no parameter '" + path + "'" + why +
-                              "; the nearest is '" + nearest->first + "'");
+                              "; the nearest is '" + NearestName(path, names) + "'");
 }
 
 }  // namespace plumb

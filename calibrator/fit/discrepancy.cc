@@ -10,6 +10,7 @@
 
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/whitening.h"
+#include "common/hash.h"
 
 namespace plumb {
 namespace {

@@ -7,6 +7,7 @@
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/search_methods.h"
 #include "common/config.h"
+#include "common/nearest_name.h"
 
 namespace plumb {
 
@@ -32,12 +33,8 @@ const std::vector<std::string>& CalibrationMethods() {
 void RequireMethod(const std::string& wanted) {
   const auto& names = CalibrationMethods();
   if (std::find(names.begin(), names.end(), wanted) != names.end()) return;
-  const std::string nearest =
-      *std::min_element(names.begin(), names.end(), [&](const auto& a, const auto& b) {
-        return EditDistance(a, wanted) < EditDistance(b, wanted);
-      });
-  throw std::invalid_argument("there is no method '" + wanted + "'; did you mean '" + nearest +
-                              "'?");
+  throw std::invalid_argument("there is no method '" + wanted + "'; did you mean '" +
+                              NearestName(wanted, names) + "'?");
 }
 
 MethodResult RunMethod(const MethodInput& input) {

@@ -7,6 +7,8 @@
 
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/whitening.h"
+#include "common/decompositions.h"
+#include "common/hash.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
@@ -164,7 +166,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
     ++drops->gap;
     return false;
   }
-  const double duration = static_cast<double>(last->second.utime - first->second.utime) * 1e-6;
+  const double duration = Seconds(last->second.utime - first->second.utime);
   if (!(std::abs(duration - period_) <= 0.2 * period_)) {
     ++drops->late;
     return false;
@@ -187,8 +189,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
       ++drops->restart;
       return false;
     }
-    EffortSegment segment{static_cast<double>(now.utime - before.utime) * 1e-6,
-                          ToEigen(now.effort)};
+    EffortSegment segment{Seconds(now.utime - before.utime), ToEigen(now.effort)};
     finite = finite && segment.duration > 0 && segment.effort.allFinite();
     transition->efforts.push_back(std::move(segment));
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/time_units.h"
 #include "drivers/driver/stop.h"
 
 namespace plumb {
@@ -11,8 +12,6 @@ constexpr int kRefusedCycles = 10;  // consecutive cycles whose frames were not 
 // in a cycle while arming: the kernel holds about ten in flight
 constexpr size_t kMaxFrames = 8;
 constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
-
-double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/time_units.h"
 #include "drivers/driver/driver.h"
 #include "drivers/driver/operating_limits.h"
 
@@ -57,7 +58,7 @@ void Driver::CheckCommand() noexcept {
 
 bool Driver::Unwatched(const Joint& joint) const noexcept {
   return mode_ == Mode::kArmed &&
-         TelemetryIsStale(joint.motor->readings(), std::llround(settings_.telemetry * 1e6), now_);
+         TelemetryIsStale(joint.motor->readings(), Microseconds(settings_.telemetry), now_);
 }
 
 bool Driver::Agree(const SecondEncoder& second, Reason& why) const noexcept {

@@ -4,12 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/time_units.h"
 #include "drivers/protocols/registry.h"
 
 namespace plumb {
 namespace {
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 Eigen::Map<const Eigen::Vector3d> Vector(const std::array<double, 3>& values) {
   return Eigen::Map<const Eigen::Vector3d>(values.data());

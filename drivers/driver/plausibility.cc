@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/time_units.h"
 #include "drivers/protocols/registry.h"
 
 namespace plumb {
@@ -14,9 +15,6 @@ constexpr double kCoarse = 0x1p-22;
 /// [rad] of a motor's shaft: coarse codes of positions, and what those of velocities add up to in a
 /// window.
 constexpr double kResolution = 0.05;
-
-double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 /// [us] in which a motor sends an encoder estimate: nothing that it sends by itself comes more
 /// often.

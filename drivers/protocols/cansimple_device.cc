@@ -5,6 +5,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
@@ -48,8 +50,6 @@ class Drive : public MotorDevice {
   CanSimpleDevice::Settings settings_;
   CanSimpleDevice device_;
 };
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "drivers/protocols/cia406.h"
 
 namespace plumb {
@@ -28,7 +29,7 @@ class Cia406Encoder : public Sensor {
         range_(description.range),
         radians_per_count_(2 * std::numbers::pi / description.counts),
         counts_per_microsecond_(description.max_speed / radians_per_count_ * 1e-6),
-        period_(std::llround(description.period * 1e6)),
+        period_(Microseconds(description.period)),
         timing_(timing) {}
 
   std::vector<Filter> filters() const override {

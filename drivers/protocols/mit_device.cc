@@ -6,6 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
@@ -184,7 +186,7 @@ std::unique_ptr<MotorDevice> MakeMitDevice(const MotorDescription& motor, const 
   own.node = motor.node;
   own.master = motor.mit->master;
   own.ranges = motor.mit->ranges;
-  own.watchdog = std::llround(settings.watchdog * 1e6);
+  own.watchdog = Microseconds(settings.watchdog);
   return std::make_unique<Drive>(own);
 }
 

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/time_units.h"
 #include "drivers/protocols/mit.h"
 
 namespace plumb {
@@ -196,8 +197,7 @@ class MitMotor : public Motor {
       estimate_.position = raw;
       return;
     }
-    if (!displaced &&
-        std::abs(step) > ranges_.velocity * (static_cast<double>(dt) * 1e-6 + kUneven)) {
+    if (!displaced && std::abs(step) > ranges_.velocity * (Seconds(dt) + kUneven)) {
       lost_place_ = true;
       Fail(now,
            "its position jumped by {:.3g} rad in {:.3g} ms: it has restarted, or lost its place",

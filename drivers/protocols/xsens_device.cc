@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/time_units.h"
+
 namespace plumb {
 
 using namespace xsens;
@@ -26,8 +28,6 @@ class Imu : public SensorDevice {
   XsensDevice::Settings settings_;
   XsensDevice device_;
 };
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 }  // namespace
 

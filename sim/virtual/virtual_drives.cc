@@ -1,9 +1,9 @@
 // Of virtual_devices.h: drives, each a protocol's device and an encoder on the motor's shaft.
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
+#include "common/time_units.h"
 #include "drivers/driver/joint_map.h"
 #include "drivers/protocols/registry.h"
 #include "sim/virtual/encoder.h"

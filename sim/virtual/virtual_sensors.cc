@@ -1,10 +1,10 @@
 // Of virtual_devices.h: sensors: encoders on joints, IMUs on links.
 
 #include <Eigen/Geometry>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "drivers/protocols/registry.h"
 #include "robot/kinematics.h"
 #include "sim/virtual/virtual_devices.h"
@@ -62,7 +62,7 @@ class VirtualImu : public VirtualDevice {
     if (motion.time < device_->NextDue()) return;
     kinematics_.Update(motion.q, motion.v);
     const LinkMotion& link = kinematics_.link(link_);
-    const double elapsed = static_cast<double>(motion.time - last_time_) * 1e-6;
+    const double elapsed = Seconds(motion.time - last_time_);
     const Eigen::Vector3d acceleration =
         elapsed > 0 ? Eigen::Vector3d((link.velocity - last_velocity_) / elapsed)
                     : Eigen::Vector3d::Zero();
