@@ -130,7 +130,7 @@ int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::v
 std::string MethodHelp() {
   std::string help = "Methods:";
   for (const Method& method : Methods())
-    help += fmt::format("\n  {:<15} {}", method.name, method.help);
+    help += fmt::format("\n  {:<20}{}", method.name, method.help);
   return help;
 }
 

@@ -113,10 +113,11 @@ MethodResult ConditionalMixture(const MethodInput& input) {
         ConditionalMixtureDiagnostics found;
         Posterior posterior = InferConditionalMixture(problem, options, input.options.seed, &found);
         const auto& rounds = found.rounds;
+        if (rounds.empty()) return Inferred{std::move(posterior), "one round"};
+        const int components = rounds.back().components;
         return Inferred{std::move(posterior),
-                        rounds.empty() ? "one round"
-                                       : fmt::format("{} rounds, of {} components towards the end",
-                                                     rounds.size() + 1, rounds.back().components)};
+                        fmt::format("{} rounds, {} component{} before the last one",
+                                    rounds.size() + 1, components, components == 1 ? "" : "s")};
       });
 }
 
