@@ -24,6 +24,34 @@ uint64_t Fingerprint(const std::string& file, uint64_t hash) {
 
 }  // namespace
 
+bool JointDescription::IsOf(JointGroup group) const {
+  switch (group) {
+    case JointGroup::kDriven:
+      return !passive && type != Type::kSpherical;
+    case JointGroup::kOneCoordinate:
+      return type != Type::kSpherical;
+    default:
+      return true;
+  }
+}
+
+bool SimulationSettings::Has(WorldParameterKind::Table table) const {
+  switch (table) {
+    case WorldParameterKind::Table::kContact:
+      return contact.has_value();
+    case WorldParameterKind::Table::kLimit:
+      return stop.has_value();
+    default:
+      return true;
+  }
+}
+
+void SimulationSettings::set_world(const World& world) {
+  gravity = world.gravity;
+  if (contact) contact = world.contact;
+  if (stop) stop = world.stop;
+}
+
 int RobotDescription::num_positions() const {
   int count = 0;
   for (const JointDescription& joint : joints) count += joint.num_positions();

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "robot/parameter_kinds.h"
+
 namespace plumb {
 
 /// A solid of URDF's <visual> or <collision>.
@@ -142,26 +144,6 @@ struct SensorDescription {
   NoiseDescription noise = {};
 };
 
-/// What moves a joint besides inertia and gravity. Zeros say that there is none of it.
-struct JointDynamics {
-  static constexpr double kLongestDelay = 0.5;  ///< [s]
-
-  double armature = 0;    ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
-  double damping = 0;     ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
-  double friction = 0;    ///< [Nm] or [N] >= 0: Coulomb friction
-  double stiffness = 0;   ///< [Nm/rad] or [N/m] >= 0 of a spring
-  double rest = 0;        ///< [rad] or [m] where the spring is relaxed
-  double motor_gain = 1;  ///< effort at the joint per effort commanded, >= 0
-  /// [s] 0 to kLongestDelay between an effort's command and its effect, beyond what was recorded
-  double delay = 0;
-  double sensor_delay = 0;  ///< [s] 0 to kLongestDelay: a reading is of the state so long ago
-  double sensor_bias = 0;   ///< [rad] or [m]: what a reading of the position adds to it
-  /// [rad/s] or [m/s] > 0: speed at which the motor's back-EMF leaves it no effort. At speed w in
-  /// the effort's own direction the effort is at most effort_limit * (1 - w / no_load_speed), as of
-  /// a DC motor at its full voltage.
-  double no_load_speed = std::numeric_limits<double>::infinity();
-};
-
 /// How the driver keeps a joint with a motor within its limits, and how the joint stops.
 struct JointLimitSettings {
   double position_margin =
@@ -203,6 +185,7 @@ struct JointDescription {
 
   int num_positions() const { return type == Type::kSpherical ? 4 : 1; }
   int num_velocities() const { return type == Type::kSpherical ? 3 : 1; }
+  bool IsOf(JointGroup group) const;
 };
 
 struct DriverSettings {
@@ -228,9 +211,6 @@ struct DriverSettings {
   double stuck_after = 0;
 };
 
-/// Standard acceleration of free fall, ISO 80000-3 [m/s^2].
-inline constexpr double kStandardGravity = 9.80665;
-
 struct SimulationSettings {
   /// kSemiImplicit: v += h a(q, v); q += h v, as gym does. kLeapfrog: q += h/2 v; v += h a; q +=
   /// h/2 v.
@@ -244,21 +224,16 @@ struct SimulationSettings {
   bool move_before_clip;
   double gravity = kStandardGravity;  ///< [m/s^2] >= 0, along -z of the base
 
-  /// Where the collision shapes meet the ground, the plane z = 0 of the base: a force
-  /// max(0, stiffness * depth + damping * depth') along z, and Coulomb friction.
-  struct Contact {
-    double stiffness;   ///< [N/m] > 0
-    double damping;     ///< [N s/m] >= 0
-    double friction;    ///< coefficient >= 0
-    double slip_speed;  ///< [m/s] > 0 below which friction is viscous
-  };
-  /// A joint beyond its position limits is pushed back by stiffness * depth + damping * depth'.
-  struct Stop {
-    double stiffness;  ///< [Nm/rad] or [N/m] > 0
-    double damping;    ///< [Nm s/rad] or [N s/m] >= 0
-  };
+  using Contact = ContactOf<double>;
+  using Stop = StopOf<double>;
   std::optional<Contact> contact;  ///< none: the robot does not touch the ground
   std::optional<Stop> stop;        ///< none: joints move on beyond their limits
+
+  /// What of these may be an uncertain parameter.
+  World world() const { return {gravity, contact.value_or(Contact{}), stop.value_or(Stop{})}; }
+  /// Sets it; what the robot does not have stays without.
+  void set_world(const World& world);
+  bool Has(WorldParameterKind::Table table) const;
 };
 
 /// One uncertain simulator parameter, named by a path such as "gravity", "mass/pole", "delay/hip":

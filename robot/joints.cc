@@ -48,28 +48,14 @@ MotorDescription ReadMotor(Config& config) {
 
 // `dynamics` are the URDF's.
 JointDynamics ReadDynamics(Config config, JointDynamics dynamics, const JointDescription& joint) {
-  const auto refuse = [&](const char* key, const char* why) {
-    if (config.Has(key)) config.Fail(key, why);
-  };
-  if (joint.passive) {
-    for (const char* key : {"motor_gain", "delay", "no_load_speed"})
-      refuse(key, "needs a motor: the joint is passive");
+  for (const JointParameterKind& kind : kJointParameterKinds) {
+    if (config.Has(kind.key) && !joint.IsOf(kind.joints)) {
+      config.Fail(kind.key, kind.joints == JointGroup::kDriven
+                                ? "needs a motor: the joint is passive"
+                                : "has no meaning for a spherical joint");
+    }
+    dynamics.*kind.member = config.Number(kind.key, kind.in_file, dynamics.*kind.member);
   }
-  if (joint.type == JointDescription::Type::kSpherical) {
-    for (const char* key : {"stiffness", "rest", "sensor_delay", "sensor_bias"})
-      refuse(key, "has no meaning for a spherical joint");
-  }
-  dynamics.armature = config.Number("armature", kSaneNotNegative, 0);
-  dynamics.damping = config.Number("damping", kSaneNotNegative, dynamics.damping);
-  dynamics.friction = config.Number("friction", kSaneNotNegative, dynamics.friction);
-  dynamics.stiffness = config.Number("stiffness", kSaneNotNegative, 0);
-  dynamics.rest = config.Number("rest", kSane, 0);
-  dynamics.motor_gain = config.Number("motor_gain", kSaneNotNegative, 1);
-  dynamics.delay = config.Number("delay", {0, JointDynamics::kLongestDelay}, 0);
-  dynamics.sensor_delay = config.Number("sensor_delay", {0, JointDynamics::kLongestDelay}, 0);
-  dynamics.sensor_bias = config.Number("sensor_bias", kSane, 0);
-  if (config.Has("no_load_speed"))
-    dynamics.no_load_speed = config.Number("no_load_speed", {1e-9, HUGE_VAL});
   config.Finish();
   return dynamics;
 }

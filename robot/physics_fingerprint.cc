@@ -34,6 +34,9 @@ class Hash {
   uint64_t value_ = 0xcbf29ce484222325;
 };
 
+// Kinds that came later count where a joint has them: older posteriors still fit their robots.
+constexpr size_t kFirstKinds = 10;
+
 void AddLink(const LinkDescription& link, Hash* hash) {
   hash->Add(link.name), hash->Add(link.mass), hash->Add(link.center_of_mass),
       hash->Add(link.inertia);
@@ -46,11 +49,16 @@ void AddLink(const LinkDescription& link, Hash* hash) {
 void AddJoint(const JointDescription& joint, Hash* hash) {
   hash->Add(joint.name);
   hash->Add(joint.origin), hash->Add(joint.rotation), hash->Add(joint.axis);
-  const JointDynamics& d = joint.dynamics;
-  for (const double number :
-       {static_cast<double>(joint.type), static_cast<double>(joint.parent), joint.lower,
-        joint.upper, joint.effort_limit, d.armature, d.damping, d.friction, d.stiffness, d.rest,
-        d.motor_gain, d.delay, d.sensor_delay, d.sensor_bias, d.no_load_speed}) {
+  for (const double number : {static_cast<double>(joint.type), static_cast<double>(joint.parent),
+                              joint.lower, joint.upper, joint.effort_limit}) {
+    hash->Add(number);
+  }
+  constexpr JointDynamics kDefault;
+  for (size_t i = 0; i < std::size(kJointParameterKinds); ++i) {
+    const JointParameterKind& kind = kJointParameterKinds[i];
+    const double number = joint.dynamics.*kind.member;
+    if (i >= kFirstKinds && number == kDefault.*kind.member) continue;
+    if (i >= kFirstKinds) hash->Add(kind.name);
     hash->Add(number);
   }
 }

@@ -18,22 +18,24 @@ constexpr Range kSanePositive{1e-12, 1e12}, kSaneNotNegative{0, 1e12};
 
 const std::vector<std::string> kLiveMethods{"auto", "laplace", "mixture", "reps", "simopt"};
 
-SimulationSettings::Contact ReadContact(Config config) {
-  SimulationSettings::Contact s;
-  s.stiffness = config.Number("stiffness", {1e-9, 1e12});
-  s.damping = config.Number("damping", {0, 1e12});
-  s.friction = config.Number("friction", {0, 1e6});
-  s.slip_speed = config.Number("slip_speed", {1e-9, 1e6});
-  config.Finish();
-  return s;
-}
-
-SimulationSettings::Stop ReadStop(Config config) {
-  SimulationSettings::Stop s;
-  s.stiffness = config.Number("stiffness", {1e-9, 1e12});
-  s.damping = config.Number("damping", {0, 1e12});
-  config.Finish();
-  return s;
+// Gravity may be left out; of a table that is there, nothing may.
+World ReadWorld(Config& simulation, const SimulationSettings& settings) {
+  using Table = WorldParameterKind::Table;
+  World world;
+  Config contact = simulation.Table("contact", false), limit = simulation.Table("limit", false);
+  for (const WorldParameterKind& kind : kWorldParameterKinds) {
+    if (!settings.Has(kind.table)) continue;
+    Config& table = kind.table == Table::kContact ? contact
+                    : kind.table == Table::kLimit ? limit
+                                                  : simulation;
+    const bool optional = kind.table == Table::kSimulation;
+    kind.of(world) = optional ? table.Number(kind.key, kind.in_file, kind.of(world))
+                              : table.Number(kind.key, kind.in_file);
+  }
+  if (settings.contact) world.contact.slip_speed = contact.Number("slip_speed", {1e-9, 1e6});
+  contact.Finish();
+  limit.Finish();
+  return world;
 }
 
 UnmodelledJoint ReadUnmodelledJoint(Config& config, const RobotDescription& robot,
@@ -149,12 +151,12 @@ SimulationSettings ReadSimulation(Config config, double period) {
   s.latency = config.Number("latency", kSaneNotNegative, 0);
   s.speed_clip = config.Number("speed_clip", {std::numeric_limits<double>::min()}, HUGE_VAL);
   s.move_before_clip = config.Boolean("move_before_clip", false);
-  s.gravity = config.Number("gravity", {0, 1000}, kStandardGravity);
   if (s.substep > period * (1 + 1e-9))
     config.Fail("substep", "must not be longer than task.period");
   if (s.latency >= period) config.Fail("latency", "must be shorter than task.period");
-  if (config.Has("contact")) s.contact = ReadContact(config.Table("contact"));
-  if (config.Has("limit")) s.stop = ReadStop(config.Table("limit"));
+  if (config.Has("contact")) s.contact.emplace();
+  if (config.Has("limit")) s.stop.emplace();
+  s.set_world(ReadWorld(config, s));
   config.Finish();
   return s;
 }
