@@ -10,7 +10,7 @@
 #include "calibrator/urdf_numbers.h"
 #include "common/atomic_file.h"
 #include "common/config.h"
-#include "robot/urdf.h"
+#include "robot/urdf/urdf.h"
 #include "sim/model.h"
 
 namespace plumb {
@@ -73,7 +73,7 @@ class Placement {
     const auto found = std::find_if(file_.joints.begin(), file_.joints.end(),
                                     [&](const auto& j) { return j.name == joint; });
     return found != file_.joints.end() &&
-           !file_.part[static_cast<size_t>(found - file_.joints.begin())] &&
+           !found->part &&
            toml_.dynamics.count(name) == 0;
   }
 

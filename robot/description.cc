@@ -5,11 +5,7 @@
 #include <filesystem>
 
 #include "common/config.h"
-#include "robot/joints.h"
-#include "robot/parameters.h"
-#include "robot/sensors.h"
-#include "robot/settings.h"
-#include "robot/urdf.h"
+#include "robot/urdf/urdf.h"
 
 namespace plumb {
 namespace {
@@ -23,34 +19,6 @@ uint64_t Fingerprint(const std::string& file, uint64_t hash) {
 }
 
 }  // namespace
-
-bool JointDescription::IsOf(JointGroup group) const {
-  switch (group) {
-    case JointGroup::kDriven:
-      return !passive && type != Type::kSpherical;
-    case JointGroup::kOneCoordinate:
-      return type != Type::kSpherical;
-    default:
-      return true;
-  }
-}
-
-bool SimulationSettings::Has(WorldParameterKind::Table table) const {
-  switch (table) {
-    case WorldParameterKind::Table::kContact:
-      return contact.has_value();
-    case WorldParameterKind::Table::kLimit:
-      return stop.has_value();
-    default:
-      return true;
-  }
-}
-
-void SimulationSettings::set_world(const World& world) {
-  gravity = world.gravity;
-  if (contact) contact = world.contact;
-  if (stop) stop = world.stop;
-}
 
 int RobotDescription::num_positions() const {
   int count = 0;
@@ -119,9 +87,8 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.fingerprint = kFnvOffset;
   for (const std::string& part : files) robot.fingerprint = Fingerprint(part, robot.fingerprint);
   if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);
-  ReadJoints(root, urdf);
+  robot.joints = ReadJoints(root, urdf);
   robot.links = std::move(urdf.links);
-  robot.joints = std::move(urdf.joints);
 
   Config bus = root.Table("bus");
   robot.bus_url = bus.String("url");

@@ -11,7 +11,8 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BELOW = {
     "common": set(),
-    "robot": {"common"},
+    "robot/urdf": {"common"},
+    "robot": {"common", "robot/urdf"},
     "sim/tasks": {"common", "robot"},
     "drivers": {"common", "robot"},
     "estimator": {"common", "robot"},
@@ -19,7 +20,7 @@ BELOW = {
     "controller": {"common", "robot", "sim/tasks"},
     "sim": {"common", "robot", "sim/tasks"},
     "calibrator/inference": {"common"},
-    "calibrator": {"common", "robot", "sim", "sim/tasks", "calibrator/inference"},
+    "calibrator": {"common", "robot/urdf", "robot", "sim", "sim/tasks", "calibrator/inference"},
     "trainer": {"common", "robot", "sim", "sim/tasks", "controller"},
     "cli": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "controller", "calibrator", "calibrator/inference", "trainer"},
     "experiments": {"common", "robot", "sim", "sim/tasks", "drivers", "estimator", "calibrator", "calibrator/inference", "trainer", "controller"},
