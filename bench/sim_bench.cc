@@ -11,8 +11,8 @@
 
 #include "common/random.h"
 #include "sim/environment.h"
-#include "sim/plant.h"
 #include "sim/simulator.h"
+#include "sim/virtual/simbody_plant.h"
 #include "sim/windows.h"
 #include "tests/sim/allocations.h"
 #ifdef PLUMB_MUJOCO
@@ -70,7 +70,7 @@ BENCHMARK_CAPTURE(PendulumStep, robot, "pendulum");
 /// The virtual robot's dynamics, asked every 5 ms: Simbody the textbook way.
 void SimbodyPendulumFiveMilliseconds(benchmark::State& state) {
   const Model model(Load("pendulum"));
-  Plant plant(model.Describe(model.parameters().means()));
+  SimbodyPlant plant(model.Describe(model.parameters().means()));
   plant.SetState(kOne, kOne);
   double seconds = 0;
   for (auto _ : state) {
@@ -223,7 +223,7 @@ BENCHMARK(HopperWindows)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillis
 /// four times.
 void SimbodyHopperMassAndBias(benchmark::State& state) {
   RobotDescription robot = Load("hopper/gym.toml");
-  Plant plant(Model(robot).Describe(Model(robot).parameters().means()));
+  SimbodyPlant plant(Model(robot).Describe(Model(robot).parameters().means()));
   ForEachHop(state, [&](const auto& q, const auto& v, const auto&) {
     plant.SetState(q, v);
     benchmark::DoNotOptimize(plant.MassMatrix().data());

@@ -3,8 +3,8 @@
 #include <iostream>
 
 #include "common/atomic_file.h"
-#include "drivers/bus_plan.h"
-#include "drivers/dbc.h"
+#include "drivers/bus/bus_plan.h"
+#include "drivers/bus/dbc.h"
 #include "robot/description.h"
 
 namespace plumb {

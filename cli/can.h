@@ -9,7 +9,7 @@ namespace plumb {
 /// @return exit status: 1 if it cannot work.
 int PrintBusPlan(const std::string& robot);
 
-/// `plumb can dbc ROBOT`: writes the DBC file (see drivers/dbc.h). @param output file; "" =
+/// `plumb can dbc ROBOT`: writes the DBC file (see drivers/bus/dbc.h). @param output file; "" =
 /// standard output.
 /// @return exit status
 int WriteDbc(const std::string& robot, const std::string& output);

@@ -14,8 +14,8 @@
 #include "common/atomic_file.h"
 #include "robot/description.h"
 #include "robot/posterior_reader.h"
-#include "sim/picture.h"
 #include "sim/tasks/task.h"
+#include "sim/view/picture.h"
 
 namespace plumb {
 namespace {

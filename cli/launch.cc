@@ -23,7 +23,7 @@
 #include "common/atomic_file.h"
 #include "common/lcm_url.h"
 #include "common/signature.h"
-#include "drivers/driver.h"
+#include "drivers/driver/driver.h"
 #include "plumb/driver_request_t.hpp"
 #include "robot/description.h"
 #include "sim/parameters.h"

@@ -12,8 +12,8 @@
 
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
-#include "sim/picture.h"
-#include "sim/viewer.h"
+#include "sim/view/picture.h"
+#include "sim/view/viewer.h"
 #include "trainer/policy_file.h"
 
 namespace plumb {

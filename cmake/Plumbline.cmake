@@ -34,13 +34,15 @@ function(plumb_process name)
   target_precompile_headers(plumb-${name} REUSE_FROM plumb_common)
 endfunction()
 
-# plumb_test(<name> [FOLDER folder] LINKS ...) -> one Catch2 binary of tests/<folder>/*.cc, one CTest entry
+# plumb_test(<name> [FOLDER folder] [ROOMS room ...] LINKS ...) -> one Catch2 binary of tests/<folder>/*.cc and
+# tests/<folder>/<room>/*.cc, one CTest entry
 function(plumb_test folder)
-  cmake_parse_arguments(ARG "" "FOLDER" "LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "FOLDER" "ROOMS;LINKS" ${ARGN})
   if(NOT ARG_FOLDER)
     set(ARG_FOLDER ${folder})
   endif()
-  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${ARG_FOLDER}/*.cc)
+  list(TRANSFORM ARG_ROOMS REPLACE "(.+)" "${PROJECT_SOURCE_DIR}/tests/${ARG_FOLDER}/\\1/*.cc")
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${ARG_FOLDER}/*.cc ${ARG_ROOMS})
   if(NOT sources)
     return()
   endif()

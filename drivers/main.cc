@@ -15,10 +15,10 @@
 #include "common/process.h"
 #include "common/realtime.h"
 #include "common/signature.h"
-#include "drivers/driver.h"
-#include "drivers/flight_recorder.h"
-#include "drivers/phase_times.h"
-#include "drivers/state_log.h"
+#include "drivers/driver/driver.h"
+#include "drivers/driver/flight_recorder.h"
+#include "drivers/driver/phase_times.h"
+#include "drivers/driver/state_log.h"
 #include "robot/description.h"
 
 namespace plumb {

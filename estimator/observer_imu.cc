@@ -1,4 +1,4 @@
-// What a StateObserver makes of an IMU's readings.
+// Of state_observer.h: IMU readings.
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-// What a StateObserver says of itself and of the sensors.
+// Of state_observer.h: ESTIMATOR_STATUS, about the observer and the sensors.
 
 #include <fmt/format.h>
 

@@ -14,7 +14,7 @@
 #include "plumb/driver_request_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "sim/tasks/task.h"
-#include "sim/virtual_bus.h"
+#include "sim/virtual/virtual_bus.h"
 
 namespace plumb {
 namespace {

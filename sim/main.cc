@@ -1,5 +1,4 @@
-// plumb-robot: a robot that is not there. Speaks its drives' side of the CAN bus and obeys
-// PLACE_ROBOT.
+// plumb-robot: a virtual robot. Speaks the CAN bus as drives and sensors do, and obeys PLACE_ROBOT.
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
@@ -18,7 +17,7 @@
 #include "plumb/place_robot_t.hpp"
 #include "sim/parameters.h"
 #include "sim/tasks/task.h"
-#include "sim/virtual_robot.h"
+#include "sim/virtual/virtual_robot.h"
 
 namespace plumb {
 namespace {

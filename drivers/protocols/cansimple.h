@@ -9,7 +9,7 @@
 /// ODrive's CANSimple, firmware 0.6: 11-bit ids `node << 5 | command`, little-endian payloads,
 /// positions in revolutions and torques in Nm at the motor's shaft. Layouts from ODrive Robotics'
 /// "CAN Protocol" manual (docs.odriverobotics.com/v/latest/manual/can-protocol.html). Host and
-/// virtual drive share these tables; tests/drivers/cansimple_test.cc checks them against frames
+/// virtual drive share these tables; tests/drivers/protocols/cansimple_test.cc checks them against frames
 /// written by hand.
 namespace plumb::cansimple {
 

@@ -1,3 +1,4 @@
+// Of cansimple.h: the drive's error codes in words.
 #include <array>
 
 #include "drivers/protocols/cansimple.h"

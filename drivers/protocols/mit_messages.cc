@@ -1,3 +1,4 @@
+// Of mit_host.h: the messages on the bus, for plans and DBC files.
 #include <cmath>
 
 #include "drivers/protocols/mit.h"

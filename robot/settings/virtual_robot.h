@@ -28,7 +28,7 @@ struct UnmodelledJoint {
 
 /// [virtual_robot].
 struct VirtualRobotSettings {
-  /// The physics that integrates its motion, see Mechanism.
+  /// The physics that integrates its motion, see VirtualPlant.
   enum class Engine { kAuto, kMujoco };
 
   double watchdog;   ///< [s]

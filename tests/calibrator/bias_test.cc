@@ -8,8 +8,8 @@
 
 #include "calibrator/simopt.h"
 #include "estimator/state_observer.h"
-#include "sim/encoder.h"
-#include "sim/plant.h"
+#include "sim/virtual/encoder.h"
+#include "sim/virtual/simbody_plant.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/synthetic.h"
 
@@ -25,7 +25,7 @@ struct Recording {
 };
 
 Recording Record(const RobotDescription& robot, uint32_t episode) {
-  Plant plant(Model(robot).Describe(kTruth));
+  SimbodyPlant plant(Model(robot).Describe(kTruth));
   Encoder encoder(robot.virtual_robot.encoder_bits);
   StateObserver observer(robot);
   Random random(23, {episode});

@@ -12,7 +12,7 @@
 
 #include "common/random.h"
 #include "tests/calibrator/observed_log.h"
-#include "tests/sim/hopper_bus.h"
+#include "tests/sim/virtual/hopper_bus.h"
 
 namespace plumb {
 

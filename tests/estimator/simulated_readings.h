@@ -13,16 +13,16 @@
 #include "plumb/imu_t.hpp"
 #include "plumb/joint_state_t.hpp"
 #include "robot/imu_mounting.h"
-#include "sim/encoder.h"
-#include "sim/mechanism.h"
 #include "sim/model.h"
+#include "sim/virtual/encoder.h"
+#include "sim/virtual/virtual_plant.h"
 
 namespace plumb {
 
 /// What a driver would publish of a simulated robot, with imperfections of real sensors, and the
 /// truth at every time that is a message's: for tests and bench/observer.
 ///
-/// Drives have an encoder and its tracking loop (sim/encoder.h) plus white noise on the velocity;
+/// Drives have an encoder and its tracking loop (sim/virtual/encoder.h) plus white noise on the velocity;
 /// joints with an encoder of their own are quantised by its counts; an IMU has white noise, a
 /// constant bias, and forces averaged over its period. All messages are labelled with the time of
 /// their arrival, kDelay after the measurement, as a driver would that cannot know the constant
@@ -184,7 +184,7 @@ class SimulatedReadings {
 
   RobotDescription robot_;
   Random random_;
-  Mechanism mechanism_;
+  VirtualPlant mechanism_;
   std::vector<Encoder> encoders_;
   const SensorDescription* imu_ = nullptr;
   ImuMounting mounting_;

@@ -9,9 +9,9 @@
 
 #include "calibrator/calibration.h"
 #include "common/decompositions.h"
-#include "sim/mujoco_engine.h"
 #include "sim/parameters.h"
 #include "sim/tasks/task.h"
+#include "sim/virtual/mujoco_backend.h"
 #include "tests/calibrator/hop_on_bus.h"
 
 namespace plumb {

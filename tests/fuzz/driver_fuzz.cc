@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "drivers/driver.h"
+#include "drivers/driver/driver.h"
 #include "drivers/protocols/cansimple_device.h"
 #include "drivers/protocols/cia406_device.h"
 #include "tests/fuzz/bytes.h"

@@ -1,0 +1,257 @@
+#include "drivers/bus/bus_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "drivers/bus/bus_collisions.h"
+#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/sensor.h"
+
+namespace plumb {
+namespace {
+
+using Direction = BusMessage::Direction;
+using Row = BusPlan::Row;
+
+constexpr int64_t kNanoseconds = 1000;  // in a microsecond
+constexpr int kMostRounds = 100'000;    // of an iteration that is known to end
+
+// From start of frame to the end of the CRC: what is stuffed, without the data.
+constexpr int kStuffed = 34, kStuffedExtended = 54;
+// CRC delimiter, acknowledgement, end of frame, interframe space.
+constexpr int kUnstuffed = 13;
+
+// The order in which ids win: the 11 bits that both formats have, then standard before extended.
+uint64_t Priority(const BusMessage& message) {
+  const uint64_t id = message.id;
+  return message.extended ? (id >> 18) << 19 | uint64_t{1} << 18 | (id & 0x3FFFF) : id << 19;
+}
+
+/// Times of one message [ns].
+struct Task {
+  int64_t cost, period, jitter;
+};
+
+int64_t Releases(const Task& task, int64_t window) {
+  return (window + task.jitter + task.period - 1) / task.period;
+}
+
+/// The last of the tasks, the others before it in priority, all with periods; `blocking` [ns] of
+/// what may have begun. @return [ns] or -1: it may wait for ever.
+int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) {
+  const Task& own = tasks.back();
+  double load = 0;
+  for (const Task& task : tasks)
+    load += static_cast<double>(task.cost) / static_cast<double>(task.period);
+  if (load >= 1) return -1;
+  // The longest time in which the bus is busy with this one and higher ones.
+  int64_t busy = own.cost;
+  for (int round = 0;; ++round) {
+    if (round > kMostRounds) return -1;
+    int64_t next = blocking;
+    for (const Task& task : tasks) next += Releases(task, busy) * task.cost;
+    if (next == busy) break;
+    busy = next;
+  }
+  int64_t worst = 0;
+  for (int64_t instance = 0; instance < Releases(own, busy); ++instance) {
+    int64_t wait = blocking + instance * own.cost;
+    for (int round = 0;; ++round) {
+      if (round > kMostRounds) return -1;
+      int64_t next = blocking + instance * own.cost;
+      for (size_t i = 0; i + 1 < tasks.size(); ++i)
+        next += Releases(tasks[i], wait + bit) * tasks[i].cost;
+      if (next == wait) break;
+      wait = next;
+    }
+    worst = std::max(worst, own.jitter + wait - instance * own.period + own.cost);
+  }
+  return worst;
+}
+
+/// Of the polled messages of a direction one waits at a time: together they are one, the longest,
+/// as often as all of them.
+Task PolledTask(const BusPlan& plan, Direction direction, int64_t bit) {
+  Task all{0, 0, 0};
+  double rate = 0;
+  for (const Row& row : plan.rows) {
+    const BusMessage& message = row.message;
+    if (!message.polled || message.direction != direction) continue;
+    all.cost = std::max(all.cost, row.worst_bits * bit);
+    all.jitter = std::max(all.jitter, message.jitter * kNanoseconds);
+    rate += 1 / static_cast<double>(message.period * kNanoseconds);
+  }
+  all.period = static_cast<int64_t>(1 / rate);
+  return all;
+}
+
+void ComputeResponses(BusPlan& plan) {
+  const auto bit = static_cast<int64_t>(std::ceil(1e9 / plan.bit_rate));
+  std::vector<Task> higher;
+  std::map<Direction, size_t> polled;  // where in `higher`
+  for (size_t i = 0; i < plan.rows.size(); ++i) {
+    Row& row = plan.rows[i];
+    if (row.message.period <= 0) continue;
+    int64_t blocking = 0;
+    for (size_t j = i + 1; j < plan.rows.size(); ++j)
+      blocking = std::max(blocking, plan.rows[j].worst_bits * bit);
+    row.deadline = static_cast<double>(row.message.period);
+    int64_t response;
+    if (row.message.polled) {
+      const Task all = PolledTask(plan, row.message.direction, bit);
+      // It must be there before the next one is asked for.
+      row.deadline = static_cast<double>(all.period) / static_cast<double>(kNanoseconds);
+      const auto [counted, first] = polled.try_emplace(row.message.direction, higher.size());
+      if (first) higher.push_back(all);
+      std::vector<Task> tasks = higher;
+      std::rotate(tasks.begin() + static_cast<std::ptrdiff_t>(counted->second),
+                  tasks.begin() + static_cast<std::ptrdiff_t>(counted->second) + 1, tasks.end());
+      response = Response(tasks, blocking, bit);
+    } else {
+      higher.push_back({row.worst_bits * bit, row.message.period * kNanoseconds,
+                        row.message.jitter * kNanoseconds});
+      response = Response(higher, blocking, bit);
+    }
+    row.response = response < 0 ? std::numeric_limits<double>::infinity()
+                                : static_cast<double>(response) / static_cast<double>(kNanoseconds);
+  }
+}
+
+// An answer is queued as late as what it answers was heard. @return whether that changed anything.
+bool InheritJitter(BusPlan& plan, const std::vector<BusDevice>& devices) {
+  bool changed = false;
+  for (Row& row : plan.rows) {
+    if (row.message.answers < 0 || row.message.period <= 0) continue;
+    const auto device = std::find_if(devices.begin(), devices.end(),
+                                     [&](const auto& d) { return d.name == row.device; });
+    const BusMessage& question = device->messages[static_cast<size_t>(row.message.answers)];
+    for (const Row& other : plan.rows) {
+      if (other.device != row.device || other.message.id != question.id ||
+          other.message.remote != question.remote ||
+          other.message.direction != question.direction) {
+        continue;
+      }
+      if (!(other.response <= static_cast<double>(row.message.period)))
+        return false;  // it is an error already
+      const auto jitter = static_cast<int64_t>(std::ceil(other.response));
+      changed = changed || jitter != row.message.jitter;
+      row.message.jitter = jitter;
+    }
+  }
+  return changed;
+}
+
+void Judge(BusPlan& plan) {
+  const int percent = static_cast<int>(std::lround(100 * plan.worst_load));
+  if (plan.worst_load > 1) {
+    plan.errors.push_back(
+        fmt::format("the bus would be loaded to {} %: use longer periods, or two buses", percent));
+  } else if (plan.worst_load > BusPlan::kWarnLoad) {
+    plan.warnings.push_back(
+        fmt::format("the bus is loaded to {} % at worst: above {:.0f} % nothing is left for errors "
+                    "and repetitions",
+                    percent, 100 * BusPlan::kWarnLoad));
+  }
+  for (const Row& row : plan.rows) {
+    if (row.message.period <= 0 || row.response <= row.deadline) continue;
+    const std::string when = std::isfinite(row.response)
+                                 ? fmt::format("{:.2f} ms after it is due", row.response / 1000)
+                                 : std::string("later and later");
+    plan.errors.push_back(fmt::format(
+        "{} of '{}' (id {:#05x}) may be sent {}, but is due every {:.2f} ms",
+        row.message.layout.name, row.device, row.message.id, when, row.deadline / 1000));
+  }
+}
+
+}  // namespace
+
+int NominalBits(bool extended, int length) {
+  return (extended ? kStuffedExtended : kStuffed) + kUnstuffed + 8 * length;
+}
+
+int WorstCaseBits(bool extended, int length) {
+  const int stuffed = (extended ? kStuffedExtended : kStuffed) + 8 * length;
+  return stuffed + kUnstuffed + (stuffed - 1) / 4;
+}
+
+BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate) {
+  BusPlan plan;
+  plan.bit_rate = bit_rate;
+  // from the driver to several devices: sent once
+  std::set<std::pair<uint64_t, Direction>> broadcasts;
+  for (const BusDevice& device : devices) {
+    for (const BusMessage& message : device.messages) {
+      if (message.shared && message.direction == Direction::kToDevice &&
+          !broadcasts.insert({Priority(message), message.direction}).second) {
+        continue;
+      }
+      const int length = message.remote ? 0 : message.layout.length;
+      Row row{device.name,
+              message,
+              NominalBits(message.extended, length),
+              WorstCaseBits(message.extended, length),
+              0,
+              std::numeric_limits<double>::quiet_NaN(),
+              0};
+      if (message.period > 0) {
+        const double rate = 1e6 / static_cast<double>(message.period) / bit_rate;
+        row.worst_load = row.worst_bits * rate;
+        plan.worst_load += row.worst_load;
+        plan.nominal_load += row.nominal_bits * rate;
+      }
+      plan.rows.push_back(row);
+    }
+  }
+  std::stable_sort(plan.rows.begin(), plan.rows.end(), [](const Row& a, const Row& b) {
+    return Priority(a.message) < Priority(b.message);
+  });
+  FindCollisions(devices, plan.errors, plan.warnings);
+  ComputeResponses(plan);
+  // Jitters only grow from round to round, up to a period.
+  for (int round = 0; round < 100 && InheritJitter(plan, devices); ++round) ComputeResponses(plan);
+  Judge(plan);
+  return plan;
+}
+
+std::vector<BusDevice> BusDevices(const RobotDescription& robot) {
+  std::vector<BusDevice> devices;
+  for (const JointDescription& joint : robot.joints) {
+    if (joint.passive) continue;
+    devices.push_back(MotorBusDevice(joint.motor, robot.driver));
+    devices.back().name = joint.name;
+  }
+  for (const SensorDescription& sensor : robot.sensors) devices.push_back(SensorBusDevice(sensor));
+  return devices;
+}
+
+std::string ToText(const BusPlan& plan) {
+  std::string text =
+      fmt::format("{:<10} {:<16} {:<24} {:>4} {:>9} {:>7} {:>8} {:>7} {:>9}\n", "id", "device",
+                  "message", "dlc", "period ms", "bits", "load %", "from", "worst ms");
+  for (const Row& row : plan.rows) {
+    const BusMessage& message = row.message;
+    const bool periodic = message.period > 0;
+    text += fmt::format(
+        "{:<10} {:<16} {:<24} {:>4} {:>9} {:>7} {:>8} {:>7} {:>9}\n",
+        message.extended ? fmt::format("{:#010x}", message.id) : fmt::format("{:#05x}", message.id),
+        row.device, message.layout.name, message.layout.length,
+        periodic ? fmt::format("{:.2f}", static_cast<double>(message.period) / 1000) : "-",
+        fmt::format("{}-{}", row.nominal_bits, row.worst_bits),
+        periodic ? fmt::format("{:.2f}", 100 * row.worst_load) : "-",
+        message.direction == Direction::kToDevice ? "driver" : "device",
+        periodic ? fmt::format("{:.2f}", row.response / 1000) : "-");
+  }
+  text += fmt::format("load {:.1f} % nominal, {:.1f} % at worst, of {:g} bit/s\n",
+                      100 * plan.nominal_load, 100 * plan.worst_load, plan.bit_rate);
+  for (const std::string& error : plan.errors) text += "error: " + error + "\n";
+  for (const std::string& warning : plan.warnings) text += "warning: " + warning + "\n";
+  if (plan.errors.empty()) text += "all deadlines are met\n";
+  return text;
+}
+
+}  // namespace plumb

@@ -1,0 +1,235 @@
+#include "drivers/driver/driver.h"
+
+#include <algorithm>
+
+#include "drivers/driver/stop.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kRefusedCycles = 10;  // consecutive cycles whose frames were not accepted
+// in a cycle while arming: the kernel holds about ten in flight
+constexpr size_t kMostFrames = 8;
+constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
+
+double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
+
+}  // namespace
+
+void Driver::Disarm() noexcept {
+  stopped_utime_ = utime_;
+  stop_dated_ = false;
+  inbox_.Clear();
+  for (Joint& joint : joints_) {
+    // One that has failed is being disarmed already, and remembers why.
+    if (joint.motor->state() != DriveState::kFault) joint.motor->Disarm(now_);
+  }
+  mode_ = Mode::kRest;
+}
+
+/// A frame, or the link, stops us without saying what time it is, and the last time we were told is
+/// long ago where our process stood still: an ARM that was made meanwhile is older than the stop.
+void Driver::DateStop() noexcept {
+  if (!stop_dated_) stopped_utime_ = utime_;
+  stop_dated_ = true;
+}
+
+void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
+  now_ = now;
+  ++status_.frames_received;
+  switch (DecodeErrorFrame(frame)) {
+    case BusEvent::kBusOff:
+      bus_off_ = true;
+      if (Active()) Fault("the CAN controller went bus-off");
+      return;
+    case BusEvent::kRestarted:
+      bus_off_ = false;
+      return;
+    case BusEvent::kNoAck:
+      if (++unacknowledged_ > kUnacknowledged && Active())
+        Fault("nobody on the bus acknowledges frames");
+      return;
+    case BusEvent::kNone:
+      break;
+  }
+  if (frame.error) return;
+  if (frame.foreign) {
+    foreign_at_ = now;
+    // A button on the bus is obeyed by all drives, whomever it was for.
+    if (std::ranges::any_of(joints_,
+                            [&](const Joint& joint) { return joint.motor->IsEstop(frame); })) {
+      return Estop("emergency stop from the bus");
+    }
+    if (Active()) Fault("second master: somebody else sends frame {:#05x} to the drives", frame.id);
+    return;
+  }
+  bus_off_ = false;
+  unacknowledged_ = 0;
+  if (!UseOfMotor(frame, now, utime) && !UseOfSensor(frame, now, utime)) ++frames_rejected_;
+}
+
+bool Driver::UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept {
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[i];
+    switch (joint.motor->OnFrame(frame, now)) {
+      case FrameUse::kNotMine:
+        continue;
+      case FrameUse::kRejected:
+        return false;
+      case FrameUse::kConsumed:
+        return true;
+      case FrameUse::kEstimate: {
+        const MotorEstimate& estimate = joint.motor->estimate();
+        joint.latest = {joint.map.JointPosition(estimate.position),
+                        joint.map.JointVelocity(estimate.velocity),
+                        joint.map.JointEffort(joint.motor->torque_estimate())};
+        joint.measured = true;
+        joint.measured_at = now;
+        joint.watch.Add(utime, joint.latest.position, joint.latest.velocity,
+                        effort_sent_[joint.index]);
+        measurements_.Add(static_cast<int>(i), joint.latest, utime);
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+bool Driver::UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept {
+  for (JointSensor& sensor : sensors_) {
+    const SensorUse use = sensor.OnFrame(frame, now, utime);
+    if (use != SensorUse::kNotMine) return use != SensorUse::kRejected;
+  }
+  return false;
+}
+
+void Driver::OnLink(LinkState link) noexcept {
+  link_ = link;
+  if (link != LinkState::kUp && Active()) {
+    Fault("{}",
+          link == LinkState::kDown ? "the CAN interface is down" : "the CAN interface is gone");
+  }
+}
+
+std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
+  now_ = now;
+  utime_ = utime;
+  DateStop();
+  NoteLateness(lateness);
+  housekeeping_.Clear();
+  frames_.Clear();
+  CheckHealth();
+  CheckCommand();
+  DateStop();
+  CommandTorques();
+  // After the checks, so that a fault is answered in this cycle. The joints take turns to be the
+  // first.
+  size_t arming = std::max(kMostFrames - std::min(kMostFrames, torque_frames_), kMostArmingFrames);
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[(turn_ + i) % joints_.size()];
+    const size_t before = housekeeping_.size();
+    joint.motor->Tick(now, arming >= kMostArmingFrames, housekeeping_);
+    arming -= std::min(arming, housekeeping_.size() - before);
+    joint.frames_end = torque_frames_ + housekeeping_.size();
+  }
+  turn_ = (turn_ + 1) % joints_.size();
+  Poll();
+  for (JointSensor& sensor : sensors_) sensor.device().Tick(now, housekeeping_);
+  for (const Frame& frame : housekeeping_.frames()) frames_.Push(frame);
+  NoteChanges();
+  return frames_.frames();
+}
+
+void Driver::CommandTorques() noexcept {
+  const bool commanded = mode_ == Mode::kArmed && !inbox_.empty(),
+             fresh = commanded && !inbox_.Expired(now_);
+  bool limited = false;
+  for (Joint& joint : joints_) {
+    joint.effort = 0;
+    if (!Active()) continue;
+    const double position = joint.latest.position, velocity = joint.latest.velocity;
+    double wish = 0;
+    if (fresh) {
+      wish = inbox_.Effort(static_cast<int>(joint.index), position, velocity);
+    } else if (commanded) {
+      wish = StoppingEffort(settings_, joint.damping, joint.commanded,
+                            Seconds(now_ - inbox_.expires()), velocity);
+    }
+    joint.effort =
+        LimitEffort(wish, {position, velocity, effort_sent_[joint.index], Seconds(cycle_)},
+                    joint.limits)
+            .value_or(0);
+    if (fresh) joint.commanded = joint.effort;
+    limited = limited || (fresh && joint.effort != wish);
+    frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.effort)));
+  }
+  if (limited) ++status_.commands_limited;
+  torque_frames_ = frames_.size();
+}
+
+void Driver::Transmitted(int accepted, int64_t utime) noexcept {
+  const auto taken = static_cast<size_t>(std::max(accepted, 0));
+  // A torque that was not accepted leaves the drive with the one before.
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    double& sent = effort_sent_[joints_[i].index];
+    if (torque_frames_ == 0) sent = 0;
+    if (i < torque_frames_ && i < taken) sent = joints_[i].effort;
+  }
+  history_.Record(utime + effort_delay_, effort_sent_);
+  LetJump();
+  for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);
+  refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;
+  if (refused_cycles_ >= kRefusedCycles && Active()) {
+    Fault("the bus has not accepted frames in {} cycles", refused_cycles_);
+  }
+}
+
+void Driver::Poll() noexcept {
+  if (now_ < next_poll_ || mode_ == Mode::kArming) return;  // arming has need of all room there is
+  next_poll_ = now_ + poll_period_;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    Motor& motor = *joints_[(poll_turn_ + i) % joints_.size()].motor;
+    if (motor.num_polled() == 0 || motor.state() == DriveState::kAbsent) continue;
+    motor.Poll(housekeeping_);
+    poll_turn_ = (poll_turn_ + i + 1) % joints_.size();
+    return;
+  }
+}
+
+void Driver::LetJump() noexcept {
+  // In an episode a policy, or a limit, may want no effort, too: nobody places the robot then.
+  const bool at_rest = std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
+  const bool let = virtual_ && at_rest && !(Active() && inbox_.in_episode());
+  may_jump_ = let;
+  for (Joint& joint : joints_) {
+    joint.motor->LetJump(let);
+    joint.watch.LetJump(let);
+  }
+  for (JointSensor& sensor : sensors_) {
+    sensor.device().LetJump(let);
+    sensor.ForgetTurns(let || !Active());
+  }
+}
+
+DriveState Driver::state() const noexcept {
+  switch (mode_) {
+    case Mode::kArming:
+      return DriveState::kArming;
+    case Mode::kArmed:
+      return DriveState::kArmed;
+    case Mode::kFault:
+      return DriveState::kFault;
+    case Mode::kRest:
+      break;
+  }
+  const bool absent = std::ranges::any_of(
+      joints_, [](const Joint& joint) { return joint.motor->state() == DriveState::kAbsent; });
+  return absent ? DriveState::kAbsent : DriveState::kIdle;
+}
+
+bool Driver::confirmed_idle() const noexcept {
+  return std::ranges::all_of(joints_,
+                             [](const Joint& joint) { return joint.motor->confirmed_idle(); });
+}
+
+}  // namespace plumb

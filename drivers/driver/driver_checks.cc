@@ -1,0 +1,77 @@
+// Of driver.h: the checks while it is active: drives, encoders, sensors, commands.
+
+#include <cmath>
+#include <numbers>
+
+#include "drivers/driver/driver.h"
+#include "drivers/driver/operating_limits.h"
+
+namespace plumb {
+
+void Driver::CheckHealth() noexcept {
+  if (!Active()) return;
+  bool all_armed = true;
+  for (const Joint& joint : joints_) {
+    const DriveState state = joint.motor->state();
+    if (state != DriveState::kArming && state != DriveState::kArmed) {
+      return Fault("{}: {}", joint.name, joint.motor->reason());
+    }
+    if (now_ - joint.measured_at > stale_after_) {
+      return Fault("{}: no encoder estimate for {} ms", joint.name,
+                   (now_ - joint.measured_at) / 1000);
+    }
+    if (!joint.watch.complaint().empty())
+      return Fault("{}: {}", joint.name, joint.watch.complaint());
+    if (Reason why; !WithinOperatingLimits(joint.motor->readings(), settings_, why)) {
+      return Fault("{}: {}", joint.name, why.text());
+    }
+    all_armed = all_armed && state == DriveState::kArmed;
+  }
+  for (const JointSensor& sensor : sensors_) {
+    if (!sensor.fresh(now_)) return Fault("{}: {}", sensor.name(), sensor.Silent(now_).text());
+  }
+  for (const SecondEncoder& second : second_encoders_) {
+    if (Reason why; !Agree(second, why)) return Fault("{}", why.text());
+  }
+  if (mode_ == Mode::kArming && all_armed) {
+    mode_ = Mode::kArmed;
+    armed_at_ = now_;
+    reason_.Clear();
+  }
+}
+
+void Driver::CheckCommand() noexcept {
+  if (mode_ != Mode::kArmed) return;
+  const int64_t silence = now_ - (inbox_.empty() ? armed_at_ : inbox_.arrival());
+  if (silence > disarm_after_) {
+    const std::string_view refusal = inbox_.refusal().empty() ? forgery_ : inbox_.refusal();
+    if (refusal.empty()) return Fault("no command for {} ms", silence / 1000);
+    return Fault("commands refused: {} (none taken for {} ms)", refusal, silence / 1000);
+  }
+  if (!inbox_.empty() && inbox_.Expired(now_) && !expiry_counted_) {
+    ++status_.commands_expired;
+    expiry_counted_ = true;
+  }
+}
+
+bool Driver::Unwatched(const Joint& joint) const noexcept {
+  return mode_ == Mode::kArmed &&
+         TelemetryIsStale(joint.motor->readings(), std::llround(settings_.telemetry * 1e6), now_);
+}
+
+bool Driver::Agree(const SecondEncoder& second, Reason& why) const noexcept {
+  const Joint& joint = joints_[second.joint];
+  const JointSensor& sensor = sensors_[second.sensor];
+  if (may_jump_ || !joint.measured || !sensor.fresh(now_)) return true;
+  double difference = sensor.newest().position - joint.latest.position;
+  // Neither knows how often the joint has turned round.
+  if (joint.turns) difference = std::remainder(difference, 2 * std::numbers::pi);
+  // They are not of one time.
+  const double most = second.tolerance + std::abs(joint.latest.velocity) * settings_.stale_after;
+  if (std::abs(difference) <= most) return true;
+  why.Set("{}: {} measures {:.4g}, its motor {:.4g}, which differ by more than {:.3g}", joint.name,
+          sensor.name(), sensor.newest().position, joint.latest.position, most);
+  return false;
+}
+
+}  // namespace plumb

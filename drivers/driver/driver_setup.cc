@@ -1,0 +1,131 @@
+// Of driver.h: its construction: joints with motors, sensors, the bus that they share.
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <stdexcept>
+
+#include "drivers/bus/bus_plan.h"
+#include "drivers/driver/driver.h"
+#include "robot/floating_base.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kHistory = 2048;  // cycles of transmitted efforts: ten seconds
+
+int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
+
+MotorTiming TimingOf(const DriverSettings& settings) {
+  return {Microseconds(settings.heartbeat_timeout)};
+}
+
+}  // namespace
+
+Driver::Joint::Joint(size_t number, const JointDescription& joint, const DriverSettings& settings)
+    : index(number),
+      name(joint.name),
+      motor(MakeMotor(joint.motor, TimingOf(settings))),
+      map(joint.motor),
+      limits(LimitsOf(joint)),
+      damping(joint.limits.damping),
+      turns(joint.type != JointDescription::Type::kPrismatic),
+      watch(PlausibilityOf(joint, settings)) {}
+
+Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
+    : settings_(robot.driver),
+      cycle_(Microseconds(robot.driver.cycle)),
+      measurement_(Microseconds(robot.driver.measurement)),
+      disarm_after_(Microseconds(robot.driver.disarm_after)),
+      stale_after_(Microseconds(robot.driver.stale_after)),
+      start_guard_(Microseconds(robot.driver.start_guard)),
+      effort_delay_(Microseconds(robot.driver.effort_delay)),
+      start_now_(now),
+      start_utime_(utime),
+      num_joints_(robot.joints.size()),
+      joints_(DrivenJoints(robot)),
+      measurements_(static_cast<int>(joints_.size()), measurement_),
+      inbox_(robot.num_joints(), Microseconds(robot.driver.expiry)),
+      history_(robot.num_joints(), kHistory),
+      now_(now),
+      utime_(utime),
+      stopped_utime_(utime - 1),
+      armed_by_(utime - 1),
+      foreign_at_(now - start_guard_ - 1) {
+  for (const JointDescription& joint : robot.joints) names_.push_back(joint.name);
+  for (const SensorDescription& sensor : robot.sensors)
+    sensors_.emplace_back(robot, sensor, stale_after_);
+  FindMeasuring(robot);
+  FindSecondEncoders(robot);
+  const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
+  if (!plan.errors.empty())
+    throw std::invalid_argument(
+        fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
+  int polled = 0;
+  for (const Joint& joint : joints_) polled += joint.motor->num_polled();
+  poll_period_ = std::max(cycle_, Microseconds(robot.driver.telemetry) / std::max(1, polled));
+  next_poll_ = now;
+  effort_sent_.assign(num_joints_, 0);
+  scratch_.resize(joints_.size());
+  PrepareMessages();
+  reason_.Set("waiting for ARM");
+}
+
+std::vector<Driver::Joint> Driver::DrivenJoints(const RobotDescription& robot) {
+  std::vector<Joint> joints;
+  for (size_t i = 0; i < robot.joints.size(); ++i) {
+    if (!robot.joints[i].passive) joints.emplace_back(i, robot.joints[i], robot.driver);
+  }
+  if (joints.empty()) throw std::invalid_argument("no joint has a motor");
+  return joints;
+}
+
+void Driver::FindMeasuring(const RobotDescription& robot) {
+  std::optional<FloatingBase> base;
+  if (robot.estimator.base == EstimatorSettings::Base::kLegs) base = FloatingBaseOf(robot);
+  for (size_t i = 0; i < num_joints_; ++i) {
+    const JointDescription& joint = robot.joints[i];
+    if (!joint.passive) {
+      for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
+        if (message.direction != BusMessage::Direction::kToDevice || message.remote ||
+            message.extended)
+          continue;
+        own_.push_back({.id = message.id, .own = true});
+      }
+      continue;
+    }
+    const auto sensor = std::ranges::find(sensors_, static_cast<int>(i), &JointSensor::joint);
+    // the estimator finds out
+    if (sensor == sensors_.end() && base && base->Has(static_cast<int>(i))) continue;
+    if (sensor == sensors_.end()) {
+      throw std::invalid_argument(fmt::format(
+          "joint '{}' has no motor, and no sensor measures it: give it one with [[sensor]]",
+          joint.name));
+    }
+    passive_.push_back({i, static_cast<size_t>(sensor - sensors_.begin())});
+  }
+}
+
+void Driver::FindSecondEncoders(const RobotDescription& robot) {
+  for (size_t i = 0; i < sensors_.size(); ++i) {
+    const auto joint = std::ranges::find(joints_, sensors_[i].joint(),
+                                         [](const Joint& j) { return static_cast<int>(j.index); });
+    const double tolerance = robot.sensors[i].tolerance;
+    if (joint == joints_.end() || std::isinf(tolerance)) continue;
+    second_encoders_.push_back({static_cast<size_t>(joint - joints_.begin()), i, tolerance});
+  }
+}
+
+std::vector<Filter> Driver::filters() const {
+  std::vector<Filter> filters;
+  for (const Joint& joint : joints_) filters.push_back(joint.motor->filter());
+  for (const JointSensor& sensor : sensors_)
+    std::ranges::copy(sensor.device().filters(), std::back_inserter(filters));
+  filters.insert(filters.end(), own_.begin(), own_.end());
+  return filters;
+}
+
+}  // namespace plumb

@@ -1,0 +1,118 @@
+#include "drivers/driver/joint_sensor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace plumb {
+namespace {
+
+int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
+
+Eigen::Map<const Eigen::Vector3d> Vector(const std::array<double, 3>& values) {
+  return Eigen::Map<const Eigen::Vector3d>(values.data());
+}
+
+}  // namespace
+
+JointSensor::JointSensor(const RobotDescription& robot, const SensorDescription& sensor,
+                         int64_t stale_after)
+    : name_(sensor.name),
+      stale_after_(std::max(stale_after, 3 * Microseconds(sensor.period))),
+      joint_(sensor.joint),
+      scale_(sensor.sign * sensor.radius),
+      offset_(sensor.offset),
+      to_link_(sensor.rotation),
+      imu_samples_(Microseconds(sensor.period)),
+      samples_(Microseconds(sensor.period)) {
+  device_ = MakeSensor(sensor, {.timeout = stale_after_});
+  newest_.position = given_.position = std::numeric_limits<double>::quiet_NaN();
+  newest_.velocity = given_.velocity = std::numeric_limits<double>::quiet_NaN();
+  newest_.effort = given_.effort = std::numeric_limits<double>::quiet_NaN();
+  if (sensor.link < 0) return;
+  message_.name = sensor.name;
+  message_.link = robot.links[static_cast<size_t>(sensor.link)].name;
+  mounting_ = MountingOf(robot, sensor.link);
+  joint_ = mounting_.turned;
+}
+
+SensorUse JointSensor::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
+  const SensorUse use = device_->OnFrame(frame, now);
+  if (use != SensorUse::kReading) return use;
+  heard_ = true;
+  heard_at_ = now;
+  if (const EncoderReading* reading = device_->encoder()) newest_ = OfEncoder(*reading);
+  if (const ImuSample* sample = device_->imu()) {
+    imu_samples_.Add(*sample, utime);
+    newest_ = OfImu(*sample);
+  }
+  if (joint_ >= 0 && std::isfinite(newest_.position)) samples_.Add(newest_, utime);
+  return use;
+}
+
+JointMeasurement JointSensor::OfEncoder(const EncoderReading& reading) const noexcept {
+  return {scale_ * reading.position + offset_, scale_ * reading.velocity,
+          std::numeric_limits<double>::quiet_NaN()};
+}
+
+JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
+  JointMeasurement measurement = newest_;
+  if (joint_ < 0 || !sample.orientation_valid) return measurement;
+  const auto& [w, x, y, z] = sample.orientation;
+  const Eigen::Quaterniond link =
+      Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
+  const double twist = mounting_.Angle(link);
+  // The one of the angles that look like this which is next to the last.
+  const double near = std::isfinite(newest_.position) && !forget_turns_ ? newest_.position : 0;
+  measurement.position = near + std::remainder(twist - near, 2 * std::numbers::pi);
+  measurement.velocity = mounting_.axis.dot(to_link_ * Vector(sample.rate));
+  return measurement;
+}
+
+const JointMeasurement& JointSensor::At(int64_t utime) noexcept {
+  samples_.Regularise();
+  while (samples_.ready() && samples_.time() <= utime) {
+    given_ = samples_.front();
+    measured_ = samples_.time();
+    samples_.Pop();
+  }
+  return given_;
+}
+
+Reason JointSensor::Silent(int64_t now) const noexcept {
+  Reason reason;
+  if (device_->state() != SensorState::kRunning) {
+    reason.Set("{}", device_->reason());
+  } else if (!heard_ || now - heard_at_ > stale_after_) {
+    reason.Set("no reading for {} ms", heard_ ? (now - heard_at_) / 1000 : stale_after_ / 1000);
+  } else if (joint_ >= 0 && !std::isfinite(newest_.position)) {
+    reason.Set("it does not trust its orientation yet");
+  }
+  return reason;
+}
+
+const imu_t* JointSensor::NextImu() noexcept {
+  imu_samples_.Regularise();
+  if (!imu_samples_.ready()) return nullptr;
+  const ImuSample& sample = imu_samples_.front();
+  message_.utime = imu_samples_.time();
+  Eigen::Map<Eigen::Vector3d>(message_.rate) = to_link_ * Vector(sample.rate);
+  Eigen::Map<Eigen::Vector3d>(message_.force) = to_link_ * Vector(sample.force);
+  const auto& [w, x, y, z] = sample.orientation;
+  const Eigen::Quaterniond link =
+      Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
+  message_.orientation[0] = link.w();
+  message_.orientation[1] = link.x();
+  message_.orientation[2] = link.y();
+  message_.orientation[3] = link.z();
+  message_.orientation_valid = sample.orientation_valid;
+  message_.clipped = sample.clipped;
+  imu_samples_.Pop();
+  return &message_;
+}
+
+int64_t JointSensor::lost() const noexcept {
+  return device_->incomplete() + samples_.lost() + imu_samples_.lost();
+}
+
+}  // namespace plumb

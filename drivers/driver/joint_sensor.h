@@ -1,0 +1,86 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/bus/timed_samples.h"
+#include "drivers/driver/measurements.h"
+#include "drivers/protocols/sensor.h"
+#include "plumb/imu_t.hpp"
+#include "robot/description.h"
+#include "robot/imu_mounting.h"
+
+namespace plumb {
+
+/// A sensor on the bus and what it says of the robot, in the robot's terms: the position of a
+/// joint, how a link turns.
+///
+/// An encoder measures its joint. An IMU measures how its link turns, and with that the joint that
+/// turns it, see ImuMounting.
+///
+/// No method but the constructor throws or allocates. Not thread-safe. `now` is scaled monotonic,
+/// `utime` scaled real time [us].
+class JointSensor {
+ public:
+  /// @param stale_after [us] without a reading after which it counts as silent, but never less than
+  /// three periods.
+  /// @throws std::invalid_argument for an unknown protocol or settings it cannot have.
+  JointSensor(const RobotDescription& robot, const SensorDescription& sensor, int64_t stale_after);
+
+  const std::string& name() const { return name_; }
+  /// Index of the joint that it measures, -1: none.
+  int joint() const { return joint_; }
+  Sensor& device() { return *device_; }
+  /// While true, an angle is the one within half a turn of 0: nobody has counted turns. See also
+  /// Motor::LetJump.
+  void ForgetTurns(bool forget) noexcept { forget_turns_ = forget; }
+  const Sensor& device() const { return *device_; }
+
+  SensorUse OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept;
+
+  /// What it measured of the joint last before or at `utime`: effort NaN; velocity NaN if it
+  /// reports none. Call it with times that do not decrease.
+  const JointMeasurement& At(int64_t utime) noexcept;
+  int64_t measured() const noexcept { return measured_; }  ///< utime of what At has given
+  /// The newest position, which At may not have given yet.
+  const JointMeasurement& newest() const noexcept { return newest_; }
+  /// Whether readings come, and the newest is not too old.
+  bool fresh(int64_t now) const noexcept { return !Silent(now).text().size(); }
+  /// Why it is not fresh; empty if it is.
+  Reason Silent(int64_t now) const noexcept;
+
+  /// The next reading of an IMU, null if there is none; valid until the next call.
+  const imu_t* NextImu() noexcept;
+
+  /// Readings that came in parts, found no room or never came.
+  int64_t lost() const noexcept;
+
+ private:
+  JointMeasurement OfEncoder(const EncoderReading& reading) const noexcept;
+  JointMeasurement OfImu(const ImuSample& sample) noexcept;
+
+  std::string name_;
+  std::unique_ptr<Sensor> device_;
+  int64_t stale_after_;
+  int joint_ = -1;
+  double scale_ = 1, offset_ = 0;  // of an encoder
+  // Of an IMU.
+  Eigen::Matrix3d to_link_ = Eigen::Matrix3d::Identity();  // its axes -> the link's
+  ImuMounting mounting_;
+  TimedSamples<ImuSample> imu_samples_;
+  imu_t message_{};
+
+  TimedSamples<JointMeasurement> samples_;
+  JointMeasurement given_, newest_;
+  int64_t measured_ = 0;
+  bool forget_turns_ = true;
+  bool heard_ = false;
+  int64_t heard_at_ = 0;  // `now` of the newest
+};
+
+}  // namespace plumb

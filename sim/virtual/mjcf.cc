@@ -1,0 +1,164 @@
+#include "sim/virtual/mjcf.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "common/decompositions.h"
+
+namespace plumb {
+namespace {
+
+using Type = JointDescription::Type;
+
+std::string Words(const Eigen::Vector3d& v) {
+  return fmt::format("{:.17g} {:.17g} {:.17g}", v[0], v[1], v[2]);
+}
+
+std::string Turn(const Eigen::Matrix3d& rotation) {
+  const Eigen::Quaterniond q(rotation);
+  return fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}", q.w(), q.x(), q.y(), q.z());
+}
+
+/// MuJoCo knows no rods that are infinitely thin.
+Eigen::Matrix3d Solid(const Eigen::Matrix3d& inertia) {
+  const double least = 1e-9 * inertia.trace();
+  const bool thin = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(inertia),
+                                                                   Eigen::EigenvaluesOnly)
+                        .eigenvalues()[0] < least;
+  return inertia + (thin ? least : 0) * Eigen::Matrix3d::Identity();
+}
+
+void RequireKnown(const JointDescription& joint) {
+  const std::string of = " of joint '" + joint.name + "'";
+  if (joint.type == Type::kSpherical) throw std::invalid_argument("the free rotation" + of);
+  const JointParameterKind* unknown =
+      FirstNotAmong({&JointDynamics::armature, &JointDynamics::damping, &JointDynamics::friction,
+                     &JointDynamics::stiffness, &JointDynamics::rest, &JointDynamics::motor_gain},
+                    joint.dynamics);
+  if (unknown) throw std::invalid_argument(unknown->noun + of);
+}
+
+/// Where a joint is in the frame of a body that it moves, perhaps through links without mass.
+struct Placed {
+  size_t joint;
+  Eigen::Isometry3d frame;
+};
+
+class Writer {
+ public:
+  explicit Writer(const RobotDescription& robot) : robot_(robot) {}
+
+  std::string Write() {
+    text_ = fmt::format(
+        "<mujoco><compiler angle=\"radian\"/>"
+        "<option timestep=\"0.002\" integrator=\"RK4\" gravity=\"0 0 {:.17g}\"/><worldbody>\n",
+        -robot_.simulation.gravity);
+    if (const auto& contact = robot_.simulation.contact) {
+      surface_ = fmt::format(
+          "condim=\"3\" friction=\"{:.17g} 0.005 0.0001\" margin=\"0.001\" solref=\"0.02 1\" "
+          "solimp=\"0.8 "
+          "0.8 0.01\"",
+          contact->friction);
+      text_ += "<geom type=\"plane\" size=\"0 0 1\" contype=\"0\" conaffinity=\"1\" " + surface_ +
+               "/>\n";
+    }
+    WriteChildren(0);
+    return text_ + "</worldbody></mujoco>\n";
+  }
+
+ private:
+  const JointDescription& joint(size_t index) const { return robot_.joints[index]; }
+
+  void WriteChildren(int link) {
+    for (size_t i = 0; i < robot_.joints.size(); ++i) {
+      if (joint(i).parent == link) WriteBody(i);
+    }
+  }
+
+  /// @param first joint of the body.
+  void WriteBody(size_t first) {
+    // A link that weighs nothing is no body there: its joint is one more of the next link's.
+    std::vector<Placed> placed;
+    Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+    size_t last = first;
+    for (;; ++last) {
+      frame.translate(joint(last).origin).rotate(joint(last).rotation);
+      placed.push_back({last, frame});
+      if (!Weightless(last)) break;
+    }
+    text_ += fmt::format("<body pos=\"{}\" quat=\"{}\">\n", Words(frame.translation()),
+                         Turn(frame.linear()));
+    for (const Placed& p : placed) WriteJoint(joint(p.joint), frame.inverse() * p.frame);
+    const LinkDescription& link = robot_.links[last + 1];
+    const Eigen::Matrix3d inertia = Solid(link.inertia);
+    text_ += fmt::format(
+        "<inertial pos=\"{}\" mass=\"{:.17g}\" "
+        "fullinertia=\"{:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\"/>\n",
+        Words(link.center_of_mass), link.mass, inertia(0, 0), inertia(1, 1), inertia(2, 2),
+        inertia(0, 1), inertia(0, 2), inertia(1, 2));
+    if (robot_.simulation.contact) {
+      for (const Shape& shape : link.collisions) WriteShape(shape);
+    }
+    WriteChildren(static_cast<int>(last) + 1);
+    text_ += "</body>\n";
+  }
+
+  /// Whether the link of that joint has no mass and carries the next one alone.
+  bool Weightless(size_t index) const {
+    const int link = static_cast<int>(index) + 1;
+    int carried = 0;
+    for (const JointDescription& other : robot_.joints) carried += other.parent == link;
+    return robot_.links[index + 1].mass == 0 && carried == 1;
+  }
+
+  void WriteJoint(const JointDescription& j, const Eigen::Isometry3d& in_body) {
+    const bool limited = robot_.simulation.stop && std::isfinite(j.upper);
+    text_ += fmt::format(
+        "<joint type=\"{}\" pos=\"{}\" axis=\"{}\" armature=\"{:.17g}\" damping=\"{:.17g}\" "
+        "frictionloss=\"{:.17g}\" "
+        "stiffness=\"{:.17g}\" springref=\"{:.17g}\"",
+        j.type == Type::kPrismatic ? "slide" : "hinge", Words(in_body.translation()),
+        Words(in_body.linear() * j.axis), j.dynamics.armature, j.dynamics.damping,
+        j.dynamics.friction, j.dynamics.stiffness, j.dynamics.rest);
+    if (limited)
+      text_ += fmt::format(" limited=\"true\" range=\"{:.17g} {:.17g}\"", j.lower, j.upper);
+    text_ += "/>\n";
+  }
+
+  void WriteShape(const Shape& shape) {
+    std::string type, size;
+    switch (shape.type) {
+      case Shape::Type::kSphere:
+        type = "sphere", size = fmt::format("{:.17g}", shape.size[0]);
+        break;
+      case Shape::Type::kCapsule:
+        type = "capsule", size = fmt::format("{:.17g} {:.17g}", shape.size[0], shape.size[1] / 2);
+        break;
+      case Shape::Type::kBox:
+        type = "box", size = Words(shape.size / 2);
+        break;
+      default:
+        return;  // the robot's warnings say so
+    }
+    text_ += fmt::format(
+        "<geom type=\"{}\" size=\"{}\" pos=\"{}\" quat=\"{}\" contype=\"1\" conaffinity=\"0\" "
+        "{}/>\n",
+        type, size, Words(shape.position), Turn(shape.rotation), surface_);
+  }
+
+  const RobotDescription& robot_;
+  std::string surface_, text_;
+};
+
+}  // namespace
+
+std::string Mjcf(const RobotDescription& robot) {
+  for (const JointDescription& joint : robot.joints) RequireKnown(joint);
+  return Writer(robot).Write();
+}
+
+}  // namespace plumb

@@ -1,0 +1,128 @@
+#include "sim/virtual/mujoco_backend.h"
+
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+#include "sim/virtual/mjcf.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kLongestStep = 0.002;  // [s]
+
+struct Delete {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+// MuJoCo's own handlers wait for a key and write a log file where the process runs.
+void InstallHandlers() {
+  static const bool installed = [] {
+    if (!mju_user_error) {
+      mju_user_error = [](const char* message) {
+        std::fprintf(stderr, "MuJoCo: %s\n", message);
+        std::abort();
+      };
+    }
+    if (!mju_user_warning) mju_user_warning = [](const char*) {};
+    return true;
+  }();
+  static_cast<void>(installed);
+}
+
+mjModel* Load(const std::string& xml) {
+  const auto files = std::make_unique<mjVFS>();
+  mj_defaultVFS(files.get());
+  if (mj_makeEmptyFileVFS(files.get(), "robot.xml", static_cast<int>(xml.size())) != 0) {
+    throw std::invalid_argument("MuJoCo takes no file");
+  }
+  std::memcpy(files->filedata[0], xml.data(), xml.size());
+  std::array<char, 1000> error{};
+  mjModel* model = mj_loadXML("robot.xml", files.get(), error.data(), error.size());
+  mj_deleteVFS(files.get());
+  if (!model) throw std::invalid_argument(std::string("MuJoCo refuses the robot: ") + error.data());
+  return model;
+}
+
+class MujocoBackend : public PhysicsBackend {
+ public:
+  explicit MujocoBackend(const RobotDescription& robot) {
+    InstallHandlers();
+    model_.reset(Load(Mjcf(robot)));
+    data_.reset(mj_makeData(model_.get()));
+    if (!data_) throw std::invalid_argument("MuJoCo has no memory for the robot");
+    q_ = v_ = Eigen::VectorXd::Zero(robot.num_velocities());
+    gain_ = q_;
+    for (size_t i = 0; i < robot.joints.size(); ++i) {
+      gain_[static_cast<Eigen::Index>(i)] = robot.joints[i].dynamics.motor_gain;
+    }
+  }
+
+  void SetState(const Vector& q, const Vector& v) override {
+    if (q.size() != q_.size() || v.size() != v_.size()) {
+      throw std::invalid_argument("a state has " + std::to_string(q_.size()) +
+                                  " positions and velocities");
+    }
+    if (!q.allFinite() || !v.allFinite())
+      throw std::invalid_argument("a robot's state must be finite");
+    q_ = q;
+    v_ = v;
+    Restore();
+  }
+
+  bool Advance(const Vector& effort, double duration) override {
+    if (!(duration > 0)) return true;
+    if (!effort.allFinite()) return false;
+    const int count = static_cast<int>(std::max(1.0, std::ceil(duration / kLongestStep - 1e-6)));
+    model_->opt.timestep = duration / count;
+    for (Eigen::Index i = 0; i < effort.size(); ++i) data_->qfrc_applied[i] = gain_[i] * effort[i];
+    for (int i = 0; i < count && !GivenUp(); ++i) mj_step(model_.get(), data_.get());
+    const auto q = Eigen::VectorXd::Map(data_->qpos, q_.size()),
+               v = Eigen::VectorXd::Map(data_->qvel, v_.size());
+    if (GivenUp() || !q.allFinite() || !v.allFinite()) {
+      Restore();
+      return false;
+    }
+    q_ = q;
+    v_ = v;
+    return true;
+  }
+
+  const Eigen::VectorXd& q() const override { return q_; }
+  const Eigen::VectorXd& v() const override { return v_; }
+
+ private:
+  // It has met numbers that it does not go on with, and begun anew from its own state.
+  bool GivenUp() const {
+    return data_->warning[mjWARN_BADQPOS].number + data_->warning[mjWARN_BADQVEL].number +
+               data_->warning[mjWARN_BADQACC].number >
+           0;
+  }
+  void Restore() {
+    mj_resetData(model_.get(), data_.get());  // forgets the solver's warm start
+    std::copy(q_.begin(), q_.end(), data_->qpos);
+    std::copy(v_.begin(), v_.end(), data_->qvel);
+  }
+
+  std::unique_ptr<mjModel, Delete> model_;
+  std::unique_ptr<mjData, Delete> data_;
+  Eigen::VectorXd q_, v_, gain_;
+};
+
+}  // namespace
+
+std::unique_ptr<PhysicsBackend> MakeMujocoBackend(const RobotDescription& robot) {
+  return std::make_unique<MujocoBackend>(robot);
+}
+
+bool HasMujoco() { return true; }
+
+}  // namespace plumb

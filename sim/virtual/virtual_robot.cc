@@ -1,0 +1,115 @@
+#include "sim/virtual/virtual_robot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "sim/model.h"
+
+namespace plumb {
+namespace {
+
+RobotDescription TrueRobot(const RobotDescription& description, const Eigen::VectorXd& physical) {
+  return Model(description).Describe(physical);
+}
+
+}  // namespace
+
+VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical,
+                           int64_t now)
+    : plant_(TrueRobot(description, physical)),
+      devices_(VirtualDevices(description)),
+      efforts_(description) {
+  std::vector<Eigen::Index> first;  // of the joints in v
+  Eigen::Index next = 0;
+  for (const JointDescription& joint : description.joints) {
+    first.push_back(next);
+    next += joint.num_velocities();
+  }
+  for (const auto& device : devices_) {
+    effort_index_.push_back(device->joint() < 0 ? -1 : first[static_cast<size_t>(device->joint())]);
+  }
+  Boot(now);
+}
+
+void VirtualRobot::Boot(int64_t now) {
+  time_ = latest_ = now;
+  efforts_.Clear();
+  for (const auto& device : devices_) device->Boot(Motion());
+}
+
+std::vector<Filter> VirtualRobot::filters() const {
+  std::vector<Filter> all;
+  for (const auto& device : devices_) {
+    for (const Filter& filter : device->filters()) all.push_back(filter);
+  }
+  return all;
+}
+
+void VirtualRobot::Receive(const Frame& frame, int64_t arrival, FrameBatch& out) {
+  Advance(arrival, out);
+  bool matters = false;
+  for (const auto& device : devices_) matters = device->OnFrame(frame, latest_) || matters;
+  if (!matters) return;
+  MoveTo(latest_);
+  Tick(out);
+}
+
+int64_t VirtualRobot::NextEvent() const {
+  int64_t next = std::numeric_limits<int64_t>::max();
+  for (const auto& device : devices_) next = std::min(next, device->NextDue());
+  return next;
+}
+
+void VirtualRobot::Advance(int64_t now, FrameBatch& out) {
+  if (std::abs(now - latest_) > kLongestGap) Boot(now);
+  latest_ = std::max(latest_, now);
+  for (int64_t next = NextEvent(); next <= latest_; next = NextEvent()) {
+    MoveTo(next);
+    unsent_.Clear();
+    Tick(latest_ - next > kLatest ? unsent_ : out);
+  }
+}
+
+void VirtualRobot::Tick(FrameBatch& out) {
+  for (size_t i = 0; i < devices_.size(); ++i) {
+    devices_[i]->Tick(Motion(), out);
+    if (effort_index_[i] >= 0) efforts_.Make(effort_index_[i], devices_[i]->Effort(), time_);
+  }
+}
+
+void VirtualRobot::MoveTo(int64_t time) {
+  while (time_ < time) {
+    const int64_t begin = time_, end = std::min(time, efforts_.NextChange());
+    last_q_ = q();
+    last_v_ = v();
+    last_motor_q_ = plant_.motor_q();
+    last_motor_v_ = plant_.motor_v();
+    // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a
+    // crash.
+    if (!plant_.Advance(efforts_.acting(), static_cast<double>(end - begin) * 1e-6))
+      plant_.SetState(q(), 0 * v());
+    time_ = end;
+    efforts_.Take(time_);
+    for (const auto& device : devices_) {
+      device->Track({begin, last_q_, last_v_, last_motor_q_, last_motor_v_}, Motion());
+    }
+  }
+}
+
+bool VirtualRobot::Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>& wish_q,
+                         const Eigen::Ref<const Eigen::VectorXd>& wish_v) {
+  const auto within_reach = [](const Eigen::Ref<const Eigen::VectorXd>& x,
+                               const Eigen::VectorXd& now) {
+    return x.size() == now.size() && (x.array().abs() <= kFarthest).all();  // NaN is not
+  };
+  if (!within_reach(wish_q, q()) || !within_reach(wish_v, v())) return false;
+  if (utime == placed_) return true;
+  placed_ = utime;
+  MoveTo(latest_);
+  plant_.SetState(wish_q, wish_v);
+  for (const auto& device : devices_) device->Place(Motion());
+  return true;
+}
+
+}  // namespace plumb

@@ -1,0 +1,287 @@
+#include "drivers/bus/bus_plan.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+#include "drivers/protocols/cansimple.h"
+#include "drivers/protocols/cia406.h"
+#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/sensor.h"
+#include "drivers/protocols/xsens.h"
+
+namespace plumb {
+namespace {
+
+using Catch::Contains;
+using Direction = BusMessage::Direction;
+
+BusMessage Message(const Layout& layout, uint32_t id, int64_t period, uint8_t length,
+                   int64_t jitter = 0) {
+  BusMessage message;
+  message.layout = layout;
+  message.layout.length = length;
+  message.id = id;
+  message.period = period;
+  message.jitter = jitter;
+  if (jitter > 0) message.direction = Direction::kToDevice;
+  return message;
+}
+
+/// An ODrive with torque setpoints of 4 bytes and without telemetry but its current.
+BusDevice Drive(int node, int64_t period) {
+  using namespace cansimple;
+  const auto id = [&](const Layout& layout) {
+    return static_cast<uint32_t>(node) << 5 | layout.command;
+  };
+  return {"drive" + std::to_string(node),
+          "cansimple",
+          {Message(kHeartbeat, id(kHeartbeat), 100'000, 8),
+           Message(kGetEncoderEstimates, id(kGetEncoderEstimates), period, 8),
+           Message(kSetInputTorque, id(kSetInputTorque), period, 4, BusMessage::kHostJitter),
+           Message(kGetIq, id(kGetIq), 10'000, 8)},
+          {}};
+}
+BusDevice Encoder(int node, int64_t period) {
+  return {"encoder" + std::to_string(node),
+          "cia406",
+          {Message(cia406::kPosition, 0x180 + static_cast<uint32_t>(node), period, 4)},
+          {}};
+}
+BusDevice Imu(uint32_t base, int64_t period) {
+  using namespace xsens;
+  return {
+      "imu",
+      "xsens",
+      {Message(kSampleTime, base + 0x05, period, 4), Message(kQuaternion, base + 0x21, period, 8),
+       Message(kRateOfTurn, base + 0x32, period, 6),
+       Message(kAcceleration, base + 0x34, period, 6)},
+      {}};
+}
+std::vector<BusDevice> Leg(int64_t motors, int64_t encoders, int64_t imu, uint32_t base = 0x380) {
+  return {Drive(1, motors),     Drive(2, motors),     Drive(3, motors),
+          Encoder(1, encoders), Encoder(2, encoders), Imu(base, imu)};
+}
+
+double Response(const BusPlan& plan, uint32_t id) {
+  for (const BusPlan::Row& row : plan.rows) {
+    if (row.message.id == id) return row.response;
+  }
+  return -1;
+}
+
+MotorDescription MitMotor(int node, int master) {
+  MotorDescription motor;
+  motor.protocol = "mit";
+  motor.node = node;
+  motor.mit = MitDescription{master, {.velocity = 50, .torque = 18}, "a test"};
+  return motor;
+}
+
+std::vector<BusDevice> Motors(std::vector<MotorDescription> motors, double cycle = 0.001) {
+  std::vector<BusDevice> devices;
+  DriverSettings driver{};
+  driver.cycle = driver.measurement = cycle;
+  driver.heartbeat_timeout = 0.5;
+  for (const MotorDescription& motor : motors) {
+    devices.push_back(MotorBusDevice(motor, driver));
+    devices.back().name = "motor" + std::to_string(motor.node);
+  }
+  return devices;
+}
+
+TEST_CASE("bits of a frame") {
+  // DLC, standard nominal and worst, extended nominal and worst.
+  const int table[][5] = {{0, 47, 55, 67, 80},    {1, 55, 65, 75, 90},     {4, 79, 95, 99, 120},
+                          {6, 95, 115, 115, 140}, {7, 103, 125, 123, 150}, {8, 111, 135, 131, 160}};
+  for (const auto& [length, nominal, worst, extended, extended_worst] : table) {
+    CHECK(NominalBits(false, length) == nominal);
+    CHECK(WorstCaseBits(false, length) == worst);
+    CHECK(NominalBits(true, length) == extended);
+    CHECK(WorstCaseBits(true, length) == extended_worst);
+  }
+}
+
+TEST_CASE("a leg at 500 Hz fits: loads and response times as computed by hand") {
+  const BusPlan plan = PlanBus(Leg(2'000, 2'000, 5'000), 1e6);
+  CHECK(plan.errors.empty());
+  CHECK(plan.warnings.empty());
+  CHECK(100 * plan.worst_load == Approx(57.655));
+  // Node 1's torque waits for any frame (135), heartbeat and estimates (135 each), takes 95, and is
+  // up to 200 us late; each further node's for a node's 500 us more.
+  CHECK(Response(plan, 0x02E) == Approx(700));
+  CHECK(Response(plan, 0x04E) == Approx(1200));
+  CHECK(Response(plan, 0x06E) == Approx(1700));
+  CHECK_THAT(ToText(plan),
+             Contains("57.7 % at worst") && Contains("all deadlines are met") && Contains("0x06e"));
+}
+
+TEST_CASE("a leg at 1 kHz does not") {
+  const BusPlan plan = PlanBus(Leg(1'000, 1'000, 2'500), 1e6);
+  CHECK(std::lround(100 * plan.worst_load) == 111);
+  REQUIRE(plan.errors.size() > 1);
+  CHECK(plan.errors[0] == "the bus would be loaded to 111 %: use longer periods, or two buses");
+  CHECK_THAT(ToText(plan), Contains("later and later"));
+}
+
+TEST_CASE("an IMU of higher priority makes others late") {
+  // With the factory's ids, at 400 Hz: the whole sample goes before the last node's torque.
+  const BusPlan high = PlanBus(Leg(2'000, 2'000, 2'500, 0), 1e6);
+  const BusPlan low = PlanBus(Leg(2'000, 2'000, 2'500), 1e6);
+  CHECK(Response(low, 0x06E) == Approx(1700));
+  CHECK(Response(high, 0x06E) > 2000);
+  CHECK(Response(high, 0x181) > 2000);
+  CHECK_THAT(high.errors.back(), Contains("may be sent") && Contains("due every 2.00 ms"));
+}
+
+TEST_CASE("loads of table rows: ODrives and MIT motors at 1 kHz") {
+  // Per ODrive: two frames of 135 bits, a heartbeat of 135 bits every 100 ms, torques every 10 ms.
+  for (const auto& [count, percent] : std::map<int, int>{{1, 29}, {2, 57}, {3, 86}, {4, 114}}) {
+    std::vector<BusDevice> devices;
+    for (int node = 1; node <= count; ++node) {
+      devices.push_back(Drive(node, 1'000));
+      devices.back().messages[2].layout.length = 8;
+    }
+    const BusPlan plan = PlanBus(devices, 1e6);
+    CHECK(std::ceil(100 * plan.worst_load) == percent);
+    CHECK(plan.warnings.empty() == (percent <= 80 || percent > 100));
+  }
+  const BusPlan mit =
+      PlanBus(Motors({MitMotor(0x11, 0x10), MitMotor(0x12, 0x20), MitMotor(0x13, 0x30)}), 1e6);
+  CHECK(100 * mit.worst_load == Approx(3 * 27));  // replies of 8 bytes
+  CHECK(mit.warnings.size() == 1);
+}
+
+TEST_CASE("the revised analysis: the first instance is not always the last to be late") {
+  // Table 3 of Davis et al.: three messages of cost 1, periods 2.5, 3.5, 3.5. The third is in time
+  // at the first instance (3) and late at the second (3.5 - 2 rounds on): its response time is 3.5,
+  // not 3.
+  const auto message = [](uint32_t id, int64_t period) {
+    return Message(cansimple::kGetIq, id, period, 8);
+  };
+  const std::vector<BusDevice> devices = {{"a", "x", {message(1, 2500)}, {}},
+                                          {"b", "x", {message(2, 3500)}, {}},
+                                          {"c", "x", {message(3, 3500)}, {}}};
+  const BusPlan plan = PlanBus(devices, 135e3);  // 1 ms per message
+  CHECK(Response(plan, 1) / 1000 == Approx(2).margin(1e-3));
+  CHECK(Response(plan, 2) / 1000 == Approx(3).margin(1e-3));
+  CHECK(Response(plan, 3) / 1000 == Approx(3.5).margin(1e-2));
+}
+
+TEST_CASE("an answer is as late as its question, and then some") {
+  const BusPlan plan = PlanBus(Motors({MitMotor(0x11, 0x10)}), 1e6);
+  // The reply has the higher priority: it waits for the command (135) and takes 135, after the
+  // command's own 200 + 135 + 135.
+  CHECK(Response(plan, 0x11) == Approx(200 + 135 + 135));
+  CHECK(Response(plan, 0x10) == Approx(470 + 135 + 135));
+}
+
+TEST_CASE("collisions name both and the id") {
+  SECTION("factory ids of an ODrive and an Xsens") {
+    MotorDescription motor;
+    motor.protocol = "cansimple";
+    motor.node = 1;
+    auto devices = Motors({motor});
+    devices.push_back(Imu(0, 5'000));
+    const BusPlan plan = PlanBus(devices, 1e6);
+    REQUIRE_FALSE(plan.errors.empty());
+    CHECK(plan.errors[0] == "CAN id 0x021: 'motor1' sends Heartbeat and 'imu' sends Quaternion");
+  }
+  SECTION("an id that the drive does not use, but owns") {
+    MotorDescription motor;
+    motor.protocol = "cansimple";
+    motor.node = 4;
+    auto devices = Motors({motor});
+    devices.push_back({"encoder", "cia406", {Message(cia406::kEmergency, 0x08A, 0, 8)}, {}});
+    const BusPlan plan = PlanBus(devices, 1e6);
+    REQUIRE(plan.errors.size() == 1);
+    CHECK(plan.errors[0] ==
+          "CAN id 0x08a: 'encoder' sends EMCY, but ids 0x080 to 0x09f are 'motor4's");
+  }
+  SECTION("two drives of one node, two motors of one id") {
+    MotorDescription motor;
+    motor.protocol = "cansimple";
+    motor.node = 2;
+    CHECK_THAT(PlanBus(Motors({motor, motor}), 1e6).errors.front(), Contains("0x041"));
+    CHECK_THAT(PlanBus(Motors({MitMotor(3, 0x10), MitMotor(3, 0x10)}), 1e6).errors.front(),
+               Contains("0x003") && Contains("obeys Command"));
+  }
+  SECTION("a MIT motor's replies are another's commands") {
+    CHECK_THAT(PlanBus(Motors({MitMotor(3, 0), MitMotor(4, 3)}), 1e6).errors.front(),
+               Contains("0x003: 'motor3' obeys Command and 'motor4' sends Reply"));
+  }
+  SECTION("MIT replies on one id: allowed, and warned of") {
+    const BusPlan plan = PlanBus(Motors({MitMotor(3, 0), MitMotor(4, 0)}, 0.002), 1e6);
+    CHECK(plan.errors.empty());
+    REQUIRE(plan.warnings.size() == 1);
+    CHECK_THAT(plan.warnings[0], Contains("0x000") && Contains("motor3") && Contains("motor4"));
+  }
+  SECTION("NMT is for all encoders, and nobody else") {
+    SensorDescription sensor;
+    sensor.protocol = "cia406";
+    sensor.period = 0.002;
+    std::vector<BusDevice> devices;
+    for (const int node : {1, 2}) {
+      sensor.node = node;
+      sensor.name = "encoder" + std::to_string(node);
+      devices.push_back(SensorBusDevice(sensor));
+    }
+    CHECK(PlanBus(devices, 1e6).errors.empty());
+    devices.push_back(Motors({MitMotor(3, 0)})[0]);
+    CHECK_THAT(PlanBus(devices, 1e6).errors.front(),
+               Contains("0x000: 'encoder1' obeys NMT and 'motor3' sends Reply"));
+  }
+  SECTION("a standard and an extended frame never collide") {
+    BusDevice a{"a", "x", {Message(cansimple::kGetIq, 0x123, 1000, 8)}, {}}, b = a;
+    b.name = "b";
+    b.messages[0].extended = true;
+    CHECK(PlanBus({a, b}, 1e6).errors.empty());
+  }
+}
+
+TEST_CASE("slower buses are fuller") {
+  CHECK(PlanBus(Leg(2'000, 2'000, 5'000), 5e5).worst_load == Approx(2 * 0.57655));
+}
+
+TEST_CASE("the robots we ship fit their buses") {
+  const char* source = std::getenv("PLUMBLINE_SOURCE");
+  for (const char* name : {"pendulum", "double_pendulum", "cartpole", "hopper"}) {
+    INFO(name);
+    const RobotDescription robot =
+        LoadRobot(std::string(source ? source : ".") + "/robots/" + name);
+    const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
+    INFO(ToText(plan));
+    CHECK(plan.errors.empty());
+    CHECK(plan.warnings.empty());
+  }
+  CHECK_THROWS_AS(MotorBusDevice(MotorDescription{"nonsense"}, DriverSettings{}),
+                  std::invalid_argument);
+}
+
+TEST_CASE("of what is asked for in turn one message waits at a time") {
+  // Ten devices with an answer of 135 us each, above a message that is due every millisecond.
+  const auto plan = [](bool polled) {
+    std::vector<BusDevice> devices;
+    for (uint32_t i = 0; i < 10; ++i) {
+      BusMessage answer = Message(cansimple::kGetTemperature, 0x10 + i, 100'000, 8);
+      answer.polled = polled;
+      devices.push_back({"drive" + std::to_string(i), "", {answer}, {}});
+    }
+    devices.push_back(
+        {"sensor", "", {Message(cansimple::kGetEncoderEstimates, 0x100, 1'000, 8)}, {}});
+    return PlanBus(devices, 1e6);
+  };
+  CHECK_THAT(plan(false).errors.at(0), Contains("'sensor'"));
+  CHECK(Response(plan(false), 0x100) == 11 * 135);
+  CHECK(plan(true).errors.empty());
+  CHECK(Response(plan(true), 0x100) == 2 * 135);
+  // The first and the last of them may both find the wire taken, and nothing above them.
+  CHECK(Response(plan(true), 0x10) == 2 * 135);
+  CHECK(Response(plan(true), 0x19) == 2 * 135);
+  // They are a load, every one of them.
+  CHECK(plan(true).worst_load == Approx(plan(false).worst_load));
+}
+
+}  // namespace
+}  // namespace plumb

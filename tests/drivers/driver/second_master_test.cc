@@ -1,0 +1,107 @@
+// Somebody else who sends what only the driver may send, and a bus that is none.
+
+#include <catch2/catch.hpp>
+
+#include "tests/drivers/driver/rig.h"
+
+namespace plumb {
+namespace {
+
+using Catch::Matchers::Contains;
+
+Frame Foreign(const char* text) {
+  Frame frame = FrameFromText(text).value();
+  frame.foreign = true;
+  return frame;
+}
+
+TEST_CASE(
+    "a second master on the bus stops the robot within the cycle, and keeps it from being armed") {
+  Rig rig(2);
+  rig.Start();
+  const auto obeyed =
+      GENERATE("02E#0000C03F", "04E#0000C03F00000000", "027#08000000", "02C#0000003F24FAFA00");
+  SECTION("armed") {
+    REQUIRE(rig.Arm(1));
+    rig.Run(50);
+    rig.driver->OnFrame(Foreign(obeyed), rig.now, rig.utime());
+    CHECK(rig.driver->state() == DriveState::kFault);
+    CHECK_THAT(rig.Reason(), Contains("second master") &&
+                                 Contains(fmt::format("{:#05x}", FrameFromText(obeyed)->id)));
+    rig.Run(300);
+    CHECK_FALSE(rig.drives[0].armed());
+    CHECK(rig.driver->confirmed_idle());
+    CHECK(rig.Arm(1));  // it has gone: a person may arm again
+  }
+  SECTION("before") {
+    rig.Run(300);
+    rig.driver->OnFrame(Foreign(obeyed), rig.now, rig.utime());
+    rig.Request(driver_request_t::ARM);
+    CHECK(rig.driver->state() != DriveState::kArming);
+    CHECK_THAT(rig.Reason(), Contains("second master"));
+    rig.Run(300);
+    rig.Request(driver_request_t::ARM);
+    CHECK(rig.driver->state() == DriveState::kArming);
+  }
+}
+
+TEST_CASE("an emergency stop that somebody sends on the bus is everybody's, and a person's") {
+  Rig rig(2);
+  rig.Start();
+  REQUIRE(rig.Arm(1));
+  rig.Run(50);
+  const auto frame = GENERATE("022#", "042#", "7E2#");  // to one drive, to the other, to all
+  rig.driver->OnFrame(Foreign(frame), rig.now, rig.utime());
+  CHECK(rig.driver->state() == DriveState::kFault);
+  CHECK(rig.Reason() == "emergency stop from the bus");
+  CHECK(rig.Status().stopped_by_request);
+  rig.Run(50);
+  for (const CanSimpleDevice& drive : rig.drives) {
+    CHECK_FALSE(drive.armed());
+    CHECK(drive.disarm_reason() == cansimple::kEstopRequested);
+  }
+  rig.Run(1000);
+  CHECK(rig.driver->state() == DriveState::kFault);
+  CHECK(rig.Arm(1));
+}
+
+TEST_CASE("the transport is asked to tell another's commands from ours, for every drive") {
+  Rig rig(2);
+  rig.Start();
+  const auto driver_end = OpenTransport("loop:second_master", rig.driver->filters()),
+             other = OpenTransport("loop:second_master");
+  const Frame sent[] = {FrameFromText("02E#0000C03F").value(),
+                        FrameFromText("047#0800000000000000").value(),
+                        FrameFromText("029#000080BE00006040").value()};
+  REQUIRE(other->Send(sent) == 3);
+  std::array<Frame, 8> received;
+  REQUIRE(driver_end->Receive(received) == 3);
+  CHECK(received[0].foreign);
+  CHECK(received[1].foreign);
+  CHECK_FALSE(received[2].foreign);  // a drive's
+  CHECK(driver_end->stats().foreign == 2);
+}
+
+TEST_CASE("a recording is no robot") {
+  Rig rig;
+  rig.Start();
+  rig.driver->set_replay(true);
+  CHECK_FALSE(rig.Arm());
+  CHECK_THAT(rig.Reason(), Contains("recording"));
+}
+
+TEST_CASE("a bus that cannot work is refused with the names and the numbers") {
+  Rig rig(2);
+  SECTION("two drives of one node") {
+    rig.robot.joints[1].motor.node = 1;
+    CHECK_THROWS_WITH(rig.Start(),
+                      Contains("pivot") && Contains("knee1") && Contains("CAN id 0x02"));
+  }
+  SECTION("more than it carries") {
+    rig.robot.driver.cycle = rig.robot.driver.measurement = 0.0003;
+    CHECK_THROWS_WITH(rig.Start(), Contains("%"));
+  }
+}
+
+}  // namespace
+}  // namespace plumb
