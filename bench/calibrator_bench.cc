@@ -8,8 +8,8 @@
 #include <ctime>
 #include <vector>
 
-#include "calibrator/curriculum.h"
-#include "calibrator/streaming.h"
+#include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/streaming.h"
 #include "tests/calibrator/hopper.h"
 
 namespace plumb {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "calibrator/touch.h"
+#include "calibrator/motion/touch.h"
 #include "tests/calibrator/hop_on_bus.h"
 #include "tests/estimator/observer_errors.h"
 

@@ -9,7 +9,7 @@
 #include <functional>
 #include <string>
 
-#include "calibrator/calibration.h"
+#include "calibrator/results/calibration.h"
 #include "sim/parameters.h"
 #include "tests/calibrator/hop_on_bus.h"
 #include "tests/estimator/observer_errors.h"

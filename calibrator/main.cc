@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "calibrator/calibrator.h"
-#include "calibrator/checkpoint.h"
-#include "calibrator/motion_log.h"
+#include "calibrator/live/calibrator.h"
+#include "calibrator/live/checkpoint.h"
+#include "calibrator/motion/motion_log.h"
 #include "common/atomic_file.h"
 #include "common/process.h"
 

@@ -10,14 +10,16 @@
 #include <memory>
 #include <thread>
 
-#include "calibrator/identified_urdf.h"
-#include "calibrator/posterior_file.h"
-#include "calibrator/rank_batches.h"
-#include "calibrator/report.h"
-#include "calibrator/robot_sbc.h"
-#include "calibrator/summary.h"
+#include "calibrator/diagnostics/robot_sbc.h"
+#include "calibrator/motion/csv_log.h"
+#include "calibrator/motion/lcm_log.h"
+#include "calibrator/report/report.h"
+#include "calibrator/results/identified_urdf.h"
+#include "calibrator/results/posterior_file.h"
+#include "calibrator/results/summary.h"
 #include "cli/progress_line.h"
 #include "common/atomic_file.h"
+#include "common/rank_batches.h"
 
 namespace plumb {
 namespace {

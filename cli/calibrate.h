@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "calibrator/calibration.h"
+#include "calibrator/results/calibration.h"
 #include "common/process.h"
 
 namespace plumb {

@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "calibrator/excitation.h"
-#include "calibrator/simopt.h"
+#include "calibrator/design/excitation.h"
+#include "calibrator/live/simopt.h"
 #include "common/atomic_file.h"
 #include "robot/description.h"
 #include "robot/posterior_reader.h"

@@ -180,7 +180,7 @@ double Progress::TrueCombination(const calibration_status_t& c, size_t index,
     log = log && robot_.parameters[i].coordinate == ParameterDescription::Coordinate::kLog;
   }
   if (log) return std::exp(sum);
-  // as calibrator/identifiability.h has it
+  // as calibrator/diagnostics/identifiability.h has it
   return involved == 1 && std::isfinite(alone) ? alone : sum;
 }
 

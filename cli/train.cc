@@ -15,8 +15,8 @@
 #include <sstream>
 #include <thread>
 
-#include "calibrator/batches.h"
 #include "common/atomic_file.h"
+#include "common/batches.h"
 #include "common/config.h"
 #include "common/ranks.h"
 #include "robot/posterior_reader.h"

@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "calibrator/log_reader.h"
+#include "calibrator/motion/log_reader.h"
 #include "cli/progress_line.h"
 #include "estimator/noise_tuning.h"
 

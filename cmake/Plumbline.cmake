@@ -34,23 +34,23 @@ function(plumb_process name)
   target_precompile_headers(plumb-${name} REUSE_FROM plumb_common)
 endfunction()
 
-# plumb_test(<name> [FOLDER folder] [ROOMS room ...] LINKS ...) -> one Catch2 binary of tests/<folder>/*.cc and
-# tests/<folder>/<room>/*.cc, one CTest entry
-function(plumb_test folder)
-  cmake_parse_arguments(ARG "" "FOLDER" "ROOMS;LINKS" ${ARGN})
-  if(NOT ARG_FOLDER)
-    set(ARG_FOLDER ${folder})
+# plumb_test(<name> [FOLDERS folder ...] LINKS ...) -> one Catch2 binary of tests/<folder>/*.cc, one CTest entry.
+# Without FOLDERS the folder has the name.
+function(plumb_test name)
+  cmake_parse_arguments(ARG "" "" "FOLDERS;LINKS" ${ARGN})
+  if(NOT ARG_FOLDERS)
+    set(ARG_FOLDERS ${name})
   endif()
-  list(TRANSFORM ARG_ROOMS REPLACE "(.+)" "${PROJECT_SOURCE_DIR}/tests/${ARG_FOLDER}/\\1/*.cc")
-  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${ARG_FOLDER}/*.cc ${ARG_ROOMS})
+  list(TRANSFORM ARG_FOLDERS REPLACE "(.+)" "${PROJECT_SOURCE_DIR}/tests/\\1/*.cc")
+  file(GLOB sources CONFIGURE_DEPENDS ${ARG_FOLDERS})
   if(NOT sources)
     return()
   endif()
-  add_executable(${folder}_test ${sources})
-  target_link_libraries(${folder}_test PRIVATE plumb_test_main ${ARG_LINKS} plumb_warnings)
-  target_precompile_headers(${folder}_test REUSE_FROM plumb_test_main)
-  add_test(NAME ${folder} COMMAND ${folder}_test)
-  set_tests_properties(${folder} PROPERTIES ENVIRONMENT "PLUMBLINE_SOURCE=${PROJECT_SOURCE_DIR};PLUMBLINE_BUILD=${PROJECT_BINARY_DIR}")
+  add_executable(${name}_test ${sources})
+  target_link_libraries(${name}_test PRIVATE plumb_test_main ${ARG_LINKS} plumb_warnings)
+  target_precompile_headers(${name}_test REUSE_FROM plumb_test_main)
+  add_test(NAME ${name} COMMAND ${name}_test)
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PLUMBLINE_SOURCE=${PROJECT_SOURCE_DIR};PLUMBLINE_BUILD=${PROJECT_BINARY_DIR}")
 endfunction()
 
 # plumb_levels(<name> SOURCES a.cc ... OPTIONS -O3 ...) -> shared library plumb_<name>, built once per level of instruction

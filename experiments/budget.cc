@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "calibrator/methods.h"
-#include "calibrator/simopt.h"
+#include "calibrator/fit/methods.h"
+#include "calibrator/live/simopt.h"
 
 namespace plumb {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "robot/parameter_distribution.h"
 
 namespace plumb {

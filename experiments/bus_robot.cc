@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "controller/controller.h"
 #include "estimator/state_observer.h"
 #include "plumb/controller_status_t.hpp"

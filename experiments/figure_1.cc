@@ -17,9 +17,9 @@
 #include "calibrator/inference/conditional_mixture.h"
 #include "calibrator/inference/population_weights.h"
 #include "calibrator/inference/reps_search.h"
-#include "calibrator/svg.h"
 #include "common/atomic_file.h"
 #include "experiments/results.h"
+#include "plot/svg.h"
 
 namespace plumb {
 namespace {

@@ -14,10 +14,10 @@
 #include <iostream>
 
 #include "common/atomic_file.h"
-#include "experiments/curves.h"
 #include "experiments/recording.h"
 #include "experiments/results.h"
 #include "experiments/simulated_system.h"
+#include "plot/curves.h"
 
 namespace plumb {
 namespace {

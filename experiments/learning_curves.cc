@@ -19,9 +19,9 @@
 #include <map>
 #include <numeric>
 
-#include "calibrator/svg.h"
 #include "common/atomic_file.h"
 #include "common/process.h"
+#include "plot/svg.h"
 #include "robot/parameter_distribution.h"
 #include "trainer/robot_simulation.h"
 #include "trainer/trainer.h"

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "robot/parameter_distribution.h"
 
 namespace plumb {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "controller/policy.h"
 
 namespace plumb {

@@ -18,12 +18,12 @@
 #include <fstream>
 #include <iostream>
 
-#include "calibrator/calibration.h"
+#include "calibrator/results/calibration.h"
 #include "common/atomic_file.h"
 #include "experiments/bus_robot.h"
-#include "experiments/curves.h"
 #include "experiments/loop.h"
 #include "experiments/results.h"
+#include "plot/curves.h"
 #include "sim/parameters.h"
 
 namespace plumb {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "controller/policy.h"
 #include "experiments/loop.h"
 #include "robot/description.h"

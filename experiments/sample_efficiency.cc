@@ -20,11 +20,11 @@
 
 #include "common/atomic_file.h"
 #include "experiments/budget.h"
-#include "experiments/curves.h"
 #include "experiments/n_step_error.h"
 #include "experiments/recording.h"
 #include "experiments/results.h"
 #include "experiments/simulated_system.h"
+#include "plot/curves.h"
 
 namespace plumb {
 namespace {

@@ -12,8 +12,8 @@
 #include <fstream>
 #include <iostream>
 
-#include "calibrator/checkpoint.h"
-#include "calibrator/simopt.h"
+#include "calibrator/live/checkpoint.h"
+#include "calibrator/live/simopt.h"
 #include "common/process.h"
 
 namespace plumb {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "calibrator/simopt.h"
+#include "calibrator/live/simopt.h"
 #include "robot/parameter_distribution.h"
 
 namespace plumb {

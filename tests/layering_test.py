@@ -9,30 +9,48 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# "drivers/*": all rooms of that folder.
-BELOW = {
+# Each folder may include the named ones and all that these may.
+STANDS_ON = {
     "common": set(),
+    "plot": {"common"},
     "robot/urdf": {"common"},
-    "robot": {"common", "robot/urdf"},
+    "robot": {"robot/urdf"},
     "drivers/can": {"common"},
-    "drivers/protocols": {"common", "robot", "drivers/can"},
-    "drivers/bus": {"common", "robot", "drivers/can", "drivers/protocols"},
-    "drivers/driver": {"common", "robot", "drivers/can", "drivers/protocols", "drivers/bus"},
-    "drivers": {"common", "robot", "drivers/*"},
-    "estimator": {"common", "robot"},
-    "estimator/model": {"common", "robot", "sim", "estimator"},
-    "controller": {"common", "robot", "sim/tasks"},
+    "drivers/protocols": {"robot", "drivers/can"},
+    "drivers/bus": {"drivers/protocols"},
+    "drivers/driver": {"drivers/bus"},
+    "drivers": {"drivers/driver"},
+    "estimator": {"robot"},
+    "estimator/model": {"sim", "estimator"},
+    "controller": {"sim/tasks"},
     "sim/dynamics": {"robot"},
-    "sim/tasks": {"common", "robot"},
-    "sim": {"common", "robot", "sim/dynamics", "sim/tasks"},
-    "sim/virtual": {"common", "robot", "sim"},
-    "sim/view": {"common", "robot", "sim"},
+    "sim/tasks": {"robot"},
+    "sim": {"sim/dynamics", "sim/tasks"},
+    "sim/virtual": {"sim"},
+    "sim/view": {"sim"},
     "calibrator/inference": {"common"},
-    "calibrator": {"common", "robot/urdf", "robot", "sim", "sim/tasks", "calibrator/inference"},
-    "trainer": {"common", "robot", "sim", "sim/tasks", "controller"},
-    "cli": {"common", "robot", "sim", "sim/*", "drivers/*", "estimator", "controller", "calibrator", "calibrator/*", "trainer"},
-    "experiments": {"common", "robot", "sim", "sim/*", "drivers/*", "estimator", "calibrator", "calibrator/*", "trainer", "controller"},
+    "calibrator/motion": {"sim"},
+    "calibrator/fit": {"calibrator/motion", "calibrator/inference"},
+    "calibrator/diagnostics": {"calibrator/fit"},
+    "calibrator/design": {"calibrator/diagnostics"},
+    "calibrator/results": {"calibrator/design"},
+    "calibrator/report": {"calibrator/results", "plot"},
+    "calibrator/live": {"calibrator/diagnostics"},
+    "calibrator": {"calibrator/report", "calibrator/live"},
+    "trainer": {"sim", "controller"},
+    "cli": {"drivers", "estimator", "controller", "calibrator", "trainer", "sim/virtual", "sim/view"},
+    "experiments": {"drivers", "estimator", "controller", "calibrator", "trainer", "sim/virtual", "sim/view"},
 }
+
+
+def all_below(room, path=()):
+    if room in path:
+        sys.exit("a circle: " + " -> ".join((*path, room)))
+    nearest = STANDS_ON[room]
+    return nearest.union(*(all_below(below, (*path, room)) for below in nearest))
+
+
+BELOW = {room: all_below(room) for room in STANDS_ON}
 # Of the virtual robot's room only the part on the bus knows drivers: it speaks the protocols' device side.
 ON_THE_BUS = [f"sim/virtual/{file}" for file in
               ("virtual_bus.h", "virtual_bus.cc", "virtual_robot.h", "virtual_robot.cc", "virtual_devices.h",

@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <span>
 
-#include "calibrator/candidates.h"
-#include "calibrator/discrepancy.h"
+#include "calibrator/diagnostics/candidates.h"
+#include "calibrator/fit/discrepancy.h"
 #include "common/decompositions.h"
 #include "common/random.h"
 #include "sim/environment.h"

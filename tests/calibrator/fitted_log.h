@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "calibrator/misspecification.h"
-#include "calibrator/transitions.h"
-#include "calibrator/window_errors.h"
+#include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/fit/window_errors.h"
+#include "calibrator/motion/transitions.h"
 #include "robot/description.h"
 
 namespace plumb {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "common/random.h"
 #include "robot/description.h"
 #include "sim/environment.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "calibrator/log.h"
+#include "calibrator/motion/log.h"
 #include "estimator/state_observer.h"
 #include "tests/estimator/simulated_readings.h"
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "calibrator/findings.h"
-#include "calibrator/posterior_file.h"
+#include "calibrator/results/findings.h"
+#include "calibrator/results/posterior_file.h"
 #include "common/random.h"
 #include "robot/description.h"
 

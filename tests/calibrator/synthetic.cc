@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "calibrator/discrepancy.h"
-#include "calibrator/simopt.h"
+#include "calibrator/fit/discrepancy.h"
+#include "calibrator/live/simopt.h"
 #include "common/decompositions.h"
 #include "common/random.h"
 #include "sim/simulator.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calibrator/inference/gaussian.h"
-#include "calibrator/transitions.h"
+#include "calibrator/motion/transitions.h"
 #include "robot/description.h"
 
 namespace plumb {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "calibrator/calibration.h"
+#include "calibrator/results/calibration.h"
 #include "common/decompositions.h"
 #include "sim/parameters.h"
 #include "sim/tasks/task.h"

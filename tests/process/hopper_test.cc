@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "calibrator/log_reader.h"
+#include "calibrator/motion/log_reader.h"
 #include "common/lcm_log_writer.h"
 #include "estimator/state_observer.h"
 #include "plumb/imu_t.hpp"

@@ -1,0 +1,124 @@
+#include "calibrator/diagnostics/holdout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace plumb {
+namespace {
+
+constexpr size_t kFew = 5;  // roll-outs
+constexpr size_t kLeast = 10;
+constexpr double kRounding = 1e-9;  // of a simulation, standard units: who is better by less is not
+constexpr std::array<int, 6> kHorizons{1, 2, 5, 10, 20, 50};
+
+int64_t CountWindows(std::span<const Rollout> rollouts, int horizon) {
+  int64_t count = 0;
+  const auto length = static_cast<size_t>(horizon);
+  for (const Rollout& rollout : rollouts) {
+    const auto& t = rollout.transitions;
+    for (size_t i = 0; i + length <= t.size(); ++i)
+      count += t[i + length - 1].step == t[i].step + horizon - 1;
+  }
+  return count;
+}
+
+// Mean number of entries of (q, v) that were observed at the end of a transition.
+double ObservedEntries(std::span<const Rollout> rollouts) {
+  double entries = 0, transitions = 0;
+  for (const Rollout& rollout : rollouts) {
+    for (const Transition& t : rollout.transitions) {
+      entries += static_cast<double>(t.next_q.array().isFinite().count() +
+                                     t.next_v.array().isFinite().count());
+      ++transitions;
+    }
+  }
+  return std::max(1.0, entries / std::max(1.0, transitions));
+}
+
+}  // namespace
+
+Split HoldOut(std::span<const Rollout> rollouts) {
+  Split split;
+  if (CountTransitions(rollouts) < kLeast) {
+    split.fitted.assign(rollouts.begin(), rollouts.end());
+    return split;
+  }
+  for (size_t i = 0; i < rollouts.size(); ++i) {
+    if (rollouts.size() >= kFew) {
+      (i % kFew == kFew - 1 ? split.held_out : split.fitted).push_back(rollouts[i]);
+      continue;
+    }
+    const auto& all = rollouts[i].transitions;
+    const auto border = all.begin() + static_cast<std::ptrdiff_t>(all.size() - all.size() / kFew);
+    Rollout first = rollouts[i], last = rollouts[i];
+    first.transitions.assign(all.begin(), border);
+    last.transitions.assign(border, all.end());
+    split.fitted.push_back(std::move(first));
+    split.held_out.push_back(std::move(last));
+  }
+  return split;
+}
+
+Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorXd& posterior,
+              const Eigen::VectorXd& prior) {
+  Holdout result;
+  result.fitted = static_cast<int64_t>(CountTransitions(split.fitted));
+  result.held_out = static_cast<int64_t>(CountTransitions(split.held_out));
+  const double entries = split.held_out.empty() ? 1 : ObservedEntries(split.held_out);
+  Eigen::MatrixXd both(posterior.size(), 2);
+  both << posterior, prior;
+  int tried = 0, better = 0;
+  std::string worse, alike;
+  for (const int horizon : kHorizons) {
+    HorizonError error{horizon, CountWindows(split.held_out, horizon), NAN, NAN};
+    if (error.windows > 0) {
+      const Eigen::VectorXd errors = discrepancy.PredictionError(both, split.held_out, horizon);
+      error.posterior = errors(0), error.prior = errors(1);
+      ++tried;
+      // A root mean square of so many errors is known that well; where noise is most of it the two
+      // are alike.
+      const double chance = 1 / std::sqrt(2.0 * static_cast<double>(error.windows) * entries);
+      if (error.posterior + kRounding < error.prior * (1 - chance))
+        ++better;
+      else if (error.posterior <= error.prior * (1 + chance) + kRounding)
+        alike += fmt::format("{}{}", alike.empty() ? "" : ", ", horizon);
+      else
+        worse += fmt::format("{}{}", worse.empty() ? "" : ", ", horizon);
+    }
+    result.errors.push_back(error);
+  }
+  result.better = better > 0 && worse.empty();
+  if (tried == 0) {
+    result.words =
+        "too few transitions to hold any out: whether the posterior predicts better than the prior "
+        "is not known";
+  } else if (result.better) {
+    const HorizonError* last = nullptr;
+    for (const HorizonError& error : result.errors) {
+      if (error.windows > 0) last = &error;
+    }
+    result.words = fmt::format(
+        "on {} transitions that it has not seen, the posterior predicts better than the prior: "
+        "errors are {:.3g} times "
+        "the prior's after 1 step, {:.3g} times after {}",
+        result.held_out, result.errors[0].posterior / result.errors[0].prior,
+        last->posterior / last->prior, last->horizon);
+  } else if (worse.empty()) {
+    result.words = fmt::format(
+        "on {} transitions that it has not seen, the posterior predicts no better than the prior: "
+        "do not train with it",
+        result.held_out);
+  } else {
+    result.words = fmt::format(
+        "on {} transitions that it has not seen, the posterior predicts WORSE than the prior {} "
+        "step{} "
+        "ahead: do not train with it",
+        result.held_out, worse, worse == "1" ? "" : "s");
+  }
+  return result;
+}
+
+}  // namespace plumb

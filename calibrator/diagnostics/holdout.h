@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calibrator/fit/discrepancy.h"
+
+namespace plumb {
+
+/// Error of predicting n steps ahead on transitions that the fit has not seen, root mean square
+/// over states and windows, in standard units (Task::state_scale).
+struct HorizonError {
+  int horizon;       ///< n
+  int64_t windows;   ///< predicted; with 0 the errors are NaN
+  double posterior;  ///< of the posterior's mean
+  double prior;      ///< of the prior's mean
+};
+
+struct Holdout {
+  int64_t fitted = 0, held_out = 0;  ///< transitions
+  std::vector<HorizonError> errors;
+  /// the posterior predicts better than the prior at some horizons, and at none worse, chance apart
+  bool better = false;
+  std::string words;
+};
+
+/// Transitions to fit, and those kept back to judge the fit by.
+struct Split {
+  std::vector<Rollout> fitted, held_out;
+};
+
+/// Every fifth roll-out is held out; of fewer than five, the last fifth of each. What has fewer
+/// than ten transitions cannot spare any: nothing is held out.
+Split HoldOut(std::span<const Rollout> rollouts);
+
+/// Errors of predicting 1, 2, 5, 10, 20 and 50 steps ahead. @param posterior, prior means, physical
+/// units.
+Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorXd& posterior,
+              const Eigen::VectorXd& prior);
+
+}  // namespace plumb

@@ -1,0 +1,238 @@
+#include "calibrator/diagnostics/misspecification.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "calibrator/diagnostics/error_tests.h"
+#include "calibrator/diagnostics/projected_errors.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kMostCandidates = 3;      // that are told of, one after the other
+constexpr double kNearlyAsGood = 0.85;  // of the best one's gain: an alternative
+constexpr size_t kMostAlternatives = 2;
+constexpr double kWorthwhile = 0.3;  // share of what is left that a further one has to explain
+constexpr double kMostly = 0.8;      // of a gain, in one joint or condition
+
+double LeastEffect(const std::string& test) {
+  return test == "scale" ? kLeastExcess : test == "whiteness" ? kLeastCorrelation : kLeastShare;
+}
+
+// p of the misfit corrected.
+bool Significant(const Misfit& misfit) { return misfit.p < kFalseAlarm; }
+
+bool Counts(const Misfit& misfit) {
+  // Of outliers it is how many they are: a single one makes most of a variance.
+  if (misfit.test == "outliers") return Significant(misfit) && misfit.statistic >= kLeastOutliers;
+  return Significant(misfit) && misfit.effect >= LeastEffect(misfit.test);
+}
+
+std::vector<Misfit> TestErrors(const ProjectedErrors& errors,
+                               const std::vector<bool>& noise_known) {
+  std::vector<Misfit> tests = TestScale(errors, noise_known);
+  for (const auto& more :
+       {TestOutliers(errors), TestWhiteness(errors), TestBias(errors), TestRegression(errors)}) {
+    tests.insert(tests.end(), more.begin(), more.end());
+  }
+  return tests;
+}
+
+// "20 % larger", or "by 0.002 s larger" where there was nothing.
+std::string Change(const Candidate& candidate, double change) {
+  const char* how = change > 0 ? "larger" : "smaller";
+  const bool relative = candidate.value > 1e-3 * candidate.scale && std::isfinite(candidate.lower);
+  if (relative)
+    return fmt::format("{} {:.2g} % {}", candidate.path, 100 * std::abs(change) / candidate.value,
+                       how);
+  return fmt::format("{} {:.2g}{}{} {}", candidate.path, std::abs(change),
+                     candidate.unit.empty() ? "" : " ", candidate.unit, how);
+}
+
+// A candidate and what it would do.
+struct Explanation {
+  size_t index;
+  Eigen::VectorXd column;  // projected
+  Score score;
+  Misfit misfit;
+};
+
+// Where a change of the candidate reduces the errors.
+void Locate(const ProjectedErrors& errors, const Explanation& explanation, Misfit* misfit) {
+  double contact = 0, total = 0;
+  std::vector<std::pair<std::string, double>> joints;
+  for (Eigen::Index i = 0; i < errors.r.size(); ++i) {
+    const double after = errors.r(i) + explanation.column(i) * explanation.score.change;
+    const double gain = errors.r(i) * errors.r(i) - after * after;
+    const std::string& joint =
+        errors.joint_of[static_cast<size_t>(errors.coordinate[static_cast<size_t>(i)] % errors.n)];
+    if (joints.empty() || joints.back().first != joint) {
+      const auto known = std::find_if(joints.begin(), joints.end(),
+                                      [&](const auto& j) { return j.first == joint; });
+      if (known == joints.end()) joints.push_back({joint, 0});
+    }
+    std::find_if(joints.begin(), joints.end(), [&](const auto& j) {
+      return j.first == joint;
+    })->second += gain;
+    total += gain;
+    if (errors.Contact(i)) contact += gain;
+  }
+  const auto most =
+      std::max_element(joints.begin(), joints.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most != joints.end() && joints.size() > 1 && most->second >= kMostly * total)
+    misfit->joint = most->first;
+  if (errors.conditions && contact >= kMostly * total) misfit->condition = "contact";
+  if (errors.conditions && contact <= (1 - kMostly) * total) misfit->condition = "free";
+}
+
+// Share of the errors' squares that a change takes away, in the joint where it is the largest.
+double Share(const ProjectedErrors& errors, const Eigen::VectorXd& column, double change) {
+  Eigen::VectorXd gain = Eigen::VectorXd::Zero(errors.n), squares = gain;
+  for (Eigen::Index i = 0; i < errors.r.size(); ++i) {
+    const Eigen::Index joint = errors.coordinate[static_cast<size_t>(i)] % errors.n;
+    const double before = errors.r(i) * errors.r(i);
+    gain(joint) += before - std::pow(errors.r(i) + column(i) * change, 2);
+    squares(joint) += before;
+  }
+  double most = 0;
+  for (Eigen::Index joint = 0; joint < errors.n; ++joint) {
+    if (squares(joint) > 0) most = std::max(most, gain(joint) / squares(joint));
+  }
+  return std::min(1.0, most);
+}
+
+// Best first.
+std::vector<Explanation> FindExplanations(const ProjectedErrors& errors, const Leftover& leftover) {
+  std::vector<Explanation> found;
+  for (size_t k = 0; k < leftover.candidates.size(); ++k) {
+    const Candidate& candidate = leftover.candidates[k];
+    const Eigen::VectorXd raw =
+        errors.weight.cwiseProduct(leftover.columns.col(static_cast<Eigen::Index>(k)));
+    Eigen::VectorXd column = errors.Project(raw);
+    // What fitted parameters do as well, or nothing does, cannot be tested.
+    if (!(column.norm() > 1e-4 * raw.norm()) || !(column.norm() * candidate.scale > 1e-3)) continue;
+    const Score score =
+        FindScore(errors, column, candidate.scale, candidate.lower - candidate.value);
+    const double share = Share(errors, column, score.change);
+    Misfit misfit{
+        Change(candidate, score.change), "", "", "structure", score.statistic, score.p, share};
+    found.push_back({k, std::move(column), score, std::move(misfit)});
+  }
+  std::stable_sort(found.begin(), found.end(), [](const Explanation& a, const Explanation& b) {
+    return a.score.gain > b.score.gain;
+  });
+  return found;
+}
+
+void Correct(size_t tests, std::vector<Misfit>* misfits) {
+  for (Misfit& misfit : *misfits) misfit.p = std::min(1.0, misfit.p * static_cast<double>(tests));
+}
+
+// What share a gain is of the errors beyond the noise, or of all of them where the noise was
+// estimated from them.
+struct Explained {
+  double share;
+  std::string words;
+};
+
+Explained Explain(const ProjectedErrors& errors, const std::vector<bool>& noise_known,
+                  double gain) {
+  const bool known = std::all_of(noise_known.begin(), noise_known.end(), [](bool k) { return k; });
+  const double squares = errors.r.squaredNorm(), beyond = squares - errors.freedom.sum();
+  const bool of_it = known && beyond > 0;
+  const double share = std::min(1.0, gain / (of_it ? beyond : squares));
+  return {share, fmt::format("{:.0f} % of {}", 100 * share, of_it ? "it" : "the errors' variance")};
+}
+
+std::string Join(const std::vector<std::string>& parts, const std::string& by) {
+  std::string all;
+  for (const std::string& part : parts) all += (all.empty() ? "" : by) + part;
+  return all;
+}
+
+}  // namespace
+
+Misspecification FindMisspecification(const RobotDescription& robot, const Leftover& leftover) {
+  Misspecification found;
+  ProjectedErrors errors(robot, leftover);
+  if (!errors.r.allFinite()) {
+    found.alarm = true;
+    found.words = "the simulation fails on this log with the parameters found";
+    return found;
+  }
+  std::vector<Misfit> tests = TestErrors(errors, leftover.noise_known);
+  std::vector<Explanation> explanations = FindExplanations(errors, leftover);
+  const size_t count = tests.size() + explanations.size();
+  Correct(count, &tests);
+  found.alarm = std::any_of(tests.begin(), tests.end(), Counts);
+
+  std::vector<std::string> words, places;
+  for (int round = 0; round < kMostCandidates; ++round) {
+    for (Explanation& explanation : explanations) {
+      explanation.misfit.p = std::min(1.0, explanation.misfit.p * static_cast<double>(count));
+    }
+    const auto best =
+        std::find_if(explanations.begin(), explanations.end(),
+                     [](const Explanation& explanation) { return Counts(explanation.misfit); });
+    if (best == explanations.end()) break;
+    const Explained explained = Explain(errors, leftover.noise_known, best->score.gain);
+    // No model is linear: a little of what the first candidate is about is always left.
+    if (round > 0 && explained.share < kWorthwhile) break;
+    found.alarm = true;
+    Locate(errors, *best, &best->misfit);
+    places.push_back(errors.Place(best->misfit.joint, best->misfit.condition));
+    std::string line = fmt::format("{} would explain {}", best->misfit.what, explained.words);
+    std::vector<std::string> alternatives;
+    for (const Explanation& other : explanations) {
+      if (&other == &*best || other.score.gain < kNearlyAsGood * best->score.gain) continue;
+      if (alternatives.size() < kMostAlternatives) alternatives.push_back(other.misfit.what);
+    }
+    if (!alternatives.empty()) line += " (nearly as well: " + Join(alternatives, "; ") + ")";
+    words.push_back((round == 0 ? "" : "of what is left ") + line);
+    found.misfits.push_back(best->misfit);
+    errors.Explain(best->column);
+    explanations = FindExplanations(errors, leftover);
+  }
+
+  if (!found.misfits.empty()) {
+    tests = TestErrors(errors, leftover.noise_known);
+    Correct(count, &tests);
+  }
+  std::erase_if(tests, [](const Misfit& test) {
+    return !Counts(test) && !(test.test == "outliers" && Significant(test));
+  });
+  std::stable_sort(tests.begin(), tests.end(), [](const Misfit& a, const Misfit& b) {
+    return std::pair(Counts(a), a.effect) > std::pair(Counts(b), b.effect);
+  });
+  std::vector<std::string> rest;
+  for (const Misfit& test : tests) {
+    if (rest.size() < 3) rest.push_back(test.what);
+    if (found.alarm) places.push_back(errors.Place(test.joint, test.condition));
+  }
+  found.misfits.insert(found.misfits.end(), tests.begin(), tests.end());
+
+  std::vector<std::string> distinct;
+  for (const std::string& place : places) {
+    if (std::find(distinct.begin(), distinct.end(), place) == distinct.end() && distinct.size() < 3)
+      distinct.push_back(place);
+  }
+  if (!found.alarm) {
+    found.words = fmt::format("nothing speaks against the model ({} tests of {} errors)", count,
+                              errors.r.size());
+    if (!rest.empty()) found.words += ", but look at " + Join(rest, "; ");
+    return found;
+  }
+  found.words = "the model cannot explain this log: " + Join(distinct, "; ");
+  for (const std::string& line : words) found.words += "; " + line;
+  if (!rest.empty())
+    found.words += (words.empty() ? "; " : "; not explained by that: ") + Join(rest, "; ");
+  return found;
+}
+
+}  // namespace plumb

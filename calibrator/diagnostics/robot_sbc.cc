@@ -1,0 +1,83 @@
+#include "calibrator/diagnostics/robot_sbc.h"
+
+#include <vector>
+
+#include "calibrator/diagnostics/identifiability.h"
+#include "calibrator/fit/curriculum.h"
+
+namespace plumb {
+namespace {
+
+// Where the recorded steps lead these parameters, exactly, from the recorded states on.
+std::vector<Rollout> Replay(WindowErrors& errors, std::span<const Rollout> rollouts,
+                            const Eigen::VectorXd& physical) {
+  const Eigen::VectorXd raw = errors.Raw(physical);
+  std::vector<Rollout> replayed(rollouts.begin(), rollouts.end());
+  const Eigen::Index n = errors.num_velocities();
+  for (size_t i = 0; i < errors.rows().size(); ++i) {
+    const WindowErrors::Row& row = errors.rows()[i];
+    Transition& t =
+        replayed[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+    (row.coordinate < n ? t.next_q(row.coordinate) : t.next_v(row.coordinate - n)) +=
+        raw(static_cast<Eigen::Index>(i));
+  }
+  return replayed;
+}
+
+// Each step begins at a state that is known, and ends where noise hides the robot.
+void Blur(std::vector<Rollout>& rollouts, const Eigen::VectorXd& noise_sd, Random& random) {
+  const Eigen::Index n = noise_sd.size() / 2;
+  for (Rollout& rollout : rollouts) {
+    for (Transition& t : rollout.transitions) {
+      for (Eigen::Index i = 0; i < n; ++i) {
+        t.next_q(i) += noise_sd(i) * random.Normal();
+        t.next_v(i) += noise_sd(n + i) * random.Normal();
+      }
+      t.q_sd.setZero(), t.v_sd.setZero();
+      t.next_q_sd.setConstant(NAN), t.next_v_sd.setConstant(NAN);
+    }
+  }
+}
+
+}  // namespace
+
+SbcResult RunRobotSbc(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
+                      const Eigen::VectorXd& noise_sd, const RobotSbcOptions& options) {
+  const RobotDescription& robot = model->description();
+  const Prior prior = PriorOf(robot);
+  WindowErrors errors(model, rollouts, 1, options.threads);
+  errors.set_noise_sd(noise_sd);
+  std::vector<std::string> names;
+  for (const ParameterDescription& p : robot.parameters) names.push_back(p.name);
+  std::vector<SbcQuantity> quantities = Marginals(names);
+  const Eigen::VectorXd mean = prior.FromStandard(Eigen::VectorXd::Zero(prior.size()));
+  LaplaceOptions still;
+  still.most_iterations = 0;
+  const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), mean, still);
+  const Eigen::VectorXd sd = (prior.FromStandard(Eigen::VectorXd::Ones(prior.size())) - mean);
+  for (const Combination& c :
+       FindIdentifiability(robot, view.information, sd, view.posterior).combinations) {
+    // a parameter on its own is among them already
+    if ((c.power.array() != 0).count() < 2) continue;
+    quantities.push_back(
+        {c.name, [power = c.power](const Eigen::VectorXd& x) { return power.dot(x); }});
+  }
+  CurriculumOptions curriculum;
+  curriculum.horizons = {1};
+  curriculum.workforce = options.threads;
+  int run = 0;
+  const auto fit = [&](const Eigen::VectorXd& truth,
+                       Random& random) -> std::optional<Eigen::MatrixXd> {
+    options.progress(++run / static_cast<double>(options.runs));
+    std::vector<Rollout> data = Replay(errors, rollouts, robot.ToPhysical(truth));
+    Blur(data, noise_sd, random);
+    try {
+      return Draw(FitCurriculum(model, data, curriculum).fit, prior, options.draws, random);
+    } catch (const std::invalid_argument&) {
+      return {};
+    }
+  };
+  return RunSbc(prior, fit, quantities, options.runs, options.seed);
+}
+
+}  // namespace plumb

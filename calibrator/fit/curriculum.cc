@@ -1,0 +1,342 @@
+#include "calibrator/fit/curriculum.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "calibrator/inference/noise.h"
+#include "common/decompositions.h"
+#include "common/random.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kClusterSteps = 25;     // beyond the memory of an estimator's smoother
+constexpr int64_t kSearchSteps = 40;  // transitions that are enough to find a mode
+constexpr double kSameMode = 4;       // [sd] between two answers that count as one
+// [nat] by which another mode may explain the transitions worse
+constexpr double kWorthless = 12;
+constexpr int kNoiseRounds = 4;        // until the noise of beginnings and ends agrees
+constexpr double kGrownNoise = 1.15;   // of a stage, relative to the first one's
+constexpr double kLargestShift = 3.5;  // [sd] of a mode from one stage to the next
+
+class Curriculum {
+ public:
+  Curriculum(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
+             const CurriculumOptions& options)
+      : model_(std::move(model)),
+        robot_(model_->description()),
+        prior_(PriorOf(robot_)),
+        rollouts_(rollouts),
+        options_(options) {}
+
+  CurriculumFit Run(const Eigen::VectorXd& start) {
+    WindowErrors one_step(model_, rollouts_, 1, options_.workforce);
+    result_.noise_known = one_step.noise_known();
+    result_.rows = one_step.rows();
+    std::vector<Eigen::VectorXd> guesses = Search(FirstGuesses(start), one_step);
+    std::vector<LaplaceFit> modes;
+    Eigen::VectorXd noise;  // that the best mode's errors are whitened by
+    double best = -std::numeric_limits<double>::infinity();
+    for (const Eigen::VectorXd& guess : guesses) {
+      modes.push_back(FitStage(one_step, guess, kNoiseRounds));
+      if (modes.back().log_posterior <= best) continue;
+      best = modes.back().log_posterior;
+      noise = one_step.noise_sd();
+      result_.noise_sd = NoiseOf(one_step, modes.back());
+    }
+    if (modes.size() > 1) one_step.set_noise_sd(noise);
+    std::stable_sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) {
+      return a.log_posterior > b.log_posterior;
+    });
+    for (size_t i = 1; i < modes.size(); ++i) {
+      if (modes[i].log_posterior > modes[0].log_posterior - kWorthless &&
+          Differs(modes[i], modes[0])) {
+        result_.others.push_back(std::move(modes[i]));
+      }
+    }
+    result_.fit = std::move(modes[0]);
+    result_.one_step = result_.fit;
+    first_errors_ = Whitened(one_step, result_.fit).cwiseProduct(one_step.EndNoise());
+    Record(one_step, result_.fit, 1);
+    // Where one step leaves nothing to explain, more can teach nothing.
+    const bool exact = (result_.fit.scale.array() <= Noise::kLeastScale).all();
+    for (const int horizon : options_.horizons) {
+      if (exact) break;
+      if (horizon > 1 && !Lengthen(horizon)) break;
+    }
+    if (result_.horizon > 1 || modes.size() > 1) {  // how the one-step errors are at the final mode
+      one_step.Linearise(robot_.ToPhysical(result_.fit.mode));
+      const Eigen::VectorXd errors = ProblemOf(robot_, one_step).errors(result_.fit.mode);
+      result_.one_step.errors = errors.array() / RowScale(one_step, result_.one_step).array();
+    }
+    Account(one_step);
+    result_.fit.simulations = simulations_;
+    return std::move(result_);
+  }
+
+ private:
+  std::vector<Eigen::VectorXd> FirstGuesses(const Eigen::VectorXd& start) const {
+    std::vector<Eigen::VectorXd> guesses{start};
+    if (start.size() == 0) guesses[0] = prior_.FromStandard(Eigen::VectorXd::Zero(prior_.size()));
+    for (int i = 1; i < options_.starts; ++i) {
+      Random random(options_.seed, {0x57a57, static_cast<uint32_t>(i)});
+      guesses.push_back(prior_.Sample(1, random));
+    }
+    return guesses;
+  }
+
+  // Modes that the guesses lead to on a part of the transitions; the best explanation first.
+  std::vector<Eigen::VectorXd> Search(const std::vector<Eigen::VectorXd>& guesses,
+                                      const WindowErrors& all) {
+    const auto every = static_cast<int>(std::max<int64_t>(1, all.steps() / kSearchSteps));
+    LaplaceOptions quick;
+    quick.sandwich = quick.robust = quick.jacobian_at_end = false;
+    quick.tolerance = 0.3;
+    std::vector<LaplaceFit> found;
+    int impossible = 0;
+    std::string last_error = "no first guess can be simulated";
+    for (const Eigen::VectorXd& guess : guesses) {
+      WindowErrors part(model_, rollouts_, 1, options_.workforce, every);
+      try {
+        part.Linearise(robot_.ToPhysical(guess));
+        found.push_back(FitLaplace(ProblemOf(robot_, part), guess, quick));
+        found.back().log_posterior -= part.LogSpread();
+        simulations_ += found.back().simulations;
+      } catch (const std::invalid_argument& error) {
+        last_error = error.what();
+        ++impossible;
+      }
+      Account(part);
+      // nothing is left to explain
+      if (!found.empty() && (found.back().scale.array() <= Noise::kLeastScale).all()) break;
+      options_.progress("first guesses", 0.3 * static_cast<double>(found.size()) /
+                                             static_cast<double>(guesses.size()));
+    }
+    if (found.empty()) throw std::invalid_argument(last_error);
+    if (impossible > 0) {
+      result_.warnings.push_back(
+          fmt::format("{} of {} first guesses could not be simulated", impossible, guesses.size()));
+    }
+    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
+      return a.log_posterior > b.log_posterior;
+    });
+    // With a part of the evidence the difference is that much smaller.
+    const double share = static_cast<double>(every);
+    std::vector<Eigen::VectorXd> modes;
+    std::vector<const LaplaceFit*> kept;
+    for (const LaplaceFit& fit : found) {
+      if (fit.log_posterior < found[0].log_posterior - std::max(3.0, kWorthless / share)) continue;
+      if (std::any_of(kept.begin(), kept.end(),
+                      [&](const LaplaceFit* other) { return !Differs(fit, *other); }))
+        continue;
+      kept.push_back(&fit);
+      modes.push_back(fit.mode);
+    }
+    return modes;
+  }
+
+  static bool Differs(const LaplaceFit& a, const LaplaceFit& b) {
+    const Eigen::VectorXd offset = a.standard.mean - b.standard.mean;
+    const Eigen::MatrixXd spread = a.standard.covariance + b.standard.covariance;
+    return std::sqrt(offset.dot(spread.llt().solve(offset))) > kSameMode;
+  }
+
+  // Fits until the sensitivity to the initial states, and the noise that both ends share, are those
+  // at the mode.
+  LaplaceFit FitStage(WindowErrors& errors, const Eigen::VectorXd& start, int rounds) {
+    LaplaceFit fit;
+    Eigen::VectorXd mode = start;
+    const bool exact = errors.starts_known();
+    for (int round = 0; round < (exact ? 1 : rounds); ++round) {
+      errors.Linearise(robot_.ToPhysical(mode));
+      fit = FitLaplace(ProblemOf(robot_, errors), mode);
+      simulations_ += fit.simulations;
+      const Eigen::VectorXd offset = fit.mode - mode;
+      mode = fit.mode;
+      if (exact) break;
+      const bool settled =
+          (offset.array() / fit.posterior.covariance.diagonal().array().sqrt()).abs().maxCoeff() <
+              0.1 &&
+          (errors.noise_known() || (fit.scale.array().log().abs() < 0.05).all());
+      if (settled || round + 1 == rounds) break;
+      if (!errors.noise_known()) errors.set_noise_sd(Scaled(errors.noise_sd(), fit));
+    }
+    // of the errors themselves, whatever they were whitened by
+    fit.log_posterior -= errors.LogSpread();
+    return fit;
+  }
+
+  // What the errors' scale makes of the record, or of the assumption.
+  static Eigen::VectorXd NoiseOf(const WindowErrors& errors, const LaplaceFit& fit) {
+    return Scaled(errors.EndNoise(), fit);
+  }
+
+  // There is no scale of what was never observed.
+  static Eigen::VectorXd Scaled(Eigen::VectorXd noise, const LaplaceFit& fit) {
+    for (Eigen::Index c = 0; c < std::min(noise.size(), fit.scale.size()); ++c)
+      noise(c) *= std::max(fit.scale(c), 1e-150);
+    return noise;
+  }
+
+  static Eigen::VectorXd RowScale(const WindowErrors& errors, const LaplaceFit& fit) {
+    Eigen::VectorXd scale(static_cast<Eigen::Index>(errors.rows().size()));
+    for (size_t i = 0; i < errors.rows().size(); ++i)
+      scale(static_cast<Eigen::Index>(i)) = fit.scale(errors.rows()[i].coordinate);
+    return scale;
+  }
+
+  // @return false if windows of that length do not count.
+  bool Lengthen(int horizon) {
+    WindowErrors errors(model_, rollouts_, horizon, options_.workforce);
+    // no two transitions follow each other
+    if (errors.windows() == static_cast<int>(errors.steps())) return false;
+    if (!result_.noise_known) errors.set_noise_sd(result_.noise_sd);
+    LaplaceFit fit;
+    try {
+      fit = FitStage(errors, result_.fit.mode, 2);
+    } catch (const std::invalid_argument& error) {
+      Account(errors);
+      result_.warnings.push_back(
+          fmt::format("windows of {} steps are not used: {}", horizon, error.what()));
+      return false;
+    }
+    Account(errors);
+    const double grown = GrownNoise(errors, fit);
+    const double shift = Shift(result_.fit, fit);
+    std::string why;
+    if (!fit.converged)
+      why = "the fit does not converge";
+    else if (!(grown < kGrownNoise))
+      why = fmt::format("their errors are {:.2g} times the noise of one step", grown);
+    else if (!(shift < kLargestShift))
+      why = fmt::format("they lead {:.2g} standard deviations away from what shorter ones say",
+                        shift);
+    if (!why.empty()) {
+      result_.warnings.push_back(fmt::format("windows of {} steps are not used: {}", horizon, why));
+      return false;
+    }
+    Record(errors, fit, horizon);
+    result_.fit = std::move(fit);
+    return true;
+  }
+
+  // Root mean square error of each entry of (q, v), in units of the noise as it is assumed.
+  static Eigen::VectorXd Whitened(const WindowErrors& errors, const LaplaceFit& fit) {
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * errors.num_velocities()), rows = squares;
+    for (Eigen::Index i = 0; i < fit.errors.size(); ++i) {
+      const int c = errors.rows()[static_cast<size_t>(i)].coordinate;
+      squares(c) += std::pow(fit.errors(i) * fit.scale(c), 2);
+      rows(c) += 1;
+    }
+    return squares.cwiseQuotient(rows.cwiseMax(1)).cwiseSqrt();
+  }
+
+  // Largest ratio of an entry's errors to what they were at first, less what chance may have made
+  // of it.
+  double GrownNoise(const WindowErrors& errors, const LaplaceFit& fit) const {
+    const Eigen::VectorXd noise = Whitened(errors, fit).cwiseProduct(errors.EndNoise());
+    Eigen::VectorXd rows = Eigen::VectorXd::Zero(noise.size());
+    for (const WindowErrors::Row& row : errors.rows()) rows(row.coordinate) += 1;
+    double grown = 0;
+    for (Eigen::Index c = 0; c < noise.size(); ++c) {
+      if (rows(c) == 0) continue;
+      const double before = std::max(first_errors_(c), kNegligible * errors.state_scale()(c));
+      grown = std::max(grown, noise(c) / before - 3 / std::sqrt(2 * rows(c)));
+    }
+    return grown;
+  }
+
+  // How far a mode has moved, in standard deviations of where it was known before, along the
+  // direction where that is most. If both stages are right the difference varies less than the
+  // earlier mode does (Hausman, Econometrica 46, 1978).
+  static double Shift(const LaplaceFit& before, const LaplaceFit& after) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(before.standard.covariance);
+    const Eigen::VectorXd along =
+        axes.eigenvectors().transpose() * (after.standard.mean - before.standard.mean);
+    return (along.array().abs() / axes.eigenvalues().array().max(1e-300).sqrt()).maxCoeff();
+  }
+
+  void Record(const WindowErrors& errors, const LaplaceFit& fit, int horizon) {
+    // Relative to the noise as recorded or, where nobody knows it, to that of one step.
+    const Eigen::VectorXd relative =
+        NoiseOf(errors, fit)
+            .cwiseQuotient(result_.noise_known ? errors.EndNoise() : result_.noise_sd);
+    double squares = 0;
+    for (Eigen::Index i = 0; i < fit.errors.size(); ++i) {
+      squares +=
+          std::pow(fit.errors(i) * relative(errors.rows()[static_cast<size_t>(i)].coordinate), 2);
+    }
+    result_.stages.push_back({horizon, errors.windows(), errors.simulated_steps(),
+                              squares / static_cast<double>(fit.errors.size()), fit.mode,
+                              fit.posterior.covariance.diagonal().cwiseSqrt()});
+    result_.horizon = horizon;
+    const double last = options_.horizons.empty() ? 1 : options_.horizons.back();
+    options_.progress(fmt::format("windows of {} step{}", horizon, horizon == 1 ? "" : "s"),
+                      0.3 + 0.7 * horizon / std::max(last, 1.0));
+  }
+
+  void Account(const WindowErrors& errors) {
+    result_.simulated_steps += errors.simulated_steps();
+    result_.failures += errors.failures();
+  }
+
+  std::shared_ptr<const Model> model_;
+  const RobotDescription& robot_;
+  Prior prior_;
+  std::span<const Rollout> rollouts_;
+  const CurriculumOptions& options_;
+  CurriculumFit result_;
+  // of one step, root mean square of each entry of (q, v), physical units
+  Eigen::VectorXd first_errors_;
+  int64_t simulations_ = 0;
+};
+
+}  // namespace
+
+Prior PriorOf(const RobotDescription& robot) {
+  std::vector<Prior::Marginal> marginals;
+  for (const ParameterDescription& p : robot.parameters) {
+    marginals.push_back(Prior::Normal(p.coordinate_mean(), std::sqrt(p.coordinate_variance())));
+  }
+  return Prior(std::move(marginals));
+}
+
+LeastSquares ProblemOf(const RobotDescription& robot, WindowErrors& errors) {
+  LeastSquares problem{PriorOf(robot),
+                       [&](const Eigen::MatrixXd& coordinates) {
+                         Eigen::MatrixXd physical(coordinates.rows(), coordinates.cols());
+                         for (Eigen::Index j = 0; j < coordinates.cols(); ++j)
+                           physical.col(j) = robot.ToPhysical(coordinates.col(j));
+                         return errors.Whitened(physical);
+                       },
+                       {},
+                       {},
+                       {},
+                       errors.noise_known()};
+  int block = -1, cluster = -1, steps = kClusterSteps;
+  const WindowErrors::Row* before = nullptr;
+  for (const WindowErrors::Row& row : errors.rows()) {
+    const bool new_step =
+        !before || row.window != before->window || row.transition != before->transition;
+    const bool new_window = !before || row.window != before->window;
+    if (new_step) ++block, ++steps;
+    if (!before || (new_window && (steps > kClusterSteps || row.rollout != before->rollout)))
+      ++cluster, steps = 1;
+    problem.group.push_back(row.coordinate);
+    problem.block.push_back(block);
+    problem.cluster.push_back(cluster);
+    before = &row;
+  }
+  return problem;
+}
+
+CurriculumFit FitCurriculum(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
+                            const CurriculumOptions& options, const Eigen::VectorXd& start) {
+  return Curriculum(std::move(model), rollouts, options).Run(start);
+}
+
+}  // namespace plumb

@@ -1,0 +1,274 @@
+#include "calibrator/fit/discrepancy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Gaussian filter over rows (time) with reflected ends.
+Eigen::MatrixXd SmoothOverTime(const Eigen::MatrixXd& x, double sigma_rows) {
+  const int n = static_cast<int>(x.rows()), reach = static_cast<int>(std::ceil(4 * sigma_rows));
+  if (reach == 0 || n < 2) return x;
+  Eigen::MatrixXd smooth = Eigen::MatrixXd::Zero(x.rows(), x.cols());
+  double total = 0;
+  for (int offset = -reach; offset <= reach; ++offset) {
+    const double weight = std::exp(-0.5 * offset * offset / (sigma_rows * sigma_rows));
+    total += weight;
+    for (int i = 0; i < n; ++i) {
+      int from = std::abs(i + offset) % (2 * n);
+      if (from >= n) from = 2 * n - 1 - from;
+      smooth.row(i) += weight * x.row(from);
+    }
+  }
+  return smooth / total;
+}
+
+// From the first to the last: Eigen's order depends on where in memory a column begins, hence on
+// what is beside it, and a batch may be shared out.
+Eigen::VectorXd ColumnSums(const Eigen::MatrixXd& values) {
+  Eigen::VectorXd sums(values.cols());
+  for (Eigen::Index j = 0; j < values.cols(); ++j)
+    sums(j) = std::accumulate(values.col(j).begin(), values.col(j).end(), 0.0);
+  return sums;
+}
+
+}  // namespace
+
+size_t CountTransitions(std::span<const Rollout> rollouts) {
+  size_t count = 0;
+  for (const Rollout& rollout : rollouts) count += rollout.transitions.size();
+  return count;
+}
+
+Discrepancy::Discrepancy(const RobotDescription& robot, Workforce workforce)
+    : n_(robot.num_velocities()),
+      windows_(std::make_shared<Model>(robot), workforce.threads),
+      scale_(MakeTask(robot)->state_scale()),
+      batches_(workforce.batches) {
+  if (robot.num_positions() != robot.num_velocities()) {
+    throw std::invalid_argument("calibration does not know spherical joints yet");
+  }
+}
+
+// Some recorded steps from one transition's state on.
+Window Discrepancy::WindowOf(const Rollout& rollout, size_t first, size_t length) const {
+  const auto& transitions = rollout.transitions;
+  Window window;
+  window.q = transitions[first].q;
+  window.v = transitions[first].v;
+  for (size_t i = first; i < first + length; ++i) window.steps.emplace_back(transitions[i].efforts);
+  if (!windows_.model().parameters().delays()) return window;
+  double known = 0;
+  for (size_t i = first; i > 0 && known < JointDynamics::kLongestDelay; --i) {
+    if (transitions[i - 1].step != transitions[i].step - 1) break;
+    window.before.insert(window.before.begin(), transitions[i - 1].efforts);
+    known += transitions[i - 1].duration();
+  }
+  return window;
+}
+
+void Discrepancy::OneStep(std::span<const Rollout> rollouts, std::vector<Window>* windows,
+                          Ends* ends) const {
+  for (const Rollout& rollout : rollouts) {
+    for (size_t i = 0; i < rollout.transitions.size(); ++i) {
+      windows->push_back(WindowOf(rollout, i, 1));
+      ends->push_back(&rollout.transitions[i]);
+    }
+  }
+}
+
+void Discrepancy::Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
+                          const Windows::Visit& visit, bool last_only) {
+  const Windows::Failures failures = windows_.Predict(parameters, windows, visit, last_only);
+  failures_.impossible += failures.impossible;
+  failures_.diverged += failures.diverged;
+}
+
+// Squared whitened error of one transition; writes the errors themselves unless null.
+double Discrepancy::Whiten(const Transition& t, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                           double* whitened) const {
+  const double period = t.duration();
+  double squared = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double error_q = q(i) - t.next_q(i), error_v = v(i) - t.next_v(i);
+    const double v_variance = t.v_sd(i) * t.v_sd(i);
+    const double qq =
+        t.next_q_sd(i) * t.next_q_sd(i) + t.q_sd(i) * t.q_sd(i) + period * period * v_variance;
+    const double vv = t.next_v_sd(i) * t.next_v_sd(i) + v_variance, qv = period * v_variance;
+    // Cholesky's factor of [[vv, qv], [qv, qq]], applied from the left.
+    const double root_v = std::sqrt(vv);
+    const double first = error_v / root_v;
+    const double second = (error_q - qv / vv * error_v) / std::sqrt(qq - qv * qv / vv);
+    if (whitened) {
+      whitened[2 * i] = first;
+      whitened[2 * i + 1] = second;
+    }
+    squared += first * first + second * second;
+  }
+  return std::isfinite(squared) ? squared : kInfinity;
+}
+
+// One row per transition, one column per sample.
+Eigen::MatrixXd Discrepancy::SquaredStepErrors(const Eigen::MatrixXd& parameters,
+                                               std::span<const Rollout> rollouts) {
+  std::vector<Window> windows;
+  Ends ends;
+  OneStep(rollouts, &windows, &ends);
+  Eigen::MatrixXd squared(static_cast<Eigen::Index>(windows.size()), parameters.cols());
+  Predict(parameters, windows,
+          [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
+            squared(static_cast<Eigen::Index>(window), sample) =
+                Whiten(*ends[window], q, v, nullptr);
+          });
+  return squared;
+}
+
+Eigen::VectorXd Discrepancy::LogLikelihood(const Eigen::MatrixXd& parameters,
+                                           std::span<const Rollout> rollouts) {
+  const Eigen::MatrixXd squared = SquaredStepErrors(parameters, rollouts);
+  const double weight = -0.5 * (kDegreesOfFreedom + 2 * static_cast<double>(n_));
+  return weight * ColumnSums((squared / kDegreesOfFreedom).array().log1p().matrix());
+}
+
+Eigen::VectorXd Discrepancy::StepError(const Eigen::MatrixXd& parameters,
+                                       std::span<const Rollout> rollouts) {
+  const Eigen::MatrixXd squared = SquaredStepErrors(parameters, rollouts);
+  return ColumnSums(squared) / static_cast<double>(squared.rows() * 2 * n_);
+}
+
+Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters,
+                                       std::span<const Rollout> rollouts) {
+  std::vector<Window> windows;
+  Ends ends;
+  OneStep(rollouts, &windows, &ends);
+  Eigen::MatrixXd residuals(static_cast<Eigen::Index>(windows.size()) * 2 * n_, parameters.cols());
+  Predict(parameters, windows,
+          [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
+            double* errors = &residuals(static_cast<Eigen::Index>(window) * 2 * n_, sample);
+            if (Whiten(*ends[window], q, v, errors) == kInfinity)
+              std::fill_n(errors, 2 * n_, kInfinity);
+          });
+  return residuals;
+}
+
+template <class Compute>
+Eigen::VectorXd Discrepancy::Batch(uint64_t identity, const Eigen::MatrixXd& parameters,
+                                   const Compute& compute) {
+  Batches here;
+  return (batches_ ? *batches_ : here)
+      .Run(Hash(parameters, identity), 1, parameters.cols(),
+           [&](Eigen::Index first, Eigen::Index count) -> Eigen::MatrixXd {
+             return compute(parameters.middleCols(first, count)).transpose();
+           })
+      .transpose();
+}
+
+Eigen::VectorXd Discrepancy::TrajectoryError(const Eigen::MatrixXd& parameters,
+                                             std::span<const Rollout> rollouts, double smoothing) {
+  return Batch(0, parameters, [&](const Eigen::MatrixXd& columns) {
+    return TrajectoryErrorHere(columns, rollouts, smoothing);
+  });
+}
+
+Eigen::VectorXd Discrepancy::PredictionError(const Eigen::MatrixXd& parameters,
+                                             std::span<const Rollout> rollouts, int horizon) {
+  return Batch(static_cast<uint64_t>(horizon), parameters, [&](const Eigen::MatrixXd& columns) {
+    return PredictionErrorHere(columns, rollouts, horizon);
+  });
+}
+
+Eigen::VectorXd Discrepancy::TrajectoryErrorHere(const Eigen::MatrixXd& parameters,
+                                                 std::span<const Rollout> rollouts,
+                                                 double smoothing) {
+  // Over a gap nothing is known of the efforts: the simulation sets off again where the record
+  // does.
+  std::vector<Window> windows;
+  std::vector<const Transition*> first;  // of each window
+  // where each window's errors go, and where each roll-out's begin
+  std::vector<Eigen::Index> rows, begins;
+  Eigen::Index steps = 0;
+  for (const Rollout& rollout : rollouts) {
+    const auto& transitions = rollout.transitions;
+    begins.push_back(steps);
+    for (size_t begin = 0, end = 1; begin < transitions.size(); begin = end++) {
+      while (end < transitions.size() && transitions[end].step == transitions[end - 1].step + 1)
+        ++end;
+      windows.push_back(WindowOf(rollout, begin, end - begin));
+      first.push_back(&transitions[begin]);
+      rows.push_back(steps + static_cast<Eigen::Index>(begin));
+    }
+    steps += static_cast<Eigen::Index>(transitions.size());
+  }
+  begins.push_back(steps);
+  std::vector<Eigen::MatrixXd> errors(static_cast<size_t>(parameters.cols()),
+                                      Eigen::MatrixXd(steps, 2 * n_));
+  const auto visit = [&](Eigen::Index sample, size_t window, size_t step, const auto& q,
+                         const auto& v) {
+    const Transition& transition = first[window][step];
+    auto row =
+        errors[static_cast<size_t>(sample)].row(rows[window] + static_cast<Eigen::Index>(step));
+    row << (q - transition.next_q).transpose(), (v - transition.next_v).transpose();
+    row.array() /= scale_.transpose().array();
+    for (Eigen::Index i = 0; i < n_; ++i) {  // what was not observed is not compared
+      if (std::isnan(transition.next_q(i))) row(i) = 0;
+      if (std::isnan(transition.next_v(i))) row(n_ + i) = 0;
+    }
+  };
+  Predict(parameters, windows, visit, /*last_only=*/false);
+  Eigen::VectorXd total = Eigen::VectorXd::Zero(parameters.cols());
+  for (Eigen::Index sample = 0; sample < parameters.cols(); ++sample) {
+    for (size_t i = 0; i < rollouts.size(); ++i) {
+      if (rollouts[i].transitions.empty()) continue;
+      const Eigen::MatrixXd own =
+          errors[static_cast<size_t>(sample)].middleRows(begins[i], begins[i + 1] - begins[i]);
+      const Eigen::MatrixXd smooth =
+          SmoothOverTime(own, smoothing / rollouts[i].transitions[0].duration());
+      const double error = smooth.cwiseAbs().sum() + smooth.squaredNorm();
+      total(sample) += std::isfinite(error) ? error : kInfinity;
+    }
+  }
+  return total / static_cast<double>(steps);
+}
+
+Eigen::VectorXd Discrepancy::PredictionErrorHere(const Eigen::MatrixXd& parameters,
+                                                 std::span<const Rollout> rollouts, int horizon) {
+  std::vector<Window> windows;
+  Ends ends;
+  const auto length = static_cast<size_t>(horizon);
+  for (const Rollout& rollout : rollouts) {
+    const auto& t = rollout.transitions;
+    for (size_t start = 0; start + length <= t.size(); ++start) {
+      if (t[start + length - 1].step != t[start].step + horizon - 1) continue;
+      if (!t[start + length - 1].next_q.array().isFinite().any() &&
+          !t[start + length - 1].next_v.array().isFinite().any())
+        continue;
+      windows.push_back(WindowOf(rollout, start, length));
+      ends.push_back(&t[start + length - 1]);
+    }
+  }
+  if (windows.empty())
+    return Eigen::VectorXd::Constant(parameters.cols(), std::numeric_limits<double>::quiet_NaN());
+  Eigen::MatrixXd squared(static_cast<Eigen::Index>(windows.size()), parameters.cols());
+  Predict(
+      parameters, windows,
+      [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
+        Eigen::VectorXd error(2 * n_);
+        error << q - ends[window]->next_q, v - ends[window]->next_v;
+        const Eigen::ArrayXd recorded =
+            (Eigen::ArrayXd(2 * n_) << ends[window]->next_q, ends[window]->next_v).finished();
+        const auto observed = recorded.isFinite();
+        const double mean = observed.select((error.array() / scale_.array()).square(), 0.0).sum() /
+                            static_cast<double>(observed.count());
+        squared(static_cast<Eigen::Index>(window), sample) = std::isfinite(mean) ? mean : kInfinity;
+      });
+  return (ColumnSums(squared) / static_cast<double>(squared.rows())).cwiseSqrt();
+}
+
+}  // namespace plumb

@@ -1,0 +1,106 @@
+#include "calibrator/fit/robot_problem.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+
+#include "calibrator/fit/curriculum.h"
+#include "calibrator/inference/distances.h"
+#include "common/decompositions.h"
+
+namespace plumb {
+namespace {
+
+Random NoiseOf(uint64_t seed, int64_t simulation) {
+  return Random(
+      seed, {0xabc, static_cast<uint32_t>(simulation), static_cast<uint32_t>(simulation >> 32)});
+}
+
+// Errors divided by the noise's scale, one column of each simulator.
+Eigen::MatrixXd Scaled(const LeastSquares& problem, const Eigen::VectorXd& scale,
+                       const Eigen::MatrixXd& parameters) {
+  Eigen::MatrixXd errors = problem.errors(parameters);
+  for (size_t i = 0; i < problem.group.size(); ++i)
+    errors.row(static_cast<Eigen::Index>(i)) /= scale(problem.group[i]);
+  return errors;
+}
+
+// A block of rows as one column each, zeros where nothing was observed.
+Eigen::MatrixXd AsSet(const LeastSquares& problem, Eigen::Index dimension,
+                      const Eigen::VectorXd& errors) {
+  Eigen::MatrixXd set = Eigen::MatrixXd::Zero(dimension, problem.block.back() + 1);
+  for (size_t i = 0; i < problem.block.size(); ++i)
+    set(problem.group[i], problem.block[i]) = errors(static_cast<Eigen::Index>(i));
+  return set;
+}
+
+}  // namespace
+
+const std::vector<std::string>& RobotDiscrepancies() {
+  static const std::vector<std::string> names{"likelihood", "squared", "absolute",
+                                              "energy",     "mmd",     "sliced-wasserstein"};
+  return names;
+}
+
+Problem RobotProblem(const RobotDescription& robot, WindowErrors& errors, const LaplaceFit& first,
+                     const std::string& discrepancy, uint64_t seed) {
+  const auto& names = RobotDiscrepancies();
+  if (std::find(names.begin(), names.end(), discrepancy) == names.end()) {
+    throw std::invalid_argument(fmt::format("there is no discrepancy '{}'; there are {}",
+                                            discrepancy, fmt::join(names, ", ")));
+  }
+  const auto problem = std::make_shared<LeastSquares>(ProblemOf(robot, errors));
+  const Eigen::VectorXd scale = first.scale;
+  const Eigen::Index n = problem->prior.size(),
+                     rows = static_cast<Eigen::Index>(problem->group.size());
+  if (discrepancy == "likelihood") {
+    const Eigen::MatrixXd slopes = first.jacobian;
+    const Eigen::VectorXd sd = (problem->prior.FromStandard(Eigen::VectorXd::Ones(n)) -
+                                problem->prior.FromStandard(-Eigen::VectorXd::Ones(n))) /
+                               2;
+    Eigen::MatrixXd spread = slopes.transpose() * slopes;
+    spread.diagonal() += sd.array().square().inverse().matrix();
+    const Eigen::MatrixXd project = spread.llt().matrixL().solve(slopes.transpose());
+    return {problem->prior, Eigen::VectorXd::Zero(n),
+            [=](const Eigen::MatrixXd& parameters, int64_t index) -> Eigen::MatrixXd {
+              Eigen::MatrixXd simulated = Scaled(*problem, scale, parameters);
+              for (Eigen::Index j = 0; j < simulated.cols(); ++j) {
+                Random random = NoiseOf(seed, index + j);
+                for (double& e : simulated.col(j)) e += random.Normal();
+              }
+              return project * simulated;
+            }};
+  }
+  if (discrepancy == "squared" || discrepancy == "absolute") {
+    const bool squared = discrepancy == "squared";
+    return {problem->prior, Eigen::VectorXd::Zero(1),
+            [=](const Eigen::MatrixXd& parameters, int64_t) -> Eigen::MatrixXd {
+              const Eigen::MatrixXd simulated = Scaled(*problem, scale, parameters);
+              if (squared) return simulated.cwiseAbs2().colwise().mean();
+              return simulated.cwiseAbs().colwise().mean();
+            }};
+  }
+  // What errors would be if they were noise alone: the same for all simulators.
+  Random random = NoiseOf(seed, -1);
+  const Eigen::Index dimension = 2 * errors.num_velocities();
+  const SetDistance distance =
+      MakeDistance(discrepancy, AsSet(*problem, dimension, StandardNormals(rows, 1, random)), seed);
+  return {problem->prior, Eigen::VectorXd::Zero(1),
+          [=](const Eigen::MatrixXd& parameters, int64_t) -> Eigen::MatrixXd {
+            const Eigen::MatrixXd simulated = Scaled(*problem, scale, parameters);
+            Eigen::MatrixXd distances(1, simulated.cols());
+            for (Eigen::Index j = 0; j < simulated.cols(); ++j) {
+              const double d = simulated.col(j).allFinite()
+                                   ? distance(AsSet(*problem, dimension, simulated.col(j)))
+                                   : NAN;
+              distances(0, j) = std::isfinite(d) ? d : std::numeric_limits<double>::quiet_NaN();
+            }
+            return distances;
+          }};
+}
+
+}  // namespace plumb

@@ -1,0 +1,280 @@
+#include "calibrator/fit/window_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "common/decompositions.h"
+#include "sim/tasks/task.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// Relative to the units of the state; large against the rounding of a simulation, small against its
+// curvature.
+constexpr double kDifference = 1e-6;
+
+constexpr double kGuess = 1e-3;  // relative to the units of the state
+
+// How many transitions from `first` on follow each other without a gap.
+size_t StretchLength(const Rollout& rollout, size_t first) {
+  const auto& t = rollout.transitions;
+  size_t end = first + 1;
+  while (end < t.size() && t[end].step == t[end - 1].step + 1) ++end;
+  return end - first;
+}
+
+}  // namespace
+
+Eigen::VectorXd GuessedNoise(const RobotDescription& robot) {
+  return kGuess * MakeTask(robot)->state_scale();
+}
+
+Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd) {
+  return kDifference * (noise_sd / kGuess).cwiseMax(1.0);
+}
+
+WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
+                           int horizon, Workforce workforce, int every)
+    : n_(model->num_velocities()),
+      rollouts_(rollouts),
+      simulate_(std::move(model), workforce.threads),
+      batches_(workforce.batches) {
+  if (simulate_.model().num_positions() != n_)
+    throw std::invalid_argument("calibration does not know spherical joints yet");
+  scale_ = MakeTask(simulate_.model().description())->state_scale();
+  noise_sd_ = GuessedNoise(simulate_.model().description());
+  const auto longest = static_cast<size_t>(std::max(1, horizon));
+  size_t count = 0;
+  for (size_t r = 0; r < rollouts.size(); ++r) {
+    for (size_t begin = 0; begin < rollouts[r].transitions.size();) {
+      size_t left = StretchLength(rollouts[r], begin);
+      for (; left > 0; ++count) {
+        const size_t length = std::min(left, longest);
+        if (count % static_cast<size_t>(every) == 0) AddWindow(r, begin, length);
+        begin += length;
+        left -= length;
+      }
+    }
+  }
+  first_row_.push_back(static_cast<Eigen::Index>(rows_.size()));
+  if (rows_.empty()) throw std::invalid_argument("there is no transition whose end was observed");
+  identity_ = Hash(rows_.data(), rows_.size() * sizeof(Row));
+}
+
+void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
+  const auto& transitions = rollouts_[rollout].transitions;
+  const auto row_count = rows_.size();
+  std::vector<Eigen::Index> step_rows;
+  for (size_t i = first; i < first + length; ++i) {
+    step_rows.push_back(static_cast<Eigen::Index>(rows_.size()));
+    const Transition& t = transitions[i];
+    for (Eigen::Index c = 0; c < 2 * n_; ++c) {
+      if (!std::isfinite(c < n_ ? t.next_q(c) : t.next_v(c - n_))) continue;
+      rows_.push_back({static_cast<int>(windows_.size()), static_cast<int>(rollout),
+                       static_cast<int>(i), static_cast<int>(c)});
+    }
+  }
+  if (rows_.size() == row_count) return;  // nothing was observed
+  step_rows.push_back(static_cast<Eigen::Index>(rows_.size()));
+  step_rows_.push_back(std::move(step_rows));
+  first_row_.push_back(static_cast<Eigen::Index>(row_count));
+  Window window;
+  window.q = transitions[first].q;
+  window.v = transitions[first].v;
+  for (size_t i = first; i < first + length; ++i) window.steps.emplace_back(transitions[i].efforts);
+  if (simulate_.model().parameters().delays()) {
+    double known = 0;
+    for (size_t i = first; i > 0 && known < JointDynamics::kLongestDelay; --i) {
+      if (transitions[i - 1].step != transitions[i].step - 1) break;
+      window.before.insert(window.before.begin(), transitions[i - 1].efforts);
+      known += transitions[i - 1].duration();
+    }
+  }
+  windows_.push_back(std::move(window));
+  Eigen::VectorXd sd(2 * n_);
+  sd << transitions[first].q_sd, transitions[first].v_sd;
+  starts_.push_back({std::move(sd), {}});
+  steps_ += static_cast<int64_t>(length);
+}
+
+void WindowErrors::set_noise_sd(const Eigen::VectorXd& sd) {
+  if (sd.size() != 2 * n_ || !(sd.minCoeff() > 0) || !sd.allFinite()) {
+    throw std::invalid_argument("noise needs a standard deviation > 0 for each entry of (q, v)");
+  }
+  noise_sd_ = sd;
+}
+
+double WindowErrors::EndSd(const Row& row) const {
+  const Transition& t =
+      rollouts_[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
+  const double sd =
+      row.coordinate < n_ ? t.next_q_sd(row.coordinate) : t.next_v_sd(row.coordinate - n_);
+  return sd > 0 ? sd : noise_sd_(row.coordinate);  // no reading is exact
+}
+
+Eigen::VectorXd WindowErrors::EndNoise() const {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * n_), count = squares;
+  for (const Row& row : rows_)
+    squares(row.coordinate) += std::pow(EndSd(row), 2), count(row.coordinate) += 1;
+  return (count.array() > 0)
+      .select((squares.array() / count.array().max(1)).sqrt(), noise_sd_.array());
+}
+
+bool WindowErrors::noise_known() const {
+  return std::all_of(rows_.begin(), rows_.end(), [&](const Row& row) {
+    const Transition& t = rollouts_[static_cast<size_t>(row.rollout)]
+                              .transitions[static_cast<size_t>(row.transition)];
+    return (row.coordinate < n_ ? t.next_q_sd(row.coordinate) : t.next_v_sd(row.coordinate - n_)) >
+           0;
+  });
+}
+
+bool WindowErrors::starts_known() const {
+  return std::all_of(starts_.begin(), starts_.end(),
+                     [](const Start& start) { return (start.sd.array() == 0).all(); });
+}
+
+Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical,
+                                       std::span<const Window> windows) {
+  Eigen::MatrixXd errors(static_cast<Eigen::Index>(rows_.size()), physical.cols());
+  simulate_.Predict(
+      physical, windows,
+      [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto& v) {
+        const auto& step_rows = step_rows_[window];
+        for (Eigen::Index i = step_rows[step]; i < step_rows[step + 1]; ++i) {
+          const Row& row = rows_[static_cast<size_t>(i)];
+          const Transition& t = rollouts_[static_cast<size_t>(row.rollout)]
+                                    .transitions[static_cast<size_t>(row.transition)];
+          const Eigen::Index c = row.coordinate;
+          errors(i, sample) = c < n_ ? q(c) - t.next_q(c) : v(c - n_) - t.next_v(c - n_);
+        }
+      },
+      /*last_only=*/false);
+  return errors;
+}
+
+// @param which initial states: 0 = the recorded ones.
+Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical,
+                                      std::span<const Window> windows, uint64_t which) {
+  const auto compute = [&](Eigen::Index first, Eigen::Index count) {
+    return Simulate(physical.middleCols(first, count), windows);
+  };
+  Batches here;
+  const Eigen::MatrixXd errors =
+      (batches_ ? *batches_ : here)
+          .Run(Hash(physical, Hash(&which, sizeof which, identity_)),
+               static_cast<Eigen::Index>(rows_.size()), physical.cols(), compute);
+  simulated_steps_ += steps_ * physical.cols();
+  for (Eigen::Index j = 0; j < errors.cols(); ++j) {
+    if (errors.col(j).allFinite()) continue;
+    for (size_t w = 0; w < windows_.size(); ++w) {
+      failures_ +=
+          !errors.col(j).segment(first_row_[w], first_row_[w + 1] - first_row_[w]).allFinite();
+    }
+  }
+  return errors;
+}
+
+Eigen::MatrixXd WindowErrors::Raw(const Eigen::MatrixXd& physical) {
+  return Predict(physical, windows_);
+}
+
+bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
+  if (starts_known()) return true;
+  const Eigen::MatrixXd middle = Predict(physical, windows_);
+  const Eigen::VectorXd differences = StartDifferences(noise_sd_);
+  Eigen::MatrixXd sensitivity(middle.rows(), 2 * n_);
+  for (Eigen::Index c = 0; c < 2 * n_; ++c) {
+    std::vector<Window> moved = windows_;
+    const double h = differences(c);
+    for (Window& window : moved) (c < n_ ? window.q(c) : window.v(c - n_)) += h;
+    sensitivity.col(c) = (Predict(physical, moved, static_cast<uint64_t>(c) + 1) - middle) / h;
+  }
+  const bool good = sensitivity.allFinite();
+  if (!good) sensitivity = FreeMotion();
+  for (size_t w = 0; w < windows_.size(); ++w) {
+    starts_[w].sensitivity =
+        sensitivity.middleRows(first_row_[w], first_row_[w + 1] - first_row_[w]);
+  }
+  return good;
+}
+
+Eigen::MatrixXd WindowErrors::FreeMotion() const {
+  Eigen::MatrixXd sensitivity =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_.size()), 2 * n_);
+  for (size_t i = 0; i < rows_.size(); ++i) {
+    const Row& row = rows_[i];
+    const auto at = static_cast<Eigen::Index>(i);
+    sensitivity(at, row.coordinate) = 1;
+    if (row.coordinate >= n_) continue;
+    const auto& steps = step_rows_[static_cast<size_t>(row.window)];
+    const auto& t = rollouts_[static_cast<size_t>(row.rollout)]
+                        .transitions[static_cast<size_t>(row.transition)];
+    const auto step = std::upper_bound(steps.begin(), steps.end(), at) - steps.begin();
+    sensitivity(at, row.coordinate + n_) = t.duration() * static_cast<double>(step);
+  }
+  return sensitivity;
+}
+
+Eigen::MatrixXd WindowErrors::Whitened(const Eigen::MatrixXd& physical) {
+  Eigen::MatrixXd errors = Raw(physical);
+  for (size_t w = 0; w < windows_.size(); ++w) WhitenWindow(w, &errors);
+  for (Eigen::Index j = 0; j < errors.cols(); ++j) {
+    if (!errors.col(j).allFinite()) errors.col(j).setConstant(kNaN);
+  }
+  return errors;
+}
+
+double WindowErrors::LogSpread() const {
+  Eigen::MatrixXd none = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_.size()), 1);
+  double sum = 0;
+  for (size_t w = 0; w < windows_.size(); ++w) sum += WhitenWindow(w, &none);
+  return sum;
+}
+
+// A Kalman filter of what the recorded initial state was off by, a constant: its innovations,
+// divided by their spread.
+// @return ln det of that.
+double WindowErrors::WhitenWindow(size_t w, Eigen::MatrixXd* errors) const {
+  const auto& step_rows = step_rows_[w];
+  const Start& start = starts_[w];
+  double log_spread = 0;
+  if (start.sensitivity.size() == 0) {
+    for (Eigen::Index i = step_rows.front(); i < step_rows.back(); ++i) {
+      const double sd = EndSd(rows_[static_cast<size_t>(i)]);
+      errors->row(i) /= sd;
+      log_spread += std::log(sd);
+    }
+    return log_spread;
+  }
+  const Eigen::VectorXd sd = start.sd.array().isNaN().select(noise_sd_, start.sd);
+  Eigen::MatrixXd offset = Eigen::MatrixXd::Zero(2 * n_, errors->cols());
+  Eigen::MatrixXd covariance = sd.array().square().matrix().asDiagonal();
+  for (size_t step = 0; step + 1 < step_rows.size(); ++step) {
+    const Eigen::Index first = step_rows[step], count = step_rows[step + 1] - first;
+    if (count == 0) continue;
+    const Eigen::MatrixXd h = start.sensitivity.middleRows(first - step_rows.front(), count);
+    Eigen::MatrixXd spread = h * covariance * h.transpose();
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const double noise = EndSd(rows_[static_cast<size_t>(first + i)]);
+      spread(i, i) += noise * noise;
+    }
+    const Eigen::LLT<Eigen::MatrixXd> factor(spread);
+    auto rows = errors->middleRows(first, count);
+    rows -= h * offset;
+    factor.matrixL().solveInPlace(rows);
+    log_spread += factor.matrixLLT().diagonal().array().log().sum();
+    const Eigen::MatrixXd whitened_h = factor.matrixL().solve(h);
+    if (step + 2 == step_rows.size()) break;
+    const Eigen::MatrixXd gain = covariance * whitened_h.transpose();
+    offset += gain * rows;
+    covariance -= gain * gain.transpose();
+  }
+  return log_spread;
+}
+
+}  // namespace plumb

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "calibrator/motion/transitions.h"
+#include "common/batches.h"
+#include "sim/windows.h"
+
+namespace plumb {
+
+/// What a sensor might well be off by where nobody says, for each entry of (q, v), physical units:
+/// a thousandth of the task's units of the state. Only a beginning: the scale of the errors is
+/// estimated.
+Eigen::VectorXd GuessedNoise(const RobotDescription& robot);
+
+/// By how much each entry of (q, v) is moved to see what the initial state does: large against the
+/// rounding of a simulation, small against its curvature.
+Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd);
+
+/// How far simulators are from what a robot did, window by window: reset to a recorded state, apply
+/// what was applied for up to `horizon` steps, compare with every recorded state on the way.
+/// Windows follow each other without overlap over all gapless stretches of the record; the last of
+/// a stretch may be shorter. With horizon 1 a window is a transition.
+///
+/// Errors are whitened by what is known of the recorded states' uncertainty, that of the state a
+/// window begins with included: it is carried along by the simulator's own sensitivity, and what
+/// the window's earlier errors have told of it is taken into account (a Kalman filter of the
+/// initial state; errors-in-variables). For the right simulator whitened errors are independent,
+/// with mean zero and variance one; where the noise is not known (sd NaN) it is `noise_sd`.
+///
+/// Not thread-safe. The same bits for any number of threads and whoever does the work.
+class WindowErrors {
+ public:
+  /// What one row of the errors is about.
+  struct Row {
+    int window;
+    int rollout, transition;  ///< at whose end
+    int coordinate;           ///< 0 ... n - 1: q, n ... 2 n - 1: v
+  };
+
+  /// @param rollouts must outlive this. @param every keeps only each so-manieth window, >= 1.
+  /// @throws std::invalid_argument if the robot has spherical joints or there is no transition with
+  /// an observed end.
+  WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
+               Workforce workforce, int every = 1);
+
+  const std::vector<Row>& rows() const { return rows_; }
+  int windows() const { return static_cast<int>(windows_.size()); }
+  int num_velocities() const { return static_cast<int>(n_); }
+  int parameter_count() const { return simulate_.model().parameters().size(); }
+  /// Control steps that one simulator makes.
+  int64_t steps() const { return steps_; }
+
+  /// Noise of each entry of (q, v), physical units, where the record does not say.
+  const Eigen::VectorXd& noise_sd() const { return noise_sd_; }
+  /// Units of (q, v): Task::state_scale.
+  const Eigen::VectorXd& state_scale() const { return scale_; }
+  void set_noise_sd(const Eigen::VectorXd& sd);
+  /// Noise of each entry of (q, v) at the windows' ends, root mean square: as recorded or, where
+  /// not, noise_sd().
+  Eigen::VectorXd EndNoise() const;
+  /// Whether the record says what the noise at the windows' ends is, and that their beginnings are
+  /// exact.
+  bool noise_known() const;
+  bool starts_known() const;
+  /// Takes the sensitivity to the initial state, by finite differences, from the simulator with
+  /// these parameters. It has to be called before Whitened if any initial state is uncertain, and
+  /// costs 2 n + 1 simulators then, nothing else.
+  /// @return false if that simulator fails: the sensitivity is then that of free motion, q + v t.
+  bool Linearise(const Eigen::VectorXd& physical);
+
+  /// Predicted minus recorded, physical units: a row of each, a column for each simulator. NaN from
+  /// where it has failed.
+  Eigen::MatrixXd Raw(const Eigen::MatrixXd& physical);
+  /// The same whitened. A simulator that fails anywhere has NaN all over.
+  Eigen::MatrixXd Whitened(const Eigen::MatrixXd& physical);
+  /// ln det of what Whitened divides by: likelihoods whose noise or linearisation differ compare
+  /// less this.
+  double LogSpread() const;
+
+  /// Of all calls.
+  int64_t simulated_steps() const { return simulated_steps_; }
+  int64_t failures() const { return failures_; }  ///< windows whose simulation failed
+
+ private:
+  struct Start {
+    Eigen::VectorXd sd;           // of (q, v)
+    Eigen::MatrixXd sensitivity;  // rows of the window x 2 n, physical units; empty until Linearise
+  };
+  void AddWindow(size_t rollout, size_t first, size_t length);
+  Eigen::MatrixXd Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows,
+                          uint64_t which = 0);
+  Eigen::MatrixXd Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows);
+  Eigen::MatrixXd FreeMotion() const;
+  double WhitenWindow(size_t window, Eigen::MatrixXd* errors) const;
+  double EndSd(const Row& row) const;
+
+  Eigen::Index n_;
+  std::span<const Rollout> rollouts_;
+  Windows simulate_;
+  std::vector<Window> windows_;
+  std::vector<Start> starts_;
+  std::vector<Row> rows_;
+  std::vector<Eigen::Index> first_row_;  // of each window, and the end
+  // first of each step of each window, and the end
+  std::vector<std::vector<Eigen::Index>> step_rows_;
+  Eigen::VectorXd scale_, noise_sd_;
+  int64_t steps_ = 0, simulated_steps_ = 0, failures_ = 0;
+  Batches* batches_;
+  uint64_t identity_ = 0;  // of the windows
+};
+
+}  // namespace plumb

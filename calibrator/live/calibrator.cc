@@ -1,0 +1,135 @@
+#include "calibrator/live/calibrator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "plumb/policy_t.hpp"
+
+namespace plumb {
+
+void Calibrator::OnCommand(const joint_command_t& command) {
+  joiner_.OnCommand(command);
+  if (command.episode > newest_episode_) newest_episode_ = command.episode, next_step_ = 0;
+}
+
+Rollout Calibrator::TakeArrived() {
+  Rollout rollout;
+  rollout.episode = newest_episode_;
+  rollout.policy_iteration = simopt_.state().iteration;
+  if (rolling_out_) rollout.transitions = joiner_.Arrived(newest_episode_, &next_step_);
+  return rollout;
+}
+
+void Calibrator::OnControllerStatus(const controller_status_t& status) {
+  rolling_out_ = status.phase == controller_status_t::RUNNING &&
+                 status.purpose == policy_t::CALIBRATE &&
+                 status.policy_iteration == simopt_.state().iteration;
+  if (status.phase != controller_status_t::COMPLETE || status.purpose != policy_t::CALIBRATE)
+    return;
+  // The policy of iteration k is rolled out to compute the distribution of iteration k + 1.
+  if (status.policy_iteration != simopt_.state().iteration || status.num_episodes == 0) return;
+  complete_ = status;
+}
+
+bool Calibrator::ready() const {
+  return complete_ && !simopt_.running() &&
+         complete_->policy_iteration == simopt_.state().iteration &&
+         joiner_.newest_state() >= *std::max_element(complete_->last_state_sequence.begin(),
+                                                     complete_->last_state_sequence.end());
+}
+
+size_t Calibrator::Begin() {
+  std::vector<Rollout> rollouts;
+  for (size_t i = 0; i < complete_->episode.size(); ++i) {
+    rollouts.push_back(joiner_.Join(complete_->episode[i], complete_->last_state_sequence[i]));
+  }
+  complete_.reset();
+  const size_t usable = CountTransitions(rollouts);
+  simopt_.Begin(std::move(rollouts));
+  return usable;
+}
+
+ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {
+  ParameterDistribution distribution{state.iteration, robot.parameters, {}};
+  for (size_t i = 0; i < state.distribution.components.size(); ++i) {
+    const Gaussian& component = state.distribution.components[i];
+    distribution.components.push_back(
+        {state.distribution.weights[i], component.mean, component.covariance});
+  }
+  return distribution;
+}
+
+parameter_distribution_t DistributionMessage(const RobotDescription& robot,
+                                             const SimOpt::State& state, uint64_t seed,
+                                             const CalibrationReport* report) {
+  parameter_distribution_t m = Distribution(robot, state).ToMessage();
+  // The episode's identity is its start: a time that live run and replay share.
+  m.utime = state.rollouts.empty() ? 0 : state.rollouts.back().episode;
+  m.seed = static_cast<int64_t>(seed);
+  if (report) {
+    m.kl = report->kl;
+    m.ess = report->ess;
+    m.temperature = report->temperature;
+    m.discrepancy = report->discrepancy;
+  }
+  return m;
+}
+
+calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state,
+                                   const DropCounts& drops, const CalibrationReport* report,
+                                   double seconds, const StreamingLaplace* stream) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  calibration_status_t m{};
+  m.utime = state.rollouts.empty() ? 0 : state.rollouts.back().episode;
+  m.iteration = state.iteration;
+  m.transitions = static_cast<int32_t>(CountTransitions(state.rollouts));
+  m.rollouts = static_cast<int32_t>(state.rollouts.size());
+  m.dropped_gap = drops.gap;
+  m.dropped_late = drops.late;
+  m.dropped_not_finite = drops.not_finite;
+  m.dropped_restart = drops.restart;
+  m.dropped_model_based = drops.model_based;
+  m.discrepancy = report ? report->discrepancy : kNaN;
+  m.prior_discrepancy = report ? report->prior_discrepancy : kNaN;
+  m.kl = report ? report->kl : kNaN;
+  m.ess = report ? report->ess : kNaN;
+  m.temperature = report ? report->temperature : kNaN;
+  if (report) {
+    for (const PredictionErrors& errors : report->errors) {
+      m.horizon.push_back(errors.horizon);
+      m.error_before.push_back(errors.before);
+      m.error_after.push_back(errors.after);
+      m.error_prior.push_back(errors.prior);
+    }
+    for (const Combination& c : report->identifiability.combinations) {
+      m.combination.push_back(c.name);
+      m.combination_power.insert(m.combination_power.end(), c.power.begin(), c.power.end());
+      m.combination_mean.push_back(c.mean);
+      m.combination_sd.push_back(c.sd);
+    }
+    m.identifiability = report->identifiability.words;
+  }
+  m.num_horizons = static_cast<int32_t>(m.horizon.size());
+  m.num_powers = static_cast<int32_t>(m.combination_power.size());
+  m.num_combinations = static_cast<int32_t>(m.combination.size());
+  const ParameterDistribution distribution = Distribution(robot, state);
+  const Eigen::VectorXd mean = distribution.Mean(), sd = distribution.Sd();
+  m.mean.assign(mean.begin(), mean.end());
+  m.sd.assign(sd.begin(), sd.end());
+  m.num_parameters = static_cast<int32_t>(m.mean.size());
+  m.seconds = seconds;
+  if (stream && stream->determined()) {
+    const Gaussian interim = stream->posterior();
+    const ParameterDistribution streamed{
+        state.iteration, robot.parameters, {{1, interim.mean, interim.covariance}}};
+    const Eigen::VectorXd streamed_mean = streamed.Mean(), streamed_sd = streamed.Sd();
+    m.streamed_transitions = static_cast<int32_t>(stream->transitions() - stream->left_out());
+    m.streamed_mean.assign(streamed_mean.begin(), streamed_mean.end());
+    m.streamed_sd.assign(streamed_sd.begin(), streamed_sd.end());
+  }
+  m.num_streamed = static_cast<int32_t>(m.streamed_mean.size());
+  return m;
+}
+
+}  // namespace plumb

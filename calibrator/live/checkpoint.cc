@@ -1,0 +1,199 @@
+#include "calibrator/live/checkpoint.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "common/atomic_file.h"
+
+namespace plumb {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kVersion = 2;  // 1: the distribution was one Gaussian
+
+json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
+
+Eigen::VectorXd VectorFrom(const json& j) {
+  const auto values = j.get<std::vector<double>>();
+  return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+json ToJson(const Gaussian& p) {
+  const Eigen::MatrixXd& c = p.covariance;
+  return {{"mean", ToJson(p.mean)},
+          {"covariance", std::vector<double>(c.data(), c.data() + c.size())}};
+}
+
+Gaussian GaussianFrom(const json& j) {
+  Gaussian p;
+  p.mean = VectorFrom(j.at("mean"));
+  const auto values = j.at("covariance").get<std::vector<double>>();
+  const Eigen::Index n = p.mean.size();
+  if (static_cast<Eigen::Index>(values.size()) != n * n)
+    throw std::runtime_error("covariance has the wrong size");
+  p.covariance = Eigen::MatrixXd::Map(values.data(), n, n);
+  LogDensity(p, p.mean);  // throws unless it is positive definite
+  return p;
+}
+
+json ToJson(const GaussianMixture& mixture) {
+  json components = json::array();
+  for (size_t i = 0; i < mixture.components.size(); ++i) {
+    components.push_back(ToJson(mixture.components[i]));
+    components.back()["weight"] = mixture.weights[i];
+  }
+  return components;
+}
+
+GaussianMixture MixtureFrom(const json& j) {
+  GaussianMixture mixture;
+  for (const json& component : j) {
+    mixture.components.push_back(GaussianFrom(component));
+    mixture.weights.push_back(component.at("weight"));
+  }
+  const bool good =
+      !mixture.weights.empty() && std::all_of(mixture.weights.begin(), mixture.weights.end(),
+                                              [](double w) { return w > 0 && w <= 1; });
+  if (!good) throw std::runtime_error("the distribution's weights are none");
+  return mixture;
+}
+
+// JSON has no NaN.
+double NumberOrNaN(const json& j) {
+  return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
+}
+
+const std::vector<std::pair<const char*, Eigen::VectorXd Transition::*>> kVectors{
+    {"q", &Transition::q},
+    {"v", &Transition::v},
+    {"next_q", &Transition::next_q},
+    {"next_v", &Transition::next_v},
+    {"q_sd", &Transition::q_sd},
+    {"v_sd", &Transition::v_sd},
+    {"next_q_sd", &Transition::next_q_sd},
+    {"next_v_sd", &Transition::next_v_sd}};
+
+json ToJson(const Rollout& rollout) {
+  json transitions = json::array();
+  for (const Transition& t : rollout.transitions) {
+    json entry{{"step", t.step}};
+    for (const auto& [name, member] : kVectors) entry[name] = ToJson(t.*member);
+    json efforts = json::array();
+    for (const EffortSegment& e : t.efforts)
+      efforts.push_back({{"duration", e.duration}, {"effort", ToJson(e.effort)}});
+    entry["efforts"] = std::move(efforts);
+    transitions.push_back(std::move(entry));
+  }
+  return {{"episode", rollout.episode},
+          {"policy_iteration", rollout.policy_iteration},
+          {"transitions", std::move(transitions)}};
+}
+
+Rollout RolloutFrom(const json& j) {
+  Rollout rollout;
+  rollout.episode = j.at("episode");
+  rollout.policy_iteration = j.at("policy_iteration");
+  for (const json& entry : j.at("transitions")) {
+    Transition t;
+    t.step = entry.at("step");
+    for (const auto& [name, member] : kVectors) t.*member = VectorFrom(entry.at(name));
+    for (const json& e : entry.at("efforts"))
+      t.efforts.push_back({e.at("duration"), VectorFrom(e.at("effort"))});
+    rollout.transitions.push_back(std::move(t));
+  }
+  return rollout;
+}
+
+json ReadJson(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  if (!stream) throw std::runtime_error("cannot be opened");
+  return json::parse(stream);
+}
+
+std::string RolloutFile(size_t index) { return fmt::format("rollout_{}.json", index); }
+
+}  // namespace
+
+std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
+  std::vector<Rollout> rollouts;
+  for (;;) {
+    const std::filesystem::path file = folder / RolloutFile(rollouts.size());
+    if (!std::filesystem::exists(file)) return rollouts;
+    try {
+      rollouts.push_back(RolloutFrom(ReadJson(file)));
+    } catch (const std::exception& error) {
+      throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+    }
+  }
+}
+
+CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
+                                             const RobotDescription& robot, uint64_t seed)
+    : folder_(std::move(folder)), robot_(robot.name), seed_(seed), fingerprint_(robot.fingerprint) {
+  for (const ParameterDescription& p : robot.parameters) parameters_.push_back(p.name);
+  std::error_code error;
+  std::filesystem::create_directories(folder_, error);
+  if (error) throw std::runtime_error(folder_.string() + ": " + error.message());
+}
+
+void CalibrationCheckpoint::Save(const SimOpt::State& state) {
+  for (; saved_rollouts_ < state.rollouts.size(); ++saved_rollouts_) {
+    WriteAtomically(folder_ / RolloutFile(saved_rollouts_),
+                    ToJson(state.rollouts[saved_rollouts_]).dump());
+  }
+  const json j{{"version", kVersion},
+               {"robot", robot_},
+               {"parameters", parameters_},
+               {"seed", seed_},
+               {"fingerprint", fingerprint_},
+               {"iteration", state.iteration},
+               {"update", state.update},
+               {"distribution", ToJson(state.distribution)},
+               {"before", ToJson(state.before)},
+               {"kl", state.kl},
+               {"ess", state.ess},
+               {"temperature", state.temperature},
+               {"rollouts_per_iteration", state.rollouts_per_iteration}};
+  WriteAtomically(folder_ / "calibration.json", j.dump(1));
+}
+
+std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
+  std::filesystem::path file = folder_ / "calibration.json";
+  if (!std::filesystem::exists(file)) return {};
+  try {
+    const json j = ReadJson(file);
+    if (j.at("version") != kVersion) throw std::runtime_error("is of another version");
+    if (j.at("robot") != robot_ || j.at("parameters") != parameters_)
+      throw std::runtime_error("is another robot's");
+    if (j.at("seed") != seed_) throw std::runtime_error("has another seed; choose another folder");
+    if (j.at("fingerprint") != fingerprint_) {
+      throw std::runtime_error(
+          "was made with another robot.toml or robot.urdf; choose another folder");
+    }
+    SimOpt::State state;
+    state.iteration = j.at("iteration");
+    state.update = j.at("update");
+    state.distribution = MixtureFrom(j.at("distribution"));
+    state.before = MixtureFrom(j.at("before"));
+    state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
+    state.temperature = j.at("temperature");
+    state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
+    size_t count = 0;
+    for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);
+    for (size_t i = 0; i < count; ++i) {
+      file = folder_ / RolloutFile(i);
+      state.rollouts.push_back(RolloutFrom(ReadJson(file)));
+    }
+    return state;
+  } catch (const std::exception& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
+}  // namespace plumb

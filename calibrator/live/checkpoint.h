@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "calibrator/live/simopt.h"
+
+namespace plumb {
+
+/// Keeps a SimOpt state in a folder: `calibration.json` (small, after every update) and one
+/// `rollout_<n>.json` each. Files are replaced atomically; numbers are written so that they read
+/// back to the same bits.
+class CalibrationCheckpoint {
+ public:
+  /// Creates the folder. @throws std::runtime_error if it cannot.
+  CalibrationCheckpoint(std::filesystem::path folder, const RobotDescription& robot, uint64_t seed);
+
+  void Save(const SimOpt::State& state);
+  /// @return empty if there is none. @throws std::runtime_error naming the file if it is damaged or
+  /// is another robot's or seed's.
+  std::optional<SimOpt::State> Load() const;
+
+ private:
+  std::filesystem::path folder_;
+  std::string robot_;
+  std::vector<std::string> parameters_;
+  uint64_t seed_, fingerprint_;
+  size_t saved_rollouts_ = 0;
+};
+
+/// The roll-outs a checkpoint folder holds, in order. @throws std::runtime_error naming the file if
+/// one is damaged.
+std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder);
+
+}  // namespace plumb

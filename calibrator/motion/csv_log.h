@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+
+#include "calibrator/motion/log.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// Reads transitions from a table with a row for each and these columns, in any order, further ones
+/// ignored:
+///   t   [s]; begins anew, or goes on, with every episode
+///   q/<joint>, v/<joint>   [rad or m], [rad/s or m/s]: the state s. Where it is not known in full,
+///       no transition begins. A spherical joint has /w, /x, /y, /z in q and /x, /y, /z in v
+///   u/<driven joint>   effort / Task::action_unit, held for one control period. As in the
+///       simulator, it is clipped to the effort limits and acts simulation.latency late, the one
+///       before until then; before an episode there was none
+///   next_q/<joint>, next_v/<joint>   the state s' that it led to. Without these columns, as
+///       `plumb sim --csv` writes the table, s' is the next row's state
+///   terminated, truncated   optional: other than 0 where an episode ends with this row
+/// nan, or nothing, stands for what was not observed: in s' it is not compared.
+///
+/// An episode ends where a row says so, where t does not go on by one control period, within 20 %,
+/// or where s is not what the row before led to. That is s' itself; or, in a table whose rows
+/// follow each other in most coordinates like that, what is within 20 % of the spread that s has
+/// over the table, or within what noise makes of most rows, in every coordinate observed. A row
+/// that is followed like that, but at another time, is dropped as late. One that is not lasts a
+/// control period.
+///
+/// A table does not say what the noise is. At the end of a transition sds are NaN. At its beginning
+/// they are, too, if s is a reading: the very same one as the end of the transition before, or the
+/// first of a stretch of such; else the beginning is taken as exact, and they are 0.
+///
+/// Fields are separated by commas and may be quoted; blank lines and those that begin with # are
+/// skipped. Numbers have a decimal point in every locale.
+/// @throws std::runtime_error "file:line: ..." for what is no number, or infinite, too few or too
+/// many fields, a missing, repeated or unknown column (naming the nearest), the same time twice in
+/// a row; and "file: ..." if it cannot be opened or no transition can be used (and why).
+/// Thread-safe.
+Log ReadCsvLog(const std::string& file, const RobotDescription& robot);
+
+}  // namespace plumb

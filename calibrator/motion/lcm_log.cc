@@ -1,0 +1,185 @@
+#include "calibrator/motion/lcm_log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "calibrator/motion/motion_log.h"
+
+namespace plumb {
+namespace {
+
+// [states] A message may be in the log that much later than one of another channel that came after
+// it.
+constexpr int64_t kPatience = 5000;
+// [states] The same within a channel, where messages keep their order but for a few: further back
+// is another run.
+constexpr int64_t kReordered = 1000;
+// No counter and no clock gets there; beyond it, sums and differences overflow.
+constexpr int64_t kLargest = int64_t{1} << 53;
+
+/// Joins the episodes of a log one after the other as soon as each is complete, so that no more
+/// than one or two need be remembered however long the log is.
+class EpisodeJoiner {
+ public:
+  EpisodeJoiner(const RobotDescription& robot, std::vector<Rollout>* rollouts)
+      : robot_(robot), rollouts_(*rollouts), joiner_(TransitionJoiner::Unbounded(robot)) {}
+
+  void OnState(const robot_state_t& state) {
+    if (!Fits(state.num_joints) || state.sequence < 0 || state.sequence > kLargest) return;
+    if (state.utime < -kLargest || state.utime > kLargest) return;
+    const robot_state_t* newest = joiner_.FindState(joiner_.newest_state());
+    if (newest && (state.sequence < newest->sequence - kReordered ||
+                   (state.sequence <= newest->sequence && state.utime > newest->utime))) {
+      BeginRun();
+    }
+    joiner_.OnState(state);
+    while (!episodes_.empty() && IsComplete(episodes_.front())) JoinFirst();
+    const int64_t needed =
+        episodes_.empty() ? std::numeric_limits<int64_t>::max() : episodes_.front().first_state;
+    joiner_.Forget(std::min(needed, joiner_.newest_state() - kPatience));
+  }
+
+  void OnCommand(const joint_command_t& command) {
+    if (!Fits(command.num_joints)) return;
+    // Whatever command comes next answers the state that the one before led to.
+    for (Episode& episode : episodes_) {
+      if (!episode.next_state && episode.id != command.episode)
+        episode.next_state = command.state_sequence;
+    }
+    if (command.episode < 0) return;
+    const auto found = std::find_if(episodes_.begin(), episodes_.end(),
+                                    [&](const Episode& e) { return e.id == command.episode; });
+    if (found == episodes_.end()) {
+      episodes_.push_back(
+          {command.episode, command.state_sequence, command.state_sequence, {}, {}});
+    } else {
+      found->first_state = std::min(found->first_state, command.state_sequence);
+      found->last_command = std::max(found->last_command, command.state_sequence);
+    }
+    joiner_.OnCommand(command);
+  }
+
+  void OnControllerStatus(const controller_status_t& status) {
+    for (size_t i = 0; i < status.episode.size(); ++i) {
+      for (Episode& episode : episodes_) {
+        if (episode.id == status.episode[i]) episode.named_state = status.last_state_sequence[i];
+      }
+    }
+  }
+
+  /// No more will come.
+  void Finish() {
+    while (!episodes_.empty()) JoinFirst();
+  }
+
+  DropCounts drops() const {
+    DropCounts sum = drops_of_earlier_runs_;
+    return sum += joiner_.drops();
+  }
+  int64_t fitting() const { return fitting_; }
+  /// Messages of a robot with another number of joints, and the newest such number.
+  int64_t foreign() const { return foreign_; }
+  int foreign_joints() const { return foreign_joints_; }
+
+ private:
+  struct Episode {
+    int64_t id;
+    int64_t first_state, last_command;   // states that its first and last command answer
+    std::optional<int64_t> next_state;   // that the command after it answers
+    std::optional<int64_t> named_state;  // that ended it, says CONTROLLER_STATUS
+  };
+
+  bool Fits(int joints) {
+    if (joints == robot_.num_joints()) return ++fitting_, true;
+    ++foreign_;
+    foreign_joints_ = joints;
+    return false;
+  }
+
+  // A restarted driver counts its states from 0 again. What is under way gets no further.
+  void BeginRun() {
+    Finish();
+    drops_of_earlier_runs_ = drops();
+    joiner_ = TransitionJoiner::Unbounded(robot_);
+  }
+
+  bool IsComplete(const Episode& episode) const {
+    if (episode.named_state) return joiner_.newest_state() >= *episode.named_state;
+    return joiner_.newest_state() - kPatience >=
+           std::max(episode.last_command, episode.next_state.value_or(0));
+  }
+
+  int64_t LastState(const Episode& episode) const {
+    if (episode.named_state) return *episode.named_state;
+    if (episode.next_state) return *episode.next_state;
+    const robot_state_t* from = joiner_.FindState(episode.last_command);
+    if (!from) return episode.last_command;
+    const double period = robot_.task.period + robot_.driver.measurement / 2;
+    const int64_t until = from->utime + static_cast<int64_t>(period * 1e6);
+    int64_t last = episode.last_command;
+    for (const robot_state_t* next; (next = joiner_.FindState(last + 1)) && next->utime <= until;)
+      ++last;
+    return last;
+  }
+
+  void JoinFirst() {
+    const Episode episode = episodes_.front();
+    episodes_.pop_front();
+    Rollout rollout = joiner_.Join(episode.id, LastState(episode));
+    if (!rollout.transitions.empty()) rollouts_.push_back(std::move(rollout));
+  }
+
+  const RobotDescription& robot_;
+  std::vector<Rollout>& rollouts_;
+  TransitionJoiner joiner_;
+  std::deque<Episode> episodes_;  // not joined yet, in the order in which they began
+  DropCounts drops_of_earlier_runs_;
+  int64_t fitting_ = 0, foreign_ = 0;
+  int foreign_joints_ = 0;
+};
+
+}  // namespace
+
+Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
+  Log log{file, {}, {}, {}};
+  EpisodeJoiner joiner(robot, &log.rollouts);
+  const MotionCounts counts = ReadMotion(file, joiner, [] { return true; });
+  joiner.Finish();
+  log.drops = joiner.drops();
+  if (counts.undecodable > 0) {
+    log.warnings.push_back(fmt::format("{} messages do not decode", counts.undecodable));
+  }
+  if (joiner.foreign() > 0) {
+    log.warnings.push_back(fmt::format("{} messages are of a robot with {} joints, '{}' has {}",
+                                       joiner.foreign(), joiner.foreign_joints(), robot.name,
+                                       robot.num_joints()));
+  }
+  if (!log.rollouts.empty()) return log;
+  if (log.drops.model_based > 0) {
+    throw std::runtime_error(
+        file +
+        ": its states are model-based: calibration would find the parameters that the estimator "
+        "assumed. ROBOT_STATE_SMOOTHED has to be a kinematic estimator's");
+  }
+  std::string why;
+  if (counts.messages == 0) {
+    why = fmt::format(
+        "none of its {} messages is a ROBOT_STATE_SMOOTHED, JOINT_COMMAND or CONTROLLER_STATUS",
+        counts.events);
+  } else if (joiner.fitting() == 0 && !log.warnings.empty()) {
+    why = log.warnings.back();
+  } else if (log.drops.total() == 0) {
+    why = "it holds no command of an episode";
+  } else {
+    why = log.drops.words();
+  }
+  throw std::runtime_error(file + ": no transition can be used: " + why);
+}
+
+}  // namespace plumb

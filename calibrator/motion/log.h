@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calibrator/motion/transitions.h"
+
+namespace plumb {
+
+/// What one file tells of a robot's motion. Readers: lcm_log.h and csv_log.h.
+struct Log {
+  std::string name;               ///< the file
+  std::vector<Rollout> rollouts;  ///< each with at least one transition, in the file's order
+  DropCounts drops;
+  std::vector<std::string> warnings;  ///< what of the file could not be used, for people
+};
+
+}  // namespace plumb

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <string>
+
+#include "calibrator/motion/log_reader.h"
+#include "plumb/controller_status_t.hpp"
+#include "plumb/joint_command_t.hpp"
+#include "plumb/robot_state_t.hpp"
+
+namespace plumb {
+
+struct MotionCounts {
+  int64_t events = 0;       ///< of all channels
+  int64_t messages = 0;     ///< of the three
+  int64_t undecodable = 0;  ///< of the three, left out
+};
+
+/// Hands what an LCM log tells of a robot's motion to a receiver, in the file's order, as a live
+/// run would: ROBOT_STATE_SMOOTHED to OnState, JOINT_COMMAND to OnCommand and CONTROLLER_STATUS to
+/// OnControllerStatus.
+/// @param go_on asked after every event of any channel; false stops.
+/// @throws std::runtime_error, see ReadLog; and what the receiver and go_on throw.
+template <class Receiver>
+MotionCounts ReadMotion(const std::string& file, Receiver& receiver,
+                        const std::function<bool()>& go_on) {
+  robot_state_t state{};
+  joint_command_t command{};
+  controller_status_t status{};
+  MotionCounts counts;
+  const auto decoded = [&](auto& message, const void* data, int size) {
+    ++counts.messages;
+    try {
+      if (message.decode(data, 0, size) == size) return true;
+    } catch (const std::exception&) {  // a hostile count may ask for more memory than there is
+    }
+    ++counts.undecodable;
+    return false;
+  };
+  counts.events =
+      ReadLog(file, [&](const std::string& channel, const void* data, int size, int64_t) {
+        if (channel == "ROBOT_STATE_SMOOTHED") {
+          if (decoded(state, data, size)) receiver.OnState(state);
+        } else if (channel == "JOINT_COMMAND") {
+          if (decoded(command, data, size)) receiver.OnCommand(command);
+        } else if (channel == "CONTROLLER_STATUS") {
+          if (decoded(status, data, size)) receiver.OnControllerStatus(status);
+        }
+        return go_on();
+      });
+  return counts;
+}
+
+}  // namespace plumb

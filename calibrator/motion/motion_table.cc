@@ -1,0 +1,233 @@
+#include "calibrator/motion/motion_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "calibrator/motion/csv_table.h"
+#include "common/config.h"
+#include "sim/tasks/task.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
+constexpr size_t kLongestName = 200;       // of a column, when the nearest is looked for
+
+/// What the columns are called, in the order of q, v and the actions.
+struct Names {
+  std::vector<std::string> q, v, u;
+
+  explicit Names(const RobotDescription& robot) {
+    for (const JointDescription& joint : robot.joints) {
+      if (joint.type == JointDescription::Type::kSpherical) {
+        for (const char* part : {"/w", "/x", "/y", "/z"}) q.push_back("q/" + joint.name + part);
+        for (const char* part : {"/x", "/y", "/z"}) v.push_back("v/" + joint.name + part);
+      } else {
+        q.push_back("q/" + joint.name);
+        v.push_back("v/" + joint.name);
+      }
+      if (!joint.passive) u.push_back("u/" + joint.name);
+    }
+  }
+};
+
+std::vector<std::string> Prefixed(std::vector<std::string> names) {
+  for (std::string& name : names) name.insert(0, "next_");
+  return names;
+}
+
+const std::string& Nearest(const std::string& name, const std::vector<std::string>& among) {
+  const auto distance = [&](const std::string& other) {
+    return EditDistance(name.substr(0, kLongestName), other.substr(0, kLongestName));
+  };
+  return *std::min_element(among.begin(), among.end(),
+                           [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+}
+
+/// Where things are in a table.
+struct Columns {
+  int t, terminated, truncated;  // the latter two -1 if there is none
+  std::vector<int> q, v, u, next_q, next_v;
+  bool has_next() const { return !next_q.empty(); }
+};
+
+std::vector<int> FindAll(const CsvTable& table, const std::vector<std::string>& names) {
+  std::vector<int> columns;
+  for (const std::string& name : names) {
+    columns.push_back(table.Find(name));
+    if (columns.back() < 0) {
+      table.Fail(fmt::format("has no column '{}'; the nearest is {}", name,
+                             Quoted(Nearest(name, table.names()))));
+    }
+  }
+  return columns;
+}
+
+// A column that looks like a joint's but is of none of this robot's is of another robot, or
+// misspelt: its values would be ignored in silence.
+void RefuseForeign(const CsvTable& table, const std::vector<std::string>& known,
+                   const std::string& robot) {
+  constexpr const char* kPrefixes[] = {"q/", "v/", "u/", "next_q/", "next_v/"};
+  for (const std::string& name : table.names()) {
+    const bool of_a_joint =
+        std::any_of(std::begin(kPrefixes), std::end(kPrefixes),
+                    [&](const char* prefix) { return name.starts_with(prefix); });
+    if (of_a_joint && std::find(known.begin(), known.end(), name) == known.end()) {
+      table.Fail(fmt::format("column {} is of no joint{} of robot '{}'; the nearest is '{}'",
+                             Quoted(name), name.starts_with("u/") ? " with a motor" : "", robot,
+                             Nearest(name, known)));
+    }
+  }
+}
+
+Columns FindColumns(const CsvTable& table, const Names& names, const std::string& robot) {
+  const std::vector<std::string> next_q = Prefixed(names.q), next_v = Prefixed(names.v);
+  std::vector<std::string> known;
+  for (const auto* some : {&names.q, &names.v, &names.u, &next_q, &next_v}) {
+    known.insert(known.end(), some->begin(), some->end());
+  }
+  RefuseForeign(table, known, robot);
+  Columns columns{FindAll(table, {"t"})[0],
+                  table.Find("terminated"),
+                  table.Find("truncated"),
+                  FindAll(table, names.q),
+                  FindAll(table, names.v),
+                  FindAll(table, names.u),
+                  {},
+                  {}};
+  const auto is_there = [&](const std::string& name) { return table.Find(name) >= 0; };
+  if (std::any_of(next_q.begin(), next_q.end(), is_there) ||
+      std::any_of(next_v.begin(), next_v.end(), is_there)) {
+    columns.next_q = FindAll(table, next_q);
+    columns.next_v = FindAll(table, next_v);
+  }
+  return columns;
+}
+
+Eigen::VectorXd Numbers(const CsvTable& table, const std::vector<int>& columns) {
+  Eigen::VectorXd numbers(columns.size());
+  std::transform(columns.begin(), columns.end(), numbers.begin(),
+                 [&](int column) { return table.Number(column); });
+  return numbers;
+}
+
+bool Flag(const CsvTable& table, int column) {
+  if (column < 0) return false;
+  const std::string_view text = table.Text(column);
+  if (text == "True" || text == "true") return true;
+  if (text == "False" || text == "false") return false;
+  const double number = table.Number(column);
+  return number != 0 && !std::isnan(number);
+}
+
+/// Actions to efforts as the simulator has them.
+class Efforts {
+ public:
+  explicit Efforts(const RobotDescription& robot)
+      : task_(MakeTask(robot)),
+        limits_(robot.effort_limits()),
+        velocities_(robot.num_velocities()) {}
+
+  Eigen::VectorXd operator()(const Eigen::VectorXd& action) {
+    Eigen::VectorXd effort = Eigen::VectorXd::Zero(velocities_);
+    for (int i = 0; i < action.size(); ++i) {
+      const double asked = action(i) * task_->action_unit(i);
+      double& given = effort(task_->action_indices()[static_cast<size_t>(i)]);
+      given = std::isnan(asked) ? kNaN : std::clamp(asked, -limits_(i), limits_(i));
+      clipped_ += std::abs(asked) > limits_(i) * kBeyondLimit;
+    }
+    return effort;
+  }
+  int64_t clipped() const { return clipped_; }
+
+ private:
+  std::unique_ptr<Task> task_;
+  Eigen::VectorXd limits_;
+  int velocities_;
+  int64_t clipped_ = 0;
+};
+
+std::vector<MotionRow> ReadRows(CsvTable& table, const Columns& columns, Efforts& efforts) {
+  std::vector<MotionRow> rows;
+  while (table.Next()) {
+    MotionRow row{table.Number(columns.t),
+                  Flag(table, columns.terminated) || Flag(table, columns.truncated),
+                  efforts(Numbers(table, columns.u)),
+                  {}};
+    if (std::isnan(row.t)) table.Fail("t must be known");
+    if (!rows.empty() && !rows.back().ends && rows.back().t == row.t) {
+      table.Fail(fmt::format("t is {}, as in the row before", row.t));
+    }
+    row.transition.q = Numbers(table, columns.q);
+    row.transition.v = Numbers(table, columns.v);
+    if (columns.has_next()) {
+      row.transition.next_q = Numbers(table, columns.next_q);
+      row.transition.next_v = Numbers(table, columns.next_v);
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::string Join(const std::vector<std::string>& names) {
+  std::string joined;
+  for (const std::string& name : names) joined += (joined.empty() ? "" : ", ") + name;
+  return joined;
+}
+
+std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Names& names,
+                                  int64_t clipped) {
+  if (rows.empty()) return {};
+  std::vector<std::string> states = names.q, still, missing, warnings;
+  states.insert(states.end(), names.v.begin(), names.v.end());
+  const Eigen::VectorXd spread = Spread(rows);
+  for (size_t i = 0; i < states.size(); ++i) {
+    const double s = spread(static_cast<Eigen::Index>(i));
+    if (std::isnan(s)) missing.push_back(states[i]);
+    if (s == 0 && rows.size() > 1) still.push_back(states[i]);
+  }
+  if (!missing.empty()) warnings.push_back("never observed: " + Join(missing));
+  if (!still.empty()) warnings.push_back("the same in all rows: " + Join(still));
+  if (clipped > 0) {
+    warnings.push_back(
+        fmt::format("{} actions go beyond the effort limits: clipped, as the task does", clipped));
+  }
+  return warnings;
+}
+
+}  // namespace
+
+MotionTable ReadMotionTable(const std::string& file, const RobotDescription& robot) {
+  CsvTable table(file);
+  const Names names(robot);
+  const Columns columns = FindColumns(table, names, robot.name);
+  Efforts efforts(robot);
+  MotionTable motion{ReadRows(table, columns, efforts), columns.has_next(), {}};
+  motion.warnings = Warnings(motion.rows, names, efforts.clipped());
+  return motion;
+}
+
+Eigen::VectorXd Spread(const std::vector<MotionRow>& rows) {
+  if (rows.empty()) return {};
+  const Eigen::Index n = rows[0].transition.q.size();
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(n + rows[0].transition.v.size()), squares = mean,
+                  count = mean;
+  for (const MotionRow& row : rows) {
+    for (Eigen::Index i = 0; i < mean.size(); ++i) {
+      const double s = i < n ? row.transition.q(i) : row.transition.v(i - n);
+      if (std::isnan(s)) continue;
+      const double from_mean = s - mean(i);
+      mean(i) += from_mean / ++count(i);
+      squares(i) += from_mean * (s - mean(i));
+    }
+  }
+  return (squares.array() / count.array()).sqrt();
+}
+
+}  // namespace plumb

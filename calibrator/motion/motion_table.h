@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calibrator/motion/transitions.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// A row of a table of motion as it stands.
+struct MotionRow {
+  double t;                ///< [s], finite
+  bool ends;               ///< the episode
+  Eigen::VectorXd effort;  ///< commanded, per velocity, within the limits; NaN = unknown
+  /// q, v, and next_q, next_v if the table has them; NaN = unknown. Nothing else yet
+  Transition transition;
+};
+
+/// A table of motion: see ReadCsvLog.
+struct MotionTable {
+  /// in the file's order; t differs from row to row but where an episode ends
+  std::vector<MotionRow> rows;
+  bool has_next = false;  ///< next_ columns are there
+  std::vector<std::string> warnings;
+};
+
+/// @throws std::runtime_error for all that is wrong with columns and fields: see ReadCsvLog.
+MotionTable ReadMotionTable(const std::string& file, const RobotDescription& robot);
+
+/// Standard deviation of each coordinate of (q, v) over the rows; NaN where it was never observed.
+/// Empty without rows.
+Eigen::VectorXd Spread(const std::vector<MotionRow>& rows);
+
+}  // namespace plumb

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "calibrator/motion/transitions.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// What a robot touches in a state.
+struct Touch {
+  bool ground = false;  ///< a contact point of a collision shape is at or below z = 0 of the base
+  bool stop = false;    ///< a joint is at or beyond a position limit
+  bool any() const { return ground || stop; }
+};
+
+/// Only what the robot's simulator knows counts: the ground with SimulationSettings::contact, stops
+/// with ::stop.
+/// @param robot with known parameters (Model::Describe), as lengths decide how far down it reaches.
+/// @param q as in RobotDescription. @throws std::invalid_argument if q has the wrong size.
+/// Thread-safe.
+Touch FindTouch(const RobotDescription& robot, const Eigen::Ref<const Eigen::VectorXd>& q);
+
+/// Of a transition: at its beginning or its end. Where the end was not observed the beginning has
+/// to do.
+Touch FindTouch(const RobotDescription& robot, const Transition& transition);
+
+}  // namespace plumb

@@ -1,0 +1,209 @@
+#include "calibrator/motion/transitions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace plumb {
+namespace {
+
+constexpr size_t kMostStates = 200'000;  // a quarter of an hour at 200 Hz
+constexpr size_t kMostEpisodes = 64;
+constexpr int kMostSteps = 1'000'000;
+
+Eigen::VectorXd ToEigen(const std::vector<double>& values) {
+  return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+// Where a staircase of efforts steps once, within a measurement's interval, its mean tells when:
+// with e0 before and e1 after, after the share (e1 - mean) / (e1 - e0). The step is put back there.
+// Left as its mean, it would move a joint wrongly by up to a / 8 T^2, a the step of the
+// acceleration and T the interval: 1.6 % of what a command does in four intervals. Where there are
+// more steps, or none, nothing is changed.
+// @param before effort of the interval before the first segment.
+void RestoreStep(const Eigen::VectorXd& before, std::vector<EffortSegment>* segments) {
+  constexpr double kSame = 1e-9;  // of an effort: rounding of a mean
+  Eigen::Index joint;
+  const Eigen::VectorXd after = segments->back().effort;
+  const double step = (after - before).cwiseAbs().maxCoeff(&joint);
+  const double same = kSame * (1 + before.cwiseAbs().maxCoeff() + after.cwiseAbs().maxCoeff());
+  if (!(step > same)) return;
+  const auto is = [&](const EffortSegment& segment, const Eigen::VectorXd& effort) {
+    return (segment.effort - effort).cwiseAbs().maxCoeff() <= same;
+  };
+  auto mixed = segments->begin();
+  while (mixed != segments->end() && is(*mixed, before)) ++mixed;
+  if (mixed == segments->end() || is(*mixed, after)) return;  // it steps where an interval begins
+  for (auto later = mixed + 1; later != segments->end(); ++later) {
+    if (!is(*later, after)) return;
+  }
+  if (mixed + 1 == segments->end()) return;  // what comes after it is not known
+  const double share = (after(joint) - mixed->effort(joint)) / (after(joint) - before(joint));
+  if (!(share > kSame && share < 1 - kSame)) return;
+  const EffortSegment rest{(1 - share) * mixed->duration,
+                           (mixed->effort - share * before) / (1 - share)};
+  *mixed = {share * mixed->duration, before};
+  segments->insert(mixed + 1, rest);
+}
+
+}  // namespace
+
+double Transition::duration() const {
+  return std::accumulate(
+      efforts.begin(), efforts.end(), 0.0,
+      [](double sum, const EffortSegment& segment) { return sum + segment.duration; });
+}
+
+std::string DropCounts::words() const {
+  std::string words = fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap,
+                                  gap == 1 ? "" : "s", late, not_finite, restart);
+  if (model_based > 0) words += fmt::format(", {} model-based", model_based);
+  return words;
+}
+
+DropCounts& DropCounts::operator+=(const DropCounts& other) {
+  gap += other.gap, late += other.late, not_finite += other.not_finite, restart += other.restart;
+  model_based += other.model_based;
+  return *this;
+}
+
+TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
+    : n_(robot.num_joints()),
+      period_(robot.task.period),
+      most_states_(kMostStates),
+      most_episodes_(kMostEpisodes) {}
+
+TransitionJoiner TransitionJoiner::Unbounded(const RobotDescription& robot) {
+  TransitionJoiner joiner(robot);
+  joiner.most_states_ = joiner.most_episodes_ = std::numeric_limits<size_t>::max();
+  return joiner;
+}
+
+const robot_state_t* TransitionJoiner::FindState(int64_t sequence) const {
+  const auto found = states_.find(sequence);
+  return found == states_.end() ? nullptr : &found->second;
+}
+
+void TransitionJoiner::OnState(const robot_state_t& smoothed) {
+  if (smoothed.num_joints != n_) return;
+  // A restarted driver counts from 0 again, at a later time; what was before cannot be joined with
+  // it.
+  if (!states_.empty() && smoothed.sequence <= newest_state() &&
+      smoothed.utime > states_.rbegin()->second.utime) {
+    states_.clear();
+    commands_.clear();
+  }
+  states_.insert_or_assign(smoothed.sequence, smoothed);
+  if (states_.size() > most_states_) states_.erase(states_.begin());
+}
+
+void TransitionJoiner::OnCommand(const joint_command_t& command) {
+  if (command.num_joints != n_ || command.episode < 0 || command.step < 0 ||
+      command.step >= kMostSteps)
+    return;
+  commands_[command.episode].insert_or_assign(command.step, command);
+  if (commands_.size() > most_episodes_) commands_.erase(commands_.begin());
+}
+
+Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
+  Rollout rollout;
+  rollout.episode = episode;
+  const auto found = commands_.find(episode);
+  if (found == commands_.end()) return rollout;
+  const std::map<int, joint_command_t>& commands = found->second;
+  for (auto command = commands.begin(); command != commands.end(); ++command) {
+    rollout.policy_iteration = command->second.policy_iteration;
+    const auto next = std::next(command);
+    if (next != commands.end() && next->first != command->first + 1) {
+      ++drops_.gap;
+      continue;
+    }
+    Transition transition;
+    transition.step = command->first;
+    const int64_t to = next != commands.end() ? next->second.state_sequence : last_state;
+    if (JoinOne(command->second.state_sequence, to, &transition, &drops_))
+      rollout.transitions.push_back(std::move(transition));
+  }
+  commands_.erase(found);
+  return rollout;
+}
+
+std::vector<Transition> TransitionJoiner::Arrived(int64_t episode, int* from) const {
+  std::vector<Transition> arrived;
+  const auto found = commands_.find(episode);
+  if (found == commands_.end()) return arrived;
+  DropCounts uncounted;
+  for (auto command = found->second.lower_bound(*from); command != found->second.end(); ++command) {
+    const auto next = std::next(command);
+    if (next == found->second.end() || newest_state() < next->second.state_sequence) break;
+    *from = next->first;
+    Transition transition;
+    transition.step = command->first;
+    const bool follows = next->first == command->first + 1;
+    if (follows && JoinOne(command->second.state_sequence, next->second.state_sequence, &transition,
+                           &uncounted)) {
+      arrived.push_back(std::move(transition));
+    }
+  }
+  return arrived;
+}
+
+bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
+                               DropCounts* drops) const {
+  const auto first = states_.find(from), last = states_.find(to);
+  if (first == states_.end() || last == states_.end() || to <= from) {
+    ++drops->gap;
+    return false;
+  }
+  const double duration = static_cast<double>(last->second.utime - first->second.utime) * 1e-6;
+  if (!(std::abs(duration - period_) <= 0.2 * period_)) {
+    ++drops->late;
+    return false;
+  }
+  bool finite = true;
+  int64_t expected = from;
+  for (auto state = first; expected <= to; ++state, ++expected) {
+    if (state == states_.end() || state->first != expected) {
+      ++drops->gap;
+      return false;
+    }
+    const robot_state_t& now = state->second;
+    if (now.model_based) {
+      ++drops->model_based;
+      return false;
+    }
+    if (expected == from) continue;
+    const robot_state_t& before = std::prev(state)->second;
+    if (now.restarted) {
+      ++drops->restart;
+      return false;
+    }
+    EffortSegment segment{static_cast<double>(now.utime - before.utime) * 1e-6,
+                          ToEigen(now.effort)};
+    finite = finite && segment.duration > 0 && segment.effort.allFinite();
+    transition->efforts.push_back(std::move(segment));
+  }
+  const robot_state_t& s = first->second;
+  const robot_state_t& t = last->second;
+  transition->q = ToEigen(s.q), transition->v = ToEigen(s.v);
+  transition->next_q = ToEigen(t.q), transition->next_v = ToEigen(t.v);
+  transition->q_sd = ToEigen(s.q_sd), transition->v_sd = ToEigen(s.v_sd);
+  transition->next_q_sd = ToEigen(t.q_sd), transition->next_v_sd = ToEigen(t.v_sd);
+  for (const Eigen::VectorXd* x :
+       {&transition->q, &transition->v, &transition->next_q, &transition->next_v, &transition->q_sd,
+        &transition->v_sd, &transition->next_q_sd, &transition->next_v_sd}) {
+    finite = finite && x->allFinite();
+  }
+  if (!finite) {
+    ++drops->not_finite;
+    return false;
+  }
+  if (const Eigen::VectorXd before = ToEigen(s.effort); before.allFinite())
+    RestoreStep(before, &transition->efforts);
+  return true;
+}
+
+}  // namespace plumb

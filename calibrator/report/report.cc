@@ -1,0 +1,355 @@
+#include "calibrator/report/report.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "calibrator/report/pair_plot.h"
+#include "calibrator/report/report_html.h"
+#include "calibrator/report/report_plots.h"
+#include "calibrator/report/report_residuals.h"
+#include "calibrator/report/report_style.h"
+#include "calibrator/results/summary.h"
+#include "common/atomic_file.h"
+#include "common/decompositions.h"
+#include "common/process.h"
+#include "plot/svg.h"
+
+namespace plumb {
+namespace {
+
+using Coordinate = ParameterDescription::Coordinate;
+using Index = Eigen::Index;
+
+constexpr Index kMostPairs = 8;
+constexpr double kNull = 1e-6;  // as FindIdentifiability has it
+constexpr double kInvolved = 1e-3;
+constexpr double kHardly = 0.22;  // nat: the data made the sd smaller by less than a fifth
+
+constexpr char kKeys[] =
+    "<span class=\"key prior\"></span>prior (dashed) &#160; <span class=\"key "
+    "posterior\"></span>posterior. ";
+
+std::string Verdict(const std::string& css, const std::string& title, const std::string& words) {
+  return "<div class=\"verdict " + css + "\"><b>" + title + "</b>" + Escape(words) + "</div>\n";
+}
+
+class Report {
+ public:
+  Report(const Findings& findings, const RobotDescription& robot, const Provenance& provenance,
+         const Residuals& residuals)
+      : findings_(findings),
+        robot_(robot),
+        provenance_(provenance),
+        residuals_(residuals),
+        summary_(Summarise(findings, robot)) {}
+
+  std::string Print() const {
+    return "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/>"
+           "<meta name=\"viewport\" content=\"width=device-width, "
+           "initial-scale=1\"/>\n<title>Calibration "
+           "of " +
+           Escape(robot_.name) + "</title>\n<style>" + kReportStyle +
+           "</style></head>\n<body><main>\n" + Headline() + Parameters() + Pairs() +
+           KnownAndUnknown() + Predictions() + Misfits() + ResidualSection(residuals_) + Logs() +
+           Stages() + Reproduce() + "</main></body>\n</html>\n";
+  }
+
+ private:
+  Index size() const { return summary_.mean.size(); }
+  const ParameterDescription& parameter(Index i) const {
+    return robot_.parameters[static_cast<size_t>(i)];
+  }
+  std::string Name(Index i) const { return Escape(parameter(i).name); }
+
+  std::string Headline() const {
+    const size_t logs = provenance_.logs.size();
+    std::string html = fmt::format(
+        "<h1>Calibration of {}</h1>\n<p class=\"sub\">{} parameter{} from {} transitions",
+        Escape(robot_.name), size(), size() == 1 ? "" : "s", findings_.transitions);
+    if (logs > 0) html += fmt::format(" of {} log{}", logs, logs == 1 ? "" : "s");
+    if (!provenance_.date.empty()) html += ", " + Escape(provenance_.date);
+    html += "</p>\n<div class=\"verdicts\">\n";
+
+    const bool all_known =
+        findings_.identifiability.null.empty() && !findings_.identifiability.words.empty();
+    html += Verdict(all_known ? "good" : "", "What can be known", KnownWords() + Values());
+    const Misspecification& model = findings_.misspecification;
+    html += model.alarm ? Verdict("bad", "The model does not explain the robot", model.words)
+            : model.words.empty() ? Verdict("", "The model was not tested",
+                                            "Whether it can explain the robot is not known.")
+                                  : Verdict("good", "The model explains the robot", model.words);
+    const bool tried = std::any_of(findings_.holdout.errors.begin(), findings_.holdout.errors.end(),
+                                   [](const HorizonError& e) { return e.windows > 0; });
+    html += !tried ? Verdict("", "Predictions were not tested", findings_.holdout.words)
+            : findings_.holdout.better
+                ? Verdict("good", "Predicts better than the prior", findings_.holdout.words)
+                : Verdict("bad", "Does not predict better than the prior", findings_.holdout.words);
+    if (!findings_.agreement.logs.empty()) {
+      html += findings_.agreement.agree
+                  ? Verdict("good", "The logs agree", findings_.agreement.words)
+                  : Verdict("bad", "The logs disagree", findings_.agreement.words);
+    }
+    html += "</div>\n";
+    for (const std::string& warning : findings_.warnings)
+      html += "<p><b>Warning:</b> " + Escape(warning) + "</p>\n";
+    return html;
+  }
+
+  std::string KnownWords() const {
+    const Identifiability& found = findings_.identifiability;
+    return found.words.empty() ? "Identifiability was not examined." : found.words;
+  }
+
+  // What the motion determines, in numbers, where that is a headline.
+  std::string Values() const {
+    constexpr size_t kMost = 4;
+    const std::vector<Combination>& combinations = findings_.identifiability.combinations;
+    if (combinations.size() > kMost) return "";
+    std::string words;
+    for (const Combination& c : combinations) {
+      words += (words.empty() ? ". " : ", ") + c.name + " = " + PlusMinus(c.mean, c.sd);
+    }
+    return words;
+  }
+
+  // First-order: the coordinate's sd in physical units, at the mean.
+  double CramerRao(Index i) const {
+    if (i >= findings_.cramer_rao.size()) return NAN;
+    const ParameterDescription& p = parameter(i);
+    const double x = p.ToCoordinate(summary_.mean(i)), step = 1e-5;
+    return findings_.cramer_rao(i) * (p.ToPhysical(x + step) - p.ToPhysical(x - step)) / (2 * step);
+  }
+
+  std::string Identifiable(Index i) const {
+    std::vector<std::string> others;
+    bool involved = false;
+    for (Index k = 0; k < size(); ++k) {
+      const bool together = std::any_of(
+          findings_.identifiability.null.begin(), findings_.identifiability.null.end(),
+          [&](const Eigen::VectorXd& d) {
+            return d.size() == size() && std::abs(d(i)) > kInvolved && std::abs(d(k)) > kInvolved;
+          });
+      involved = involved || together;
+      if (together && k != i) others.push_back(Name(k));
+    }
+    if (involved && others.empty()) return "no: the motion does not depend on it";
+    constexpr size_t kMostNames = 3;
+    if (others.size() > kMostNames)
+      return fmt::format("only in combination with {} others", others.size());
+    if (involved) return fmt::format("only in combination with {}", fmt::join(others, ", "));
+    if (summary_.gain(i) < kHardly) return "hardly: the motion adds little to the prior";
+    return "yes";
+  }
+
+  std::string Parameters() const {
+    Table table({"parameter", "unit", "prior", "posterior", "95 % interval", "Cram&#233;r-Rao sd",
+                 "identifiable"});
+    for (Index i = 0; i < size(); ++i) {
+      const double sd = summary_.sd(i);
+      table.Add({Name(i), Escape(parameter(i).unit),
+                 PlusMinus(summary_.prior_mean(i), summary_.prior_sd(i)),
+                 "<b>" + PlusMinus(summary_.mean(i), sd) + "</b>",
+                 Number(summary_.lower(i), sd) + " to " + Number(summary_.upper(i), sd),
+                 Number(CramerRao(i), CramerRao(i)), Identifiable(i)});
+    }
+    return "<h2>Parameters</h2>\n" + table.Print() +
+           "<p class=\"note\">Mean &#177; standard deviation. Cram&#233;r-Rao: the smallest sd "
+           "that an "
+           "unbiased estimate from these "
+           "data alone can have; &#8734; where they do not tell the parameter on its own. A "
+           "posterior may be "
+           "narrower, as it knows the "
+           "prior, too.</p>\n";
+  }
+
+  std::string Pairs() const {
+    std::vector<Index> shown(static_cast<size_t>(size()));
+    std::iota(shown.begin(), shown.end(), 0);
+    std::string selection;
+    if (size() > kMostPairs) {
+      std::stable_sort(shown.begin(), shown.end(),
+                       [&](Index a, Index b) { return summary_.gain(a) > summary_.gain(b); });
+      shown.resize(kMostPairs);
+      std::sort(shown.begin(), shown.end());
+      selection =
+          fmt::format("Of {} parameters these are the {} that the data have told most about. ",
+                      size(), kMostPairs);
+    }
+    return "<h2>Prior and posterior</h2>\n" +
+           Figure(Scrolling(PairPlot(findings_, summary_, robot_, shown)),
+                  selection + kKeys +
+                      "Ellipses: 1 and 2 sigma, one pair for each component of the posterior; dots "
+                      "are its "
+                      "samples. Where the "
+                      "posterior is much narrower than the prior, only its surroundings are shown. "
+                      "Numbers: "
+                      "the posterior's "
+                      "correlation of the coordinates.") +
+           Paragraph(findings_.check);
+  }
+
+  std::string KnownAndUnknown() const {
+    const Identifiability& found = findings_.identifiability;
+    std::string html = "<h2>What can be known from this motion</h2>\n" + Paragraph(KnownWords());
+    if (!found.combinations.empty()) {
+      Table table({"what the motion determines", "value"});
+      for (const Combination& c : found.combinations)
+        table.Add({Escape(c.name), PlusMinus(c.mean, c.sd)});
+      html += table.Print();
+    }
+    if (!found.null.empty()) {
+      Table table({"direction", "what changes nothing, in the parameters' coordinates"});
+      for (size_t k = 0; k < found.null.size(); ++k)
+        table.Add({std::to_string(k + 1), Direction(found.null[k])});
+      html += table.Print();
+    }
+    if (!findings_.advice.empty()) html += Paragraph(findings_.advice);
+    const std::string scree = ScreePlot(InformationEigenvalues(), kNull);
+    if (scree.empty()) return html;
+    return html +
+           Figure(
+               scree,
+               "Eigenvalues of the Fisher information in units of the prior, greatest first. Along "
+               "a direction with "
+               "1 (dashed) the data tell as much as the prior; what is below a millionth of the "
+               "greatest (dotted) cannot "
+               "be known from them.");
+  }
+
+  std::string Direction(const Eigen::VectorXd& direction) const {
+    std::string words;
+    for (Index i = 0; i < std::min(size(), direction.size()); ++i) {
+      if (!(std::abs(direction(i)) > kInvolved)) continue;
+      const bool log = parameter(i).coordinate == Coordinate::kLog;
+      words += (words.empty() ? "" : ", ") + Name(i) +
+               fmt::format(" {:+.3g}{}", direction(i), log ? " %" : "");
+    }
+    return words;
+  }
+
+  std::vector<double> InformationEigenvalues() const {
+    const Eigen::MatrixXd& information = findings_.identifiability.information;
+    if (information.rows() != size() || information.cols() != size() || !information.allFinite())
+      return {};
+    const Eigen::VectorXd sd = findings_.prior.covariance.diagonal().cwiseSqrt();
+    const Eigen::MatrixXd scaled = sd.asDiagonal() * information * sd.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled, Eigen::EigenvaluesOnly);
+    std::vector<double> values(eigen.eigenvalues().begin(), eigen.eigenvalues().end());
+    std::reverse(values.begin(), values.end());
+    return values;
+  }
+
+  std::string Predictions() const {
+    const Holdout& holdout = findings_.holdout;
+    std::string html = "<h2>Predictions of held-out motion</h2>\n" + Paragraph(holdout.words);
+    const std::string plot = ErrorPlot(holdout.errors);
+    if (plot.empty()) return html;
+    html += Figure(plot, kKeys + fmt::format("Root mean square error of predicting so many control "
+                                             "steps ahead, of {} transitions that "
+                                             "the fit has not seen.",
+                                             holdout.held_out));
+    Table table({"steps ahead", "windows", "posterior", "prior", "ratio"});
+    for (const HorizonError& e : holdout.errors) {
+      table.Add({std::to_string(e.horizon), std::to_string(e.windows), Number(e.posterior, NAN),
+                 Number(e.prior, NAN), Number(e.posterior / e.prior, 0.01)});
+    }
+    return html + table.Print();
+  }
+
+  std::string Misfits() const {
+    const Misspecification& model = findings_.misspecification;
+    std::string html =
+        "<h2>Can the model explain the robot?</h2>\n" +
+        Paragraph(model.words.empty() && !model.alarm ? "This was not tested." : model.words) +
+        fmt::format("<p>Mean squared whitened one-step error: {} (1 = down to the noise).</p>\n",
+                    Number(findings_.discrepancy, 0.01));
+    if (model.misfits.empty()) return html;
+    Table table({"misfit", "test", "statistic", "p, corrected", "share of the errors"});
+    for (const Misfit& m : model.misfits) {
+      table.Add(
+          {Escape(m.what), Escape(m.test), Number(m.statistic, NAN), Number(m.p, NAN),
+           std::isfinite(m.effect) ? fmt::format("{:.0f} %", 100 * m.effect) : "\xe2\x80\x93"});
+    }
+    return html + table.Print();
+  }
+
+  std::string Logs() const {
+    const Agreement& agreement = findings_.agreement;
+    if (agreement.logs.empty()) return "";
+    Table table({"", "log", "distance", "p, corrected"});
+    for (size_t k = 0; k < agreement.logs.size(); ++k) {
+      const LogAgreement& log = agreement.logs[k];
+      table.Add(
+          {std::to_string(k + 1), Escape(log.log), Number(log.distance, 0.1), Number(log.p, NAN)});
+    }
+    std::string html = "<h2>Do the logs agree?</h2>\n" + Paragraph(agreement.words) + table.Print();
+    constexpr size_t kMostLogs = 40;
+    if (agreement.logs.size() > kMostLogs) return html;
+    html += "<figure><div class=\"panels\">\n";
+    for (Index i = 0; i < std::min(size(), kMostPairs); ++i)
+      html += AgreementPlot(agreement.logs, summary_, robot_, i);
+    return html +
+           "</div><figcaption>Each log alone, mean and 95 %; the band is 95 % of all logs "
+           "together.</figcaption></figure>\n";
+  }
+
+  std::string Stages() const {
+    if (findings_.stages.empty()) return "";
+    Table table(
+        {"stage", "steps per window", "windows", "simulated steps", "mean squared whitened error"});
+    for (size_t k = 0; k < findings_.stages.size(); ++k) {
+      const CurriculumStage& s = findings_.stages[k];
+      table.Add({std::to_string(k + 1), std::to_string(s.horizon), std::to_string(s.windows),
+                 std::to_string(s.simulated_steps), Number(s.discrepancy, 0.001)});
+    }
+    return "<h2>Stages of the fit</h2>\n" + table.Print();
+  }
+
+  std::string Reproduce() const {
+    Table table({"", ""});
+    const auto add = [&](const std::string& what, const std::string& value) {
+      table.Add({what, Escape(value)});
+    };
+    add("seed", std::to_string(findings_.seed));
+    add("method", findings_.used == findings_.method || findings_.used.empty()
+                      ? findings_.method
+                      : findings_.method + ": " + findings_.used);
+    for (const auto& [name, value] : provenance_.options) table.Add({Escape(name), Escape(value)});
+    for (const std::string& log : provenance_.logs) add("log", log);
+    add("robot's files", fmt::format("{}, fingerprint {:#018x}", robot_.file, robot_.fingerprint));
+    add("version", VersionLine("plumb"));
+    add("simulated steps",
+        fmt::format("{} for the fit, {} for diagnostics; {} simulations failed",
+                    findings_.simulated_steps, findings_.diagnostic_steps, findings_.failures));
+    add("wall time", fmt::format("{:.1f} s", findings_.seconds));
+    return "<h2>How to do it again</h2>\n" +
+           (provenance_.command.empty() ? "" : "<pre>" + Escape(provenance_.command) + "</pre>\n") +
+           table.Print();
+  }
+
+  const Findings& findings_;
+  const RobotDescription& robot_;
+  const Provenance& provenance_;
+  const Residuals& residuals_;
+  Summary summary_;
+};
+
+}  // namespace
+
+std::string ReportHtml(const Findings& findings, const RobotDescription& robot,
+                       const Provenance& provenance, const Residuals& residuals) {
+  return Report(findings, robot, provenance, residuals).Print();
+}
+
+void WriteReport(const std::filesystem::path& file, const Findings& findings,
+                 const RobotDescription& robot, const Provenance& provenance,
+                 const Residuals& residuals) {
+  WriteAtomically(file, ReportHtml(findings, robot, provenance, residuals));
+}
+
+}  // namespace plumb

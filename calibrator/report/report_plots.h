@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calibrator/fit/window_errors.h"
+#include "calibrator/results/findings.h"
+#include "calibrator/results/summary.h"
+#include "robot/description.h"
+
+// The report's drawings: each returns an <svg> element. Classes "prior" and "posterior" have their
+// colours.
+namespace plumb {
+
+/// "mass/pole [kg]"
+inline std::string WithUnit(const ParameterDescription& p) {
+  return p.unit.empty() ? p.name : p.name + " [" + p.unit + "]";
+}
+
+/// Errors against the horizon, both logarithmic. @return empty if there are none.
+std::string ErrorPlot(const std::vector<HorizonError>& errors);
+
+/// Eigenvalues of the Fisher information in units of the prior, in decreasing order, on a
+/// logarithmic axis. Lines: 1 = as much as the prior knows, dashed; `null` times the greatest,
+/// below which nothing is identifiable, dotted.
+std::string ScreePlot(const std::vector<double>& eigenvalues, double null);
+
+/// Whitened residuals against the standard normal distribution.
+std::string ResidualHistogram(const std::vector<double>& residuals);
+/// Quantiles against those of the standard normal distribution. @param sorted ascending.
+std::string ResidualQuantiles(const std::vector<double>& sorted);
+/// @param correlation of lags 1, 2, ... @param count of residuals, for the band of 95 % of white
+/// noise.
+std::string ResidualCorrelation(const std::vector<double>& correlation, size_t count);
+/// Root mean square of all residuals over the record, in at most 120 bins of transitions, with
+/// vertical lines where roll-outs begin. 1 = down to the noise.
+std::string ResidualsOverTime(const Eigen::VectorXd& residuals,
+                              const std::vector<WindowErrors::Row>& rows);
+
+/// What each log alone says of a parameter, mean and 95 %, and all of them together as a band.
+std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary,
+                          const RobotDescription& robot, Eigen::Index parameter);
+
+}  // namespace plumb

@@ -1,0 +1,323 @@
+#include "calibrator/results/calibration.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "calibrator/design/excitation.h"
+#include "calibrator/diagnostics/holdout.h"
+#include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/fit/methods.h"
+#include "calibrator/inference/chi_squared.h"
+#include "common/decompositions.h"
+#include "sim/tasks/task.h"
+
+namespace plumb {
+namespace {
+
+// p below which logs are of different robots, or the model is wrong
+constexpr double kDisagreement = 1e-3;
+
+Eigen::MatrixXd ToPhysical(const RobotDescription& robot, const Eigen::MatrixXd& coordinates) {
+  Eigen::MatrixXd physical(coordinates.rows(), coordinates.cols());
+  for (Eigen::Index i = 0; i < coordinates.cols(); ++i)
+    physical.col(i) = robot.ToPhysical(coordinates.col(i));
+  return physical;
+}
+
+class Run {
+ public:
+  Run(const RobotDescription& robot, std::span<const Log> logs, const CalibrationOptions& options)
+      : robot_(robot),
+        model_(std::make_shared<Model>(robot)),
+        logs_(logs),
+        options_(options),
+        prior_(PriorOf(robot)) {
+    for (const Log& log : logs)
+      rollouts_.insert(rollouts_.end(), log.rollouts.begin(), log.rollouts.end());
+    if (CountTransitions(rollouts_) == 0)
+      throw std::invalid_argument("there is no transition to calibrate with");
+  }
+
+  Findings Go() {
+    const auto start = std::chrono::steady_clock::now();
+    MethodResult result = RunMethod({model_, rollouts_, options_});
+    findings_.method = options_.method;
+    findings_.used = result.used;
+    findings_.seed = options_.seed;
+    findings_.prior = {prior_.FromStandard(Eigen::VectorXd::Zero(prior_.size())),
+                       PriorCovariance()};
+    findings_.posterior = result.posterior;
+    findings_.samples = ToPhysical(robot_, result.samples);
+    findings_.transitions = static_cast<int64_t>(CountTransitions(rollouts_));
+    findings_.simulated_steps = result.simulated_steps;
+    findings_.failures = result.failures;
+    findings_.check = result.check;
+    findings_.warnings = result.warnings;
+    mean_ = Moments(result.posterior).mean;
+    Look(result);
+    Check(result);
+    Compare();
+    findings_.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return std::move(findings_);
+  }
+
+ private:
+  Eigen::MatrixXd PriorCovariance() const {
+    Eigen::VectorXd variance(prior_.size());
+    for (Eigen::Index i = 0; i < variance.size(); ++i)
+      variance(i) = std::pow(prior_.marginals()[static_cast<size_t>(i)].b, 2);
+    return variance.asDiagonal();
+  }
+
+  // One-step errors, their noise and their slopes at the posterior's mean, whatever method has
+  // found it.
+  void Look(const MethodResult& result) {
+    LaplaceFit view;
+    std::vector<WindowErrors::Row> rows;
+    bool noise_known = false;
+    if (result.curriculum) {
+      noise_known = result.curriculum->noise_known;
+      view = result.curriculum->one_step;
+      rows = result.curriculum->rows;
+      findings_.noise_sd = result.noise_sd;
+      findings_.stages = result.curriculum->stages;
+      information_ = result.curriculum->fit.information;
+    } else {
+      WindowErrors errors(model_, rollouts_, 1, options_.workforce);
+      LaplaceOptions still;
+      still.most_iterations = 0;
+      errors.Linearise(robot_.ToPhysical(mean_));
+      view = FitLaplace(ProblemOf(robot_, errors), mean_, still);
+      rows = errors.rows();
+      findings_.noise_sd = errors.EndNoise();
+      // there is none of what was never observed
+      findings_.noise_sd.head(view.scale.size()).array() *= view.scale.array();
+      noise_known = errors.noise_known();
+      findings_.diagnostic_steps += errors.simulated_steps();
+      information_ = view.information;
+    }
+    findings_.discrepancy = view.errors.cwiseAbs2().mean();
+    findings_.errors = view.errors;
+    findings_.rows = rows;
+    Suspect(view, noise_known);
+    findings_.identifiability =
+        FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
+    findings_.cramer_rao = findings_.identifiability.cramer_rao;
+    ExcitationSettings settings;
+    settings.seed = options_.seed;
+    settings.seconds = std::min(settings.seconds, robot_.task.steps * robot_.task.period);
+    findings_.advice =
+        AdviseMotion(robot_, Moments(findings_.posterior), findings_.identifiability, settings)
+            .words;
+  }
+
+  // What the model has wrong, whatever its parameters.
+  void Suspect(const LaplaceFit& view, bool noise_known) {
+    const Eigen::VectorXd physical = robot_.ToPhysical(mean_);
+    if ((findings_.noise_sd.array() <= kNegligible * MakeTask(robot_)->state_scale().array())
+            .all()) {
+      findings_.misspecification.words = "the model reproduces this log to five digits";
+      return;
+    }
+    const std::vector<Candidate> candidates = FindCandidates(robot_);
+    auto extended = std::make_shared<Model>(WithCandidates(robot_, candidates));
+    WindowErrors errors(extended, rollouts_, 1, options_.workforce);
+    errors.set_noise_sd(findings_.noise_sd);
+    Eigen::VectorXd nominal = extended->parameters().means();
+    nominal.head(physical.size()) = physical;
+    errors.Linearise(nominal);
+    Leftover leftover{
+        rollouts_,
+        findings_.rows,
+        findings_.errors,
+        view.jacobian,
+        std::vector<bool>(static_cast<size_t>(findings_.noise_sd.size()), noise_known),
+        candidates,
+        {}};
+    leftover.columns = CandidateColumns(
+        [&](const Eigen::MatrixXd& x) { return errors.Whitened(x); }, physical, candidates);
+    // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of
+    // it, as the errors are.
+    if (noise_known) {
+      for (size_t i = 0; i < findings_.rows.size(); ++i) {
+        leftover.columns.row(static_cast<Eigen::Index>(i)) /=
+            view.scale(findings_.rows[i].coordinate);
+      }
+    }
+    findings_.misspecification = FindMisspecification(model_->Describe(physical), leftover);
+    findings_.diagnostic_steps += errors.simulated_steps();
+  }
+
+  // Fits again without a part of the data, which then judges.
+  void Check(const MethodResult& result) {
+    Split split = HoldOut(rollouts_);
+    Discrepancy discrepancy(robot_, options_.workforce);
+    Eigen::VectorXd mean = mean_;
+    if (!split.held_out.empty()) {
+      CalibrationOptions again = options_;
+      again.progress = [&](const std::string&, double share) {
+        options_.progress("hold-out", share);
+      };
+      if (result.curriculum) again.method = "laplace";
+      try {
+        const MethodResult part =
+            RunMethod({model_, split.fitted, again, result.curriculum ? mean_ : Eigen::VectorXd()});
+        mean = Moments(part.posterior).mean;
+        findings_.diagnostic_steps += part.simulated_steps;
+      } catch (const std::invalid_argument& error) {
+        findings_.warnings.push_back(fmt::format("nothing could be held out: {}", error.what()));
+        split = {rollouts_, {}};
+      }
+    }
+    findings_.holdout =
+        Judge(discrepancy, split, robot_.ToPhysical(mean), robot_.ToPhysical(findings_.prior.mean));
+    for (const HorizonError& error : findings_.holdout.errors)
+      findings_.diagnostic_steps += 2 * error.windows * error.horizon;
+  }
+
+  // Each log on its own: are they of the same robot?
+  void Compare() {
+    Agreement& agreement = findings_.agreement;
+    if (logs_.size() < 2) {
+      agreement.words = "a single log: nothing to compare it with";
+      return;
+    }
+    std::vector<LaplaceFit> fits;
+    std::vector<std::string> names;
+    for (const Log& log : logs_) {
+      try {
+        CurriculumOptions options;
+        options.horizons = options_.horizons, options.workforce = options_.workforce,
+        options.starts = 1;
+        const CurriculumFit own = FitCurriculum(model_, log.rollouts, options, mean_);
+        findings_.diagnostic_steps += own.simulated_steps;
+        fits.push_back(own.fit);
+        names.push_back(log.name);
+      } catch (const std::invalid_argument& error) {
+        findings_.warnings.push_back(fmt::format("{} on its own: {}", log.name, error.what()));
+      }
+    }
+    for (size_t i = 0; i < fits.size(); ++i) agreement.logs.push_back(Against(names[i], fits, i));
+    if (fits.size() < 2) {
+      agreement.words = "fewer than two of the logs can be fitted on their own: nothing to compare";
+      return;
+    }
+    std::string against;
+    for (const LogAgreement& log : agreement.logs) {
+      if (log.p >= kDisagreement) continue;
+      agreement.agree = false;
+      against +=
+          fmt::format("{}{} ({:.1f} sd)", against.empty() ? "" : ", ", log.log, log.distance);
+    }
+    agreement.words = agreement.agree ? fmt::format("the {} logs agree", agreement.logs.size())
+                                      : "the logs do not agree with each other: " + against +
+                                            "; they are of different robots, or the model is wrong "
+                                            "in a way that depends on the motion";
+  }
+
+  // A log's likelihood against that of the others together, both quadratic: their modes differ by a
+  // normal vector with the sum of both covariances, in the directions that both determine.
+  LogAgreement Against(const std::string& name, const std::vector<LaplaceFit>& fits,
+                       size_t i) const {
+    const Eigen::Index n = prior_.size();
+    const LaplaceFit& own = fits[i];
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
+    for (size_t k = 0; k < fits.size(); ++k) {
+      if (k == i) continue;
+      information += Data(fits[k]);
+      weighted += Data(fits[k]) * LikelihoodMode(fits[k]);
+    }
+    const Eigen::VectorXd sd = prior_sd();
+    const auto scaled = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
+      return sd.asDiagonal() * m * sd.asDiagonal();
+    };
+    // Pseudo-inverses in the prior's units: directions with less information than the prior has do
+    // not count.
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> mine(scaled(Data(own))),
+        theirs(scaled(information));
+    const auto pseudo =
+        [](const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>& eigen) -> Eigen::MatrixXd {
+      const Eigen::ArrayXd values = eigen.eigenvalues().array();
+      const Eigen::VectorXd inverse = (values > 1).select(1 / values.max(1e-300), 0.0);
+      return eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
+    };
+    const Eigen::VectorXd their_mode =
+        sd.asDiagonal() * pseudo(theirs) * sd.asDiagonal() * weighted;
+    Eigen::MatrixXd both(n, 0);
+    const Eigen::MatrixXd my_projector = Projector(mine), their_projector = Projector(theirs);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> common(
+        Eigen::MatrixXd(my_projector * their_projector * my_projector));
+    const Eigen::Index rank = (common.eigenvalues().array() > 0.99).count();
+    both = common.eigenvectors().rightCols(rank);
+    LogAgreement result;
+    result.log = name;
+    result.mean = robot_.ToPhysical(own.mode);
+    const Eigen::VectorXd own_sd = own.posterior.covariance.diagonal().cwiseSqrt();
+    result.sd =
+        (robot_.ToPhysical(own.mode + own_sd) - robot_.ToPhysical(own.mode - own_sd)).cwiseAbs() /
+        2;
+    if (rank == 0) {
+      result.distance = 0, result.p = 1;
+      return result;
+    }
+    const Eigen::VectorXd offset =
+        both.transpose() * ((LikelihoodMode(own) - their_mode).cwiseQuotient(sd));
+    const Eigen::MatrixXd spread = both.transpose() * (pseudo(mine) + pseudo(theirs)) * both;
+    const double squared = offset.dot(spread.llt().solve(offset));
+    result.distance = std::sqrt(squared);
+    result.p = std::min(
+        1.0, ChiSquaredTail(static_cast<double>(rank), squared) * static_cast<double>(fits.size()));
+    return result;
+  }
+
+  Eigen::VectorXd prior_sd() const { return findings_.prior.covariance.diagonal().cwiseSqrt(); }
+  static Eigen::MatrixXd Projector(const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>& eigen) {
+    const Eigen::Index rank = (eigen.eigenvalues().array() > 1).count();
+    const auto v = eigen.eigenvectors().rightCols(rank);
+    return v * v.transpose();
+  }
+  // What the data alone say: the posterior without the prior.
+  Eigen::MatrixXd Data(const LaplaceFit& fit) const {
+    return Precision(fit.posterior) -
+           Eigen::MatrixXd(findings_.prior.covariance.diagonal().cwiseInverse().asDiagonal());
+  }
+  // Data * mode + prior * prior mean = posterior precision * posterior mode.
+  Eigen::VectorXd LikelihoodMode(const LaplaceFit& fit) const {
+    const Eigen::VectorXd sd = prior_sd();
+    const Eigen::VectorXd right =
+        Precision(fit.posterior) * fit.mode - findings_.prior.mean.cwiseQuotient(sd.cwiseAbs2());
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+        Eigen::MatrixXd(sd.asDiagonal() * Data(fit) * sd.asDiagonal()));
+    const Eigen::ArrayXd values = eigen.eigenvalues().array();
+    // as in Against
+    const Eigen::VectorXd inverse = (values > 1).select(1 / values.max(1e-300), 0.0);
+    return sd.asDiagonal() *
+           (eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose()) *
+           sd.asDiagonal() * right;
+  }
+
+  const RobotDescription& robot_;
+  std::shared_ptr<const Model> model_;
+  std::span<const Log> logs_;
+  const CalibrationOptions& options_;
+  Prior prior_;
+  std::vector<Rollout> rollouts_;
+  Eigen::VectorXd mean_;
+  Eigen::MatrixXd information_;
+  Findings findings_;
+};
+
+}  // namespace
+
+Findings Calibrate(const RobotDescription& robot, std::span<const Log> logs,
+                   const CalibrationOptions& options) {
+  return Run(robot, logs, options).Go();
+}
+
+}  // namespace plumb

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "calibrator/diagnostics/holdout.h"
+#include "calibrator/diagnostics/identifiability.h"
+#include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/window_errors.h"
+#include "calibrator/inference/gaussian.h"
+
+namespace plumb {
+
+/// One log's own answer against that of all.
+struct LogAgreement {
+  std::string log;
+  Eigen::VectorXd mean, sd;  ///< of its own posterior, physical units
+  double distance;           ///< Mahalanobis' from the others' together, in what the log can tell
+  /// of such a distance if all logs were of one robot, corrected for the number of logs
+  double p;
+};
+
+struct Agreement {
+  bool agree = true;
+  std::vector<LogAgreement> logs;  ///< empty for a single log
+  std::string words;
+};
+
+/// All that a calibration has found.
+struct Findings {
+  std::string method;  ///< that was asked for
+  std::string used;    ///< that gave the answer, e.g. "laplace" where "auto" was asked for
+  uint64_t seed = 0;
+  Gaussian prior;             ///< coordinates
+  GaussianMixture posterior;  ///< coordinates
+  Eigen::MatrixXd samples;    ///< of the posterior, physical units, n x N, equally weighted
+  int64_t transitions = 0;
+  int64_t simulated_steps = 0;   ///< transitions simulated for the fit
+  int64_t diagnostic_steps = 0;  ///< and for the diagnostics
+  int64_t failures = 0;          ///< simulations that failed
+  /// mean squared whitened one-step error of the mean; 1 = down to the noise
+  double discrepancy = 0;
+  /// of each entry of (q, v), estimated or as recorded, physical units
+  Eigen::VectorXd noise_sd;
+  /// one-step errors of the mean, whitened, divided by their estimated scale
+  Eigen::VectorXd errors;
+  std::vector<WindowErrors::Row> rows;  ///< what each is about
+  std::vector<CurriculumStage> stages;
+  Identifiability identifiability;
+  /// sd of each parameter's coordinate if nothing but the data told, infinite where they do not
+  Eigen::VectorXd cramer_rao;
+  std::string advice;  ///< which further motion would tell most of what is left open, in words
+  Holdout holdout;
+  Misspecification misspecification;
+  Agreement agreement;
+  std::string check;  ///< how the posterior's shape was verified, in words
+  std::vector<std::string> warnings;
+  double seconds = 0;  ///< wall time
+};
+
+}  // namespace plumb

@@ -1,0 +1,339 @@
+#include "calibrator/diagnostics/misspecification.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <iostream>
+#include <limits>
+#include <map>
+
+#include "calibrator/diagnostics/error_tests.h"
+#include "calibrator/diagnostics/projected_errors.h"
+#include "calibrator/inference/gaussian.h"
+#include "calibrator/motion/touch.h"
+#include "tests/calibrator/fitted_log.h"
+
+namespace plumb {
+namespace {
+
+struct Wrong {
+  const char* name;
+  Truth truth;
+};
+
+/// What the hopper's masses, the only parameters fitted, cannot absorb.
+std::vector<Wrong> WrongModels() {
+  return {{"inertia/torso", {{{"inertia/torso", 1.2}}}},
+          {"inertia/thigh", {{{"inertia/thigh", 1.2}}}},
+          {"inertia/leg", {{{"inertia/leg", 1.2}}}},
+          {"inertia/foot", {{{"inertia/foot", 1.2}}}},
+          {"friction/leg", {{{"friction/leg", 5}}}},
+          {"delay/thigh", {{{"delay/thigh", 0.002}}}},
+          {"gravity", {{{"gravity", 9.81 * 1.02}}}},
+          {"contact/stiffness", {{{"contact/stiffness", 7500}}}}};
+}
+
+Misspecification Diagnose(const RobotDescription& robot, const Truth& truth, int transitions,
+                          uint64_t seed) {
+  return FittedLog(robot, RandomLog(robot, truth, transitions, seed)).Find();
+}
+
+}  // namespace
+
+TEST_CASE("what a model gets wrong is named, and a right model is left in peace") {
+  const RobotDescription robot = Robot("hopper");
+  const Misspecification right = Diagnose(robot, {}, 400, 7);
+  INFO(right.words);
+  CHECK_FALSE(right.alarm);
+  CHECK(right.misfits.empty());
+  for (const Wrong& wrong : WrongModels()) {
+    const Misspecification found = Diagnose(robot, wrong.truth, 400, 7);
+    INFO(wrong.name << ": " << found.words);
+    CHECK(found.alarm);
+    CHECK_THAT(found.words, Catch::StartsWith("the model cannot explain this log: "));
+    REQUIRE(!found.misfits.empty());
+    CHECK_THAT(found.misfits[0].what, Catch::StartsWith(wrong.name));
+    CHECK(found.misfits[0].test == "structure");
+    CHECK(found.misfits[0].p < kFalseAlarm);
+    CHECK(found.misfits[0].effect > kLeastShare);
+    if (std::string(wrong.name) != "contact/stiffness") continue;
+    for (const Misfit& misfit : found.misfits) CHECK(misfit.condition != "free");
+    CHECK(found.misfits[0].condition == "contact");
+  }
+}
+
+TEST_CASE("how much larger a parameter would have to be is told") {
+  const Misspecification found = Diagnose(Robot("hopper"), {{{"inertia/torso", 1.2}}}, 400, 8);
+  INFO(found.words);
+  CHECK_THAT(found.words,
+             Catch::Matches(".*inertia/torso (19|20|21) % larger would explain [0-9]+ % of it.*"));
+  const Misspecification slow = Diagnose(Robot("hopper"), {{{"delay/thigh", 0.002}}}, 400, 8);
+  INFO(slow.words);
+  CHECK_THAT(slow.words, Catch::Matches(".*delay/thigh 0.002[0-9]* s larger would explain.*"));
+}
+
+TEST_CASE(
+    "p values are uniform where the model is right, and a little larger at most where states are "
+    "shared") {
+  const RobotDescription robot = Robot("hopper");
+  for (const bool shared : {false, true}) {
+    const Truth truth{{}, shared ? 1e-3 : 0, 1e-3};
+    FittedLog log(robot, RandomLog(robot, truth, 250, 3));
+    log.leftover.rollouts = log.rollouts;
+    log.leftover.rows = log.rows;
+    std::map<std::string, std::vector<double>> p;
+    Random random(5, {shared});
+    const auto n = static_cast<Eigen::Index>(log.rows.size()),
+               width = static_cast<Eigen::Index>(12);
+    for (int trial = 0; trial < 40; ++trial) {
+      // Of a state that two transitions share each coordinate's error appears in both: -1/2 of the
+      // variance.
+      const Eigen::MatrixXd noise = StandardNormals(n + width, 1, random);
+      log.leftover.errors = shared
+                                ? ((noise.topRows(n) - noise.bottomRows(n)) / std::sqrt(2)).eval()
+                                : noise.topRows(n).eval();
+      log.leftover.jacobian = StandardNormals(n, 4, random);
+      for (const bool known : {true, false}) {
+        log.leftover.noise_known.assign(12, known);
+        const ProjectedErrors errors(log.known, log.leftover);
+        REQUIRE(errors.conditions);
+        for (const Misfit& test : TestScale(errors, log.leftover.noise_known)) {
+          p[known ? "scale" : "heteroscedasticity"].push_back(test.p);
+        }
+        for (const auto& tests :
+             {TestWhiteness(errors), TestBias(errors), TestRegression(errors)}) {
+          for (const Misfit& test : tests) p[test.test].push_back(test.p);
+        }
+        const Eigen::VectorXd column = errors.Project(StandardNormals(n, 1, random));
+        p["score"].push_back(FindScore(errors, column, 1e9, -1e9).p);
+        for (const Misfit& test : TestOutliers(errors)) CHECK(test.p > 1e-4);
+      }
+    }
+    for (const auto& [test, values] : p) {
+      if (shared && (test == "scale" || test == "heteroscedasticity"))
+        continue;  // rows correlate: not these tests' matter
+      const auto below = [&](double limit) {
+        return static_cast<double>(std::count_if(values.begin(), values.end(),
+                                                 [&](double x) { return x < limit; })) /
+               static_cast<double>(values.size());
+      };
+      INFO(test << (shared ? ", shared states" : "") << ", " << values.size()
+                << " values: " << below(0.1) << ", " << below(0.5));
+      CHECK(below(0.1) < 0.17);
+      if (shared) continue;
+      CHECK(below(0.1) > 0.03);
+      CHECK(below(0.5) > 0.35);
+      CHECK(below(0.5) < 0.63);
+    }
+  }
+}
+
+/// A right model's log whose errors a test can spoil.
+class Spoilt {
+ public:
+  /// @param spoil is given each error, its coordinate (0 ... 11), the step's number and whether it
+  /// is in contact.
+  template <class Spoil>
+  Misspecification Find(bool noise_known, const Spoil& spoil) {
+    Random random(2);
+    FittedLog log = Right();
+    log.leftover.noise_known.assign(12, noise_known);
+    for (size_t i = 0; i < log.rows.size(); ++i) {
+      const WindowErrors::Row& row = log.rows[i];
+      const Transition& t = log.rollouts[static_cast<size_t>(row.rollout)]
+                                .transitions[static_cast<size_t>(row.transition)];
+      double& error = log.leftover.errors(static_cast<Eigen::Index>(i));
+      error = spoil(error, row.coordinate, row.window, FindTouch(log.known, t).any(), random);
+    }
+    return log.Find();
+  }
+
+  static const FittedLog& Right() {
+    static const RobotDescription hopper = Robot("hopper/gym.toml");
+    static const FittedLog log(hopper, RandomLog(hopper, {}, 600, 11));
+    return log;
+  }
+};
+
+TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
+  const auto has = [](const Misspecification& found, const std::string& test,
+                      const std::string& joint, const std::string& condition) {
+    return std::any_of(found.misfits.begin(), found.misfits.end(), [&](const Misfit& m) {
+      return m.test == test && m.joint == joint && m.condition == condition;
+    });
+  };
+  SECTION("nothing wrong") {
+    for (const bool known : {true, false}) {
+      const auto found = Find(known, [](double e, auto...) { return e; });
+      INFO(found.words);
+      CHECK_FALSE(found.alarm);
+      CHECK(found.misfits.empty());
+    }
+  }
+  SECTION("scale") {
+    const auto found =
+        Find(true, [](double e, int c, auto...) { return c % 6 == 4 ? 1.7 * e : e; });
+    INFO(found.words);
+    CHECK(found.alarm);
+    CHECK(has(found, "scale", "leg", "free"));
+    CHECK_FALSE(has(found, "scale", "thigh", "free"));
+    // Noise that was estimated has any scale.
+    CHECK_FALSE(
+        Find(false, [](double e, int c, auto...) { return c % 6 == 4 ? 1.7 * e : e; }).alarm);
+  }
+  SECTION("larger errors in contact than in free motion, with noise estimated") {
+    const auto found = Find(false, [](double e, int c, int, bool contact, auto&) {
+      return c == 3 && contact ? 2 * e : e;
+    });
+    INFO(found.words);
+    CHECK(found.alarm);
+    CHECK(has(found, "scale", "thigh", "contact"));
+    CHECK(found.words.find("position of thigh") != std::string::npos);
+  }
+  SECTION("bias") {
+    const auto found = Find(true, [](double e, int c, auto...) { return c == 11 ? e + 0.5 : e; });
+    INFO(found.words);
+    CHECK(found.alarm);
+    CHECK((has(found, "bias", "foot", "free") || has(found, "bias", "foot", "contact") ||
+           found.misfits[0].joint == "foot"));
+  }
+  SECTION("whiteness") {
+    double last = 0;
+    const auto found = Find(
+        true, [&](double e, int c, auto...) { return c == 10 ? last = 0.6 * last + 0.8 * e : e; });
+    INFO(found.words);
+    CHECK(found.alarm);
+    CHECK(has(found, "whiteness", "leg", ""));
+  }
+  SECTION("an effect that is real but negligible") {
+    CHECK_FALSE(Find(true, [](double e, auto...) { return 1.05 * e; }).alarm);
+  }
+  SECTION("knocks: told of, no alarm, and they pass for nothing else") {
+    const auto found = Find(true, [](double e, int c, int step, auto...) {
+      return c == 9 && step % 200 == 17 ? e + 100 : e;
+    });
+    INFO(found.words);
+    CHECK_FALSE(found.alarm);
+    REQUIRE(!found.misfits.empty());
+    for (const Misfit& misfit : found.misfits) {
+      CHECK(misfit.test == "outliers");
+      CHECK(misfit.joint == "thigh");
+    }
+    CHECK_THAT(found.words, Catch::Contains("outliers"));
+  }
+  SECTION("heavy tails") {
+    const auto found = Find(true, [](double e, int c, int, bool, Random& random) {
+      return c == 9 && random.Uniform() < 0.1 ? 20 * e : e;
+    });
+    INFO(found.words);
+    CHECK(found.alarm);
+    CHECK((has(found, "outliers", "thigh", "free") || has(found, "outliers", "thigh", "contact")));
+  }
+  SECTION("dependence on the state that no candidate has") {
+    FittedLog log = Right();
+    log.leftover.candidates.clear();
+    log.leftover.columns.resize(log.leftover.errors.size(), 0);
+    for (size_t i = 0; i < log.rows.size(); ++i) {
+      const WindowErrors::Row& row = log.rows[i];
+      const auto& t = log.rollouts[static_cast<size_t>(row.rollout)]
+                          .transitions[static_cast<size_t>(row.transition)];
+      if (row.coordinate == 9)
+        log.leftover.errors(static_cast<Eigen::Index>(i)) += 0.5 * (t.v(3) > 0 ? 1 : -1);
+    }
+    const auto found = log.Find();
+    INFO(found.words);
+    CHECK(found.alarm);
+    CHECK(has(found, "structure", "thigh", ""));
+  }
+}
+
+TEST_CASE("errors that are not finite are an alarm, and sizes have to fit") {
+  FittedLog log(Robot("pendulum"), RandomLog(Robot("pendulum"), {}, 50, 1));
+  CHECK_FALSE(log.Find().alarm);
+  log.leftover.errors(3) = std::numeric_limits<double>::quiet_NaN();
+  CHECK(log.Find().alarm);
+  log.leftover.errors.conservativeResize(7);
+  CHECK_THROWS_AS(log.Find(), std::invalid_argument);
+}
+
+TEST_CASE("what a robot touches") {
+  const RobotDescription hopper = Robot("hopper");
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(6);
+  q.tail(3) << -0.1, -0.1, 0.1;
+  q(1) = 1.25;
+  CHECK_FALSE(FindTouch(hopper, q).any());
+  q(1) = 1.15;
+  CHECK(FindTouch(hopper, q).ground);
+  CHECK_FALSE(FindTouch(hopper, q).stop);
+  q(1) = 2;
+  q(4) = 0.01;
+  CHECK(FindTouch(hopper, q).stop);
+  CHECK_FALSE(FindTouch(hopper, q).ground);
+  RobotDescription blind = hopper;
+  blind.simulation.stop.reset();
+  CHECK_FALSE(FindTouch(blind, q).any());
+  CHECK_THROWS_AS(FindTouch(hopper, q.head(5)), std::invalid_argument);
+}
+
+TEST_CASE("candidates are parameters of every robot's simulator, at the values that it has") {
+  for (const char* name : {"pendulum", "hopper", "cartpole", "double_pendulum"}) {
+    const RobotDescription robot = Robot(name);
+    const std::vector<Candidate> candidates = FindCandidates(robot);
+    REQUIRE(candidates.size() > 3);
+    const Model model(WithCandidates(robot, candidates));
+    Eigen::VectorXd own(robot.parameters.size());
+    for (size_t i = 0; i < robot.parameters.size(); ++i)
+      own(static_cast<Eigen::Index>(i)) = robot.parameters[i].mean;
+    Eigen::VectorXd all(own.size() + static_cast<Eigen::Index>(candidates.size()));
+    all << own, Eigen::VectorXd::NullaryExpr(
+                    static_cast<Eigen::Index>(candidates.size()),
+                    [&](Eigen::Index i) { return candidates[static_cast<size_t>(i)].value; });
+    Simulator with(WithCandidates(robot, candidates)), without(robot);
+    with.SetParameters(all);
+    without.SetParameters(own);
+    const Eigen::VectorXd q = Eigen::VectorXd::Constant(robot.num_positions(), 0.1);
+    const Eigen::VectorXd v = Eigen::VectorXd::Constant(robot.num_velocities(), -0.2);
+    for (Simulator* simulator : {&with, &without}) {
+      simulator->SetState(q, v);
+      simulator->Step(Eigen::VectorXd::Constant(v.size(), 0.3), 0.01);
+    }
+    INFO(name);
+    CHECK((with.v() - without.v()).norm() < 1e-6);
+  }
+}
+
+TEST_CASE("the alarm on logs of right and wrong models, measured", "[.slow]") {
+  const RobotDescription robot = Robot("hopper");
+  constexpr int kLogs = 20;
+  std::vector<Wrong> models = WrongModels();
+  models.insert(models.begin(), {"right", {}});
+  for (const Wrong& wrong : models) {
+    int alarms = 0, first = 0, named = 0, at_contact = 0;
+    std::string words;
+    const auto begin = std::chrono::steady_clock::now();
+    for (int log = 0; log < kLogs; ++log) {
+      const Misspecification found =
+          Diagnose(robot, wrong.truth, 1000, 100 + static_cast<uint64_t>(log));
+      alarms += found.alarm;
+      first += !found.misfits.empty() && found.misfits[0].what.starts_with(wrong.name);
+      at_contact += !found.misfits.empty() && found.misfits[0].condition == "contact" &&
+                    std::none_of(found.misfits.begin(), found.misfits.end(),
+                                 [](const Misfit& m) { return m.condition == "free"; });
+      named += found.words.find(wrong.name) != std::string::npos;
+      if (log == 0 || (wrong.name[0] != 'r' && found.words.find(wrong.name) == std::string::npos) ||
+          (wrong.name[0] == 'r' && found.alarm))
+        words += found.words + "\n";
+    }
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    std::cout << fmt::format("{}: {} alarms of {}, first {}, named {}, {:.1f} s\n{}", wrong.name,
+                             alarms, kLogs, first, named, seconds.count(), words)
+              << std::endl;
+    if (std::string(wrong.name) == "contact/stiffness") CHECK(at_contact == kLogs);
+    CHECK(alarms == (wrong.truth.changed.empty() ? 0 : kLogs));
+    if (!wrong.truth.changed.empty()) CHECK(first >= kLogs - 2);
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,304 @@
+#include "calibrator/results/calibration.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "calibrator/diagnostics/holdout.h"
+#include "common/decompositions.h"
+#include "tests/calibrator/hopper.h"
+#include "tests/calibrator/inference/statistics.h"
+#include "tests/calibrator/synthetic.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+const Eigen::Vector3d kTruth(9.5, 1.1, 0.95);
+
+Log Swinging(const std::string& name, const Eigen::VectorXd& truth, int rollouts, uint32_t stream,
+             int steps = 60) {
+  Log log;
+  log.name = name;
+  for (int i = 0; i < rollouts; ++i) {
+    log.rollouts.push_back(
+        SyntheticRollout(Pendulum(), truth, steps, 1e-3, 5e-3, stream + static_cast<uint32_t>(i)));
+    for (Transition& t : log.rollouts.back().transitions) {  // nobody says what the noise is
+      for (Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
+        sd->setConstant(kNaN);
+    }
+  }
+  return log;
+}
+
+Findings Of(const std::vector<Log>& logs, const std::string& method = "auto",
+            int64_t budget = 20'000) {
+  CalibrationOptions options;
+  options.method = method;
+  options.budget = budget;
+  options.horizons = {1, 5};
+  return Calibrate(Pendulum(), logs, options);
+}
+
+TEST_CASE("a pendulum's calibration finds what the motion tells, and names what it does not") {
+  const Findings f = Of({Swinging("a", kTruth, 6, 0)});
+  CHECK(f.used == "laplace");
+  CHECK(f.transitions == 360);
+  // gravity / length and mass length^2 to a few standard deviations, both well known.
+  const Eigen::Vector3d slow(1, 0, -1), heavy(0, 1, 2), null(1, -2, 1);
+  const Gaussian posterior = Moments(f.posterior);
+  for (const Eigen::Vector3d& known : {slow, heavy}) {
+    const double sd = std::sqrt(known.dot(posterior.covariance * known));
+    CHECK(sd < 0.02);
+    CHECK(std::abs(known.dot(posterior.mean) - known.dot(Eigen::Vector3d(kTruth.array().log()))) <
+          4 * sd);
+  }
+  REQUIRE(f.identifiability.null.size() == 1);
+  CHECK((f.identifiability.null[0].normalized().cwiseAbs() - null.normalized().cwiseAbs()).norm() <
+        0.02);
+  REQUIRE(f.identifiability.combinations.size() == 2);
+  CHECK(f.cramer_rao.array().isInf().all());
+  // Along the null direction, relative to the prior's metric, samples are the prior's.
+  const Eigen::Vector3d across = f.prior.covariance.inverse() * null;
+  const Eigen::VectorXd along = (f.samples.array().log().matrix().transpose() * across).eval();
+  CHECK(f.samples.cols() == 1000);
+  CHECK(KolmogorovSmirnov(along, across.dot(f.prior.mean),
+                          std::sqrt(across.dot(f.prior.covariance * across))) > 0.01);
+  // Noise that nobody had told, and errors down to it.
+  CHECK(f.noise_sd(0) == Approx(1e-3).epsilon(0.2));
+  CHECK(f.noise_sd(1) == Approx(5e-3).epsilon(0.2));
+  CHECK(f.discrepancy == Approx(1).epsilon(0.1));
+  CHECK(f.rows.size() == static_cast<size_t>(f.errors.size()));
+  CHECK_FALSE(f.misspecification.alarm);
+  CHECK(f.holdout.better);
+  CHECK(f.holdout.held_out == 60);
+  CHECK(f.holdout.fitted == 300);
+  CHECK(f.holdout.errors[0].prior > 1.3 * f.holdout.errors[0].posterior);
+  CHECK(f.holdout.errors[5].prior > 4 * f.holdout.errors[5].posterior);
+  CHECK(f.agreement.agree);
+  CHECK(f.failures == 0);
+}
+
+TEST_CASE("the world's mass has no effect, which is said, and keeps its prior") {
+  const RobotDescription robot = Hopper("/paper.toml");
+  Eigen::VectorXd truth(5);
+  truth << 1, RandomMasses(Hopper(), 3);
+  Log log;
+  log.name = "hopper";
+  log.rollouts = RandomRollouts(robot, truth, 300, 1e-5, 3);
+  CalibrationOptions options;
+  options.horizons = {1, 5};
+  const Findings f = Calibrate(robot, std::vector<Log>{log}, options);
+  REQUIRE(f.identifiability.null.size() == 1);
+  CHECK((f.identifiability.null[0].cwiseAbs() - Eigen::VectorXd::Unit(5, 0)).norm() < 1e-6);
+  CHECK(f.identifiability.words.find("mass/world") != std::string::npos);
+  CAPTURE(f.identifiability.words);
+  const double mean = f.prior.mean(0), sd = std::sqrt(f.prior.covariance(0, 0));
+  CHECK(KolmogorovSmirnov(f.samples.row(0).transpose().array().log(), mean, sd) > 0.01);
+  CHECK(Moments(f.posterior).mean(0) == Approx(mean).margin(0.02 * sd));
+  CHECK(std::isinf(f.cramer_rao(0)));
+  CHECK(f.cramer_rao.tail(4).maxCoeff() < 0.1);
+  const Eigen::ArrayXd off =
+      Moments(f.posterior).mean.tail(4).array() - truth.tail(4).array().log();
+  CHECK((off.abs() / Moments(f.posterior).covariance.diagonal().tail(4).array().sqrt()).maxCoeff() <
+        4);
+}
+
+TEST_CASE("noise alone raises the alarm, and teaches hardly anything") {
+  Log log = Swinging("noise", kTruth, 6, 20);
+  Random random(3);
+  for (Rollout& rollout : log.rollouts) {
+    for (Transition& t : rollout.transitions) {
+      t.q(0) = random.Uniform(-3, 3), t.v(0) = random.Uniform(-5, 5);
+      t.next_q(0) = random.Uniform(-3, 3), t.next_v(0) = random.Uniform(-5, 5);
+    }
+  }
+  const Findings f = Of({log});
+  CAPTURE(f.holdout.words);
+  CHECK((f.misspecification.alarm || !f.holdout.better));
+  CHECK(f.holdout.errors[0].posterior == Approx(f.holdout.errors[0].prior).epsilon(0.03));
+  // of a uniform reading, or of two
+  CHECK(f.noise_sd(0) == Approx(6 / std::sqrt(12)).epsilon(0.5));
+}
+
+TEST_CASE("logs of one robot agree, logs of two do not") {
+  const Log a = Swinging("a", kTruth, 3, 30), b = Swinging("b", kTruth, 3, 40);
+  const Log other = Swinging("other", Eigen::Vector3d(9.5, 1.15, 0.95), 3, 50);
+  const Findings same = Of({a, b});
+  CHECK(same.agreement.agree);
+  REQUIRE(same.agreement.logs.size() == 2);
+  CHECK(same.agreement.logs[0].log == "a");
+  // of two, each is the other's judge
+  CHECK(same.agreement.logs[0].p == Approx(same.agreement.logs[1].p));
+  const Findings odd = Of({a, b, other});
+  CHECK_FALSE(odd.agreement.agree);
+  REQUIRE(odd.agreement.logs.size() == 3);
+  CHECK(odd.agreement.logs[2].p < 1e-3);
+  CHECK(odd.agreement.logs[2].distance > odd.agreement.logs[0].distance);
+  CHECK(odd.agreement.words.find("other") != std::string::npos);
+}
+
+TEST_CASE("logs of one robot seldom disagree by chance") {
+  int p_below = 0;
+  constexpr int kPairs = 40;
+  for (uint32_t i = 0; i < kPairs; ++i) {
+    CalibrationOptions options;
+    options.method = "laplace";
+    options.horizons = {1};
+    const std::vector<Log> logs{Swinging("a", kTruth, 2, 1000 + 10 * i, 30),
+                                Swinging("b", kTruth, 2, 1005 + 10 * i, 30)};
+    // which is 0.1, for two logs
+    p_below += Calibrate(Pendulum(), logs, options).agreement.logs[0].p < 0.2;
+  }
+  CHECK(p_below <= 11);  // of 4 expected
+}
+
+TEST_CASE("a log that cannot be fitted on its own is named, and leaves nothing to compare with") {
+  const Log a = Swinging("a", kTruth, 3, 30);
+  const Log tiny = Swinging("tiny", kTruth, 1, 60, 1);
+  const Findings f = Of({a, tiny});
+  REQUIRE_FALSE(f.warnings.empty());
+  CHECK(std::any_of(f.warnings.begin(), f.warnings.end(),
+                    [](const auto& w) { return w.find("tiny") != std::string::npos; }));
+  CHECK(f.agreement.words.find("the 1 logs") == std::string::npos);
+  CHECK(f.agreement.agree);
+}
+
+TEST_CASE("an unknown method is an error that names the nearest") {
+  const std::vector<Log> logs{Swinging("a", kTruth, 1, 0)};
+  CHECK_THROWS_WITH(Of(logs, "laplas"),
+                    Catch::Contains("'laplas'") && Catch::Contains("'laplace'"));
+  CHECK_THROWS_AS(Of(logs, "laplas"), std::invalid_argument);
+}
+
+TEST_CASE("what is no data, or hardly any, is refused or believed as little as it deserves") {
+  CHECK_THROWS_AS(Of({}), std::invalid_argument);
+  CHECK_THROWS_AS(Of({Log{}}), std::invalid_argument);
+  SECTION("one transition") {
+    CHECK_THROWS_WITH(Of({Swinging("a", kTruth, 1, 0, 1)}), Catch::Contains("too few"));
+  }
+  SECTION("one transition whose noise is known") {
+    Log log = Swinging("a", kTruth, 1, 0, 1);
+    for (Transition& t : log.rollouts[0].transitions) {
+      t.q_sd = t.next_q_sd = Eigen::VectorXd::Constant(1, 1e-3);
+      t.v_sd = t.next_v_sd = Eigen::VectorXd::Constant(1, 5e-3);
+    }
+    const Findings f = Of({log});
+    CHECK_FALSE(f.holdout.better);
+    const Gaussian posterior = Moments(f.posterior);
+    CHECK((posterior.covariance.diagonal().array() <= 1.001 * f.prior.covariance.diagonal().array())
+              .all());
+    CHECK(((posterior.mean - Eigen::Vector3d(kTruth.array().log())).array().abs() <
+           4 * posterior.covariance.diagonal().array().sqrt())
+              .all());
+    CHECK(f.noise_sd(0) == Approx(1e-3).epsilon(0.3));
+  }
+  SECTION("a pendulum at rest tells nothing but that it hangs") {
+    Log log = Swinging("rest", kTruth, 2, 0);
+    for (Rollout& rollout : log.rollouts) {
+      for (Transition& t : rollout.transitions) {
+        for (Eigen::VectorXd* x : {&t.q, &t.v, &t.next_q, &t.next_v}) x->setConstant(0);
+        // hanging is an equilibrium of all pendulums, at whichever end it is
+        t.q(0) = t.next_q(0) = M_PI;
+        for (EffortSegment& e : t.efforts) e.effort.setZero();
+      }
+    }
+    const Findings f = Of({log});
+    CHECK_FALSE(f.holdout.better);
+    const Gaussian posterior = Moments(f.posterior);
+    CHECK(posterior.mean.allFinite());
+    CHECK(posterior.covariance.allFinite());
+  }
+}
+
+TEST_CASE("noise that the record knows is what is reported") {
+  Log log;
+  log.name = "known";
+  for (uint32_t i = 0; i < 5; ++i)
+    log.rollouts.push_back(SyntheticRollout(Pendulum(), kTruth, 40, 2e-3, 8e-3, 70 + i));
+  for (const char* method : {"laplace", "reps"}) {
+    const Findings f = Of({log}, method, 400'000);
+    CAPTURE(method);
+    CHECK(f.noise_sd(0) == Approx(2e-3).epsilon(0.25));
+    CHECK(f.noise_sd(1) == Approx(8e-3).epsilon(0.25));
+    CHECK(f.discrepancy == Approx(1).epsilon(0.3));
+    CHECK_FALSE(f.misspecification.alarm);
+  }
+}
+
+TEST_CASE("each method runs and comes near") {
+  const std::vector<Log> logs{Swinging("a", kTruth, 2, 80, 30)};
+  const Findings laplace = Of(logs, "laplace");
+  const Eigen::Vector3d heavy(0, 1, 2);
+  const double truth = heavy.dot(Eigen::Vector3d(kTruth.array().log()));
+  for (const std::string& method : CalibrationMethods()) {
+    CAPTURE(method);
+    const Findings f = Of(logs, method, 100'000);
+    CHECK(f.method == method);
+    CHECK((f.used == method || method == "auto"));
+    CHECK(f.samples.rows() == 3);
+    CHECK(f.samples.cols() > 0);
+    CHECK(f.samples.allFinite());
+    CHECK(f.simulated_steps <= 100'000);
+    CHECK(f.errors.size() == 120);
+    CHECK(f.errors.allFinite());
+    CHECK(f.discrepancy > 0);
+    CHECK(heavy.dot(Moments(f.posterior).mean) ==
+          Approx(truth).margin(method == "simopt" ? 0.2 : 0.05));
+    CHECK(f.holdout.better);
+  }
+}
+
+TEST_CASE("the same bits with any number of threads and a journal or none") {
+  const std::vector<Log> logs{Swinging("a", kTruth, 2, 90, 30)};
+  for (const char* method : {"auto", "mixture", "reps", "simopt"}) {
+    CalibrationOptions options;
+    options.method = method, options.budget = 20'000, options.horizons = {1, 5};
+    const Findings one = Calibrate(Pendulum(), logs, options);
+    options.workforce = 2;
+    const Findings two = Calibrate(Pendulum(), logs, options);
+    CHECK(one.samples == two.samples);
+    CHECK(one.errors == two.errors);
+    CHECK(one.simulated_steps == two.simulated_steps);
+  }
+}
+
+TEST_CASE("simulations that fail over a part of the prior do not spoil the rest") {
+  // Masses so uncertain that some of them are none at all, where the coordinate is the mass itself.
+  RobotDescription robot = Pendulum();
+  robot.parameters[1].coordinate = ParameterDescription::Coordinate::kLinear;
+  robot.parameters[1].variance = 4;
+  const std::vector<Log> logs{Swinging("a", kTruth, 4, 95)};
+  for (const char* method : {"laplace", "reps"}) {
+    CAPTURE(method);
+    CalibrationOptions options;
+    options.method = method, options.horizons = {1, 5};
+    const Findings f = Calibrate(robot, logs, options);
+    CHECK(f.holdout.better);
+    if (options.method == "reps") CHECK(f.failures > 0);
+  }
+}
+
+TEST_CASE("hold-out keeps every fifth roll-out back, or the last fifth of each") {
+  const Log five = Swinging("a", kTruth, 11, 0, 7);
+  const Split whole = HoldOut(five.rollouts);
+  REQUIRE(whole.held_out.size() == 2);
+  CHECK(whole.held_out[0].episode == 4);
+  CHECK(whole.held_out[1].episode == 9);
+  CHECK(whole.fitted.size() == 9);
+  const Log few = Swinging("a", kTruth, 4, 0, 13);
+  const Split parts = HoldOut(few.rollouts);
+  REQUIRE(parts.held_out.size() == 4);
+  for (const Rollout& rollout : parts.held_out) {
+    REQUIRE(rollout.transitions.size() == 2);
+    CHECK(rollout.transitions[0].step == 11);
+  }
+  for (const Rollout& rollout : parts.fitted) CHECK(rollout.transitions.size() == 11);
+  const Log hardly = Swinging("a", kTruth, 1, 0, 9);
+  CHECK(HoldOut(hardly.rollouts).held_out.empty());
+  CHECK(HoldOut(hardly.rollouts).fitted.size() == 1);
+}
+
+}  // namespace
+}  // namespace plumb

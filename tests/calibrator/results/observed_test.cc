@@ -1,0 +1,85 @@
+// Calibration through the whole chain: virtual robot, frames on its bus, driver, observer. Quick
+// form of bench/observed_calibration.
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "calibrator/results/calibration.h"
+#include "tests/calibrator/fitted_log.h"
+#include "tests/calibrator/hop_on_bus.h"
+
+namespace plumb {
+namespace {
+
+struct Answer {
+  Eigen::VectorXd error, sd;  // of the masses, relative
+  double discrepancy;         // 1 = down to the noise
+};
+
+Answer Calibrated(const RobotDescription& robot, const Samples& motion, States states,
+                  uint32_t seed) {
+  const std::vector<Log> logs{ObservedLog(robot, motion, states)};
+  CalibrationOptions options;
+  options.method = "laplace";
+  options.horizons = {1};
+  const Findings findings = Calibrate(robot, logs, options);
+  const Gaussian posterior = Moments(findings.posterior);
+  return {posterior.mean - HiddenParameters(robot, seed).array().log().matrix(),
+          posterior.covariance.diagonal().cwiseSqrt(), findings.stages.at(0).discrepancy};
+}
+
+TEST_CASE(
+    "a hopper's masses are found through its bus as well as the posterior says; errors in "
+    "variables are part of "
+    "the noise") {
+  RobotDescription robot = Robot("hopper");
+  robot.estimator.delay = 0;  // here frames arrive at once
+  double unexplained = 0, unexplained_if_exact = 0;
+  for (const uint32_t seed : {1, 2}) {
+    const Samples motion = HopOnBus(robot, seed);
+    REQUIRE(motion.size() > 900);
+    const Answer truth = Calibrated(robot, motion, States::kTrue, seed);
+    CHECK(truth.error.cwiseAbs().maxCoeff() < 1e-3);
+    const Answer found = Calibrated(robot, motion, States::kSmoothed, seed);
+    INFO("errors " << found.error.transpose() << ", claimed " << found.sd.transpose());
+    CHECK((found.error.array().abs() < 3 * found.sd.array()).all());
+    CHECK(found.sd(0) < 0.02);
+    const Answer sure = Calibrated(robot, motion, States::kCertain, seed);
+    unexplained += found.discrepancy / 2;
+    unexplained_if_exact += sure.discrepancy / 2;
+  }
+  INFO("mean squared whitened error " << unexplained << ", states taken for exact "
+                                      << unexplained_if_exact);
+  CHECK(unexplained < 1);
+  CHECK(unexplained_if_exact > 2 * unexplained);
+}
+
+TEST_CASE("driven into its stops and into the ground a hopper's masses are found all the same") {
+  RobotDescription robot = Robot("hopper");
+  robot.estimator.delay = 0;
+  constexpr uint32_t kSeed = 1;
+  const std::vector<Samples> motions = BangBangOnBus(robot, kSeed);
+  CalibrationOptions options;
+  options.method = "laplace";
+  options.horizons = {1};
+  const auto find = [&] {
+    const std::vector<Log> logs{ObservedLog(robot, motions, States::kSmoothed)};
+    return Calibrate(robot, logs, options);
+  };
+  const Findings found = find();
+  const Gaussian posterior = Moments(found.posterior);
+  const Eigen::ArrayXd error =
+      posterior.mean.array() - HiddenParameters(robot, kSeed).array().log();
+  const Eigen::ArrayXd sd = posterior.covariance.diagonal().cwiseSqrt();
+  INFO("errors " << error.transpose() << ", claimed " << sd.transpose());
+  CHECK((error.abs() < 4 * sd).all());
+  CHECK(sd(0) < 0.01);
+  CHECK(found.stages[0].discrepancy < 1.6);
+  // Without impacts states are further off than they say.
+  for (JointDescription& joint : robot.joints)
+    joint.noise.ground_impact = joint.noise.stop_impact = 0;
+  CHECK(find().stages[0].discrepancy > 10);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,297 @@
+#include "calibrator/results/posterior_file.h"
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "calibrator/results/summary.h"
+#include "robot/physics_fingerprint.h"
+#include "robot/posterior_reader.h"
+#include "tests/calibrator/sample_findings.h"
+#include "tests/calibrator/synthetic.h"
+#include "tests/robot/zoo.h"
+#include "tests/temporary_file.h"
+
+namespace plumb {
+namespace {
+
+using Catch::Contains;
+using nlohmann::json;
+
+std::string Error(const std::string& text, const RobotDescription& robot) {
+  const TemporaryFile file(text, ".json");
+  try {
+    ReadPosterior(file.path(), robot);
+  } catch (const std::runtime_error& error) {
+    CHECK_THAT(error.what(), Contains(file.path()));
+    return error.what();
+  }
+  return "";
+}
+
+TEST_CASE("a posterior reads back to the same bits") {
+  const RobotDescription robot = Pendulum();
+  const Findings findings = SampleFindings(robot);
+  const TemporaryFile file("", ".json");
+  WritePosterior(file.path(), findings, robot, SampleProvenance());
+  const ParameterDistribution read = ReadPosterior(file.path(), robot);
+  REQUIRE(read.components.size() == 2);
+  for (size_t i = 0; i < 2; ++i) {
+    CHECK(read.components[i].weight == findings.posterior.weights[i]);
+    CHECK(read.components[i].mean == findings.posterior.components[i].mean);
+    CHECK(read.components[i].covariance == findings.posterior.components[i].covariance);
+  }
+  CHECK(read.parameters.size() == 3);
+  CHECK(read.iteration == 1);
+}
+
+TEST_CASE("the file says what was found") {
+  const RobotDescription robot = Pendulum();
+  const Findings findings = SampleFindings(robot);
+  const Summary summary = Summarise(findings, robot);
+  const json j = json::parse(PosteriorJson(findings, robot, SampleProvenance()));
+  CHECK(j["names"] == json({"gravity", "mass/pole", "length/pole"}));
+  CHECK(j["units"] == json({"m/s^2", "kg", "m"}));
+  CHECK(j["coordinates"][0] == json{{"kind", "log"}});
+  CHECK(j["seed"] == 0xfedcba9876543210);
+  CHECK(j["prior"]["mean"][0].get<double>() == Approx(10.4));
+  CHECK(j["prior"]["sd"][0].get<double>() == Approx(std::sqrt(0.33)));
+  CHECK(j["prior"]["coordinate_mean"][2] == findings.prior.mean(2));
+  REQUIRE(j["samples"].size() == 1000);  // of 1500
+  CHECK(j["samples"][999][1] == findings.samples(1, 1498));
+  for (size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    CHECK(j["mean"][i] == summary.mean(k));
+    CHECK(summary.mean(k) == Approx(findings.samples.row(k).mean()).epsilon(1e-12));
+    CHECK(j["covariance"][i][i].get<double>() == Approx(std::pow(j["sd"][i].get<double>(), 2)));
+    // As many beyond the quantiles as there should be.
+    const auto outside =
+        (findings.samples.row(k).array() < j["interval_95"][i][0].get<double>()).count() +
+        (findings.samples.row(k).array() > j["interval_95"][i][1].get<double>()).count();
+    CHECK(outside == Approx(75).margin(2));
+  }
+  CHECK(j["coordinate_covariance"][0][1] == summary.coordinates.covariance(0, 1));
+  CHECK(j["alarm"]["raised"] == true);
+  CHECK(j["alarm"]["misfits"][0]["effect"] == 0.31);
+  CHECK(j["alarm"]["misfits"][1]["effect"].is_null());
+  CHECK(j["identifiability"]["cramer_rao"][0].is_null());
+  CHECK(j["identifiability"]["cramer_rao"][1] == findings.cramer_rao(1));
+  CHECK(j["identifiability"]["null"][0]["moves"]["mass/pole"] ==
+        findings.identifiability.null[0](1));
+  CHECK(j["identifiability"]["combinations"][0]["sd"] == 0.02);
+  CHECK(j["holdout"]["better"] == true);
+  CHECK(j["holdout"]["errors"][2]["prior"] == 0.12);
+  CHECK(j["holdout"]["errors"][3]["posterior"].is_null());
+  CHECK(j["agreement"]["logs"][1]["log"] == "tuesday.lcm");
+  CHECK(j["stages"].size() == 3);
+  CHECK(j["simulations"]["failures"] == 2);
+  CHECK(j["method"] == json{{"asked", "auto"}, {"used", "smc"}});
+  CHECK(j["versions"]["plumbline"].get<std::string>().starts_with("plumb "));
+}
+
+TEST_CASE("what differs between runs is at the end, and all else is the same to the byte") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  Provenance provenance = SampleProvenance();
+  const std::string first = PosteriorJson(findings, robot, provenance);
+  findings.seconds *= 2;
+  provenance.date = "another day", provenance.command += " --threads 3";
+  const std::string second = PosteriorJson(findings, robot, provenance);
+  CHECK(first != second);
+  const size_t run = first.find("\n \"run\": ");
+  REQUIRE(run != std::string::npos);
+  CHECK(first.substr(0, run) == second.substr(0, run));
+  CHECK(std::count(first.begin() + static_cast<std::ptrdiff_t>(run), first.end(), '\n') < 8);
+}
+
+TEST_CASE("without samples the numbers are drawn from the mixture") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  findings.samples.resize(0, 0);
+  const Summary summary = Summarise(findings, robot);
+  const ParameterDistribution exact = ToDistribution(findings.posterior, robot);
+  const Eigen::VectorXd error = (summary.mean - exact.Mean()).cwiseQuotient(exact.Sd());
+  CHECK(error.cwiseAbs().maxCoeff() < 5 / std::sqrt(4000));
+  CHECK((summary.sd.cwiseQuotient(exact.Sd()).array() - 1).abs().maxCoeff() < 0.1);
+  CHECK(Summarise(findings, robot).mean == summary.mean);
+}
+
+TEST_CASE("quantiles are interpolated") {
+  CHECK(Quantile({1, 2, 4}, 0.5) == 2);
+  CHECK(Quantile({1, 2, 4}, 0.75) == 3);
+  CHECK(Quantile({1, 2, 4}, 1) == 4);
+  CHECK(Quantile({7}, 0.3) == 7);
+  CHECK(std::isnan(Quantile({}, 0.5)));
+}
+
+TEST_CASE("findings that are none are not written") {
+  const RobotDescription robot = Pendulum();
+  const auto why = [&](const std::function<void(Findings&)>& spoil) -> std::string {
+    Findings findings = SampleFindings(robot);
+    spoil(findings);
+    try {
+      PosteriorJson(findings, robot, {});
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  CHECK_THAT(why([](Findings& f) { f.posterior.components[1].covariance.resize(0, 0); }),
+             Contains("component 1"));
+  CHECK_THAT(why([](Findings& f) { f.posterior.components[0].covariance(1, 1) *= -1; }),
+             Contains("positive definite"));
+  CHECK_THAT(why([](Findings& f) { f.posterior.components[0].mean(2) = NAN; }),
+             Contains("not finite"));
+  CHECK_THAT(why([](Findings& f) { f.posterior.weights[0] = 0.8; }), Contains("sum to 1.1"));
+  CHECK_THAT(why([](Findings& f) { f.posterior.weights.pop_back(); }), Contains("1 weights of 2"));
+  CHECK_THAT(why([](Findings& f) { f.posterior = {}; }), Contains("0 components"));
+  CHECK_THAT(why([](Findings& f) { f.prior.mean.resize(2); }), Contains("the prior"));
+  CHECK_THAT(why([](Findings& f) { f.samples(1, 7) = INFINITY; }),
+             Contains("samples are not finite"));
+  CHECK_THAT(why([](Findings& f) { f.samples = Eigen::MatrixXd::Ones(2, 9); }),
+             Contains("samples are not of 3"));
+  CHECK(why([](Findings& f) { f.discrepancy = NAN, f.cramer_rao.setConstant(INFINITY); }) == "");
+}
+
+TEST_CASE("diagnostics without numbers, and names that are not UTF-8, still make a JSON file") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  findings.discrepancy = NAN;
+  findings.identifiability = {}, findings.holdout = {}, findings.misspecification = {},
+  findings.agreement = {};
+  findings.cramer_rao.resize(0), findings.noise_sd.resize(0), findings.stages.clear();
+  findings.warnings = {"quote \" backslash \\ newline \n and \xff"};
+  const json j = json::parse(PosteriorJson(findings, robot, {{"\xc3\x28.lcm"}, {}, "", ""}));
+  CHECK(j["discrepancy"].is_null());
+  CHECK(j["stages"] == json::array());
+  CHECK(j["warnings"][0].get<std::string>().starts_with("quote \" backslash \\ newline \n and "));
+}
+
+TEST_CASE("a posterior that is not this robot's is refused, with the reason") {
+  RobotDescription robot = Pendulum();
+  const std::string text = PosteriorJson(SampleFindings(robot), robot, {});
+  CHECK(Error(text, robot) == "");
+  RobotDescription other = robot;
+  other.training.updates += 1, other.task.steps += 1, other.parameters[0].mean += 1,
+      ++other.fingerprint;
+  other.links[1].visuals.clear();
+  CHECK(Error(text, other) == "");  // a posterior is about physics
+  other = robot, other.name = "reacher";
+  CHECK_THAT(Error(text, other), Contains(": robot: is another robot's"));
+  other = robot, other.parameters[1].name = "mass/rod";
+  CHECK_THAT(Error(text, other), Contains(": names[1]: "));
+  other = robot, other.parameters.pop_back();
+  CHECK_THAT(Error(text, other), Contains(": names: has 3 entries, expected 2"));
+  other = robot, other.parameters[2].unit = "mm";
+  CHECK_THAT(Error(text, other), Contains(": units[2]: "));
+  other = robot, other.parameters[2].coordinate = ParameterDescription::Coordinate::kLinear;
+  CHECK_THAT(Error(text, other), Contains(": coordinates[2].kind: "));
+  other = robot, other.links[1].mass *= 1 + 1e-15;
+  CHECK_THAT(Error(text, other), Contains(": physics: "));
+  CHECK_THAT(Error("", robot), Contains("parse error"));
+  CHECK_THROWS_WITH(ReadPosterior("/nowhere/posterior.json", robot),
+                    Contains("/nowhere/posterior.json: there is no such file"));
+  CHECK_THROWS_WITH(ReadPosterior("/dev/zero", robot), Contains("no such file"));
+}
+
+TEST_CASE("bounds of a logit coordinate are part of the posterior") {
+  const RobotFolder folder(kZooUrdf, kZooToml);
+  RobotDescription robot = LoadRobot(folder.path());
+  const std::string text = PosteriorJson(SampleFindings(robot), robot, {});
+  CHECK(Error(text, robot) == "");
+  robot.parameters[1].upper = 1.3;
+  CHECK_THAT(Error(text, robot),
+             Contains("coordinates[1].upper: is 1.2, contact/friction has the bound 1.3 now"));
+}
+
+TEST_CASE("everything that matters to the motion is in the fingerprint of the physics") {
+  const RobotFolder folder(kZooUrdf, kZooToml);
+  const RobotDescription robot = LoadRobot(folder.path());
+  const std::vector<std::function<void(RobotDescription&)>> changes{
+      [](auto& r) { r.links[3].center_of_mass.x() += 1e-9; },
+      [](auto& r) { r.links[3].inertia(0, 0) *= 1.0000001; },
+      [](auto& r) { r.links[4].collisions.pop_back(); },
+      [](auto& r) { r.joints[3].axis = -r.joints[3].axis; },
+      [](auto& r) { r.joints[3].dynamics.delay = 0; },
+      [](auto& r) { r.joints[3].dynamics.no_load_speed += 1; },
+      [](auto& r) { r.frozen[0].value = 0.3; },
+      [](auto& r) { r.simulation.substep /= 2; },
+      [](auto& r) { r.simulation.contact->friction = 0.9; },
+      [](auto& r) { r.simulation.stop.reset(); }};
+  for (size_t i = 0; i < changes.size(); ++i) {
+    INFO("change " << i);
+    RobotDescription other = robot;
+    changes[i](other);
+    CHECK(PhysicsFingerprint(other) != PhysicsFingerprint(robot));
+  }
+  CHECK(PhysicsFingerprint(LoadRobot(folder.path())) == PhysicsFingerprint(robot));
+}
+
+TEST_CASE("hostile posteriors are refused with file and field") {
+  const RobotDescription robot = Pendulum();
+  const json good = json::parse(PosteriorJson(SampleFindings(robot), robot, {}));
+  const auto spoilt = [&](const std::string& pointer, const json& value) {
+    json j = good;
+    j[json::json_pointer(pointer)] = value;
+    return Error(j.dump(), robot);
+  };
+  CHECK_THAT(spoilt("/format", "plumbline prior"), Contains(": format: "));
+  CHECK_THAT(spoilt("/version", 2), Contains(": version: is 2, this program reads 1"));
+  CHECK_THAT(spoilt("/version", "1"), Contains(": version: is not a number"));
+  CHECK_THAT(spoilt("/names", "gravity"), Contains(": names: is not an array"));
+  CHECK_THAT(spoilt("/names/0", 7), Contains(": names[0]: is not a string"));
+  CHECK_THAT(spoilt("/mixture", 7), Contains(": mixture: is not an object"));
+  CHECK_THAT(spoilt("/mixture/weights", json::array()),
+             Contains(": mixture.weights: has 0 entries"));
+  CHECK_THAT(spoilt("/mixture/weights", std::vector<double>(100000, 1e-5)),
+             Contains(": mixture.weights: has 100000"));
+  CHECK_THAT(spoilt("/mixture/weights", {0.7, 0.2}), Contains(": mixture.weights: sum to"));
+  CHECK_THAT(spoilt("/mixture/weights", {1.5, -0.5}),
+             Contains(": mixture.weights[1]: is not positive"));
+  CHECK_THAT(spoilt("/mixture/weights/0", nullptr),
+             Contains(": mixture.weights[0]: is not a number"));
+  CHECK_THAT(spoilt("/mixture/weights/0", true), Contains(": mixture.weights[0]: is not a number"));
+  CHECK_THAT(spoilt("/mixture/means/0", {1, 2}),
+             Contains(": mixture.means[0]: has 2 entries, expected 3"));
+  CHECK_THAT(spoilt("/mixture/means/0/1", "1"), Contains(": mixture.means[0][1]: is not a number"));
+  CHECK_THAT(spoilt("/mixture/means/0/0", 1e9), Contains(": mixture: is too wide"));
+  CHECK_THAT(spoilt("/mixture/covariances", json::array()),
+             Contains(": mixture.covariances: has 0 entries, expected 2"));
+  CHECK_THAT(spoilt("/mixture/covariances/1/2", {1}),
+             Contains(": mixture.covariances[1][2]: has 1 entries, expected 3"));
+  CHECK_THAT(spoilt("/mixture/covariances/1/0/1", 5),
+             Contains(": mixture.covariances[1]: is not symmetric"));
+  CHECK_THAT(spoilt("/mixture/covariances/1/0/0", -1),
+             Contains(": mixture.covariances[1]: is not positive definite"));
+  CHECK_THAT(Error("[1]", robot), Contains("is not a posterior"));
+  CHECK_THAT(Error(std::string(1000000, '['), robot), Contains("parse error"));
+  for (const char* key :
+       {"format", "version", "robot", "physics", "names", "units", "coordinates", "mixture"}) {
+    json j = good;
+    j.erase(key);
+    CHECK_THAT(Error(j.dump(), robot), Contains(std::string(": ") + key + ": is missing"));
+  }
+}
+
+TEST_CASE("a posterior that was cut off or has rotten bytes is refused or read, nothing else") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  findings.samples.conservativeResize(3, 2);
+  const std::string text = PosteriorJson(findings, robot, {});
+  for (size_t length = 0; length + 2 < text.size(); length += 97)
+    CHECK(Error(text.substr(0, length), robot) != "");
+  Random random(3, {1});
+  int refused = 0;
+  for (int i = 0; i < 400; ++i) {
+    std::string rotten = text;
+    for (int k = 0; k < 3; ++k)
+      rotten[random.Bits() % text.size()] = static_cast<char>(random.Bits());
+    if (Error(rotten, robot) != "") ++refused;
+  }
+  CHECK(refused > 200);
+}
+
+}  // namespace
+}  // namespace plumb
