@@ -65,6 +65,8 @@ void AddJoint(const JointDescription& joint, double effort, std::vector<Candidat
   }
 }
 
+}  // namespace
+
 std::vector<Candidate> FindCandidates(const RobotDescription& robot) {
   const bool shapes =
       std::any_of(robot.links.begin() + 1, robot.links.end(),
