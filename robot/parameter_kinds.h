@@ -37,6 +37,9 @@ struct JointDynamicsOf {
   /// the effort's own direction the effort is at most effort_limit * (1 - w / no_load_speed), as of
   /// a DC motor at its full voltage.
   Real no_load_speed = Real{} + std::numeric_limits<double>::infinity();
+  /// (0, 1]: the share of the motor's effort that its gear passes on while it drives the joint;
+  /// driven by it, the motor brakes with all of its effort
+  Real gear_efficiency = Real{} + 1;
 };
 using JointDynamics = JointDynamicsOf<double>;
 
@@ -93,6 +96,9 @@ inline constexpr JointParameterKind kJointParameterKinds[] = {
     {"no_load_speed", "no_load_speed", &JointDynamics::no_load_speed, JointGroup::kDriven,
      "rad/s", "m/s", "the no-load speed",
      {1e-9}, kPositive, {}},
+    {"gear_efficiency", "gear_efficiency", &JointDynamics::gear_efficiency, JointGroup::kDriven,
+     "", "", "the gear's losses",
+     {1e-9, 1}, {1e-9, 1}, {}},
 };
 // clang-format on
 static_assert(sizeof(JointDynamics) == std::size(kJointParameterKinds) * sizeof(double));

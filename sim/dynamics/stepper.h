@@ -29,7 +29,8 @@ class Stepper {
         settings_(settings),
         springs_(terms.Has(&JointDynamics::stiffness)),
         speed_limits_(terms.Has(&JointDynamics::no_load_speed)),
-        rubs_(terms.Has(&JointDynamics::friction)),
+        gears_lose_(terms.Has(&JointDynamics::gear_efficiency)),
+        rubs_(terms.Has(&JointDynamics::friction) || gears_lose_),
         leapfrog_(settings.integrator == SimulationSettings::Integrator::kLeapfrog),
         n_(static_cast<size_t>(topology.velocities)),
         tree_(topology),
@@ -69,7 +70,10 @@ class Stepper {
       Solve(h);
     }
     if (moment) {
-      for (size_t i = 0; i < n_; ++i) shift_[i] = physics.axes[i].motor_gain * moment[i];
+      for (size_t i = 0; i < n_; ++i) {
+        shift_[i] = physics.axes[i].motor_gain * moment[i];
+        if (gears_lose_) shift_[i] -= GearLoss(i, shift_[i]);
+      }
       cholesky_.Solve(topology_.ancestors, matrix_.data(), shift_.data());
     }
     Constrain(h);
@@ -127,7 +131,7 @@ class Stepper {
 
   const Topology& topology_;
   SimulationSettings settings_;
-  bool springs_, speed_limits_, rubs_;  // whether any joint may have them
+  bool springs_, speed_limits_, gears_lose_, rubs_;  // whether any joint may have them
   bool leapfrog_;
   size_t n_;
   Tree<Real> tree_;
@@ -155,6 +159,14 @@ class Stepper {
     return Clamp(effort, Real(-backwards), forwards);
   }
 
+  // An effort f that drives arrives as e f, one that brakes as f (efficiency that depends on the
+  // direction: Wang, Kim, ICRA 2015). That is f - l with Coulomb friction of |l| against the motion,
+  // l = (1 - e)/2 f: so the jump where the motion turns is settled with friction, implicitly, and a
+  // joint may hold still under a load that its motor can hold but not lift.
+  Real GearLoss(size_t i, const Real& effort) const {
+    return 0.5 * (1 - physics.axes[i].gear_efficiency) * effort;
+  }
+
   void AssembleSmooth(const Real& h, const Real* effort) {
     tree_.MoveAt(v.data());
     tree_.MassMatrix(physics, smooth_.data());
@@ -167,7 +179,7 @@ class Stepper {
       smooth_[i * n_ + i] += axis.armature + share * h * axis.damping;
       if (rubs_) friction_[i] = axis.friction;
     }
-    if (speed_limits_ || springs_) AssembleJoints(h, effort);
+    if (speed_limits_ || gears_lose_ || springs_) AssembleJoints(h, effort);
   }
 
   void AssembleJoints(const Real& h, const Real* effort) {
@@ -177,6 +189,13 @@ class Stepper {
       const auto& axis = physics.axes[i];
       if (speed_limits_ && joint.effort_limit > 0) {
         drive_[i] += axis.motor_gain * (Slowed(i, effort[i], v[i], joint.effort_limit) - effort[i]);
+      }
+      if (gears_lose_) {
+        const bool slows = speed_limits_ && joint.effort_limit > 0;
+        const Real acting = slows ? Slowed(i, effort[i], v[i], joint.effort_limit) : effort[i];
+        const Real loss = GearLoss(i, axis.motor_gain * acting);
+        drive_[i] -= loss;
+        friction_[i] += Abs(loss);
       }
       if (springs_) {
         // At the end of the substep; for the leapfrog at the mean of both ends (implicit midpoint).
