@@ -183,10 +183,8 @@ void HopperAllParameters(benchmark::State& state) {
       add("inertia/" + of + entry, 0.1);
   }
   for (const char* joint : {"thigh", "leg", "foot"}) {
-    for (const char* kind : {"armature/", "damping/", "friction/", "stiffness/", "rest/", "gain/",
-                             "delay/", "sensor_delay/", "sensor_bias/", "no_load_speed/"}) {
-      add(std::string(kind) + joint, 0.01);
-    }
+    for (const JointParameterKind& kind : kJointParameterKinds)
+      add(std::string(kind.name) + "/" + joint, 0.01);
   }
   for (const char* path : {"contact/stiffness", "contact/damping", "contact/friction",
                            "limit/stiffness", "limit/damping"}) {

@@ -53,7 +53,7 @@ class LegOdometry {
     Eigen::Matrix3d velocity_variance = Eigen::Matrix3d::Zero();
   };
 
-  /// @param num_feet up to FloatingBase::kMostPoints.
+  /// @param num_feet up to FloatingBase::kMaxPoints.
   LegOdometry(const Settings& settings, size_t num_feet);
 
   /// The state when it begins: it stands or is about to, within 0.04 m and 0.2 m/s, or, in
@@ -102,7 +102,7 @@ class LegOdometry {
  private:
   static constexpr Eigen::Index kPosition = 0, kVelocity = 3, kAngle = 6, kRateBias = 9,
                                 kAccelerationBias = 12, kFeet = 15;
-  static constexpr int kMax = kFeet + 3 * FloatingBase::kMostPoints;
+  static constexpr int kMax = kFeet + 3 * FloatingBase::kMaxPoints;
   struct Rest {
     Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of the centre, if it rests
     ContactTest test;

@@ -6,11 +6,7 @@
 
 #include "common/config.h"
 #include "common/hash.h"
-#include "robot/joints.h"
-#include "robot/parameters.h"
-#include "robot/sensors.h"
-#include "robot/settings.h"
-#include "robot/urdf.h"
+#include "robot/urdf/urdf.h"
 
 namespace plumb {
 
@@ -81,9 +77,8 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.fingerprint = kEmptyHash;
   for (const std::string& part : files) robot.fingerprint = Hash(ReadFile(part), robot.fingerprint);
   if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);
-  ReadJoints(root, urdf);
+  robot.joints = ReadJoints(root, urdf);
   robot.links = std::move(urdf.links);
-  robot.joints = std::move(urdf.joints);
 
   Config bus = root.Table("bus");
   robot.bus_url = bus.String("url");

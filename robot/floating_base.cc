@@ -92,9 +92,9 @@ FloatingBase FloatingBaseOf(const RobotDescription& robot) {
     Refuse(
         "nothing of it can touch the ground: no [simulation.contact], or no <collision> of "
         "spheres, capsules or boxes");
-  if (points.size() > FloatingBase::kMostPoints) {
+  if (points.size() > FloatingBase::kMaxPoints) {
     Refuse(fmt::format("{} points can touch the ground, more than {}", points.size(),
-                       FloatingBase::kMostPoints));
+                       FloatingBase::kMaxPoints));
   }
   if (!std::all_of(points.begin(), points.end(), moved))
     Refuse("what touches the ground does not hang on the IMU's link");

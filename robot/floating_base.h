@@ -13,7 +13,7 @@ namespace plumb {
 /// IMU are joints with neither motor nor encoder, two that slide at right angles and a last one
 /// that turns about the plane's normal.
 struct FloatingBase {
-  static constexpr int kMostPoints = 32;  ///< that can touch the ground
+  static constexpr int kMaxPoints = 32;  ///< that can touch the ground
 
   size_t imu;                              ///< index into sensors
   int link;                                ///< index into links: what carries the IMU

@@ -46,30 +46,17 @@ MotorDescription ReadMotor(Config& config) {
   return motor;
 }
 
-// `dynamics` are the URDF's.
-JointDynamics ReadDynamics(Config config, JointDynamics dynamics, const JointDescription& joint) {
-  const auto refuse = [&](const char* key, const char* why) {
-    if (config.Has(key)) config.Fail(key, why);
-  };
-  if (joint.passive) {
-    for (const char* key : {"motor_gain", "delay", "no_load_speed"})
-      refuse(key, "needs a motor: the joint is passive");
+// The URDF's, which `joint` has, with what the table says of them.
+JointDynamics ReadDynamics(Config config, const JointDescription& joint) {
+  JointDynamics dynamics = joint.dynamics;
+  for (const JointParameterKind& kind : kJointParameterKinds) {
+    if (config.Has(kind.key) && !joint.IsOf(kind.joints)) {
+      config.Fail(kind.key, kind.joints == JointGroup::kDriven
+                                ? "needs a motor: the joint is passive"
+                                : "has no meaning for a spherical joint");
+    }
+    dynamics.*kind.member = config.Number(kind.key, kind.in_file, dynamics.*kind.member);
   }
-  if (joint.type == JointDescription::Type::kSpherical) {
-    for (const char* key : {"stiffness", "rest", "sensor_delay", "sensor_bias"})
-      refuse(key, "has no meaning for a spherical joint");
-  }
-  dynamics.armature = config.Number("armature", kSaneNotNegative, 0);
-  dynamics.damping = config.Number("damping", kSaneNotNegative, dynamics.damping);
-  dynamics.friction = config.Number("friction", kSaneNotNegative, dynamics.friction);
-  dynamics.stiffness = config.Number("stiffness", kSaneNotNegative, 0);
-  dynamics.rest = config.Number("rest", kSane, 0);
-  dynamics.motor_gain = config.Number("motor_gain", kSaneNotNegative, 1);
-  dynamics.delay = config.Number("delay", {0, JointDynamics::kLongestDelay}, 0);
-  dynamics.sensor_delay = config.Number("sensor_delay", {0, JointDynamics::kLongestDelay}, 0);
-  dynamics.sensor_bias = config.Number("sensor_bias", kSane, 0);
-  if (config.Has("no_load_speed"))
-    dynamics.no_load_speed = config.Number("no_load_speed", {1e-9, HUGE_VAL});
   config.Finish();
   return dynamics;
 }
@@ -109,7 +96,7 @@ NoiseDescription ReadNoise(Config config) {
   return noise;
 }
 
-// What the joint may do must have a code.
+// Every effort and velocity within the joint's limits must have a code.
 void CheckMitRanges(const Config& config, const JointDescription& joint) {
   const MitRanges& ranges = joint.motor.mit->ranges;
   const double torque = joint.effort_limit / joint.motor.gear,
@@ -128,22 +115,22 @@ void CheckMitRanges(const Config& config, const JointDescription& joint) {
 }
 
 void CheckMotor(const UrdfModel& urdf, size_t index) {
-  const JointDescription& joint = urdf.joints[index];
+  const UrdfJoint& joint = urdf.joints[index];
   const std::string label = "joint " + joint.name;
   if (!(joint.effort_limit > 0)) {
-    urdf.Fail(urdf.limit_lines[index], label + ": limit effort must be positive: it has a motor");
+    urdf.Fail(joint.limit_line, label + ": limit effort must be positive: it has a motor");
   }
   if (!std::isfinite(joint.velocity_limit)) {
-    urdf.Fail(urdf.limit_lines[index], label + ": limit velocity is missing: it has a motor");
+    urdf.Fail(joint.limit_line, label + ": limit velocity is missing: it has a motor");
   }
 }
 
 // An acceleration is an effort divided by something.
-void CheckInertia(const UrdfModel& urdf) {
+void CheckInertia(const UrdfModel& urdf, const std::vector<JointDescription>& joints) {
   std::vector<double> beyond;  // [kg] of a link and all that it carries
   for (const LinkDescription& link : urdf.links) beyond.push_back(link.mass);
-  for (size_t i = urdf.joints.size(); i-- > 0;) {
-    const JointDescription& joint = urdf.joints[i];
+  for (size_t i = joints.size(); i-- > 0;) {
+    const JointDescription& joint = joints[i];
     const auto child = static_cast<size_t>(joint.child);
     if (!(beyond[child] > 0) && !(joint.dynamics.armature > 0)) {
       urdf.Fail(urdf.link_lines[child],
@@ -155,36 +142,33 @@ void CheckInertia(const UrdfModel& urdf) {
   }
 }
 
-// A table of joints: `read` is told the key and the joint, and where its coordinates begin.
-template <typename Read>
-void ReadByJoint(Config config, const std::vector<JointDescription>& joints, const Read& read) {
-  size_t at = 0;
-  for (const JointDescription& joint : joints) {
-    if (config.Has(joint.name)) read(config, joint, at);
-    at += static_cast<size_t>(joint.num_positions());
-  }
-  config.Finish();
-}
-
-void ReadTarget(Config& config, const JointDescription& joint, double* target) {
-  if (joint.type != JointDescription::Type::kSpherical) {
-    *target = config.Number(joint.name, kSane);
-    if (*target < joint.lower || *target > joint.upper) {
-      config.Fail(joint.name, fmt::format("= {} is beyond the joint's limits [{}, {}]", *target,
-                                          joint.lower, joint.upper));
-    }
-    return;
-  }
-  const std::vector<double> q = config.Numbers(joint.name, 4, {-1.001, 1.001});
-  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  if (std::abs(norm - 1) > 1e-3) config.Fail(joint.name, "is not a unit quaternion [w, x, y, z]");
-  for (size_t i = 0; i < 4; ++i) target[i] = q[i] / norm;
-}
-
 }  // namespace
 
-void ReadJoints(Config& root, UrdfModel& urdf) {
-  std::vector<JointDescription>& joints = urdf.joints;
+bool JointDescription::IsOf(JointGroup group) const {
+  switch (group) {
+    case JointGroup::kDriven:
+      return !passive && type != Type::kSpherical;
+    case JointGroup::kOneCoordinate:
+      return type != Type::kSpherical;
+    default:
+      return true;
+  }
+}
+
+std::vector<JointDescription> JointsOf(const UrdfModel& urdf) {
+  std::vector<JointDescription> joints;
+  for (const UrdfJoint& joint : urdf.joints) {
+    JointDescription description;
+    static_cast<JointGeometry&>(description) = joint;
+    description.dynamics.damping = joint.damping;
+    description.dynamics.friction = joint.friction;
+    joints.push_back(description);
+  }
+  return joints;
+}
+
+std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf) {
+  std::vector<JointDescription> joints = JointsOf(urdf);
   std::vector<bool> seen(joints.size());
   for (Config& config : root.Tables("joint")) {
     const std::string name = config.String("name");
@@ -220,12 +204,12 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
       }
     }
     seen[index] = true;
-    joint->dynamics = ReadDynamics(config.Table("dynamics", false), joint->dynamics, *joint);
+    joint->dynamics = ReadDynamics(config.Table("dynamics", false), *joint);
     joint->noise = ReadNoise(config.Table("estimator", false));
     config.Finish();
   }
   for (size_t i = 0; i < joints.size(); ++i) {
-    if (!seen[i]) joints[i].passive = urdf.part[i];
+    if (!seen[i]) joints[i].passive = urdf.joints[i].part;
     if (!seen[i] && !joints[i].passive) {
       root.Fail(
           "joint",
@@ -237,34 +221,8 @@ void ReadJoints(Config& root, UrdfModel& urdf) {
   if (std::all_of(joints.begin(), joints.end(), [](const auto& joint) { return joint.passive; })) {
     root.Fail("joint", "drives no joint: all are passive");
   }
-  CheckInertia(urdf);
-}
-
-TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints) {
-  TaskSettings s;
-  s.name = config.String("name");
-  s.period = config.Number("period", {1e-3, 10});
-  s.steps = config.Integer("steps", {1, 1e6});
-  for (const JointDescription& joint : joints) {
-    s.target.push_back(joint.num_positions() == 4 ? 1 : 0);
-    s.target.resize(s.target.size() + static_cast<size_t>(joint.num_positions()) - 1);
-  }
-  s.spread.resize(s.target.size());
-  ReadByJoint(config.Table("target", false), joints,
-              [&](Config& table, const JointDescription& joint, size_t at) {
-                ReadTarget(table, joint, &s.target[at]);
-              });
-  if (config.IsTable("spread")) {
-    ReadByJoint(config.Table("spread"), joints,
-                [&](Config& table, const JointDescription& joint, size_t at) {
-                  std::fill_n(&s.spread[at], joint.num_positions(),
-                              table.Number(joint.name, kSaneNotNegative));
-                });
-  } else {
-    std::fill(s.spread.begin(), s.spread.end(), config.Number("spread", kSaneNotNegative, 0));
-  }
-  config.Finish();
-  return s;
+  CheckInertia(urdf, joints);
+  return joints;
 }
 
 }  // namespace plumb

@@ -1,18 +1,71 @@
 #pragma once
 
+#include <limits>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "common/config.h"
-#include "robot/description.h"
-#include "robot/urdf.h"
+#include "robot/parameter_kinds.h"
+#include "robot/settings/estimator.h"
+#include "robot/urdf/urdf.h"
 
 namespace plumb {
 
-/// Adds what the [[joint]] tables say to the URDF's joints: motors and dynamics. Then every joint
-/// is passive or has a motor, and moves some inertia. @throws ConfigError
-void ReadJoints(Config& root, UrdfModel& urdf);
+/// The ranges that the codes of a motor of protocol "mit" stand for, see drivers/protocols/mit.h.
+/// All > 0, at the output shaft.
+struct MitRanges {
+  double position = 12.5;  ///< [rad] positions are in [-position, position]
+  double velocity = 0;     ///< [rad/s] likewise
+  double torque = 0;       ///< [Nm] likewise
+  double kp = 500;         ///< [Nm/rad] in [0, kp]
+  double kd = 5;           ///< [Nm s/rad] in [0, kd]
+};
 
-/// [task], with its tables of joints.
-TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints);
+/// Settings of a motor of protocol "mit" besides its node.
+struct MitDescription {
+  int master = 0;  ///< CAN id of the replies
+  MitRanges ranges;
+  std::string source;  ///< where the ranges are from: a wrong one scales silently
+};
+
+/// How a joint's motor is reached.
+struct MotorDescription {
+  std::string protocol;  ///< file name in drivers/protocols/, e.g. "cansimple"
+  int node = 0;          ///< CAN node id of the protocol
+  /// motor turns per joint turn (or per metre / 2 pi for a prismatic joint), > 0
+  double gear = 1;
+  int sign = 1;                            ///< +1 or -1
+  double offset = 0;                       ///< [rad] or [m] joint position at motor position 0
+  std::optional<MitDescription> mit = {};  ///< of protocol "mit" and no other
+};
+
+/// How the driver keeps a joint with a motor within its limits, and how the joint stops.
+struct JointLimitSettings {
+  double position_margin =
+      0;  ///< [rad] or [m] >= 0 before a position limit, in which efforts towards it fade
+  /// [Nm/s] or [N/s] > 0, away from zero
+  double effort_rate = std::numeric_limits<double>::infinity();
+  /// [Nm s/rad] or [N s/m] >= 0 of a stop by damping, see DriverSettings::stop
+  double damping = 0;
+};
+
+/// A moving joint: the URDF's, and what robot.toml says of it.
+struct JointDescription : JointGeometry {
+  bool passive = false;    ///< has no motor
+  MotorDescription motor;  ///< of a joint that is not passive
+  JointDynamics dynamics;
+  JointLimitSettings limits;  ///< of a joint that is not passive
+  NoiseDescription noise = {};
+
+  bool IsOf(JointGroup group) const;
+};
+
+/// The URDF's joints as they are without robot.toml: none passive, no motor known.
+std::vector<JointDescription> JointsOf(const UrdfModel& urdf);
+
+/// The URDF's joints with what the [[joint]] tables say of them: motors and dynamics. Every joint
+/// is passive or has a motor, and moves some inertia. @throws ConfigError
+std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf);
 
 }  // namespace plumb

@@ -1,11 +1,40 @@
 #pragma once
 
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "common/config.h"
-#include "robot/description.h"
 
 namespace plumb {
+
+/// One uncertain simulator parameter, named by a path such as "gravity", "mass/pole", "delay/hip":
+/// see sim/parameters.h.
+struct ParameterDescription {
+  enum class Coordinate { kLinear, kLog, kLogit };
+  std::string name;
+  std::string unit;
+  Coordinate coordinate;
+  double mean;      ///< prior mean, physical units
+  double variance;  ///< prior variance, physical units squared
+  /// kLogit: bounds, physical units; lower < mean < upper
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
+  /// Prior in the coordinate. For kLog the Gaussian whose log-normal has that mean and variance:
+  /// s^2 = ln(1 + variance/mean^2), m = ln(mean) - s^2/2. For kLogit, x = ln((p - lower) / (upper -
+  /// p)), the one that has them to first order: m = x(mean), s^2 = variance * x'(mean)^2.
+  double coordinate_mean() const;
+  double coordinate_variance() const;
+  double ToPhysical(double coordinate_value) const;
+  double ToCoordinate(double physical_value) const;
+};
+
+/// A parameter that is known: not inferred, but other than what the URDF and the TOML file's tables
+/// say.
+struct FrozenParameter {
+  std::string name;
+  double value;  ///< physical units
+};
 
 /// The [[parameter]] tables: those to be inferred, and those with frozen = true. What their names
 /// mean is known to the simulator only. @throws ConfigError

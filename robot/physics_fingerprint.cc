@@ -27,6 +27,9 @@ class Fingerprint {
   uint64_t value_ = kEmptyHash;
 };
 
+// Kinds that came later count where a joint has them: older posteriors still fit their robots.
+constexpr size_t kFirstKinds = 10;
+
 void AddLink(const LinkDescription& link, Fingerprint* hash) {
   hash->Add(link.name), hash->Add(link.mass), hash->Add(link.center_of_mass),
       hash->Add(link.inertia);
@@ -39,11 +42,16 @@ void AddLink(const LinkDescription& link, Fingerprint* hash) {
 void AddJoint(const JointDescription& joint, Fingerprint* hash) {
   hash->Add(joint.name);
   hash->Add(joint.origin), hash->Add(joint.rotation), hash->Add(joint.axis);
-  const JointDynamics& d = joint.dynamics;
-  for (const double number :
-       {static_cast<double>(joint.type), static_cast<double>(joint.parent), joint.lower,
-        joint.upper, joint.effort_limit, d.armature, d.damping, d.friction, d.stiffness, d.rest,
-        d.motor_gain, d.delay, d.sensor_delay, d.sensor_bias, d.no_load_speed}) {
+  for (const double number : {static_cast<double>(joint.type), static_cast<double>(joint.parent),
+                              joint.lower, joint.upper, joint.effort_limit}) {
+    hash->Add(number);
+  }
+  constexpr JointDynamics kDefault;
+  for (size_t i = 0; i < std::size(kJointParameterKinds); ++i) {
+    const JointParameterKind& kind = kJointParameterKinds[i];
+    const double number = joint.dynamics.*kind.member;
+    if (i >= kFirstKinds && number == kDefault.*kind.member) continue;
+    if (i >= kFirstKinds) hash->Add(kind.name);
     hash->Add(number);
   }
 }

@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robot/description.h"
+#include "robot/settings/ranges.h"
+
 namespace plumb {
 namespace {
 
-constexpr double kMostCounts = 4294967296;  // an unsigned 32-bit position
-constexpr Range kSanePositive{1e-12, 1e12};
+constexpr double kMaxCounts = 4294967296;  // an unsigned 32-bit position
 // Of an IMU about which nothing is said, of the size that data sheets of industrial ones give: half
 // a degree of tilt while it moves, and what its vibration adds to the rate's and the force's own
 // noise.
@@ -32,8 +34,8 @@ int Find(const Config& config, const char* key, const std::string& name, const s
 void ReadEncoder(Config& config, const RobotDescription& robot, SensorDescription& s) {
   using Type = JointDescription::Type;
   s.node = config.Integer("node", {1, 127});
-  s.counts = config.Number("counts", {2, kMostCounts});
-  s.range = config.Number("range", {2, kMostCounts}, s.counts);
+  s.counts = config.Number("counts", {2, kMaxCounts});
+  s.range = config.Number("range", {2, kMaxCounts}, s.counts);
   for (const auto& [key, counts] : {std::pair{"counts", s.counts}, std::pair{"range", s.range}}) {
     if (counts != std::floor(counts))
       config.Fail(key, fmt::format("= {} is not a whole number", counts));

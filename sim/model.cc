@@ -96,18 +96,12 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
     JointDescription& joint = robot.joints[i];
     joint.origin =
         topology_.link_axes[static_cast<size_t>(joint.parent)].transpose() * vector(now.origin);
-    const Physics<double>::Axis& axis = physics.axes[velocity];
-    joint.dynamics = {axis.armature,    axis.damping,    axis.friction, axis.stiffness,
-                      axis.rest,        axis.gain,       axis.delay,    axis.sensor_delay,
-                      axis.sensor_bias, 1 / axis.slowing};
+    joint.dynamics = physics.axes[velocity];
     velocity += static_cast<size_t>(joint.num_velocities());
   }
   SimulationSettings& settings = robot.simulation;
-  settings.gravity = physics.globals.gravity;
+  settings.set_world(physics.world);
   if (settings.contact) {
-    settings.contact->stiffness = physics.globals.contact_stiffness;
-    settings.contact->damping = physics.globals.contact_damping;
-    settings.contact->friction = physics.globals.contact_friction;
     for (size_t i = 1; i < robot.links.size(); ++i) {
       std::vector<Shape> spheres;
       while (point < topology_.points.size() &&
@@ -121,7 +115,6 @@ RobotDescription Model::Describe(const Eigen::Ref<const Eigen::VectorXd>& physic
       robot.links[i].collisions = std::move(spheres);
     }
   }
-  if (settings.stop) settings.stop = {physics.globals.stop_stiffness, physics.globals.stop_damping};
   return robot;
 }
 

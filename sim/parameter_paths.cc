@@ -1,81 +1,72 @@
-// The paths that a robot's parameters can have.
+#include "sim/parameter_paths.h"
+
 #include <algorithm>
 #include <stdexcept>
 
 #include "common/nearest_name.h"
-#include "sim/parameter_names.h"
-#include "sim/parameters.h"
 
 namespace plumb {
+namespace {
 
 using Eigen::Vector3d;
+using Number = LinkParameterKind::Number;
 
-Parameters::Paths Parameters::AllPaths(const RobotDescription& description) const {
-  Paths paths;
-  const auto domain = [](const std::string& name) {
-    if (name == "rest" || name == "sensor_bias") return Domain::kAny;
-    if (name == "delay" || name == "sensor_delay") return Domain::kDelay;
-    if (name == "no_load_speed" || name.ends_with("stiffness")) return Domain::kMoreThanZero;
-    return Domain::kZeroOrMore;
-  };
-  for (size_t slot = 0; slot < std::size(kGlobalNames); ++slot) {
-    const std::string name = kGlobalNames[slot];
-    if (name.starts_with("contact/") && !description.simulation.contact) continue;
-    if (name.starts_with("limit/") && !description.simulation.stop) continue;
-    paths.push_back({name, {.effect = Effect::kGlobal, .domain = domain(name), .slot = slot}});
+// To the first further joint of the link that joint `index` moves; a link that carries none is a
+// uniform rod.
+double LengthOf(const RobotDescription& description, size_t index, const Physics<double>& physics) {
+  const auto& joints = description.joints;
+  const auto child = std::find_if(joints.begin(), joints.end(), [&](const auto& joint) {
+    return joint.parent == static_cast<int>(index) + 1;
+  });
+  if (child == joints.end()) return 2 * description.links[index + 1].center_of_mass.norm();
+  return Vector3d::Map(physics.links[static_cast<size_t>(child - joints.begin())].origin).norm();
+}
+
+}  // namespace
+
+std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
+                                          const Physics<double>& physics) {
+  std::vector<ParameterPath> paths;
+  for (const WorldParameterKind& kind : kWorldParameterKinds) {
+    if (!description.simulation.Has(kind.table)) continue;
+    paths.push_back({.path = kind.name, .values = kind.values, .world = &kind});
   }
-  paths.push_back({"mass/" + description.links[0].name,
-                   {.effect = Effect::kNone, .domain = Domain::kMoreThanZero}});
+  paths.push_back({.path = "mass/" + description.links[0].name, .values = kPositive});
   size_t velocity = 0;
   for (size_t i = 0; i < description.joints.size(); ++i) {
-    const std::string& link = description.links[i + 1].name;
-    const auto add = [&](const std::string& path, Effect effect, Domain in, size_t slot = 0,
-                         double reference = 1) {
-      paths.push_back(
-          {path,
-           {.effect = effect, .domain = in, .index = i, .slot = slot, .reference = reference}});
-    };
-    if (base_.links[i].mass > 0) {
-      add("mass/" + link, Effect::kMass, Domain::kMoreThanZero, 0, base_.links[i].mass);
-      add("inertia/" + link, Effect::kInertia, Domain::kMoreThanZero);
-      for (size_t k = 0; k < 3; ++k)
-        add("com/" + link + "/" + "xyz"[k], Effect::kCenter, Domain::kAny, k);
-      for (size_t k = 0; k < 6; ++k) {
-        add("inertia/" + link + "/" + kEntries[k].name, Effect::kCholesky, Domain::kExponent, k);
-      }
+    const LinkDescription& link = description.links[i + 1];
+    const double mass = physics.links[i].mass, length = LengthOf(description, i, physics);
+    for (const LinkParameterKind& kind : kLinkParameterKinds) {
+      const bool is_length = kind.number == Number::kLength;
+      if (!((is_length ? length : mass) > 0)) continue;
+      const std::string entry = *kind.entry ? std::string("/") + kind.entry : "";
+      const double reference = is_length ? length : kind.number == Number::kMass ? mass : 1;
+      paths.push_back({.path = std::string(kind.name) + "/" + link.name + entry,
+                       .values = kind.values,
+                       .link = &kind,
+                       .index = i,
+                       .reference = reference});
     }
-    const auto child = std::find_if(parents_.begin(), parents_.end(),
-                                    [&](int p) { return p == static_cast<int>(i) + 1; });
-    const double length =
-        child == parents_.end()
-            ? 2 * centers_[i].norm()
-            : Vector3d::Map(base_.links[static_cast<size_t>(child - parents_.begin())].origin)
-                  .norm();
-    if (length > 0) add("length/" + link, Effect::kLength, Domain::kMoreThanZero, 0, length);
     const JointDescription& joint = description.joints[i];
-    for (size_t slot = 0; slot < std::size(kAxisNames); ++slot) {
-      const std::string name = kAxisNames[slot];
-      // Springs, sensors and speed limits of a spherical joint are not modelled; motors' numbers
-      // need a motor.
-      if (joint.type == JointDescription::Type::kSpherical && slot > 2) continue;
-      if (joint.passive && (name == "gain" || name == "delay" || name == "no_load_speed")) continue;
-      paths.push_back({name + "/" + joint.name,
-                       {.effect = slot == kSlowing ? Effect::kSpeedLimit : Effect::kAxis,
-                        .domain = domain(name),
-                        .index = velocity,
-                        .slot = slot,
-                        .count = static_cast<size_t>(joint.num_velocities())}});
+    const auto count = static_cast<size_t>(joint.num_velocities());
+    for (const JointParameterKind& kind : kJointParameterKinds) {
+      if (!joint.IsOf(kind.joints)) continue;
+      paths.push_back({.path = std::string(kind.name) + "/" + joint.name,
+                       .values = kind.values,
+                       .joint = &kind,
+                       .index = velocity,
+                       .count = count});
     }
-    velocity += static_cast<size_t>(joint.num_velocities());
+    velocity += count;
   }
   return paths;
 }
 
-Parameters::Binding Parameters::Find(const Paths& paths, const std::string& path) {
+const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path) {
   std::vector<std::string> names;
-  for (const auto& [name, binding] : paths) {
-    if (name == path) return binding;
-    names.push_back(name);
+  for (const ParameterPath& candidate : paths) {
+    if (candidate.path == path) return candidate;
+    names.push_back(candidate.path);
   }
   std::string why;
   if (path.starts_with("contact/"))

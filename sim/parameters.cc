@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "robot/contact_points.h"
-#include "sim/parameter_names.h"
 
 namespace plumb {
 namespace {
@@ -16,8 +15,12 @@ using Eigen::Vector3d;
 // Stream words of the generators used here, so that no two purposes share numbers.
 constexpr uint32_t kHiddenStream = 0x48494444;  // "HIDD"
 
-// Beyond e^20 an inertia's shape is no parameter any more, and far from overflow.
-constexpr double kLargestExponent = 20;
+using Number = LinkParameterKind::Number;
+
+// xx, yy, zz, xy, xz, yz of a matrix.
+constexpr struct { int row, column; } kEntries[] = {{0, 0}, {1, 1}, {2, 2}, {1, 0}, {2, 0}, {2, 1}};
+
+constexpr Range kDelays{0, JointDynamics::kLongestDelay};
 
 void Write(const Matrix3d& inertia, double* entries) {
   for (size_t i = 0; i < 6; ++i) entries[i] = inertia(kEntries[i].row, kEntries[i].column);
@@ -35,6 +38,10 @@ Matrix3d Root(const Matrix3d& s) {
       l(i, j) = (s(i, j) - l.row(i).head(j).dot(l.row(j).head(j))) / l(j, j);
   }
   return l;
+}
+
+bool IsCholesky(const ParameterPath& path) {
+  return path.link && path.link->number == Number::kCholesky;
 }
 
 // The inertia of second moments of mass s, and back.
@@ -62,20 +69,14 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
     Vector3d::Map(physics.origin) =
         topology.link_axes[static_cast<size_t>(joint.parent)] * joint.origin;
     base_.links.push_back(physics);
-    const JointDynamics& d = joint.dynamics;
-    Check("delay/" + joint.name, Domain::kDelay, d.delay);
-    Check("sensor_delay/" + joint.name, Domain::kDelay, d.sensor_delay);
-    const Physics<double>::Axis axis{d.armature,     d.damping,    d.friction,          d.stiffness,
-                                     d.rest,         d.motor_gain, 1 / d.no_load_speed, d.delay,
-                                     d.sensor_delay, d.sensor_bias};
-    base_.axes.insert(base_.axes.end(), static_cast<size_t>(joint.num_velocities()), axis);
+    // What would need too much memory.
+    Check("delay/" + joint.name, kDelays, joint.dynamics.delay);
+    Check("sensor_delay/" + joint.name, kDelays, joint.dynamics.sensor_delay);
+    base_.axes.insert(base_.axes.end(), static_cast<size_t>(joint.num_velocities()),
+                      joint.dynamics);
   }
-  const SimulationSettings& settings = description.simulation;
-  base_.globals = {settings.gravity, 0, 0, 0, 0, 0};
-  if (settings.contact) {
-    base_.globals.contact_stiffness = settings.contact->stiffness;
-    base_.globals.contact_damping = settings.contact->damping;
-    base_.globals.contact_friction = settings.contact->friction;
+  base_.world = description.simulation.world();
+  if (description.simulation.contact) {
     for (const ContactPoint& at : ContactPoints(description)) {
       Physics<double>::Point point{};
       Vector3d::Map(point.position) = topology.link_axes[static_cast<size_t>(at.link)] * at.centre;
@@ -84,91 +85,60 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
       point_links_.push_back(at.link);
     }
   }
-  if (settings.stop) {
-    base_.globals.stop_stiffness = settings.stop->stiffness;
-    base_.globals.stop_damping = settings.stop->damping;
-  }
 
-  const Paths paths = AllPaths(description);
+  const std::vector<ParameterPath> all = ParameterPaths(description, base_);
   for (const ParameterDescription& parameter : description.parameters) {
-    const auto index = static_cast<int>(bindings_.size());
-    bindings_.push_back(Find(paths, parameter.name));
-    names_.push_back(parameter.name);
+    const auto index = static_cast<int>(paths_.size());
+    paths_.push_back(FindPath(all, parameter.name));
     means_[index] = parameter.mean;
-    if (bindings_.back().effect == Effect::kCholesky) AddCholesky(bindings_.back(), index, 0);
+    if (IsCholesky(paths_.back())) AddCholesky(paths_.back(), index, 0);
   }
   for (const FrozenParameter& parameter : description.frozen) {
-    const Binding binding = Find(paths, parameter.name);
-    Check(parameter.name, binding.domain, parameter.value);
-    Freeze(binding, parameter.value);
+    const ParameterPath& path = FindPath(all, parameter.name);
+    Check(path.path, path.values, parameter.value);
+    Freeze(path, parameter.value);
   }
   FindTerms(description);
 }
 
-void Parameters::Check(const std::string& name, Domain domain, double value) {
-  bool fits = std::isfinite(value);
-  switch (domain) {
-    case Domain::kAny:
-      break;
-    case Domain::kZeroOrMore:
-      fits = fits && value >= 0;
-      break;
-    case Domain::kMoreThanZero:
-      fits = fits && value > 0;
-      break;
-    case Domain::kDelay:
-      fits = fits && value >= 0 && value <= JointDynamics::kLongestDelay;
-      break;
-    case Domain::kExponent:
-      fits = fits && std::abs(value) <= kLargestExponent;
-      break;
-  }
-  if (!fits)
-    throw std::invalid_argument("parameter '" + name + "' cannot be " + std::to_string(value));
+void Parameters::Check(const std::string& path, Range values, double value) {
+  if (!(values.lower <= value && value <= values.upper))
+    throw std::invalid_argument("parameter '" + path + "' cannot be " + std::to_string(value));
 }
 
-void Parameters::Freeze(const Binding& binding, double value) {
-  switch (binding.effect) {
-    case Effect::kNone:
-      break;
-    case Effect::kCholesky:
-      AddCholesky(binding, -1, value);
-      break;
-    case Effect::kMass:
-    case Effect::kInertia:
-    case Effect::kLength:
-      factors_.push_back({binding, value});
-      break;
-    default:
-      Set(binding, value, &base_);
+void Parameters::Freeze(const ParameterPath& path, double value) {
+  if (IsCholesky(path)) {
+    AddCholesky(path, -1, value);
+  } else if (path.link && path.link->number != Number::kCenter) {
+    factors_.push_back({path, value});
+  } else {
+    Set(path, value, &base_);
   }
 }
 
-void Parameters::AddCholesky(const Binding& binding, int parameter, double value) {
+void Parameters::AddCholesky(const ParameterPath& path, int parameter, double value) {
   auto found = std::find_if(inertias_.begin(), inertias_.end(),
-                            [&](const Inertia& i) { return i.link == binding.index; });
+                            [&](const Inertia& i) { return i.link == path.index; });
   if (found == inertias_.end()) {
-    inertias_.push_back({binding.index, {-1, -1, -1, -1, -1, -1}, {}});
+    inertias_.push_back({path.index, {-1, -1, -1, -1, -1, -1}, {}});
     found = std::prev(inertias_.end());
   }
-  found->parameter[binding.slot] = parameter;
-  found->value[binding.slot] = value;
+  const auto entry = static_cast<size_t>(path.link->index);
+  found->parameter[entry] = parameter;
+  found->value[entry] = value;
 }
 
 void Parameters::FindTerms(const RobotDescription& description) {
-  const auto has = [&](size_t slot) {
-    for (const auto& axis : base_.axes) {
-      if (reinterpret_cast<const double*>(&axis)[slot] != 0) return true;
-    }
-    return std::any_of(bindings_.begin(), bindings_.end(), [&](const Binding& b) {
-      return (b.effect == Effect::kAxis || b.effect == Effect::kSpeedLimit) && b.slot == slot;
-    });
-  };
-  terms_.friction = has(2);
-  terms_.springs = has(3);
-  terms_.slowing = has(kSlowing);
-  delays_ = has(7);
-  terms_.sensors = has(8) || has(9);
+  constexpr JointDynamics kDefault;
+  for (size_t i = 0; i < std::size(kJointParameterKinds); ++i) {
+    const JointParameterKind& kind = kJointParameterKinds[i];
+    const auto has = [&](const JointDynamics& axis) {
+      return axis.*kind.member != kDefault.*kind.member;
+    };
+    const auto may_have = [&](const ParameterPath& path) { return path.joint == &kind; };
+    terms_.joints[i] = std::any_of(base_.axes.begin(), base_.axes.end(), has) ||
+                       std::any_of(paths_.begin(), paths_.end(), may_have);
+  }
   terms_.stops = description.simulation.stop.has_value();
 }
 
@@ -184,36 +154,25 @@ void Parameters::Apply(const Eigen::Ref<const Eigen::VectorXd>& physical,
     throw std::invalid_argument("the simulator has " + std::to_string(size()) +
                                 " parameters, not " + std::to_string(physical.size()));
   }
-  for (int i = 0; i < size(); ++i) {
-    Check(names_[static_cast<size_t>(i)], bindings_[static_cast<size_t>(i)].domain, physical[i]);
-  }
+  const auto path = [&](int i) -> const ParameterPath& { return paths_[static_cast<size_t>(i)]; };
+  for (int i = 0; i < size(); ++i) Check(path(i).path, path(i).values, physical[i]);
   *physics = base_;  // equal sizes: copies values, does not allocate
-  for (int i = 0; i < size(); ++i) Set(bindings_[static_cast<size_t>(i)], physical[i], physics);
+  for (int i = 0; i < size(); ++i) Set(path(i), physical[i], physics);
   for (const Inertia& inertia : inertias_) SetInertia(inertia, physical, physics);
-  for (const Fixed& fixed : factors_) Scale(fixed.binding, fixed.value, physics);
-  for (int i = 0; i < size(); ++i) Scale(bindings_[static_cast<size_t>(i)], physical[i], physics);
+  for (const Fixed& fixed : factors_) Scale(fixed.path, fixed.value, physics);
+  for (int i = 0; i < size(); ++i) Scale(path(i), physical[i], physics);
 }
 
-void Parameters::Set(const Binding& binding, double value, Physics<double>* physics) const {
-  switch (binding.effect) {
-    case Effect::kGlobal:
-      reinterpret_cast<double*>(&physics->globals)[binding.slot] = value;
-      break;
-    case Effect::kAxis:
-    case Effect::kSpeedLimit:
-      for (size_t k = 0; k < binding.count; ++k) {
-        auto* axis = reinterpret_cast<double*>(&physics->axes[binding.index + k]);
-        axis[binding.slot] = binding.effect == Effect::kSpeedLimit ? 1 / value : value;
-      }
-      break;
-    case Effect::kCenter: {
-      const auto slot = static_cast<Eigen::Index>(binding.slot);
-      Vector3d::Map(physics->links[binding.index].center) +=
-          (value - centers_[binding.index][slot]) * link_axes_[binding.index].col(slot);
-      break;
-    }
-    default:
-      break;
+void Parameters::Set(const ParameterPath& path, double value, Physics<double>* physics) const {
+  if (path.world) path.world->of(physics->world) = value;
+  if (path.joint) {
+    for (size_t k = 0; k < path.count; ++k)
+      physics->axes[path.index + k].*path.joint->member = value;
+  }
+  if (path.link && path.link->number == Number::kCenter) {
+    const Eigen::Index entry = path.link->index;
+    Vector3d::Map(physics->links[path.index].center) +=
+        (value - centers_[path.index][entry]) * link_axes_[path.index].col(entry);
   }
 }
 
@@ -230,23 +189,25 @@ void Parameters::SetInertia(const Inertia& inertia,
   Write(FromMoments(root * root.transpose()), physics->links[inertia.link].inertia);
 }
 
-void Parameters::Scale(const Binding& binding, double value, Physics<double>* physics) const {
-  const double factor = value / binding.reference;
+void Parameters::Scale(const ParameterPath& path, double value, Physics<double>* physics) const {
+  if (!path.link) return;
+  const double factor = value / path.reference;
+  Physics<double>::Link& scaled = physics->links[path.index];
   const auto scale = [](double* numbers, size_t count, double by) {
     for (size_t k = 0; k < count; ++k) numbers[k] *= by;
   };
-  switch (binding.effect) {
-    case Effect::kMass:
-      physics->links[binding.index].mass *= factor;
-      scale(physics->links[binding.index].inertia, 6, factor);
+  switch (path.link->number) {
+    case Number::kMass:
+      scaled.mass *= factor;
+      scale(scaled.inertia, 6, factor);
       break;
-    case Effect::kInertia:
-      scale(physics->links[binding.index].inertia, 6, factor);
+    case Number::kInertia:
+      scale(scaled.inertia, 6, factor);
       break;
-    case Effect::kLength: {
-      const int link = static_cast<int>(binding.index) + 1;
-      scale(physics->links[binding.index].center, 3, factor);
-      scale(physics->links[binding.index].inertia, 6, factor * factor);
+    case Number::kLength: {
+      const int link = static_cast<int>(path.index) + 1;
+      scale(scaled.center, 3, factor);
+      scale(scaled.inertia, 6, factor * factor);
       for (size_t i = 0; i < parents_.size(); ++i) {
         if (parents_[i] == link) scale(physics->links[i].origin, 3, factor);
       }

@@ -3,13 +3,13 @@
 #include <Eigen/Core>
 #include <array>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/random.h"
 #include "robot/description.h"
 #include "sim/dynamics/physics.h"
 #include "sim/dynamics/topology.h"
+#include "sim/parameter_paths.h"
 
 namespace plumb {
 
@@ -27,12 +27,10 @@ namespace plumb {
 ///                           mass times (l/l0)^2. l0 is the distance to the first further joint,
 ///                           or, of a link that carries none, the length that the URDF implies for
 ///                           a uniform rod: twice that of the centre of mass.
-///   {armature,damping,friction,stiffness,rest,gain,delay,sensor_delay,sensor_bias,
-///    no_load_speed}/<joint>
-///                           as in JointDynamics; a spherical joint has the first three, for all of
-///                           its axes, and a passive one no gain, delay and no_load_speed
-///   contact/{stiffness,damping,friction}, limit/{stiffness,damping}
-///                           as in SimulationSettings
+///   <kind>/<joint>          those of kJointParameterKinds, as in JointDynamics; of a spherical joint
+///                           they are for all of its axes
+///   contact/<kind>, limit/<kind>
+///                           those of kWorldParameterKinds, as in SimulationSettings
 ///
 /// Only inertias that a body can have can be expressed. With S = tr(I)/2 - I, the second moment of
 /// mass about the centre (I is physical exactly where S is positive semidefinite: Wensing, Kim,
@@ -49,14 +47,17 @@ class Parameters {
   /// is, or a value that is not physical.
   Parameters(const RobotDescription& description, const Topology& topology);
 
-  int size() const { return static_cast<int>(bindings_.size()); }
+  int size() const { return static_cast<int>(paths_.size()); }
   /// Prior means, physical units.
   const Eigen::VectorXd& means() const { return means_; }
   /// The robot with its frozen parameters and the prior means of the uncertain ones.
   Physics<double> Nominal() const;
   /// What any values of the parameters may bring into play.
   const Terms& terms() const { return terms_; }
-  bool delays() const { return delays_; }
+  bool delays() const { return terms_.Has(&JointDynamics::delay); }
+  bool sensor_errors() const {
+    return terms_.Has(&JointDynamics::sensor_delay) || terms_.Has(&JointDynamics::sensor_bias);
+  }
 
   /// Writes the physics with these parameters. Does not allocate.
   /// @param physical in the order of description.parameters, physical units.
@@ -66,29 +67,8 @@ class Parameters {
   void Apply(const Eigen::Ref<const Eigen::VectorXd>& physical, Physics<double>* physics) const;
 
  private:
-  enum class Domain { kAny, kZeroOrMore, kMoreThanZero, kDelay, kExponent };
-  enum class Effect {
-    kNone,
-    kGlobal,
-    kAxis,
-    kSpeedLimit,
-    kCenter,
-    kCholesky,
-    kMass,
-    kInertia,
-    kLength
-  };
-  struct Binding {
-    Effect effect;
-    Domain domain;
-    size_t index = 0;  // of the link's joint, or the first velocity
-    // which of the globals, of the axis' numbers, of the centre's or the factor's entries
-    size_t slot = 0;
-    size_t count = 1;      // of velocities
-    double reference = 1;  // what the files imply
-  };
   struct Fixed {
-    Binding binding;
+    ParameterPath path;
     double value;
   };
   // Cholesky coordinates of a link's inertia: where they come from.
@@ -97,16 +77,13 @@ class Parameters {
     std::array<int, 6> parameter;  // index of the uncertain parameter, or -1: the value holds
     std::array<double, 6> value;
   };
-  using Paths = std::vector<std::pair<std::string, Binding>>;
 
-  Paths AllPaths(const RobotDescription& description) const;
-  static Binding Find(const Paths& paths, const std::string& path);
-  static void Check(const std::string& name, Domain domain, double value);
-  void Freeze(const Binding& binding, double value);
-  void AddCholesky(const Binding& binding, int parameter, double value);
+  static void Check(const std::string& path, Range values, double value);
+  void Freeze(const ParameterPath& path, double value);
+  void AddCholesky(const ParameterPath& path, int parameter, double value);
   void FindTerms(const RobotDescription& description);
-  void Set(const Binding& binding, double value, Physics<double>* physics) const;
-  void Scale(const Binding& binding, double value, Physics<double>* physics) const;
+  void Set(const ParameterPath& path, double value, Physics<double>* physics) const;
+  void Scale(const ParameterPath& path, double value, Physics<double>* physics) const;
   void SetInertia(const Inertia& inertia, const Eigen::Ref<const Eigen::VectorXd>& physical,
                   Physics<double>* physics) const;
 
@@ -116,13 +93,11 @@ class Parameters {
   std::vector<Eigen::Vector3d> centers_;    // of mass, in the link frame
   std::vector<Eigen::Matrix3d> roots_;      // L of each link, in working axes
   Physics<double> base_;                    // the files, and what is frozen and not a factor
-  std::vector<std::string> names_;
-  std::vector<Binding> bindings_;  // of the uncertain parameters
-  std::vector<Fixed> factors_;     // frozen
+  std::vector<ParameterPath> paths_;        // of the uncertain parameters
+  std::vector<Fixed> factors_;              // frozen
   std::vector<Inertia> inertias_;
   Eigen::VectorXd means_;
   Terms terms_;
-  bool delays_ = false;
 };
 
 /// The truth behind a virtual robot: the prior means, with description.virtual_robot.hidden drawn

@@ -58,7 +58,7 @@ void Simulator::SetReading(const Vector& q, const Vector& v, const Vector& effor
   RequireSize(effort.size());
   SetState(q, v);
   std::copy(effort.begin(), effort.end(), arriving_.begin());
-  if (!model_->parameters().terms().sensors) return;
+  if (!model_->parameters().sensor_errors()) return;
   engine_->FromReading(effort.data());
   Take();
 }
@@ -142,7 +142,7 @@ void Simulator::Take() {
 }
 
 Simulator::State Simulator::Reading() {
-  if (!model_->parameters().terms().sensors) return {q_, v_};
+  if (!model_->parameters().sensor_errors()) return {q_, v_};
   engine_->ToReading(arriving_.data());
   std::copy_n(engine_->q(), q_.size(), reading_q_.begin());
   std::copy_n(engine_->v(), v_.size(), reading_v_.begin());

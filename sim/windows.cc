@@ -129,7 +129,7 @@ struct Windows::Worker {
   void Simulate(Eigen::Index sample, const Group& group, std::span<const Window> windows,
                 const Plan& plan, const Visit& visit, bool last_only) {
     const auto n = static_cast<size_t>(model.num_velocities());
-    const bool sensors = model.parameters().terms().sensors;
+    const bool sensors = model.parameters().sensor_errors();
     for (size_t lane = 0; lane < lanes; ++lane) {
       const Window& window = windows[group.windows[lane]];
       for (Eigen::Index i = 0; i < q.size(); ++i)

@@ -13,7 +13,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 STANDS_ON = {
     "common": set(),
     "plot": {"common"},
-    "robot": {"common"},
+    "robot/urdf": {"common"},
+    "robot": {"robot/urdf"},
     "drivers/can": {"common"},
     "drivers/protocols": {"robot", "drivers/can"},
     "drivers/bus": {"drivers/protocols"},

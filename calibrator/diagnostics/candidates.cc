@@ -27,55 +27,60 @@ double LargestEffort(const RobotDescription& robot) {
 void AddLink(const LinkDescription& link, std::vector<Candidate>* all) {
   if (!(link.mass > 0)) return;
   const double gyration = std::sqrt(link.inertia.trace() / 2 / link.mass);
-  all->push_back({"mass/" + link.name, "kg", link.mass, 0.2 * link.mass, 0});
-  all->push_back({"inertia/" + link.name, "", 1, 0.2, 0});
-  for (Eigen::Index k = 0; k < 3 && gyration > 0; ++k) {
-    all->push_back({"com/" + link.name + "/" + "xyz"[k], "m", link.center_of_mass(k),
-                    0.2 * gyration, -kInfinity});
+  const auto add = [&](const LinkParameterKind& kind, double value, double size) {
+    const std::string entry = *kind.entry ? std::string("/") + kind.entry : "";
+    const double lower = kind.values.lower < 0 ? -kInfinity : 0;
+    all->push_back(
+        {std::string(kind.name) + "/" + link.name + entry, kind.unit, value, 0.2 * size, lower});
+  };
+  for (const LinkParameterKind& kind : kLinkParameterKinds) {
+    switch (kind.number) {
+      case LinkParameterKind::Number::kMass:
+        add(kind, link.mass, link.mass);
+        break;
+      case LinkParameterKind::Number::kInertia:
+        add(kind, 1, 1);
+        break;
+      case LinkParameterKind::Number::kCenter:
+        if (gyration > 0) add(kind, link.center_of_mass(kind.index), gyration);
+        break;
+      default:  // a shape, which the others tell enough of
+        break;
+    }
   }
 }
 
 void AddJoint(const JointDescription& joint, double effort, std::vector<Candidate>* all) {
-  const bool turns = joint.type != JointDescription::Type::kPrismatic;
-  const std::string force = turns ? "Nm" : "N", place = turns ? "rad" : "m";
-  const JointDynamics& has = joint.dynamics;
-  const auto add = [&](const std::string& name, const std::string& unit, double value, double least,
-                       double lower) {
+  for (const JointParameterKind& kind : kJointParameterKinds) {
+    const auto& surprise = kind.surprise;
+    if (surprise.least == 0 || !joint.IsOf(kind.joints) || !joint.IsOf(surprise.joints)) continue;
+    double value = joint.dynamics.*kind.member;
+    // A parameter that must be positive begins above zero: the simulator has no spring of none.
+    if (kind.values.lower > 0) value = std::max(value, 1e-9 * effort);
+    const double least = surprise.least * (surprise.of_effort ? effort : 1);
+    const bool turns = joint.type != JointDescription::Type::kPrismatic;
     all->push_back(
-        {name + "/" + joint.name, unit, value, std::max(0.3 * std::abs(value), least), lower});
-  };
-  add("damping", force + " s/" + place, has.damping, 0.01 * effort, 0);
-  add("friction", force, has.friction, 0.05 * effort, 0);
-  if (joint.type == JointDescription::Type::kSpherical) return;
-  add("sensor_delay", "s", has.sensor_delay, 0.003, 0);
-  add("sensor_bias", place, has.sensor_bias, 0.02, -kInfinity);
-  if (joint.passive) return;
-  add("armature", turns ? "kg m^2" : "kg", has.armature, 1e-3 * effort, 0);
-  // The simulator has no spring of stiffness 0 among its uncertain parameters.
-  add("stiffness", force + "/" + place, std::max(has.stiffness, 1e-9 * effort), 0.05 * effort, 0);
-  add("gain", "", has.motor_gain, 0.1, 0);
-  add("delay", "s", has.delay, 0.003, 0);
+        {std::string(kind.name) + "/" + joint.name, turns ? kind.unit_turning : kind.unit_sliding,
+         value, std::max(0.3 * std::abs(value), least), kind.values.lower < 0 ? -kInfinity : 0});
+  }
 }
 
 }  // namespace
 
 std::vector<Candidate> FindCandidates(const RobotDescription& robot) {
-  std::vector<Candidate> all = {
-      {"gravity", "m/s^2", robot.simulation.gravity, 0.1 * robot.simulation.gravity, 0}};
-  for (size_t i = 1; i < robot.links.size(); ++i) AddLink(robot.links[i], &all);
-  for (const JointDescription& joint : robot.joints) AddJoint(joint, LargestEffort(robot), &all);
   const bool shapes =
       std::any_of(robot.links.begin() + 1, robot.links.end(),
                   [](const LinkDescription& link) { return !link.collisions.empty(); });
-  if (const auto& contact = robot.simulation.contact; contact && shapes) {
-    all.push_back({"contact/stiffness", "N/m", contact->stiffness, 0.5 * contact->stiffness, 0});
-    all.push_back({"contact/damping", "N s/m", contact->damping, 0.5 * contact->damping, 0});
-    all.push_back({"contact/friction", "", contact->friction, 0.5 * contact->friction, 0});
+  std::vector<Candidate> all;
+  World world = robot.simulation.world();
+  for (const WorldParameterKind& kind : kWorldParameterKinds) {
+    if (!robot.simulation.Has(kind.table)) continue;
+    if (kind.table == WorldParameterKind::Table::kContact && !shapes) continue;
+    const double value = kind.of(world);
+    all.push_back({kind.name, kind.unit, value, kind.surprise * value, 0});
   }
-  if (const auto& stop = robot.simulation.stop) {
-    all.push_back({"limit/stiffness", "Nm/rad", stop->stiffness, 0.5 * stop->stiffness, 0});
-    all.push_back({"limit/damping", "Nm s/rad", stop->damping, 0.5 * stop->damping, 0});
-  }
+  for (size_t i = 1; i < robot.links.size(); ++i) AddLink(robot.links[i], &all);
+  for (const JointDescription& joint : robot.joints) AddJoint(joint, LargestEffort(robot), &all);
   for (const FrozenParameter& frozen : robot.frozen) {
     for (Candidate& candidate : all) {
       if (candidate.path == frozen.name) candidate.value = frozen.value;

@@ -22,9 +22,9 @@ struct Candidate {
   double lower;  ///< the least value there is: 0, or -infinity
 };
 
-/// Gravity; each link's mass, inertia and centre of mass; each joint's damping, friction, sensor
-/// delay and bias, and with a motor armature, stiffness, gain and delay; contact and stops: what of
-/// these the robot has and does not fit.
+/// Gravity, contact and stops; each link's mass, inertia and centre of mass; the numbers of each
+/// joint that kJointParameterKinds calls a likely surprise: what of these the robot has and does
+/// not fit.
 std::vector<Candidate> FindCandidates(const RobotDescription& robot);
 
 /// The robot with the candidates as further uncertain parameters, after its own.

@@ -16,7 +16,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMostBins = 20;
 // expected; fewer, and the statistic is not chi-squared distributed
 constexpr int kFewestPerBin = 5;
-constexpr int kMostPoints = 100;       // at which distribution functions are compared
+constexpr int kMaxPoints = 100;        // at which distribution functions are compared
 constexpr double kNegligible = 1e-20;  // a probability
 constexpr double kSignificant = 0.01;
 constexpr uint32_t kTieStream = 0x54494553;  // "TIES"
@@ -139,7 +139,7 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
   std::sort(sorted.begin(), sorted.end());
   const auto n = static_cast<int>(ranks.size());
   std::vector<int> points;
-  const int count = std::min(kMostPoints, draws);
+  const int count = std::min(kMaxPoints, draws);
   for (int i = 1; i <= count; ++i) {
     points.push_back(static_cast<int>(static_cast<int64_t>(i) * (draws + 1) / (count + 1)));
   }

@@ -10,7 +10,7 @@
 #include "calibrator/results/urdf_numbers.h"
 #include "common/atomic_file.h"
 #include "common/config.h"
-#include "robot/urdf.h"
+#include "robot/urdf/urdf.h"
 #include "sim/model.h"
 
 namespace plumb {
@@ -19,7 +19,7 @@ namespace {
 /// The settings of robot.toml that matter here.
 struct Toml {
   std::string urdf;                // path
-  std::set<std::string> dynamics;  // "damping/<joint>" where it overrides the URDF's
+  std::set<std::string> dynamics;  // paths of what is in [joint.dynamics]
 };
 
 Toml ReadToml(const RobotDescription& robot) {
@@ -30,8 +30,8 @@ Toml ReadToml(const RobotDescription& robot) {
   for (Config& joint : root.Tables("joint")) {
     const std::string name = joint.String("name");
     const Config dynamics = joint.Table("dynamics", false);
-    for (const char* key : {"damping", "friction"}) {
-      if (dynamics.Has(key)) toml.dynamics.insert(std::string(key) + "/" + name);
+    for (const JointParameterKind& kind : kJointParameterKinds) {
+      if (dynamics.Has(kind.key)) toml.dynamics.insert(std::string(kind.name) + "/" + name);
     }
   }
   return toml;
@@ -45,15 +45,25 @@ struct Value {
   bool in_urdf;
 };
 
+/// The attribute of <dynamics> that a parameter is; null if it is none.
+const char* DynamicsAttribute(const std::string& name) {
+  const std::string kind = name.substr(0, name.find('/'));
+  for (const JointParameterKind& of_joint : kJointParameterKinds) {
+    if (of_joint.in_urdf && kind == of_joint.name) return of_joint.key;
+  }
+  return nullptr;
+}
+
 class Placement {
  public:
   Placement(const Toml& toml, const UrdfModel& file) : toml_(toml), file_(file) {}
 
   bool InUrdf(const std::string& name) const {
-    for (const char* kind : {"mass/", "com/", "inertia/", "length/"}) {
-      if (name.starts_with(kind)) return true;
+    const std::string kind = name.substr(0, name.find('/'));
+    for (const LinkParameterKind& of_link : kLinkParameterKinds) {
+      if (kind == of_link.name) return true;
     }
-    return (name.starts_with("damping/") || name.starts_with("friction/")) && InDynamics(name);
+    return DynamicsAttribute(name) && InDynamics(name);
   }
 
  private:
@@ -62,9 +72,7 @@ class Placement {
     const std::string joint = name.substr(name.find('/') + 1);
     const auto found = std::find_if(file_.joints.begin(), file_.joints.end(),
                                     [&](const auto& j) { return j.name == joint; });
-    return found != file_.joints.end() &&
-           !file_.part[static_cast<size_t>(found - file_.joints.begin())] &&
-           toml_.dynamics.count(name) == 0;
+    return found != file_.joints.end() && !found->part && toml_.dynamics.count(name) == 0;
   }
 
   const Toml& toml_;
@@ -145,11 +153,9 @@ std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd&
   UrdfNumbers writer(ReadFile(toml.urdf), file, now);
   for (size_t i = 1; i < file.links.size(); ++i) writer.WriteLink(i, StretchOf(file, i, values));
   for (const Value& v : values) {
-    const size_t slash = v.name.find('/');
-    const std::string kind = v.name.substr(0, slash);
-    if (v.in_urdf && (kind == "damping" || kind == "friction")) {
-      writer.WriteDynamics(v.name.substr(slash + 1), kind.c_str(), v.mean);
-    }
+    const char* attribute = DynamicsAttribute(v.name);
+    if (v.in_urdf && attribute)
+      writer.WriteDynamics(v.name.substr(v.name.find('/') + 1), attribute, v.mean);
   }
   writer.AddComment(Comment(robot, values));
   return writer.Print();

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "robot/description.h"
-#include "robot/urdf.h"
-#include "robot/xml_edits.h"
+#include "robot/urdf/urdf.h"
+#include "robot/urdf/xml_edits.h"
 
 namespace plumb {
 

@@ -26,10 +26,11 @@ class Constraints {
   /// [rad/s] or [m/s] below which joint friction is viscous
   static constexpr double kStickSpeed = 0.01;
 
-  Constraints(const Topology& topology, const SimulationSettings& settings, const Terms& terms)
+  /// @param rubs, stops whether any joint may have friction, or stops.
+  Constraints(const Topology& topology, bool rubs, bool stops)
       : topology_(topology),
-        slip_speed_(settings.contact ? settings.contact->slip_speed : 1),
-        terms_(terms),
+        rubs_(rubs),
+        stops_(stops),
         n_(static_cast<size_t>(topology.velocities)),
         shift_(n_),
         rubbed_(n_),
@@ -43,13 +44,14 @@ class Constraints {
     const Physics<Real>& physics;
     const Real* q;
     const Real* v;
+    const Real* friction;  ///< [Nm] or [N] of each joint's Coulomb friction, if there is any
     Real h, ahead;
   };
 
   /// Looks which constraints act if the velocities become `trial`. False: none does, and nothing
   /// need be assembled.
   bool Find(const Substep& now, const Tree<Real>& tree, const Real* trial) {
-    bool any = terms_.friction;
+    bool any = rubs_;
     std::fill(rubbed_.begin(), rubbed_.end(), Real{});
     for (const Topology::Joint& joint : topology_.joints) {
       if (any || !HasStop(joint)) continue;
@@ -76,18 +78,17 @@ class Constraints {
   void Foresee(const Substep& now, const Real* trial, const SparseCholesky<Real>& cholesky,
                const Real* factors) {
     std::fill(shift_.begin(), shift_.end(), Real{});
-    bool rubs = terms_.friction;
-    for (size_t i = 0; terms_.friction && i < n_; ++i) {
-      const Real full =
-          trial[i] < 0 ? Real(-now.physics.axes[i].friction) : now.physics.axes[i].friction;
+    bool rubs = rubs_;
+    for (size_t i = 0; rubs_ && i < n_; ++i) {
+      const Real full = trial[i] < 0 ? Real(-now.friction[i]) : now.friction[i];
       shift_[i] = now.h * (full - rubbed_[i] * trial[i]);
     }
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
-      contact.outcome = Max(contact.speed, Real{} + slip_speed_);
+      contact.outcome = Max(contact.speed, now.physics.world.contact.slip_speed);
       if (!contact.any || !Any(contact.pressure > 0)) continue;  // as in the first trial
       rubs = true;
-      const Real more = now.physics.globals.contact_friction * contact.pressure - contact.gripped;
+      const Real more = now.physics.world.contact.friction * contact.pressure - contact.gripped;
       for (size_t t = 1; t < kRows; ++t) {
         const Real force = contact.active ? Real(now.h * more * contact.along[t]) : Real{};
         const Real* row = Row(p, t);
@@ -97,7 +98,7 @@ class Constraints {
     }
     if (!rubs) return;
     cholesky.Solve(topology_.ancestors, factors, shift_.data());
-    for (size_t i = 0; terms_.friction && i < n_; ++i) {
+    for (size_t i = 0; rubs_ && i < n_; ++i) {
       const Real taken = trial[i] < 0 ? Real(-shift_[i]) : shift_[i];
       outcome_[i] = Max(Real(Abs(trial[i]) - taken), Real{} + kStickSpeed);
     }
@@ -106,15 +107,15 @@ class Constraints {
       if (!contact.any) continue;
       Real taken{};
       for (size_t t = 1; t < kRows; ++t) taken += contact.along[t] * Along(p, t, shift_.data());
-      contact.outcome = Max(Real(contact.speed - taken), Real{} + slip_speed_);
+      contact.outcome = Max(Real(contact.speed - taken), now.physics.world.contact.slip_speed);
     }
   }
 
   /// Adds what acts to the matrix (lower triangle, row by row) and to the right-hand side.
   void Assemble(const Substep& now, const Real* trial, Real* matrix, Real* rhs) {
-    const auto& globals = now.physics.globals;
-    for (size_t i = 0; terms_.friction && i < n_; ++i) {
-      rubbed_[i] = now.physics.axes[i].friction / outcome_[i];
+    const WorldOf<Real>& world = now.physics.world;
+    for (size_t i = 0; rubs_ && i < n_; ++i) {
+      rubbed_[i] = now.friction[i] / outcome_[i];
       matrix[i * n_ + i] += now.h * rubbed_[i];
       rhs[i] -= now.h * rubbed_[i] * now.v[i];
     }
@@ -123,18 +124,18 @@ class Constraints {
       const auto i = static_cast<size_t>(joint.velocity);
       Real depth, sign;
       StopDepth(joint, now.q, &depth, &sign);
-      const Real slope = globals.stop_stiffness * now.ahead + globals.stop_damping;
-      const Real force = globals.stop_stiffness * depth - slope * sign * trial[i];
+      const Real slope = world.stop.stiffness * now.ahead + world.stop.damping;
+      const Real force = world.stop.stiffness * depth - slope * sign * trial[i];
       const Truth acts = (depth - now.ahead * sign * trial[i] > 0) & (force > 0);
       matrix[i * n_ + i] += acts ? now.h * slope : Real{};
-      rhs[i] += acts ? now.h * (sign * globals.stop_stiffness * depth - slope * now.v[i]) : Real{};
+      rhs[i] += acts ? now.h * (sign * world.stop.stiffness * depth - slope * now.v[i]) : Real{};
     }
     for (size_t p = 0; p < contacts_.size(); ++p) {
       Contact& contact = contacts_[p];
       if (!contact.any) continue;
-      const Real push = contact.active ? globals.contact_stiffness * contact.depth : Real{};
+      const Real push = contact.active ? world.contact.stiffness * contact.depth : Real{};
       AddForce(now, p, 0, push, contact.active ? Slope(now) : Real{}, matrix, rhs);
-      const Real grip = globals.contact_friction * contact.pressure / contact.outcome;
+      const Real grip = world.contact.friction * contact.pressure / contact.outcome;
       contact.gripped = contact.active ? grip : Real{};
       if (!Any(grip > 0)) continue;
       for (size_t t = 1; t < kRows; ++t) {
@@ -154,8 +155,7 @@ class Constraints {
       // One that was far may be pushed into the ground by another, one that pushed may have been
       // pushed out.
       const Real rising = Along(p, 0, trial);
-      const Real force =
-          now.physics.globals.contact_stiffness * contact.depth - Slope(now) * rising;
+      const Real force = now.physics.world.contact.stiffness * contact.depth - Slope(now) * rising;
       const Truth acts = (contact.depth - now.ahead * rising > 0) & (force > 0);
       settled = settled & (acts == contact.active);
       contact.active = acts;
@@ -175,7 +175,7 @@ class Constraints {
       // Not: is inside. What is not finite will not settle, and must not look unsettled only beside
       // others.
       const Truth beyond =
-          contact.gripped > kSlack * now.physics.globals.contact_friction * contact.pressure;
+          contact.gripped > kSlack * now.physics.world.contact.friction * contact.pressure;
       settled = settled & (beyond == 0);
     }
     return settled;
@@ -218,11 +218,11 @@ class Constraints {
 
   // Of a contact's force in the velocity.
   Real Slope(const Substep& now) const {
-    return now.physics.globals.contact_stiffness * now.ahead + now.physics.globals.contact_damping;
+    return now.physics.world.contact.stiffness * now.ahead + now.physics.world.contact.damping;
   }
 
   bool HasStop(const Topology::Joint& joint) const {
-    return terms_.stops && joint.upper < std::numeric_limits<double>::infinity() &&
+    return stops_ && joint.upper < std::numeric_limits<double>::infinity() &&
            joint.type != JointDescription::Type::kSpherical;
   }
 
@@ -248,8 +248,7 @@ class Constraints {
   }
 
   const Topology& topology_;
-  double slip_speed_;
-  Terms terms_;
+  bool rubs_, stops_;
   size_t n_;
   std::vector<Real> shift_;  // of the velocities, by friction
   std::vector<Real> rubbed_,

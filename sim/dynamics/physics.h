@@ -1,15 +1,27 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <iterator>
 #include <vector>
 
+#include "robot/parameter_kinds.h"
 #include "sim/dynamics/real.h"
 
 namespace plumb {
 
 /// Which terms of the equations a robot has at all: what is false costs nothing.
 struct Terms {
-  bool springs = false, friction = false, slowing = false, stops = false, sensors = false;
+  bool stops = false;
+  /// By kJointParameterKinds: some joint has the number other than by default, or may have it.
+  std::array<bool, std::size(kJointParameterKinds)> joints = {};
+
+  bool Has(double JointDynamics::*member) const {
+    for (size_t i = 0; i < joints.size(); ++i) {
+      if (kJointParameterKinds[i].member == member) return joints[i];
+    }
+    return false;
+  }
 };
 
 /// The numbers of a robot that may differ from one simulator to the next. All vectors are in
@@ -23,27 +35,15 @@ struct Physics {
     Real inertia[6];  ///< [kg m^2] about the centre of mass: xx, yy, zz, xy, xz, yz
     Real origin[3];   ///< [m] of the link's joint, from its parent's origin
   };
-  struct Axis {  ///< one degree of freedom; units of the joint or its angle. See JointDynamics.
-    Real armature, damping, friction, stiffness, rest;
-    Real gain;
-    Real slowing;  ///< 1 / no_load_speed
-    /// not the equations' of motion, but their surroundings'
-    Real delay, sensor_delay, sensor_bias;
-  };
   struct Point {       ///< a sphere that may touch the ground
     Real position[3];  ///< [m] from its link's origin
     Real radius;       ///< [m]
   };
-  struct Globals {
-    Real gravity;                                               ///< [m/s^2], downwards
-    Real contact_stiffness, contact_damping, contact_friction;  ///< see SimulationSettings::Contact
-    Real stop_stiffness, stop_damping;                          ///< see SimulationSettings::Stop
-  };
 
-  std::vector<Link> links;  ///< one per joint: the link that it moves
-  std::vector<Axis> axes;   ///< one per velocity
+  std::vector<Link> links;                  ///< one per joint: the link that it moves
+  std::vector<JointDynamicsOf<Real>> axes;  ///< one per velocity: its joint's
   std::vector<Point> points;
-  Globals globals;
+  WorldOf<Real> world;
 };
 
 namespace internal {
@@ -64,7 +64,7 @@ void SetLane(const Physics<double>& narrow, int lane, Physics<Real>* wide) {
   internal::SetLane(wide->links.data(), narrow.links.data(), narrow.links.size(), lane);
   internal::SetLane(wide->axes.data(), narrow.axes.data(), narrow.axes.size(), lane);
   internal::SetLane(wide->points.data(), narrow.points.data(), narrow.points.size(), lane);
-  internal::SetLane(&wide->globals, &narrow.globals, 1, lane);
+  internal::SetLane(&wide->world, &narrow.world, 1, lane);
 }
 
 }  // namespace plumb

@@ -126,8 +126,8 @@ class PlanarTree {
   /// MoveAt.
   void Bias(const Physics<Real>& physics, Real* bias) {
     const size_t n = topology_.joints.size();
-    const Real gx = physics.globals.gravity * topology_.up[0],
-               gy = physics.globals.gravity * topology_.up[1];
+    const Real gx = physics.world.gravity * topology_.up[0],
+               gy = physics.world.gravity * topology_.up[1];
     for (size_t i = 0; i < n; ++i) {
       const Link& link = links_[i + 1];
       const Real mass = physics.links[i].mass, squared = link.spin * link.spin;

@@ -185,9 +185,9 @@ class SpatialTree {
 
   void Bias(const Physics<Real>& physics, Real* bias) {
     Vector<Real> gravity{};
-    gravity.x += physics.globals.gravity * topology_.up[0];
-    gravity.y += physics.globals.gravity * topology_.up[1];
-    gravity.z += physics.globals.gravity * topology_.up[2];
+    gravity.x += physics.world.gravity * topology_.up[0];
+    gravity.y += physics.world.gravity * topology_.up[1];
+    gravity.z += physics.world.gravity * topology_.up[2];
     for (size_t i = 0; i < topology_.joints.size(); ++i) {
       const Link& link = links_[i + 1];
       Composite& own = composites_[i + 1];

@@ -27,7 +27,10 @@ class Stepper {
   Stepper(const Topology& topology, const SimulationSettings& settings, const Terms& terms)
       : topology_(topology),
         settings_(settings),
-        terms_(terms),
+        springs_(terms.Has(&JointDynamics::stiffness)),
+        speed_limits_(terms.Has(&JointDynamics::no_load_speed)),
+        gears_lose_(terms.Has(&JointDynamics::gear_efficiency)),
+        rubs_(terms.Has(&JointDynamics::friction) || gears_lose_),
         leapfrog_(settings.integrator == SimulationSettings::Integrator::kLeapfrog),
         n_(static_cast<size_t>(topology.velocities)),
         tree_(topology),
@@ -41,8 +44,9 @@ class Stepper {
         trial_(n_),
         tried_(n_),
         shift_(n_),
+        friction_(n_),
         cholesky_(n_),
-        constraints_(topology, settings, terms) {}
+        constraints_(topology, rubs_, terms.stops) {}
 
   /// One substep of h > 0 seconds, which may differ from lane to lane. Arrays of one per velocity:
   /// @param effort mean over the substep of what is commanded.
@@ -66,7 +70,10 @@ class Stepper {
       Solve(h);
     }
     if (moment) {
-      for (size_t i = 0; i < n_; ++i) shift_[i] = physics.axes[i].gain * moment[i];
+      for (size_t i = 0; i < n_; ++i) {
+        shift_[i] = physics.axes[i].motor_gain * moment[i];
+        if (gears_lose_) shift_[i] -= GearLoss(i, shift_[i]);
+      }
       cholesky_.Solve(topology_.ancestors, matrix_.data(), shift_.data());
     }
     Constrain(h);
@@ -124,7 +131,7 @@ class Stepper {
 
   const Topology& topology_;
   SimulationSettings settings_;
-  Terms terms_;
+  bool springs_, speed_limits_, gears_lose_, rubs_;  // whether any joint may have them
   bool leapfrog_;
   size_t n_;
   Tree<Real> tree_;
@@ -139,16 +146,25 @@ class Stepper {
   std::vector<Real> smooth_;  // matrix without stops, contacts and friction
   std::vector<Real> matrix_;  // with them; then its factors
   std::vector<Real> drive_;   // forces without them
-  std::vector<Real> bias_, change_, trial_, tried_, shift_;
+  std::vector<Real> bias_, change_, trial_, tried_, shift_, friction_;
   SparseCholesky<Real> cholesky_;
   Constraints<Real, Tree> constraints_;
 
   // A torque along the speed is limited by it: see JointDynamics::no_load_speed.
   Real Slowed(size_t i, const Real& effort, const Real& speed, double limit) const {
-    const Real share = speed * physics.axes[i].slowing;
+    const Real inverse_no_load_speed = 1 / physics.axes[i].no_load_speed;
+    const Real share = speed * inverse_no_load_speed;
     const Real forwards = limit * Max(Real(1 - share), Real{}),
                backwards = limit * Max(Real(1 + share), Real{});
     return Clamp(effort, Real(-backwards), forwards);
+  }
+
+  // An effort f that drives arrives as e f, one that brakes as f (efficiency that depends on the
+  // direction: Wang, Kim, ICRA 2015). That is f - l with Coulomb friction of |l| against the motion,
+  // l = (1 - e)/2 f: so the jump where the motion turns is settled with friction, implicitly, and a
+  // joint may hold still under a load that its motor can hold but not lift.
+  Real GearLoss(size_t i, const Real& effort) const {
+    return 0.5 * (1 - physics.axes[i].gear_efficiency) * effort;
   }
 
   void AssembleSmooth(const Real& h, const Real* effort) {
@@ -159,10 +175,11 @@ class Stepper {
     const double share = leapfrog_ ? 0.5 : 1;
     for (size_t i = 0; i < n_; ++i) {
       const auto& axis = physics.axes[i];
-      drive_[i] = axis.gain * effort[i] - bias_[i] - axis.damping * v[i];
+      drive_[i] = axis.motor_gain * effort[i] - bias_[i] - axis.damping * v[i];
       smooth_[i * n_ + i] += axis.armature + share * h * axis.damping;
+      if (rubs_) friction_[i] = axis.friction;
     }
-    if (terms_.slowing || terms_.springs) AssembleJoints(h, effort);
+    if (speed_limits_ || gears_lose_ || springs_) AssembleJoints(h, effort);
   }
 
   void AssembleJoints(const Real& h, const Real* effort) {
@@ -170,10 +187,17 @@ class Stepper {
       if (joint.type == JointDescription::Type::kSpherical) continue;
       const auto i = static_cast<size_t>(joint.velocity);
       const auto& axis = physics.axes[i];
-      if (terms_.slowing && joint.effort_limit > 0) {
-        drive_[i] += axis.gain * (Slowed(i, effort[i], v[i], joint.effort_limit) - effort[i]);
+      if (speed_limits_ && joint.effort_limit > 0) {
+        drive_[i] += axis.motor_gain * (Slowed(i, effort[i], v[i], joint.effort_limit) - effort[i]);
       }
-      if (terms_.springs) {
+      if (gears_lose_) {
+        const bool slows = speed_limits_ && joint.effort_limit > 0;
+        const Real acting = slows ? Slowed(i, effort[i], v[i], joint.effort_limit) : effort[i];
+        const Real loss = GearLoss(i, axis.motor_gain * acting);
+        drive_[i] -= loss;
+        friction_[i] += Abs(loss);
+      }
+      if (springs_) {
         // At the end of the substep; for the leapfrog at the mean of both ends (implicit midpoint).
         const Real stretch = q[static_cast<size_t>(joint.position)] - axis.rest;
         drive_[i] -= axis.stiffness * (leapfrog_ ? stretch : Real(stretch + h * v[i]));
@@ -203,7 +227,8 @@ class Stepper {
   // Changes the free motion into that with stops, friction and contacts, if any of them acts. A
   // lane whose trial has settled keeps it, however long others try.
   void Constrain(const Real& h) {
-    const typename Constraints<Real, Tree>::Substep now{physics, q.data(), v.data(), h, Ahead(h)};
+    const typename Constraints<Real, Tree>::Substep now{physics,          q.data(), v.data(),
+                                                        friction_.data(), h,        Ahead(h)};
     for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
     if (!constraints_.Find(now, tree_, trial_.data())) return;
     Mask<Real> open = Real{} < 1;

@@ -20,11 +20,11 @@ GearPlay::GearPlay(const RobotDescription& robot) {
   for (const UnmodelledJoint& unmodelled : robot.virtual_robot.joints) {
     if (unmodelled.backlash == 0) continue;
     const auto index = static_cast<size_t>(unmodelled.joint);
-    const JointDynamics& d = robot.joints[index].dynamics;
-    if (d.motor_gain != 1 || d.delay != 0 || std::isfinite(d.no_load_speed)) {
-      throw std::invalid_argument(
-          "joint '" + robot.joints[index].name +
-          "' has backlash: its motor_gain, delay and no_load_speed have no place");
+    for (const JointParameterKind& kind : kJointParameterKinds) {
+      if (kind.joints != JointGroup::kDriven) continue;
+      if (robot.joints[index].dynamics.*kind.member == JointDynamics{}.*kind.member) continue;
+      throw std::invalid_argument("joint '" + robot.joints[index].name + "' has backlash: its " +
+                                  kind.key + " has no place");
     }
     Gear gear{.position = 0,
               .velocity = 0,

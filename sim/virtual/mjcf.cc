@@ -33,13 +33,13 @@ Eigen::Matrix3d Solid(const Eigen::Matrix3d& inertia) {
 }
 
 void RequireKnown(const JointDescription& joint) {
-  const JointDynamics& d = joint.dynamics;
   const std::string of = " of joint '" + joint.name + "'";
   if (joint.type == Type::kSpherical) throw std::invalid_argument("the free rotation" + of);
-  if (d.delay != 0 || d.sensor_delay != 0 || d.sensor_bias != 0) {
-    throw std::invalid_argument("delays and sensor errors" + of);
-  }
-  if (std::isfinite(d.no_load_speed)) throw std::invalid_argument("the no-load speed" + of);
+  const JointParameterKind* unknown =
+      FirstNotAmong({&JointDynamics::armature, &JointDynamics::damping, &JointDynamics::friction,
+                     &JointDynamics::stiffness, &JointDynamics::rest, &JointDynamics::motor_gain},
+                    joint.dynamics);
+  if (unknown) throw std::invalid_argument(unknown->noun + of);
 }
 
 /// Where a joint is in the frame of a body that it moves, perhaps through links without mass.

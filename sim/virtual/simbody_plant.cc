@@ -223,14 +223,14 @@ SimbodyPlant::SimbodyPlant(const RobotDescription& robot, double max_step) {
 std::string SimbodyPlant::Lacks(const RobotDescription& robot) {
   if (robot.simulation.contact) return "contact with the ground";
   for (const JointDescription& joint : robot.joints) {
-    const JointDynamics& d = joint.dynamics;
     const std::string of = " of joint '" + joint.name + "'";
     if (joint.type == Type::kSpherical) return "the free rotation" + of;
-    if (d.armature != 0) return "the armature" + of;
     if (robot.simulation.stop && std::isfinite(joint.upper)) return "the stops" + of;
-    if (d.delay != 0 || d.sensor_delay != 0 || d.sensor_bias != 0)
-      return "delays and sensor errors" + of;
-    if (std::isfinite(d.no_load_speed)) return "the no-load speed" + of;
+    const JointParameterKind* lacking =
+        FirstNotAmong({&JointDynamics::damping, &JointDynamics::friction, &JointDynamics::stiffness,
+                       &JointDynamics::rest, &JointDynamics::motor_gain},
+                      joint.dynamics);
+    if (lacking) return lacking->noun + of;
   }
   return "";
 }

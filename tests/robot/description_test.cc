@@ -8,7 +8,7 @@
 #include <iterator>
 
 #include "common/config.h"
-#include "robot/urdf.h"
+#include "robot/urdf/urdf.h"
 #include "tests/temporary_folder.h"
 
 namespace plumb {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "robot/description.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {

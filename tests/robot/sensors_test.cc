@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "robot/description.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {

@@ -50,7 +50,7 @@ TEST_CASE("parameters that are not physical are refused and change nothing") {
        {Vector3d(9, 0, 1), Vector3d(9, 1, -1), Vector3d(-1, 1, 1), Vector3d(9, nan, 1),
         Vector3d(infinity, 1, 1), Vector3d(9, 1, infinity)}) {
     CHECK_THROWS_AS(model.parameters().Apply(bad, &physics), std::invalid_argument);
-    CHECK(physics.globals.gravity == 10.4);
+    CHECK(physics.world.gravity == 10.4);
   }
   CHECK_THROWS_AS(model.parameters().Apply(Eigen::Vector2d(9, 1), &physics), std::invalid_argument);
   CHECK_THROWS_WITH(model.parameters().Apply(Vector3d(9, -3, 1), &physics),

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "robot/urdf.h"
+#include "robot/urdf/urdf.h"
 #include "tests/robot/zoo.h"
 #include "tests/sim/robots.h"
 
@@ -111,7 +111,7 @@ RobotDescription FromUrdf(const std::string& urdf) {
   UrdfModel model = LoadUrdf(folder.urdf());
   RobotDescription robot = Frictionless(LoadPendulum("robot.toml"));
   robot.links = std::move(model.links);
-  robot.joints = std::move(model.joints);
+  robot.joints = JointsOf(model);
   return Frictionless(robot);
 }
 

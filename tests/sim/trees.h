@@ -9,7 +9,7 @@
 
 #include "common/random.h"
 #include "robot/description.h"
-#include "robot/urdf.h"
+#include "robot/urdf/urdf.h"
 #include "tests/robot/zoo.h"
 #include "tests/sim/robots.h"
 

@@ -7,7 +7,7 @@
 
 #include "calibrator/report/report_residuals.h"
 #include "plot/svg.h"
-#include "robot/xml.h"
+#include "robot/urdf/xml.h"
 #include "tests/calibrator/sample_findings.h"
 #include "tests/calibrator/synthetic.h"
 #include "tests/robot/zoo.h"

@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "common/config.h"
-#include "robot/xml_edits.h"
+#include "robot/urdf/xml_edits.h"
 #include "sim/model.h"
 #include "tests/robot/zoo.h"
 

@@ -58,10 +58,10 @@ Physics<double> Vary(Physics<double> physics, Random& random) {
     for (double& entry : link.origin) entry *= random.Uniform(0.9, 1.1);
   }
   for (auto& axis : physics.axes)
-    axis.damping += random.Uniform(0, 0.1), axis.gain = random.Uniform(0.8, 1.2);
-  physics.globals.gravity = random.Uniform(5, 12);
-  physics.globals.contact_stiffness *= random.Uniform(0.5, 2);
-  physics.globals.contact_friction = random.Uniform(0, 1.5);
+    axis.damping += random.Uniform(0, 0.1), axis.motor_gain = random.Uniform(0.8, 1.2);
+  physics.world.gravity = random.Uniform(5, 12);
+  physics.world.contact.stiffness *= random.Uniform(0.5, 2);
+  physics.world.contact.friction = random.Uniform(0, 1.5);
   return physics;
 }
 

@@ -1,4 +1,4 @@
-#include "robot/xml_edits.h"
+#include "robot/urdf/xml_edits.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,6 @@
-#include "robot/xml.h"
+#include "robot/urdf/xml.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -75,19 +74,12 @@ Xml::Xml(const std::string& text, std::string file) : file_(std::move(file)) {
   }
 }
 
-std::string Xml::Print() const {
-  TiXmlPrinter printer;
-  printer.SetStreamPrinting();
-  document_.Accept(&printer);
-  return printer.Str();
-}
-
 void Xml::Fail(int line, const std::string& what) const {
   throw ConfigError(fmt::format("{}:{}: {}", file_, line, what));
 }
 
-TiXmlElement* Xml::Child(TiXmlElement& parent, const char* name) const {
-  TiXmlElement* child = parent.FirstChildElement(name);
+const TiXmlElement* Xml::Child(const TiXmlElement& parent, const char* name) const {
+  const TiXmlElement* child = parent.FirstChildElement(name);
   if (child) {
     if (const TiXmlElement* second = child->NextSiblingElement(name)) {
       Fail(*second, fmt::format("a second <{}> in <{}>", name, parent.Value()));
@@ -96,8 +88,8 @@ TiXmlElement* Xml::Child(TiXmlElement& parent, const char* name) const {
   return child;
 }
 
-TiXmlElement& Xml::RequiredChild(TiXmlElement& parent, const char* name) const {
-  TiXmlElement* child = Child(parent, name);
+const TiXmlElement& Xml::RequiredChild(const TiXmlElement& parent, const char* name) const {
+  const TiXmlElement* child = Child(parent, name);
   if (!child) Fail(parent, fmt::format("<{}> has no <{}>", parent.Value(), name));
   return *child;
 }
@@ -115,7 +107,7 @@ std::string Xml::Name(const TiXmlElement& element, const char* attribute) const 
   return name;
 }
 
-std::vector<double> Xml::Numbers(TiXmlElement& element, const char* attribute, size_t count,
+std::vector<double> Xml::Numbers(const TiXmlElement& element, const char* attribute, size_t count,
                                  double magnitude) const {
   const char* value = element.Attribute(attribute);
   if (!value) Fail(element, fmt::format("<{}> has no {}=\"...\"", element.Value(), attribute));
@@ -142,27 +134,20 @@ std::vector<double> Xml::Numbers(TiXmlElement& element, const char* attribute, s
     at = after;
   }
   if (numbers.size() != count) fail();
-  element.SetAttribute(attribute, fmt::format("{}", fmt::join(numbers, " ")));
   return numbers;
 }
 
-std::vector<std::string> Xml::RemoveOthers(TiXmlElement& parent,
-                                           std::initializer_list<const char*> known) const {
-  std::vector<std::string> removed;
-  for (TiXmlNode* node = parent.FirstChild(); node;) {
-    TiXmlNode* next = node->NextSibling();
-    const TiXmlElement* element = node->ToElement();
-    if (!element) {
-      parent.RemoveChild(node);  // text and comments
-    } else if (std::none_of(known.begin(), known.end(),
-                            [&](const char* name) { return element->ValueStr() == name; })) {
-      removed.push_back(fmt::format("{}:{}: <{}> in <{}>", file_, element->Row(),
-                                    element->ValueStr().substr(0, 80), parent.Value()));
-      parent.RemoveChild(node);
-    }
-    node = next;
+std::vector<std::string> Xml::Others(const TiXmlElement& parent,
+                                     std::initializer_list<const char*> known) const {
+  std::vector<std::string> others;
+  for (const TiXmlElement* e = parent.FirstChildElement(); e; e = e->NextSiblingElement()) {
+    if (std::any_of(known.begin(), known.end(),
+                    [&](const char* name) { return e->ValueStr() == name; }))
+      continue;
+    others.push_back(fmt::format("{}:{}: <{}> in <{}>", file_, e->Row(),
+                                 e->ValueStr().substr(0, 80), parent.Value()));
   }
-  return removed;
+  return others;
 }
 
 }  // namespace plumb

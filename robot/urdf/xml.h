@@ -17,9 +17,7 @@ class Xml {
 
   static constexpr int kMaxDepth = 100;
 
-  TiXmlElement& root() { return *document_.FirstChildElement(); }
-  /// The document as text.
-  std::string Print() const;
+  const TiXmlElement& root() const { return *document_.FirstChildElement(); }
 
   [[noreturn]] void Fail(int line, const std::string& what) const;
   [[noreturn]] void Fail(const TiXmlElement& element, const std::string& what) const {
@@ -27,20 +25,19 @@ class Xml {
   }
 
   /// The child of that name, null if there is none. @throws ConfigError if there are several.
-  TiXmlElement* Child(TiXmlElement& parent, const char* name) const;
-  TiXmlElement& RequiredChild(TiXmlElement& parent, const char* name) const;
+  const TiXmlElement* Child(const TiXmlElement& parent, const char* name) const;
+  const TiXmlElement& RequiredChild(const TiXmlElement& parent, const char* name) const;
   /// Printable ASCII, 1 to 200 bytes: names go to logs, messages and web pages.
   std::string Name(const TiXmlElement& element, const char* attribute) const;
-  /// `count` numbers of at most `magnitude`; writes them back so that other readers cannot read
-  /// others.
-  std::vector<double> Numbers(TiXmlElement& element, const char* attribute, size_t count,
+  /// `count` numbers of at most `magnitude`.
+  std::vector<double> Numbers(const TiXmlElement& element, const char* attribute, size_t count,
                               double magnitude) const;
-  double Number(TiXmlElement& element, const char* attribute, double magnitude) const {
+  double Number(const TiXmlElement& element, const char* attribute, double magnitude) const {
     return Numbers(element, attribute, 1, magnitude)[0];
   }
-  /// Removes the children whose names are not known. @return their "file:line: <name> in <parent>".
-  std::vector<std::string> RemoveOthers(TiXmlElement& parent,
-                                        std::initializer_list<const char*> known) const;
+  /// The children whose names are not known: "file:line: <name> in <parent>".
+  std::vector<std::string> Others(const TiXmlElement& parent,
+                                  std::initializer_list<const char*> known) const;
 
  private:
   std::string file_;

@@ -3,13 +3,20 @@
 #include <string>
 #include <vector>
 
-#include "robot/description.h"
+#include "robot/urdf/tree.h"
 
 namespace plumb {
 
+/// A joint, and what else the file says of it.
+struct UrdfJoint : JointGeometry {
+  double damping = 0, friction = 0;  ///< of <dynamics>, as in JointDynamics
+  bool part = false;                 ///< one of those that a planar or floating joint is made of
+  int line = 0, limit_line = 0;      ///< in the file; the joint's if it has no <limit>
+};
+
 /// Links and joints of a URDF file. Links behind fixed joints are merged into the link they are
 /// fixed to; links[0] is the root, which does not move. Planar and floating joints are taken apart
-/// as JointDescription says: a planar joint's x is the joint frame's x axis projected into the
+/// as JointGeometry says: a planar joint's x is the joint frame's x axis projected into the
 /// plane (its y axis if <axis> is along x), and (x, y, axis) are right-handed. A <limit>'s lower
 /// and upper do not bind the parts, its effort, and <dynamics>, count for each.
 ///
@@ -20,10 +27,8 @@ struct UrdfModel {
   std::string name;
   std::vector<LinkDescription> links;
   /// depth-first, as the file has them; joint i moves link i + 1
-  std::vector<JointDescription> joints;
-  std::vector<int> link_lines, joint_lines, limit_lines;  ///< of links and joints in the file
-  /// joints[i] is one of those a planar or floating joint is made of
-  std::vector<bool> part;
+  std::vector<UrdfJoint> joints;
+  std::vector<int> link_lines;                ///< in the file
   std::vector<std::string> warnings;          ///< elements without effect
   std::vector<std::string> contact_warnings;  ///< collision solids that do not touch the ground
 

@@ -1,4 +1,4 @@
-#include "robot/urdf.h"
+#include "robot/urdf/urdf.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using Type = JointDescription::Type;
+using Type = JointGeometry::Type;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -49,7 +49,7 @@ TEST_CASE("every kind of joint is read, depth first, in the file's order") {
   REQUIRE(zoo.joints.size() == expected.size());
   REQUIRE(zoo.links.size() == expected.size() + 1);
   for (size_t i = 0; i < expected.size(); ++i) {
-    const JointDescription& joint = zoo.joints[i];
+    const UrdfJoint& joint = zoo.joints[i];
     INFO(joint.name);
     CHECK(joint.name == expected[i].name);
     CHECK(joint.type == expected[i].type);
@@ -58,7 +58,7 @@ TEST_CASE("every kind of joint is read, depth first, in the file's order") {
     CHECK(zoo.links[i + 1].name == expected[i].child);
     CHECK((joint.axis - expected[i].axis).norm() < 1e-15);
     const bool part = joint.name.find('/') != std::string::npos;
-    CHECK(zoo.part[i] == part);
+    CHECK(joint.part == part);
     const bool intermediate = zoo.links[i + 1].name.find('/') != std::string::npos;
     if (intermediate) CHECK(zoo.links[i + 1].mass == 0);
   }
@@ -83,18 +83,18 @@ TEST_CASE("limits and dynamics are those of the file, and none are none") {
     CHECK(zoo.joints[i].upper == kInfinity);
     CHECK(zoo.joints[i].velocity_limit == kInfinity);
     CHECK(zoo.joints[i].effort_limit == 0);
-    CHECK(zoo.joints[i].dynamics.damping == (i < 3 ? 0.5 : 0));
+    CHECK(zoo.joints[i].damping == (i < 3 ? 0.5 : 0));
   }
-  const JointDescription& hip = zoo.joints[3];
+  const UrdfJoint& hip = zoo.joints[3];
   CHECK(hip.lower == -1);
   CHECK(hip.upper == 1.5);
   CHECK(hip.effort_limit == 20);
   CHECK(hip.velocity_limit == 10);
-  CHECK(hip.dynamics.damping == 0.1);
-  CHECK(hip.dynamics.friction == 0.2);
+  CHECK(hip.damping == 0.1);
+  CHECK(hip.friction == 0.2);
   CHECK(zoo.joints[4].velocity_limit == kInfinity);
   const UrdfModel planar = LoadJoint("planar", "<limit effort='3' velocity='2'/>");
-  for (const JointDescription& joint : planar.joints) {
+  for (const UrdfJoint& joint : planar.joints) {
     CHECK(joint.effort_limit == 3);
     CHECK(joint.velocity_limit == 2);
   }

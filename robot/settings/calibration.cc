@@ -1,0 +1,26 @@
+#include "robot/settings/calibration.h"
+
+#include "robot/settings/ranges.h"
+
+namespace plumb {
+namespace {
+
+const std::vector<std::string> kLiveMethods{"auto", "laplace", "mixture", "reps", "simopt"};
+
+}  // namespace
+
+CalibrationSettings ReadCalibration(Config config) {
+  CalibrationSettings s;
+  s.method = kLiveMethods[static_cast<size_t>(config.Choice("method", kLiveMethods, 0))];
+  s.samples = config.Integer("samples", {4, 1e6});
+  s.updates = config.Integer("updates", {1, 1000});
+  s.kl = config.Number("kl", kSanePositive);
+  s.min_temperature = config.Number("min_temperature", kSanePositive);
+  s.horizons = config.Integers("horizons", {1, 10000});
+  if (s.horizons.empty()) config.Fail("horizons", "is empty");
+  s.duration = config.Number("duration", {0, 1e6}, 0);
+  config.Finish();
+  return s;
+}
+
+}  // namespace plumb

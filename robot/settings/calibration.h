@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/config.h"
+
+namespace plumb {
+
+/// [calibration]: of the live calibrator.
+struct CalibrationSettings {
+  std::string method;  ///< of the live calibrator, see SimOpt
+  int samples, updates;
+  double kl, min_temperature;
+  std::vector<int> horizons;
+  double duration = 0;  ///< [s] >= 0 that a calibration takes in virtual time
+};
+
+/// @throws ConfigError
+CalibrationSettings ReadCalibration(Config config);
+
+}  // namespace plumb

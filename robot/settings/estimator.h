@@ -1,0 +1,60 @@
+#pragma once
+
+#include <limits>
+
+#include "common/config.h"
+
+namespace plumb {
+
+struct RobotDescription;
+
+/// [estimator]: what the estimator assumes of a coordinate that nothing says more about, in [m] for
+/// [rad] where the joint slides, and how it goes about it. See EstimatorOf for a joint's own.
+struct EstimatorSettings {
+  double position_sd;  ///< [rad] of a reading
+  double velocity_sd;  ///< [rad/s]
+  double jerk;         ///< [rad/s^3 sqrt(s)]
+  double effort_step;  ///< [rad/s^2 per Nm]
+  /// sd of the acceleration's step per speed of an impact: of a point with the ground [rad/s^2 per
+  /// m/s], of a joint with its stop [rad/s^2 per rad/s]
+  double ground_impact = 0, stop_impact = 0;
+  /// of a joint with a motor: share of an effort's or a stop's effect that others' have, 0 to 1
+  double coupling = 1;
+  double timing_sd;    ///< [s]
+  int lag;             ///< [measurements]
+  double reset_after;  ///< [rad]
+  /// [s] of a reading on its way: the constant part, which arrivals cannot tell
+  double delay = 0;
+  double outage = 0.05;  ///< [s] that a silent joint is predicted before the state is invalid
+  /// [rad/s^2 sqrt(s)] spectral density^(1/2) of what the accelerations differ by from the
+  /// simulator's, of the filter on its dynamics: [estimator.model]
+  double model_acceleration = 0.2;
+  /// How the joints of the robot's base are known: as all others, or, if nothing holds it, from its
+  /// IMU and its legs.
+  enum class Base { kSensors, kLegs };
+  Base base = Base::kSensors;
+  double ground_sd = 5e-3;  ///< [m] of kLegs: by which the ground is uneven and gives way
+  double slip = 0.01;       ///< [m/sqrt(s)] of kLegs: by which a foot that rests creeps
+  // Of an IMU on a link that the joint carries; 0: there is none.
+  /// [m/s^2] of a slide's acceleration, averaged over a period of the IMU
+  double acceleration_sd = 0;
+  /// [rad/s] of the gyro, if the joint turns, or [m/s^2] of the accelerometer
+  double bias_sd = 0;
+};
+
+/// A joint's or a sensor's own noise in robot.toml; NaN = not given. Units as in EstimatorSettings.
+struct NoiseDescription {
+  double position_sd = std::numeric_limits<double>::quiet_NaN();
+  double velocity_sd = std::numeric_limits<double>::quiet_NaN();
+  double jerk = std::numeric_limits<double>::quiet_NaN();
+  double effort_step = std::numeric_limits<double>::quiet_NaN();
+  double ground_impact = std::numeric_limits<double>::quiet_NaN();
+  double stop_impact = std::numeric_limits<double>::quiet_NaN();
+  double coupling = std::numeric_limits<double>::quiet_NaN();
+  double delay = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// @param robot with links, joints, sensors and simulation. @throws ConfigError
+EstimatorSettings ReadEstimator(Config config, const RobotDescription& robot);
+
+}  // namespace plumb

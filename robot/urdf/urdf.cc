@@ -1,0 +1,208 @@
+#include "robot/urdf/urdf.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <limits>
+#include <utility>
+
+#include "common/config.h"
+#include "common/decompositions.h"
+#include "robot/urdf/elements.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr size_t kMaxJoints = 500;  // as many as are still a robot
+
+using Pose = UrdfElements::Pose;
+
+class Reader {
+ public:
+  explicit Reader(const std::string& file) : elements_(ReadUrdfElements(ReadFile(file), file)) {
+    model_.file = file;
+  }
+
+  UrdfModel Read() {
+    model_.name = elements_.name;
+    model_.warnings = elements_.warnings;
+    AddLink(elements_.root, elements_.links.at(elements_.root).line);
+    AddBody(elements_.root, 0, {});
+    for (const auto& [name, joint] : elements_.joints) CheckPartNames(name, joint);
+    return std::move(model_);
+  }
+
+ private:
+  void AddLink(const std::string& name, int line) {
+    model_.links.push_back({name});
+    model_.link_lines.push_back(line);
+  }
+
+  // What parts are called must not be taken.
+  void CheckPartNames(const std::string& name, const UrdfElements::Joint& joint) const {
+    if (joint.type != "planar" && joint.type != "floating") return;
+    for (const char* part : {"/x", "/y", "/z", "/angle", "/rotation"}) {
+      if (elements_.joints.count(name + part))
+        model_.Fail(elements_.joints.at(name + part).line,
+                    "joint " + name + part + " is a part of joint " + name);
+      if (elements_.links.count(name + part))
+        model_.Fail(elements_.links.at(name + part).line,
+                    "link " + name + part + " is a part of joint " + name);
+    }
+  }
+
+  // `pose` of this URDF link in the frame of our link `index`, to which it is rigidly attached;
+  // then what hangs on it.
+  void AddBody(const std::string& name, int index, const Pose& pose) {
+    const UrdfElements::Link& link = elements_.links.at(name);
+    if (link.inertial) AddInertia(name, *link.inertial, index, pose);
+    AddSolids(name, link, index, pose);
+    for (const std::string& joint_name : link.joints) {
+      const UrdfElements::Joint& joint = elements_.joints.at(joint_name);
+      const Pose child_pose = pose * joint.origin;
+      if (joint.type == "fixed") {
+        AddBody(joint.child, index, child_pose);
+      } else {
+        AddJoint(joint_name, joint, index, child_pose);
+        AddBody(joint.child, static_cast<int>(model_.links.size()) - 1, {});
+      }
+    }
+  }
+
+  // The moving joint, or the chain of them, from our link `parent` to its child.
+  void AddJoint(const std::string& name, const UrdfElements::Joint& joint, int parent,
+                const Pose& pose) {
+    using Type = JointGeometry::Type;
+    const auto axis = [&] {
+      if (!(joint.axis.norm() > 1e-9))
+        model_.Fail(joint.axis_line, "joint " + name + " has no axis");
+      return Eigen::Vector3d(joint.axis.normalized());
+    };
+    struct Part {
+      const char* suffix;
+      Type type;
+      Eigen::Vector3d axis;
+    };
+    std::vector<Part> parts;
+    if (joint.type == "revolute") {
+      parts = {{"", Type::kRevolute, axis()}};
+    } else if (joint.type == "continuous") {
+      parts = {{"", Type::kContinuous, axis()}};
+    } else if (joint.type == "prismatic") {
+      parts = {{"", Type::kPrismatic, axis()}};
+    } else if (joint.type == "planar") {
+      const Eigen::Vector3d n = axis();
+      const bool along_x = n.tail<2>().norm() < 1e-3;
+      const Eigen::Vector3d near = along_x ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitX();
+      const Eigen::Vector3d x = (near - near.dot(n) * n).normalized();
+      parts = {{"/x", Type::kPrismatic, x},
+               {"/y", Type::kPrismatic, n.cross(x)},
+               {"/angle", Type::kContinuous, n}};
+    } else {  // floating
+      parts = {{"/x", Type::kPrismatic, Eigen::Vector3d::UnitX()},
+               {"/y", Type::kPrismatic, Eigen::Vector3d::UnitY()},
+               {"/z", Type::kPrismatic, Eigen::Vector3d::UnitZ()},
+               {"/rotation", Type::kSpherical, Eigen::Vector3d::UnitX()}};
+    }
+    if (model_.joints.size() + parts.size() > kMaxJoints) {
+      model_.Fail(joint.line, fmt::format("more than {} moving joints", kMaxJoints));
+    }
+    for (size_t i = 0; i < parts.size(); ++i) {
+      UrdfJoint part;
+      part.name = name + parts[i].suffix;
+      part.type = parts[i].type;
+      part.axis = parts[i].axis;
+      part.parent = i == 0 ? parent : static_cast<int>(model_.links.size()) - 1;
+      part.child = static_cast<int>(model_.links.size());
+      if (i == 0) {
+        part.origin = pose.at;
+        part.rotation = pose.axes;
+      }
+      const bool bound = joint.type == "revolute" || joint.type == "prismatic";
+      part.lower = bound ? joint.lower : -kInfinity;
+      part.upper = bound ? joint.upper : kInfinity;
+      part.effort_limit = joint.effort;
+      part.velocity_limit = joint.velocity;
+      part.damping = joint.damping;
+      part.friction = joint.friction;
+      part.part = parts.size() > 1;
+      part.line = joint.line;
+      part.limit_line = joint.limit_line;
+      model_.joints.push_back(part);
+      const bool last = i + 1 == parts.size();
+      AddLink(last ? joint.child : part.name,
+              last ? elements_.links.at(joint.child).line : joint.line);
+    }
+  }
+
+  // <visual> and <collision> of a URDF link.
+  void AddSolids(const std::string& name, const UrdfElements::Link& link, int index,
+                 const Pose& pose) {
+    LinkDescription& ours = model_.links[static_cast<size_t>(index)];
+    const auto add = [&](Shape shape, std::vector<Shape>* to) {
+      shape.position = pose.at + pose.axes * shape.position;
+      shape.rotation = pose.axes * shape.rotation;
+      to->push_back(shape);
+    };
+    const auto warn = [&](int line, const char* what) {
+      if (index == 0) return;  // does not move
+      model_.contact_warnings.push_back(
+          fmt::format("{}:{}: link {}: a collision {} does not touch the ground: only spheres, "
+                      "capsules and boxes do",
+                      model_.file, line, name, what));
+    };
+    for (const UrdfElements::Solid& visual : link.visuals) add(visual.shape, &ours.visuals);
+    for (const UrdfElements::Solid& collision : link.collisions) {
+      add(collision.shape, &ours.collisions);
+      if (collision.shape.type == Shape::Type::kCylinder) warn(collision.line, "cylinder");
+    }
+    for (const int line : link.collision_meshes) warn(line, "mesh");
+  }
+
+  // Adds the inertia of a URDF link to our link `index` (parallel axis theorem).
+  void AddInertia(const std::string& name, const UrdfElements::Inertial& inertial, int index,
+                  const Pose& pose) {
+    const double mass = inertial.mass;
+    const Eigen::Matrix3d& inertia = inertial.inertia;
+    const auto fail = [&](const char* what) {
+      model_.Fail(inertial.line, "link " + name + ": " + what);
+    };
+    // Principal moments of a body: none negative, none larger than the sum of the others.
+    const Eigen::Vector3d moments =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(inertia)).eigenvalues();
+    const double slack = 1e-9 * moments.cwiseAbs().maxCoeff();
+    if (!inertia.allFinite() || moments(0) < -slack ||
+        moments(2) > moments(0) + moments(1) + slack) {
+      fail("no body can have this inertia");
+    }
+    if (mass == 0 && !inertia.isZero(0)) fail("inertia without mass");
+    const auto [com, rotation] = pose * inertial.origin;
+    LinkDescription& link = model_.links[static_cast<size_t>(index)];
+    const double total = link.mass + mass;
+    if (total == 0) return;
+    const Eigen::Vector3d center = (link.mass * link.center_of_mass + mass * com) / total;
+    const auto about = [&](const Eigen::Matrix3d& own, double m,
+                           const Eigen::Vector3d& c) -> Eigen::Matrix3d {
+      const Eigen::Vector3d d = c - center;
+      return own + m * (d.squaredNorm() * Eigen::Matrix3d::Identity() - d * d.transpose());
+    };
+    link.inertia = about(link.inertia, link.mass, link.center_of_mass) +
+                   about(rotation * inertia * rotation.transpose(), mass, com);
+    link.mass = total;
+    link.center_of_mass = center;
+  }
+
+  UrdfElements elements_;
+  UrdfModel model_;
+};
+
+}  // namespace
+
+void UrdfModel::Fail(int line, const std::string& what) const {
+  throw ConfigError(fmt::format("{}:{}: {}", file, line, what));
+}
+
+UrdfModel LoadUrdf(const std::string& file) { return Reader(file).Read(); }
+
+}  // namespace plumb

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "robot/description.h"
+#include "sim/dynamics/physics.h"
+
+namespace plumb {
+
+/// A parameter that a robot's simulator has: its path, and where in the physics its value goes.
+struct ParameterPath {
+  std::string path;
+  Range values;  ///< that it may have
+  // Exactly one of these is not null; none is for what has no effect, the base's mass.
+  const WorldParameterKind* world = nullptr;
+  const JointParameterKind* joint = nullptr;
+  const LinkParameterKind* link = nullptr;
+
+  size_t index = 0;      ///< of the joint that moves the link, or of the joint's first velocity
+  size_t count = 1;      ///< of the joint's velocities
+  double reference = 1;  ///< of a link's mass or length: what the files imply
+};
+
+/// All of them.
+/// @param physics of the description's own numbers.
+std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
+                                          const Physics<double>& physics);
+
+/// The one of that path. @throws std::invalid_argument naming the nearest if there is none.
+const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path);
+
+}  // namespace plumb
