@@ -14,9 +14,9 @@
 namespace plumb {
 namespace {
 
-constexpr int kMostCandidates = 3;      // that are told of, one after the other
+constexpr int kMaxCandidates = 3;       // that are told of, one after the other
 constexpr double kNearlyAsGood = 0.85;  // of the best one's gain: an alternative
-constexpr size_t kMostAlternatives = 2;
+constexpr size_t kMaxAlternatives = 2;
 constexpr double kWorthwhile = 0.3;  // share of what is left that a further one has to explain
 constexpr double kMostly = 0.8;      // of a gain, in one joint or condition
 
@@ -175,7 +175,7 @@ Misspecification FindMisspecification(const RobotDescription& robot,
   found.alarm = std::any_of(tests.begin(), tests.end(), Counts);
 
   std::vector<std::string> words, places;
-  for (int round = 0; round < kMostCandidates; ++round) {
+  for (int round = 0; round < kMaxCandidates; ++round) {
     for (Explanation& explanation : explanations) {
       explanation.misfit.p = std::min(1.0, explanation.misfit.p * static_cast<double>(count));
     }
@@ -193,7 +193,7 @@ Misspecification FindMisspecification(const RobotDescription& robot,
     std::vector<std::string> alternatives;
     for (const Explanation& other : explanations) {
       if (&other == &*best || other.score.gain < kNearlyAsGood * best->score.gain) continue;
-      if (alternatives.size() < kMostAlternatives) alternatives.push_back(other.misfit.what);
+      if (alternatives.size() < kMaxAlternatives) alternatives.push_back(other.misfit.what);
     }
     if (!alternatives.empty()) line += " (nearly as well: " + Join(alternatives, "; ") + ")";
     words.push_back((round == 0 ? "" : "of what is left ") + line);

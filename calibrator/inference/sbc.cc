@@ -13,7 +13,7 @@ namespace plumb {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr int kMostBins = 20;
+constexpr int kMaxBins = 20;
 // expected; fewer, and the statistic is not chi-squared distributed
 constexpr int kFewestPerBin = 5;
 constexpr int kMaxPoints = 100;        // at which distribution functions are compared
@@ -114,7 +114,7 @@ std::vector<SbcQuantity> Marginals(const std::vector<std::string>& names) {
 
 double UniformityByChi2(const std::vector<int>& ranks, int draws) {
   const auto n = static_cast<int>(ranks.size());
-  const int bins = std::min({kMostBins, n / kFewestPerBin, draws + 1});
+  const int bins = std::min({kMaxBins, n / kFewestPerBin, draws + 1});
   if (bins < 2) return 1;
   // Bins of whole ranks; not all of them have as many.
   const auto bin = [&](int rank) {

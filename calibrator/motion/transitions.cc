@@ -14,7 +14,7 @@ namespace {
 
 constexpr size_t kMaxStates = 200'000;  // a quarter of an hour at 200 Hz
 constexpr size_t kMaxEpisodes = 64;
-constexpr int kMostSteps = 1'000'000;
+constexpr int kMaxSteps = 1'000'000;
 
 Eigen::VectorXd ToEigen(const std::vector<double>& values) {
   return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
@@ -110,7 +110,7 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
 
 void TransitionJoiner::OnCommand(const joint_command_t& command) {
   if (command.num_joints != n_ || command.episode < 0 || command.step < 0 ||
-      command.step >= kMostSteps)
+      command.step >= kMaxSteps)
     return;
   commands_[command.episode].insert_or_assign(command.step, command);
   if (commands_.size() > max_episodes_) commands_.erase(commands_.begin());

@@ -25,7 +25,7 @@ namespace {
 using Coordinate = ParameterDescription::Coordinate;
 using Index = Eigen::Index;
 
-constexpr Index kMostPairs = 8;
+constexpr Index kMaxPairs = 8;
 constexpr double kNull = 1e-6;  // as FindIdentifiability has it
 constexpr double kInvolved = 1e-3;
 constexpr double kHardly = 0.22;  // nat: the data made the sd smaller by less than a fifth
@@ -140,8 +140,8 @@ class Report {
       if (together && k != i) others.push_back(Name(k));
     }
     if (involved && others.empty()) return "no: the motion does not depend on it";
-    constexpr size_t kMostNames = 3;
-    if (others.size() > kMostNames)
+    constexpr size_t kMaxNames = 3;
+    if (others.size() > kMaxNames)
       return fmt::format("only in combination with {} others", others.size());
     if (involved) return fmt::format("only in combination with {}", fmt::join(others, ", "));
     if (summary_.gain(i) < kHardly) return "hardly: the motion adds little to the prior";
@@ -173,14 +173,14 @@ class Report {
     std::vector<Index> shown(static_cast<size_t>(size()));
     std::iota(shown.begin(), shown.end(), 0);
     std::string selection;
-    if (size() > kMostPairs) {
+    if (size() > kMaxPairs) {
       std::stable_sort(shown.begin(), shown.end(),
                        [&](Index a, Index b) { return summary_.gain(a) > summary_.gain(b); });
-      shown.resize(kMostPairs);
+      shown.resize(kMaxPairs);
       std::sort(shown.begin(), shown.end());
       selection =
           fmt::format("Of {} parameters these are the {} that the data have told most about. ",
-                      size(), kMostPairs);
+                      size(), kMaxPairs);
     }
     return "<h2>Prior and posterior</h2>\n" +
            Figure(Scrolling(PairPlot(findings_, summary_, robot_, shown)),
@@ -291,10 +291,10 @@ class Report {
     }
     std::string html =
         "<h2>Do the logs agree?</h2>\n" + Paragraph(agreement.summary) + table.Print();
-    constexpr size_t kMostLogs = 40;
-    if (agreement.logs.size() > kMostLogs) return html;
+    constexpr size_t kMaxLogs = 40;
+    if (agreement.logs.size() > kMaxLogs) return html;
     html += "<figure><div class=\"panels\">\n";
-    for (Index i = 0; i < std::min(size(), kMostPairs); ++i)
+    for (Index i = 0; i < std::min(size(), kMaxPairs); ++i)
       html += AgreementPlot(agreement.logs, summary_, robot_, i);
     return html +
            "</div><figcaption>Each log alone, mean and 95 %; the band is 95 % of all logs "
