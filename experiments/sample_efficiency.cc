@@ -162,7 +162,7 @@ class Experiment {
     return Loop::Judge(real, trainer->policy(), robot.task.steps, options_.quick ? 2 : 20);
   }
 
-  Options options_;
+  ExperimentOptions options_;
   Remembered now_;
 };
 
