@@ -39,7 +39,7 @@ void RequireSizes(const Leftover& leftover, Eigen::Index n) {
 }
 
 // Orthonormal, of the columns' range. A parameter without effect has no part in it.
-Eigen::MatrixXd Range(const Eigen::MatrixXd& jacobian) {
+Eigen::MatrixXd RangeBasis(const Eigen::MatrixXd& jacobian) {
   Eigen::MatrixXd scaled = jacobian;
   for (auto column : scaled.colwise()) {
     if (column.norm() > 0) column.normalize();
@@ -107,7 +107,7 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const Leftover& 
         static_cast<Eigen::Index>(i);
   }
   Weigh(leftover.errors);
-  basis = Range(weight.asDiagonal() * leftover.jacobian);
+  basis = RangeBasis(weight.asDiagonal() * leftover.jacobian);
   Take(weight.cwiseProduct(leftover.errors));
 }
 

@@ -72,9 +72,7 @@ class Placement {
     const std::string joint = name.substr(name.find('/') + 1);
     const auto found = std::find_if(file_.joints.begin(), file_.joints.end(),
                                     [&](const auto& j) { return j.name == joint; });
-    return found != file_.joints.end() &&
-           !found->part &&
-           toml_.dynamics.count(name) == 0;
+    return found != file_.joints.end() && !found->part && toml_.dynamics.count(name) == 0;
   }
 
   const Toml& toml_;
