@@ -16,7 +16,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMostBins = 20;
 // expected; fewer, and the statistic is not chi-squared distributed
 constexpr int kFewestPerBin = 5;
-constexpr int kMaxPoints = 100;       // at which distribution functions are compared
+constexpr int kMaxPoints = 100;        // at which distribution functions are compared
 constexpr double kNegligible = 1e-20;  // a probability
 constexpr double kSignificant = 0.01;
 constexpr uint32_t kTieStream = 0x54494553;  // "TIES"

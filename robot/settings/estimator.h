@@ -29,7 +29,7 @@ struct EstimatorSettings {
   /// [rad/s^2 sqrt(s)] spectral density^(1/2) of what the accelerations differ by from the
   /// simulator's, of the filter on its dynamics: [estimator.model]
   double model_acceleration = 0.2;
-  /// What measures the joints of the base: sensors of their own, as all others', or, of a free
+  /// Sensors of the base's joints: their own, as all other joints have them, or, of a free
   /// base, its IMU and its legs.
   enum class Base { kSensors, kLegs };
   Base base = Base::kSensors;
