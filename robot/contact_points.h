@@ -10,7 +10,7 @@ namespace plumb {
 
 /// Where a shape can touch the ground: centres [m] of spheres in the link frame and their radii. A
 /// sphere and the ends of a capsule are spheres, the corners of a box have radius zero; a
-/// cylinder's rim is not one of them.
+/// cylinder's rim is not one of them. Thread-safe.
 std::vector<std::pair<Eigen::Vector3d, double>> ContactSpheres(const Shape& shape);
 
 /// A sphere on a link that can touch the ground.
@@ -22,6 +22,7 @@ struct ContactPoint {
 
 /// Those of all collision shapes, link by link: the order of ROBOT_STATE's contacts and of the
 /// simulator. None if the robot does not touch the ground ([simulation.contact] is missing).
+/// Thread-safe.
 std::vector<ContactPoint> ContactPoints(const RobotDescription& robot);
 
 }  // namespace plumb

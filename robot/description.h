@@ -61,7 +61,7 @@ struct RobotDescription {
 
 /// Reads a robot from a folder (its robot.toml) or from a TOML file.
 /// @throws ConfigError naming file, line and field for anything missing, unknown, out of range or
-/// inconsistent between URDF and TOML.
+/// inconsistent between URDF and TOML. Thread-safe but for the files.
 RobotDescription LoadRobot(const std::string& folder_or_file);
 
 }  // namespace plumb

@@ -9,9 +9,9 @@
 
 namespace plumb {
 
-/// A robot that nothing holds in an upright plane: between the world and the link that carries its
-/// IMU are joints with neither motor nor encoder, two that slide at right angles and a last one
-/// that turns about the plane's normal.
+/// The free base of a robot that moves in an upright plane: between the world and the link that
+/// carries its IMU are joints with neither motor nor encoder, two that slide at right angles and a
+/// last one that turns about the plane's normal. Plain data.
 struct FloatingBase {
   static constexpr int kMaxPoints = 32;  ///< that can touch the ground
 
@@ -28,8 +28,9 @@ struct FloatingBase {
   Eigen::Vector3d normal() const { return zero.rotation * axis; }
 };
 
-/// That of the robot's first IMU. @throws std::invalid_argument saying what is missing: an IMU,
-/// such joints, points that can touch the ground.
+/// The free base that the robot's first IMU is on. Thread-safe.
+/// @throws std::invalid_argument saying what is missing: an IMU, such joints, points that can touch
+/// the ground.
 FloatingBase FloatingBaseOf(const RobotDescription& robot);
 
 }  // namespace plumb

@@ -8,9 +8,9 @@
 
 namespace plumb {
 
-/// What an IMU on a link tells of joints: all joints from the base up to its link only slide, but
-/// for the last one, which may turn without a motor. Of any other link it tells nothing, and both
-/// are empty.
+/// The joints whose motion an IMU on a link measures: from the base up to its link all joints
+/// slide, but for the last one, which may turn without a motor. An IMU on any other link measures
+/// no joint: turned is -1, and there are no slides. Plain data.
 struct ImuMounting {
   /// Index into joints of the one that turns the link: the angle is the twist of the link's
   /// orientation about the joint's axis, indifferent to a wrong heading where the axis is level.
@@ -33,7 +33,7 @@ struct ImuMounting {
   double Angle(const Eigen::Quaterniond& link_to_world) const;
 };
 
-/// @param link index into robot.links.
+/// Thread-safe. @param link index into robot.links.
 ImuMounting MountingOf(const RobotDescription& robot, int link);
 
 }  // namespace plumb

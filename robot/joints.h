@@ -26,10 +26,10 @@ struct MitRanges {
 struct MitDescription {
   int master = 0;  ///< CAN id of the replies
   MitRanges ranges;
-  std::string source;  ///< where the ranges are from: a wrong one scales silently
+  std::string source;  ///< of the ranges: a wrong one scales every value unnoticed
 };
 
-/// How a joint's motor is reached.
+/// Address, gear and zero of a joint's motor.
 struct MotorDescription {
   std::string protocol;  ///< file name in drivers/protocols/, e.g. "cansimple"
   int node = 0;          ///< CAN node id of the protocol
@@ -61,11 +61,11 @@ struct JointDescription : JointGeometry {
   bool IsOf(JointGroup group) const;
 };
 
-/// The URDF's joints as they are without robot.toml: none passive, no motor known.
+/// The URDF's joints as they are without robot.toml: none passive, no motor known. Thread-safe.
 std::vector<JointDescription> JointsOf(const UrdfModel& urdf);
 
 /// The URDF's joints with what the [[joint]] tables say of them: motors and dynamics. Every joint
-/// is passive or has a motor, and moves some inertia. @throws ConfigError
+/// is passive or has a motor, and moves some inertia. Thread-safe. @throws ConfigError
 std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf);
 
 }  // namespace plumb

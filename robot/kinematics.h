@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// Where a link is, in the base's frame.
+/// Of a link in the base's frame.
 struct Pose {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< link axes in the base's
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< [m] of the link's origin
@@ -16,11 +16,11 @@ struct Pose {
 /// Poses of all links, links[0] (the base) first. For pictures: the simulator has its own, faster
 /// kinematics.
 /// @param q as in RobotDescription; a spherical joint's quaternion need not be normalised.
-/// @throws std::invalid_argument if q has the wrong size.
+/// @throws std::invalid_argument if q has the wrong size. Thread-safe.
 std::vector<Pose> LinkPoses(const RobotDescription& description,
                             const Eigen::Ref<const Eigen::VectorXd>& q);
 
-/// Where a link is and how it moves, in the base's axes.
+/// Pose and velocity of a link, in the base's axes.
 struct LinkMotion : Pose {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s] of the link's origin

@@ -4,10 +4,10 @@
 
 namespace plumb {
 
-/// What the estimator assumes of a joint: [estimator], where the sensor that measures the joint
-/// does not know better, where [joint.estimator] does not say otherwise. An IMU adds its bias and,
-/// to joints that slide under it, the noise of its accelerometer. @param joint index into
-/// robot.joints
+/// The noise that the estimator assumes for a joint: that of [estimator], unless the sensor that
+/// measures the joint or its [joint.estimator] gives another. An IMU adds its bias and, to joints
+/// that slide under it, the noise of its accelerometer. Thread-safe.
+/// @param joint index into robot.joints
 EstimatorSettings EstimatorOf(const RobotDescription& robot, int joint);
 
 }  // namespace plumb

@@ -43,6 +43,10 @@ struct JointDynamicsOf {
 };
 using JointDynamics = JointDynamicsOf<double>;
 
+/// Above zero, however little.
+inline constexpr Range kAboveZero{std::numeric_limits<double>::denorm_min(),
+                                  std::numeric_limits<double>::max()};
+
 /// One number of JointDynamics: "<name>/<joint>" among parameters, `key` in [joint.dynamics].
 struct JointParameterKind {
   const char* name;
@@ -77,7 +81,7 @@ inline constexpr JointParameterKind kJointParameterKinds[] = {
      {0, 1e9}, kNotNegative, {0.05, true, JointGroup::kAll}, true},
     {"stiffness", "stiffness", &JointDynamics::stiffness, JointGroup::kOneCoordinate,
      "Nm/rad", "N/m", "the spring",
-     {0, 1e9}, kPositive, {0.05, true}},
+     {0, 1e9}, kAboveZero, {0.05, true}},
     {"rest", "rest", &JointDynamics::rest, JointGroup::kOneCoordinate, "rad", "m", "the spring",
      {-1e9, 1e9}, kFinite, {}},
     {"gain", "motor_gain", &JointDynamics::motor_gain, JointGroup::kDriven,
@@ -95,7 +99,7 @@ inline constexpr JointParameterKind kJointParameterKinds[] = {
      {-1e9, 1e9}, kFinite, {0.02, false, JointGroup::kOneCoordinate}},
     {"no_load_speed", "no_load_speed", &JointDynamics::no_load_speed, JointGroup::kDriven,
      "rad/s", "m/s", "the no-load speed",
-     {1e-9}, kPositive, {}},
+     {1e-9}, kAboveZero, {}},
     {"gear_efficiency", "gear_efficiency", &JointDynamics::gear_efficiency, JointGroup::kDriven,
      "", "", "the gear's losses",
      {1e-9, 1}, {1e-9, 1}, {}},
@@ -158,13 +162,14 @@ inline constexpr WorldParameterKind kWorldParameterKinds[] = {
     {"gravity", WorldParameterKind::Table::kSimulation, "gravity", "m/s^2",
      [](World& world) -> double& { return world.gravity; }, {0, 1000}, kNotNegative, 0.1},
     {"contact/stiffness", WorldParameterKind::Table::kContact, "stiffness", "N/m",
-     [](World& world) -> double& { return world.contact.stiffness; }, {1e-9, 1e12}, kPositive, 0.5},
+     [](World& world) -> double& { return world.contact.stiffness; },
+     {1e-9, 1e12}, kAboveZero, 0.5},
     {"contact/damping", WorldParameterKind::Table::kContact, "damping", "N s/m",
      [](World& world) -> double& { return world.contact.damping; }, {0, 1e12}, kNotNegative, 0.5},
     {"contact/friction", WorldParameterKind::Table::kContact, "friction", "",
      [](World& world) -> double& { return world.contact.friction; }, {0, 1e6}, kNotNegative, 0.5},
     {"limit/stiffness", WorldParameterKind::Table::kLimit, "stiffness", "Nm/rad",
-     [](World& world) -> double& { return world.stop.stiffness; }, {1e-9, 1e12}, kPositive, 0.5},
+     [](World& world) -> double& { return world.stop.stiffness; }, {1e-9, 1e12}, kAboveZero, 0.5},
     {"limit/damping", WorldParameterKind::Table::kLimit, "damping", "Nm s/rad",
      [](World& world) -> double& { return world.stop.damping; }, {0, 1e12}, kNotNegative, 0.5},
 };
@@ -184,8 +189,8 @@ struct LinkParameterKind {
 
 inline constexpr Range kExponent{-20, 20};  ///< beyond e^20 an inertia's shape is none any more
 inline constexpr LinkParameterKind kLinkParameterKinds[] = {
-    {"mass", "", LinkParameterKind::Number::kMass, 0, "kg", kPositive},
-    {"inertia", "", LinkParameterKind::Number::kInertia, 0, "", kPositive},
+    {"mass", "", LinkParameterKind::Number::kMass, 0, "kg", kAboveZero},
+    {"inertia", "", LinkParameterKind::Number::kInertia, 0, "", kAboveZero},
     {"com", "x", LinkParameterKind::Number::kCenter, 0, "m", kFinite},
     {"com", "y", LinkParameterKind::Number::kCenter, 1, "m", kFinite},
     {"com", "z", LinkParameterKind::Number::kCenter, 2, "m", kFinite},
@@ -195,7 +200,7 @@ inline constexpr LinkParameterKind kLinkParameterKinds[] = {
     {"inertia", "xy", LinkParameterKind::Number::kCholesky, 3, "", kExponent},
     {"inertia", "xz", LinkParameterKind::Number::kCholesky, 4, "", kExponent},
     {"inertia", "yz", LinkParameterKind::Number::kCholesky, 5, "", kExponent},
-    {"length", "", LinkParameterKind::Number::kLength, 0, "m", kPositive},
+    {"length", "", LinkParameterKind::Number::kLength, 0, "m", kAboveZero},
 };
 
 }  // namespace plumb

@@ -29,15 +29,14 @@ struct ParameterDescription {
   double ToCoordinate(double physical_value) const;
 };
 
-/// A parameter that is known: not inferred, but other than what the URDF and the TOML file's tables
-/// say.
+/// A parameter with a known value, which replaces that of the URDF and of robot.toml's tables.
 struct FrozenParameter {
   std::string name;
   double value;  ///< physical units
 };
 
-/// The [[parameter]] tables: those to be inferred, and those with frozen = true. What their names
-/// mean is known to the simulator only. @throws ConfigError
+/// The [[parameter]] tables: those to be inferred, and those with frozen = true. The simulator
+/// checks their names (sim/parameter_paths.h). Thread-safe. @throws ConfigError
 void ReadParameters(Config& root, std::vector<ParameterDescription>& parameters,
                     std::vector<FrozenParameter>& frozen);
 

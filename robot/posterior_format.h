@@ -7,7 +7,7 @@
 
 #include "robot/description.h"
 
-// What writing and reading posterior.json have in common.
+// The format of posterior.json, for its writer and its reader. Thread-safe.
 namespace plumb {
 
 inline constexpr char kPosteriorFormat[] = "plumbline posterior";

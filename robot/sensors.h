@@ -12,7 +12,7 @@ namespace plumb {
 
 struct RobotDescription;
 
-/// Something on the bus that measures and is no motor.
+/// A sensor on the bus: an encoder of a joint, or an IMU on a link.
 struct SensorDescription {
   std::string name;
   /// file name in drivers/protocols/: "cia406", an encoder, or "xsens", an IMU
@@ -34,7 +34,7 @@ struct SensorDescription {
   double tolerance = std::numeric_limits<double>::infinity();
 
   // Of an IMU.
-  /// index into links: what it is fixed to
+  /// index into links, of the one that it is fixed to
   int link = -1;
   int base = 0;                                            ///< CAN id added to the factory's
   double tick = 1e-4;                                      ///< [s] unit of its SampleTime
@@ -43,12 +43,12 @@ struct SensorDescription {
   double rate_bias_sd = 0;                                 ///< [rad/s] >= 0
   double acceleration_bias_sd = 0;                         ///< [m/s^2] >= 0
 
-  /// position_sd and velocity_sd of an IMU: of the angle and of the rate of turn. What moves it,
-  /// the joint knows.
+  /// position_sd and velocity_sd of an IMU: of the angle and of the rate of turn. Jerks, impacts
+  /// and steps of the acceleration are the joint's.
   NoiseDescription noise = {};
 };
 
-/// The [[sensor]] tables.
+/// The [[sensor]] tables. Thread-safe.
 /// @param robot with links and joints. @throws ConfigError
 std::vector<SensorDescription> ReadSensors(Config& root, const RobotDescription& robot);
 

@@ -31,7 +31,7 @@ std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
     if (!description.simulation.Has(kind.table)) continue;
     paths.push_back({.path = kind.name, .values = kind.values, .world = &kind});
   }
-  paths.push_back({.path = "mass/" + description.links[0].name, .values = kPositive});
+  paths.push_back({.path = "mass/" + description.links[0].name, .values = kAboveZero});
   size_t velocity = 0;
   for (size_t i = 0; i < description.joints.size(); ++i) {
     const LinkDescription& link = description.links[i + 1];

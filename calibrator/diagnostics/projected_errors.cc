@@ -39,7 +39,7 @@ void RequireSizes(const FitResiduals& residuals, Eigen::Index n) {
 }
 
 // Orthonormal, of the columns' range. A parameter without effect has no part in it.
-Eigen::MatrixXd ColumnSpace(const Eigen::MatrixXd& jacobian) {
+Eigen::MatrixXd RangeBasis(const Eigen::MatrixXd& jacobian) {
   Eigen::MatrixXd scaled = jacobian;
   for (auto column : scaled.colwise()) {
     if (column.norm() > 0) column.normalize();
@@ -107,7 +107,7 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
         static_cast<Eigen::Index>(i);
   }
   Weigh(residuals.errors);
-  basis = ColumnSpace(weight.asDiagonal() * residuals.jacobian);
+  basis = RangeBasis(weight.asDiagonal() * residuals.jacobian);
   Take(weight.cwiseProduct(residuals.errors));
 }
 

@@ -16,7 +16,7 @@ struct CalibrationSettings {
   double duration = 0;  ///< [s] >= 0 that a calibration takes in virtual time
 };
 
-/// @throws ConfigError
+/// Thread-safe. @throws ConfigError
 CalibrationSettings ReadCalibration(Config config);
 
 }  // namespace plumb

@@ -10,7 +10,7 @@ struct ControllerSettings {
   double place_tolerance;  ///< [rad]; times ten [rad/s]
 };
 
-/// @throws ConfigError
+/// Thread-safe. @throws ConfigError
 ControllerSettings ReadController(Config config);
 
 }  // namespace plumb

@@ -9,7 +9,7 @@ namespace plumb {
 
 struct JointDescription;
 
-/// [driver]: its times, how it stops, and what it takes for a fault.
+/// [driver]: its periods and timeouts, how it stops, and the limits beyond which there is a fault.
 struct DriverSettings {
   /// The efforts of the joints when a command has expired, until the driver disarms: none, the last
   /// one falling linearly to nothing within `ramp`, or -damping * velocity (JointLimitSettings).
@@ -23,7 +23,7 @@ struct DriverSettings {
   double ramp = 0;          ///< [s] > 0 of kRamp, else 0
   double effort_delay = 0;  ///< [s] 0 to 0.01, from a torque frame's transmission until it acts
 
-  // Beyond these is a fault. What a drive does not report is not judged.
+  // Beyond these is a fault. A quantity that a drive does not report is not checked.
   double max_motor_temperature = 90, max_drive_temperature = 90;     ///< [degC]
   double min_bus_voltage = 0;                                        ///< [V]
   double max_bus_voltage = std::numeric_limits<double>::infinity();  ///< [V]
@@ -33,7 +33,7 @@ struct DriverSettings {
   double stuck_after = 0;
 };
 
-/// @throws ConfigError
+/// Thread-safe. @throws ConfigError
 DriverSettings ReadDriver(Config config, const std::vector<JointDescription>& joints);
 
 }  // namespace plumb

@@ -8,8 +8,8 @@ namespace plumb {
 
 struct RobotDescription;
 
-/// [estimator]: what the estimator assumes of a coordinate that nothing says more about, in [m] for
-/// [rad] where the joint slides, and how it goes about it. See EstimatorOf for a joint's own.
+/// [estimator]: the noise that the estimator assumes for a joint without settings of its own (see
+/// EstimatorOf), in [m] instead of [rad] where the joint slides, and the settings of its filters.
 struct EstimatorSettings {
   double position_sd;  ///< [rad] of a reading
   double velocity_sd;  ///< [rad/s]
@@ -29,8 +29,8 @@ struct EstimatorSettings {
   /// [rad/s^2 sqrt(s)] spectral density^(1/2) of what the accelerations differ by from the
   /// simulator's, of the filter on its dynamics: [estimator.model]
   double model_acceleration = 0.2;
-  /// How the joints of the robot's base are known: as all others, or, if nothing holds it, from its
-  /// IMU and its legs.
+  /// Sensors of the base's joints: their own, as all other joints have them, or, of a free
+  /// base, its IMU and its legs.
   enum class Base { kSensors, kLegs };
   Base base = Base::kSensors;
   double ground_sd = 5e-3;  ///< [m] of kLegs: by which the ground is uneven and gives way
@@ -54,7 +54,7 @@ struct NoiseDescription {
   double delay = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// @param robot with links, joints, sensors and simulation. @throws ConfigError
+/// @param robot with links, joints, sensors and simulation. Thread-safe. @throws ConfigError
 EstimatorSettings ReadEstimator(Config config, const RobotDescription& robot);
 
 }  // namespace plumb

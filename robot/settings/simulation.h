@@ -26,14 +26,14 @@ struct SimulationSettings {
   std::optional<Contact> contact;  ///< none: the robot does not touch the ground
   std::optional<Stop> stop;        ///< none: joints move on beyond their limits
 
-  /// What of these may be an uncertain parameter.
+  /// The numbers among these that may be uncertain parameters.
   World world() const { return {gravity, contact.value_or(Contact{}), stop.value_or(Stop{})}; }
-  /// Sets it; what the robot does not have stays without.
+  /// Sets them; contact and stops that the robot does not have stay away.
   void set_world(const World& world);
   bool Has(WorldParameterKind::Table table) const;
 };
 
-/// @param period [s] of control, which a substep must not exceed. @throws ConfigError
+/// @param period [s] of control, which a substep must not exceed. Thread-safe. @throws ConfigError
 SimulationSettings ReadSimulation(Config config, double period);
 
 }  // namespace plumb

@@ -19,7 +19,7 @@ struct TaskSettings {
   std::vector<double> target = {}, spread = {};
 };
 
-/// @throws ConfigError
+/// Thread-safe. @throws ConfigError
 TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints);
 
 }  // namespace plumb

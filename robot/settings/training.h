@@ -26,7 +26,7 @@ struct TrainingSettings {
   double position_noise = 0, velocity_noise = 0;
 };
 
-/// @throws ConfigError
+/// Thread-safe. @throws ConfigError
 TrainingSettings ReadTraining(Config config);
 
 }  // namespace plumb

@@ -40,7 +40,7 @@ struct VirtualRobotSettings {
   std::vector<UnmodelledJoint> joints = {};
 };
 
-/// @param robot with joints and parameters. @throws ConfigError
+/// @param robot with joints and parameters. Thread-safe. @throws ConfigError
 VirtualRobotSettings ReadVirtualRobot(Config config, const RobotDescription& robot);
 
 }  // namespace plumb

@@ -59,7 +59,7 @@ struct UrdfElements {
 
 /// Checks a URDF element by element: every element and number that we use, and that the links form
 /// one tree.
-/// @throws ConfigError "file:line: ..."
+/// Thread-safe. @throws ConfigError "file:line: ..."
 UrdfElements ReadUrdfElements(const std::string& text, const std::string& file);
 
 }  // namespace plumb

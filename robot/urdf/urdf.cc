@@ -39,7 +39,7 @@ class Reader {
     model_.link_lines.push_back(line);
   }
 
-  // What parts are called must not be taken.
+  // The names of parts must be free.
   void CheckPartNames(const std::string& name, const UrdfElements::Joint& joint) const {
     if (joint.type != "planar" && joint.type != "floating") return;
     for (const char* part : {"/x", "/y", "/z", "/angle", "/rotation"}) {

@@ -38,7 +38,7 @@ struct UrdfModel {
 
 /// Does not know motors: effort limits may be 0, and links may have no mass.
 /// @throws ConfigError "file:line: ..." for anything missing, unsupported or impossible (an inertia
-/// no body can have, a cycle of joints, a joint without limits).
+/// no body can have, a cycle of joints, a joint without limits). Thread-safe but for the file.
 UrdfModel LoadUrdf(const std::string& file);
 
 }  // namespace plumb

@@ -8,7 +8,7 @@
 
 namespace plumb {
 
-/// An XML file in which every complaint has its line.
+/// An XML text, all of whose errors name their line. Immutable, hence thread-safe.
 class Xml {
  public:
   /// @throws ConfigError "file:line: ..." if the text is not XML, nests deeper than kMaxDepth or

@@ -8,7 +8,7 @@
 namespace plumb {
 
 /// An XML text in which single attributes are set: every other byte of it stays, comments and
-/// layout included.
+/// layout included. Not thread-safe.
 class XmlEdits {
  public:
   /// @param text that Xml accepts. @throws std::invalid_argument otherwise.

@@ -9,9 +9,9 @@ namespace plumb {
 namespace {
 
 /// The world around a controller, in steps of one measurement (5 ms).
-class World {
+class Surroundings {
  public:
-  World()
+  Surroundings()
       : robot(LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum")),
         controller(robot, 1) {
     robot_state.num_joints = 1;
@@ -66,7 +66,7 @@ class World {
 
 using S = controller_status_t;
 
-TEST_CASE_METHOD(World, "it is silent until the driver is armed, then commands zero") {
+TEST_CASE_METHOD(Surroundings, "it is silent until the driver is armed, then commands zero") {
   for (int i = 0; i < 50; ++i) {
     driver_state = driver_status_t::IDLE;
     CHECK_FALSE(Step());
@@ -84,7 +84,7 @@ TEST_CASE_METHOD(World, "it is silent until the driver is armed, then commands z
   CHECK(commands <= 11);
 }
 
-TEST_CASE_METHOD(World, "an episode has its number of steps, one control period apart") {
+TEST_CASE_METHOD(Surroundings, "an episode has its number of steps, one control period apart") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(3, 2, 0.25f));
   std::vector<joint_command_t> commands;
@@ -111,7 +111,8 @@ TEST_CASE_METHOD(World, "an episode has its number of steps, one control period 
 }
 
 TEST_CASE_METHOD(
-    World, "a return is that of the steps taken: each is paid when the state after it is there") {
+    Surroundings,
+    "a return is that of the steps taken: each is paid when the state after it is there") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0, 1, 0.25f));
   StepUntil(S::RUNNING);
@@ -137,7 +138,7 @@ TEST_CASE_METHOD(
   CHECK(controller.status().returns.at(0) == Approx(expected));
 }
 
-TEST_CASE_METHOD(World, "a new policy waits for the end of the episode") {
+TEST_CASE_METHOD(Surroundings, "a new policy waits for the end of the episode") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0));
   StepUntil(S::RUNNING);
@@ -149,7 +150,7 @@ TEST_CASE_METHOD(World, "a new policy waits for the end of the episode") {
   CHECK(controller.status().num_episodes == 0);
 }
 
-TEST_CASE_METHOD(World, "a policy that is repeated is not run again") {
+TEST_CASE_METHOD(Surroundings, "a policy that is repeated is not run again") {
   Driver(driver_status_t::ARMED);
   policy_t policy = Policy(0);
   controller.OnPolicy(policy);
@@ -161,7 +162,7 @@ TEST_CASE_METHOD(World, "a policy that is repeated is not run again") {
   CHECK(controller.phase() == S::WAITING);
 }
 
-TEST_CASE_METHOD(World, "a policy that does not fit is refused and the old one stays") {
+TEST_CASE_METHOD(Surroundings, "a policy that does not fit is refused and the old one stays") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0));
   policy_t wrong = GaussianPolicy(PolicyShape{5, {4}, 1}).ToMessage();
@@ -177,7 +178,7 @@ TEST_CASE_METHOD(World, "a policy that does not fit is refused and the old one s
   CHECK(controller.status().policy_iteration == 0);
 }
 
-TEST_CASE_METHOD(World,
+TEST_CASE_METHOD(Surroundings,
                  "doubtful states halt it: zero effort, silence, and only a re-arming leads out") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0, 1, 0.5f));
@@ -224,7 +225,7 @@ TEST_CASE_METHOD(World,
   CHECK(controller.status().num_episodes == 1);
 }
 
-TEST_CASE_METHOD(World,
+TEST_CASE_METHOD(Surroundings,
                  "a driver that disarms ends the episode; a silent driver counts as absent") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0));
@@ -245,7 +246,7 @@ TEST_CASE_METHOD(World,
   CHECK_FALSE(Step());
 }
 
-TEST_CASE_METHOD(World, "a robot that nobody can place rests, and begins where it is") {
+TEST_CASE_METHOD(Surroundings, "a robot that nobody can place rests, and begins where it is") {
   Controller resting(robot, 1, 2.0);
   driver_status_t armed{};
   armed.state = driver_status_t::ARMED;
@@ -267,10 +268,10 @@ TEST_CASE_METHOD(World, "a robot that nobody can place rests, and begins where i
   CHECK(zeros <= 42);
 }
 
-TEST_CASE_METHOD(World, "the same seed places the robot in the same states") {
+TEST_CASE_METHOD(Surroundings, "the same seed places the robot in the same states") {
   Driver(driver_status_t::ARMED);
   controller.OnPolicy(Policy(0, 3));
-  World other;
+  Surroundings other;
   other.Driver(driver_status_t::ARMED);
   other.controller.OnPolicy(Policy(0, 3));
   StepUntil(S::RUNNING);
