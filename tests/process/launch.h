@@ -32,6 +32,16 @@ inline void LearnLittle(Stage& stage) {
   stage.robot_folder = file;
 }
 
+/// The bytes of the last frame with an id in a log of candump's form: the whole run's, while a
+/// witness of the bus may be too slow to hear the end. Empty if there is none.
+inline std::string LastFrame(const std::filesystem::path& can_log, const std::string& id) {
+  const std::string frames = Read(can_log), head = " " + id + "#";
+  const size_t last = frames.rfind(head);
+  if (last == std::string::npos) return "";
+  const size_t begin = last + head.size();
+  return frames.substr(begin, frames.find_first_of(" \n", begin) - begin);
+}
+
 /// How many processes have the stage's LCM URL in their command line.
 inline int Left(const Stage& stage) {
   int left = 0;

@@ -23,7 +23,7 @@ std::string Read(const std::filesystem::path& file) {
 }
 
 bool AwaitReally(const std::function<bool()>& so) {
-  for (int i = 0; i < 6000; ++i) {
+  for (int i = 0; i < 120'000; ++i) {  // 20 minutes: whoever is as late as that hangs
     if (so()) return true;
     usleep(10'000);
   }
