@@ -1,4 +1,4 @@
-// What it costs to calibrate the hopper's four masses from 1000 transitions, in one thread:
+// The time of calibrating the hopper's four masses from 1000 transitions, in one thread:
 //   build/bench/calibrator_bench [--benchmark_filter=...]
 // as they stream in (median, 99th percentile and longest of the transitions, each repeated), and
 // all at once.

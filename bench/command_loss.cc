@@ -18,6 +18,7 @@
 #include "common/clock.h"
 #include "common/messenger.h"
 #include "common/random.h"
+#include "common/time_units.h"
 #include "drivers/can/transport.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
@@ -27,7 +28,7 @@
 namespace plumb {
 namespace {
 
-/// What passes on the wire: when torque was last asked for, and when first no more.
+/// A listener on the wire: when torque was last asked for, and when first no more.
 struct Wire {
   void Listen() {
     std::array<Frame, 64> frames;
@@ -77,8 +78,8 @@ class Bench {
       }
       Wait();
     }
-    const auto expiry = static_cast<int64_t>(robot_.driver.expiry * 1e6);
-    const auto disarm_after = static_cast<int64_t>(robot_.driver.disarm_after * 1e6);
+    const auto expiry = Microseconds(robot_.driver.expiry);
+    const auto disarm_after = Microseconds(robot_.driver.disarm_after);
     const int64_t silent_until = last + expiry + (disarm_after - expiry) / 3;
     const int64_t patience = last + 1'000'000;
     while (Now() < silent_until || (wire_.zero_at == 0 && Now() < patience)) Wait();

@@ -1,5 +1,5 @@
 // How honest the observer's standard deviations are at impacts and elsewhere, on hoppers on their
-// bus in virtual time: tables for docs/measurements.md. build/bench/impacts [motions]
+// bus in virtual time: tables for docs/measurements/estimator.md. build/bench/impacts [motions]
 
 #include <fmt/format.h>
 

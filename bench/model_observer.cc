@@ -1,5 +1,5 @@
 // How well the filter on the simulator's dynamics knows the state of simulated robots, beside the
-// kinematic one, and what a step of it costs: a table for docs/measurements.md.
+// kinematic one, and what a step of it costs: a table for docs/measurements/estimator.md.
 // build/bench/model_observer [runs]
 
 #include <fmt/format.h>

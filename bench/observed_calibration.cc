@@ -1,6 +1,6 @@
-// What the observer costs calibration: parameters from estimated states beside those from true
-// states of the same motions. A table for docs/measurements.md. build/bench/observed_calibration
-// [motions [robot]]
+// How much accuracy the observer costs calibration: parameters from estimated states beside those
+// from true states of the same motions. A table for docs/measurements/estimator.md.
+// build/bench/observed_calibration [motions [robot]]
 
 #include <fmt/format.h>
 
@@ -17,21 +17,21 @@
 namespace plumb {
 namespace {
 
-struct Way {
+struct StateSource {
   const char* name;
   States states;
 };
-constexpr Way kWays[] = {{"true", States::kTrue},
-                         {"smoothed", States::kSmoothed},
-                         {"smoothed, taken for exact", States::kCertain},
-                         {"causal", States::kCausal}};
+constexpr StateSource kSources[] = {{"true", States::kTrue},
+                                    {"smoothed", States::kSmoothed},
+                                    {"smoothed, taken for exact", States::kCertain},
+                                    {"causal", States::kCausal}};
 
 using Motion = std::function<std::vector<Samples>(uint32_t seed)>;  // episodes
 
 void Print(const std::string& name, const RobotDescription& robot, const Motion& motion_of,
            uint32_t motions) {
   const std::vector<Knowable> knowable = KnowableOf(robot);
-  for (const Way& way : kWays) {
+  for (const StateSource& source : kSources) {
     std::vector<double> square(knowable.size(), 0), sum(knowable.size(), 0),
         claimed(knowable.size(), 0);
     std::vector<int> covered(knowable.size(), 0);
@@ -39,12 +39,13 @@ void Print(const std::string& name, const RobotDescription& robot, const Motion&
     double discrepancy = 0;
     for (uint32_t seed = 1; seed <= motions; ++seed) {
       const Eigen::VectorXd truth = HiddenParameters(robot, seed);
-      const std::vector<Log> logs{ObservedLog(robot, motion_of(seed), way.states)};
+      const std::vector<Log> logs{ObservedLog(robot, motion_of(seed), source.states)};
       const Findings found = Calibrate(robot, logs, {});
       alarms += found.misspecification.alarm;
       discrepancy += found.stages.front().discrepancy / motions;
       if (found.misspecification.alarm)
-        fmt::print(stderr, "\n{} {} {}: {}\n", name, way.name, seed, found.misspecification.words);
+        fmt::print(stderr, "\n{} {} {}: {}\n", name, source.name, seed,
+                   found.misspecification.summary);
       const Gaussian posterior = Moments(found.posterior);
       const Eigen::VectorXd hidden =
           truth.array().log();  // both robots' parameters have logarithms for coordinates
@@ -55,11 +56,11 @@ void Print(const std::string& name, const RobotDescription& robot, const Motion&
         square[i] += error * error, sum[i] += error, claimed[i] += sd * sd;
         covered[i] += std::abs(error) < 1.96 * sd;
       }
-      fmt::print(stderr, "\r{} {}: {} of {} ", name, way.name, seed, motions);
+      fmt::print(stderr, "\r{} {}: {} of {} ", name, source.name, seed, motions);
     }
     for (size_t i = 0; i < knowable.size(); ++i) {
       fmt::print("| {} | {} | {} | {:.3f} | {:+.3f} | {:.3f} | {:.0f} % | {:.2f} | {} |\n", name,
-                 way.name, knowable[i].name, 100 * std::sqrt(square[i] / motions),
+                 source.name, knowable[i].name, 100 * std::sqrt(square[i] / motions),
                  100 * sum[i] / motions, 100 * std::sqrt(claimed[i] / motions),
                  100. * covered[i] / motions, discrepancy, alarms);
       std::fflush(stdout);

@@ -1,5 +1,5 @@
 // How well the observer knows the state of simulated robots, beside what is usually done: a table
-// for docs/measurements.md. build/bench/observer [runs]
+// for docs/measurements/estimator.md. build/bench/observer [runs]
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
-// What a step of the observer costs: build/bench/observer_bench. The time of a step is the inverse
-// of items per second.
+// The time of a step of the observer: build/bench/observer_bench. It is the inverse of items per
+// second.
 
 #include <benchmark/benchmark.h>
 

@@ -219,8 +219,8 @@ void HopperWindows(benchmark::State& state) {
 }
 BENCHMARK(HopperWindows)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
-/// What a step cost if Simbody's own mass matrix and bias were all there is to it: once instead of
-/// four times.
+/// The time of a step if Simbody's own mass matrix and bias were all there is to it: once instead
+/// of four times.
 void SimbodyHopperMassAndBias(benchmark::State& state) {
   RobotDescription robot = Load("hopper/gym.toml");
   SimbodyPlant plant(Model(robot).Describe(Model(robot).parameters().means()));

@@ -31,7 +31,7 @@ struct Samples {
   std::vector<double> advantages;
 };
 
-/// One Fisher-vector product; second argument: every how many-th sample.
+/// One Fisher-vector product; second argument k: at every k-th sample.
 void FisherProduct(benchmark::State& state) {
   Workers workers(static_cast<int>(state.range(0)));
   const Samples samples(workers);
@@ -47,7 +47,7 @@ BENCHMARK(FisherProduct)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
 
-/// A policy's step; second argument: Fisher at every how many-th sample.
+/// A policy's step; second argument k: Fisher's matrix at every k-th sample.
 void PolicyStep(benchmark::State& state) {
   Workers workers(static_cast<int>(state.range(0)));
   const Samples samples(workers);

@@ -6,14 +6,14 @@
 #include <CLI/CLI.hpp>
 
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "calibrator/live/calibrator.h"
 #include "calibrator/live/checkpoint.h"
 #include "calibrator/motion/motion_log.h"
-#include "common/atomic_file.h"
+#include "calibrator/results/posterior_file.h"
 #include "common/process.h"
+#include "common/time_units.h"
 
 namespace plumb {
 namespace {
@@ -33,7 +33,6 @@ class Session {
   Session(const RobotDescription& robot, const Flags& flags, const Clock& clock)
       : robot_(robot),
         clock_(clock),
-        seed_(flags.seed),
         folder_(flags.checkpoint),
         simopt_(robot, flags.seed,
                 flags.threads > 0 ? flags.threads
@@ -44,9 +43,9 @@ class Session {
     if (auto state = checkpoint_.Load()) {
       simopt_.Resume(std::move(*state));
       spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration,
-                   simopt_.state().update);
+                   simopt_.state().search.update);
       report_ = simopt_.Report();
-      if (report_) WriteDistribution();  // a kill may have come before it
+      if (report_) WriteFindings();  // a kill may have come before it
     }
   }
 
@@ -61,7 +60,7 @@ class Session {
         spdlog::warn(
             "iteration {} has no usable transition: it goes by with the earlier ones; dropped so "
             "far: {}",
-            simopt_.state().iteration + 1, calibrator.drops().words());
+            simopt_.state().iteration + 1, calibrator.drops().summary());
       }
       checkpoint_.Save(simopt_.state());
     }
@@ -75,8 +74,8 @@ class Session {
     for (const std::string& warning : report->warnings)
       spdlog::warn("iteration {}: {}", report->iteration, warning);
     report_ = std::move(report);
-    seconds_ = static_cast<double>(clock_.Now() - start_) * 1e-6 / clock_.scale();
-    WriteDistribution();
+    seconds_ = Seconds(clock_.Now() - start_) / clock_.scale();
+    WriteFindings();
     return true;
   }
 
@@ -94,7 +93,8 @@ class Session {
   }
 
   parameter_distribution_t Distribution() const {
-    return DistributionMessage(robot_, simopt_.state(), seed_, report_ ? &*report_ : nullptr);
+    return DistributionMessage(robot_, simopt_.state(), simopt_.seed(),
+                               report_ ? &*report_ : nullptr);
   }
   calibration_status_t Status() const {
     return StatusMessage(
@@ -108,26 +108,13 @@ class Session {
       stream_->Add(transition, rollout.episode);
   }
 
-  void WriteDistribution() const {
-    const parameter_distribution_t m = Distribution();
-    const nlohmann::json j{{"iteration", m.iteration},
-                           {"seed", m.seed},
-                           {"utime", m.utime},
-                           {"names", m.name},
-                           {"weight", m.weight},
-                           {"mean", m.mean},
-                           {"covariance", m.covariance},
-                           {"kl", m.kl},
-                           {"ess", m.ess},
-                           {"temperature", m.temperature},
-                           {"discrepancy", m.discrepancy},
-                           {"identifiability", report_->identifiability.words}};
-    WriteAtomically(folder_ / fmt::format("distribution_{}.json", m.iteration), j.dump(1) + "\n");
+  void WriteFindings() const {
+    WritePosterior(folder_ / fmt::format("posterior_{}.json", report_->iteration),
+                   IterationFindings(robot_, simopt_, *report_), robot_, {});
   }
 
   const RobotDescription& robot_;
   const Clock& clock_;
-  uint64_t seed_;
   std::filesystem::path folder_;
   SimOpt simopt_;
 
@@ -196,7 +183,7 @@ int RunLog(Process& process, Session& session, const RobotDescription& robot,
   });
   const calibration_status_t found = session.Status();
   spdlog::info("{} events, {} undecodable; dropped transitions: {}", counts.events,
-               counts.undecodable, session.calibrator.drops().words());
+               counts.undecodable, session.calibrator.drops().summary());
   if (found.iteration == 0)
     throw std::runtime_error(file + ": holds no complete roll-out to calibrate with");
   std::cout << found.identifiability << std::endl;
@@ -220,7 +207,7 @@ int main(int argc, char** argv) {
             "auto, laplace, mixture, reps or simopt; without it the one that robot.toml says");
         app.add_option("--seed", flags.seed, "of the random numbers")->capture_default_str();
         app.add_option("--checkpoint", flags.checkpoint,
-                       "folder for checkpoints and distribution_<n>.json")
+                       "folder for checkpoints and posterior_<iteration>.json")
             ->capture_default_str();
         app.add_option("--threads", flags.threads,
                        "0 = one per core; the result does not depend on it")

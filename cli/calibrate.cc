@@ -17,9 +17,10 @@
 #include "calibrator/results/identified_urdf.h"
 #include "calibrator/results/posterior_file.h"
 #include "calibrator/results/summary.h"
-#include "cli/progress_line.h"
 #include "common/atomic_file.h"
-#include "common/rank_batches.h"
+#include "common/hash.h"
+#include "common/progress_line.h"
+#include "common/rank_batch_runner.h"
 
 namespace plumb {
 namespace {
@@ -39,7 +40,7 @@ void PrintLogs(const std::vector<Log>& logs) {
                              CountTransitions(log.rollouts), log.rollouts.size(),
                              log.rollouts.size() == 1 ? "" : "s");
     if (log.drops.total() > 0) {
-      std::cout << "; dropped: " << log.drops.words();
+      std::cout << "; dropped: " << log.drops.summary();
     }
     std::cout << "\n";
     for (const std::string& warning : log.warnings) std::cout << "  " << warning << "\n";
@@ -63,8 +64,8 @@ void PrintFindings(const Findings& findings, const RobotDescription& robot) {
                              summary.upper(at));
   }
   for (const std::string* words :
-       {&findings.identifiability.words, &findings.advice, &findings.misspecification.words,
-        &findings.holdout.words, &findings.agreement.words, &findings.check}) {
+       {&findings.identifiability.summary, &findings.advice, &findings.misspecification.summary,
+        &findings.holdout.summary, &findings.agreement.summary, &findings.check}) {
     if (!words->empty()) std::cout << "- " << *words << "\n";
   }
   for (const std::string& warning : findings.warnings) std::cout << "! " << warning << "\n";
@@ -109,7 +110,7 @@ std::string List(const std::vector<int>& numbers) {
 }
 
 int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::vector<Log>& logs,
-        const ProgressLine& line, const std::function<void()>& look) {
+        ProgressLine& line, const std::function<void()>& look) {
   CalibrationOptions options = flags.options;
   options.method = "laplace", options.horizons = {1};
   const Findings findings = Calibrate(robot, logs, options);
@@ -117,7 +118,7 @@ int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::v
   for (const Log& log : logs)
     rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
   RobotSbcOptions sbc;
-  sbc.runs = flags.sbc, sbc.seed = options.seed, sbc.threads = options.workforce.threads;
+  sbc.runs = flags.sbc, sbc.seed = options.seed, sbc.threads = options.execution.threads;
   sbc.progress = [&](double share) { look(), line.Show("simulation-based calibration", share); };
   std::cout << Words(RunRobotSbc(std::make_shared<Model>(robot), rollouts, findings.noise_sd, sbc))
             << std::endl;
@@ -125,6 +126,13 @@ int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::v
 }
 
 }  // namespace
+
+std::string MethodHelp() {
+  std::string help = "Methods:";
+  for (const Method& method : Methods())
+    help += fmt::format("\n  {:<20}{}", method.name, method.help);
+  return help;
+}
 
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command) {
   const Ranks ranks;
@@ -141,9 +149,9 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const std::vector<Log> logs = ReadLogs(flags, robot);
   if (speaks) PrintLogs(logs);
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  flags.options.workforce.threads =
+  flags.options.execution.threads =
       flags.threads > 0 ? flags.threads : std::max(1, cores / ranks.size());
-  const ProgressLine line(speaks);
+  ProgressLine line(speaks);
   const auto look = [&] {
     if (process.stopping()) throw Interrupted();
   };
@@ -152,8 +160,8 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
     if (flags.sbc > 0) return Sbc(flags, robot, logs, line, look);
     std::optional<Journal> journal;
     if (speaks) journal.emplace(journal_file, IdentityOf(robot, flags, logs));
-    RankBatches batches(ranks, journal ? &*journal : nullptr);
-    flags.options.workforce.batches = &batches;
+    RankBatchRunner batches(ranks, journal ? &*journal : nullptr);
+    flags.options.execution.batches = &batches;
     flags.options.progress = [&](const std::string& what, double share) {
       look(), line.Show(what, share);
     };

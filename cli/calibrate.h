@@ -9,6 +9,7 @@
 
 namespace plumb {
 
+/// The flags of `plumb calibrate`.
 struct CalibrateFlags {
   std::string robot;
   std::vector<std::string> logs, tables;  ///< LCM logs, CSV files
@@ -20,11 +21,15 @@ struct CalibrateFlags {
   bool strict = false;       ///< exit status 3 if the findings should not be trusted
 };
 
-/// `plumb calibrate`: learns from logs which simulators could have produced the robot's motion,
-/// writes what it has learned, and says so in words. With mpirun its ranks share the work. An
+/// What --help says of the methods: a line for each.
+std::string MethodHelp();
+
+/// `plumb calibrate`: infers from logs which simulators could have produced the robot's motion,
+/// writes the posterior, and summarises it for people. With mpirun its ranks share the work. An
 /// interrupted run leaves a journal beside the output, from which the same command goes on. @return
 /// exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better
 /// than the prior, the model cannot explain the logs, or they do not agree.
+/// @throws std::invalid_argument or std::runtime_error, one line for people: robot, logs, files.
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command);
 
 }  // namespace plumb

@@ -4,9 +4,9 @@
 
 namespace plumb {
 
-/// `plumb can plan ROBOT`: prints what is on the robot's bus, how full it is and how late it may
-/// get.
-/// @return exit status: 1 if it cannot work.
+/// `plumb can plan ROBOT`: prints the messages on the robot's bus, its load and the response times.
+/// Thread-safe, like WriteDbc. @return exit status: 1 if the bus cannot work.
+/// @throws std::invalid_argument or ConfigError if there is no such robot.
 int PrintBusPlan(const std::string& robot);
 
 /// `plumb can dbc ROBOT`: writes the DBC file (see drivers/bus/dbc.h). @param output file; "" =

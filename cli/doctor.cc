@@ -68,7 +68,7 @@ Finding Signatures(const std::string& lcm_url, const std::string& key) {
       "ip route add 224.0.0.0/4 dev lo, or plumb key FILE and --key FILE"};
 }
 
-/// What a driver that is running says of it; nothing if none is.
+/// Findings about a driver that is running, from its own status; none if there is no driver.
 std::vector<Finding> RunningDriver(Messenger& messenger, const std::string& lcm_url) {
   const Subscriber<driver_status_t> drivers(messenger, "DRIVER_STATUS");
   if (messenger.lcm().handleTimeout(kListen) > 0) messenger.Drain();

@@ -20,7 +20,8 @@ struct Finding {
 std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus,
                              const std::string& key = {});
 
-/// Prints the findings. @return exit status: 1 if any is bad.
+/// Prints the findings. Not thread-safe: it opens LCM and the bus. @return exit status: 1 if any is
+/// bad.
 int Doctor(const std::string& lcm_url, const std::string& bus, const std::string& key);
 
 }  // namespace plumb

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "calibrator/design/excitation.h"
-#include "calibrator/live/simopt.h"
 #include "common/atomic_file.h"
 #include "robot/description.h"
 #include "robot/posterior_reader.h"
@@ -20,7 +19,7 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kMostRows = 10;
+constexpr size_t kMaxRows = 10;
 
 std::string DescribeStart(const RobotDescription& robot, uint64_t seed) {
   const auto [q, v] = ExcitationStart(robot, seed);
@@ -35,7 +34,7 @@ std::string DescribeStart(const RobotDescription& robot, uint64_t seed) {
 std::string Table(const RobotDescription& robot, const std::vector<RatedExcitation>& rated) {
   std::string text =
       fmt::format("{:<44}{:>12}{:>9}{:>9}\n", "excitation", "gain [nat]", "s", "margin");
-  for (size_t i = 0; i < std::min(rated.size(), kMostRows); ++i) {
+  for (size_t i = 0; i < std::min(rated.size(), kMaxRows); ++i) {
     text += fmt::format("{:<44}{:>12.2f}{:>9.2f}{:>7.0f} %\n", rated[i].excitation.name,
                         rated[i].gain, rated[i].steps * robot.task.period, 100 * rated[i].margin);
   }
@@ -81,15 +80,6 @@ std::vector<Snapshot> Film(const RobotDescription& robot, const RatedExcitation&
   return film;
 }
 
-Gaussian Known(const std::string& file, const RobotDescription& robot) {
-  GaussianMixture mixture;
-  for (const auto& component : ReadPosterior(file, robot).components) {
-    mixture.weights.push_back(component.weight);
-    mixture.components.push_back({component.mean, component.covariance});
-  }
-  return Moments(mixture);
-}
-
 }  // namespace
 
 int Excite(Process& process, const ExciteFlags& flags) {
@@ -105,8 +95,9 @@ int Excite(Process& process, const ExciteFlags& flags) {
   settings.candidates = flags.candidates;
   settings.seconds = flags.seconds;
   settings.seed = flags.seed;
-  const Gaussian prior =
-      flags.posterior.empty() ? PriorGaussian(robot) : Known(flags.posterior, robot);
+  const Gaussian prior = flags.posterior.empty()
+                             ? PriorGaussian(robot)
+                             : Moments(ReadPosterior(flags.posterior, robot).mixture);
   const std::vector<RatedExcitation> rated = RateExcitations(robot, prior, settings);
   if (process.stopping()) return 130;
   std::cout << fmt::format("{}, task {}, seed {}: {} of {} excitations keep within the limits\n",

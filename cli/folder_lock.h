@@ -4,7 +4,7 @@
 
 namespace plumb {
 
-/// Keeps a run's folder for one process at a time, for as long as it lives.
+/// Keeps a run's folder for one process at a time, for as long as it lives. Not thread-safe.
 class FolderLock {
  public:
   /// @throws std::runtime_error naming the folder and who has it.

@@ -22,7 +22,9 @@
 #include "cli/virtual_run.h"
 #include "common/atomic_file.h"
 #include "common/lcm_url.h"
+#include "common/progress_line.h"
 #include "common/signature.h"
+#include "common/time_units.h"
 #include "drivers/driver/driver.h"
 #include "plumb/driver_request_t.hpp"
 #include "robot/description.h"
@@ -35,7 +37,7 @@ namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
 // of a virtual robot; a real one is armed by a person, every time
-constexpr int kMostRearms = 20;
+constexpr int kMaxRearms = 20;
 constexpr int64_t kArmAgain = 500'000;  // [us]
 constexpr int64_t kLook = 50'000;       // [us]
 
@@ -43,7 +45,7 @@ double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
 }
 
-// What the driver would say in its log, said before anything starts.
+// Says before anything starts what the driver would otherwise say in its log.
 void RequireDrivable(const RobotDescription& robot) {
   try {
     Driver(robot, 0, 0);
@@ -62,7 +64,7 @@ fs::path MakeFolder(const std::string& wanted) {
   return folder;
 }
 
-/// What is settled before anything starts.
+/// The run's settings, checked before anything starts.
 struct Setting {
   Setting(const Process& process, const LaunchFlags& flags)
       : robot(LoadRobot(flags.robot)), bus(flags.bus.empty() ? robot.bus_url : flags.bus) {
@@ -77,7 +79,7 @@ struct Setting {
     lock.emplace(output);
     if (flags.real || flags.real_time) return;
     virtual_run.emplace(output, process.lcm_url(), VirtualRun::Records{flags.log, flags.can_log});
-    virtual_run->coordinator().most_speed = flags.speed;
+    virtual_run->coordinator().max_speed = flags.speed;
   }
 
   Coordinator* coordinator() { return virtual_run ? &virtual_run->coordinator() : nullptr; }
@@ -123,7 +125,7 @@ class ClosedLoop {
     setting.coordinator()->go_on = [this] { return GoOn(); };
   }
 
-  int Go() {
+  int Run() {
     std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << setting_.bus << ", seed "
               << flags_.seed << ", logs in " << setting_.output.string() << std::endl;
     if (setting_.virtual_run && !setting_.virtual_run->mirror_failure().empty()) {
@@ -138,17 +140,16 @@ class ClosedLoop {
     std::cout << progress_.Header() << std::endl;
     while (!progress_.finished()) {
       if (!process_.Wait(kLook)) {
-        EndLine();
+        line_.Clear();
         std::cout << "interrupted" << std::endl;
         return 130;
       }
-      progress_.Account(static_cast<double>(clock_.Now() - start_) * 1e-6,
-                        SecondsSince(really_started_));
+      progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
       if (!AllRunning() || !KeepArmed()) return 1;
       for (const std::string& row : progress_.TakeRows()) Print(row);
       ShowStatus();
     }
-    EndLine();
+    line_.Clear();
     processes_.Stop(false);
     if (setting_.virtual_run) setting_.virtual_run->Finish();
     std::cout << progress_.Conclusion(setting_.truth);
@@ -224,13 +225,13 @@ class ClosedLoop {
 
   bool AllRunning() {
     if (stopped_from_outside_) {
-      EndLine();
+      line_.Clear();
       std::cerr << "plumb: somebody outside the run has asked for a stop: the run ends here\n";
       return false;
     }
     Child* const ended = processes_.Ended();
     if (!ended) return true;
-    EndLine();
+    line_.Clear();
     std::cerr << "plumb: " << ended->name() << " ended (" << ended->ending() << "); the end of "
               << ended->log().string() << ":\n"
               << ended->Tail(5);
@@ -250,7 +251,7 @@ class ClosedLoop {
       fault_seen_ = true;
       Print("driver fault: " + driver.reason);
       if (flags_.real) Print("Look at the robot. To go on: " + ArmCommand());
-      if (!flags_.real && ++rearms_ > kMostRearms) {
+      if (!flags_.real && ++rearms_ > kMaxRearms) {
         std::cerr << "plumb: too many faults\n";
         return false;
       }
@@ -294,24 +295,15 @@ class ClosedLoop {
   }
 
   void Print(const std::string& line) {
-    EndLine();
+    line_.Clear();
     std::cout << line << std::endl;
   }
-  void EndLine() {
-    if (line_open_) std::cout << "\r\033[K" << std::flush;
-    line_open_ = false;
-  }
   void ShowStatus() {
-    const bool terminal = isatty(STDOUT_FILENO) != 0;
-    if (SecondsSince(last_status_) < (terminal ? 0.1 : 10)) return;
+    if (SecondsSince(last_status_) < (line_.shown() ? 0.1 : 10)) return;
     last_status_ = SteadyClock::now();
     const std::string line = progress_.StatusLine(SecondsSince(really_started_));
-    if (terminal) {
-      std::cout << "\r\033[K" << line << std::flush;
-      line_open_ = true;
-    } else {
-      std::cout << line << std::endl;
-    }
+    line_.Show(line);
+    if (!line_.shown()) std::cout << line << std::endl;
   }
 
   Process& process_;
@@ -330,7 +322,8 @@ class ClosedLoop {
   const SteadyClock::time_point really_started_ = SteadyClock::now();
   SteadyClock::time_point last_status_ = really_started_;
   int64_t last_request_ = start_;
-  bool line_open_ = false, fault_seen_ = false, stopped_ = false, stopped_from_outside_ = false;
+  ProgressLine line_{true, std::cout};
+  bool fault_seen_ = false, stopped_ = false, stopped_from_outside_ = false;
   int rearms_ = 0;
   std::set<std::string> strange_channels_;
   RunProcesses processes_;  // is stopped first
@@ -341,7 +334,7 @@ class ClosedLoop {
 int Launch(Process& process, const LaunchFlags& flags) {
   Setting setting(process, flags);
   if (setting.virtual_run) process.Enter(setting.coordinator()->participant());
-  return ClosedLoop(process, flags, setting).Go();
+  return ClosedLoop(process, flags, setting).Run();
 }
 
 }  // namespace plumb

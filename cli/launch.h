@@ -7,6 +7,7 @@
 
 namespace plumb {
 
+/// The flags of `plumb launch`.
 struct LaunchFlags {
   std::string robot = "robots/pendulum";
   uint64_t seed = 1;
@@ -29,7 +30,9 @@ struct LaunchFlags {
 
 /// `plumb launch`: starts every process of a run, arms, shows progress, stops everything again
 /// whatever happens: motors first, the virtual robot last, within a second. @return exit status: 0
-/// finished, 1 something failed, 130 interrupted.
+/// finished, 1 something failed, 130 interrupted. Runs in one thread; the work is done by
+/// processes.
+/// @throws std::invalid_argument or std::runtime_error, one line for people, if it cannot begin.
 int Launch(Process& process, const LaunchFlags& flags);
 
 }  // namespace plumb

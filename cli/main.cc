@@ -161,16 +161,18 @@ int main(int argc, char** argv) {
         sim->add_option("--episodes", sim_flags.episodes, "how many")
             ->check(CLI::Range(1, 1000000))
             ->capture_default_str();
+        auto* posterior = sim->add_option("--posterior", sim_flags.posterior,
+                                          "a posterior.json: its means instead of the prior's");
         sim->add_option("--set", sim_flags.set,
                         "parameters other than their prior means, e.g. mass/thigh=4");
         sim->add_flag("--urdf", sim_flags.urdf,
-                      "the robot as its URDF and TOML tables have it, without the prior's means");
+                      "the robot as its URDF and TOML tables have it, without the prior's means")
+            ->excludes(posterior);
         sim->add_option("--csv", sim_flags.csv, "write every step to this file");
         sim->add_option("--png", sim_flags.png, "draw the first episode as a strip of snapshots");
         sim->add_option("--gif", sim_flags.gif, "draw the first episode as a film");
-        sim->add_flag("--view", sim_flags.view, "show it in a window, in real time");
         calibrate = app.add_subcommand(
-            "calibrate", "learn from logs which simulators could have produced the robot's motion");
+            "calibrate", "infer from logs which simulators could have produced the robot's motion");
         calibrate->add_option("robot", calibrate_flags.robot, "robot folder or TOML file")
             ->required();
         calibrate->add_option("--log", calibrate_flags.logs, "LCM log; may be given several times")
@@ -183,15 +185,17 @@ int main(int argc, char** argv) {
         calibrate->add_option("--method", calibrate_flags.options.method, "of inference")
             ->check(CLI::IsMember(plumb::CalibrationMethods()))
             ->capture_default_str();
+        calibrate->footer(plumb::MethodHelp());
         calibrate->add_option("--seed", calibrate_flags.options.seed, "of all random numbers")
             ->check(seed)
             ->capture_default_str();
-        calibrate->add_option("--output", calibrate_flags.output, "what was found, for programs")
+        calibrate
+            ->add_option("--output", calibrate_flags.output, "the posterior, for programs (JSON)")
             ->capture_default_str();
         calibrate->add_option("--report", calibrate_flags.report,
-                              "what was found, for people: an HTML page");
+                              "the findings, for people: an HTML page");
         calibrate->add_option("--urdf", calibrate_flags.urdf,
-                              "the robot's URDF with what was found");
+                              "the robot's URDF with the identified parameters");
         calibrate
             ->add_option("--horizons", calibrate_flags.options.horizons,
                          "control steps of the windows, stage by stage")
@@ -205,7 +209,7 @@ int main(int argc, char** argv) {
             ->capture_default_str();
         calibrate
             ->add_option("--discrepancy", calibrate_flags.options.discrepancy,
-                         "of abc-rejection and abc-smc")
+                         "of methods that know only simulations")
             ->capture_default_str();
         calibrate
             ->add_option("--threads", calibrate_flags.threads,
@@ -219,7 +223,7 @@ int main(int argc, char** argv) {
             ->check(CLI::Range(0, 1000000))
             ->capture_default_str();
         calibrate->add_flag("--strict", calibrate_flags.strict,
-                            "exit status 3 if what was found should not be trusted");
+                            "exit status 3 if the findings should not be trusted");
         excite = app.add_subcommand(
             "excite", "find the efforts that would tell most of the robot's parameters");
         excite->add_option("robot", excite_flags.robot, "robot folder or TOML file")->required();
@@ -237,7 +241,7 @@ int main(int argc, char** argv) {
             ->check(CLI::Range(0.01, 600.0))
             ->capture_default_str();
         excite->add_option("--posterior", excite_flags.posterior,
-                           "what is known already: a posterior.json; default: the prior");
+                           "a posterior.json to start from; default: the prior");
         excite->add_option("--png", excite_flags.png, "draw the best one as a strip of snapshots");
         train =
             app.add_subcommand("train", "train a policy on simulators drawn from a distribution");
@@ -285,11 +289,11 @@ int main(int argc, char** argv) {
         train->add_option("--held-out", train_flags.held_out, "simulators to judge the policy by")
             ->check(CLI::Range(1, 1000000))
             ->capture_default_str();
-        doctor = app.add_subcommand("doctor", "look whether this machine has what a run needs");
+        doctor = app.add_subcommand("doctor", "check that this machine is ready for a run");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")
             ->capture_default_str();
         doctor->add_option("--key", key, "key that the commands are going to be signed with");
-        CLI::App* can = app.add_subcommand("can", "what is on the robot's CAN bus");
+        CLI::App* can = app.add_subcommand("can", "the plan of the robot's CAN bus");
         can->require_subcommand(1);
         can_plan = can->add_subcommand(
             "plan", "ids, load and response times; exit status 1 if it cannot work");
@@ -297,10 +301,10 @@ int main(int argc, char** argv) {
         can_dbc = can->add_subcommand("dbc", "all messages as a DBC file, for other tools");
         can_dbc->add_option("robot", can_robot, "robot folder or TOML file")->required();
         can_dbc->add_option("--output", dbc_output, "file; default: print it");
-        CLI::App* estimate = app.add_subcommand("estimate", "what the estimator assumes");
+        CLI::App* estimate = app.add_subcommand("estimate", "settings of the estimator");
         estimate->require_subcommand(1);
         tune = estimate->add_subcommand(
-            "tune", "learn from a log what noise sensors and motion have, for robot.toml");
+            "tune", "infer the noise of sensors and motion from a log, for robot.toml");
         tune->add_option("robot", tune_robot, "robot folder or TOML file")->required();
         tune->add_option("--log", tune_log, "LCM log with JOINT_STATE and IMU")->required();
         arm = app.add_subcommand("arm", "switch the motors on, also after a fault");

@@ -9,8 +9,8 @@ namespace plumb {
 /// robot that already talks on a bus meant for a virtual one is a real one.
 /// @param real the robot itself is on the bus. Otherwise the bus must be one that no real robot can
 /// be on: udp: or a vcan interface; or loop:, on which nobody is.
-/// @throws std::runtime_error or std::invalid_argument, one line that says what to do. Also if the
-/// bus cannot be opened.
+/// Not thread-safe. @throws std::runtime_error or std::invalid_argument, one line that says what to
+/// do. Also if the bus cannot be opened.
 void RequireFree(const std::string& lcm_url, const std::string& bus_url, bool real);
 
 }  // namespace plumb

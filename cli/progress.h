@@ -14,7 +14,7 @@
 
 namespace plumb {
 
-/// What a run has shown so far, gathered from the status messages: the live line, the table, the
+/// The progress of a run, gathered from the status messages, for the live line, the table and the
 /// summary. Time is an argument. Not thread-safe.
 class Progress {
  public:

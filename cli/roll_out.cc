@@ -17,14 +17,14 @@ void AppendNumbers(const Eigen::VectorXd& numbers, std::string& csv) {
 
 }  // namespace
 
-SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& robot,
-                             const Actor& actor, uint64_t seed, uint32_t number,
-                             const std::function<void(const SimulatedStep&)>& see,
-                             const std::function<bool()>& stop) {
+EpisodeSummary PlayEpisode(Environment& environment, const RobotDescription& robot,
+                           const Actor& actor, uint64_t seed, uint32_t number,
+                           const std::function<void(const SimulatedStep&)>& see,
+                           const std::function<bool()>& stop) {
   const Task& task = environment.task();
   Random start(seed, {number, kStartStream}), random(seed, {number, kActorStream});
   environment.Reset(start);
-  SimulatedEpisode episode;
+  EpisodeSummary episode;
   Eigen::VectorXf observation(environment.observation_size());
   SimulatedStep step;
   step.action.resize(environment.action_size());
@@ -36,7 +36,7 @@ SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& r
     step.time = static_cast<double>(episode.steps) * robot.task.period;
     step.q = environment.q();
     step.v = environment.v();
-    const Environment::StepResult result = environment.Step(action);
+    const StepResult result = environment.Step(action);
     for (int i = 0; i < environment.action_size(); ++i) {
       step.action[i] =
           environment.effort()[task.action_indices()[static_cast<size_t>(i)]] / task.action_unit(i);
@@ -49,28 +49,28 @@ SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& r
     see(step);
     if (result.terminated) {
       const bool finite = environment.q().allFinite() && environment.v().allFinite();
-      episode.end = finite ? SimulatedEpisode::End::kTerminated : SimulatedEpisode::End::kNotFinite;
+      episode.end = finite ? EpisodeSummary::End::kTerminated : EpisodeSummary::End::kNotFinite;
       return episode;
     }
     if (stop()) {
-      episode.end = SimulatedEpisode::End::kInterrupted;
+      episode.end = EpisodeSummary::End::kInterrupted;
       return episode;
     }
   } while (episode.steps < limit);
   return episode;
 }
 
-std::string Totals(const std::vector<SimulatedEpisode>& episodes) {
-  const auto failed = [](const SimulatedEpisode& episode) {
-    return episode.end == SimulatedEpisode::End::kNotFinite;
+std::string Totals(const std::vector<EpisodeSummary>& episodes) {
+  const auto failed = [](const EpisodeSummary& episode) {
+    return episode.end == EpisodeSummary::End::kNotFinite;
   };
   double sum = 0, squares = 0, count = 0;
   int64_t steps = 0;
-  for (const SimulatedEpisode& episode : episodes) {
+  for (const EpisodeSummary& episode : episodes) {
     steps += episode.steps;
     if (!failed(episode)) sum += episode.sum, ++count;
   }
-  for (const SimulatedEpisode& episode : episodes) {
+  for (const EpisodeSummary& episode : episodes) {
     if (!failed(episode)) squares += std::pow(episode.sum - sum / count, 2);
   }
   std::string text = fmt::format("{} episode{}, {} steps", episodes.size(),

@@ -23,24 +23,26 @@ struct SimulatedStep {
   bool terminated, truncated;
 };
 
-struct SimulatedEpisode {
+/// How long an episode was, what it earned, and why it ended.
+struct EpisodeSummary {
   int64_t steps = 0;
   double sum = 0;  ///< of the rewards
   enum class End { kTimeLimit, kTerminated, kNotFinite, kInterrupted };
   End end = End::kTimeLimit;
 };
 
-/// Plays one episode of the environment. Equal seeds and numbers give equal episodes.
+/// Plays one episode of the environment. Equal seeds and numbers give equal episodes. One thread
+/// for each environment.
 /// @param see is shown every step, in order. @param stop is asked after every step but the last.
 /// @throws std::runtime_error if an action is not finite.
-SimulatedEpisode PlayEpisode(Environment& environment, const RobotDescription& robot,
-                             const Actor& actor, uint64_t seed, uint32_t number,
-                             const std::function<void(const SimulatedStep&)>& see,
-                             const std::function<bool()>& stop);
+EpisodeSummary PlayEpisode(Environment& environment, const RobotDescription& robot,
+                           const Actor& actor, uint64_t seed, uint32_t number,
+                           const std::function<void(const SimulatedStep&)>& see,
+                           const std::function<bool()>& stop);
 
 /// "3 episodes, 396 steps, mean return 129.5, standard deviation 1.2". Episodes whose simulation
 /// failed have no return: they are counted apart.
-std::string Totals(const std::vector<SimulatedEpisode>& episodes);
+std::string Totals(const std::vector<EpisodeSummary>& episodes);
 
 /// The table's head: t, q/<joint>, v/<joint>, u/<driven joint>, reward, terminated, truncated. A
 /// spherical joint has /w, /x, /y, /z in q and /x, /y, /z in v.

@@ -53,7 +53,7 @@ void RunProcesses::Start() {
   if (!flags_.real) driver.push_back("--virtual");
   if (flags_.allow_unsigned) driver.push_back("--unsigned");
   std::vector<std::string> controller{flags_.robot, "--seed", seed};
-  // nobody throws a real robot about
+  // a real robot cannot be placed: it rests, then its episode begins where it is
   if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});
   if (!flags_.key.empty()) {
     for (auto* arguments : {&driver, &controller})
@@ -101,7 +101,7 @@ void RunProcesses::Stop(bool hurry) noexcept {
 /// Everything that could command ends at one moment; the driver disarms and confirms; the robot
 /// goes last.
 void RunProcesses::StopInVirtualTime(bool hurry) {
-  constexpr int64_t kFarewell = 1'000'000, kSlice = 10'000;  // [us]
+  constexpr int64_t kStopTimeout = 1'000'000, kSlice = 10'000;  // [us]
   // [s] of real time, with a person who waits
   constexpr double kPatience = 0.5;
   const auto start = SteadyClock::now();
@@ -116,7 +116,7 @@ void RunProcesses::StopInVirtualTime(bool hurry) {
     for (const Child& child : children_) {
       if (whom(child)) coordinator_->Stop(child.name());
     }
-    const int64_t deadline = coordinator_->now() + kFarewell;
+    const int64_t deadline = coordinator_->now() + kStopTimeout;
     while (anybody(whom) && coordinator_->now() < deadline && in_time()) {
       coordinator_->participant().Wait(coordinator_->now() + kSlice, Participant::Wake::kOnTime);
     }

@@ -27,7 +27,7 @@ class RunProcesses {
 
   /// @throws std::runtime_error if one cannot be started.
   void Start();
-  /// One that has ended, though nobody has asked it to; null if all run.
+  /// A process that has ended though nobody has asked it to; null if all run.
   Child* Ended();
   /// Motors first, the virtual robot last. Does not throw. @param hurry whatever they do: within a
   /// second, for a person who waits. Otherwise, in virtual time, always in the same way.

@@ -8,12 +8,12 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
+#include "common/time_units.h"
+#include "robot/posterior_reader.h"
 #include "sim/view/picture.h"
-#include "sim/view/viewer.h"
 #include "trainer/policy_file.h"
 
 namespace plumb {
@@ -63,6 +63,13 @@ void Set(const std::string& assignment, RobotDescription& robot) {
   }
 }
 
+/// The posterior's means instead of the prior's.
+void SetMeans(const std::string& posterior, RobotDescription& robot) {
+  const Eigen::VectorXd means = ReadPosterior(posterior, robot).Mean();
+  for (size_t i = 0; i < robot.parameters.size(); ++i)
+    robot.parameters[i].mean = means(static_cast<Eigen::Index>(i));
+}
+
 Eigen::VectorXd Means(const RobotDescription& robot) {
   Eigen::VectorXd means(robot.parameters.size());
   std::transform(robot.parameters.begin(), robot.parameters.end(), means.begin(),
@@ -85,15 +92,15 @@ Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task
   };
 }
 
-const char* Describe(SimulatedEpisode::End end) {
+const char* Describe(EpisodeSummary::End end) {
   switch (end) {
-    case SimulatedEpisode::End::kTimeLimit:
+    case EpisodeSummary::End::kTimeLimit:
       return "time limit";
-    case SimulatedEpisode::End::kTerminated:
+    case EpisodeSummary::End::kTerminated:
       return "terminated by the task";
-    case SimulatedEpisode::End::kNotFinite:
+    case EpisodeSummary::End::kNotFinite:
       return "the simulation is no longer finite";
-    case SimulatedEpisode::End::kInterrupted:
+    case EpisodeSummary::End::kInterrupted:
       return "interrupted";
   }
   return "";
@@ -125,6 +132,7 @@ int Simulate(Process& process, const SimFlags& flags) {
     throw std::invalid_argument("--policy and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
+  if (!flags.posterior.empty()) SetMeans(flags.posterior, robot);
   if (flags.urdf) robot.parameters.clear();
   for (const std::string& assignment : flags.set) Set(assignment, robot);
   RequireOutputs(flags);
@@ -132,8 +140,6 @@ int Simulate(Process& process, const SimFlags& flags) {
   Environment environment(robot);
   environment.SetParameters(means);
   const Actor actor = MakeActor(flags, robot, environment.task());
-  std::unique_ptr<Viewer> viewer;
-  if (flags.view) viewer = std::make_unique<Viewer>(robot);
 
   std::cout << fmt::format("{}, task {}, {}, seed {}\n", robot.name, robot.task.name,
                            flags.random           ? "random actions"
@@ -144,11 +150,9 @@ int Simulate(Process& process, const SimFlags& flags) {
             << fmt::format("{:>7}  {:>6}  {:>10}  ended by\n", "episode", "steps", "return");
   std::string csv = CsvHeader(robot);
   std::vector<Snapshot> film;  // of the first episode
-  std::vector<SimulatedEpisode> episodes;
+  std::vector<EpisodeSummary> episodes;
   int64_t asked = 0;
-  const auto stop = [&] {
-    return (flags.view || ++asked % kStepsPerLook == 0) && process.stopping();
-  };
+  const auto stop = [&] { return ++asked % kStepsPerLook == 0 && process.stopping(); };
   const int64_t begin = process.clock().Now();
   for (int number = 0; number < flags.episodes; ++number) {
     if (process.stopping()) {
@@ -158,23 +162,22 @@ int Simulate(Process& process, const SimFlags& flags) {
     const auto see = [&](const SimulatedStep& step) {
       if (!flags.csv.empty()) AppendCsv(step, csv);
       if (number == 0) film.push_back({step.time, step.q});
-      if (viewer) viewer->Show(step.time, step.q);
     };
     episodes.push_back(PlayEpisode(environment, robot, actor, flags.seed,
                                    static_cast<uint32_t>(number), see, stop));
-    const SimulatedEpisode& episode = episodes.back();
+    const EpisodeSummary& episode = episodes.back();
     std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum,
                              Describe(episode.end))
               << std::endl;
-    if (episode.end == SimulatedEpisode::End::kInterrupted) return 130;
+    if (episode.end == EpisodeSummary::End::kInterrupted) return 130;
     if (number == 0 && environment.q().allFinite()) {
       film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
     }
   }
-  const double seconds = std::max(
-      static_cast<double>(process.clock().Now() - begin) * 1e-6 / process.clock().scale(), 1e-6);
+  const double seconds =
+      std::max(Seconds(process.clock().Now() - begin) / process.clock().scale(), 1e-6);
   double steps = 0;
-  for (const SimulatedEpisode& episode : episodes) steps += static_cast<double>(episode.steps);
+  for (const EpisodeSummary& episode : episodes) steps += static_cast<double>(episode.steps);
   std::cout << Totals(episodes)
             << fmt::format("\n{:.1f} s simulated in {:.2f} s, {:.0f} steps per second\n",
                            steps * robot.task.period, seconds, steps / seconds);

@@ -8,6 +8,7 @@
 
 namespace plumb {
 
+/// The flags of `plumb sim`.
 struct SimFlags {
   std::string robot;
   std::string policy;  ///< file; empty = none
@@ -15,14 +16,15 @@ struct SimFlags {
   uint64_t seed = 1;
   int episodes = 1;
   std::string csv, png, gif;     ///< files; empty = none
+  std::string posterior;         ///< posterior.json, its means for the prior's; empty = the prior
   std::vector<std::string> set;  ///< "mass/thigh=4"
   bool urdf = false;             ///< forget the uncertain parameters' prior means
-  bool view = false;
 };
 
 /// `plumb sim`: rolls a policy, random actions or no action out in the simulator, without messages
 /// or buses, and says how it went. @return exit status: 0, or 130 if it was interrupted; then it
-/// writes no files.
+/// writes no files. Runs in one thread.
+/// @throws std::invalid_argument or std::runtime_error, one line for people: robot, policy, files.
 int Simulate(Process& process, const SimFlags& flags);
 
 }  // namespace plumb

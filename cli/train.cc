@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -16,8 +15,10 @@
 #include <thread>
 
 #include "common/atomic_file.h"
-#include "common/batches.h"
+#include "common/batch_runner.h"
 #include "common/config.h"
+#include "common/hash.h"
+#include "common/progress_line.h"
 #include "common/ranks.h"
 #include "robot/posterior_reader.h"
 #include "trainer/checkpoint.h"
@@ -47,7 +48,7 @@ class Stopwatch {
 
 RobotDescription ReadRobot(const TrainFlags& flags) {
   RobotDescription robot = LoadRobot(flags.robot);
-  if (flags.paper) robot.training = AsThePaper(robot.training);
+  if (flags.paper) robot.training = PaperSettings(robot.training);
   if (flags.worst_share > 0) robot.training.worst_share = flags.worst_share;
   if (flags.worst_after >= 0) robot.training.worst_after = flags.worst_after;
   return robot;
@@ -56,11 +57,12 @@ RobotDescription ReadRobot(const TrainFlags& flags) {
 ParameterDistribution ReadDistribution(const std::string& name, const RobotDescription& robot) {
   if (name != "prior" && name != "nominal") return ReadPosterior(name, robot);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  if (name == "nominal") distribution.components[0].covariance.setZero();
+  if (name == "nominal") distribution.mixture.components[0].covariance.setZero();
   return distribution;
 }
 
-/// What the result depends on, but for the steps: a longer run may go on from a shorter one.
+/// A fingerprint of all that the result depends on, but for the number of steps: a longer run may
+/// go on from a shorter one.
 uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
                     const ParameterDistribution& distribution,
                     const std::optional<GaussianPolicy>& start) {
@@ -68,9 +70,10 @@ uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
   std::ostringstream text;
   text << VersionLine("plumb") << robot.fingerprint << s.normalise_values << s.fisher_fraction
        << ' ' << s.worst_share << ' ' << s.worst_after << ' ' << flags.seed;
-  for (const auto& component : distribution.components) {
-    text.precision(17);
-    text << component.weight << component.mean << component.covariance;
+  text.precision(17);
+  for (size_t i = 0; i < distribution.mixture.components.size(); ++i) {
+    const Gaussian& component = distribution.mixture.components[i];
+    text << distribution.mixture.weights[i] << component.mean << component.covariance;
   }
   if (start) text << start->parameters << start->observation_mean << start->observation_scale;
   return Hash(text.str());
@@ -115,19 +118,16 @@ std::string Clock(double seconds) {
 }
 
 /// One line that is written over where people look at it; into a file, a line now and then.
-class ProgressLine {
+class TrainingProgress {
  public:
-  explicit ProgressLine(bool speaks) : speaks_(speaks) {}
-  ~ProgressLine() {
-    if (terminal_ && shown_) std::cerr << "\n";
-  }
+  explicit TrainingProgress(bool speaks) : speaks_(speaks), line_(speaks) {}
+  ~TrainingProgress() { line_.Keep(); }
   void Show(const Trainer& trainer, const UpdateReport& report, int64_t steps,
             int64_t done_before) {
     if (!speaks_) return;
     const double seconds = clock_.seconds();
     if (seconds < next_ && trainer.steps() < steps) return;
-    next_ = seconds + (terminal_ ? 0.1 : 5);
-    shown_ = true;
+    next_ = seconds + (line_.shown() ? 0.1 : 5);
     const double speed = static_cast<double>(trainer.steps() - done_before) / seconds;
     const std::string line = fmt::format(
         "{:3.0f} %  {:.3g} steps  return {:.5g}  KL {:.4f}  gain {:.3f}  explained {:.2f}  entropy "
@@ -136,12 +136,13 @@ class ProgressLine {
         static_cast<double>(trainer.steps()), report.mean_return, report.step.kl,
         report.step.surrogate_gain, report.explained_variance, report.entropy, speed,
         Clock(static_cast<double>(steps - trainer.steps()) / speed));
-    std::cerr << (terminal_ ? "\r\033[K" : "") << line << (terminal_ ? "" : "\n") << std::flush;
+    line_.Show(line);
+    if (!line_.shown()) std::cerr << line << std::endl;
   }
 
  private:
-  bool speaks_, terminal_ = isatty(STDERR_FILENO);
-  bool shown_ = false;
+  bool speaks_;
+  ProgressLine line_;
   double next_ = 0;
   Stopwatch clock_;
 };
@@ -175,7 +176,7 @@ class Training {
     const ParameterSampler sample = [this](Random& random) { return distribution_.Sample(random); };
     ProgressTable table(speaks() ? flags_.csv : "", trainer_.updates());
     {
-      ProgressLine line(speaks());
+      TrainingProgress line(speaks());
       const int64_t before = trainer_.steps();
       double saved = 0;
       while (trainer_.steps() < steps_) {
@@ -287,9 +288,9 @@ class Training {
     std::cout << fmt::format(
         "{} steps, {} updates, {:.1f} s\nreturn without exploration, {} simulators held out:\n",
         trainer_.steps(), trainer_.updates(), clock_.seconds(), flags_.held_out);
-    std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Words(own));
+    std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Summary(own));
     if (flags_.distribution != "prior")
-      std::cout << fmt::format("  {:24} {}\n", "prior", Words(on_prior));
+      std::cout << fmt::format("  {:24} {}\n", "prior", Summary(on_prior));
     std::cout << "wrote " << flags_.output << std::endl;
   }
 

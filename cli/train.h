@@ -7,6 +7,7 @@
 
 namespace plumb {
 
+/// The flags of `plumb train`.
 struct TrainFlags {
   std::string robot;
   /// a posterior.json, "prior" or "nominal" (the prior's means)
@@ -19,7 +20,7 @@ struct TrainFlags {
   std::string csv;         ///< file; empty = none
   /// a policy or checkpoint to begin with; empty = from scratch
   std::string from;
-  bool paper = false;      ///< see AsThePaper
+  bool paper = false;      ///< see PaperSettings
   double worst_share = 0;  ///< 0 = the robot's setting
   int worst_after = -1;    ///< updates; negative = the robot's setting
   int evaluate_every = 0;  ///< updates; 0 = never
@@ -30,6 +31,8 @@ struct TrainFlags {
 /// process, and says how it does on simulators held out. An interrupted run leaves a checkpoint,
 /// from which the same command goes on to the same bits.
 /// @return exit status: 0, or 130 if it was interrupted.
+/// @throws std::invalid_argument or std::runtime_error, one line for people: robot, distribution,
+/// files, simulations that cannot be used.
 int Train(Process& process, TrainFlags flags);
 
 }  // namespace plumb

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calibrator/motion/log_reader.h"
-#include "cli/progress_line.h"
+#include "common/progress_line.h"
 #include "estimator/noise_tuning.h"
 
 namespace plumb {
@@ -55,10 +55,10 @@ int TuneEstimator(const std::string& robot_path, const std::string& log) {
     throw std::runtime_error(
         fmt::format("{}: has no JOINT_STATE ({} undecodable)", log, undecodable));
   }
-  const ProgressLine line;
+  ProgressLine line;
   int played = 0;
   const TunedNoise tuned = TuneNoise(robot, [&](StateObserver& observer) {
-    line.Show("playing the log with other noise", static_cast<double>(played++) / kMostPlays);
+    line.Show("playing the log with other noise", static_cast<double>(played++) / kMaxPlays);
     for (const auto& message : messages) {
       if (const auto* imu = std::get_if<imu_t>(&message))
         observer.OnImu(*imu);

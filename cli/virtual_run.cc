@@ -10,7 +10,7 @@
 namespace plumb {
 namespace {
 
-/// What candump would call the interface.
+/// The interface's name, as candump would print it.
 std::string_view Interface(std::string_view bus_url) {
   constexpr std::string_view kSocketCan = "socketcan:";
   return bus_url.starts_with(kSocketCan) ? bus_url.substr(kSocketCan.size()) : "can0";

@@ -12,8 +12,8 @@
 
 namespace plumb {
 
-/// What a run in virtual time has besides its processes: the coordinator, the mirror of its
-/// messages on LCM, and its records. Not thread-safe.
+/// The parts of a run in virtual time that are no processes of their own: the coordinator, the
+/// mirror of its messages on LCM, and its records. Not thread-safe.
 class VirtualRun {
  public:
   struct Records {
@@ -32,7 +32,7 @@ class VirtualRun {
   Coordinator& coordinator() { return coordinator_; }
   /// Why nobody outside sees the messages; empty if they do.
   const std::string& mirror_failure() const { return mirror_failure_; }
-  /// What somebody outside the run has said on LCM since the last call.
+  /// Messages that somebody outside the run has sent on LCM since the last call.
   std::vector<LcmMirror::Message> TakeStrangers() {
     return mirror_ ? mirror_->TakeStrangers() : std::vector<LcmMirror::Message>();
   }

@@ -34,8 +34,8 @@ class Clock {
   int64_t Utime() const;
   /// Scaled CLOCK_MONOTONIC: for deadlines and staleness. Its origin is arbitrary.
   int64_t Now() const;
-  /// What signatures are dated by: real time, not scaled, so that it rises from run to run; virtual
-  /// time, if it is.
+  /// The date of signatures [us]: real time, not scaled, so that it rises from run to run; virtual
+  /// time in a run in virtual time.
   int64_t SigningUtime() const;
   /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds). Not of virtual time, which
   /// no kernel knows.

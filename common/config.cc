@@ -7,17 +7,18 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <numeric>
 #include <tuple>
 #define TOML_HEADER_ONLY 1
 #include <toml++/toml.h>
+
+#include "common/nearest_name.h"
 
 namespace plumb {
 namespace {
 
 constexpr int kLongestChain = 8;  // of files that extend each other
 
-// What is merged into a file keeps the name of its own.
+// A value that was merged in from another file is reported with that file's name.
 std::string At(const std::string& file, const toml::source_region& source) {
   if (source.begin.line == 0) return file + ": ";
   return fmt::format("{}:{}:{}: ", source.path ? *source.path : file, source.begin.line,
@@ -109,21 +110,6 @@ std::string Describe(Range range) {
 bool Inside(double value, Range range) { return value >= range.lower && value <= range.upper; }
 
 }  // namespace
-
-size_t EditDistance(const std::string& a, const std::string& b) {
-  std::vector<size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), size_t{0});
-  for (size_t i = 1; i <= a.size(); ++i) {
-    size_t diagonal = row[0];
-    row[0] = i;
-    for (size_t j = 1; j <= b.size(); ++j) {
-      const size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({substituted, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row.back();
-}
 
 std::string ReadFile(const std::string& file) {
   std::error_code error;
@@ -313,7 +299,7 @@ std::vector<Config> Config::Tables(const std::string& key) {
 }
 
 std::vector<std::string> Config::Keys() const {
-  // What the file itself says comes after what it extends.
+  // The file's own keys come after those of the file that it extends.
   std::vector<std::tuple<bool, toml::source_position, std::string>> keys;
   for (const auto& [key, node] : table()) {
     const toml::source_region& source = node.source();
@@ -328,11 +314,9 @@ std::vector<std::string> Config::Keys() const {
 void Config::Finish() const {
   for (const std::string& key : Keys()) {
     if (known_.count(key) != 0) continue;
-    const auto nearest = std::min_element(
-        known_.begin(), known_.end(),
-        [&](const auto& a, const auto& b) { return EditDistance(a, key) < EditDistance(b, key); });
+    const std::vector<std::string> known(known_.begin(), known_.end());
     Fail(key, "is not a known key" +
-                  (nearest == known_.end() ? "" : "; did you mean " + *nearest + "?"));
+                  (known.empty() ? "" : "; did you mean " + NearestName(key, known) + "?"));
   }
 }
 

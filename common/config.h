@@ -58,7 +58,8 @@ class Config {
   /// A key that may hold a table or something else.
   bool IsTable(const std::string& key) const;
 
-  /// Values; without `fallback` the key is required.
+  /// Values; without `fallback` the key is required. @throws ConfigError naming the key's place, if
+  /// it is missing, of another type or out of range.
   double Number(const std::string& key, Range range = kFinite, std::optional<double> fallback = {});
   int Integer(const std::string& key, Range range, std::optional<int> fallback = {});
   bool Boolean(const std::string& key, std::optional<bool> fallback = {});
@@ -102,8 +103,5 @@ class Config {
 /// The bytes of a regular file. @throws ConfigError if it is none, cannot be read or is longer than
 /// 16 MB.
 std::string ReadFile(const std::string& file);
-
-/// Levenshtein's distance, for "did you mean".
-size_t EditDistance(const std::string& a, const std::string& b);
 
 }  // namespace plumb

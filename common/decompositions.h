@@ -24,7 +24,7 @@ extern template SelfAdjointEigenSolver<MatrixXd>& SelfAdjointEigenSolver<MatrixX
 
 namespace plumb {
 
-/// As m.inverse().
+/// As m.inverse(), for any square m. Thread-safe, as all of these are.
 Eigen::MatrixXd Inverse(const Eigen::MatrixXd& m);
 
 /// Of the matrix Q that a QR decomposition makes as a product: FirstColumns(qr.householderQ(), n).

@@ -13,7 +13,7 @@ namespace plumb {
 
 /// The program: accepts whole messages ("LC02") whose channel name ends within 64 bytes, and
 /// fragments ("LC03") that lie inside a message of at most `max_message` bytes; drops everything
-/// else.
+/// else. Thread-safe.
 std::vector<sock_filter> LcmGuardProgram(uint32_t max_message);
 
 /// Attaches the program to every UDP socket of this process bound to `port`.

@@ -9,7 +9,7 @@
 namespace plumb {
 namespace {
 
-constexpr int kMostAttempts = 3;
+constexpr int kMaxAttempts = 3;
 
 }  // namespace
 
@@ -17,7 +17,7 @@ Messenger::Messenger(const std::string& url) : url_(url), lcm_(url) {
   // liblcm tests itself when its file descriptor is first wanted, in two tenths of a second: a busy
   // machine may need another go. A subscription made where that fails is a null pointer.
   bool works = lcm_.good();
-  for (int attempt = 0; works && lcm_.getFileno() < 0; ++attempt) works = attempt < kMostAttempts;
+  for (int attempt = 0; works && lcm_.getFileno() < 0; ++attempt) works = attempt < kMaxAttempts;
   if (!works) {
     const bool multicast = url.empty() || url.rfind("udpm", 0) == 0;
     throw std::runtime_error(fmt::format("cannot open LCM at '{}'{}", url,
@@ -70,11 +70,11 @@ void Messenger::Subscription::OnBuffer(const lcm::ReceiveBuffer* buffer,
   handler_(channel, {static_cast<const uint8_t*>(buffer->data), buffer->data_size});
 }
 
-int Messenger::Drain(int most) {
+int Messenger::Drain(int max_messages) {
   int handled = 0;
   if (participant_) {
     std::deque<lockstep_post_t>& heard = participant_->messages();
-    for (; handled < most && !heard.empty(); ++handled) {
+    for (; handled < max_messages && !heard.empty(); ++handled) {
       const lockstep_post_t post = std::move(heard.front());
       heard.pop_front();
       for (const Subscription* subscription : subscriptions_) {
@@ -84,12 +84,12 @@ int Messenger::Drain(int most) {
     }
     return handled;
   }
-  for (; handled < most; ++handled) {
+  for (; handled < max_messages; ++handled) {
     const int result = lcm_.handleTimeout(0);
     if (result < 0) return handled > 0 ? handled : -1;
     if (result == 0) return handled;
   }
-  return most;
+  return max_messages;
 }
 
 void Messenger::Guard() {

@@ -31,10 +31,10 @@ class Messenger {
   int fd() { return lcm_.getFileno(); }
   /// @return false if the message was not sent (liblcm says no more).
   bool Publish(const std::string& channel, std::span<const uint8_t> message);
-  /// Handles the messages that have arrived, but no more than `most`, so that a flood does not keep
+  /// Handles the messages that have arrived, at most `max_messages`, so that a flood does not keep
   /// the caller from its other duties; what is left keeps fd() readable. @return how many, -1 at
   /// the end of a file or on failure.
-  int Drain(int most = 1000);
+  int Drain(int max_messages = 1000);
   /// Called with a message's bytes as they arrived; must not throw.
   using Handler = std::function<void(const std::string& channel, std::span<const uint8_t> message)>;
   class Subscription;

@@ -19,6 +19,7 @@
 
 #include "common/program_version.h"
 #include "common/realtime.h"
+#include "common/time_units.h"
 
 namespace plumb {
 namespace {
@@ -109,7 +110,7 @@ void Process::BecomeFast(int priority) {
 
 void Process::TakeVirtualTime(double seconds) {
   if (!participant_ || seconds == 0) return;
-  const int64_t end = participant_->now() + std::llround(seconds * 1e6);
+  const int64_t end = participant_->now() + Microseconds(seconds);
   while (participant_->now() < end && !stopping())
     participant_->Wait(end, Participant::Wake::kOnTime, stop_fd_);
 }

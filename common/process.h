@@ -14,7 +14,8 @@ class App;
 
 namespace plumb {
 
-/// What every Plumbline process has: flags, a log, a clock, a stop signal, a connection to LCM.
+/// The frame of every Plumbline process: flags, a log, a clock, a stop signal, a connection to LCM.
+/// Not thread-safe.
 ///
 ///   int main(int argc, char** argv) {
 ///     return plumb::Run("plumb-estimator", "what it does", argc, argv,

@@ -4,7 +4,8 @@
 
 namespace plumb {
 
-/// "0.1.0 (3f2a9c1, clean)": what was built from the same state of the sources has the same.
+/// "0.1.0 (3f2a9c1, clean)": the same for programs that were built from the same sources.
+/// Thread-safe.
 std::string ProgramVersion();
 
 }  // namespace plumb

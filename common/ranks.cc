@@ -101,9 +101,9 @@ Ranks::~Ranks() {
 
 void Ranks::Broadcast(std::span<std::byte> bytes) const {
   if (size_ == 1) return;
-  constexpr size_t kMost = 1 << 30;  // MPI counts in int
-  for (size_t first = 0; first < bytes.size(); first += kMost) {
-    const size_t count = std::min(kMost, bytes.size() - first);
+  constexpr size_t kMax = 1 << 30;  // MPI counts in int
+  for (size_t first = 0; first < bytes.size(); first += kMax) {
+    const size_t count = std::min(kMax, bytes.size() - first);
     MPI_Bcast(bytes.data() + first, static_cast<int>(count), MPI_BYTE, 0, MPI_COMM_WORLD);
   }
 }

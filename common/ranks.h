@@ -52,7 +52,7 @@ class Ranks {
     return all;
   }
 
-  /// What the ranks have each, in their order. Not all need have as much.
+  /// The bytes of all ranks, in their order. Each may have another number of them.
   /// @throws std::length_error if it is more than 2 GiB.
   std::vector<std::byte> Concatenate(std::span<const std::byte> mine) const;
 

@@ -17,7 +17,7 @@ inline constexpr int kHighestPriority = 90;
 /// @throws std::runtime_error with the cure if the system refuses.
 void BecomeRealtime(int priority);
 
-/// The calling thread has time. Does nothing where it is an ordinary one already.
+/// Gives the calling thread ordinary priority. Does nothing where it has that already.
 void BecomeOrdinary() noexcept;
 
 /// --realtime-priority, 0 = off.

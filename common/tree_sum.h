@@ -10,7 +10,7 @@ namespace plumb {
 /// Sums of many vectors have the same bits whoever adds them up if the order of the additions is
 /// fixed. Here it is a binary tree's: the terms [begin, end) are the sum of [begin, middle) and
 /// [middle, end), the middle rounded down. Whoever has consecutive terms can add up whole branches
-/// alone and need only hand on those.
+/// alone and need only hand on those. Thread-safe for different values.
 
 /// The terms [begin, end) of a sum, added up.
 struct PartialSum {

@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
@@ -19,8 +21,6 @@ constexpr double kPlaceSpeedFactor = 10;
 // Third words of the random streams, so that placement, exploration and the other processes'
 // streams never meet.
 constexpr uint32_t kPlacementStream = 0xC0000000, kExplorationStream = 0x80000000;
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 Eigen::Map<const Eigen::VectorXd> Map(const std::vector<double>& values) {
   return {values.data(), static_cast<Eigen::Index>(values.size())};

@@ -52,7 +52,7 @@ class GaussianPolicy {
   /// A random action, not clipped.
   Eigen::VectorXf Sample(const Eigen::Ref<const Eigen::VectorXf>& observation,
                          Random& random) const;
-  /// What the network sees: (observation - mean) / scale, clipped to +-kObservationClip.
+  /// The network's input: (observation - mean) / scale, clipped to +-kObservationClip.
   Eigen::VectorXf Normalize(const Eigen::Ref<const Eigen::VectorXf>& observation) const;
 
   static constexpr float kObservationClip = 10;

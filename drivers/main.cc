@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 
@@ -15,6 +14,7 @@
 #include "common/process.h"
 #include "common/realtime.h"
 #include "common/signature.h"
+#include "common/time_units.h"
 #include "drivers/driver/driver.h"
 #include "drivers/driver/flight_recorder.h"
 #include "drivers/driver/phase_times.h"
@@ -27,7 +27,7 @@ namespace {
 constexpr int64_t kStatusPeriod = 100'000;  // [us]
 constexpr int64_t kReopenPeriod = 100'000;  // [us]
 // [s] real time that the drives have to confirm a disarm at the end
-constexpr double kFarewell = 0.3;
+constexpr double kDisarmTimeout = 0.3;
 // of frames per wake: a flood must not keep us from our deadlines
 constexpr int kBursts = 8;
 constexpr int64_t kFlight = 2'000'000;    // [us] before a fault whose frames are kept
@@ -47,7 +47,7 @@ std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const s
   return Verifier(*key, channel, clock.SigningUtime());
 }
 
-void SayWhoMayCommand(const std::string& lcm_url, bool commands_signed) {
+void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {
   if (commands_signed) return spdlog::info("takes signed commands only");
   if (!StaysOnMachine(lcm_url))
     return spdlog::warn("takes unsigned commands of anybody on the network");
@@ -68,9 +68,8 @@ class DriverProcess {
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
-        transport_(
-            OpenTransport(bus, driver_.filters(),
-                          {process.participant(), std::llround(robot.driver.effort_delay * 1e6)})),
+        transport_(OpenTransport(bus, driver_.filters(),
+                                 {process.participant(), Microseconds(robot.driver.effort_delay)})),
         cycle_(driver_.cycle(), clock_.Now()),
         states_(process.messenger(), "JOINT_STATE"),
         imus_(process.messenger(), "IMU"),
@@ -91,7 +90,7 @@ class DriverProcess {
     driver_.set_bus(bus);
     driver_.set_virtual(is_virtual);
     driver_.set_commands_signed(key.has_value());
-    SayWhoMayCommand(process.lcm_url(), key.has_value());
+    LogCommandPolicy(process.lcm_url(), key.has_value());
     driver_.set_replay(transport_->is_replay());
     for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
@@ -100,7 +99,7 @@ class DriverProcess {
 
   int Run() {
     while (!process_.stopping()) Step();
-    return Farewell();
+    return DisarmAndStop();
   }
 
  private:
@@ -110,7 +109,7 @@ class DriverProcess {
     const int64_t next = std::max(transport_->NextEvent(), now) - now;
     process_.Doze(std::min(cycle_.Remaining(now), next), transport_->fd());
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
-    // What there was nothing to do for is not timed.
+    // A wake-up with nothing to do is not timed.
     phases_.Mark();
     if (ReceiveFrames()) phases_.End(PhaseTimes::kReceive);
     if (Publish()) phases_.End(PhaseTimes::kPublish);
@@ -209,12 +208,12 @@ class DriverProcess {
 
   /// Zero torque and idle drives, confirmed by their heartbeats. @return 1 if a drive that may be
   /// armed has not confirmed it in time, else 0: one that was never there has nothing to confirm.
-  int Farewell() {
+  int DisarmAndStop() {
     driver_request_t disarm{};
     disarm.utime = clock_.Utime();
     disarm.request = driver_request_t::DISARM;
     driver_.OnRequest(disarm, clock_.Now(), disarm.utime);
-    const auto patience = static_cast<int64_t>(kFarewell * 1e6 * clock_.scale());
+    const auto patience = Microseconds(kDisarmTimeout * clock_.scale());
     const int64_t begin = clock_.Now();
     do {
       Step();

@@ -4,6 +4,8 @@
 #include <limits>
 #include <numbers>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
@@ -75,7 +77,7 @@ double BaseObserver::Angle() const {
 }
 
 void BaseObserver::Read(int64_t utime, const ImuInbox::Reading& reading) {
-  const double elapsed = static_cast<double>(utime - utime_) * 1e-6;
+  const double elapsed = Seconds(utime - utime_);
   if (started_ && elapsed <= 0) return;
   const auto& [w, x, y, z] = reading.orientation;
   const bool begin = !started_ || elapsed > longest_gap_ || odometry_.astray();
@@ -106,7 +108,7 @@ void BaseObserver::Read(int64_t utime, const ImuInbox::Reading& reading) {
 }
 
 void BaseObserver::Fill(int64_t utime, robot_state_t& state) const {
-  const double ahead = static_cast<double>(utime - utime_) * 1e-6;
+  const double ahead = Seconds(utime - utime_);
   const auto set = [&](int joint, double q, double v, double q_sd, double v_sd) {
     const auto i = static_cast<size_t>(joint);
     state.q[i] = started_ ? q : std::numeric_limits<double>::quiet_NaN();
@@ -135,7 +137,7 @@ void BaseObserver::Fill(int64_t utime, robot_state_t& state) const {
 }
 
 bool BaseObserver::valid(int64_t utime) const {
-  if (!started_ || static_cast<double>(utime - utime_) * 1e-6 > longest_gap_) return false;
+  if (!started_ || Seconds(utime - utime_) > longest_gap_) return false;
   double velocity_sd = 0;
   for (const ImuMounting::Slide& slide : base_.slides)
     velocity_sd = std::hypot(velocity_sd, odometry_.velocity_sd(slide.direction));

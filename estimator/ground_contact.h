@@ -16,7 +16,7 @@ namespace plumb {
 /// no masses: what calibration learns from it is not what it put in. Not thread-safe.
 class ContactTest {
  public:
-  /// What is not known of the ground rather than of the robot: it is not quite even, and gives way.
+  /// Uncertainty of the ground rather than of the robot: it is not quite even, and gives way.
   static constexpr double kHeightSd = 1e-3;  ///< [m]
   static constexpr double kRiseSd = 0.2;     ///< [m/s]
   /// Bounds of the sum of both squares, chi-square with two degrees of freedom if the point rests:

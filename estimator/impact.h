@@ -8,7 +8,7 @@ namespace plumb {
 /// How fast a robot meets what it hits, as far as kinematics tells; 0 = it does not. An impact's
 /// force is roughly proportional to that speed (all of it is the damping's where something is hit,
 /// and gone where it rests), so the acceleration's step is left open in proportion. Masses and
-/// forces do not enter: calibration may use what comes of it.
+/// forces do not enter: calibration may use what comes of it. Functions here are thread-safe.
 struct ImpactSpeeds {
   double ground = 0;  ///< [m/s] of a point with the ground
   double stop = 0;    ///< [rad/s] or [m/s] of joints with their stops

@@ -16,9 +16,9 @@ namespace plumb {
 using KinematicState = Eigen::Matrix<double, 6, 1>;
 using KinematicCovariance = Eigen::Matrix<double, 6, 6>;
 
-/// What a reading is of. A gyro's rate is the velocity plus the bias. An accelerometer's
-/// acceleration is the mean since the mark, which is the change of the velocity since then, divided
-/// by the time, plus the bias. No joint has both.
+/// The quantity that a reading is of. A gyro's rate is the velocity plus the bias. An
+/// accelerometer's acceleration is the mean since the mark, which is the change of the velocity
+/// since then, divided by the time, plus the bias. No joint has both.
 enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 
 /// One joint's Kalman filter on a white-noise-jerk model (Bar-Shalom, Li, Kirubarajan, "Estimation

@@ -42,8 +42,8 @@ class LegOdometry {
     /// unit vector, in the world: the body stays in the plane across it
     std::optional<Eigen::Vector3d> normal = {};
   };
-  /// What legs say of a sphere that can touch the ground, in the body's axes, relative to the body.
-  /// Variances without those of the body.
+  /// The legs' measurement of a sphere that can touch the ground, in the body's axes, relative to
+  /// the body. Variances without those of the body.
   struct Foot {
     double radius = 0;                                          ///< [m]
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();           ///< [m]
@@ -56,7 +56,7 @@ class LegOdometry {
   /// @param num_feet up to FloatingBase::kMaxPoints.
   LegOdometry(const Settings& settings, size_t num_feet);
 
-  /// What is known when it begins: that it stands or is about to, within 0.04 m and 0.2 m/s, or, in
+  /// The state when it begins: it stands or is about to, within 0.04 m and 0.2 m/s, or, in
   /// the middle of a motion, little: 0.2 m, 3 m/s. Either with the lowest foot on the ground and at
   /// rest on average.
   enum class Beginning { kStands, kMoves };
@@ -102,7 +102,7 @@ class LegOdometry {
  private:
   static constexpr Eigen::Index kPosition = 0, kVelocity = 3, kAngle = 6, kRateBias = 9,
                                 kAccelerationBias = 12, kFeet = 15;
-  static constexpr int kMost = kFeet + 3 * FloatingBase::kMaxPoints;
+  static constexpr int kMax = kFeet + 3 * FloatingBase::kMaxPoints;
   struct Rest {
     Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of the centre, if it rests
     ContactTest test;
@@ -134,12 +134,12 @@ class LegOdometry {
   std::vector<Rest> feet_;
   // Of bounded size, so that what is computed with them needs no memory but the stack.
   // of the error
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMost, kMost> covariance_;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMax, kMax> covariance_;
   // what a correction finds
-  Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMost, 1> error_;
+  Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMax, 1> error_;
   // covariance of what is seen with the error
-  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMost> seen_;
-  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMost, 3> gain_;
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMax> seen_;
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMax, 3> gain_;
   int64_t slips_ = 0;
   bool astray_ = false;
 };

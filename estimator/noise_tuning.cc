@@ -27,7 +27,7 @@ constexpr Parameter kImpacts[] = {&NoiseDescription::ground_impact, &NoiseDescri
 // As it is, with impacts, both directions of each parameter, without impacts.
 static_assert(2 + std::size(kFactors) * kRounds * std::size(kParameters) * 2 +
                   std::size(kImpacts) ==
-              kMostPlays);
+              kMaxPlays);
 // [1/s] Where the search for an impact begins if there was none: 10 kg that meet 100 N s/m.
 constexpr double kFirstImpact = 10;
 
@@ -105,7 +105,7 @@ TunedNoise TuneNoise(const RobotDescription& robot,
       }
     }
   }
-  // What was not there and is not worth it is not there.
+  // A kind of noise that was absent and is not worth having stays absent.
   for (const Parameter impact : kImpacts) {
     std::vector<NoiseDescription> candidate = tuned.joints;
     for (size_t i = 0; i < n; ++i) {

@@ -15,6 +15,8 @@ struct TunedNoise {
   std::vector<double> before, after;
 };
 
+inline constexpr int kMaxPlays = 228;  ///< calls of `play`
+
 /// Noise parameters of maximum likelihood of the innovations (the prediction-error decomposition:
 /// F. Schweppe, "Evaluation of likelihood functions for Gaussian signals", IEEE Trans. Information
 /// Theory 11, 1965), by a coordinate search in their logarithms with ever smaller steps, in all
@@ -22,8 +24,7 @@ struct TunedNoise {
 /// impact. A parameter that makes no difference stays as it was. Impacts are tried where there were
 /// none, too.
 /// @param play gives an observer all messages of the log.
-/// @throws std::invalid_argument if there are fewer than 100 readings of a joint.
-inline constexpr int kMostPlays = 228;  ///< calls of `play`
+/// @throws std::invalid_argument if there are fewer than 100 readings of a joint. Thread-safe.
 TunedNoise TuneNoise(const RobotDescription& robot,
                      const std::function<void(StateObserver&)>& play);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/time_units.h"
 #include "estimator/state_observer.h"
 
 namespace plumb {
@@ -63,8 +64,7 @@ estimator_status_t StateObserver::Status() const {
   status.num_joints = state_.num_joints;
   for (const Joint& joint : joints_) {
     status.joint_name.push_back(joint.name);
-    status.age.push_back(joint.used < 0 ? kNone
-                                        : static_cast<double>(state_.utime - joint.used) * 1e-6);
+    status.age.push_back(joint.used < 0 ? kNone : Seconds(state_.utime - joint.used));
     status.position_nis.push_back(joint.position_nis.value());
     status.velocity_nis.push_back(joint.velocity_nis.value());
     status.acceleration_nis.push_back(joint.acceleration_nis.value());

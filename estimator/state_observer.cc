@@ -11,7 +11,7 @@ namespace {
 
 // [us]; beyond it nothing is known of the motion in between
 constexpr int64_t kLongestGap = 1'000'000;
-constexpr int64_t kMostAhead = 10'000;            // [us] of a joint's reading before the others
+constexpr int64_t kMaxAhead = 10'000;             // [us] of a joint's reading before the others
 constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
 // measurements after a restart until velocity can be trusted
 constexpr int kSettled = 5;
@@ -94,7 +94,7 @@ StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
     if (std::isinf(measured.velocity[i])) return Use::kRefuse;  // NaN: not measured
     if (!measured.valid[i]) continue;
     const int64_t t = measured.measured[i];
-    const bool of_that_time = t >= 0 && t < kEndOfTime && t - measured.utime <= kMostAhead &&
+    const bool of_that_time = t >= 0 && t < kEndOfTime && t - measured.utime <= kMaxAhead &&
                               measured.utime - t <= kLongestGap;
     if (!of_that_time || !std::isfinite(measured.position[i])) return Use::kRefuse;
   }
@@ -167,7 +167,7 @@ double StateObserver::FindEffortSteps(const joint_state_t& measured) {
 
 void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
   const double after = FindEffortSteps(measured);
-  // What acts on one joint may step every joint's acceleration: its own most of all, others' by
+  // An effort on one joint may step every joint's acceleration: its own most of all, others' by
   // their coupling.
   const double left = std::exp(-elapsed / kImpactFades);  // of earlier impacts
   double efforts = 0, stops = 0;                          // sums of squares

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/time_units.h"
 #include "estimator/base_observer.h"
 #include "estimator/ground_contact.h"
 #include "estimator/imu_inbox.h"
@@ -99,9 +100,6 @@ class StateObserver {
     bool of_base = false;  // base_ has its readings
   };
   enum class Use { kUse, kRefuse, kDuplicate, kReordered };
-
-  static double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
-  static int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
   Use Judge(const joint_state_t& measured) const;
   bool IsNew(const joint_state_t& measured, size_t joint) const;

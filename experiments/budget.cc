@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "calibrator/fit/discrepancy.h"
 #include "calibrator/fit/methods.h"
-#include "calibrator/live/simopt.h"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
 namespace {
@@ -55,7 +56,7 @@ BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>&
   const auto model = std::make_shared<const Model>(robot);
   CalibrationOptions options;
   options.seed = seed;
-  options.workforce = threads;
+  options.execution = threads;
   auto count = std::min(static_cast<int64_t>(CountTransitions(rollouts)), budget / kCheapest);
   while (count >= kFewest) {
     const std::vector<Rollout> spread = SpreadTransitions(rollouts, count);
@@ -64,15 +65,9 @@ BudgetedFit FitWithin(const RobotDescription& robot, const std::vector<Rollout>&
       count = std::min(count * 9 / 10, count * budget / result.simulated_steps);
       continue;
     }
-    BudgetedFit fit{ParameterDistribution::Prior(robot), result.simulated_steps,
-                    static_cast<int64_t>(CountTransitions(spread))};
-    fit.distribution.components.clear();
-    for (size_t i = 0; i < result.posterior.components.size(); ++i) {
-      const Gaussian& component = result.posterior.components[i];
-      fit.distribution.components.push_back(
-          {result.posterior.weights[i], component.mean, component.covariance});
-    }
-    return fit;
+    return {{0, robot.parameters, result.posterior},
+            result.simulated_steps,
+            static_cast<int64_t>(CountTransitions(spread))};
   }
   throw std::invalid_argument("a budget of " + std::to_string(budget) +
                               " simulated steps is not enough for a fit");

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calibrator/motion/transitions.h"
+#include "common/time_units.h"
 #include "controller/controller.h"
 #include "estimator/state_observer.h"
 #include "plumb/controller_status_t.hpp"
@@ -20,21 +21,19 @@ namespace plumb {
 namespace {
 
 constexpr uint32_t kStandStream = 0x5374616E;           // of random numbers; "Stan"
-constexpr int64_t kFirstStart = 1'700'000'000'000'000;  // [us] utime of trial 0: a time as any
+constexpr int64_t kFirstStart = 1'700'000'000'000'000;  // [us] utime of episode 0: a time as any
 // [us] so that no two episodes begin at the same time
-constexpr int64_t kBetweenTrials = 1'000'000'000;
+constexpr int64_t kBetweenEpisodes = 1'000'000'000;
 // [us] periods of requests and of DRIVER_STATUS
 constexpr int64_t kArmAgain = 500'000, kStatus = 100'000;
 constexpr int64_t kPatience = 30'000'000;  // [us] until the episode has begun
 constexpr int64_t kSlice = 10'000;         // [us] in which plumb-controller looks at its clock
 
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
-
-/// All that is switched on for one trial.
-class Loop {
+/// The processes that are switched on for one episode, in one loop on one bus.
+class BusLoop {
  public:
-  Loop(const RobotDescription& truth, const RobotDescription& model, const Eigen::VectorXd& hidden,
-       uint64_t seed, int64_t start, int64_t phase)
+  BusLoop(const RobotDescription& truth, const RobotDescription& model,
+          const Eigen::VectorXd& hidden, uint64_t seed, int64_t start, int64_t phase)
       : bus_(truth, hidden, model, start,
              {Microseconds(truth.driver.effort_delay), Microseconds(truth.estimator.delay)}, phase),
         observer_(model),
@@ -128,8 +127,7 @@ BusRobot::BusRobot(RobotDescription truth, RobotDescription model, Eigen::Vector
                    uint64_t seed)
     : truth_(std::move(truth)), model_(std::move(model)), hidden_(std::move(hidden)), seed_(seed) {}
 
-RealSystem::Trial BusRobot::Run(const GaussianPolicy& policy, bool explore, int steps,
-                                uint32_t number) {
+RobotEpisode BusRobot::Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) {
   policy_t message = policy.ToMessage();
   message.iteration = static_cast<int32_t>(number);
   message.purpose = explore ? policy_t::CALIBRATE : policy_t::EVALUATE;
@@ -139,7 +137,7 @@ RealSystem::Trial BusRobot::Run(const GaussianPolicy& policy, bool explore, int 
   // Drives and driver do not wait for each other.
   Random random(seed_, {kStandStream, number});
   const int64_t phase = Microseconds(random.Uniform(0, model.driver.cycle));
-  Loop loop(truth_, model, hidden_, seed_, kFirstStart + number * kBetweenTrials, phase);
+  BusLoop loop(truth_, model, hidden_, seed_, kFirstStart + number * kBetweenEpisodes, phase);
   loop.SetPolicy(message);
 
   // Switched on, it lies about as it may, but not in the ground.

@@ -11,8 +11,8 @@ namespace plumb {
 
 /// The fast loop round a virtual robot, in virtual time: its drives and sensors, their frames, the
 /// driver, the observer, the controller and the joiner of transitions, the classes that the
-/// processes are made of. Each trial begins with switching everything on and is a function of the
-/// policy, the seed and the trial's number: the same bits every time. Not thread-safe.
+/// processes are made of. Each episode begins with switching everything on and is a function of the
+/// policy, the seed and the episode's number: the same bits every time. Not thread-safe.
 class BusRobot : public RealSystem {
  public:
   /// @param truth the robot that is there. A frame takes its [estimator] delay to the driver, and
@@ -22,16 +22,16 @@ class BusRobot : public RealSystem {
   BusRobot(RobotDescription truth, RobotDescription model, Eigen::VectorXd hidden, uint64_t seed);
 
   /// The robot is armed and placed where the model's task begins an episode. The policy is told the
-  /// causal state; the roll-out has the smoothed ones. The trial ends by the task's termination,
+  /// causal state; the roll-out has the smoothed ones. The episode ends by the task's termination,
   /// after `steps` or the task's own time limit, or because the controller or the driver stops it:
   /// see stopped().
   /// @param number < 2^31.
   /// @throws std::invalid_argument if the policy is not of this robot, or the robot cannot be
   /// simulated.
   /// @throws std::runtime_error if the robot cannot be armed or placed.
-  Trial Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
+  RobotEpisode Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
 
-  /// Why the last trial did not come to its own end; empty if it did.
+  /// Why the last episode did not come to its own end; empty if it did.
   const std::string& stopped() const { return stopped_; }
 
  private:

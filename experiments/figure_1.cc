@@ -15,9 +15,10 @@
 #include <iostream>
 
 #include "calibrator/inference/conditional_mixture.h"
-#include "calibrator/inference/population_weights.h"
 #include "calibrator/inference/reps_search.h"
 #include "common/atomic_file.h"
+#include "experiments/options.h"
+#include "experiments/population_weights.h"
 #include "experiments/results.h"
 #include "plot/svg.h"
 
@@ -33,7 +34,7 @@ const Vector2d kNoise(0.0005, 0.015);  // sd of a next state that was read [rad,
 // First stream words.
 constexpr uint32_t kRobot = 1, kSimulators = 2, kSimulation = 3;
 
-struct Transition {
+struct ToyTransition {
   Vector2d state, next;
   double effort;
 };
@@ -55,8 +56,8 @@ Vector2d Read(const Vector2d& state, Random& random) {
   return state + kNoise.cwiseProduct(StandardNormals(2, 1, random));
 }
 
-std::vector<Transition> Record(int count, uint64_t seed) {
-  std::vector<Transition> transitions;
+std::vector<ToyTransition> Record(int count, uint64_t seed) {
+  std::vector<ToyTransition> transitions;
   Random random(seed, {kRobot});
   for (int t = 0; t < count; ++t) {
     const Vector2d state(random.Uniform(-M_PI, M_PI), random.Uniform(-2, 2));
@@ -85,15 +86,16 @@ struct Found {
 
 Prior OfXi() { return Prior({Prior::Normal(0, 1)}); }
 
-// What SimOpt does: the mean squared error, and a Gaussian that searches where it is small.
-Gaussian BySquaredError(const std::vector<Transition>& transitions, uint64_t seed) {
+// SimOpt's strategy: the mean squared error, and a Gaussian that searches where it is small.
+Gaussian BySquaredError(const std::vector<ToyTransition>& transitions, uint64_t seed) {
   RepsOptions options;
   options.returns = RepsReturns::kUnitRange;
   options.min_temperature = 0.01;
   options.seed = seed;
+  constexpr int kUpdates = 40;
   const auto cost = [&](const Eigen::MatrixXd& xi) {
     VectorXd costs = VectorXd::Zero(xi.cols());
-    for (const Transition& t : transitions) {
+    for (const ToyTransition& t : transitions) {
       for (Index j = 0; j < xi.cols(); ++j) {
         const Vector2d error = Step(t.state, t.effort, xi(0, j)) - t.next;
         costs(j) +=
@@ -102,17 +104,17 @@ Gaussian BySquaredError(const std::vector<Transition>& transitions, uint64_t see
     }
     return costs;
   };
-  return RepsSearch(OfXi(), cost, options).distribution;
+  return SearchByReps(OfXi(), cost, options, kUpdates).distribution;
 }
 
 // Weights of draws of the prior that together predict best, in energy distance.
-Found AsPopulation(const std::vector<Transition>& transitions, uint64_t seed) {
+Found AsPopulation(const std::vector<ToyTransition>& transitions, uint64_t seed) {
   constexpr Index kCount = 200;
   Random random(seed, {kSimulators});
   const Eigen::MatrixXd xi = OfXi().Sample(kCount, random);
   std::vector<Eigen::MatrixXd> predictions;
   Eigen::MatrixXd outcomes(2, static_cast<Index>(transitions.size()));
-  for (const Transition& t : transitions) {
+  for (const ToyTransition& t : transitions) {
     outcomes.col(static_cast<Index>(predictions.size())) = t.next.cwiseQuotient(kNoise);
     Eigen::MatrixXd prediction(2, kCount);
     for (Index j = 0; j < kCount; ++j)
@@ -123,7 +125,7 @@ Found AsPopulation(const std::vector<Transition>& transitions, uint64_t seed) {
 }
 
 // The posterior of every transition alone, and all of them together.
-Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t seed,
+Found ByConditionalMixture(const std::vector<ToyTransition>& transitions, uint64_t seed,
                            const std::function<void(double)>& progress) {
   ConditionalMixtureOptions options;
   options.simulations = 600;
@@ -134,7 +136,7 @@ Found ByConditionalMixture(const std::vector<Transition>& transitions, uint64_t 
   Found found{VectorXd(count * options.samples), {}, 0.03};
   for (Index i = 0; i < count; ++i) {
     progress(static_cast<double>(i) / static_cast<double>(count));
-    const Transition& t = transitions[static_cast<size_t>(i)];
+    const ToyTransition& t = transitions[static_cast<size_t>(i)];
     const auto simulate = [&](const Eigen::MatrixXd& xi, int64_t first) {
       Eigen::MatrixXd outcomes(2, xi.cols());
       for (Index j = 0; j < xi.cols(); ++j) {
@@ -242,7 +244,7 @@ std::string Percent(double light, double heavy) {
 }
 
 int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t seed, bool quick) {
-  const std::vector<Transition> transitions = Record(quick ? 20 : 400, seed);
+  const std::vector<ToyTransition> transitions = Record(quick ? 20 : 400, seed);
   const VectorXd grid = VectorXd::LinSpaced(321, -2, 2);
   Results results(output / "figure_1.csv", fmt::format("seed {}{}", seed, quick ? ", quick" : ""),
                   {"method"}, {"xi", "density", "near_light", "near_heavy", "mean", "sd"});
@@ -291,8 +293,7 @@ int main(int argc, char** argv) {
       "Which simulators three methods find for a robot whose payload is light or heavy.", argc,
       argv,
       [&](CLI::App& app) {
-        app.add_option("--output", output, "folder for figure_1.csv and figure_1.svg")
-            ->capture_default_str();
+        plumb::AddOutputFlag(app, output, "figure_1.csv and figure_1.svg");
         app.add_option("--seed", seed, "of all random numbers")->capture_default_str();
         app.add_flag("--quick", quick, "a twentieth of the transitions, in a second");
       },

@@ -18,6 +18,7 @@
 #include "common/atomic_file.h"
 #include "experiments/budget.h"
 #include "experiments/n_step_error.h"
+#include "experiments/options.h"
 #include "experiments/recording.h"
 #include "experiments/results.h"
 #include "plot/curves.h"
@@ -30,32 +31,30 @@ constexpr int kHorizon = 50, kSimulators = 20;
 struct Method {
   const char* key;
   std::string label;
-  Way way;
-  int64_t share;  // of the budget: one so-manieth
+  CalibrationStrategy strategy;
+  int64_t share;  // 1/share of the budget
 };
 const std::vector<Method> kMethods{
-    {"original", Label(Way::kOriginal), Way::kOriginal, 1},
-    {"step", Label(Way::kStep), Way::kStep, 1},
-    {"default", Label(Way::kDefault) + ", same budget", Way::kDefault, 1},
-    {"default-100", Label(Way::kDefault) + ", a hundredth", Way::kDefault, 100},
-    {"prior", "the prior", Way::kPrior, 1}};
+    {"original", Label(CalibrationStrategy::kOriginal), CalibrationStrategy::kOriginal, 1},
+    {"step", Label(CalibrationStrategy::kStep), CalibrationStrategy::kStep, 1},
+    {"default", Label(CalibrationStrategy::kDefault) + ", same budget",
+     CalibrationStrategy::kDefault, 1},
+    {"default-100", Label(CalibrationStrategy::kDefault) + ", a hundredth",
+     CalibrationStrategy::kDefault, 100},
+    {"prior", "the prior", CalibrationStrategy::kPrior, 1}};
 
-struct Options {
-  std::string robots, output = ".";
-  int runs = 5, iterations = 40, threads = 0;
+struct Options : ExperimentOptions {
   double noise = 1;
-  Hidden hidden = Hidden::kPaper;
-  bool quick = false;
 };
 
 std::string KeyOf(const PaperTask& task, const Method& method, int run) {
   return fmt::format("{},{},{}", task.name, method.key, run);
 }
 
-// What a run's methods have in common.
+// The data that all methods of a run share.
 struct Remembered {
   std::string of;
-  Recording recording;
+  RobotDataset recording;
   int64_t budget = 0;  // simulated steps
 };
 
@@ -76,12 +75,12 @@ Results::Rows Measure(const Options& options, const Remembered& remembered, cons
   const RobotDescription& robot = remembered.recording.robot;
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   int64_t simulated = 0;
-  if (method.way == Way::kDefault) {
+  if (method.strategy == CalibrationStrategy::kDefault) {
     const BudgetedFit fit = FitWithin(robot, remembered.recording.seen,
                                       remembered.budget / method.share, seed, options.threads);
     distribution = fit.distribution, simulated = fit.simulated_steps;
-  } else if (Learns(method.way)) {
-    const auto simopt = MakeSimOpt(method.way, robot, seed, options.threads);
+  } else if (Learns(method.strategy)) {
+    const auto simopt = MakeSimOpt(method.strategy, robot, seed, options.threads);
     for (const Rollout& rollout : remembered.recording.seen) {
       simopt->Begin({rollout});
       simopt->Update();
@@ -184,29 +183,18 @@ int MakeFigure(Process& process, const Options& options) {
 
 int main(int argc, char** argv) {
   plumb::Options options;
+  options.iterations = 40;
   return plumb::Run(
       "plumb-figure-2",
       "How far calibrated simulators are from a robot after n steps, by each way of calibrating.",
       argc, argv,
       [&](CLI::App& app) {
-        app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output, "folder for figure_2.csv and figure_2.svg")
-            ->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
-        app.add_option("--iterations", options.iterations, "roll-outs, and updates of both SimOpts")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
+        plumb::AddExperimentFlags(app, options, "figure_2.csv and figure_2.svg");
+        plumb::AddIterationsFlag(app, options.iterations, "roll-outs, and updates of both SimOpts");
+        plumb::AddHiddenFlag(app, options.hidden);
         app.add_option("--noise", options.noise, "of the readings: a factor; the paper's are exact")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();
-        plumb::AddHiddenFlag(app, options.hidden);
-        app.add_option("--threads", options.threads,
-                       "0 = one per core; the result does not depend on it")
-            ->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick,
-                     "a policy that has hardly been trained: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::MakeFigure(process, options); });
 }

@@ -14,6 +14,7 @@
 #include <iostream>
 
 #include "common/atomic_file.h"
+#include "experiments/options.h"
 #include "experiments/recording.h"
 #include "experiments/results.h"
 #include "experiments/simulated_system.h"
@@ -22,20 +23,14 @@
 namespace plumb {
 namespace {
 
-constexpr Way kWays[] = {Way::kOriginal, Way::kStep,    Way::kDefault,
-                         Way::kPrior,    Way::kNominal, Way::kOracle};
+constexpr CalibrationStrategy kStrategies[] = {
+    CalibrationStrategy::kOriginal, CalibrationStrategy::kStep,    CalibrationStrategy::kDefault,
+    CalibrationStrategy::kPrior,    CalibrationStrategy::kNominal, CalibrationStrategy::kOracle};
 constexpr double kRobotSeconds = 6;  // of an iteration: five of them are half a minute
 constexpr double kEnough = 0.95;     // of the oracle's return
 
-struct Options {
-  std::string robots, output = ".";
-  int runs = 5, iterations = 10, threads = 0;
-  Hidden hidden = Hidden::kPaper;
-  bool quick = false;
-};
-
-std::string KeyOf(const PaperTask& task, Way way, int run) {
-  return fmt::format("{},{},{}", task.name, Key(way), run);
+std::string KeyOf(const PaperTask& task, CalibrationStrategy strategy, int run) {
+  return fmt::format("{},{},{}", task.name, Key(strategy), run);
 }
 
 // The loop of a task and a run, which remembers the first policy.
@@ -44,8 +39,9 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
-Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, int run,
-                      Remembered& remembered, const std::function<void(double)>& progress) {
+Results::Rows RunLoop(const ExperimentOptions& options, const PaperTask& task,
+                      CalibrationStrategy strategy, int run, Remembered& remembered,
+                      const std::function<void(double)>& progress) {
   const RobotDescription robot = LoadTask(options.robots, task);
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = DrawHidden(robot, options.hidden, seed);
@@ -53,7 +49,7 @@ Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, in
     remembered = {of, std::make_unique<Loop>(robot, hidden)};
   SimulatedSystem real(robot, hidden, ReadingNoise(robot), seed);
   LoopSettings settings;
-  settings.way = way;
+  settings.strategy = strategy;
   settings.iterations = options.iterations;
   settings.steps_per_iteration = static_cast<int>(kRobotSeconds / robot.task.period);
   settings.first_updates = options.quick ? 2 : task.first_updates;
@@ -71,15 +67,15 @@ Results::Rows RunLoop(const Options& options, const PaperTask& task, Way way, in
   return rows;
 }
 
-Panel Draw(const Options& options, const PaperTask& task, const Results& results) {
+Panel Draw(const ExperimentOptions& options, const PaperTask& task, const Results& results) {
   Panel panel{
       task.name, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
-  for (const Way way : kWays) {
-    Curve curve{Label(way), {}, {}, {}, {}};
+  for (const CalibrationStrategy strategy : kStrategies) {
+    Curve curve{Label(strategy), {}, {}, {}, {}};
     for (int k = 0; k <= options.iterations; ++k) {
       std::vector<double> returns;
       for (int run = 1; run <= options.runs; ++run)
-        returns.push_back(results.Of(KeyOf(task, way, run))[static_cast<size_t>(k)][1]);
+        returns.push_back(results.Of(KeyOf(task, strategy, run))[static_cast<size_t>(k)][1]);
       const Band band = ConfidenceBand(returns, false);
       curve.x.push_back(k), curve.middle.push_back(band.middle), curve.low.push_back(band.low),
           curve.high.push_back(band.high);
@@ -95,28 +91,32 @@ double ShareOfOracle(double value, double oracle) {
   return oracle > 0 ? value / oracle : oracle / value;
 }
 
-std::string Sentence(const Options& options, const PaperTask& task, const Results& results) {
+std::string Sentence(const ExperimentOptions& options, const PaperTask& task,
+                     const Results& results) {
   std::string text = fmt::format(
       "{}: return on the robot after 0, {}, {} iterations (mean of {} runs):", task.name,
       std::min(5, options.iterations), options.iterations, options.runs);
-  const auto mean = [&](Way way, int k) {
+  const auto mean = [&](CalibrationStrategy strategy, int k) {
     double sum = 0;
     for (int run = 1; run <= options.runs; ++run)
-      sum += results.Of(KeyOf(task, way, run))[static_cast<size_t>(k)][1];
+      sum += results.Of(KeyOf(task, strategy, run))[static_cast<size_t>(k)][1];
     return sum / options.runs;
   };
-  for (const Way way : kWays) {
-    text += fmt::format("\n  {:<40}{:8.0f}{:8.0f}{:8.0f}", Label(way), mean(way, 0),
-                        mean(way, std::min(5, options.iterations)), mean(way, options.iterations));
+  for (const CalibrationStrategy strategy : kStrategies) {
+    text += fmt::format("\n  {:<40}{:8.0f}{:8.0f}{:8.0f}", Label(strategy), mean(strategy, 0),
+                        mean(strategy, std::min(5, options.iterations)),
+                        mean(strategy, options.iterations));
   }
-  for (const Way way : {Way::kOriginal, Way::kStep, Way::kDefault}) {
+  for (const CalibrationStrategy strategy :
+       {CalibrationStrategy::kOriginal, CalibrationStrategy::kStep,
+        CalibrationStrategy::kDefault}) {
     int enough = options.iterations + 1;
-    while (enough > 0 &&
-           ShareOfOracle(mean(way, enough - 1), mean(Way::kOracle, enough - 1)) >= kEnough)
+    while (enough > 0 && ShareOfOracle(mean(strategy, enough - 1),
+                                       mean(CalibrationStrategy::kOracle, enough - 1)) >= kEnough)
       --enough;
     text += fmt::format(
         "\n  {} has {:.0f} % of the oracle's return for good after so many iterations: {}",
-        Label(way), 100 * kEnough,
+        Label(strategy), 100 * kEnough,
         enough > options.iterations
             ? "never"
             : fmt::format("{} ({:.0f} s of the robot)", enough, enough * kRobotSeconds));
@@ -124,12 +124,12 @@ std::string Sentence(const Options& options, const PaperTask& task, const Result
   return text;
 }
 
-std::string SettingsOf(const Options& options) {
+std::string SettingsOf(const ExperimentOptions& options) {
   return fmt::format("iterations {}, hidden {}{}", options.iterations, Key(options.hidden),
                      options.quick ? ", quick" : "");
 }
 
-int MakeFigure(Process& process, const Options& options) {
+int MakeFigure(Process& process, const ExperimentOptions& options) {
   const std::filesystem::path folder = options.output;
   Results results(folder / "figure_3.csv", SettingsOf(options), {"task", "way", "run"},
                   {"iteration", "robot_return", "simulated_return", "discrepancy", "transitions",
@@ -138,12 +138,13 @@ int MakeFigure(Process& process, const Options& options) {
   Remembered remembered;
   for (const PaperTask& task : kPaperTasks) {
     for (int run = 1; run <= options.runs; ++run) {
-      for (const Way way : kWays) {
-        const double weight =
-            task.first_updates * (Learns(way) ? 0.5 : 1.0) + options.iterations * task.next_updates;
-        jobs.push_back({KeyOf(task, way, run), weight, [&, run, way](const auto& progress) {
-                          return RunLoop(options, task, way, run, remembered, progress);
-                        }});
+      for (const CalibrationStrategy strategy : kStrategies) {
+        const double weight = task.first_updates * (Learns(strategy) ? 0.5 : 1.0) +
+                              options.iterations * task.next_updates;
+        jobs.push_back(
+            {KeyOf(task, strategy, run), weight, [&, run, strategy](const auto& progress) {
+               return RunLoop(options, task, strategy, run, remembered, progress);
+             }});
       }
     }
   }
@@ -164,26 +165,15 @@ int MakeFigure(Process& process, const Options& options) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  plumb::Options options;
+  plumb::ExperimentOptions options;
   return plumb::Run(
       "plumb-figure-3",
       "Return on the robot over SimOpt's iterations, by each way of choosing simulators.", argc,
       argv,
       [&](CLI::App& app) {
-        app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output, "folder for figure_3.csv and figure_3.svg")
-            ->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
-        app.add_option("--iterations", options.iterations, "of SimOpt")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
+        plumb::AddExperimentFlags(app, options, "figure_3.csv and figure_3.svg");
+        plumb::AddIterationsFlag(app, options.iterations);
         plumb::AddHiddenFlag(app, options.hidden);
-        app.add_option("--threads", options.threads,
-                       "0 = one per core; the result does not depend on it")
-            ->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::MakeFigure(process, options); });
 }

@@ -5,7 +5,6 @@
 // A seed that the table already has is not run again: an interrupted experiment goes on with the
 // others.
 #include <fmt/format.h>
-#include <unistd.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -21,6 +20,8 @@
 
 #include "common/atomic_file.h"
 #include "common/process.h"
+#include "common/progress_line.h"
+#include "experiments/options.h"
 #include "plot/svg.h"
 #include "robot/parameter_distribution.h"
 #include "trainer/robot_simulation.h"
@@ -121,18 +122,18 @@ Curve Train(const RobotDescription& robot, const ParameterDistribution& distribu
   const ParameterSampler sample = [&](Random& random) { return distribution.Sample(random); };
   const auto start = std::chrono::steady_clock::now();
   Curve curve;
+  ProgressLine line;
   while (trainer.steps() < steps && !process.stopping()) {
     curve.returns.push_back(trainer.Update(sample).mean_return);
     curve.steps.push_back(static_cast<double>(trainer.steps()));
-    if (trainer.updates() % 25 == 0 && isatty(STDERR_FILENO)) {
-      std::cerr << fmt::format(
-                       "\r\033[Kseed {}: {:.0f} %, return {:.5g}", seed,
-                       100. * static_cast<double>(trainer.steps()) / static_cast<double>(steps),
-                       curve.returns.back())
-                << std::flush;
+    if (trainer.updates() % 25 == 0) {
+      line.Show(
+          fmt::format("seed {}: {:.0f} %, return {:.5g}", seed,
+                      100. * static_cast<double>(trainer.steps()) / static_cast<double>(steps),
+                      curve.returns.back()));
     }
   }
-  if (isatty(STDERR_FILENO)) std::cerr << "\r\033[K" << std::flush;
+  line.Clear();
   curve.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   curve.evaluation = trainer.EvaluateHeldOut(sample, kEvaluationEpisodes).mean;
   return curve;
@@ -197,9 +198,9 @@ std::string Each(const std::map<int, Curve>& curves, const std::string& format, 
 
 int RunSeeds(Process& process, const Options& options) {
   RobotDescription robot = LoadRobot(options.robot);
-  if (options.paper) robot.training = AsThePaper(robot.training);
+  if (options.paper) robot.training = PaperSettings(robot.training);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
-  if (options.distribution == "nominal") distribution.components[0].covariance.setZero();
+  if (options.distribution == "nominal") distribution.mixture.components[0].covariance.setZero();
   const auto steps = options.steps > 0 ? static_cast<int64_t>(options.steps)
                                        : int64_t{robot.training.updates} * robot.training.batch;
 
@@ -247,12 +248,8 @@ int main(int argc, char** argv) {
       "plumb-learning-curves", "How training goes, over several seeds.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", options.robot, "robot folder or TOML file")->required();
-        app.add_option("--output", options.output,
-                       "folder for learning_curves.csv and learning_curves.svg")
-            ->capture_default_str();
-        app.add_option("--seeds", options.seeds, "how many, from 1")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
+        plumb::AddOutputFlag(app, options.output, "learning_curves.csv and learning_curves.svg");
+        plumb::AddCountFlag(app, "--seeds", options.seeds, "how many, from 1");
         app.add_option("--steps", options.steps,
                        "to simulate; default: updates x batch of robot.toml")
             ->check(CLI::Range(1.0, 1e15));
@@ -261,9 +258,7 @@ int main(int argc, char** argv) {
             ->capture_default_str();
         app.add_option("--threshold", options.threshold,
                        "return to say when it is reached, over 5 batches");
-        app.add_option("--threads", options.threads,
-                       "0 = one per core; the result does not depend on it")
-            ->check(CLI::Range(0, 1024));
+        plumb::AddThreadsFlag(app, options.threads);
         app.add_flag("--paper", options.paper, "the paper's settings");
       },
       [&](plumb::Process& process) { return plumb::RunSeeds(process, options); });

@@ -16,16 +16,16 @@ constexpr uint32_t kJudges = 1u << 20;
 std::vector<Rollout> RollOut(RealSystem& real, const GaussianPolicy& policy, int steps,
                              int iteration, double* seconds) {
   std::vector<Rollout> rollouts;
-  for (uint32_t episode = 0; steps > 0; ++episode) {
-    RealSystem::Trial trial =
-        real.Run(policy, true, steps, 1000 * static_cast<uint32_t>(iteration) + episode);
-    const auto made = static_cast<int>(trial.rollout.transitions.size());
-    if (made == 0 && episode > 10)
+  for (uint32_t number = 0; steps > 0; ++number) {
+    RobotEpisode episode =
+        real.Run(policy, true, steps, 1000 * static_cast<uint32_t>(iteration) + number);
+    const auto made = static_cast<int>(episode.rollout.transitions.size());
+    if (made == 0 && number > 10)
       throw std::runtime_error("the robot does not move: ten episodes without a transition");
-    trial.rollout.policy_iteration = iteration;
-    *seconds += trial.seconds;
+    episode.rollout.policy_iteration = iteration;
+    *seconds += episode.seconds;
     steps -= made;
-    rollouts.push_back(std::move(trial.rollout));
+    rollouts.push_back(std::move(episode.rollout));
   }
   return rollouts;
 }
@@ -60,15 +60,16 @@ std::unique_ptr<Trainer> Loop::TrainFirst(const std::string& name,
 
 LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
                      const std::function<void(double)>& progress) {
-  ParameterDistribution distribution = FirstDistribution(settings.way, model_, truth_);
+  ParameterDistribution distribution = FirstDistribution(settings.strategy, model_, truth_);
   const std::unique_ptr<SimOpt> simopt =
-      Learns(settings.way) ? MakeSimOpt(settings.way, model_, settings.seed, settings.threads)
-                           : nullptr;
+      Learns(settings.strategy)
+          ? MakeSimOpt(settings.strategy, model_, settings.seed, settings.threads)
+          : nullptr;
   const double all = settings.first_updates + settings.iterations * settings.next_updates;
   const double first = settings.first_updates / all, next = settings.next_updates / all;
-  const std::unique_ptr<Trainer> trainer =
-      TrainFirst(Learns(settings.way) ? Key(Way::kPrior) : Key(settings.way), distribution,
-                 settings, [&](double share) { progress(first * share); });
+  const std::unique_ptr<Trainer> trainer = TrainFirst(
+      Learns(settings.strategy) ? Key(CalibrationStrategy::kPrior) : Key(settings.strategy),
+      distribution, settings, [&](double share) { progress(first * share); });
   const ParameterSampler sample = [&](Random& random) { return distribution.Sample(random); };
   LoopResult result;
   int64_t transitions = 0;

@@ -7,15 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "experiments/calibration_strategy.h"
 #include "experiments/real_system.h"
-#include "experiments/ways.h"
 #include "trainer/trainer.h"
 
 namespace plumb {
 
 /// How SimOpt's loop is run: roll out, calibrate, train, judge.
 struct LoopSettings {
-  Way way = Way::kDefault;
+  CalibrationStrategy strategy = CalibrationStrategy::kDefault;
   int iterations = 5;
   /// of the robot, at most; episodes follow each other until there are as many
   int steps_per_iteration = 750;
@@ -43,8 +43,8 @@ struct LoopResult {
   std::vector<Rollout> rollouts;  ///< that were calibrated with
 };
 
-/// Trains policies, one way after the other. The first policy of a distribution is trained once for
-/// all ways that begin with it.
+/// Runs the loop, one strategy after the other. The first policy of a distribution is trained once
+/// for all strategies that begin with it.
 class Loop {
  public:
   /// @param model what is calibrated and trained in. @param truth physical units, for the oracle;

@@ -11,9 +11,9 @@ namespace plumb {
 /// How far simulators drawn from a distribution are, after n = 1 ... `horizon` control steps, from
 /// what a robot did: reset to a recorded state, apply what was applied, compare. Root mean square
 /// over simulators, windows and entries of (q, v), in standard units (Task::state_scale). A
-/// simulation that fails errs by `kFailed`.
-/// @param rollouts with states without noise: that of the judge would count as an error. @param
-/// every so-manieth state begins a window.
+/// simulation that fails errs by `kFailed`. Thread-safe.
+/// @param rollouts with states without noise: that of the judge would count as an error.
+/// @param every a window begins at every `every`-th state.
 /// @return `horizon` numbers; NaN where no roll-out is as long.
 Eigen::VectorXd NStepErrors(const RobotDescription& robot,
                             const ParameterDistribution& distribution,

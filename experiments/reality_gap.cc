@@ -22,6 +22,7 @@
 #include "common/atomic_file.h"
 #include "experiments/bus_robot.h"
 #include "experiments/loop.h"
+#include "experiments/options.h"
 #include "experiments/results.h"
 #include "plot/curves.h"
 #include "sim/parameters.h"
@@ -44,30 +45,25 @@ constexpr Gap kGaps[] = {{"pendulum", "worn pendulum", "pendulum/worn.toml", "pe
 struct Method {
   const char* key;
   std::string label;
-  Way way;
+  CalibrationStrategy strategy;
   bool fitted;
 };
 const std::array<Method, 7> kMethods{
-    {{"original", Label(Way::kOriginal), Way::kOriginal, false},
-     {"step", Label(Way::kStep), Way::kStep, false},
-     {"default", Label(Way::kDefault), Way::kDefault, false},
-     {"fitted", Label(Way::kDefault) + ", more parameters", Way::kDefault, true},
-     {"prior", Label(Way::kPrior), Way::kPrior, false},
-     {"nominal", Label(Way::kNominal), Way::kNominal, false},
-     {"oracle", "the robot's masses, in the simulator", Way::kOracle, false}}};
-
-struct Options {
-  std::string robots, output = ".";
-  int runs = 3, iterations = 5, threads = 0;
-  bool quick = false;
-};
+    {{"original", Label(CalibrationStrategy::kOriginal), CalibrationStrategy::kOriginal, false},
+     {"step", Label(CalibrationStrategy::kStep), CalibrationStrategy::kStep, false},
+     {"default", Label(CalibrationStrategy::kDefault), CalibrationStrategy::kDefault, false},
+     {"fitted", Label(CalibrationStrategy::kDefault) + ", more parameters",
+      CalibrationStrategy::kDefault, true},
+     {"prior", Label(CalibrationStrategy::kPrior), CalibrationStrategy::kPrior, false},
+     {"nominal", Label(CalibrationStrategy::kNominal), CalibrationStrategy::kNominal, false},
+     {"oracle", "the robot's masses, in the simulator", CalibrationStrategy::kOracle, false}}};
 
 std::string KeyOf(const Gap& gap, const Method& method, int run) {
   return fmt::format("{},{},{}", gap.name, method.key, run);
 }
 
-std::filesystem::path AlarmFile(const Options& options, const Gap& gap, const Method& method,
-                                int run) {
+std::filesystem::path AlarmFile(const ExperimentOptions& options, const Gap& gap,
+                                const Method& method, int run) {
   return std::filesystem::path(options.output) /
          fmt::format("alarm_{}_{}_{}.txt", gap.name, method.key, run);
 }
@@ -77,8 +73,9 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
-Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& method, int run,
-                      Remembered& remembered, const std::function<void(double)>& progress) {
+Results::Rows RunLoop(const ExperimentOptions& options, const Gap& gap, const Method& method,
+                      int run, Remembered& remembered,
+                      const std::function<void(double)>& progress) {
   const auto load = [&](const char* file) {
     return LoadRobot((std::filesystem::path(options.robots) / file).string());
   };
@@ -92,7 +89,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   }
   BusRobot real(truth, model, hidden, seed);
   LoopSettings settings;
-  settings.way = method.way;
+  settings.strategy = method.strategy;
   settings.iterations = options.iterations;
   settings.steps_per_iteration =
       static_cast<int>((options.quick ? 1 : kRobotSeconds) / model.task.period);
@@ -103,14 +100,14 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   settings.threads = options.threads;
   const LoopResult result = remembered.loop->Run(real, settings, progress);
   double alarm = std::nan("");
-  if (method.way == Way::kDefault) {
+  if (method.strategy == CalibrationStrategy::kDefault) {
     CalibrationOptions calibration;
     calibration.seed = seed;
-    calibration.workforce = options.threads;
+    calibration.execution = options.threads;
     const std::vector<Log> logs{{"roll-outs", result.rollouts, {}, {}}};
     const Misspecification found = Calibrate(model, logs, calibration).misspecification;
     alarm = found.alarm;
-    WriteAtomically(AlarmFile(options, gap, method, run), found.words + "\n");
+    WriteAtomically(AlarmFile(options, gap, method, run), found.summary + "\n");
   }
   Results::Rows rows;
   for (const LoopRow& row : result.rows) {
@@ -121,15 +118,15 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   return rows;
 }
 
-double Mean(const Options& options, const Gap& gap, const Method& method, const Results& results,
-            int iteration, size_t column) {
+double Mean(const ExperimentOptions& options, const Gap& gap, const Method& method,
+            const Results& results, int iteration, size_t column) {
   double sum = 0;
   for (int run = 1; run <= options.runs; ++run)
     sum += results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column];
   return sum / options.runs;
 }
 
-Panel Draw(const Options& options, const Gap& gap, const Results& results) {
+Panel Draw(const ExperimentOptions& options, const Gap& gap, const Results& results) {
   Panel panel{
       gap.title, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
   for (const Method& method : kMethods) {
@@ -148,7 +145,7 @@ Panel Draw(const Options& options, const Gap& gap, const Results& results) {
   return panel;
 }
 
-std::string Sentence(const Options& options, const Gap& gap, const Results& results) {
+std::string Sentence(const ExperimentOptions& options, const Gap& gap, const Results& results) {
   std::string text = fmt::format(
       "{}, {} runs: return on the robot before and after {} iterations, in simulation, "
       "discrepancy, alarms:",
@@ -160,7 +157,7 @@ std::string Sentence(const Options& options, const Gap& gap, const Results& resu
     text += fmt::format("\n  {:<42}{:8.0f}{:8.0f}{:8.0f}{:10.3g}", method.label, mean(0, 1),
                         mean(options.iterations, 1), mean(options.iterations, 2),
                         mean(options.iterations, 3));
-    if (method.way != Way::kDefault) continue;
+    if (method.strategy != CalibrationStrategy::kDefault) continue;
     text += fmt::format("   {:.0f} of {}", options.runs * mean(0, 6), options.runs);
     std::ifstream file(AlarmFile(options, gap, method, 1));
     for (std::string line; std::getline(file, line);) text += "\n      " + line;
@@ -168,7 +165,7 @@ std::string Sentence(const Options& options, const Gap& gap, const Results& resu
   return text;
 }
 
-int Compare(Process& process, const Options& options) {
+int Compare(Process& process, const ExperimentOptions& options) {
   const std::filesystem::path folder = options.output;
   Results results(
       folder / "reality_gap.csv",
@@ -206,24 +203,14 @@ int Compare(Process& process, const Options& options) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  plumb::Options options;
+  plumb::ExperimentOptions options;
+  options.runs = 3, options.iterations = 5;
   return plumb::Run(
       "plumb-reality-gap", "Who transfers to a robot that is none of the simulators.", argc, argv,
       [&](CLI::App& app) {
-        app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output,
-                       "folder for reality_gap.csv, reality_gap.svg and what the alarms say")
-            ->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
-        app.add_option("--iterations", options.iterations, "of SimOpt")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
-        app.add_option("--threads", options.threads,
-                       "0 = one per core; the result does not depend on it")
-            ->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
+        plumb::AddExperimentFlags(app, options,
+                                  "reality_gap.csv, reality_gap.svg and what the alarms say");
+        plumb::AddIterationsFlag(app, options.iterations);
       },
       [&](plumb::Process& process) { return plumb::Compare(process, options); });
 }

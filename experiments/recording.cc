@@ -1,7 +1,6 @@
 #include "experiments/recording.h"
 
 #include <filesystem>
-#include <map>
 
 #include "experiments/simulated_system.h"
 #include "sim/parameters.h"
@@ -27,26 +26,16 @@ Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_
   return ParameterDistribution::Prior(robot).Sample(random);
 }
 
-void AddHiddenFlag(CLI::App& app, Hidden& hidden) {
-  const std::map<std::string, Hidden> names{{Key(Hidden::kPaper), Hidden::kPaper},
-                                            {Key(Hidden::kPrior), Hidden::kPrior}};
-  app.add_option("--hidden", hidden,
-                 "where the robot's parameters are drawn from: the paper's narrow ranges, or the "
-                 "whole prior")
-      ->transform(CLI::CheckedTransformer(names, CLI::ignore_case))
-      ->default_str("paper");
-}
-
-Recording Record(const RobotDescription& robot, const RecordingSettings& settings,
-                 const std::function<void(double)>& progress) {
-  Recording recording{robot, DrawHidden(robot, settings.hidden, settings.seed), nullptr, {}, {}};
+RobotDataset Record(const RobotDescription& robot, const RecordingSettings& settings,
+                    const std::function<void(double)>& progress) {
+  RobotDataset recording{robot, DrawHidden(robot, settings.hidden, settings.seed), nullptr, {}, {}};
   recording.loop = std::make_shared<Loop>(robot, recording.hidden);
   LoopSettings first;
   first.seed = settings.seed;
   first.threads = settings.threads;
   first.first_updates = settings.updates;
   const auto trainer = recording.loop->TrainFirst(
-      Key(Way::kPrior), ParameterDistribution::Prior(robot), first, progress);
+      Key(CalibrationStrategy::kPrior), ParameterDistribution::Prior(robot), first, progress);
   const Eigen::VectorXd noise = settings.noise * ReadingNoise(robot);
   SimulatedSystem read(robot, recording.hidden, noise, settings.seed),
       exact(robot, recording.hidden, 0 * noise, settings.seed);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <string>
@@ -35,11 +34,8 @@ std::string Key(Hidden hidden);  ///< "paper", "prior"
 /// Parameters of "the real robot". @return physical units, order of robot.parameters.
 Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_t seed);
 
-/// The flag --hidden of an experiment.
-void AddHiddenFlag(CLI::App& app, Hidden& hidden);
-
-/// What a policy did on a robot with parameters that are drawn for each seed.
-struct Recording {
+/// The motion of a policy on a robot whose parameters are drawn for each seed.
+struct RobotDataset {
   RobotDescription robot;
   Eigen::VectorXd hidden;
   std::shared_ptr<Loop> loop;     ///< that has trained the policy
@@ -58,7 +54,7 @@ struct RecordingSettings {
 
 /// Trains a policy and rolls it out. Episodes are as long as the task's. @param progress told the
 /// share that is done; may throw to break off.
-Recording Record(const RobotDescription& robot, const RecordingSettings& settings,
-                 const std::function<void(double)>& progress);
+RobotDataset Record(const RobotDescription& robot, const RecordingSettings& settings,
+                    const std::function<void(double)>& progress);
 
 }  // namespace plumb

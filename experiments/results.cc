@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -11,13 +10,14 @@
 #include <stdexcept>
 
 #include "common/atomic_file.h"
+#include "common/progress_line.h"
 
 namespace plumb {
 namespace {
 
 struct Stopped {};
 
-std::string Words(double seconds) {
+std::string Duration(double seconds) {
   const auto whole = static_cast<int>(seconds + 0.5);
   return whole < 60 ? fmt::format("{} s", whole)
                     : fmt::format("{}:{:02} min", whole / 60, whole % 60);
@@ -82,7 +82,7 @@ void Results::Add(const std::string& key, Rows rows) {
 bool RunJobs(Process& process, const std::vector<Job>& jobs, Results& results) {
   double left = 0, done = 0;
   for (const Job& job : jobs) left += results.Has(job.key) ? 0 : job.weight;
-  const bool shown = isatty(STDERR_FILENO);
+  ProgressLine line;
   const auto start = std::chrono::steady_clock::now();
   for (size_t i = 0; i < jobs.size(); ++i) {
     const Job& job = jobs[i];
@@ -92,28 +92,26 @@ bool RunJobs(Process& process, const std::vector<Job>& jobs, Results& results) {
       const double seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       const double now = done + share * job.weight;
-      if (!shown) return;
-      const std::string rest = now > 0 ? Words(seconds * (left - now) / now) + " left" : "";
-      std::cerr << fmt::format("\r\033[K{} of {}: {}  {:.0f} %  {}", i + 1, jobs.size(), job.key,
-                               100 * share, rest)
-                << std::flush;
+      if (!line.shown()) return;
+      const std::string rest = now > 0 ? Duration(seconds * (left - now) / now) + " left" : "";
+      line.Show(fmt::format("{} of {}: {}  {:.0f} %  {}", i + 1, jobs.size(), job.key, 100 * share,
+                            rest));
     };
     try {
       progress(0);
       results.Add(job.key, job.run(progress));
     } catch (const Stopped&) {
-      if (shown) std::cerr << "\r\033[K";
+      line.Clear();
       std::cerr << "stopped; the same command goes on from here\n";
       return false;
     }
     done += job.weight;
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (!shown)
+    if (!line.shown())
       std::cerr << fmt::format("{} of {}: {} done, {} left\n", i + 1, jobs.size(), job.key,
-                               Words(seconds * (left - done) / done));
+                               Duration(seconds * (left - done) / done));
   }
-  if (shown) std::cerr << "\r\033[K" << std::flush;
   return true;
 }
 

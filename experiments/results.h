@@ -12,7 +12,7 @@ namespace plumb {
 
 /// The table of an experiment, a CSV file: what was asked for (a key of several columns) and the
 /// numbers that came out, a row or more. Every job's rows are written at once and at once complete,
-/// so that an interrupted experiment goes on with the next job.
+/// so that an interrupted experiment goes on with the next job. Not thread-safe.
 class Results {
  public:
   using Rows = std::vector<std::vector<double>>;

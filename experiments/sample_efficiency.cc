@@ -1,11 +1,11 @@
-// What calibration costs, by each way: transitions of the robot until a policy that is trained on
-// what they told earns nearly what the oracle's does, and simulated steps until simulators predict
-// the robot to a given error.
+// The cost of calibration, by each method: transitions of the robot until a policy that is trained
+// on their posterior earns nearly as much as the oracle's, and simulated steps until simulators
+// predict the robot to a given error.
 //
 // A policy trained on the prior moves a robot whose parameters are drawn for each run, as in
 // Figures 2 and 3.
 //   robot: N transitions of it calibrate (both SimOpts make 40 updates of 25 simulators on them);
-//          then every way trains as much, from the same policy on.
+//          then every strategy trains as much, from the same policy on.
 //   simulator: 40 roll-outs calibrate, one an update, or for the default as many of their
 //          transitions as the budget allows.
 //
@@ -21,6 +21,7 @@
 #include "common/atomic_file.h"
 #include "experiments/budget.h"
 #include "experiments/n_step_error.h"
+#include "experiments/options.h"
 #include "experiments/recording.h"
 #include "experiments/results.h"
 #include "experiments/simulated_system.h"
@@ -29,54 +30,49 @@
 namespace plumb {
 namespace {
 
-constexpr Way kWays[] = {Way::kOriginal, Way::kStep, Way::kDefault};
+constexpr CalibrationStrategy kStrategies[] = {
+    CalibrationStrategy::kOriginal, CalibrationStrategy::kStep, CalibrationStrategy::kDefault};
 constexpr int kUpdates = 40;      // of both SimOpts
 constexpr int kIterations = 5;    // TRPO updates of so many iterations follow
 constexpr double kEnough = 0.95;  // of the oracle's return
 constexpr int kHorizon = 10, kSimulators = 20;
 constexpr double kTargets[] = {0.01, 0.001};  // errors after kHorizon steps, standard units
 
-struct Options {
-  std::string robots, output = ".";
-  int runs = 5, threads = 0;
-  Hidden hidden = Hidden::kPaper;
-  bool quick = false;
-};
-
-std::vector<int> TransitionCounts(const Options& options) {
+std::vector<int> TransitionCounts(const ExperimentOptions& options) {
   return options.quick ? std::vector<int>{50, 200}
                        : std::vector<int>{12, 25, 50, 100, 200, 400, 800};
 }
-std::vector<int64_t> Budgets(const Options& options) {
+std::vector<int64_t> Budgets(const ExperimentOptions& options) {
   return options.quick ? std::vector<int64_t>{4000, 40'000}
                        : std::vector<int64_t>{1000,   2000,    5000,    10'000, 20'000,
                                               50'000, 100'000, 200'000, 500'000};
 }
-std::string KeyOf(const PaperTask& task, Way way, int run) {
-  return fmt::format("{},{},{}", task.name, Key(way), run);
+std::string KeyOf(const PaperTask& task, CalibrationStrategy strategy, int run) {
+  return fmt::format("{},{},{}", task.name, Key(strategy), run);
 }
 
 struct Remembered {
   std::string of;
-  Recording recording;
+  RobotDataset recording;
 };
 
 class Experiment {
  public:
-  explicit Experiment(const Options& options) : options_(options) {}
+  explicit Experiment(const ExperimentOptions& options) : options_(options) {}
 
-  Results::Rows Robot(const PaperTask& task, Way way, int run,
+  Results::Rows Robot(const PaperTask& task, CalibrationStrategy strategy, int run,
                       const std::function<void(double)>& progress) {
     Remember(task, run, progress);
     const RobotDescription& robot = now_.recording.robot;
-    const std::vector<int> counts = way == Way::kOracle || way == Way::kPrior
-                                        ? std::vector<int>{0}
-                                        : TransitionCounts(options_);
+    const std::vector<int> counts =
+        strategy == CalibrationStrategy::kOracle || strategy == CalibrationStrategy::kPrior
+            ? std::vector<int>{0}
+            : TransitionCounts(options_);
     Results::Rows rows;
     for (size_t i = 0; i < counts.size(); ++i) {
       const ParameterDistribution distribution =
-          Learns(way) ? Calibrated(way, counts[i], run)
-                      : FirstDistribution(way, robot, now_.recording.hidden);
+          Learns(strategy) ? Calibrated(strategy, counts[i], run)
+                           : FirstDistribution(strategy, robot, now_.recording.hidden);
       const double share = static_cast<double>(i) / static_cast<double>(counts.size());
       rows.push_back(
           {static_cast<double>(counts[i]), Trained(task, distribution, run, [&](double part) {
@@ -86,18 +82,18 @@ class Experiment {
     return rows;
   }
 
-  Results::Rows Simulator(const PaperTask& task, Way way, int run,
+  Results::Rows Simulator(const PaperTask& task, CalibrationStrategy strategy, int run,
                           const std::function<void(double)>& progress) {
     Remember(task, run, progress);
     const auto seed = static_cast<uint64_t>(run);
-    const Recording& recording = now_.recording;
+    const RobotDataset& recording = now_.recording;
     Results::Rows rows;
     const auto judge = [&](int64_t simulated, const ParameterDistribution& distribution) {
       const Eigen::VectorXd errors = NStepErrors(recording.robot, distribution, recording.held_out,
                                                  kHorizon, kSimulators, 10, seed);
       rows.push_back({static_cast<double>(simulated), errors(kHorizon - 1)});
     };
-    if (way == Way::kDefault) {
+    if (strategy == CalibrationStrategy::kDefault) {
       for (const int64_t budget : Budgets(options_)) {
         try {
           const BudgetedFit fit =
@@ -109,7 +105,7 @@ class Experiment {
       }
       return rows;
     }
-    const auto simopt = MakeSimOpt(way, recording.robot, seed, options_.threads);
+    const auto simopt = MakeSimOpt(strategy, recording.robot, seed, options_.threads);
     int64_t simulated = 0;
     for (const Rollout& rollout : recording.seen) {
       simopt->Begin({rollout});
@@ -135,12 +131,12 @@ class Experiment {
     now_ = {of, Record(robot, settings, progress)};
   }
 
-  ParameterDistribution Calibrated(Way way, int transitions, int run) const {
+  ParameterDistribution Calibrated(CalibrationStrategy strategy, int transitions, int run) const {
     const RobotDescription& robot = now_.recording.robot;
-    const auto simopt = MakeSimOpt(way, robot, static_cast<uint64_t>(run), options_.threads);
+    const auto simopt = MakeSimOpt(strategy, robot, static_cast<uint64_t>(run), options_.threads);
     // The same transitions again and again: an iteration is an update.
     const std::vector<Rollout> some = FirstTransitions(now_.recording.seen, transitions);
-    for (int i = 0; i < (way == Way::kDefault ? 1 : kUpdates); ++i) {
+    for (int i = 0; i < (strategy == CalibrationStrategy::kDefault ? 1 : kUpdates); ++i) {
       simopt->Begin(some);
       simopt->Update();
     }
@@ -156,7 +152,7 @@ class Experiment {
     settings.threads = options_.threads;
     settings.first_updates = options_.quick ? 40 : task.first_updates;
     const auto trainer = now_.recording.loop->TrainFirst(
-        Key(Way::kPrior), ParameterDistribution::Prior(robot), settings, progress);
+        Key(CalibrationStrategy::kPrior), ParameterDistribution::Prior(robot), settings, progress);
     const int updates = options_.quick ? 1 : kIterations * task.next_updates;
     for (int i = 0; i < updates; ++i) {
       trainer->Update([&](Random& random) { return distribution.Sample(random); });
@@ -170,17 +166,17 @@ class Experiment {
   Remembered now_;
 };
 
-// Means over the runs, of each row of a way.
-std::vector<Band> Bands(const Options& options, const PaperTask& task, Way way,
-                        const Results& results, bool logarithmic) {
+// Means over the runs, of each row of a strategy.
+std::vector<Band> Bands(const ExperimentOptions& options, const PaperTask& task,
+                        CalibrationStrategy strategy, const Results& results, bool logarithmic) {
   std::vector<Band> bands;
   size_t rows = SIZE_MAX;
   for (int run = 1; run <= options.runs; ++run)
-    rows = std::min(rows, results.Of(KeyOf(task, way, run)).size());
+    rows = std::min(rows, results.Of(KeyOf(task, strategy, run)).size());
   for (size_t i = 0; i < rows; ++i) {
     std::vector<double> values;
     for (int run = 1; run <= options.runs; ++run) {
-      const auto& all = results.Of(KeyOf(task, way, run));
+      const auto& all = results.Of(KeyOf(task, strategy, run));
       // what was too little for a fit in one run is missing at the beginning
       values.push_back(all[all.size() - rows + i][1]);
     }
@@ -189,21 +185,21 @@ std::vector<Band> Bands(const Options& options, const PaperTask& task, Way way,
   return bands;
 }
 
-std::vector<double> FirstColumn(const Options& options, const PaperTask& task, Way way,
-                                const Results& results) {
-  const size_t rows = Bands(options, task, way, results, false).size();
+std::vector<double> FirstColumn(const ExperimentOptions& options, const PaperTask& task,
+                                CalibrationStrategy strategy, const Results& results) {
+  const size_t rows = Bands(options, task, strategy, results, false).size();
   std::vector<double> means(rows, 0);
   for (int run = 1; run <= options.runs; ++run) {
-    const auto& all = results.Of(KeyOf(task, way, run));
+    const auto& all = results.Of(KeyOf(task, strategy, run));
     for (size_t i = 0; i < rows; ++i) means[i] += all[all.size() - rows + i][0] / options.runs;
   }
   return means;
 }
 
-Curve CurveOf(const Options& options, const PaperTask& task, Way way, const Results& results,
-              bool logarithmic) {
-  Curve curve{Label(way), FirstColumn(options, task, way, results), {}, {}, {}};
-  for (const Band& band : Bands(options, task, way, results, logarithmic)) {
+Curve CurveOf(const ExperimentOptions& options, const PaperTask& task, CalibrationStrategy strategy,
+              const Results& results, bool logarithmic) {
+  Curve curve{Label(strategy), FirstColumn(options, task, strategy, results), {}, {}, {}};
+  for (const Band& band : Bands(options, task, strategy, results, logarithmic)) {
     curve.middle.push_back(band.middle), curve.low.push_back(band.low),
         curve.high.push_back(band.high);
   }
@@ -222,20 +218,21 @@ double ShareOfOracle(double value, double oracle) {
   return oracle > 0 ? value / oracle : oracle / value;
 }
 
-std::string SettingsOf(const Options& options) {
+std::string SettingsOf(const ExperimentOptions& options) {
   return fmt::format("hidden {}{}", Key(options.hidden), options.quick ? ", quick" : "");
 }
 
-// A way's share of the oracle's return on the same robot: the median of the runs, for each number
-// of transitions.
-std::vector<double> Shares(const Options& options, const PaperTask& task, Way way,
-                           const Results& results) {
+// A strategy's share of the oracle's return on the same robot: the median of the runs, for each
+// number of transitions.
+std::vector<double> Shares(const ExperimentOptions& options, const PaperTask& task,
+                           CalibrationStrategy strategy, const Results& results) {
   std::vector<double> medians;
-  for (size_t i = 0; i < results.Of(KeyOf(task, way, 1)).size(); ++i) {
+  for (size_t i = 0; i < results.Of(KeyOf(task, strategy, 1)).size(); ++i) {
     std::vector<double> shares;
     for (int run = 1; run <= options.runs; ++run) {
-      shares.push_back(ShareOfOracle(results.Of(KeyOf(task, way, run))[i][1],
-                                     results.Of(KeyOf(task, Way::kOracle, run))[0][1]));
+      shares.push_back(
+          ShareOfOracle(results.Of(KeyOf(task, strategy, run))[i][1],
+                        results.Of(KeyOf(task, CalibrationStrategy::kOracle, run))[0][1]));
     }
     std::nth_element(shares.begin(), shares.begin() + static_cast<ptrdiff_t>(shares.size() / 2),
                      shares.end());
@@ -244,7 +241,7 @@ std::vector<double> Shares(const Options& options, const PaperTask& task, Way wa
   return medians;
 }
 
-int Measure(Process& process, const Options& options) {
+int Measure(Process& process, const ExperimentOptions& options) {
   const std::filesystem::path folder = options.output;
   Results robot(folder / "sample_efficiency_robot.csv", SettingsOf(options), {"task", "way", "run"},
                 {"transitions", "robot_return"});
@@ -254,17 +251,21 @@ int Measure(Process& process, const Options& options) {
   std::vector<Job> robot_jobs, simulator_jobs;
   for (const PaperTask& task : kPaperTasks) {
     for (int run = 1; run <= options.runs; ++run) {
-      for (const Way way : {Way::kOriginal, Way::kStep, Way::kDefault, Way::kPrior, Way::kOracle}) {
+      for (const CalibrationStrategy strategy :
+           {CalibrationStrategy::kOriginal, CalibrationStrategy::kStep,
+            CalibrationStrategy::kDefault, CalibrationStrategy::kPrior,
+            CalibrationStrategy::kOracle}) {
         const double weight =
-            Learns(way) ? static_cast<double>(TransitionCounts(options).size()) : 1;
-        robot_jobs.push_back({KeyOf(task, way, run), weight * task.next_updates,
-                              [&, way, run](const auto& progress) {
-                                return experiment.Robot(task, way, run, progress);
+            Learns(strategy) ? static_cast<double>(TransitionCounts(options).size()) : 1;
+        robot_jobs.push_back({KeyOf(task, strategy, run), weight * task.next_updates,
+                              [&, strategy, run](const auto& progress) {
+                                return experiment.Robot(task, strategy, run, progress);
                               }});
-        if (!Learns(way)) continue;
-        simulator_jobs.push_back({KeyOf(task, way, run), 1, [&, way, run](const auto& progress) {
-                                    return experiment.Simulator(task, way, run, progress);
-                                  }});
+        if (!Learns(strategy)) continue;
+        simulator_jobs.push_back(
+            {KeyOf(task, strategy, run), 1, [&, strategy, run](const auto& progress) {
+               return experiment.Simulator(task, strategy, run, progress);
+             }});
       }
     }
   }
@@ -284,26 +285,28 @@ int Measure(Process& process, const Options& options) {
                              "", "95 % of the oracle's",
                              fmt::format("error {} after {}", kTargets[0], kHorizon),
                              fmt::format("error {} after {}", kTargets[1], kHorizon));
-    for (const Way way : kWays) {
-      errors.curves.push_back(CurveOf(options, task, way, simulator, true));
-      returns.curves.push_back(CurveOf(options, task, way, robot, false));
-      std::cout << fmt::format("  {:<40}{:>22}", Label(way),
-                               Needed(returns.curves.back().x, Shares(options, task, way, robot),
-                                      [](double share) { return share >= kEnough; }));
+    for (const CalibrationStrategy strategy : kStrategies) {
+      errors.curves.push_back(CurveOf(options, task, strategy, simulator, true));
+      returns.curves.push_back(CurveOf(options, task, strategy, robot, false));
+      std::cout << fmt::format(
+          "  {:<40}{:>22}", Label(strategy),
+          Needed(returns.curves.back().x, Shares(options, task, strategy, robot),
+                 [](double share) { return share >= kEnough; }));
       for (const double target : kTargets)
         std::cout << fmt::format("{:>22}",
                                  Needed(errors.curves.back().x, errors.curves.back().middle,
                                         [&](double error) { return error <= target; }));
       std::cout << "\n";
     }
-    for (const Way way : {Way::kPrior, Way::kOracle}) {
-      const Band band = Bands(options, task, way, robot, false)[0];
+    for (const CalibrationStrategy strategy :
+         {CalibrationStrategy::kPrior, CalibrationStrategy::kOracle}) {
+      const Band band = Bands(options, task, strategy, robot, false)[0];
       const std::vector<double>& x = returns.curves[0].x;
-      returns.curves.push_back({Label(way), x, std::vector<double>(x.size(), band.middle),
+      returns.curves.push_back({Label(strategy), x, std::vector<double>(x.size(), band.middle),
                                 std::vector<double>(x.size(), band.low),
                                 std::vector<double>(x.size(), band.high)});
-      errors.curves.push_back({Label(way), {}, {}, {}, {}});
-      std::cout << fmt::format("  {:<40}return {:.0f}\n", Label(way), band.middle);
+      errors.curves.push_back({Label(strategy), {}, {}, {}, {}});
+      std::cout << fmt::format("  {:<40}return {:.0f}\n", Label(strategy), band.middle);
     }
     panels.push_back(std::move(returns));
     panels.push_back(std::move(errors));
@@ -320,24 +323,14 @@ int Measure(Process& process, const Options& options) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  plumb::Options options;
+  plumb::ExperimentOptions options;
   return plumb::Run(
       "plumb-sample-efficiency",
       "Transitions of the robot and simulated steps that each way of calibrating needs.", argc,
       argv,
       [&](CLI::App& app) {
-        app.add_option("robots", options.robots, "the folder robots/")->required();
-        app.add_option("--output", options.output,
-                       "folder for the tables and sample_efficiency.svg")
-            ->capture_default_str();
-        app.add_option("--runs", options.runs, "seeds, and robots, from 1")
-            ->check(CLI::Range(1, 1000))
-            ->capture_default_str();
+        plumb::AddExperimentFlags(app, options, "the tables and sample_efficiency.svg");
         plumb::AddHiddenFlag(app, options.hidden);
-        app.add_option("--threads", options.threads,
-                       "0 = one per core; the result does not depend on it")
-            ->check(CLI::Range(0, 1024));
-        app.add_flag("--quick", options.quick, "hardly any training: looks whether it runs");
       },
       [&](plumb::Process& process) { return plumb::Measure(process, options); });
 }

@@ -28,12 +28,12 @@ SimulatedSystem::SimulatedSystem(const RobotDescription& robot, const Eigen::Vec
   environment_.SetParameters(hidden);
 }
 
-RealSystem::Trial SimulatedSystem::Run(const GaussianPolicy& policy, bool explore, int steps,
-                                       uint32_t number) {
+RobotEpisode SimulatedSystem::Run(const GaussianPolicy& policy, bool explore, int steps,
+                                  uint32_t number) {
   Random random(seed_, {kTrial, number, explore ? 1u : 0u});
   environment_.Reset(random);
-  Trial trial;
-  trial.rollout.episode = number;
+  RobotEpisode episode;
+  episode.rollout.episode = number;
   Eigen::VectorXf observation(environment_.observation_size());
   Eigen::VectorXd q = Noisy(environment_.q(), q_sd_, random),
                   v = Noisy(environment_.v(), v_sd_, random);
@@ -46,18 +46,18 @@ RealSystem::Trial SimulatedSystem::Run(const GaussianPolicy& policy, bool explor
     if (latency_ > 0) transition.efforts.push_back({latency_, environment_.effort()});
     environment_.task().Observe(
         q, v, std::span(observation.data(), static_cast<size_t>(observation.size())));
-    const Environment::StepResult result =
+    const StepResult result =
         environment_.Step(explore ? policy.Sample(observation, random) : policy.Mean(observation));
     transition.efforts.push_back({period_ - latency_, environment_.effort()});
     q = Noisy(environment_.q(), q_sd_, random), v = Noisy(environment_.v(), v_sd_, random);
     if (!q.allFinite() || !v.allFinite()) break;
     transition.next_q = q, transition.next_v = v;
-    trial.rollout.transitions.push_back(std::move(transition));
-    trial.sum_of_rewards += result.reward;
-    trial.seconds += period_;
+    episode.rollout.transitions.push_back(std::move(transition));
+    episode.sum_of_rewards += result.reward;
+    episode.seconds += period_;
     if (result.terminated) break;
   }
-  return trial;
+  return episode;
 }
 
 Eigen::VectorXd ReadingNoise(const RobotDescription& robot) {

@@ -7,7 +7,8 @@
 namespace plumb {
 
 /// The "real" robot of the paper: the simulator itself with parameters that nobody is told. Its
-/// states are read with independent noise, which is what the policy sees and what is recorded.
+/// states are read with independent noise, by the policy and by the recording alike. Not
+/// thread-safe.
 class SimulatedSystem : public RealSystem {
  public:
   /// @param hidden physical units, order of robot.parameters. @param noise standard deviations of
@@ -16,7 +17,7 @@ class SimulatedSystem : public RealSystem {
   SimulatedSystem(const RobotDescription& robot, const Eigen::VectorXd& hidden,
                   const Eigen::VectorXd& noise, uint64_t seed);
 
-  Trial Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
+  RobotEpisode Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
 
  private:
   Environment environment_;
@@ -25,8 +26,9 @@ class SimulatedSystem : public RealSystem {
   uint64_t seed_;
 };
 
-/// What encoders and an observer leave of noise: positions [rad or m] as exact as a count of a
-/// 14-bit encoder, 1.1e-4, velocities [rad/s or m/s] as the observer's smoother has them, 5e-3.
+/// Standard deviations of a state as encoders and an observer tell it: positions [rad or m] to a
+/// count of a 14-bit encoder, 1.1e-4, velocities [rad/s or m/s] as the observer's smoother has
+/// them, 5e-3.
 Eigen::VectorXd ReadingNoise(const RobotDescription& robot);
 
 }  // namespace plumb

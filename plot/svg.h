@@ -60,7 +60,7 @@ class Svg {
   /// @param angle [deg] clockwise, about (x, y).
   void Text(double x, double y, const std::string& text, const std::string& css = "label",
             Anchor anchor = Anchor::kMiddle, double angle = 0);
-  /// What follows is not drawn outside of that rectangle, until EndClip.
+  /// Clips all that follows to that rectangle, until EndClip.
   void BeginClip(double x, double y, double width, double height);
   void EndClip() { body_ += "</svg>\n"; }
 

@@ -5,20 +5,10 @@
 #include <filesystem>
 
 #include "common/config.h"
+#include "common/hash.h"
 #include "robot/urdf/urdf.h"
 
 namespace plumb {
-namespace {
-
-// FNV-1a, 64 bit (Fowler, Noll, Vo; RFC draft "The FNV Non-Cryptographic Hash Algorithm").
-constexpr uint64_t kFnvOffset = 0xcbf29ce484222325, kFnvPrime = 0x100000001b3;
-
-uint64_t Fingerprint(const std::string& file, uint64_t hash) {
-  for (const char c : ReadFile(file)) hash = (hash ^ static_cast<unsigned char>(c)) * kFnvPrime;
-  return hash;
-}
-
-}  // namespace
 
 int RobotDescription::num_positions() const {
   int count = 0;
@@ -84,8 +74,8 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   header.Finish();
   UrdfModel urdf = LoadUrdf(urdf_path);
   files.push_back(urdf_path);
-  robot.fingerprint = kFnvOffset;
-  for (const std::string& part : files) robot.fingerprint = Fingerprint(part, robot.fingerprint);
+  robot.fingerprint = kEmptyHash;
+  for (const std::string& part : files) robot.fingerprint = Hash(ReadFile(part), robot.fingerprint);
   if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);
   robot.joints = ReadJoints(root, urdf);
   robot.links = std::move(urdf.links);

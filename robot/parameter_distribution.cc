@@ -68,17 +68,17 @@ void RequireCovariance(const Eigen::MatrixXd& covariance) {
   }
 }
 
-/// First and second moment of one component, per parameter in physical units.
-struct Moments {
+/// First and second moment of one parameter, in physical units.
+struct RawMoments {
   double mean, square;
 };
 
 // The moments of a logistic function of a normal variable have no closed form. The trapezoidal rule
 // converges exponentially, as the integrand is analytic and gone at the ends; beyond sd 8, where
 // all is at the bounds, slower.
-Moments LogitMoments(double mean, double sd, const ParameterDescription& parameter) {
+RawMoments LogitMoments(double mean, double sd, const ParameterDescription& parameter) {
   constexpr double kEnd = 9, kSpacing = 1. / 16;
-  Moments sum{0, 0};
+  RawMoments sum{0, 0};
   double total = 0;
   for (double z = -kEnd; z <= kEnd; z += kSpacing) {
     const double weight = std::exp(-z * z / 2), value = parameter.ToPhysical(mean + sd * z);
@@ -89,8 +89,8 @@ Moments LogitMoments(double mean, double sd, const ParameterDescription& paramet
   return {sum.mean / total, sum.square / total};
 }
 
-Moments PhysicalMoments(const ParameterDistribution::Component& component, Eigen::Index i,
-                        const ParameterDescription& parameter) {
+RawMoments PhysicalMoments(const Gaussian& component, Eigen::Index i,
+                           const ParameterDescription& parameter) {
   const double mean = component.mean[i], variance = component.covariance(i, i);
   switch (parameter.coordinate) {
     case Coordinate::kLog:
@@ -102,19 +102,32 @@ Moments PhysicalMoments(const ParameterDistribution::Component& component, Eigen
   }
 }
 
+RawMoments PhysicalMoments(const GaussianMixture& mixture, Eigen::Index i,
+                           const ParameterDescription& parameter) {
+  RawMoments sum{0, 0};
+  for (size_t k = 0; k < mixture.components.size(); ++k) {
+    const RawMoments moments = PhysicalMoments(mixture.components[k], i, parameter);
+    sum.mean += mixture.weights[k] * moments.mean;
+    sum.square += mixture.weights[k] * moments.square;
+  }
+  return sum;
+}
+
 }  // namespace
 
-ParameterDistribution ParameterDistribution::Prior(const RobotDescription& description) {
-  ParameterDistribution prior;
-  prior.parameters = description.parameters;
-  const Eigen::Index size = prior.size();
-  Component component{1, Eigen::VectorXd(size), Eigen::MatrixXd::Zero(size, size)};
+Gaussian PriorGaussian(const RobotDescription& description) {
+  const auto size = static_cast<Eigen::Index>(description.parameters.size());
+  Gaussian prior{Eigen::VectorXd(size), Eigen::MatrixXd::Zero(size, size)};
   for (Eigen::Index i = 0; i < size; ++i) {
-    component.mean[i] = prior.parameters[static_cast<size_t>(i)].coordinate_mean();
-    component.covariance(i, i) = prior.parameters[static_cast<size_t>(i)].coordinate_variance();
+    const ParameterDescription& parameter = description.parameters[static_cast<size_t>(i)];
+    prior.mean[i] = parameter.coordinate_mean();
+    prior.covariance(i, i) = parameter.coordinate_variance();
   }
-  prior.components.push_back(std::move(component));
   return prior;
+}
+
+ParameterDistribution ParameterDistribution::Prior(const RobotDescription& description) {
+  return {0, description.parameters, {{1}, {PriorGaussian(description)}}};
 }
 
 ParameterDistribution ParameterDistribution::FromMessage(const parameter_distribution_t& message,
@@ -136,18 +149,18 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
   double total = 0;
   for (int64_t c = 0; c < components; ++c) {
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    Component component;
-    component.weight = message.weight[static_cast<size_t>(c)];
-    component.mean = Eigen::Map<const Eigen::VectorXd>(message.mean.data() + c * size, size);
-    component.covariance =
-        Eigen::Map<const RowMajor>(message.covariance.data() + c * size * size, size, size);
-    if (!(component.weight > 0) || !std::isfinite(component.weight) ||
-        !component.mean.allFinite() || !component.covariance.allFinite()) {
+    const double weight = message.weight[static_cast<size_t>(c)];
+    Gaussian component{
+        Eigen::Map<const Eigen::VectorXd>(message.mean.data() + c * size, size),
+        Eigen::Map<const RowMajor>(message.covariance.data() + c * size * size, size, size)};
+    if (!(weight > 0) || !std::isfinite(weight) || !component.mean.allFinite() ||
+        !component.covariance.allFinite()) {
       Reject(fmt::format("component {} is not finite or has no weight", c));
     }
     if (size > 0) RequireCovariance(component.covariance);
-    total += component.weight;
-    result.components.push_back(std::move(component));
+    total += weight;
+    result.mixture.weights.push_back(weight);
+    result.mixture.components.push_back(std::move(component));
   }
   if (std::abs(total - 1) > kRounding) Reject(fmt::format("weights sum to {}", total));
   if (!result.Mean().allFinite() || !result.Sd().allFinite())
@@ -165,9 +178,9 @@ parameter_distribution_t ParameterDistribution::ToMessage() const {
     message.name.push_back(parameter.name);
     message.coordinate.push_back(ToCode(parameter.coordinate));
   }
-  message.num_components = static_cast<int32_t>(components.size());
-  for (const Component& component : components) {
-    message.weight.push_back(component.weight);
+  message.num_components = static_cast<int32_t>(mixture.components.size());
+  message.weight = mixture.weights;
+  for (const Gaussian& component : mixture.components) {
     for (Eigen::Index i = 0; i < component.mean.size(); ++i) {
       message.mean.push_back(component.mean[i]);
       for (Eigen::Index j = 0; j < component.mean.size(); ++j)
@@ -182,11 +195,7 @@ parameter_distribution_t ParameterDistribution::ToMessage() const {
 }
 
 Eigen::VectorXd ParameterDistribution::SampleCoordinates(Random& random) const {
-  double left = random.Uniform();
-  size_t chosen = 0;
-  while (chosen + 1 < components.size() && left >= components[chosen].weight)
-    left -= components[chosen++].weight;
-  const Component& component = components[chosen];
+  const Gaussian& component = mixture.components[SampleComponent(mixture, random)];
   if (size() == 0) return component.mean;
 
   // Not Cholesky: a parameter known exactly, or exactly tied to another, makes the covariance
@@ -211,26 +220,17 @@ Eigen::VectorXd ParameterDistribution::ToPhysical(const Eigen::VectorXd& coordin
 }
 
 Eigen::VectorXd ParameterDistribution::Mean() const {
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(size());
-  for (Eigen::Index i = 0; i < mean.size(); ++i) {
-    for (const Component& component : components) {
-      mean[i] +=
-          component.weight * PhysicalMoments(component, i, parameters[static_cast<size_t>(i)]).mean;
-    }
-  }
+  Eigen::VectorXd mean(size());
+  for (Eigen::Index i = 0; i < mean.size(); ++i)
+    mean[i] = PhysicalMoments(mixture, i, parameters[static_cast<size_t>(i)]).mean;
   return mean;
 }
 
 Eigen::VectorXd ParameterDistribution::Sd() const {
-  const Eigen::VectorXd mean = Mean();
   Eigen::VectorXd sd(size());
   for (Eigen::Index i = 0; i < sd.size(); ++i) {
-    double square = 0;
-    for (const Component& component : components) {
-      square += component.weight *
-                PhysicalMoments(component, i, parameters[static_cast<size_t>(i)]).square;
-    }
-    sd[i] = std::sqrt(std::max(0., square - mean[i] * mean[i]));
+    const RawMoments m = PhysicalMoments(mixture, i, parameters[static_cast<size_t>(i)]);
+    sd[i] = std::sqrt(std::max(0., m.square - m.mean * m.mean));
   }
   return sd;
 }

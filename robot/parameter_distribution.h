@@ -5,27 +5,26 @@
 #include <string>
 #include <vector>
 
+#include "common/gaussian.h"
 #include "common/random.h"
 #include "plumb/parameter_distribution_t.hpp"
 #include "robot/description.h"
 
 namespace plumb {
 
+/// The description's prior over the P coordinates: independent, in the order of
+/// RobotDescription::parameters. Thread-safe.
+Gaussian PriorGaussian(const RobotDescription& description);
+
 /// Which simulators could have produced a robot's motion: a mixture of Gaussians over the
-/// *coordinates* of the uncertain parameters (the logarithm of a positive one, else itself), in the
-/// order of RobotDescription::parameters. Immutable use is thread-safe.
+/// *coordinates* of the uncertain parameters (see ParameterDescription::coordinate), in the order
+/// of RobotDescription::parameters. Immutable use is thread-safe.
 struct ParameterDistribution {
-  struct Component {
-    double weight;               ///< > 0; they sum to 1
-    Eigen::VectorXd mean;        ///< P, in coordinates
-    Eigen::MatrixXd covariance;  ///< P x P, symmetric, positive semidefinite, in coordinates
-
-    bool operator==(const Component&) const = default;
-  };
-
-  int iteration = 0;  ///< of SimOpt; 0 = the prior
-  std::vector<ParameterDescription> parameters;
-  std::vector<Component> components;
+  int iteration = 0;                             ///< of SimOpt; 0 = the prior
+  std::vector<ParameterDescription> parameters;  ///< P
+  /// of P coordinates; covariances may be singular: of a parameter that is known exactly, or
+  /// exactly tied to another
+  GaussianMixture mixture;
 
   /// The description's prior: one component with a diagonal covariance.
   static ParameterDistribution Prior(const RobotDescription& description);

@@ -1,22 +1,19 @@
 #include "robot/physics_fingerprint.h"
 
-#include <cstring>
+#include "common/hash.h"
 
 namespace plumb {
 namespace {
 
-// FNV-1a, 64 bit (Fowler, Noll, Vo; RFC draft "The FNV Non-Cryptographic Hash Algorithm").
-class Hash {
+class Fingerprint {
  public:
   void Add(double number) {
-    char bytes[sizeof number];
     if (number == 0) number = 0;  // -0 is the same physics
-    std::memcpy(bytes, &number, sizeof number);
-    AddBytes(bytes, sizeof bytes);
+    value_ = Hash(&number, sizeof number, value_);
   }
   void Add(const std::string& text) {
     Add(static_cast<double>(text.size()));
-    AddBytes(text.data(), text.size());
+    value_ = Hash(text, value_);
   }
   template <class Derived>
   void Add(const Eigen::DenseBase<Derived>& numbers) {
@@ -27,17 +24,13 @@ class Hash {
   uint64_t value() const { return value_; }
 
  private:
-  void AddBytes(const char* bytes, size_t count) {
-    for (size_t i = 0; i < count; ++i)
-      value_ = (value_ ^ static_cast<unsigned char>(bytes[i])) * 0x100000001b3;
-  }
-  uint64_t value_ = 0xcbf29ce484222325;
+  uint64_t value_ = kEmptyHash;
 };
 
 // Kinds that came later count where a joint has them: older posteriors still fit their robots.
 constexpr size_t kFirstKinds = 10;
 
-void AddLink(const LinkDescription& link, Hash* hash) {
+void AddLink(const LinkDescription& link, Fingerprint* hash) {
   hash->Add(link.name), hash->Add(link.mass), hash->Add(link.center_of_mass),
       hash->Add(link.inertia);
   for (const Shape& shape : link.collisions) {
@@ -46,7 +39,7 @@ void AddLink(const LinkDescription& link, Hash* hash) {
   }
 }
 
-void AddJoint(const JointDescription& joint, Hash* hash) {
+void AddJoint(const JointDescription& joint, Fingerprint* hash) {
   hash->Add(joint.name);
   hash->Add(joint.origin), hash->Add(joint.rotation), hash->Add(joint.axis);
   for (const double number : {static_cast<double>(joint.type), static_cast<double>(joint.parent),
@@ -63,7 +56,7 @@ void AddJoint(const JointDescription& joint, Hash* hash) {
   }
 }
 
-void AddSimulation(const SimulationSettings& s, Hash* hash) {
+void AddSimulation(const SimulationSettings& s, Fingerprint* hash) {
   for (const double number : {static_cast<double>(s.integrator), s.substep, s.speed_clip,
                               static_cast<double>(s.move_before_clip), s.gravity}) {
     hash->Add(number);
@@ -82,7 +75,7 @@ void AddSimulation(const SimulationSettings& s, Hash* hash) {
 }  // namespace
 
 uint64_t PhysicsFingerprint(const RobotDescription& robot) {
-  Hash hash;
+  Fingerprint hash;
   for (const LinkDescription& link : robot.links) AddLink(link, &hash);
   for (const JointDescription& joint : robot.joints) AddJoint(joint, &hash);
   for (const FrozenParameter& frozen : robot.frozen) hash.Add(frozen.name), hash.Add(frozen.value);

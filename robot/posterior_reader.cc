@@ -123,10 +123,8 @@ void RequireRobot(const Field& root, const RobotDescription& robot) {
       "calibrate again");
 }
 
-ParameterDistribution::Component ReadComponent(const Field& weight, const Field& mean,
-                                               const Field& covariance, size_t n) {
-  ParameterDistribution::Component component{weight.Number(), mean.Vector(n), covariance.Matrix(n)};
-  weight.Require(component.weight > 0, "is not positive");
+Gaussian ReadComponent(const Field& mean, const Field& covariance, size_t n) {
+  Gaussian component{mean.Vector(n), covariance.Matrix(n)};
   const Eigen::MatrixXd& c = component.covariance;
   covariance.Require(
       (c - c.transpose()).cwiseAbs().maxCoeff() <= kRounding * c.cwiseAbs().maxCoeff(),
@@ -143,13 +141,14 @@ ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& 
   const std::vector<Field> weights = mixture["weights"].Entries(count),
                            means = mixture["means"].Entries(count),
                            covariances = mixture["covariances"].Entries(count);
-  ParameterDistribution distribution;
-  distribution.iteration = 1;
-  distribution.parameters = robot.parameters;
+  ParameterDistribution distribution{1, robot.parameters, {}};
   double total = 0;
   for (size_t i = 0; i < count; ++i) {
-    distribution.components.push_back(ReadComponent(weights[i], means[i], covariances[i], n));
-    total += distribution.components.back().weight;
+    const double weight = weights[i].Number();
+    weights[i].Require(weight > 0, "is not positive");
+    distribution.mixture.weights.push_back(weight);
+    distribution.mixture.components.push_back(ReadComponent(means[i], covariances[i], n));
+    total += weight;
   }
   mixture["weights"].Require(std::abs(total - 1) <= kRounding,
                              fmt::format("sum to {}, not to 1", total));

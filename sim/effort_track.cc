@@ -6,14 +6,14 @@ namespace plumb {
 namespace {
 
 // Segments that are kept at most of the past: a 1 kHz command for as long as any delay.
-constexpr size_t kMostSegments = 1024;
+constexpr size_t kMaxSegments = 1024;
 
 }  // namespace
 
 EffortTrack::EffortTrack(int velocities, double remembered)
     : n_(static_cast<size_t>(velocities)), remembered_(remembered) {
-  ends_.reserve(kMostSegments + 1);
-  efforts_.reserve((kMostSegments + 1) * n_);
+  ends_.reserve(kMaxSegments + 1);
+  efforts_.reserve((kMaxSegments + 1) * n_);
   Clear();
 }
 
@@ -37,8 +37,7 @@ void EffortTrack::Advance() {
   const double now = ends_.back();
   for (double& end : ends_) end -= now;
   size_t old = 0;
-  while (old + 1 < ends_.size() &&
-         (ends_[old] < -remembered_ || ends_.size() - old > kMostSegments))
+  while (old + 1 < ends_.size() && (ends_[old] < -remembered_ || ends_.size() - old > kMaxSegments))
     ++old;
   ends_.erase(ends_.begin(), ends_.begin() + static_cast<std::ptrdiff_t>(old));
   efforts_.erase(efforts_.begin(), efforts_.begin() + static_cast<std::ptrdiff_t>(old * n_));

@@ -33,7 +33,7 @@ void Environment::SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
   Read();
 }
 
-Environment::StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
+StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
   task_->Effort(std::span(action.data(), static_cast<size_t>(action.size())), next_effort_);
   start_q_ = q();
   start_v_ = v();

@@ -10,6 +10,12 @@
 
 namespace plumb {
 
+/// The outcome of a control step.
+struct StepResult {
+  double reward;    ///< of this step
+  bool terminated;  ///< by the task, or because the simulation is no longer finite; never by time
+};
+
 /// A task on a simulated robot, in control steps. One per worker; not thread-safe. After
 /// construction nothing allocates. Equal parameters, state and actions give equal bits in any
 /// thread.
@@ -38,10 +44,6 @@ class Environment {
   void SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
                 const Eigen::Ref<const Eigen::VectorXd>& v);
 
-  struct StepResult {
-    double reward;    ///< of this step
-    bool terminated;  ///< by the task, or because the simulation is no longer finite
-  };
   /// One control period. During its first description.simulation.latency seconds the previous
   /// action still acts: on the robot, too, an effort arrives some time after the state it answers.
   /// @param action policy units, [-1, 1] = effort limits; clipped here.
@@ -56,7 +58,7 @@ class Environment {
   /// The sensors' readings.
   const Eigen::VectorXd& reading_q() const { return reading_q_; }
   const Eigen::VectorXd& reading_v() const { return reading_v_; }
-  /// What the latest action asked the motors for [Nm or N], one per velocity.
+  /// The efforts that the latest action asked the motors for [Nm or N], one per velocity.
   const Eigen::VectorXd& effort() const { return effort_; }
   const Task& task() const { return *task_; }
 

@@ -13,6 +13,7 @@
 #include "common/process.h"
 #include "common/random.h"
 #include "common/realtime.h"
+#include "common/time_units.h"
 #include "drivers/can/transport.h"
 #include "plumb/place_robot_t.hpp"
 #include "sim/parameters.h"
@@ -73,9 +74,8 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
   const Clock& clock = process.clock();
   VirtualRobot robot(description, physical, clock.Utime());
   Stand(description, seed, robot);
-  const std::unique_ptr<Transport> transport =
-      OpenTransport(bus_url, robot.filters(),
-                    {process.participant(), std::llround(description.estimator.delay * 1e6)});
+  const std::unique_ptr<Transport> transport = OpenTransport(
+      bus_url, robot.filters(), {process.participant(), Microseconds(description.estimator.delay)});
   Subscriber<place_robot_t> places(
       process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
         const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(),

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "common/config.h"
+#include "common/nearest_name.h"
 
 namespace plumb {
 namespace {
@@ -63,11 +63,10 @@ std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
 }
 
 const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path) {
-  const ParameterPath* nearest = &paths[0];
+  std::vector<std::string> names;
   for (const ParameterPath& candidate : paths) {
     if (candidate.path == path) return candidate;
-    if (EditDistance(path, candidate.path) < EditDistance(path, nearest->path))
-      nearest = &candidate;
+    names.push_back(candidate.path);
   }
   std::string why;
   if (path.starts_with("contact/"))
@@ -76,7 +75,7 @@ const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std
   if (path.starts_with("length/"))
     why = " (a link whose joints and centre of mass coincide has no length)";
   throw std::invalid_argument("the simulator has no parameter '" + path + "'" + why +
-                              "; the nearest is '" + nearest->path + "'");
+                              "; the nearest is '" + NearestName(path, names) + "'");
 }
 
 }  // namespace plumb

@@ -9,7 +9,7 @@ namespace plumb {
 namespace {
 
 // Beyond which nobody waits for a step.
-constexpr double kMostSubsteps = 1e9;
+constexpr double kMaxSubsteps = 1e9;
 
 }  // namespace
 
@@ -101,7 +101,7 @@ void Simulator::Step(std::span<const EffortSegment> profile) {
 }
 
 void Simulator::RequireEnd(double duration) const {
-  if (duration > kMostSubsteps * model_->description().simulation.substep) {
+  if (duration > kMaxSubsteps * model_->description().simulation.substep) {
     throw std::invalid_argument("a step of " + std::to_string(duration) +
                                 " s would never come to an end");
   }

@@ -47,7 +47,7 @@ class Simulator {
   /// JointDynamics.
   /// @param effort that acts at that time.
   void SetReading(const Vector& q, const Vector& v, const Vector& effort);
-  /// What had been commanded before the present, in order of time: where an effort is delayed, it
+  /// The efforts commanded before the present, in order of time: where an effort is delayed, it
   /// is still to come.
   void Recall(std::span<const EffortSegment> before);
 
@@ -66,7 +66,7 @@ class Simulator {
 
   const Eigen::VectorXd& q() const { return q_; }  ///< [rad or m]
   const Eigen::VectorXd& v() const { return v_; }  ///< [rad/s or m/s]
-  /// What the sensors say: of the past, extrapolated to second order in their delay by the
+  /// The sensors' readings: of the past, extrapolated to second order in their delay by the
   /// accelerations that the efforts arriving now and all stops and contacts would give. Valid until
   /// the next call.
   struct State {

@@ -19,7 +19,7 @@ struct Window {
   /// Control step by control step, at least one; efforts of num_velocities entries, of positive
   /// duration together.
   std::vector<std::span<const EffortSegment>> steps;
-  /// What had been commanded before, the latest last: where efforts are delayed, some of it is
+  /// The efforts commanded before, the latest last: where efforts are delayed, some of it is
   /// still to come. Before all that is known there was no effort.
   std::vector<std::span<const EffortSegment>> before = {};
 };

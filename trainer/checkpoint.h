@@ -19,8 +19,8 @@ struct CheckpointError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Where training stands. Everything that shapes its future is here, so that a resumed run gives
-/// the same bits.
+/// The state of training. Everything that shapes its future is here, so that a resumed run gives
+/// the same bits. All functions of this header are thread-safe for different files.
 struct Checkpoint {
   uint64_t seed = 0;
   /// of all that a run of `plumb train` depends on; 0 in the trainer process

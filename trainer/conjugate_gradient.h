@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// What ConjugateGradient found.
+/// The result of ConjugateGradient.
 struct LinearSolution {
   Eigen::VectorXd x;
   Eigen::VectorXd residual;  ///< b - A x, as the recursion has it
@@ -17,7 +17,8 @@ struct LinearSolution {
 /// Solves A x = b for symmetric positive definite A by conjugate gradients (Hestenes and Stiefel,
 /// 1952), starting from x = 0. Gives up, saying so, at the first direction whose curvature is not
 /// positive or not finite.
-/// @param product writes A v to its second argument.
+/// Thread-safe if `product` is.
+/// @param product writes A v to its second argument, of b's size. @param iterations at most.
 /// @param tolerance stops when |residual|^2 <= tolerance * |b|^2.
 LinearSolution ConjugateGradient(
     const std::function<void(const Eigen::VectorXd& v, Eigen::VectorXd& av)>& product,

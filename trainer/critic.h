@@ -12,7 +12,7 @@
 
 namespace plumb {
 
-/// All that a critic has learnt: what a checkpoint keeps.
+/// All that a critic has learnt, as a checkpoint keeps it.
 struct CriticState {
   Eigen::VectorXf parameters, first_moment, second_moment;  ///< of the network, and Adam's
   int32_t adam_steps = 0;

@@ -9,8 +9,9 @@
 
 namespace plumb {
 
-/// One episode as it was played. The observations and actions are those that are learnt from: as
-/// the network saw them, observations x steps, and as drawn, actions x steps; empty if nothing is.
+/// One episode as it was played by one rank, before it is part of a Batch. The observations and
+/// actions are those that are learnt from: as the network saw them, observations x steps, and as
+/// drawn, actions x steps; empty if nothing is.
 struct EpisodeRecord {
   std::vector<float> observations, actions;
   std::vector<double> rewards;        ///< one per step
@@ -25,7 +26,7 @@ struct EpisodeRecord {
   int steps() const { return static_cast<int>(rewards.size()); }
 };
 
-/// The episodes of all ranks, in the order of ranks. Called by all of them.
+/// The episodes of all ranks, in the order of ranks. Called by all of them, by one thread each.
 std::vector<EpisodeRecord> Gather(const Ranks& ranks, std::vector<EpisodeRecord> mine);
 
 }  // namespace plumb

@@ -29,7 +29,7 @@ Evaluation Evaluate(std::span<const double> returns) {
   return evaluation;
 }
 
-std::string Words(const Evaluation& evaluation) {
+std::string Summary(const Evaluation& evaluation) {
   std::string words = fmt::format("{:.1f} mean, {:.1f} 10th percentile, {:.1f} worst",
                                   evaluation.mean, evaluation.tenth, evaluation.worst);
   if (evaluation.failed > 0)

@@ -17,10 +17,10 @@ struct Evaluation {
 };
 
 /// Of returns, NaN where an episode failed. The percentile is interpolated linearly between the
-/// ordered returns.
+/// ordered returns. Thread-safe.
 Evaluation Evaluate(std::span<const double> returns);
 
 /// "-142.1 mean, -263.3 10th percentile, -370.2 worst", and how many failed.
-std::string Words(const Evaluation& evaluation);
+std::string Summary(const Evaluation& evaluation);
 
 }  // namespace plumb

@@ -6,10 +6,12 @@
 namespace plumb {
 
 Advantages EstimateAdvantages(std::span<const double> rewards, std::span<const double> values,
-                              std::span<const EpisodeSpan> episodes, double gamma, double lambda) {
+                              std::span<const EpisodeSpan> episodes,
+                              std::span<const double> final_values, double gamma, double lambda) {
   Advantages result{std::vector<double>(rewards.size()), std::vector<double>(rewards.size())};
-  for (const EpisodeSpan& episode : episodes) {
-    double next_value = episode.terminated ? 0 : episode.final_value;
+  for (size_t e = 0; e < episodes.size(); ++e) {
+    const EpisodeSpan& episode = episodes[e];
+    double next_value = episode.terminated ? 0 : final_values[e];
     double advantage = 0;
     for (int i = episode.end; i-- > episode.begin;) {
       const auto t = static_cast<size_t>(i);
@@ -32,7 +34,7 @@ void Normalize(std::span<double> advantages) {
     squares += a * a;
   }
   const double sd = std::sqrt(squares / count);
-  // What rounding leaves of equal numbers is not a difference.
+  // Equal numbers differ by rounding, and that is no difference.
   const bool differ = sd > 1e-12 * std::abs(mean) && sd > 0;
   for (double& a : advantages) a = differ ? a / sd : 0;
 }

@@ -5,14 +5,14 @@
 
 namespace plumb {
 
-/// A stretch [begin, end) of a batch, begin < end.
+/// The steps [begin, end) of a batch, begin < end, that are one episode.
 struct EpisodeSpan {
   int begin, end;
-  bool terminated;     ///< false: cut off by the time limit, and life would have gone on
-  double final_value;  ///< V of the observation after the last step; not used if terminated
+  bool terminated;  ///< false: cut off by the time limit, and the task would have gone on
 };
 
-/// Advantages and value targets of a batch.
+/// Advantages and value targets of a batch, one per step. All functions of this header are
+/// thread-safe.
 struct Advantages {
   std::vector<double> advantage;
   std::vector<double> target;  ///< of V: advantage + value
@@ -23,8 +23,11 @@ struct Advantages {
 /// V(s_{t+1}) is 0; at a time limit it is the value of the observation then, because the limit is
 /// no part of the task.
 /// @param rewards,values one per step of the batch. @param episodes together cover the batch.
+/// @param final_values V of the observation after the last step, one per episode; not used where
+/// that has terminated.
 Advantages EstimateAdvantages(std::span<const double> rewards, std::span<const double> values,
-                              std::span<const EpisodeSpan> episodes, double gamma, double lambda);
+                              std::span<const EpisodeSpan> episodes,
+                              std::span<const double> final_values, double gamma, double lambda);
 
 /// Shifts and scales to mean 0 and standard deviation 1; to all zeros if they do not differ.
 void Normalize(std::span<double> advantages);

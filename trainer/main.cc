@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/process.h"
+#include "common/time_units.h"
 #include "plumb/parameter_distribution_t.hpp"
 #include "trainer/kernels/network.h"
 #include "trainer/robot_simulation.h"
@@ -94,7 +95,7 @@ class TrainerProcess {
 
   void Train() {
     const UpdateReport report = session_.Advance();
-    seconds_ = Seconds();
+    seconds_ = Elapsed();
     spdlog::debug("update {}: return {:.1f}, KL {:.4f}, explained variance {:.3f}",
                   session_.update(), report.mean_return, report.step.kl, report.explained_variance);
     if (!report.step.accepted)
@@ -108,7 +109,7 @@ class TrainerProcess {
     if (session_.complete()) {
       spdlog::info(
           "iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s",
-          session_.iteration(), session_.evaluation().episodes, Words(session_.evaluation()),
+          session_.iteration(), session_.evaluation().episodes, Summary(session_.evaluation()),
           seconds_);
       Save();
       process_.TakeVirtualTime(robot_.training.duration);
@@ -139,8 +140,8 @@ class TrainerProcess {
   }
 
   /// Wall time of this iteration in this process.
-  double Seconds() const {
-    return static_cast<double>(process_.clock().Now() - start_) * 1e-6 / process_.clock().scale();
+  double Elapsed() const {
+    return Seconds(process_.clock().Now() - start_) / process_.clock().scale();
   }
 
   Process& process_;

@@ -4,7 +4,8 @@
 
 namespace plumb {
 
-/// Running mean and variance of a number (Welford, Technometrics 4, 1962), in double.
+/// Running mean and variance of a number (Welford, Technometrics 4, 1962), in double. Not
+/// thread-safe, like ObservationMoments.
 struct RunningMoments {
   double count = 0, mean = 0, squares = 0;
 

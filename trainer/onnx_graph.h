@@ -22,7 +22,8 @@ namespace plumb {
 /// action_max, action_scale, log_std_value.
 onnx::ModelProto MakeOnnxModel(const GaussianPolicy& policy);
 
-/// What the tensors of a layer begin with: "layer1" is the first.
+/// The prefix of a layer's tensors: "layer1" is the first. @param layer counts from 0.
+/// All functions of this header are thread-safe.
 std::string LayerName(size_t layer);
 
 }  // namespace plumb

@@ -30,7 +30,7 @@ using google::protobuf::util::MessageDifferencer;
 using onnx::GraphProto, onnx::ModelProto, onnx::TensorProto;
 
 constexpr size_t kLongestModel = size_t{16} << 20;  // [bytes] what ReadFile reads
-constexpr size_t kMostStructure = size_t{1} << 20;  // [bytes] of a model besides its weights
+constexpr size_t kMaxStructure = size_t{1} << 20;   // [bytes] of a model besides its weights
 constexpr size_t kLongestDifference = 200;          // [characters] of a graph, in an error
 
 [[noreturn]] void Fail(const std::string& what) { throw std::invalid_argument(what); }
@@ -69,7 +69,7 @@ ModelProto Parse(std::string_view bytes) {
   if (!AddLengths(input, weights, of_weights)) Fail("is not an ONNX model, or damaged");
   input.PopLimit(none);
   // Two bytes of an empty message become two hundred in memory; weights remain as long as they are.
-  if (bytes.size() - of_weights > kMostStructure)
+  if (bytes.size() - of_weights > kMaxStructure)
     Fail("is not a policy: it is too large besides its weights");
   const google::protobuf::LogSilencer silent;
   ModelProto model;

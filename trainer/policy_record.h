@@ -11,8 +11,8 @@
 
 namespace plumb {
 
-/// What a policy file says of its policy besides the numbers: what it is for and where it comes
-/// from.
+/// The metadata of a policy file: the robot and task that the policy is for, and its origin. All
+/// functions of this header are thread-safe.
 struct PolicyRecord {
   std::string robot, task;  ///< names, as in robot.toml
   /// Task::observation_names: what the policy sees, in order

@@ -30,10 +30,10 @@ class RobotSimulation : public Simulation {
     environment_.task().Observe(q_, v_,
                                 {observation.data(), static_cast<size_t>(observation.size())});
   }
-  Outcome Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
-    const Environment::StepResult result = environment_.Step(action);
+  StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
+    const StepResult result = environment_.Step(action);
     Read();
-    return {result.reward, result.terminated};
+    return result;
   }
 
  private:

@@ -5,8 +5,8 @@
 
 namespace plumb {
 
-/// Makes simulations of the robot's task. @throws std::invalid_argument, when called, as
-/// Environment does.
+/// Makes simulations of the robot's task, which share one model. Thread-safe.
+/// @throws std::invalid_argument, when called, as Environment does.
 SimulationFactory SimulateRobot(const RobotDescription& description);
 
 }  // namespace plumb

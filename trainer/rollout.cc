@@ -13,7 +13,7 @@ namespace {
 
 // Episodes side by side: the kernels gain little from more columns. Tasks: enough for as many
 // threads, in a number that two and four of them share evenly.
-constexpr int kMostTogether = 8, kTasks = 8;
+constexpr int kMaxTogether = 8, kTasks = 8;
 
 }  // namespace
 
@@ -34,7 +34,7 @@ struct RolloutSampler::Player {
     }
   }
 
-  /// What the network sees now. Ends the episode if it is over, or not finite and of no use.
+  /// Writes the network's input. Ends the episode if it is over, or not finite and of no use.
   void Observe(const GaussianPolicy& policy, bool explore, float* observation) {
     simulation->Observe(raw);
     const Eigen::VectorXf normalised = policy.Normalize(raw);
@@ -63,17 +63,17 @@ struct RolloutSampler::Player {
       record = nullptr;
       return;
     }
-    const Simulation::Outcome outcome = simulation->Step(action);
-    record->rewards.push_back(outcome.reward);
-    record->sum += outcome.reward;
-    record->terminated = outcome.terminated;
+    const StepResult result = simulation->Step(action);
+    record->rewards.push_back(result.reward);
+    record->sum += result.reward;
+    record->terminated = result.terminated;
     if (!explore) return;
     record->observations.insert(record->observations.end(), observation, observation + raw.size());
     record->actions.insert(record->actions.end(), action.begin(), action.end());
   }
 };
 
-/// What one thread works with.
+/// The work space of one thread.
 struct RolloutSampler::Worker {
   std::vector<Player> players;
   kernels::Tape tape;
@@ -115,12 +115,11 @@ RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape&
                                Workers& workers, const Ranks& ranks)
     : workers_(&workers), ranks_(&ranks), network_(shape.sizes()) {
   for (int i = 0; i < workers.size(); ++i) {
-    auto worker =
-        std::make_unique<Worker>(Worker{{},
-                                        kernels::Tape(shape.sizes(), kMostTogether),
-                                        Eigen::MatrixXf(shape.observations, kMostTogether),
-                                        Eigen::MatrixXf(shape.actions, kMostTogether)});
-    for (int k = 0; k < kMostTogether; ++k) {
+    auto worker = std::make_unique<Worker>(Worker{{},
+                                                  kernels::Tape(shape.sizes(), kMaxTogether),
+                                                  Eigen::MatrixXf(shape.observations, kMaxTogether),
+                                                  Eigen::MatrixXf(shape.actions, kMaxTogether)});
+    for (int k = 0; k < kMaxTogether; ++k) {
       worker->players.push_back({.simulation = make(), .raw = Eigen::VectorXf(shape.observations)});
     }
     state_.push_back(std::move(worker));
@@ -140,7 +139,7 @@ std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy,
   const int own = bounds[rank + 1] - bounds[rank];
   first += bounds[rank];
   std::vector<EpisodeRecord> records(static_cast<size_t>(own));
-  int tasks = (own + kMostTogether - 1) / kMostTogether;
+  int tasks = (own + kMaxTogether - 1) / kMaxTogether;
   tasks = std::min(own, (tasks + kTasks - 1) / kTasks * kTasks);
   workers_->Run(tasks, [&](int task, int worker) {
     const int begin = own * task / tasks, end = own * (task + 1) / tasks;
@@ -209,7 +208,7 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
     batch.final_observations.insert(batch.final_observations.end(),
                                     record.final_observation.begin(),
                                     record.final_observation.end());
-    batch.episodes.push_back({begin, batch.size(), record.terminated, record.sum});
+    batch.episodes.push_back({begin, batch.size(), record.terminated});
   }
   batch.mean_return = sum / static_cast<double>(records.size());
   return batch;

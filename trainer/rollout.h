@@ -8,14 +8,16 @@
 
 #include "common/random.h"
 #include "controller/policy.h"
+#include "sim/environment.h"
 #include "trainer/episode_record.h"
+#include "trainer/gae.h"
 #include "trainer/kernels/network.h"
 #include "trainer/moments.h"
 #include "trainer/workers.h"
 
 namespace plumb {
 
-/// What the trainer needs of a simulated task. Used by one thread at a time.
+/// A simulated task as the trainer sees it: reset, observe, step. Used by one thread at a time.
 class Simulation {
  public:
   virtual ~Simulation() = default;
@@ -27,12 +29,8 @@ class Simulation {
   /// @throws std::invalid_argument if there is no such simulator.
   virtual void Reset(const Eigen::VectorXd& parameters, Random& random) = 0;
   virtual void Observe(Eigen::Ref<Eigen::VectorXf> observation) const = 0;
-  struct Outcome {
-    double reward;
-    bool terminated;  ///< by the task itself, never by the time limit
-  };
   /// @param action policy units; clipped by the simulation.
-  virtual Outcome Step(const Eigen::Ref<const Eigen::VectorXf>& action) = 0;
+  virtual StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) = 0;
 };
 
 using SimulationFactory = std::function<std::unique_ptr<Simulation>()>;
@@ -44,12 +42,7 @@ struct Batch {
   std::vector<float> observations;  ///< as the network sees them (normalised), observations x N
   std::vector<float> actions;       ///< as drawn, before clipping, actions x N
   std::vector<double> rewards;      ///< N
-  struct Episode {
-    int begin, end;   ///< steps [begin, end)
-    bool terminated;  ///< false: cut off by the time limit
-    double sum;       ///< of the rewards, undiscounted
-  };
-  std::vector<Episode> episodes;
+  std::vector<EpisodeSpan> episodes;
   /// after the last step (before any reset), observations x episodes
   std::vector<float> final_observations;
   /// of the observations as the task gives them, of all episodes played

@@ -43,7 +43,7 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
 
 bool TrainingSession::Replace(const ParameterDistribution& distribution) {
   if (!training() || distribution.iteration != iteration_ ||
-      distribution.components == distribution_.components)
+      distribution.mixture == distribution_.mixture)
     return false;
   distribution_ = distribution;
   return true;

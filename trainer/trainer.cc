@@ -43,7 +43,7 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 
 }  // namespace
 
-TrainingSettings AsThePaper(TrainingSettings settings) {
+TrainingSettings PaperSettings(TrainingSettings settings) {
   settings.normalise_values = false;
   settings.fisher_fraction = 1;
   settings.critic_epochs = 20;
@@ -101,13 +101,8 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
       rollout_.Collect(policy_, sample, settings_.batch, share, seed_, kRolloutStream, update);
   const std::vector<double> values = critic_.Values(batch.observations);
   const std::vector<double> final_values = critic_.Values(batch.final_observations);
-  std::vector<EpisodeSpan> episodes;
-  for (const Batch::Episode& episode : batch.episodes) {
-    episodes.push_back(
-        {episode.begin, episode.end, episode.terminated, final_values[episodes.size()]});
-  }
-  Advantages advantages =
-      EstimateAdvantages(batch.rewards, values, episodes, settings_.gamma, settings_.lambda);
+  Advantages advantages = EstimateAdvantages(batch.rewards, values, batch.episodes, final_values,
+                                             settings_.gamma, settings_.lambda);
   Normalize(advantages.advantage);
 
   UpdateReport report;

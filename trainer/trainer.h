@@ -13,12 +13,12 @@
 
 namespace plumb {
 
-/// The settings as the paper has them, where ours learn faster: value targets in units of return,
-/// the whole batch for Fisher's matrix. The paper does not say how long its critic is fitted;
-/// targets so large need 20 passes, 10 leave one seed in ten behind.
-TrainingSettings AsThePaper(TrainingSettings settings);
+/// The settings of the paper where ours learn faster: value targets in units of return, the whole
+/// batch for Fisher's matrix. The paper does not say how long its critic is fitted; targets so
+/// large need 20 passes, 10 leave one seed in ten behind. Thread-safe.
+TrainingSettings PaperSettings(TrainingSettings settings);
 
-/// All that training has learnt: what a checkpoint keeps.
+/// All that training has learnt, as a checkpoint keeps it.
 struct TrainerState {
   GaussianPolicy policy;
   CriticState critic;
@@ -69,8 +69,8 @@ class Trainer {
   UpdateReport Update(const ParameterSampler& sample);
   /// The policy without exploration on simulators drawn anew. Changes nothing.
   Evaluation Evaluate(const ParameterSampler& sample, int episodes);
-  /// The same on simulators and initial states that are always the same for a seed: what makes
-  /// policies comparable.
+  /// The same on simulators and initial states that are always the same for a seed, so that
+  /// policies can be compared.
   Evaluation EvaluateHeldOut(const ParameterSampler& sample, int episodes);
 
  private:

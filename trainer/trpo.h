@@ -11,7 +11,7 @@
 
 namespace plumb {
 
-/// What a policy did and how well: one column or entry per step.
+/// Observations, actions and advantages of a batch: one column or entry per step.
 struct PolicySamples {
   std::span<const float> observations;  ///< as the network sees them (normalised), observations x N
   std::span<const float> actions;       ///< as drawn, before any clipping, actions x N

@@ -23,8 +23,8 @@ void WaitWhile(const std::atomic<T>& value, T old) {
   value.wait(old, std::memory_order_acquire);
 }
 
-// What a thread is to the Workers it serves: to all others it is the caller, worker 0. The job it
-// gives out is the second one within Together's second.
+// The place of a thread in the Workers that it serves: in all others it is the caller, worker 0.
+// The job that it gives out is the second one within Together's second.
 struct Role {
   const Workers* workers = nullptr;
   int worker = 0, job = 0;

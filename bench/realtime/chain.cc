@@ -19,6 +19,7 @@
 #include "cli/child.h"
 #include "common/clock.h"
 #include "common/messenger.h"
+#include "common/time_units.h"
 #include "controller/policy.h"
 #include "drivers/can/transport.h"
 #include "drivers/protocols/cansimple.h"
@@ -180,7 +181,7 @@ class Chain {
 
   template <class So>
   void Listen(double seconds, So so) {
-    const int64_t end = clock_.Now() + static_cast<int64_t>(seconds * 1e6);
+    const int64_t end = clock_.Now() + Microseconds(seconds);
     while (!so() && clock_.Now() < end) {
       std::array<pollfd, 2> polled{{{bus_->fd(), POLLIN, 0}, {messenger_.fd(), POLLIN, 0}}};
       poll(polled.data(), polled.size(), 10);

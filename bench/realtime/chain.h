@@ -8,7 +8,7 @@
 
 namespace plumb {
 
-/// What was seen of a chain.
+/// Times measured along a chain.
 struct ChainTimes {
   /// Of the driver's cycles, from DRIVER_STATUS: bin i counts lateness in [2^i, 2^(i+1)) us, the
   /// first from 0, the last without end.

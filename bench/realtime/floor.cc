@@ -16,6 +16,7 @@
 
 #include "common/clock.h"
 #include "common/messenger.h"
+#include "common/time_units.h"
 #include "plumb/joint_state_t.hpp"
 
 namespace plumb {
@@ -93,7 +94,7 @@ Times BareTimer(double seconds) {
   const Clock clock;
   Times lateness;
   lateness.reserve(static_cast<size_t>(seconds * 1e6 / kPeriod) + 10);
-  const int64_t end = clock.Now() + static_cast<int64_t>(seconds * 1e6);
+  const int64_t end = clock.Now() + Microseconds(seconds);
   for (Periodic cycle(kPeriod, clock.Now()); clock.Now() < end;) {
     const timespec wait = clock.RealDuration(cycle.Remaining(clock.Now()));
     ppoll(nullptr, 0, &wait, nullptr);
@@ -116,7 +117,7 @@ Times BarePingPong(double seconds, const std::string& lcm_url) {
     const auto answered = [&] {
       return pong.received() > 0 && pong.newest().sequence == message.sequence;
     };
-    const int64_t begin = clock.Now(), end = begin + static_cast<int64_t>(seconds * 1e6);
+    const int64_t begin = clock.Now(), end = begin + Microseconds(seconds);
     for (Periodic cycle(kPeriod, begin); clock.Now() < end;) {
       const timespec wait = clock.RealDuration(cycle.Remaining(clock.Now()));
       ppoll(nullptr, 0, &wait, nullptr);

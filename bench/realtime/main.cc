@@ -1,5 +1,5 @@
 // How punctual the driver's cycle and the whole chain are on this machine, and the floor beneath
-// them: bare timers and bare LCM. One Markdown table, for docs/measurements.md.
+// them: bare timers and bare LCM. One Markdown table, for docs/measurements/drivers.md.
 
 #include <fmt/format.h>
 

@@ -33,7 +33,7 @@ struct Motion {
   Eigen::MatrixXd q;
 };
 
-// What is left of the limits in a state, as a share of them.
+// The share of its limits that a state leaves unused, the least of all joints.
 double Margin(const RobotDescription& robot, const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   double margin = 1;
   Eigen::Index i = 0;
@@ -254,7 +254,7 @@ MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posteri
                           const Identifiability& found, const ExcitationSettings& settings) {
   MotionAdvice advice{RateExcitations(robot, posterior, settings), ""};
   if (advice.rated.empty()) {
-    advice.words = "no excitation that was tried keeps within the robot's limits";
+    advice.summary = "no excitation that was tried keeps within the robot's limits";
     return advice;
   }
   if (!found.weak.empty()) {
@@ -268,7 +268,7 @@ MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posteri
                        return left_open(a) < left_open(b);
                      });
   }
-  advice.words =
+  advice.summary =
       fmt::format("{} for {:.3g} s would tell most{}: {}", advice.rated[0].excitation.name,
                   advice.rated[0].steps * robot.task.period,
                   found.weak.empty() ? "" : " of what is hardly determined",

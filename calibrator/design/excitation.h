@@ -8,12 +8,14 @@
 
 #include "calibrator/design/excitation_signals.h"
 #include "calibrator/diagnostics/identifiability.h"
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 #include "robot/description.h"
 
 namespace plumb {
 
-/// What an excitation would tell of the parameters.
+// The functions here share nothing: thread-safe.
+
+/// An excitation, the motion it makes and how much that would tell of the parameters.
 struct RatedExcitation {
   Excitation excitation;  ///< scaled down until all simulators keep within the limits
   double gain;            ///< [nat], the least of the simulators drawn
@@ -26,8 +28,8 @@ struct RatedExcitation {
   Eigen::MatrixXd q;  ///< positions x (steps + 1), of the mean simulator
 };
 
-/// Which of the excitations that MakeExcitations makes tell most. The value of an experiment is its information gain in the
-/// linear-Gaussian model,
+/// Which of the excitations that MakeExcitations makes tell most. The value of an experiment is its
+/// information gain in the linear-Gaussian model,
 ///   1/2 ln det(I + L^T F L),
 /// L L^T the belief's covariance, F the Fisher information of one-step errors
 /// (D-optimality: Chaloner, Verdinelli, Statistical Science 10, 1995, eq. 5), with states as exact
@@ -64,7 +66,7 @@ std::string DescribeGain(const RobotDescription& robot, const Gaussian& belief,
 struct MotionAdvice {
   /// best first, by what they tell of the weak directions; maybe none
   std::vector<RatedExcitation> rated;
-  std::string words;
+  std::string summary;
 };
 MotionAdvice AdviseMotion(const RobotDescription& robot, const Gaussian& posterior,
                           const Identifiability& found, const ExcitationSettings& settings);

@@ -9,6 +9,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// Efforts to apply one after the other, whatever the robot does.
 struct Excitation {
   std::string name;        ///< "multisine up to 2.5 Hz, 50 % effort"

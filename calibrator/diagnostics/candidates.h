@@ -9,6 +9,9 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
+
 /// A parameter of the simulator that is not fitted, and so may be what the model has wrong.
 struct Candidate {
   std::string path;  ///< see sim/parameters.h

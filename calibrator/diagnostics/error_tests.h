@@ -6,6 +6,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// Tests of errors for what they are themselves: scale, outliers, whiteness and bias. p not
 /// corrected; all, whether they count or not.
 std::vector<Misfit> TestScale(const ProjectedErrors& errors, const std::vector<bool>& noise_known);

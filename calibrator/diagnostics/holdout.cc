@@ -92,7 +92,7 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
   }
   result.better = better > 0 && worse.empty();
   if (tried == 0) {
-    result.words =
+    result.summary =
         "too few transitions to hold any out: whether the posterior predicts better than the prior "
         "is not known";
   } else if (result.better) {
@@ -100,19 +100,19 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
     for (const HorizonError& error : result.errors) {
       if (error.windows > 0) last = &error;
     }
-    result.words = fmt::format(
+    result.summary = fmt::format(
         "on {} transitions that it has not seen, the posterior predicts better than the prior: "
         "errors are {:.3g} times "
         "the prior's after 1 step, {:.3g} times after {}",
         result.held_out, result.errors[0].posterior / result.errors[0].prior,
         last->posterior / last->prior, last->horizon);
   } else if (worse.empty()) {
-    result.words = fmt::format(
+    result.summary = fmt::format(
         "on {} transitions that it has not seen, the posterior predicts no better than the prior: "
         "do not train with it",
         result.held_out);
   } else {
-    result.words = fmt::format(
+    result.summary = fmt::format(
         "on {} transitions that it has not seen, the posterior predicts WORSE than the prior {} "
         "step{} "
         "ahead: do not train with it",

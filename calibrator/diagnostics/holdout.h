@@ -10,6 +10,8 @@
 
 namespace plumb {
 
+// Judge uses the discrepancy's threads, and that alone is not thread-safe.
+
 /// Error of predicting n steps ahead on transitions that the fit has not seen, root mean square
 /// over states and windows, in standard units (Task::state_scale).
 struct HorizonError {
@@ -24,7 +26,7 @@ struct Holdout {
   std::vector<HorizonError> errors;
   /// the posterior predicts better than the prior at some horizons, and at none worse, chance apart
   bool better = false;
-  std::string words;
+  std::string summary;
 };
 
 /// Transitions to fit, and those kept back to judge the fit by.

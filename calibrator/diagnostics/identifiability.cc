@@ -20,7 +20,7 @@ constexpr double kWeakInformation = 1;     // of the prior's
 // of the largest in a weak direction: smaller ones are not told
 constexpr double kWeakEntry = 0.2;
 constexpr int kLargestPower = 2;
-constexpr Eigen::Index kMostTried = 6;  // parameters of which all small powers are tried
+constexpr Eigen::Index kMaxTried = 6;  // parameters of which all small powers are tried
 
 using Vectors = std::vector<Eigen::VectorXd>;
 
@@ -101,7 +101,7 @@ Vectors SimplePowers(const Eigen::MatrixXd& null, const Eigen::MatrixXd& covaria
     return (null.transpose() * power).norm() < 1e-3 * power.norm();
   };
   Vectors chosen;
-  if (n <= kMostTried) {
+  if (n <= kMaxTried) {
     Vectors candidates = SmallPowers(n);
     std::erase_if(candidates, [&](const Eigen::VectorXd& power) { return !unchanged(power); });
     SortBySimplicity(covariance, cost, &candidates);
@@ -222,7 +222,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
   found.cramer_rao = Eigen::VectorXd::Constant(n, kInfinity);
   if (!information.allFinite()) {
     found.information.setConstant(std::numeric_limits<double>::quiet_NaN());
-    found.words =
+    found.summary =
         "the simulation fails at the mean parameters, so nothing is known of what can be known";
     return found;
   }
@@ -257,7 +257,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
   }
   found.weak =
       FindWeak(information, prior_sd, eigen.eigenvectors().middleCols(nulls, weak), found.null);
-  found.words = IdentifiabilityWords(robot, distribution.mean, found);
+  found.summary = IdentifiabilityWords(robot, distribution.mean, found);
   return found;
 }
 

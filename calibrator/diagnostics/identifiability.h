@@ -27,7 +27,7 @@ struct WeakDirection {
   double sd_ratio;            ///< posterior sd along it over the prior's, 0.7 to 1
 };
 
-/// What a set of transitions can and cannot tell about the parameters.
+/// The combinations of parameters that a set of transitions determines, and those it does not.
 struct Identifiability {
   Eigen::MatrixXd information;            ///< Fisher information of the coordinates, n x n
   std::vector<Combination> combinations;  ///< as many as the information has rank
@@ -40,7 +40,7 @@ struct Identifiability {
   /// inverse where it has one (Cramer-Rao); infinite for a parameter that a null direction
   /// involves.
   Eigen::VectorXd cramer_rao;
-  std::string words;  ///< for people
+  std::string summary;  ///< for people
 };
 
 /// From the Fisher information of the coordinates. A direction counts as null if the information

@@ -8,7 +8,7 @@
 namespace plumb {
 namespace {
 
-constexpr Eigen::Index kMostNames = 6;  // of determined parameters: more are only counted
+constexpr Eigen::Index kMaxNames = 6;  // of determined parameters: more are only counted
 
 // "length/pole" -> "length", unless another parameter would read the same.
 std::string ShortName(const RobotDescription& robot, size_t index) {
@@ -46,9 +46,9 @@ std::string Known(const std::vector<Combination>& combinations) {
   std::vector<std::string> names;
   const auto alone = std::count_if(combinations.begin(), combinations.end(),
                                    [](const auto& c) { return Single(c.power) >= 0; });
-  if (alone > kMostNames) names.push_back(fmt::format("{} parameters on their own", alone));
+  if (alone > kMaxNames) names.push_back(fmt::format("{} parameters on their own", alone));
   for (const Combination& combination : combinations) {
-    if (alone <= kMostNames || Single(combination.power) < 0) names.push_back(combination.name);
+    if (alone <= kMaxNames || Single(combination.power) < 0) names.push_back(combination.name);
   }
   return names.empty() ? "nothing" : "only " + Join(names, " and ");
 }

@@ -8,6 +8,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// Whether all parameters with a power have logarithmic coordinates.
 bool AllLog(const RobotDescription& robot, const Eigen::VectorXd& power);
 

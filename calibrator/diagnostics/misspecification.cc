@@ -14,9 +14,9 @@
 namespace plumb {
 namespace {
 
-constexpr int kMostCandidates = 3;      // that are told of, one after the other
+constexpr int kMaxCandidates = 3;       // that are told of, one after the other
 constexpr double kNearlyAsGood = 0.85;  // of the best one's gain: an alternative
-constexpr size_t kMostAlternatives = 2;
+constexpr size_t kMaxAlternatives = 2;
 constexpr double kWorthwhile = 0.3;  // share of what is left that a further one has to explain
 constexpr double kMostly = 0.8;      // of a gain, in one joint or condition
 
@@ -108,12 +108,13 @@ double Share(const ProjectedErrors& errors, const Eigen::VectorXd& column, doubl
 }
 
 // Best first.
-std::vector<Explanation> FindExplanations(const ProjectedErrors& errors, const Leftover& leftover) {
+std::vector<Explanation> FindExplanations(const ProjectedErrors& errors,
+                                          const FitResiduals& residuals) {
   std::vector<Explanation> found;
-  for (size_t k = 0; k < leftover.candidates.size(); ++k) {
-    const Candidate& candidate = leftover.candidates[k];
+  for (size_t k = 0; k < residuals.candidates.size(); ++k) {
+    const Candidate& candidate = residuals.candidates[k];
     const Eigen::VectorXd raw =
-        errors.weight.cwiseProduct(leftover.columns.col(static_cast<Eigen::Index>(k)));
+        errors.weight.cwiseProduct(residuals.columns.col(static_cast<Eigen::Index>(k)));
     Eigen::VectorXd column = errors.Project(raw);
     // What fitted parameters do as well, or nothing does, cannot be tested.
     if (!(column.norm() > 1e-4 * raw.norm()) || !(column.norm() * candidate.scale > 1e-3)) continue;
@@ -134,11 +135,11 @@ void Correct(size_t tests, std::vector<Misfit>* misfits) {
   for (Misfit& misfit : *misfits) misfit.p = std::min(1.0, misfit.p * static_cast<double>(tests));
 }
 
-// What share a gain is of the errors beyond the noise, or of all of them where the noise was
+// The share that a gain is of the errors beyond the noise, or of all of them where the noise was
 // estimated from them.
 struct Explained {
   double share;
-  std::string words;
+  std::string summary;
 };
 
 Explained Explain(const ProjectedErrors& errors, const std::vector<bool>& noise_known,
@@ -158,22 +159,23 @@ std::string Join(const std::vector<std::string>& parts, const std::string& by) {
 
 }  // namespace
 
-Misspecification FindMisspecification(const RobotDescription& robot, const Leftover& leftover) {
+Misspecification FindMisspecification(const RobotDescription& robot,
+                                      const FitResiduals& residuals) {
   Misspecification found;
-  ProjectedErrors errors(robot, leftover);
+  ProjectedErrors errors(robot, residuals);
   if (!errors.r.allFinite()) {
     found.alarm = true;
-    found.words = "the simulation fails on this log with the parameters found";
+    found.summary = "the simulation fails on this log with the parameters found";
     return found;
   }
-  std::vector<Misfit> tests = TestErrors(errors, leftover.noise_known);
-  std::vector<Explanation> explanations = FindExplanations(errors, leftover);
+  std::vector<Misfit> tests = TestErrors(errors, residuals.noise_known);
+  std::vector<Explanation> explanations = FindExplanations(errors, residuals);
   const size_t count = tests.size() + explanations.size();
   Correct(count, &tests);
   found.alarm = std::any_of(tests.begin(), tests.end(), Counts);
 
   std::vector<std::string> words, places;
-  for (int round = 0; round < kMostCandidates; ++round) {
+  for (int round = 0; round < kMaxCandidates; ++round) {
     for (Explanation& explanation : explanations) {
       explanation.misfit.p = std::min(1.0, explanation.misfit.p * static_cast<double>(count));
     }
@@ -181,27 +183,27 @@ Misspecification FindMisspecification(const RobotDescription& robot, const Lefto
         std::find_if(explanations.begin(), explanations.end(),
                      [](const Explanation& explanation) { return Counts(explanation.misfit); });
     if (best == explanations.end()) break;
-    const Explained explained = Explain(errors, leftover.noise_known, best->score.gain);
+    const Explained explained = Explain(errors, residuals.noise_known, best->score.gain);
     // No model is linear: a little of what the first candidate is about is always left.
     if (round > 0 && explained.share < kWorthwhile) break;
     found.alarm = true;
     Locate(errors, *best, &best->misfit);
     places.push_back(errors.Place(best->misfit.joint, best->misfit.condition));
-    std::string line = fmt::format("{} would explain {}", best->misfit.what, explained.words);
+    std::string line = fmt::format("{} would explain {}", best->misfit.what, explained.summary);
     std::vector<std::string> alternatives;
     for (const Explanation& other : explanations) {
       if (&other == &*best || other.score.gain < kNearlyAsGood * best->score.gain) continue;
-      if (alternatives.size() < kMostAlternatives) alternatives.push_back(other.misfit.what);
+      if (alternatives.size() < kMaxAlternatives) alternatives.push_back(other.misfit.what);
     }
     if (!alternatives.empty()) line += " (nearly as well: " + Join(alternatives, "; ") + ")";
     words.push_back((round == 0 ? "" : "of what is left ") + line);
     found.misfits.push_back(best->misfit);
     errors.Explain(best->column);
-    explanations = FindExplanations(errors, leftover);
+    explanations = FindExplanations(errors, residuals);
   }
 
   if (!found.misfits.empty()) {
-    tests = TestErrors(errors, leftover.noise_known);
+    tests = TestErrors(errors, residuals.noise_known);
     Correct(count, &tests);
   }
   std::erase_if(tests, [](const Misfit& test) {
@@ -223,15 +225,15 @@ Misspecification FindMisspecification(const RobotDescription& robot, const Lefto
       distinct.push_back(place);
   }
   if (!found.alarm) {
-    found.words = fmt::format("nothing speaks against the model ({} tests of {} errors)", count,
-                              errors.r.size());
-    if (!rest.empty()) found.words += ", but look at " + Join(rest, "; ");
+    found.summary = fmt::format("nothing speaks against the model ({} tests of {} errors)", count,
+                                errors.r.size());
+    if (!rest.empty()) found.summary += ", but look at " + Join(rest, "; ");
     return found;
   }
-  found.words = "the model cannot explain this log: " + Join(distinct, "; ");
-  for (const std::string& line : words) found.words += "; " + line;
+  found.summary = "the model cannot explain this log: " + Join(distinct, "; ");
+  for (const std::string& line : words) found.summary += "; " + line;
   if (!rest.empty())
-    found.words += (words.empty() ? "; " : "; not explained by that: ") + Join(rest, "; ");
+    found.summary += (words.empty() ? "; " : "; not explained by that: ") + Join(rest, "; ");
   return found;
 }
 

@@ -29,11 +29,11 @@ struct Misfit {
 struct Misspecification {
   bool alarm = false;
   std::vector<Misfit> misfits;  ///< those that count, worst first
-  std::string words;
+  std::string summary;
 };
 
-/// What a fit has left unexplained.
-struct Leftover {
+/// The errors that a fit has left, and what they are to be tested for.
+struct FitResiduals {
   std::span<const Rollout> rollouts;        ///< that were fitted
   std::span<const WindowErrors::Row> rows;  ///< what each error is about
   /// one-step, whitened, at the posterior's mean: for the right model N(0, 1)
@@ -86,7 +86,7 @@ struct Leftover {
 ///
 /// @param robot with known parameters (Model::Describe), for what touches the ground.
 /// @throws std::invalid_argument if sizes do not fit together.
-Misspecification FindMisspecification(const RobotDescription& robot, const Leftover& leftover);
+Misspecification FindMisspecification(const RobotDescription& robot, const FitResiduals& residuals);
 
 inline constexpr double kFalseAlarm = 1e-3;
 inline constexpr double kLeastShare = 0.01;

@@ -18,20 +18,20 @@ constexpr int kFewest = 20;
 constexpr double kMostOf =
     0.8;  // of the steps in contact are at the ground: then that is what contact is called
 
-void RequireSizes(const Leftover& leftover, Eigen::Index n) {
-  const auto rows = static_cast<Eigen::Index>(leftover.rows.size());
-  if (leftover.errors.size() != rows || leftover.jacobian.rows() != rows ||
-      leftover.noise_known.size() != static_cast<size_t>(2 * n) ||
-      leftover.columns.cols() != static_cast<Eigen::Index>(leftover.candidates.size()) ||
-      (leftover.columns.cols() > 0 && leftover.columns.rows() != rows)) {
+void RequireSizes(const FitResiduals& residuals, Eigen::Index n) {
+  const auto rows = static_cast<Eigen::Index>(residuals.rows.size());
+  if (residuals.errors.size() != rows || residuals.jacobian.rows() != rows ||
+      residuals.noise_known.size() != static_cast<size_t>(2 * n) ||
+      residuals.columns.cols() != static_cast<Eigen::Index>(residuals.candidates.size()) ||
+      (residuals.columns.cols() > 0 && residuals.columns.rows() != rows)) {
     throw std::invalid_argument(
         "errors, their Jacobian and what they are about do not fit together");
   }
-  for (const WindowErrors::Row& row : leftover.rows) {
-    if (row.rollout < 0 || static_cast<size_t>(row.rollout) >= leftover.rollouts.size() ||
+  for (const WindowErrors::Row& row : residuals.rows) {
+    if (row.rollout < 0 || static_cast<size_t>(row.rollout) >= residuals.rollouts.size() ||
         row.transition < 0 ||
         static_cast<size_t>(row.transition) >=
-            leftover.rollouts[static_cast<size_t>(row.rollout)].transitions.size() ||
+            residuals.rollouts[static_cast<size_t>(row.rollout)].transitions.size() ||
         row.coordinate < 0 || row.coordinate >= 2 * n) {
       throw std::invalid_argument("an error is about no transition");
     }
@@ -65,19 +65,19 @@ bool Exact(const Transition& t) {
 
 }  // namespace
 
-ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const Leftover& leftover)
-    : n(robot.num_velocities()), noise_known_(leftover.noise_known) {
-  RequireSizes(leftover, n);
+ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResiduals& residuals)
+    : n(robot.num_velocities()), noise_known_(residuals.noise_known) {
+  RequireSizes(residuals, n);
   for (const JointDescription& joint : robot.joints) {
     joint_of.insert(joint_of.end(), static_cast<size_t>(joint.num_velocities()), joint.name);
   }
   std::map<std::pair<int, int>, int> index;
-  for (const WindowErrors::Row& row : leftover.rows)
+  for (const WindowErrors::Row& row : residuals.rows)
     index.emplace(std::pair(row.rollout, row.transition), 0);
   int ground = 0, stop = 0;
   for (auto& [key, number] : index) {
     number = static_cast<int>(steps.size());
-    const auto& transitions = leftover.rollouts[static_cast<size_t>(key.first)].transitions;
+    const auto& transitions = residuals.rollouts[static_cast<size_t>(key.first)].transitions;
     const Transition& transition = transitions[static_cast<size_t>(key.second)];
     const Touch touch = FindTouch(robot, transition);
     ground += touch.ground;
@@ -99,16 +99,16 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const Leftover& 
                       ? "at a stop"
                       : "in contact with the ground or a stop";
   conditions = touching >= kFewest && static_cast<int>(steps.size()) - touching >= kFewest;
-  for (size_t i = 0; i < leftover.rows.size(); ++i) {
-    const WindowErrors::Row& row = leftover.rows[i];
+  for (size_t i = 0; i < residuals.rows.size(); ++i) {
+    const WindowErrors::Row& row = residuals.rows[i];
     step_of.push_back(index.at({row.rollout, row.transition}));
     coordinate.push_back(row.coordinate);
     steps[static_cast<size_t>(step_of.back())].rows[static_cast<size_t>(row.coordinate)] =
         static_cast<Eigen::Index>(i);
   }
-  Weigh(leftover.errors);
-  basis = RangeBasis(weight.asDiagonal() * leftover.jacobian);
-  Take(weight.cwiseProduct(leftover.errors));
+  Weigh(residuals.errors);
+  basis = RangeBasis(weight.asDiagonal() * residuals.jacobian);
+  Take(weight.cwiseProduct(residuals.errors));
 }
 
 void ProjectedErrors::Explain(const Eigen::VectorXd& column) {

@@ -8,12 +8,14 @@
 
 namespace plumb {
 
+// The functions here share nothing, and const errors may be read by several threads at once.
+
 /// Errors that no other values of the fitted parameters would explain, sorted by what they are
 /// about.
 struct ProjectedErrors {
   /// @param robot with known parameters. @throws std::invalid_argument if sizes do not fit
   /// together.
-  ProjectedErrors(const RobotDescription& robot, const Leftover& leftover);
+  ProjectedErrors(const RobotDescription& robot, const FitResiduals& residuals);
 
   /// As if the parameter with this (projected) column had been fitted, too.
   void Explain(const Eigen::VectorXd& column);

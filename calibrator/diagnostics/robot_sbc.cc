@@ -51,9 +51,9 @@ SbcResult RunRobotSbc(std::shared_ptr<const Model> model, std::span<const Rollou
   for (const ParameterDescription& p : robot.parameters) names.push_back(p.name);
   std::vector<SbcQuantity> quantities = Marginals(names);
   const Eigen::VectorXd mean = prior.FromStandard(Eigen::VectorXd::Zero(prior.size()));
-  LaplaceOptions still;
-  still.most_iterations = 0;
-  const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), mean, still);
+  LaplaceOptions curvature_only;
+  curvature_only.max_iterations = 0;
+  const LaplaceFit view = FitLaplace(ProblemOf(robot, errors), mean, curvature_only);
   const Eigen::VectorXd sd = (prior.FromStandard(Eigen::VectorXd::Ones(prior.size())) - mean);
   for (const Combination& c :
        FindIdentifiability(robot, view.information, sd, view.posterior).combinations) {
@@ -64,7 +64,7 @@ SbcResult RunRobotSbc(std::shared_ptr<const Model> model, std::span<const Rollou
   }
   CurriculumOptions curriculum;
   curriculum.horizons = {1};
-  curriculum.workforce = options.threads;
+  curriculum.execution = options.threads;
   int run = 0;
   const auto fit = [&](const Eigen::VectorXd& truth,
                        Random& random) -> std::optional<Eigen::MatrixXd> {

@@ -7,7 +7,7 @@
 
 #include "calibrator/inference/sbc.h"
 #include "calibrator/motion/transitions.h"
-#include "common/batches.h"
+#include "common/batch_runner.h"
 #include "sim/model.h"
 
 namespace plumb {

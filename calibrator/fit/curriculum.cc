@@ -34,7 +34,7 @@ class Curriculum {
         options_(options) {}
 
   CurriculumFit Run(const Eigen::VectorXd& start) {
-    WindowErrors one_step(model_, rollouts_, 1, options_.workforce);
+    WindowErrors one_step(model_, rollouts_, 1, options_.execution);
     result_.noise_known = one_step.noise_known();
     result_.rows = one_step.rows();
     std::vector<Eigen::VectorXd> guesses = Search(FirstGuesses(start), one_step);
@@ -100,7 +100,7 @@ class Curriculum {
     int impossible = 0;
     std::string last_error = "no first guess can be simulated";
     for (const Eigen::VectorXd& guess : guesses) {
-      WindowErrors part(model_, rollouts_, 1, options_.workforce, every);
+      WindowErrors part(model_, rollouts_, 1, options_.execution, every);
       try {
         part.Linearise(robot_.ToPhysical(guess));
         found.push_back(FitLaplace(ProblemOf(robot_, part), guess, quick));
@@ -170,7 +170,7 @@ class Curriculum {
     return fit;
   }
 
-  // What the errors' scale makes of the record, or of the assumption.
+  // The noise by the errors' scale: that times the recorded noise, or the assumed one.
   static Eigen::VectorXd NoiseOf(const WindowErrors& errors, const LaplaceFit& fit) {
     return Scaled(errors.EndNoise(), fit);
   }
@@ -191,7 +191,7 @@ class Curriculum {
 
   // @return false if windows of that length do not count.
   bool Lengthen(int horizon) {
-    WindowErrors errors(model_, rollouts_, horizon, options_.workforce);
+    WindowErrors errors(model_, rollouts_, horizon, options_.execution);
     // no two transitions follow each other
     if (errors.windows() == static_cast<int>(errors.steps())) return false;
     if (!result_.noise_known) errors.set_noise_sd(result_.noise_sd);

@@ -10,9 +10,11 @@
 
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
-#include "common/batches.h"
+#include "common/batch_runner.h"
 
 namespace plumb {
+
+// Thread-safe, but for errors that two threads would share; threads as ExecutionOptions says.
 
 /// Of the units of the state (Task::state_scale): an error that nobody needs to explain.
 inline constexpr double kNegligible = 1e-5;
@@ -30,7 +32,7 @@ struct CurriculumOptions {
   /// first guesses: the prior's mean, and draws of the prior
   int starts = 4;
   uint64_t seed = 1;
-  Workforce workforce;
+  ExecutionOptions execution;
   /// Told what has just been done, and which share of the work, roughly; may throw to break off.
   std::function<void(const std::string& what, double share)> progress = [](const std::string&,
                                                                            double) {};

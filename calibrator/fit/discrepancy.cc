@@ -1,11 +1,16 @@
 #include "calibrator/fit/discrepancy.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
+
+#include "calibrator/fit/recorded_window.h"
+#include "calibrator/fit/whitening.h"
+#include "common/hash.h"
 
 namespace plumb {
 namespace {
@@ -41,44 +46,21 @@ Eigen::VectorXd ColumnSums(const Eigen::MatrixXd& values) {
 
 }  // namespace
 
-size_t CountTransitions(std::span<const Rollout> rollouts) {
-  size_t count = 0;
-  for (const Rollout& rollout : rollouts) count += rollout.transitions.size();
-  return count;
-}
-
-Discrepancy::Discrepancy(const RobotDescription& robot, Workforce workforce)
+Discrepancy::Discrepancy(const RobotDescription& robot, ExecutionOptions execution)
     : n_(robot.num_velocities()),
-      windows_(std::make_shared<Model>(robot), workforce.threads),
+      windows_(std::make_shared<Model>(robot), execution.threads),
       scale_(MakeTask(robot)->state_scale()),
-      batches_(workforce.batches) {
+      batches_(execution.batches) {
   if (robot.num_positions() != robot.num_velocities()) {
     throw std::invalid_argument("calibration does not know spherical joints yet");
   }
-}
-
-// Some recorded steps from one transition's state on.
-Window Discrepancy::WindowOf(const Rollout& rollout, size_t first, size_t length) const {
-  const auto& transitions = rollout.transitions;
-  Window window;
-  window.q = transitions[first].q;
-  window.v = transitions[first].v;
-  for (size_t i = first; i < first + length; ++i) window.steps.emplace_back(transitions[i].efforts);
-  if (!windows_.model().parameters().delays()) return window;
-  double known = 0;
-  for (size_t i = first; i > 0 && known < JointDynamics::kLongestDelay; --i) {
-    if (transitions[i - 1].step != transitions[i].step - 1) break;
-    window.before.insert(window.before.begin(), transitions[i - 1].efforts);
-    known += transitions[i - 1].duration();
-  }
-  return window;
 }
 
 void Discrepancy::OneStep(std::span<const Rollout> rollouts, std::vector<Window>* windows,
                           Ends* ends) const {
   for (const Rollout& rollout : rollouts) {
     for (size_t i = 0; i < rollout.transitions.size(); ++i) {
-      windows->push_back(WindowOf(rollout, i, 1));
+      windows->push_back(RecordedWindow(windows_.model(), rollout, i, 1));
       ends->push_back(&rollout.transitions[i]);
     }
   }
@@ -89,45 +71,6 @@ void Discrepancy::Predict(const Eigen::MatrixXd& parameters, std::span<const Win
   const Windows::Failures failures = windows_.Predict(parameters, windows, visit, last_only);
   failures_.impossible += failures.impossible;
   failures_.diverged += failures.diverged;
-}
-
-// Squared whitened error of one transition; writes the errors themselves unless null.
-double Discrepancy::Whiten(const Transition& t, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                           double* whitened) const {
-  const double period = t.duration();
-  double squared = 0;
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    const double error_q = q(i) - t.next_q(i), error_v = v(i) - t.next_v(i);
-    const double v_variance = t.v_sd(i) * t.v_sd(i);
-    const double qq =
-        t.next_q_sd(i) * t.next_q_sd(i) + t.q_sd(i) * t.q_sd(i) + period * period * v_variance;
-    const double vv = t.next_v_sd(i) * t.next_v_sd(i) + v_variance, qv = period * v_variance;
-    // Cholesky's factor of [[vv, qv], [qv, qq]], applied from the left.
-    const double root_v = std::sqrt(vv);
-    const double first = error_v / root_v;
-    const double second = (error_q - qv / vv * error_v) / std::sqrt(qq - qv * qv / vv);
-    if (whitened) {
-      whitened[2 * i] = first;
-      whitened[2 * i + 1] = second;
-    }
-    squared += first * first + second * second;
-  }
-  return std::isfinite(squared) ? squared : kInfinity;
-}
-
-// One row per transition, one column per sample.
-Eigen::MatrixXd Discrepancy::SquaredStepErrors(const Eigen::MatrixXd& parameters,
-                                               std::span<const Rollout> rollouts) {
-  std::vector<Window> windows;
-  Ends ends;
-  OneStep(rollouts, &windows, &ends);
-  Eigen::MatrixXd squared(static_cast<Eigen::Index>(windows.size()), parameters.cols());
-  Predict(parameters, windows,
-          [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
-            squared(static_cast<Eigen::Index>(window), sample) =
-                Whiten(*ends[window], q, v, nullptr);
-          });
-  return squared;
 }
 
 Eigen::VectorXd Discrepancy::LogLikelihood(const Eigen::MatrixXd& parameters,
@@ -148,20 +91,57 @@ Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters,
   std::vector<Window> windows;
   Ends ends;
   OneStep(rollouts, &windows, &ends);
-  Eigen::MatrixXd residuals(static_cast<Eigen::Index>(windows.size()) * 2 * n_, parameters.cols());
+  const Eigen::Index size = 2 * n_;
+  Eigen::MatrixXd residuals(static_cast<Eigen::Index>(windows.size()) * size, parameters.cols());
   Predict(parameters, windows,
           [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
-            double* errors = &residuals(static_cast<Eigen::Index>(window) * 2 * n_, sample);
-            if (Whiten(*ends[window], q, v, errors) == kInfinity)
-              std::fill_n(errors, 2 * n_, kInfinity);
+            auto errors =
+                residuals.col(sample).segment(static_cast<Eigen::Index>(window) * size, size);
+            for (Eigen::Index i = 0; i < n_; ++i) {
+              errors(2 * i) = v(i) - ends[window]->next_v(i);
+              errors(2 * i + 1) = q(i) - ends[window]->next_q(i);
+            }
           });
+  const std::array<Eigen::Index, 2> step{0, size};
+  for (size_t window = 0; window < ends.size(); ++window) {
+    const Transition& t = *ends[window];
+    const Eigen::MatrixXd free_motion = FreeMotion(n_, t.duration());
+    Eigen::MatrixXd sensitivity(size, size);
+    Eigen::VectorXd end_sd(size);
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      sensitivity.row(2 * i) = free_motion.row(n_ + i);
+      sensitivity.row(2 * i + 1) = free_motion.row(i);
+      end_sd(2 * i) = t.next_v_sd(i);
+      end_sd(2 * i + 1) = t.next_q_sd(i);
+    }
+    auto errors = residuals.middleRows(static_cast<Eigen::Index>(window) * size, size);
+    WhitenWindow(step, StartSd(t), sensitivity, end_sd, errors);
+    for (Eigen::Index j = 0; j < errors.cols(); ++j) {
+      if (!errors.col(j).allFinite()) errors.col(j).setConstant(kInfinity);
+    }
+  }
   return residuals;
+}
+
+// One row per transition, one column per sample.
+Eigen::MatrixXd Discrepancy::SquaredStepErrors(const Eigen::MatrixXd& parameters,
+                                               std::span<const Rollout> rollouts) {
+  const Eigen::MatrixXd residuals = Residuals(parameters, rollouts);
+  const Eigen::Index size = 2 * n_;
+  Eigen::MatrixXd squared(residuals.rows() / size, residuals.cols());
+  for (Eigen::Index j = 0; j < squared.cols(); ++j) {
+    for (Eigen::Index i = 0; i < squared.rows(); ++i) {
+      const auto errors = residuals.col(j).segment(i * size, size);
+      squared(i, j) = std::inner_product(errors.begin(), errors.end(), errors.begin(), 0.0);
+    }
+  }
+  return squared;
 }
 
 template <class Compute>
 Eigen::VectorXd Discrepancy::Batch(uint64_t identity, const Eigen::MatrixXd& parameters,
                                    const Compute& compute) {
-  Batches here;
+  BatchRunner here;
   return (batches_ ? *batches_ : here)
       .Run(Hash(parameters, identity), 1, parameters.cols(),
            [&](Eigen::Index first, Eigen::Index count) -> Eigen::MatrixXd {
@@ -197,10 +177,9 @@ Eigen::VectorXd Discrepancy::TrajectoryErrorHere(const Eigen::MatrixXd& paramete
   for (const Rollout& rollout : rollouts) {
     const auto& transitions = rollout.transitions;
     begins.push_back(steps);
-    for (size_t begin = 0, end = 1; begin < transitions.size(); begin = end++) {
-      while (end < transitions.size() && transitions[end].step == transitions[end - 1].step + 1)
-        ++end;
-      windows.push_back(WindowOf(rollout, begin, end - begin));
+    for (size_t begin = 0, length = 0; begin < transitions.size(); begin += length) {
+      length = StretchLength(rollout, begin);
+      windows.push_back(RecordedWindow(windows_.model(), rollout, begin, length));
       first.push_back(&transitions[begin]);
       rows.push_back(steps + static_cast<Eigen::Index>(begin));
     }
@@ -249,7 +228,7 @@ Eigen::VectorXd Discrepancy::PredictionErrorHere(const Eigen::MatrixXd& paramete
       if (!t[start + length - 1].next_q.array().isFinite().any() &&
           !t[start + length - 1].next_v.array().isFinite().any())
         continue;
-      windows.push_back(WindowOf(rollout, start, length));
+      windows.push_back(RecordedWindow(windows_.model(), rollout, start, length));
       ends.push_back(&t[start + length - 1]);
     }
   }

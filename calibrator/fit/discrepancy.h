@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calibrator/motion/transitions.h"
-#include "common/batches.h"
+#include "common/batch_runner.h"
 #include "sim/tasks/task.h"
 #include "sim/windows.h"
 
@@ -21,10 +21,11 @@ class Discrepancy {
 
   /// @throws std::invalid_argument if there is no simulator of the robot, or it has spherical
   /// joints.
-  explicit Discrepancy(const RobotDescription& robot, Workforce workforce = {});
+  explicit Discrepancy(const RobotDescription& robot, ExecutionOptions execution = {});
 
   /// Step-based (Cui & Hensel): reset to s, apply what was applied, compare with s'. The squared
-  /// error of one transition is whitened by the uncertainty of both states, joint by joint:
+  /// error of one transition is whitened by the uncertainty of both states (WhitenWindow, with the
+  /// sensitivity of free motion), joint by joint:
   ///   e_q has variance  s'_q^2 + s_q^2 + T^2 s_v^2,   e_v has  s'_v^2 + s_v^2,
   ///   covariance  T s_v^2,
   /// because an error of v moves the predicted q by T of it. Its expectation is 2 per joint for the
@@ -41,7 +42,8 @@ class Discrepancy {
   Eigen::VectorXd LogLikelihood(const Eigen::MatrixXd& parameters,
                                 std::span<const Rollout> rollouts);
 
-  /// All whitened errors, 2 * joints rows per transition: for Jacobians.
+  /// All whitened errors, 2 * joints rows per transition, the speed's before the position's: for
+  /// Jacobians.
   Eigen::MatrixXd Residuals(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts);
 
   /// Trajectory-based (Chebotar et al., "Closing the sim-to-real loop", ICRA 2019, eq. 5): simulate
@@ -60,12 +62,9 @@ class Discrepancy {
 
  private:
   using Ends = std::vector<const Transition*>;
-  Window WindowOf(const Rollout& rollout, size_t first, size_t length) const;
   void OneStep(std::span<const Rollout> rollouts, std::vector<Window>* windows, Ends* ends) const;
   void Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
                const Windows::Visit& visit, bool last_only = true);
-  double Whiten(const Transition& transition, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                double* whitened) const;
   Eigen::VectorXd TrajectoryErrorHere(const Eigen::MatrixXd& parameters,
                                       std::span<const Rollout> rollouts, double smoothing);
   Eigen::VectorXd PredictionErrorHere(const Eigen::MatrixXd& parameters,
@@ -80,10 +79,7 @@ class Discrepancy {
   Windows windows_;
   Eigen::VectorXd scale_;
   Windows::Failures failures_;
-  Batches* batches_;
+  BatchRunner* batches_;
 };
-
-/// How many transitions there are.
-size_t CountTransitions(std::span<const Rollout> rollouts);
 
 }  // namespace plumb

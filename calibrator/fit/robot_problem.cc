@@ -84,7 +84,7 @@ Problem RobotProblem(const RobotDescription& robot, WindowErrors& errors, const 
               return simulated.cwiseAbs().colwise().mean();
             }};
   }
-  // What errors would be if they were noise alone: the same for all simulators.
+  // Errors as they would be if they were noise alone: the same for all simulators.
   Random random = NoiseOf(seed, -1);
   const Eigen::Index dimension = 2 * errors.num_velocities();
   const SetDistance distance =

@@ -10,6 +10,8 @@
 
 namespace plumb {
 
+// The problem uses its errors and their threads: one thread at a time.
+
 /// A robot's log for methods that know only simulations. What is simulated is a record like the one
 /// there is: the recorded steps from the recorded states, and noise as large as a first fit has
 /// found it. Its outcome depends on `discrepancy`:

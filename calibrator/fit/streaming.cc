@@ -1,14 +1,16 @@
 #include "calibrator/fit/streaming.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/recorded_window.h"
+#include "calibrator/fit/whitening.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
-#include "common/decompositions.h"
 
 namespace plumb {
 namespace {
@@ -23,19 +25,6 @@ constexpr size_t kSettledAtOnce = 64;
 // of the mode, in standard coordinates: slopes are not to be trusted further away
 constexpr double kLongestStep = 2;
 constexpr double kNoiseOff = 0.05;  // relative
-
-double EndReading(const Transition& t, Eigen::Index c) {
-  return c < t.next_q.size() ? t.next_q(c) : t.next_v(c - t.next_q.size());
-}
-double EndSd(const Transition& t, Eigen::Index c) {
-  return c < t.next_q.size() ? t.next_q_sd(c) : t.next_v_sd(c - t.next_q.size());
-}
-
-Eigen::VectorXd StartSd(const Transition& t) {
-  Eigen::VectorXd sd(t.q_sd.size() + t.v_sd.size());
-  sd << t.q_sd, t.v_sd;
-  return sd;
-}
 
 }  // namespace
 
@@ -57,7 +46,17 @@ StreamingLaplace::StreamingLaplace(std::shared_ptr<const Model> model)
 
 bool StreamingLaplace::Add(const Transition& transition, int64_t episode) {
   std::vector<size_t> turns = NextInTurn();
-  Piece piece{transition, episode, {}, !(StartSd(transition).array() == 0).all(), -1, {}, {}};
+  if (rollouts_.empty() || rollouts_.back().episode != episode)
+    rollouts_.push_back({episode, 0, {}});
+  auto& transitions = rollouts_.back().transitions;
+  transitions.push_back(transition);
+  Piece piece{rollouts_.size() - 1,
+              transitions.size() - 1,
+              {},
+              !(StartSd(transition).array() == 0).all(),
+              -1,
+              {},
+              {}};
   int unknown = 0;
   for (int c = 0; c < static_cast<int>(2 * n_); ++c) {
     if (!std::isfinite(EndReading(transition, c))) continue;
@@ -78,6 +77,8 @@ bool StreamingLaplace::Add(const Transition& transition, int64_t episode) {
     Linearise(indices);
   } catch (...) {
     pieces_.pop_back();
+    transitions.pop_back();
+    if (transitions.empty()) rollouts_.pop_back();
     --left_out_;
     count_turns();
     throw;
@@ -121,19 +122,8 @@ double StreamingLaplace::DistanceFrom(const Eigen::VectorXd& at) const {
   return std::sqrt(offset.dot(precision_ * offset));
 }
 
-Window StreamingLaplace::WindowOf(size_t index) const {
-  const Piece& piece = pieces_[index];
-  Window window{piece.transition.q, piece.transition.v, {piece.transition.efforts}};
-  if (!model_->parameters().delays()) return window;
-  double known = 0;
-  for (size_t i = index; i > 0 && known < JointDynamics::kLongestDelay; --i) {
-    const Piece& before = pieces_[i - 1];
-    if (before.episode != piece.episode || before.transition.step != pieces_[i].transition.step - 1)
-      break;
-    window.before.insert(window.before.begin(), before.transition.efforts);
-    known += before.transition.duration();
-  }
-  return window;
+const Transition& StreamingLaplace::TransitionOf(const Piece& piece) const {
+  return rollouts_[piece.rollout].transitions[piece.transition];
 }
 
 // States at the windows' ends, 2 n rows for each window; NaN where the simulation fails.
@@ -157,7 +147,10 @@ Eigen::MatrixXd StreamingLaplace::Predict(const Eigen::MatrixXd& standard,
 // All at the mode, side by side.
 void StreamingLaplace::Linearise(const std::vector<size_t>& indices) {
   std::vector<Window> windows;
-  for (const size_t i : indices) windows.push_back(WindowOf(i));
+  for (const size_t i : indices) {
+    const Piece& piece = pieces_[i];
+    windows.push_back(RecordedWindow(*model_, rollouts_[piece.rollout], piece.transition, 1));
+  }
   Eigen::MatrixXd at = mode_.replicate(1, 1 + p_);
   at.rightCols(p_).diagonal().array() += kSlopeDifference;
   const Eigen::MatrixXd ends = Predict(at, windows);
@@ -171,7 +164,7 @@ void StreamingLaplace::Linearise(const std::vector<size_t>& indices) {
       const int c = piece.coordinates[static_cast<size_t>(i)];
       raw.row(i) = ends.row(first + c);
       raw.row(i).tail(p_).array() -= raw(i, 0);
-      raw(i, 0) -= EndReading(piece.transition, c);
+      raw(i, 0) -= EndReading(TransitionOf(piece), c);
     }
     for (Eigen::Index j = 1; j <= p_; ++j) {
       if (raw.col(j).allFinite()) continue;
@@ -189,7 +182,7 @@ void StreamingLaplace::Linearise(const std::vector<size_t>& indices) {
   }
 }
 
-// What the start's entries do to the end's, 2 n x 2 n, of those windows whose start is uncertain;
+// Sensitivities of the ends to the starts, 2 n x 2 n, of those windows whose start is uncertain;
 // by finite differences, or that of free motion where they fail.
 std::vector<Eigen::MatrixXd> StreamingLaplace::StartSensitivities(
     const std::vector<size_t>& indices, const std::vector<Window>& windows,
@@ -214,36 +207,29 @@ std::vector<Eigen::MatrixXd> StreamingLaplace::StartSensitivities(
         ends.data() + 4 * n_ * n_ * static_cast<Eigen::Index>(u), 2 * n_, 2 * n_);
     sensitivity.colwise() -= middle.segment(2 * n_ * static_cast<Eigen::Index>(k), 2 * n_);
     sensitivity = sensitivity * differences.cwiseInverse().asDiagonal();
-    if (!sensitivity.allFinite()) {
-      sensitivity.setIdentity();
-      sensitivity.topRightCorner(n_, n_).diagonal().setConstant(
-          pieces_[indices[k]].transition.duration());
-    }
+    if (!sensitivity.allFinite())
+      sensitivity = FreeMotion(n_, TransitionOf(pieces_[indices[k]]).duration());
     sensitivities[k] = std::move(sensitivity);
   }
   return sensitivities;
 }
 
-// As WindowErrors does with windows of one step.
-Eigen::MatrixXd StreamingLaplace::Whiten(const Piece& piece, const Eigen::MatrixXd& raw,
+// @param raw errors and slopes of what was observed. @param sensitivity of all entries.
+Eigen::MatrixXd StreamingLaplace::Whiten(const Piece& piece, Eigen::MatrixXd raw,
                                          const Eigen::MatrixXd& sensitivity) const {
-  const Eigen::Index rows = raw.rows();
-  Eigen::VectorXd noise(rows);
-  for (Eigen::Index i = 0; i < rows; ++i) {
+  const Transition& transition = TransitionOf(piece);
+  const Eigen::VectorXd recorded = StartSd(transition);
+  Eigen::VectorXd end_sd(raw.rows());
+  Eigen::MatrixXd observed(sensitivity.size() > 0 ? raw.rows() : 0, sensitivity.cols());
+  for (Eigen::Index i = 0; i < raw.rows(); ++i) {
     const int c = piece.coordinates[static_cast<size_t>(i)];
-    const double sd = EndSd(piece.transition, c);
-    noise(i) = sd > 0 ? sd : noise_sd_(c);
+    const double sd = EndSd(transition, c);
+    end_sd(i) = sd > 0 ? sd : noise_sd_(c);
+    if (observed.rows() > 0) observed.row(i) = sensitivity.row(c);
   }
-  if (!piece.start_uncertain) return noise.cwiseInverse().asDiagonal() * raw;
-  const Eigen::VectorXd recorded = StartSd(piece.transition);
-  const Eigen::VectorXd start = recorded.array().isNaN().select(noise_sd_, recorded);
-  Eigen::MatrixXd spread(rows, 2 * n_);
-  for (Eigen::Index i = 0; i < rows; ++i)
-    spread.row(i) = sensitivity.row(piece.coordinates[static_cast<size_t>(i)]);
-  spread = spread * start.asDiagonal();
-  spread = (spread * spread.transpose()).eval();
-  spread.diagonal() += noise.cwiseAbs2();
-  return spread.llt().matrixL().solve(raw);
+  const std::array<Eigen::Index, 2> step{0, raw.rows()};
+  WhitenWindow(step, recorded.array().isNaN().select(noise_sd_, recorded), observed, end_sd, raw);
+  return raw;
 }
 
 void StreamingLaplace::Replace(Piece& piece, Eigen::MatrixXd errors) {

@@ -6,10 +6,10 @@
 #include <memory>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/group_sums.h"
 #include "calibrator/inference/prior.h"
 #include "calibrator/motion/transitions.h"
+#include "common/gaussian.h"
 #include "sim/windows.h"
 
 namespace plumb {
@@ -65,8 +65,7 @@ class StreamingLaplace {
 
  private:
   struct Piece {
-    Transition transition;
-    int64_t episode;
+    size_t rollout, transition;    // where in rollouts_
     std::vector<int> coordinates;  // observed entries of (q, v)
     bool start_uncertain;
     int noise_version = -1;  // of the whitening
@@ -75,7 +74,7 @@ class StreamingLaplace {
     Eigen::MatrixXd errors;  // observed x (1 + p): whitened errors and slopes
   };
 
-  Window WindowOf(size_t index) const;
+  const Transition& TransitionOf(const Piece& piece) const;
   double DistanceFrom(const Eigen::VectorXd& at) const;
   std::vector<size_t> NextInTurn();
   void Linearise(const std::vector<size_t>& indices);
@@ -83,7 +82,7 @@ class StreamingLaplace {
   std::vector<Eigen::MatrixXd> StartSensitivities(const std::vector<size_t>& indices,
                                                   const std::vector<Window>& windows,
                                                   const Eigen::VectorXd& middle);
-  Eigen::MatrixXd Whiten(const Piece& piece, const Eigen::MatrixXd& raw,
+  Eigen::MatrixXd Whiten(const Piece& piece, Eigen::MatrixXd raw,
                          const Eigen::MatrixXd& sensitivity) const;
   void Replace(Piece& piece, Eigen::MatrixXd errors);
   void Solve();
@@ -93,9 +92,10 @@ class StreamingLaplace {
   Prior prior_;
   Windows windows_;
   Eigen::Index n_, p_;
-  std::deque<Piece> pieces_;
-  Eigen::VectorXd mode_;       // standard coordinates
-  Eigen::MatrixXd precision_;  // there
+  std::vector<Rollout> rollouts_;  // what came, one for each episode without another in between
+  std::deque<Piece> pieces_;       // of each transition, in order
+  Eigen::VectorXd mode_;           // standard coordinates
+  Eigen::MatrixXd precision_;      // there
   Eigen::VectorXd noise_sd_, scale_;
   int noise_version_ = 0;
   int64_t unknown_rows_ = 0, uncertain_starts_ = 0, left_out_ = 0, simulated_steps_ = 0;

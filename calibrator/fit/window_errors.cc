@@ -5,7 +5,10 @@
 #include <limits>
 #include <stdexcept>
 
+#include "calibrator/fit/recorded_window.h"
+#include "calibrator/fit/whitening.h"
 #include "common/decompositions.h"
+#include "common/hash.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -19,14 +22,6 @@ constexpr double kDifference = 1e-6;
 
 constexpr double kGuess = 1e-3;  // relative to the units of the state
 
-// How many transitions from `first` on follow each other without a gap.
-size_t StretchLength(const Rollout& rollout, size_t first) {
-  const auto& t = rollout.transitions;
-  size_t end = first + 1;
-  while (end < t.size() && t[end].step == t[end - 1].step + 1) ++end;
-  return end - first;
-}
-
 }  // namespace
 
 Eigen::VectorXd GuessedNoise(const RobotDescription& robot) {
@@ -38,11 +33,11 @@ Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd) {
 }
 
 WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
-                           int horizon, Workforce workforce, int every)
+                           int horizon, ExecutionOptions execution, int every)
     : n_(model->num_velocities()),
       rollouts_(rollouts),
-      simulate_(std::move(model), workforce.threads),
-      batches_(workforce.batches) {
+      simulate_(std::move(model), execution.threads),
+      batches_(execution.batches) {
   if (simulate_.model().num_positions() != n_)
     throw std::invalid_argument("calibration does not know spherical joints yet");
   scale_ = MakeTask(simulate_.model().description())->state_scale();
@@ -73,7 +68,7 @@ void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
     step_rows.push_back(static_cast<Eigen::Index>(rows_.size()));
     const Transition& t = transitions[i];
     for (Eigen::Index c = 0; c < 2 * n_; ++c) {
-      if (!std::isfinite(c < n_ ? t.next_q(c) : t.next_v(c - n_))) continue;
+      if (!std::isfinite(EndReading(t, c))) continue;
       rows_.push_back({static_cast<int>(windows_.size()), static_cast<int>(rollout),
                        static_cast<int>(i), static_cast<int>(c)});
     }
@@ -82,22 +77,8 @@ void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
   step_rows.push_back(static_cast<Eigen::Index>(rows_.size()));
   step_rows_.push_back(std::move(step_rows));
   first_row_.push_back(static_cast<Eigen::Index>(row_count));
-  Window window;
-  window.q = transitions[first].q;
-  window.v = transitions[first].v;
-  for (size_t i = first; i < first + length; ++i) window.steps.emplace_back(transitions[i].efforts);
-  if (simulate_.model().parameters().delays()) {
-    double known = 0;
-    for (size_t i = first; i > 0 && known < JointDynamics::kLongestDelay; --i) {
-      if (transitions[i - 1].step != transitions[i].step - 1) break;
-      window.before.insert(window.before.begin(), transitions[i - 1].efforts);
-      known += transitions[i - 1].duration();
-    }
-  }
-  windows_.push_back(std::move(window));
-  Eigen::VectorXd sd(2 * n_);
-  sd << transitions[first].q_sd, transitions[first].v_sd;
-  starts_.push_back({std::move(sd), {}});
+  windows_.push_back(RecordedWindow(simulate_.model(), rollouts_[rollout], first, length));
+  starts_.push_back({StartSd(transitions[first]), {}});
   steps_ += static_cast<int64_t>(length);
 }
 
@@ -108,29 +89,27 @@ void WindowErrors::set_noise_sd(const Eigen::VectorXd& sd) {
   noise_sd_ = sd;
 }
 
-double WindowErrors::EndSd(const Row& row) const {
-  const Transition& t =
-      rollouts_[static_cast<size_t>(row.rollout)].transitions[static_cast<size_t>(row.transition)];
-  const double sd =
-      row.coordinate < n_ ? t.next_q_sd(row.coordinate) : t.next_v_sd(row.coordinate - n_);
+const Transition& WindowErrors::TransitionOf(const Row& row) const {
+  return rollouts_[static_cast<size_t>(row.rollout)]
+      .transitions[static_cast<size_t>(row.transition)];
+}
+
+double WindowErrors::NoiseOf(const Row& row) const {
+  const double sd = EndSd(TransitionOf(row), row.coordinate);
   return sd > 0 ? sd : noise_sd_(row.coordinate);  // no reading is exact
 }
 
 Eigen::VectorXd WindowErrors::EndNoise() const {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * n_), count = squares;
   for (const Row& row : rows_)
-    squares(row.coordinate) += std::pow(EndSd(row), 2), count(row.coordinate) += 1;
+    squares(row.coordinate) += std::pow(NoiseOf(row), 2), count(row.coordinate) += 1;
   return (count.array() > 0)
       .select((squares.array() / count.array().max(1)).sqrt(), noise_sd_.array());
 }
 
 bool WindowErrors::noise_known() const {
-  return std::all_of(rows_.begin(), rows_.end(), [&](const Row& row) {
-    const Transition& t = rollouts_[static_cast<size_t>(row.rollout)]
-                              .transitions[static_cast<size_t>(row.transition)];
-    return (row.coordinate < n_ ? t.next_q_sd(row.coordinate) : t.next_v_sd(row.coordinate - n_)) >
-           0;
-  });
+  return std::all_of(rows_.begin(), rows_.end(),
+                     [&](const Row& row) { return EndSd(TransitionOf(row), row.coordinate) > 0; });
 }
 
 bool WindowErrors::starts_known() const {
@@ -147,10 +126,9 @@ Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical,
         const auto& step_rows = step_rows_[window];
         for (Eigen::Index i = step_rows[step]; i < step_rows[step + 1]; ++i) {
           const Row& row = rows_[static_cast<size_t>(i)];
-          const Transition& t = rollouts_[static_cast<size_t>(row.rollout)]
-                                    .transitions[static_cast<size_t>(row.transition)];
+          const Transition& t = TransitionOf(row);
           const Eigen::Index c = row.coordinate;
-          errors(i, sample) = c < n_ ? q(c) - t.next_q(c) : v(c - n_) - t.next_v(c - n_);
+          errors(i, sample) = (c < n_ ? q(c) : v(c - n_)) - EndReading(t, c);
         }
       },
       /*last_only=*/false);
@@ -163,7 +141,7 @@ Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical,
   const auto compute = [&](Eigen::Index first, Eigen::Index count) {
     return Simulate(physical.middleCols(first, count), windows);
   };
-  Batches here;
+  BatchRunner here;
   const Eigen::MatrixXd errors =
       (batches_ ? *batches_ : here)
           .Run(Hash(physical, Hash(&which, sizeof which, identity_)),
@@ -212,10 +190,8 @@ Eigen::MatrixXd WindowErrors::FreeMotion() const {
     sensitivity(at, row.coordinate) = 1;
     if (row.coordinate >= n_) continue;
     const auto& steps = step_rows_[static_cast<size_t>(row.window)];
-    const auto& t = rollouts_[static_cast<size_t>(row.rollout)]
-                        .transitions[static_cast<size_t>(row.transition)];
     const auto step = std::upper_bound(steps.begin(), steps.end(), at) - steps.begin();
-    sensitivity(at, row.coordinate + n_) = t.duration() * static_cast<double>(step);
+    sensitivity(at, row.coordinate + n_) = TransitionOf(row).duration() * static_cast<double>(step);
   }
   return sensitivity;
 }
@@ -236,45 +212,16 @@ double WindowErrors::LogSpread() const {
   return sum;
 }
 
-// A Kalman filter of what the recorded initial state was off by, a constant: its innovations,
-// divided by their spread.
-// @return ln det of that.
+// @return ln det of what the errors were divided by.
 double WindowErrors::WhitenWindow(size_t w, Eigen::MatrixXd* errors) const {
-  const auto& step_rows = step_rows_[w];
+  const auto& steps = step_rows_[w];
+  const Eigen::Index first = steps.front(), count = steps.back() - first;
   const Start& start = starts_[w];
-  double log_spread = 0;
-  if (start.sensitivity.size() == 0) {
-    for (Eigen::Index i = step_rows.front(); i < step_rows.back(); ++i) {
-      const double sd = EndSd(rows_[static_cast<size_t>(i)]);
-      errors->row(i) /= sd;
-      log_spread += std::log(sd);
-    }
-    return log_spread;
-  }
-  const Eigen::VectorXd sd = start.sd.array().isNaN().select(noise_sd_, start.sd);
-  Eigen::MatrixXd offset = Eigen::MatrixXd::Zero(2 * n_, errors->cols());
-  Eigen::MatrixXd covariance = sd.array().square().matrix().asDiagonal();
-  for (size_t step = 0; step + 1 < step_rows.size(); ++step) {
-    const Eigen::Index first = step_rows[step], count = step_rows[step + 1] - first;
-    if (count == 0) continue;
-    const Eigen::MatrixXd h = start.sensitivity.middleRows(first - step_rows.front(), count);
-    Eigen::MatrixXd spread = h * covariance * h.transpose();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const double noise = EndSd(rows_[static_cast<size_t>(first + i)]);
-      spread(i, i) += noise * noise;
-    }
-    const Eigen::LLT<Eigen::MatrixXd> factor(spread);
-    auto rows = errors->middleRows(first, count);
-    rows -= h * offset;
-    factor.matrixL().solveInPlace(rows);
-    log_spread += factor.matrixLLT().diagonal().array().log().sum();
-    const Eigen::MatrixXd whitened_h = factor.matrixL().solve(h);
-    if (step + 2 == step_rows.size()) break;
-    const Eigen::MatrixXd gain = covariance * whitened_h.transpose();
-    offset += gain * rows;
-    covariance -= gain * gain.transpose();
-  }
-  return log_spread;
+  Eigen::VectorXd end_sd(count);
+  for (Eigen::Index i = 0; i < count; ++i)
+    end_sd(i) = NoiseOf(rows_[static_cast<size_t>(first + i)]);
+  return plumb::WhitenWindow(steps, start.sd.array().isNaN().select(noise_sd_, start.sd),
+                             start.sensitivity, end_sd, errors->middleRows(first, count));
 }
 
 }  // namespace plumb

@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "calibrator/motion/transitions.h"
-#include "common/batches.h"
+#include "common/batch_runner.h"
 #include "sim/windows.h"
 
 namespace plumb {
 
-/// What a sensor might well be off by where nobody says, for each entry of (q, v), physical units:
+/// A guess of the sensors' noise where nobody says, for each entry of (q, v), physical units:
 /// a thousandth of the task's units of the state. Only a beginning: the scale of the errors is
 /// estimated.
 Eigen::VectorXd GuessedNoise(const RobotDescription& robot);
@@ -35,18 +35,18 @@ Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd);
 /// Not thread-safe. The same bits for any number of threads and whoever does the work.
 class WindowErrors {
  public:
-  /// What one row of the errors is about.
+  /// The reading that one row of the errors compares with.
   struct Row {
     int window;
     int rollout, transition;  ///< at whose end
     int coordinate;           ///< 0 ... n - 1: q, n ... 2 n - 1: v
   };
 
-  /// @param rollouts must outlive this. @param every keeps only each so-manieth window, >= 1.
+  /// @param rollouts must outlive this. @param every k: only each k-th window is kept; >= 1.
   /// @throws std::invalid_argument if the robot has spherical joints or there is no transition with
   /// an observed end.
   WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
-               Workforce workforce, int every = 1);
+               ExecutionOptions execution, int every = 1);
 
   const std::vector<Row>& rows() const { return rows_; }
   int windows() const { return static_cast<int>(windows_.size()); }
@@ -97,7 +97,8 @@ class WindowErrors {
   Eigen::MatrixXd Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows);
   Eigen::MatrixXd FreeMotion() const;
   double WhitenWindow(size_t window, Eigen::MatrixXd* errors) const;
-  double EndSd(const Row& row) const;
+  const Transition& TransitionOf(const Row& row) const;
+  double NoiseOf(const Row& row) const;
 
   Eigen::Index n_;
   std::span<const Rollout> rollouts_;
@@ -110,7 +111,7 @@ class WindowErrors {
   std::vector<std::vector<Eigen::Index>> step_rows_;
   Eigen::VectorXd scale_, noise_sd_;
   int64_t steps_ = 0, simulated_steps_ = 0, failures_ = 0;
-  Batches* batches_;
+  BatchRunner* batches_;
   uint64_t identity_ = 0;  // of the windows
 };
 

@@ -17,7 +17,7 @@ namespace {
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
 constexpr uint32_t kParameters = 1, kSamples = 2;  // first stream words
-constexpr int kMostKernels = 2'000, kMostFitted = 2'000, kMostComponents = 16;
+constexpr int kMaxKernels = 2'000, kMaxFitted = 2'000, kMaxComponents = 16;
 
 }  // namespace
 
@@ -58,12 +58,12 @@ Posterior InferByRejection(const Problem& problem, const RejectionOptions& optio
       kept = AdjustByRegression(kept.samples, outcomes(Eigen::all, order), problem.observed,
                                 distances(order), equal);
     }
-    const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMostKernels, random);
+    const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMaxKernels, random);
     posterior.samples = problem.prior.FromStandard(Sample(density, options.samples, random));
   }
-  const Index some = std::min<Index>(options.samples, kMostFitted);
+  const Index some = std::min<Index>(options.samples, kMaxFitted);
   posterior.mixture =
-      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMostComponents, random)
+      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMaxComponents, random)
           .mixture;
   posterior.simulations = total;
   for (const auto column : outcomes.colwise()) posterior.failures += !column.allFinite();

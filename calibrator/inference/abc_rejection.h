@@ -7,6 +7,9 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
+
 struct RejectionOptions {
   int64_t simulations = 10'000;
   double fraction = 0.01;                ///< kept: the nearest, of all simulations

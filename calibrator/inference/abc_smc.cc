@@ -18,7 +18,7 @@ namespace {
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
 constexpr uint32_t kProposals = 1, kSamples = 2;  // first stream words
-constexpr int kMostKernels = 2'000, kMostFitted = 2'000, kMostComponents = 16;
+constexpr int kMaxKernels = 2'000, kMaxFitted = 2'000, kMaxComponents = 16;
 
 struct Population {
   MatrixXd u, outcomes;
@@ -158,12 +158,12 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
       kept = AdjustByRegression(population.u, population.outcomes, observed, distances,
                                 population.weights);
     }
-    const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMostKernels, random);
+    const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMaxKernels, random);
     posterior.samples = problem.prior.FromStandard(Sample(density, options.samples, random));
   }
-  const Index some = std::min<Index>(options.samples, kMostFitted);
+  const Index some = std::min<Index>(options.samples, kMaxFitted);
   posterior.mixture =
-      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMostComponents, random)
+      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMaxComponents, random)
           .mixture;
   if (diagnostics) *diagnostics = std::move(report);
   return posterior;

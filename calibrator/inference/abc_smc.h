@@ -8,6 +8,9 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
+
 struct SmcOptions {
   /// in all; a generation that it cuts short is used if half complete
   int64_t simulations = 10'000;

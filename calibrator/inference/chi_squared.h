@@ -2,6 +2,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// The probability of more than `value`, with so many degrees of freedom.
 double ChiSquaredTail(double degrees, double value);
 

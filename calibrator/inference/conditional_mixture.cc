@@ -21,7 +21,7 @@ constexpr uint32_t kParameters = 1, kEstimate = 2, kFinal = 3, kSamples = 4;
 // Simulations of less than this of the nearest one's weight are left out.
 constexpr double kNegligible = 1e-3;
 // More would cost time and hardly change a mixture.
-constexpr Index kMostFitted = 20'000;
+constexpr Index kMaxFitted = 20'000;
 
 // Simulations that succeeded with parameters in the region.
 struct Simulations {
@@ -76,10 +76,10 @@ std::vector<Index> Weighty(const VectorXd& weights) {
   for (Index j = 0; j < weights.size(); ++j) {
     if (weights(j) > kNegligible * weights.maxCoeff()) columns.push_back(j);
   }
-  if (static_cast<Index>(columns.size()) > kMostFitted) {
+  if (static_cast<Index>(columns.size()) > kMaxFitted) {
     std::stable_sort(columns.begin(), columns.end(),
                      [&](Index a, Index b) { return weights(a) > weights(b); });
-    columns.resize(kMostFitted);
+    columns.resize(kMaxFitted);
   }
   return columns;
 }

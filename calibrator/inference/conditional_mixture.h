@@ -7,6 +7,9 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
+
 struct ConditionalMixtureOptions {
   int64_t simulations = 10'000;  ///< in all
   int rounds = 6;                ///< the first draws from the prior
@@ -20,7 +23,7 @@ struct ConditionalMixtureOptions {
   int samples = 10'000;     ///< of the posterior, drawn at the end
 };
 
-/// What happened in each round.
+/// The course of an inference, round by round.
 struct ConditionalMixtureDiagnostics {
   struct Round {
     int64_t simulations;  ///< so far

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
 #include "common/decompositions.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 namespace {

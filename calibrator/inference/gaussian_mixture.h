@@ -3,10 +3,12 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 #include "common/random.h"
 
 namespace plumb {
+
+// The functions here share nothing but a Random that is given: thread-safe apart from that.
 
 /// ln p(x) of every column of `points`. @throws std::invalid_argument if a covariance is not
 /// positive definite.
@@ -38,7 +40,7 @@ struct MixtureOptions {
   double regularisation = 1e-6;
 };
 
-/// What expectation maximisation found.
+/// The mixture that expectation maximisation has found.
 struct MixtureFit {
   GaussianMixture mixture;
   std::vector<double> log_likelihood;  ///< mean of a sample [nat], at the start of every iteration

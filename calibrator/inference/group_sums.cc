@@ -8,7 +8,7 @@
 namespace plumb {
 namespace {
 
-constexpr int kMostIterations = 100;
+constexpr int kMaxIterations = 100;
 constexpr double kSettled = 1e-12;  // change of the mode, and of the scales relative to them
 
 }  // namespace
@@ -39,7 +39,7 @@ GroupSums::Fit GroupSums::Solve(bool scale_known) const {
   Fit fit;
   Eigen::VectorXd point = Eigen::VectorXd::Unit(1 + n, 0);  // (1, u - reference)
   double effective = 0;
-  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     Eigen::VectorXd squares = Eigen::VectorXd::Zero(rows_.size());
     for (size_t g = 0; g < sums_.size(); ++g) {
       squares(rule.shared(static_cast<int>(g))) += std::max(0.0, point.dot(sums_[g] * point));

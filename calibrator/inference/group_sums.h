@@ -12,7 +12,7 @@ namespace plumb {
 /// thread-safe.
 class GroupSums {
  public:
-  /// What the errors say, with a standard normal prior.
+  /// The posterior of the errors so far, with a standard normal prior.
   struct Fit {
     Eigen::VectorXd mode;         ///< n
     Eigen::MatrixXd information;  ///< of the errors alone, J'J / s^2

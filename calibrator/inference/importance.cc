@@ -115,7 +115,6 @@ ImportanceFit FitByImportance(
     for (double& d : density) {
       if (!std::isfinite(d)) d = -std::numeric_limits<double>::infinity();
     }
-    fit.simulations += options.samples;
     fit.samples.conservativeResize(n, fit.samples.cols() + fresh.cols());
     fit.samples.rightCols(fresh.cols()) = fresh;
     target.conservativeResize(target.size() + density.size());

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <functional>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
+
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
 
 struct ImportanceOptions {
   int samples = 400;  ///< a round
@@ -20,7 +22,6 @@ struct ImportanceFit {
   Eigen::VectorXd weights;  ///< of the samples, sum to 1
   double ess = 0;           ///< effective number of samples, 1 / sum w^2
   double heaviest = 0;      ///< largest weight
-  int64_t simulations = 0;
 };
 
 /// A density known up to its constant, from guesses of its modes: population Monte Carlo with a

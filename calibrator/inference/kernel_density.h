@@ -2,10 +2,12 @@
 
 #include <Eigen/Core>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 #include "common/random.h"
 
 namespace plumb {
+
+// The functions here share nothing: thread-safe.
 
 enum class BandwidthRule { kSilverman, kScott };
 

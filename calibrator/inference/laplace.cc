@@ -95,7 +95,7 @@ class Fit {
     }
   }
 
-  // What rounding makes of nothing is no knowledge either.
+  // Information that is no more than rounding is none.
   static Eigen::MatrixXd WithoutRounding(const Eigen::MatrixXd& information) {
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
     const Eigen::ArrayXd values = eigen.eigenvalues().array();
@@ -120,7 +120,7 @@ class Fit {
     double damping = 0;
     converged_ = false;
     if (!near_) Differentiate();  // even if there is no iteration
-    for (int iteration = 0; iteration < options_.most_iterations && !converged_; ++iteration) {
+    for (int iteration = 0; iteration < options_.max_iterations && !converged_; ++iteration) {
       if (!near_) Differentiate();
       const double effective = EffectiveParameters();
       noise_.Estimate(errors_, effective);
@@ -173,14 +173,14 @@ class Fit {
     fit.mode = problem_.prior.FromStandard(u_);
     const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(n_, n_);
     const Eigen::MatrixXd information = WithoutRounding(noise_.Information(jacobian_));
-    Eigen::MatrixXd honest = information;
+    Eigen::MatrixXd widened = information;
     if (options_.sandwich) {
       const Eigen::VectorXd weighted = noise_.Weights(errors_).cwiseProduct(errors_);
       const Sandwich wider =
           WidenBySandwich(information, weighted.asDiagonal() * jacobian_, problem_.cluster);
-      honest = wider.information, fit.inflation = wider.inflation;
+      widened = wider.information, fit.inflation = wider.inflation;
     }
-    fit.standard = {u_, Eigen::MatrixXd(honest + identity).llt().solve(identity)};
+    fit.standard = {u_, Eigen::MatrixXd(widened + identity).llt().solve(identity)};
     fit.standard.covariance =
         (fit.standard.covariance + fit.standard.covariance.transpose()).eval() / 2;
     // dx/du: exact for normal priors.

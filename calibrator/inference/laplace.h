@@ -6,10 +6,13 @@
 #include <limits>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/prior.h"
+#include "common/gaussian.h"
 
 namespace plumb {
+
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
 
 /// Data explained up to noise: errors(parameters) would be independent, with mean zero and equal
 /// variance within each group, for the right parameters.
@@ -31,7 +34,7 @@ struct LeastSquares {
 inline constexpr double kSlopeDifference = 1e-5;
 
 struct LaplaceOptions {
-  int most_iterations = 50;
+  int max_iterations = 50;
   double tolerance = 0.02;  ///< ends when a step is below that many posterior standard deviations
   bool robust = true;       ///< Student's t where errors have its tails
   bool sandwich = true;     ///< wider where errors of a cluster are correlated

@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 namespace {

@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// What was known before: independent distributions of n parameters. In *standard* coordinates u =
+/// The prior: independent distributions of n parameters. In *standard* coordinates u =
 /// Phi^-1(F(x)), F the prior's distribution function, every prior is a standard normal and no
 /// parameter has bounds: methods may work there. Immutable, hence thread-safe.
 class Prior {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/inference/prior.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 
@@ -24,7 +24,7 @@ struct Problem {
   Simulate simulate;
 };
 
-/// What is known afterwards, in the prior's coordinates.
+/// The posterior, in the prior's coordinates.
 struct Posterior {
   GaussianMixture mixture;  ///< what the trainer draws from
   /// n x N, equally weighted; more exact than the mixture where they differ

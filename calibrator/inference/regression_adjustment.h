@@ -4,6 +4,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// Parameters moved to where they would be had their simulations come out as observed.
 struct AdjustedSamples {
   Eigen::MatrixXd samples;  ///< n x N

@@ -2,9 +2,11 @@
 
 #include <Eigen/Core>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
+
+// The functions here share nothing: thread-safe.
 
 /// Weights of episodic relative-entropy policy search (Peters, Muelling, Altun, AAAI 2010):
 ///   w_i = exp((R_i - max R) / eta) / sum

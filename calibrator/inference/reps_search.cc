@@ -3,8 +3,11 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
+#include "calibrator/inference/reps.h"
 #include "common/decompositions.h"
+#include "common/random.h"
 
 namespace plumb {
 namespace {
@@ -74,106 +77,77 @@ Eigen::VectorXd UnitRange(const Eigen::VectorXd& costs) {
   return -(costs.array() - low) / std::max(high - low, std::numeric_limits<double>::min());
 }
 
-// The temperature rises until enough samples count.
-RepsWeights Solve(const Eigen::VectorXd& returns, const RepsOptions& options) {
-  RepsWeights weights = SolveReps(returns, options.kl, options.min_temperature);
-  const double floor = std::min(options.least_ess, 0.9 * static_cast<double>(returns.size()));
-  for (double hotter = weights.temperature; weights.ess < floor && hotter < 1e300;) {
-    hotter *= 1.2;
-    weights = SolveReps(returns, options.kl, hotter);
-  }
-  return weights;
-}
-
-class Search {
- public:
-  Search(const Prior& prior, const RepsOptions& options) : options_(options), n_(prior.size()) {
-    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n_), one = Eigen::VectorXd::Ones(n_);
-    const Eigen::VectorXd width = (prior.FromStandard(one) - prior.FromStandard(-one)) / 2;
-    prior_ = {prior.FromStandard(zero), width.array().square().matrix().asDiagonal()};
-    run_.distribution = prior_;
-  }
-
-  Eigen::MatrixXd Draw(int update) const {
-    Eigen::MatrixXd normals(n_, options_.samples);
-    for (Eigen::Index i = 0; i < normals.cols(); ++i) {
-      Random random(options_.seed,
-                    {0x4e95, static_cast<uint32_t>(update), static_cast<uint32_t>(i)});
-      for (Eigen::Index j = 0; j < n_; ++j) normals(j, i) = random.Normal();
-    }
-    return Transform(run_.distribution, normals);
-  }
-
-  void Update(const Eigen::MatrixXd& samples, Eigen::VectorXd values) {
-    const bool likelihood = options_.returns == RepsReturns::kLogLikelihood;
-    const double worst = likelihood ? -kInfinity : kInfinity;
-    run_.simulations += values.size();
-    for (double& value : values) {
-      if (std::isfinite(value)) continue;
-      value = worst;
-      ++run_.failures;
-    }
-    if ((values.array() == worst).all()) return;  // nothing has been learned
-    Eigen::VectorXd returns = -values;
-    if (options_.returns == RepsReturns::kUnitRange) returns = UnitRange(values);
-    std::optional<Gaussian> target;
-    if (likelihood) {
-      for (Eigen::Index i = 0; i < values.size(); ++i)
-        values(i) += LogDensity(prior_, samples.col(i));
-      returns = values;
-      for (Eigen::Index i = 0; i < values.size(); ++i)
-        returns(i) -= LogDensity(run_.distribution, samples.col(i));
-      if (options_.surrogate) {
-        Remember(samples, values);
-        target = QuadraticFit(points_, densities_, run_.distribution);
-      }
-    }
-    const RepsWeights weights = Solve(returns, options_);
-    if (!target) target = FitGaussian(samples, weights, run_.distribution);
-    const Gaussian before = run_.distribution;
-    if (options_.damping > 0) {
-      const double ratio =
-          (Precision(before) * target->covariance).trace() / static_cast<double>(n_);
-      target->covariance = std::pow(ratio, 1 / options_.damping) * before.covariance;
-    }
-    run_.distribution =
-        options_.bound_distribution ? LimitKl(before, *target, options_.kl) : *target;
-    run_.kl += KlDivergence(run_.distribution, before);
-    run_.samples = samples, run_.weights = weights.weights;
-    run_.temperature = weights.temperature, run_.ess = weights.ess;
-  }
-
-  RepsRun Take() { return std::move(run_); }
-
- private:
-  void Remember(const Eigen::MatrixXd& samples, const Eigen::VectorXd& values) {
-    const Eigen::Index before = points_.cols();
-    points_.conservativeResize(n_, before + samples.cols());
-    points_.rightCols(samples.cols()) = samples;
-    densities_.conservativeResize(before + values.size());
-    densities_.tail(values.size()) = values;
-  }
-
-  const RepsOptions& options_;
-  Eigen::Index n_;
-  Gaussian prior_;
-  RepsRun run_;
-  Eigen::MatrixXd points_{0, 0};
-  Eigen::VectorXd densities_{0};
-};
-
 }  // namespace
 
-RepsRun RepsSearch(const Prior& prior,
-                   const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& evaluate,
-                   const RepsOptions& options, const std::function<void(int)>& progress) {
-  Search search(prior, options);
-  for (int update = 0; update < options.updates; ++update) {
-    const Eigen::MatrixXd samples = search.Draw(update);
-    search.Update(samples, evaluate(samples));
-    progress(update + 1);
+RepsSearch::RepsSearch(Gaussian prior, const RepsOptions& options, RepsState state)
+    : prior_(std::move(prior)), options_(options), state_(std::move(state)) {}
+
+Eigen::MatrixXd RepsSearch::Samples() const {
+  Eigen::MatrixXd normals(prior_.mean.size(), options_.samples);
+  for (Eigen::Index i = 0; i < normals.cols(); ++i) {
+    Random random(options_.seed, {options_.stream, static_cast<uint32_t>(state_.update),
+                                  static_cast<uint32_t>(i)});
+    for (Eigen::Index j = 0; j < normals.rows(); ++j) normals(j, i) = random.Normal();
   }
-  return search.Take();
+  return Transform(state_.distribution, normals);
+}
+
+bool RepsSearch::Update(const Eigen::VectorXd& values) {
+  const bool likelihood = options_.returns == RepsReturns::kLogLikelihood;
+  const Eigen::MatrixXd samples = Samples();
+  ++state_.update;
+  const auto finite = values.array().isFinite();
+  state_.failures += values.size() - finite.count();
+  if (!finite.any()) return false;
+  const Gaussian before = state_.distribution;
+  Eigen::VectorXd returns;
+  std::optional<Gaussian> target;
+  if (likelihood) {
+    Eigen::VectorXd densities = finite.select(values, -kInfinity);
+    for (Eigen::Index i = 0; i < densities.size(); ++i)
+      densities(i) += LogDensity(prior_, samples.col(i));
+    returns = densities;
+    for (Eigen::Index i = 0; i < returns.size(); ++i)
+      returns(i) -= LogDensity(before, samples.col(i));
+    Remember(samples, densities);
+    target = QuadraticFit(state_.points, state_.densities, before);
+  } else {
+    returns = UnitRange(finite.select(values, kInfinity));
+  }
+  const RepsWeights weights = SolveReps(returns, options_.kl, options_.min_temperature);
+  if (!target) target = FitGaussian(samples, weights, before);
+  state_.distribution = LimitKl(before, *target, options_.kl);
+  state_.kl += KlDivergence(state_.distribution, before);
+  state_.temperature = weights.temperature;
+  state_.ess = weights.ess;
+  return true;
+}
+
+void RepsSearch::Remember(const Eigen::MatrixXd& samples, const Eigen::VectorXd& densities) {
+  state_.points.conservativeResize(samples.rows(), state_.points.cols() + samples.cols());
+  state_.points.rightCols(samples.cols()) = samples;
+  state_.densities.conservativeResize(state_.densities.size() + densities.size());
+  state_.densities.tail(densities.size()) = densities;
+}
+
+Gaussian CentralGaussian(const Prior& prior) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(prior.size()),
+                        one = Eigen::VectorXd::Ones(prior.size());
+  const Eigen::VectorXd width = (prior.FromStandard(one) - prior.FromStandard(-one)) / 2;
+  return {prior.FromStandard(zero), width.array().square().matrix().asDiagonal()};
+}
+
+RepsState SearchByReps(const Prior& prior,
+                       const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& evaluate,
+                       const RepsOptions& options, int updates,
+                       const std::function<void(int)>& progress) {
+  const Gaussian begin = CentralGaussian(prior);
+  RepsSearch search(begin, options, {0, begin});
+  while (search.state().update < updates) {
+    search.Update(evaluate(search.Samples()));
+    progress(search.state().update);
+  }
+  return search.state();
 }
 
 }  // namespace plumb

@@ -5,6 +5,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 struct Sandwich {
   /// n x n: what the data tell when their dependence is taken into account
   Eigen::MatrixXd information;

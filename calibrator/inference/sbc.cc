@@ -13,7 +13,7 @@ namespace plumb {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr int kMostBins = 20;
+constexpr int kMaxBins = 20;
 // expected; fewer, and the statistic is not chi-squared distributed
 constexpr int kFewestPerBin = 5;
 constexpr int kMaxPoints = 100;        // at which distribution functions are compared
@@ -89,7 +89,7 @@ int Rank(double truth, const Eigen::VectorXd& draws, Random& ties) {
   return below + (equal > 0 ? static_cast<int>(ties.Uniform() * (equal + 1)) : 0);
 }
 
-// What is most wrong, in standard errors of uniform ranks' mean and variance.
+// The quantity that is most wrong, in standard errors of uniform ranks' mean and variance.
 std::string Verdict(const SbcUniformity& quantity, double runs, size_t tests) {
   if (std::isnan(quantity.chi2_p)) return "unknown";
   const double p = std::min(quantity.chi2_p, quantity.ecdf_p);
@@ -114,7 +114,7 @@ std::vector<SbcQuantity> Marginals(const std::vector<std::string>& names) {
 
 double UniformityByChi2(const std::vector<int>& ranks, int draws) {
   const auto n = static_cast<int>(ranks.size());
-  const int bins = std::min({kMostBins, n / kFewestPerBin, draws + 1});
+  const int bins = std::min({kMaxBins, n / kFewestPerBin, draws + 1});
   if (bins < 2) return 1;
   // Bins of whole ranks; not all of them have as many.
   const auto bin = [&](int rank) {

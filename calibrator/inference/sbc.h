@@ -13,6 +13,9 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
+
 /// Something about the parameters of which a posterior is judged: one of them, a combination that
 /// the data tell or one that they do not.
 struct SbcQuantity {
@@ -51,7 +54,7 @@ struct SbcUniformity {
   double mean, variance;
 };
 
-/// What simulation-based calibration has found.
+/// The ranks that simulation-based calibration has found, and their tests.
 struct SbcResult {
   static constexpr int kFailed = -1;
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 

@@ -5,8 +5,21 @@
 #include <limits>
 
 #include "plumb/policy_t.hpp"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
+namespace {
+
+ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {
+  return {state.iteration, robot.parameters, state.distribution};
+}
+
+// An iteration's identity is its newest episode's start: a time that live run and replay share.
+int64_t Time(const SimOpt::State& state) {
+  return state.rollouts.empty() ? 0 : state.rollouts.back().episode;
+}
+
+}  // namespace
 
 void Calibrator::OnCommand(const joint_command_t& command) {
   joiner_.OnCommand(command);
@@ -50,22 +63,11 @@ size_t Calibrator::Begin() {
   return usable;
 }
 
-ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {
-  ParameterDistribution distribution{state.iteration, robot.parameters, {}};
-  for (size_t i = 0; i < state.distribution.components.size(); ++i) {
-    const Gaussian& component = state.distribution.components[i];
-    distribution.components.push_back(
-        {state.distribution.weights[i], component.mean, component.covariance});
-  }
-  return distribution;
-}
-
 parameter_distribution_t DistributionMessage(const RobotDescription& robot,
                                              const SimOpt::State& state, uint64_t seed,
                                              const CalibrationReport* report) {
   parameter_distribution_t m = Distribution(robot, state).ToMessage();
-  // The episode's identity is its start: a time that live run and replay share.
-  m.utime = state.rollouts.empty() ? 0 : state.rollouts.back().episode;
+  m.utime = Time(state);
   m.seed = static_cast<int64_t>(seed);
   if (report) {
     m.kl = report->kl;
@@ -76,12 +78,30 @@ parameter_distribution_t DistributionMessage(const RobotDescription& robot,
   return m;
 }
 
+Findings IterationFindings(const RobotDescription& robot, const SimOpt& simopt,
+                           const CalibrationReport& report) {
+  const SimOpt::State& state = simopt.state();
+  Findings findings;
+  findings.method = simopt.method();
+  findings.used = state.used;
+  findings.seed = simopt.seed();
+  findings.prior = PriorGaussian(robot);
+  findings.posterior = state.distribution;
+  findings.transitions = static_cast<int64_t>(CountTransitions(state.rollouts));
+  findings.discrepancy = report.discrepancy;
+  findings.identifiability = report.identifiability;
+  findings.cramer_rao = report.identifiability.cramer_rao;
+  findings.warnings = report.warnings;
+  findings.loop = {report.iteration, Time(state), report.kl, report.ess, report.temperature};
+  return findings;
+}
+
 calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state,
                                    const DropCounts& drops, const CalibrationReport* report,
                                    double seconds, const StreamingLaplace* stream) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   calibration_status_t m{};
-  m.utime = state.rollouts.empty() ? 0 : state.rollouts.back().episode;
+  m.utime = Time(state);
   m.iteration = state.iteration;
   m.transitions = static_cast<int32_t>(CountTransitions(state.rollouts));
   m.rollouts = static_cast<int32_t>(state.rollouts.size());
@@ -108,7 +128,7 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
       m.combination_mean.push_back(c.mean);
       m.combination_sd.push_back(c.sd);
     }
-    m.identifiability = report->identifiability.words;
+    m.identifiability = report->identifiability.summary;
   }
   m.num_horizons = static_cast<int32_t>(m.horizon.size());
   m.num_powers = static_cast<int32_t>(m.combination_power.size());
@@ -120,9 +140,8 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
   m.num_parameters = static_cast<int32_t>(m.mean.size());
   m.seconds = seconds;
   if (stream && stream->determined()) {
-    const Gaussian interim = stream->posterior();
     const ParameterDistribution streamed{
-        state.iteration, robot.parameters, {{1, interim.mean, interim.covariance}}};
+        state.iteration, robot.parameters, {{1}, {stream->posterior()}}};
     const Eigen::VectorXd streamed_mean = streamed.Mean(), streamed_sd = streamed.Sd();
     m.streamed_transitions = static_cast<int32_t>(stream->transitions() - stream->left_out());
     m.streamed_mean.assign(streamed_mean.begin(), streamed_mean.end());

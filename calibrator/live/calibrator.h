@@ -6,10 +6,11 @@
 #include "calibrator/fit/streaming.h"
 #include "calibrator/live/simopt.h"
 #include "calibrator/motion/transitions.h"
+#include "calibrator/results/findings.h"
 #include "plumb/calibration_status_t.hpp"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
-#include "robot/parameter_distribution.h"
+#include "robot/description.h"
 
 namespace plumb {
 
@@ -48,14 +49,17 @@ class Calibrator {
   int next_step_ = 0;  // of it, to be taken
 };
 
-/// SimOpt's distribution, as the trainer samples it.
-ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state);
-/// The same as a message. @param report of the iteration that led there; null for the prior.
+/// SimOpt's distribution as a message. @param report of the iteration that led there; null for the
+/// prior.
 parameter_distribution_t DistributionMessage(const RobotDescription& robot,
                                              const SimOpt::State& state, uint64_t seed,
                                              const CalibrationReport* report);
-/// Findings as a message. @param stream of transitions that have arrived since, null if there is
-/// none.
+/// What an iteration has found, to be written as posterior.json. @param report of the iteration
+/// that `simopt` has completed last.
+Findings IterationFindings(const RobotDescription& robot, const SimOpt& simopt,
+                           const CalibrationReport& report);
+/// Progress and findings as a message. @param stream of transitions that have arrived since, null
+/// if there is none.
 calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state,
                                    const DropCounts& drops, const CalibrationReport* report,
                                    double seconds, const StreamingLaplace* stream = nullptr);

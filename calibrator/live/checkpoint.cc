@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kVersion = 2;  // 1: the distribution was one Gaussian
+constexpr int kVersion = 3;  // 2: without the method used, its warnings and a search's samples
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -67,6 +67,30 @@ GaussianMixture MixtureFrom(const json& j) {
 // JSON has no NaN.
 double NumberOrNaN(const json& j) {
   return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
+}
+
+// The samples alone: the rest follows from the state. JSON writes -infinity, a failure's density,
+// as null.
+json ToJson(const RepsState& search) {
+  const Eigen::MatrixXd& points = search.points;
+  return {{"points", std::vector<double>(points.data(), points.data() + points.size())},
+          {"densities", ToJson(search.densities)}};
+}
+
+void ReadSamples(const json& j, RepsState* search) {
+  const json& densities = j.at("densities");
+  const auto points = j.at("points").get<std::vector<double>>();
+  const Eigen::Index n = search->distribution.mean.size();
+  const auto count = static_cast<Eigen::Index>(densities.size());
+  if (static_cast<Eigen::Index>(points.size()) != n * count)
+    throw std::runtime_error("the search has not as many points as densities");
+  search->points = Eigen::MatrixXd::Map(points.data(), n, count);
+  search->densities.resize(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const json& density = densities[static_cast<size_t>(i)];
+    search->densities(i) =
+        density.is_null() ? -std::numeric_limits<double>::infinity() : density.get<double>();
+  }
 }
 
 const std::vector<std::pair<const char*, Eigen::VectorXd Transition::*>> kVectors{
@@ -153,12 +177,15 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"seed", seed_},
                {"fingerprint", fingerprint_},
                {"iteration", state.iteration},
-               {"update", state.update},
+               {"update", state.search.update},
                {"distribution", ToJson(state.distribution)},
+               {"used", state.used},
                {"before", ToJson(state.before)},
                {"kl", state.kl},
                {"ess", state.ess},
                {"temperature", state.temperature},
+               {"search", ToJson(state.search)},
+               {"warnings", state.warnings},
                {"rollouts_per_iteration", state.rollouts_per_iteration}};
   WriteAtomically(folder_ / "calibration.json", j.dump(1));
 }
@@ -178,11 +205,18 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     }
     SimOpt::State state;
     state.iteration = j.at("iteration");
-    state.update = j.at("update");
     state.distribution = MixtureFrom(j.at("distribution"));
+    state.used = j.at("used");
     state.before = MixtureFrom(j.at("before"));
     state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
     state.temperature = j.at("temperature");
+    state.search = {.update = j.at("update"),
+                    .distribution = Moments(state.distribution),
+                    .kl = state.kl,
+                    .temperature = state.temperature,
+                    .ess = state.ess};
+    ReadSamples(j.at("search"), &state.search);
+    state.warnings = j.at("warnings").get<std::vector<std::string>>();
     state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
     size_t count = 0;
     for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);

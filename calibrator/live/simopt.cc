@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
-#include "calibrator/inference/reps.h"
-#include "common/random.h"
 #include "robot/parameter_distribution.h"
 
 namespace plumb {
@@ -18,30 +15,13 @@ constexpr double kScaledMinTemperature = 0.01;
 // [control steps] beyond which one-step models of robots do not hold
 constexpr int kLongestWindow = 50;
 
-std::optional<Objective> SearchOf(const std::string& method) {
+std::optional<Objective> ParseObjective(const std::string& method) {
   if (method == "reps") return Objective::kPosterior;
   if (method == "simopt") return Objective::kTrajectory;
   return {};
 }
 
-// Costs c -> -(c - min) / (max - min); infinitely costly samples stay so.
-Eigen::VectorXd ScaledReturns(const Eigen::VectorXd& costs) {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const double cost : costs) {
-    if (!std::isfinite(cost)) continue;
-    low = std::min(low, cost);
-    high = std::max(high, cost);
-  }
-  if (!std::isfinite(low)) return Eigen::VectorXd::Constant(costs.size(), low > 0 ? -low : low);
-  return -(costs.array() - low) / std::max(high - low, std::numeric_limits<double>::min());
-}
-
 }  // namespace
-
-Gaussian PriorGaussian(const RobotDescription& robot) {
-  const ParameterDistribution prior = ParameterDistribution::Prior(robot);
-  return {prior.components[0].mean, prior.components[0].covariance};
-}
 
 SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective)
     : SimOpt(robot, seed, threads, "reps") {
@@ -53,7 +33,7 @@ SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, const 
       seed_(seed),
       threads_(threads),
       method_(method),
-      objective_(SearchOf(method)),
+      objective_(ParseObjective(method)),
       model_(std::make_shared<Model>(robot)),
       prior_(PriorGaussian(robot)),
       discrepancy_(robot, threads) {
@@ -72,6 +52,10 @@ void SimOpt::Resume(State state) {
       throw std::invalid_argument("the checkpoint has another number of parameters than the robot");
     }
   }
+  const RepsState& search = state.search;
+  if (search.points.cols() != search.densities.size() ||
+      (search.points.size() > 0 && search.points.rows() != prior_.mean.size()))
+    throw std::invalid_argument("the checkpoint's search is of another robot");
   state_ = std::move(state);
 }
 
@@ -84,8 +68,10 @@ void SimOpt::Begin(std::vector<Rollout> rollouts) {
   state_.rollouts_per_iteration.push_back(static_cast<int>(rollouts.size()));
   for (Rollout& rollout : rollouts) state_.rollouts.push_back(std::move(rollout));
   state_.before = state_.distribution;
-  state_.update = 0;
   state_.kl = 0;
+  state_.search = {.distribution = Moments(state_.distribution),
+                   .temperature = state_.temperature,
+                   .ess = state_.ess};
 }
 
 std::span<const Rollout> SimOpt::Newest() const {
@@ -93,68 +79,58 @@ std::span<const Rollout> SimOpt::Newest() const {
   return std::span(state_.rollouts).last(count);
 }
 
-Eigen::MatrixXd SimOpt::Samples(int iteration, int update) const {
-  Eigen::MatrixXd normals(prior_.mean.size(), robot_.calibration.samples);
-  for (Eigen::Index i = 0; i < normals.cols(); ++i) {
-    Random random(seed_, {static_cast<uint32_t>(iteration), static_cast<uint32_t>(update),
-                          static_cast<uint32_t>(i)});
-    for (Eigen::Index j = 0; j < normals.rows(); ++j) normals(j, i) = random.Normal();
-  }
-  return Transform(Moments(state_.distribution), normals);
-}
-
-Eigen::VectorXd SimOpt::Returns(const Eigen::MatrixXd& samples) {
-  // Without data the samples' own scatter must not move anything.
-  if (CountTransitions(state_.rollouts) == 0) return Eigen::VectorXd::Constant(samples.cols(), NAN);
-  Eigen::MatrixXd physical(samples.rows(), samples.cols());
-  for (Eigen::Index i = 0; i < samples.cols(); ++i)
-    physical.col(i) = robot_.ToPhysical(samples.col(i));
-  Eigen::VectorXd values;
-  switch (*objective_) {
-    case Objective::kPosterior:
-      values = discrepancy_.LogLikelihood(physical, state_.rollouts);
-      break;
-    case Objective::kStep:
-      values = discrepancy_.StepError(physical, Newest());
-      break;
-    case Objective::kTrajectory:
-      values = discrepancy_.TrajectoryError(physical, Newest());
-      break;
-  }
-  if (objective_ != Objective::kPosterior) return ScaledReturns(values);
-  const Gaussian present = Moments(state_.distribution);
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    values(i) += LogDensity(prior_, samples.col(i)) - LogDensity(present, samples.col(i));
-  }
-  return values;
-}
-
 std::optional<CalibrationReport> SimOpt::Update() {
-  warnings_.clear();
+  state_.warnings.clear();
   objective_ ? Search() : Infer();
-  if (++state_.update < (objective_ ? robot_.calibration.updates : 1)) return {};
+  if (state_.search.update < (objective_ ? robot_.calibration.updates : 1)) return {};
   ++state_.iteration;
   return Report();
 }
 
 void SimOpt::Search() {
-  const Eigen::MatrixXd samples = Samples(state_.iteration + 1, state_.update);
-  const Eigen::VectorXd returns = Returns(samples);
-  // nothing is known: keep it
-  if (returns.array().isNaN().any() || !std::isfinite(returns.maxCoeff())) return;
-  const double coldest = objective_ == Objective::kPosterior ? robot_.calibration.min_temperature
-                                                             : kScaledMinTemperature;
-  const RepsWeights weights = SolveReps(returns, robot_.calibration.kl, coldest);
-  const Gaussian present = Moments(state_.distribution);
-  const Gaussian limited =
-      LimitKl(present, FitGaussian(samples, weights, present), robot_.calibration.kl);
-  state_.kl += KlDivergence(limited, present);
-  state_.ess = weights.ess;
-  state_.temperature = weights.temperature;
-  state_.distribution = {{1}, {limited}};
+  RepsSearch search(prior_, SearchOptions(), state_.search);
+  const bool learned = search.Update(Evaluate(search.Samples()));
+  state_.search = search.state();
+  if (!learned) return;
+  state_.distribution = {{1}, {state_.search.distribution}};
+  state_.kl = state_.search.kl;
+  state_.ess = state_.search.ess;
+  state_.temperature = state_.search.temperature;
+  state_.used = method_;
+}
+
+RepsOptions SimOpt::SearchOptions() const {
+  const bool posterior = objective_ == Objective::kPosterior;
+  RepsOptions options;
+  options.returns = posterior ? RepsReturns::kLogLikelihood : RepsReturns::kUnitRange;
+  options.samples = robot_.calibration.samples;
+  options.kl = robot_.calibration.kl;
+  options.min_temperature = posterior ? robot_.calibration.min_temperature : kScaledMinTemperature;
+  options.seed = seed_;
+  options.stream = static_cast<uint32_t>(state_.iteration + 1);
+  return options;
+}
+
+// Log-likelihoods or costs, as SearchOptions has it.
+Eigen::VectorXd SimOpt::Evaluate(const Eigen::MatrixXd& samples) {
+  // Without data the samples' own scatter must not move anything.
+  if (CountTransitions(state_.rollouts) == 0) return Eigen::VectorXd::Constant(samples.cols(), NAN);
+  Eigen::MatrixXd physical(samples.rows(), samples.cols());
+  for (Eigen::Index i = 0; i < samples.cols(); ++i)
+    physical.col(i) = robot_.ToPhysical(samples.col(i));
+  switch (*objective_) {
+    case Objective::kPosterior:
+      return discrepancy_.LogLikelihood(physical, state_.rollouts);
+    case Objective::kStep:
+      return discrepancy_.StepError(physical, Newest());
+    case Objective::kTrajectory:
+      return discrepancy_.TrajectoryError(physical, Newest());
+  }
+  throw std::logic_error("an objective that is none");
 }
 
 void SimOpt::Infer() {
+  ++state_.search.update;
   if (CountTransitions(state_.rollouts) == 0) return;  // nothing is known: keep it
   try {
     const MethodResult result = RunFromWhereItIs();
@@ -162,10 +138,11 @@ void SimOpt::Infer() {
     state_.ess = result.ess;
     state_.temperature = 1;
     state_.distribution = result.posterior;
+    state_.used = result.used;
     failures_ += result.failures;
-    warnings_ = result.warnings;
+    state_.warnings = result.warnings;
   } catch (const std::invalid_argument& error) {
-    warnings_ = {std::string("the distribution stays as it is: ") + error.what()};
+    state_.warnings = {std::string("the distribution stays as it is: ") + error.what()};
   }
 }
 
@@ -181,7 +158,7 @@ MethodResult SimOpt::RunFromWhereItIs() const {
   options.horizons.erase(std::unique(options.horizons.begin(), options.horizons.end()),
                          options.horizons.end());
   options.seed = seed_;
-  options.workforce = threads_;
+  options.execution = threads_;
   const bool one_mode = state_.iteration > 0 && state_.before.components.size() == 1;
   if (one_mode) {
     try {
@@ -215,7 +192,7 @@ std::optional<CalibrationReport> SimOpt::Report() {
       FindIdentifiability(robot_, discrepancy_, state_.rollouts, Moments(state_.distribution));
   report.failures = discrepancy_.failures();
   report.failures.diverged += failures_;
-  report.warnings = warnings_;
+  report.warnings = state_.warnings;
   return report;
 }
 

@@ -9,13 +9,14 @@
 #include "calibrator/diagnostics/identifiability.h"
 #include "calibrator/fit/discrepancy.h"
 #include "calibrator/fit/methods.h"
-#include "calibrator/inference/gaussian.h"
+#include "calibrator/inference/reps_search.h"
 #include "calibrator/motion/transitions.h"
+#include "common/gaussian.h"
 #include "robot/description.h"
 
 namespace plumb {
 
-/// What an update by relative-entropy policy search strives for.
+/// The goal of an update by relative-entropy policy search.
 enum class Objective {
   /// R = ln p(transitions | xi) + ln prior(xi) - ln p_phi(xi), temperature >= min_temperature. With
   /// temperature 1 the weighted samples are exactly the Bayesian posterior's, so the distribution
@@ -39,7 +40,7 @@ struct PredictionErrors {
   double prior;   ///< the prior
 };
 
-/// What one iteration found.
+/// The outcome of one iteration.
 struct CalibrationReport {
   int iteration = 0;
   /// D_KL(after || before) of their moments, summed over the updates [nat]
@@ -52,7 +53,7 @@ struct CalibrationReport {
   Windows::Failures failures;  ///< simulations that failed, of all since the start of the process
   std::vector<PredictionErrors> errors;
   Identifiability identifiability;
-  std::vector<std::string> warnings;  ///< of the method; empty after Resume
+  std::vector<std::string> warnings;  ///< of the method
 };
 
 /// The loop's inference: the distribution over simulators, from roll-outs that come iteration by
@@ -60,8 +61,8 @@ struct CalibrationReport {
 ///   auto, laplace, mixture   one update an iteration: the posterior given all roll-outs so far
 ///                            (RunMethod). Windows grow up to the robot's calibration horizons, or
 ///                            50 steps; the search begins at the present mean
-///   reps                     some updates an iteration by step-based SimOpt (Cui & Hensel),
-///                            Objective::kPosterior
+///   reps                     some updates an iteration by step-based SimOpt (Cui & Hensel), a
+///                            RepsSearch with Objective::kPosterior
 ///   simopt                   the same with Objective::kTrajectory
 /// Random numbers are keyed by (seed, iteration, update), so an interrupted calibration resumes to
 /// the same bits, with any number of threads. Not thread-safe; uses `threads` threads inside.
@@ -70,10 +71,15 @@ class SimOpt {
   /// Everything a resumed run needs, apart from the robot.
   struct State {
     int iteration = 0;  ///< completed iterations
-    int update = 0;     ///< completed updates of the running iteration
     GaussianMixture distribution;
+    /// method that gave the distribution, e.g. laplace where auto was asked for; "prior" = none yet
+    std::string used = "prior";
     GaussianMixture before;  ///< distribution at the beginning of the running iteration
-    double kl = 0, ess = 0, temperature = 0;
+    /// of the running iteration, else of the last one; without a search its update counts all the
+    /// same
+    RepsState search;
+    double kl = 0, ess = 0, temperature = 0;  ///< see CalibrationReport
+    std::vector<std::string> warnings;        ///< of the last update
     std::vector<Rollout> rollouts;  ///< all so far; an iteration's are added when it begins
     std::vector<int> rollouts_per_iteration;
   };
@@ -85,6 +91,8 @@ class SimOpt {
   SimOpt(const RobotDescription& robot, uint64_t seed, int threads, const std::string& method);
   ~SimOpt();
 
+  uint64_t seed() const { return seed_; }
+  const std::string& method() const { return method_; }
   const State& state() const { return state_; }
   /// Takes up an earlier state. @throws std::invalid_argument if it is not of this robot.
   void Resume(State state);
@@ -100,13 +108,10 @@ class SimOpt {
   /// The report of the iteration completed last, e.g. after Resume; empty for the prior.
   std::optional<CalibrationReport> Report();
 
-  /// n x samples of the distribution's coordinates that update `update` of iteration `iteration`
-  /// evaluates, of reps and simopt.
-  Eigen::MatrixXd Samples(int iteration, int update) const;
-
  private:
   void Search();
-  Eigen::VectorXd Returns(const Eigen::MatrixXd& samples);
+  RepsOptions SearchOptions() const;
+  Eigen::VectorXd Evaluate(const Eigen::MatrixXd& samples);
   void Infer();
   MethodResult RunFromWhereItIs() const;
   std::span<const Rollout> Newest() const;
@@ -121,10 +126,6 @@ class SimOpt {
   State state_;
   Discrepancy discrepancy_;
   int64_t failures_ = 0;  // simulations of RunMethod that have failed
-  std::vector<std::string> warnings_;
 };
-
-/// The prior over the coordinates, as the description has it.
-Gaussian PriorGaussian(const RobotDescription& robot);
 
 }  // namespace plumb

@@ -217,7 +217,7 @@ Log ReadCsvLog(const std::string& file, const RobotDescription& robot) {
     why = fmt::format("its rows are {:.6g} s apart, but the task's control period is {:.6g} s",
                       assembly.late_interval(), robot.task.period);
   } else {
-    why = log.drops.words();
+    why = log.drops.summary();
   }
   throw std::runtime_error(file + ": no transition can be used: " + why);
 }

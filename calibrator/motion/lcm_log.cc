@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "calibrator/motion/motion_log.h"
+#include "common/time_units.h"
 
 namespace plumb {
 namespace {
@@ -121,7 +122,7 @@ class EpisodeJoiner {
     const robot_state_t* from = joiner_.FindState(episode.last_command);
     if (!from) return episode.last_command;
     const double period = robot_.task.period + robot_.driver.measurement / 2;
-    const int64_t until = from->utime + static_cast<int64_t>(period * 1e6);
+    const int64_t until = from->utime + Microseconds(period);
     int64_t last = episode.last_command;
     for (const robot_state_t* next; (next = joiner_.FindState(last + 1)) && next->utime <= until;)
       ++last;
@@ -177,7 +178,7 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
   } else if (log.drops.total() == 0) {
     why = "it holds no command of an episode";
   } else {
-    why = log.drops.words();
+    why = log.drops.summary();
   }
   throw std::runtime_error(file + ": no transition can be used: " + why);
 }

@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// What one file tells of a robot's motion. Readers: lcm_log.h and csv_log.h.
+/// A robot's motion as one file has recorded it. Readers: lcm_log.h and csv_log.h.
 struct Log {
   std::string name;               ///< the file
   std::vector<Rollout> rollouts;  ///< each with at least one transition, in the file's order

@@ -6,6 +6,9 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe if the given function is, which the caller's thread
+// calls.
+
 /// Reads an LCM log event by event, in the file's order.
 /// @param on_event channel, data, size, time of reception [us]; return false to stop.
 /// @return the number of events. A log cut off in the middle of an event (a logger that was killed)

@@ -12,6 +12,8 @@
 
 namespace plumb {
 
+// Thread-safe, but for a receiver that two threads would share; the caller's thread calls it.
+
 struct MotionCounts {
   int64_t events = 0;       ///< of all channels
   int64_t messages = 0;     ///< of the three

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "calibrator/motion/csv_table.h"
-#include "common/config.h"
+#include "common/nearest_name.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -17,9 +17,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
-constexpr size_t kLongestName = 200;       // of a column, when the nearest is looked for
 
-/// What the columns are called, in the order of q, v and the actions.
+/// The columns' names, in the order of q, v and the actions.
 struct Names {
   std::vector<std::string> q, v, u;
 
@@ -42,14 +41,6 @@ std::vector<std::string> Prefixed(std::vector<std::string> names) {
   return names;
 }
 
-const std::string& Nearest(const std::string& name, const std::vector<std::string>& among) {
-  const auto distance = [&](const std::string& other) {
-    return EditDistance(name.substr(0, kLongestName), other.substr(0, kLongestName));
-  };
-  return *std::min_element(among.begin(), among.end(),
-                           [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
-}
-
 /// Where things are in a table.
 struct Columns {
   int t, terminated, truncated;  // the latter two -1 if there is none
@@ -63,7 +54,7 @@ std::vector<int> FindAll(const CsvTable& table, const std::vector<std::string>& 
     columns.push_back(table.Find(name));
     if (columns.back() < 0) {
       table.Fail(fmt::format("has no column '{}'; the nearest is {}", name,
-                             Quoted(Nearest(name, table.names()))));
+                             Quoted(NearestName(name, table.names()))));
     }
   }
   return columns;
@@ -81,7 +72,7 @@ void RefuseForeign(const CsvTable& table, const std::vector<std::string>& known,
     if (of_a_joint && std::find(known.begin(), known.end(), name) == known.end()) {
       table.Fail(fmt::format("column {} is of no joint{} of robot '{}'; the nearest is '{}'",
                              Quoted(name), name.starts_with("u/") ? " with a motor" : "", robot,
-                             Nearest(name, known)));
+                             NearestName(name, known)));
     }
   }
 }

@@ -9,6 +9,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// A row of a table of motion as it stands.
 struct MotionRow {
   double t;                ///< [s], finite

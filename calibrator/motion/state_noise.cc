@@ -69,13 +69,13 @@ Eigen::VectorXd SmoothedNoise(const RobotDescription& robot) {
   Eigen::VectorXd sd(2 * n);
   Eigen::Index velocity = 0;
   // A step of any joint's effort may step every joint's acceleration.
-  double most_effort = 0;
+  double max_effort = 0;
   for (const JointDescription& joint : robot.joints) {
-    if (!joint.passive) most_effort = std::hypot(most_effort, joint.effort_limit);
+    if (!joint.passive) max_effort = std::hypot(max_effort, joint.effort_limit);
   }
   const auto felt = [&](const JointDescription& joint, double coupling) {
     const double own = joint.passive ? 0 : joint.effort_limit;
-    return std::hypot(coupling * most_effort, std::sqrt(1 - coupling * coupling) * own);
+    return std::hypot(coupling * max_effort, std::sqrt(1 - coupling * coupling) * own);
   };
   for (int j = 0; j < robot.num_joints(); ++j) {
     EstimatorSettings settings = EstimatorOf(robot, j);

@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// What a robot touches in a state.
+/// The ground and the stops that a robot touches in a state.
 struct Touch {
   bool ground = false;  ///< a contact point of a collision shape is at or below z = 0 of the base
   bool stop = false;    ///< a joint is at or beyond a position limit

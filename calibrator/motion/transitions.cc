@@ -7,12 +7,14 @@
 #include <limits>
 #include <numeric>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
-constexpr size_t kMostStates = 200'000;  // a quarter of an hour at 200 Hz
-constexpr size_t kMostEpisodes = 64;
-constexpr int kMostSteps = 1'000'000;
+constexpr size_t kMaxStates = 200'000;  // a quarter of an hour at 200 Hz
+constexpr size_t kMaxEpisodes = 64;
+constexpr int kMaxSteps = 1'000'000;
 
 Eigen::VectorXd ToEigen(const std::vector<double>& values) {
   return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
@@ -51,13 +53,19 @@ void RestoreStep(const Eigen::VectorXd& before, std::vector<EffortSegment>* segm
 
 }  // namespace
 
+size_t CountTransitions(std::span<const Rollout> rollouts) {
+  size_t count = 0;
+  for (const Rollout& rollout : rollouts) count += rollout.transitions.size();
+  return count;
+}
+
 double Transition::duration() const {
   return std::accumulate(
       efforts.begin(), efforts.end(), 0.0,
       [](double sum, const EffortSegment& segment) { return sum + segment.duration; });
 }
 
-std::string DropCounts::words() const {
+std::string DropCounts::summary() const {
   std::string words = fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap,
                                   gap == 1 ? "" : "s", late, not_finite, restart);
   if (model_based > 0) words += fmt::format(", {} model-based", model_based);
@@ -73,12 +81,12 @@ DropCounts& DropCounts::operator+=(const DropCounts& other) {
 TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
     : n_(robot.num_joints()),
       period_(robot.task.period),
-      most_states_(kMostStates),
-      most_episodes_(kMostEpisodes) {}
+      max_states_(kMaxStates),
+      max_episodes_(kMaxEpisodes) {}
 
 TransitionJoiner TransitionJoiner::Unbounded(const RobotDescription& robot) {
   TransitionJoiner joiner(robot);
-  joiner.most_states_ = joiner.most_episodes_ = std::numeric_limits<size_t>::max();
+  joiner.max_states_ = joiner.max_episodes_ = std::numeric_limits<size_t>::max();
   return joiner;
 }
 
@@ -97,15 +105,15 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
     commands_.clear();
   }
   states_.insert_or_assign(smoothed.sequence, smoothed);
-  if (states_.size() > most_states_) states_.erase(states_.begin());
+  if (states_.size() > max_states_) states_.erase(states_.begin());
 }
 
 void TransitionJoiner::OnCommand(const joint_command_t& command) {
   if (command.num_joints != n_ || command.episode < 0 || command.step < 0 ||
-      command.step >= kMostSteps)
+      command.step >= kMaxSteps)
     return;
   commands_[command.episode].insert_or_assign(command.step, command);
-  if (commands_.size() > most_episodes_) commands_.erase(commands_.begin());
+  if (commands_.size() > max_episodes_) commands_.erase(commands_.begin());
 }
 
 Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
@@ -158,7 +166,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
     ++drops->gap;
     return false;
   }
-  const double duration = static_cast<double>(last->second.utime - first->second.utime) * 1e-6;
+  const double duration = Seconds(last->second.utime - first->second.utime);
   if (!(std::abs(duration - period_) <= 0.2 * period_)) {
     ++drops->late;
     return false;
@@ -181,8 +189,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
       ++drops->restart;
       return false;
     }
-    EffortSegment segment{static_cast<double>(now.utime - before.utime) * 1e-6,
-                          ToEigen(now.effort)};
+    EffortSegment segment{Seconds(now.utime - before.utime), ToEigen(now.effort)};
     finite = finite && segment.duration > 0 && segment.effort.allFinite();
     transition->efforts.push_back(std::move(segment));
   }

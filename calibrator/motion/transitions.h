@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,9 @@ struct Rollout {
   std::vector<Transition> transitions;
 };
 
+/// How many transitions there are.
+size_t CountTransitions(std::span<const Rollout> rollouts);
+
 /// Why transitions were left out, counted since the start. Nothing is ever guessed.
 struct DropCounts {
   int64_t gap = 0;         ///< a state or a command is missing
@@ -44,7 +48,7 @@ struct DropCounts {
   int64_t total() const { return gap + late + not_finite + restart + model_based; }
   DropCounts& operator+=(const DropCounts& other);
   /// "1 gap, 2 late, 0 not finite, 3 across restarts", and ", 4 model-based" if there are any
-  std::string words() const;
+  std::string summary() const;
 };
 
 /// Joins ROBOT_STATE_SMOOTHED and JOINT_COMMAND by state_sequence: s is the state a command acted
@@ -89,7 +93,7 @@ class TransitionJoiner {
 
   int n_;
   double period_;
-  size_t most_states_, most_episodes_;
+  size_t max_states_, max_episodes_;
   std::map<int64_t, robot_state_t> states_;                     // by sequence
   std::map<int64_t, std::map<int, joint_command_t>> commands_;  // by episode, by step
   DropCounts drops_;

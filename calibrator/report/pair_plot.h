@@ -10,6 +10,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// Pairs of parameters below the diagonal: 1 and 2 sigma of prior (of the coordinates: exact
 /// contours) and of each of the posterior's components, and samples. On the diagonal: the prior's
 /// density and a histogram of the samples. Above it: the posterior's correlation of the

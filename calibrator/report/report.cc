@@ -25,7 +25,7 @@ namespace {
 using Coordinate = ParameterDescription::Coordinate;
 using Index = Eigen::Index;
 
-constexpr Index kMostPairs = 8;
+constexpr Index kMaxPairs = 8;
 constexpr double kNull = 1e-6;  // as FindIdentifiability has it
 constexpr double kInvolved = 1e-3;
 constexpr double kHardly = 0.22;  // nat: the data made the sd smaller by less than a fifth
@@ -76,23 +76,25 @@ class Report {
     html += "</p>\n<div class=\"verdicts\">\n";
 
     const bool all_known =
-        findings_.identifiability.null.empty() && !findings_.identifiability.words.empty();
+        findings_.identifiability.null.empty() && !findings_.identifiability.summary.empty();
     html += Verdict(all_known ? "good" : "", "What can be known", KnownWords() + Values());
     const Misspecification& model = findings_.misspecification;
-    html += model.alarm ? Verdict("bad", "The model does not explain the robot", model.words)
-            : model.words.empty() ? Verdict("", "The model was not tested",
-                                            "Whether it can explain the robot is not known.")
-                                  : Verdict("good", "The model explains the robot", model.words);
+    html += model.alarm ? Verdict("bad", "The model does not explain the robot", model.summary)
+            : model.summary.empty()
+                ? Verdict("", "The model was not tested",
+                          "Whether it can explain the robot is not known.")
+                : Verdict("good", "The model explains the robot", model.summary);
     const bool tried = std::any_of(findings_.holdout.errors.begin(), findings_.holdout.errors.end(),
                                    [](const HorizonError& e) { return e.windows > 0; });
-    html += !tried ? Verdict("", "Predictions were not tested", findings_.holdout.words)
-            : findings_.holdout.better
-                ? Verdict("good", "Predicts better than the prior", findings_.holdout.words)
-                : Verdict("bad", "Does not predict better than the prior", findings_.holdout.words);
+    html +=
+        !tried ? Verdict("", "Predictions were not tested", findings_.holdout.summary)
+        : findings_.holdout.better
+            ? Verdict("good", "Predicts better than the prior", findings_.holdout.summary)
+            : Verdict("bad", "Does not predict better than the prior", findings_.holdout.summary);
     if (!findings_.agreement.logs.empty()) {
       html += findings_.agreement.agree
-                  ? Verdict("good", "The logs agree", findings_.agreement.words)
-                  : Verdict("bad", "The logs disagree", findings_.agreement.words);
+                  ? Verdict("good", "The logs agree", findings_.agreement.summary)
+                  : Verdict("bad", "The logs disagree", findings_.agreement.summary);
     }
     html += "</div>\n";
     for (const std::string& warning : findings_.warnings)
@@ -102,10 +104,10 @@ class Report {
 
   std::string KnownWords() const {
     const Identifiability& found = findings_.identifiability;
-    return found.words.empty() ? "Identifiability was not examined." : found.words;
+    return found.summary.empty() ? "Identifiability was not examined." : found.summary;
   }
 
-  // What the motion determines, in numbers, where that is a headline.
+  // The combinations that the motion determines, in numbers, where that is a headline.
   std::string Values() const {
     constexpr size_t kMost = 4;
     const std::vector<Combination>& combinations = findings_.identifiability.combinations;
@@ -138,8 +140,8 @@ class Report {
       if (together && k != i) others.push_back(Name(k));
     }
     if (involved && others.empty()) return "no: the motion does not depend on it";
-    constexpr size_t kMostNames = 3;
-    if (others.size() > kMostNames)
+    constexpr size_t kMaxNames = 3;
+    if (others.size() > kMaxNames)
       return fmt::format("only in combination with {} others", others.size());
     if (involved) return fmt::format("only in combination with {}", fmt::join(others, ", "));
     if (summary_.gain(i) < kHardly) return "hardly: the motion adds little to the prior";
@@ -171,14 +173,14 @@ class Report {
     std::vector<Index> shown(static_cast<size_t>(size()));
     std::iota(shown.begin(), shown.end(), 0);
     std::string selection;
-    if (size() > kMostPairs) {
+    if (size() > kMaxPairs) {
       std::stable_sort(shown.begin(), shown.end(),
                        [&](Index a, Index b) { return summary_.gain(a) > summary_.gain(b); });
-      shown.resize(kMostPairs);
+      shown.resize(kMaxPairs);
       std::sort(shown.begin(), shown.end());
       selection =
           fmt::format("Of {} parameters these are the {} that the data have told most about. ",
-                      size(), kMostPairs);
+                      size(), kMaxPairs);
     }
     return "<h2>Prior and posterior</h2>\n" +
            Figure(Scrolling(PairPlot(findings_, summary_, robot_, shown)),
@@ -246,7 +248,7 @@ class Report {
 
   std::string Predictions() const {
     const Holdout& holdout = findings_.holdout;
-    std::string html = "<h2>Predictions of held-out motion</h2>\n" + Paragraph(holdout.words);
+    std::string html = "<h2>Predictions of held-out motion</h2>\n" + Paragraph(holdout.summary);
     const std::string plot = ErrorPlot(holdout.errors);
     if (plot.empty()) return html;
     html += Figure(plot, kKeys + fmt::format("Root mean square error of predicting so many control "
@@ -265,7 +267,7 @@ class Report {
     const Misspecification& model = findings_.misspecification;
     std::string html =
         "<h2>Can the model explain the robot?</h2>\n" +
-        Paragraph(model.words.empty() && !model.alarm ? "This was not tested." : model.words) +
+        Paragraph(model.summary.empty() && !model.alarm ? "This was not tested." : model.summary) +
         fmt::format("<p>Mean squared whitened one-step error: {} (1 = down to the noise).</p>\n",
                     Number(findings_.discrepancy, 0.01));
     if (model.misfits.empty()) return html;
@@ -287,11 +289,12 @@ class Report {
       table.Add(
           {std::to_string(k + 1), Escape(log.log), Number(log.distance, 0.1), Number(log.p, NAN)});
     }
-    std::string html = "<h2>Do the logs agree?</h2>\n" + Paragraph(agreement.words) + table.Print();
-    constexpr size_t kMostLogs = 40;
-    if (agreement.logs.size() > kMostLogs) return html;
+    std::string html =
+        "<h2>Do the logs agree?</h2>\n" + Paragraph(agreement.summary) + table.Print();
+    constexpr size_t kMaxLogs = 40;
+    if (agreement.logs.size() > kMaxLogs) return html;
     html += "<figure><div class=\"panels\">\n";
-    for (Index i = 0; i < std::min(size(), kMostPairs); ++i)
+    for (Index i = 0; i < std::min(size(), kMaxPairs); ++i)
       html += AgreementPlot(agreement.logs, summary_, robot_, i);
     return html +
            "</div><figcaption>Each log alone, mean and 95 %; the band is 95 % of all logs "

@@ -3,8 +3,10 @@
 #include <string>
 #include <vector>
 
-// What the report is made of, beside its drawings.
+// The report's HTML: verdicts, tables, figures.
 namespace plumb {
+
+// The functions here share nothing: thread-safe.
 
 /// A value with as many digits as its standard deviation allows: two significant ones of that. Four
 /// significant ones where the sd is not positive or not finite; a dash for NaN.

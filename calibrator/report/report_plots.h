@@ -13,6 +13,8 @@
 // colours.
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// "mass/pole [kg]"
 inline std::string WithUnit(const ParameterDescription& p) {
   return p.unit.empty() ? p.name : p.name + " [" + p.unit + "]";
@@ -38,7 +40,7 @@ std::string ResidualCorrelation(const std::vector<double>& correlation, size_t c
 std::string ResidualsOverTime(const Eigen::VectorXd& residuals,
                               const std::vector<WindowErrors::Row>& rows);
 
-/// What each log alone says of a parameter, mean and 95 %, and all of them together as a band.
+/// The posterior of a parameter from each log alone, mean and 95 %, and from all as a band.
 std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary,
                           const RobotDescription& robot, Eigen::Index parameter);
 

@@ -14,7 +14,7 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kMostCoordinates = 16;
+constexpr size_t kMaxCoordinates = 16;
 constexpr int kLags = 20;
 
 void RequireFit(const Residuals& residuals) {
@@ -92,14 +92,14 @@ std::string ResidualSection(const Residuals& residuals) {
   html += fmt::format("{} residuals", total);
   if (total < residuals.rows.size())
     html += fmt::format(", and {} without a number", residuals.rows.size() - total);
-  if (shown.size() > kMostCoordinates) {
+  if (shown.size() > kMaxCoordinates) {
     const size_t all = shown.size();
     std::stable_sort(shown.begin(), shown.end(), [&](size_t a, size_t b) {
       return MeanSquare(sorted[a]) > MeanSquare(sorted[b]);
     });
-    shown.resize(kMostCoordinates);
+    shown.resize(kMaxCoordinates);
     std::sort(shown.begin(), shown.end());
-    html += fmt::format("; of {} coordinates the {} with the greatest", all, kMostCoordinates);
+    html += fmt::format("; of {} coordinates the {} with the greatest", all, kMaxCoordinates);
   }
   html += ".</p>\n<figure><div class=\"scroll\">" +
           ResidualsOverTime(residuals.whitened, residuals.rows) +

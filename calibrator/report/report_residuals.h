@@ -7,6 +7,8 @@
 
 namespace plumb {
 
+// The functions here share nothing: thread-safe.
+
 /// The report's section about residuals, HTML; says so where there are none.
 /// @throws std::invalid_argument if residuals, rows and coordinates do not fit each other.
 std::string ResidualSection(const Residuals& residuals);

@@ -28,9 +28,10 @@ Eigen::MatrixXd ToPhysical(const RobotDescription& robot, const Eigen::MatrixXd&
   return physical;
 }
 
-class Run {
+class Calibration {
  public:
-  Run(const RobotDescription& robot, std::span<const Log> logs, const CalibrationOptions& options)
+  Calibration(const RobotDescription& robot, std::span<const Log> logs,
+              const CalibrationOptions& options)
       : robot_(robot),
         model_(std::make_shared<Model>(robot)),
         logs_(logs),
@@ -42,7 +43,7 @@ class Run {
       throw std::invalid_argument("there is no transition to calibrate with");
   }
 
-  Findings Go() {
+  Findings Run() {
     const auto start = std::chrono::steady_clock::now();
     MethodResult result = RunMethod({model_, rollouts_, options_});
     findings_.method = options_.method;
@@ -58,9 +59,9 @@ class Run {
     findings_.check = result.check;
     findings_.warnings = result.warnings;
     mean_ = Moments(result.posterior).mean;
-    Look(result);
-    Check(result);
-    Compare();
+    DiagnoseOneStep(result);
+    CrossValidate(result);
+    CompareLogs();
     findings_.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return std::move(findings_);
@@ -76,7 +77,7 @@ class Run {
 
   // One-step errors, their noise and their slopes at the posterior's mean, whatever method has
   // found it.
-  void Look(const MethodResult& result) {
+  void DiagnoseOneStep(const MethodResult& result) {
     LaplaceFit view;
     std::vector<WindowErrors::Row> rows;
     bool noise_known = false;
@@ -88,11 +89,11 @@ class Run {
       findings_.stages = result.curriculum->stages;
       information_ = result.curriculum->fit.information;
     } else {
-      WindowErrors errors(model_, rollouts_, 1, options_.workforce);
-      LaplaceOptions still;
-      still.most_iterations = 0;
+      WindowErrors errors(model_, rollouts_, 1, options_.execution);
+      LaplaceOptions curvature_only;
+      curvature_only.max_iterations = 0;
       errors.Linearise(robot_.ToPhysical(mean_));
-      view = FitLaplace(ProblemOf(robot_, errors), mean_, still);
+      view = FitLaplace(ProblemOf(robot_, errors), mean_, curvature_only);
       rows = errors.rows();
       findings_.noise_sd = errors.EndNoise();
       // there is none of what was never observed
@@ -104,7 +105,7 @@ class Run {
     findings_.discrepancy = view.errors.cwiseAbs2().mean();
     findings_.errors = view.errors;
     findings_.rows = rows;
-    Suspect(view, noise_known);
+    TestModel(view, noise_known);
     findings_.identifiability =
         FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
     findings_.cramer_rao = findings_.identifiability.cramer_rao;
@@ -113,25 +114,25 @@ class Run {
     settings.seconds = std::min(settings.seconds, robot_.task.steps * robot_.task.period);
     findings_.advice =
         AdviseMotion(robot_, Moments(findings_.posterior), findings_.identifiability, settings)
-            .words;
+            .summary;
   }
 
-  // What the model has wrong, whatever its parameters.
-  void Suspect(const LaplaceFit& view, bool noise_known) {
+  // Tests whether the model can explain the log at all, whatever its parameters.
+  void TestModel(const LaplaceFit& view, bool noise_known) {
     const Eigen::VectorXd physical = robot_.ToPhysical(mean_);
     if ((findings_.noise_sd.array() <= kNegligible * MakeTask(robot_)->state_scale().array())
             .all()) {
-      findings_.misspecification.words = "the model reproduces this log to five digits";
+      findings_.misspecification.summary = "the model reproduces this log to five digits";
       return;
     }
     const std::vector<Candidate> candidates = FindCandidates(robot_);
     auto extended = std::make_shared<Model>(WithCandidates(robot_, candidates));
-    WindowErrors errors(extended, rollouts_, 1, options_.workforce);
+    WindowErrors errors(extended, rollouts_, 1, options_.execution);
     errors.set_noise_sd(findings_.noise_sd);
     Eigen::VectorXd nominal = extended->parameters().means();
     nominal.head(physical.size()) = physical;
     errors.Linearise(nominal);
-    Leftover leftover{
+    FitResiduals residuals{
         rollouts_,
         findings_.rows,
         findings_.errors,
@@ -139,24 +140,24 @@ class Run {
         std::vector<bool>(static_cast<size_t>(findings_.noise_sd.size()), noise_known),
         candidates,
         {}};
-    leftover.columns = CandidateColumns(
+    residuals.columns = CandidateColumns(
         [&](const Eigen::MatrixXd& x) { return errors.Whitened(x); }, physical, candidates);
     // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of
     // it, as the errors are.
     if (noise_known) {
       for (size_t i = 0; i < findings_.rows.size(); ++i) {
-        leftover.columns.row(static_cast<Eigen::Index>(i)) /=
+        residuals.columns.row(static_cast<Eigen::Index>(i)) /=
             view.scale(findings_.rows[i].coordinate);
       }
     }
-    findings_.misspecification = FindMisspecification(model_->Describe(physical), leftover);
+    findings_.misspecification = FindMisspecification(model_->Describe(physical), residuals);
     findings_.diagnostic_steps += errors.simulated_steps();
   }
 
   // Fits again without a part of the data, which then judges.
-  void Check(const MethodResult& result) {
+  void CrossValidate(const MethodResult& result) {
     Split split = HoldOut(rollouts_);
-    Discrepancy discrepancy(robot_, options_.workforce);
+    Discrepancy discrepancy(robot_, options_.execution);
     Eigen::VectorXd mean = mean_;
     if (!split.held_out.empty()) {
       CalibrationOptions again = options_;
@@ -181,10 +182,10 @@ class Run {
   }
 
   // Each log on its own: are they of the same robot?
-  void Compare() {
+  void CompareLogs() {
     Agreement& agreement = findings_.agreement;
     if (logs_.size() < 2) {
-      agreement.words = "a single log: nothing to compare it with";
+      agreement.summary = "a single log: nothing to compare it with";
       return;
     }
     std::vector<LaplaceFit> fits;
@@ -192,7 +193,7 @@ class Run {
     for (const Log& log : logs_) {
       try {
         CurriculumOptions options;
-        options.horizons = options_.horizons, options.workforce = options_.workforce,
+        options.horizons = options_.horizons, options.execution = options_.execution,
         options.starts = 1;
         const CurriculumFit own = FitCurriculum(model_, log.rollouts, options, mean_);
         findings_.diagnostic_steps += own.simulated_steps;
@@ -204,7 +205,8 @@ class Run {
     }
     for (size_t i = 0; i < fits.size(); ++i) agreement.logs.push_back(Against(names[i], fits, i));
     if (fits.size() < 2) {
-      agreement.words = "fewer than two of the logs can be fitted on their own: nothing to compare";
+      agreement.summary =
+          "fewer than two of the logs can be fitted on their own: nothing to compare";
       return;
     }
     std::string against;
@@ -214,10 +216,11 @@ class Run {
       against +=
           fmt::format("{}{} ({:.1f} sd)", against.empty() ? "" : ", ", log.log, log.distance);
     }
-    agreement.words = agreement.agree ? fmt::format("the {} logs agree", agreement.logs.size())
-                                      : "the logs do not agree with each other: " + against +
-                                            "; they are of different robots, or the model is wrong "
-                                            "in a way that depends on the motion";
+    agreement.summary = agreement.agree
+                            ? fmt::format("the {} logs agree", agreement.logs.size())
+                            : "the logs do not agree with each other: " + against +
+                                  "; they are of different robots, or the model is wrong "
+                                  "in a way that depends on the motion";
   }
 
   // A log's likelihood against that of the others together, both quadratic: their modes differ by a
@@ -282,7 +285,7 @@ class Run {
     const auto v = eigen.eigenvectors().rightCols(rank);
     return v * v.transpose();
   }
-  // What the data alone say: the posterior without the prior.
+  // The likelihood alone: the posterior without the prior.
   Eigen::MatrixXd Data(const LaplaceFit& fit) const {
     return Precision(fit.posterior) -
            Eigen::MatrixXd(findings_.prior.covariance.diagonal().cwiseInverse().asDiagonal());
@@ -317,7 +320,7 @@ class Run {
 
 Findings Calibrate(const RobotDescription& robot, std::span<const Log> logs,
                    const CalibrationOptions& options) {
-  return Run(robot, logs, options).Go();
+  return Calibration(robot, logs, options).Run();
 }
 
 }  // namespace plumb

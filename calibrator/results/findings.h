@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,7 +11,7 @@
 #include "calibrator/diagnostics/misspecification.h"
 #include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/window_errors.h"
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 
@@ -26,7 +27,16 @@ struct LogAgreement {
 struct Agreement {
   bool agree = true;
   std::vector<LogAgreement> logs;  ///< empty for a single log
-  std::string words;
+  std::string summary;
+};
+
+/// The update of the loop that findings come from.
+struct LoopUpdate {
+  int iteration;       ///< of the distribution; it has seen the roll-outs of earlier policies
+  int64_t utime;       ///< [us] start of the newest roll-out
+  double kl;           ///< D_KL(after || before) of the moments, summed over the updates [nat]
+  double ess;          ///< effective sample size of the last update; NaN = draws no samples
+  double temperature;  ///< of the last update; 1 = Bayes' rule
 };
 
 /// All that a calibration has found.
@@ -59,6 +69,9 @@ struct Findings {
   std::string check;  ///< how the posterior's shape was verified, in words
   std::vector<std::string> warnings;
   double seconds = 0;  ///< wall time
+  /// Of plumb-calibrator only, which fits and looks no further: stages, noise, advice, holdout,
+  /// misspecification, agreement, check and the counts of simulations then say nothing.
+  std::optional<LoopUpdate> loop;
 };
 
 }  // namespace plumb

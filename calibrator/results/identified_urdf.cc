@@ -16,7 +16,7 @@
 namespace plumb {
 namespace {
 
-/// What robot.toml says that matters here.
+/// The settings of robot.toml that matter here.
 struct Toml {
   std::string urdf;                // path
   std::set<std::string> dynamics;  // paths of what is in [joint.dynamics]

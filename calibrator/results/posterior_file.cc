@@ -61,7 +61,7 @@ json Samples(const Eigen::MatrixXd& samples) {
 
 json ToJson(const Misspecification& found) {
   return {{"raised", found.alarm},
-          {"words", found.words},
+          {"words", found.summary},
           {"misfits", List(found.misfits, [](const Misfit& m) {
              return json{{"what", m.what},           {"joint", m.joint},
                          {"condition", m.condition}, {"test", m.test},
@@ -83,7 +83,7 @@ json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao,
     }
     return json{{"direction", ToJson(d)}, {"moves", moves}};
   };
-  return {{"words", found.words},
+  return {{"words", found.summary},
           {"information", ToJson(found.information)},
           {"null", List(found.null, direction)},
           {"combinations", List(found.combinations, combination)},
@@ -91,7 +91,7 @@ json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao,
 }
 
 json ToJson(const Holdout& holdout) {
-  return {{"words", holdout.words},
+  return {{"words", holdout.summary},
           {"better", holdout.better},
           {"fitted", holdout.fitted},
           {"held_out", holdout.held_out},
@@ -105,7 +105,7 @@ json ToJson(const Holdout& holdout) {
 
 json ToJson(const Agreement& agreement) {
   return {{"agree", agreement.agree},
-          {"words", agreement.words},
+          {"words", agreement.summary},
           {"logs", List(agreement.logs, [](const LogAgreement& l) {
              return json{{"log", l.log},
                          {"mean", ToJson(l.mean)},
@@ -122,6 +122,14 @@ json ToJson(const CurriculumStage& s) {
           {"discrepancy", s.discrepancy},
           {"mean", ToJson(s.mean)},
           {"sd", ToJson(s.sd)}};
+}
+
+json ToJson(const LoopUpdate& update) {
+  return {{"iteration", update.iteration},
+          {"utime", update.utime},
+          {"kl", update.kl},
+          {"ess", update.ess},
+          {"temperature", update.temperature}};
 }
 
 json Interval(const Summary& summary) {
@@ -155,57 +163,62 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
   std::vector<std::string> names;
   for (const ParameterDescription& p : parameters) names.push_back(p.name);
   const Eigen::VectorXd coordinate_sd = findings.prior.covariance.diagonal().cwiseSqrt();
-  const json j{
-      {"format", kPosteriorFormat},
-      {"version", kPosteriorVersion},
-      {"robot", robot.name},
-      {"fingerprint", Hexadecimal(robot.fingerprint)},
-      {"physics", Hexadecimal(PhysicsFingerprint(robot))},
-      {"logs", provenance.logs},
-      {"options", provenance.options},
-      {"seed", findings.seed},
-      {"method", {{"asked", findings.method}, {"used", findings.used}}},
-      {"names", names},
-      {"units", List(parameters, [](const ParameterDescription& p) { return p.unit; })},
-      {"coordinates", List(parameters, [](const ParameterDescription& p) { return ToJson(p); })},
-      {"prior",
-       {{"mean", ToJson(summary.prior_mean)},
-        {"sd", ToJson(summary.prior_sd)},
-        {"coordinate_mean", ToJson(findings.prior.mean)},
-        {"coordinate_sd", ToJson(coordinate_sd)},
-        {"coordinate_covariance", ToJson(findings.prior.covariance)}}},
-      {"mean", ToJson(summary.mean)},
-      {"sd", ToJson(summary.sd)},
-      {"interval_95", Interval(summary)},
-      {"covariance", ToJson(summary.covariance)},
-      {"coordinate_mean", ToJson(summary.coordinates.mean)},
-      {"coordinate_covariance", ToJson(summary.coordinates.covariance)},
-      {"mixture", ToJson(findings.posterior)},
-      {"check", findings.check},
-      {"alarm", ToJson(findings.misspecification)},
-      {"identifiability", ToJson(findings.identifiability, findings.cramer_rao, names)},
-      {"advice", findings.advice},
-      {"holdout", ToJson(findings.holdout)},
-      {"agreement", ToJson(findings.agreement)},
-      {"discrepancy", findings.discrepancy},
-      {"noise_sd", ToJson(findings.noise_sd)},
-      {"transitions", findings.transitions},
-      {"simulations",
-       {{"fit_steps", findings.simulated_steps},
-        {"diagnostic_steps", findings.diagnostic_steps},
-        {"failures", findings.failures}}},
-      {"stages", List(findings.stages, [](const CurriculumStage& s) { return ToJson(s); })},
-      {"warnings", findings.warnings},
-      {"samples", Samples(summary.samples)},
-      {"versions",
-       {{"plumbline", VersionLine("plumb")},
-        {"eigen",
-         fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
-        {"compiler", __VERSION__}}},
-      {"run",
-       {{"seconds", findings.seconds},
-        {"date", provenance.date},
-        {"command", provenance.command}}}};
+  json j{{"format", kPosteriorFormat},
+         {"version", kPosteriorVersion},
+         {"robot", robot.name},
+         {"fingerprint", Hexadecimal(robot.fingerprint)},
+         {"physics", Hexadecimal(PhysicsFingerprint(robot))},
+         {"logs", provenance.logs},
+         {"options", provenance.options},
+         {"seed", findings.seed},
+         {"method", {{"asked", findings.method}, {"used", findings.used}}},
+         {"names", names},
+         {"units", List(parameters, [](const ParameterDescription& p) { return p.unit; })},
+         {"coordinates", List(parameters, [](const ParameterDescription& p) { return ToJson(p); })},
+         {"prior",
+          {{"mean", ToJson(summary.prior_mean)},
+           {"sd", ToJson(summary.prior_sd)},
+           {"coordinate_mean", ToJson(findings.prior.mean)},
+           {"coordinate_sd", ToJson(coordinate_sd)},
+           {"coordinate_covariance", ToJson(findings.prior.covariance)}}},
+         {"mean", ToJson(summary.mean)},
+         {"sd", ToJson(summary.sd)},
+         {"interval_95", Interval(summary)},
+         {"covariance", ToJson(summary.covariance)},
+         {"coordinate_mean", ToJson(summary.coordinates.mean)},
+         {"coordinate_covariance", ToJson(summary.coordinates.covariance)},
+         {"mixture", ToJson(findings.posterior)},
+         {"check", findings.check},
+         {"alarm", ToJson(findings.misspecification)},
+         {"identifiability", ToJson(findings.identifiability, findings.cramer_rao, names)},
+         {"advice", findings.advice},
+         {"holdout", ToJson(findings.holdout)},
+         {"agreement", ToJson(findings.agreement)},
+         {"discrepancy", findings.discrepancy},
+         {"noise_sd", ToJson(findings.noise_sd)},
+         {"transitions", findings.transitions},
+         {"simulations",
+          {{"fit_steps", findings.simulated_steps},
+           {"diagnostic_steps", findings.diagnostic_steps},
+           {"failures", findings.failures}}},
+         {"stages", List(findings.stages, [](const CurriculumStage& s) { return ToJson(s); })},
+         {"warnings", findings.warnings},
+         {"samples", Samples(summary.samples)},
+         {"versions",
+          {{"plumbline", VersionLine("plumb")},
+           {"eigen",
+            fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+           {"compiler", __VERSION__}}}};
+  if (findings.loop) {
+    for (const char* unknown :
+         {"check", "alarm", "advice", "holdout", "agreement", "noise_sd", "simulations", "stages"})
+      j[unknown] = nullptr;
+    j["loop"] = ToJson(*findings.loop);
+    j["run"] = nullptr;
+  } else {
+    j["run"] = {
+        {"seconds", findings.seconds}, {"date", provenance.date}, {"command", provenance.command}};
+  }
   return Print(j, "") + "\n";
 }
 

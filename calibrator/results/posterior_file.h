@@ -10,7 +10,8 @@
 
 namespace plumb {
 
-/// Where findings come from, as far as they do not say it themselves.
+/// Where findings come from, as far as they do not say it themselves. Empty for the loop's, which
+/// are the same to the byte whether its messages are live or read from a log.
 struct Provenance {
   std::vector<std::string> logs;               ///< names of the files
   std::map<std::string, std::string> options;  ///< that the result depends on, by name

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
 namespace {
@@ -66,23 +67,11 @@ double Quantile(const std::vector<double>& sorted, double share) {
   return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
-ParameterDistribution ToDistribution(const GaussianMixture& mixture,
-                                     const RobotDescription& robot) {
-  ParameterDistribution distribution;
-  distribution.iteration = 1;
-  distribution.parameters = robot.parameters;
-  for (size_t i = 0; i < mixture.components.size(); ++i) {
-    distribution.components.push_back(
-        {mixture.weights[i], mixture.components[i].mean, mixture.components[i].covariance});
-  }
-  return distribution;
-}
-
 Summary Summarise(const Findings& findings, const RobotDescription& robot) {
   const auto n = static_cast<Eigen::Index>(robot.parameters.size());
   RequireFit(findings, n);
   Summary summary;
-  const ParameterDistribution prior = ToDistribution({{1}, {findings.prior}}, robot);
+  const ParameterDistribution prior{0, robot.parameters, {{1}, {findings.prior}}};
   summary.prior_mean = prior.Mean(), summary.prior_sd = prior.Sd();
 
   summary.samples = findings.samples.cols() >= 2 ? findings.samples : Draw(findings, robot);

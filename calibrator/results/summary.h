@@ -4,7 +4,6 @@
 
 #include "calibrator/results/findings.h"
 #include "robot/description.h"
-#include "robot/parameter_distribution.h"
 
 namespace plumb {
 
@@ -29,9 +28,6 @@ struct Summary {
 /// robot, are not finite, or a covariance is not positive definite: such findings must not be
 /// written as if they were some. Thread-safe.
 Summary Summarise(const Findings& findings, const RobotDescription& robot);
-
-/// The mixture as the robot's other programs know it.
-ParameterDistribution ToDistribution(const GaussianMixture& mixture, const RobotDescription& robot);
 
 /// Quantile of sorted values, linear between them (type 7 of Hyndman and Fan, The American
 /// Statistician 50, 1996).

@@ -14,6 +14,7 @@ namespace plumb {
 
 /// A URDF's text in which links and joints get other numbers. Those that differ by rounding only
 /// stay as they are written.
+/// Not thread-safe.
 class UrdfNumbers {
  public:
   /// @param file what LoadUrdf makes of the text. @param now what it shall make of the result. Both

@@ -14,6 +14,7 @@
 
 #include "common/lockstep/process_watch.h"
 #include "common/program_version.h"
+#include "common/time_units.h"
 #include "plumb/lockstep_grant_t.hpp"
 #include "plumb/lockstep_hello_t.hpp"
 
@@ -187,12 +188,12 @@ void Coordinator::TakeTurns(int stop_fd) {
 
 /// @return false if stop_fd has become readable meanwhile.
 bool Coordinator::MoveOn(int64_t moment, int stop_fd) {
-  if (most_speed > 0) {
+  if (max_speed > 0) {
     using std::chrono::microseconds;
     constexpr auto kSlack = std::chrono::milliseconds(100);  // that may be made up for
     const auto real_now = std::chrono::steady_clock::now();
     allowed_ = std::max(allowed_, real_now - kSlack) +
-               microseconds(std::llround(static_cast<double>(moment - now()) / most_speed));
+               microseconds(std::llround(static_cast<double>(moment - now()) / max_speed));
     const auto wait = std::chrono::duration_cast<std::chrono::milliseconds>(allowed_ - real_now);
     if (wait.count() > 0 && !Listen(stop_fd, static_cast<int>(wait.count()))) return false;
   }
@@ -264,7 +265,7 @@ void Coordinator::WatchProgress() {
     const char* const whose =
         member->state == Member::State::kExpected ? "has not joined the run" : "has its turn";
     const std::string line = fmt::format("{} {} at {:.6f} s: {}", member->name, whose,
-                                         static_cast<double>(now() - kBeginning) * 1e-6, note);
+                                         Seconds(now() - kBeginning), note);
     if (member->watch.idle() > kPatience) throw std::runtime_error("given up: " + line);
     on_note(line);
   }
@@ -340,8 +341,7 @@ void Coordinator::Read(Member& member, PacketSocket::When when) {
     }
   }
   if (there || (member.state == Member::State::kReported && member.report.leaves)) return;
-  on_note(fmt::format("{} has died at {:.6f} s", member.name,
-                      static_cast<double>(now() - kBeginning) * 1e-6));
+  on_note(fmt::format("{} has died at {:.6f} s", member.name, Seconds(now() - kBeginning)));
   Leave(member);
 }
 

@@ -61,7 +61,7 @@ class Coordinator {
 
   /// Virtual seconds that may pass in a second of real time, for somebody who looks on; 0 = as many
   /// as can be.
-  double most_speed = 0;
+  double max_speed = 0;
   /// Called, in order, with all that is said, when it is said.
   std::function<void(const lockstep_post_t&, const std::string& speaker)> on_post =
       [](const auto&, const auto&) {};
@@ -103,7 +103,7 @@ class Coordinator {
   std::vector<uint8_t> buffer_;
   std::vector<pollfd> polled_;
   std::chrono::steady_clock::time_point next_glance_{};
-  // before then most_speed does not let time move on
+  // before then max_speed does not let time move on
   std::chrono::steady_clock::time_point allowed_{};
 };
 

@@ -11,10 +11,10 @@
 namespace plumb {
 namespace {
 
-constexpr int kNap = 2;            // [ms] of real time for which there was nothing to do
-constexpr int kMostRead = 10'000;  // messages in one go
-constexpr size_t kMostMessages = 400, kMostBytes = 500'000;    // on their way
-constexpr size_t kMostBehind = 20'000, kMostStrangers = 1000;  // messages
+constexpr int kNap = 2;           // [ms] of real time for which there was nothing to do
+constexpr int kMaxRead = 10'000;  // messages in one go
+constexpr size_t kMaxMessages = 400, kMaxBytes = 500'000;    // on their way
+constexpr size_t kMaxBehind = 20'000, kMaxStrangers = 1000;  // messages
 constexpr char kSelfTest[] = "LCM_SELF_TEST";  // which liblcm says to itself when it starts
 
 size_t Hash(std::span<const uint8_t> message) {
@@ -37,7 +37,7 @@ LcmMirror::~LcmMirror() {
 }
 
 void LcmMirror::Publish(const std::string& channel, std::span<const uint8_t> message) {
-  if (unfinished_ >= kMostBehind) AwaitRoom(kMostBehind / 2);
+  if (unfinished_ >= kMaxBehind) AwaitRoom(kMaxBehind / 2);
   const std::lock_guard lock(mutex_);
   if (failure_) std::rethrow_exception(failure_);
   ++unfinished_;
@@ -70,7 +70,7 @@ void LcmMirror::Work() {
       for (const Message& message : batch) Say(message);
       // Looks now and then instead of being told, which would cost the run more than it costs us.
       if (batch.empty()) Nap();
-      messenger_.Drain(kMostRead);
+      messenger_.Drain(kMaxRead);
       batch.clear();
     }
   } catch (...) {
@@ -90,10 +90,10 @@ void LcmMirror::Nap() {
 }
 
 void LcmMirror::Say(const Message& message) {
-  if (said_.size() >= kMostMessages || said_bytes_ + message.bytes.size() > kMostBytes) {
-    while (!ended_ && (said_.size() > kMostMessages / 2 || said_bytes_ > kMostBytes / 2)) {
+  if (said_.size() >= kMaxMessages || said_bytes_ + message.bytes.size() > kMaxBytes) {
+    while (!ended_ && (said_.size() > kMaxMessages / 2 || said_bytes_ > kMaxBytes / 2)) {
       Nap();
-      messenger_.Drain(kMostRead);
+      messenger_.Drain(kMaxRead);
     }
   }
   said_.push_back(
@@ -116,7 +116,7 @@ void LcmMirror::OnMessage(const std::string& channel, std::span<const uint8_t> m
     --unfinished_;
   } else if (channel != kSelfTest) {
     const std::lock_guard lock(mutex_);
-    if (strangers_.size() < kMostStrangers)
+    if (strangers_.size() < kMaxStrangers)
       strangers_.push_back({channel, {message.begin(), message.end()}});
   }
 }

@@ -37,7 +37,7 @@ class LcmMirror {
   /// Soon. Waits where it is far behind. @throws std::runtime_error naming channel and number, if
   /// an earlier message has not come back.
   void Publish(const std::string& channel, std::span<const uint8_t> message);
-  /// What somebody outside the run has said since the last call.
+  /// Messages that somebody outside the run has sent since the last call.
   std::vector<Message> TakeStrangers();
   /// Waits until everything has come back. @throws std::runtime_error as Publish.
   void Flush() { AwaitRoom(0); }

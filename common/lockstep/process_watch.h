@@ -16,8 +16,8 @@ class ProcessWatch {
 
   /// The wait begins.
   void Begin();
-  /// What keeps it, for people, now and then: once it has been waited for long. Empty: nothing to
-  /// say.
+  /// For people: the reason for which the process keeps others waiting, now and then once it has
+  /// been waited for long. Empty: nothing to say.
   std::string Look();
   /// Whether there is no such process any more; looks.
   bool dead() const;

@@ -50,7 +50,7 @@ class RemoteParticipant : public Participant {
 
   void Wait(int64_t until, Wake wake, int stop_fd,
             const std::function<void()>& meanwhile) override {
-    // What has been heard and not been read yet is read first; time does not pass meanwhile.
+    // Messages that have been heard and not been read are read first; no time passes meanwhile.
     if (wake == Wake::kWhenHeard && heard()) until = now();
     Report(until, wake);
     if (meanwhile) meanwhile();

@@ -9,8 +9,7 @@
 #include <set>
 
 #include "drivers/bus/bus_collisions.h"
-#include "drivers/protocols/protocol.h"
-#include "drivers/protocols/sensor.h"
+#include "drivers/protocols/registry.h"
 
 namespace plumb {
 namespace {
@@ -19,7 +18,7 @@ using Direction = BusMessage::Direction;
 using Row = BusPlan::Row;
 
 constexpr int64_t kNanoseconds = 1000;  // in a microsecond
-constexpr int kMostRounds = 100'000;    // of an iteration that is known to end
+constexpr int kMaxRounds = 100'000;     // of an iteration that is known to end
 
 // From start of frame to the end of the CRC: what is stuffed, without the data.
 constexpr int kStuffed = 34, kStuffedExtended = 54;
@@ -52,7 +51,7 @@ int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) 
   // The longest time in which the bus is busy with this one and higher ones.
   int64_t busy = own.cost;
   for (int round = 0;; ++round) {
-    if (round > kMostRounds) return -1;
+    if (round > kMaxRounds) return -1;
     int64_t next = blocking;
     for (const Task& task : tasks) next += Releases(task, busy) * task.cost;
     if (next == busy) break;
@@ -62,7 +61,7 @@ int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) 
   for (int64_t instance = 0; instance < Releases(own, busy); ++instance) {
     int64_t wait = blocking + instance * own.cost;
     for (int round = 0;; ++round) {
-      if (round > kMostRounds) return -1;
+      if (round > kMaxRounds) return -1;
       int64_t next = blocking + instance * own.cost;
       for (size_t i = 0; i + 1 < tasks.size(); ++i)
         next += Releases(tasks[i], wait + bit) * tasks[i].cost;

@@ -10,7 +10,7 @@
 namespace plumb {
 
 /// Bits of a classic frame, the 3 of the interframe space included.
-/// @param length bytes of data; 0 for a remote frame.
+/// @param length bytes of data; 0 for a remote frame. Functions here are thread-safe.
 int NominalBits(bool extended, int length);
 /// With the most stuff bits that there can be.
 int WorstCaseBits(bool extended, int length);

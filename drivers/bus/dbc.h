@@ -11,7 +11,7 @@ namespace plumb {
 /// devices with its fields, from the very tables that driver and virtual devices use. Names are the
 /// devices' and the fields', with an underscore for what is no letter or digit. Messages without
 /// fields are left out; replies that several motors send with one id are multiplexed by their first
-/// field. Requests (remote frames) have no place in a DBC.
+/// field. Requests (remote frames) have no place in a DBC. Thread-safe.
 std::string ToDbc(const std::vector<BusDevice>& devices);
 
 }  // namespace plumb

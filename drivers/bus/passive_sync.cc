@@ -20,7 +20,7 @@ size_t PassiveSync::Regularise(std::span<const int64_t> arrivals,
   for (size_t i = 0; i < arrivals.size(); ++i) {
     const std::span<const int64_t> waiting = arrivals.subspan(i);
     const bool undecided =
-        waiting.size() < kMostWaiting &&
+        waiting.size() < kMaxWaiting &&
         static_cast<double>(waiting.back() - waiting.front()) < kEvidence * period_;
     const double gap = SinceOrigin(waiting.front()) - estimate_;
     // The estimate is never later than the arrival, and arrivals are in order: the clock was set

@@ -27,12 +27,12 @@ class PassiveSync {
   /// After a jump back by more than a period it always does.
   explicit PassiveSync(int64_t period, double rate_error = 1e-4, int64_t max_gap = 1'000'000);
 
-  static constexpr size_t kMostWaiting = 32;  ///< samples that may wait, whatever they are
+  static constexpr size_t kMaxWaiting = 32;  ///< samples that may wait, whatever they are
 
   /// @param arrivals [us] of the samples that have no time yet, in order.
   /// @param times [us] of their measurement, room for as many: strictly increasing from call to
   /// call, except after a jump back of the clock by more than a period.
-  /// @return how many times it gives: all, but for less than kMostWaiting at the end, to be passed
+  /// @return how many times it gives: all, but for less than kMaxWaiting at the end, to be passed
   /// again.
   size_t Regularise(std::span<const int64_t> arrivals, std::span<int64_t> times) noexcept;
 

@@ -18,7 +18,7 @@ struct CanLink {
 /// Asks the kernel (RTM_GETLINK); needs no privilege. @return nothing if it does not answer.
 std::optional<CanLink> ReadCanLink(int interface_index);
 
-/// Reads the kernel's answer. @return nothing if that is not one RTM_NEWLINK message.
+/// Reads the kernel's answer. @return nothing if that is not one RTM_NEWLINK message. Thread-safe.
 std::optional<CanLink> ParseCanLink(std::span<const uint8_t> message);
 
 }  // namespace plumb

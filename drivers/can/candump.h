@@ -21,7 +21,7 @@ struct LoggedFrame {
 ///
 /// with frames of every kind (see FrameFromText), up to nine decimals, and a direction "R" or "T"
 /// behind.
-/// @return nothing if the line is not exactly that.
+/// @return nothing if the line is not exactly that. Thread-safe.
 std::optional<LoggedFrame> ParseCandump(std::string_view line) noexcept;
 
 }  // namespace plumb

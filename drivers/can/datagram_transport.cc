@@ -8,7 +8,7 @@ namespace plumb {
 namespace {
 
 /// Datagrams that one call of Receive looks at, echoes, malformed and unwanted ones included.
-constexpr size_t kMostExamined = 128;
+constexpr size_t kMaxExamined = 128;
 
 }  // namespace
 
@@ -40,8 +40,8 @@ int DatagramTransport::Send(std::span<const Frame> frames) noexcept {
 
 int DatagramTransport::Receive(std::span<Frame> frames) noexcept {
   size_t count = 0;
-  // What is not handed out counts, too: a flood of it must not keep us.
-  for (size_t left = kMostExamined; left > 0 && count < frames.size();) {
+  // Datagrams that are not handed out count, too: a flood of them must not keep us.
+  for (size_t left = kMaxExamined; left > 0 && count < frames.size();) {
     const size_t room = std::min({frames.size() - count, kReceived, left});
     for (size_t i = 0; i < room; ++i) {
       msghdr& header = received_.messages[i].msg_hdr;

@@ -14,9 +14,9 @@
 
 namespace plumb {
 
-/// What SocketCAN and UDP have in common: a frame is a datagram, and many of them travel in one
+/// The common part of SocketCAN and UDP: a frame is a datagram, and many of them travel in one
 /// system call. Counts, stamps and sorts out; what is left to the kinds of bus is what a datagram
-/// looks like.
+/// looks like. Not thread-safe, as Transport.
 class DatagramTransport : public Transport {
  public:
   int Send(std::span<const Frame> frames) noexcept final;

@@ -4,7 +4,7 @@
 
 namespace plumb {
 
-/// What a controller's error frame means to a driver (classes of linux/can/error.h).
+/// A controller's error frame to a driver (classes of linux/can/error.h). Thread-safe. A value.
 enum class BusEvent {
   kNone,       ///< not an error frame, or one without consequence (lost arbitration, error-warning)
   kBusOff,     ///< the controller has left the bus; nothing is sent or received any more

@@ -5,7 +5,7 @@
 
 namespace plumb {
 
-/// What goes wrong on a bus, see faulty.h. Probabilities are per frame, in [0, 1]; times in
+/// Faults of a bus, see faulty.h. Probabilities are per frame, in [0, 1]; times in
 /// microseconds.
 struct Faults {
   /// One direction.
@@ -20,7 +20,7 @@ struct Faults {
   uint64_t seed = 1;
 };
 
-/// Reads "loss=0.1,rx.delay=2ms,seed=7".
+/// Reads "loss=0.1,rx.delay=2ms,seed=7". Thread-safe.
 /// @throws std::invalid_argument naming the fault that is wrong, or all that there are.
 Faults ParseFaults(const std::string& text);
 

@@ -35,7 +35,7 @@ namespace plumb {
 /// frames are not stamped (receive_ns = 0), as their arrival is when they are handed out.
 /// @param faults_and_bus what follows "faulty:".
 /// @throws std::runtime_error naming the fault that is not one; or what opening the other bus
-/// throws.
+/// throws. The transport is not thread-safe.
 std::unique_ptr<Transport> OpenFaulty(const std::string& faults_and_bus,
                                       std::vector<Filter> filters, LockstepBus run = {});
 

@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Owns a file descriptor.
+/// Owns a file descriptor. Not thread-safe.
 class FileDescriptor {
  public:
   FileDescriptor() = default;

@@ -30,7 +30,7 @@ struct Frame {
 };
 static_assert(std::is_trivially_copyable_v<Frame>);
 
-/// Equal on the wire: everything but the time of reception.
+/// Equal on the wire: everything but the time of reception. Functions here are thread-safe.
 bool SameOnWire(const Frame& a, const Frame& b);
 
 /// True if id and length are possible for the frame's kind (11/29 bits; 8 bytes, or an FD length)

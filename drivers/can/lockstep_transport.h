@@ -16,7 +16,7 @@ namespace plumb {
 ///
 /// Receive may block, for a frame that is said to have been sent and has not arrived yet.
 /// @param url what the bus is called in the run. @param bus null: there is no other than the
-/// coordinator's.
+/// coordinator's. The transport is not thread-safe.
 std::unique_ptr<Transport> OpenLockstep(const std::string& url, std::unique_ptr<Transport> bus,
                                         std::vector<Filter> filters, LockstepBus run);
 

@@ -13,12 +13,12 @@
 namespace plumb {
 namespace {
 
-class Loop;
+class LoopTransport;
 
 /// Who is on which bus.
 struct Registry {
   std::mutex mutex;
-  std::map<std::string, std::vector<Loop*>> buses;
+  std::map<std::string, std::vector<LoopTransport*>> buses;
 };
 
 Registry& TheRegistry() {
@@ -33,9 +33,9 @@ int64_t RealtimeNs() noexcept {
 }
 
 /// Frames wait in a socket pair: the kernel gives us a bounded queue that can be polled.
-class Loop : public Transport {
+class LoopTransport : public Transport {
  public:
-  Loop(const std::string& name, std::vector<Filter> filters)
+  LoopTransport(const std::string& name, std::vector<Filter> filters)
       : Transport(std::move(filters)), name_(name) {
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, sockets_) != 0) {
       throw std::runtime_error("loop:" + name +
@@ -47,7 +47,7 @@ class Loop : public Transport {
     TheRegistry().buses[name].push_back(this);
   }
 
-  ~Loop() override {
+  ~LoopTransport() override {
     {
       const std::lock_guard lock(TheRegistry().mutex);
       auto& members = TheRegistry().buses[name_];
@@ -69,7 +69,7 @@ class Loop : public Transport {
     for (Frame frame : frames) {
       frame.receive_ns = stamp;
       frame.foreign = false;
-      for (Loop* member : bus->second) {
+      for (LoopTransport* member : bus->second) {
         if (member != this) member->Deliver(frame);
       }
     }
@@ -106,7 +106,7 @@ class Loop : public Transport {
 }  // namespace
 
 std::unique_ptr<Transport> OpenLoop(const std::string& name, std::vector<Filter> filters) {
-  return std::make_unique<Loop>(name, std::move(filters));
+  return std::make_unique<LoopTransport>(name, std::move(filters));
 }
 
 }  // namespace plumb

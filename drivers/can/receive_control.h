@@ -10,12 +10,12 @@
 
 namespace plumb {
 
-/// Room for what the kernel says about a received datagram.
+/// Room for what the kernel says about a received datagram. Thread-safe.
 struct ControlBuffer {
   alignas(cmsghdr) char bytes[256];
 };
 
-/// What it said.
+/// The answer.
 struct ReceiveControl {
   int64_t receive_ns = 0;  ///< CLOCK_REALTIME of arrival in the kernel; 0 = not stamped
   /// datagrams this socket has lost since it was opened (SO_RXQ_OVFL)

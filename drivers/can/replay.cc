@@ -14,8 +14,8 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kMostNamed = 5;        // malformed lines
-constexpr size_t kMostCharacters = 60;  // of such a line
+constexpr size_t kMaxNamed = 5;        // malformed lines
+constexpr size_t kMaxCharacters = 60;  // of such a line
 
 class Replay : public Transport {
  public:
@@ -77,10 +77,10 @@ class Replay : public Transport {
       if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
       const auto logged = ParseCandump(line);
       if (!logged) {
-        if (++stats_.malformed <= static_cast<int64_t>(kMostNamed)) {
+        if (++stats_.malformed <= static_cast<int64_t>(kMaxNamed)) {
           warnings_.push_back(fmt::format("{}:{}: not a line of candump -l: '{}'{}", file, number,
-                                          line.substr(0, kMostCharacters),
-                                          line.size() > kMostCharacters ? "..." : ""));
+                                          line.substr(0, kMaxCharacters),
+                                          line.size() > kMaxCharacters ? "..." : ""));
         }
         continue;
       }
@@ -95,7 +95,7 @@ class Replay : public Transport {
         ++unwanted_;
       }
     }
-    if (stats_.malformed > static_cast<int64_t>(kMostNamed)) {
+    if (stats_.malformed > static_cast<int64_t>(kMaxNamed)) {
       warnings_.push_back(
           fmt::format("{}: {} lines in all are not of candump -l", file, stats_.malformed));
     }

@@ -18,7 +18,7 @@ namespace plumb {
 ///
 /// Nothing hears what is sent: Send accepts it and forgets it, and is_replay() says so. Logged
 /// frames that only we may send (Filter::own) were our own then: they count as echoes and are not
-/// handed out.
+/// handed out. The transport is not thread-safe.
 /// @throws std::runtime_error if the file cannot be read or has no frame in it.
 std::unique_ptr<Transport> OpenReplay(const std::string& file, std::vector<Filter> filters);
 

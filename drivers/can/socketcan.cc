@@ -211,7 +211,7 @@ class SocketCan : public DatagramTransport {
   bool LinksChanged() noexcept {
     bool changed = false;
     char any;
-    for (int i = 0; i < kMostNotes; ++i) {
+    for (int i = 0; i < kMaxNotes; ++i) {
       if (recv(links_.get(), &any, sizeof any, MSG_TRUNC) < 0 && errno != ENOBUFS) break;
       changed = true;
     }
@@ -273,7 +273,7 @@ class SocketCan : public DatagramTransport {
     if (error == EAGAIN && links_.valid() && LinksChanged()) Reopen();
   }
 
-  static constexpr int kMostNotes = 64;           // read in one go
+  static constexpr int kMaxNotes = 64;            // read in one go
   static constexpr int kReceiveBuffer = 4 << 20;  // bytes
   static constexpr int kBytesPerFrame = 766;      // of it; measured: 278 frames in 212992 bytes
 

@@ -40,7 +40,7 @@ struct TransportStats {
   int64_t injected = 0;   ///< faults made by faulty:
 };
 
-/// What a transport has to know of a run in virtual time.
+/// A transport's part in a run in virtual time.
 struct LockstepBus {
   Participant* participant = nullptr;  ///< null: there is no such run
   int64_t way = 0;                     ///< [us] that frames sent by this transport are on their way
@@ -80,7 +80,7 @@ class Transport {
 
   LinkState link() const noexcept { return link_; }
   const TransportStats& stats() const noexcept { return stats_; }
-  /// What was found wrong at opening and did not prevent it: one line each, with the cure.
+  /// Faults found at opening that did not prevent it: one line each, with the cure.
   const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 
   static constexpr int64_t kNever = std::numeric_limits<int64_t>::max();

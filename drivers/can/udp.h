@@ -8,7 +8,7 @@ namespace plumb {
 /// "udp_multicast" interface (see udp_codec.h). Datagrams stay on this machine (TTL 0). Nothing
 /// arbitrates, acknowledges or limits the rate; frames are lost only when a receiver is too slow.
 /// @param address "GROUP:PORT", an IPv4 multicast group.
-/// @throws std::runtime_error with the cure.
+/// @throws std::runtime_error with the cure. The transport is not thread-safe.
 std::unique_ptr<Transport> OpenUdp(const std::string& address, std::vector<Filter> filters,
                                    bool told_time = false);
 

@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// Largest datagram of the format, with room for the longest FD frame.
+/// Largest datagram of the format, with room for the longest FD frame. Functions are thread-safe.
 inline constexpr size_t kMaxUdpDatagram = 512;
 
 /// Writes one frame as python-can's "udp_multicast" does: one msgpack map of 11 keys.

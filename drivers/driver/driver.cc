@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/time_units.h"
 #include "drivers/driver/stop.h"
 
 namespace plumb {
@@ -9,16 +10,14 @@ namespace {
 
 constexpr int kRefusedCycles = 10;  // consecutive cycles whose frames were not accepted
 // in a cycle while arming: the kernel holds about ten in flight
-constexpr size_t kMostFrames = 8;
+constexpr size_t kMaxFrames = 8;
 constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
-
-double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
 
 }  // namespace
 
 void Driver::Disarm() noexcept {
   stopped_utime_ = utime_;
-  stop_dated_ = false;
+  stop_stamped_ = false;
   inbox_.Clear();
   for (Joint& joint : joints_) {
     // One that has failed is being disarmed already, and remembers why.
@@ -29,9 +28,9 @@ void Driver::Disarm() noexcept {
 
 /// A frame, or the link, stops us without saying what time it is, and the last time we were told is
 /// long ago where our process stood still: an ARM that was made meanwhile is older than the stop.
-void Driver::DateStop() noexcept {
-  if (!stop_dated_) stopped_utime_ = utime_;
-  stop_dated_ = true;
+void Driver::StampStopTime() noexcept {
+  if (!stop_stamped_) stopped_utime_ = utime_;
+  stop_stamped_ = true;
 }
 
 void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
@@ -65,10 +64,12 @@ void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
   }
   bus_off_ = false;
   unacknowledged_ = 0;
-  if (!UseOfMotor(frame, now, utime) && !UseOfSensor(frame, now, utime)) ++frames_rejected_;
+  if (MayBeDisplaced()) Displaced();
+  if (!DispatchToMotors(frame, now, utime) && !DispatchToSensors(frame, now, utime))
+    ++frames_rejected_;
 }
 
-bool Driver::UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept {
+bool Driver::DispatchToMotors(const Frame& frame, int64_t now, int64_t utime) noexcept {
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
     switch (joint.motor->OnFrame(frame, now)) {
@@ -95,8 +96,9 @@ bool Driver::UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept
   return false;
 }
 
-bool Driver::UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept {
+bool Driver::DispatchToSensors(const Frame& frame, int64_t now, int64_t utime) noexcept {
   for (JointSensor& sensor : sensors_) {
+    if (!Active()) sensor.ForgetTurns();
     const SensorUse use = sensor.OnFrame(frame, now, utime);
     if (use != SensorUse::kNotMine) return use != SensorUse::kRejected;
   }
@@ -114,21 +116,21 @@ void Driver::OnLink(LinkState link) noexcept {
 std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
   now_ = now;
   utime_ = utime;
-  DateStop();
+  StampStopTime();
   NoteLateness(lateness);
   housekeeping_.Clear();
   frames_.Clear();
   CheckHealth();
   CheckCommand();
-  DateStop();
+  StampStopTime();
   CommandTorques();
   // After the checks, so that a fault is answered in this cycle. The joints take turns to be the
   // first.
-  size_t arming = std::max(kMostFrames - std::min(kMostFrames, torque_frames_), kMostArmingFrames);
+  size_t arming = std::max(kMaxFrames - std::min(kMaxFrames, torque_frames_), kMaxArmingFrames);
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[(turn_ + i) % joints_.size()];
     const size_t before = housekeeping_.size();
-    joint.motor->Tick(now, arming >= kMostArmingFrames, housekeeping_);
+    joint.motor->Tick(now, arming >= kMaxArmingFrames, housekeeping_);
     arming -= std::min(arming, housekeeping_.size() - before);
     joint.frames_end = torque_frames_ + housekeeping_.size();
   }
@@ -176,7 +178,6 @@ void Driver::Transmitted(int accepted, int64_t utime) noexcept {
     if (i < torque_frames_ && i < taken) sent = joints_[i].effort;
   }
   history_.Record(utime + effort_delay_, effort_sent_);
-  LetJump();
   for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);
   refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;
   if (refused_cycles_ >= kRefusedCycles && Active()) {
@@ -196,19 +197,20 @@ void Driver::Poll() noexcept {
   }
 }
 
-void Driver::LetJump() noexcept {
+bool Driver::MayBeDisplaced() const noexcept {
   // In an episode a policy, or a limit, may want no effort, too: nobody places the robot then.
-  const bool at_rest = std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
-  const bool let = virtual_ && at_rest && !(Active() && inbox_.in_episode());
-  may_jump_ = let;
+  const bool in_episode = Active() && inbox_.in_episode();
+  return virtual_ && !in_episode &&
+         std::ranges::all_of(effort_sent_, [](double effort) { return effort == 0; });
+}
+
+void Driver::Displaced() noexcept {
+  displaced_at_ = now_;
   for (Joint& joint : joints_) {
-    joint.motor->LetJump(let);
-    joint.watch.LetJump(let);
+    joint.motor->Displaced();
+    joint.watch.Displaced();
   }
-  for (JointSensor& sensor : sensors_) {
-    sensor.device().LetJump(let);
-    sensor.ForgetTurns(let || !Active());
-  }
+  for (JointSensor& sensor : sensors_) sensor.Displaced();
 }
 
 DriveState Driver::state() const noexcept {

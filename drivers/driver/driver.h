@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -15,7 +16,7 @@
 #include "drivers/driver/limits.h"
 #include "drivers/driver/measurements.h"
 #include "drivers/driver/plausibility.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/joint_command_t.hpp"
@@ -88,10 +89,10 @@ class Driver {
   void set_bus(const std::string& url) { status_.bus = url; }
   /// Whether signatures are looked at before OnRequest and OnCommand are called.
   void set_commands_signed(bool commands_signed) { status_.commands_signed = commands_signed; }
-  /// The robot is a virtual one, which is put elsewhere at once: between episodes, while no effort
-  /// is sent, positions may jump.
+  /// The robot is a virtual one, which may be put elsewhere at once (PLACE_ROBOT) between episodes,
+  /// while no effort is sent: every check of its motion then begins anew, as after switching on.
   void set_virtual(bool is_virtual) { virtual_ = is_virtual; }
-  /// What it hears is a recording: it refuses to arm.
+  /// The bus is a recording: the driver refuses to arm.
   void set_replay(bool replay) { replay_ = replay; }
 
  private:
@@ -127,12 +128,12 @@ class Driver {
   /// Of the joints without a motor. @throws std::invalid_argument if nothing measures one.
   void FindMeasuring(const RobotDescription& robot);
   void FindSecondEncoders(const RobotDescription& robot);
-  bool UseOfMotor(const Frame& frame, int64_t now, int64_t utime) noexcept;
-  bool UseOfSensor(const Frame& frame, int64_t now, int64_t utime) noexcept;
+  bool DispatchToMotors(const Frame& frame, int64_t now, int64_t utime) noexcept;
+  bool DispatchToSensors(const Frame& frame, int64_t now, int64_t utime) noexcept;
   void Refuse(std::string_view why) noexcept;
   void Disarm() noexcept;
   void Estop(std::string_view reason) noexcept;
-  void DateStop() noexcept;
+  void StampStopTime() noexcept;
   void RequestArm(int64_t made, bool homed) noexcept;
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;
@@ -140,7 +141,9 @@ class Driver {
   /// @param why is set if not.
   bool Agree(const SecondEncoder& second, Reason& why) const noexcept;
   void CommandTorques() noexcept;
-  void LetJump() noexcept;
+  /// Whether the robot may be put elsewhere at this time; a real one never is.
+  bool MayBeDisplaced() const noexcept;
+  void Displaced() noexcept;
   void Poll() noexcept;
   void PrepareMessages();
   void NoteLateness(int64_t lateness) noexcept;
@@ -178,7 +181,7 @@ class Driver {
   int arms_refused_ = 0;           // since it was armed last
   int64_t now_, utime_;            // latest times given
   int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
-  bool stop_dated_ = true;         // false: that time is the last one known before it
+  bool stop_stamped_ = true;       // false: that time is the last one known before it
   int64_t armed_by_;               // utime of the last ARM request that was obeyed
   int64_t armed_at_ = 0;           // `now`
   bool stray_controller_ = false;  // commanded during the start guard
@@ -189,7 +192,8 @@ class Driver {
   LinkState link_ = LinkState::kUp;
   bool bus_off_ = false;
   bool replay_ = false;
-  bool virtual_ = false, may_jump_ = false;
+  bool virtual_ = false;
+  int64_t displaced_at_ = std::numeric_limits<int64_t>::min();  // `now` of the last Displaced()
   int64_t foreign_at_;  // `now` of the last frame that only we may send, and another has sent
   std::vector<Filter> own_;
   int unacknowledged_ = 0;

@@ -1,8 +1,10 @@
 // Of driver.h: the checks while it is active: drives, encoders, sensors, commands.
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "common/time_units.h"
 #include "drivers/driver/driver.h"
 #include "drivers/driver/operating_limits.h"
 
@@ -56,13 +58,14 @@ void Driver::CheckCommand() noexcept {
 
 bool Driver::Unwatched(const Joint& joint) const noexcept {
   return mode_ == Mode::kArmed &&
-         TelemetryIsStale(joint.motor->readings(), std::llround(settings_.telemetry * 1e6), now_);
+         TelemetryIsStale(joint.motor->readings(), Microseconds(settings_.telemetry), now_);
 }
 
 bool Driver::Agree(const SecondEncoder& second, Reason& why) const noexcept {
   const Joint& joint = joints_[second.joint];
   const JointSensor& sensor = sensors_[second.sensor];
-  if (may_jump_ || !joint.measured || !sensor.fresh(now_)) return true;
+  if (!joint.measured || !sensor.fresh(now_)) return true;
+  if (std::min(joint.measured_at, sensor.heard_at()) <= displaced_at_) return true;  // of before
   double difference = sensor.newest().position - joint.latest.position;
   // Neither knows how often the joint has turned round.
   if (joint.turns) difference = std::remainder(difference, 2 * std::numbers::pi);

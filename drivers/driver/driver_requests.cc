@@ -14,7 +14,7 @@ constexpr int64_t kClockError = 1'000'000;
 void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept {
   now_ = now;
   utime_ = utime;
-  DateStop();
+  StampStopTime();
   switch (request.request) {
     case driver_request_t::ARM:
       return RequestArm(request.utime, false);
@@ -49,7 +49,7 @@ void Driver::Refuse(std::string_view why) noexcept {
   ++arms_refused_;
   Reason count;
   if (arms_refused_ > 1) count.Set(" ({} times)", arms_refused_);
-  // What stopped it is worth more than what is refused.
+  // The cause of the stop is worth more than that of the refusal.
   const std::string_view cause = cause_.text();
   reason_.Set("{}{}ARM refused{}: {}", cause, cause.empty() ? "" : "; ", count.text(), why);
 }
@@ -87,8 +87,7 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
     } else if (Reason bad; !WithinOperatingLimits(joint.motor->readings(), settings_, bad)) {
       why.Set("{}: {}", joint.name, bad.text());
     }
-    // A virtual robot's encoders are absolute.
-    if (homed || virtual_) joint.motor->Homed();
+    if (homed) joint.motor->Homed();
     if (joint.motor->lost_place())
       why.Set("{}: its drive has lost its place: home the joint, then plumb arm --homed",
               joint.name);
@@ -115,7 +114,7 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
   cause_.Clear();
   for (Joint& joint : joints_) {
     joint.motor->Arm(now);
-    joint.watch.Forgive();
+    joint.watch.ClearComplaint();
     joint.commanded = 0;
   }
   mode_ = Mode::kArming;

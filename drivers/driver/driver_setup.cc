@@ -8,16 +8,16 @@
 #include <optional>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "drivers/bus/bus_plan.h"
 #include "drivers/driver/driver.h"
+#include "drivers/protocols/registry.h"
 #include "robot/floating_base.h"
 
 namespace plumb {
 namespace {
 
 constexpr int kHistory = 2048;  // cycles of transmitted efforts: ten seconds
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 MotorTiming TimingOf(const DriverSettings& settings) {
   return {Microseconds(settings.heartbeat_timeout)};

@@ -7,9 +7,9 @@
 
 namespace plumb {
 
-/// What effort each joint was told to produce, and when: the drives hold a setpoint until the next
-/// one, so the effort is a staircase with steps at the times of transmission. Record and Average do
-/// not allocate. Not thread-safe.
+/// The efforts that each joint was told to produce, and when: the drives hold a setpoint until the
+/// next one, so the effort is a staircase with steps at the times of transmission. Record and
+/// Average do not allocate. Not thread-safe.
 class EffortHistory {
  public:
   /// @param capacity steps remembered, > 0.

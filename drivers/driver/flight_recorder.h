@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "drivers/can/frame.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 
 namespace plumb {
 

@@ -4,10 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/time_units.h"
+#include "drivers/protocols/registry.h"
+
 namespace plumb {
 namespace {
-
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 Eigen::Map<const Eigen::Vector3d> Vector(const std::array<double, 3>& values) {
   return Eigen::Map<const Eigen::Vector3d>(values.data());
@@ -63,7 +64,8 @@ JointMeasurement JointSensor::OfImu(const ImuSample& sample) noexcept {
       Eigen::Quaterniond(w, x, y, z) * Eigen::Quaterniond(to_link_).conjugate();
   const double twist = mounting_.Angle(link);
   // The one of the angles that look like this which is next to the last.
-  const double near = std::isfinite(newest_.position) && !forget_turns_ ? newest_.position : 0;
+  const double near = std::isfinite(newest_.position) && turns_counted_ ? newest_.position : 0;
+  turns_counted_ = true;
   measurement.position = near + std::remainder(twist - near, 2 * std::numbers::pi);
   measurement.velocity = mounting_.axis.dot(to_link_ * Vector(sample.rate));
   return measurement;

@@ -36,19 +36,24 @@ class JointSensor {
   /// Index of the joint that it measures, -1: none.
   int joint() const { return joint_; }
   Sensor& device() { return *device_; }
-  /// While true, an angle is the one within half a turn of 0: nobody has counted turns. See also
-  /// Motor::LetJump.
-  void ForgetTurns(bool forget) noexcept { forget_turns_ = forget; }
+  /// The next angle of an IMU is the one within half a turn of 0: nobody has counted turns.
+  void ForgetTurns() noexcept { turns_counted_ = false; }
+  /// The robot may have been put elsewhere at once: what the sensor says is judged anew.
+  void Displaced() noexcept {
+    device_->Displaced();
+    ForgetTurns();
+  }
   const Sensor& device() const { return *device_; }
 
   SensorUse OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept;
 
-  /// What it measured of the joint last before or at `utime`: effort NaN; velocity NaN if it
+  /// The last measurement of the joint before or at `utime`: effort NaN; velocity NaN if it
   /// reports none. Call it with times that do not decrease.
   const JointMeasurement& At(int64_t utime) noexcept;
   int64_t measured() const noexcept { return measured_; }  ///< utime of what At has given
   /// The newest position, which At may not have given yet.
   const JointMeasurement& newest() const noexcept { return newest_; }
+  int64_t heard_at() const noexcept { return heard_at_; }  ///< `now` of the newest reading
   /// Whether readings come, and the newest is not too old.
   bool fresh(int64_t now) const noexcept { return !Silent(now).text().size(); }
   /// Why it is not fresh; empty if it is.
@@ -78,7 +83,7 @@ class JointSensor {
   TimedSamples<JointMeasurement> samples_;
   JointMeasurement given_, newest_;
   int64_t measured_ = 0;
-  bool forget_turns_ = true;
+  bool turns_counted_ = false;
   bool heard_ = false;
   int64_t heard_at_ = 0;  // `now` of the newest
 };

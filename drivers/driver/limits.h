@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// What a joint must not exceed; see JointDescription and JointLimitSettings.
+/// The bounds of a joint; see JointDescription and JointLimitSettings. Thread-safe.
 struct JointLimits {
   double lower, upper;  ///< [rad] or [m]; infinite for a continuous joint
   double velocity;      ///< [rad/s] or [m/s]; infinite = none
@@ -29,7 +29,7 @@ inline JointLimits LimitsOf(const JointDescription& joint) {
 /// The last part of the velocity limit, in which efforts that would make the joint faster fade.
 inline constexpr double kVelocityBand = 0.05;
 
-/// What is known of a joint when its effort is chosen.
+/// The state of a joint when its effort is chosen.
 struct JointSituation {
   double position, velocity;  ///< measured
   double effort_sent;         ///< [Nm] or [N] the effort last sent

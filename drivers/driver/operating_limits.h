@@ -1,6 +1,6 @@
 #pragma once
 
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -8,7 +8,7 @@ namespace plumb {
 /// Whether a drive's temperatures and supply are within DriverSettings' limits. What it does not
 /// report is not judged. There is no hysteresis: a fault is left by a person's ARM, which is
 /// refused as long as this says why.
-/// @param why is set if not: the reading, and the limit by its key.
+/// @param why is set if not: the reading, and the limit by its key. Thread-safe.
 bool WithinOperatingLimits(const MotorReadings& readings, const DriverSettings& settings,
                            Reason& why) noexcept;
 

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/time_units.h"
+#include "drivers/protocols/registry.h"
+
 namespace plumb {
 namespace {
 
@@ -12,9 +15,6 @@ constexpr double kCoarse = 0x1p-22;
 /// [rad] of a motor's shaft: coarse codes of positions, and what those of velocities add up to in a
 /// window.
 constexpr double kResolution = 0.05;
-
-double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
 
 /// [us] in which a motor sends an encoder estimate: nothing that it sends by itself comes more
 /// often.
@@ -43,8 +43,7 @@ void Plausibility::Add(int64_t time, double position, double velocity, double ef
   const Estimate next{time, position, velocity};
   CountDevices(time);
   const int64_t since = time - last_.time;
-  if (!seen_ || may_jump_ || since < 0 || Jumped(next) || since > settings_.lateness)
-    return Begin(next);
+  if (!seen_ || since < 0 || Jumped(next) || since > settings_.lateness) return Begin(next);
   LookForStuck(next, effort);
   Compare(next);
   last_ = next;
@@ -63,12 +62,12 @@ double Plausibility::Slack(double position) const noexcept {
 
 void Plausibility::CountDevices(int64_t time) noexcept {
   const int64_t since = time - window_;
-  if (!seen_ || since < 0 || since >= kWindow * settings_.period) {
-    crowded_ = count_ > kMostInWindow;
+  if (count_ == 0 || since < 0 || since >= kWindow * settings_.period) {
+    crowded_ = count_ > kMaxInWindow;
     window_ = time;
     count_ = 0;
   }
-  if (++count_ > kMostInWindow) {
+  if (++count_ > kMaxInWindow) {
     crowded_ = true;
     Complain(
         "{} encoder estimates in {} ms, where one device sends {}: two devices with one id, or "

@@ -2,12 +2,12 @@
 
 #include <cstdint>
 
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "robot/description.h"
 
 namespace plumb {
 
-/// What a joint's estimates are judged by.
+/// The bounds by which a joint's estimates are judged.
 struct PlausibilitySettings {
   double velocity_limit;  ///< [rad/s] or [m/s] > 0; infinite: jumps are not looked for
   double effort_limit;    ///< [Nm] or [N] > 0
@@ -32,7 +32,7 @@ PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverS
 ///   integral of the velocity (trapezoids) is I, and
 ///     |D - I| > resolution + max(path of D, path of I) / 4
 ///               + L (|v first| + |v last| + sum |change of v|).
-///   What the velocity lags, or the times of arrival err, by up to L is within the last term
+///   A lag of the velocity, or an error of the times of arrival, up to L is within the last term
 ///   (summation by parts);
 /// - stuck: position and velocity are the same bit by bit for `stuck_after` while the effort sent
 ///   is a tenth of the limit or more;
@@ -44,7 +44,7 @@ PlausibilitySettings PlausibilityOf(const JointDescription& joint, const DriverS
 class Plausibility {
  public:
   static constexpr int kWindow = 100;            ///< estimates, or periods
-  static constexpr int kMostInWindow = 150;      ///< estimates of one device within kWindow periods
+  static constexpr int kMaxInWindow = 150;       ///< estimates of one device within kWindow periods
   static constexpr double kDisagreement = 0.25;  ///< part of the path
   static constexpr double kEffort = 0.1;         ///< of the limit, under which a joint should move
 
@@ -56,14 +56,14 @@ class Plausibility {
   /// @param effort [Nm] or [N] last sent.
   void Add(int64_t time, double position, double velocity, double effort) noexcept;
 
-  /// While true, the joint may be put elsewhere at once: nothing but the number of devices is
-  /// judged.
-  void LetJump(bool let) noexcept { may_jump_ = let; }
+  /// The joint may have been put elsewhere at once: all but the number of devices is judged anew
+  /// from the next estimate on.
+  void Displaced() noexcept { seen_ = false; }
 
   /// The first thing that was implausible; empty if nothing was.
   std::string_view complaint() const noexcept { return complaint_.text(); }
   /// Takes the complaint back. What is wrong still will be found again.
-  void Forgive() noexcept { complaint_.Clear(); }
+  void ClearComplaint() noexcept { complaint_.Clear(); }
   /// Whether more than one device seems to send estimates; so until 100 T have gone by with no more
   /// than one would.
   bool crowded() const noexcept { return crowded_; }
@@ -103,7 +103,6 @@ class Plausibility {
   int64_t window_ = 0;     // begin of that in which estimates are counted
   int count_ = 0;
   bool crowded_ = false;
-  bool may_jump_ = false;
 };
 
 }  // namespace plumb

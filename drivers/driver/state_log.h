@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 
 namespace plumb {
 

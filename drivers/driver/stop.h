@@ -6,7 +6,7 @@ namespace plumb {
 
 /// The effort [Nm] or [N] on a joint whose command has expired, until commands come again or the
 /// driver disarms, by DriverSettings::stop. Not yet limited. Zero if anything it needs is not
-/// finite.
+/// finite. Thread-safe.
 /// @param damping [Nm s/rad] or [N s/m] JointLimitSettings::damping.
 /// @param last [Nm] or [N] the effort last sent for a command.
 /// @param elapsed [s] >= 0 since the command expired.

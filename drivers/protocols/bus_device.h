@@ -39,7 +39,7 @@ struct IdRange {
   uint32_t first, last;
 };
 
-/// What a device has to do with a bus.
+/// A device's messages on a bus, and the ids that are its own. A value.
 struct BusDevice {
   std::string name;
   std::string protocol;

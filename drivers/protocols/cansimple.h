@@ -9,8 +9,8 @@
 /// ODrive's CANSimple, firmware 0.6: 11-bit ids `node << 5 | command`, little-endian payloads,
 /// positions in revolutions and torques in Nm at the motor's shaft. Layouts from ODrive Robotics'
 /// "CAN Protocol" manual (docs.odriverobotics.com/v/latest/manual/can-protocol.html). Host and
-/// virtual drive share these tables; tests/drivers/protocols/cansimple_test.cc checks them against frames
-/// written by hand.
+/// virtual drive share these tables; tests/drivers/protocols/cansimple_test.cc checks them
+/// against frames written by hand. Constants and pure functions: thread-safe.
 namespace plumb::cansimple {
 
 inline constexpr int kMaxNode = 0x3E;
@@ -84,7 +84,7 @@ inline constexpr Layout kSetInputTorqueShort{
 inline constexpr Layout kClearErrors{0x18, "Clear_Errors", 1, {{U("Identify", 0, 8)}}};
 // clang-format on
 
-/// What the driver asks for in turn while the robot moves.
+/// Reports that the driver asks for in turn while the robot moves.
 inline constexpr std::array kPolledReports = {kGetTemperature, kGetBusVoltageCurrent};
 
 enum AxisState : uint8_t { kUndefined = 0, kIdle = 1, kClosedLoopControl = 8 };

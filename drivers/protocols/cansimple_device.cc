@@ -1,8 +1,11 @@
 #include "drivers/protocols/cansimple_device.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "common/time_units.h"
 
 namespace plumb {
 namespace {
@@ -17,6 +20,36 @@ int64_t NextMultiple(int64_t period, int64_t now) {
   const int64_t remainder = (now % period + period) % period;
   return now - remainder + period;
 }
+
+class Drive : public MotorDevice {
+ public:
+  explicit Drive(const CanSimpleDevice::Settings& settings)
+      : settings_(settings), device_(settings, 0) {}
+
+  std::vector<Filter> filters() const override {
+    const auto filters = device_.filters();
+    return {filters.begin(), filters.end()};
+  }
+  bool OnFrame(const Frame& frame, int64_t now) override {
+    const double before = Torque();
+    device_.OnFrame(frame, now);
+    // May be a request: its answer is of the shaft as it is now.
+    return frame.remote || frame.length == 0 || Torque() != before;
+  }
+  void Tick(int64_t now, const ShaftReading& shaft, FrameBatch& out) override {
+    device_.Tick(now, {shaft.turns, shaft.turns_per_second}, out);
+  }
+  int64_t NextDue() const override { return device_.NextDue(); }
+  double Torque() const override { return device_.Torque(); }
+  void Boot(int64_t now) override { device_ = CanSimpleDevice(settings_, now); }
+  bool armed() const override { return device_.armed(); }
+  uint32_t disarm_reason() const override { return device_.disarm_reason(); }
+  int64_t rejected() const override { return device_.rejected(); }
+
+ private:
+  CanSimpleDevice::Settings settings_;
+  CanSimpleDevice device_;
+};
 
 }  // namespace
 
@@ -227,6 +260,18 @@ void CanSimpleDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) n
     if (requested_ & 1u << command) out.Push(Report(command, sample));
     requested_ &= ~(1u << command);
   }
+}
+
+std::unique_ptr<MotorDevice> MakeCanSimpleDevice(const MotorDescription& motor,
+                                                 const DriverSettings& driver,
+                                                 const VirtualRobotSettings& settings) {
+  return std::make_unique<Drive>(CanSimpleDevice::Settings{
+      .node = motor.node,
+      .heartbeat_period = Microseconds(settings.heartbeat),
+      .encoder_period = Microseconds(driver.measurement),
+      .watchdog = Microseconds(settings.watchdog),
+      .serial_number = static_cast<uint64_t>(motor.node),
+  });
 }
 
 }  // namespace plumb

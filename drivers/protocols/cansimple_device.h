@@ -2,10 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "drivers/can/transport.h"
 #include "drivers/protocols/cansimple.h"
+#include "drivers/protocols/motor_device.h"
+#include "robot/description.h"
 
 namespace plumb {
 
@@ -102,5 +105,10 @@ class CanSimpleDevice {
   int64_t rejected_ = 0;
   int64_t setpoints_ = 0;
 };
+
+/// One that is set up as the driver expects it.
+std::unique_ptr<MotorDevice> MakeCanSimpleDevice(const MotorDescription& motor,
+                                                 const DriverSettings& driver,
+                                                 const VirtualRobotSettings& settings);
 
 }  // namespace plumb

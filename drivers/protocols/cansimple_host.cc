@@ -48,7 +48,6 @@ class CanSimpleMotor : public Motor {
     return use;
   }
 
-  void LetJump(bool let) noexcept override { reports_.LetJump(let); }
   const MotorEstimate& estimate() const noexcept override { return reports_.estimate(); }
   double torque_estimate() const noexcept override { return reports_.torque_estimate(); }
   MotorReadings readings() const noexcept override { return reports_.readings(); }
@@ -72,6 +71,10 @@ class CanSimpleMotor : public Motor {
 
   bool lost_place() const noexcept override { return lost_place_; }
   void Homed() noexcept override { lost_place_ = false; }
+  void Displaced() noexcept override {
+    reports_.Displaced();
+    lost_place_ = false;
+  }
   bool IsEstop(const Frame& frame) const noexcept override {
     const uint32_t to = frame.id >> 5;
     return (frame.id & 0x1F) == kEstop.command && !frame.remote &&

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "drivers/protocols/bus_device.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 
 namespace plumb {
 
@@ -15,14 +15,14 @@ namespace plumb {
 /// on the bus goes unnoticed: hence twice, in two Ticks, the second time in front of the order to
 /// run, lest a drive that restarts in between runs in the mode it wakes up in. The driver sends
 /// zero torque meanwhile, which feeds the drive's watchdog.
-/// @throws std::invalid_argument if the node is not in [0, 0x3E].
+/// Thread-safe. @throws std::invalid_argument if the node is not in [0, 0x3E].
 std::unique_ptr<Motor> MakeCanSimpleMotor(const MotorDescription& description,
                                           const MotorTiming& timing);
 
 /// Heartbeats that are expected within heartbeat_timeout: with the factory's 100 ms, 0.5 s.
 inline constexpr int kBeatsPerTimeout = 5;
 
-/// What such a drive and its host say to each other, the drive configured to send heartbeats with a
+/// The messages between such a drive and its host, the drive configured to send heartbeats with a
 /// fifth of heartbeat_timeout and encoder estimates with `measurement`; all else on request,
 /// temperatures and its supply every `telemetry`.
 BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings& driver);

@@ -1,6 +1,6 @@
 // Of cansimple_host.h: the messages on the bus, for plans and DBC files.
-#include <cmath>
 
+#include "common/time_units.h"
 #include "drivers/protocols/cansimple.h"
 #include "drivers/protocols/cansimple_host.h"
 
@@ -10,10 +10,9 @@ using namespace cansimple;
 
 BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings& driver) {
   using Direction = BusMessage::Direction;
-  const auto microseconds = [](double seconds) { return std::llround(seconds * 1e6); };
   const auto block = static_cast<uint32_t>(motor.node) << 5;
-  const int64_t heartbeat = microseconds(driver.heartbeat_timeout) / kBeatsPerTimeout;
-  const int64_t telemetry = microseconds(driver.telemetry);
+  const int64_t heartbeat = Microseconds(driver.heartbeat_timeout) / kBeatsPerTimeout;
+  const int64_t telemetry = Microseconds(driver.telemetry);
   BusDevice device{
       .name = "", .protocol = "cansimple", .messages = {}, .claims = {{block, block + 0x1F}}};
   const auto add = [&](const Layout& layout, Direction direction, int64_t period) {
@@ -26,7 +25,7 @@ BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings
     device.messages.push_back(message);
   };
   add(kHeartbeat, Direction::kFromDevice, heartbeat);
-  add(kGetEncoderEstimates, Direction::kFromDevice, microseconds(driver.measurement));
+  add(kGetEncoderEstimates, Direction::kFromDevice, Microseconds(driver.measurement));
   for (const Layout& layout : kPolledReports) {
     add(layout, Direction::kToDevice, telemetry);
     device.messages.back().remote = device.messages.back().polled = true;
@@ -38,7 +37,7 @@ BusDevice CanSimpleBusDevice(const MotorDescription& motor, const DriverSettings
   for (const Layout& layout : {kGetVersion, kGetError, kAddress, kGetTorques, kGetIq, kGetPowers}) {
     add(layout, Direction::kFromDevice, 0);
   }
-  add(kSetInputTorqueShort, Direction::kToDevice, microseconds(driver.cycle));
+  add(kSetInputTorqueShort, Direction::kToDevice, Microseconds(driver.cycle));
   for (const Layout& layout : {kEstop, kSetAxisState, kSetControllerMode, kClearErrors}) {
     add(layout, Direction::kToDevice, 0);
   }

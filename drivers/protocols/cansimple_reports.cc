@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
@@ -89,12 +91,12 @@ FrameUse CanSimpleReports::OnAddress(const FieldValues& v) noexcept {
 FrameUse CanSimpleReports::OnEstimates(const FieldValues& v, int64_t now) noexcept {
   const MotorEstimate next{v[0] * kRadiansPerTurn, v[1] * kRadiansPerTurn};
   if (estimated_) {
-    const double seconds = static_cast<double>(now - estimated_at_) * 1e-6;
+    const double seconds = Seconds(now - estimated_at_);
     const double turned = std::abs(next.position - estimate_.position) / kRadiansPerTurn;
     const double fastest =
         std::max(std::abs(next.velocity), std::abs(estimate_.velocity)) / kRadiansPerTurn;
     // Twice: it may have been faster in between.
-    if (!may_jump_ && turned > kLeastJump + 2 * fastest * seconds) {
+    if (turned > kLeastJump + 2 * fastest * seconds) {
       jump_ = {now, (next.position - estimate_.position) / kRadiansPerTurn, true};
       LookForRestart();
     }

@@ -5,11 +5,11 @@
 #include <optional>
 
 #include "drivers/protocols/cansimple.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 
 namespace plumb {
 
-/// What an ODrive reports besides heartbeats and errors, remembered; and the signs that it has
+/// The latest reports of an ODrive, but for heartbeats and errors; and the signs that it has
 /// restarted. Pure logic; free of exceptions and allocation. Not thread-safe.
 class CanSimpleReports {
  public:
@@ -34,8 +34,8 @@ class CanSimpleReports {
   /// True if frames with two serial numbers have come from one node: two drives that both obey us.
   bool two_drives() const noexcept { return two_drives_; }
 
-  /// See Motor::LetJump.
-  void LetJump(bool let) noexcept { may_jump_ = let; }
+  /// See Motor::Displaced.
+  void Displaced() noexcept { estimated_ = false; }
 
   struct Restart {
     int64_t silence;  ///< [us] between two heartbeats
@@ -57,9 +57,9 @@ class CanSimpleReports {
   Reason identity_;
   std::optional<Firmware> firmware_;
   std::optional<double> serial_number_;
-  bool two_drives_ = false, may_jump_ = false;
+  bool two_drives_ = false;
 
-  bool estimated_ = false;
+  bool estimated_ = false;  // since it was switched on or displaced
   int64_t estimated_at_ = 0;
   int64_t heartbeat_ = 0, interval_ = 0;  // time of the last one; to the one before; 0 = not known
   struct Event {

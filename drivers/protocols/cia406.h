@@ -6,7 +6,7 @@
 /// profile CiA 406 needs it. Identifiers are those of the predefined connection set, little-endian.
 /// Object numbers as in the profile: 6004h is the position, an unsigned 32-bit number of counts,
 /// and TPDO1 carries it, alone. The specifications are CAN in Automation's; layouts as printed in
-/// the manuals of Lika, SICK and Kuebler.
+/// the manuals of Lika, SICK and Kuebler. Thread-safe: constants and pure functions.
 namespace plumb::cia406 {
 
 // clang-format off

@@ -19,6 +19,28 @@ int64_t Next(int64_t period, int64_t now) {
   return period > 0 ? now - now % period + period : kNever;
 }
 
+class Encoder : public SensorDevice {
+ public:
+  explicit Encoder(const Cia406Device::Settings& settings)
+      : settings_(settings), device_(settings, 0) {}
+
+  std::vector<Filter> filters() const override {
+    const auto filters = device_.filters();
+    return {filters.begin(), filters.end()};
+  }
+  void OnFrame(const Frame& frame, int64_t now) override { device_.OnFrame(frame, now); }
+  void Tick(int64_t now, const SensedMotion& motion, FrameBatch& out) override {
+    device_.Tick(now, motion.position, out);
+  }
+  int64_t NextDue() const override { return device_.NextDue(); }
+  void Boot(int64_t now) override { device_ = Cia406Device(settings_, now); }
+  int64_t rejected() const override { return device_.rejected(); }
+
+ private:
+  Cia406Device::Settings settings_;
+  Cia406Device device_;
+};
+
 }  // namespace
 
 Cia406Device::Cia406Device(const Settings& settings, int64_t now) : settings_(settings) {
@@ -121,6 +143,11 @@ void Cia406Device::Tick(int64_t now, double position, FrameBatch& out) noexcept 
     next_heartbeat_ = Next(settings_.heartbeat_period, now);
     out.Push(Make(kHeartbeat, node, {double(state_)}));
   }
+}
+
+std::unique_ptr<SensorDevice> MakeCia406Device(const SensorDescription& sensor) {
+  return std::make_unique<Encoder>(
+      Cia406Device::Settings{.node = sensor.node, .counts = sensor.counts, .range = sensor.range});
 }
 
 }  // namespace plumb

@@ -2,9 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 
 #include "drivers/can/transport.h"
 #include "drivers/protocols/cia406.h"
+#include "drivers/protocols/sensor_device.h"
+#include "robot/description.h"
 
 namespace plumb {
 
@@ -49,5 +52,8 @@ class Cia406Device {
   int64_t next_position_, next_heartbeat_;
   int64_t rejected_ = 0;
 };
+
+/// One as described.
+std::unique_ptr<SensorDevice> MakeCia406Device(const SensorDescription& sensor);
 
 }  // namespace plumb

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "drivers/protocols/cia406.h"
 
 namespace plumb {
@@ -28,7 +29,7 @@ class Cia406Encoder : public Sensor {
         range_(description.range),
         radians_per_count_(2 * std::numbers::pi / description.counts),
         counts_per_microsecond_(description.max_speed / radians_per_count_ * 1e-6),
-        period_(std::llround(description.period * 1e6)),
+        period_(Microseconds(description.period)),
         timing_(timing) {}
 
   std::vector<Filter> filters() const override {
@@ -59,7 +60,7 @@ class Cia406Encoder : public Sensor {
   void Tick(int64_t now, FrameBatch& out) noexcept override {
     present_ = heard_ && now - heard_at_ <= timing_.timeout;
     if (state_ == SensorState::kRunning && now - position_at_ > timing_.timeout) {
-      // What it has turned by then can still be counted, if it is not too long.
+      // Its turns until then can still be counted, if it is not too long.
       if (!present_) {
         state_ = SensorState::kStarting;
         agreed_ = false;
@@ -78,7 +79,7 @@ class Cia406Encoder : public Sensor {
     out.Push(Make(kNmt, node_, {kStart, double(node_)}));
   }
 
-  void LetJump(bool let) noexcept override { may_jump_ = let; }
+  void Displaced() noexcept override { tracking_ = false; }
 
   SensorState state() const noexcept override {
     return present_ || state_ == SensorState::kFault ? state_ : SensorState::kAbsent;
@@ -110,7 +111,7 @@ class Cia406Encoder : public Sensor {
     Hear(now);
     if (state_ == SensorState::kFault) return SensorUse::kConsumed;
     const double raw = (*values)[0];
-    if (!tracking_ || may_jump_) {
+    if (!tracking_) {
       counts_ = std::remainder(raw, range_);
     } else {
       const double step = std::remainder(raw - raw_, range_);
@@ -183,7 +184,6 @@ class Cia406Encoder : public Sensor {
   bool heard_ = false, present_ = false;  // ever, lately
   int64_t heard_at_ = 0, position_at_ = 0;
   int64_t retry_ = std::numeric_limits<int64_t>::min();
-  bool may_jump_ = false;
   bool agreed_ = false;    // it has said that it sends with our period, since Start
   bool tracking_ = false;  // raw_ and position_at_ are of the last position
   double raw_ = 0, counts_ = 0;

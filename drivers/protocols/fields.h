@@ -14,7 +14,7 @@
 
 namespace plumb {
 
-/// Where a number lies in a classic CAN payload, and what it means: value = raw * scale + offset.
+/// A number in a classic CAN payload: value = raw * scale + offset. Constant, so thread-safe.
 ///
 /// `bit` counts in the order in which the field's bytes follow each other:
 ///   kLittleEndian (Intel)     from bit 0 of byte 0, its least significant; the field's least

@@ -10,7 +10,7 @@
 /// speak, too: one 8-byte command to the motor's id, one reply to the master's id, both packed
 /// big-endian in codes that divide ranges evenly. Nothing in a frame says which ranges: they are
 /// configuration (MitRanges), since the sources disagree even about one and the same motor.
-/// Positions and torques are the output shaft's.
+/// Positions and torques are the output shaft's. Constants and pure functions: thread-safe.
 ///
 /// Layouts and behaviour from bgkatz/motorcontrol (Core/Src/can.c, fsm.c, stm32f4xx_it.c), the
 /// firmware by the actuator's author; lengths 6 and 8 of the reply from CubeMars' AK series manual.
@@ -92,7 +92,7 @@ constexpr Layout ReplyLayout(const MitRanges& ranges, uint8_t length) {
 /// bits than they hold, and the codes go round.
 constexpr double Period(const MitRanges& ranges) { return 2 * ranges.position * 65536. / 65535.; }
 
-/// What a command asks for.
+/// The contents of a command.
 struct Setpoint {
   double position = 0;  ///< [rad]
   double velocity = 0;  ///< [rad/s]

@@ -1,8 +1,12 @@
 #include "drivers/protocols/mit_device.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
+
+#include "common/time_units.h"
 
 namespace plumb {
 namespace {
@@ -24,6 +28,39 @@ uint32_t Truncate(const Field& field, double value) {
   }
   return static_cast<uint32_t>(std::clamp(code, 0.f, static_cast<float>(field.mask())));
 }
+
+class Drive : public MotorDevice {
+ public:
+  explicit Drive(const MitDevice::Settings& settings) : settings_(settings), device_(settings) {}
+
+  std::vector<Filter> filters() const override { return {device_.filter()}; }
+  bool OnFrame(const Frame& frame, int64_t now) override {
+    device_.OnFrame(frame, now);
+    torque_ = device_.Torque(sample_);
+    // it answers everything
+    return !frame.remote && frame.id == static_cast<uint32_t>(settings_.node);
+  }
+  void Tick(int64_t now, const ShaftReading& shaft, FrameBatch& out) override {
+    constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
+    sample_ = {shaft.turns * kTurn, shaft.turns_per_second * kTurn};
+    device_.Tick(now, sample_, out);
+    torque_ = device_.Torque(sample_);
+  }
+  int64_t NextDue() const override { return device_.NextDue(); }
+  double Torque() const override { return torque_; }
+  void Boot(int64_t) override {
+    device_ = MitDevice(settings_);
+    torque_ = 0;
+  }
+  bool armed() const override { return device_.armed(); }
+  int64_t rejected() const override { return device_.rejected(); }
+
+ private:
+  MitDevice::Settings settings_;
+  MitDevice device_;
+  MitDevice::Sample sample_;
+  double torque_ = 0;
+};
 
 }  // namespace
 
@@ -140,6 +177,17 @@ void MitDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) noexcep
     ++zeroed_;
     make_zero_ = false;
   }
+}
+
+std::unique_ptr<MotorDevice> MakeMitDevice(const MotorDescription& motor, const DriverSettings&,
+                                           const VirtualRobotSettings& settings) {
+  if (!motor.mit) throw std::invalid_argument("a motor of protocol 'mit' needs its ranges");
+  MitDevice::Settings own;
+  own.node = motor.node;
+  own.master = motor.mit->master;
+  own.ranges = motor.mit->ranges;
+  own.watchdog = Microseconds(settings.watchdog);
+  return std::make_unique<Drive>(own);
 }
 
 }  // namespace plumb

@@ -2,9 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 
 #include "drivers/can/transport.h"
 #include "drivers/protocols/mit.h"
+#include "drivers/protocols/motor_device.h"
+#include "robot/description.h"
 
 namespace plumb {
 
@@ -72,5 +75,12 @@ class MitDevice {
   int zeroed_ = 0;
   int64_t rejected_ = 0;
 };
+
+/// One that is set up as the driver expects it. Its gains, if somebody gives it any, act on the
+/// motion at its last Tick.
+/// @throws std::invalid_argument if it has no ranges, or settings that it cannot have.
+std::unique_ptr<MotorDevice> MakeMitDevice(const MotorDescription& motor,
+                                           const DriverSettings& driver,
+                                           const VirtualRobotSettings& settings);
 
 }  // namespace plumb

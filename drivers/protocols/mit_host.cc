@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/time_units.h"
 #include "drivers/protocols/mit.h"
 
 namespace plumb {
@@ -140,9 +141,12 @@ class MitMotor : public Motor {
     return MakeCommand(command_, node_, {.torque = std::isfinite(torque) ? torque : 0});
   }
 
-  void LetJump(bool let) noexcept override { may_jump_ = let; }
   bool lost_place() const noexcept override { return lost_place_; }
   void Homed() noexcept override { lost_place_ = false; }
+  void Displaced() noexcept override {
+    displaced_ = true;
+    lost_place_ = false;
+  }
 
   DriveState state() const noexcept override {
     if (!present_) return DriveState::kAbsent;
@@ -187,13 +191,13 @@ class MitMotor : public Motor {
   /// to count turns from there.
   void Track(double raw, int64_t dt, int64_t now) noexcept {
     const double step = std::remainder(raw - raw_, Period(ranges_));
+    const bool displaced = std::exchange(displaced_, false);
     raw_ = raw;
     if (dt < 0) {
       estimate_.position = raw;
       return;
     }
-    if (!may_jump_ &&
-        std::abs(step) > ranges_.velocity * (static_cast<double>(dt) * 1e-6 + kUneven)) {
+    if (!displaced && std::abs(step) > ranges_.velocity * (Seconds(dt) + kUneven)) {
       lost_place_ = true;
       Fail(now,
            "its position jumped by {:.3g} rad in {:.3g} ms: it has restarted, or lost its place",
@@ -227,7 +231,7 @@ class MitMotor : public Motor {
   bool given_ = false;          // the last Tick gave a frame
   bool may_run_ = false;        // told to run, and not known to have stopped since
   bool fault_ = false;
-  bool may_jump_ = false;
+  bool displaced_ = false;  // since the last reply
   bool lost_place_ = false;
   Reason reason_;
 };

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "drivers/protocols/bus_device.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 
 namespace plumb {
 
@@ -21,7 +21,7 @@ namespace plumb {
 /// is unwrapped, and a step that the greatest velocity does not explain is a fault. After a silence
 /// of heartbeat_timeout, as at the start, the turns are unknown and counted anew.
 /// @throws std::invalid_argument if the node is not in [1, 0xFF], the id of the replies not in [0,
-/// 0x7FF] or equal to the node, a range is not positive, or there is none (MotorDescription::mit).
+/// 0x7FF] or equal to the node, a range is not positive or missing. Thread-safe.
 std::unique_ptr<Motor> MakeMitMotor(const MotorDescription& description, const MotorTiming& timing);
 
 /// A command and a reply, in every cycle.

@@ -1,6 +1,6 @@
 // Of mit_host.h: the messages on the bus, for plans and DBC files.
-#include <cmath>
 
+#include "common/time_units.h"
 #include "drivers/protocols/mit.h"
 #include "drivers/protocols/mit_host.h"
 
@@ -8,7 +8,7 @@ namespace plumb {
 
 BusDevice MitBusDevice(const MotorDescription& motor, const DriverSettings& driver) {
   const MitDescription mit = motor.mit.value_or(MitDescription{});
-  const int64_t cycle = std::llround(driver.cycle * 1e6);
+  const int64_t cycle = Microseconds(driver.cycle);
   BusDevice device{.name = "", .protocol = "mit", .messages = {}, .claims = {}};
   BusMessage command;
   command.layout = mit::CommandLayout(mit.ranges);

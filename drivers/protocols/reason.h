@@ -8,7 +8,7 @@
 
 namespace plumb {
 
-/// Why something is as it is: one line in a fixed buffer, so that the driver's cycle can write it.
+/// A cause in words: a line in a fixed buffer, which the cycle can write. Not thread-safe.
 class Reason {
  public:
   template <class... Args>

@@ -9,7 +9,7 @@
 
 #include "drivers/can/transport.h"
 #include "drivers/protocols/bus_device.h"
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -40,7 +40,7 @@ struct ImuSample {
   bool clipped = false;            ///< rate or force was beyond what it can measure
 };
 
-/// What a sensor made of a frame.
+/// A sensor's verdict on a frame.
 enum class SensorUse {
   kNotMine,   ///< another id, or not a frame a sensor sends: remote, extended, FD, error
   kRejected,  ///< its id, but too short or impossible
@@ -65,8 +65,8 @@ class Sensor {
   /// Once per cycle: deadlines, and frames that make it send.
   virtual void Tick(int64_t now, FrameBatch& out) noexcept = 0;
 
-  /// See Motor::LetJump.
-  virtual void LetJump(bool) noexcept {}
+  /// As Motor::Displaced.
+  virtual void Displaced() noexcept {}
 
   virtual SensorState state() const noexcept = 0;
   /// Why it is not running; empty if it is.
@@ -80,19 +80,9 @@ class Sensor {
   virtual const ImuSample* imu() const noexcept { return nullptr; }
 };
 
-/// What a sensor needs to know of the driver's settings.
+/// The driver's settings that concern a sensor.
 struct SensorTiming {
   int64_t timeout = 0;  ///< [us] > 0 silence after which a sensor counts as absent
 };
-
-/// A sensor of the named protocol (SensorDescription::protocol).
-/// @throws std::invalid_argument for an unknown protocol (the message lists those known) or
-/// settings it cannot have.
-std::unique_ptr<Sensor> MakeSensor(const SensorDescription& description,
-                                   const SensorTiming& timing);
-
-/// What that sensor and the driver say on the bus, under its name.
-/// @throws std::invalid_argument for an unknown protocol.
-BusDevice SensorBusDevice(const SensorDescription& description);
 
 }  // namespace plumb

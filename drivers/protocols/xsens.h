@@ -5,7 +5,7 @@
 /// Xsens' MTi-600, Avior and Sirius on CAN: one quantity per message, big-endian, fixed-point.
 /// Layouts from Movella's "MTi CAN messages" (mtidocs.movella.com/canmessages); ids are the
 /// factory's, to which SensorDescription::base is added (they can be moved with
-/// SetCanOutputConfig). Status bits as in Xsens' public XsStatusFlag.
+/// SetCanOutputConfig). Status bits as in Xsens' public XsStatusFlag. Thread-safe.
 namespace plumb::xsens {
 
 namespace detail {

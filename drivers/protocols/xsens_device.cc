@@ -1,10 +1,35 @@
 #include "drivers/protocols/xsens_device.h"
 
+#include <cmath>
 #include <stdexcept>
+
+#include "common/time_units.h"
 
 namespace plumb {
 
 using namespace xsens;
+
+namespace {
+
+class Imu : public SensorDevice {
+ public:
+  explicit Imu(const XsensDevice::Settings& settings) : settings_(settings), device_(settings, 0) {}
+
+  std::vector<Filter> filters() const override { return {}; }
+  void OnFrame(const Frame&, int64_t) override {}
+  void Tick(int64_t now, const SensedMotion& motion, FrameBatch& out) override {
+    device_.Tick(
+        now, {.rate = motion.rate, .force = motion.force, .orientation = motion.orientation}, out);
+  }
+  int64_t NextDue() const override { return device_.NextDue(); }
+  void Boot(int64_t now) override { device_ = XsensDevice(settings_, now); }
+
+ private:
+  XsensDevice::Settings settings_;
+  XsensDevice device_;
+};
+
+}  // namespace
 
 XsensDevice::XsensDevice(const Settings& settings, int64_t now) : settings_(settings) {
   if (settings.period <= 0 || settings.tick <= 0) {
@@ -34,6 +59,12 @@ void XsensDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) noexc
   out.Push(Make(kQuaternion, base, {w, x, y, z}));
   out.Push(Make(kRateOfTurn, base, {sample.rate[0], sample.rate[1], sample.rate[2]}));
   out.Push(Make(kAcceleration, base, {sample.force[0], sample.force[1], sample.force[2]}));
+}
+
+std::unique_ptr<SensorDevice> MakeXsensDevice(const SensorDescription& sensor) {
+  return std::make_unique<Imu>(XsensDevice::Settings{.base = sensor.base,
+                                                     .period = Microseconds(sensor.period),
+                                                     .tick = Microseconds(sensor.tick)});
 }
 
 }  // namespace plumb

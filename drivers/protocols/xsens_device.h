@@ -2,9 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 
 #include "drivers/can/transport.h"
+#include "drivers/protocols/sensor_device.h"
 #include "drivers/protocols/xsens.h"
+#include "robot/description.h"
 
 namespace plumb {
 
@@ -42,5 +45,8 @@ class XsensDevice {
   uint16_t counter_ = 0;
   int error_ = 0;
 };
+
+/// One as described.
+std::unique_ptr<SensorDevice> MakeXsensDevice(const SensorDescription& sensor);
 
 }  // namespace plumb

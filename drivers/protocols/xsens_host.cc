@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "drivers/protocols/xsens.h"
 
 namespace plumb {
@@ -19,7 +20,7 @@ class XsensImu : public Sensor {
   XsensImu(const SensorDescription& description, const SensorTiming& timing)
       : base_(static_cast<uint32_t>(description.base)),
         tick_(description.tick * 1e6),
-        period_(std::llround(description.period * 1e6)),
+        period_(Microseconds(description.period)),
         timing_(timing) {}
 
   std::vector<Filter> filters() const override {
@@ -224,7 +225,7 @@ std::unique_ptr<Sensor> MakeXsensImu(const SensorDescription& d, const SensorTim
 
 BusDevice XsensBusDevice(const SensorDescription& description) {
   BusDevice device{.name = "", .protocol = "xsens", .messages = {}, .claims = {}};
-  const int64_t period = std::llround(description.period * 1e6);
+  const int64_t period = Microseconds(description.period);
   const auto add = [&](const Layout& layout, int64_t every) {
     BusMessage message;
     message.layout = layout;

@@ -15,7 +15,7 @@ namespace plumb {
 /// unless several frames of both were lost. A SampleTime that goes back, and an Error message, are
 /// faults until Start. It is never told anything.
 /// @throws std::invalid_argument if base is not in [0, 0x7FF - 0x7F], or period or tick are not
-/// positive.
+/// positive. Thread-safe.
 std::unique_ptr<Sensor> MakeXsensImu(const SensorDescription& description,
                                      const SensorTiming& timing);
 

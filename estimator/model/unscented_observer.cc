@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "estimator/kinematic_filter.h"
 #include "robot/motion_noise.h"
 
@@ -13,8 +14,6 @@ namespace {
 constexpr double kSurely = 5;  // standard deviations
 
 constexpr double Square(double x) { return x * x; }
-
-double Seconds(int64_t microseconds) { return static_cast<double>(microseconds) * 1e-6; }
 
 // A JOINT_STATE has one number per joint. A semi-implicit step is of first order: with substeps as
 // long as gym's, its error would be greater than the noise.
@@ -28,7 +27,7 @@ RobotDescription ForFilter(RobotDescription robot) {
   return robot;
 }
 
-// What a gyro measures is its joint's rate and a bias; no joint that slides has a gyro.
+// A gyro measures its joint's rate and a bias; no joint that slides has a gyro.
 bool HasGyroBias(const EstimatorSettings& s) { return s.bias_sd > 0 && !(s.acceleration_sd > 0); }
 
 Eigen::Index StateSize(const RobotDescription& robot) {

@@ -11,7 +11,7 @@
 
 namespace plumb {
 
-/// What acts on a robot only sometimes, or not in proportion: joint stops, Coulomb friction,
+/// Forces that act only sometimes, or not in proportion: joint stops, Coulomb friction,
 /// contact with the ground. All of it is taken at the end of a substep of h seconds, linear in the
 /// velocity v + dv there: force = f - b (v + dv) adds h b to the matrix and h (f - b v) to the
 /// right-hand side of  matrix dv = rhs.
@@ -144,7 +144,7 @@ class Constraints {
     }
   }
 
-  /// What became of the contacts at the velocities `trial`: the next trial starts from there. True
+  /// Updates the contacts to the velocities `trial`: the next trial starts from there. True
   /// where it may be the last, because the same contacts act as in it and none of their forces is
   /// outside the cone of friction.
   Mask<Real> Judge(const Substep& now, const Real* trial) {

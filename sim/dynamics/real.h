@@ -17,7 +17,7 @@ struct PackOf {
 template <int N>
 using Pack = typename PackOf<N>::Type;
 
-/// What follows is the same for double and for packs. Comparisons give a Mask; mask ? a : b chooses
+/// The rest is the same for double and for packs. Comparisons give a Mask; mask ? a : b chooses
 /// by element.
 template <class Real>
 using Mask = decltype(Real() < Real());

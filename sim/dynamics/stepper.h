@@ -22,7 +22,7 @@ namespace plumb {
 template <class Real, template <class> class Tree>
 class Stepper {
  public:
-  static constexpr int kFewestTrials = 2, kMostTrials = 4;  ///< of stops, friction and contacts
+  static constexpr int kFewestTrials = 2, kMaxTrials = 4;  ///< of stops, friction and contacts
 
   Stepper(const Topology& topology, const SimulationSettings& settings, const Terms& terms)
       : topology_(topology),
@@ -232,7 +232,7 @@ class Stepper {
     for (size_t i = 0; i < n_; ++i) trial_[i] = v[i] + change_[i];
     if (!constraints_.Find(now, tree_, trial_.data())) return;
     Mask<Real> open = Real{} < 1;
-    for (int trial = 1; trial <= kMostTrials; ++trial) {
+    for (int trial = 1; trial <= kMaxTrials; ++trial) {
       constraints_.Foresee(now, trial_.data(), cholesky_, matrix_.data());
       matrix_ = smooth_;
       for (size_t i = 0; i < n_; ++i) tried_[i] = h * drive_[i];

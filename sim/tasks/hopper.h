@@ -13,7 +13,7 @@ namespace plumb {
 ///
 /// Errors of predicted states are measured in units of what a hop makes of each: 1 m forward, 0.5 m
 /// up, 0.2 rad of the torso (where it falls) and 1 rad of the others; 2 m/s, 2 rad/s of the torso,
-/// and 10 rad/s of the others.
+/// and 10 rad/s of the others. Thread-safe, as Task.
 class HopperTask : public Task {
  public:
   /// @throws std::invalid_argument unless the robot has gym's six joints: two slides and a turning

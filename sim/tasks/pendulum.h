@@ -11,7 +11,7 @@ namespace plumb {
 ///   start        q ~ U(-pi, pi), v ~ U(-1, 1)
 /// Never terminates. Errors are measured in units of 1 rad and 8 rad/s, gym's bound of the speed:
 /// about what a 1 m rod reaches at the bottom when it falls from the top, sqrt(6 g / l) = 7.7
-/// rad/s.
+/// rad/s. Thread-safe, as Task.
 class PendulumTask : public Task {
  public:
   /// @throws std::invalid_argument unless the robot has exactly one joint and that one turns.

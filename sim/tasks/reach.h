@@ -22,7 +22,7 @@ namespace plumb {
 ///                spread every orientation is as likely
 /// Never terminates. Errors of predicted states are measured in units of s and 8 s per second: a
 /// falling rod of 1 m reaches 7.7 rad/s. The unit of a quaternion's entries is 1; a small rotation
-/// changes them by half its angle.
+/// changes them by half its angle. Thread-safe, as Task.
 class ReachTask : public Task {
  public:
   /// @throws std::invalid_argument for a joint that may start anywhere but has neither limits nor a

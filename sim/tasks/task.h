@@ -11,7 +11,7 @@
 
 namespace plumb {
 
-/// What a policy is asked to do with a robot: what it sees, what it is paid, how an episode begins.
+/// The work of a policy on a robot: its observations, its reward, how an episode begins.
 /// Immutable, hence thread-safe. States are q [rad or m] and v [rad/s or m/s] as in
 /// RobotDescription.
 class Task {
@@ -21,8 +21,8 @@ class Task {
   virtual ~Task() = default;
 
   int observation_size() const { return static_cast<int>(observation_names_.size()); }
-  /// What each observation is, with its unit unless that is 1: "cos(q/pole)", "v/pole [rad/s]". A
-  /// policy that was trained with other names, or in another order, is another task's.
+  /// The name of each observation, with its unit unless that is 1: "cos(q/pole)", "v/pole [rad/s]".
+  /// A policy that was trained with other names, or in another order, is another task's.
   const std::vector<std::string>& observation_names() const { return observation_names_; }
   /// One action per driven joint.
   int action_size() const { return static_cast<int>(effort_limits_.size()); }

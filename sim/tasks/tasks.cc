@@ -1,7 +1,7 @@
 // The list of tasks. A new task is its file pair, its line here, and its name in CMakeLists.txt.
 #include <stdexcept>
 
-#include "common/config.h"
+#include "common/nearest_name.h"
 #include "sim/tasks/hopper.h"
 #include "sim/tasks/pendulum.h"
 #include "sim/tasks/reach.h"
@@ -29,12 +29,11 @@ constexpr struct {
 
 std::unique_ptr<Task> MakeTask(const RobotDescription& description) {
   const std::string& name = description.task.name;
-  std::string nearest = kTasks[0].name;
   for (const auto& task : kTasks) {
     if (task.name == name) return task.make(description);
-    if (EditDistance(name, task.name) < EditDistance(name, nearest)) nearest = task.name;
   }
-  throw std::invalid_argument("no task is named '" + name + "'; the nearest is '" + nearest + "'");
+  throw std::invalid_argument("no task is named '" + name + "'; the nearest is '" +
+                              NearestName(name, TaskNames()) + "'");
 }
 
 std::vector<std::string> TaskNames() {

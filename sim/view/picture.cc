@@ -38,10 +38,10 @@ struct Box {
   Eigen::Vector2d size() const { return high - low; }
 };
 
-/// Where a camera is to look, from all that a film shows.
-class Stage {
+/// The part of the world that a picture shows, chosen from all that a film shows.
+class Framing {
  public:
-  Stage(const RobotDescription& robot, const std::vector<Snapshot>& film)
+  Framing(const RobotDescription& robot, const std::vector<Snapshot>& film)
       : robot_(robot), scene_(robot, Across(robot, film)) {
     double widest = 0;
     for (const Snapshot& snapshot : film) {
@@ -133,7 +133,7 @@ class Canvas {
     cairo_show_text(cairo_, text.c_str());
   }
   /// A snapshot in the rectangle at x, 0. @param scale [pixel/m].
-  void Draw(const Stage& stage, const Snapshot& snapshot, double x, double width, double height,
+  void Draw(const Framing& framing, const Snapshot& snapshot, double x, double width, double height,
             double scale);
 
   std::string Png() const {
@@ -159,9 +159,9 @@ class Canvas {
   cairo_t* cairo_;
 };
 
-void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double width,
+void Canvas::Draw(const Framing& framing, const Snapshot& snapshot, double x, double width,
                   double height, double scale) {
-  const double middle = stage.Middle(snapshot), bottom = stage.bottom();
+  const double middle = framing.Middle(snapshot), bottom = framing.bottom();
   const auto to_x = [&](double across) { return x + width / 2 + (across - middle) * scale; };
   const auto to_y = [&](double up) { return height - (up - bottom) * scale; };
   cairo_save(cairo_);
@@ -175,7 +175,7 @@ void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double
   const double ground = std::floor(to_y(0)) + 0.5;
   cairo_move_to(cairo_, x, ground);
   cairo_line_to(cairo_, x + width, ground);
-  if (stage.follows()) {  // half metres, to see how far it has got
+  if (framing.follows()) {  // half metres, to see how far it has got
     for (double mark = std::ceil((middle - width / scale / 2) * 2) / 2; to_x(mark) < x + width;
          mark += 0.5) {
       const bool whole = mark == std::round(mark);
@@ -186,14 +186,14 @@ void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double
   cairo_stroke(cairo_);
 
   cairo_set_line_join(cairo_, CAIRO_LINE_JOIN_ROUND);
-  for (const Silhouette& silhouette : stage.scene().Look(snapshot.q)) {
+  for (const Silhouette& silhouette : framing.scene().Look(snapshot.q)) {
     for (const Eigen::Vector2d& point : silhouette.outline)
       cairo_line_to(cairo_, to_x(point.x()), to_y(point.y()));
     cairo_close_path(cairo_);
     // Links without a shape take no colour.
     int moving = 0;
     for (int link = 1; link < silhouette.link; ++link) {
-      const LinkDescription& other = stage.robot().links[static_cast<size_t>(link)];
+      const LinkDescription& other = framing.robot().links[static_cast<size_t>(link)];
       if (!other.visuals.empty() || !other.collisions.empty()) ++moving;
     }
     const Color color =
@@ -204,7 +204,7 @@ void Canvas::Draw(const Stage& stage, const Snapshot& snapshot, double x, double
     cairo_set_line_width(cairo_, 1.2);
     cairo_stroke(cairo_);
   }
-  for (const Eigen::Vector2d& hinge : stage.scene().Hinges(snapshot.q)) {
+  for (const Eigen::Vector2d& hinge : framing.scene().Hinges(snapshot.q)) {
     cairo_arc(cairo_, to_x(hinge.x()), to_y(hinge.y()), 2.2, 0, 7);
     Fill(kPaper);
     cairo_fill_preserve(cairo_);
@@ -221,11 +221,12 @@ constexpr double kTextHeight = 26;  // [pixel], below a picture
 
 std::string DrawStrip(const RobotDescription& robot, const std::vector<Snapshot>& film,
                       int panels) {
-  const Stage stage(robot, film);
+  const Framing framing(robot, film);
   constexpr double kHeight = 220, kNarrowest = 84, kWidest = 180;
-  const double scale = std::min(kHeight / (stage.top() - stage.bottom()), kWidest / stage.width());
-  const double height = std::ceil(scale * (stage.top() - stage.bottom()));
-  const double width = std::clamp(std::ceil(scale * stage.width()), kNarrowest, kWidest);
+  const double scale =
+      std::min(kHeight / (framing.top() - framing.bottom()), kWidest / framing.width());
+  const double height = std::ceil(scale * (framing.top() - framing.bottom()));
+  const double width = std::clamp(std::ceil(scale * framing.width()), kNarrowest, kWidest);
   const int count = std::min(panels, static_cast<int>(film.size()));
   Canvas canvas(static_cast<int>(width) * count, static_cast<int>(height + kTextHeight));
   const int digits = film.back().time - film.front().time < 0.1 * count ? 3 : 2;
@@ -233,7 +234,7 @@ std::string DrawStrip(const RobotDescription& robot, const std::vector<Snapshot>
     const size_t at =
         count == 1 ? 0
                    : static_cast<size_t>(i) * (film.size() - 1) / static_cast<size_t>(count - 1);
-    canvas.Draw(stage, film[at], i * width, width, height, scale);
+    canvas.Draw(framing, film[at], i * width, width, height, scale);
     canvas.Fill(kInk);
     canvas.Text(fmt::format("{:.{}f} s", film[at].time, digits), (i + 0.5) * width, height + 18,
                 13);
@@ -242,12 +243,13 @@ std::string DrawStrip(const RobotDescription& robot, const std::vector<Snapshot>
 }
 
 std::string DrawFilm(const RobotDescription& robot, const std::vector<Snapshot>& film) {
-  const Stage stage(robot, film);
+  const Framing framing(robot, film);
   constexpr double kHeight = 240, kNarrowest = 320, kWidest = 480;
   constexpr double kFrame = 0.04;  // [s]; browsers slow films down that are faster than 50 Hz
-  const double scale = std::min(kHeight / (stage.top() - stage.bottom()), kWidest / stage.width());
-  const double height = std::ceil(scale * (stage.top() - stage.bottom()));
-  const double width = std::clamp(std::ceil(scale * stage.width()), kNarrowest, kWidest);
+  const double scale =
+      std::min(kHeight / (framing.top() - framing.bottom()), kWidest / framing.width());
+  const double height = std::ceil(scale * (framing.top() - framing.bottom()));
+  const double width = std::clamp(std::ceil(scale * framing.width()), kNarrowest, kWidest);
   std::vector<const Snapshot*> frames;
   for (const Snapshot& snapshot : film) {
     if (snapshot.time >= static_cast<double>(frames.size()) * kFrame - 1e-9)
@@ -257,7 +259,7 @@ std::string DrawFilm(const RobotDescription& robot, const std::vector<Snapshot>&
   const auto draw = [&](int frame, std::vector<uint32_t>& pixels) {
     const Snapshot& snapshot = *frames[static_cast<size_t>(frame)];
     Canvas canvas(columns, rows);
-    canvas.Draw(stage, snapshot, 0, width, height, scale);
+    canvas.Draw(framing, snapshot, 0, width, height, scale);
     canvas.Fill(kInk);
     canvas.Text(fmt::format("{:.2f} s", snapshot.time), width / 2, height + 18, 13);
     pixels.clear();

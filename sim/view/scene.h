@@ -15,7 +15,7 @@ struct Silhouette {
   std::vector<Eigen::Vector2d> outline;
 };
 
-/// What a picture of a robot shows, in two dimensions: across (to the right) and up.
+/// The contents of a robot's picture, in two dimensions: across (to the right) and up. Thread-safe.
 class Scene {
  public:
   /// @param across the base's axis that points to the right, 0 or 1 (x or y).

@@ -1,8 +1,9 @@
 #include "sim/virtual/effort_delay.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+
+#include "common/time_units.h"
 
 namespace plumb {
 
@@ -15,7 +16,7 @@ EffortDelay::EffortDelay(const RobotDescription& robot)
     for (int i = 0; i < unmodelled.joint; ++i) {
       velocity += static_cast<size_t>(robot.joints[static_cast<size_t>(i)].num_velocities());
     }
-    delay_[velocity] = std::llround(unmodelled.delay * 1e6);
+    delay_[velocity] = Microseconds(unmodelled.delay);
   }
 }
 

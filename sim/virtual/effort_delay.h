@@ -15,7 +15,7 @@ class EffortDelay {
  public:
   explicit EffortDelay(const RobotDescription& robot);
 
-  /// What acts on each velocity's coordinate [Nm or N].
+  /// Efforts that act now, one per velocity [Nm or N].
   const Eigen::VectorXd& acting() const { return acting_; }
   /// A drive makes this effort from `now` [us] on, which does not decrease.
   void Make(Eigen::Index velocity, double effort, int64_t now);

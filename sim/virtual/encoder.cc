@@ -2,12 +2,14 @@
 
 #include <cmath>
 
+#include "common/time_units.h"
+
 namespace plumb {
 
 double ShaftMotion::Position(int64_t time) const {
   if (end == begin) return end_position;
-  const double h = static_cast<double>(end - begin) * 1e-6;
-  const double s = static_cast<double>(time - begin) * 1e-6 / h;
+  const double h = Seconds(end - begin);
+  const double s = Seconds(time - begin) / h;
   // Hermite's basis.
   return (1 + 2 * s) * (1 - s) * (1 - s) * begin_position + s * s * (3 - 2 * s) * end_position +
          h * s * (1 - s) * ((1 - s) * begin_velocity - s * end_velocity);

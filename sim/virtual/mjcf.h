@@ -12,7 +12,7 @@ namespace plumb {
 /// contacts and limits give way is MuJoCo's own matter, as gym's Hopper sets it: solref 0.02 1,
 /// solimp 0.8 0.8 0.01 and a margin of 1 mm for contacts, MuJoCo's defaults for limits. Runge-Kutta
 /// of fourth order.
-/// @param robot with known parameters.
+/// @param robot with known parameters. Thread-safe.
 /// @throws std::invalid_argument naming what of the robot MuJoCo cannot be told.
 std::string Mjcf(const RobotDescription& robot);
 

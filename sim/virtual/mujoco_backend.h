@@ -15,7 +15,7 @@ namespace plumb {
 /// robot is.
 std::unique_ptr<PhysicsBackend> MakeMujocoBackend(const RobotDescription& robot);
 
-/// Whether MuJoCo is part of this build.
+/// Whether MuJoCo is part of this build. Functions here are thread-safe.
 bool HasMujoco();
 
 }  // namespace plumb

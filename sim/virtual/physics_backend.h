@@ -4,7 +4,8 @@
 
 namespace plumb {
 
-/// What integrates the motion of a robot that is not there. Not thread-safe.
+/// The physics of a virtual robot: integrates the motion of its joints under the efforts of its
+/// motors. Not thread-safe.
 class PhysicsBackend {
  public:
   using Vector = Eigen::Ref<const Eigen::VectorXd>;

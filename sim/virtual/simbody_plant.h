@@ -27,7 +27,7 @@ class SimbodyPlant : public PhysicsBackend {
   explicit SimbodyPlant(const RobotDescription& robot, double max_step = 0.005);
   ~SimbodyPlant() override;
 
-  /// What of the robot this physics leaves out, as a sentence; empty if nothing.
+  /// Parts of the robot that this physics leaves out, as a sentence; empty if none.
   static std::string Lacks(const RobotDescription& robot);
 
   void SetState(const Vector& q, const Vector& v) override;

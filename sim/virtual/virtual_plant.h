@@ -9,18 +9,17 @@
 
 namespace plumb {
 
-/// What moves in a virtual robot. By description.virtual_robot.engine:
-///   auto    a SimbodyPlant, or, where the robot has something that a SimbodyPlant has not (armature, stops,
-///           contact), a Simulator with substeps a tenth as long as calibration's and at most
-///           kLongestSubstep: then reality has the simulator's equations, but not its integration
-///           errors: what a model of contact gets wrong does not show there
+/// The moving parts of a virtual robot. By description.virtual_robot.engine:
+///   auto    a SimbodyPlant, or, where the robot has something that a SimbodyPlant has not (armature,
+///           stops, contact), a fine simulator (see MakeFineSimulator): then reality has the
+///           simulator's equations, but not its integration errors: errors of a model of contact do
+///           not show there
 ///   mujoco  MuJoCo (see MakeMujocoBackend): another contact, other stops, another integrator than
 ///           any model has
 /// Coulomb friction and backlash of description.virtual_robot.joints come on top. Not thread-safe.
 class VirtualPlant {
  public:
   using Vector = PhysicsBackend::Vector;
-  static constexpr double kLongestSubstep = 1e-4;  ///< [s]
 
   /// @param robot with known parameters, see Model::Describe.
   /// @throws std::invalid_argument if it cannot be simulated.
@@ -33,14 +32,14 @@ class VirtualPlant {
   /// @return false then.
   bool Advance(const Vector& effort, double duration);
 
-  const Eigen::VectorXd& q() const { return engine_->q(); }
-  const Eigen::VectorXd& v() const { return engine_->v(); }
+  const Eigen::VectorXd& q() const { return backend_->q(); }
+  const Eigen::VectorXd& v() const { return backend_->v(); }
   /// The same as the motors have it, before the backlash of their gears.
   const Eigen::VectorXd& motor_q() const { return play_.any() ? play_.q() : q(); }
   const Eigen::VectorXd& motor_v() const { return play_.any() ? play_.v() : v(); }
 
  private:
-  std::unique_ptr<PhysicsBackend> engine_;
+  std::unique_ptr<PhysicsBackend> backend_;
   GearPlay play_;
 };
 

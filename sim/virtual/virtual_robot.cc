@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/time_units.h"
 #include "sim/model.h"
 
 namespace plumb {
@@ -87,8 +88,7 @@ void VirtualRobot::MoveTo(int64_t time) {
     last_motor_v_ = plant_.motor_v();
     // A state that cannot be simulated (nothing sane leads there) ends in standstill, not in a
     // crash.
-    if (!plant_.Advance(efforts_.acting(), static_cast<double>(end - begin) * 1e-6))
-      plant_.SetState(q(), 0 * v());
+    if (!plant_.Advance(efforts_.acting(), Seconds(end - begin))) plant_.SetState(q(), 0 * v());
     time_ = end;
     efforts_.Take(time_);
     for (const auto& device : devices_) {

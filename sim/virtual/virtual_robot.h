@@ -15,7 +15,7 @@
 
 namespace plumb {
 
-/// A robot that is not there: a VirtualPlant moved by virtual drives and felt by virtual sensors, all
+/// A virtual robot: a VirtualPlant moved by virtual drives and felt by virtual sensors, all
 /// of them on a CAN bus. Event-driven, with time as an argument, so that its motion does not
 /// depend, to the bit, on when the process gets to run: torques change when their frame arrived,
 /// sensors are read at multiples of their periods, watchdogs expire on time. Only the sending can
@@ -27,7 +27,7 @@ class VirtualRobot {
   /// parameter is not physical.
   VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical, int64_t now);
 
-  /// What the bus must let in.
+  /// Frames that the bus must let in.
   std::vector<Filter> filters() const;
 
   /// Obeys a frame that arrived at that time, after doing what was due before it. Frames must come

@@ -1,54 +1,45 @@
 // Of virtual_devices.h: sensors: encoders on joints, IMUs on links.
 
 #include <Eigen/Geometry>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 
-#include "drivers/protocols/cia406_device.h"
-#include "drivers/protocols/xsens_device.h"
+#include "common/time_units.h"
+#include "drivers/protocols/registry.h"
 #include "robot/kinematics.h"
 #include "sim/virtual/virtual_devices.h"
 
 namespace plumb {
 namespace {
 
-int64_t Microseconds(double seconds) { return std::llround(seconds * 1e6); }
-
 class VirtualEncoder : public VirtualDevice {
  public:
   VirtualEncoder(const RobotDescription& robot, const SensorDescription& sensor)
-      : scale_(sensor.sign * sensor.radius), offset_(sensor.offset) {
+      : scale_(sensor.sign * sensor.radius),
+        offset_(sensor.offset),
+        device_(MakeSensorDevice(sensor)) {
     for (int i = 0; i < sensor.joint; ++i)
       index_ += robot.joints[static_cast<size_t>(i)].num_positions();
-    settings_.node = sensor.node;
-    settings_.counts = sensor.counts;
-    settings_.range = sensor.range;
-    device_.emplace(settings_, 0);
   }
 
-  std::vector<Filter> filters() const override {
-    const auto filters = device_->filters();
-    return {filters.begin(), filters.end()};
-  }
+  std::vector<Filter> filters() const override { return device_->filters(); }
   bool OnFrame(const Frame& frame, int64_t now) override {
     device_->OnFrame(frame, now);
     return false;  // what it answers says nothing of the motion
   }
   void Tick(const RobotMotion& motion, FrameBatch& out) override {
-    device_->Tick(motion.time, (motion.q[index_] - offset_) / scale_, out);
+    device_->Tick(motion.time, {.position = (motion.q[index_] - offset_) / scale_}, out);
   }
   int64_t NextDue() const override { return device_->NextDue(); }
-  void Boot(const RobotMotion& motion) override { device_.emplace(settings_, motion.time); }
+  void Boot(const RobotMotion& motion) override { device_->Boot(motion.time); }
   void Track(const RobotMotion&, const RobotMotion&) override {}
   void Place(const RobotMotion&) override {}
   int64_t rejected() const override { return device_->rejected(); }
 
  private:
   double scale_, offset_;
+  std::unique_ptr<SensorDevice> device_;
   Eigen::Index index_ = 0;
-  Cia406Device::Settings settings_;
-  std::optional<Cia406Device> device_;
 };
 
 /// At its link's origin. It measures as such sensors do, by the change of its velocity in a period:
@@ -59,20 +50,19 @@ class VirtualImu : public VirtualDevice {
       : kinematics_(robot),
         gravity_(robot.simulation.gravity),
         link_(sensor.link),
-        to_link_(sensor.rotation) {
-    settings_.base = sensor.base;
-    settings_.period = Microseconds(sensor.period);
-    settings_.tick = Microseconds(sensor.tick);
-    device_.emplace(settings_, 0);
-  }
+        to_link_(sensor.rotation),
+        device_(MakeSensorDevice(sensor)) {}
 
-  std::vector<Filter> filters() const override { return {}; }
-  bool OnFrame(const Frame&, int64_t) override { return false; }
+  std::vector<Filter> filters() const override { return device_->filters(); }
+  bool OnFrame(const Frame& frame, int64_t now) override {
+    device_->OnFrame(frame, now);
+    return false;  // what it answers says nothing of the motion
+  }
   void Tick(const RobotMotion& motion, FrameBatch& out) override {
     if (motion.time < device_->NextDue()) return;
     kinematics_.Update(motion.q, motion.v);
     const LinkMotion& link = kinematics_.link(link_);
-    const double elapsed = static_cast<double>(motion.time - last_time_) * 1e-6;
+    const double elapsed = Seconds(motion.time - last_time_);
     const Eigen::Vector3d acceleration =
         elapsed > 0 ? Eigen::Vector3d((link.velocity - last_velocity_) / elapsed)
                     : Eigen::Vector3d::Zero();
@@ -80,7 +70,7 @@ class VirtualImu : public VirtualDevice {
     last_velocity_ = link.velocity;
     const Eigen::Matrix3d axes = link.rotation * to_link_;  // the sensor's -> the base's
     const Eigen::Vector3d gravity(0, 0, -gravity_);
-    XsensDevice::Sample sample;
+    SensedMotion sample;
     Eigen::Map<Eigen::Vector3d>(sample.rate.data()) = axes.transpose() * link.rate;
     Eigen::Map<Eigen::Vector3d>(sample.force.data()) = axes.transpose() * (acceleration - gravity);
     const Eigen::Quaterniond orientation(axes);
@@ -89,7 +79,7 @@ class VirtualImu : public VirtualDevice {
   }
   int64_t NextDue() const override { return device_->NextDue(); }
   void Boot(const RobotMotion& motion) override {
-    device_.emplace(settings_, motion.time);
+    device_->Boot(motion.time);
     Place(motion);
   }
   void Track(const RobotMotion&, const RobotMotion&) override {}
@@ -98,14 +88,14 @@ class VirtualImu : public VirtualDevice {
     kinematics_.Update(motion.q, motion.v);
     last_velocity_ = kinematics_.link(link_).velocity;
   }
+  int64_t rejected() const override { return device_->rejected(); }
 
  private:
   Kinematics kinematics_;
   double gravity_;
   int link_;
   Eigen::Matrix3d to_link_;
-  XsensDevice::Settings settings_;
-  std::optional<XsensDevice> device_;
+  std::unique_ptr<SensorDevice> device_;
   int64_t last_time_ = 0;
   Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();
 };
@@ -114,10 +104,8 @@ class VirtualImu : public VirtualDevice {
 
 std::unique_ptr<VirtualDevice> MakeVirtualSensor(const RobotDescription& robot,
                                                  const SensorDescription& sensor) {
-  if (sensor.protocol == "cia406") return std::make_unique<VirtualEncoder>(robot, sensor);
-  if (sensor.protocol == "xsens") return std::make_unique<VirtualImu>(robot, sensor);
-  throw std::invalid_argument("sensor '" + sensor.name + "': no virtual sensor speaks '" +
-                              sensor.protocol + "'; known: cia406, xsens");
+  if (sensor.link >= 0) return std::make_unique<VirtualImu>(robot, sensor);
+  return std::make_unique<VirtualEncoder>(robot, sensor);
 }
 
 std::vector<std::unique_ptr<VirtualDevice>> VirtualDevices(const RobotDescription& robot) {

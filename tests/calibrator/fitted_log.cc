@@ -124,22 +124,22 @@ FittedLog::FittedLog(const RobotDescription& robot, std::vector<Rollout> log)
       }
     }
   }
-  leftover.errors = r;
-  leftover.jacobian = jacobian;
-  leftover.noise_known.assign(static_cast<size_t>(2 * n), true);
+  residuals.errors = r;
+  residuals.jacobian = jacobian;
+  residuals.noise_known.assign(static_cast<size_t>(2 * n), true);
   RobotDescription own = known;
   own.parameters = robot.parameters;
-  leftover.candidates = FindCandidates(own);
-  Discrepancy extended(WithCandidates(robot, leftover.candidates));
-  leftover.columns =
+  residuals.candidates = FindCandidates(own);
+  Discrepancy extended(WithCandidates(robot, residuals.candidates));
+  residuals.columns =
       CandidateColumns([&](const Eigen::MatrixXd& p) { return extended.Residuals(p, rollouts); },
-                       physical, leftover.candidates);
+                       physical, residuals.candidates);
 }
 
 Misspecification FittedLog::Find() {
-  leftover.rollouts = rollouts;
-  leftover.rows = rows;
-  return FindMisspecification(known, leftover);
+  residuals.rollouts = rollouts;
+  residuals.rows = rows;
+  return FindMisspecification(known, residuals);
 }
 
 }  // namespace plumb

@@ -42,7 +42,7 @@ struct FittedLog {
   std::vector<WindowErrors::Row> rows;
   RobotDescription known;  ///< as fitted
   Eigen::VectorXd physical;
-  Leftover leftover;
+  FitResiduals residuals;
 
   FittedLog(const RobotDescription& robot, std::vector<Rollout> log);
 

@@ -8,6 +8,7 @@
 #include "calibrator/results/posterior_file.h"
 #include "common/random.h"
 #include "robot/description.h"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
 
@@ -18,11 +19,7 @@ inline Findings SampleFindings(const RobotDescription& robot) {
   Random random(5, {1});
   Findings f;
   f.method = "auto", f.used = "smc", f.seed = 0xfedcba9876543210;
-  f.prior = {Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n)};
-  for (Eigen::Index i = 0; i < n; ++i) {
-    f.prior.mean(i) = robot.parameters[static_cast<size_t>(i)].coordinate_mean();
-    f.prior.covariance(i, i) = robot.parameters[static_cast<size_t>(i)].coordinate_variance();
-  }
+  f.prior = PriorGaussian(robot);
   const Eigen::VectorXd prior_sd = f.prior.covariance.diagonal().cwiseSqrt();
   // The first direction stays unknown, the rest shrink.
   Eigen::VectorXd null = prior_sd.normalized();
@@ -47,7 +44,7 @@ inline Findings SampleFindings(const RobotDescription& robot) {
       Eigen::MatrixXd::Identity(n, n) - null * null.transpose() * (1 - 1e-9);
   f.identifiability.null = {null / null.cwiseAbs().maxCoeff()};
   f.identifiability.combinations = {{"gravity / length", Eigen::VectorXd::Unit(n, 0), 9.81, 0.02}};
-  f.identifiability.words = "only gravity / length can be known from this motion";
+  f.identifiability.summary = "only gravity / length can be known from this motion";
   f.cramer_rao = 0.05 * prior_sd;
   f.cramer_rao(0) = std::numeric_limits<double>::infinity();
   f.holdout = {

@@ -5,9 +5,9 @@
 #include <string>
 
 #include "calibrator/fit/discrepancy.h"
-#include "calibrator/live/simopt.h"
 #include "common/decompositions.h"
 #include "common/random.h"
+#include "robot/parameter_distribution.h"
 #include "sim/simulator.h"
 
 namespace plumb {

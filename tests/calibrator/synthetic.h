@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/motion/transitions.h"
+#include "common/gaussian.h"
 #include "robot/description.h"
 
 namespace plumb {

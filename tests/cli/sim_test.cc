@@ -3,6 +3,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -16,6 +18,7 @@
 #include "cli/roll_out.h"
 #include "controller/policy.h"
 #include "robot/description.h"
+#include "robot/posterior_reader.h"
 #include "tests/cli/shell.h"
 #include "tests/temporary_folder.h"
 #include "trainer/checkpoint.h"
@@ -213,8 +216,6 @@ TEST_CASE("sim: errors say what to do") {
   CHECK_THAT(complaint(Robot("pendulum") + " --csv /nonexistent/a.csv"),
              Contains("/nonexistent/a.csv"));
   CHECK_THAT(complaint(Robot("pendulum") + " --png /"), Contains("folder"));
-  CHECK_THAT(complaint(Robot("pendulum") + " --view"),
-             Contains("DISPLAY") && Contains("--png") && Contains("--gif"));
   CHECK_THAT(complaint(Robot("nonesuch")), Contains("no such robot"));
   CHECK(Sim(Robot("pendulum") + " --random --policy x").status != 0);
   CHECK(Sim(Robot("pendulum") + " --episodes 0").status != 0);
@@ -275,16 +276,16 @@ TEST_CASE("sim: stop is asked at every step") {
     return Eigen::VectorXf::Zero(1).eval();
   };
   int asked = 0;
-  const SimulatedEpisode episode = PlayEpisode(
+  const EpisodeSummary episode = PlayEpisode(
       environment, LoadRobot(Robot("pendulum")), actor, 1, 0, [](const SimulatedStep&) {},
       [&] { return ++asked == 3; });
-  CHECK(episode.end == SimulatedEpisode::End::kInterrupted);
+  CHECK(episode.end == EpisodeSummary::End::kInterrupted);
   CHECK(episode.steps == 3);
 }
 
 TEST_CASE("sim: episodes that failed have no return") {
-  using End = SimulatedEpisode::End;
-  const SimulatedEpisode good{10, 1, End::kTimeLimit}, better{20, 3, End::kTerminated},
+  using End = EpisodeSummary::End;
+  const EpisodeSummary good{10, 1, End::kTimeLimit}, better{20, 3, End::kTerminated},
       failed{5, NAN, End::kNotFinite};
   CHECK(Totals({good, failed, better}) ==
         "3 episodes, 35 steps, mean return 2.0, standard deviation 1.4; 1 failed: no longer "
@@ -337,6 +338,27 @@ TEST_CASE("sim: says which parameters are in use") {
        std::getline(lines, set);) {
     CHECK(set.size() <= 120);
   }
+}
+
+TEST_CASE("sim: a posterior's means instead of the prior's") {
+  using Catch::Contains;
+  const TemporaryFolder folder;
+  const std::string pendulum = Robot("pendulum"), posterior = folder / "posterior.json";
+  Sim(pendulum + " --random --episodes 2 --seed 7 --set mass/pole=1.2 --csv " + folder / "a.csv");
+  const Outcome calibration = Shell(Plumb() + "calibrate " + pendulum + " --csv " +
+                                    folder / "a.csv" + " --method laplace --output " + posterior);
+  INFO(calibration.text);
+  REQUIRE(calibration.status == 0);
+  const Outcome outcome = Sim(pendulum + " --posterior " + posterior);
+  INFO(outcome.text);
+  CHECK(outcome.status == 0);
+  const Eigen::VectorXd means = ReadPosterior(posterior, LoadRobot(pendulum)).Mean();
+  CHECK_THAT(outcome.text, Contains(fmt::format("mass/pole {}", means(1))));
+  CHECK_THAT(Sim(pendulum + " --set gravity=3 --posterior " + posterior).text,
+             Contains(fmt::format("gravity 3, mass/pole {}", means(1))));
+  CHECK_THAT(Sim(Robot("hopper") + " --posterior " + posterior).text,
+             Contains("is another robot's"));
+  CHECK(Sim(pendulum + " --urdf --posterior " + posterior).status == 2);
 }
 
 TEST_CASE("sim: pictures") {

@@ -164,11 +164,5 @@ TEST_CASE("a key may hold a table or something else") {
   config.Finish();
 }
 
-TEST_CASE("edit distance") {
-  CHECK(EditDistance("kitten", "sitting") == 3);
-  CHECK(EditDistance("", "abc") == 3);
-  CHECK(EditDistance("abc", "abc") == 0);
-}
-
 }  // namespace
 }  // namespace plumb

@@ -1,4 +1,4 @@
-// What the observer makes of silence, disorder and lies.
+// The observer under silence, disorder and lies.
 
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -19,8 +19,8 @@
 
 namespace plumb {
 
-/// What a driver would publish of a simulated robot, with imperfections of real sensors, and the
-/// truth at every time that is a message's: for tests and bench/observer.
+/// The messages that a driver would publish of a simulated robot, with imperfections of real
+/// sensors, and the truth at every time that is a message's: for tests and bench/observer.
 ///
 /// Drives have an encoder and its tracking loop (sim/virtual/encoder.h) plus white noise on the velocity;
 /// joints with an encoder of their own are quantised by its counts; an IMU has white noise, a

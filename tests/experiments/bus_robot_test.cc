@@ -33,7 +33,7 @@ GaussianPolicy Wanderer(const RobotDescription& robot, float sd) {
 std::vector<Rollout> Trials(BusRobot& system, const GaussianPolicy& policy, int count) {
   std::vector<Rollout> rollouts;
   for (int i = 0; i < count; ++i) {
-    const RealSystem::Trial trial = system.Run(policy, true, 1000, static_cast<uint32_t>(i));
+    const RobotEpisode trial = system.Run(policy, true, 1000, static_cast<uint32_t>(i));
     INFO(system.stopped());
     CHECK(system.stopped().empty());
     CHECK_FALSE(trial.rollout.transitions.empty());
@@ -50,7 +50,7 @@ double Sum(const Rollout& rollout) {
   return sum;
 }
 
-TEST_CASE("a trial is a function of seed and number, to the bit") {
+TEST_CASE("an episode is a function of seed and number, to the bit") {
   const std::string name = GENERATE("pendulum", "hopper");
   const RobotDescription robot = Robot(name);
   const Eigen::VectorXd hidden = HiddenParameters(robot, 1);

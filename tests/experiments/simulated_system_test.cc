@@ -26,7 +26,7 @@ GaussianPolicy Policy(const RobotDescription& robot) {
 }
 
 ParameterDistribution Certain(const RobotDescription& robot, const Eigen::VectorXd& physical) {
-  return FirstDistribution(Way::kOracle, robot, physical);
+  return FirstDistribution(CalibrationStrategy::kOracle, robot, physical);
 }
 
 TEST_CASE("what is recorded without noise is what the simulator does, latency included") {
@@ -37,12 +37,12 @@ TEST_CASE("what is recorded without noise is what the simulator does, latency in
     const RobotDescription robot = Pendulum(file);
     const Eigen::VectorXd hidden = DrawHidden(robot, Hidden::kPaper, 3);
     SimulatedSystem system(robot, hidden, Eigen::VectorXd::Zero(2), 3);
-    const RealSystem::Trial trial = system.Run(Policy(robot), true, 120, 7);
-    REQUIRE(trial.rollout.transitions.size() == 120);
-    CHECK(trial.seconds == Approx(120 * robot.task.period));
+    const RobotEpisode episode = system.Run(Policy(robot), true, 120, 7);
+    REQUIRE(episode.rollout.transitions.size() == 120);
+    CHECK(episode.seconds == Approx(120 * robot.task.period));
     Simulator simulator(robot);
     simulator.SetParameters(hidden);
-    for (const Transition& transition : trial.rollout.transitions) {
+    for (const Transition& transition : episode.rollout.transitions) {
       CHECK(transition.duration() == Approx(robot.task.period));
       simulator.SetState(transition.q, transition.v);
       simulator.Step(transition.efforts);
@@ -50,16 +50,16 @@ TEST_CASE("what is recorded without noise is what the simulator does, latency in
       CHECK(simulator.v()(0) == Approx(transition.next_v(0)).margin(tolerance));
     }
     // The truth errs by nothing, another robot by more the further it looks ahead.
-    CHECK(NStepErrors(robot, Certain(robot, hidden), {trial.rollout}, 20, 2, 5, 1).maxCoeff() <
+    CHECK(NStepErrors(robot, Certain(robot, hidden), {episode.rollout}, 20, 2, 5, 1).maxCoeff() <
           1e3 * tolerance);
     const Eigen::VectorXd wrong =
-        NStepErrors(robot, Certain(robot, 1.1 * hidden), {trial.rollout}, 20, 2, 5, 1);
+        NStepErrors(robot, Certain(robot, 1.1 * hidden), {episode.rollout}, 20, 2, 5, 1);
     CHECK(wrong(0) > 1e-4);
     CHECK(wrong(19) > 5 * wrong(0));
   }
 }
 
-TEST_CASE("trials are functions of seed and number; noise has the size that is claimed") {
+TEST_CASE("episodes are functions of seed and number; noise has the size that is claimed") {
   const RobotDescription robot = Pendulum("gym.toml");
   const Eigen::VectorXd hidden = DrawHidden(robot, Hidden::kPrior, 1);
   const Eigen::Vector2d noise(0.01, 0.2);

@@ -87,7 +87,7 @@ class Drive : public VirtualDrive {
     if (!values || frame.id != (kNode << 5 | kSetInputTorque.command)) return {};
     return (*values)[0];
   }
-  double most_torque() const override { return std::numeric_limits<float>::max(); }
+  double max_torque() const override { return std::numeric_limits<float>::max(); }
   double Rounding(double torque) const override { return 1e-7 * std::abs(torque) + 1e-44; }
   bool MayBeTold(const Frame& frame, DriveState state) const override {
     const auto is = [&](const Frame& expected) { return SameOnWire(frame, expected); };

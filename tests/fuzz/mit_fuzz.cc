@@ -79,7 +79,7 @@ class Drive : public VirtualDrive {
     if (v[2] != 0 || v[3] != 0) return {};
     return v[4];
   }
-  double most_torque() const override { return settings_.ranges.torque; }
+  double max_torque() const override { return settings_.ranges.torque; }
   double Rounding(double) const override { return 1.001 * settings_.ranges.torque / 4095; }
   bool MayBeTold(const Frame& frame, DriveState state) const override {
     return SameOnWire(frame, MakeSpecial(kNode, kExit)) ||

@@ -124,10 +124,10 @@ void MotorGame::SetTorque(double torque) {
   const Frame frame = motor_->Torque(torque);
   Require(IsWellFormed(frame));
   const std::optional<double> said = drive_->TorqueIn(frame);
-  Require(said && std::isfinite(*said) && std::abs(*said) <= drive_->most_torque());
+  Require(said && std::isfinite(*said) && std::abs(*said) <= drive_->max_torque());
   if (!std::isfinite(torque)) return;
   torque_ = torque;
-  if (motor_->state() != DriveState::kArmed || std::abs(torque) > drive_->most_torque()) return;
+  if (motor_->state() != DriveState::kArmed || std::abs(torque) > drive_->max_torque()) return;
   Require(std::abs(*said - torque) <= drive_->Rounding(torque));
 }
 
@@ -148,7 +148,7 @@ void MotorGame::CheckHost() {
 
 void MotorGame::CheckDrive() {
   const double torque = drive_->Torque();
-  Require(std::isfinite(torque) && std::abs(torque) <= drive_->most_torque());
+  Require(std::isfinite(torque) && std::abs(torque) <= drive_->max_torque());
   if (!drive_->armed()) Require(torque == 0);
   if (clean_) Require(drive_->rejected() == 0);
 }
@@ -173,7 +173,7 @@ void MotorGame::ComeToRestAndArm() {
   motor_->Arm(now_);
   for (int i = 0; i < 200 && motor_->state() != DriveState::kArmed; ++i) Cycle(kStep);
   Require(motor_->state() == DriveState::kArmed && drive_->armed() && !motor_->confirmed_idle());
-  SetTorque(0.5 * std::min(drive_->most_torque(), 10.));
+  SetTorque(0.5 * std::min(drive_->max_torque(), 10.));
   run(20'000);
   Require(std::abs(drive_->Torque() - torque_) <= drive_->Rounding(torque_));
   motor_->Estop(now_);

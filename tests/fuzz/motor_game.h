@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "drivers/protocols/protocol.h"
+#include "drivers/protocols/motor.h"
 #include "tests/fuzz/bytes.h"
 
 namespace plumb {
@@ -36,7 +36,7 @@ class VirtualDrive {
   /// [Nm] in a frame of Motor::Torque; nothing if it is not one.
   virtual std::optional<double> TorqueIn(const Frame& frame) const = 0;
   /// The most it may be.
-  virtual double most_torque() const = 0;
+  virtual double max_torque() const = 0;
   /// By how much it may differ from what was asked for.
   virtual double Rounding(double torque) const = 0;
   /// Whether Motor::Tick may give this frame.

@@ -78,7 +78,7 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
                                             "--seed", "3"};
   const auto same = [&](const fs::path& folder) {
     for (int k = 1; k <= 2; ++k) {
-      const std::string name = "distribution_" + std::to_string(k) + ".json";
+      const std::string name = "posterior_" + std::to_string(k) + ".json";
       INFO(folder / name);
       const std::string live = Read(stage.folder / "run" / "calibration" / name);
       REQUIRE_FALSE(live.empty());
@@ -97,6 +97,23 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   INFO(offline.Tail(10));
   REQUIRE_FALSE(offline.failed());
   same(stage.folder / "offline");
+
+  // What the run has left is what the programs read.
+  const std::string posterior = stage.folder / "run/calibration/posterior_2.json";
+  const std::vector<std::vector<std::string>> readers{
+      {"train", stage.robot_folder, "--distribution", posterior, "--steps", "1e4", "--output",
+       stage.folder / "policy.onnx"},
+      {"excite", stage.robot_folder, "--posterior", posterior, "--candidates", "2", "--output",
+       stage.folder / "excite.csv"},
+      {"sim", stage.robot_folder, "--posterior", posterior}};
+  for (const std::vector<std::string>& command : readers) {
+    std::vector<std::string> line{Stage::Binary("plumb")};
+    line.insert(line.end(), command.begin(), command.end());
+    Child reader(command[0], line, stage.folder / (command[0] + ".log"));
+    REQUIRE(reader.WaitFor(kLong));
+    INFO(command[0] << "\n" << reader.Tail(10));
+    CHECK_FALSE(reader.failed());
+  }
 }
 
 /// All that a run leaves behind which must be the same, one after the other.
@@ -104,7 +121,7 @@ std::string Traces(const Stage& stage, const std::string& output) {
   std::string traces =
       Read(stage.folder / (output + ".lcmlog")) + Read(stage.folder / (output + ".can"));
   for (const char* file :
-       {"summary.json", "calibration/distribution_1.json", "training/trainer.checkpoint"}) {
+       {"summary.json", "calibration/posterior_1.json", "training/trainer.checkpoint"}) {
     const std::string trace = Read(stage.folder / output / file);
     INFO(file);
     REQUIRE_FALSE(trace.empty());
@@ -174,8 +191,8 @@ TEST_CASE("the same run, every time: beside others, stopped now and then, withou
     Finish(stage, again);
     // Only what names the bus is another.
     CHECK(Read(stage.folder / "again.can") == Read(stage.folder / "first.can"));
-    CHECK(Read(stage.folder / "again/calibration/distribution_1.json") ==
-          Read(stage.folder / "first/calibration/distribution_1.json"));
+    CHECK(Read(stage.folder / "again/calibration/posterior_1.json") ==
+          Read(stage.folder / "first/calibration/posterior_1.json"));
     stage.bus_url = bus;
   }
   SECTION("another seed is another run") {

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "common/random.h"
+#include "common/time_units.h"
 #include "tests/process/stage.h"
 
 namespace plumb {
@@ -17,9 +18,7 @@ namespace fs = std::filesystem;
 constexpr int kClosedLoop = 8, kIdle = 1;  // CANSimple axis states
 constexpr int64_t kTick = 10'000;          // [us] in which plumb-controller looks at its clock
 
-int64_t Us(double seconds) { return std::llround(seconds * 1e6); }
-
-int64_t Cycle(const Stage& stage) { return Us(stage.robot.driver.cycle); }
+int64_t Cycle(const Stage& stage) { return Microseconds(stage.robot.driver.cycle); }
 
 // After the event: the last torque comes no later than `most` [us] after `since`, the drive is
 // idle, the driver in FAULT with a reason.
@@ -48,7 +47,7 @@ TEST_CASE("a killed estimator") {
   stage.Kill("plumb-estimator");
   REQUIRE(stage.WaitUntil(
       [&] { return stage.controllers.newest().phase == controller_status_t::HALTED; }, 3));
-  const int64_t timeout = Us(stage.robot.controller.state_timeout);
+  const int64_t timeout = Microseconds(stage.robot.controller.state_timeout);
   CHECK(stage.Now() - stage.last_state > timeout);
   CHECK(stage.Now() - stage.last_state <= timeout + kTick);
   CHECK_THAT(stage.controllers.newest().reason, Catch::Contains("no valid state"));
@@ -62,7 +61,7 @@ TEST_CASE("a controller that stands still") {
   stage.RunWithTorque();
   stage.Stall("plumb-controller", 0.5);
   stage.Listen(0.1);
-  const int64_t expiry = Us(stage.robot.driver.expiry), last_command = stage.last_command;
+  const int64_t expiry = Microseconds(stage.robot.driver.expiry), last_command = stage.last_command;
   ExpectSafe(stage, last_command, expiry);
   CHECK(stage.last_torque_time - last_command >= expiry - Cycle(stage));  // and not earlier, either
   CHECK_THAT(stage.drivers.newest().reason, Catch::Contains("command"));
@@ -89,8 +88,8 @@ TEST_CASE("a killed driver: the drive's own watchdog ends it") {
   stage.Kill("plumb-driver");
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 5));
   CHECK(stage.last_torque_time <= killed);
-  const int64_t watchdog = Us(stage.robot.virtual_robot.watchdog),
-                heartbeat = Us(stage.robot.virtual_robot.heartbeat);
+  const int64_t watchdog = Microseconds(stage.robot.virtual_robot.watchdog),
+                heartbeat = Microseconds(stage.robot.virtual_robot.heartbeat);
   CHECK(stage.Now() - stage.last_torque_time >= watchdog);
   CHECK(stage.Now() - stage.last_torque_time <= watchdog + heartbeat);
   // A driver that is started beside a running controller does not arm, and takes no old command for
@@ -108,9 +107,9 @@ TEST_CASE("a driver that stands still: the watchdog ends it, and it wakes up dis
   const int64_t stalled = stage.Now();
   stage.Stall("plumb-driver", 0.3);
   REQUIRE(stage.WaitUntil([&] { return stage.axis_state == kIdle; }, 5));
-  CHECK(stage.Now() < stalled + Us(0.3));
+  CHECK(stage.Now() < stalled + Microseconds(0.3));
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
-  CHECK(stage.Now() == stalled + Us(0.3));  // in its first cycle
+  CHECK(stage.Now() == stalled + Microseconds(0.3));  // in its first cycle
   stage.Listen(0.5);
   CHECK(stage.last_torque_time <= stalled);
   CHECK(stage.axis_state == kIdle);
@@ -121,7 +120,7 @@ TEST_CASE("a drive that disappears") {
   Stage stage(5);
   stage.RunWithTorque();
   stage.Kill("plumb-robot");
-  const int64_t gone = stage.last_state, stale = Us(stage.robot.driver.stale_after);
+  const int64_t gone = stage.last_state, stale = Microseconds(stage.robot.driver.stale_after);
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
   CHECK(stage.Now() - gone > stale);
   CHECK(stage.Now() - gone <= stale + Cycle(stage));

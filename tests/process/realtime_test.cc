@@ -58,9 +58,9 @@ TEST_CASE("the loop closes in real time") {
   CHECK(until([&] { return distributions.newest().iteration == 1; }, 120));
   replayed.Signal(SIGTERM);
   CHECK(replayed.WaitFor(60));
-  const std::string live = Read(stage.folder / "run" / "calibration" / "distribution_1.json");
+  const std::string live = Read(stage.folder / "run" / "calibration" / "posterior_1.json");
   REQUIRE_FALSE(live.empty());
-  CHECK(live == Read(stage.folder / "replayed" / "distribution_1.json"));
+  CHECK(live == Read(stage.folder / "replayed" / "posterior_1.json"));
 }
 
 TEST_CASE("Ctrl-C stops everything within a second") {

@@ -10,6 +10,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "common/time_units.h"
 #include "controller/policy.h"
 
 namespace plumb {
@@ -106,7 +107,7 @@ void Stage::Kill(const std::string& name) {
 }
 
 void Stage::Stall(const std::string& name, double seconds) {
-  coordinator->Stall(name, static_cast<int64_t>(seconds * 1e6));
+  coordinator->Stall(name, Microseconds(seconds));
 }
 
 std::filesystem::path Stage::UseKey() {
@@ -118,7 +119,7 @@ std::filesystem::path Stage::UseKey() {
 }
 
 bool Stage::WaitUntil(const std::function<bool()>& so, double seconds) {
-  const int64_t deadline = clock.Now() + static_cast<int64_t>(seconds * 1e6);
+  const int64_t deadline = clock.Now() + Microseconds(seconds);
   for (;;) {
     if (coordinator) {
       coordinator->participant().Wait(deadline, Participant::Wake::kWhenHeard);

@@ -17,12 +17,11 @@ RobotDescription Robot() {
 
 parameter_distribution_t TwoComponents() {
   ParameterDistribution distribution = ParameterDistribution::Prior(Robot());
-  ParameterDistribution::Component second = distribution.components[0];
-  distribution.components[0].weight = .25;
-  second.weight = .75;
+  Gaussian second = distribution.mixture.components[0];
+  distribution.mixture.weights = {.25, .75};
   second.mean << std::log(9.), .3;
   second.covariance << .04, .006, .006, .01;
-  distribution.components.push_back(second);
+  distribution.mixture.components.push_back(second);
   distribution.iteration = 3;
   return distribution.ToMessage();
 }
@@ -79,8 +78,8 @@ TEST_CASE("A logit parameter's moments, samples and code") {
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   CHECK(distribution.ToMessage().coordinate[1] == 2);
   for (const double sd : {.01, .5, 2.}) {
-    distribution.components[0].mean[1] = .4;
-    distribution.components[0].covariance(1, 1) = sd * sd;
+    distribution.mixture.components[0].mean[1] = .4;
+    distribution.mixture.components[0].covariance(1, 1) = sd * sd;
     double mean = 0, square = 0, total = 0;
     constexpr int kCells = 200000;
     for (int i = 0; i < kCells; ++i) {
@@ -111,7 +110,7 @@ TEST_CASE("A singular covariance is sampled on its subspace") {
   Random random(5);
   for (int i = 0; i < 20; ++i) {
     const Eigen::VectorXd offset =
-        distribution.SampleCoordinates(random) - distribution.components[0].mean;
+        distribution.SampleCoordinates(random) - distribution.mixture.components[0].mean;
     CHECK(offset[0] == Approx(2 * offset[1]).margin(1e-7));
   }
 }

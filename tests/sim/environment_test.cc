@@ -36,7 +36,7 @@ TEST_CASE("an episode of gym.toml is gym's") {
     const double reward = -(angle * angle + 0.1 * v * v + 0.001 * u * u);
     v = std::clamp(v + 0.05 * (15 * std::sin(q) + 3 * u), -8.0, 8.0);
     q += 0.05 * v;
-    const Environment::StepResult result = environment.Step(Action(action));
+    const StepResult result = environment.Step(Action(action));
     CHECK(result.reward == Approx(reward).epsilon(1e-9));
     CHECK_FALSE(result.terminated);
     REQUIRE(std::abs(environment.q()[0] - q) < 1e-9);

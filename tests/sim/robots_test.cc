@@ -85,7 +85,7 @@ TEST_CASE("the hopper pays for the way it makes") {
   q << 7, 3, 0, -0.1, -0.1, 0;  // in the air
   v[0] = 2;
   environment.SetState(q, v);
-  const Environment::StepResult result = environment.Step(Eigen::Vector3f(0.5f, -3, 0));
+  const StepResult result = environment.Step(Eigen::Vector3f(0.5f, -3, 0));
   CHECK(result.reward == Approx((environment.q()[0] - 7) / 0.008 + 1 - 1e-3 * 1.25).epsilon(1e-9));
   CHECK(environment.effort() == (Eigen::VectorXd(6) << 0, 0, 0, 100, -200, 0).finished());
   CHECK_FALSE(result.terminated);

@@ -12,8 +12,9 @@ TEST_CASE("Advantages are the sum of discounted differences, written out") {
   const std::vector<double> rewards = {1, -2, 3, .5}, values = {.3, .7, -.2, 1.1};
   const double final_value = 2;
   for (const bool terminated : {false, true}) {
-    const std::vector<EpisodeSpan> episodes = {{0, 4, terminated, final_value}};
-    const Advantages result = EstimateAdvantages(rewards, values, episodes, kGamma, kLambda);
+    const std::vector<EpisodeSpan> episodes = {{0, 4, terminated}};
+    const Advantages result =
+        EstimateAdvantages(rewards, values, episodes, std::vector{final_value}, kGamma, kLambda);
     for (size_t t = 0; t < 4; ++t) {
       double expected = 0;
       for (size_t l = t; l < 4; ++l) {
@@ -32,19 +33,20 @@ TEST_CASE("Where the values are right, the time limit leaves no trace") {
   // limit.
   const double value = 1 / (1 - kGamma);
   const std::vector<double> rewards(7, 1), values(7, value);
-  const Advantages cut = EstimateAdvantages(
-      rewards, values, std::vector<EpisodeSpan>{{0, 7, false, value}}, kGamma, kLambda);
+  const Advantages cut =
+      EstimateAdvantages(rewards, values, std::vector<EpisodeSpan>{{0, 7, false}},
+                         std::vector{value}, kGamma, kLambda);
   for (const double advantage : cut.advantage) CHECK(advantage == Approx(0).margin(1e-12));
   const Advantages ended = EstimateAdvantages(
-      rewards, values, std::vector<EpisodeSpan>{{0, 7, true, value}}, kGamma, kLambda);
+      rewards, values, std::vector<EpisodeSpan>{{0, 7, true}}, std::vector{value}, kGamma, kLambda);
   CHECK(ended.advantage[6] == Approx(1 - value));
 }
 
 TEST_CASE("Nothing flows from one episode into another") {
   const std::vector<double> rewards = {1, 2, 3, 4}, values = {0, 0, 0, 0};
-  const Advantages both = EstimateAdvantages(
-      rewards, values, std::vector<EpisodeSpan>{{0, 2, false, 5}, {2, 4, true, 9}}, kGamma,
-      kLambda);
+  const Advantages both =
+      EstimateAdvantages(rewards, values, std::vector<EpisodeSpan>{{0, 2, false}, {2, 4, true}},
+                         std::vector{5., 9.}, kGamma, kLambda);
   CHECK(both.advantage[1] == Approx(2 + kGamma * 5));
   CHECK(both.advantage[0] == Approx(1 + kGamma * kLambda * both.advantage[1]));
   CHECK(both.advantage[3] == Approx(4));

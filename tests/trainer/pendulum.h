@@ -24,7 +24,7 @@ class GymPendulum : public Simulation {
     observation << static_cast<float>(std::cos(angle_)), static_cast<float>(std::sin(angle_)),
         static_cast<float>(speed_);
   }
-  Outcome Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
+  StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
     const double g = parameters_[0], m = parameters_[1], l = parameters_[2];
     const double torque = 2 * std::clamp(double{action[0]}, -1., 1.);
     const double wrapped = std::remainder(angle_, 2 * M_PI);

@@ -21,12 +21,12 @@ class FragilePendulum : public GymPendulum {
     if (parameters[0] < 9.2) throw std::invalid_argument("no such simulator");
     GymPendulum::Reset(parameters, random);
   }
-  Outcome Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
-    Outcome outcome = GymPendulum::Step(action);
+  StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
+    StepResult result = GymPendulum::Step(action);
     Eigen::VectorXf observation(3);
     Observe(observation);
-    outcome.terminated = std::abs(observation[2]) > 5;
-    return outcome;
+    result.terminated = std::abs(observation[2]) > 5;
+    return result;
   }
 };
 

@@ -19,7 +19,7 @@ RobotDescription Robot(const std::string& name, double position_noise, double ve
 
 Eigen::VectorXd Nominal(const RobotDescription& robot) {
   ParameterDistribution prior = ParameterDistribution::Prior(robot);
-  return prior.ToPhysical(prior.components[0].mean);
+  return prior.ToPhysical(prior.mixture.components[0].mean);
 }
 
 // What a policy is told over an episode of no action, a column for each step.

@@ -43,7 +43,7 @@ class Fragile : public Simulation {
     observation.setConstant(static_cast<float>(step_));
     if (fails_ && break_ == Break::kObservation && step_ == 2) observation[1] = NAN;
   }
-  Outcome Step(const Eigen::Ref<const Eigen::VectorXf>&) override {
+  StepResult Step(const Eigen::Ref<const Eigen::VectorXf>&) override {
     ++step_;
     return {fails_ && break_ == Break::kReward && step_ == 3 ? NAN : 1., step_ >= length_};
   }
@@ -80,6 +80,7 @@ TEST_CASE(
   RolloutSampler rollout(MakeGymPendulum, kShape, workers);
   const GaussianPolicy policy = SomePolicy();
   const Batch batch = rollout.Collect(policy, RandomParameters, 600, 1, 7, 1, 2);
+  double total = 0;
   for (int e = 0; e < 3; ++e) {
     Random random(7, {1, 2, static_cast<uint32_t>(e)});
     GymPendulum pendulum;
@@ -92,18 +93,18 @@ TEST_CASE(
       pendulum.Observe(observation);
       REQUIRE(policy.Normalize(observation) ==
               Eigen::Map<const Eigen::Vector3f>(&batch.observations[3 * at]));
-      const Simulation::Outcome outcome =
-          pendulum.Step(Eigen::VectorXf::Constant(1, batch.actions[at]));
-      REQUIRE(outcome.reward == batch.rewards[at]);
-      sum += outcome.reward;
+      const StepResult result = pendulum.Step(Eigen::VectorXf::Constant(1, batch.actions[at]));
+      REQUIRE(result.reward == batch.rewards[at]);
+      sum += result.reward;
     }
     pendulum.Observe(observation);
     const auto episode = static_cast<size_t>(e);
     CHECK(policy.Normalize(observation) ==
           Eigen::Map<const Eigen::Vector3f>(&batch.final_observations[3 * episode]));
-    CHECK(batch.episodes[episode].sum == Approx(sum));
+    total += sum;
     CHECK_FALSE(batch.episodes[episode].terminated);  // the time limit is no termination
   }
+  CHECK(batch.mean_return == Approx(total / 3));
 }
 
 TEST_CASE("Actions scatter about the policy's mean by its deviation") {
@@ -135,7 +136,7 @@ TEST_CASE(
     const Batch batch = rollout.Collect(SomePolicy(), UniformParameter, 300, 1, 7, 1, 2);
     CHECK(batch.size() >= 300);
     CHECK(batch.size() < 450);  // how many were needed had to be guessed from the first few
-    for (const Batch::Episode& episode : batch.episodes) {
+    for (const EpisodeSpan& episode : batch.episodes) {
       CHECK(episode.terminated);
       CHECK(episode.sum == episode.end - episode.begin);
     }
@@ -154,7 +155,7 @@ TEST_CASE("What is not finite is dropped with its episode and counted") {
     CHECK(batch.size() >= 1000);
     for (const double reward : batch.rewards) REQUIRE(reward == 1);
     for (const float value : batch.observations) REQUIRE(std::isfinite(value));
-    for (const Batch::Episode& episode : batch.episodes) CHECK(episode.end - episode.begin >= 8);
+    for (const EpisodeSpan& episode : batch.episodes) CHECK(episode.end - episode.begin >= 8);
   }
 }
 

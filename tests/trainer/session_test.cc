@@ -143,7 +143,7 @@ TEST_CASE("A newer distribution of the iteration takes effect at the next batch"
   }
   CHECK_FALSE(session.Replace(newer));  // a repeat
   newer.iteration = 1;
-  newer.components[0].mean[0] += 1;
+  newer.mixture.components[0].mean[0] += 1;
   CHECK_FALSE(session.Replace(newer));
   newer.iteration = 0;
   REQUIRE(session.Replace(newer));
@@ -151,7 +151,7 @@ TEST_CASE("A newer distribution of the iteration takes effect at the next batch"
   CHECK(session.Policy(1).weight == undisturbed.Policy(1).weight);
   for (TrainingSession* s : {&session, &undisturbed}) s->Advance();
   CHECK(session.Policy(1).weight != undisturbed.Policy(1).weight);
-  CHECK(session.MakeCheckpoint().distribution.mean[0] == newer.components[0].mean[0]);
+  CHECK(session.MakeCheckpoint().distribution.mean[0] == newer.mixture.components[0].mean[0]);
   TrainToTheEnd(session);
   CHECK_FALSE(session.Replace(Distribution(0)));  // its policy is out
 }

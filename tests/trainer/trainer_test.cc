@@ -67,7 +67,7 @@ class Endless : public Simulation {
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override {
     observation[0] = observation_;
   }
-  Outcome Step(const Eigen::Ref<const Eigen::VectorXf>&) override { return {-1, false}; }
+  StepResult Step(const Eigen::Ref<const Eigen::VectorXf>&) override { return {-1, false}; }
 
  private:
   float observation_ = 0;
@@ -164,7 +164,7 @@ TEST_CASE("Learning from the worst episodes makes the worst simulators better") 
       rich_ = parameters[0] > .5;
     }
     void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override { observation[0] = 1; }
-    Outcome Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
+    StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
       const double a = std::clamp(double{action[0]}, -1., 1.);
       return {rich_ ? 2 + 2 * a : -a, false};
     }
@@ -202,7 +202,7 @@ TEST_CASE("Rewards and states beyond all bounds never make weights that are no n
       Endless::Observe(observation);
       if (kind_ == 1) observation[0] *= 1e30f;
     }
-    Outcome Step(const Eigen::Ref<const Eigen::VectorXf>&) override {
+    StepResult Step(const Eigen::Ref<const Eigen::VectorXf>&) override {
       return {kind_ == 2 ? 1e300 : kind_ == 3 ? -1e200 : kind_ == 4 ? NAN : 1, false};
     }
 

@@ -51,7 +51,7 @@ struct LeftFactor {
   ptrdiff_t stride;
 };
 
-/// What the product is added to.
+/// The summand of a product: nothing, the bias, or C as it is.
 enum class Onto { kZero, kBias, kItself };
 
 /// C = onto + A B with A (m x k), B (k x n), C (m x n). The sums over k are taken in order, one

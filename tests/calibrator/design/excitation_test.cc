@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "calibrator/live/simopt.h"
 #include "calibrator/motion/state_noise.h"
+#include "robot/parameter_distribution.h"
 #include "sim/simulator.h"
 #include "tests/calibrator/fitted_log.h"
 
@@ -142,11 +142,11 @@ TEST_CASE("advice is for what the posterior has left open") {
   posterior.covariance.diagonal().tail(2) *= 1e-6;
   found.weak = {{Eigen::Vector3d::UnitX(), 0.99}};
   const MotionAdvice advice = AdviseMotion(robot, posterior, found, Few(11, 3));
-  INFO(advice.words);
+  INFO(advice.summary);
   REQUIRE(!advice.rated.empty());
   for (const RatedExcitation& one : advice.rated) CHECK(advice.rated[0].sd(0) <= one.sd(0) * 1.3);
-  CHECK_THAT(advice.words, Catch::Contains("of what is hardly determined: helps with gravity"));
-  CHECK_THAT(advice.words, Catch::Contains("hardly with mass/pole, length/pole"));
+  CHECK_THAT(advice.summary, Catch::Contains("of what is hardly determined: helps with gravity"));
+  CHECK_THAT(advice.summary, Catch::Contains("hardly with mass/pole, length/pole"));
 }
 
 TEST_CASE("smoothed states are better known than measured ones, and worse with a worse sensor") {

@@ -194,12 +194,12 @@ TEST_CASE(
     "latency does") {
   const RobotDescription robot = Pendulum();
   const Misspecification right = FittedLog(robot, Rollouts(robot)).Find();
-  INFO(right.words);
+  INFO(right.summary);
   CHECK_FALSE(right.alarm);
   const Misspecification wrong = FittedLog(robot, Rollouts(robot, {.latency = true})).Find();
-  INFO(wrong.words);
+  INFO(wrong.summary);
   CHECK(wrong.alarm);
-  CHECK_THAT(wrong.words, Catch::Contains("delay/pivot 0.007"));
+  CHECK_THAT(wrong.summary, Catch::Contains("delay/pivot 0.007"));
 }
 
 }  // namespace

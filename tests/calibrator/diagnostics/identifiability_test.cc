@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "calibrator/diagnostics/sparse_basis.h"
-#include "calibrator/live/simopt.h"
 #include "common/decompositions.h"
+#include "robot/parameter_distribution.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/synthetic.h"
 
@@ -74,7 +74,7 @@ TEST_CASE("of forty parameters those coupled are found, and nothing else is said
   Eigen::MatrixXd combinations(static_cast<Eigen::Index>(rows.size()), n);
   for (size_t i = 0; i < rows.size(); ++i) combinations.row(static_cast<Eigen::Index>(i)) = rows[i];
   const Identifiability found = FindFrom(WithParameters(40), InformationOf(combinations, 100));
-  INFO(found.words);
+  INFO(found.summary);
   REQUIRE(found.null.size() == 3);
   CHECK(Has(found.null, Powers(n, {{3, 1}})));
   CHECK(Has(found.null, Powers(n, {{5, 2}, {7, -1}, {11, -1}})));
@@ -89,9 +89,9 @@ TEST_CASE("of forty parameters those coupled are found, and nothing else is said
     for (const Eigen::VectorXd& direction : found.null)
       CHECK(std::abs(direction.dot(combination.power)) < 1e-9);
   }
-  CHECK_THAT(found.words, Catch::StartsWith("only 28 parameters on their own and "));
-  CHECK_THAT(found.words, Catch::Contains("; a3 has no effect on this motion"));
-  CHECK_THAT(found.words, Catch::Contains("(a5 +2 %, a7 -1 %, a11 -1 %) changes nothing"));
+  CHECK_THAT(found.summary, Catch::StartsWith("only 28 parameters on their own and "));
+  CHECK_THAT(found.summary, Catch::Contains("; a3 has no effect on this motion"));
+  CHECK_THAT(found.summary, Catch::Contains("(a5 +2 %, a7 -1 %, a11 -1 %) changes nothing"));
   for (const int i : {3, 5, 7, 11, 20, 27})
     CHECK(found.cramer_rao(i) == std::numeric_limits<double>::infinity());
   const Eigen::MatrixXd information = InformationOf(combinations, 100);
@@ -120,13 +120,13 @@ TEST_CASE("what is hardly determined is told, with what is left of the prior's s
   Eigen::Vector3d information(1e4, 1e4, 0.16);  // in units of the prior
   SECTION("a parameter") {
     const Identifiability found = FindFrom(robot, (information / variance).asDiagonal());
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.null.empty());
     CHECK(found.combinations.size() == 3);
     REQUIRE(found.weak.size() == 1);
     CHECK(found.weak[0].direction == Powers(3, {{2, 1}}));
     CHECK(found.weak[0].sd_ratio == Approx(1 / std::sqrt(1.16)));
-    CHECK_THAT(found.words,
+    CHECK_THAT(found.summary,
                Catch::Contains("a2 is hardly determined: posterior sd is 93 % of the prior's"));
     CHECK(found.cramer_rao(2) == Approx(std::sqrt(variance / 0.16)));
   }
@@ -135,23 +135,24 @@ TEST_CASE("what is hardly determined is told, with what is left of the prior's s
     axes.bottomRightCorner(2, 2) << std::sqrt(0.5), std::sqrt(0.5), std::sqrt(0.5), -std::sqrt(0.5);
     const Identifiability found =
         FindFrom(robot, axes * (information / variance).asDiagonal() * axes.transpose());
-    INFO(found.words);
+    INFO(found.summary);
     REQUIRE(found.weak.size() == 1);
     CHECK(std::abs(found.weak[0].direction(0)) < 1e-9);
     CHECK(found.weak[0].direction(1) * found.weak[0].direction(2) == Approx(-1));
-    CHECK_THAT(found.words, Catch::Contains("changes little: posterior sd is 93 % of the prior's"));
+    CHECK_THAT(found.summary,
+               Catch::Contains("changes little: posterior sd is 93 % of the prior's"));
   }
   SECTION("nothing is weak") {
     information(2) = 2;
     const Identifiability found = FindFrom(robot, (information / variance).asDiagonal());
     CHECK(found.weak.empty());
-    CHECK(found.words == "every parameter is determined by this motion");
+    CHECK(found.summary == "every parameter is determined by this motion");
   }
   SECTION("no motion at all") {
     const Identifiability found = FindFrom(robot, Eigen::Matrix3d::Zero());
     CHECK(found.null.size() == 3);
     CHECK(found.combinations.empty());
-    CHECK(found.words ==
+    CHECK(found.summary ==
           "nothing can be known from this motion; a0, a1, a2 have no effect on this motion");
   }
 }
@@ -171,10 +172,10 @@ TEST_CASE("linear parameters move in their unit") {
   Eigen::MatrixXd combination(1, 2);
   combination << 0.5, 1;  // ln a0 / 2 + x
   const Identifiability found = FindFrom(robot, InformationOf(combination, 10));
-  INFO(found.words);
+  INFO(found.summary);
   REQUIRE(found.null.size() == 1);
-  CHECK_THAT(found.words, Catch::Contains("(a0 +2 %, com -0.01 m) changes nothing") ||
-                              Catch::Contains("(a0 +1 %, com -0.005 m) changes nothing"));
+  CHECK_THAT(found.summary, Catch::Contains("(a0 +2 %, com -0.01 m) changes nothing") ||
+                                Catch::Contains("(a0 +1 %, com -0.005 m) changes nothing"));
 }
 
 TEST_CASE("the base's mass has no effect on the hopper, and all others are known") {
@@ -186,7 +187,7 @@ TEST_CASE("the base's mass has no effect on the hopper, and all others are known
   const std::vector<Rollout> rollouts = RandomLog(robot, {}, 60, 4);
   const Identifiability found =
       FindIdentifiability(robot, discrepancy, rollouts, PriorGaussian(robot));
-  CHECK(found.words ==
+  CHECK(found.summary ==
         "every other parameter is determined by this motion; mass/world has no effect on this "
         "motion");
   REQUIRE(found.null.size() == 1);
@@ -199,10 +200,10 @@ TEST_CASE("a parameter at the border of what is physical does not hide what cann
   for (const char* name : {"friction/pivot", "delay/pivot"}) {
     const Identifiability found =
         Find({name, "", Coordinate::kLinear, 0, 1e-6}, Eigen::Vector4d(10, 1, 1, 1e-3));
-    INFO(name << ": " << found.words);
+    INFO(name << ": " << found.summary);
     CHECK(found.information.allFinite());
     CHECK(found.null.size() == 1);
-    CHECK_THAT(found.words,
+    CHECK_THAT(found.summary,
                Catch::Contains("gravity, mass, length are not identifiable separately"));
   }
 }
@@ -234,7 +235,7 @@ TEST_CASE("where simulation fails nothing is said to be known") {
   const Identifiability blind =
       FindIdentifiability(robot, discrepancy, rollouts, PriorGaussian(robot));
   CHECK(blind.combinations.empty());
-  CHECK_THAT(blind.words, Catch::Contains("fails"));
+  CHECK_THAT(blind.summary, Catch::Contains("fails"));
 }
 
 }  // namespace plumb

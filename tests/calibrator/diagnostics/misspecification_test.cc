@@ -11,8 +11,8 @@
 
 #include "calibrator/diagnostics/error_tests.h"
 #include "calibrator/diagnostics/projected_errors.h"
-#include "calibrator/inference/gaussian.h"
 #include "calibrator/motion/touch.h"
+#include "common/gaussian.h"
 #include "tests/calibrator/fitted_log.h"
 
 namespace plumb {
@@ -45,14 +45,14 @@ Misspecification Diagnose(const RobotDescription& robot, const Truth& truth, int
 TEST_CASE("what a model gets wrong is named, and a right model is left in peace") {
   const RobotDescription robot = Robot("hopper");
   const Misspecification right = Diagnose(robot, {}, 400, 7);
-  INFO(right.words);
+  INFO(right.summary);
   CHECK_FALSE(right.alarm);
   CHECK(right.misfits.empty());
   for (const Wrong& wrong : WrongModels()) {
     const Misspecification found = Diagnose(robot, wrong.truth, 400, 7);
-    INFO(wrong.name << ": " << found.words);
+    INFO(wrong.name << ": " << found.summary);
     CHECK(found.alarm);
-    CHECK_THAT(found.words, Catch::StartsWith("the model cannot explain this log: "));
+    CHECK_THAT(found.summary, Catch::StartsWith("the model cannot explain this log: "));
     REQUIRE(!found.misfits.empty());
     CHECK_THAT(found.misfits[0].what, Catch::StartsWith(wrong.name));
     CHECK(found.misfits[0].test == "structure");
@@ -66,12 +66,12 @@ TEST_CASE("what a model gets wrong is named, and a right model is left in peace"
 
 TEST_CASE("how much larger a parameter would have to be is told") {
   const Misspecification found = Diagnose(Robot("hopper"), {{{"inertia/torso", 1.2}}}, 400, 8);
-  INFO(found.words);
-  CHECK_THAT(found.words,
+  INFO(found.summary);
+  CHECK_THAT(found.summary,
              Catch::Matches(".*inertia/torso (19|20|21) % larger would explain [0-9]+ % of it.*"));
   const Misspecification slow = Diagnose(Robot("hopper"), {{{"delay/thigh", 0.002}}}, 400, 8);
-  INFO(slow.words);
-  CHECK_THAT(slow.words, Catch::Matches(".*delay/thigh 0.002[0-9]* s larger would explain.*"));
+  INFO(slow.summary);
+  CHECK_THAT(slow.summary, Catch::Matches(".*delay/thigh 0.002[0-9]* s larger would explain.*"));
 }
 
 TEST_CASE(
@@ -81,8 +81,8 @@ TEST_CASE(
   for (const bool shared : {false, true}) {
     const Truth truth{{}, shared ? 1e-3 : 0, 1e-3};
     FittedLog log(robot, RandomLog(robot, truth, 250, 3));
-    log.leftover.rollouts = log.rollouts;
-    log.leftover.rows = log.rows;
+    log.residuals.rollouts = log.rollouts;
+    log.residuals.rows = log.rows;
     std::map<std::string, std::vector<double>> p;
     Random random(5, {shared});
     const auto n = static_cast<Eigen::Index>(log.rows.size()),
@@ -91,15 +91,15 @@ TEST_CASE(
       // Of a state that two transitions share each coordinate's error appears in both: -1/2 of the
       // variance.
       const Eigen::MatrixXd noise = StandardNormals(n + width, 1, random);
-      log.leftover.errors = shared
-                                ? ((noise.topRows(n) - noise.bottomRows(n)) / std::sqrt(2)).eval()
-                                : noise.topRows(n).eval();
-      log.leftover.jacobian = StandardNormals(n, 4, random);
+      log.residuals.errors = shared
+                                 ? ((noise.topRows(n) - noise.bottomRows(n)) / std::sqrt(2)).eval()
+                                 : noise.topRows(n).eval();
+      log.residuals.jacobian = StandardNormals(n, 4, random);
       for (const bool known : {true, false}) {
-        log.leftover.noise_known.assign(12, known);
-        const ProjectedErrors errors(log.known, log.leftover);
+        log.residuals.noise_known.assign(12, known);
+        const ProjectedErrors errors(log.known, log.residuals);
         REQUIRE(errors.conditions);
-        for (const Misfit& test : TestScale(errors, log.leftover.noise_known)) {
+        for (const Misfit& test : TestScale(errors, log.residuals.noise_known)) {
           p[known ? "scale" : "heteroscedasticity"].push_back(test.p);
         }
         for (const auto& tests :
@@ -139,12 +139,12 @@ class Spoilt {
   Misspecification Find(bool noise_known, const Spoil& spoil) {
     Random random(2);
     FittedLog log = Right();
-    log.leftover.noise_known.assign(12, noise_known);
+    log.residuals.noise_known.assign(12, noise_known);
     for (size_t i = 0; i < log.rows.size(); ++i) {
       const WindowErrors::Row& row = log.rows[i];
       const Transition& t = log.rollouts[static_cast<size_t>(row.rollout)]
                                 .transitions[static_cast<size_t>(row.transition)];
-      double& error = log.leftover.errors(static_cast<Eigen::Index>(i));
+      double& error = log.residuals.errors(static_cast<Eigen::Index>(i));
       error = spoil(error, row.coordinate, row.window, FindTouch(log.known, t).any(), random);
     }
     return log.Find();
@@ -167,7 +167,7 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
   SECTION("nothing wrong") {
     for (const bool known : {true, false}) {
       const auto found = Find(known, [](double e, auto...) { return e; });
-      INFO(found.words);
+      INFO(found.summary);
       CHECK_FALSE(found.alarm);
       CHECK(found.misfits.empty());
     }
@@ -175,7 +175,7 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
   SECTION("scale") {
     const auto found =
         Find(true, [](double e, int c, auto...) { return c % 6 == 4 ? 1.7 * e : e; });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK(has(found, "scale", "leg", "free"));
     CHECK_FALSE(has(found, "scale", "thigh", "free"));
@@ -187,14 +187,14 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     const auto found = Find(false, [](double e, int c, int, bool contact, auto&) {
       return c == 3 && contact ? 2 * e : e;
     });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK(has(found, "scale", "thigh", "contact"));
-    CHECK(found.words.find("position of thigh") != std::string::npos);
+    CHECK(found.summary.find("position of thigh") != std::string::npos);
   }
   SECTION("bias") {
     const auto found = Find(true, [](double e, int c, auto...) { return c == 11 ? e + 0.5 : e; });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK((has(found, "bias", "foot", "free") || has(found, "bias", "foot", "contact") ||
            found.misfits[0].joint == "foot"));
@@ -203,7 +203,7 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     double last = 0;
     const auto found = Find(
         true, [&](double e, int c, auto...) { return c == 10 ? last = 0.6 * last + 0.8 * e : e; });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK(has(found, "whiteness", "leg", ""));
   }
@@ -214,36 +214,36 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
     const auto found = Find(true, [](double e, int c, int step, auto...) {
       return c == 9 && step % 200 == 17 ? e + 100 : e;
     });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK_FALSE(found.alarm);
     REQUIRE(!found.misfits.empty());
     for (const Misfit& misfit : found.misfits) {
       CHECK(misfit.test == "outliers");
       CHECK(misfit.joint == "thigh");
     }
-    CHECK_THAT(found.words, Catch::Contains("outliers"));
+    CHECK_THAT(found.summary, Catch::Contains("outliers"));
   }
   SECTION("heavy tails") {
     const auto found = Find(true, [](double e, int c, int, bool, Random& random) {
       return c == 9 && random.Uniform() < 0.1 ? 20 * e : e;
     });
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK((has(found, "outliers", "thigh", "free") || has(found, "outliers", "thigh", "contact")));
   }
   SECTION("dependence on the state that no candidate has") {
     FittedLog log = Right();
-    log.leftover.candidates.clear();
-    log.leftover.columns.resize(log.leftover.errors.size(), 0);
+    log.residuals.candidates.clear();
+    log.residuals.columns.resize(log.residuals.errors.size(), 0);
     for (size_t i = 0; i < log.rows.size(); ++i) {
       const WindowErrors::Row& row = log.rows[i];
       const auto& t = log.rollouts[static_cast<size_t>(row.rollout)]
                           .transitions[static_cast<size_t>(row.transition)];
       if (row.coordinate == 9)
-        log.leftover.errors(static_cast<Eigen::Index>(i)) += 0.5 * (t.v(3) > 0 ? 1 : -1);
+        log.residuals.errors(static_cast<Eigen::Index>(i)) += 0.5 * (t.v(3) > 0 ? 1 : -1);
     }
     const auto found = log.Find();
-    INFO(found.words);
+    INFO(found.summary);
     CHECK(found.alarm);
     CHECK(has(found, "structure", "thigh", ""));
   }
@@ -252,9 +252,9 @@ TEST_CASE_METHOD(Spoilt, "each way of being wrong has its test") {
 TEST_CASE("errors that are not finite are an alarm, and sizes have to fit") {
   FittedLog log(Robot("pendulum"), RandomLog(Robot("pendulum"), {}, 50, 1));
   CHECK_FALSE(log.Find().alarm);
-  log.leftover.errors(3) = std::numeric_limits<double>::quiet_NaN();
+  log.residuals.errors(3) = std::numeric_limits<double>::quiet_NaN();
   CHECK(log.Find().alarm);
-  log.leftover.errors.conservativeResize(7);
+  log.residuals.errors.conservativeResize(7);
   CHECK_THROWS_AS(log.Find(), std::invalid_argument);
 }
 
@@ -321,10 +321,11 @@ TEST_CASE("the alarm on logs of right and wrong models, measured", "[.slow]") {
       at_contact += !found.misfits.empty() && found.misfits[0].condition == "contact" &&
                     std::none_of(found.misfits.begin(), found.misfits.end(),
                                  [](const Misfit& m) { return m.condition == "free"; });
-      named += found.words.find(wrong.name) != std::string::npos;
-      if (log == 0 || (wrong.name[0] != 'r' && found.words.find(wrong.name) == std::string::npos) ||
+      named += found.summary.find(wrong.name) != std::string::npos;
+      if (log == 0 ||
+          (wrong.name[0] != 'r' && found.summary.find(wrong.name) == std::string::npos) ||
           (wrong.name[0] == 'r' && found.alarm))
-        words += found.words + "\n";
+        words += found.summary + "\n";
     }
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     std::cout << fmt::format("{}: {} alarms of {}, first {}, named {}, {:.1f} s\n{}", wrong.name,

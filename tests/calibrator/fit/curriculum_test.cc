@@ -222,7 +222,7 @@ TEST_CASE("a curriculum has the same bits with any number of threads") {
       RandomRollouts(robot, RandomMasses(robot, 8), 200, kNoise, 8);
   CurriculumOptions options;
   const CurriculumFit one = FitCurriculum(model, rollouts, options);
-  options.workforce = 2;
+  options.execution = 2;
   const CurriculumFit two = FitCurriculum(model, rollouts, options);
   CHECK(one.fit.mode == two.fit.mode);
   CHECK(one.fit.posterior.covariance == two.fit.posterior.covariance);

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "calibrator/fit/curriculum.h"
-#include "calibrator/live/simopt.h"
+#include "robot/parameter_distribution.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/synthetic.h"
 

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "calibrator/inference/gaussian.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 namespace {

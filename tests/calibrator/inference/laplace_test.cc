@@ -390,10 +390,10 @@ TEST_CASE("no iteration at all looks at the start as it is") {
   const Eigen::MatrixXd a = Normals(100, 3, 15);
   const Eigen::Vector3d at(1, -1, 0.5);
   const Eigen::VectorXd y = a * Eigen::Vector3d(2, -0.5, 0.7) + Normals(100, 1, 16);
-  LaplaceOptions still;
-  still.most_iterations = 0;
-  still.robust = still.sandwich = false;
-  const LaplaceFit fit = FitLaplace(Line(prior, y, a), at, still);
+  LaplaceOptions curvature_only;
+  curvature_only.max_iterations = 0;
+  curvature_only.robust = curvature_only.sandwich = false;
+  const LaplaceFit fit = FitLaplace(Line(prior, y, a), at, curvature_only);
   CHECK((fit.mode - at).norm() < 1e-12);
   const Eigen::VectorXd errors = a * at - y;
   const double s = fit.scale(0);

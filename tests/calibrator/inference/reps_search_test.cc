@@ -33,171 +33,99 @@ TEST_CASE("with log-likelihoods, policy search comes to rest at the posterior") 
   const Gaussian truth = likelihood.Posterior();
   const Eigen::Array3d sd = truth.covariance.diagonal().array().sqrt();
   RepsOptions options;
-  options.updates = 120;
-  const auto check = [&](const RepsRun& run, double mean, double width) {
-    CHECK(((run.distribution.mean - truth.mean).array() / sd).abs().maxCoeff() < mean);
+  for (const uint64_t seed : {1, 2, 3, 4, 5}) {
+    options.seed = seed;
+    const RepsState run = SearchByReps(likelihood.prior, likelihood, options, 120);
+    CHECK(((run.distribution.mean - truth.mean).array() / sd).abs().maxCoeff() < 0.1);
     const Eigen::Array3d ratio = run.distribution.covariance.diagonal().array().sqrt() / sd;
-    CHECK(ratio.maxCoeff() < 1 + width);
-    CHECK(ratio.minCoeff() > 1 - width);
+    CHECK(ratio.maxCoeff() < 1.2);
+    CHECK(ratio.minCoeff() > 0.8);
     const double correlation =
         run.distribution.covariance(0, 1) /
         std::sqrt(run.distribution.covariance(0, 0) * run.distribution.covariance(1, 1));
-    CHECK(correlation == Approx(truth.covariance(0, 1) / (sd(0) * sd(1))).margin(width));
-  };
-  for (const uint64_t seed : {1, 2, 3, 4, 5}) {
-    options.seed = seed;
-    const RepsRun run = RepsSearch(likelihood.prior, likelihood, options);
-    check(run, 0.1, 0.2);
+    CHECK(correlation == Approx(truth.covariance(0, 1) / (sd(0) * sd(1))).margin(0.2));
     CHECK(run.temperature == 1);
-    CHECK(run.simulations == 120 * 25);
+    CHECK(run.update == 120);
     CHECK(run.failures == 0);
   }
-  // Without the quadratic model it does so up to the samples' noise, hence with more of them.
-  options.surrogate = false;
-  options.samples = 400;
-  check(RepsSearch(likelihood.prior, likelihood, options), 0.25, 0.2);
 }
 
 TEST_CASE("the width at rest is the posterior's even where it is wider than what came before") {
   // A likelihood so flat that the posterior is the prior.
-  RepsOptions options;
-  options.updates = 60;
   const Prior prior({Prior::Normal(2, 3), Prior::Normal(0, 1)});
-  const RepsRun run = RepsSearch(
+  const RepsState run = SearchByReps(
       prior,
       [](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
         return Eigen::VectorXd::Constant(x.cols(), -7);
       },
-      options);
+      {}, 60);
   CHECK((run.distribution.mean - Eigen::Vector2d(2, 0)).norm() < 1e-6);
   CHECK((run.distribution.covariance - Eigen::Matrix2d(Eigen::Vector2d(9, 1).asDiagonal())).norm() <
         1e-6);
   CHECK(run.kl < 1e-9);
 }
 
-// The distribution after each update: a shorter search is the beginning of a longer one.
-std::vector<Gaussian> Path(const Linear& likelihood, RepsOptions options, int updates) {
-  std::vector<Gaussian> path;
-  for (options.updates = 0; options.updates <= updates; ++options.updates) {
-    path.push_back(RepsSearch(likelihood.prior, likelihood, options).distribution);
-  }
-  return path;
+Eigen::VectorXd Bowl(const Eigen::MatrixXd& x) {
+  return (x.colwise() - Eigen::Vector3d(1.8, -2.3, 2)).colwise().squaredNorm().transpose();
 }
 
 TEST_CASE("no update leads the distribution further than the bound") {
   const Linear likelihood;
-  const bool surrogate = GENERATE(false, true);
+  const bool by_likelihood = GENERATE(false, true);
   RepsOptions options;
-  options.surrogate = surrogate;
-  const std::vector<Gaussian> path = Path(likelihood, options, 20);
+  if (!by_likelihood) options.returns = RepsReturns::kUnitRange, options.min_temperature = 0.01;
+  const Gaussian prior = CentralGaussian(likelihood.prior);
+  RepsSearch search(prior, options, {0, prior});
   double sum = 0, farthest = 0;
-  for (size_t i = 1; i < path.size(); ++i) {
-    const double kl = KlDivergence(path[i], path[i - 1]);
+  for (int update = 0; update < 20; ++update) {
+    const Gaussian before = search.state().distribution;
+    const Eigen::MatrixXd x = search.Samples();
+    search.Update(by_likelihood ? likelihood(x) : Bowl(x));
+    const double kl = KlDivergence(search.state().distribution, before);
     sum += kl;
     farthest = std::max(farthest, kl);
   }
   CHECK(farthest <= 0.1 * (1 + 1e-9));
   CHECK(farthest > 0.099);  // nor is it more careful than it need be
-  options.updates = 20;
-  CHECK(RepsSearch(likelihood.prior, likelihood, options).kl == Approx(sum).epsilon(1e-6));
-  // Unbound, only the weights' divergence is kept small, and the distribution's is not.
-  options.bound_distribution = false;
-  const std::vector<Gaussian> free = Path(likelihood, options, 5);
-  farthest = 0;
-  for (size_t i = 1; i < free.size(); ++i)
-    farthest = std::max(farthest, KlDivergence(free[i], free[i - 1]));
-  CHECK(farthest > 0.15);
+  CHECK(search.state().kl == Approx(sum).epsilon(1e-6));
 }
 
-Eigen::VectorXd Bowl(const Eigen::MatrixXd& x) {
-  return (x.colwise() - Eigen::Vector3d(1.8, -2.3, 2)).colwise().squaredNorm().transpose();
-}
-
-TEST_CASE("costs in the unit range are free of units, raw ones are not") {
+TEST_CASE("costs in the unit range are free of units") {
   const Linear likelihood;
   RepsOptions options;
   options.returns = RepsReturns::kUnitRange;
   options.min_temperature = 0.01;
-  const RepsRun run = RepsSearch(likelihood.prior, Bowl, options);
+  const RepsState run = SearchByReps(likelihood.prior, Bowl, options, 40);
   CHECK((run.distribution.mean - Eigen::Vector3d(1.8, -2.3, 2)).norm() < 0.5);
   CHECK(run.distribution.covariance.trace() < 0.5 * 5.25);
-  CHECK(run.weights.sum() == Approx(1));
-  const RepsRun other = RepsSearch(
+  CHECK(run.points.size() == 0);
+  const RepsState other = SearchByReps(
       likelihood.prior,
       [](const Eigen::MatrixXd& x) -> Eigen::VectorXd { return 1e-6 * Bowl(x).array() + 3; },
-      options);
+      options, 40);
   CHECK((run.distribution.mean - other.distribution.mean).norm() < 1e-4);
-  // Raw costs far below the least temperature: all samples count alike.
-  options.returns = RepsReturns::kRaw;
-  const RepsRun tiny = RepsSearch(
-      likelihood.prior, [](const Eigen::MatrixXd& x) -> Eigen::VectorXd { return 1e-6 * Bowl(x); },
-      options);
-  CHECK(tiny.ess == Approx(25).margin(1e-3));
-  CHECK(tiny.temperature == 0.01);
-  // And of a size that suits the temperature, they do select.
-  CHECK((RepsSearch(likelihood.prior, Bowl, options).distribution.mean -
-         Eigen::Vector3d(1.8, -2.3, 2))
-            .norm() < 0.5);
-  options.updates = 1;
-  CHECK(RepsSearch(likelihood.prior, Bowl, options).ess < 23);
-}
-
-TEST_CASE("as many samples count as asked for") {
-  const Linear likelihood;
-  RepsOptions options;
-  options.kl = 1;
-  options.updates = 1;
-  const RepsRun sharp = RepsSearch(likelihood.prior, likelihood, options);
-  options.least_ess = 18;
-  const RepsRun smooth = RepsSearch(likelihood.prior, likelihood, options);
-  CHECK(sharp.ess < 15);
-  CHECK(smooth.ess >= 18);
-  CHECK(smooth.ess < 20);
-  CHECK(smooth.temperature > sharp.temperature);
-  CHECK(smooth.ess == Approx(1 / smooth.weights.squaredNorm()));
-}
-
-TEST_CASE("damping keeps the covariance's shape and scales it as Chebotar does") {
-  RepsOptions options;
-  options.returns = RepsReturns::kUnitRange;
-  options.min_temperature = 0.01;
-  options.kl = 0.5;
-  options.updates = 1;
-  options.bound_distribution = false;
-  const Linear likelihood;
-  const RepsRun plain = RepsSearch(likelihood.prior, Bowl, options);
-  options.damping = 2;
-  const RepsRun damped = RepsSearch(likelihood.prior, Bowl, options);
-  const Eigen::Matrix3d old = Eigen::Vector3d(1, 0.25, 4).asDiagonal();
-  // S' of plain is of the same samples and weights.
-  const double m = (old.inverse() * plain.distribution.covariance).trace() / 3;
-  CHECK(m < 0.95);
-  CHECK((damped.distribution.covariance - std::sqrt(m) * old).norm() < 1e-9);
-  CHECK((damped.distribution.mean - plain.distribution.mean).norm() < 1e-12);
-  CHECK((plain.distribution.mean - plain.samples * plain.weights).norm() < 1e-12);
 }
 
 TEST_CASE("failures are infinitely bad, counted, and teach nothing when they are all there is") {
   const Linear likelihood;
-  for (const RepsReturns returns :
-       {RepsReturns::kRaw, RepsReturns::kUnitRange, RepsReturns::kLogLikelihood}) {
+  for (const RepsReturns returns : {RepsReturns::kUnitRange, RepsReturns::kLogLikelihood}) {
     RepsOptions options;
     options.returns = returns;
-    options.updates = 7;
-    const RepsRun none = RepsSearch(
+    const RepsState none = SearchByReps(
         likelihood.prior,
         [](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
           return Eigen::VectorXd::Constant(x.cols(), std::nan(""));
         },
-        options);
+        options, 7);
+    CHECK(none.update == 7);
     CHECK(none.failures == 7 * 25);
     CHECK(none.distribution.mean == Eigen::Vector3d(1, -2, 3));
     CHECK((none.distribution.covariance - Eigen::Matrix3d(Eigen::Vector3d(1, 0.25, 4).asDiagonal()))
               .norm() < 1e-12);
     CHECK(none.kl == 0);
-    // Below zero the first parameter is no simulator; the weights know.
+    // Below zero the first parameter is no simulator.
     int64_t expected = 0;
-    const RepsRun some = RepsSearch(
+    const RepsState some = SearchByReps(
         likelihood.prior,
         [&](const Eigen::MatrixXd& x) -> Eigen::VectorXd {
           Eigen::VectorXd values = returns == RepsReturns::kLogLikelihood ? likelihood(x) : Bowl(x);
@@ -208,26 +136,37 @@ TEST_CASE("failures are infinitely bad, counted, and teach nothing when they are
           }
           return values;
         },
-        options);
+        options, 7);
     CHECK(expected > 5);
     CHECK(some.failures == expected);
-    for (Eigen::Index i = 0; i < some.weights.size(); ++i) {
-      if (some.samples(0, i) < 0) CHECK(some.weights(i) == 0);
+    for (Eigen::Index i = 0; i < some.densities.size(); ++i) {
+      if (some.points(0, i) < 0) CHECK(some.densities(i) == -kInfinity);
     }
   }
 }
 
-TEST_CASE("the last update's samples and the progress are told") {
+TEST_CASE("a search goes on from its state to the same bits") {
   const Linear likelihood;
-  RepsOptions options;
-  options.updates = 3;
+  const Gaussian prior = CentralGaussian(likelihood.prior);
+  const RepsState straight = SearchByReps(likelihood.prior, likelihood, {}, 9);
+  RepsState state{0, prior};
+  for (int update = 0; update < 9; ++update) {
+    RepsSearch search(prior, {}, state);
+    search.Update(likelihood(search.Samples()));
+    state = search.state();
+  }
+  CHECK(state.distribution.mean == straight.distribution.mean);
+  CHECK(state.distribution.covariance == straight.distribution.covariance);
+  CHECK(state.points.cols() == 9 * 25);
+}
+
+TEST_CASE("the progress is told, and may end the search") {
+  const Linear likelihood;
   std::vector<int> told;
-  const RepsRun run = RepsSearch(likelihood.prior, likelihood, options,
-                                 [&](int update) { told.push_back(update); });
+  SearchByReps(likelihood.prior, likelihood, {}, 3, [&](int update) { told.push_back(update); });
   CHECK(told == std::vector<int>{1, 2, 3});
-  CHECK(run.samples.cols() == 25);
   const auto stop = [](int) { throw std::runtime_error("stop"); };
-  CHECK_THROWS_AS(RepsSearch(likelihood.prior, likelihood, options, stop), std::runtime_error);
+  CHECK_THROWS_AS(SearchByReps(likelihood.prior, likelihood, {}, 3, stop), std::runtime_error);
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "calibrator/inference/gaussian.h"
 #include "common/decompositions.h"
+#include "common/gaussian.h"
 
 namespace plumb {
 namespace {

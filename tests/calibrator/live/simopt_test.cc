@@ -4,12 +4,17 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 
 #include "calibrator/live/calibrator.h"
 #include "calibrator/live/checkpoint.h"
+#include "calibrator/results/posterior_file.h"
+#include "robot/parameter_distribution.h"
+#include "robot/posterior_reader.h"
 #include "tests/calibrator/synthetic.h"
+#include "tests/temporary_file.h"
 #include "tests/temporary_folder.h"
 
 namespace plumb {
@@ -123,7 +128,7 @@ TEST_CASE("what the motion determines is found and said in words") {
   REQUIRE(found.combinations.size() == 2);
   CHECK(found.combinations[0].name == "gravity / length");
   CHECK(found.combinations[1].name == "mass length^2");
-  CHECK(found.words ==
+  CHECK(found.summary ==
         "only gravity / length and mass length^2 can be known from this motion; gravity, mass, "
         "length are not "
         "identifiable separately: (gravity +1 %, mass -2 %, length +1 %) changes nothing");
@@ -293,6 +298,36 @@ TEST_CASE(
   CHECK_THROWS_WITH(SimOpt(robot, 1, 1, "laplas"), Catch::Contains("did you mean 'laplace'"));
 }
 
+TEST_CASE("what an iteration has found is a posterior, and the same bytes after a resumption") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 3, 1, "auto");
+  simopt.Begin({Synthetic(robot, 1)});
+  const auto report = simopt.Update();
+  REQUIRE(report);
+  const std::string text = PosteriorJson(IterationFindings(robot, simopt, *report), robot, {});
+  const TemporaryFile file(text, ".json");
+  CHECK(ReadPosterior(file.path(), robot).mixture == simopt.state().distribution);
+  const auto j = nlohmann::json::parse(text);
+  CHECK(j["method"] == nlohmann::json{{"asked", "auto"}, {"used", simopt.state().used}});
+  CHECK(j["method"]["used"] != "prior");
+  CHECK(j["seed"] == 3);
+  CHECK(j["loop"]["iteration"] == 1);
+  CHECK(j["loop"]["kl"] == report->kl);
+  CHECK(j["discrepancy"] == report->discrepancy);
+  CHECK(j["identifiability"]["words"] == report->identifiability.summary);
+  CHECK(j["transitions"] == simopt.state().rollouts[0].transitions.size());
+  for (const char* unknown : {"alarm", "holdout", "agreement", "simulations", "run"}) {
+    INFO(unknown);
+    CHECK(j.at(unknown).is_null());
+  }
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 3);
+  checkpoint.Save(simopt.state());
+  SimOpt resumed(robot, 3, 1, "auto");
+  resumed.Resume(*checkpoint.Load());
+  CHECK(PosteriorJson(IterationFindings(robot, resumed, *resumed.Report()), robot, {}) == text);
+}
+
 TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trainer") {
   const RobotDescription robot = Pendulum();
   SimOpt simopt(robot, 1, 1);
@@ -303,9 +338,9 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   state.ess = NAN;
   const ParameterDistribution told =
       ParameterDistribution::FromMessage(DistributionMessage(robot, state, 1, nullptr), robot);
-  REQUIRE(told.components.size() == 2);
-  CHECK(told.components[1].weight == 0.75);
-  CHECK(told.components[1].mean == second.mean);
+  REQUIRE(told.mixture.components.size() == 2);
+  CHECK(told.mixture.weights[1] == 0.75);
+  CHECK(told.mixture.components[1].mean == second.mean);
   const TemporaryFolder folder;
   CalibrationCheckpoint checkpoint(folder.path(), robot, 1);
   checkpoint.Save(state);
@@ -315,7 +350,7 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   CHECK(std::isnan(loaded->ess));
   std::string text =
       (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
-  text.replace(text.find("\"version\": 2"), 12, "\"version\": 1");
+  text.replace(text.find("\"version\": 3"), 12, "\"version\": 1");
   std::ofstream(folder / "calibration.json") << text;
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
 }

@@ -54,7 +54,7 @@ std::string SimulatedTable(const RobotDescription& robot, int episodes, int step
       for (const double x : environment.v()) append(x);
       Eigen::VectorXf action(task.action_size());
       for (float& a : action) a = static_cast<float>(random.Uniform(-1.2, 1.2));
-      const Environment::StepResult result = environment.Step(action);
+      const StepResult result = environment.Step(action);
       for (int k = 0; k < task.action_size(); ++k) {
         append(environment.effort()[task.action_indices()[static_cast<size_t>(k)]] /
                task.action_unit(k));

@@ -172,7 +172,7 @@ TEST_CASE_METHOD(Fixture, "gaps, lateness, restarts and rubbish are dropped and 
     CHECK(joiner.Join(42, 300).transitions.size() == 18);
     CHECK(joiner.drops().model_based == 2);
     CHECK(joiner.drops().total() == 2);
-    CHECK(joiner.drops().words() ==
+    CHECK(joiner.drops().summary() ==
           "0 gaps, 0 late, 0 not finite, 0 across restarts, 2 model-based");
   }
   SECTION("an unknown effort") {

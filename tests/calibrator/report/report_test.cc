@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "calibrator/report/report_residuals.h"
+#include "plot/svg.h"
 #include "robot/urdf/xml.h"
 #include "tests/calibrator/sample_findings.h"
 #include "tests/calibrator/synthetic.h"
@@ -125,10 +126,10 @@ TEST_CASE("whatever files call things, the page stays a page") {
   robot.parameters[2].name = evil;
   Findings findings = SampleFindings(robot);
   findings.method = findings.used = findings.check = findings.warnings[0] = evil;
-  findings.identifiability.words = findings.identifiability.combinations[0].name = evil;
-  findings.misspecification.words = findings.misspecification.misfits[0].what =
+  findings.identifiability.summary = findings.identifiability.combinations[0].name = evil;
+  findings.misspecification.summary = findings.misspecification.misfits[0].what =
       findings.misspecification.misfits[0].test = evil;
-  findings.holdout.words = findings.agreement.words = findings.agreement.logs[0].log = evil;
+  findings.holdout.summary = findings.agreement.summary = findings.agreement.logs[0].log = evil;
   Residuals residuals = SampleResiduals(robot);
   residuals.coordinates[0] = evil;
   const std::string html =

@@ -92,8 +92,8 @@ TEST_CASE("the world's mass has no effect, which is said, and keeps its prior") 
   const Findings f = Calibrate(robot, std::vector<Log>{log}, options);
   REQUIRE(f.identifiability.null.size() == 1);
   CHECK((f.identifiability.null[0].cwiseAbs() - Eigen::VectorXd::Unit(5, 0)).norm() < 1e-6);
-  CHECK(f.identifiability.words.find("mass/world") != std::string::npos);
-  CAPTURE(f.identifiability.words);
+  CHECK(f.identifiability.summary.find("mass/world") != std::string::npos);
+  CAPTURE(f.identifiability.summary);
   const double mean = f.prior.mean(0), sd = std::sqrt(f.prior.covariance(0, 0));
   CHECK(KolmogorovSmirnov(f.samples.row(0).transpose().array().log(), mean, sd) > 0.01);
   CHECK(Moments(f.posterior).mean(0) == Approx(mean).margin(0.02 * sd));
@@ -115,7 +115,7 @@ TEST_CASE("noise alone raises the alarm, and teaches hardly anything") {
     }
   }
   const Findings f = Of({log});
-  CAPTURE(f.holdout.words);
+  CAPTURE(f.holdout.summary);
   CHECK((f.misspecification.alarm || !f.holdout.better));
   CHECK(f.holdout.errors[0].posterior == Approx(f.holdout.errors[0].prior).epsilon(0.03));
   // of a uniform reading, or of two
@@ -136,7 +136,7 @@ TEST_CASE("logs of one robot agree, logs of two do not") {
   REQUIRE(odd.agreement.logs.size() == 3);
   CHECK(odd.agreement.logs[2].p < 1e-3);
   CHECK(odd.agreement.logs[2].distance > odd.agreement.logs[0].distance);
-  CHECK(odd.agreement.words.find("other") != std::string::npos);
+  CHECK(odd.agreement.summary.find("other") != std::string::npos);
 }
 
 TEST_CASE("logs of one robot seldom disagree by chance") {
@@ -161,7 +161,7 @@ TEST_CASE("a log that cannot be fitted on its own is named, and leaves nothing t
   REQUIRE_FALSE(f.warnings.empty());
   CHECK(std::any_of(f.warnings.begin(), f.warnings.end(),
                     [](const auto& w) { return w.find("tiny") != std::string::npos; }));
-  CHECK(f.agreement.words.find("the 1 logs") == std::string::npos);
+  CHECK(f.agreement.summary.find("the 1 logs") == std::string::npos);
   CHECK(f.agreement.agree);
 }
 
@@ -256,7 +256,7 @@ TEST_CASE("the same bits with any number of threads and a journal or none") {
     CalibrationOptions options;
     options.method = method, options.budget = 20'000, options.horizons = {1, 5};
     const Findings one = Calibrate(Pendulum(), logs, options);
-    options.workforce = 2;
+    options.execution = 2;
     const Findings two = Calibrate(Pendulum(), logs, options);
     CHECK(one.samples == two.samples);
     CHECK(one.errors == two.errors);

@@ -7,8 +7,7 @@
 
 #include "drivers/protocols/cansimple.h"
 #include "drivers/protocols/cia406.h"
-#include "drivers/protocols/protocol.h"
-#include "drivers/protocols/sensor.h"
+#include "drivers/protocols/registry.h"
 #include "drivers/protocols/xsens.h"
 
 namespace plumb {

@@ -183,7 +183,7 @@ TEST_CASE("times increase strictly whatever arrives") {
       REQUIRE(time > last);
       last = time;
     }
-    REQUIRE(feed.waiting.size() < PassiveSync::kMostWaiting);
+    REQUIRE(feed.waiting.size() < PassiveSync::kMaxWaiting);
     arrival = std::max(arrival, last - 500'000);
   }
 }

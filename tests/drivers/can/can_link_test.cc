@@ -33,7 +33,7 @@ Bytes operator+(Bytes a, const Bytes& b) {
   return a;
 }
 
-/// What the kernel says of an interface of some kind with restart-ms 100 and 1 Mbit/s.
+/// The kernel's answer on an interface of some kind with restart-ms 100 and 1 Mbit/s.
 Bytes Message(const char* kind) {
   can_bittiming timing{};
   timing.bitrate = 1'000'000;

@@ -204,7 +204,7 @@ TEST_CASE("bus-off: an error frame, silence for 100 ms, and another that it is o
   CHECK(Numbers(*bus.sound).size() == 2);
 }
 
-/// What a run of a faulty bus hands out and lets through.
+/// The frames that a faulty bus hands out and lets through.
 std::string History(const std::string& faults) {
   Pair bus(faults);
   std::string history;

@@ -21,7 +21,7 @@ std::string UdpUrl() { return "udp:239.74.163.77:" + std::to_string(Port()); }
 /// Long enough for any machine: only who fails waits so long.
 constexpr int kPatience = 10'000;  // [ms]
 /// As often as nobody is woken for nothing.
-constexpr int kMostWakes = 10'000;
+constexpr int kMaxWakes = 10'000;
 
 bool Readable(const Transport& transport, int milliseconds = kPatience) {
   pollfd polled{transport.fd(), POLLIN, 0};
@@ -33,7 +33,7 @@ std::vector<Frame> ReceiveAll(Transport& transport, size_t enough) {
   std::vector<Frame> all;
   std::array<Frame, 8> frames;
   for (int wakes = 0; all.size() < enough && Readable(transport); ++wakes) {
-    REQUIRE(wakes < kMostWakes);
+    REQUIRE(wakes < kMaxWakes);
     const int count = transport.Receive(frames);
     all.insert(all.end(), frames.begin(), frames.begin() + count);
   }
@@ -163,7 +163,7 @@ TEST_CASE("udp multicast carries frames, stamps their arrival and drops the send
   }
   std::array<Frame, 4> none;
   for (int wakes = 0; a->stats().echoes < 4 && Readable(*a); ++wakes) {
-    REQUIRE(wakes < kMostWakes);
+    REQUIRE(wakes < kMaxWakes);
     REQUIRE(a->Receive(none) == 0);
   }
   CHECK(a->stats().echoes == 4);
@@ -208,7 +208,7 @@ TEST_CASE("a flood of what is not for us does not keep Receive from returning") 
   CHECK(b->Receive(frames) == 0);
   CHECK(Readable(*b));  // the rest
   for (int wakes = 0; a->stats().echoes < kSent && Readable(*a); ++wakes) {
-    REQUIRE(wakes < kMostWakes);
+    REQUIRE(wakes < kMaxWakes);
     REQUIRE(a->Receive(frames) == 0);
   }
   CHECK(a->stats().echoes == kSent);

@@ -1,5 +1,5 @@
-// What the transport does not take has not been sent: arming and stopping over a bus that refuses
-// frames.
+// Frames that the transport does not take have not been sent: arming and stopping over a bus that
+// refuses frames.
 
 #include <algorithm>
 #include <catch2/catch.hpp>

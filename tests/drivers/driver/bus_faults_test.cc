@@ -1,4 +1,4 @@
-// What may go wrong on the bus between the driver and the drives.
+// Faults of the bus between the driver and the drives.
 
 #include <catch2/catch.hpp>
 

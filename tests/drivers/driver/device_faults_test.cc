@@ -1,4 +1,4 @@
-// What may go wrong in a drive, or in the process that drives it.
+// Faults in a drive, or in the process that drives it.
 
 #include <catch2/catch.hpp>
 #include <cmath>

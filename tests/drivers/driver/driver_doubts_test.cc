@@ -1,4 +1,4 @@
-// What drives and encoders report that cannot be true, or must not be: each stops the robot, with
+// Reports of drives and encoders that cannot be true, or must not be: each stops the robot, with
 // the reason.
 
 #include <catch2/catch.hpp>

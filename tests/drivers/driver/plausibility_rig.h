@@ -9,6 +9,7 @@
 
 #include "drivers/driver/plausibility.h"
 #include "drivers/protocols/cansimple_device.h"
+#include "drivers/protocols/registry.h"
 #include "sim/virtual/encoder.h"
 
 namespace plumb {

@@ -153,7 +153,7 @@ TEST_CASE("a complaint stays until it is taken back, and the first one counts") 
   CHECK(first != "");
   CHECK(joint.Add(1, 0) == first);
   CHECK(joint.Add(5, 0) == first);
-  joint.watch.Forgive();
+  joint.watch.ClearComplaint();
   CHECK(joint.Add(5, 0) == "");
 }
 
@@ -197,12 +197,11 @@ TEST_CASE("the same bits under an effort are a stuck encoder") {
   CHECK(after(2, half, zero) == -1);
 }
 
-TEST_CASE("a joint that may jump") {
+TEST_CASE("a joint that is put elsewhere") {
   Given joint(kSettings);
   for (int i = 0; i < 50; ++i) joint.Add(0, 0);
-  joint.watch.LetJump(true);
+  joint.watch.Displaced();
   CHECK(joint.Add(3, 1) == "");
-  joint.watch.LetJump(false);
   for (int i = 0; i < 300; ++i) REQUIRE(joint.Add(3, 0) == "");
   CHECK(joint.Add(0, 0) != "");
 }
@@ -211,7 +210,7 @@ TEST_CASE("a second device is remembered until it is gone") {
   Given joint(kSettings);
   for (int i = 0; i < 1000; ++i) joint.Add(0, 0, 0, 2'500);
   CHECK(joint.watch.crowded());
-  joint.watch.Forgive();
+  joint.watch.ClearComplaint();
   for (int i = 0; i < 100; ++i) joint.Add(0, 0);
   CHECK(joint.watch.complaint().empty());
   CHECK(joint.watch.crowded());

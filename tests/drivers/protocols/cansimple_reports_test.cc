@@ -1,4 +1,4 @@
-// What an ODrive reports besides its position, and a restart told from a fault: the host's side
+// The reports of an ODrive besides its position, and a restart told from a fault: the host's side
 // against the virtual drive, in virtual time.
 
 #include <catch2/catch.hpp>
@@ -141,7 +141,7 @@ TEST_CASE("what is no restart") {
     bench.Run(300);
     bench.powered = true;
     bench.Run(20);
-    bench.motor->LetJump(true);
+    bench.motor->Displaced();
     bench.sample.position = -4;
     bench.Run(100);
     CHECK(bench.motor->state() == DriveState::kIdle);

@@ -9,6 +9,7 @@
 
 #include "drivers/protocols/cia406_device.h"
 #include "drivers/protocols/cia406_host.h"
+#include "drivers/protocols/registry.h"
 
 namespace plumb {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "drivers/protocols/mit_device.h"
 #include "drivers/protocols/mit_host.h"
+#include "drivers/protocols/registry.h"
 
 namespace plumb {
 namespace {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/protocols/registry.h"
 #include "drivers/protocols/xsens_device.h"
 #include "drivers/protocols/xsens_host.h"
 

@@ -1,4 +1,4 @@
-// What free motion keeps, and how fast the integrators come to the truth.
+// The invariants of free motion, and how fast the integrators come to the truth.
 #include <algorithm>
 #include <catch2/catch.hpp>
 

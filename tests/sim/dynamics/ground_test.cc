@@ -1,4 +1,4 @@
-// What the ground does to a robot that touches it in more than one place.
+// The ground's forces on a robot that touches it in more than one place.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>

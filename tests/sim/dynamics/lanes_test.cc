@@ -49,7 +49,7 @@ RobotDescription Everything(RobotDescription robot, Random& random) {
   return robot;
 }
 
-// What is different from lane to lane without being a parameter of the description.
+// Differences from lane to lane without being a parameter of the description.
 Physics<double> Vary(Physics<double> physics, Random& random) {
   for (auto& link : physics.links) {
     const double factor = random.Uniform(0.7, 1.4);

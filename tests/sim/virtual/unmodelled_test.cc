@@ -1,4 +1,4 @@
-// What a virtual robot has and no model knows, as its drives feel it.
+// Parts of a virtual robot that no model knows, as its drives feel it.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,4 @@
-// What goes wrong on a bus, made by the kernel's own means: traffic control on a pair of vxcan
+// Faults of a bus, made by the kernel's own means: traffic control on a pair of vxcan
 // interfaces, whose frames really pass a queue, and a serial adapter (slcan) of which we are the
 // adapter.
 
@@ -175,7 +175,7 @@ struct SerialAdapter {
   void Write(const std::string& text) {
     REQUIRE(write(our_end.get(), text.data(), text.size()) == static_cast<ssize_t>(text.size()));
   }
-  /// What the kernel sends: so many lines, and what else comes within a moment.
+  /// The kernel's messages: so many lines, and what else comes within a moment.
   std::string Read(int lines) {
     std::string all;
     std::array<char, 256> part;

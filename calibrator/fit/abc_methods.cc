@@ -1,0 +1,141 @@
+#include "calibrator/fit/abc_methods.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "calibrator/fit/robot_problem.h"
+#include "calibrator/inference/abc_rejection.h"
+#include "calibrator/inference/abc_smc.h"
+#include "calibrator/inference/conditional_mixture.h"
+#include "calibrator/inference/importance.h"
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kFewestSimulators = 3000;
+
+// The posterior that an inference has found, and a clause on how it went.
+struct Inferred {
+  Posterior posterior;
+  std::string how;
+};
+
+// @param infer (problem, simulations) -> Inferred.
+template <class Infer>
+MethodResult ByApproximation(const MethodInput& input, const std::string& name,
+                             const Infer& infer) {
+  const RobotDescription& robot = input.model->description();
+  CurriculumOptions options = CurriculumOptionsOf(input);
+  options.horizons = {1};
+  MethodResult result =
+      FromCurriculum(input, FitCurriculum(input.model, input.rollouts, options, input.start));
+  const int every = EveryFor(input, kFewestSimulators);
+  WindowErrors errors(input.model, input.rollouts, 1, input.options.execution, every);
+  errors.set_noise_sd(result.noise_sd);
+  errors.Linearise(robot.ToPhysical(result.curriculum->fit.mode));
+  LaplaceOptions curvature_only;
+  curvature_only.max_iterations = 0;
+  const LaplaceFit view =
+      FitLaplace(ProblemOf(robot, errors), result.curriculum->fit.mode, curvature_only);
+  Problem problem =
+      RobotProblem(robot, errors, view, input.options.discrepancy, input.options.seed);
+  // the first fit counts, too
+  const int64_t left = input.options.budget - result.simulated_steps - errors.simulated_steps();
+  const int64_t simulations = std::max<int64_t>(1, left / errors.steps());
+  const Simulate simulate = problem.simulate;
+  problem.simulate = [&](const Eigen::MatrixXd& parameters, int64_t first) {
+    input.options.progress(
+        name, std::min(1.0, static_cast<double>(first) / static_cast<double>(simulations)));
+    return simulate(parameters, first);
+  };
+  const auto [posterior, how] = infer(problem, simulations);
+  result.curriculum.reset();  // the first fit is not the answer
+  result.used = name;
+  result.posterior = posterior.mixture;
+  Random random = SampleStream(input);
+  result.samples = posterior.samples;
+  if (result.samples.cols() > kPosteriorSamples) {
+    result.samples =
+        Resample(posterior.samples,
+                 Eigen::VectorXd::Constant(posterior.samples.cols(),
+                                           1.0 / static_cast<double>(posterior.samples.cols())),
+                 kPosteriorSamples, random);
+  }
+  result.simulated_steps += errors.simulated_steps();
+  result.failures += posterior.failures;
+  result.check =
+      fmt::format("approximate Bayesian computation with {} simulators, discrepancy {}; {}",
+                  posterior.simulations, input.options.discrepancy, how);
+  if (every > 1)
+    result.warnings.push_back(fmt::format(
+        "{} looks at each {}th transition only, to try enough simulators within its budget", name,
+        every));
+  return result;
+}
+
+MethodResult AbcRejection(const MethodInput& input) {
+  return ByApproximation(input, "abc-rejection", [&](const Problem& problem, int64_t simulations) {
+    RejectionOptions options;
+    options.simulations = simulations;
+    options.fraction = 0.05;
+    RejectionDiagnostics found;
+    Posterior posterior = InferByRejection(problem, options, input.options.seed, &found);
+    return Inferred{
+        std::move(posterior),
+        fmt::format("kept the nearest {}, up to a distance of {:.3g}", found.kept, found.epsilon)};
+  });
+}
+
+MethodResult AbcSmc(const MethodInput& input) {
+  return ByApproximation(input, "abc-smc", [&](const Problem& problem, int64_t simulations) {
+    SmcOptions options;
+    options.simulations = simulations;
+    options.population = static_cast<int>(std::clamp<int64_t>(simulations / 10, 20, 500));
+    SmcDiagnostics found;
+    Posterior posterior = InferBySmc(problem, options, input.options.seed, &found);
+    const auto& generations = found.generations;
+    return Inferred{std::move(posterior),
+                    generations.empty()
+                        ? "nothing was accepted"
+                        : fmt::format("{} generations, the last one nearer than {:.3g}",
+                                      generations.size(), generations.back().epsilon)};
+  });
+}
+
+MethodResult ConditionalMixture(const MethodInput& input) {
+  return ByApproximation(
+      input, "conditional-mixture", [&](const Problem& problem, int64_t simulations) {
+        ConditionalMixtureOptions options;
+        options.simulations = simulations;
+        ConditionalMixtureDiagnostics found;
+        Posterior posterior = InferConditionalMixture(problem, options, input.options.seed, &found);
+        const auto& rounds = found.rounds;
+        if (rounds.empty()) return Inferred{std::move(posterior), "one round"};
+        const int components = rounds.back().components;
+        return Inferred{std::move(posterior),
+                        fmt::format("{} rounds, {} component{} before the last one",
+                                    rounds.size() + 1, components, components == 1 ? "" : "s")};
+      });
+}
+
+}  // namespace
+
+std::vector<Method> AbcMethods() {
+  return {
+      {"abc-rejection",
+       "approximate Bayesian computation: the nearest of many simulators, by --discrepancy",
+       AbcRejection},
+      {"abc-smc",
+       "approximate Bayesian computation, generation by generation nearer, by --discrepancy",
+       AbcSmc},
+      {"conditional-mixture",
+       "mixture of Gaussians over parameters and outcomes, conditioned on what was observed, by "
+       "--discrepancy",
+       ConditionalMixture},
+  };
+}
+
+}  // namespace plumb

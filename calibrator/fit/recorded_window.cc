@@ -1,0 +1,40 @@
+#include "calibrator/fit/recorded_window.h"
+
+namespace plumb {
+
+size_t StretchLength(const Rollout& rollout, size_t first) {
+  const auto& t = rollout.transitions;
+  size_t end = first + 1;
+  while (end < t.size() && t[end].step == t[end - 1].step + 1) ++end;
+  return end - first;
+}
+
+Window RecordedWindow(const Model& model, const Rollout& rollout, size_t first, size_t length) {
+  const auto& t = rollout.transitions;
+  Window window{t[first].q, t[first].v, {}};
+  for (size_t i = first; i < first + length; ++i) window.steps.emplace_back(t[i].efforts);
+  if (!model.parameters().delays()) return window;
+  double known = 0;
+  for (size_t i = first; i > 0 && known < JointDynamics::kLongestDelay; --i) {
+    if (t[i - 1].step != t[i].step - 1) break;
+    window.before.insert(window.before.begin(), t[i - 1].efforts);
+    known += t[i - 1].duration();
+  }
+  return window;
+}
+
+double EndReading(const Transition& t, Eigen::Index c) {
+  return c < t.next_q.size() ? t.next_q(c) : t.next_v(c - t.next_q.size());
+}
+
+double EndSd(const Transition& t, Eigen::Index c) {
+  return c < t.next_q.size() ? t.next_q_sd(c) : t.next_v_sd(c - t.next_q.size());
+}
+
+Eigen::VectorXd StartSd(const Transition& t) {
+  Eigen::VectorXd sd(t.q_sd.size() + t.v_sd.size());
+  sd << t.q_sd, t.v_sd;
+  return sd;
+}
+
+}  // namespace plumb

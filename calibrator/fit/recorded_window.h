@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+#include "calibrator/motion/transitions.h"
+#include "sim/model.h"
+#include "sim/windows.h"
+
+namespace plumb {
+
+// Recorded motion as simulators' windows begin and end with it. (q, v) has 2 n entries: n
+// positions, n velocities. All of these are thread-safe.
+
+/// How many transitions of a roll-out from `first` on follow each other without a gap, at least 1.
+size_t StretchLength(const Rollout& rollout, size_t first);
+
+/// `length` recorded steps from transition `first` on: the state that it begins with, and what was
+/// applied. Where the model delays efforts, what had been commanded before is part of it, as far
+/// back as there is no gap.
+/// @param rollout whose efforts the window refers to: they must outlive it.
+Window RecordedWindow(const Model& model, const Rollout& rollout, size_t first, size_t length);
+
+/// Entry c of (q, v) at a transition's end, physical units, NaN = not observed; and its standard
+/// deviation, NaN = not known.
+double EndReading(const Transition& transition, Eigen::Index c);
+double EndSd(const Transition& transition, Eigen::Index c);
+
+/// Standard deviations of (q, v) at a transition's beginning: 0 = exact, NaN = not known.
+Eigen::VectorXd StartSd(const Transition& transition);
+
+}  // namespace plumb
