@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "common/time_units.h"
 #include "drivers/driver/stop.h"
 
 namespace plumb {
@@ -12,6 +11,9 @@ constexpr int kRefusedCycles = 10;  // consecutive cycles whose frames were not 
 // in a cycle while arming: the kernel holds about ten in flight
 constexpr size_t kMaxFrames = 8;
 constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
+
+// By division, so that whole cycles sum up to the settings' seconds: a ramp ends at zero.
+double InSeconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
 
 }  // namespace
 
@@ -155,10 +157,10 @@ void Driver::CommandTorques() noexcept {
       wish = inbox_.Effort(static_cast<int>(joint.index), position, velocity);
     } else if (commanded) {
       wish = StoppingEffort(settings_, joint.damping, joint.commanded,
-                            Seconds(now_ - inbox_.expires()), velocity);
+                            InSeconds(now_ - inbox_.expires()), velocity);
     }
     joint.effort =
-        LimitEffort(wish, {position, velocity, effort_sent_[joint.index], Seconds(cycle_)},
+        LimitEffort(wish, {position, velocity, effort_sent_[joint.index], InSeconds(cycle_)},
                     joint.limits)
             .value_or(0);
     if (fresh) joint.commanded = joint.effort;
