@@ -24,8 +24,8 @@ class Model {
   int num_positions() const { return topology_.positions; }
   int num_velocities() const { return topology_.velocities; }
 
-  /// The equations that step the robot, with the prior means as parameters in all lanes. The model must
-  /// outlive it.
+  /// The equations that step the robot, with the prior means as parameters in all lanes.
+  /// The model must outlive it.
   std::unique_ptr<Engine> NewEngine() const;
   std::unique_ptr<Engine> NewWideEngine() const;
 

@@ -27,8 +27,8 @@ namespace plumb {
 ///                           mass times (l/l0)^2. l0 is the distance to the first further joint,
 ///                           or, of a link that carries none, the length that the URDF implies for
 ///                           a uniform rod: twice that of the centre of mass.
-///   <kind>/<joint>          those of kJointParameterKinds, as in JointDynamics; of a spherical joint
-///                           they are for all of its axes
+///   <kind>/<joint>          those of kJointParameterKinds, as in JointDynamics; of a
+///                           spherical joint they are for all of its axes
 ///   contact/<kind>, limit/<kind>
 ///                           those of kWorldParameterKinds, as in SimulationSettings
 ///

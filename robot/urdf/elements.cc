@@ -57,7 +57,7 @@ class Reader {
  private:
   using Pose = UrdfElements::Pose;
 
-  // Warns of children that are not `known`. `silent` are those that say something to other programs.
+  // Warns of children that are not `known`. `silent` are those that tell other programs something.
   void CheckChildren(const TiXmlElement& parent, std::initializer_list<const char*> known,
                      std::initializer_list<const char*> silent = {}) {
     for (const std::string& other : xml_.Others(parent, known)) {
