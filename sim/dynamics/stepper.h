@@ -161,8 +161,8 @@ class Stepper {
 
   // An effort f that drives arrives as e f, one that brakes as f (efficiency that depends on the
   // direction: Wang, Kim, ICRA 2015). That is f - l with Coulomb friction of |l| against the
-  // motion, l = (1 - e)/2 f: so the jump where the motion turns is settled with friction, implicitly, and a
-  // joint may hold still under a load that its motor can hold but not lift.
+  // motion, l = (1 - e)/2 f: so the jump where the motion turns is settled with friction,
+  // implicitly, and a joint may hold still under a load that its motor can hold but not lift.
   Real GearLoss(size_t i, const Real& effort) const {
     return 0.5 * (1 - physics.axes[i].gear_efficiency) * effort;
   }

@@ -11,9 +11,9 @@ namespace plumb {
 
 /// The moving parts of a virtual robot. By description.virtual_robot.engine:
 ///   auto    a SimbodyPlant, or, where the robot has something that a SimbodyPlant has not
-///           (armature, stops, contact), a fine simulator (see MakeFineSimulator): then reality has the
-///           simulator's equations, but not its integration errors: errors of a model of contact do
-///           not show there
+///           (armature, stops, contact), a fine simulator (see MakeFineSimulator): then reality has
+///           the simulator's equations, but not its integration errors: errors of a model of
+///           contact do not show there
 ///   mujoco  MuJoCo (see MakeMujocoBackend): another contact, other stops, another integrator than
 ///           any model has
 /// Coulomb friction and backlash of description.virtual_robot.joints come on top. Not thread-safe.

@@ -23,10 +23,10 @@ namespace plumb {
 /// sensors, and the truth at every time that is a message's: for tests and bench/observer.
 ///
 /// Drives have an encoder and its tracking loop (sim/virtual/encoder.h) plus white noise on the
-/// velocity; joints with an encoder of their own are quantised by its counts; an IMU has white noise, a
-/// constant bias, and forces averaged over its period. All messages are labelled with the time of
-/// their arrival, kDelay after the measurement, as a driver would that cannot know the constant
-/// part of the delay.
+/// velocity; joints with an encoder of their own are quantised by its counts; an IMU has white
+/// noise, a constant bias, and forces averaged over its period. All messages are labelled with the
+/// time of their arrival, kDelay after the measurement, as a driver would that cannot know the
+/// constant part of the delay.
 class SimulatedReadings {
  public:
   static constexpr int64_t kStep = 500;                    ///< [us] of the truth
