@@ -173,7 +173,7 @@ class Training {
   }
 
   int Run() {
-    const ParameterSampler sample = [this](Random& random) { return distribution_.Sample(random); };
+    const ParameterSampler sample = [this](Random& random) { return distribution_.Draw(random); };
     ProgressTable table(speaks() ? flags_.csv : "", trainer_.updates());
     {
       TrainingProgress line(speaks());

@@ -89,6 +89,7 @@ void Controller::TakePolicy() {
   for (auto* list : {&status_.episode, &status_.first_state_sequence, &status_.last_state_sequence})
     list->clear();
   status_.returns.clear();
+  status_.steps.clear(), status_.late_rate.clear(), status_.fell.clear();
   attempt_ = 0;
   ++changes_;
   if (phase() != controller_status_t::HALTED) {
@@ -170,6 +171,7 @@ void Controller::BeginPlacing(int64_t now, int64_t utime) {
   place.v.assign(v.begin(), v.end());
   status_.step = 0;
   status_.episode_return = 0;
+  record_ = {};
   Enter(controller_status_t::PLACING);
   let_go_ = false;
   if (rest_ < 0) place_ = std::move(place);
@@ -243,14 +245,18 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
     return Halt("a state came half a control period late", utime);
   next_decision_ += period;
   const auto q = Map(state.q), v = Map(state.v);
-  if (status_.step > 0) status_.episode_return += task_->Reward(step_q_, step_v_, effort_, q, v);
-  if (status_.step >= robot_.task.steps || task_->Terminated(q, v)) {
-    FinishEpisode(state);
+  if (status_.step > 0) {
+    record_.Add(task_->Reward(step_q_, step_v_, effort_, q, v), StepLimit());
+    status_.episode_return = record_.sum_of_rewards;
+  }
+  const bool fell = task_->Terminated(q, v);
+  if (status_.step >= StepLimit() || fell) {
+    FinishEpisode(state, fell);
     return ZeroCommand(utime);
   }
   task_->Observe(q, v, {observation_.data(), static_cast<size_t>(observation_.size())});
   Eigen::VectorXf action;
-  if (policy_header_.purpose == policy_t::EVALUATE) {
+  if (policy_header_.purpose == policy_t::EVALUATE || Trying()) {
     action = policy_->Mean(observation_);
   } else {  // the policy's own noise excites what is to be learned
     Random random(seed_,
@@ -274,11 +280,26 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   return command;
 }
 
-void Controller::FinishEpisode(const robot_state_t& state) {
+bool Controller::Trying() const {
+  return policy_header_.purpose == policy_t::CALIBRATE && policy_header_.trial_steps > 0 &&
+         status_.num_episodes == 0;
+}
+
+int Controller::StepLimit() const {
+  const int all = robot_.task.steps;
+  if (policy_header_.purpose != policy_t::CALIBRATE || policy_header_.trial_steps <= 0) return all;
+  const int trial = std::min(policy_header_.trial_steps, all);
+  return Trying() ? trial : std::max(1, all - trial);
+}
+
+void Controller::FinishEpisode(const robot_state_t& state, bool fell) {
   status_.episode.push_back(episode_);
   status_.first_state_sequence.push_back(first_state_sequence_);
   status_.last_state_sequence.push_back(state.sequence);
   status_.returns.push_back(status_.episode_return);
+  status_.steps.push_back(record_.steps);
+  status_.late_rate.push_back(record_.late_rate);
+  status_.fell.push_back(fell);
   ++status_.num_episodes;
   if (next_policy_) {
     TakePolicy();

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "controller/acceptance.h"
 #include "controller/policy.h"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/driver_status_t.hpp"
@@ -56,7 +57,9 @@ class Controller {
   void BeginPlacing(int64_t now, int64_t utime);
   bool ReadyToRun(const robot_state_t& state, int64_t now) const;
   bool Placed(const robot_state_t& state) const;
-  void FinishEpisode(const robot_state_t& state);
+  bool Trying() const;
+  int StepLimit() const;
+  void FinishEpisode(const robot_state_t& state, bool fell);
   joint_command_t Halt(const std::string& reason, int64_t utime);
   joint_command_t ZeroCommand(int64_t utime);
   std::optional<joint_command_t> Act(const robot_state_t& state, int64_t utime);
@@ -88,6 +91,7 @@ class Controller {
   // Of the step under way, whose reward is known when it ends.
   Eigen::VectorXd step_q_, step_v_, effort_;
   Eigen::VectorXf observation_;
+  Trial record_;  // of the episode under way
 };
 
 }  // namespace plumb

@@ -109,6 +109,7 @@ policy_t GaussianPolicy::ToMessage() const {
   message.iteration = 0;
   message.purpose = policy_t::CALIBRATE;
   message.episodes = 0;
+  message.trial_steps = 0;
   const std::vector<int> sizes = shape_.sizes();
   message.num_layers = static_cast<int32_t>(sizes.size());
   message.size.assign(sizes.begin(), sizes.end());

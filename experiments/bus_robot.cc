@@ -150,8 +150,15 @@ RobotEpisode BusRobot::Run(const GaussianPolicy& policy, bool explore, int steps
   const controller_status_t& status = loop.status();
   const bool whole = !status.returns.empty();
   stopped_ = whole ? "" : status.reason;
-  return {loop.Join(), whole ? status.returns.back() : status.episode_return,
-          status.step * model.task.period};
+  RobotEpisode episode{loop.Join(),
+                       whole ? status.returns.back() : status.episode_return,
+                       status.step * model.task.period,
+                       {}};
+  // One that was stopped has failed.
+  episode.trial = whole ? Trial{status.steps.back(), status.returns.back(), status.late_rate.back(),
+                                status.fell.back() != 0}
+                        : Trial{status.step, status.episode_return, 0, true};
+  return episode;
 }
 
 }  // namespace plumb

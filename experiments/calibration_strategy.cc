@@ -68,7 +68,9 @@ ParameterDistribution FirstDistribution(CalibrationStrategy strategy, const Robo
 }
 
 ParameterDistribution DistributionOf(const SimOpt& simopt, const RobotDescription& robot) {
-  return {simopt.state().iteration, robot.parameters, simopt.state().distribution};
+  const SimOpt::State& state = simopt.state();
+  return {state.iteration, robot.parameters, state.distribution, state.residual,
+          Starts(state.rollouts)};
 }
 
 }  // namespace plumb

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
+#include <optional>
 
 #include "trainer/robot_simulation.h"
 
@@ -10,24 +12,40 @@ namespace plumb {
 namespace {
 
 // numbers of the episodes that judge: not those that are learnt from
-constexpr uint32_t kJudges = 1u << 20;
+constexpr uint32_t kJudges = 1u << 20, kTrials = 1u << 21;
 
-// So many transitions of one policy, in whole episodes but for the last.
-std::vector<Rollout> RollOut(RealSystem& real, const GaussianPolicy& policy, int steps,
-                             int iteration, double* seconds) {
+// What the robot did with one policy in an iteration.
+struct Use {
   std::vector<Rollout> rollouts;
-  for (uint32_t number = 0; steps > 0; ++number) {
-    RobotEpisode episode =
-        real.Run(policy, true, steps, 1000 * static_cast<uint32_t>(iteration) + number);
+  std::optional<Trial> trial;
+  double seconds = 0;
+
+  int Add(RobotEpisode episode, int iteration) {
     const auto made = static_cast<int>(episode.rollout.transitions.size());
-    if (made == 0 && number > 10)
-      throw std::runtime_error("the robot does not move: ten episodes without a transition");
     episode.rollout.policy_iteration = iteration;
-    *seconds += episode.seconds;
-    steps -= made;
+    seconds += episode.seconds;
     rollouts.push_back(std::move(episode.rollout));
+    return made;
   }
-  return rollouts;
+};
+
+// So many transitions, in whole episodes but for the last; first a trial without exploration.
+Use UseRobot(RealSystem& real, const GaussianPolicy& policy, int steps, int trial_steps,
+             int iteration) {
+  Use use;
+  uint32_t number = 1000 * static_cast<uint32_t>(iteration);
+  if (trial_steps > 0) {
+    RobotEpisode episode = real.Run(policy, false, trial_steps, kTrials + number);
+    use.trial = episode.trial;
+    steps -= use.Add(std::move(episode), iteration);
+  }
+  for (int empty = 0; steps > 0; ++number) {
+    const int made = use.Add(real.Run(policy, true, steps, number), iteration);
+    steps -= made;
+    if (made == 0 && ++empty > 10)
+      throw std::runtime_error("the robot does not move: ten episodes without a transition");
+  }
+  return use;
 }
 
 }  // namespace
@@ -51,7 +69,7 @@ std::unique_ptr<Trainer> Loop::TrainFirst(const std::string& name,
     return trainer;
   }
   for (int i = 0; i < settings.first_updates; ++i) {
-    trainer->Update([&](Random& random) { return distribution.Sample(random); });
+    trainer->Update([&](Random& random) { return distribution.Draw(random); });
     progress(static_cast<double>(i) / settings.first_updates);
   }
   first_.emplace(key, trainer->state());
@@ -70,26 +88,49 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
   const std::unique_ptr<Trainer> trainer = TrainFirst(
       Learns(settings.strategy) ? Key(CalibrationStrategy::kPrior) : Key(settings.strategy),
       distribution, settings, [&](double share) { progress(first * share); });
-  const ParameterSampler sample = [&](Random& random) { return distribution.Sample(random); };
+  const ParameterSampler sample = [&](Random& random) { return distribution.Draw(random); };
   LoopResult result;
+  Acceptance acceptance(model_.task.steps);
+  GaussianPolicy deployed = trainer->policy();
+  int deployed_iteration = 0;
   int64_t transitions = 0;
   double seconds = 0, discrepancy = std::numeric_limits<double>::quiet_NaN();
+  const auto judge = [&](const GaussianPolicy& policy) {
+    return Judge(real, policy, model_.task.steps, settings.evaluation_episodes);
+  };
   for (int iteration = 0;; ++iteration) {
+    if (!settings.accept) deployed = trainer->policy(), deployed_iteration = iteration;
+    const Judgement judged = judge(deployed);
+    const bool newest = deployed_iteration == iteration;
     result.rows.push_back(
-        {iteration, Judge(real, trainer->policy(), model_.task.steps, settings.evaluation_episodes),
-         trainer->EvaluateHeldOut(sample, settings.evaluation_episodes).mean, discrepancy,
-         transitions, seconds, distribution.Mean(), distribution.Sd()});
+        {iteration, judged.mean, judged.worst, newest ? judged.mean : judge(trainer->policy()).mean,
+         deployed_iteration, trainer->EvaluateHeldOut(sample, settings.evaluation_episodes).mean,
+         discrepancy, transitions, seconds, distribution.Mean(), distribution.Sd()});
     if (iteration == settings.iterations) break;
-    if (simopt) {
-      std::vector<Rollout> rollouts =
-          RollOut(real, trainer->policy(), settings.steps_per_iteration, iteration, &seconds);
-      transitions += static_cast<int64_t>(CountTransitions(rollouts));
-      simopt->Begin(std::move(rollouts));
-      std::optional<CalibrationReport> report;
-      while (!(report = simopt->Update())) {
+    if (simopt || settings.accept) {
+      const int steps = settings.steps_per_iteration;
+      Use use = UseRobot(real, trainer->policy(), steps,
+                         static_cast<int>(settings.trial_share * steps), iteration);
+      seconds += use.seconds;
+      transitions += static_cast<int64_t>(CountTransitions(use.rollouts));
+      if (use.trial) acceptance.Add(iteration, *use.trial);
+      if (simopt) {
+        simopt->Begin(std::move(use.rollouts));
+        std::optional<CalibrationReport> report;
+        while (!(report = simopt->Update())) {
+        }
+        discrepancy = report->discrepancy;
+        distribution = DistributionOf(*simopt, model_);
+        if (!settings.residual) distribution.residual = nullptr;
       }
-      discrepancy = report->discrepancy;
-      distribution = DistributionOf(*simopt, model_);
+      if (settings.accept) {
+        const bool right = simopt && !simopt->state().residual;
+        const Acceptance::Decision decision =
+            right ? acceptance.Trust(iteration) : acceptance.Decide(iteration);
+        result.decisions.push_back(Summary(decision));
+        if (acceptance.incumbent() == iteration)
+          deployed = trainer->policy(), deployed_iteration = iteration;
+      }
     }
     for (int i = 0; i < settings.next_updates; ++i) {
       trainer->Update(sample);
@@ -100,11 +141,16 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
   return result;
 }
 
-double Loop::Judge(RealSystem& real, const GaussianPolicy& policy, int steps, int episodes) {
-  double sum = 0;
-  for (int i = 0; i < episodes; ++i)
-    sum += real.Run(policy, false, steps, kJudges + static_cast<uint32_t>(i)).sum_of_rewards;
-  return sum / episodes;
+Loop::Judgement Loop::Judge(RealSystem& real, const GaussianPolicy& policy, int steps,
+                            int episodes) {
+  Judgement judgement{0, std::numeric_limits<double>::infinity()};
+  for (int i = 0; i < episodes; ++i) {
+    const double one =
+        real.Run(policy, false, steps, kJudges + static_cast<uint32_t>(i)).sum_of_rewards;
+    judgement.mean += one / episodes;
+    judgement.worst = std::min(judgement.worst, one);
+  }
+  return judgement;
 }
 
 }  // namespace plumb

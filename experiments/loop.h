@@ -21,6 +21,13 @@ struct LoopSettings {
   int steps_per_iteration = 750;
   /// TRPO updates of the first policy and of each later one
   int first_updates = 0, next_updates = 0;
+  /// of an iteration's steps, the first so many try the policy, without exploration; 0 = none
+  double trial_share = 0;
+  /// The learnt residual is trained with, where the model has been found wrong.
+  bool residual = true;
+  /// Only what does better on the robot is deployed there, once its model has been found wrong;
+  /// needs trials.
+  bool accept = false;
   /// on the robot, without exploration: they judge, and nobody learns from them
   int evaluation_episodes = 20;
   uint64_t seed = 1;
@@ -30,7 +37,10 @@ struct LoopSettings {
 /// Iteration 0 is the policy before the robot has been used.
 struct LoopRow {
   int iteration;
-  double robot_return;       ///< mean without exploration
+  double robot_return;       ///< of the deployed policy: mean without exploration
+  double worst_return;       ///< its worst episode
+  double newest_return;      ///< mean of the newest policy, which may not be deployed
+  int deployed;              ///< the iteration whose policy that is
   double simulated_return;   ///< the same on simulators of the distribution that it was trained on
   double discrepancy;        ///< see CalibrationReport; NaN where nothing is learnt
   int64_t transitions;       ///< of the robot so far
@@ -40,7 +50,8 @@ struct LoopRow {
 
 struct LoopResult {
   std::vector<LoopRow> rows;
-  std::vector<Rollout> rollouts;  ///< that were calibrated with
+  std::vector<Rollout> rollouts;       ///< that were calibrated with
+  std::vector<std::string> decisions;  ///< which policy was deployed, and why, with acceptance
 };
 
 /// Runs the loop, one strategy after the other. The first policy of a distribution is trained once
@@ -56,8 +67,11 @@ class Loop {
   LoopResult Run(RealSystem& real, const LoopSettings& settings,
                  const std::function<void(double)>& progress);
 
-  /// Return without exploration, mean of some episodes.
-  static double Judge(RealSystem& real, const GaussianPolicy& policy, int steps, int episodes);
+  /// Returns without exploration.
+  struct Judgement {
+    double mean, worst;
+  };
+  static Judgement Judge(RealSystem& real, const GaussianPolicy& policy, int steps, int episodes);
 
   /// A trainer that has made so many updates on a distribution; from the one that made them before,
   /// if any.

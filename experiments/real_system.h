@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "calibrator/motion/transitions.h"
+#include "controller/acceptance.h"
 #include "controller/policy.h"
 
 namespace plumb {
@@ -12,6 +13,7 @@ struct RobotEpisode {
   Rollout rollout;  ///< as the observer has it
   double sum_of_rewards = 0;
   double seconds = 0;  ///< of the robot's time
+  Trial trial;         ///< what it tells of the policy, if that did not explore
 };
 
 /// The system that policies are trained for. Nothing may be learnt of it but from its episodes.

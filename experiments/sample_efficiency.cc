@@ -159,7 +159,7 @@ class Experiment {
       progress(static_cast<double>(i) / updates);
     }
     SimulatedSystem real(robot, now_.recording.hidden, ReadingNoise(robot), settings.seed);
-    return Loop::Judge(real, trainer->policy(), robot.task.steps, options_.quick ? 2 : 20);
+    return Loop::Judge(real, trainer->policy(), robot.task.steps, options_.quick ? 2 : 20).mean;
   }
 
   ExperimentOptions options_;

@@ -37,7 +37,8 @@ RobotEpisode SimulatedSystem::Run(const GaussianPolicy& policy, bool explore, in
   Eigen::VectorXf observation(environment_.observation_size());
   Eigen::VectorXd q = Noisy(environment_.q(), q_sd_, random),
                   v = Noisy(environment_.v(), v_sd_, random);
-  for (int step = 0; step < std::min(steps, environment_.steps_per_episode()); ++step) {
+  const int limit = std::min(steps, environment_.steps_per_episode());
+  for (int step = 0; step < limit; ++step) {
     Transition transition;
     transition.step = step;
     transition.q = q, transition.v = v;
@@ -54,7 +55,9 @@ RobotEpisode SimulatedSystem::Run(const GaussianPolicy& policy, bool explore, in
     transition.next_q = q, transition.next_v = v;
     episode.rollout.transitions.push_back(std::move(transition));
     episode.sum_of_rewards += result.reward;
+    episode.trial.Add(result.reward, limit);
     episode.seconds += period_;
+    episode.trial.fell = result.terminated;
     if (result.terminated) break;
   }
   return episode;

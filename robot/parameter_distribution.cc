@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "robot/residual_message.h"
 
 namespace plumb {
 namespace {
@@ -165,6 +166,20 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
   if (std::abs(total - 1) > kRounding) Reject(fmt::format("weights sum to {}", total));
   if (!result.Mean().allFinite() || !result.Sd().allFinite())
     Reject("too wide: its moments overflow");
+  try {
+    result.residual = ReadResidual(message);
+  } catch (const std::invalid_argument& error) {
+    Reject(error.what());
+  }
+  const auto state =
+      static_cast<size_t>(description.num_positions() + description.num_velocities());
+  if (message.start.size() % std::max<size_t>(1, state) != 0) Reject("start of the wrong size");
+  for (size_t i = 0; state > 0 && i < message.start.size(); i += state) {
+    result.starts.push_back(
+        Eigen::VectorXf::Map(message.start.data() + i, static_cast<Eigen::Index>(state))
+            .cast<double>());
+    if (!result.starts.back().allFinite()) Reject("start is not finite");
+  }
   return result;
 }
 
@@ -189,6 +204,14 @@ parameter_distribution_t ParameterDistribution::ToMessage() const {
   }
   message.num_means = static_cast<int32_t>(message.mean.size());
   message.num_covariances = static_cast<int32_t>(message.covariance.size());
+  message.num_residuals = message.num_draws = 0;
+  message.residual_margin = 0;
+  if (residual) WriteResidual(*residual, &message);
+  for (const Eigen::VectorXd& start : starts) {
+    const Eigen::VectorXf rounded = start.cast<float>();
+    message.start.insert(message.start.end(), rounded.begin(), rounded.end());
+  }
+  message.num_starts = static_cast<int32_t>(message.start.size());
   message.kl = message.ess = message.temperature = message.discrepancy =
       std::numeric_limits<double>::quiet_NaN();
   return message;
@@ -205,6 +228,25 @@ Eigen::VectorXd ParameterDistribution::SampleCoordinates(Random& random) const {
   for (double& value : normal) value = random.Normal();
   return component.mean +
          eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().cwiseProduct(normal);
+}
+
+SimulatorDraw ParameterDistribution::Draw(Random& random) const {
+  const auto choose = [&](size_t count) {
+    return static_cast<size_t>(random.Uniform() * static_cast<double>(count));
+  };
+  SimulatorDraw draw{Eigen::VectorXd()};
+  if (!residual || random.Uniform() < kPlainShare) {
+    draw.parameters = Sample(random);
+  } else {
+    draw.draw = choose(residual->coordinates.size());
+    draw.parameters = ToPhysical(residual->coordinates[draw.draw]);
+    draw.residual = residual;
+  }
+  if (!starts.empty() && random.Uniform() < kRecordedStarts) {
+    const Eigen::VectorXd& start = starts[choose(starts.size())];
+    draw.q = start.head(start.size() / 2), draw.v = start.tail(start.size() / 2);
+  }
+  return draw;
 }
 
 Eigen::VectorXd ParameterDistribution::Sample(Random& random) const {

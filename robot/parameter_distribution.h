@@ -1,20 +1,37 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/gaussian.h"
 #include "common/random.h"
 #include "plumb/parameter_distribution_t.hpp"
 #include "robot/description.h"
+#include "robot/residual.h"
 
 namespace plumb {
 
 /// The description's prior over the P coordinates: independent, in the order of
 /// RobotDescription::parameters. Thread-safe.
 Gaussian PriorGaussian(const RobotDescription& description);
+
+/// A simulator.
+struct SimulatorDraw {
+  // Most are nothing but parameters.
+  SimulatorDraw(Eigen::VectorXd physical) : parameters(std::move(physical)) {}  // NOLINT
+
+  Eigen::VectorXd parameters;  ///< physical units
+  /// that the simulator lacks, and which draw of it; null = nothing
+  std::shared_ptr<const Residual> residual = nullptr;
+  size_t draw = 0;
+  /// the state that an episode begins with; empty = one of the task's
+  Eigen::VectorXd q = {}, v = {};
+};
 
 /// Which simulators could have produced a robot's motion: a mixture of Gaussians over the
 /// *coordinates* of the uncertain parameters (see ParameterDescription::coordinate), in the order
@@ -25,6 +42,11 @@ struct ParameterDistribution {
   /// of P coordinates; covariances may be singular: of a parameter that is known exactly, or
   /// exactly tied to another
   GaussianMixture mixture;
+  /// that all of these simulators lack; null = nothing
+  std::shared_ptr<const Residual> residual = nullptr;
+
+  /// States (q, v), 2 num_velocities entries, in which episodes have begun on the robot.
+  std::vector<Eigen::VectorXd> starts = {};
 
   /// The description's prior: one component with a diagonal covariance.
   static ParameterDistribution Prior(const RobotDescription& description);
@@ -40,7 +62,15 @@ struct ParameterDistribution {
   parameter_distribution_t ToMessage() const;
 
   int size() const { return static_cast<int>(parameters.size()); }
-  /// Draws a simulator. @return P values in physical units.
+  /// Draws a simulator: of the mixture, or, where there is a residual, one of its draws, and in
+  /// kPlainShare of the cases, one of the mixture as it is. A residual is right only near what was
+  /// recorded: a policy that exploits it elsewhere must not be a good one.
+  SimulatorDraw Draw(Random& random) const;
+  static constexpr double kPlainShare = 0.5;
+  /// Half of the episodes begin as they did on the robot, if that is known: however it is placed
+  /// there, it has moved before the first command arrives.
+  static constexpr double kRecordedStarts = 0.5;
+  /// Draws parameters of the mixture. @return P values in physical units.
   Eigen::VectorXd Sample(Random& random) const;
   /// Draws a simulator. @return P values in coordinates.
   Eigen::VectorXd SampleCoordinates(Random& random) const;

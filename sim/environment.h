@@ -5,6 +5,8 @@
 
 #include "common/random.h"
 #include "robot/description.h"
+#include "robot/residual.h"
+#include "sim/residual_inputs.h"
 #include "sim/simulator.h"
 #include "sim/tasks/task.h"
 
@@ -38,6 +40,11 @@ class Environment {
   void SetParameters(const Eigen::Ref<const Eigen::VectorXd>& physical) {
     simulator_.SetParameters(physical);
   }
+  /// What has been learnt that the simulator lacks; null = nothing, it is right as it is. Holds from
+  /// the next Reset on. Allocates where it is another one than before.
+  /// @param draw of the residual, to which the parameters belong.
+  /// @throws std::invalid_argument if it is another robot's, or there is no such draw.
+  void SetResidual(std::shared_ptr<const Residual> residual, size_t draw = 0);
   /// Draws a state of the task's initial distribution. No effort has been applied yet.
   void Reset(Random& random);
   /// @throws std::invalid_argument if the state is not finite.
@@ -63,10 +70,21 @@ class Environment {
   const Task& task() const { return *task_; }
 
  private:
+  // A residual under way.
+  struct Lack {
+    std::shared_ptr<const Residual> residual;
+    ResidualSample sample;
+    ResidualInputs inputs;
+    size_t draw = 0;
+  };
+
   void Read();
+  void Correct();
 
   std::unique_ptr<Task> task_;
+  std::shared_ptr<const Model> model_;
   Simulator simulator_;
+  std::unique_ptr<Lack> lack_;
   int steps_per_episode_;
   double period_;
   double latency_;
@@ -75,6 +93,7 @@ class Environment {
   // of the latest action: what acts at the beginning of the next step
   Eigen::VectorXd effort_;
   Eigen::VectorXd next_effort_;
+  Eigen::VectorXd mean_effort_, mean_effort_before_;
   Eigen::VectorXd reading_q_, reading_v_;
 };
 

@@ -100,6 +100,13 @@ void Simulator::Step(std::span<const EffortSegment> profile) {
   if (duration > 0) Run(duration);
 }
 
+void Simulator::Correct(const Vector& dq, const Vector& dv) {
+  if (!finite_) return;
+  for (Eigen::Index i = 0; i < q_.size(); ++i) engine_->q()[i] += dq[i];
+  for (Eigen::Index i = 0; i < v_.size(); ++i) engine_->v()[i] += dv[i];
+  Take();
+}
+
 void Simulator::RequireEnd(double duration) const {
   if (duration > kMaxSubsteps * model_->description().simulation.substep) {
     throw std::invalid_argument("a step of " + std::to_string(duration) +
@@ -154,6 +161,11 @@ Simulator::State Simulator::Reading() {
 Eigen::VectorXd Simulator::Acceleration(const Vector& effort) {
   RequireSize(effort.size());
   return Eigen::VectorXd::Map(engine_->Acceleration(effort.data()), num_velocities());
+}
+
+void Simulator::Acceleration(const Vector& effort, Eigen::VectorXd* acceleration) {
+  RequireSize(effort.size());
+  *acceleration = Eigen::VectorXd::Map(engine_->Acceleration(effort.data()), num_velocities());
 }
 
 Eigen::MatrixXd Simulator::MassMatrix() {

@@ -63,6 +63,8 @@ class Simulator {
   void Step(const Vector& effort, double duration);
   /// The same for efforts one after the other: the profile that was really applied to a robot.
   void Step(std::span<const EffortSegment> profile);
+  /// Adds to the state what a residual says that the step has left out; efforts on their way stay.
+  void Correct(const Vector& dq, const Vector& dv);
 
   const Eigen::VectorXd& q() const { return q_; }  ///< [rad or m]
   const Eigen::VectorXd& v() const { return v_; }  ///< [rad/s or m/s]
@@ -80,6 +82,8 @@ class Simulator {
   /// At the current state under `effort` [rad/s^2 or m/s^2], without stops, contacts and Coulomb
   /// friction.
   Eigen::VectorXd Acceleration(const Vector& effort);
+  /// The same without allocating.
+  void Acceleration(const Vector& effort, Eigen::VectorXd* acceleration);
   /// With armature [kg m^2 or kg].
   Eigen::MatrixXd MassMatrix();
   /// Efforts that gravity and inertia exert at zero accelerations.

@@ -20,9 +20,11 @@ class RobotSimulation : public Simulation {
   int observation_size() const override { return environment_.observation_size(); }
   int action_size() const override { return environment_.action_size(); }
   int steps_per_episode() const override { return environment_.steps_per_episode(); }
-  void Reset(const Eigen::VectorXd& parameters, Random& random) override {
-    environment_.SetParameters(parameters);
+  void Reset(const SimulatorDraw& simulator, Random& random) override {
+    environment_.SetParameters(simulator.parameters);
+    environment_.SetResidual(simulator.residual, simulator.draw);
     environment_.Reset(random);
+    if (simulator.q.size() > 0) environment_.SetState(simulator.q, simulator.v);
     if (noisy()) noise_ = Random(uint64_t{random.Bits()} << 32 | random.Bits());
     Read();
   }

@@ -8,6 +8,7 @@
 
 #include "common/random.h"
 #include "controller/policy.h"
+#include "robot/parameter_distribution.h"
 #include "sim/environment.h"
 #include "trainer/episode_record.h"
 #include "trainer/gae.h"
@@ -25,17 +26,17 @@ class Simulation {
   virtual int action_size() const = 0;
   /// Time limit of an episode.
   virtual int steps_per_episode() const = 0;
-  /// Becomes the simulator with these parameters (physical units), in a random initial state.
+  /// Becomes this simulator, in a random initial state.
   /// @throws std::invalid_argument if there is no such simulator.
-  virtual void Reset(const Eigen::VectorXd& parameters, Random& random) = 0;
+  virtual void Reset(const SimulatorDraw& simulator, Random& random) = 0;
   virtual void Observe(Eigen::Ref<Eigen::VectorXf> observation) const = 0;
   /// @param action policy units; clipped by the simulation.
   virtual StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) = 0;
 };
 
 using SimulationFactory = std::function<std::unique_ptr<Simulation>()>;
-/// Draws a simulator's parameters.
-using ParameterSampler = std::function<Eigen::VectorXd(Random&)>;
+/// Draws a simulator.
+using ParameterSampler = std::function<SimulatorDraw(Random&)>;
 
 /// Complete episodes, one after the other.
 struct Batch {

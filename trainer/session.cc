@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "sim/residual_inputs.h"
+
 namespace plumb {
 namespace {
 
@@ -32,6 +34,7 @@ int TrainingSession::awaited() const {
 
 bool TrainingSession::Begin(const ParameterDistribution& distribution) {
   if (distribution.iteration != awaited()) return false;
+  if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
   distribution_ = distribution;
   iteration_ = distribution.iteration;
   begun_ = true;
@@ -45,12 +48,13 @@ bool TrainingSession::Replace(const ParameterDistribution& distribution) {
   if (!training() || distribution.iteration != iteration_ ||
       distribution.mixture == distribution_.mixture)
     return false;
+  if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
   distribution_ = distribution;
   return true;
 }
 
 UpdateReport TrainingSession::Advance() {
-  const ParameterSampler sample = [this](Random& random) { return distribution_.Sample(random); };
+  const ParameterSampler sample = [this](Random& random) { return distribution_.Draw(random); };
   if (update_ < updates()) {
     last_ = trainer_.Update(sample);
     ++update_;
@@ -67,6 +71,7 @@ policy_t TrainingSession::Policy(int evaluation_episodes) const {
   message.iteration = iteration_;
   message.purpose = finished() ? policy_t::EVALUATE : policy_t::CALIBRATE;
   message.episodes = finished() ? evaluation_episodes : 1;
+  message.trial_steps = 0;
   return message;
 }
 

@@ -29,7 +29,7 @@ class TrainingSession {
   /// The iteration whose distribution is awaited; -1 while training and after the last.
   int awaited() const;
   /// Begins the iteration. @return false, and nothing happens, if it is not the one that is
-  /// awaited.
+  /// awaited. @throws std::invalid_argument if its residual is another robot's, as Replace does.
   bool Begin(const ParameterDistribution& distribution);
 
   /// Goes on training with another distribution of the same iteration, from the next batch on.

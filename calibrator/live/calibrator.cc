@@ -11,7 +11,8 @@ namespace plumb {
 namespace {
 
 ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {
-  return {state.iteration, robot.parameters, state.distribution};
+  return {state.iteration, robot.parameters, state.distribution, state.residual,
+          Starts(state.rollouts)};
 }
 
 // An iteration's identity is its newest episode's start: a time that live run and replay share.

@@ -23,6 +23,18 @@ std::optional<Objective> ParseObjective(const std::string& method) {
 
 }  // namespace
 
+std::vector<Eigen::VectorXd> Starts(std::span<const Rollout> rollouts) {
+  std::vector<Eigen::VectorXd> starts;
+  for (size_t i = rollouts.size(); i-- > 0 && starts.size() < kMostStarts;) {
+    const auto& transitions = rollouts[i].transitions;
+    if (transitions.empty() || transitions.front().step != 0) continue;
+    Eigen::VectorXd start(transitions.front().q.size() + transitions.front().v.size());
+    start << transitions.front().q, transitions.front().v;
+    starts.push_back(start.cast<float>().cast<double>());  // as messages have it
+  }
+  return starts;
+}
+
 SimOpt::SimOpt(const RobotDescription& robot, uint64_t seed, int threads, Objective objective)
     : SimOpt(robot, seed, threads, "reps") {
   objective_ = objective;
@@ -133,7 +145,10 @@ void SimOpt::Infer() {
   ++state_.search.update;
   if (CountTransitions(state_.rollouts) == 0) return;  // nothing is known: keep it
   try {
-    const MethodResult result = RunFromWhereItIs();
+    const GapFit gap = RunFromWhereItIs();
+    const MethodResult& result = gap.result;
+    state_.residual = gap.residual;
+    alarm_ = gap.alarm.summary, gap_ = gap.summary;
     state_.kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
     state_.ess = result.ess;
     state_.temperature = 1;
@@ -148,7 +163,7 @@ void SimOpt::Infer() {
 
 // One mode leads to the next iteration's. Of several none may be given up, and in the beginning
 // there is none: the search is then one from many places, the prior's mean first.
-MethodResult SimOpt::RunFromWhereItIs() const {
+GapFit SimOpt::RunFromWhereItIs() const {
   CalibrationOptions options;
   options.method = method_;
   options.horizons = {1};
@@ -162,12 +177,14 @@ MethodResult SimOpt::RunFromWhereItIs() const {
   const bool one_mode = state_.iteration > 0 && state_.before.components.size() == 1;
   if (one_mode) {
     try {
-      return RunMethod({model_, state_.rollouts, options, state_.before.components[0].mean});
+      const MethodInput input{model_, state_.rollouts, options, state_.before.components[0].mean};
+      return CloseGap(input, RunMethod(input));
       // perhaps it cannot be simulated where the new roll-outs went
     } catch (const std::invalid_argument&) {
     }
   }
-  return RunMethod({model_, state_.rollouts, options});
+  const MethodInput input{model_, state_.rollouts, options};
+  return CloseGap(input, RunMethod(input));
 }
 
 std::optional<CalibrationReport> SimOpt::Report() {
@@ -193,6 +210,7 @@ std::optional<CalibrationReport> SimOpt::Report() {
   report.failures = discrepancy_.failures();
   report.failures.diverged += failures_;
   report.warnings = state_.warnings;
+  report.alarm = alarm_, report.gap = gap_;
   return report;
 }
 

@@ -9,6 +9,7 @@
 #include "calibrator/diagnostics/identifiability.h"
 #include "calibrator/fit/discrepancy.h"
 #include "calibrator/fit/methods.h"
+#include "calibrator/gap/gap.h"
 #include "calibrator/inference/reps_search.h"
 #include "calibrator/motion/transitions.h"
 #include "common/gaussian.h"
@@ -54,7 +55,14 @@ struct CalibrationReport {
   std::vector<PredictionErrors> errors;
   Identifiability identifiability;
   std::vector<std::string> warnings;  ///< of the method
+  /// whether the model explains what was recorded, and what was done about it; empty = not looked at
+  std::string alarm, gap;
 };
+
+/// States (q, v) in which the newest roll-outs have begun on the robot, kMostStarts of them.
+/// Thread-safe.
+std::vector<Eigen::VectorXd> Starts(std::span<const Rollout> rollouts);
+inline constexpr size_t kMostStarts = 32;
 
 /// The loop's inference: the distribution over simulators, from roll-outs that come iteration by
 /// iteration.
@@ -74,6 +82,8 @@ class SimOpt {
     GaussianMixture distribution;
     /// method that gave the distribution, e.g. laplace where auto was asked for; "prior" = none yet
     std::string used = "prior";
+    /// that its simulators lack; null = nothing, or nothing is known of it
+    std::shared_ptr<const Residual> residual;
     GaussianMixture before;  ///< distribution at the beginning of the running iteration
     /// of the running iteration, else of the last one; without a search its update counts all the
     /// same
@@ -113,7 +123,7 @@ class SimOpt {
   RepsOptions SearchOptions() const;
   Eigen::VectorXd Evaluate(const Eigen::MatrixXd& samples);
   void Infer();
-  MethodResult RunFromWhereItIs() const;
+  GapFit RunFromWhereItIs() const;
   std::span<const Rollout> Newest() const;
 
   RobotDescription robot_;
@@ -125,7 +135,8 @@ class SimOpt {
   Gaussian prior_;
   State state_;
   Discrepancy discrepancy_;
-  int64_t failures_ = 0;  // simulations of RunMethod that have failed
+  std::string alarm_, gap_;  // of the last update
+  int64_t failures_ = 0;     // simulations of RunMethod that have failed
 };
 
 }  // namespace plumb

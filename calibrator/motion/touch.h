@@ -4,18 +4,11 @@
 
 #include "calibrator/motion/transitions.h"
 #include "robot/description.h"
+#include "sim/touch.h"
 
 namespace plumb {
 
-/// The ground and the stops that a robot touches in a state.
-struct Touch {
-  bool ground = false;  ///< a contact point of a collision shape is at or below z = 0 of the base
-  bool stop = false;    ///< a joint is at or beyond a position limit
-  bool any() const { return ground || stop; }
-};
-
-/// Only what the robot's simulator knows counts: the ground with SimulationSettings::contact, stops
-/// with ::stop.
+/// The ground and the stops that a robot touches in a state: TouchFinder.
 /// @param robot with known parameters (Model::Describe), as lengths decide how far down it reaches.
 /// @param q as in RobotDescription. @throws std::invalid_argument if q has the wrong size.
 /// Thread-safe.

@@ -9,11 +9,10 @@
 
 #include "calibrator/design/excitation.h"
 #include "calibrator/diagnostics/holdout.h"
-#include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/inference/chi_squared.h"
 #include "common/decompositions.h"
-#include "sim/tasks/task.h"
 
 namespace plumb {
 namespace {
@@ -75,37 +74,18 @@ class Calibration {
     return variance.asDiagonal();
   }
 
-  // One-step errors, their noise and their slopes at the posterior's mean, whatever method has
-  // found it.
+  // At the posterior's mean, whatever method has found it.
   void DiagnoseOneStep(const MethodResult& result) {
-    LaplaceFit view;
-    std::vector<WindowErrors::Row> rows;
-    bool noise_known = false;
-    if (result.curriculum) {
-      noise_known = result.curriculum->noise_known;
-      view = result.curriculum->one_step;
-      rows = result.curriculum->rows;
-      findings_.noise_sd = result.noise_sd;
-      findings_.stages = result.curriculum->stages;
-      information_ = result.curriculum->fit.information;
-    } else {
-      WindowErrors errors(model_, rollouts_, 1, options_.execution);
-      LaplaceOptions curvature_only;
-      curvature_only.max_iterations = 0;
-      errors.Linearise(robot_.ToPhysical(mean_));
-      view = FitLaplace(ProblemOf(robot_, errors), mean_, curvature_only);
-      rows = errors.rows();
-      findings_.noise_sd = errors.EndNoise();
-      // there is none of what was never observed
-      findings_.noise_sd.head(view.scale.size()).array() *= view.scale.array();
-      noise_known = errors.noise_known();
-      findings_.diagnostic_steps += errors.simulated_steps();
-      information_ = view.information;
-    }
-    findings_.discrepancy = view.errors.cwiseAbs2().mean();
-    findings_.errors = view.errors;
-    findings_.rows = rows;
-    TestModel(view, noise_known);
+    const MethodInput input{model_, rollouts_, options_};
+    const OneStepView view = ViewOneStep(input, result);
+    findings_.noise_sd = view.noise_sd;
+    if (result.curriculum) findings_.stages = result.curriculum->stages;
+    information_ = view.information;
+    findings_.diagnostic_steps += view.simulated_steps;
+    findings_.discrepancy = view.fit.errors.cwiseAbs2().mean();
+    findings_.errors = view.fit.errors;
+    findings_.rows = view.rows;
+    findings_.misspecification = TestModel(input, result, view, &findings_.diagnostic_steps);
     findings_.identifiability =
         FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
     findings_.cramer_rao = findings_.identifiability.cramer_rao;
@@ -115,43 +95,6 @@ class Calibration {
     findings_.advice =
         AdviseMotion(robot_, Moments(findings_.posterior), findings_.identifiability, settings)
             .summary;
-  }
-
-  // Tests whether the model can explain the log at all, whatever its parameters.
-  void TestModel(const LaplaceFit& view, bool noise_known) {
-    const Eigen::VectorXd physical = robot_.ToPhysical(mean_);
-    if ((findings_.noise_sd.array() <= kNegligible * MakeTask(robot_)->state_scale().array())
-            .all()) {
-      findings_.misspecification.summary = "the model reproduces this log to five digits";
-      return;
-    }
-    const std::vector<Candidate> candidates = FindCandidates(robot_);
-    auto extended = std::make_shared<Model>(WithCandidates(robot_, candidates));
-    WindowErrors errors(extended, rollouts_, 1, options_.execution);
-    errors.set_noise_sd(findings_.noise_sd);
-    Eigen::VectorXd nominal = extended->parameters().means();
-    nominal.head(physical.size()) = physical;
-    errors.Linearise(nominal);
-    FitResiduals residuals{
-        rollouts_,
-        findings_.rows,
-        findings_.errors,
-        view.jacobian,
-        std::vector<bool>(static_cast<size_t>(findings_.noise_sd.size()), noise_known),
-        candidates,
-        {}};
-    residuals.columns = CandidateColumns(
-        [&](const Eigen::MatrixXd& x) { return errors.Whitened(x); }, physical, candidates);
-    // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of
-    // it, as the errors are.
-    if (noise_known) {
-      for (size_t i = 0; i < findings_.rows.size(); ++i) {
-        residuals.columns.row(static_cast<Eigen::Index>(i)) /=
-            view.scale(findings_.rows[i].coordinate);
-      }
-    }
-    findings_.misspecification = FindMisspecification(model_->Describe(physical), residuals);
-    findings_.diagnostic_steps += errors.simulated_steps();
   }
 
   // Fits again without a part of the data, which then judges.

@@ -15,8 +15,8 @@ class GymPendulum : public Simulation {
   int observation_size() const override { return 3; }
   int action_size() const override { return 1; }
   int steps_per_episode() const override { return 200; }
-  void Reset(const Eigen::VectorXd& parameters, Random& random) override {
-    parameters_ = parameters;
+  void Reset(const SimulatorDraw& simulator, Random& random) override {
+    parameters_ = simulator.parameters;
     angle_ = random.Uniform(-M_PI, M_PI);
     speed_ = random.Uniform(-1, 1);
   }

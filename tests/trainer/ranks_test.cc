@@ -17,9 +17,9 @@ namespace {
 /// Ends early when it turns fast; some of its simulators cannot be.
 class FragilePendulum : public GymPendulum {
  public:
-  void Reset(const Eigen::VectorXd& parameters, Random& random) override {
-    if (parameters[0] < 9.2) throw std::invalid_argument("no such simulator");
-    GymPendulum::Reset(parameters, random);
+  void Reset(const SimulatorDraw& simulator, Random& random) override {
+    if (simulator.parameters[0] < 9.2) throw std::invalid_argument("no such simulator");
+    GymPendulum::Reset(simulator, random);
   }
   StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
     StepResult result = GymPendulum::Step(action);

@@ -34,10 +34,10 @@ class Fragile : public Simulation {
   int observation_size() const override { return 3; }
   int action_size() const override { return 1; }
   int steps_per_episode() const override { return 100; }
-  void Reset(const Eigen::VectorXd& parameters, Random&) override {
-    length_ = 5 + static_cast<int>(10 * parameters[0]);
+  void Reset(const SimulatorDraw& simulator, Random&) override {
+    length_ = 5 + static_cast<int>(10 * simulator.parameters[0]);
     step_ = 0;
-    fails_ = parameters[0] < .3;
+    fails_ = simulator.parameters[0] < .3;
     if (fails_ && break_ == Break::kReset) throw std::invalid_argument("no such simulator");
   }
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override {

@@ -61,7 +61,7 @@ class Endless : public Simulation {
   int observation_size() const override { return 1; }
   int action_size() const override { return 1; }
   int steps_per_episode() const override { return 20; }
-  void Reset(const Eigen::VectorXd&, Random& random) override {
+  void Reset(const SimulatorDraw&, Random& random) override {
     observation_ = static_cast<float>(random.Normal());
   }
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override {
@@ -159,9 +159,9 @@ TEST_CASE("Learning from the worst episodes makes the worst simulators better") 
   // a = -2/3.
   class Dilemma : public Endless {
    public:
-    void Reset(const Eigen::VectorXd& parameters, Random& random) override {
-      Endless::Reset(parameters, random);
-      rich_ = parameters[0] > .5;
+    void Reset(const SimulatorDraw& simulator, Random& random) override {
+      Endless::Reset(simulator, random);
+      rich_ = simulator.parameters[0] > .5;
     }
     void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override { observation[0] = 1; }
     StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
@@ -172,7 +172,7 @@ TEST_CASE("Learning from the worst episodes makes the worst simulators better") 
    private:
     bool rich_ = false;
   };
-  const ParameterSampler coin = [](Random& random) {
+  const ParameterSampler coin = [](Random& random) -> Eigen::VectorXd {
     return Eigen::VectorXd::Constant(1, random.Uniform());
   };
   double action[2];
@@ -194,8 +194,8 @@ TEST_CASE("Learning from the worst episodes makes the worst simulators better") 
 TEST_CASE("Rewards and states beyond all bounds never make weights that are no numbers") {
   class Wild : public Endless {
    public:
-    void Reset(const Eigen::VectorXd& parameters, Random& random) override {
-      Endless::Reset(parameters, random);
+    void Reset(const SimulatorDraw& simulator, Random& random) override {
+      Endless::Reset(simulator, random);
       kind_ = static_cast<int>(random.Uniform(0, 5));
     }
     void Observe(Eigen::Ref<Eigen::VectorXf> observation) const override {

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "calibrator/motion/transitions.h"
+#include "robot/residual.h"
+#include "sim/model.h"
+
+namespace plumb {
+
+struct ResidualFitOptions {
+  bool free = true, touching = true;  ///< where the simulator is to be corrected
+  int features = 150;                 ///< random Fourier features
+  /// of the weights: 0 = their posterior's mean for each draw of the parameters, 1 = as uncertain
+  /// as they are
+  double width = 0;
+  double noise = 1;  ///< factor of what is left
+  uint64_t seed = 1;
+};
+
+/// A condition's fit in numbers, each of n entries, of velocities.
+struct ResidualQuality {
+  int transitions = 0;
+  Eigen::VectorXd before;  ///< rms error of one step without the residual [rad/s or m/s]
+  Eigen::VectorXd after;   ///< with it, each transition predicted by the others (leave-one-out)
+  Eigen::VectorXd claimed; ///< that readings alone would make
+  double length = 0;       ///< of the features, in units of the inputs' sd
+};
+
+struct ResidualFit {
+  Residual residual;
+  ResidualQuality free, touching;
+};
+
+/// Learns what a simulator lacks from one-step errors of the velocities, given its parameters:
+/// Bayesian linear regression on random features, weights ~ N(0, s^2), in closed form. Per velocity
+/// the ratio of noise to s^2, and for all of them the features' length scale, are those of greatest
+/// evidence (MacKay, Neural Computation 4, 1992). Noise is the covariance of leave-one-out errors
+/// less that of the readings. A condition of fewer than kFewestForResidual transitions has no
+/// residual. Thread-safe; the same bits each time.
+/// @param coordinates of the simulators to be corrected, a column each, at least one; the first one
+/// decides the scales.
+/// @throws std::invalid_argument for robots with spherical joints, or parameters that are none.
+ResidualFit FitResidual(const std::shared_ptr<const Model>& model,
+                        const Eigen::MatrixXd& coordinates, std::span<const Rollout> rollouts,
+                        const ResidualFitOptions& options);
+
+inline constexpr int kFewestForResidual = 20;
+
+}  // namespace plumb

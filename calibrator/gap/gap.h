@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/fit/method.h"
+#include "calibrator/fit/residual_fit.h"
+#include "robot/residual.h"
+
+namespace plumb {
+
+/// A posterior, and what its simulators lack.
+struct GapFit {
+  MethodResult result;     ///< informed by the transitions that the model explains
+  Misspecification alarm;  ///< of the model alone, with the posterior of all transitions
+  /// that the model does not explain
+  bool free = false, touching = false;
+  /// learnt from all transitions; null where there is no alarm, or too little to learn from
+  std::shared_ptr<const Residual> residual;
+  ResidualQuality free_quality, touching_quality;  ///< of the residual's functions
+  std::string summary;                             ///< in words, for people
+  int64_t simulated_steps = 0;                     ///< beyond the result's own
+};
+
+/// Learns what a model lacks where the alarm speaks: the discrepancy of Kennedy and O'Hagan (J. R.
+/// Statist. Soc. B 63, 2001) with a likelihood that is cut (Plummer, Stat. Comput. 25, 2015), so
+/// that parameters are not bent to explain what they are not the cause of.
+///
+///   1. No alarm: the result stays as it is, to the bit, and there is no residual.
+///   2. Else steps that touch the ground or a stop are left out, if there are any, and the method
+///      runs again on the others. If these do not raise the alarm, the parameters are theirs.
+///   3. If they do, or if too few are left, nothing informs the parameters: the prior stays.
+///   4. A residual for what was left out is learnt for draws of that posterior, from all steps.
+///
+/// Uses the threads that input.options says, and shares nothing. The same bits for any number of
+/// them.
+/// @param all the method's result for input.rollouts.
+/// @throws std::invalid_argument as FitResidual.
+GapFit CloseGap(const MethodInput& input, MethodResult all);
+
+/// Mean share of the velocities' squared errors that a residual must explain to be used.
+inline constexpr double kLeastExplained = 0.2;
+/// Draws of the posterior that a residual is learnt for, the mean first.
+inline constexpr int kResidualDraws = 8;
+/// Free transitions below which they do not inform the parameters.
+inline constexpr int kFewestFree = 50;
+
+}  // namespace plumb

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace plumb {
+
+/// A policy's episode on the robot without exploration, as far as it went.
+struct Trial {
+  int steps = 0;
+  double sum_of_rewards = 0;
+  double late_rate = 0;  ///< mean reward of a step, of the trial's second half
+  bool fell = false;     ///< ended by the task; else by time
+
+  /// Adds a control step's reward. @param planned steps of the whole trial, >= 1.
+  void Add(double reward, int planned);
+};
+
+/// Which of several policies a robot is to be run with: the incumbent, and challengers one after
+/// the other, judged by what they return on the robot itself. A return in a simulator that is not
+/// the robot tells nothing of a policy: those that exploit the simulator look best there.
+///
+/// What a trial of s steps would have returned over an episode of T steps is its sum and, unless it
+/// fell,
+///   late_rate L(lambda, T - s),   L(lambda, m) = (1 - e^(-lambda m)) / lambda,
+/// lambda being the policy's probability of a fall per step. Of n trials with S steps and F falls
+///   lambda ~ Gamma(1 + F, S_all / F_all + S),
+/// the conjugate posterior where the prior is the exponential distribution with the mean of all
+/// policies that this robot has tried; zero where none has fallen. Returns of trials that begin
+/// alike scatter by kScatter of themselves, falls apart, the mean of n by 1 / sqrt(n) of that.
+/// Not thread-safe; the same bits for the same trials.
+class Acceptance {
+ public:
+  /// @param steps_per_episode T >= 1
+  explicit Acceptance(int steps_per_episode) : steps_(steps_per_episode) {}
+
+  /// A policy's trial. @param iteration names the policy. The first one is the incumbent.
+  void Add(int iteration, const Trial& trial);
+
+  /// How the latest challenger has done.
+  struct Decision {
+    int challenger = -1, incumbent = -1;  ///< iterations; the incumbent of before
+    bool accepted = false;
+    double probability = 0;  ///< that the challenger returns more
+    double challenger_return = 0, incumbent_return = 0;  ///< of an episode, means
+  };
+  /// Makes the challenger the incumbent if it returns more with probability kSure.
+  /// @throws std::invalid_argument if it has had no trial.
+  Decision Decide(int challenger);
+  /// Makes it the incumbent whatever the trials say: where the model explains the robot, training
+  /// on it is the better judge.
+  Decision Trust(int challenger);
+
+  /// -1 = none yet.
+  int incumbent() const { return incumbent_; }
+  /// E of the return of an episode. @throws std::invalid_argument if it has had no trial.
+  double MeanReturn(int iteration) const;
+  const std::map<int, std::vector<Trial>>& trials() const { return trials_; }
+
+  static constexpr double kSure = 0.75;
+  static constexpr double kScatter = 0.03;
+
+ private:
+  std::vector<double> Returns(int iteration) const;
+
+  int steps_;
+  int incumbent_ = -1;
+  std::map<int, std::vector<Trial>> trials_;  // by policy
+};
+
+/// "policy 3 accepted (2951, incumbent 0: 1846; better with 98 %)". Thread-safe.
+std::string Summary(const Acceptance::Decision& decision);
+
+}  // namespace plumb

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "robot/residual.h"
+#include "sim/simulator.h"
+#include "sim/tasks/task.h"
+#include "sim/touch.h"
+
+namespace plumb {
+
+/// Entries of a step's inputs. Thread-safe, as is the next one.
+int ResidualInputCount(const RobotDescription& robot);
+/// @throws std::invalid_argument if the residual has other inputs or outputs than the robot.
+void RequireResidualOf(const RobotDescription& robot, const Residual& residual);
+
+/// By what a residual knows a control step: D entries,
+///   the task's observation of the state it begins with,
+///   the mean effort of each driven joint, in units of its limit,
+///   the same of the step before: a drive may be late,
+///   the change of each velocity that stops, contacts and Coulomb friction made in the simulator,
+///   v' - v - T a_free.
+/// Not thread-safe; does not allocate after construction.
+class ResidualInputs {
+ public:
+  /// @param margin see TouchFinder.
+  /// @throws std::invalid_argument if the robot has spherical joints.
+  ResidualInputs(const Model& model, double margin);
+
+  int size() const { return static_cast<int>(x_.size()); }
+
+  /// Before the simulator makes the step. @param effort, before mean of the step and of the one
+  /// before it, num_velocities entries [Nm or N]. @param duration [s].
+  void Begin(Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,
+             const Eigen::Ref<const Eigen::VectorXd>& before, double duration);
+  /// After it.
+  void End(const Simulator& simulator);
+
+  // Of the step that has ended:
+  const Eigen::VectorXd& x() const { return x_; }
+  /// Whether it touched the ground or a stop, at its beginning or, in the simulator, at its end.
+  bool touching() const { return touching_; }
+
+ private:
+  std::unique_ptr<Task> task_;
+  Eigen::VectorXd limits_;  // of the driven joints
+  TouchFinder touch_;
+  Eigen::VectorXf observation_;
+  Eigen::VectorXd free_, x_;  // v + T a_free
+  bool touching_ = false;
+};
+
+}  // namespace plumb

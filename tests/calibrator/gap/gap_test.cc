@@ -1,0 +1,121 @@
+#include "calibrator/gap/gap.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "calibrator/fit/methods.h"
+#include "sim/parameters.h"
+#include "sim/residual_inputs.h"
+#include "tests/calibrator/fitted_log.h"
+#include "tests/calibrator/hopper.h"
+
+namespace plumb {
+namespace {
+
+GapFit Close(const RobotDescription& robot, const std::vector<Rollout>& rollouts) {
+  CalibrationOptions options;
+  options.method = "laplace", options.horizons = {1};
+  const MethodInput input{std::make_shared<Model>(robot), rollouts, options};
+  return CloseGap(input, RunMethod(input));
+}
+
+// Mean squared errors of the velocities of a log's steps of a condition, without and with the
+// residual's first draw.
+struct Squares {
+  double before = 0, after = 0;
+};
+Squares SquaredErrors(const RobotDescription& robot, const Residual& residual, bool touching,
+                      const std::vector<Rollout>& rollouts) {
+  const Model model(robot);
+  Simulator simulator(robot);
+  simulator.SetParameters(robot.ToPhysical(residual.coordinates[0]));
+  ResidualInputs inputs(model, residual.margin);
+  const ResidualFunction& function = touching ? *residual.touching : *residual.free;
+  Eigen::VectorXd features(function.features());
+  Squares squares;
+  for (const Rollout& rollout : rollouts) {
+    for (size_t i = 1; i < rollout.transitions.size(); ++i) {
+      const Transition& t = rollout.transitions[i];
+      simulator.SetState(t.q, t.v);
+      inputs.Begin(simulator, t.efforts[0].effort, rollout.transitions[i - 1].efforts[0].effort,
+                   t.duration());
+      simulator.Step(t.efforts);
+      inputs.End(simulator);
+      if (inputs.touching() != touching) continue;
+      function.Features(inputs.x(), features);
+      const Eigen::VectorXd error = t.next_v - simulator.v();
+      squares.before += error.squaredNorm();
+      squares.after += (error - function.weights[0] * features).squaredNorm();
+    }
+  }
+  return squares;
+}
+
+}  // namespace
+
+TEST_CASE("a right model keeps its posterior to the bit, and lacks nothing") {
+  const RobotDescription robot = Hopper();
+  const auto log = RandomLog(robot, {}, 400, 3);
+  CalibrationOptions options;
+  options.method = "laplace", options.horizons = {1};
+  const MethodInput input{std::make_shared<Model>(robot), log, options};
+  const MethodResult alone = RunMethod(input);
+  const GapFit gap = CloseGap(input, alone);
+  CHECK_FALSE(gap.alarm.alarm);
+  CHECK_FALSE(gap.residual);
+  CHECK(gap.result.posterior == alone.posterior);
+  CHECK(gap.result.samples == alone.samples);
+}
+
+TEST_CASE("a softer ground: masses are learnt in the air, and the ground apart") {
+  const RobotDescription robot = Hopper();
+  const Truth softer{{{"contact/stiffness", 0.3 * robot.simulation.contact->stiffness}}};
+  std::vector<Rollout> log = RandomLog(robot, softer, 4000, 3), unseen;
+  while (CountTransitions(log) > 3000) unseen.push_back(log.back()), log.pop_back();
+  const GapFit gap = Close(robot, log);
+  REQUIRE(gap.alarm.alarm);
+  CHECK(gap.touching);
+  CHECK_FALSE(gap.free);
+  REQUIRE(gap.residual);
+  CHECK_FALSE(gap.residual->free);
+  REQUIRE(gap.residual->touching);
+  const Eigen::VectorXd truth = HiddenParameters(robot, 3);
+  const Gaussian posterior = Moments(gap.result.posterior);
+  for (Eigen::Index i = 0; i < posterior.mean.size(); ++i) {
+    const ParameterDescription& p = robot.parameters[static_cast<size_t>(i)];
+    const double sd = std::sqrt(posterior.covariance(i, i));
+    CAPTURE(p.name, p.ToPhysical(posterior.mean(i)), sd);
+    CHECK(std::abs(posterior.mean(i) - p.ToCoordinate(truth(i))) < 4 * sd);
+    CHECK(sd < 0.05);
+  }
+  // on motion that was not learnt from
+  const Squares squares = SquaredErrors(robot, *gap.residual, true, unseen);
+  CHECK(squares.after < 0.3 * squares.before);
+}
+
+TEST_CASE("friction in free motion: the prior stays, and the residual goes with each draw of it") {
+  const RobotDescription robot = Robot("pendulum/gym.toml");
+  const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 600, 3);
+  const GapFit gap = Close(robot, log);
+  REQUIRE(gap.alarm.alarm);
+  CHECK(gap.free);
+  CHECK_FALSE(gap.touching);
+  CHECK(gap.result.used == "prior");
+  REQUIRE(gap.residual);
+  REQUIRE(gap.residual->free);
+  CHECK(gap.residual->coordinates.size() == static_cast<size_t>(kResidualDraws));
+  CHECK(gap.residual->coordinates[1] != gap.residual->coordinates[2]);
+  CHECK(gap.residual->free->weights[1] != gap.residual->free->weights[2]);
+  CHECK(gap.summary.find("nothing informs its parameters") != std::string::npos);
+}
+
+TEST_CASE("what is lacking has the same bits each time") {
+  const RobotDescription robot = Robot("pendulum/gym.toml");
+  const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 300, 3);
+  const GapFit a = Close(robot, log), b = Close(robot, log);
+  REQUIRE(a.residual);
+  CHECK(a.residual->free->weights == b.residual->free->weights);
+  CHECK(a.residual->free->noise == b.residual->free->noise);
+}
+
+}  // namespace plumb

@@ -1,0 +1,96 @@
+#include "controller/acceptance.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+namespace plumb {
+namespace {
+
+Trial Hops(int steps, double rate, bool fell) {
+  Trial trial;
+  for (int i = 0; i < steps; ++i) trial.Add(rate, 500);
+  trial.fell = fell;
+  return trial;
+}
+
+}  // namespace
+
+TEST_CASE("a trial knows its sum and the rate of its second half") {
+  Trial trial;
+  for (int i = 0; i < 8; ++i) trial.Add(i < 4 ? 1 : 3 + i % 2, 8);
+  CHECK(trial.steps == 8);
+  CHECK(trial.sum_of_rewards == 18);
+  CHECK(trial.late_rate == Approx(3.5));
+}
+
+TEST_CASE("where nobody falls a return is the rate times the steps") {
+  Acceptance acceptance(1000);
+  acceptance.Add(0, Hops(500, 3, false));
+  CHECK(acceptance.incumbent() == 0);
+  CHECK(acceptance.MeanReturn(0) == Approx(3000).epsilon(0.005));
+}
+
+TEST_CASE("a hazard shortens what an episode would have been") {
+  Acceptance acceptance(1000);
+  acceptance.Add(0, Hops(250, 3, true));
+  acceptance.Add(1, Hops(500, 3, false));
+  CHECK(acceptance.MeanReturn(0) == Approx(750).epsilon(0.005));  // it has fallen: that is all
+  // Falls of both: 1 in 750 steps; of policy 1 lambda ~ Gamma(1, 750 + 500), hence over 500 steps
+  //   E (1 - e^(-500 lambda)) / lambda = integral over m < 500 of 1250 / (1250 + m)
+  const double expected = 1500 + 3 * 1250 * std::log(1750. / 1250);
+  CHECK(acceptance.MeanReturn(1) == Approx(expected).epsilon(0.01));
+}
+
+TEST_CASE("who falls does not replace who does not, and the other way round") {
+  Acceptance acceptance(1000);
+  acceptance.Add(0, Hops(500, 3, false));
+  acceptance.Add(1, Hops(200, 3.3, true));
+  const auto worse = acceptance.Decide(1);
+  CHECK_FALSE(worse.accepted);
+  CHECK(worse.probability < 0.02);
+  CHECK(acceptance.incumbent() == 0);
+
+  Acceptance other(1000);
+  other.Add(0, Hops(200, 3.3, true));
+  other.Add(1, Hops(500, 3, false));
+  const auto better = other.Decide(1);
+  CHECK(better.accepted);
+  CHECK(better.probability > 0.98);
+  CHECK(better.incumbent == 0);
+  CHECK(other.incumbent() == 1);
+  CHECK(Summary(better).find("policy 1 accepted") == 0);
+}
+
+TEST_CASE("equals do not replace each other") {
+  Acceptance acceptance(1000);
+  acceptance.Add(0, Hops(500, 3, false));
+  acceptance.Add(1, Hops(500, 3, false));
+  const auto decision = acceptance.Decide(1);
+  CHECK(decision.probability == Approx(0.5).margin(0.03));
+  CHECK_FALSE(decision.accepted);
+  // 3 of 100 apart, each with 3 of 100 of scatter: Phi(1 / sqrt 2) = 0.76
+  acceptance.Add(2, Hops(500, 3.09, false));
+  CHECK(acceptance.Decide(2).probability == Approx(0.76).margin(0.02));
+}
+
+TEST_CASE("costs are returns, too") {
+  Acceptance acceptance(200);
+  Trial swing, fails;
+  for (int i = 0; i < 100; ++i) swing.Add(i < 40 ? -3.5 : 0, 100), fails.Add(-6, 100);
+  acceptance.Add(0, fails);
+  acceptance.Add(1, swing);
+  CHECK(acceptance.MeanReturn(0) == Approx(-1200).epsilon(0.01));
+  CHECK(acceptance.MeanReturn(1) == Approx(-140).epsilon(0.01));
+  CHECK(acceptance.Decide(1).accepted);
+}
+
+TEST_CASE("a trusted policy is taken whatever the trials say") {
+  Acceptance acceptance(1000);
+  acceptance.Add(0, Hops(500, 3, false));
+  acceptance.Add(1, Hops(500, 2, false));
+  CHECK(acceptance.Trust(1).accepted);
+  CHECK(acceptance.incumbent() == 1);
+  CHECK_THROWS_AS(acceptance.Decide(7), std::invalid_argument);
+}
+
+}  // namespace plumb

@@ -1,0 +1,151 @@
+#include <catch2/catch.hpp>
+
+#include "sim/environment.h"
+#include "sim/residual_inputs.h"
+#include "tests/sim/allocations.h"
+#include "tests/sim/robots.h"
+
+namespace plumb {
+namespace {
+
+// The same change in every step of a condition.
+ResidualFunction Constant(const RobotDescription& robot, const Eigen::VectorXd& change) {
+  const Eigen::Index d = ResidualInputCount(robot), n = change.size();
+  ResidualFunction f;
+  f.mean = Eigen::VectorXd::Zero(d), f.scale = Eigen::VectorXd::Ones(d);
+  f.low = Eigen::VectorXd::Constant(d, -1), f.high = Eigen::VectorXd::Constant(d, 1);
+  f.frequencies = Eigen::MatrixXd::Ones(3, d), f.phases = Eigen::VectorXd::Zero(3);
+  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(n, f.features());
+  weights.col(0) = change;
+  f.weights = {weights};
+  f.noise = Eigen::MatrixXd::Zero(n, n);
+  f.bound = Eigen::VectorXd::Constant(n, 10);
+  return f;
+}
+
+std::shared_ptr<Residual> Of(const RobotDescription& robot) {
+  auto residual = std::make_shared<Residual>();
+  residual->coordinates = {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.parameters.size()))};
+  return residual;
+}
+
+Eigen::VectorXf Action(const Environment& environment, Random& random) {
+  Eigen::VectorXf action(environment.action_size());
+  for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
+  return action;
+}
+
+}  // namespace
+
+TEST_CASE("a residual of nothing changes nothing") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
+  Environment plain(robot), corrected(robot);
+  const auto residual = Of(robot);
+  residual->free = Constant(robot, Eigen::VectorXd::Zero(6));
+  corrected.SetResidual(residual);
+  Random a(1), b(1), c(2);
+  b.Bits(), b.Bits();  // for the noise
+  corrected.Reset(a), plain.Reset(b);
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::VectorXf action = Action(plain, c);
+    CHECK(corrected.Step(action).reward == plain.Step(action).reward);
+    CHECK(corrected.q() == plain.q());
+    CHECK(corrected.v() == plain.v());
+  }
+}
+
+TEST_CASE("a residual moves velocities by what it says and positions by half of it") {
+  const RobotDescription robot = LoadPendulum("robot.toml");
+  Environment plain(robot), corrected(robot);
+  const auto residual = Of(robot);
+  residual->free = Constant(robot, Eigen::VectorXd::Constant(1, 0.125));
+  corrected.SetResidual(residual);
+  for (Environment* environment : {&plain, &corrected})
+    environment->SetState(Eigen::VectorXd::Constant(1, 1), Eigen::VectorXd::Constant(1, 0.5));
+  const Eigen::VectorXf action = Eigen::VectorXf::Constant(1, 0.3f);
+  plain.Step(action), corrected.Step(action);
+  CHECK(corrected.v()[0] - plain.v()[0] == Approx(0.125).epsilon(1e-12));
+  CHECK(corrected.q()[0] - plain.q()[0] == Approx(robot.task.period / 2 * 0.125).epsilon(1e-9));
+  corrected.SetResidual(nullptr);
+  for (Environment* environment : {&plain, &corrected})
+    environment->SetState(Eigen::VectorXd::Constant(1, 1), Eigen::VectorXd::Constant(1, 0.5));
+  plain.Step(action), corrected.Step(action);
+  CHECK(corrected.v() == plain.v());
+}
+
+TEST_CASE("free and touching steps have residuals of their own") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
+  const auto residual = Of(robot);
+  residual->touching = Constant(robot, Eigen::VectorXd::Constant(6, 0.25));
+  Environment plain(robot), corrected(robot);
+  corrected.SetResidual(residual);
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(6);
+  const Eigen::VectorXf action = Eigen::VectorXf::Zero(3);
+  q[3] = -0.5;  // away from its stop
+  const auto change = [&](double height, double knee) {
+    q[1] = height, q[4] = knee;
+    for (Environment* environment : {&plain, &corrected})
+      environment->SetState(q, Eigen::VectorXd::Zero(6));
+    plain.Step(action), corrected.Step(action);
+    return corrected.v()[0] - plain.v()[0];
+  };
+  CHECK(change(2, -1) == 0);                             // in the air
+  CHECK(change(1.0, -0.1) == Approx(0.25));              // on the ground
+  CHECK(change(2, -0.001) == Approx(0.25));              // at the knee's stop
+  CHECK(change(2, -0.1) == 0);
+}
+
+TEST_CASE("the inputs are observation, efforts of two steps, and what constraints did") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
+  const Model model(robot);
+  Simulator simulator(robot);
+  ResidualInputs inputs(model, 0.005);
+  REQUIRE(inputs.size() == 11 + 3 + 3 + 6);
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(6), v = q, effort = q, before = q;
+  q[1] = 2, q[4] = -1, v[3] = 0.5, effort[3] = 100, before[5] = -200;
+  simulator.SetState(q, v);
+  inputs.Begin(simulator, effort, before, 0.0005);
+  simulator.Step(effort, 0.0005);
+  inputs.End(simulator);
+  CHECK(inputs.x()[0] == 2);                    // height
+  CHECK(inputs.x()[8] == 0.5);                  // v of the thigh
+  CHECK(inputs.x()[11] == Approx(100. / 200));  // in units of the limit
+  CHECK(inputs.x()[16] == Approx(-1));
+  CHECK(inputs.x().tail(6).cwiseAbs().maxCoeff() < 1e-2);  // nothing but a short step's error
+  CHECK_FALSE(inputs.touching());
+  q[1] = 1.2, q[4] = 0;  // deep in the ground
+  simulator.SetState(q, v);
+  inputs.Begin(simulator, effort, before, 0.0005);
+  simulator.Step(effort, 0.0005);
+  inputs.End(simulator);
+  CHECK(inputs.x().tail(6).cwiseAbs().maxCoeff() > 0.05);
+  CHECK(inputs.touching());
+}
+
+TEST_CASE("a residual of another robot is refused") {
+  const RobotDescription hopper = LoadRobot(SourceFile("robots/hopper/gym.toml")), pendulum = LoadPendulum("robot.toml");
+  const auto residual = Of(pendulum);
+  residual->free = Constant(pendulum, Eigen::VectorXd::Constant(1, 0.125));
+  Environment environment(hopper);
+  CHECK_THROWS_WITH(environment.SetResidual(residual), Catch::Contains("another robot's"));
+  Environment own(pendulum);
+  CHECK_THROWS_WITH(own.SetResidual(residual, 1), Catch::Contains("no such draw"));
+}
+
+TEST_CASE("steps with a residual do not allocate") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
+  Environment environment(robot);
+  const auto residual = Of(robot);
+  residual->free = Constant(robot, Eigen::VectorXd::Zero(6));
+  residual->touching = residual->free;
+  environment.SetResidual(residual);
+  Random random(1);
+  environment.Reset(random);
+  const Eigen::VectorXf action = Eigen::VectorXf::Constant(3, 0.1f);
+  environment.Step(action);
+  const auto before = Allocations();
+  for (int i = 0; i < 20; ++i) environment.Step(action);
+  CHECK(Allocations() == before);
+}
+
+}  // namespace plumb
