@@ -77,7 +77,7 @@ class Report {
 
     const bool all_known =
         findings_.identifiability.null.empty() && !findings_.identifiability.summary.empty();
-    html += Verdict(all_known ? "good" : "", "What can be known", KnownWords() + Values());
+    html += Verdict(all_known ? "good" : "", "What can be known", KnownSummary() + Values());
     const Misspecification& model = findings_.misspecification;
     html += model.alarm ? Verdict("bad", "The model does not explain the robot", model.summary)
             : model.summary.empty()
@@ -102,7 +102,7 @@ class Report {
     return html;
   }
 
-  std::string KnownWords() const {
+  std::string KnownSummary() const {
     const Identifiability& found = findings_.identifiability;
     return found.summary.empty() ? "Identifiability was not examined." : found.summary;
   }
@@ -112,11 +112,11 @@ class Report {
     constexpr size_t kMost = 4;
     const std::vector<Combination>& combinations = findings_.identifiability.combinations;
     if (combinations.size() > kMost) return "";
-    std::string words;
+    std::string values;
     for (const Combination& c : combinations) {
-      words += (words.empty() ? ". " : ", ") + c.name + " = " + PlusMinus(c.mean, c.sd);
+      values += (values.empty() ? ". " : ", ") + c.name + " = " + PlusMinus(c.mean, c.sd);
     }
-    return words;
+    return values;
   }
 
   // First-order: the coordinate's sd in physical units, at the mean.
@@ -197,7 +197,7 @@ class Report {
 
   std::string KnownAndUnknown() const {
     const Identifiability& found = findings_.identifiability;
-    std::string html = "<h2>What can be known from this motion</h2>\n" + Paragraph(KnownWords());
+    std::string html = "<h2>What can be known from this motion</h2>\n" + Paragraph(KnownSummary());
     if (!found.combinations.empty()) {
       Table table({"what the motion determines", "value"});
       for (const Combination& c : found.combinations)
@@ -224,14 +224,14 @@ class Report {
   }
 
   std::string Direction(const Eigen::VectorXd& direction) const {
-    std::string words;
+    std::string parts;
     for (Index i = 0; i < std::min(size(), direction.size()); ++i) {
       if (!(std::abs(direction(i)) > kInvolved)) continue;
       const bool log = parameter(i).coordinate == Coordinate::kLog;
-      words += (words.empty() ? "" : ", ") + Name(i) +
+      parts += (parts.empty() ? "" : ", ") + Name(i) +
                fmt::format(" {:+.3g}{}", direction(i), log ? " %" : "");
     }
-    return words;
+    return parts;
   }
 
   std::vector<double> InformationEigenvalues() const {
