@@ -27,11 +27,11 @@ struct MitDescription {
 };
 
 /// Reads the table [joint.mit] of a motor of this protocol, whose other keys have been read.
-/// @throws ConfigError.
+/// Thread-safe. @throws ConfigError
 void ReadMit(Config& joint, MotorDescription& motor);
 
 /// Every effort and velocity within the joint's limits must have a code.
-/// @throws ConfigError.
+/// Thread-safe. @throws ConfigError
 void CheckMit(const Config& config, const JointDescription& joint);
 
 }  // namespace plumb
