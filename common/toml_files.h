@@ -16,7 +16,7 @@ std::string TomlPlace(const std::string& file, const toml::source_region& source
 /// @param name stands for the file. @throws ConfigError.
 toml::table ParseToml(const std::string& text, const std::string& name);
 
-/// Reads a file, and the one that its key `extends` names, relative to its folder, see Config::Load.
+/// Reads a file and those that it extends, merged as Config::Load says.
 /// @param files those that were read are appended to it, this one first.
 /// @throws ConfigError if one cannot be opened or parsed, or they extend each other.
 toml::table LoadTomlChain(const std::string& file, std::vector<std::string>& files);
