@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/streaming.h"
 #include "tests/calibrator/hopper.h"
 

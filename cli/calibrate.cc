@@ -120,7 +120,8 @@ int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::v
   RobotSbcOptions sbc;
   sbc.runs = flags.sbc, sbc.seed = options.seed, sbc.threads = options.execution.threads;
   sbc.progress = [&](double share) { look(), line.Show("simulation-based calibration", share); };
-  std::cout << Words(RunRobotSbc(std::make_shared<Model>(robot), rollouts, findings.noise_sd, sbc))
+  std::cout << SbcSummary(
+                   RunRobotSbc(std::make_shared<Model>(robot), rollouts, findings.noise_sd, sbc))
             << std::endl;
   return 0;
 }

@@ -21,7 +21,7 @@ struct CalibrateFlags {
   bool strict = false;       ///< exit status 3 if the findings should not be trusted
 };
 
-/// What --help says of the methods: a line for each.
+/// The methods' part of --help: a line for each. Thread-safe.
 std::string MethodHelp();
 
 /// `plumb calibrate`: infers from logs which simulators could have produced the robot's motion,
@@ -30,6 +30,7 @@ std::string MethodHelp();
 /// exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better
 /// than the prior, the model cannot explain the logs, or they do not agree.
 /// @throws std::invalid_argument or std::runtime_error, one line for people: robot, logs, files.
+/// Has threads of its own; call it from one.
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command);
 
 }  // namespace plumb

@@ -1,10 +1,8 @@
 #include "cli/launch.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,27 +11,19 @@
 #include <iostream>
 #include <optional>
 #include <set>
-#include <stdexcept>
 
-#include "cli/folder_lock.h"
-#include "cli/preflight.h"
 #include "cli/progress.h"
 #include "cli/run_processes.h"
-#include "cli/virtual_run.h"
+#include "cli/run_setting.h"
 #include "common/atomic_file.h"
-#include "common/lcm_url.h"
 #include "common/progress_line.h"
 #include "common/signature.h"
 #include "common/time_units.h"
-#include "drivers/driver/driver.h"
 #include "plumb/driver_request_t.hpp"
-#include "robot/description.h"
-#include "sim/parameters.h"
 
 namespace plumb {
 namespace {
 
-namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
 // of a virtual robot; a real one is armed by a person, every time
@@ -45,57 +35,10 @@ double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
 }
 
-// Says before anything starts what the driver would otherwise say in its log.
-void RequireDrivable(const RobotDescription& robot) {
-  try {
-    Driver(robot, 0, 0);
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(fmt::format("{} cannot be launched (plumb sim simulates it): {}",
-                                            robot.name, error.what()));
-  }
-}
-
-fs::path MakeFolder(const std::string& wanted) {
-  const fs::path folder =
-      wanted.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}",
-                                                      fmt::localtime(std::time(nullptr)), getpid())
-                     : fs::path(wanted);
-  fs::create_directories(folder);
-  return folder;
-}
-
-/// The run's settings, checked before anything starts.
-struct Setting {
-  Setting(const Process& process, const LaunchFlags& flags)
-      : robot(LoadRobot(flags.robot)), bus(flags.bus.empty() ? robot.bus_url : flags.bus) {
-    for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
-    RequireDrivable(robot);
-    RequireKey(process.lcm_url(), !flags.key.empty(), flags.allow_unsigned);
-    if (flags.real && flags.speed != 0)
-      throw std::invalid_argument("a real robot runs at its own speed, without --speed");
-    if (!flags.real) truth = HiddenParameters(robot, flags.seed);
-    RequireFree(process.lcm_url(), bus, flags.real);
-    output = MakeFolder(flags.output);
-    lock.emplace(output);
-    if (flags.real || flags.real_time) return;
-    virtual_run.emplace(output, process.lcm_url(), VirtualRun::Records{flags.log, flags.can_log});
-    virtual_run->coordinator().max_speed = flags.speed;
-  }
-
-  Coordinator* coordinator() { return virtual_run ? &virtual_run->coordinator() : nullptr; }
-
-  RobotDescription robot;
-  std::string bus;
-  Eigen::VectorXd truth;  // physical; empty: nobody knows
-  fs::path output;
-  std::optional<FolderLock> lock;
-  std::optional<VirtualRun> virtual_run;
-};
-
 /// One run: its processes and what they say.
 class ClosedLoop {
  public:
-  ClosedLoop(Process& process, const LaunchFlags& flags, Setting& setting)
+  ClosedLoop(Process& process, const LaunchFlags& flags, RunSetting& setting)
       : process_(process),
         flags_(flags),
         setting_(setting),
@@ -308,7 +251,7 @@ class ClosedLoop {
 
   Process& process_;
   const LaunchFlags& flags_;
-  Setting& setting_;
+  RunSetting& setting_;
   const RobotDescription& robot_;
   const Clock clock_;
   const int64_t start_;
@@ -332,7 +275,7 @@ class ClosedLoop {
 }  // namespace
 
 int Launch(Process& process, const LaunchFlags& flags) {
-  Setting setting(process, flags);
+  RunSetting setting(process, flags);
   if (setting.virtual_run) process.Enter(setting.coordinator()->participant());
   return ClosedLoop(process, flags, setting).Run();
 }

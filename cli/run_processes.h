@@ -16,7 +16,7 @@ class RunProcesses {
  public:
   struct Where {
     std::string bus, lcm_url;
-    std::string clock;             ///< what --clock says
+    std::string clock;             ///< value of their option --clock
     std::filesystem::path output;  ///< for their logs and checkpoints
   };
 

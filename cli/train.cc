@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -14,11 +12,11 @@
 #include <sstream>
 #include <thread>
 
+#include "cli/training_progress.h"
 #include "common/atomic_file.h"
 #include "common/batch_runner.h"
 #include "common/config.h"
 #include "common/hash.h"
-#include "common/progress_line.h"
 #include "common/ranks.h"
 #include "robot/posterior_reader.h"
 #include "trainer/checkpoint.h"
@@ -32,20 +30,6 @@ namespace {
 
 constexpr double kCheckpointPeriod = 5;  // [s]
 constexpr int kEvaluationEpisodes = 20;  // of those along the way
-constexpr char kCsvHeader[] =
-    "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,"
-    "accepted,dropped_episodes,seconds\n";
-
-class Stopwatch {
- public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 RobotDescription ReadRobot(const TrainFlags& flags) {
   RobotDescription robot = LoadRobot(flags.robot);
   if (flags.paper) robot.training = PaperSettings(robot.training);
@@ -78,74 +62,6 @@ uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
   if (start) text << start->parameters << start->observation_mean << start->observation_scale;
   return Hash(text.str());
 }
-
-/// progress.csv, a line for each update. A resumed run keeps the lines up to where it goes on from.
-class ProgressTable {
- public:
-  /// @param file empty = none. @param updates to keep.
-  ProgressTable(const std::string& file, int64_t updates) : file_(file) {
-    if (file.empty()) return;
-    std::string kept = kCsvHeader, line;
-    if (updates > 0) {
-      std::ifstream old(file);
-      for (int64_t last = 0; last < updates && std::getline(old, line);) {
-        last = std::atoll(line.c_str());
-        if (last > 0) kept += line + "\n";
-      }
-    }
-    WriteAtomically(file, kept);
-    stream_.open(file, std::ios::app);
-  }
-  void Add(const Trainer& trainer, const UpdateReport& report, double evaluation, double seconds) {
-    if (file_.empty()) return;
-    stream_ << fmt::format("{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{},{:.3f}\n",
-                           trainer.updates(), trainer.steps(), report.mean_return, evaluation,
-                           report.step.kl, report.step.surrogate_gain, report.explained_variance,
-                           report.entropy, report.step.accepted, report.dropped_episodes, seconds)
-            << std::flush;
-    if (!stream_) throw std::runtime_error(file_ + ": cannot be written");
-  }
-
- private:
-  std::string file_;
-  std::ofstream stream_;
-};
-
-std::string Clock(double seconds) {
-  const auto whole = static_cast<int64_t>(std::ceil(std::max(seconds, 0.)));
-  return whole >= 3600 ? fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60)
-                       : fmt::format("{}:{:02}", whole / 60, whole % 60);
-}
-
-/// One line that is written over where people look at it; into a file, a line now and then.
-class TrainingProgress {
- public:
-  explicit TrainingProgress(bool speaks) : speaks_(speaks), line_(speaks) {}
-  ~TrainingProgress() { line_.Keep(); }
-  void Show(const Trainer& trainer, const UpdateReport& report, int64_t steps,
-            int64_t done_before) {
-    if (!speaks_) return;
-    const double seconds = clock_.seconds();
-    if (seconds < next_ && trainer.steps() < steps) return;
-    next_ = seconds + (line_.shown() ? 0.1 : 5);
-    const double speed = static_cast<double>(trainer.steps() - done_before) / seconds;
-    const std::string line = fmt::format(
-        "{:3.0f} %  {:.3g} steps  return {:.5g}  KL {:.4f}  gain {:.3f}  explained {:.2f}  entropy "
-        "{:.2f}  {:.3g} steps/s  {} left",
-        100 * std::min(1., static_cast<double>(trainer.steps()) / static_cast<double>(steps)),
-        static_cast<double>(trainer.steps()), report.mean_return, report.step.kl,
-        report.step.surrogate_gain, report.explained_variance, report.entropy, speed,
-        Clock(static_cast<double>(steps - trainer.steps()) / speed));
-    line_.Show(line);
-    if (!line_.shown()) std::cerr << line << std::endl;
-  }
-
- private:
-  bool speaks_;
-  ProgressLine line_;
-  double next_ = 0;
-  Stopwatch clock_;
-};
 
 class Training {
  public:

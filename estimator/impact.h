@@ -5,19 +5,20 @@
 
 namespace plumb {
 
-/// How fast a robot meets what it hits, as far as kinematics tells; 0 = it does not. An impact's
-/// force is roughly proportional to that speed (all of it is the damping's where something is hit,
-/// and gone where it rests), so the acceleration's step is left open in proportion. Masses and
-/// forces do not enter: calibration may use what comes of it. Functions here are thread-safe.
+/// Speeds at which a robot may hit the ground or its stops, by kinematics alone; 0 = it does not.
+/// An impact's force is roughly proportional to that speed (at first it is the damping's alone, and
+/// at rest it is gone), so the uncertainty of the acceleration's step is, too. Masses and forces do
+/// not enter, so that calibration may use states estimated like this. Functions here are
+/// thread-safe.
 struct ImpactSpeeds {
   double ground = 0;  ///< [m/s] of a point with the ground
   double stop = 0;    ///< [rad/s] or [m/s] of joints with their stops
 };
 
-/// By how much an impact may be early or late: readings are, and the way to it is only as well
-/// known as the velocity.
+/// An impact may be early or late by this: so are readings, and the velocity on the way to it is
+/// not exact.
 inline constexpr double kImpactTiming = 1e-3;  ///< [s]
-/// In which what is left of an impact fades: its force outlasts its speed.
+/// Time in which an impact fades: its force outlasts its speed.
 inline constexpr double kImpactFades = 5e-3;   ///< [s]
 inline constexpr double kGroundMargin = 2e-3;  ///< [m]
 inline constexpr double kStopMargin = 5e-3;    ///< [rad] or [m]

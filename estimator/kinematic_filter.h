@@ -25,12 +25,12 @@ enum class Quantity { kPosition, kVelocity, kRate, kAcceleration };
 /// with Applications to Tracking and Navigation", 2001, section 6.2.3), with a fixed-lag
 /// Rauch-Tung-Striebel smoother.
 ///
-/// It knows no dynamics, so what is inferred from its output about dynamics is not eaten from its
-/// own tail. It knows one thing beyond kinematics: acceleration may step when the applied effort
-/// steps. The size of that step is left open (a wide zero-mean Gaussian), because it is what
-/// calibration wants to learn; without the allowance the filter would round off every such corner
-/// and bias the effort's apparent effect. The same where kinematics says that there may be an
-/// impact.
+/// It knows no dynamics, so that calibration, which infers dynamics from its output, does not find
+/// its own assumptions there. It knows one thing beyond kinematics: acceleration may step when the
+/// applied effort steps. The size of that step is left open (a wide zero-mean Gaussian), because
+/// calibration wants to learn it; without the allowance the filter would round off every such
+/// corner and bias the effort's apparent effect. The same where kinematics says that there may be
+/// an impact.
 ///
 /// A reading counts at its own time: its row of the observation matrix is that of the state so long
 /// ago under an acceleration that is constant but for the effort's step, its variance grows by what
@@ -55,7 +55,7 @@ class KinematicFilter {
   void Predict(double dt, double effort_step, const ImpactSpeeds& impact = {},
                double step_after = 0);
 
-  /// A reading less what was expected of it, and its variance if both are right.
+  /// A reading less its prediction, and the variance of that if filter and noise are right.
   struct Innovation {
     double value, variance;
     /// Normalised innovation squared: 1 on average.
@@ -64,7 +64,7 @@ class KinematicFilter {
   /// @param age [s] of the reading; < 0: it was made a little later.
   /// An acceleration needs a mark: since_mark() finite and above the age.
   Innovation Expect(Quantity quantity, double value, double age) const;
-  /// Takes it into account. @return what Expect says before.
+  /// Corrects the state by a reading. @return as Expect, before the correction.
   Innovation Correct(Quantity quantity, double value, double age);
   /// The mark is, from the next step on, where a reading of that age was made.
   void Mark(double age) { next_mark_ = age; }

@@ -23,9 +23,9 @@ class NisAverage {
 };
 
 /// Two sensors of one motion, of a level and of its rate (position and velocity, velocity and
-/// acceleration): what the level changed by in a quarter of a second must be the integral of the
-/// rate. No model of the motion is needed for that, so an impact raises no alarm, and what neither
-/// sensor alone could be blamed for shows. Does not allocate. Not thread-safe.
+/// acceleration): the change of the level in a quarter of a second must be the integral of the
+/// rate. No model of the motion is needed for that, so an impact raises no alarm, and a fault shows
+/// that neither sensor's readings alone would reveal. Does not allocate. Not thread-safe.
 class AgreementWatch {
  public:
   enum class Finding {
@@ -49,7 +49,7 @@ class AgreementWatch {
 
   /// A reading of both. @param elapsed [s] since the last one, > 0.
   void Add(double level, double rate, double elapsed);
-  /// The window begins anew: the motion was interrupted. What was found remains.
+  /// The window begins anew: the motion was interrupted. Earlier findings remain.
   void Restart() { readings_ = 0; }
 
   /// Of the last complete window.

@@ -5,7 +5,9 @@
 
 namespace plumb {
 
-/// A line with a band.
+// Functions here are pure: thread-safe.
+
+/// A line with a band: y = middle(x), from low to high. All of one size.
 struct Curve {
   std::string name;  ///< in the legend
   std::vector<double> x, middle, low, high;

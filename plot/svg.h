@@ -6,6 +6,8 @@
 
 namespace plumb {
 
+// Functions here are pure: thread-safe. An Axis is immutable, hence thread-safe; an Svg is not.
+
 /// For text and attribute values of HTML and SVG: & < > " ' are escaped, control characters and
 /// bytes that are not UTF-8 replaced, so that a page stays well-formed XML whatever a file called
 /// itself.

@@ -39,7 +39,7 @@ struct RobotDescription {
   SimulationSettings simulation;
   std::vector<ParameterDescription> parameters;  ///< the uncertain ones
   std::vector<FrozenParameter> frozen;           ///< the others
-  std::vector<std::string> warnings;  ///< what of the files has no effect, e.g. a collision mesh
+  std::vector<std::string> warnings;             ///< of parts without effect, e.g. a collision mesh
   TaskSettings task;
   ControllerSettings controller;
   CalibrationSettings calibration;

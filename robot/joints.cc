@@ -11,19 +11,16 @@ namespace {
 
 constexpr Range kSane{-1e9, 1e9}, kSaneNotNegative{0, 1e9};
 
-MitDescription ReadMit(Config config) {
-  MitDescription mit;
-  mit.master = config.Integer("master", {0, 0x7FF}, 0);
-  mit.ranges.position = config.Number("position", {1e-3, 1e6}, mit.ranges.position);
-  mit.ranges.velocity = config.Number("velocity", {1e-3, 1e6});
-  mit.ranges.torque = config.Number("torque", {1e-3, 1e6});
-  mit.ranges.kp = config.Number("kp", {1e-3, 1e6}, mit.ranges.kp);
-  mit.ranges.kd = config.Number("kd", {1e-3, 1e6}, mit.ranges.kd);
-  mit.source = config.String("source");
-  if (mit.source.empty()) config.Fail("source", "is empty: say where the ranges are from");
-  config.Finish();
-  return mit;
-}
+/// [joint.PROTOCOL] of the motor protocols that have keys of their own.
+struct MotorTable {
+  const char* protocol;
+  void (*read)(Config& joint, MotorDescription& motor);
+  /// against the joint's limits
+  void (*check)(const Config& config, const JointDescription& joint);
+};
+constexpr MotorTable kMotorTables[] = {
+    {"mit", &ReadMit, &CheckMit},
+};
 
 MotorDescription ReadMotor(Config& config) {
   MotorDescription motor;
@@ -33,15 +30,13 @@ MotorDescription ReadMotor(Config& config) {
   motor.sign = config.Integer("sign", {-1, 1}, 1);
   if (motor.sign == 0) config.Fail("sign", "must be 1 or -1");
   motor.offset = config.Number("offset", kSane, 0);
-  if (motor.protocol == "mit") {
-    motor.mit = ReadMit(config.Table("mit"));
-    if (motor.mit->master == motor.node) {
-      config.Fail("node",
-                  fmt::format("= {} is also the id of its replies, mit.master", motor.node));
+  for (const MotorTable& table : kMotorTables) {
+    if (motor.protocol == table.protocol) {
+      table.read(config, motor);
+    } else if (config.Has(table.protocol)) {
+      config.Fail(table.protocol, fmt::format("is of protocol \"{}\", but the motor's is \"{}\"",
+                                              table.protocol, motor.protocol));
     }
-  } else if (config.Has("mit")) {
-    config.Fail("mit",
-                fmt::format("is of protocol \"mit\", but the motor's is \"{}\"", motor.protocol));
   }
   return motor;
 }
@@ -94,24 +89,6 @@ NoiseDescription ReadNoise(Config config) {
   read("delay", {0, 0.1}, noise.delay);
   config.Finish();
   return noise;
-}
-
-// Every effort and velocity within the joint's limits must have a code.
-void CheckMitRanges(const Config& config, const JointDescription& joint) {
-  const MitRanges& ranges = joint.motor.mit->ranges;
-  const double torque = joint.effort_limit / joint.motor.gear,
-               velocity = joint.velocity_limit * joint.motor.gear;
-  if (torque > ranges.torque) {
-    config.Fail("mit",
-                fmt::format("has torques up to {} Nm, but the joint's limit is {} Nm at the motor",
-                            ranges.torque, torque));
-  }
-  if (velocity > ranges.velocity) {
-    config.Fail(
-        "mit",
-        fmt::format("has velocities up to {} rad/s, but the joint's limit is {} rad/s at the motor",
-                    ranges.velocity, velocity));
-  }
 }
 
 void CheckMotor(const UrdfModel& urdf, size_t index) {
@@ -180,9 +157,12 @@ std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf) {
     if (seen[index]) config.Fail("name", fmt::format("= \"{}\" occurs twice", name));
     joint->passive = config.Boolean("passive", false);
     if (joint->passive) {
-      for (const char* key : {"protocol", "node", "gear", "sign", "offset", "mit", "limits"}) {
+      const auto refuse = [&](const char* key) {
         if (config.Has(key)) config.Fail(key, "is of a motor, but the joint is passive");
-      }
+      };
+      for (const char* key : {"protocol", "node", "gear", "sign", "offset"}) refuse(key);
+      for (const MotorTable& table : kMotorTables) refuse(table.protocol);
+      refuse("limits");
     } else {
       if (joint->type == JointDescription::Type::kSpherical) {
         config.Fail(
@@ -193,7 +173,9 @@ std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf) {
       joint->motor = ReadMotor(config);
       CheckMotor(urdf, index);
       joint->limits = ReadLimits(config.Table("limits", false), *joint);
-      if (joint->motor.mit) CheckMitRanges(config, *joint);
+      for (const MotorTable& table : kMotorTables) {
+        if (joint->motor.protocol == table.protocol) table.check(config, *joint);
+      }
       for (size_t other = 0; other < joints.size(); ++other) {
         if (seen[other] && !joints[other].passive &&
             joints[other].motor.protocol == joint->motor.protocol &&

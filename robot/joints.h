@@ -6,28 +6,12 @@
 #include <vector>
 
 #include "common/config.h"
+#include "robot/mit.h"
 #include "robot/parameter_kinds.h"
 #include "robot/settings/estimator.h"
 #include "robot/urdf/urdf.h"
 
 namespace plumb {
-
-/// The ranges that the codes of a motor of protocol "mit" stand for, see drivers/protocols/mit.h.
-/// All > 0, at the output shaft.
-struct MitRanges {
-  double position = 12.5;  ///< [rad] positions are in [-position, position]
-  double velocity = 0;     ///< [rad/s] likewise
-  double torque = 0;       ///< [Nm] likewise
-  double kp = 500;         ///< [Nm/rad] in [0, kp]
-  double kd = 5;           ///< [Nm s/rad] in [0, kd]
-};
-
-/// Settings of a motor of protocol "mit" besides its node.
-struct MitDescription {
-  int master = 0;  ///< CAN id of the replies
-  MitRanges ranges;
-  std::string source;  ///< of the ranges: a wrong one scales every value unnoticed
-};
 
 /// Address, gear and zero of a joint's motor.
 struct MotorDescription {

@@ -8,7 +8,7 @@
 
 /// The numbers of a robot's simulator that may be uncertain: where they are, and what they are
 /// called in robot.toml and in the paths of parameters. A new kind is a member here, its line in
-/// the table after it, and the physics that uses it.
+/// the table after it, and the physics that uses it. Plain data: not thread-safe. Tables: constant.
 namespace plumb {
 
 /// Standard acceleration of free fall, ISO 80000-3 [m/s^2].

@@ -95,6 +95,16 @@ void ReadImu(Config& config, const RobotDescription& robot, SensorDescription& s
   s.acceleration_bias_sd = config.Number("acceleration_bias_sd", {0, 1e3}, kAccelerationBiasSd);
 }
 
+/// The keys of a sensor, by its protocol.
+struct SensorKind {
+  const char* protocol;
+  void (*read)(Config& config, const RobotDescription& robot, SensorDescription& sensor);
+};
+constexpr SensorKind kSensorKinds[] = {
+    {"cia406", &ReadEncoder},
+    {"xsens", &ReadImu},
+};
+
 }  // namespace
 
 std::vector<SensorDescription> ReadSensors(Config& root, const RobotDescription& robot) {
@@ -109,15 +119,12 @@ std::vector<SensorDescription> ReadSensors(Config& root, const RobotDescription&
     for (const JointDescription& joint : robot.joints) {
       if (joint.name == s.name) config.Fail("name", fmt::format("= \"{}\" is a joint's", s.name));
     }
-    const std::vector<std::string> protocols = {"cia406", "xsens"};
-    const auto protocol = static_cast<size_t>(config.Choice("protocol", protocols));
-    s.protocol = protocols[protocol];
+    std::vector<std::string> protocols;
+    for (const SensorKind& kind : kSensorKinds) protocols.emplace_back(kind.protocol);
+    const SensorKind& kind = kSensorKinds[config.Choice("protocol", protocols)];
+    s.protocol = kind.protocol;
     s.period = config.Number("period", {1e-4, 1});
-    if (protocol == 0) {
-      ReadEncoder(config, robot, s);
-    } else {
-      ReadImu(config, robot, s);
-    }
+    kind.read(config, robot, s);
     if (config.Has("delay")) s.noise.delay = config.Number("delay", {0, 0.1});
     config.Finish();
     sensors.push_back(s);

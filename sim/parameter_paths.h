@@ -9,6 +9,8 @@
 
 namespace plumb {
 
+// Functions here are pure: thread-safe.
+
 /// A parameter that a robot's simulator has: its path, and where in the physics its value goes.
 struct ParameterPath {
   std::string path;

@@ -69,7 +69,7 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
     Vector3d::Map(physics.origin) =
         topology.link_axes[static_cast<size_t>(joint.parent)] * joint.origin;
     base_.links.push_back(physics);
-    // What would need too much memory.
+    // A longer delay would need too much memory.
     Check("delay/" + joint.name, kDelays, joint.dynamics.delay);
     Check("sensor_delay/" + joint.name, kDelays, joint.dynamics.sensor_delay);
     base_.axes.insert(base_.axes.end(), static_cast<size_t>(joint.num_velocities()),

@@ -52,7 +52,7 @@ class Parameters {
   const Eigen::VectorXd& means() const { return means_; }
   /// The robot with its frozen parameters and the prior means of the uncertain ones.
   Physics<double> Nominal() const;
-  /// What any values of the parameters may bring into play.
+  /// The terms of the equations that some values of the parameters need.
   const Terms& terms() const { return terms_; }
   bool delays() const { return terms_.Has(&JointDynamics::delay); }
   bool sensor_errors() const {

@@ -12,15 +12,15 @@
 
 namespace plumb {
 
-/// A piece of a recorded motion: a state, and what was applied from there on. What it refers to
-/// must outlive it.
+/// A piece of a recorded motion: a state, and the efforts from there on, to which it refers: they
+/// must outlive it. A value.
 struct Window {
   Eigen::VectorXd q, v;  ///< readings with which it begins; finite
   /// Control step by control step, at least one; efforts of num_velocities entries, of positive
   /// duration together.
   std::vector<std::span<const EffortSegment>> steps;
-  /// The efforts commanded before, the latest last: where efforts are delayed, some of it is
-  /// still to come. Before all that is known there was no effort.
+  /// The efforts commanded before, the latest last: where efforts are delayed, some of them are
+  /// still to act. Before the first of them there was no effort.
   std::vector<std::span<const EffortSegment>> before = {};
 };
 
@@ -53,7 +53,7 @@ class Windows {
   /// @param parameters one column per sample, physical units. @param last_only visit the end of
   /// each window only.
   /// @throws std::invalid_argument if a window is not as it should be, or a column not of the
-  /// model's parameters; and what a visit throws, when all threads have ended.
+  /// model's parameters; and any exception of a visit, when all threads have ended.
   Failures Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
                    const Visit& visit, bool last_only = true);
 

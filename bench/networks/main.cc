@@ -63,7 +63,7 @@ class Kernels {
   kernels::Tape tape_;
 };
 
-/// What is timed of one implementation at one size, and what it gives.
+/// One implementation at one size: the work that is timed, by name, and its results.
 struct Candidate {
   std::string name;
   std::map<std::string, std::function<void()>> work;

@@ -28,7 +28,7 @@ struct ChainTimes {
 
 /// Runs plumb-robot, plumb-driver, plumb-estimator and plumb-controller on the udp: bus with
 /// robots/pendulum at 1 kHz (control every 10 ms), and listens for `seconds` from the first torque
-/// on.
+/// on. Not thread-safe.
 /// @param priority the driver's --realtime-priority.
 /// @param load processes that keep the cores busy meanwhile.
 /// @throws std::runtime_error if no torque is seen within a minute.

@@ -41,7 +41,7 @@ struct RatedExcitation {
 /// margin) or velocity limit is tried at half and at a quarter of its amplitude, and then left out.
 /// Position limits do not count where the robot's simulator has their stops ([simulation.limit]):
 /// then they are part of the motion.
-/// @param belief over the parameters' coordinates: the prior, or what a posterior has left open.
+/// @param belief over the parameters' coordinates: the prior, or a posterior.
 /// @return best first, maybe none.
 /// @throws std::invalid_argument if the robot has no parameters or motors, or its description has
 /// spherical joints.
@@ -61,8 +61,8 @@ Eigen::VectorXd PhysicalSd(const RobotDescription& robot, const Eigen::VectorXd&
 std::string DescribeGain(const RobotDescription& robot, const Gaussian& belief,
                          const RatedExcitation& rated);
 
-/// The motion that would tell most of what a posterior has left open: of its weak directions, and
-/// if there are none, of everything.
+/// The motion that would tell most about a posterior's weak directions, or about all parameters if
+/// there are none.
 struct MotionAdvice {
   /// best first, by what they tell of the weak directions; maybe none
   std::vector<RatedExcitation> rated;

@@ -203,7 +203,7 @@ std::vector<Misfit> TestWhiteness(const ProjectedErrors& errors) {
     const double statistic = z.dot(covariance.ldlt().solve(z));
     double predictable = 0;
     for (int lag = first; lag < last; ++lag) {
-      // What chance alone would make of it does not count.
+      // Less the expectation of chance alone.
       predictable += std::pow(correlation(lag), 2) - covariance(0, 0) / pairs(lag);
     }
     tests.push_back({CoordinateName(errors, c) + ": successive errors resemble each other",

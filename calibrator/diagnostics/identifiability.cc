@@ -6,7 +6,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "calibrator/diagnostics/identifiability_words.h"
+#include "calibrator/diagnostics/identifiability_summary.h"
 #include "calibrator/diagnostics/sparse_basis.h"
 #include "common/decompositions.h"
 
@@ -257,7 +257,7 @@ Identifiability FindIdentifiability(const RobotDescription& robot,
   }
   found.weak =
       FindWeak(information, prior_sd, eigen.eigenvectors().middleCols(nulls, weak), found.null);
-  found.summary = IdentifiabilityWords(robot, distribution.mean, found);
+  found.summary = IdentifiabilitySummary(robot, distribution.mean, found);
   return found;
 }
 

@@ -116,7 +116,7 @@ std::vector<Explanation> FindExplanations(const ProjectedErrors& errors,
     const Eigen::VectorXd raw =
         errors.weight.cwiseProduct(residuals.columns.col(static_cast<Eigen::Index>(k)));
     Eigen::VectorXd column = errors.Project(raw);
-    // What fitted parameters do as well, or nothing does, cannot be tested.
+    // A candidate whose effect is nil, or one of the fitted parameters', cannot be tested.
     if (!(column.norm() > 1e-4 * raw.norm()) || !(column.norm() * candidate.scale > 1e-3)) continue;
     const Score score =
         FindScore(errors, column, candidate.scale, candidate.lower - candidate.value);

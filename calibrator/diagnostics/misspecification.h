@@ -35,7 +35,7 @@ struct Misspecification {
 /// The errors that a fit has left, and what they are to be tested for.
 struct FitResiduals {
   std::span<const Rollout> rollouts;        ///< that were fitted
-  std::span<const WindowErrors::Row> rows;  ///< what each error is about
+  std::span<const WindowErrors::Row> rows;  ///< the coordinate and transition of each error
   /// one-step, whitened, at the posterior's mean: for the right model N(0, 1)
   Eigen::VectorXd errors;
   /// rows x d: of the errors with respect to what was fitted, in any units

@@ -4,6 +4,7 @@
 
 #include "calibrator/diagnostics/identifiability.h"
 #include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/robot_least_squares.h"
 
 namespace plumb {
 namespace {

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/robot_problem.h"
 #include "calibrator/inference/abc_rejection.h"
 #include "calibrator/inference/abc_smc.h"

@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/noise.h"
 #include "common/decompositions.h"
 #include "common/random.h"
@@ -14,7 +15,6 @@
 namespace plumb {
 namespace {
 
-constexpr int kClusterSteps = 25;     // beyond the memory of an estimator's smoother
 constexpr int64_t kSearchSteps = 40;  // transitions that are enough to find a mode
 constexpr double kSameMode = 4;       // [sd] between two answers that count as one
 // [nat] by which another mode may explain the transitions worse
@@ -296,43 +296,6 @@ class Curriculum {
 };
 
 }  // namespace
-
-Prior PriorOf(const RobotDescription& robot) {
-  std::vector<Prior::Marginal> marginals;
-  for (const ParameterDescription& p : robot.parameters) {
-    marginals.push_back(Prior::Normal(p.coordinate_mean(), std::sqrt(p.coordinate_variance())));
-  }
-  return Prior(std::move(marginals));
-}
-
-LeastSquares ProblemOf(const RobotDescription& robot, WindowErrors& errors) {
-  LeastSquares problem{PriorOf(robot),
-                       [&](const Eigen::MatrixXd& coordinates) {
-                         Eigen::MatrixXd physical(coordinates.rows(), coordinates.cols());
-                         for (Eigen::Index j = 0; j < coordinates.cols(); ++j)
-                           physical.col(j) = robot.ToPhysical(coordinates.col(j));
-                         return errors.Whitened(physical);
-                       },
-                       {},
-                       {},
-                       {},
-                       errors.noise_known()};
-  int block = -1, cluster = -1, steps = kClusterSteps;
-  const WindowErrors::Row* before = nullptr;
-  for (const WindowErrors::Row& row : errors.rows()) {
-    const bool new_step =
-        !before || row.window != before->window || row.transition != before->transition;
-    const bool new_window = !before || row.window != before->window;
-    if (new_step) ++block, ++steps;
-    if (!before || (new_window && (steps > kClusterSteps || row.rollout != before->rollout)))
-      ++cluster, steps = 1;
-    problem.group.push_back(row.coordinate);
-    problem.block.push_back(block);
-    problem.cluster.push_back(cluster);
-    before = &row;
-  }
-  return problem;
-}
 
 CurriculumFit FitCurriculum(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts,
                             const CurriculumOptions& options, const Eigen::VectorXd& start) {

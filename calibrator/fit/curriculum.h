@@ -19,14 +19,6 @@ namespace plumb {
 /// Of the units of the state (Task::state_scale): an error that nobody needs to explain.
 inline constexpr double kNegligible = 1e-5;
 
-/// The prior of a robot's parameters, in their coordinates.
-Prior PriorOf(const RobotDescription& robot);
-
-/// Errors of windows as a least-squares problem: a noise scale for each entry of (q, v), a block
-/// for each recorded state, a cluster for each stretch of at least 25 control steps. `errors` must
-/// outlive it.
-LeastSquares ProblemOf(const RobotDescription& robot, WindowErrors& errors);
-
 struct CurriculumOptions {
   std::vector<int> horizons{1, 5, 10, 50};  ///< control steps of each stage's windows, increasing
   /// first guesses: the prior's mean, and draws of the prior

@@ -11,7 +11,7 @@
 
 namespace plumb {
 
-/// How far simulators are from what a robot did. Parameters are physical, in the description's
+/// How far simulators are from a robot's record. Parameters are physical, in the description's
 /// order, one column per simulator; so are results. A simulation that fails is infinitely far, and
 /// counted. Uses `threads` threads inside; not thread-safe itself. The same bits for any number of
 /// threads.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/importance.h"
 #include "common/decompositions.h"
 #include "sim/tasks/task.h"

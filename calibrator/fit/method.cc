@@ -1,4 +1,5 @@
 #include "calibrator/fit/method.h"
+#include "calibrator/fit/robot_least_squares.h"
 
 #include <algorithm>
 

@@ -15,9 +15,9 @@ namespace plumb {
 /// How many transitions of a roll-out from `first` on follow each other without a gap, at least 1.
 size_t StretchLength(const Rollout& rollout, size_t first);
 
-/// `length` recorded steps from transition `first` on: the state that it begins with, and what was
-/// applied. Where the model delays efforts, what had been commanded before is part of it, as far
-/// back as there is no gap.
+/// `length` recorded steps from transition `first` on: the state that it begins with, and the
+/// applied efforts. Where the model delays efforts, the efforts commanded before are part of it, as
+/// far back as there is no gap.
 /// @param rollout whose efforts the window refers to: they must outlive it.
 Window RecordedWindow(const Model& model, const Rollout& rollout, size_t first, size_t length);
 

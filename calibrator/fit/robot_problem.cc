@@ -8,7 +8,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/distances.h"
 #include "common/decompositions.h"
 

@@ -12,8 +12,8 @@ namespace plumb {
 
 // The problem uses its errors and their threads: one thread at a time.
 
-/// A robot's log for methods that know only simulations. What is simulated is a record like the one
-/// there is: the recorded steps from the recorded states, and noise as large as a first fit has
+/// A robot's log for methods that know only simulations. A simulation makes a record like the
+/// robot's: the recorded steps from the recorded states, and noise as large as a first fit has
 /// found it. Its outcome depends on `discrepancy`:
 ///   likelihood   the scores of the first fit, J'(e + noise) in units of their spread: n numbers
 ///                that hold all that Gaussian errors near that fit can tell (semi-automatic

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "calibrator/fit/discrepancy.h"
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/reps_search.h"
 
 namespace plumb {

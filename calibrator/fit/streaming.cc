@@ -6,8 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/recorded_window.h"
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/whitening.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"

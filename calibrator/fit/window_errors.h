@@ -17,20 +17,20 @@ namespace plumb {
 /// estimated.
 Eigen::VectorXd GuessedNoise(const RobotDescription& robot);
 
-/// By how much each entry of (q, v) is moved to see what the initial state does: large against the
-/// rounding of a simulation, small against its curvature.
+/// The step of each entry of (q, v) in finite differences with respect to the initial state: large
+/// against the rounding of a simulation, small against its curvature.
 Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd);
 
-/// How far simulators are from what a robot did, window by window: reset to a recorded state, apply
-/// what was applied for up to `horizon` steps, compare with every recorded state on the way.
-/// Windows follow each other without overlap over all gapless stretches of the record; the last of
-/// a stretch may be shorter. With horizon 1 a window is a transition.
+/// The errors of simulators against a robot's record, window by window: reset to a recorded state,
+/// apply the recorded efforts for up to `horizon` steps, compare with every recorded state on the
+/// way. Windows follow each other without overlap over all gapless stretches of the record; the
+/// last of a stretch may be shorter. With horizon 1 a window is a transition.
 ///
-/// Errors are whitened by what is known of the recorded states' uncertainty, that of the state a
-/// window begins with included: it is carried along by the simulator's own sensitivity, and what
-/// the window's earlier errors have told of it is taken into account (a Kalman filter of the
-/// initial state; errors-in-variables). For the right simulator whitened errors are independent,
-/// with mean zero and variance one; where the noise is not known (sd NaN) it is `noise_sd`.
+/// Errors are whitened by the uncertainty of the recorded states, the state a window begins with
+/// included: that is carried along by the simulator's own sensitivity, and reduced by the window's
+/// earlier errors (a Kalman filter of the initial state; errors-in-variables, WhitenWindow). For
+/// the right simulator whitened errors are independent, with mean zero and variance one; where the
+/// noise is not known (sd NaN) it is `noise_sd`.
 ///
 /// Not thread-safe. The same bits for any number of threads and whoever does the work.
 class WindowErrors {

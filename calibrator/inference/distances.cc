@@ -81,8 +81,8 @@ Whitening MakeWhitening(const MatrixXd& recorded) {
   Whitening whitening{recorded.rowwise().mean(), {}};
   const MatrixXd centred = recorded.colwise() - whitening.mean;
   MatrixXd covariance = centred * centred.transpose() / static_cast<double>(recorded.cols());
-  // What never varied is compared in the units it comes in, nearly: there is nothing else to scale
-  // it by.
+  // A statistic that never varied has no scale of its own: it stays, nearly, in the units it comes
+  // in.
   const double largest = covariance.diagonal().maxCoeff();
   covariance.diagonal().array() += largest > 0 ? 1e-6 * largest : 1.;
   whitening.root.compute(covariance);

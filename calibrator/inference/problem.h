@@ -26,7 +26,7 @@ struct Problem {
 
 /// The posterior, in the prior's coordinates.
 struct Posterior {
-  GaussianMixture mixture;  ///< what the trainer draws from
+  GaussianMixture mixture;  ///< for whoever draws simulators, e.g. the trainer
   /// n x N, equally weighted; more exact than the mixture where they differ
   Eigen::MatrixXd samples;
   int64_t simulations = 0;  ///< made, failed ones included

@@ -228,7 +228,7 @@ SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQua
   return result;
 }
 
-std::string Words(const SbcResult& result) {
+std::string SbcSummary(const SbcResult& result) {
   const int posteriors = result.runs - result.failures;
   size_t width = 8;
   for (const SbcUniformity& quantity : result.quantities)

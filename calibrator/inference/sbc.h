@@ -26,8 +26,8 @@ struct SbcQuantity {
 /// The parameters themselves, in the prior's order.
 std::vector<SbcQuantity> Marginals(const std::vector<std::string>& names);
 
-/// One run of what is to be judged: simulates data of a robot with parameters `truth` and infers a
-/// posterior from them.
+/// One run of the inference to be judged: simulates data of a robot with parameters `truth` and
+/// infers a posterior from them.
 /// @param random of this run, for the data's noise and whatever else is drawn.
 /// @return n x M independent draws of the posterior, in the prior's coordinates (draws of a Markov
 /// chain must be thinned until they are), M the same in all runs; none if the inference failed. A
@@ -79,13 +79,13 @@ struct SbcResult {
 SbcResult RunSbc(const Prior& prior, const SbcFit& fit, const std::vector<SbcQuantity>& quantities,
                  int runs, uint64_t seed);
 
-/// Those two p-values, of ranks 0 to `draws`, at least one of them. 1 if there is too little to
-/// tell.
+/// The p-values of SbcUniformity, of at least one rank, each 0 to `draws`. 1 if there are too few
+/// ranks to tell.
 double UniformityByChi2(const std::vector<int>& ranks, int draws);
 double UniformityByEcdf(const std::vector<int>& ranks, int draws);
 
 /// A table for the terminal, a line for each quantity: p-values, coverage, and in what way the
 /// posterior is wrong where it is at the 1 % level, corrected for the number of tests.
-std::string Words(const SbcResult& result);
+std::string SbcSummary(const SbcResult& result);
 
 }  // namespace plumb

@@ -54,7 +54,7 @@ class Calibrator {
 parameter_distribution_t DistributionMessage(const RobotDescription& robot,
                                              const SimOpt::State& state, uint64_t seed,
                                              const CalibrationReport* report);
-/// What an iteration has found, to be written as posterior.json. @param report of the iteration
+/// The findings of an iteration, to be written as posterior.json. @param report of the iteration
 /// that `simopt` has completed last.
 Findings IterationFindings(const RobotDescription& robot, const SimOpt& simopt,
                            const CalibrationReport& report);

@@ -164,7 +164,7 @@ class Assembly {
       late_.push_back(interval);
       return false;
     }
-    // What acts until the action does is not known after a gap.
+    // After a gap the effort that acts until the action does is unknown.
     if (latency_ > 0 && before.linked && IsLate(before.interval)) {
       ++log_.drops.gap;
       return false;

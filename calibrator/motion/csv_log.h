@@ -18,14 +18,14 @@ namespace plumb {
 ///   next_q/<joint>, next_v/<joint>   the state s' that it led to. Without these columns, as
 ///       `plumb sim --csv` writes the table, s' is the next row's state
 ///   terminated, truncated   optional: other than 0 where an episode ends with this row
-/// nan, or nothing, stands for what was not observed: in s' it is not compared.
+/// nan, or an empty field, stands for an unobserved entry: in s' it is not compared.
 ///
 /// An episode ends where a row says so, where t does not go on by one control period, within 20 %,
-/// or where s is not what the row before led to. That is s' itself; or, in a table whose rows
-/// follow each other in most coordinates like that, what is within 20 % of the spread that s has
-/// over the table, or within what noise makes of most rows, in every coordinate observed. A row
-/// that is followed like that, but at another time, is dropped as late. One that is not lasts a
-/// control period.
+/// or where s does not continue the row before. It does if s equals that row's s'; or, in a table
+/// most of whose rows nearly do, if every coordinate observed is off by at most 20 % of the spread
+/// that s has over the table, or by no more than the noise with which the other rows continue each
+/// other. A row that is continued at another time than a control period later is dropped as late. A
+/// row that is not continued lasts a control period.
 ///
 /// A table does not say what the noise is. At the end of a transition sds are NaN. At its beginning
 /// they are, too, if s is a reading: the very same one as the end of the transition before, or the

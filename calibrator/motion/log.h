@@ -7,12 +7,13 @@
 
 namespace plumb {
 
-/// A robot's motion as one file has recorded it. Readers: lcm_log.h and csv_log.h.
+/// A robot's motion as one file has recorded it. Readers: lcm_log.h and csv_log.h. Plain data: not
+/// thread-safe.
 struct Log {
   std::string name;               ///< the file
   std::vector<Rollout> rollouts;  ///< each with at least one transition, in the file's order
   DropCounts drops;
-  std::vector<std::string> warnings;  ///< what of the file could not be used, for people
+  std::vector<std::string> warnings;  ///< parts of the file that could not be used, for people
 };
 
 }  // namespace plumb

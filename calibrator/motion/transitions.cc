@@ -66,10 +66,10 @@ double Transition::duration() const {
 }
 
 std::string DropCounts::summary() const {
-  std::string words = fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap,
-                                  gap == 1 ? "" : "s", late, not_finite, restart);
-  if (model_based > 0) words += fmt::format(", {} model-based", model_based);
-  return words;
+  std::string summary = fmt::format("{} gap{}, {} late, {} not finite, {} across restarts", gap,
+                                    gap == 1 ? "" : "s", late, not_finite, restart);
+  if (model_based > 0) summary += fmt::format(", {} model-based", model_based);
+  return summary;
 }
 
 DropCounts& DropCounts::operator+=(const DropCounts& other) {

@@ -34,7 +34,7 @@ struct Rollout {
   std::vector<Transition> transitions;
 };
 
-/// How many transitions there are.
+/// The number of transitions.
 size_t CountTransitions(std::span<const Rollout> rollouts);
 
 /// Why transitions were left out, counted since the start. Nothing is ever guessed.

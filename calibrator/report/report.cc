@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "calibrator/report/pair_plot.h"
+#include "calibrator/report/report_checks.h"
 #include "calibrator/report/report_html.h"
 #include "calibrator/report/report_plots.h"
 #include "calibrator/report/report_residuals.h"
@@ -29,10 +30,6 @@ constexpr Index kMaxPairs = 8;
 constexpr double kNull = 1e-6;  // as FindIdentifiability has it
 constexpr double kInvolved = 1e-3;
 constexpr double kHardly = 0.22;  // nat: the data made the sd smaller by less than a fifth
-
-constexpr char kKeys[] =
-    "<span class=\"key prior\"></span>prior (dashed) &#160; <span class=\"key "
-    "posterior\"></span>posterior. ";
 
 std::string Verdict(const std::string& css, const std::string& title, const std::string& words) {
   return "<div class=\"verdict " + css + "\"><b>" + title + "</b>" + Escape(words) + "</div>\n";
@@ -55,8 +52,10 @@ class Report {
            "of " +
            Escape(robot_.name) + "</title>\n<style>" + kReportStyle +
            "</style></head>\n<body><main>\n" + Headline() + Parameters() + Pairs() +
-           KnownAndUnknown() + Predictions() + Misfits() + ResidualSection(residuals_) + Logs() +
-           Stages() + Reproduce() + "</main></body>\n</html>\n";
+           KnownAndUnknown() + PredictionSection(findings_.holdout) + MisfitSection(findings_) +
+           ResidualSection(residuals_) +
+           AgreementSection(findings_.agreement, summary_, robot_, kMaxPairs) + Stages() +
+           Reproduce() + "</main></body>\n</html>\n";
   }
 
  private:
@@ -77,7 +76,7 @@ class Report {
 
     const bool all_known =
         findings_.identifiability.null.empty() && !findings_.identifiability.summary.empty();
-    html += Verdict(all_known ? "good" : "", "What can be known", KnownWords() + Values());
+    html += Verdict(all_known ? "good" : "", "What can be known", KnownSummary() + Values());
     const Misspecification& model = findings_.misspecification;
     html += model.alarm ? Verdict("bad", "The model does not explain the robot", model.summary)
             : model.summary.empty()
@@ -102,7 +101,7 @@ class Report {
     return html;
   }
 
-  std::string KnownWords() const {
+  std::string KnownSummary() const {
     const Identifiability& found = findings_.identifiability;
     return found.summary.empty() ? "Identifiability was not examined." : found.summary;
   }
@@ -112,11 +111,11 @@ class Report {
     constexpr size_t kMost = 4;
     const std::vector<Combination>& combinations = findings_.identifiability.combinations;
     if (combinations.size() > kMost) return "";
-    std::string words;
+    std::string values;
     for (const Combination& c : combinations) {
-      words += (words.empty() ? ". " : ", ") + c.name + " = " + PlusMinus(c.mean, c.sd);
+      values += (values.empty() ? ". " : ", ") + c.name + " = " + PlusMinus(c.mean, c.sd);
     }
-    return words;
+    return values;
   }
 
   // First-order: the coordinate's sd in physical units, at the mean.
@@ -184,7 +183,7 @@ class Report {
     }
     return "<h2>Prior and posterior</h2>\n" +
            Figure(Scrolling(PairPlot(findings_, summary_, robot_, shown)),
-                  selection + kKeys +
+                  selection + kPriorPosteriorKey +
                       "Ellipses: 1 and 2 sigma, one pair for each component of the posterior; dots "
                       "are its "
                       "samples. Where the "
@@ -197,7 +196,7 @@ class Report {
 
   std::string KnownAndUnknown() const {
     const Identifiability& found = findings_.identifiability;
-    std::string html = "<h2>What can be known from this motion</h2>\n" + Paragraph(KnownWords());
+    std::string html = "<h2>What can be known from this motion</h2>\n" + Paragraph(KnownSummary());
     if (!found.combinations.empty()) {
       Table table({"what the motion determines", "value"});
       for (const Combination& c : found.combinations)
@@ -224,14 +223,14 @@ class Report {
   }
 
   std::string Direction(const Eigen::VectorXd& direction) const {
-    std::string words;
+    std::string parts;
     for (Index i = 0; i < std::min(size(), direction.size()); ++i) {
       if (!(std::abs(direction(i)) > kInvolved)) continue;
       const bool log = parameter(i).coordinate == Coordinate::kLog;
-      words += (words.empty() ? "" : ", ") + Name(i) +
+      parts += (parts.empty() ? "" : ", ") + Name(i) +
                fmt::format(" {:+.3g}{}", direction(i), log ? " %" : "");
     }
-    return words;
+    return parts;
   }
 
   std::vector<double> InformationEigenvalues() const {
@@ -244,61 +243,6 @@ class Report {
     std::vector<double> values(eigen.eigenvalues().begin(), eigen.eigenvalues().end());
     std::reverse(values.begin(), values.end());
     return values;
-  }
-
-  std::string Predictions() const {
-    const Holdout& holdout = findings_.holdout;
-    std::string html = "<h2>Predictions of held-out motion</h2>\n" + Paragraph(holdout.summary);
-    const std::string plot = ErrorPlot(holdout.errors);
-    if (plot.empty()) return html;
-    html += Figure(plot, kKeys + fmt::format("Root mean square error of predicting so many control "
-                                             "steps ahead, of {} transitions that "
-                                             "the fit has not seen.",
-                                             holdout.held_out));
-    Table table({"steps ahead", "windows", "posterior", "prior", "ratio"});
-    for (const HorizonError& e : holdout.errors) {
-      table.Add({std::to_string(e.horizon), std::to_string(e.windows), Number(e.posterior, NAN),
-                 Number(e.prior, NAN), Number(e.posterior / e.prior, 0.01)});
-    }
-    return html + table.Print();
-  }
-
-  std::string Misfits() const {
-    const Misspecification& model = findings_.misspecification;
-    std::string html =
-        "<h2>Can the model explain the robot?</h2>\n" +
-        Paragraph(model.summary.empty() && !model.alarm ? "This was not tested." : model.summary) +
-        fmt::format("<p>Mean squared whitened one-step error: {} (1 = down to the noise).</p>\n",
-                    Number(findings_.discrepancy, 0.01));
-    if (model.misfits.empty()) return html;
-    Table table({"misfit", "test", "statistic", "p, corrected", "share of the errors"});
-    for (const Misfit& m : model.misfits) {
-      table.Add(
-          {Escape(m.what), Escape(m.test), Number(m.statistic, NAN), Number(m.p, NAN),
-           std::isfinite(m.effect) ? fmt::format("{:.0f} %", 100 * m.effect) : "\xe2\x80\x93"});
-    }
-    return html + table.Print();
-  }
-
-  std::string Logs() const {
-    const Agreement& agreement = findings_.agreement;
-    if (agreement.logs.empty()) return "";
-    Table table({"", "log", "distance", "p, corrected"});
-    for (size_t k = 0; k < agreement.logs.size(); ++k) {
-      const LogAgreement& log = agreement.logs[k];
-      table.Add(
-          {std::to_string(k + 1), Escape(log.log), Number(log.distance, 0.1), Number(log.p, NAN)});
-    }
-    std::string html =
-        "<h2>Do the logs agree?</h2>\n" + Paragraph(agreement.summary) + table.Print();
-    constexpr size_t kMaxLogs = 40;
-    if (agreement.logs.size() > kMaxLogs) return html;
-    html += "<figure><div class=\"panels\">\n";
-    for (Index i = 0; i < std::min(size(), kMaxPairs); ++i)
-      html += AgreementPlot(agreement.logs, summary_, robot_, i);
-    return html +
-           "</div><figcaption>Each log alone, mean and 95 %; the band is 95 % of all logs "
-           "together.</figcaption></figure>\n";
   }
 
   std::string Stages() const {

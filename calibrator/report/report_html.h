@@ -8,6 +8,11 @@ namespace plumb {
 
 // The functions here share nothing: thread-safe.
 
+/// The key to drawings of prior and posterior. HTML, for the beginning of a caption.
+inline constexpr char kPriorPosteriorKey[] =
+    "<span class=\"key prior\"></span>prior (dashed) &#160; <span class=\"key "
+    "posterior\"></span>posterior. ";
+
 /// A value with as many digits as its standard deviation allows: two significant ones of that. Four
 /// significant ones where the sd is not positive or not finite; a dash for NaN.
 std::string Number(double value, double sd);

@@ -3,7 +3,7 @@
 namespace plumb {
 
 /// The report's colours and layout. Prior and posterior differ in lightness, too: for those who do
-/// not see colours.
+/// not see colours. A constant: thread-safe.
 inline constexpr char kReportStyle[] = R"(
 :root { color-scheme: light dark; --paper: #ffffff; --card: #f5f7fa; --ink: #1b2330;
   --muted: #5b6676; --rule: #d8dee6;

@@ -8,10 +8,11 @@
 
 namespace plumb {
 
-/// Whitened residuals of the posterior's mean, for a look at what the model leaves unexplained.
+/// Whitened residuals of the posterior's mean, to see what the model leaves unexplained. Plain
+/// data: not thread-safe.
 struct Residuals {
-  Eigen::VectorXd whitened;  ///< NaN where there is none
-  /// what each is of; coordinate is an index of `coordinates`
+  Eigen::VectorXd whitened;  ///< without unit, one per row; NaN where there is none
+  /// window, transition and coordinate of each; coordinate is an index of `coordinates`
   std::vector<WindowErrors::Row> rows;
   std::vector<std::string> coordinates;  ///< names: "q knee", "v knee"
 };

@@ -11,6 +11,7 @@
 #include "calibrator/diagnostics/holdout.h"
 #include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/methods.h"
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/chi_squared.h"
 #include "common/decompositions.h"
 

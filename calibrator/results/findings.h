@@ -39,7 +39,7 @@ struct LoopUpdate {
   double temperature;  ///< of the last update; 1 = Bayes' rule
 };
 
-/// All that a calibration has found.
+/// All that a calibration has found. Plain data: not thread-safe.
 struct Findings {
   std::string method;  ///< that was asked for
   std::string used;    ///< that gave the answer, e.g. "laplace" where "auto" was asked for
@@ -57,7 +57,7 @@ struct Findings {
   Eigen::VectorXd noise_sd;
   /// one-step errors of the mean, whitened, divided by their estimated scale
   Eigen::VectorXd errors;
-  std::vector<WindowErrors::Row> rows;  ///< what each is about
+  std::vector<WindowErrors::Row> rows;  ///< coordinate and transition of each
   std::vector<CurriculumStage> stages;
   Identifiability identifiability;
   /// sd of each parameter's coordinate if nothing but the data told, infinite where they do not

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <deque>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -22,51 +20,12 @@ namespace plumb {
 namespace {
 
 constexpr int kGlance = 100;  // [ms] of real time between two looks at a participant that works
-constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
 
 std::string Key(const lockstep_topic_t& topic) {
   return (topic.kind == lockstep_topic_t::FRAME ? 'f' : 'm') + topic.name;
 }
 
 }  // namespace
-
-struct Coordinator::Member {
-  enum class State {
-    kAbsent,    // has left, or has been killed; its turn is kept for one of the same name
-    kExpected,  // has been started
-    kWorking,   // has its turn, or comes up
-    kReported,  // its turn is over, and what it reports not yet made known
-    kWaiting,
-  };
-  bool settled() const {
-    return state == State::kAbsent || state == State::kReported || state == State::kWaiting;
-  }
-  bool heard(int64_t now) const { return !mail.empty() && mail.front().arrival <= now; }
-  /// @return kNever if nothing is due unless something is heard.
-  int64_t NextMoment() const {
-    const int64_t arrival = wakes && !mail.empty() ? mail.front().arrival : kNever;
-    return std::max(stalled_until, std::min(until, arrival));
-  }
-  void Put(const lockstep_post_t& post) {
-    auto place = mail.end();
-    while (place != mail.begin() && std::prev(place)->arrival > post.arrival) --place;
-    mail.insert(place, post);
-  }
-
-  std::string name;
-  pid_t pid = 0;
-  State state = State::kExpected;
-  PacketSocket socket;
-  ProcessWatch watch;
-  lockstep_report_t report{};
-  int64_t grants = 0;  // that it has had
-  int64_t until = kNever;
-  bool wakes = true;
-  bool stop = false;  // is to be told, or has been
-  bool told = false;  // to stop
-  int64_t stalled_until = std::numeric_limits<int64_t>::min();
-  std::deque<lockstep_post_t> mail;  // by time of arrival
-};
 
 /// The owner's place: its turns end and begin in its calls of Wait.
 class Coordinator::Owner : public Participant {
@@ -98,7 +57,7 @@ class Coordinator::Owner : public Participant {
 
   void MoveOn(int64_t now) { SetNow(now); }
 
-  Member seat;
+  LockstepMember seat;
 
  private:
   Coordinator& coordinator_;
@@ -115,38 +74,38 @@ Participant& Coordinator::participant() { return *owner_; }
 
 int64_t Coordinator::now() const { return owner_->now(); }
 
-Coordinator::Member* Coordinator::Find(const std::string& name) const {
+LockstepMember* Coordinator::Find(const std::string& name) const {
   const auto found =
       std::ranges::find_if(members_, [&](const auto& member) { return member->name == name; });
   return found == members_.end() ? nullptr : found->get();
 }
 
-Coordinator::Member& Coordinator::Seat(const std::string& name) {
-  if (Member* known = Find(name)) return *known;
+LockstepMember& Coordinator::Seat(const std::string& name) {
+  if (LockstepMember* known = Find(name)) return *known;
   if (turn_ == members_.size()) ++turn_;  // the owner stays the last one
-  members_.push_back(std::make_unique<Member>());
+  members_.push_back(std::make_unique<LockstepMember>());
   members_.back()->name = name;
   return *members_.back();
 }
 
 void Coordinator::Expect(const std::string& name, pid_t pid) {
-  Member& member = Seat(name);
-  member.state = Member::State::kExpected;
+  LockstepMember& member = Seat(name);
+  member.state = LockstepMember::State::kExpected;
   member.watch = ProcessWatch(pid);
   processor_.Release(pid);  // it has been born on ours
 }
 
 void Coordinator::Stop(const std::string& name) {
-  if (Member* member = Find(name)) member->stop = true;
+  if (LockstepMember* member = Find(name)) member->stop = true;
 }
 
 void Coordinator::Stall(const std::string& name, int64_t duration) {
-  if (Member* member = Find(name)) member->stalled_until = now() + duration;
+  if (LockstepMember* member = Find(name)) member->stalled_until = now() + duration;
 }
 
 bool Coordinator::present(const std::string& name) const {
-  const Member* member = Find(name);
-  return member && member->state != Member::State::kAbsent;
+  const LockstepMember* member = Find(name);
+  return member && member->state != LockstepMember::State::kAbsent;
 }
 
 bool Coordinator::AwaitEnd(const std::string& name) {
@@ -159,15 +118,15 @@ bool Coordinator::AwaitEnd(const std::string& name) {
 
 /// Until the owner's turn has come.
 void Coordinator::TakeTurns(int stop_fd) {
-  Member& owner = owner_->seat;
+  LockstepMember& owner = owner_->seat;
   if (!Listen(stop_fd, 0)) return;
   while (Settle(stop_fd)) {
     if (!failure_.empty()) throw std::runtime_error(std::exchange(failure_, {}));
     const size_t places = members_.size() + 1;
-    Member* next = nullptr;
+    LockstepMember* next = nullptr;
     for (size_t i = 1; i <= places && !next; ++i) {
       const size_t place = (turn_ + i) % places;
-      Member& member = place == members_.size() ? owner : *members_[place];
+      LockstepMember& member = place == members_.size() ? owner : *members_[place];
       if (!HasTurn(member)) continue;
       turn_ = place;
       next = &member;
@@ -178,7 +137,7 @@ void Coordinator::TakeTurns(int stop_fd) {
     } else {
       int64_t moment = owner.NextMoment();
       for (const auto& member : members_) {
-        if (member->state == Member::State::kWaiting)
+        if (member->state == LockstepMember::State::kWaiting)
           moment = std::min(moment, member->NextMoment());
       }
       if (!MoveOn(moment, stop_fd)) return;
@@ -202,14 +161,14 @@ bool Coordinator::MoveOn(int64_t moment, int stop_fd) {
   return true;
 }
 
-bool Coordinator::HasTurn(const Member& member) const {
+bool Coordinator::HasTurn(const LockstepMember& member) const {
   if (&member == &owner_->seat) return member.NextMoment() <= now();
-  if (member.state != Member::State::kWaiting) return false;
+  if (member.state != LockstepMember::State::kWaiting) return false;
   return member.NextMoment() <= now() ||
          (member.stop && !member.told && member.stalled_until <= now());
 }
 
-void Coordinator::Grant(Member& member) {
+void Coordinator::Grant(LockstepMember& member) {
   lockstep_grant_t grant;
   grant.number = ++member.grants;
   grant.now = now();
@@ -218,7 +177,7 @@ void Coordinator::Grant(Member& member) {
     grant.post.push_back(std::move(member.mail.front()));
   grant.num_posts = static_cast<int32_t>(grant.post.size());
   member.told = member.stop;
-  member.state = Member::State::kWorking;
+  member.state = LockstepMember::State::kWorking;
   member.watch.Begin();
   // Where it does not read any more, its end is what is read next.
   member.socket.Send(Encode(grant, buffer_), go_on);
@@ -228,14 +187,14 @@ void Coordinator::Grant(Member& member) {
 /// @return false if the wait is to end before that: then it goes on with the next one.
 bool Coordinator::Settle(int stop_fd) {
   while (true) {
-    Member* working = nullptr;
+    LockstepMember* working = nullptr;
     int count = 0;
     for (const auto& member : members_) {
       if (!member->settled()) working = member.get(), ++count;
     }
     if (count == 0) break;
     // The rule is one who has its turn, and waiting for nobody else is the fastest.
-    if (count == 1 && working->state == Member::State::kWorking) {
+    if (count == 1 && working->state == LockstepMember::State::kWorking) {
       Read(*working, PacketSocket::When::kSoon);
     } else if (!Listen(stop_fd, kGlance)) {
       return false;
@@ -248,7 +207,7 @@ bool Coordinator::Settle(int stop_fd) {
     if (!go_on()) return false;
   }
   for (const auto& member : members_) {
-    if (member->state == Member::State::kReported) Digest(*member);
+    if (member->state == LockstepMember::State::kReported) Digest(*member);
   }
   return true;
 }
@@ -256,14 +215,15 @@ bool Coordinator::Settle(int stop_fd) {
 void Coordinator::WatchProgress() {
   for (const auto& member : members_) {
     if (member->settled()) continue;
-    if (member->state == Member::State::kExpected && member->watch.dead()) {
+    if (member->state == LockstepMember::State::kExpected && member->watch.dead()) {
       Leave(*member);  // it has ended before it has joined; whoever has started it knows why
       continue;
     }
     const std::string note = member->watch.Look();
     if (note.empty()) continue;
-    const char* const whose =
-        member->state == Member::State::kExpected ? "has not joined the run" : "has its turn";
+    const char* const whose = member->state == LockstepMember::State::kExpected
+                                  ? "has not joined the run"
+                                  : "has its turn";
     const std::string line = fmt::format("{} {} at {:.6f} s: {}", member->name, whose,
                                          Seconds(now() - kBeginning), note);
     if (member->watch.idle() > kPatience) throw std::runtime_error("given up: " + line);
@@ -305,7 +265,7 @@ void Coordinator::Admit(PacketSocket& stranger) {
   } else if (hello.version != ProgramVersion()) {
     welcome.refusal = fmt::format("{} is {}, the run is {}: build both together", hello.name,
                                   hello.version, ProgramVersion());
-  } else if (const Member* known = Find(hello.name); known && known->socket.open()) {
+  } else if (const LockstepMember* known = Find(hello.name); known && known->socket.open()) {
     welcome.refusal = fmt::format("there is a {} in the run already", hello.name);
   }
   stranger.Send(Encode(welcome, buffer_), go_on);
@@ -313,17 +273,17 @@ void Coordinator::Admit(PacketSocket& stranger) {
     on_note(fmt::format("refused: {}", welcome.refusal));
     return stranger.Close();
   }
-  Member& member = Seat(hello.name);
+  LockstepMember& member = Seat(hello.name);
   const std::string name = std::move(member.name);
-  member = Member();
+  member = LockstepMember();
   member.name = name;
   member.socket = std::move(stranger);
-  member.state = Member::State::kWorking;
+  member.state = LockstepMember::State::kWorking;
   member.pid = hello.pid;
   member.watch = ProcessWatch(hello.pid);
 }
 
-void Coordinator::Read(Member& member, PacketSocket::When when) {
+void Coordinator::Read(LockstepMember& member, PacketSocket::When when) {
   const bool there = member.socket.Read(when);
   for (std::span<const uint8_t> packet; !(packet = member.socket.Next()).empty();) {
     lockstep_report_t report;
@@ -333,22 +293,22 @@ void Coordinator::Read(Member& member, PacketSocket::When when) {
     }
     // it asked for a turn that it has been given meanwhile
     if (report.grant != member.grants) continue;
-    if (member.state == Member::State::kWaiting) {
+    if (member.state == LockstepMember::State::kWaiting) {
       member.until = std::min(member.until, now());  // a signal has come: it wants to look at it
     } else {
       member.report = std::move(report);
-      member.state = Member::State::kReported;
+      member.state = LockstepMember::State::kReported;
     }
   }
-  if (there || (member.state == Member::State::kReported && member.report.leaves)) return;
+  if (there || (member.state == LockstepMember::State::kReported && member.report.leaves)) return;
   on_note(fmt::format("{} has died at {:.6f} s", member.name, Seconds(now() - kBeginning)));
   Leave(member);
 }
 
 /// Its turn is over: the others hear what it has said.
-void Coordinator::Digest(Member& member) {
+void Coordinator::Digest(LockstepMember& member) {
   const lockstep_report_t report = std::exchange(member.report, {});
-  member.state = Member::State::kWaiting;
+  member.state = LockstepMember::State::kWaiting;
   member.until = report.until;
   member.wakes = report.wakes;
   for (const lockstep_topic_t& topic : report.topic) listeners_[Key(topic)].push_back(&member);
@@ -359,19 +319,19 @@ void Coordinator::Digest(Member& member) {
   if (report.leaves) Leave(member);
 }
 
-void Coordinator::Leave(Member& member) {
+void Coordinator::Leave(LockstepMember& member) {
   processor_.Remove(member.pid);
   member.socket.Close();
-  member.state = Member::State::kAbsent;
+  member.state = LockstepMember::State::kAbsent;
   member.mail.clear();
   for (auto& [key, listeners] : listeners_) std::erase(listeners, &member);
 }
 
-void Coordinator::Route(const lockstep_post_t& post, const Member& speaker) {
+void Coordinator::Route(const lockstep_post_t& post, const LockstepMember& speaker) {
   on_post(post, &speaker == &owner_->seat ? "" : speaker.name);
   const auto listeners = listeners_.find(Key(post.topic));
   if (listeners == listeners_.end()) return;
-  for (Member* listener : listeners->second) {
+  for (LockstepMember* listener : listeners->second) {
     // On a bus nobody hears itself; LCM's messages come back.
     if (listener == &speaker && post.topic.kind == lockstep_topic_t::FRAME) continue;
     listener->Put(post);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/lockstep/lockstep_member.h"
 #include "common/lockstep/packet_socket.h"
 #include "common/lockstep/participant.h"
 #include "common/lockstep/shared_processor.h"
@@ -74,30 +75,29 @@ class Coordinator {
 
  private:
   class Owner;
-  struct Member;
 
-  Member* Find(const std::string& name) const;
-  Member& Seat(const std::string& name);
+  LockstepMember* Find(const std::string& name) const;
+  LockstepMember& Seat(const std::string& name);
   void TakeTurns(int stop_fd);
-  bool HasTurn(const Member& member) const;
-  void Grant(Member& member);
+  bool HasTurn(const LockstepMember& member) const;
+  void Grant(LockstepMember& member);
   bool Settle(int stop_fd);
   void WatchProgress();
   bool MoveOn(int64_t moment, int stop_fd);
   bool Listen(int stop_fd, int timeout);
   void Admit(PacketSocket& stranger);
-  void Read(Member& member, PacketSocket::When when);
-  void Digest(Member& member);
-  void Leave(Member& member);
-  void Route(const lockstep_post_t& post, const Member& speaker);
+  void Read(LockstepMember& member, PacketSocket::When when);
+  void Digest(LockstepMember& member);
+  void Leave(LockstepMember& member);
+  void Route(const lockstep_post_t& post, const LockstepMember& speaker);
 
   std::string path_;
   PacketSocket listener_;
   std::unique_ptr<Owner> owner_;
-  std::vector<std::unique_ptr<Member>> members_;  // in the order of their turns
+  std::vector<std::unique_ptr<LockstepMember>> members_;  // in the order of their turns
   size_t turn_ = 0;  // place of the participant that worked last; members_.size(): the owner's
-  std::map<std::string, std::vector<Member*>> listeners_;  // of each topic
-  std::vector<PacketSocket> strangers_;                    // who have not said yet who they are
+  std::map<std::string, std::vector<LockstepMember*>> listeners_;  // of each topic
+  std::vector<PacketSocket> strangers_;  // who have not said yet who they are
   std::string failure_;
   SharedProcessor processor_;
   std::vector<uint8_t> buffer_;

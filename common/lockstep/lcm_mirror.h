@@ -16,10 +16,11 @@
 
 namespace plumb {
 
-/// Says on LCM what is said in a run in virtual time, so that lcm-spy, lcm-logger and others see it
-/// as ever; and hears what comes back. It waits for it, so that nobody with a buffer as large as
-/// ours (2 MB) loses anything, and what does not come back has been lost. A thread of its own does
-/// so, that the run need not wait. Its calls are one thread's.
+/// Publishes the messages of a run in virtual time on LCM, so that lcm-spy, lcm-logger and others
+/// see them as in any run, and receives its own messages. A new one is sent only when earlier ones
+/// have come back: a listener with a buffer as large as ours (2 MB) then loses none, and a message
+/// that never comes back counts as lost. A thread of the mirror's own does this, so that the run
+/// need not wait. Its methods are to be called by one thread.
 class LcmMirror {
  public:
   struct Message {

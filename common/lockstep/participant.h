@@ -21,7 +21,7 @@ class Participant {
  public:
   enum class Wake {
     kWhenHeard,  ///< Wait ends early when something has been heard
-    kOnTime,     ///< what is heard meanwhile is there when Wait ends
+    kOnTime,     ///< Wait lasts its time; messages that come meanwhile are there when it ends
   };
 
   virtual ~Participant() = default;

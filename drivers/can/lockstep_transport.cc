@@ -85,7 +85,7 @@ class LockstepTransport : public Transport {
   void ReadBus() noexcept {
     for (int count; (count = bus_->Receive(batch_)) > 0;) {
       for (const Frame& frame : std::span(batch_).first(static_cast<size_t>(count))) {
-        // What the controller of the bus says is of no participant's making.
+        // The bus controller's own reports come from no participant.
         if (!frame.error) early_.push_back({frame, run_.now()});
       }
     }

@@ -21,8 +21,8 @@ class CommandInbox {
 
   /// Takes a command if it has the right size, finite efforts, no infinite or negative gains, was
   /// computed no longer than an expiry from `utime`, and has a greater sequence number than the
-  /// last one taken. One that is too much greater is nobody's next and would make void what the
-  /// real controller says.
+  /// last one taken. A number that is too much greater is refused, too: it is no controller's next,
+  /// and would make all later commands of the real one look old.
   /// @return false if not; the one before stays in force.
   bool Offer(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
   /// Why the last command was refused; empty if none was since the last one taken.

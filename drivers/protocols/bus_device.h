@@ -8,29 +8,30 @@
 
 namespace plumb {
 
-/// One kind of message that a device sends, or listens to and the driver sends.
+/// One kind of message that a device sends, or listens to and the driver sends. Plain data, as all
+/// of this file: not thread-safe.
 struct BusMessage {
   enum class Direction : uint8_t { kFromDevice, kToDevice };
   /// [us] assumed of what a program on Linux sends once per period.
   static constexpr int64_t kHostJitter = 200;
 
-  Layout layout;  ///< name, fields, and bytes on the wire
-  uint32_t id = 0;
+  Layout layout;    ///< name, fields, and bytes on the wire
+  uint32_t id = 0;  ///< 11 bits, or 29 if extended
   bool extended = false;
   bool remote = false;  ///< a request: no data
   Direction direction = Direction::kFromDevice;
   int64_t period = 0;  ///< [us]; 0 = now and then, not while the robot moves
   int64_t jitter = 0;  ///< [us] by which it may be queued late
-  int answers =
-      /// it is the answer to that message of the device, whose response time adds to the jitter
-      -1;
+  /// index into BusDevice::messages of the question that this one answers, whose response time adds
+  /// to the jitter; -1 = it is no answer
+  int answers = -1;
   /// The driver asks for it, and for one such message of the whole bus at a time; or it is that
   /// question.
   bool polled = false;
   /// Other devices of the protocol may have it, too: broadcasts, and replies that say whose they
   /// are.
   bool shared = false;
-  /// of a shared one from the device: value of its first field that says whose it is
+  /// of a shared one from the device: value of its first field that says whose it is; -1 = none
   int selector = -1;
 };
 
@@ -39,7 +40,7 @@ struct IdRange {
   uint32_t first, last;
 };
 
-/// A device's messages on a bus, and the ids that are its own. A value.
+/// A device's messages on a bus, and the ids that are its own.
 struct BusDevice {
   std::string name;
   std::string protocol;

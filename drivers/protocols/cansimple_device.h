@@ -97,7 +97,7 @@ class CanSimpleDevice {
   int input_mode_ = cansimple::kPassthrough;
   int procedure_result_ = cansimple::kSuccess;
   uint32_t active_errors_ = 0;  ///< conditions that exist now
-  uint32_t disarm_reason_ = 0;  ///< what disarmed it, until Clear_Errors
+  uint32_t disarm_reason_ = 0;  ///< error bits that disarmed it, until Clear_Errors
   double setpoint_ = 0;         ///< [Nm]
   int64_t fed_;                 ///< time of the last setpoint
   int64_t next_heartbeat_, next_encoder_, next_torques_, next_telemetry_;

@@ -42,7 +42,7 @@ class UnscentedFilter {
   /// not finite or the covariance is not positive definite.
   bool Predict(const Motion& motion, const Eigen::MatrixXd& noise);
 
-  /// A reading less what was expected of it, and its variance if both are right.
+  /// A reading less its prediction, and the variance of that if filter and noise are right.
   struct Innovation {
     double value, variance;
   };

@@ -63,6 +63,12 @@ TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints
   } else {
     std::fill(s.spread.begin(), s.spread.end(), config.Number("spread", kLengthOrAngle, 0));
   }
+  s.fall.resize(s.target.size());
+  ReadByJoint(config.Table("fall", false), joints,
+              [&](Config& table, const JointDescription& joint, size_t at) {
+                std::fill_n(&s.fall[at], joint.num_positions(),
+                            table.Number(joint.name, kPositive));
+              });
   config.Finish();
   return s;
 }

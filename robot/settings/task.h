@@ -14,9 +14,11 @@ struct TaskSettings {
   std::string name;  ///< file name in sim/tasks/
   double period;     ///< [s] control period
   int steps;         ///< per episode
-  /// Tasks reach and hold: where to go and how far around it an episode may begin; one each per
-  /// coordinate of q.
+  /// Tasks reach, hold and balance: where to go and how far around it an episode may begin; one
+  /// each per coordinate of q.
   std::vector<double> target = {}, spread = {};
+  /// Task balance: how far from the target the robot has fallen; likewise, 0 = never.
+  std::vector<double> fall = {};
 };
 
 /// Thread-safe. @throws ConfigError

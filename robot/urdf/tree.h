@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// A solid of URDF's <visual> or <collision>.
+/// A solid of URDF's <visual> or <collision>. Plain data, as all of this file: not thread-safe.
 struct Shape {
   enum class Type { kSphere, kCapsule, kCylinder, kBox };
   Type type = Type::kSphere;

@@ -71,9 +71,9 @@ class Constraints {
     return any;
   }
 
-  /// Friction divides by the speed that it will leave, so that what slides slows evenly and what
-  /// sticks sticks at once: the trial's, changed by what friction at its full force takes beyond
-  /// what it took in the trial.
+  /// Friction divides by the speed that it will leave, so that a sliding point slows evenly and a
+  /// sticking one stops at once. That speed is the trial's, less the change that friction at its
+  /// full force makes beyond the friction of the trial.
   /// @param factors of the trial's matrix.
   void Foresee(const Substep& now, const Real* trial, const SparseCholesky<Real>& cholesky,
                const Real* factors) {

@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-/// Which terms of the equations a robot has at all: what is false costs nothing.
+/// The terms of the equations that a robot has: those that are false cost nothing. Plain data.
 struct Terms {
   bool stops = false;
   /// By kJointParameterKinds: some joint has the number other than by default, or may have it.
@@ -26,7 +26,7 @@ struct Terms {
 
 /// The numbers of a robot that may differ from one simulator to the next. All vectors are in
 /// working axes: those that every link's axes are parallel to where q = 0 (see Topology), hence
-/// constant in the link. Real is double, or a pack with one robot per lane.
+/// constant in the link. Real is double, or a pack with one robot per lane. Not thread-safe.
 template <class Real>
 struct Physics {
   struct Link {
@@ -58,7 +58,7 @@ void SetLane(Wide* wide, const Narrow* narrow, size_t count, int lane) {
 }
 }  // namespace internal
 
-/// Makes one lane of `wide` the robot `narrow`. Sizes must agree.
+/// Makes one lane of `wide` the robot `narrow`. @param lane in [0, kLanes<Real>). Sizes must agree.
 template <class Real>
 void SetLane(const Physics<double>& narrow, int lane, Physics<Real>* wide) {
   internal::SetLane(wide->links.data(), narrow.links.data(), narrow.links.size(), lane);

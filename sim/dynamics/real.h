@@ -9,7 +9,7 @@ namespace plumb {
 
 /// N doubles side by side: N simulations that go through the same equations together. Operators are
 /// GCC's, one IEEE operation per element, so that every element has the bits a double on its own
-/// would have.
+/// would have. Functions here are pure, but for the writing Lane: thread-safe.
 template <int N>
 struct PackOf {
   typedef double Type __attribute__((vector_size(N * sizeof(double))));

@@ -10,12 +10,16 @@ namespace plumb {
 /// L^T D L factorisation of a symmetric positive definite matrix whose rows differ from zero only
 /// at a coordinate's ancestors: nothing fills in (Featherstone, "Rigid Body Dynamics Algorithms",
 /// 2008, section 6.5). In place, lower triangle, row by row. A matrix that is not positive definite
-/// gives a solution that is not one.
+/// gives a solution that is not one. Real is double, or a pack with one matrix per lane. Only the
+/// constructor allocates; nothing throws. Not thread-safe.
 template <class Real>
 class SparseCholesky {
  public:
+  /// @param n rows of the matrices.
   explicit SparseCholesky(size_t n) : inverse_(n) {}
 
+  /// Replaces the matrix, n x n, by its factors. @param ancestors n: the parent of each coordinate,
+  /// before it in order; -1 = none.
   void Factorize(const std::vector<int>& ancestors, Real* matrix) {
     const size_t n = ancestors.size();
     for (size_t k = n; k-- > 0;) {
@@ -31,7 +35,7 @@ class SparseCholesky {
     }
   }
 
-  /// Overwrites b by the solution.
+  /// Overwrites b, of n entries, by the solution. @param factors of the last Factorize.
   void Solve(const std::vector<int>& ancestors, const Real* factors, Real* b) const {
     const size_t n = ancestors.size();
     for (size_t i = n; i-- > 0;) {

@@ -137,7 +137,7 @@ class Stepper {
   Tree<Real> tree_;
 
  public:
-  // What a step starts from and ends with; sizes are fixed.
+  // The robot, and its state before and after a step. Sizes are fixed.
   Physics<Real> physics;
   std::vector<Real> q, v;
 
@@ -254,7 +254,7 @@ class Stepper {
   void Clip() {
     if (!(settings_.speed_clip < std::numeric_limits<double>::infinity())) return;
     for (Real& speed : v) {
-      // What has become infinite must not look like a bounded speed again: inf - inf is NaN.
+      // A speed that has become infinite must not look bounded again: inf - inf is NaN.
       speed = Clamp(speed, Real{} - settings_.speed_clip, Real{} + settings_.speed_clip) +
               (speed - speed);
     }
@@ -293,7 +293,7 @@ class Stepper {
     const Real y1 = a * y - b * z + c * cosine + d * x;
     const Real z1 = a * z + b * y - c * x + d * cosine;
     const Real length = Sqrt(Real(w1 * w1 + x1 * x1 + y1 * y1 + z1 * z1));
-    // What does not turn keeps its bits: another lane may have made us look.
+    // A lane that does not turn keeps its bits: it may be here for another lane's sake.
     quaternion[0] = moves ? Real(w1 / length) : a;
     quaternion[1] = moves ? Real(x1 / length) : b;
     quaternion[2] = moves ? Real(y1 / length) : c;

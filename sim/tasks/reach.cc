@@ -121,6 +121,13 @@ Eigen::Vector3d ReachTask::Turn(const Joint& joint, const State& q) {
   return RotationVector(joint.orientation.conjugate() * Quaternion(q.data() + joint.q));
 }
 
+double ReachTask::Distance(size_t index, const State& q) const {
+  const Joint& joint = joints_[index];
+  if (joint.type == Type::kSpherical) return Turn(joint, q).norm();
+  const double difference = q[joint.q] - joint.target;
+  return std::abs(joint.type == Type::kContinuous ? WrapAngle(difference) : difference);
+}
+
 void ReachTask::Observe(const State& q, const State& v, std::span<float> observation) const {
   size_t next = 0;
   for (const Joint& joint : joints_) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,9 @@ class ReachTask : public Task {
 
  protected:
   ReachTask(const RobotDescription& description, const std::string& name);
+
+  /// |e| of a joint [rad] or [m]. @param joint index into RobotDescription::joints.
+  double Distance(size_t joint, const State& q) const;
 
  private:
   struct Joint {

@@ -2,6 +2,7 @@
 #include <stdexcept>
 
 #include "common/nearest_name.h"
+#include "sim/tasks/balance.h"
 #include "sim/tasks/hopper.h"
 #include "sim/tasks/pendulum.h"
 #include "sim/tasks/reach.h"
@@ -19,10 +20,11 @@ constexpr struct {
   const char* name;
   std::unique_ptr<Task> (*make)(const RobotDescription&);
 } kTasks[] = {
-    {"pendulum", Make<PendulumTask>},
-    {"hopper", Make<HopperTask>},
-    {"reach", Make<ReachTask>},
-    {"hold", Make<HoldTask>},
+    {"pendulum", Make<PendulumTask>},  // swing up
+    {"hopper", Make<HopperTask>},      // hop forward
+    {"reach", Make<ReachTask>},        // go to a target from anywhere
+    {"hold", Make<HoldTask>},          // stay near a target
+    {"balance", Make<BalanceTask>},    // and do not fall
 };
 
 }  // namespace

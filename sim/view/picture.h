@@ -8,10 +8,12 @@
 
 namespace plumb {
 
+// Functions here are pure: thread-safe.
+
 /// A robot at a time.
 struct Snapshot {
-  double time;  ///< [s]
-  Eigen::VectorXd q;
+  double time;        ///< [s]
+  Eigen::VectorXd q;  ///< [rad] or [m], as in RobotDescription
 };
 
 /// Side views of a robot: its visual shapes, or collision shapes where a link has none of these,

@@ -16,7 +16,7 @@ namespace plumb {
 
 RobotDescription Robot(const std::string& name);
 
-/// What a log is recorded from.
+/// The robot that a log is recorded from, and its noise.
 struct Truth {
   std::vector<std::pair<std::string, double>> changed =
       {};  ///< parameters that are not fitted: paths and values

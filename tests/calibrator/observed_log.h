@@ -12,16 +12,16 @@ namespace plumb {
 
 using Samples = std::vector<SimulatedReadings::Sample>;
 
-/// What calibration is told of a simulated motion's states.
+/// Which estimate of a simulated motion's states calibration is given.
 enum class States {
   kTrue,      ///< the truth, with next to no uncertainty
-  kSmoothed,  ///< as plumb-calibrator is told: the smoother's
-  kCausal,    ///< what control is told
+  kSmoothed,  ///< the smoother's, as plumb-calibrator has them
+  kCausal,    ///< the causal estimate, as the controller has it
   /// the smoother's, but taken for exact where a transition begins: no errors in variables
   kCertain,
 };
 
-/// What of a motion that was controlled every robot.task.period comes into a log, as this episode.
+/// A motion that was controlled every robot.task.period as a log has it, as this episode.
 inline Rollout Observed(const RobotDescription& robot, const Samples& motion, States states,
                         int64_t episode = 0) {
   const auto n = static_cast<size_t>(robot.num_joints());
@@ -77,8 +77,8 @@ inline Log ObservedLog(const RobotDescription& robot, const Samples& motion, Sta
   return ObservedLog(robot, std::vector<Samples>{motion}, states);
 }
 
-/// What of a robot's parameters a motion can tell: a name, and the powers of the parameters whose
-/// product it is.
+/// A combination of a robot's parameters that a motion can tell: a name, and the powers of the
+/// parameters whose product it is.
 struct Knowable {
   std::string name;
   Eigen::VectorXd power;

@@ -13,7 +13,7 @@
 
 namespace plumb {
 
-/// What a command that was run as a person would has said and how it ended; -1 if by a signal.
+/// Output and exit status of a command, run as by a person; status -1 if a signal ended it.
 struct Outcome {
   int status;
   std::string text;  ///< both streams
@@ -23,7 +23,7 @@ struct Outcome {
 inline Outcome Shell(const std::string& command, const std::string& words = "") {
   std::string quoted;
   for (const char c : command) quoted += c == '\'' ? "'\\''" : std::string(1, c);
-  // What hangs is ended, with status 124. timeout passes our signal on to the command.
+  // A command that hangs is ended, with status 124. timeout passes our signal on to it.
   FILE* pipe = popen(
       ("echo $$; exec timeout -k 60 120 sh -c '" + quoted + "' 2>&1 </dev/null").c_str(), "r");
   REQUIRE(pipe);

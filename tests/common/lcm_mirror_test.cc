@@ -1,4 +1,4 @@
-// What is said in a run in virtual time, on LCM.
+// Messages of a run in virtual time, on LCM.
 #include "common/lockstep/lcm_mirror.h"
 
 #include <unistd.h>

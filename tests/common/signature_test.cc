@@ -124,7 +124,7 @@ TEST_CASE("the hash is the reference implementation's") {
         "f9800d373d6dee2d46d62ef2a461");
 }
 
-// What python3's hashlib says: blake2b(b"CHANNEL\0" + bytes(range(100)), key=bytes(range(32)),
+// By python3's hashlib: blake2b(b"CHANNEL\0" + bytes(range(100)), key=bytes(range(32)),
 // digest_size=32).
 TEST_CASE("a signature is the keyed hash of channel, zero byte and message") {
   const Folder folder;

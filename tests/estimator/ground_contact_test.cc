@@ -118,7 +118,7 @@ TEST_CASE("resting is judged by height and velocity, with hysteresis") {
   CHECK_FALSE(rests(0.0025, 0));
   CHECK(rests(0.0015, 0));
   CHECK(rests(0.0025, 0));  // stays what it was
-  // What is not known speaks neither for nor against: 2 cm is not far if it may as well be none.
+  // An uncertain height speaks neither for nor against: 2 cm is not far if it may as well be none.
   CHECK(rests(0.02, 0, 0.02));
   CHECK_FALSE(rests(0.02, 2, 0.02));
   CHECK(rests(0.02, 1.5, 0.02, 1.5));

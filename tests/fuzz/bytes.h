@@ -87,7 +87,7 @@ class Bytes {
   std::span<const uint8_t> bytes_;
 };
 
-/// What happens to frames on their way: some are lost, come twice, are cut or have bits flipped.
+/// A bus that harms frames on their way: some are lost, come twice, are cut or have bits flipped.
 class BadWire {
  public:
   /// The next frames, up to 255, are treated as the input says.

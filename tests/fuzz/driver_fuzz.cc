@@ -176,7 +176,7 @@ class DriverGame {
     }
   }
 
-  /// What all this is about.
+  /// The promises about torque: fresh commands only, an armed robot only, the limits kept.
   void CheckTorque(size_t i, double effort) const {
     Require(std::isfinite(effort));
     if (effort == 0) return;
@@ -317,7 +317,7 @@ class DriverGame {
   bool commanding_ = false;
   double effort_ = 0;
   int64_t sequence_ = 0;
-  // What the driver can know at best.
+  // The truth, as far as the driver can know it.
   std::array<int64_t, kMotors> measured_{};
   std::array<double, kMotors> q_{}, v_{};
   int64_t commanded_ = 0;

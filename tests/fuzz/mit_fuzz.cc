@@ -37,7 +37,7 @@ class Drive : public VirtualDrive {
     const bool armed = device_.armed();
     device_.OnFrame(frame, now);
     const bool command = frame.id == kNode && device_.rejected() == rejected && !IsSpecial(frame);
-    // What it was told at rest counts from the moment it is switched on.
+    // The watchdog of a command given at rest runs from the moment it is switched on.
     if (command || device_.armed() != armed) fed_ = now;
   }
   void Tick(int64_t now, FrameBatch& out) override {

@@ -50,7 +50,7 @@ std::vector<Files> Originals(const std::string& source) {
   return originals;
 }
 
-// What a description promises to everyone who reads one.
+// The invariants of a description that its readers rely on.
 void RequireValid(const RobotDescription& robot) {
   const auto require = [](bool right, const char* what) {
     if (!right) throw std::logic_error(std::string("a valid robot whose ") + what);

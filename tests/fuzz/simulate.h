@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// What became of a robot in the simulator.
+/// The outcome of simulating a robot.
 struct SimulatorOutcome {
   std::string refusal;  ///< the simulator's reason not to be built; empty if it was
   bool finite = true;   ///< the state in the end

@@ -1,4 +1,4 @@
-// What linux.uml does on a processor with AMX, on any: it takes only the beginning of another
+// Does on any processor what linux.uml does on one with AMX: it takes only the beginning of another
 // process's extended registers, changes it, and hands it back. Linked to the library that is
 // preloaded into linux.uml.
 

@@ -96,7 +96,7 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   REQUIRE_FALSE(offline.failed());
   same(stage.folder / "offline");
 
-  // What the run has left is what the programs read.
+  // The programs read the files that the run has left.
   const std::string posterior = stage.folder / "run/calibration/posterior_2.json";
   const std::vector<std::vector<std::string>> readers{
       {"train", stage.robot_folder, "--distribution", posterior, "--steps", "1e4", "--output",

@@ -1,4 +1,4 @@
-// What must never hurt anybody, with real processes: whatever dies, stops or talks rubbish, the
+// Faults must never hurt anybody, with real processes: whatever dies, stops or talks rubbish, the
 // torque goes to zero within the configured time, the drive is disarmed, the driver says why, and
 // only a deliberate request re-arms.
 
@@ -65,7 +65,7 @@ TEST_CASE("a controller that stands still") {
   ExpectSafe(stage, last_command, expiry);
   CHECK(stage.last_torque_time - last_command >= expiry - Cycle(stage));  // and not earlier, either
   CHECK_THAT(stage.drivers.newest().reason, Catch::Contains("command"));
-  // What was on the bus before is on disk, its reason above, the last torques among it.
+  // The frames before it are on disk, the reason above them, the last torques among them.
   std::vector<fs::path> records;
   REQUIRE(AwaitReally([&] {  // the disk takes its own time
     records.assign(fs::directory_iterator(stage.folder / "faults"), {});

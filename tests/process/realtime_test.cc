@@ -1,4 +1,4 @@
-// What is about the wall clock: the loop as a real robot has it, and witnesses who play and disturb
+// Tests of the wall clock: the loop as a real robot has it, and witnesses who play and disturb
 // at their own pace.
 
 #include <arpa/inet.h>

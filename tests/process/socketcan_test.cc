@@ -46,7 +46,7 @@ TEST_CASE("the loop closes over SocketCAN, and candump sees it") {
 
   const auto lines = [](const fs::path& log) { return std::ranges::count(Read(log), '\n'); };
   CHECK(AwaitReally([&] { return lines(candump.log()) >= lines(can_log); }));
-  // What it has seen is what the run has said, but for the times, which are the kernel's.
+  // It has seen the frames that the run has recorded, but for the times, which are the kernel's.
   const std::regex time(R"(\([0-9.]+\) )");
   const std::string seen = std::regex_replace(Read(candump.log()), time, ""),
                     said = std::regex_replace(Read(can_log), time, "");

@@ -91,7 +91,7 @@ class Stage {
   /// Brings everything up to an episode with a torque on the bus.
   void RunWithTorque();
 
-  // What the witness saw on the bus, node 1: newest torque setpoint [Nm], axis state, times [us].
+  // As the witness saw node 1 on the bus: newest torque setpoint [Nm], axis state, times [us].
   float torque = 0;
   int axis_state = 0;
   int64_t last_torque_time = 0;  ///< of the last frame that asked for torque

@@ -6,9 +6,9 @@
 
 namespace plumb {
 
-/// What the machine does to somebody who only sleeps: by how much a bare timer of a millisecond
-/// comes late, at worst. A test in real time can tell nothing of us where that is more than what we
-/// are given. Ends with its destruction.
+/// Measures how late a bare timer of a millisecond comes on this machine, at worst, until it is
+/// destroyed. Where that exceeds the deadline of a test in real time, the test says nothing about
+/// us.
 class StallMeter {
  public:
   StallMeter() : thread_([this] { Measure(); }) {}

@@ -34,7 +34,7 @@ Child StartWitness(const Stage& stage, const fs::path& log) {
                log);
 }
 
-/// What candump and the run write of a remote frame differs by its length.
+/// candump writes the length of a remote frame, the run does not.
 std::string Normal(std::string frame) {
   const size_t remote = frame.find("#R");
   return remote == std::string::npos ? frame : frame.substr(0, remote + 2);

@@ -44,7 +44,7 @@ TEST_CASE("a logit coordinate goes there and back") {
       const double value = p.ToPhysical(x);
       CHECK(value > p.lower);
       CHECK(value < p.upper);
-      // What is known of the distance to a bound is the value's own rounding.
+      // The distance to a bound is as exact as the value's own rounding allows.
       const double rounding = 4e-16 * std::abs(value) / std::min(value - p.lower, p.upper - value);
       CHECK(p.ToCoordinate(value) == Approx(x).margin(1e-12 + 4 * rounding));
     }

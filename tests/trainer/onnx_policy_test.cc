@@ -92,7 +92,7 @@ void DecodeChanged(const std::function<void(ModelProto&)>& change) {
   DecodeOnnxPolicy(model.SerializePartialAsString());
 }
 
-/// What is said of the small policy's model after a change; "" if it is still a policy.
+/// The error on reading the small policy's model after a change; "" if it is still a policy.
 std::string Complaint(const std::function<void(ModelProto&)>& change) {
   try {
     DecodeChanged(change);
@@ -135,7 +135,7 @@ TEST_CASE("a policy and its record survive ONNX to the bit") {
     CHECK(SameBits(read.policy, policy));
     CHECK(read.record == record);
   }
-  // What need not be known.
+  // Entries that may be missing.
   PolicyRecord record = Record(kSmall);
   record.training_return.reset();
   record.evaluation.clear();

@@ -22,7 +22,7 @@ Eigen::VectorXd Nominal(const RobotDescription& robot) {
   return prior.ToPhysical(prior.mixture.components[0].mean);
 }
 
-// What a policy is told over an episode of no action, a column for each step.
+// A policy's observations over an episode of no action, a column for each step.
 Eigen::MatrixXf Observations(const RobotDescription& robot, uint64_t seed, int steps) {
   const auto simulation = SimulateRobot(robot)();
   Random random(seed);

@@ -5,7 +5,7 @@
 
 #include "trainer/kernels/packet.h"
 
-/// Matrices laid out for the kernels, and their product. For files of this folder only.
+/// Matrices laid out for the kernels, and their product. For this folder only. Not thread-safe.
 
 namespace plumb::kernels {
 

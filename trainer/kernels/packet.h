@@ -4,7 +4,7 @@
 #include <cstring>
 
 /// One vector register of floats, as wide as the compiler's target has them, and what the kernels
-/// need of it. For files of this folder only: included by others it would be another type.
+/// need of it: thread-safe. For this folder only: included by others it would be another type.
 
 namespace plumb::kernels {
 

@@ -23,7 +23,7 @@ struct Wrong {
   Truth truth;
 };
 
-/// What the hopper's masses, the only parameters fitted, cannot absorb.
+/// Errors of the model that the hopper's masses, the only parameters fitted, cannot absorb.
 std::vector<Wrong> WrongModels() {
   return {{"inertia/torso", {{{"inertia/torso", 1.2}}}},
           {"inertia/thigh", {{{"inertia/thigh", 1.2}}}},

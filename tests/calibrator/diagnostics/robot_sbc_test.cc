@@ -29,7 +29,7 @@ TEST_CASE(
                 random);
   };
   const SbcResult result = RunSbc(prior, fit, Marginals({"a", "b"}), 500, 7);
-  INFO(Words(result));
+  INFO(SbcSummary(result));
   CHECK(result.failures == 0);
   for (const SbcUniformity& quantity : result.quantities) {
     CHECK(quantity.chi2_p > 0.01);
@@ -47,7 +47,7 @@ TEST_CASE(
   options.seed = 11;
   const SbcResult result =
       RunRobotSbc(std::make_shared<Model>(robot), rollouts, Eigen::Vector2d(0.003, 0.01), options);
-  INFO(Words(result));
+  INFO(SbcSummary(result));
   CHECK(result.failures == 0);
   REQUIRE(result.quantities.size() == 5);  // three parameters, two combinations
   CHECK(result.quantities[3].name == "gravity / length");

@@ -1,4 +1,5 @@
 #include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/robot_least_squares.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>

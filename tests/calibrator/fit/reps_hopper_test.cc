@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/reps_search.h"
 #include "tests/calibrator/hopper.h"
 

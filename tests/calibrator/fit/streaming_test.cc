@@ -1,10 +1,10 @@
 #include "calibrator/fit/streaming.h"
+#include "calibrator/fit/robot_least_squares.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 
-#include "calibrator/fit/curriculum.h"
 #include "robot/parameter_distribution.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/synthetic.h"

@@ -230,7 +230,7 @@ TEST_CASE(
       CHECK_FALSE((row.rollout == 0 &&
                    ((row.transition == 1 && row.coordinate == 0) || row.transition == 6)));
     }
-    // What follows is predicted all the same.
+    // The transitions after it are predicted all the same.
     CHECK(less.Raw(truth).cwiseAbs().maxCoeff() < 1e-12);
     for (Rollout& rollout : rollouts) {
       for (Transition& t : rollout.transitions) t.next_q(0) = t.next_v(0) = kNaN;

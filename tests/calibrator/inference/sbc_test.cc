@@ -61,10 +61,10 @@ TEST_CASE("an exact posterior is calibrated, along what is observed and what is 
     CHECK(quantity.coverage[1] == Approx(0.8).margin(0.06));
     CHECK(quantity.coverage[2] == Approx(0.95).margin(0.03));
   }
-  const std::string words = Words(result);
-  CHECK(words.find("500 posteriors of 99 draws each; 0 of 500 runs failed") == 0);
-  CHECK(words.find("a - b, unseen") != std::string::npos);
-  CHECK(words.find("too") == std::string::npos);
+  const std::string summary = SbcSummary(result);
+  CHECK(summary.find("500 posteriors of 99 draws each; 0 of 500 runs failed") == 0);
+  CHECK(summary.find("a - b, unseen") != std::string::npos);
+  CHECK(summary.find("too") == std::string::npos);
 }
 
 TEST_CASE("posteriors that are too sure or too unsure are found out") {
@@ -74,7 +74,7 @@ TEST_CASE("posteriors that are too sure or too unsure are found out") {
       CHECK(quantity.chi2_p < 1e-4);
       CHECK(quantity.ecdf_p < 1e-4);
     }
-    CHECK(Words(result).find(verdict) != std::string::npos);
+    CHECK(SbcSummary(result).find(verdict) != std::string::npos);
   };
   const SbcResult sure = Run(0.7, 0), unsure = Run(1.5, 0);
   check(sure, "too sure");
@@ -93,7 +93,7 @@ TEST_CASE("a biased posterior is found out") {
     }
     CHECK(result.quantities[3].chi2_p > 0.01);
     CHECK(result.quantities[3].ecdf_p > 0.01);
-    CHECK(Words(result).find(bias > 0 ? "too high" : "too low") != std::string::npos);
+    CHECK(SbcSummary(result).find(bias > 0 ? "too high" : "too low") != std::string::npos);
   }
 }
 
@@ -141,7 +141,7 @@ TEST_CASE("failed runs are counted, and tests are of the others") {
   CHECK(result.failures == 60);
   CHECK((result.ranks.col(0).array() == SbcResult::kFailed).count() == 60);
   CHECK(result.quantities[0].ecdf_p > 0.01);
-  CHECK(Words(result).find("60 of 300 runs failed (20.0 %)") != std::string::npos);
+  CHECK(SbcSummary(result).find("60 of 300 runs failed (20.0 %)") != std::string::npos);
 
   const auto never = [](const Eigen::VectorXd&, Random&) -> std::optional<Eigen::MatrixXd> {
     return {};
@@ -150,7 +150,7 @@ TEST_CASE("failed runs are counted, and tests are of the others") {
   CHECK(nothing.failures == 3);
   CHECK(nothing.draws == 0);
   CHECK(std::isnan(nothing.quantities[0].chi2_p));
-  CHECK(Words(nothing).find("unknown") != std::string::npos);
+  CHECK(SbcSummary(nothing).find("unknown") != std::string::npos);
 }
 
 TEST_CASE("draws equal to the truth are below it or not, at random") {

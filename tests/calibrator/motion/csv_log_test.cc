@@ -21,7 +21,7 @@ Log Read(const std::string& contents, const RobotDescription& robot = GymPendulu
   return ReadCsvLog(TemporaryFile(contents, ".csv").path(), robot);
 }
 
-/// What was thrown, without the file's name.
+/// The message of the exception that reading throws, without the file's name.
 std::string Refusal(const std::string& contents, const RobotDescription& robot = GymPendulum()) {
   const TemporaryFile file(contents, ".csv");
   try {
@@ -34,7 +34,7 @@ std::string Refusal(const std::string& contents, const RobotDescription& robot =
   return "nothing";
 }
 
-/// What `plumb sim --csv` writes of episodes under random actions.
+/// A table as `plumb sim --csv` writes it, of episodes under random actions.
 std::string SimulatedTable(const RobotDescription& robot, int episodes, int steps) {
   Environment environment(robot);
   const Task& task = environment.task();

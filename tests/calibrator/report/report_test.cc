@@ -156,7 +156,7 @@ TEST_CASE("findings with little in them still make a report") {
   CHECK_THAT(html, Contains("Predictions were not tested") &&
                        Contains("hardly: the motion adds little to the prior") &&
                        Contains("There are none."));
-  // What was not examined is not good news.
+  // A question that was not examined is not shown as good news.
   CHECK_THAT(html,
              Contains("The model was not tested") && Contains("Identifiability was not examined"));
   CHECK_THAT(html, !Contains("The logs") && !Contains("verdict good") && !Contains("verdict bad"));

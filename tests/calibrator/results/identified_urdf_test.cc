@@ -54,8 +54,8 @@ void CheckSame(const A& a, const B& b) {
   CHECK((a - b).cwiseAbs().maxCoeff() <= 1e-12 * (1 + b.cwiseAbs().maxCoeff()));
 }
 
-/// What LoadRobot makes of the new URDF and the old robot.toml is what the simulator has with these
-/// parameters.
+/// Loads the new URDF with the old robot.toml, and checks that this is the robot that the simulator
+/// has with these parameters.
 /// @return the new URDF.
 std::string CheckPhysics(const std::string& urdf, const std::string& toml,
                          const std::vector<NewValue>& values) {
@@ -86,7 +86,7 @@ std::string CheckPhysics(const std::string& urdf, const std::string& toml,
     CHECK(is.lower == should.lower);
     CHECK(is.upper == should.upper);
     CHECK(is.effort_limit == should.effort_limit);
-    // What robot.toml says instead is in the comment, for robot.toml.
+    // Where robot.toml overrides the URDF, the comment has the value for robot.toml.
     const auto check_dynamics = [&](const std::string& kind, double now, double expected_now,
                                     double before) {
       const bool frozen = std::any_of(robot.frozen.begin(), robot.frozen.end(), [&](const auto& f) {

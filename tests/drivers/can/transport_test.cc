@@ -112,7 +112,7 @@ TEST_CASE("frames that only we may send are marked when another sends them") {
     REQUIRE(received.size() == 4);
     for (const Frame& frame : received) CHECK(frame.foreign == (ToText(frame) == "02E#00"));
     CHECK(master->stats().foreign == 1);
-    // What is passed on does not keep the mark.
+    // A frame that is passed on does not keep the mark.
     REQUIRE(master->Send(std::span(received).first(2)) == 2);
     const std::vector<Frame> returned = ReceiveAll(*second, 2);
     REQUIRE(returned.size() == 2);

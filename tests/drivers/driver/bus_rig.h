@@ -76,7 +76,7 @@ struct BusRig : Rig {
   }
 
   std::function<bool(const Frame&)> silent = Nothing,
-                                    deaf = Nothing;  ///< what the drives do not say, do not hear
+                                    deaf = Nothing;  ///< frames the drives do not send or hear
   std::vector<std::function<void()>> each_millisecond;
   std::unique_ptr<Transport> stranger;
   bool cut_off = false;  ///< nothing goes to or comes from the driver

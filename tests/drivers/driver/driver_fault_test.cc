@@ -244,7 +244,7 @@ TEST_CASE("a bus that accepts nothing for ten cycles is a fault") {
   rig.bus_full = true;
   CHECK(rig.RunUntil(DriveState::kFault) == 50);
   CHECK_THAT(rig.Reason(), Equals("the bus has not accepted frames in 10 cycles"));
-  // What was not accepted is not sent later: there is one disarm, not ten cycles of torques.
+  // Frames that were not accepted are not sent later: one disarm, not ten cycles of torques.
   rig.bus_full = false;
   rig.Run(60);
   CHECK_FALSE(rig.drives[0].armed());

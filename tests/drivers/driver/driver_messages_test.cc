@@ -27,7 +27,7 @@ TEST_CASE("JOINT_STATE comes once per measurement, with regular times and the ef
       rig.samples[i] = {0.001 * static_cast<double>(step) / kTwoPi, 1.0 / kTwoPi};
   };
   REQUIRE(rig.Arm());
-  // What was sent when, noted by the receiver's side.
+  // The setpoints and their times, as the receiver notes them.
   struct Setpoint {
     int64_t utime;
     double effort;

@@ -21,12 +21,12 @@ namespace plumb {
 ///   PLUMBLINE_FAULT_TABLE=1 drivers_test '[fault]' | grep '^|' | sort -t'|' -k2n -s
 struct Fault {
   const char* number;     ///< in that table
-  const char* name;       ///< what goes wrong
+  const char* name;       ///< of the fault
   const char* detection;  ///< by what the driver, or a drive, notices
   std::function<void(BusRig&)> happens;
   std::function<void(BusRig&)> is_over = [](BusRig&) {};  ///< and what else is to be seen by then
   const char* reason = "";  ///< DRIVER_STATUS says, from its beginning; "" if the robot runs on
-  int8_t arm = driver_request_t::ARM;  ///< what leads back
+  int8_t arm = driver_request_t::ARM;  ///< the request that leads back to normal
   /// [ms] until no torque is asked for or produced any more, at the latest
   int64_t within = 0;
   std::function<void(BusRig&)> prepare = [](BusRig&) {};  ///< before it starts

@@ -122,7 +122,7 @@ TEST_CASE("a silent joint moves on as the simulator says, under efforts that are
     m = Measured(k, 0, 0, efforts.back());
     m.valid[0] = 0;
     observer.OnJointState(m, Kinematic(m));
-    // What was applied from (j - 1) to j periods has acted from 2.4 periods later on.
+    // The effort applied from (j - 1) to j periods acts from 2.4 periods later on.
     double v = 0.3;
     for (int j = 1; j <= k; ++j)
       v += efforts[static_cast<size_t>(j)] / kMass * kPeriod *

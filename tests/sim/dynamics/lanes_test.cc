@@ -69,7 +69,7 @@ struct Tally {
   int compared = 0, finite = 0;
 };
 
-// What goes wrong in one lane.
+// The trouble of one lane.
 enum class Trouble { kNone, kNaN, kHugeAngle, kInfiniteSpeed, kHugeEffort, kSteady };
 
 void CompareLanes(const RobotDescription& robot, Trouble trouble, Random& random, Tally* tally) {

@@ -84,7 +84,7 @@ TEST_CASE("play: the two exchange momentum, and lose energy only") {
     REQUIRE(mechanism.Advance(Scalar(0), 1e-3));
     const Energy now = Of(mechanism, inertia);
     REQUIRE(now.momentum == Approx(begin.momentum).epsilon(1e-6));
-    // What the teeth store between blows is given back, and no more.
+    // The teeth give back the energy that they store between blows, and no more.
     REQUIRE(now.kinetic < begin.kinetic * (1 + 1e-9));
     kinetic = now.kinetic;
   }

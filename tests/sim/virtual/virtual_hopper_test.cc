@@ -57,7 +57,7 @@ TEST_CASE("a hopper on one bus: every joint is measured as it is, whatever measu
   } else {
     for (const uint32_t command : {0x1u, 0x2u, 0x3u}) CHECK(bus.count[command] == 500);
   }
-  // What moved is what was measured.
+  // The measurements show the motion.
   VectorXd moved = VectorXd::Zero(6);
   for (size_t k = 1; k < bus.states.size(); ++k) {
     const joint_state_t& state = bus.states[k];

@@ -98,7 +98,7 @@ TEST_CASE(
   CHECK(Send(*sender, all) == 6);
   Shell("cansend vcan0 20000040#0000000000000000");
   CheckReceives(*host, {"029#11", "03F#22", "20000040#0000000000000000"});
-  // What stays out does not even wake us.
+  // Frames that the filter keeps out do not even wake us.
   CHECK(Send(*sender, {"029#R", "049#11", "00000029#11"}) == 3);
   CHECK_FALSE(Readable(*host, 50));
   CheckReceives(*drive, {"029#11", "029#R", "03F#22", "20000040#0000000000000000", "029#R"});

@@ -1,4 +1,4 @@
-#include "calibrator/diagnostics/identifiability_words.h"
+#include "calibrator/diagnostics/identifiability_summary.h"
 
 #include <fmt/format.h>
 
@@ -65,12 +65,12 @@ std::string Coupled(const RobotDescription& robot, const Eigen::VectorXd& mean,
     if (involved) names.push_back(ShortName(robot, i));
   }
   if (names.empty()) return "";
-  std::string words = "; " + Join(names, ", ") + " are not identifiable separately:";
+  std::string summary = "; " + Join(names, ", ") + " are not identifiable separately:";
   for (const Eigen::VectorXd& direction : found.null) {
     if (Single(direction) < 0)
-      words += " (" + DirectionName(robot, mean, direction) + ") changes nothing";
+      summary += " (" + DirectionName(robot, mean, direction) + ") changes nothing";
   }
-  return words;
+  return summary;
 }
 
 // "mass/world has no effect on this motion", for those of which that is so.
@@ -86,14 +86,15 @@ std::string WithoutEffect(const RobotDescription& robot, const Identifiability& 
 
 std::string Weak(const RobotDescription& robot, const Eigen::VectorXd& mean,
                  const Identifiability& found) {
-  std::string words;
+  std::string summary;
   for (const WeakDirection& weak : found.weak) {
     const Eigen::Index single = Single(weak.direction);
-    words += single >= 0 ? "; " + FullName(robot, single) + " is hardly determined"
-                         : "; (" + DirectionName(robot, mean, weak.direction) + ") changes little";
-    words += fmt::format(": posterior sd is {:.0f} % of the prior's", 100 * weak.sd_ratio);
+    summary += single >= 0
+                   ? "; " + FullName(robot, single) + " is hardly determined"
+                   : "; (" + DirectionName(robot, mean, weak.direction) + ") changes little";
+    summary += fmt::format(": posterior sd is {:.0f} % of the prior's", 100 * weak.sd_ratio);
   }
-  return words;
+  return summary;
 }
 
 }  // namespace
@@ -149,18 +150,18 @@ std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& 
   return Join(moves, ", ");
 }
 
-std::string IdentifiabilityWords(const RobotDescription& robot, const Eigen::VectorXd& mean,
-                                 const Identifiability& found) {
-  std::string words = "every parameter is determined by this motion";
+std::string IdentifiabilitySummary(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                                   const Identifiability& found) {
+  std::string summary = "every parameter is determined by this motion";
   const bool coupled = std::any_of(found.null.begin(), found.null.end(),
                                    [](const auto& d) { return Single(d) < 0; });
   if (coupled) {
-    words = Known(found.combinations) + " can be known from this motion";
+    summary = Known(found.combinations) + " can be known from this motion";
   } else if (!found.null.empty()) {
-    words = found.combinations.empty() ? "nothing can be known from this motion"
-                                       : "every other parameter is determined by this motion";
+    summary = found.combinations.empty() ? "nothing can be known from this motion"
+                                         : "every other parameter is determined by this motion";
   }
-  return words + Coupled(robot, mean, found) + WithoutEffect(robot, found) +
+  return summary + Coupled(robot, mean, found) + WithoutEffect(robot, found) +
          Weak(robot, mean, found);
 }
 

@@ -22,7 +22,7 @@ std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& 
                           const Eigen::VectorXd& direction);
 
 /// Everything that was found, for people. @param mean of the coordinates.
-std::string IdentifiabilityWords(const RobotDescription& robot, const Eigen::VectorXd& mean,
-                                 const Identifiability& found);
+std::string IdentifiabilitySummary(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                                   const Identifiability& found);
 
 }  // namespace plumb

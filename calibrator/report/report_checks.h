@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+#include "calibrator/diagnostics/holdout.h"
+#include "calibrator/results/findings.h"
+#include "calibrator/results/summary.h"
+#include "robot/description.h"
+
+// The report's sections that say how far its findings can be trusted, HTML.
+namespace plumb {
+
+// The functions here share nothing: thread-safe.
+
+/// Errors of predicting motion that the fit has not seen.
+std::string PredictionSection(const Holdout& holdout);
+
+/// Whether the model can explain the robot, and what it does not.
+std::string MisfitSection(const Findings& findings);
+
+/// How far each log's own posterior is from that of the others; empty for a single log.
+/// @param most of the parameters that are drawn.
+std::string AgreementSection(const Agreement& agreement, const Summary& summary,
+                             const RobotDescription& robot, Eigen::Index most);
+
+}  // namespace plumb

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "cli/folder_lock.h"
+#include "cli/launch.h"
+#include "cli/virtual_run.h"
+#include "common/process.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// A run's settings, checked before anything starts. Not thread-safe.
+struct RunSetting {
+  /// Makes the run's folder and locks it.
+  /// @throws std::invalid_argument or std::runtime_error, one line for people: a robot that cannot
+  /// be driven, commands that strangers could give, a bus or LCM in use, a folder in use.
+  RunSetting(const Process& process, const LaunchFlags& flags);
+
+  /// Null in real time.
+  Coordinator* coordinator() { return virtual_run ? &virtual_run->coordinator() : nullptr; }
+
+  RobotDescription robot;
+  std::string bus;
+  Eigen::VectorXd truth;         ///< hidden parameters, physical; empty: nobody knows them
+  std::filesystem::path output;  ///< the run's folder
+  std::optional<FolderLock> lock;
+  std::optional<VirtualRun> virtual_run;  ///< none in real time
+};
+
+}  // namespace plumb
