@@ -32,8 +32,8 @@ struct UnmodelledJoint {
 
 /// What the ground is and no model knows. Only of a robot that touches the ground.
 struct UnmodelledGround {
-  double stiffness_factor = 1;     ///< > 0, on what the engine's ground has
-  std::optional<double> friction;  ///< >= 0, in place of the robot's own contact friction
+  double stiffness_factor = 1;          ///< > 0, on what the engine's ground has
+  std::optional<double> friction = {};  ///< >= 0, in place of the robot's own contact friction
   /// [rad] by which it rises towards +x. Positions and orientations count from the ground as if it
   /// were level, so that it is gravity that leans.
   double slope = 0;

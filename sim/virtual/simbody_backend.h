@@ -27,8 +27,8 @@ class SimbodyBackend : public PhysicsBackend {
   static constexpr double kViscous = 0.01;      ///< [s/m]
   static constexpr double kTransition = 0.1;    ///< [m/s] below which friction is viscous
   static constexpr double kSmoothDepth = 1e-6;  ///< [m^2], "cf"
-  static constexpr double kHertzSmoothing = 1000;        ///< [1/m], "bd"
-  static constexpr double kHuntCrossleySmoothing = 100;  ///< [s/m], "bv"
+  static constexpr double kHertzSmoothing = 1000;         ///< [1/m], "bd"
+  static constexpr double kHuntCrossleySmoothing = 1000;  ///< [s/m], "bv"
   // Stops.
   static constexpr double kStopStiffness = 2e4;    ///< [Nm/rad] or [N/m]
   static constexpr double kStopDissipation = 0.5;  ///< [s/rad] or [s/m]
