@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "robot/description.h"
 
@@ -35,15 +36,67 @@ UnmodelledJoint ReadUnmodelledJoint(Config& config, const RobotDescription& robo
   return s;
 }
 
+UnmodelledGround ReadUnmodelledGround(Config config, const RobotDescription& robot,
+                                      VirtualRobotSettings::Engine engine) {
+  UnmodelledGround s;
+  const std::vector<std::string> keys = config.Keys();
+  s.stiffness_factor = config.Number("stiffness_factor", {1e-3, 1e3}, 1);
+  if (config.Has("friction")) s.friction = config.Number("friction", {0, 1e3});
+  s.slope = config.Number("slope", {-0.785, 0.785}, 0);
+  config.Finish();
+  if (!keys.empty() && !robot.simulation.contact)
+    config.Fail(keys.front(),
+                "is of a ground that the robot does not touch: there is no "
+                "[simulation.contact]");
+  if (s.slope != 0 && engine == VirtualRobotSettings::Engine::kAuto)
+    config.Fail("slope",
+                "needs engine = \"mujoco\" or \"simbody\": the simulator's ground is level");
+  return s;
+}
+
+SprungMass ReadSprungMass(Config& config, const RobotDescription& robot,
+                          const std::vector<SprungMass>& before) {
+  SprungMass s;
+  s.name = config.String("name");
+  if (std::any_of(before.begin(), before.end(),
+                  [&](const auto& other) { return other.name == s.name; })) {
+    config.Fail("name", fmt::format("= \"{}\" occurs twice", s.name));
+  }
+  const std::string link = config.String("link");
+  const auto found = std::find_if(robot.links.begin() + 1, robot.links.end(),
+                                  [&](const auto& other) { return other.name == link; });
+  if (found == robot.links.end())
+    config.Fail("link", fmt::format("= \"{}\" is not a link that moves", link));
+  s.link = static_cast<int>(found - robot.links.begin());
+  s.mass = config.Number("mass", {1e-6, 1e9});
+  s.frequency = config.Number("frequency", {1e-3, 1e3});
+  s.damping_ratio = config.Number("damping_ratio", {0, 1e3});
+  const std::vector<double> axis = config.Numbers("axis", 3, {-1e6, 1e6});
+  s.axis = Eigen::Vector3d(axis[0], axis[1], axis[2]);
+  if (s.axis.isZero(1e-6)) config.Fail("axis", "has no direction");
+  s.axis.normalize();
+  const std::vector<double> centre = config.Numbers("centre", 3, {-1e3, 1e3});
+  s.centre = Eigen::Vector3d(centre[0], centre[1], centre[2]);
+  s.travel = config.Number("travel", {1e-6, 1e3}, std::numeric_limits<double>::infinity());
+  if (std::isfinite(s.travel) && !robot.simulation.stop)
+    config.Fail("travel", "ends at stops, and there is no [simulation.limit]");
+  config.Finish();
+  return s;
+}
+
 }  // namespace
+
+Eigen::Vector3d UnmodelledGround::Down() const {
+  return {0 - std::sin(slope), 0, -std::cos(slope)};  // 0 - 0 is not -0
+}
 
 VirtualRobotSettings ReadVirtualRobot(Config config, const RobotDescription& robot) {
   VirtualRobotSettings s;
   s.watchdog = config.Number("watchdog", {0, 10});
   s.heartbeat = config.Number("heartbeat", {1e-3, 10});
   s.encoder_bits = config.Integer("encoder_bits", {4, 32});
-  s.engine =
-      static_cast<VirtualRobotSettings::Engine>(config.Choice("engine", {"auto", "mujoco"}, 0));
+  s.engine = static_cast<VirtualRobotSettings::Engine>(
+      config.Choice("engine", {"auto", "mujoco", "simbody"}, 0));
   s.engine_source = config.Position("engine");
   Config hidden = config.Table("hidden", false);
   for (const std::string& name : hidden.Keys()) {
@@ -54,6 +107,9 @@ VirtualRobotSettings ReadVirtualRobot(Config config, const RobotDescription& rob
   }
   for (Config& joint : config.Tables("joint"))
     s.joints.push_back(ReadUnmodelledJoint(joint, robot, s.joints));
+  s.ground = ReadUnmodelledGround(config.Table("ground", false), robot, s.engine);
+  for (Config& mass : config.Tables("sprung_mass"))
+    s.sprung_masses.push_back(ReadSprungMass(mass, robot, s.sprung_masses));
   config.Finish();
   return s;
 }

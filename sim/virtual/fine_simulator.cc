@@ -1,6 +1,7 @@
 #include "sim/virtual/fine_simulator.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "sim/simulator.h"
@@ -28,6 +29,11 @@ class FineSimulator : public PhysicsBackend {
  private:
   static RobotDescription Finer(RobotDescription robot) {
     robot.parameters.clear();
+    if (auto& contact = robot.simulation.contact) {
+      const double factor = robot.virtual_robot.ground.stiffness_factor;
+      contact->stiffness *= factor;
+      contact->damping *= std::sqrt(factor);  // as many periods to come to rest
+    }
     robot.simulation.integrator = SimulationSettings::Integrator::kLeapfrog;
     robot.simulation.speed_clip = std::numeric_limits<double>::infinity();
     robot.simulation.substep = std::min(robot.simulation.substep / 10, kLongestSubstep);

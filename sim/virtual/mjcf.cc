@@ -55,14 +55,13 @@ class Writer {
   std::string Write() {
     text_ = fmt::format(
         "<mujoco><compiler angle=\"radian\"/>"
-        "<option timestep=\"0.002\" integrator=\"RK4\" gravity=\"0 0 {:.17g}\"/><worldbody>\n",
-        -robot_.simulation.gravity);
+        "<option timestep=\"0.002\" integrator=\"RK4\" gravity=\"{}\"/><worldbody>\n",
+        Words(robot_.simulation.gravity * robot_.virtual_robot.ground.Down()));
     if (const auto& contact = robot_.simulation.contact) {
       surface_ = fmt::format(
-          "condim=\"3\" friction=\"{:.17g} 0.005 0.0001\" margin=\"0.001\" solref=\"0.02 1\" "
-          "solimp=\"0.8 "
-          "0.8 0.01\"",
-          contact->friction);
+          "condim=\"3\" friction=\"{:.17g} 0.005 0.0001\" margin=\"0.001\" solref=\"{:.17g} 1\" "
+          "solimp=\"0.8 0.8 0.01\"",
+          contact->friction, ContactTime(robot_));
       text_ += "<geom type=\"plane\" size=\"0 0 1\" contype=\"0\" conaffinity=\"1\" " + surface_ +
                "/>\n";
     }
@@ -92,7 +91,7 @@ class Writer {
     }
     text_ += fmt::format("<body pos=\"{}\" quat=\"{}\">\n", Words(frame.translation()),
                          Turn(frame.linear()));
-    for (const Placed& p : placed) WriteJoint(joint(p.joint), frame.inverse() * p.frame);
+    for (const Placed& p : placed) WriteJoint(p.joint, frame.inverse() * p.frame);
     const LinkDescription& link = robot_.links[last + 1];
     const Eigen::Matrix3d inertia = Solid(link.inertia);
     text_ += fmt::format(
@@ -115,15 +114,15 @@ class Writer {
     return robot_.links[index + 1].mass == 0 && carried == 1;
   }
 
-  void WriteJoint(const JointDescription& j, const Eigen::Isometry3d& in_body) {
+  void WriteJoint(size_t index, const Eigen::Isometry3d& in_body) {
+    const JointDescription& j = joint(index);
     const bool limited = robot_.simulation.stop && std::isfinite(j.upper);
     text_ += fmt::format(
-        "<joint type=\"{}\" pos=\"{}\" axis=\"{}\" armature=\"{:.17g}\" damping=\"{:.17g}\" "
-        "frictionloss=\"{:.17g}\" "
-        "stiffness=\"{:.17g}\" springref=\"{:.17g}\"",
-        j.type == Type::kPrismatic ? "slide" : "hinge", Words(in_body.translation()),
-        Words(in_body.linear() * j.axis), j.dynamics.armature, j.dynamics.damping,
-        j.dynamics.friction, j.dynamics.stiffness, j.dynamics.rest);
+        "<joint name=\"{}\" type=\"{}\" pos=\"{}\" axis=\"{}\" armature=\"{:.17g}\" "
+        "damping=\"{:.17g}\" frictionloss=\"{:.17g}\" stiffness=\"{:.17g}\" springref=\"{:.17g}\"",
+        MjcfJoint(index), j.type == Type::kPrismatic ? "slide" : "hinge",
+        Words(in_body.translation()), Words(in_body.linear() * j.axis), j.dynamics.armature,
+        j.dynamics.damping, j.dynamics.friction, j.dynamics.stiffness, j.dynamics.rest);
     if (limited)
       text_ += fmt::format(" limited=\"true\" range=\"{:.17g} {:.17g}\"", j.lower, j.upper);
     text_ += "/>\n";
@@ -155,6 +154,12 @@ class Writer {
 };
 
 }  // namespace
+
+std::string MjcfJoint(size_t index) { return fmt::format("joint{}", index); }
+
+double ContactTime(const RobotDescription& robot) {
+  return 0.02 / std::sqrt(robot.virtual_robot.ground.stiffness_factor);
+}
 
 std::string Mjcf(const RobotDescription& robot) {
   for (const JointDescription& joint : robot.joints) RequireKnown(joint);

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "sim/virtual/mjcf.h"
 
@@ -59,10 +60,13 @@ class MujocoBackend : public PhysicsBackend {
     model_.reset(Load(Mjcf(robot)));
     data_.reset(mj_makeData(model_.get()));
     if (!data_) throw std::invalid_argument("MuJoCo has no memory for the robot");
+    longest_step_ = std::min(kLongestStep, ContactTime(robot) / 10);
     q_ = v_ = Eigen::VectorXd::Zero(robot.num_velocities());
     gain_ = q_;
     for (size_t i = 0; i < robot.joints.size(); ++i) {
       gain_[static_cast<Eigen::Index>(i)] = robot.joints[i].dynamics.motor_gain;
+      const int joint = mj_name2id(model_.get(), mjOBJ_JOINT, MjcfJoint(i).c_str());
+      address_.push_back(model_->jnt_dofadr[joint]);
     }
   }
 
@@ -81,9 +85,10 @@ class MujocoBackend : public PhysicsBackend {
   bool Advance(const Vector& effort, double duration) override {
     if (!(duration > 0)) return true;
     if (!effort.allFinite()) return false;
-    const int count = static_cast<int>(std::max(1.0, std::ceil(duration / kLongestStep - 1e-6)));
+    const int count = static_cast<int>(std::max(1.0, std::ceil(duration / longest_step_ - 1e-6)));
     model_->opt.timestep = duration / count;
-    for (Eigen::Index i = 0; i < effort.size(); ++i) data_->qfrc_applied[i] = gain_[i] * effort[i];
+    for (Eigen::Index i = 0; i < effort.size(); ++i)
+      data_->qfrc_applied[Address(i)] = gain_[i] * effort[i];
     for (int i = 0; i < count && !GivenUp(); ++i) mj_step(model_.get(), data_.get());
     const auto q = Eigen::VectorXd::Map(data_->qpos, q_.size()),
                v = Eigen::VectorXd::Map(data_->qvel, v_.size());
@@ -91,8 +96,10 @@ class MujocoBackend : public PhysicsBackend {
       Restore();
       return false;
     }
-    q_ = q;
-    v_ = v;
+    for (Eigen::Index i = 0; i < effort.size(); ++i) {
+      q_[i] = q[Address(i)];
+      v_[i] = v[Address(i)];
+    }
     return true;
   }
 
@@ -108,12 +115,17 @@ class MujocoBackend : public PhysicsBackend {
   }
   void Restore() {
     mj_resetData(model_.get(), data_.get());  // forgets the solver's warm start
-    std::copy(q_.begin(), q_.end(), data_->qpos);
-    std::copy(v_.begin(), v_.end(), data_->qvel);
+    for (Eigen::Index i = 0; i < q_.size(); ++i) {
+      data_->qpos[Address(i)] = q_[i];
+      data_->qvel[Address(i)] = v_[i];
+    }
   }
+  int Address(Eigen::Index i) const { return address_[static_cast<size_t>(i)]; }
 
   std::unique_ptr<mjModel, Delete> model_;
   std::unique_ptr<mjData, Delete> data_;
+  double longest_step_;       // [s]
+  std::vector<int> address_;  // of our coordinates in MuJoCo's, which is depth first
   Eigen::VectorXd q_, v_, gain_;
 };
 

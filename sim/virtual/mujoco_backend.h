@@ -8,9 +8,9 @@
 namespace plumb {
 
 /// MuJoCo as what moves a robot: see Mjcf. It goes in steps of its Runge-Kutta method as long as
-/// from one event to the next, and 2 ms, gym's, at most: so that it is exact to the microsecond
-/// when it is looked at, and nothing is interpolated. A contact's softness is in seconds there, not
-/// in steps.
+/// from one event to the next, and 2 ms, gym's, at most, or a tenth of a contact's softness, which
+/// is in seconds there: so that it is exact to the microsecond when it is looked at, and nothing is
+/// interpolated.
 /// @throws std::invalid_argument if MuJoCo is not part of this build, or cannot be told what the
 /// robot is.
 std::unique_ptr<PhysicsBackend> MakeMujocoBackend(const RobotDescription& robot);

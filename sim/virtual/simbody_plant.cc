@@ -1,7 +1,5 @@
 #include "sim/virtual/simbody_plant.h"
 
-#include <Simbody.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -10,26 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "sim/virtual/simbody_tree.h"
+
 namespace plumb {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-SimTK::Vec3 ToSimbody(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
-
-SimTK::Rotation ToSimbody(const Eigen::Matrix3d& m) {
-  return SimTK::Rotation(SimTK::Mat33(m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0),
-                                      m(2, 1), m(2, 2)));
-}
-
-SimTK::MassProperties ToSimbody(const LinkDescription& link) {
-  if (link.mass == 0) return {0, SimTK::Vec3(0), SimTK::Inertia(0)};
-  const Eigen::Matrix3d& i = link.inertia;
-  const SimTK::Inertia central(i(0, 0), i(1, 1), i(2, 2), i(0, 1), i(0, 2), i(1, 2));
-  const SimTK::Vec3 center = ToSimbody(link.center_of_mass);
-  return {link.mass, center, central.shiftFromMassCenter(-center, link.mass)};
-}
 
 using Type = JointDescription::Type;
 
@@ -38,42 +23,9 @@ using Type = JointDescription::Type;
 class SimbodyPlant::Impl {
  public:
   Impl(const RobotDescription& robot, double max_step)
-      : matter_(system_),
-        forces_(system_),
-        gravity_(forces_, matter_, SimTK::Vec3(0, 0, -robot.simulation.gravity)),
-        efforts_(forces_, matter_),
-        joints_(robot.joints),
-        max_step_(max_step) {
-    std::vector<SimTK::MobilizedBody> links{matter_.Ground()};
-    for (size_t i = 0; i < joints_.size(); ++i) {
-      const JointDescription& joint = joints_[i];
-      if (joint.child != static_cast<int>(i) + 1 || joint.parent < 0 ||
-          joint.parent > static_cast<int>(i)) {
-        throw std::invalid_argument("joint '" + joint.name +
-                                    "' is not in depth-first order of a tree");
-      }
-      const SimTK::Body::Rigid body(ToSimbody(robot.links[i + 1]));
-      SimTK::MobilizedBody& parent = links[static_cast<size_t>(joint.parent)];
-      if (joint.type == Type::kSpherical) {
-        const SimTK::Transform inboard(ToSimbody(joint.rotation), ToSimbody(joint.origin));
-        links.push_back(SimTK::MobilizedBody::Ball(parent, inboard, body, SimTK::Transform()));
-        continue;
-      }
-      // Simbody turns about z and slides along x; body frames are the URDF's link frames.
-      const bool slides = joint.type == Type::kPrismatic;
-      const SimTK::Rotation to_axis(
-          SimTK::UnitVec3(ToSimbody(joint.axis)),
-          slides ? SimTK::CoordinateAxis(SimTK::XAxis) : SimTK::CoordinateAxis(SimTK::ZAxis));
-      const SimTK::Transform outboard(to_axis);
-      const SimTK::Transform inboard(ToSimbody(joint.rotation) * to_axis, ToSimbody(joint.origin));
-      if (slides) {
-        links.push_back(SimTK::MobilizedBody::Slider(parent, inboard, body, outboard));
-      } else {
-        links.push_back(SimTK::MobilizedBody::Pin(parent, inboard, body, outboard));
-      }
-    }
-    state_ = system_.realizeTopology();
-    system_.realizeModel(state_);
+      : tree_(robot), joints_(robot.joints), max_step_(max_step) {
+    state_ = tree_.system.realizeTopology();
+    tree_.system.realizeModel(state_);
     q_ = VectorXd::Zero(robot.num_positions());
     v_ = VectorXd::Zero(robot.num_velocities());
     int position = 0;
@@ -99,16 +51,16 @@ class SimbodyPlant::Impl {
     Write(q, v);
     const VectorXd all = OnJoints(q, v, effort);
     for (int i = 0; i < applied_.size(); ++i) applied_[i] = all[i];
-    efforts_.setAllMobilityForces(state_, applied_);
-    system_.realize(state_, SimTK::Stage::Acceleration);
+    tree_.efforts.setAllMobilityForces(state_, applied_);
+    tree_.system.realize(state_, SimTK::Stage::Acceleration);
     return Read(state_.getUDot());
   }
 
   MatrixXd MassMatrix() const {
     Write(q_, v_);
-    system_.realize(state_, SimTK::Stage::Position);
+    tree_.system.realize(state_, SimTK::Stage::Position);
     SimTK::Matrix mass;
-    matter_.calcM(state_, mass);
+    tree_.matter.calcM(state_, mass);
     MatrixXd result(v_.size(), v_.size());
     for (int row = 0; row < result.rows(); ++row) {
       for (int column = 0; column < result.cols(); ++column)
@@ -120,12 +72,13 @@ class SimbodyPlant::Impl {
 
   VectorXd Bias() const {
     Write(q_, v_);
-    efforts_.clearAllForces(state_);
-    system_.realize(state_, SimTK::Stage::Dynamics);
+    tree_.efforts.clearAllForces(state_);
+    tree_.system.realize(state_, SimTK::Stage::Dynamics);
     SimTK::Vector residual;
     const SimTK::Vector none(static_cast<int>(v_.size()), 0.0);
-    matter_.calcResidualForceIgnoringConstraints(
-        state_, none, system_.getRigidBodyForces(state_, SimTK::Stage::Dynamics), none, residual);
+    tree_.matter.calcResidualForceIgnoringConstraints(
+        state_, none, tree_.system.getRigidBodyForces(state_, SimTK::Stage::Dynamics), none,
+        residual);
     VectorXd result(v_.size());
     for (int i = 0; i < residual.size(); ++i) result[i] = residual[i];
     return Turn(q_).transpose() * result;
@@ -201,11 +154,7 @@ class SimbodyPlant::Impl {
     return all;
   }
 
-  SimTK::MultibodySystem system_;  // before its subsystems, which refer to it when destroyed
-  SimTK::SimbodyMatterSubsystem matter_;
-  SimTK::GeneralForceSubsystem forces_;
-  SimTK::Force::Gravity gravity_;
-  SimTK::Force::DiscreteForces efforts_;
+  SimbodyTree tree_;
   std::vector<JointDescription> joints_;
   mutable SimTK::State state_;  // work space: q_, v_ are the plant's state
   mutable SimTK::Vector applied_;

@@ -9,7 +9,9 @@
 
 #include "sim/virtual/fine_simulator.h"
 #include "sim/virtual/mujoco_backend.h"
+#include "sim/virtual/simbody_backend.h"
 #include "sim/virtual/simbody_plant.h"
+#include "sim/virtual/sprung_masses.h"
 
 namespace plumb {
 namespace {
@@ -31,6 +33,7 @@ struct Backend {
 constexpr Backend kBackends[] = {
     {Engine::kAuto, "auto", &MakeByNeed},
     {Engine::kMujoco, "mujoco", &MakeMujocoBackend},
+    {Engine::kSimbody, "simbody", &MakeSimbodyBackend},
 };
 
 std::unique_ptr<PhysicsBackend> MakeBackend(const RobotDescription& robot) {
@@ -52,26 +55,60 @@ std::unique_ptr<PhysicsBackend> MakeBackend(const RobotDescription& robot) {
   }
 }
 
-RobotDescription WithFriction(RobotDescription robot) {
+/// The robot with all that no model knows of and an engine can be told as if it were known.
+RobotDescription AsItIs(RobotDescription robot) {
   for (const UnmodelledJoint& unmodelled : robot.virtual_robot.joints) {
-    robot.joints[static_cast<size_t>(unmodelled.joint)].dynamics.friction += unmodelled.friction;
+    JointDynamics& dynamics = robot.joints[static_cast<size_t>(unmodelled.joint)].dynamics;
+    dynamics.friction += unmodelled.friction;
+    dynamics.armature = std::max(0.0, dynamics.armature - unmodelled.rotor);  // before the play
   }
-  return robot;
+  if (robot.virtual_robot.ground.friction)
+    robot.simulation.contact->friction = *robot.virtual_robot.ground.friction;
+  return WithSprungMasses(std::move(robot));
 }
 
 }  // namespace
 
-VirtualPlant::VirtualPlant(RobotDescription robot)
-    : backend_(MakeBackend(robot = WithFriction(std::move(robot)))), play_(robot) {}
+VirtualPlant::VirtualPlant(const RobotDescription& robot) : VirtualPlant(robot, AsItIs(robot)) {}
+
+VirtualPlant::VirtualPlant(const RobotDescription& robot, const RobotDescription& real)
+    : backend_(MakeBackend(real)),
+      play_(real),
+      q_(robot.num_positions()),
+      v_(robot.num_velocities()),
+      motor_q_(q_.size()),
+      motor_v_(v_.size()),
+      all_q_(Eigen::VectorXd::Zero(real.num_positions())),
+      all_v_(Eigen::VectorXd::Zero(real.num_velocities())),
+      all_effort_(all_v_) {
+  Show();
+}
 
 void VirtualPlant::SetState(const Vector& q, const Vector& v) {
-  backend_->SetState(q, v);
+  if (q.size() != q_.size() || v.size() != v_.size()) {
+    throw std::invalid_argument(
+        fmt::format("a state has {} positions and {} velocities", q_.size(), v_.size()));
+  }
+  all_q_.head(q.size()) = q;
+  all_v_.head(v.size()) = v;
+  backend_->SetState(all_q_, all_v_);
   if (play_.any()) play_.Place(backend_->q(), backend_->v());
+  Show();
 }
 
 bool VirtualPlant::Advance(const Vector& effort, double duration) {
-  return play_.any() ? play_.Advance(effort, duration, *backend_)
-                     : backend_->Advance(effort, duration);
+  all_effort_.head(effort.size()) = effort;
+  const bool done = play_.any() ? play_.Advance(all_effort_, duration, *backend_)
+                                : backend_->Advance(all_effort_, duration);
+  Show();
+  return done;
+}
+
+void VirtualPlant::Show() {
+  q_ = backend_->q().head(q_.size());
+  v_ = backend_->v().head(v_.size());
+  motor_q_ = play_.any() ? play_.q().head(q_.size()) : q_;
+  motor_v_ = play_.any() ? play_.v().head(v_.size()) : v_;
 }
 
 }  // namespace plumb

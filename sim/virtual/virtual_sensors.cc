@@ -42,13 +42,14 @@ class VirtualEncoder : public VirtualDevice {
   Eigen::Index index_ = 0;
 };
 
-/// At its link's origin. It measures as such sensors do, by the change of its velocity in a period:
+/// At its link's origin. Its orientation counts from the ground, which it has been levelled on; its
+/// force has gravity as that is there. It measures as such sensors do, by the change of its velocity in a period:
 /// the force of an impact is spread over one.
 class VirtualImu : public VirtualDevice {
  public:
   VirtualImu(const RobotDescription& robot, const SensorDescription& sensor)
       : kinematics_(robot),
-        gravity_(robot.simulation.gravity),
+        gravity_(robot.simulation.gravity * robot.virtual_robot.ground.Down()),
         link_(sensor.link),
         to_link_(sensor.rotation),
         device_(MakeSensorDevice(sensor)) {}
@@ -69,10 +70,9 @@ class VirtualImu : public VirtualDevice {
     last_time_ = motion.time;
     last_velocity_ = link.velocity;
     const Eigen::Matrix3d axes = link.rotation * to_link_;  // the sensor's -> the base's
-    const Eigen::Vector3d gravity(0, 0, -gravity_);
     SensedMotion sample;
     Eigen::Map<Eigen::Vector3d>(sample.rate.data()) = axes.transpose() * link.rate;
-    Eigen::Map<Eigen::Vector3d>(sample.force.data()) = axes.transpose() * (acceleration - gravity);
+    Eigen::Map<Eigen::Vector3d>(sample.force.data()) = axes.transpose() * (acceleration - gravity_);
     const Eigen::Quaterniond orientation(axes);
     sample.orientation = {orientation.w(), orientation.x(), orientation.y(), orientation.z()};
     device_->Tick(motion.time, sample, out);
@@ -92,7 +92,7 @@ class VirtualImu : public VirtualDevice {
 
  private:
   Kinematics kinematics_;
-  double gravity_;
+  Eigen::Vector3d gravity_;  // [m/s^2]
   int link_;
   Eigen::Matrix3d to_link_;
   std::unique_ptr<SensorDevice> device_;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <numbers>
 
 #include "common/config.h"
 #include "robot/urdf/urdf.h"
@@ -112,7 +113,57 @@ TEST_CASE(
   refused("rotor = 0.01\n[[virtual_robot.joint]]\nname = \"pivot\"", "occurs twice");
   refused("rotor = 0.01\n[[virtual_robot.joint]]\nname = \"pole\"",
           "\"pole\" is not a joint with a motor");
-  refused("rotor = 0.01\n[virtual_robot]\nengine = \"bullet\"", "is not one of auto, mujoco");
+  refused("rotor = 0.01\n[virtual_robot]\nengine = \"bullet\"",
+          "is not one of auto, mujoco, simbody");
+  refused("rotor = 0.01\n[virtual_robot.ground]\nfriction = 1",
+          "virtual_robot.ground.friction is of a ground that the robot does not touch");
+}
+
+TEST_CASE("a ground and sprung masses that no model knows are read, and refused likewise") {
+  const std::string folder = kPendulum + "/../hopper/";
+  const RobotDescription worn = LoadRobot(folder + "worn.toml");
+  CHECK(worn.virtual_robot.engine == VirtualRobotSettings::Engine::kMujoco);
+  REQUIRE(worn.virtual_robot.joints.size() == 3);
+  CHECK(worn.virtual_robot.joints[1].backlash == 0.003);
+  REQUIRE(worn.virtual_robot.sprung_masses.size() == 1);
+  const SprungMass& battery = worn.virtual_robot.sprung_masses[0];
+  CHECK(worn.links[static_cast<size_t>(battery.link)].name == "torso");
+  CHECK(battery.mass == 0.5);
+  CHECK(battery.frequency == 5);
+  CHECK(battery.damping_ratio == 0.1);
+  CHECK(battery.axis == Eigen::Vector3d::UnitZ());
+  CHECK(battery.travel == 0.05);
+  CHECK(LoadRobot(folder + "simbody.toml").virtual_robot.engine ==
+        VirtualRobotSettings::Engine::kSimbody);
+  CHECK(LoadRobot(folder + "mujoco_stiff.toml").virtual_robot.ground.stiffness_factor == 5);
+  CHECK(LoadRobot(folder + "mujoco_slippery.toml").virtual_robot.ground.friction == 0.7);
+  const UnmodelledGround slope = LoadRobot(folder + "mujoco_slope.toml").virtual_robot.ground;
+  CHECK(slope.slope == Approx(3 * std::numbers::pi / 180));
+  // Uphill is forward: it pulls back.
+  CHECK(slope.Down()[0] == Approx(-std::sin(slope.slope)));
+  CHECK(slope.Down().norm() == Approx(1));
+  CHECK(worn.virtual_robot.ground.Down() == -Eigen::Vector3d::UnitZ());
+
+  const TemporaryFolder copies;
+  fs::copy(folder, copies.path());
+  const auto refused = [&](const std::string& text, const std::string& why) {
+    std::ofstream(copies / "other.toml") << "extends = \"robot.toml\"\n" << text;
+    CHECK_THROWS_WITH(LoadRobot(copies / "other.toml"), Contains("other.toml:") && Contains(why));
+  };
+  const std::string ground = "[virtual_robot.ground]\n";
+  refused(ground + "slope = 0.1", "virtual_robot.ground.slope needs engine = \"mujoco\" or");
+  refused(ground + "slope = 1.6", "virtual_robot.ground.slope = 1.6 is not");
+  refused(ground + "stiffness_factor = 0", "virtual_robot.ground.stiffness_factor = 0 is not");
+  refused(ground + "friction = -1", "virtual_robot.ground.friction = -1 is not");
+  refused(ground + "stiffnes_factor = 5", "virtual_robot.ground.stiffnes_factor is not a known");
+  const std::string mass =
+      "[[virtual_robot.sprung_mass]]\nname = \"a\"\nmass = 1\ndamping_ratio = 0.1\n"
+      "centre = [0, 0, 0]\n";
+  const std::string rest = "link = \"torso\"\nfrequency = 5\naxis = [0, 0, 1]\n";
+  refused(mass + "link = \"world\"", "link = \"world\" is not a link that moves");
+  refused(mass + "link = \"torso\"\nfrequency = 0", "sprung_mass[0].frequency = 0 is not");
+  refused(mass + "link = \"torso\"\nfrequency = 5\naxis = [0, 0, 0]", "axis has no direction");
+  refused(mass + rest + "travel = 0", "sprung_mass[0].travel = 0 is not");
 }
 
 TEST_CASE("mistakes in robot.toml are one line with file, line and field") {

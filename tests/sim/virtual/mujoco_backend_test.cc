@@ -4,34 +4,17 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/model.h"
 #include "sim/simulator.h"
 #include "sim/virtual/simbody_plant.h"
 #include "sim/virtual/virtual_plant.h"
 #include "tests/sim/mujoco_hopper.h"
-#include "tests/sim/robots.h"
+#include "tests/sim/virtual/ball.h"
 
 namespace plumb {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::VectorXd;
-
-RobotDescription Known(const std::string& name) {
-  const Model model(LoadRobot(SourceFile("robots/" + name)));
-  return model.Describe(model.parameters().means());
-}
-
-/// A ball of 2 kg that slides along x and z.
-RobotDescription Ball() {
-  RobotDescription ball = Known("hopper");
-  ball.links.resize(3);
-  ball.links[2] = {.name = "ball", .mass = 2, .inertia = 0.01 * Eigen::Matrix3d::Identity()};
-  ball.links[2].collisions.push_back({.type = Shape::Type::kSphere, .size = {0.1, 0, 0}});
-  ball.joints.resize(2);
-  ball.simulation.contact->friction = 0.5;
-  return ball;
-}
 
 /// By steps that have nothing in common with any period.
 bool Advance(PhysicsBackend& engine, const VectorXd& effort, double duration) {
