@@ -155,7 +155,7 @@ std::string Sentence(const Options& options, const PaperTask& task, const Panel&
 }
 
 std::string SettingsOf(const Options& options) {
-  return fmt::format("iterations {}, noise {}, hidden {}{}", options.iterations, options.noise,
+  return fmt::format("iterations {}, noise {}, drawn from {}{}", options.iterations, options.noise,
                      Key(options.hidden), options.quick ? ", quick" : "");
 }
 

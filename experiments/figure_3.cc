@@ -150,7 +150,7 @@ std::string Sentence(const ExperimentOptions& options, const PaperTask& task,
 }
 
 std::string SettingsOf(const ExperimentOptions& options) {
-  return fmt::format("iterations {}, hidden {}{}", options.iterations, Key(options.hidden),
+  return fmt::format("iterations {}, drawn from {}{}", options.iterations, Key(options.hidden),
                      options.quick ? ", quick" : "");
 }
 

@@ -219,7 +219,7 @@ double ShareOfOracle(double value, double oracle) {
 }
 
 std::string SettingsOf(const ExperimentOptions& options) {
-  return fmt::format("hidden {}{}", Key(options.hidden), options.quick ? ", quick" : "");
+  return fmt::format("drawn from {}{}", Key(options.hidden), options.quick ? ", quick" : "");
 }
 
 // A strategy's share of the oracle's return on the same robot: the median of the runs, for each
