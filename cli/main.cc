@@ -118,6 +118,9 @@ int main(int argc, char** argv) {
         sim->add_flag("--urdf", sim_flags.urdf,
                       "the robot as its URDF and TOML tables have it, without the prior's means")
             ->excludes(posterior);
+        sim->add_option("--noise", sim_flags.noise,
+                        "SD or SD,SD of what sensors add to every q [rad or m] and v [rad/s or "
+                        "m/s] in the files; one number is for both");
         sim->add_option("--csv", sim_flags.csv, "write every step to this file");
         sim->add_option("--png", sim_flags.png, "draw the first episode as a strip of snapshots");
         sim->add_option("--gif", sim_flags.gif, "draw the first episode as a film");

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "cli/reading_noise.h"
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
 #include "common/time_units.h"
@@ -21,6 +22,7 @@ namespace {
 
 constexpr int kStepsPerLook = 256;  // whether to stop
 constexpr size_t kLineLength = 110;
+constexpr uint32_t kReadingStream = 0x52454144;  // "READ", second word of the random streams
 
 /// Before a long simulation rather than after it.
 void RequireOutputs(const SimFlags& flags) {
@@ -125,6 +127,11 @@ std::string DescribeParameters(const RobotDescription& robot) {
   return text + line + "\n";
 }
 
+std::string Describe(const ReadingNoise& noise) {
+  if (!noise.any()) return "";
+  return fmt::format("readings: noise of {} on q, {} on v\n", noise.q, noise.v);
+}
+
 }  // namespace
 
 int Simulate(Process& process, const SimFlags& flags) {
@@ -135,6 +142,7 @@ int Simulate(Process& process, const SimFlags& flags) {
   if (!flags.posterior.empty()) SetMeans(flags.posterior, robot);
   if (flags.urdf) robot.parameters.clear();
   for (const std::string& assignment : flags.set) Set(assignment, robot);
+  const ReadingNoise noise = ParseReadingNoise(flags.noise);
   RequireOutputs(flags);
   const Eigen::VectorXd means = Means(robot);
   Environment environment(robot);
@@ -146,7 +154,7 @@ int Simulate(Process& process, const SimFlags& flags) {
                            : flags.policy.empty() ? "no action"
                                                   : flags.policy,
                            flags.seed)
-            << DescribeParameters(robot)
+            << DescribeParameters(robot) << Describe(noise)
             << fmt::format("{:>7}  {:>6}  {:>10}  ended by\n", "episode", "steps", "return");
   std::string csv = CsvHeader(robot);
   std::vector<Snapshot> film;  // of the first episode
@@ -159,7 +167,9 @@ int Simulate(Process& process, const SimFlags& flags) {
       std::cout << "interrupted" << std::endl;
       return 130;
     }
-    const auto see = [&](const SimulatedStep& step) {
+    Random readings(flags.seed, {static_cast<uint32_t>(number), kReadingStream});
+    const auto see = [&](SimulatedStep step) {
+      if (noise.any()) noise.Add(robot, readings, step.q, step.v);
       if (!flags.csv.empty()) AppendCsv(step, csv);
       if (number == 0) film.push_back({step.time, step.q});
     };
@@ -171,7 +181,9 @@ int Simulate(Process& process, const SimFlags& flags) {
               << std::endl;
     if (episode.end == EpisodeSummary::End::kInterrupted) return 130;
     if (number == 0 && environment.q().allFinite()) {
-      film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
+      Eigen::VectorXd q = environment.q(), v = environment.v();
+      if (noise.any()) noise.Add(robot, readings, q, v);
+      film.push_back({static_cast<double>(episode.steps) * robot.task.period, q});
     }
   }
   const double seconds =

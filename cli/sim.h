@@ -15,6 +15,7 @@ struct SimFlags {
   bool random = false;
   uint64_t seed = 1;
   int episodes = 1;
+  std::string noise = "0";       ///< of readings: "0.003" or "0.001,0.05"
   std::string csv, png, gif;     ///< files; empty = none
   std::string posterior;         ///< posterior.json, its means for the prior's; empty = the prior
   std::vector<std::string> set;  ///< "mass/thigh=4"

@@ -9,9 +9,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <cmath>
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <numeric>
+#include <set>
 
 #include "common/atomic_file.h"
 #include "experiments/options.h"
@@ -42,7 +44,7 @@ struct Remembered {
 Results::Rows RunLoop(const ExperimentOptions& options, const PaperTask& task,
                       CalibrationStrategy strategy, int run, Remembered& remembered,
                       const std::function<void(double)>& progress) {
-  const RobotDescription robot = LoadTask(options.robots, task);
+  const RobotDescription robot = LoadTask(options.robots, task, options.hidden);
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = DrawHidden(robot, options.hidden, seed);
   if (const std::string of = fmt::format("{} {}", task.name, run); remembered.of != of)
@@ -59,10 +61,9 @@ Results::Rows RunLoop(const ExperimentOptions& options, const PaperTask& task,
   settings.threads = options.threads;
   Results::Rows rows;
   for (const LoopRow& row : remembered.loop->Run(real, settings, progress).rows) {
-    const double error = std::sqrt((row.mean.array() / hidden.array() - 1).square().mean());
     rows.push_back({static_cast<double>(row.iteration), row.robot_return, row.simulated_return,
                     row.discrepancy, static_cast<double>(row.transitions), row.robot_seconds,
-                    error});
+                    RelativeError(robot, row.mean, hidden)});
   }
   return rows;
 }
@@ -91,21 +92,45 @@ double ShareOfOracle(double value, double oracle) {
   return oracle > 0 ? value / oracle : oracle / value;
 }
 
+// One column of the table after k iterations, of all runs, ascending.
+std::vector<double> Column(const ExperimentOptions& options, const PaperTask& task,
+                           CalibrationStrategy strategy, const Results& results, int k,
+                           size_t column) {
+  std::vector<double> values;
+  for (int run = 1; run <= options.runs; ++run)
+    values.push_back(results.Of(KeyOf(task, strategy, run))[static_cast<size_t>(k)][column]);
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+double Mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
 std::string Sentence(const ExperimentOptions& options, const PaperTask& task,
                      const Results& results) {
+  constexpr size_t kReturn = 1, kError = 6;
+  const std::set<int> shown{0, std::min(1, options.iterations), std::min(5, options.iterations),
+                            options.iterations};
   std::string text = fmt::format(
-      "{}: return on the robot after 0, {}, {} iterations (mean of {} runs):", task.name,
-      std::min(5, options.iterations), options.iterations, options.runs);
+      "{}: return on the robot, mean (median, worst) of {} runs, after so many iterations; by how "
+      "much the parameters are wrong in the end, mean:\n{:40}",
+      task.name, options.runs, "");
+  for (const int k : shown) text += fmt::format("{:>22}", k);
   const auto mean = [&](CalibrationStrategy strategy, int k) {
-    double sum = 0;
-    for (int run = 1; run <= options.runs; ++run)
-      sum += results.Of(KeyOf(task, strategy, run))[static_cast<size_t>(k)][1];
-    return sum / options.runs;
+    return Mean(Column(options, task, strategy, results, k, kReturn));
   };
   for (const CalibrationStrategy strategy : kStrategies) {
-    text += fmt::format("\n  {:<40}{:8.0f}{:8.0f}{:8.0f}", Label(strategy), mean(strategy, 0),
-                        mean(strategy, std::min(5, options.iterations)),
-                        mean(strategy, options.iterations));
+    text += fmt::format("\n  {:<38}", Label(strategy));
+    for (const int k : shown) {
+      const std::vector<double> values = Column(options, task, strategy, results, k, kReturn);
+      text += fmt::format("{:>22}", fmt::format("{:.0f} ({:.0f}, {:.0f})", Mean(values),
+                                                values[values.size() / 2], values.front()));
+    }
+    if (Learns(strategy)) {
+      text += fmt::format("{:>9.2g} %", 100 * Mean(Column(options, task, strategy, results,
+                                                          options.iterations, kError)));
+    }
   }
   for (const CalibrationStrategy strategy :
        {CalibrationStrategy::kOriginal, CalibrationStrategy::kStep,
@@ -125,7 +150,7 @@ std::string Sentence(const ExperimentOptions& options, const PaperTask& task,
 }
 
 std::string SettingsOf(const ExperimentOptions& options) {
-  return fmt::format("iterations {}, hidden {}{}", options.iterations, Key(options.hidden),
+  return fmt::format("iterations {}, drawn from {}{}", options.iterations, Key(options.hidden),
                      options.quick ? ", quick" : "");
 }
 

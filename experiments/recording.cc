@@ -1,5 +1,6 @@
 #include "experiments/recording.h"
 
+#include <cmath>
 #include <filesystem>
 
 #include "experiments/simulated_system.h"
@@ -14,16 +15,36 @@ constexpr uint32_t kHeldOutFirst = 1000;  // number of the first of them
 
 }  // namespace
 
-RobotDescription LoadTask(const std::string& robots, const PaperTask& task) {
-  return LoadRobot((std::filesystem::path(robots) / task.robot).string());
+std::string Key(Hidden hidden) {
+  switch (hidden) {
+    case Hidden::kPaper:
+      return "paper";
+    case Hidden::kGym:
+      return "gym";
+    case Hidden::kPrior:
+      return "prior";
+  }
+  return "";
 }
 
-std::string Key(Hidden hidden) { return hidden == Hidden::kPaper ? "paper" : "prior"; }
+RobotDescription LoadTask(const std::string& robots, const PaperTask& task, Hidden hidden) {
+  const char* file = hidden == Hidden::kPaper ? task.paper : task.gym;
+  return LoadRobot((std::filesystem::path(robots) / file).string());
+}
 
 Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_t seed) {
-  if (hidden == Hidden::kPaper) return HiddenParameters(robot, seed);
+  if (hidden != Hidden::kPrior) return HiddenParameters(robot, seed);
   Random random(seed, {kHiddenStream});
   return ParameterDistribution::Prior(robot).Sample(random);
+}
+
+double RelativeError(const RobotDescription& robot, const Eigen::VectorXd& physical,
+                     const Eigen::VectorXd& hidden) {
+  Eigen::ArrayXd errors = physical.array() / hidden.array() - 1;
+  double count = static_cast<double>(errors.size());
+  if (const int base = robot.FindParameter("mass/" + robot.links[0].name); base >= 0)
+    errors(base) = 0, --count;
+  return std::sqrt(errors.square().sum() / count);
 }
 
 RobotDataset Record(const RobotDescription& robot, const RecordingSettings& settings,

@@ -14,25 +14,34 @@ namespace plumb {
 
 /// One of the paper's two tasks.
 struct PaperTask {
-  const char *name, *robot;  ///< file below robots/
-  int first_updates;         ///< TRPO's, of a first policy
-  int next_updates;          ///< and of each later one
+  const char* name;
+  const char *paper, *gym;  ///< files below robots/: the paper's robot, and gym's
+  int first_updates;        ///< TRPO's, of a first policy
+  int next_updates;         ///< and of each later one
 };
-inline constexpr PaperTask kPaperTasks[] = {{"pendulum", "pendulum/gym.toml", 60, 15},
-                                            {"hopper", "hopper/gym.toml", 334, 60}};
-
-RobotDescription LoadTask(const std::string& robots, const PaperTask& task);
+inline constexpr PaperTask kPaperTasks[] = {
+    {"pendulum", "pendulum/gym.toml", "pendulum/gym.toml", 60, 15},
+    {"hopper", "hopper/paper.toml", "hopper/gym.toml", 334, 60}};
 
 /// Where a robot's parameters are drawn from.
 enum class Hidden {
-  kPaper,  ///< the ranges of [virtual_robot.hidden], which are narrow
-  kPrior,  ///< the prior: as far off as whoever wrote it thought possible
+  kPaper,  ///< [virtual_robot.hidden] of the paper's robot: 1 to 5 kg for each of five masses
+  kGym,    ///< [virtual_robot.hidden] of gym's: narrow ranges about gym's masses
+  kPrior,  ///< gym's robot's prior: as far off as whoever wrote it thought possible
 };
 
-std::string Key(Hidden hidden);  ///< "paper", "prior"
+std::string Key(Hidden hidden);  ///< "paper", "gym", "prior"
+
+/// The robot of a task, with the prior that calibrations begin with.
+RobotDescription LoadTask(const std::string& robots, const PaperTask& task, Hidden hidden);
 
 /// Parameters of "the real robot". @return physical units, order of robot.parameters.
 Eigen::VectorXd DrawHidden(const RobotDescription& robot, Hidden hidden, uint64_t seed);
+
+/// How wrong parameters are: root mean square of their relative errors. The mass of the base, which
+/// moves nothing, does not count.
+double RelativeError(const RobotDescription& robot, const Eigen::VectorXd& physical,
+                     const Eigen::VectorXd& hidden);
 
 /// The motion of a policy on a robot whose parameters are drawn for each seed.
 struct RobotDataset {

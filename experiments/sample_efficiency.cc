@@ -43,7 +43,7 @@ std::vector<int> TransitionCounts(const ExperimentOptions& options) {
                        : std::vector<int>{12, 25, 50, 100, 200, 400, 800};
 }
 std::vector<int64_t> Budgets(const ExperimentOptions& options) {
-  return options.quick ? std::vector<int64_t>{4000, 40'000}
+  return options.quick ? std::vector<int64_t>{40'000, 200'000}
                        : std::vector<int64_t>{1000,   2000,    5000,    10'000, 20'000,
                                               50'000, 100'000, 200'000, 500'000};
 }
@@ -121,7 +121,7 @@ class Experiment {
   void Remember(const PaperTask& task, int run, const std::function<void(double)>& progress) {
     const std::string of = fmt::format("{} {}", task.name, run);
     if (now_.of == of) return;
-    const RobotDescription robot = LoadTask(options_.robots, task);
+    const RobotDescription robot = LoadTask(options_.robots, task, options_.hidden);
     const RecordingSettings settings{options_.quick ? 40 : task.first_updates,
                                      kUpdates,
                                      1,
@@ -219,7 +219,7 @@ double ShareOfOracle(double value, double oracle) {
 }
 
 std::string SettingsOf(const ExperimentOptions& options) {
-  return fmt::format("hidden {}{}", Key(options.hidden), options.quick ? ", quick" : "");
+  return fmt::format("drawn from {}{}", Key(options.hidden), options.quick ? ", quick" : "");
 }
 
 // A strategy's share of the oracle's return on the same robot: the median of the runs, for each

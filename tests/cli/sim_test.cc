@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/reading_noise.h"
 #include "cli/roll_out.h"
 #include "controller/policy.h"
 #include "robot/description.h"
@@ -141,6 +142,67 @@ TEST_CASE("sim: equal seeds give equal bytes, other seeds and parameters others"
   CHECK_FALSE(fs::exists(folder / "a.csv.part"));
 }
 
+TEST_CASE("sim: noise is added to every reading, and to nothing else") {
+  const TemporaryFolder folder;
+  const auto table = [&](const std::string& flags) {
+    const Outcome outcome =
+        Sim(Robot("hopper") + " --random --csv " + folder / "a.csv" + " --episodes " + flags);
+    INFO(outcome.text);
+    REQUIRE(outcome.status == 0);
+    return Read(folder / "a.csv");
+  };
+  const std::string exact = table("12");
+  CHECK(table("12 --noise 0") == exact);
+  const Table truth = ReadCsv(folder / "a.csv");
+  const std::string noisy = table("12 --noise 0.003,0.1");
+  CHECK(table("12 --noise 0.003,0.1") == noisy);
+  const Table read = ReadCsv(folder / "a.csv");
+  REQUIRE(read.rows.size() == truth.rows.size());
+  const double count = static_cast<double>(truth.rows.size());
+  REQUIRE(count > 150);
+  for (size_t column = 0; column < truth.names.size(); ++column) {
+    const std::string& name = truth.names[column];
+    double sum = 0, squares = 0, with_next = 0, last = 0;
+    for (size_t row = 0; row < truth.rows.size(); ++row) {
+      const double error = read.rows[row][column] - truth.rows[row][column];
+      sum += error, squares += error * error, with_next += error * last, last = error;
+    }
+    CAPTURE(name);
+    if (name[0] != 'q' && name[0] != 'v') {
+      CHECK(squares == 0);
+      continue;
+    }
+    // Five standard deviations of what a Gaussian's moments scatter by.
+    const double sd = name[0] == 'q' ? 0.003 : 0.1, most = 5 / std::sqrt(count);
+    CHECK(std::abs(sum / count) < sd * most);
+    CHECK(std::abs(squares / count / (sd * sd) - 1) < std::sqrt(2) * most);
+    CHECK(std::abs(with_next / count / (sd * sd)) < most);
+  }
+  // One number is for both; an episode's noise does not depend on how many there are.
+  table("12 --noise 0.1");
+  const Table both = ReadCsv(folder / "a.csv");
+  CHECK(both.at(0, "v/foot") == read.at(0, "v/foot"));
+  CHECK(both.at(0, "q/foot") != read.at(0, "q/foot"));
+  CHECK(noisy.rfind(table("3 --noise 0.003,0.1"), 0) == 0);
+}
+
+TEST_CASE("sim: noise turns a spherical joint's orientation, whose length stays") {
+  RobotDescription robot = LoadRobot(Robot("pendulum"));
+  robot.joints[0].type = JointDescription::Type::kSpherical;
+  Random random(1);
+  double squares = 0;
+  for (int i = 0; i < 1000; ++i) {
+    Eigen::VectorXd q(4), v = Eigen::VectorXd::Zero(3);
+    q << 0.5, -0.5, 0.5, 0.5;
+    const Eigen::Vector4d before = q;
+    ReadingNoise{0.01, 0}.Add(robot, random, q, v);
+    CHECK(q.norm() == Approx(1).epsilon(1e-12));
+    CHECK(v.isZero(0));
+    squares += std::pow(2 * std::acos(std::min(1.0, q.dot(before))), 2);
+  }
+  CHECK(squares / 1000 == Approx(3e-4).epsilon(0.15));  // three angles of variance 1e-4
+}
+
 TEST_CASE("sim: a trainer's policy, and whatever is not one") {
   const TemporaryFolder folder;
   GaussianPolicy policy(PolicyShape{3, {4}, 1});
@@ -213,6 +275,12 @@ TEST_CASE("sim: errors say what to do") {
   CHECK_THAT(complaint(Robot("hopper") + " --set mass/thigh=-1"), Contains("mass/thigh"));
   CHECK_THAT(complaint(Robot("hopper") + " --set mass/thigh"), Contains("mass/thigh=4"));
   CHECK_THAT(complaint(Robot("pendulum") + " --set gravity=nine"), Contains("gravity=nine"));
+  for (const char* noise :
+       {"-0.1", "nan", "inf", "1e999", "0.1,-1", "0.1,", ",0.1", "0.1,0.2,0.3", "little"}) {
+    CHECK_THAT(complaint(Robot("pendulum") + " --noise=" + noise),
+               Contains(std::string("--noise ") + noise + ": expected a standard deviation"));
+  }
+  CHECK_THAT(complaint(Robot("pendulum") + " --noise ''"), Contains("expected a standard"));
   CHECK_THAT(complaint(Robot("pendulum") + " --csv /nonexistent/a.csv"),
              Contains("/nonexistent/a.csv"));
   CHECK_THAT(complaint(Robot("pendulum") + " --png /"), Contains("folder"));

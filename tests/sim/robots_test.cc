@@ -74,7 +74,7 @@ TEST_CASE("the hopper is gym's") {
     }
   }
   CHECK(LoadExample("hopper").parameters.size() == 4);
-  CHECK(LoadExample("hopper/paper.toml").parameters[0].name == "mass/world");
+  CHECK(LoadExample("hopper/paper.toml").parameters[4].name == "mass/world");
 }
 
 TEST_CASE("the hopper pays for the way it makes") {
