@@ -45,8 +45,16 @@ TEST_CASE("train writes a policy, a table and what to expect of it") {
       outcome.text, std::regex("return -[0-9]+.*KL 0.*gain.*explained.*entropy.*steps/s.*left")));
   CHECK(outcome.text.find("wrote " + folder / "policy.onnx") != std::string::npos);
   const OnnxPolicy written = ReadOnnxPolicy(folder / "policy.onnx");
+  const Checkpoint checkpoint = *LoadCheckpoint(folder / "policy.onnx.checkpoint");
+  CHECK(checkpoint.complete);
+  CHECK(checkpoint.judged);
+  const bool last = outcome.text.find("; policy of update 4\n") != std::string::npos;
   CHECK(written.policy.ToMessage().weight ==
-        LoadCheckpoint(folder / "policy.onnx.checkpoint")->policy.weight);
+        (last ? checkpoint.policy : checkpoint.best_policy).weight);
+  if (!last) {
+    CHECK(outcome.text.find("; policy of update " + std::to_string(checkpoint.best_updates)) !=
+          std::string::npos);
+  }
   CHECK(written.record.robot == "pendulum");
   CHECK(written.record.posterior == "nominal");
   CHECK(written.record.steps == 12000);
@@ -93,11 +101,33 @@ TEST_CASE("an interrupted training goes on to the same bits, with any number of 
     CHECK(LoadCheckpoint(folder / "resumed.checkpoint")->policy.weight ==
           LoadCheckpoint(folder / "long.checkpoint")->policy.weight);
   }
-  SECTION("but not as another run") {
-    const Outcome outcome = Shell(Train(folder, "resumed", "--steps 45000 --seed 2"));
-    CHECK(outcome.status == 1);
-    CHECK(outcome.text.find("is of another run") != std::string::npos);
+  SECTION("but another run begins anew, as if there were none") {
+    const Outcome outcome = Shell(Train(folder, "resumed", "--steps 6000 --seed 2"));
+    INFO(outcome.text);
+    CHECK(outcome.status == 0);
+    CHECK(outcome.text.find("resumed.checkpoint is of another run, which has ended: begins anew") !=
+          std::string::npos);
+    REQUIRE(Shell(Train(folder, "other", "--steps 6000 --seed 2")).status == 0);
+    CHECK(Read(folder / "resumed") == Read(folder / "other"));
+    CHECK(Rows(folder / "resumed.csv") == Rows(folder / "other.csv"));
+    CHECK(Read(folder / "resumed.checkpoint") == Read(folder / "other.checkpoint"));
   }
+}
+
+TEST_CASE("a training that has not ended is not lost to another one") {
+  const TemporaryFolder folder;
+  REQUIRE(Shell("exec " + Train(folder, "half", "--steps 1e8"), " KL ").status == 130);
+  const std::string checkpoint = Read(folder / "half.checkpoint"),
+                    table = Read(folder / "half.csv");
+  const Outcome outcome = Shell(Train(folder, "half", "--steps 6000 --seed 2"));
+  INFO(outcome.text);
+  CHECK(outcome.status == 1);
+  CHECK(outcome.text.find("is of another run") != std::string::npos);
+  CHECK(outcome.text.find("has not ended: delete it, or give another --checkpoint") !=
+        std::string::npos);
+  CHECK(Read(folder / "half.checkpoint") == checkpoint);
+  CHECK(Read(folder / "half.csv") == table);
+  CHECK_FALSE(std::filesystem::exists(folder / "half"));
 }
 
 TEST_CASE("ranks give the same bits as one process, file by file") {
