@@ -48,6 +48,10 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 }  // namespace
 
 TrainingSettings PaperSettings(TrainingSettings settings) {
+  settings.batch = 3000;
+  settings.gamma = .995;
+  settings.lambda = .97;
+  settings.kl = .01;
   settings.normalise_values = false;
   settings.fisher_fraction = 1;
   settings.critic_epochs = 20;

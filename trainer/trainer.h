@@ -14,8 +14,8 @@
 
 namespace plumb {
 
-/// The settings of the paper where ours learn faster: value targets in units of return, the whole
-/// batch for Fisher's matrix. The paper does not say how long its critic is fitted; targets so
+/// The settings of the paper where ours learn faster: batches, discounts and KL bound of its table,
+/// value targets in units of return, the whole batch for Fisher's matrix. The paper does not say how long its critic is fitted; targets so
 /// large need 20 passes, 10 leave one seed in ten behind. Thread-safe.
 TrainingSettings PaperSettings(TrainingSettings settings);
 
