@@ -97,12 +97,13 @@ class Training {
       double saved = 0;
       while (trainer_.steps() < steps_) {
         if (Stopping()) {
-          Save();
+          Save(trainer_.state(), false);
           if (speaks())
             std::cerr << fmt::format("\ninterrupted; the same command goes on from {}\n",
                                      flags_.checkpoint);
           return 130;
         }
+        if (!flags_.paper && trainer_.JudgementDue()) trainer_.Judge(sample);
         const UpdateReport report = trainer_.Update(sample);
         training_return_ = report.mean_return;
         const bool judged =
@@ -112,11 +113,16 @@ class Training {
         table.Add(trainer_, report, evaluation, clock_.seconds());
         line.Show(trainer_, report, steps_, before);
         Warn(report);
-        if (clock_.seconds() - saved > kCheckpointPeriod) Save(), saved = clock_.seconds();
+        if (clock_.seconds() - saved > kCheckpointPeriod) {
+          Save(trainer_.state(), false);
+          saved = clock_.seconds();
+        }
       }
     }
-    Save();
-    Judge(sample);
+    // A longer run goes on from here, as if it had never ended.
+    const TrainerState last = trainer_.state();
+    Conclude(sample);
+    Save(last, true);
     return 0;
   }
 
@@ -155,14 +161,20 @@ class Training {
     const std::optional<Checkpoint> checkpoint = SharedCheckpoint();
     if (!checkpoint) return;
     if (checkpoint->identity != identity_) {
-      throw CheckpointError(
-          fmt::format("{} is of another run (robot, settings, distribution, start, seed or "
-                      "version): delete it, or give another --checkpoint",
-                      flags_.checkpoint));
+      // What has ended is in its output; what has not would be lost.
+      if (!checkpoint->complete) {
+        throw CheckpointError(fmt::format(
+            "{} is of another run (robot, settings, distribution, start, seed or version), which "
+            "has not ended: delete it, or give another --checkpoint",
+            flags_.checkpoint));
+      }
+      if (speaks())
+        std::cout << fmt::format("{} is of another run, which has ended: begins anew\n",
+                                 flags_.checkpoint)
+                  << std::flush;
+      return;
     }
-    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint->policy), checkpoint->critic,
-                      checkpoint->observations, checkpoint->updates, checkpoint->steps,
-                      checkpoint->dropped_episodes});
+    trainer_.Restore(TrainerStateOf(*checkpoint));
     training_return_ = checkpoint->training_return;
     if (speaks())
       std::cout << fmt::format("goes on from {}: update {}, {} steps\n", flags_.checkpoint,
@@ -170,17 +182,13 @@ class Training {
                 << std::flush;
   }
 
-  void Save() {
+  void Save(const TrainerState& state, bool complete) {
     if (!speaks()) return;
-    const TrainerState state = trainer_.state();
     Checkpoint checkpoint;
+    SetTrainerState(state, checkpoint);
     checkpoint.seed = flags_.seed, checkpoint.identity = identity_;
-    checkpoint.updates = state.updates, checkpoint.steps = state.steps,
-    checkpoint.dropped_episodes = state.dropped_episodes;
-    checkpoint.training_return = training_return_;
-    checkpoint.policy = state.policy.ToMessage(),
+    checkpoint.complete = complete, checkpoint.training_return = training_return_;
     checkpoint.distribution = distribution_.ToMessage();
-    checkpoint.critic = state.critic, checkpoint.observations = state.observations;
     SaveCheckpoint(flags_.checkpoint, checkpoint);
   }
 
@@ -194,7 +202,8 @@ class Training {
                                report.dropped_episodes));
   }
 
-  void Judge(const ParameterSampler& sample) {
+  void Conclude(const ParameterSampler& sample) {
+    const int64_t from = flags_.paper ? trainer_.updates() : trainer_.ReturnToBest(sample);
     const Evaluation own = trainer_.EvaluateHeldOut(sample, flags_.held_out);
     const ParameterDistribution prior = ParameterDistribution::Prior(robot_);
     const Evaluation on_prior = trainer_.EvaluateHeldOut(
@@ -202,8 +211,9 @@ class Training {
     if (!speaks()) return;
     WritePolicy(own);
     std::cout << fmt::format(
-        "{} steps, {} updates, {:.1f} s\nreturn without exploration, {} simulators held out:\n",
-        trainer_.steps(), trainer_.updates(), clock_.seconds(), flags_.held_out);
+        "{} steps, {} updates, {:.1f} s; policy of update {}\n"
+        "return without exploration, {} simulators held out:\n",
+        trainer_.steps(), trainer_.updates(), clock_.seconds(), from, flags_.held_out);
     std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Summary(own));
     if (flags_.distribution != "prior")
       std::cout << fmt::format("  {:24} {}\n", "prior", Summary(on_prior));

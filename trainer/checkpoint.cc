@@ -4,6 +4,7 @@
 
 #include <boost/crc.hpp>
 #include <cerrno>
+#include <concepts>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -21,7 +22,7 @@ namespace {
 // File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a
 // checkpoint stays where it was written.
 constexpr char kMagic[8] = {'P', 'L', 'U', 'M', 'B', 'T', 'R', 'N'};
-constexpr uint32_t kVersion = 2;
+constexpr uint32_t kVersion = 3;
 constexpr size_t kHeader = sizeof kMagic + 2 * sizeof(uint32_t);
 
 class Writer {
@@ -93,8 +94,21 @@ class Reader {
   size_t left_;
 };
 
+template <class Archive, class C>
+requires std::same_as<std::remove_const_t<C>, CriticState>
+void Transfer(Archive& archive, C& critic) {
+  archive(critic.parameters);
+  archive(critic.first_moment);
+  archive(critic.second_moment);
+  archive(critic.adam_steps);
+  archive(critic.targets.count);
+  archive(critic.targets.mean);
+  archive(critic.targets.squares);
+}
+
 /// The one list of what is in the file, for writing and reading.
 template <class Archive, class C>
+requires std::same_as<std::remove_const_t<C>, Checkpoint>
 void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.seed);
   archive(checkpoint.identity);
@@ -112,16 +126,16 @@ void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.training_return);
   archive.EncodedMessage(checkpoint.policy);
   archive.EncodedMessage(checkpoint.distribution);
-  archive(checkpoint.critic.parameters);
-  archive(checkpoint.critic.first_moment);
-  archive(checkpoint.critic.second_moment);
-  archive(checkpoint.critic.adam_steps);
-  archive(checkpoint.critic.targets.count);
-  archive(checkpoint.critic.targets.mean);
-  archive(checkpoint.critic.targets.squares);
+  Transfer(archive, checkpoint.critic);
   archive(checkpoint.observations.count);
   archive(checkpoint.observations.mean);
   archive(checkpoint.observations.squares);
+  archive(checkpoint.judged);
+  if (!checkpoint.judged) return;
+  archive.EncodedMessage(checkpoint.best_policy);
+  Transfer(archive, checkpoint.best_critic);
+  archive(checkpoint.best_updates);
+  archive(checkpoint.best_return);
 }
 
 uint32_t Crc(const char* data, size_t size) {
@@ -131,6 +145,34 @@ uint32_t Crc(const char* data, size_t size) {
 }
 
 }  // namespace
+
+TrainerState TrainerStateOf(const Checkpoint& checkpoint) {
+  TrainerState state{GaussianPolicy::FromMessage(checkpoint.policy),
+                     checkpoint.critic,
+                     checkpoint.observations,
+                     checkpoint.updates,
+                     checkpoint.steps,
+                     checkpoint.dropped_episodes};
+  if (checkpoint.judged) {
+    state.best =
+        JudgedPolicy{GaussianPolicy::FromMessage(checkpoint.best_policy), checkpoint.best_critic,
+                     checkpoint.best_updates, checkpoint.best_return};
+  }
+  return state;
+}
+
+void SetTrainerState(const TrainerState& state, Checkpoint& checkpoint) {
+  checkpoint.policy = state.policy.ToMessage(), checkpoint.critic = state.critic;
+  checkpoint.observations = state.observations;
+  checkpoint.updates = state.updates, checkpoint.steps = state.steps,
+  checkpoint.dropped_episodes = state.dropped_episodes;
+  checkpoint.judged = state.best.has_value();
+  if (!state.best) return;
+  checkpoint.best_policy = state.best->policy.ToMessage();
+  checkpoint.best_critic = state.best->critic;
+  checkpoint.best_updates = state.best->updates;
+  checkpoint.best_return = state.best->mean_return;
+}
 
 std::string EncodeCheckpoint(const Checkpoint& checkpoint) {
   Writer body;

@@ -10,6 +10,7 @@
 #include "plumb/policy_t.hpp"
 #include "trainer/critic.h"
 #include "trainer/evaluation.h"
+#include "trainer/trainer.h"
 
 namespace plumb {
 
@@ -35,7 +36,17 @@ struct Checkpoint {
   parameter_distribution_t distribution;  ///< of the iteration
   CriticState critic;
   ObservationMoments observations;  ///< as in TrainerState
+  /// JudgedPolicy of TrainerState, if there is one
+  bool judged = false;
+  policy_t best_policy;
+  CriticState best_critic;
+  int64_t best_updates = 0;
+  double best_return = 0;
 };
+
+/// What a checkpoint has of the trainer. @throws std::invalid_argument if a policy is none.
+TrainerState TrainerStateOf(const Checkpoint& checkpoint);
+void SetTrainerState(const TrainerState& state, Checkpoint& checkpoint);
 
 /// Writes it so that at any moment, also after a power cut, the file is either the old checkpoint
 /// or the new one: a temporary file, fsync, rename, fsync of the folder. @throws CheckpointError.

@@ -9,12 +9,20 @@
 #include <vector>
 
 namespace plumb {
+namespace {
 
-Evaluation Evaluate(std::span<const double> returns) {
+std::vector<double> Ordered(std::span<const double> returns) {
   std::vector<double> ordered;
   std::copy_if(returns.begin(), returns.end(), std::back_inserter(ordered),
                [](double x) { return std::isfinite(x); });
   std::sort(ordered.begin(), ordered.end());
+  return ordered;
+}
+
+}  // namespace
+
+Evaluation Evaluate(std::span<const double> returns) {
+  const std::vector<double> ordered = Ordered(returns);
   Evaluation evaluation;
   evaluation.episodes = static_cast<int>(returns.size());
   evaluation.failed = static_cast<int>(returns.size() - ordered.size());
@@ -27,6 +35,12 @@ Evaluation Evaluate(std::span<const double> returns) {
   evaluation.tenth = ordered[below] + (at - std::floor(at)) * (above - ordered[below]);
   evaluation.worst = ordered.front();
   return evaluation;
+}
+
+double MeanOfWorst(std::span<const double> returns, double share) {
+  const std::vector<double> ordered = Ordered(returns);
+  const auto count = static_cast<ptrdiff_t>(std::ceil(share * static_cast<double>(ordered.size())));
+  return std::accumulate(ordered.begin(), ordered.begin() + count, 0.) / static_cast<double>(count);
 }
 
 std::string Summary(const Evaluation& evaluation) {

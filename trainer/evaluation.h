@@ -20,6 +20,10 @@ struct Evaluation {
 /// ordered returns. Thread-safe.
 Evaluation Evaluate(std::span<const double> returns);
 
+/// Mean of the lowest `share` of the returns, rounded up to whole episodes; NaN are left out, and
+/// NaN if there are no others. Thread-safe.
+double MeanOfWorst(std::span<const double> returns, double share);
+
 /// "-142.1 mean, -263.3 10th percentile, -370.2 worst", and how many failed.
 std::string Summary(const Evaluation& evaluation);
 

@@ -50,16 +50,19 @@ bool TrainingSession::Replace(const ParameterDistribution& distribution) {
     return false;
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
   distribution_ = distribution;
+  trainer_.ForgetBest();
   return true;
 }
 
 UpdateReport TrainingSession::Advance() {
   const ParameterSampler sample = [this](Random& random) { return distribution_.Draw(random); };
   if (update_ < updates()) {
+    if (trainer_.JudgementDue()) trainer_.Judge(sample);
     last_ = trainer_.Update(sample);
     ++update_;
   }
   if (update_ >= updates()) {
+    trainer_.ReturnToBest(sample);
     evaluation_ = trainer_.EvaluateHeldOut(sample, kHeldOut);
     complete_ = true;
   }
@@ -97,16 +100,13 @@ training_status_t TrainingSession::Status() const {
 }
 
 Checkpoint TrainingSession::MakeCheckpoint() const {
-  const TrainerState state = trainer_.state();
   Checkpoint checkpoint;
+  SetTrainerState(trainer_.state(), checkpoint);
   checkpoint.seed = seed_;
-  checkpoint.updates = state.updates, checkpoint.steps = state.steps,
-  checkpoint.dropped_episodes = state.dropped_episodes;
   checkpoint.iteration = iteration_, checkpoint.iteration_updates = update_,
   checkpoint.complete = complete_;
   checkpoint.evaluation = evaluation_;
-  checkpoint.policy = state.policy.ToMessage(), checkpoint.distribution = distribution_.ToMessage();
-  checkpoint.critic = state.critic, checkpoint.observations = state.observations;
+  checkpoint.distribution = distribution_.ToMessage();
   return checkpoint;
 }
 
@@ -121,9 +121,7 @@ void TrainingSession::Restore(const Checkpoint& checkpoint) {
   }
   try {
     distribution_ = ParameterDistribution::FromMessage(checkpoint.distribution, description_);
-    trainer_.Restore({GaussianPolicy::FromMessage(checkpoint.policy), checkpoint.critic,
-                      checkpoint.observations, checkpoint.updates, checkpoint.steps,
-                      checkpoint.dropped_episodes});
+    trainer_.Restore(TrainerStateOf(checkpoint));
   } catch (const std::invalid_argument& error) {
     throw CheckpointError(
         fmt::format("the checkpoint is of another robot or network: {}", error.what()));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <stdexcept>
 #include <utility>
@@ -21,9 +23,11 @@ enum Stream : uint32_t {
   kRolloutStream,
   kFitStream,
   kEvaluationStream,
-  kHeldOutStream
+  kHeldOutStream,
+  kJudgementStream
 };
 
+constexpr int kJudgements = 16, kJudgementEpisodes = 30;
 constexpr double kTrustedBatches = 10;  // that a normaliser to begin with counts for
 constexpr double kOutputGain = 0.01;    // of a fresh policy: every mean action is near 0
 
@@ -44,6 +48,10 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
 }  // namespace
 
 TrainingSettings PaperSettings(TrainingSettings settings) {
+  settings.batch = 3000;
+  settings.gamma = .995;
+  settings.lambda = .97;
+  settings.kl = .01;
   settings.normalise_values = false;
   settings.fisher_fraction = 1;
   settings.critic_epochs = 20;
@@ -64,23 +72,26 @@ Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make
               ranks) {}
 
 TrainerState Trainer::state() const {
-  return {policy_, critic_.state(), observations_, updates_, steps_, dropped_episodes_};
+  return {policy_, critic_.state(), observations_, updates_, steps_, dropped_episodes_, best_};
 }
 
 void Trainer::Restore(TrainerState state) {
-  if (state.policy.shape() != policy_.shape())
+  if (state.policy.shape() != policy_.shape() ||
+      (state.best && state.best->policy.shape() != policy_.shape()))
     throw std::invalid_argument("trainer: state of another network");
   const Eigen::Index seen = state.observations.mean.size();
   if (state.observations.squares.size() != seen ||
       (seen != 0 && seen != policy_.shape().observations)) {
     throw std::invalid_argument("trainer: state of other observations");
   }
+  if (state.best) critic_.Restore(state.best->critic);  // throws now, if at all
   critic_.Restore(std::move(state.critic));
   policy_ = std::move(state.policy);
   observations_ = std::move(state.observations);
   updates_ = state.updates;
   steps_ = state.steps;
   dropped_episodes_ = state.dropped_episodes;
+  best_ = std::move(state.best);
 }
 
 void Trainer::Start(const GaussianPolicy& policy) {
@@ -149,6 +160,26 @@ void Trainer::CompareRanks() const {
                       r, updates_, kernels::InstructionSet()));
     }
   }
+}
+
+bool Trainer::JudgementDue() const {
+  return !best_ || updates_ % std::max(1, settings_.updates / kJudgements) == 0;
+}
+
+void Trainer::Judge(const ParameterSampler& sample) {
+  const double mean =
+      MeanOfWorst(rollout_.Returns(policy_, sample, kJudgementEpisodes, seed_, kJudgementStream, 0),
+                  settings_.worst_share);
+  if (best_ && !std::isnan(best_->mean_return) && !(mean > best_->mean_return)) return;
+  best_ = JudgedPolicy{policy_, critic_.state(), updates_, mean};
+}
+
+int64_t Trainer::ReturnToBest(const ParameterSampler& sample) {
+  Judge(sample);
+  const JudgedPolicy best = *std::exchange(best_, {});
+  policy_ = best.policy;
+  critic_.Restore(best.critic);
+  return best.updates;
 }
 
 Evaluation Trainer::Evaluate(const ParameterSampler& sample, int episodes) {

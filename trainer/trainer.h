@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "controller/policy.h"
@@ -13,10 +14,18 @@
 
 namespace plumb {
 
-/// The settings of the paper where ours learn faster: value targets in units of return, the whole
-/// batch for Fisher's matrix. The paper does not say how long its critic is fitted; targets so
+/// The settings of the paper where ours learn faster: batches, discounts and KL bound of its table,
+/// value targets in units of return, the whole batch for Fisher's matrix. The paper does not say how long its critic is fitted; targets so
 /// large need 20 passes, 10 leave one seed in ten behind. Thread-safe.
 TrainingSettings PaperSettings(TrainingSettings settings);
+
+/// A policy that was judged, and the critic that goes with it.
+struct JudgedPolicy {
+  GaussianPolicy policy;
+  CriticState critic;
+  int64_t updates = 0;     ///< after which it stood
+  double mean_return = 0;  ///< without exploration; NaN if no episode could be used
+};
 
 /// All that training has learnt, as a checkpoint keeps it.
 struct TrainerState {
@@ -27,6 +36,7 @@ struct TrainerState {
   int64_t updates = 0;           ///< since the beginning
   int64_t steps = 0;             ///< simulated steps since the beginning, those not learnt from too
   int64_t dropped_episodes = 0;  ///< since the beginning
+  std::optional<JudgedPolicy> best{};  ///< of those judged, until training returns to it
 };
 
 /// One update in numbers.
@@ -67,6 +77,20 @@ class Trainer {
   /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used,
   /// or if ranks have come to different results.
   UpdateReport Update(const ParameterSampler& sample);
+
+  /// Whether the policy should be judged before the next update: at first, then 16 times in the
+  /// `updates` of the settings.
+  bool JudgementDue() const;
+  /// Plays the policy without exploration in 30 simulators, always the same and not those held out,
+  /// and remembers it if it is the best so far: by the mean of all returns, or of the worst_share of
+  /// them from which it learns.
+  void Judge(const ParameterSampler& sample);
+  /// TRPO's last policy is not its best. Judges it, too, and goes back to the best one with its
+  /// critic; what follows is judged anew. @return after how many updates it stood.
+  int64_t ReturnToBest(const ParameterSampler& sample);
+  /// Other simulators than those of the judgements so far: they are void.
+  void ForgetBest() { best_.reset(); }
+
   /// The policy without exploration on simulators drawn anew. Changes nothing.
   Evaluation Evaluate(const ParameterSampler& sample, int episodes);
   /// The same on simulators and initial states that are always the same for a seed, so that
@@ -88,6 +112,7 @@ class Trainer {
   int64_t updates_ = 0;
   int64_t steps_ = 0;
   int64_t dropped_episodes_ = 0;
+  std::optional<JudgedPolicy> best_;
 };
 
 }  // namespace plumb

@@ -32,11 +32,11 @@ std::vector<std::string> Rows(const std::string& file) {
 
 TEST_CASE("train writes a policy, a table and what to expect of it") {
   const TemporaryFolder folder;
-  const Outcome outcome = Shell(
-      Train(folder, "policy.onnx", "--steps 12000 --evaluate-every 2 --distribution nominal"));
+  const Outcome outcome =
+      Shell(Train(folder, "policy.onnx", "--steps 6400 --evaluate-every 2 --distribution nominal"));
   INFO(outcome.text);
   REQUIRE(outcome.status == 0);
-  CHECK(outcome.text.find("12000 steps, 4 updates") != std::string::npos);
+  CHECK(outcome.text.find("6400 steps, 4 updates") != std::string::npos);
   CHECK(std::regex_search(
       outcome.text,
       std::regex("nominal +-[0-9.]+ mean, -[0-9.]+ 10th percentile, -[0-9.]+ worst")));
@@ -45,11 +45,19 @@ TEST_CASE("train writes a policy, a table and what to expect of it") {
       outcome.text, std::regex("return -[0-9]+.*KL 0.*gain.*explained.*entropy.*steps/s.*left")));
   CHECK(outcome.text.find("wrote " + folder / "policy.onnx") != std::string::npos);
   const OnnxPolicy written = ReadOnnxPolicy(folder / "policy.onnx");
+  const Checkpoint checkpoint = *LoadCheckpoint(folder / "policy.onnx.checkpoint");
+  CHECK(checkpoint.complete);
+  CHECK(checkpoint.judged);
+  const bool last = outcome.text.find("; policy of update 4\n") != std::string::npos;
   CHECK(written.policy.ToMessage().weight ==
-        LoadCheckpoint(folder / "policy.onnx.checkpoint")->policy.weight);
+        (last ? checkpoint.policy : checkpoint.best_policy).weight);
+  if (!last) {
+    CHECK(outcome.text.find("; policy of update " + std::to_string(checkpoint.best_updates)) !=
+          std::string::npos);
+  }
   CHECK(written.record.robot == "pendulum");
   CHECK(written.record.posterior == "nominal");
-  CHECK(written.record.steps == 12000);
+  CHECK(written.record.steps == 6400);
   CHECK(written.record.evaluation.at("simulators") == 5);
   CHECK(written.record.evaluation.at("worst") <= written.record.evaluation.at("mean"));
   CHECK(
@@ -60,20 +68,20 @@ TEST_CASE("train writes a policy, a table and what to expect of it") {
   CHECK(rows[0] ==
         "update,steps,mean_return,evaluation_return,kl,surrogate_gain,explained_variance,entropy,"
         "accepted,dropped_episodes");
-  CHECK(rows[1].find("1,3000,-") == 0);
+  CHECK(rows[1].find("1,1600,-") == 0);
   CHECK(rows[1].find(",nan,") != std::string::npos);
   CHECK(rows[2].find(",nan,") == std::string::npos);
 }
 
 TEST_CASE("an interrupted training goes on to the same bits, with any number of threads") {
   const TemporaryFolder folder;
-  REQUIRE(Shell(Train(folder, "straight", "--steps 45000 --threads 1")).status == 0);
+  REQUIRE(Shell(Train(folder, "straight", "--steps 24000 --threads 1")).status == 0);
   int runs = 0;
   for (int status = 130; status != 0; ++runs) {  // 15 updates, and one at least each time
     REQUIRE(runs <= 15);
     const std::string threads = runs % 2 == 0 ? "1" : "2";
     const Outcome outcome =
-        Shell("exec " + Train(folder, "resumed", "--steps 45000 --threads " + threads), " KL ");
+        Shell("exec " + Train(folder, "resumed", "--steps 24000 --threads " + threads), " KL ");
     INFO(outcome.text);
     status = outcome.status;
     REQUIRE((status == 0 || status == 130));
@@ -88,16 +96,38 @@ TEST_CASE("an interrupted training goes on to the same bits, with any number of 
   CHECK(Read(folder / "resumed") == Read(folder / "straight"));
   CHECK(resumed->critic.second_moment == straight->critic.second_moment);
   SECTION("and further, if asked for more steps") {
-    REQUIRE(Shell(Train(folder, "resumed", "--steps 60000")).status == 0);
-    REQUIRE(Shell(Train(folder, "long", "--steps 60000")).status == 0);
+    REQUIRE(Shell(Train(folder, "resumed", "--steps 32000")).status == 0);
+    REQUIRE(Shell(Train(folder, "long", "--steps 32000")).status == 0);
     CHECK(LoadCheckpoint(folder / "resumed.checkpoint")->policy.weight ==
           LoadCheckpoint(folder / "long.checkpoint")->policy.weight);
   }
-  SECTION("but not as another run") {
-    const Outcome outcome = Shell(Train(folder, "resumed", "--steps 45000 --seed 2"));
-    CHECK(outcome.status == 1);
-    CHECK(outcome.text.find("is of another run") != std::string::npos);
+  SECTION("but another run begins anew, as if there were none") {
+    const Outcome outcome = Shell(Train(folder, "resumed", "--steps 6000 --seed 2"));
+    INFO(outcome.text);
+    CHECK(outcome.status == 0);
+    CHECK(outcome.text.find("resumed.checkpoint is of another run, which has ended: begins anew") !=
+          std::string::npos);
+    REQUIRE(Shell(Train(folder, "other", "--steps 6000 --seed 2")).status == 0);
+    CHECK(Read(folder / "resumed") == Read(folder / "other"));
+    CHECK(Rows(folder / "resumed.csv") == Rows(folder / "other.csv"));
+    CHECK(Read(folder / "resumed.checkpoint") == Read(folder / "other.checkpoint"));
   }
+}
+
+TEST_CASE("a training that has not ended is not lost to another one") {
+  const TemporaryFolder folder;
+  REQUIRE(Shell("exec " + Train(folder, "half", "--steps 1e8"), " KL ").status == 130);
+  const std::string checkpoint = Read(folder / "half.checkpoint"),
+                    table = Read(folder / "half.csv");
+  const Outcome outcome = Shell(Train(folder, "half", "--steps 6000 --seed 2"));
+  INFO(outcome.text);
+  CHECK(outcome.status == 1);
+  CHECK(outcome.text.find("is of another run") != std::string::npos);
+  CHECK(outcome.text.find("has not ended: delete it, or give another --checkpoint") !=
+        std::string::npos);
+  CHECK(Read(folder / "half.checkpoint") == checkpoint);
+  CHECK(Read(folder / "half.csv") == table);
+  CHECK_FALSE(std::filesystem::exists(folder / "half"));
 }
 
 TEST_CASE("ranks give the same bits as one process, file by file") {

@@ -3,7 +3,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "robot/parameter_distribution.h"
 #include "tests/trainer/pendulum.h"
+#include "trainer/checkpoint.h"
 
 namespace plumb {
 namespace {
@@ -133,6 +135,82 @@ TEST_CASE("Returns are summed up by mean, tenth percentile and worst") {
   CHECK(evaluation.episodes == 12);
   CHECK(std::isnan(Evaluate(std::vector<double>{NAN}).worst));
   CHECK(Evaluate(std::vector<double>{3}).tenth == 3);
+}
+
+TEST_CASE("The mean of the worst returns") {
+  const std::vector<double> returns{4, NAN, 1, 3, 2};
+  CHECK(MeanOfWorst(returns, 1) == Approx(2.5));
+  CHECK(MeanOfWorst(returns, .5) == Approx(1.5));
+  CHECK(MeanOfWorst(returns, .3) == Approx(1.5));
+  CHECK(MeanOfWorst(returns, .25) == Approx(1));
+  CHECK(std::isnan(MeanOfWorst(std::vector<double>{NAN}, 1)));
+}
+
+TEST_CASE("Training returns to the best policy that was judged") {
+  static double reward;  // of every step: policies are better or worse as we say
+  class Told : public Endless {
+   public:
+    StepResult Step(const Eigen::Ref<const Eigen::VectorXf>&) override { return {reward, false}; }
+  };
+  TrainingSettings settings = SmallSettings();
+  settings.updates = 32;  // a judgement before every second update
+  const auto new_trainer = [&] {
+    return Trainer(
+        settings, [] { return std::make_unique<Told>(); }, Eigen::VectorXd::Ones(1), 3, 1);
+  };
+  Trainer trainer = new_trainer();
+  const auto judge = [&](double value) {
+    reward = value;
+    trainer.Judge(GymParameters);
+  };
+  const auto update = [&] {
+    reward = 1;
+    trainer.Update(GymParameters);
+  };
+  CHECK(trainer.JudgementDue());
+  judge(1);
+  update();
+  CHECK_FALSE(trainer.JudgementDue());
+  update();
+  CHECK(trainer.JudgementDue());
+  judge(2);
+  const TrainerState best = trainer.state();
+  update();
+  update();
+  judge(1.5);
+  update();
+  reward = 1.9;
+  SECTION("with its critic, and forgets what it was worth") {
+    CHECK(trainer.policy().parameters != best.policy.parameters);
+    CHECK(trainer.ReturnToBest(GymParameters) == 2);
+    CHECK(trainer.policy().parameters == best.policy.parameters);
+    CHECK(trainer.state().critic.parameters == best.critic.parameters);
+    CHECK(trainer.state().critic.adam_steps == best.critic.adam_steps);
+    CHECK(trainer.updates() == 5);
+    CHECK_FALSE(trainer.state().best);
+    CHECK(trainer.JudgementDue());
+  }
+  SECTION("after a checkpoint, too") {
+    Checkpoint checkpoint;
+    checkpoint.distribution = ParameterDistribution().ToMessage();
+    SetTrainerState(trainer.state(), checkpoint);
+    Trainer other = new_trainer();
+    other.Restore(TrainerStateOf(DecodeCheckpoint(EncodeCheckpoint(checkpoint))));
+    CHECK(other.ReturnToBest(GymParameters) == 2);
+    CHECK(other.policy().parameters == best.policy.parameters);
+    CHECK(other.state().critic.second_moment == best.critic.second_moment);
+  }
+  SECTION("which is the latest, if that is better") {
+    reward = 2.1;
+    const Eigen::VectorXf latest = trainer.policy().parameters;
+    CHECK(trainer.ReturnToBest(GymParameters) == 5);
+    CHECK(trainer.policy().parameters == latest);
+  }
+  SECTION("but not by judgements that are void") {
+    trainer.ForgetBest();
+    CHECK(trainer.JudgementDue());
+    CHECK(trainer.ReturnToBest(GymParameters) == 5);
+  }
 }
 
 TEST_CASE("Held-out simulators stay the same while the policy changes") {
