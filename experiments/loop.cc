@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "experiments/random_forces.h"
 #include "trainer/robot_simulation.h"
 
 namespace plumb {
@@ -88,6 +89,8 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
   const std::unique_ptr<Trainer> trainer = TrainFirst(
       Learns(settings.strategy) ? Key(CalibrationStrategy::kPrior) : Key(settings.strategy),
       distribution, settings, [&](double share) { progress(first * share); });
+  if (settings.forces > 0)
+    distribution.residual = RandomForces(model_, settings.forces, settings.seed);
   const ParameterSampler sample = [&](Random& random) { return distribution.Draw(random); };
   LoopResult result;
   Acceptance acceptance(model_.task.steps);
@@ -105,7 +108,7 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
     result.rows.push_back(
         {iteration, judged.mean, judged.worst, newest ? judged.mean : judge(trainer->policy()).mean,
          deployed_iteration, trainer->EvaluateHeldOut(sample, settings.evaluation_episodes).mean,
-         discrepancy, transitions, seconds, distribution.Mean(), distribution.Sd()});
+         discrepancy, distribution.residual != nullptr, transitions, seconds, distribution.Mean(), distribution.Sd()});
     if (iteration == settings.iterations) break;
     if (simopt || settings.accept) {
       const int steps = settings.steps_per_iteration;
@@ -121,10 +124,11 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
         }
         discrepancy = report->discrepancy;
         distribution = DistributionOf(*simopt, model_);
-        if (!settings.residual) distribution.residual = nullptr;
+        for (Gaussian& component : distribution.mixture.components)
+          component.covariance *= settings.tempering;
       }
       if (settings.accept) {
-        const bool right = simopt && !simopt->state().residual;
+        const bool right = simopt && model_.calibration.residual && !simopt->state().residual;
         const Acceptance::Decision decision =
             right ? acceptance.Trust(iteration) : acceptance.Decide(iteration);
         result.decisions.push_back(Summary(decision));

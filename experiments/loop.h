@@ -23,8 +23,10 @@ struct LoopSettings {
   int first_updates = 0, next_updates = 0;
   /// of an iteration's steps, the first so many try the policy, without exploration; 0 = none
   double trial_share = 0;
-  /// The learnt residual is trained with, where the model has been found wrong.
-  bool residual = true;
+  /// Random forces that are trained with, as shares of the effort limits; 0 = none.
+  double forces = 0;
+  /// Factor of the posterior's covariance: a likelihood to the power of 1 / factor.
+  double tempering = 1;
   /// Only what does better on the robot is deployed there, once its model has been found wrong;
   /// needs trials.
   bool accept = false;
@@ -43,6 +45,7 @@ struct LoopRow {
   int deployed;              ///< the iteration whose policy that is
   double simulated_return;   ///< the same on simulators of the distribution that it was trained on
   double discrepancy;        ///< see CalibrationReport; NaN where nothing is learnt
+  bool residual;             ///< a residual is trained with
   int64_t transitions;       ///< of the robot so far
   double robot_seconds;      ///< likewise
   Eigen::VectorXd mean, sd;  ///< of the parameters, physical units

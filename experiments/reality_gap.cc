@@ -1,24 +1,17 @@
-// A gap that is really there: the robot is none of the simulators, whatever their parameters.
-//
-//   hopper    MuJoCo's Hopper, with its own contact, stops and integrator
-//   pendulum  Simbody's pendulum, with Coulomb friction, delay and backlash that the model does not
-//             have
-//
-// Both are behind a CAN bus, with driver, observer and controller, in virtual time. Who still
-// transfers, does the alarm speak, and does it help to let the engine fit friction, delay and
-// contact?
+// A gap that is really there: robots that are none of the simulators, whatever their parameters,
+// each behind a CAN bus with driver, observer and controller, in virtual time. Which ways of using
+// six seconds of the robot an iteration end with a policy that works on it?
 //
 //   plumb-reality-gap robots --output reality_gap
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 
-#include "calibrator/results/calibration.h"
 #include "common/atomic_file.h"
 #include "experiments/bus_robot.h"
 #include "experiments/loop.h"
@@ -31,41 +24,86 @@ namespace plumb {
 namespace {
 
 constexpr double kRobotSeconds = 6;  // of an iteration
+constexpr double kTrialShare = 0.5;  // of these, without exploration
+constexpr double kForces = 0.05, kTempering = 14;
 
+// Files below robots/: what is there, what is believed, what is believed with contact uncertain,
+// too.
 struct Gap {
-  const char *name, *title;
-  // files below robots/: what is there, what is believed, what is believed with more to fit
-  const char *truth, *model, *fitted;
+  const char *key, *title;
+  const char *truth, *model, *uncertain;
 };
-constexpr Gap kGaps[] = {{"pendulum", "worn pendulum", "pendulum/worn.toml", "pendulum/robot.toml",
-                          "pendulum/worn_fitted.toml"},
-                         {"hopper", "MuJoCo's hopper", "hopper/mujoco.toml", "hopper/robot.toml",
-                          "hopper/mujoco_fitted.toml"}};
+constexpr std::array<Gap, 9> kGaps{
+    {{"hopper", "MuJoCo's hopper", "hopper/mujoco.toml", "hopper/robot.toml",
+      "hopper/mujoco_fitted.toml"},
+     {"stiff", "ground five times stiffer", "hopper/mujoco_stiff.toml", "hopper/robot.toml",
+      "hopper/mujoco_fitted.toml"},
+     {"slippery", "slippery ground", "hopper/mujoco_slippery.toml", "hopper/robot.toml",
+      "hopper/mujoco_fitted.toml"},
+     {"slope", "a slope of 3 degrees", "hopper/mujoco_slope.toml", "hopper/robot.toml",
+      "hopper/mujoco_fitted.toml"},
+     {"simbody", "Simbody's hopper", "hopper/simbody.toml", "hopper/robot.toml",
+      "hopper/mujoco_fitted.toml"},
+     {"worn", "worn hopper", "hopper/worn.toml", "hopper/robot.toml", "hopper/mujoco_fitted.toml"},
+     {"right", "the model itself", "hopper/robot.toml", "hopper/robot.toml",
+      "hopper/mujoco_fitted.toml"},
+     {"pendulum", "worn pendulum", "pendulum/worn.toml", "pendulum/robot.toml",
+      "pendulum/worn_fitted.toml"},
+     {"weak", "worn pendulum, weak motor", "pendulum/worn_weak.toml", "pendulum/weak.toml",
+      "pendulum/worn_fitted.toml"}}};
 
 struct Method {
-  const char* key;
-  std::string label;
+  const char *key, *label;
   CalibrationStrategy strategy;
-  bool fitted;
+  bool residual, accept;
+  bool uncertain = false;
+  double forces = 0, tempering = 1;
 };
-const std::array<Method, 7> kMethods{
-    {{"original", Label(CalibrationStrategy::kOriginal), CalibrationStrategy::kOriginal, false},
-     {"step", Label(CalibrationStrategy::kStep), CalibrationStrategy::kStep, false},
-     {"default", Label(CalibrationStrategy::kDefault), CalibrationStrategy::kDefault, false},
-     {"fitted", Label(CalibrationStrategy::kDefault) + ", more parameters",
-      CalibrationStrategy::kDefault, true},
-     {"prior", Label(CalibrationStrategy::kPrior), CalibrationStrategy::kPrior, false},
-     {"nominal", Label(CalibrationStrategy::kNominal), CalibrationStrategy::kNominal, false},
-     {"oracle", "the robot's masses, in the simulator", CalibrationStrategy::kOracle, false}}};
+// Those with the same model are neighbours: its first policy is trained once for all of them.
+const std::array<Method, 9> kMethods{
+    {{"default", "Plumbline: residual and acceptance", CalibrationStrategy::kDefault, true, true},
+     {"residual", "residual without acceptance", CalibrationStrategy::kDefault, true, false},
+     {"prior", "the prior, fixed", CalibrationStrategy::kPrior, true, false},
+     {"forces", "the prior, random forces", CalibrationStrategy::kPrior, true, false, false,
+      kForces},
+     {"step", "step-based SimOpt (paper)", CalibrationStrategy::kStep, true, false},
+     {"posterior", "posterior alone", CalibrationStrategy::kDefault, false, false},
+     {"acceptance", "acceptance without residual", CalibrationStrategy::kDefault, false, true},
+     {"tempered", "tempered posterior", CalibrationStrategy::kDefault, false, false, false, 0,
+      kTempering},
+     {"wide", "the prior, contact uncertain, too", CalibrationStrategy::kPrior, true, false,
+      true}}};
 
-std::string KeyOf(const Gap& gap, const Method& method, int run) {
-  return fmt::format("{},{},{}", gap.name, method.key, run);
+struct Options : ExperimentOptions {
+  int first_run = 1;
+  std::vector<std::string> gaps, methods;  // all if empty
+};
+
+template <class Item, size_t count>
+std::vector<Item> Chosen(const std::array<Item, count>& all, const std::vector<std::string>& keys) {
+  std::vector<Item> chosen;
+  for (const Item& item : all) {
+    if (keys.empty() || std::find(keys.begin(), keys.end(), item.key) != keys.end())
+      chosen.push_back(item);
+  }
+  return chosen;
 }
 
-std::filesystem::path AlarmFile(const ExperimentOptions& options, const Gap& gap,
-                                const Method& method, int run) {
+template <class Item, size_t count>
+CLI::Validator OneOf(const std::array<Item, count>& all) {
+  std::vector<std::string> keys;
+  for (const Item& item : all) keys.emplace_back(item.key);
+  return CLI::IsMember(keys);
+}
+
+std::string KeyOf(const Gap& gap, const Method& method, int run) {
+  return fmt::format("{},{},{}", gap.key, method.key, run);
+}
+
+std::filesystem::path DecisionsFile(const Options& options, const Gap& gap, const Method& method,
+                                    int run) {
   return std::filesystem::path(options.output) /
-         fmt::format("alarm_{}_{}_{}.txt", gap.name, method.key, run);
+         fmt::format("decisions_{}_{}_{}.txt", gap.key, method.key, run);
 }
 
 struct Remembered {
@@ -73,17 +111,18 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
-Results::Rows RunLoop(const ExperimentOptions& options, const Gap& gap, const Method& method,
-                      int run, Remembered& remembered,
-                      const std::function<void(double)>& progress) {
+Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& method, int run,
+                      Remembered& remembered, const std::function<void(double)>& progress) {
   const auto load = [&](const char* file) {
     return LoadRobot((std::filesystem::path(options.robots) / file).string());
   };
-  const RobotDescription truth = load(gap.truth),
-                         model = load(method.fitted ? gap.fitted : gap.model);
+  const char* model_file = method.uncertain ? gap.uncertain : gap.model;
+  const RobotDescription truth = load(gap.truth);
+  RobotDescription model = load(model_file);
+  model.calibration.residual = method.residual;
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = HiddenParameters(truth, seed);
-  if (const std::string of = fmt::format("{} {} {}", gap.name, method.fitted, run);
+  if (const std::string of = fmt::format("{} {} {}", model_file, method.residual, run);
       remembered.of != of) {
     remembered = {of, std::make_unique<Loop>(model, hidden)};
   }
@@ -95,91 +134,95 @@ Results::Rows RunLoop(const ExperimentOptions& options, const Gap& gap, const Me
       static_cast<int>((options.quick ? 1 : kRobotSeconds) / model.task.period);
   settings.first_updates = options.quick ? 2 : model.training.updates;
   settings.next_updates = options.quick ? 1 : model.training.updates_again;
-  settings.evaluation_episodes = options.quick ? 1 : 5;
+  settings.evaluation_episodes = options.quick ? 1 : 10;
+  settings.trial_share = method.accept ? kTrialShare : 0;
+  settings.accept = method.accept;
+  settings.forces = method.forces, settings.tempering = method.tempering;
   settings.seed = seed;
   settings.threads = options.threads;
   const LoopResult result = remembered.loop->Run(real, settings, progress);
-  double alarm = std::nan("");
-  if (method.strategy == CalibrationStrategy::kDefault) {
-    CalibrationOptions calibration;
-    calibration.seed = seed;
-    calibration.execution = options.threads;
-    const std::vector<Log> logs{{"roll-outs", result.rollouts, {}, {}}};
-    const Misspecification found = Calibrate(model, logs, calibration).misspecification;
-    alarm = found.alarm;
-    WriteAtomically(AlarmFile(options, gap, method, run), found.summary + "\n");
+  if (method.accept) {
+    std::string text;
+    for (const std::string& decision : result.decisions) text += decision + "\n";
+    WriteAtomically(DecisionsFile(options, gap, method, run), text);
   }
   Results::Rows rows;
   for (const LoopRow& row : result.rows) {
-    rows.push_back({static_cast<double>(row.iteration), row.robot_return, row.simulated_return,
-                    row.discrepancy, static_cast<double>(row.transitions), row.robot_seconds,
-                    alarm});
+    rows.push_back({static_cast<double>(row.iteration), row.robot_return, row.worst_return,
+                    row.newest_return, static_cast<double>(row.deployed), row.simulated_return,
+                    row.discrepancy, row.residual ? 1. : 0., static_cast<double>(row.transitions),
+                    row.robot_seconds});
   }
   return rows;
 }
 
-double Mean(const ExperimentOptions& options, const Gap& gap, const Method& method,
-            const Results& results, int iteration, size_t column) {
-  double sum = 0;
-  for (int run = 1; run <= options.runs; ++run)
-    sum += results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column];
-  return sum / options.runs;
+constexpr size_t kReturn = 1, kResidual = 7;  // columns
+
+std::vector<double> Column(const Options& options, const Gap& gap, const Method& method,
+                           const Results& results, int iteration, size_t column) {
+  std::vector<double> values;
+  for (int run = options.first_run; run < options.first_run + options.runs; ++run)
+    values.push_back(
+        results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column]);
+  std::sort(values.begin(), values.end());
+  return values;
 }
 
-Panel Draw(const ExperimentOptions& options, const Gap& gap, const Results& results) {
+double Median(const std::vector<double>& sorted) {
+  const size_t n = sorted.size();
+  return (sorted[(n - 1) / 2] + sorted[n / 2]) / 2;
+}
+
+Panel Draw(const Options& options, const Gap& gap, const Results& results) {
   Panel panel{
-      gap.title, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
-  for (const Method& method : kMethods) {
+      gap.title, "iterations, 6 s of the robot each", "return of the deployed policy", false, {}};
+  for (const Method& method : Chosen(kMethods, options.methods)) {
     Curve curve{method.label, {}, {}, {}, {}};
     for (int k = 0; k <= options.iterations; ++k) {
-      std::vector<double> returns;
-      for (int run = 1; run <= options.runs; ++run)
-        returns.push_back(results.Of(KeyOf(gap, method, run))[static_cast<size_t>(k)][1]);
-      const Band band = ConfidenceBand(returns, false);
-      const auto [least, most] = std::minmax_element(returns.begin(), returns.end());
-      curve.x.push_back(k), curve.middle.push_back(band.middle), curve.low.push_back(*least),
-          curve.high.push_back(*most);
+      const auto returns = Column(options, gap, method, results, k, kReturn);
+      curve.x.push_back(k), curve.middle.push_back(Median(returns)),
+          curve.low.push_back(returns.front()), curve.high.push_back(returns.back());
     }
     panel.curves.push_back(std::move(curve));
   }
   return panel;
 }
 
-std::string Sentence(const ExperimentOptions& options, const Gap& gap, const Results& results) {
+std::string Table(const Options& options, const Gap& gap, const Results& results) {
   std::string text = fmt::format(
-      "{}, {} runs: return on the robot before and after {} iterations, in simulation, "
-      "discrepancy, alarms:",
-      gap.title, options.runs, options.iterations);
-  for (const Method& method : kMethods) {
-    const auto mean = [&](int iteration, size_t column) {
-      return Mean(options, gap, method, results, iteration, column);
-    };
-    text += fmt::format("\n  {:<42}{:8.0f}{:8.0f}{:8.0f}{:10.3g}", method.label, mean(0, 1),
-                        mean(options.iterations, 1), mean(options.iterations, 2),
-                        mean(options.iterations, 3));
-    if (method.strategy != CalibrationStrategy::kDefault) continue;
-    text += fmt::format("   {:.0f} of {}", options.runs * mean(0, 6), options.runs);
-    std::ifstream file(AlarmFile(options, gap, method, 1));
-    for (std::string line; std::getline(file, line);) text += "\n      " + line;
+      "{}, {} runs: return of the deployed policy, median (worst), after 0, 1, ... iterations; "
+      "runs with a residual:",
+      gap.title, options.runs);
+  for (const Method& method : Chosen(kMethods, options.methods)) {
+    text += fmt::format("\n  {:<36}", method.label);
+    for (int k = 0; k <= options.iterations; ++k) {
+      const auto returns = Column(options, gap, method, results, k, kReturn);
+      text += fmt::format("{:>14}", fmt::format("{:.0f} ({:.0f})", Median(returns), returns[0]));
+    }
+    const auto with = Column(options, gap, method, results, options.iterations, kResidual);
+    if (method.residual)
+      text += fmt::format("  {} of {}", std::count(with.begin(), with.end(), 1.), options.runs);
   }
   return text;
 }
 
-int Compare(Process& process, const ExperimentOptions& options) {
+int Compare(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
   Results results(
       folder / "reality_gap.csv",
       fmt::format("iterations {}{}", options.iterations, options.quick ? ", quick" : ""),
       {"gap", "method", "run"},
-      {"iteration", "robot_return", "simulated_return", "discrepancy", "transitions",
-       "robot_seconds", "alarm"});
+      {"iteration", "robot_return", "worst_episode", "newest_return", "deployed",
+       "simulated_return", "discrepancy", "residual", "transitions", "robot_seconds"});
+  const std::vector<Gap> gaps = Chosen(kGaps, options.gaps);
   std::vector<Job> jobs;
   Remembered remembered;
-  for (const Gap& gap : kGaps) {
-    for (int run = 1; run <= options.runs; ++run) {
-      for (const Method& method : kMethods) {
-        jobs.push_back({KeyOf(gap, method, run), gap.name == std::string("hopper") ? 8.0 : 1.0,
-                        [&, run](const auto& progress) {
+  for (int run = options.first_run; run < options.first_run + options.runs; ++run) {
+    for (const Method& method : Chosen(kMethods, options.methods)) {
+      for (const Gap& gap : gaps) {
+        const bool hopper = std::string(gap.model).starts_with("hopper");
+        jobs.push_back({KeyOf(gap, method, run), hopper ? 8.0 : 1.0,
+                        [&, run, gap, method](const auto& progress) {
                           return RunLoop(options, gap, method, run, remembered, progress);
                         }});
       }
@@ -187,13 +230,13 @@ int Compare(Process& process, const ExperimentOptions& options) {
   }
   if (!RunJobs(process, jobs, results)) return 130;
   std::vector<Panel> panels;
-  for (const Gap& gap : kGaps) {
+  for (const Gap& gap : gaps) {
     panels.push_back(Draw(options, gap, results));
-    std::cout << Sentence(options, gap, results) << "\n";
+    std::cout << Table(options, gap, results) << "\n";
   }
   WriteAtomically(folder / "reality_gap.svg",
-                  DrawCurves(fmt::format("return on robots that no simulator is, mean of {} runs, "
-                                         "band from the worst to the best",
+                  DrawCurves(fmt::format("return on robots that no simulator is, median of {} "
+                                         "runs, band from the worst to the best",
                                          options.runs),
                              panels));
   return 0;
@@ -203,14 +246,21 @@ int Compare(Process& process, const ExperimentOptions& options) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  plumb::ExperimentOptions options;
-  options.runs = 3, options.iterations = 5;
+  plumb::Options options;
+  options.runs = 5, options.iterations = 5;
   return plumb::Run(
-      "plumb-reality-gap", "Who transfers to a robot that is none of the simulators.", argc, argv,
+      "plumb-reality-gap", "What transfers to robots that are none of the simulators.", argc, argv,
       [&](CLI::App& app) {
         plumb::AddExperimentFlags(app, options,
-                                  "reality_gap.csv, reality_gap.svg and what the alarms say");
+                                  "reality_gap.csv, reality_gap.svg and what was deployed, why");
         plumb::AddIterationsFlag(app, options.iterations);
+        plumb::AddCountFlag(app, "--first-run", options.first_run, "the first of the seeds");
+        app.add_option("--gaps", options.gaps, "some of the robots, by their keys")
+            ->check(plumb::OneOf(plumb::kGaps))
+            ->delimiter(',');
+        app.add_option("--methods", options.methods, "some of the methods, by their keys")
+            ->check(plumb::OneOf(plumb::kMethods))
+            ->delimiter(',');
       },
       [&](plumb::Process& process) { return plumb::Compare(process, options); });
 }

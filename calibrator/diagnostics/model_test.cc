@@ -4,6 +4,7 @@
 
 #include "calibrator/diagnostics/candidates.h"
 #include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/robot_least_squares.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {

@@ -8,6 +8,7 @@
 
 #include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/methods.h"
+#include "calibrator/fit/robot_least_squares.h"
 #include "robot/parameter_distribution.h"
 #include "sim/touch.h"
 

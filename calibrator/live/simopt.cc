@@ -161,6 +161,13 @@ void SimOpt::Infer() {
   }
 }
 
+GapFit SimOpt::Fit(const MethodInput& input) const {
+  if (robot_.calibration.residual) return CloseGap(input, RunMethod(input));
+  GapFit alone;
+  alone.result = RunMethod(input);
+  return alone;
+}
+
 // One mode leads to the next iteration's. Of several none may be given up, and in the beginning
 // there is none: the search is then one from many places, the prior's mean first.
 GapFit SimOpt::RunFromWhereItIs() const {
@@ -178,13 +185,13 @@ GapFit SimOpt::RunFromWhereItIs() const {
   if (one_mode) {
     try {
       const MethodInput input{model_, state_.rollouts, options, state_.before.components[0].mean};
-      return CloseGap(input, RunMethod(input));
+      return Fit(input);
       // perhaps it cannot be simulated where the new roll-outs went
     } catch (const std::invalid_argument&) {
     }
   }
   const MethodInput input{model_, state_.rollouts, options};
-  return CloseGap(input, RunMethod(input));
+  return Fit(input);
 }
 
 std::optional<CalibrationReport> SimOpt::Report() {

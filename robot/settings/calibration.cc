@@ -18,6 +18,7 @@ CalibrationSettings ReadCalibration(Config config) {
   s.min_temperature = config.Number("min_temperature", kSanePositive);
   s.horizons = config.Integers("horizons", {1, 10000});
   if (s.horizons.empty()) config.Fail("horizons", "is empty");
+  s.residual = config.Boolean("residual", true);
   s.duration = config.Number("duration", {0, 1e6}, 0);
   config.Finish();
   return s;

@@ -13,6 +13,8 @@ struct CalibrationSettings {
   int samples, updates;
   double kl, min_temperature;
   std::vector<int> horizons;
+  /// What the simulator lacks is learnt where the alarm speaks: calibrator/gap/gap.h
+  bool residual = true;
   double duration = 0;  ///< [s] >= 0 that a calibration takes in virtual time
 };
 
