@@ -43,7 +43,7 @@ class Acceptance {
   struct Decision {
     int challenger = -1, incumbent = -1;  ///< iterations; the incumbent of before
     bool accepted = false;
-    double probability = 0;  ///< that the challenger returns more
+    double probability = 0;                              ///< that the challenger returns more
     double challenger_return = 0, incumbent_return = 0;  ///< of an episode, means
   };
   /// Makes the challenger the incumbent if it returns more with probability kSure.

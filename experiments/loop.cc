@@ -105,10 +105,11 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
     if (!settings.accept) deployed = trainer->policy(), deployed_iteration = iteration;
     const Judgement judged = judge(deployed);
     const bool newest = deployed_iteration == iteration;
-    result.rows.push_back(
-        {iteration, judged.mean, judged.worst, newest ? judged.mean : judge(trainer->policy()).mean,
-         deployed_iteration, trainer->EvaluateHeldOut(sample, settings.evaluation_episodes).mean,
-         discrepancy, distribution.residual != nullptr, transitions, seconds, distribution.Mean(), distribution.Sd()});
+    result.rows.push_back({iteration, judged.mean, judged.worst,
+                           newest ? judged.mean : judge(trainer->policy()).mean, deployed_iteration,
+                           trainer->EvaluateHeldOut(sample, settings.evaluation_episodes).mean,
+                           discrepancy, distribution.residual != nullptr, transitions, seconds,
+                           distribution.Mean(), distribution.Sd()});
     if (iteration == settings.iterations) break;
     if (simopt || settings.accept) {
       const int steps = settings.steps_per_iteration;

@@ -18,8 +18,7 @@ std::shared_ptr<const Residual> RandomForces(const RobotDescription& robot, doub
   const Eigen::Index d = ResidualInputCount(robot), n = robot.num_velocities();
   // The velocities that a torque for one step gives, in the state of rest.
   Simulator simulator(robot);
-  const Eigen::MatrixXd inverse =
-      Inverse(simulator.MassMatrix());
+  const Eigen::MatrixXd inverse = Inverse(simulator.MassMatrix());
   Eigen::MatrixXd push = Eigen::MatrixXd::Zero(n, n);
   const std::vector<int> driven = robot.driven();
   const Eigen::VectorXd limits = robot.effort_limits();

@@ -162,8 +162,7 @@ std::vector<double> Column(const Options& options, const Gap& gap, const Method&
                            const Results& results, int iteration, size_t column) {
   std::vector<double> values;
   for (int run = options.first_run; run < options.first_run + options.runs; ++run)
-    values.push_back(
-        results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column]);
+    values.push_back(results.Of(KeyOf(gap, method, run))[static_cast<size_t>(iteration)][column]);
   std::sort(values.begin(), values.end());
   return values;
 }

@@ -57,10 +57,8 @@ ResidualFunction FromMessage(const Message& m, size_t draws) {
   require(m.num_waves > 0 && m.num_waves <= kMost, "num_waves");
   const auto d = static_cast<size_t>(m.num_inputs), n = static_cast<size_t>(m.num_outputs),
              w = static_cast<size_t>(m.num_waves), each = n * (1 + d + w);
-  for (const auto& [field, values] : {std::pair{"mean", &m.mean},
-                                      {"scale", &m.scale},
-                                      {"low", &m.low},
-                                      {"high", &m.high}}) {
+  for (const auto& [field, values] :
+       {std::pair{"mean", &m.mean}, {"scale", &m.scale}, {"low", &m.low}, {"high", &m.high}}) {
     require(values->size() == d, field);
   }
   require(m.frequency.size() == w * d, "frequency");
@@ -105,8 +103,8 @@ std::shared_ptr<const Residual> ReadResidual(const parameter_distribution_t& mes
     throw std::invalid_argument("residual: draw of the wrong size");
   auto residual = std::make_shared<Residual>();
   for (size_t i = 0; i < message.draw.size(); i += parameters) {
-    residual->coordinates.push_back(Eigen::VectorXd::Map(
-        message.draw.data() + i, static_cast<Eigen::Index>(parameters)));
+    residual->coordinates.push_back(
+        Eigen::VectorXd::Map(message.draw.data() + i, static_cast<Eigen::Index>(parameters)));
   }
   for (const Message& m : message.residual) {
     if (m.condition != Message::FREE && m.condition != Message::TOUCHING)

@@ -16,7 +16,8 @@ void RequireResidualOf(const RobotDescription& robot, const Residual& residual) 
   for (const auto* part : {&residual.free, &residual.touching}) {
     if (*part && ((*part)->inputs() != ResidualInputCount(robot) ||
                   (*part)->outputs() != robot.num_velocities()))
-      throw std::invalid_argument("the residual is another robot's: it has other inputs or outputs");
+      throw std::invalid_argument(
+          "the residual is another robot's: it has other inputs or outputs");
   }
   for (const Eigen::VectorXd& draw : residual.coordinates) {
     if (draw.size() != static_cast<Eigen::Index>(robot.parameters.size()))

@@ -60,8 +60,8 @@ Misspecification TestModel(const MethodInput& input, const MethodResult& result,
       std::vector<bool>(static_cast<size_t>(view.noise_sd.size()), view.noise_known),
       candidates,
       {}};
-  residuals.columns = CandidateColumns(
-      [&](const Eigen::MatrixXd& x) { return errors.Whitened(x); }, physical, candidates);
+  residuals.columns = CandidateColumns([&](const Eigen::MatrixXd& x) { return errors.Whitened(x); },
+                                       physical, candidates);
   // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of it,
   // as the errors are.
   if (view.noise_known) {

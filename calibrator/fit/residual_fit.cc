@@ -17,7 +17,7 @@ namespace {
 constexpr uint32_t kFeatureStream = 0x5265'7346, kDrawStream = 0x5265'7344;  // "ResF", "ResD"
 constexpr double kLengths[] = {2, 4, 8};  // in units of the inputs' sd
 constexpr double kBoundOfSeen = 2;
-constexpr double kStill = 1e-9;        // an input's sd below which it does not move
+constexpr double kStill = 1e-9;         // an input's sd below which it does not move
 constexpr double kLeastFreedom = 1e-3;  // 1 - leverage of a transition
 
 // One-step errors of a condition, a column for each transition.
@@ -141,8 +141,8 @@ ResidualFunction ChooseFeatures(const Eigen::MatrixXd& inputs, const Eigen::Matr
   function.scale = (inputs.colwise() - function.mean).rowwise().norm() /
                    std::sqrt(static_cast<double>(inputs.cols()));
   function.scale = (function.scale.array() > kStill).select(function.scale, 1.0);
-  const Eigen::MatrixXd z = function.scale.cwiseInverse().asDiagonal() *
-                            (inputs.colwise() - function.mean).eval();
+  const Eigen::MatrixXd z =
+      function.scale.cwiseInverse().asDiagonal() * (inputs.colwise() - function.mean).eval();
   function.low = z.rowwise().minCoeff(), function.high = z.rowwise().maxCoeff();
   Eigen::MatrixXd unit(m, d);
   for (Eigen::Index i = 0; i < m; ++i)
@@ -187,8 +187,7 @@ Eigen::MatrixXd LeftOut(const Regression& r, const Eigen::MatrixXd& features,
         (inverse * r.projected.col(k).array()).matrix().transpose() * rotated;
     const Eigen::RowVectorXd leverage =
         (rotated.array().square().colwise() * inverse).colwise().sum();
-    left_out.row(k) =
-        (errors.row(k) - fitted).array() / (1 - leverage.array()).max(kLeastFreedom);
+    left_out.row(k) = (errors.row(k) - fitted).array() / (1 - leverage.array()).max(kLeastFreedom);
   }
   return left_out;
 }

@@ -25,10 +25,10 @@ struct ResidualFitOptions {
 /// A condition's fit in numbers, each of n entries, of velocities.
 struct ResidualQuality {
   int transitions = 0;
-  Eigen::VectorXd before;  ///< rms error of one step without the residual [rad/s or m/s]
-  Eigen::VectorXd after;   ///< with it, each transition predicted by the others (leave-one-out)
-  Eigen::VectorXd claimed; ///< that readings alone would make
-  double length = 0;       ///< of the features, in units of the inputs' sd
+  Eigen::VectorXd before;   ///< rms error of one step without the residual [rad/s or m/s]
+  Eigen::VectorXd after;    ///< with it, each transition predicted by the others (leave-one-out)
+  Eigen::VectorXd claimed;  ///< that readings alone would make
+  double length = 0;        ///< of the features, in units of the inputs' sd
 };
 
 struct ResidualFit {

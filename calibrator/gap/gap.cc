@@ -37,7 +37,8 @@ std::vector<Rollout> FreeOnly(const RobotDescription& robot, std::span<const Rol
 // Mean share of a velocity's squared errors that a residual explains, left-out transitions judging.
 double Explained(const ResidualQuality& quality) {
   if (quality.before.size() == 0) return 0;
-  const Eigen::ArrayXd before = quality.before.array().square(), after = quality.after.array().square();
+  const Eigen::ArrayXd before = quality.before.array().square(),
+                       after = quality.after.array().square();
   return (1 - after / before.max(1e-300)).max(0).mean();
 }
 

@@ -188,8 +188,8 @@ class SimbodyBackend::Impl {
   std::vector<JointDescription> joints_;
   std::vector<SimTK::Force> contacts_;
   VectorXd armature_;
-  double step_ = kLongestStep;     // [s] that the error allows
-  bool known_ = false;  // whether acceleration_ is that at q_, v_ under effort_
+  double step_ = kLongestStep;  // [s] that the error allows
+  bool known_ = false;          // whether acceleration_ is that at q_, v_ under effort_
   VectorXd effort_, acceleration_;
   // Work space: q_, v_ are the state.
   mutable SimTK::State state_;

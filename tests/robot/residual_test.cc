@@ -104,20 +104,20 @@ TEST_CASE("a residual that is none is refused by its field") {
     std::function<void(parameter_distribution_t&)> spoil;
     const char* field;
   };
-  const auto field = GENERATE(
-      values<Wrong>({{[](auto& m) { m.residual[0].weight.pop_back(); }, "weight"},
-                     {[](auto& m) { m.residual[0].weight[3] = NAN; }, "weights"},
-                     {[](auto& m) { m.residual[0].frequency.push_back(1); }, "frequency"},
-                     {[](auto& m) { m.residual[0].scale[0] = 0; }, "scale"},
-                     {[](auto& m) { m.residual[0].noise[0] = INFINITY; }, "noise"},
-                     {[](auto& m) { m.residual[0].bound[0] = -1; }, "bound"},
-                     {[](auto& m) { m.residual[0].num_inputs = -1; }, "num_inputs"},
-                     {[](auto& m) { m.residual[0].num_waves = 1 << 30; }, "num_waves"},
-                     {[](auto& m) { m.residual[0].condition = 2; }, "condition"},
-                     {[](auto& m) { m.residual.push_back(m.residual[0]); }, "two of one"},
-                     {[](auto& m) { m.draw.clear(); }, "draw"},
-                     {[](auto& m) { m.draw[0] = NAN; }, "draw"},
-                     {[](auto& m) { m.residual_margin = -1; }, "margin"}}));
+  const auto field =
+      GENERATE(values<Wrong>({{[](auto& m) { m.residual[0].weight.pop_back(); }, "weight"},
+                              {[](auto& m) { m.residual[0].weight[3] = NAN; }, "weights"},
+                              {[](auto& m) { m.residual[0].frequency.push_back(1); }, "frequency"},
+                              {[](auto& m) { m.residual[0].scale[0] = 0; }, "scale"},
+                              {[](auto& m) { m.residual[0].noise[0] = INFINITY; }, "noise"},
+                              {[](auto& m) { m.residual[0].bound[0] = -1; }, "bound"},
+                              {[](auto& m) { m.residual[0].num_inputs = -1; }, "num_inputs"},
+                              {[](auto& m) { m.residual[0].num_waves = 1 << 30; }, "num_waves"},
+                              {[](auto& m) { m.residual[0].condition = 2; }, "condition"},
+                              {[](auto& m) { m.residual.push_back(m.residual[0]); }, "two of one"},
+                              {[](auto& m) { m.draw.clear(); }, "draw"},
+                              {[](auto& m) { m.draw[0] = NAN; }, "draw"},
+                              {[](auto& m) { m.residual_margin = -1; }, "margin"}}));
   parameter_distribution_t message{};
   message.num_parameters = 1;
   WriteResidual(TwoDraws(), &message);

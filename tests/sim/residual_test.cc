@@ -25,7 +25,8 @@ ResidualFunction Constant(const RobotDescription& robot, const Eigen::VectorXd& 
 
 std::shared_ptr<Residual> Of(const RobotDescription& robot) {
   auto residual = std::make_shared<Residual>();
-  residual->coordinates = {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.parameters.size()))};
+  residual->coordinates = {
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.parameters.size()))};
   return residual;
 }
 
@@ -89,9 +90,9 @@ TEST_CASE("free and touching steps have residuals of their own") {
     plain.Step(action), corrected.Step(action);
     return corrected.v()[0] - plain.v()[0];
   };
-  CHECK(change(2, -1) == 0);                             // in the air
-  CHECK(change(1.0, -0.1) == Approx(0.25));              // on the ground
-  CHECK(change(2, -0.001) == Approx(0.25));              // at the knee's stop
+  CHECK(change(2, -1) == 0);                 // in the air
+  CHECK(change(1.0, -0.1) == Approx(0.25));  // on the ground
+  CHECK(change(2, -0.001) == Approx(0.25));  // at the knee's stop
   CHECK(change(2, -0.1) == 0);
 }
 
@@ -123,7 +124,8 @@ TEST_CASE("the inputs are observation, efforts of two steps, and what constraint
 }
 
 TEST_CASE("a residual of another robot is refused") {
-  const RobotDescription hopper = LoadRobot(SourceFile("robots/hopper/gym.toml")), pendulum = LoadPendulum("robot.toml");
+  const RobotDescription hopper = LoadRobot(SourceFile("robots/hopper/gym.toml")),
+                         pendulum = LoadPendulum("robot.toml");
   const auto residual = Of(pendulum);
   residual->free = Constant(pendulum, Eigen::VectorXd::Constant(1, 0.125));
   Environment environment(hopper);
