@@ -19,7 +19,7 @@ struct GapFit {
   /// learnt from all transitions; null where there is no alarm, or too little to learn from
   std::shared_ptr<const Residual> residual;
   ResidualQuality free_quality, touching_quality;  ///< of the residual's functions
-  std::string summary;                             ///< in words, for people
+  std::string summary;                             ///< for people; empty where nothing is lacking
   int64_t simulated_steps = 0;                     ///< beyond the result's own
 };
 

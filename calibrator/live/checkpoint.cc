@@ -9,13 +9,15 @@
 #include <stdexcept>
 
 #include "common/atomic_file.h"
+#include "robot/parameter_distribution.h"
 
 namespace plumb {
 namespace {
 
 using nlohmann::json;
 
-constexpr int kVersion = 3;  // 2: without the method used, its warnings and a search's samples
+// 2: without the method used, its warnings and a search's samples; 3: without a residual
+constexpr int kVersion = 4;
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -142,6 +144,27 @@ json ReadJson(const std::filesystem::path& file) {
 
 std::string RolloutFile(size_t index) { return fmt::format("rollout_{}.json", index); }
 
+// As the message that carries it, byte for byte.
+json ToJson(const std::shared_ptr<const Residual>& residual, const RobotDescription& robot) {
+  if (!residual) return nullptr;
+  ParameterDistribution distribution = ParameterDistribution::Prior(robot);
+  distribution.residual = residual;
+  const parameter_distribution_t message = distribution.ToMessage();
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+std::shared_ptr<const Residual> ResidualFrom(const json& j, const RobotDescription& robot) {
+  if (j.is_null()) return nullptr;
+  const auto bytes = j.get<std::vector<uint8_t>>();
+  parameter_distribution_t message;
+  if (message.decode(bytes.data(), 0, static_cast<int>(bytes.size())) !=
+      static_cast<int>(bytes.size()))
+    throw std::runtime_error("residual: is not one");
+  return ParameterDistribution::FromMessage(message, robot).residual;
+}
+
 }  // namespace
 
 std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
@@ -159,7 +182,7 @@ std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
 
 CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
                                              const RobotDescription& robot, uint64_t seed)
-    : folder_(std::move(folder)), robot_(robot.name), seed_(seed), fingerprint_(robot.fingerprint) {
+    : folder_(std::move(folder)), robot_(robot), seed_(seed) {
   for (const ParameterDescription& p : robot.parameters) parameters_.push_back(p.name);
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
@@ -172,10 +195,10 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                     ToJson(state.rollouts[saved_rollouts_]).dump());
   }
   const json j{{"version", kVersion},
-               {"robot", robot_},
+               {"robot", robot_.name},
                {"parameters", parameters_},
                {"seed", seed_},
-               {"fingerprint", fingerprint_},
+               {"fingerprint", robot_.fingerprint},
                {"iteration", state.iteration},
                {"update", state.search.update},
                {"distribution", ToJson(state.distribution)},
@@ -186,6 +209,9 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"temperature", state.temperature},
                {"search", ToJson(state.search)},
                {"warnings", state.warnings},
+               {"residual", ToJson(state.residual, robot_)},
+               {"alarm", state.alarm},
+               {"gap", state.gap},
                {"rollouts_per_iteration", state.rollouts_per_iteration}};
   WriteAtomically(folder_ / "calibration.json", j.dump(1));
 }
@@ -196,10 +222,10 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
   try {
     const json j = ReadJson(file);
     if (j.at("version") != kVersion) throw std::runtime_error("is of another version");
-    if (j.at("robot") != robot_ || j.at("parameters") != parameters_)
+    if (j.at("robot") != robot_.name || j.at("parameters") != parameters_)
       throw std::runtime_error("is another robot's");
     if (j.at("seed") != seed_) throw std::runtime_error("has another seed; choose another folder");
-    if (j.at("fingerprint") != fingerprint_) {
+    if (j.at("fingerprint") != robot_.fingerprint) {
       throw std::runtime_error(
           "was made with another robot.toml or robot.urdf; choose another folder");
     }
@@ -217,6 +243,8 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
                     .ess = state.ess};
     ReadSamples(j.at("search"), &state.search);
     state.warnings = j.at("warnings").get<std::vector<std::string>>();
+    state.residual = ResidualFrom(j.at("residual"), robot_);
+    state.alarm = j.at("alarm"), state.gap = j.at("gap");
     state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
     size_t count = 0;
     for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);

@@ -23,8 +23,9 @@ class CalibrationCheckpoint {
 
  private:
   std::filesystem::path folder_;
-  std::string robot_;
+  RobotDescription robot_;
   std::vector<std::string> parameters_;
+  uint64_t seed_;
   uint64_t seed_, fingerprint_;
   size_t saved_rollouts_ = 0;
 };

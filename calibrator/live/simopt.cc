@@ -148,7 +148,7 @@ void SimOpt::Infer() {
     const GapFit gap = RunFromWhereItIs();
     const MethodResult& result = gap.result;
     state_.residual = gap.residual;
-    alarm_ = gap.alarm.summary, gap_ = gap.summary;
+    state_.alarm = gap.alarm.summary, state_.gap = gap.summary;
     state_.kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
     state_.ess = result.ess;
     state_.temperature = 1;
@@ -217,7 +217,7 @@ std::optional<CalibrationReport> SimOpt::Report() {
   report.failures = discrepancy_.failures();
   report.failures.diverged += failures_;
   report.warnings = state_.warnings;
-  report.alarm = alarm_, report.gap = gap_;
+  report.alarm = state_.alarm, report.gap = state_.gap;
   return report;
 }
 

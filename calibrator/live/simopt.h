@@ -55,8 +55,7 @@ struct CalibrationReport {
   std::vector<PredictionErrors> errors;
   Identifiability identifiability;
   std::vector<std::string> warnings;  ///< of the method
-  /// whether the model explains what was recorded, and what was done about it; empty = not looked at
-  std::string alarm, gap;
+  std::string alarm, gap;             ///< see SimOpt::State
 };
 
 /// States (q, v) in which the newest roll-outs have begun on the robot, kMostStarts of them.
@@ -84,6 +83,9 @@ class SimOpt {
     std::string used = "prior";
     /// that its simulators lack; null = nothing, or nothing is known of it
     std::shared_ptr<const Residual> residual;
+    /// whether the model explains what was recorded, and what was done about it; empty = not looked
+    /// at, or nothing
+    std::string alarm, gap;
     GaussianMixture before;  ///< distribution at the beginning of the running iteration
     /// of the running iteration, else of the last one; without a search its update counts all the
     /// same
@@ -136,7 +138,6 @@ class SimOpt {
   Gaussian prior_;
   State state_;
   Discrepancy discrepancy_;
-  std::string alarm_, gap_;  // of the last update
   int64_t failures_ = 0;     // simulations of RunMethod that have failed
 };
 
