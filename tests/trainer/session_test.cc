@@ -27,6 +27,7 @@ RobotDescription Robot() {
                       {"length/pole", "m", log, 1, .03}};
   robot.joints.resize(1);
   robot.joints[0].effort_limit = 2;
+  robot.task.name = "pendulum";
   robot.task.steps = 200;
   robot.training = PendulumSettings();
   robot.training.batch = 800;
