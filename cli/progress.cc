@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "controller/acceptance.h"
 #include "plumb/policy_t.hpp"
 
 namespace plumb {
@@ -62,12 +63,20 @@ size_t Width(const ParameterDescription& parameter) {
   return std::max<size_t>(20, Title(parameter).size() + 2);
 }
 
+// Of a whole episode. A roll-out that is to calibrate with begins with a trial, which tells.
+double RobotReturn(const RobotDescription& robot, const controller_status_t& status) {
+  const bool tried = status.purpose == policy_t::CALIBRATE && robot.training.trial > 0;
+  if (!tried || status.num_episodes < 2) return Mean(status.returns);
+  const Trial trial{status.steps[0], status.returns[0], status.late_rate[0], status.fell[0] != 0};
+  return trial.WholeReturn(robot.task.steps);
+}
+
 }  // namespace
 
 void Progress::OnController(const controller_status_t& status) {
   controller_ = status;
   if (status.phase != controller_status_t::COMPLETE) return;
-  robot_return_[status.policy_iteration] = Mean(status.returns);
+  robot_return_[status.policy_iteration] = RobotReturn(robot_, status);
   if (status.purpose == policy_t::EVALUATE && status.policy_iteration == iterations_) {
     evaluation_ = status.returns;
     finished_ = true;
@@ -77,6 +86,13 @@ void Progress::OnController(const controller_status_t& status) {
 void Progress::OnTraining(const training_status_t& status) {
   training_ = status;
   if (status.complete) simulated_return_[status.iteration] = status.evaluation_return;
+  if (status.decision.empty() || status.challenger < 0 || status.challenger > iterations_ ||
+      decisions_.contains(status.challenger))
+    return;
+  decisions_[status.challenger] = {status.decision, status.incumbent == status.challenger,
+                                   status.probability, status.challenger_return,
+                                   status.incumbent_return};
+  decided_.push_back("      " + status.decision);
 }
 
 void Progress::OnCalibration(const calibration_status_t& status) {
@@ -138,7 +154,19 @@ std::string Progress::Row(const Iteration& iteration) const {
 std::vector<std::string> Progress::TakeRows() {
   std::vector<std::string> rows;
   for (; taken_ < done_.size(); ++taken_) rows.push_back(Row(done_[taken_]));
+  rows.insert(rows.end(), decided_.begin(), decided_.end());
+  decided_.clear();
   return rows;
+}
+
+// Why the policy that runs does: its own decision, and the last one where that was another's.
+std::string Progress::Why() const {
+  std::string why;
+  const auto own = decisions_.find(training_.incumbent);
+  if (own != decisions_.end()) why = own->second.text;
+  if (training_.challenger != training_.incumbent && !training_.decision.empty())
+    why += (why.empty() ? "" : "; ") + training_.decision;
+  return why;
 }
 
 std::string Progress::StatusLine(double seconds) const {
@@ -158,9 +186,11 @@ std::string Progress::StatusLine(double seconds) const {
       break;
   }
   if (training_.updates > 0 && !training_.complete) {
-    return line + fmt::format("  training policy {}: update {}/{}, return {:.0f}, {:.0f} k steps",
-                              training_.iteration, training_.update, training_.updates,
-                              training_.mean_return, static_cast<double>(training_.steps) / 1000);
+    line += fmt::format("  training policy {}: update {}/{}, return {:.0f}, {:.0f} k steps",
+                        training_.iteration, training_.update, training_.updates,
+                        training_.mean_return, static_cast<double>(training_.steps) / 1000);
+    if (training_.incumbent >= 0) line += fmt::format("; policy {} runs", training_.incumbent);
+    return line;
   }
   if (c.phase == controller_status_t::COMPLETE) return line + "  calibrating";
   return line + "  waiting" + (c.reason.empty() ? "" : ": " + c.reason);
@@ -206,6 +236,10 @@ std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
            truth.size() > 0 ? truth(static_cast<Eigen::Index>(i)) : NAN);
     }
     text += c.identifiability + ".\n";
+  }
+  if (const std::string why = Why(); !why.empty()) {
+    text += fmt::format("policy {} runs since iteration {}: {}\n", training_.incumbent,
+                        training_.incumbent_since, why);
   }
   if (!evaluation_.empty()) {
     text += fmt::format(
@@ -261,6 +295,18 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
                                      {"seconds", iteration.seconds}});
   }
   if (!done_.empty()) summary["identifiability"] = done_.back().calibration.identifiability;
+  summary["policy"] = {{"iteration", training_.incumbent},
+                       {"since", training_.incumbent_since},
+                       {"why", Why()}};
+  summary["decisions"] = json::array();
+  for (const auto& [challenger, decision] : decisions_) {
+    summary["decisions"].push_back({{"policy", challenger},
+                                    {"accepted", decision.accepted},
+                                    {"probability", decision.probability},
+                                    {"return", decision.challenger_return},
+                                    {"incumbent_return", decision.incumbent_return},
+                                    {"summary", decision.text}});
+  }
   summary["evaluation_returns"] = evaluation_;
   summary["seconds"] = {{"robot", spent_.robot},
                         {"training", spent_.training},

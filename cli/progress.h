@@ -19,7 +19,9 @@ namespace plumb {
 class Progress {
  public:
   Progress(const RobotDescription& robot, int iterations)
-      : robot_(robot), iterations_(iterations) {}
+      : robot_(robot), iterations_(iterations) {
+    training_.incumbent = training_.incumbent_since = training_.challenger = -1;
+  }
 
   void OnDriver(const driver_status_t& status) { driver_ = status; }
   void OnController(const controller_status_t& status);
@@ -30,7 +32,8 @@ class Progress {
   void Account(double seconds, double real_seconds);
 
   const driver_status_t& driver() const { return driver_; }
-  /// Table rows that have become complete since the last call.
+  /// Table rows that have become complete since the last call, and below them what has been decided
+  /// on the policies that they rest on.
   std::vector<std::string> TakeRows();
   std::string Header() const;
   std::string StatusLine(double seconds) const;
@@ -48,6 +51,12 @@ class Progress {
     calibration_status_t calibration;
     double simulated_return, robot_return, seconds;
   };
+  struct Decision {
+    std::string text;
+    bool accepted;
+    double probability, challenger_return, incumbent_return;
+  };
+  std::string Why() const;
   std::string Row(const Iteration& iteration) const;
   /// The true value of an iteration's determined combination: which there are, and in which order,
   /// is each iteration's.
@@ -62,6 +71,8 @@ class Progress {
   std::map<int, double> simulated_return_, robot_return_;  // by policy iteration
   std::vector<Iteration> done_;
   size_t taken_ = 0;
+  std::map<int, Decision> decisions_;  // by challenger
+  std::vector<std::string> decided_;   // to be taken
   std::vector<double> evaluation_;
   bool finished_ = false;
   /// [s] spent on what, by one clock.

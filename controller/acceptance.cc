@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 
@@ -26,6 +27,10 @@ void Trial::Add(double reward, int planned) {
   ++steps;
   const int late = steps - planned / 2;
   if (late > 0) late_rate += (reward - late_rate) / late;
+}
+
+double Trial::WholeReturn(int episode_steps) const {
+  return sum_of_rewards + (fell ? 0 : late_rate * (episode_steps - steps));
 }
 
 void Acceptance::Add(int iteration, const Trial& trial) {
@@ -70,14 +75,19 @@ double Acceptance::MeanReturn(int iteration) const {
   return std::accumulate(returns.begin(), returns.end(), 0.0) / kDraws;
 }
 
-Acceptance::Decision Acceptance::Decide(int challenger) {
+double Acceptance::Better(int challenger) const {
   const std::vector<double> theirs = Returns(challenger), ours = Returns(incumbent_);
   int better = 0;
   for (size_t i = 0; i < theirs.size(); ++i) better += theirs[i] > ours[i];
+  return static_cast<double>(better) / kDraws;
+}
+
+Acceptance::Decision Acceptance::Decide(int challenger) {
   Decision decision{challenger,
                     incumbent_,
                     false,
-                    static_cast<double>(better) / kDraws,
+                    false,
+                    Better(challenger),
                     MeanReturn(challenger),
                     MeanReturn(incumbent_)};
   decision.accepted = challenger != incumbent_ && decision.probability >= kSure;
@@ -86,18 +96,30 @@ Acceptance::Decision Acceptance::Decide(int challenger) {
 }
 
 Acceptance::Decision Acceptance::Trust(int challenger) {
-  Decision decision = Decide(challenger);
-  decision.accepted = true;
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  const auto tried = [&](int iteration) { return trials_.contains(iteration); };
+  Decision decision{challenger, incumbent_, true, true, kUnknown, kUnknown, kUnknown};
+  if (tried(challenger)) decision.challenger_return = MeanReturn(challenger);
+  if (tried(incumbent_)) decision.incumbent_return = MeanReturn(incumbent_);
+  if (tried(challenger) && tried(incumbent_)) decision.probability = Better(challenger);
   incumbent_ = challenger;
   return decision;
 }
 
 std::string Summary(const Acceptance::Decision& d) {
-  if (d.challenger == d.incumbent)
-    return fmt::format("policy {} is the first ({:.4g})", d.challenger, d.challenger_return);
-  return fmt::format("policy {} {} ({:.4g}; incumbent {}: {:.4g}; better with {:.0f} %)",
-                     d.challenger, d.accepted ? "accepted" : "not accepted", d.challenger_return,
-                     d.incumbent, d.incumbent_return, 100 * d.probability);
+  const bool first = d.incumbent < 0 || d.challenger == d.incumbent;
+  std::string text = fmt::format("policy {} {}", d.challenger,
+                                 first        ? "is the first"
+                                 : d.trusted  ? "trusted: the model explains the robot"
+                                 : d.accepted ? "accepted"
+                                              : "not accepted");
+  if (!std::isfinite(d.challenger_return)) return text;
+  text += fmt::format(" ({:.4g}", d.challenger_return);
+  if (!first && std::isfinite(d.incumbent_return)) {
+    text += fmt::format("; incumbent {}: {:.4g}; better with {:.0f} %", d.incumbent,
+                        d.incumbent_return, 100 * d.probability);
+  }
+  return text + ")";
 }
 
 }  // namespace plumb

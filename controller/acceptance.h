@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumb {
@@ -16,6 +17,8 @@ struct Trial {
 
   /// Adds a control step's reward. @param planned steps of the whole trial, >= 1.
   void Add(double reward, int planned);
+  /// What it would have been over a whole episode at its late rate. @param episode_steps >= steps
+  double WholeReturn(int episode_steps) const;
 };
 
 /// Which of several policies a robot is to be run with: the incumbent, and challengers one after
@@ -35,6 +38,9 @@ class Acceptance {
  public:
   /// @param steps_per_episode T >= 1
   explicit Acceptance(int steps_per_episode) : steps_(steps_per_episode) {}
+  /// Goes on where another one stood. @param trials by policy.
+  Acceptance(int steps_per_episode, std::map<int, std::vector<Trial>> trials, int incumbent)
+      : steps_(steps_per_episode), incumbent_(incumbent), trials_(std::move(trials)) {}
 
   /// A policy's trial. @param iteration names the policy. The first one is the incumbent.
   void Add(int iteration, const Trial& trial);
@@ -42,15 +48,16 @@ class Acceptance {
   /// How the latest challenger has done.
   struct Decision {
     int challenger = -1, incumbent = -1;  ///< iterations; the incumbent of before
-    bool accepted = false;
-    double probability = 0;                              ///< that the challenger returns more
-    double challenger_return = 0, incumbent_return = 0;  ///< of an episode, means
+    bool accepted = false, trusted = false;
+    double probability = 0;  ///< that the challenger returns more
+    /// of an episode, means; with the probability NaN where there has been no trial
+    double challenger_return = 0, incumbent_return = 0;
   };
   /// Makes the challenger the incumbent if it returns more with probability kSure.
   /// @throws std::invalid_argument if it has had no trial.
   Decision Decide(int challenger);
   /// Makes it the incumbent whatever the trials say: where the model explains the robot, training
-  /// on it is the better judge.
+  /// on it is the better judge. It need not have had a trial.
   Decision Trust(int challenger);
 
   /// -1 = none yet.
@@ -64,13 +71,14 @@ class Acceptance {
 
  private:
   std::vector<double> Returns(int iteration) const;
+  double Better(int challenger) const;
 
   int steps_;
   int incumbent_ = -1;
   std::map<int, std::vector<Trial>> trials_;  // by policy
 };
 
-/// "policy 3 accepted (2951, incumbent 0: 1846; better with 98 %)". Thread-safe.
+/// "policy 3 accepted (2951; incumbent 0: 1846; better with 98 %)". Thread-safe.
 std::string Summary(const Acceptance::Decision& decision);
 
 }  // namespace plumb

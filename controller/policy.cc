@@ -106,7 +106,7 @@ GaussianPolicy GaussianPolicy::FromMessage(const policy_t& message) {
 policy_t GaussianPolicy::ToMessage() const {
   policy_t message;
   message.utime = 0;
-  message.iteration = 0;
+  message.iteration = message.trained_in = 0;
   message.purpose = policy_t::CALIBRATE;
   message.episodes = 0;
   message.trial_steps = 0;

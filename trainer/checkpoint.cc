@@ -22,7 +22,7 @@ namespace {
 // File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a
 // checkpoint stays where it was written.
 constexpr char kMagic[8] = {'P', 'L', 'U', 'M', 'B', 'T', 'R', 'N'};
-constexpr uint32_t kVersion = 3;
+constexpr uint32_t kVersion = 4;  // 3: without trials on the robot
 constexpr size_t kHeader = sizeof kMagic + 2 * sizeof(uint32_t);
 
 class Writer {
@@ -36,6 +36,10 @@ class Writer {
   void operator()(const Eigen::VectorX<Number>& values) {
     (*this)(static_cast<uint64_t>(values.size()));
     Append(values.data(), static_cast<size_t>(values.size()) * sizeof(Number));
+  }
+  template <class Element>
+  void Size(const std::vector<Element>& elements) {
+    (*this)(static_cast<uint64_t>(elements.size()));
   }
   template <class Message>
   void EncodedMessage(const Message& message) {
@@ -68,6 +72,10 @@ class Reader {
     const size_t count = Count(sizeof(Number));
     values.resize(static_cast<Eigen::Index>(count));
     std::memcpy(values.data(), Take(count * sizeof(Number)), count * sizeof(Number));
+  }
+  template <class Element>
+  void Size(std::vector<Element>& elements) {
+    elements.resize(Count(1));
   }
   template <class Message>
   void EncodedMessage(Message& message) {
@@ -106,6 +114,28 @@ void Transfer(Archive& archive, C& critic) {
   archive(critic.targets.squares);
 }
 
+template <class Archive, class C>
+requires std::same_as<std::remove_const_t<C>, TriedPolicy>
+void Transfer(Archive& archive, C& tried) {
+  archive(tried.iteration);
+  archive(tried.trial.steps);
+  archive(tried.trial.sum_of_rewards);
+  archive(tried.trial.late_rate);
+  archive(tried.trial.fell);
+}
+
+template <class Archive, class C>
+requires std::same_as<std::remove_const_t<C>, Acceptance::Decision>
+void Transfer(Archive& archive, C& decision) {
+  archive(decision.challenger);
+  archive(decision.incumbent);
+  archive(decision.accepted);
+  archive(decision.trusted);
+  archive(decision.probability);
+  archive(decision.challenger_return);
+  archive(decision.incumbent_return);
+}
+
 /// The one list of what is in the file, for writing and reading.
 template <class Archive, class C>
 requires std::same_as<std::remove_const_t<C>, Checkpoint>
@@ -130,6 +160,12 @@ void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.observations.count);
   archive(checkpoint.observations.mean);
   archive(checkpoint.observations.squares);
+  archive.Size(checkpoint.trials);
+  for (auto& tried : checkpoint.trials) Transfer(archive, tried);
+  Transfer(archive, checkpoint.decision);
+  archive(checkpoint.incumbent);
+  archive(checkpoint.incumbent_since);
+  if (checkpoint.incumbent >= 0) archive.EncodedMessage(checkpoint.incumbent_policy);
   archive(checkpoint.judged);
   if (!checkpoint.judged) return;
   archive.EncodedMessage(checkpoint.best_policy);
@@ -145,6 +181,10 @@ uint32_t Crc(const char* data, size_t size) {
 }
 
 }  // namespace
+
+const policy_t& DeployedPolicy(const Checkpoint& checkpoint) {
+  return checkpoint.incumbent >= 0 ? checkpoint.incumbent_policy : checkpoint.policy;
+}
 
 TrainerState TrainerStateOf(const Checkpoint& checkpoint) {
   TrainerState state{GaussianPolicy::FromMessage(checkpoint.policy),

@@ -5,7 +5,9 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "controller/acceptance.h"
 #include "plumb/parameter_distribution_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "trainer/critic.h"
@@ -18,6 +20,12 @@ namespace plumb {
 /// names the file.
 struct CheckpointError : std::runtime_error {
   using std::runtime_error::runtime_error;
+};
+
+/// What a policy did in a trial on the robot.
+struct TriedPolicy {
+  int32_t iteration = 0;  ///< names it
+  Trial trial;
 };
 
 /// The state of training. Everything that shapes its future is here, so that a resumed run gives
@@ -42,7 +50,16 @@ struct Checkpoint {
   CriticState best_critic;
   int64_t best_updates = 0;
   double best_return = 0;
+  /// See TrainingSession: the trials, the last choice (challenger -1: none), the iteration in which
+  /// the incumbent was chosen and, if there is an incumbent, its policy.
+  std::vector<TriedPolicy> trials;
+  Acceptance::Decision decision;
+  int32_t incumbent = -1, incumbent_since = -1;
+  policy_t incumbent_policy;
 };
+
+/// The policy that the robot is to be run with: the incumbent's, else the newest. Thread-safe.
+const policy_t& DeployedPolicy(const Checkpoint& checkpoint);
 
 /// What a checkpoint has of the trainer. @throws std::invalid_argument if a policy is none.
 TrainerState TrainerStateOf(const Checkpoint& checkpoint);

@@ -3,9 +3,11 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "common/process.h"
 #include "common/time_units.h"
+#include "plumb/controller_status_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
 #include "trainer/kernels/network.h"
 #include "trainer/robot_simulation.h"
@@ -26,7 +28,8 @@ struct Options {
   int evaluation_episodes = 10;
 };
 
-/// plumb-trainer: turns each PARAMETER_DISTRIBUTION into a POLICY.
+/// plumb-trainer: turns each PARAMETER_DISTRIBUTION into a POLICY, and chooses among them by what
+/// CONTROLLER_STATUS says of their trials.
 class TrainerProcess {
  public:
   TrainerProcess(Process& process, const Options& options)
@@ -38,6 +41,8 @@ class TrainerProcess {
         status_(process.messenger(), "TRAINING_STATUS"),
         distribution_(process.messenger(), "PARAMETER_DISTRIBUTION",
                       [this](const parameter_distribution_t& message) { OnDistribution(message); }),
+        controller_(process.messenger(), "CONTROLLER_STATUS",
+                    [this](const controller_status_t& message) { OnController(message); }),
         repeat_(kRepeat, process.clock().Now()) {
     if (!options.checkpoint.empty()) checkpoint_file_ = options.checkpoint + "/trainer.checkpoint";
   }
@@ -47,7 +52,7 @@ class TrainerProcess {
     spdlog::info("{}: iterations 0 to {}, kernels for {}", robot_.name, options_.iterations,
                  kernels::InstructionSet());
     while (process_.Wait(session_.training() ? 0 : repeat_.Remaining(process_.clock().Now()))) {
-      distribution_.Rethrow();
+      distribution_.Rethrow(), controller_.Rethrow();
       if (session_.training()) Train();
       if (repeat_.Due(process_.clock().Now())) {
         repeat_.Advance(process_.clock().Now());
@@ -74,6 +79,13 @@ class TrainerProcess {
     // Repeats of one that has been dealt with are the normal case.
     const bool newer = session_.training() && message.iteration == session_.iteration();
     if (message.iteration != session_.awaited() && !newer) return;
+    if (!newer && session_.awaits_trial()) {
+      // It is repeated, and so is CONTROLLER_STATUS.
+      if (std::exchange(missed_, session_.iteration()) != session_.iteration())
+        spdlog::info("iteration {} waits for the trial of policy {}", message.iteration,
+                     session_.iteration());
+      return;
+    }
     try {
       const ParameterDistribution distribution =
           ParameterDistribution::FromMessage(message, robot_);
@@ -90,7 +102,14 @@ class TrainerProcess {
     }
     start_ = process_.clock().Now();
     seconds_ = 0;
+    if (session_.decision().challenger >= 0)
+      spdlog::info("iteration {}: {}", session_.iteration(), Summary(session_.decision()));
     spdlog::info("iteration {}: {} updates", session_.iteration(), session_.updates());
+  }
+
+  // Repeated ten times a second.
+  void OnController(const controller_status_t& message) {
+    if (session_.AddTrial(message)) Save();
   }
 
   void Train() {
@@ -151,10 +170,12 @@ class TrainerProcess {
   Publisher<policy_t> policy_;
   Publisher<training_status_t> status_;
   Subscriber<parameter_distribution_t> distribution_;
+  Subscriber<controller_status_t> controller_;
   Periodic repeat_;
   std::string checkpoint_file_;  // empty = none
   int64_t start_ = 0;            // of the iteration, monotonic
   double seconds_ = 0;           // spent on the iteration
+  int missed_ = -1;              // policy whose trial was not there when it was needed
 };
 
 }  // namespace

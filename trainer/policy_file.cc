@@ -47,7 +47,7 @@ GaussianPolicy FromCheckpoint(const std::string& file) {
   const std::optional<Checkpoint> checkpoint = LoadCheckpoint(file);
   if (!checkpoint) throw std::invalid_argument(file + ": there is no such policy");
   try {
-    return GaussianPolicy::FromMessage(checkpoint->policy);
+    return GaussianPolicy::FromMessage(DeployedPolicy(*checkpoint));
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(file + ": " + error.what());
   }

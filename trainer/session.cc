@@ -2,16 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "sim/residual_inputs.h"
 
 namespace plumb {
 namespace {
 
-constexpr int kHeldOut = 50;  // simulators
+constexpr int kHeldOut = 50;             // simulators
+constexpr int kTrialAndExploration = 2;  // episodes of a roll-out that begins with a trial
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -21,7 +26,8 @@ TrainingSession::TrainingSession(const RobotDescription& description, const Simu
     : description_(description),
       iterations_(iterations),
       seed_(seed),
-      trainer_(description.training, make, description.effort_limits(), seed, threads) {}
+      trainer_(description.training, make, description.effort_limits(), seed, threads),
+      acceptance_(description.task.steps) {}
 
 int TrainingSession::updates() const {
   return iteration_ == 0 ? description_.training.updates : description_.training.updates_again;
@@ -32,9 +38,60 @@ int TrainingSession::awaited() const {
   return complete_ && iteration_ < iterations_ ? iteration_ + 1 : -1;
 }
 
+// Of a roll-out; its other steps are for exploration.
+int TrainingSession::trial_steps() const {
+  const int all = description_.task.steps;
+  if (description_.training.trial <= 0 || all < 2) return 0;
+  return std::clamp(static_cast<int>(description_.training.trial * all), 1, all - 1);
+}
+
+bool TrainingSession::awaits_trial() const {
+  return trial_steps() > 0 && complete_ && !finished() &&
+         !acceptance_.trials().contains(iteration_);
+}
+
+bool TrainingSession::AddTrial(const controller_status_t& status) {
+  if (!awaits_trial() || status.phase != controller_status_t::COMPLETE ||
+      status.purpose != policy_t::CALIBRATE || status.policy_iteration != iteration_)
+    return false;
+  // Anybody can send anything.
+  const auto complete = [](const auto& values) { return values.size() == kTrialAndExploration; };
+  if (status.num_episodes != kTrialAndExploration || !complete(status.steps) ||
+      !complete(status.returns) || !complete(status.late_rate) || !complete(status.fell))
+    return false;
+  const Trial trial{status.steps[0], status.returns[0], status.late_rate[0], status.fell[0] != 0};
+  if (trial.steps < 0 || trial.steps > trial_steps() || !std::isfinite(trial.sum_of_rewards) ||
+      !std::isfinite(trial.late_rate))
+    return false;
+  acceptance_.Add(iteration_, trial);
+  if (!incumbent_policy_) incumbent_policy_ = trainer_.policy(), incumbent_since_ = iteration_;
+  return true;
+}
+
+// The decision on the newest policy, made in an iteration.
+void TrainingSession::Choose(const Acceptance::Decision& decision, int iteration) {
+  decision_ = decision;
+  if (!decision.accepted || decision.challenger == decision.incumbent) return;
+  incumbent_policy_ = trainer_.policy();
+  incumbent_since_ = iteration;
+}
+
+int TrainingSession::incumbent() const {
+  if (trial_steps() > 0) return acceptance_.incumbent();
+  return complete_ ? iteration_ : iteration_ - 1;
+}
+
+int TrainingSession::incumbent_since() const {
+  return trial_steps() > 0 ? incumbent_since_ : incumbent();
+}
+
 bool TrainingSession::Begin(const ParameterDistribution& distribution) {
-  if (distribution.iteration != awaited()) return false;
+  if (distribution.iteration != awaited() || awaits_trial()) return false;
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
+  if (complete_ && trial_steps() > 0) {
+    Choose(distribution.residual ? acceptance_.Decide(iteration_) : acceptance_.Trust(iteration_),
+           distribution.iteration);
+  }
   distribution_ = distribution;
   iteration_ = distribution.iteration;
   begun_ = true;
@@ -65,16 +122,23 @@ UpdateReport TrainingSession::Advance() {
     trainer_.ReturnToBest(sample);
     evaluation_ = trainer_.EvaluateHeldOut(sample, kHeldOut);
     complete_ = true;
+    // The last one has no trial: it is trusted, or nothing but one that has had a trial is run.
+    if (finished() && trial_steps() > 0 && !(distribution_.residual && incumbent_policy_))
+      Choose(acceptance_.Trust(iteration_), iteration_);
   }
   return last_;
 }
 
 policy_t TrainingSession::Policy(int evaluation_episodes) const {
-  policy_t message = trainer_.policy().ToMessage();
+  const bool chosen = finished() && trial_steps() > 0 && incumbent_policy_;
+  policy_t message = (chosen ? *incumbent_policy_ : trainer_.policy()).ToMessage();
   message.iteration = iteration_;
+  message.trained_in = chosen ? incumbent() : iteration_;
   message.purpose = finished() ? policy_t::EVALUATE : policy_t::CALIBRATE;
-  message.episodes = finished() ? evaluation_episodes : 1;
-  message.trial_steps = 0;
+  message.trial_steps = finished() ? 0 : trial_steps();
+  message.episodes = finished()                ? evaluation_episodes
+                     : message.trial_steps > 0 ? kTrialAndExploration
+                                               : 1;
   return message;
 }
 
@@ -96,6 +160,14 @@ training_status_t TrainingSession::Status() const {
   status.evaluation_tenth = evaluation_.tenth;
   status.evaluation_worst = evaluation_.worst;
   status.complete = complete_;
+  status.incumbent = incumbent();
+  status.incumbent_since = incumbent_since();
+  const bool chosen = decision_.challenger >= 0;
+  status.decision = chosen ? Summary(decision_) : "";
+  status.challenger = decision_.challenger;
+  status.probability = chosen ? decision_.probability : kUnknown;
+  status.challenger_return = chosen ? decision_.challenger_return : kUnknown;
+  status.incumbent_return = chosen ? decision_.incumbent_return : kUnknown;
   return status;
 }
 
@@ -107,6 +179,14 @@ Checkpoint TrainingSession::MakeCheckpoint() const {
   checkpoint.complete = complete_;
   checkpoint.evaluation = evaluation_;
   checkpoint.distribution = distribution_.ToMessage();
+  for (const auto& [iteration, trials] : acceptance_.trials())
+    for (const Trial& trial : trials) checkpoint.trials.push_back({iteration, trial});
+  checkpoint.decision = decision_;
+  checkpoint.incumbent_since = incumbent_since_;
+  if (incumbent_policy_) {
+    checkpoint.incumbent = acceptance_.incumbent();
+    checkpoint.incumbent_policy = incumbent_policy_->ToMessage();
+  }
   return checkpoint;
 }
 
@@ -122,10 +202,18 @@ void TrainingSession::Restore(const Checkpoint& checkpoint) {
   try {
     distribution_ = ParameterDistribution::FromMessage(checkpoint.distribution, description_);
     trainer_.Restore(TrainerStateOf(checkpoint));
+    incumbent_policy_.reset();
+    if (checkpoint.incumbent >= 0)
+      incumbent_policy_ = GaussianPolicy::FromMessage(checkpoint.incumbent_policy);
   } catch (const std::invalid_argument& error) {
     throw CheckpointError(
         fmt::format("the checkpoint is of another robot or network: {}", error.what()));
   }
+  std::map<int, std::vector<Trial>> trials;
+  for (const TriedPolicy& tried : checkpoint.trials) trials[tried.iteration].push_back(tried.trial);
+  acceptance_ = Acceptance(description_.task.steps, std::move(trials), checkpoint.incumbent);
+  decision_ = checkpoint.decision;
+  incumbent_since_ = checkpoint.incumbent_since;
   begun_ = true;
   iteration_ = checkpoint.iteration;
   update_ = checkpoint.iteration_updates;

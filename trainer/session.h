@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
+#include "controller/acceptance.h"
+#include "plumb/controller_status_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "plumb/training_status_t.hpp"
 #include "robot/parameter_distribution.h"
@@ -11,8 +14,16 @@
 namespace plumb {
 
 /// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains
-/// from scratch, each later one from where the last ended. Knows neither messages nor clocks. Not
-/// thread-safe.
+/// from scratch, each later one from where the last ended.
+///
+/// Each policy but the last begins its roll-out with a trial, without exploration ([training]
+/// `trial`), and is judged by it when the next distribution is there (Acceptance): it becomes the
+/// incumbent if it does better than the one of before or, where that distribution has no residual,
+/// in any case. The last one has no trial: without a residual it is the incumbent, with one the
+/// incumbent of before is what the robot is run with in the end. Training goes on from the newest
+/// policy whatever the trials say.
+///
+/// Knows neither clocks nor who sends. Not thread-safe.
 class TrainingSession {
  public:
   /// @param iterations number N of distributions that follow the prior: the policy of iteration N
@@ -28,8 +39,13 @@ class TrainingSession {
 
   /// The iteration whose distribution is awaited; -1 while training and after the last.
   int awaited() const;
-  /// Begins the iteration. @return false, and nothing happens, if it is not the one that is
-  /// awaited. @throws std::invalid_argument if its residual is another robot's, as Replace does.
+  /// The complete iteration's policy is to be tried on the robot before the next one begins.
+  bool awaits_trial() const;
+  /// The trial of the policy that awaits it. @return false, and nothing happens, if these are not
+  /// the finished episodes of that policy, or have sizes or numbers that cannot be.
+  bool AddTrial(const controller_status_t& status);
+  /// Begins the iteration, once the policy of before has been tried. @return false, and nothing
+  /// happens, if it is not the one that is awaited. @throws std::invalid_argument if its residual is another robot's, as Replace does.
   bool Begin(const ParameterDistribution& distribution);
 
   /// Goes on training with another distribution of the same iteration, from the next batch on.
@@ -53,14 +69,25 @@ class TrainingSession {
   /// Of the complete iteration's policy.
   const Evaluation& evaluation() const { return evaluation_; }
 
-  /// The complete iteration's policy, its purpose and how many roll-outs are wanted; utime is the
-  /// sender's.
-  /// @param evaluation_episodes roll-outs of the last policy; of any other one is wanted.
+  /// The iteration whose policy the robot is to be run with, and the one in which that was chosen;
+  /// -1 = none yet. Without trials the newest.
+  int incumbent() const;
+  int incumbent_since() const;
+  /// The last choice; its challenger is -1 before the first.
+  const Acceptance::Decision& decision() const { return decision_; }
+
+  /// The complete iteration's policy, in the end the incumbent, its purpose and how many roll-outs
+  /// are wanted; utime is the sender's.
+  /// @param evaluation_episodes roll-outs in the end; of any other policy one is wanted, in two
+  /// episodes if the first of them is a trial.
   policy_t Policy(int evaluation_episodes) const;
   /// utime and seconds are the sender's.
   training_status_t Status() const;
 
  private:
+  int trial_steps() const;
+  void Choose(const Acceptance::Decision& decision, int iteration);
+
   RobotDescription description_;
   int iterations_;
   uint64_t seed_;
@@ -72,6 +99,10 @@ class TrainingSession {
   int update_ = 0;
   Evaluation evaluation_;
   UpdateReport last_;
+  Acceptance acceptance_;
+  Acceptance::Decision decision_;
+  int incumbent_since_ = -1;
+  std::optional<GaussianPolicy> incumbent_policy_;
 };
 
 }  // namespace plumb

@@ -14,6 +14,7 @@ TrainingSettings ReadTraining(Config config) {
   s.batch = config.Integer("batch", {10, 1e7});
   s.updates = config.Integer("updates", kAtLeastOne);
   s.updates_again = config.Integer("updates_again", {0, 1e9});
+  s.trial = config.Number("trial", {0, 0.9}, 0.5);
   s.hidden = config.Integers("hidden", {1, 4096});
   s.gamma = config.Number("gamma", {0, 1});
   s.lambda = config.Number("lambda", {0, 1});

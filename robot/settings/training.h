@@ -9,6 +9,9 @@ namespace plumb {
 /// [training]: of the trainer, see docs/training.md.
 struct TrainingSettings {
   int batch, updates, updates_again;
+  /// of a roll-out's steps, the first so many try the policy, without exploration: what does worse
+  /// on the robot is not deployed there. 0 = no trials, the newest policy is deployed
+  double trial = 0.5;
   std::vector<int> hidden;
   double gamma, lambda, kl, damping;
   int cg_iterations;

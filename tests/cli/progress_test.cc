@@ -128,6 +128,50 @@ TEST_CASE_METHOD(
   CHECK(seconds["total"] == 60);
 }
 
+TEST_CASE_METHOD(Fixture, "which policy runs, since when, and why") {
+  controller_status_t s{};
+  s.phase = controller_status_t::COMPLETE;
+  s.purpose = policy_t::CALIBRATE;
+  s.num_episodes = s.episodes_wanted = 2;
+  s.returns = {-300, -90}, s.steps = {100, 100}, s.late_rate = {-2, -1}, s.fell = {0, 0};
+  progress.OnController(s);
+  progress.OnCalibration(Calibration(1));
+  training_status_t t{};
+  t.iteration = 1, t.updates = 60;
+  t.incumbent = 0, t.incumbent_since = 0, t.challenger = 0, t.probability = 0;
+  t.challenger_return = t.incumbent_return = -500;
+  t.decision = "policy 0 is the first (-500)";
+  progress.OnTraining(t);
+  progress.OnTraining(t);  // repeated
+  auto rows = progress.TakeRows();
+  REQUIRE(rows.size() == 2);
+  CHECK_THAT(rows[0], Catch::Contains("-500"));  // -300, and 100 steps more at -2
+  CHECK_THAT(rows[1], Catch::Contains(t.decision));
+  CHECK_THAT(progress.StatusLine(3), Catch::Contains("; policy 0 runs"));
+
+  t.challenger = 1, t.probability = 0.25, t.challenger_return = -700;
+  t.decision = "policy 1 not accepted (-700; incumbent 0: -500; better with 25 %)";
+  progress.OnTraining(t);
+  rows = progress.TakeRows();
+  REQUIRE(rows.size() == 1);
+  CHECK_THAT(rows[0], Catch::Contains(t.decision));
+  CHECK_THAT(progress.Conclusion({}),
+             Catch::Contains("policy 0 runs since iteration 0: policy 0 is the first (-500); "
+                             "policy 1 not accepted (-700; incumbent 0: -500; better with 25 %)\n"));
+  const nlohmann::json summary = progress.Summary({});
+  CHECK(summary["iterations"][0]["robot_return"] == -500);
+  CHECK(summary["policy"]["iteration"] == 0);
+  CHECK(summary["policy"]["since"] == 0);
+  REQUIRE(summary["decisions"].size() == 2);
+  CHECK(summary["decisions"][0]["accepted"] == true);
+  CHECK(summary["decisions"][1]["accepted"] == false);
+  CHECK(summary["decisions"][1]["policy"] == 1);
+  CHECK(summary["decisions"][1]["probability"] == 0.25);
+  CHECK(summary["decisions"][1]["return"] == -700);
+  CHECK(summary["decisions"][1]["incumbent_return"] == -500);
+  CHECK(summary["decisions"][1]["summary"] == t.decision);
+}
+
 TEST_CASE_METHOD(Fixture, "messages whose sizes do not fit are ignored") {
   calibration_status_t hostile = Calibration(1);
   hostile.num_powers = 2, hostile.combination_power = {1, 2};

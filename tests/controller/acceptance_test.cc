@@ -21,6 +21,9 @@ TEST_CASE("a trial knows its sum and the rate of its second half") {
   CHECK(trial.steps == 8);
   CHECK(trial.sum_of_rewards == 18);
   CHECK(trial.late_rate == Approx(3.5));
+  CHECK(trial.WholeReturn(20) == Approx(18 + 12 * 3.5));
+  trial.fell = true;
+  CHECK(trial.WholeReturn(20) == 18);
 }
 
 TEST_CASE("where nobody falls a return is the rate times the steps") {
@@ -91,6 +94,38 @@ TEST_CASE("a trusted policy is taken whatever the trials say") {
   CHECK(acceptance.Trust(1).accepted);
   CHECK(acceptance.incumbent() == 1);
   CHECK_THROWS_AS(acceptance.Decide(7), std::invalid_argument);
+  const auto untried = acceptance.Trust(7);
+  CHECK(untried.accepted);
+  CHECK(std::isnan(untried.probability));
+  CHECK(std::isnan(untried.challenger_return));
+  CHECK(untried.incumbent_return == Approx(2000).epsilon(0.005));
+  CHECK(acceptance.incumbent() == 7);
+}
+
+TEST_CASE("a decision says who, why and how sure") {
+  CHECK(Summary({3, 0, true, false, 0.98, 2951, 1846}) ==
+        "policy 3 accepted (2951; incumbent 0: 1846; better with 98 %)");
+  CHECK(Summary({3, 0, false, false, 0.1, 846, 1846}) ==
+        "policy 3 not accepted (846; incumbent 0: 1846; better with 10 %)");
+  CHECK(Summary({3, 2, true, true, 0.5, 1850, 1846}) ==
+        "policy 3 trusted: the model explains the robot (1850; incumbent 2: 1846; better with 50 "
+        "%)");
+  CHECK(Summary({3, 2, true, true, NAN, NAN, 1846}) ==
+        "policy 3 trusted: the model explains the robot");
+  CHECK(Summary({0, 0, false, false, 0, 1846, 1846}) == "policy 0 is the first (1846)");
+}
+
+TEST_CASE("who goes on where another stood decides alike") {
+  Acceptance straight(1000);
+  straight.Add(0, Hops(500, 3, false));
+  straight.Add(1, Hops(500, 3.2, false));
+  straight.Decide(1);
+  straight.Add(2, Hops(300, 3.3, true));
+  Acceptance resumed(1000, straight.trials(), straight.incumbent());
+  const auto expected = straight.Decide(2), decision = resumed.Decide(2);
+  CHECK(decision.incumbent == expected.incumbent);
+  CHECK(decision.probability == expected.probability);
+  CHECK(decision.challenger_return == expected.challenger_return);
 }
 
 }  // namespace plumb

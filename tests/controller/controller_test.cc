@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <map>
+#include <set>
 
 namespace plumb {
 namespace {
@@ -108,6 +110,42 @@ TEST_CASE_METHOD(Surroundings, "an episode has its number of steps, one control 
   // gym's reward at a state held still: theta^2 + 0.1 w^2 + 0.001 u^2, summed
   const double q = robot_state.q[0], v = robot_state.v[0];
   CHECK(status.returns[1] == Approx(-200 * (q * q + 0.1 * v * v + 0.001 * 0.25)));
+}
+
+TEST_CASE_METHOD(Surroundings, "a roll-out begins with a trial, without exploration") {
+  Driver(driver_status_t::ARMED);
+  policy_t policy = Policy(3, 2, 0.25f, policy_t::CALIBRATE);
+  policy.trial_steps = 80;
+  controller.OnPolicy(policy);
+  std::map<int64_t, std::vector<double>> efforts;  // by episode
+  for (int i = 0; i < 10'000 && controller.phase() != S::COMPLETE; ++i) {
+    const auto command = Step();
+    if (command && command->episode >= 0) efforts[command->episode].push_back(command->effort[0]);
+  }
+  REQUIRE(controller.phase() == S::COMPLETE);
+  REQUIRE(efforts.size() == 2);
+  const std::vector<double>&trial = efforts.begin()->second, &rest = efforts.rbegin()->second;
+  CHECK(trial == std::vector<double>(80, 0.5));  // action 0.25 of 2 Nm, each time
+  REQUIRE(rest.size() == 120);                   // of 200
+  CHECK(std::set<double>(rest.begin(), rest.end()).size() > 60);
+  const S& status = controller.status();
+  CHECK(status.num_episodes == 2);
+  CHECK(status.steps == std::vector<int32_t>{80, 120});
+  CHECK(status.fell == std::vector<int8_t>{0, 0});
+  REQUIRE(status.episode.size() == 2);
+  CHECK(status.episode[0] == efforts.begin()->first);
+  // The robot is held still: each step of the trial pays the same.
+  REQUIRE(status.late_rate.size() == 2);
+  CHECK(status.late_rate[0] == Approx(status.returns[0] / 80));
+}
+
+TEST_CASE_METHOD(Surroundings, "nothing but a roll-out to calibrate with has a trial") {
+  Driver(driver_status_t::ARMED);
+  policy_t policy = Policy(3, 2, 0.25f, policy_t::EVALUATE);
+  policy.trial_steps = 80;
+  controller.OnPolicy(policy);
+  StepUntil(S::COMPLETE);
+  CHECK(controller.status().steps == std::vector<int32_t>{200, 200});
 }
 
 TEST_CASE_METHOD(

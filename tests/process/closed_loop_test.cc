@@ -51,6 +51,17 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
     CHECK(iteration.at("kl") > 0);
     CHECK(iteration.at("transitions") >= 150);
   }
+  // Each roll-out has told which policy runs, and why: the model is right, so the newest does.
+  CHECK(summary.at("policy").at("iteration") == 2);
+  CHECK(summary.at("policy").at("since") == 2);
+  CHECK_THAT(summary.at("policy").at("why").get<std::string>(), Contains("policy 2 trusted"));
+  const auto& decisions = summary.at("decisions");
+  REQUIRE(decisions.size() == 3);
+  for (int k = 0; k <= 2; ++k) {
+    CHECK(decisions[static_cast<size_t>(k)].at("policy") == k);
+    CHECK(decisions[static_cast<size_t>(k)].at("accepted") == true);
+    CHECK(decisions[static_cast<size_t>(k)].at("return").is_null() == (k == 2));  // is not tried
+  }
   // Two iterations may not reach the truth, but they go towards it: more than halfway from the
   // prior. Which is known better, and comes first, depends on the motion.
   const auto& p = stage.robot.parameters;

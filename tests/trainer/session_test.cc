@@ -8,7 +8,10 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
+#include <vector>
 
+#include "sim/residual_inputs.h"
 #include "tests/temporary_folder.h"
 #include "tests/trainer/pendulum.h"
 
@@ -24,6 +27,8 @@ RobotDescription Robot() {
                       {"length/pole", "m", log, 1, .03}};
   robot.joints.resize(1);
   robot.joints[0].effort_limit = 2;
+  robot.task.name = "pendulum";
+  robot.task.steps = 200;
   robot.training = PendulumSettings();
   robot.training.batch = 800;
   robot.training.hidden = {12, 10};
@@ -38,8 +43,43 @@ ParameterDistribution Distribution(int iteration) {
   return distribution;
 }
 
-TrainingSession NewSession(uint64_t seed = 4) {
-  return TrainingSession(Robot(), MakeGymPendulum, 2, seed, 1);
+// Of a model that does not explain the robot.
+ParameterDistribution Lacking(int iteration) {
+  ResidualFunction function;
+  const int inputs = ResidualInputCount(Robot());
+  function.mean = function.low = function.high = Eigen::VectorXd::Zero(inputs);
+  function.scale = Eigen::VectorXd::Ones(inputs);
+  function.frequencies = Eigen::MatrixXd::Zero(1, inputs);
+  function.phases = Eigen::VectorXd::Zero(1);
+  function.weights = {Eigen::MatrixXd::Zero(1, function.features())};
+  function.noise = Eigen::MatrixXd::Zero(1, 1);
+  function.bound = Eigen::VectorXd::Ones(1);
+  ParameterDistribution distribution = Distribution(iteration);
+  Residual residual;
+  residual.coordinates = {distribution.mixture.components[0].mean};
+  residual.free = function;
+  distribution.residual = std::make_shared<const Residual>(residual);
+  return distribution;
+}
+
+TrainingSession NewSession(uint64_t seed = 4, int iterations = 2) {
+  return TrainingSession(Robot(), MakeGymPendulum, iterations, seed, 1);
+}
+
+// CONTROLLER_STATUS at the end of a policy's roll-out: a trial of 100 steps that all pay the same,
+// and exploration.
+controller_status_t Tried(int iteration, double rate) {
+  controller_status_t status{};
+  status.policy_iteration = iteration;
+  status.phase = controller_status_t::COMPLETE;
+  status.purpose = policy_t::CALIBRATE;
+  status.num_episodes = status.episodes_wanted = 2;
+  status.episode = status.first_state_sequence = status.last_state_sequence = {1, 2};
+  status.returns = {100 * rate, -1000};
+  status.steps = {100, 100};
+  status.late_rate = {rate, -10};
+  status.fell = {0, 0};
+  return status;
 }
 
 // In a folder that is still to be made.
@@ -88,9 +128,12 @@ TEST_CASE("Iterations follow one another, each for its own distribution") {
     const policy_t policy = session.Policy(10);
     CHECK(policy.iteration == iteration);
     CHECK(policy.purpose == (iteration < 2 ? policy_t::CALIBRATE : policy_t::EVALUATE));
-    CHECK(policy.episodes == (iteration < 2 ? 1 : 10));
+    CHECK(policy.episodes == (iteration < 2 ? 2 : 10));  // a trial and exploration
+    CHECK(policy.trial_steps == (iteration < 2 ? 100 : 0));
     CHECK(policy.action_scale == std::vector<float>{2});
     CHECK_NOTHROW(GaussianPolicy::FromMessage(policy));
+    CHECK(session.awaits_trial() == (iteration < 2));
+    CHECK(session.AddTrial(Tried(iteration, -1)) == (iteration < 2));
   }
   CHECK(session.finished());
   CHECK(session.awaited() == -1);
@@ -125,12 +168,154 @@ TEST_CASE("A run that is interrupted and resumed ends in the same bits") {
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
   CHECK(third.Status().evaluation_tenth == straight.Status().evaluation_tenth);
   for (TrainingSession* session : {&third, &straight}) {
-    session->Begin(Distribution(1));
+    REQUIRE(session->AddTrial(Tried(0, -1)));
+    REQUIRE(session->Begin(Distribution(1)));
     TrainToTheEnd(*session);
   }
   CHECK(third.Policy(1).weight == straight.Policy(1).weight);
   CHECK(third.MakeCheckpoint().critic.second_moment ==
         straight.MakeCheckpoint().critic.second_moment);
+}
+
+// The whole run of a session: what the trials pay, and whether the model explains the robot.
+// @return the policies, by iteration.
+std::vector<policy_t> RunAll(TrainingSession& session, const std::vector<double>& rates,
+                             ParameterDistribution (*of)(int)) {
+  std::vector<policy_t> policies;
+  for (int iteration = 0; iteration <= static_cast<int>(rates.size()); ++iteration) {
+    REQUIRE(session.Begin(of(iteration)));
+    TrainToTheEnd(session);
+    policies.push_back(session.Policy(1));
+    if (!session.finished())
+      REQUIRE(session.AddTrial(Tried(iteration, rates[static_cast<size_t>(iteration)])));
+  }
+  return policies;
+}
+
+TEST_CASE("Where the model is wrong, what does best on the robot is what it is run with") {
+  TrainingSession session = NewSession(4, 3);
+  SECTION("the first one") {
+    const auto policies = RunAll(session, {-1, -3, -2}, Lacking);
+    CHECK(policies[3].weight == policies[0].weight);
+    CHECK(policies[3].iteration == 3);
+    CHECK(policies[3].trained_in == 0);
+    CHECK(policies[3].purpose == policy_t::EVALUATE);
+    const training_status_t status = session.Status();
+    CHECK(status.incumbent == 0);
+    CHECK(status.incumbent_since == 0);
+    CHECK(status.challenger == 2);
+    CHECK(status.decision.find("policy 2 not accepted (-400") == 0);
+    CHECK(status.probability < 0.01);
+    CHECK(status.challenger_return == Approx(-400).epsilon(0.01));
+    CHECK(status.incumbent_return == Approx(-200).epsilon(0.01));
+  }
+  SECTION("a later one") {
+    const auto policies = RunAll(session, {-2, -1, -1.5}, Lacking);
+    CHECK(policies[3].weight == policies[1].weight);
+    CHECK(policies[3].trained_in == 1);
+    CHECK(session.incumbent() == 1);
+    CHECK(session.incumbent_since() == 2);  // when the next distribution was there
+  }
+  // Training goes on from the newest nevertheless.
+  CHECK(session.MakeCheckpoint().policy.weight != session.Policy(1).weight);
+  CHECK(DeployedPolicy(session.MakeCheckpoint()).weight == session.Policy(1).weight);
+}
+
+TEST_CASE("Where the model explains the robot the newest policy is trusted") {
+  TrainingSession session = NewSession(4, 2);
+  const auto policies = RunAll(session, {-1, -3}, Distribution);
+  CHECK(policies[2].trained_in == 2);
+  CHECK(policies[2].weight == session.MakeCheckpoint().policy.weight);
+  const training_status_t status = session.Status();
+  CHECK(status.incumbent == 2);
+  CHECK(status.incumbent_since == 2);
+  CHECK(status.challenger == 2);
+  CHECK(status.decision.find("policy 2 trusted") == 0);
+  CHECK(std::isnan(status.probability));  // it has not been tried
+}
+
+TEST_CASE("Without trials the newest policy is run") {
+  RobotDescription robot = Robot();
+  robot.training.trial = 0;
+  TrainingSession session(robot, MakeGymPendulum, 1, 4, 1);
+  CHECK(session.incumbent() == -1);
+  session.Begin(Distribution(0));
+  TrainToTheEnd(session);
+  CHECK(session.Policy(9).episodes == 1);
+  CHECK(session.Policy(9).trial_steps == 0);
+  CHECK_FALSE(session.AddTrial(Tried(0, -1)));
+  REQUIRE(session.Begin(Lacking(1)));
+  CHECK(session.incumbent() == 0);
+  TrainToTheEnd(session);
+  CHECK(session.Policy(9).trained_in == 1);
+  CHECK(session.Policy(9).weight == session.MakeCheckpoint().policy.weight);
+  CHECK(session.incumbent() == 1);
+  CHECK(session.Status().decision.empty());
+}
+
+TEST_CASE("No iteration begins before the policy of the last one has been tried") {
+  TrainingSession session = NewSession();
+  CHECK_FALSE(session.AddTrial(Tried(0, -1)));  // there is no policy
+  session.Begin(Distribution(0));
+  CHECK_FALSE(session.AddTrial(Tried(0, -1)));
+  TrainToTheEnd(session);
+  CHECK_FALSE(session.Begin(Distribution(1)));
+  CHECK(session.awaited() == 1);
+  const auto refused = [&](void (*spoil)(controller_status_t&)) {
+    controller_status_t status = Tried(0, -1);
+    spoil(status);
+    CHECK_FALSE(session.AddTrial(status));
+    CHECK(session.awaits_trial());
+  };
+  refused([](controller_status_t& s) { s.policy_iteration = 1; });
+  refused([](controller_status_t& s) { s.phase = controller_status_t::RUNNING; });
+  refused([](controller_status_t& s) { s.purpose = policy_t::EVALUATE; });
+  refused([](controller_status_t& s) { s.num_episodes = 1; });
+  refused([](controller_status_t& s) { s.steps.pop_back(); });
+  refused([](controller_status_t& s) { s.returns.clear(); });
+  refused([](controller_status_t& s) { s.late_rate.push_back(0); });
+  refused([](controller_status_t& s) { s.fell.clear(); });
+  refused([](controller_status_t& s) { s.returns[0] = NAN; });
+  refused([](controller_status_t& s) { s.late_rate[0] = INFINITY; });
+  refused([](controller_status_t& s) { s.steps[0] = -1; });
+  refused([](controller_status_t& s) { s.steps[0] = 101; });
+  CHECK(session.AddTrial(Tried(0, -1)));
+  CHECK_FALSE(session.AddTrial(Tried(0, -7)));  // repeated ten times a second
+  CHECK(session.Begin(Distribution(1)));
+  CHECK(session.Status().challenger_return == Approx(-200).epsilon(0.01));
+}
+
+TEST_CASE("Trials, the incumbent and the reason survive an interruption") {
+  const TemporaryFolder folder;
+  TrainingSession straight = NewSession(4, 3);
+  const auto policies = RunAll(straight, {-2, -1, -1.02}, Lacking);
+  // Interrupted after every roll-out and in the middle of every training.
+  auto session = std::make_unique<TrainingSession>(NewSession(4, 3));
+  const auto resume = [&] {
+    SaveCheckpoint(CheckpointIn(folder), session->MakeCheckpoint());
+    session = std::make_unique<TrainingSession>(NewSession(4, 3));
+    session->Restore(LoadCheckpoint(CheckpointIn(folder)).value());
+  };
+  const std::vector<double> rates{-2, -1, -1.02};
+  for (int iteration = 0; iteration <= 3; ++iteration) {
+    REQUIRE(session->Begin(Lacking(iteration)));
+    session->Advance();
+    resume();
+    TrainToTheEnd(*session);
+    resume();
+    if (iteration < 3)
+      REQUIRE(session->AddTrial(Tried(iteration, rates[static_cast<size_t>(iteration)])));
+    resume();
+  }
+  CHECK(session->Policy(1).weight == policies[3].weight);
+  CHECK(session->Policy(1).trained_in == 1);
+  CHECK(session->incumbent_since() == 2);
+  const training_status_t status = session->Status(), expected = straight.Status();
+  CHECK(status.decision == expected.decision);
+  CHECK(status.probability == expected.probability);
+  CHECK(status.challenger_return == expected.challenger_return);
+  CHECK(EncodeCheckpoint(session->MakeCheckpoint()) ==
+        EncodeCheckpoint(straight.MakeCheckpoint()));
 }
 
 TEST_CASE("A newer distribution of the iteration takes effect at the next batch") {

@@ -4,9 +4,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
 
 #include "calibrator/live/calibrator.h"
 #include "calibrator/live/checkpoint.h"
@@ -350,9 +352,52 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   CHECK(std::isnan(loaded->ess));
   std::string text =
       (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
-  text.replace(text.find("\"version\": 3"), 12, "\"version\": 1");
+  text.replace(text.find("\"version\": 4"), 12, "\"version\": 1");
   std::ofstream(folder / "calibration.json") << text;
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
+}
+
+TEST_CASE("what the simulators lack is told to the trainer again after a resumption") {
+  const RobotDescription robot = Pendulum();
+  const auto numbers = [](Eigen::Index rows, Eigen::Index columns) {  // of single precision
+    return Eigen::MatrixXf(Eigen::MatrixXf::Random(rows, columns)).cast<double>().eval();
+  };
+  ResidualFunction function;
+  function.mean = numbers(6, 1), function.scale = numbers(6, 1).cwiseAbs();
+  function.low = numbers(6, 1), function.high = function.low.array() + 1;
+  function.frequencies = numbers(4, 6), function.phases = numbers(4, 1);
+  function.weights = {numbers(1, 11), numbers(1, 11)};
+  function.noise = numbers(1, 1).cwiseAbs(), function.bound = numbers(1, 1).cwiseAbs();
+  Residual residual;
+  residual.coordinates = {kTruth, kNull};
+  residual.touching = function;
+  SimOpt simopt(robot, 1, 1);
+  SimOpt::State state = simopt.state();
+  state.residual = std::make_shared<const Residual>(residual);
+  const auto told = [&](const SimOpt::State& of) {
+    const parameter_distribution_t message = DistributionMessage(robot, of, 1, nullptr);
+    std::vector<char> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    return bytes;
+  };
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 1);
+  checkpoint.Save(state);
+  const auto loaded = checkpoint.Load();
+  REQUIRE(loaded);
+  REQUIRE(loaded->residual);
+  state.ess = loaded->ess;  // NaN has many bits
+  CHECK(told(*loaded) == told(state));
+  CHECK(told(*loaded) != told(simopt.state()));
+
+  std::string text =
+      (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
+  const size_t at = text.find("\"residual\": \"") + 13;
+  for (const std::string& spoilt : {text.substr(0, at) + text.substr(at + 2),
+                                    text.substr(0, at) + "zz" + text.substr(at + 2)}) {
+    std::ofstream(folder / "calibration.json") << spoilt;
+    CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("calibration.json: the residual is none"));
+  }
 }
 
 }  // namespace
