@@ -11,23 +11,15 @@
 #include <stdexcept>
 
 #include "common/atomic_file.h"
-<<<<<<< HEAD
 #include "robot/parameter_distribution.h"
-=======
-#include "robot/residual_message.h"
->>>>>>> cbde2c0a6d519c7248083b45bca9e053faa76087
 
 namespace plumb {
 namespace {
 
 using nlohmann::json;
 
-<<<<<<< HEAD
 // 2: without the method used, its warnings and a search's samples; 3: without a residual
 constexpr int kVersion = 4;
-=======
-constexpr int kVersion = 4;  // 3: without the residual
->>>>>>> cbde2c0a6d519c7248083b45bca9e053faa76087
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -146,32 +138,6 @@ Rollout RolloutFrom(const json& j) {
   return rollout;
 }
 
-// As its message has it, in hexadecimal digits; null if there is none.
-json ToJson(const std::shared_ptr<const Residual>& residual) {
-  if (!residual) return nullptr;
-  parameter_distribution_t message{};
-  WriteResidual(*residual, &message);
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return fmt::format("{:02x}", fmt::join(bytes, ""));
-}
-
-std::shared_ptr<const Residual> ResidualFrom(const json& j) {
-  if (j.is_null()) return nullptr;
-  const auto digits = j.get<std::string>();
-  std::vector<uint8_t> bytes(digits.size() / 2);
-  bool good = true;
-  for (size_t i = 0; i < bytes.size(); ++i) {
-    const char* const begin = digits.data() + 2 * i;
-    good = good && std::from_chars(begin, begin + 2, bytes[i], 16).ptr == begin + 2;
-  }
-  parameter_distribution_t message{};
-  if (!good || message.decode(bytes.data(), 0, static_cast<int>(bytes.size())) !=
-                   static_cast<int>(bytes.size()))
-    throw std::runtime_error("the residual is none");
-  return ReadResidual(message);
-}
-
 json ReadJson(const std::filesystem::path& file) {
   std::ifstream stream(file);
   if (!stream) throw std::runtime_error("cannot be opened");
@@ -180,7 +146,7 @@ json ReadJson(const std::filesystem::path& file) {
 
 std::string RolloutFile(size_t index) { return fmt::format("rollout_{}.json", index); }
 
-// As the message that carries it, byte for byte.
+// As the message that carries it, in hexadecimal digits; null if there is none.
 json ToJson(const std::shared_ptr<const Residual>& residual, const RobotDescription& robot) {
   if (!residual) return nullptr;
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
@@ -188,16 +154,22 @@ json ToJson(const std::shared_ptr<const Residual>& residual, const RobotDescript
   const parameter_distribution_t message = distribution.ToMessage();
   std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
 }
 
 std::shared_ptr<const Residual> ResidualFrom(const json& j, const RobotDescription& robot) {
   if (j.is_null()) return nullptr;
-  const auto bytes = j.get<std::vector<uint8_t>>();
+  const auto digits = j.get<std::string>();
+  std::vector<uint8_t> bytes(digits.size() / 2);
+  bool good = digits.size() % 2 == 0;
+  for (size_t i = 0; i < bytes.size(); ++i) {
+    const char* const begin = digits.data() + 2 * i;
+    good = good && std::from_chars(begin, begin + 2, bytes[i], 16).ptr == begin + 2;
+  }
   parameter_distribution_t message;
-  if (message.decode(bytes.data(), 0, static_cast<int>(bytes.size())) !=
-      static_cast<int>(bytes.size()))
-    throw std::runtime_error("residual: is not one");
+  const auto size = static_cast<int>(bytes.size());
+  if (!good || message.decode(bytes.data(), 0, size) != size)
+    throw std::runtime_error("the residual is none");
   return ParameterDistribution::FromMessage(message, robot).residual;
 }
 
@@ -239,7 +211,6 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"update", state.search.update},
                {"distribution", ToJson(state.distribution)},
                {"used", state.used},
-               {"residual", ToJson(state.residual)},
                {"before", ToJson(state.before)},
                {"kl", state.kl},
                {"ess", state.ess},
@@ -270,7 +241,6 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     state.iteration = j.at("iteration");
     state.distribution = MixtureFrom(j.at("distribution"));
     state.used = j.at("used");
-    state.residual = ResidualFrom(j.at("residual"));
     state.before = MixtureFrom(j.at("before"));
     state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
     state.temperature = j.at("temperature");
