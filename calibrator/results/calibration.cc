@@ -9,11 +9,11 @@
 
 #include "calibrator/design/excitation.h"
 #include "calibrator/diagnostics/holdout.h"
-#include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/inference/chi_squared.h"
+#include "calibrator/motion/differences.h"
 #include "common/decompositions.h"
-#include "sim/tasks/task.h"
 
 namespace plumb {
 namespace {
@@ -105,7 +105,13 @@ class Calibration {
     findings_.discrepancy = view.errors.cwiseAbs2().mean();
     findings_.errors = view.errors;
     findings_.rows = rows;
-    TestModel(view, noise_known);
+    if (const std::string why = NotJudged(); !why.empty()) {
+      findings_.misspecification.summary = why;
+    } else {
+      findings_.misspecification =
+          TestModel({model_, rollouts_, mean_, view, rows, findings_.noise_sd, noise_known},
+                    options_.execution, &findings_.diagnostic_steps);
+    }
     findings_.identifiability =
         FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
     findings_.cramer_rao = findings_.identifiability.cramer_rao;
@@ -117,41 +123,13 @@ class Calibration {
             .summary;
   }
 
-  // Tests whether the model can explain the log at all, whatever its parameters.
-  void TestModel(const LaplaceFit& view, bool noise_known) {
-    const Eigen::VectorXd physical = robot_.ToPhysical(mean_);
-    if ((findings_.noise_sd.array() <= kNegligible * MakeTask(robot_)->state_scale().array())
-            .all()) {
-      findings_.misspecification.summary = "the model reproduces this log to five digits";
-      return;
+  // Why errors tell nothing of the model, empty if they do.
+  std::string NotJudged() const {
+    for (const Log& log : logs_) {
+      if (!log.differenced.empty())
+        return "the model is not judged: " + DifferencesWarning(log.differenced);
     }
-    const std::vector<Candidate> candidates = FindCandidates(robot_);
-    auto extended = std::make_shared<Model>(WithCandidates(robot_, candidates));
-    WindowErrors errors(extended, rollouts_, 1, options_.execution);
-    errors.set_noise_sd(findings_.noise_sd);
-    Eigen::VectorXd nominal = extended->parameters().means();
-    nominal.head(physical.size()) = physical;
-    errors.Linearise(nominal);
-    FitResiduals residuals{
-        rollouts_,
-        findings_.rows,
-        findings_.errors,
-        view.jacobian,
-        std::vector<bool>(static_cast<size_t>(findings_.noise_sd.size()), noise_known),
-        candidates,
-        {}};
-    residuals.columns = CandidateColumns(
-        [&](const Eigen::MatrixXd& x) { return errors.Whitened(x); }, physical, candidates);
-    // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of
-    // it, as the errors are.
-    if (noise_known) {
-      for (size_t i = 0; i < findings_.rows.size(); ++i) {
-        residuals.columns.row(static_cast<Eigen::Index>(i)) /=
-            view.scale(findings_.rows[i].coordinate);
-      }
-    }
-    findings_.misspecification = FindMisspecification(model_->Describe(physical), residuals);
-    findings_.diagnostic_steps += errors.simulated_steps();
+    return {};
   }
 
   // Fits again without a part of the data, which then judges.

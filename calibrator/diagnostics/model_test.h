@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/fit/window_errors.h"
+#include "calibrator/inference/laplace.h"
+#include "common/batch_runner.h"
+
+namespace plumb {
+
+/// A fit, and the one-step errors that it has left. What it refers to must outlive it.
+struct TestedFit {
+  std::shared_ptr<const Model> model;
+  std::span<const Rollout> rollouts;
+  Eigen::VectorXd mean;                     ///< of the posterior, coordinates
+  const LaplaceFit& one_step;               ///< errors and slopes at the mean
+  std::span<const WindowErrors::Row> rows;  ///< what its errors are about
+  /// of each entry of (q, v), as estimated or as recorded, physical units
+  Eigen::VectorXd noise_sd;
+  bool noise_known;
+};
+
+/// Whether the model can explain the log at all, whatever its parameters: FindMisspecification of
+/// the fit's errors, with every parameter that the simulator knows and the robot does not fit for a
+/// candidate.
+///
+/// Errors are whitened as if simulators were linear over the noise of the states that transitions
+/// begin with. If these are noisy and there is an alarm, it may be that which is wrong: then
+/// Witnesses alone are asked again, with their own noise (and PredictWhereabouts), and theirs is the
+/// answer. If they are fewer than kFewestWitnesses there is none: no alarm, and the summary says so.
+/// @param simulated_steps is added to. @throws std::invalid_argument if sizes do not fit together.
+Misspecification TestModel(const TestedFit& fit, ExecutionOptions execution,
+                           int64_t* simulated_steps);
+
+inline constexpr int kFewestWitnesses = 50;
+
+}  // namespace plumb
