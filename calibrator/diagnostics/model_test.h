@@ -30,8 +30,8 @@ struct TestedFit {
 ///
 /// Errors are whitened as if simulators were linear over the noise of the states that transitions
 /// begin with. If these are noisy and there is an alarm, it may be that which is wrong: then
-/// Witnesses alone are asked again, with their own noise (and PredictWhereabouts), and theirs is the
-/// answer. If they are fewer than kFewestWitnesses there is none: no alarm, and the summary says so.
+/// Witnesses alone are asked again, with their own noise (and PredictWhereabouts): theirs is the
+/// answer. Fewer than kFewestWitnesses give none: no alarm, and the summary says so.
 /// @param simulated_steps is added to. @throws std::invalid_argument if sizes do not fit together.
 Misspecification TestModel(const TestedFit& fit, ExecutionOptions execution,
                            int64_t* simulated_steps);

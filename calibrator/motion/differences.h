@@ -13,10 +13,10 @@ namespace plumb {
 /// forward or central ones, over a control period.
 ///
 /// Such velocities know nothing that the positions do not. Their errors are those of two positions,
-/// divided by the time between, so that errors of neighbouring transitions depend on each other; and
-/// where the acceleration steps, as at every control step, the difference lies beside the velocity
-/// by a quarter or a half of what the step makes of it, which a fit takes for dynamics: intervals
-/// hold the truth in a third of all cases (docs/diagnostics.md).
+/// divided by the time between: errors of neighbouring transitions depend on each other. And where
+/// the acceleration steps, as at every control step, the difference lies beside the velocity by a
+/// quarter or a half of what the step makes of it, which a fit takes for dynamics: intervals hold
+/// the truth in a third of all cases (docs/diagnostics.md).
 ///
 /// A joint counts if what its velocities differ by from such differences is, root mean square,
 /// below kSameDifference of their own second differences. Of any motion's true velocities that
