@@ -239,15 +239,16 @@ std::vector<Misfit> TestBias(const ProjectedErrors& errors) {
 namespace {
 
 // 1, and of each velocity u, v, |v| v, sign v, and of each position q, sin q, cos q.
-Eigen::RowVectorXd Features(const Transition& t) {
-  Eigen::VectorXd effort = Eigen::VectorXd::Zero(t.v.size());
+Eigen::RowVectorXd Features(const ProjectedErrors::Step& step) {
+  const Transition& t = *step.transition;
+  const Eigen::VectorXd &q = step.q, &v = step.v;
+  Eigen::VectorXd effort = Eigen::VectorXd::Zero(v.size());
   for (const EffortSegment& segment : t.efforts) effort += segment.duration * segment.effort;
   effort /= t.duration();
-  Eigen::RowVectorXd features(1 + 4 * t.v.size() + 3 * t.q.size());
-  features << 1, effort.transpose(), t.v.transpose(),
-      (t.v.array().abs() * t.v.array()).matrix().transpose(),
-      t.v.array().sign().matrix().transpose(), t.q.transpose(),
-      t.q.array().sin().matrix().transpose(), t.q.array().cos().matrix().transpose();
+  Eigen::RowVectorXd features(1 + 4 * v.size() + 3 * q.size());
+  features << 1, effort.transpose(), v.transpose(),
+      (v.array().abs() * v.array()).matrix().transpose(), v.array().sign().matrix().transpose(),
+      q.transpose(), q.array().sin().matrix().transpose(), q.array().cos().matrix().transpose();
   return features;
 }
 
@@ -261,15 +262,15 @@ std::vector<Misfit> TestRegression(const ProjectedErrors& errors) {
         errors, [&](int other) { return other == c; }, "");
     if (rows.empty()) continue;
     const auto count = static_cast<Eigen::Index>(rows.size());
-    Eigen::MatrixXd features(count, Features(*errors.steps[0].transition).size());
+    Eigen::MatrixXd features(count, Features(errors.steps[0]).size());
     if (count < 5 * features.cols()) continue;
     Eigen::MatrixXd basis(count, errors.basis.cols());
     Eigen::VectorXd r(count);
     double leverage = 0;
     for (Eigen::Index k = 0; k < count; ++k) {
       const Eigen::Index row = rows[static_cast<size_t>(k)];
-      features.row(k) = Features(
-          *errors.steps[static_cast<size_t>(errors.step_of[static_cast<size_t>(row)])].transition);
+      features.row(k) =
+          Features(errors.steps[static_cast<size_t>(errors.step_of[static_cast<size_t>(row)])]);
       basis.row(k) = errors.basis.row(row);
       r(k) = errors.r(row);
       leverage += 1 - errors.freedom(row);

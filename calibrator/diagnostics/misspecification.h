@@ -32,6 +32,11 @@ struct Misspecification {
   std::string summary;
 };
 
+/// A state, and the positions at a transition's end.
+struct Whereabouts {
+  Eigen::VectorXd q, v, next_q;
+};
+
 /// The errors that a fit has left, and what they are to be tested for.
 struct FitResiduals {
   std::span<const Rollout> rollouts;        ///< that were fitted
@@ -44,6 +49,9 @@ struct FitResiduals {
   std::vector<bool> noise_known;
   std::vector<Candidate> candidates;  ///< not fitted
   Eigen::MatrixXd columns;            ///< rows x candidates: CandidateColumns
+  /// Of each transition that there are rows of, in order: where it is taken to have been, for what
+  /// touches and for the regression. Empty: as recorded.
+  std::vector<Whereabouts> where = {};
 };
 
 /// Whether the model can explain the robot at all, whatever its parameters.

@@ -1,13 +1,163 @@
 #include "calibrator/diagnostics/model_test.h"
 
-#include <utility>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <vector>
 
 #include "calibrator/diagnostics/candidates.h"
+#include "calibrator/diagnostics/witnesses.h"
 #include "calibrator/fit/curriculum.h"
+#include "calibrator/fit/one_step.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
+namespace {
+
+constexpr int kNoiseRounds = 3;  // until witnesses and their noise agree
+constexpr double kLargest = 5;   // [sd] that an error counts as, for the noise
+
+class Test {
+ public:
+  Test(const TestedFit& fit, ExecutionOptions execution)
+      : fit_(fit),
+        robot_(fit.model->description()),
+        physical_(robot_.ToPhysical(fit.mean)),
+        candidates_(FindCandidates(robot_)),
+        extended_(std::make_shared<Model>(WithCandidates(robot_, candidates_))),
+        errors_(extended_, fit.rollouts, 1, execution),
+        step_(fit.model, fit.rollouts, execution.threads) {
+    errors_.set_noise_sd(fit.noise_sd);
+    nominal_ = extended_->parameters().means();
+    nominal_.head(physical_.size()) = physical_;
+  }
+
+  Misspecification Run() {
+    const Misspecification found = AskAll();
+    return found.alarm && !errors_.starts_known() ? AskWitnesses() : found;
+  }
+
+  int64_t simulated_steps() const { return errors_.simulated_steps() + step_.simulated_steps(); }
+
+ private:
+  Misspecification AskAll() {
+    errors_.Linearise(nominal_);
+    FitResiduals residuals = Residuals(fit_.rows);
+    residuals.errors = fit_.one_step.errors;
+    residuals.jacobian = fit_.one_step.jacobian;
+    residuals.columns = CandidateColumns(
+        [&](const Eigen::MatrixXd& x) { return errors_.Whitened(x); }, physical_, candidates_);
+    // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of
+    // it, as the errors are.
+    if (fit_.noise_known) DivideByScale(fit_.rows, &residuals.columns);
+    return FindMisspecification(Known(), residuals);
+  }
+
+  Misspecification AskWitnesses() {
+    const Eigen::MatrixXd raw = errors_.Raw(nominal_);
+    Eigen::VectorXd noise_sd = fit_.noise_sd;
+    Witnesses witnesses(step_, fit_.rows, physical_, noise_sd);
+    // What has made other errors larger has made the noise seem larger.
+    for (int round = 1; round < kNoiseRounds && !fit_.noise_known; ++round) {
+      if (witnesses.count() < kFewestWitnesses) break;
+      noise_sd.array() *= ScaleOf(witnesses.rows(), witnesses.Whiten(raw));
+      witnesses = Witnesses(step_, fit_.rows, physical_, noise_sd);
+    }
+    const std::string share = fmt::format(
+        "{} of {} transitions, as predictions of the others are not linear over the "
+        "noise of the states that they begin with",
+        witnesses.count(), step_.steps().size());
+    Misspecification found;
+    if (witnesses.count() < kFewestWitnesses) {
+      found.summary = "nobody can tell whether the model explains this log: only " + share;
+      return found;
+    }
+    FitResiduals residuals = Residuals(witnesses.rows());
+    residuals.errors = witnesses.Whiten(raw);
+    residuals.jacobian = witnesses.Whiten(Slopes());
+    residuals.columns =
+        CandidateColumns([&](const Eigen::MatrixXd& x) { return witnesses.Whiten(errors_.Raw(x)); },
+                         physical_, candidates_);
+    if (fit_.noise_known) {
+      Eigen::MatrixXd errors = residuals.errors;
+      DivideByScale(residuals.rows, &errors);
+      residuals.errors = errors;
+      DivideByScale(residuals.rows, &residuals.jacobian);
+      DivideByScale(residuals.rows, &residuals.columns);
+    }
+    residuals.where = PredictWhereabouts(step_, witnesses.rows(), physical_);
+    found = FindMisspecification(Known(), residuals);
+    found.summary += "; judged by " + share;
+    return found;
+  }
+
+  FitResiduals Residuals(std::span<const WindowErrors::Row> rows) const {
+    return {fit_.rollouts,
+            rows,
+            {},
+            {},
+            std::vector<bool>(static_cast<size_t>(fit_.noise_sd.size()), fit_.noise_known),
+            candidates_,
+            {}};
+  }
+
+  RobotDescription Known() const { return fit_.model->Describe(physical_); }
+
+  void DivideByScale(std::span<const WindowErrors::Row> rows, Eigen::MatrixXd* of_rows) const {
+    for (size_t i = 0; i < rows.size(); ++i)
+      of_rows->row(static_cast<Eigen::Index>(i)) /= fit_.one_step.scale(rows[i].coordinate);
+  }
+
+  // Root mean square of each entry's errors, 1 where there are hardly any.
+  Eigen::ArrayXd ScaleOf(std::span<const WindowErrors::Row> rows,
+                         const Eigen::VectorXd& errors) const {
+    Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(fit_.noise_sd.size()), count = squares;
+    for (size_t i = 0; i < rows.size(); ++i) {
+      const double error = std::min(kLargest, std::abs(errors(static_cast<Eigen::Index>(i))));
+      squares(rows[i].coordinate) += error * error;
+      count(rows[i].coordinate) += 1;
+    }
+    return (count >= kFewestWitnesses).select((squares / count.max(1)).sqrt(), 1.0);
+  }
+
+  // Of raw errors to the parameters, in units of the prior's standard deviations.
+  Eigen::MatrixXd Slopes() {
+    const Prior prior = PriorOf(robot_);
+    Eigen::MatrixXd at = nominal_.replicate(1, prior.size() + 1);
+    for (Eigen::Index i = 0; i < prior.size(); ++i) {
+      Eigen::VectorXd moved = fit_.mean;
+      moved(i) += kSlopeDifference * prior.marginals()[static_cast<size_t>(i)].b;
+      at.col(i).head(physical_.size()) = robot_.ToPhysical(moved);
+    }
+    const Eigen::MatrixXd raw = errors_.Raw(at);
+    return (raw.leftCols(prior.size()).colwise() - raw.col(prior.size())) / kSlopeDifference;
+  }
+
+  const TestedFit& fit_;
+  const RobotDescription& robot_;
+  Eigen::VectorXd physical_, nominal_;
+  std::vector<Candidate> candidates_;
+  std::shared_ptr<const Model> extended_;
+  WindowErrors errors_;
+  OneStep step_;
+};
+
+}  // namespace
+
+Misspecification TestModel(const TestedFit& fit, ExecutionOptions execution,
+                           int64_t* simulated_steps) {
+  const Eigen::VectorXd units = MakeTask(fit.model->description())->state_scale();
+  if ((fit.noise_sd.array() <= kNegligible * units.array()).all()) {
+    Misspecification none;
+    none.summary = "the model reproduces this log to five digits";
+    return none;
+  }
+  Test test(fit, execution);
+  const Misspecification found = test.Run();
+  *simulated_steps += test.simulated_steps();
+  return found;
+}
 
 OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result) {
   OneStepView view;
@@ -37,40 +187,10 @@ OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result) {
 }
 
 Misspecification TestModel(const MethodInput& input, const MethodResult& result,
-                           const OneStepView& view, int64_t* steps) {
-  const RobotDescription& robot = input.model->description();
-  if ((view.noise_sd.array() <= kNegligible * MakeTask(robot)->state_scale().array()).all()) {
-    Misspecification none;
-    none.summary = "the model reproduces this log to five digits";
-    return none;
-  }
-  const Eigen::VectorXd physical = robot.ToPhysical(Moments(result.posterior).mean);
-  const std::vector<Candidate> candidates = FindCandidates(robot);
-  auto extended = std::make_shared<Model>(WithCandidates(robot, candidates));
-  WindowErrors errors(extended, input.rollouts, 1, input.options.execution);
-  errors.set_noise_sd(view.noise_sd);
-  Eigen::VectorXd nominal = extended->parameters().means();
-  nominal.head(physical.size()) = physical;
-  errors.Linearise(nominal);
-  FitResiduals residuals{
-      input.rollouts,
-      view.rows,
-      view.fit.errors,
-      view.fit.jacobian,
-      std::vector<bool>(static_cast<size_t>(view.noise_sd.size()), view.noise_known),
-      candidates,
-      {}};
-  residuals.columns = CandidateColumns([&](const Eigen::MatrixXd& x) { return errors.Whitened(x); },
-                                       physical, candidates);
-  // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of it,
-  // as the errors are.
-  if (view.noise_known) {
-    for (size_t i = 0; i < view.rows.size(); ++i)
-      residuals.columns.row(static_cast<Eigen::Index>(i)) /=
-          view.fit.scale(view.rows[i].coordinate);
-  }
-  *steps += errors.simulated_steps();
-  return FindMisspecification(input.model->Describe(physical), residuals);
+                           const OneStepView& view, int64_t* simulated_steps) {
+  return TestModel({input.model, input.rollouts, Moments(result.posterior).mean, view.fit,
+                    view.rows, view.noise_sd, view.noise_known},
+                   input.options.execution, simulated_steps);
 }
 
 }  // namespace plumb

@@ -10,10 +10,37 @@
 #include "calibrator/fit/method.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
+#include "common/batch_runner.h"
 
 namespace plumb {
 
 // The functions here share nothing: thread-safe; they use the threads that they are told.
+
+/// A fit, and the one-step errors that it has left. What it refers to must outlive it.
+struct TestedFit {
+  std::shared_ptr<const Model> model;
+  std::span<const Rollout> rollouts;
+  Eigen::VectorXd mean;                     ///< of the posterior, coordinates
+  const LaplaceFit& one_step;               ///< errors and slopes at the mean
+  std::span<const WindowErrors::Row> rows;  ///< what its errors are about
+  /// of each entry of (q, v), as estimated or as recorded, physical units
+  Eigen::VectorXd noise_sd;
+  bool noise_known;
+};
+
+/// Whether the model can explain the log at all, whatever its parameters: FindMisspecification of
+/// the fit's errors, with every parameter that the simulator knows and the robot does not fit for a
+/// candidate.
+///
+/// Errors are whitened as if simulators were linear over the noise of the states that transitions
+/// begin with. If these are noisy and there is an alarm, it may be that which is wrong: then
+/// Witnesses alone are asked again, with their own noise (and PredictWhereabouts): theirs is the
+/// answer. Fewer than kFewestWitnesses give none: no alarm, and the summary says so.
+/// @param simulated_steps is added to. @throws std::invalid_argument if sizes do not fit together.
+Misspecification TestModel(const TestedFit& fit, ExecutionOptions execution,
+                           int64_t* simulated_steps);
+
+inline constexpr int kFewestWitnesses = 50;
 
 /// One-step errors of a posterior's mean, their noise and their slopes, whatever method has found
 /// it.
@@ -29,9 +56,8 @@ struct OneStepView {
 /// @throws std::invalid_argument as FitLaplace.
 OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result);
 
-/// Whether the model, with the parameters at the posterior's mean, can explain the transitions at
-/// all: FindMisspecification on them. @param steps is added the number of simulated ones.
+/// TestModel of a method's result.
 Misspecification TestModel(const MethodInput& input, const MethodResult& result,
-                           const OneStepView& view, int64_t* steps);
+                           const OneStepView& view, int64_t* simulated_steps);
 
 }  // namespace plumb

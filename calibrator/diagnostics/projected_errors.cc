@@ -74,15 +74,27 @@ ProjectedErrors::ProjectedErrors(const RobotDescription& robot, const FitResidua
   std::map<std::pair<int, int>, int> index;
   for (const WindowErrors::Row& row : residuals.rows)
     index.emplace(std::pair(row.rollout, row.transition), 0);
+  if (!residuals.where.empty() && residuals.where.size() != index.size())
+    throw std::invalid_argument("it is not known of each transition where it was");
   int ground = 0, stop = 0;
   for (auto& [key, number] : index) {
     number = static_cast<int>(steps.size());
     const auto& transitions = residuals.rollouts[static_cast<size_t>(key.first)].transitions;
     const Transition& transition = transitions[static_cast<size_t>(key.second)];
-    const Touch touch = FindTouch(robot, transition);
+    Touch touch;
+    Eigen::VectorXd q = transition.q, v = transition.v;
+    if (residuals.where.empty()) {
+      touch = FindTouch(robot, transition);
+    } else {
+      const Whereabouts& where = residuals.where[static_cast<size_t>(number)];
+      q = where.q, v = where.v;
+      touch = FindTouch(robot, where.q);
+      const Touch end = where.next_q.allFinite() ? FindTouch(robot, where.next_q) : touch;
+      touch = {touch.ground || end.ground, touch.stop || end.stop};
+    }
     ground += touch.ground;
     stop += touch.stop;
-    steps.push_back({&transition, touch.any(), -1, false,
+    steps.push_back({&transition, std::move(q), std::move(v), touch.any(), -1, false,
                      std::vector<Eigen::Index>(static_cast<size_t>(2 * n), -1)});
     const auto before = index.find({key.first, key.second - 1});
     if (before == index.end()) continue;

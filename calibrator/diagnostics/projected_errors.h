@@ -33,6 +33,7 @@ struct ProjectedErrors {
   Eigen::MatrixXd basis;    ///< of the Jacobian's range, orthonormal
   struct Step {
     const Transition* transition;
+    Eigen::VectorXd q, v;  ///< where it is taken to begin
     bool contact;
     int next;           ///< index of the step that goes on from this one's end, -1 if there is none
     bool shares_state;  ///< and begins with the same noisy reading

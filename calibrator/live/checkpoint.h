@@ -25,7 +25,7 @@ class CalibrationCheckpoint {
   std::filesystem::path folder_;
   RobotDescription robot_;
   std::vector<std::string> parameters_;
-  uint64_t seed_, fingerprint_;
+  uint64_t seed_;
   size_t saved_rollouts_ = 0;
 };
 

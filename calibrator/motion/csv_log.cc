@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "calibrator/motion/differences.h"
 #include "calibrator/motion/motion_table.h"
 
 namespace plumb {
@@ -209,7 +210,11 @@ Log ReadCsvLog(const std::string& file, const RobotDescription& robot) {
       table.has_next ? LinksByState(table.rows) : LinksByTime(table.rows);
   Assembly assembly(robot, table.has_next, &log);
   assembly.Take(table.rows, links);
-  if (!log.rollouts.empty()) return log;
+  if (!log.rollouts.empty()) {
+    log.differenced = DifferencedJoints(robot, log.rollouts);
+    if (!log.differenced.empty()) log.warnings.push_back(DifferencesWarning(log.differenced));
+    return log;
+  }
   std::string why;
   if (log.drops.total() == 0) {
     why = "no row is followed by another of its episode, and there are no next_ columns";

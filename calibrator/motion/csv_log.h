@@ -31,6 +31,8 @@ namespace plumb {
 /// they are, too, if s is a reading: the very same one as the end of the transition before, or the
 /// first of a stretch of such; else the beginning is taken as exact, and they are 0.
 ///
+/// Velocities that are but differences of the positions are told of (DifferencedJoints).
+///
 /// Fields are separated by commas and may be quoted; blank lines and those that begin with # are
 /// skipped. Numbers have a decimal point in every locale.
 /// @throws std::runtime_error "file:line: ..." for what is no number, or infinite, too few or too

@@ -14,6 +14,8 @@ struct Log {
   std::vector<Rollout> rollouts;  ///< each with at least one transition, in the file's order
   DropCounts drops;
   std::vector<std::string> warnings;  ///< parts of the file that could not be used, for people
+  /// joints whose velocities are but differences of their positions: DifferencedJoints
+  std::vector<std::string> differenced = {};
 };
 
 }  // namespace plumb

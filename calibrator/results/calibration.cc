@@ -13,6 +13,7 @@
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/chi_squared.h"
+#include "calibrator/motion/differences.h"
 #include "common/decompositions.h"
 
 namespace plumb {
@@ -86,7 +87,11 @@ class Calibration {
     findings_.discrepancy = view.fit.errors.cwiseAbs2().mean();
     findings_.errors = view.fit.errors;
     findings_.rows = view.rows;
-    findings_.misspecification = TestModel(input, result, view, &findings_.diagnostic_steps);
+    if (const std::string why = NotJudged(); !why.empty()) {
+      findings_.misspecification.summary = why;
+    } else {
+      findings_.misspecification = TestModel(input, result, view, &findings_.diagnostic_steps);
+    }
     findings_.identifiability =
         FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
     findings_.cramer_rao = findings_.identifiability.cramer_rao;
@@ -96,6 +101,15 @@ class Calibration {
     findings_.advice =
         AdviseMotion(robot_, Moments(findings_.posterior), findings_.identifiability, settings)
             .summary;
+  }
+
+  // Why errors tell nothing of the model, empty if they do.
+  std::string NotJudged() const {
+    for (const Log& log : logs_) {
+      if (!log.differenced.empty())
+        return "the model is not judged: " + DifferencesWarning(log.differenced);
+    }
+    return {};
   }
 
   // Fits again without a part of the data, which then judges.

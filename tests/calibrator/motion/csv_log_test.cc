@@ -113,6 +113,21 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("a table whose velocities are differences of its positions is told of") {
+  const RobotDescription robot = Pendulum();
+  std::string csv = "t,q/pivot,v/pivot,u/pivot\n";
+  double before = 0;
+  for (int k = 0; k < 60; ++k) {
+    const double q = std::sin(0.1 * k) + 1e-3 * (k * k % 7);  // a motion, and noise
+    csv += fmt::format("{},{},{},0\n", k * robot.task.period, q, (q - before) / robot.task.period);
+    before = q;
+  }
+  const Log log = Read(csv, robot);
+  CHECK(log.differenced == std::vector<std::string>{"pivot"});
+  REQUIRE(log.warnings.size() == 1);
+  CHECK_THAT(log.warnings[0], Catch::StartsWith("v/pivot is made of differences"));
+}
+
 TEST_CASE("an action acts as late as in the simulator that recorded it") {
   RobotDescription robot = Pendulum();
   REQUIRE(robot.simulation.latency == 0.008);

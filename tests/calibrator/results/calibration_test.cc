@@ -41,6 +41,15 @@ Findings Of(const std::vector<Log>& logs, const std::string& method = "auto",
   return Calibrate(Pendulum(), logs, options);
 }
 
+TEST_CASE("a model is not judged by velocities that are differences of positions") {
+  std::vector<Log> logs{Swinging("a", kTruth, 3, 0)};
+  logs[0].differenced = {"pivot"};
+  const Findings f = Of(logs, "laplace");
+  CHECK_FALSE(f.misspecification.alarm);
+  CHECK_THAT(f.misspecification.summary,
+             Catch::StartsWith("the model is not judged: v/pivot is made of differences"));
+}
+
 TEST_CASE("a pendulum's calibration finds what the motion tells, and names what it does not") {
   const Findings f = Of({Swinging("a", kTruth, 6, 0)});
   CHECK(f.used == "laplace");

@@ -1,0 +1,243 @@
+// How often the misspecification alarm speaks of a right model and of wrong ones, and how often
+// intervals hold the truth: a table for docs/diagnostics.md.
+// build/bench/false_alarms [logs [first seed [how the case's name begins]]]
+
+#include <fmt/format.h>
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "calibrator/diagnostics/model_test.h"
+#include "calibrator/fit/methods.h"
+#include "calibrator/motion/csv_log.h"
+#include "common/random.h"
+#include "sim/environment.h"
+#include "sim/parameters.h"
+
+namespace plumb {
+namespace {
+
+struct State {
+  Eigen::VectorXd q, v, action;
+};
+using Episode = std::vector<State>;
+/// What a log says of an episode.
+using Sensor = std::function<void(Episode& episode, double period, Random& random)>;
+
+void AddNoise(Episode& episode, double sd, Random& random) {
+  for (State& state : episode) {
+    for (double& x : state.q) x += sd * random.Normal();
+    for (double& x : state.v) x += sd * random.Normal();
+  }
+}
+
+Sensor Noise(double sd) {
+  return [sd](Episode& episode, double, Random& random) { AddNoise(episode, sd, random); };
+}
+
+void Round(Eigen::VectorXd& x) {
+  constexpr double kCounts = 16384 / (2 * M_PI);
+  for (double& entry : x) entry = std::round(entry * kCounts) / kCounts;
+}
+
+void Quantise(Episode& episode, double, Random&) {
+  for (State& state : episode) Round(state.q), Round(state.v);
+}
+
+enum class Difference { kBackward, kCentral };
+
+Sensor Differences(Difference kind, double sd, bool quantised = false) {
+  return [=](Episode& episode, double period, Random& random) {
+    for (State& state : episode) {
+      for (double& x : state.q) x += sd * random.Normal();
+      if (quantised) Round(state.q);
+    }
+    for (size_t k = 0; k < episode.size(); ++k) {
+      const size_t from = k == 0 ? 0 : k - 1, to = kind == Difference::kCentral || k == 0
+                                                       ? std::min(k + 1, episode.size() - 1)
+                                                       : k;
+      if (to == from) continue;
+      episode[k].v = (episode[to].q - episode[from].q) / (static_cast<double>(to - from) * period);
+    }
+  };
+}
+
+struct Case {
+  std::string name;
+  const char* robot;
+  int episodes;
+  Sensor sensor;
+  std::vector<std::pair<std::string, double>> wrong = {};
+};
+
+std::vector<Case> Cases() {
+  std::vector<Case> cases{
+      {"hopper, noise 0.003", "hopper/gym.toml", 60, Noise(0.003)},
+      {"hopper, noise 0.001", "hopper/gym.toml", 60, Noise(0.001)},
+      {"hopper, noise 0.0003", "hopper/gym.toml", 60, Noise(0.0003)},
+      {"hopper, 14 bit", "hopper/gym.toml", 60, Quantise},
+      {"double pendulum, noise 0.001", "double_pendulum", 3, Noise(0.001)},
+      {"cart-pole, noise 0.001", "cartpole", 3, Noise(0.001)},
+      {"pendulum, noise 0.001", "pendulum", 5, Noise(0.001)},
+      {"double pendulum, central differences, 0.001", "double_pendulum", 3,
+       Differences(Difference::kCentral, 0.001)},
+      {"double pendulum, backward differences, 14 bit", "double_pendulum", 3,
+       Differences(Difference::kBackward, 0, true)},
+      {"cart-pole, central differences, 0.001", "cartpole", 3,
+       Differences(Difference::kCentral, 0.001)},
+      {"hopper, central differences, 0.0003", "hopper/gym.toml", 60,
+       Differences(Difference::kCentral, 0.0003)},
+      {"hopper, backward differences, 14 bit", "hopper/gym.toml", 60,
+       Differences(Difference::kBackward, 0, true)},
+  };
+  const std::vector<std::pair<std::string, double>> faults{
+      {"inertia/torso", 1.2},   {"inertia/thigh", 1.2},     {"inertia/leg", 1.2},
+      {"inertia/foot", 1.2},    {"friction/leg", 5},        {"delay/thigh", 0.002},
+      {"gravity", 9.81 * 1.02}, {"contact/stiffness", 7500}};
+  for (const auto& fault : faults)
+    cases.push_back(
+        {"wrong " + fault.first + ", noise 0.003", "hopper/gym.toml", 60, Noise(0.003), {fault}});
+  for (const auto& fault : faults)
+    cases.push_back(
+        {"wrong " + fault.first + ", noise 0.0003", "hopper/gym.toml", 60, Noise(0.0003), {fault}});
+  return cases;
+}
+
+RobotDescription Changed(RobotDescription robot,
+                         const std::vector<std::pair<std::string, double>>& changed) {
+  for (const auto& [path, value] : changed) {
+    std::erase_if(robot.frozen,
+                  [&, p = path](const FrozenParameter& frozen) { return frozen.name == p; });
+    robot.parameters.push_back({path, "", ParameterDescription::Coordinate::kLinear, value, 1});
+  }
+  return robot;
+}
+
+std::vector<Episode> Motion(const Case& one, const RobotDescription& fitted, uint64_t seed) {
+  const RobotDescription robot = Changed(fitted, one.wrong);
+  Eigen::VectorXd physical(robot.parameters.size());
+  physical.head(static_cast<Eigen::Index>(fitted.parameters.size())) =
+      HiddenParameters(fitted, seed);
+  for (size_t i = 0; i < one.wrong.size(); ++i)
+    physical(static_cast<Eigen::Index>(fitted.parameters.size() + i)) = one.wrong[i].second;
+  Environment environment(robot);
+  environment.SetParameters(physical);
+  Random random(seed, {7});
+  std::vector<Episode> episodes;
+  for (int e = 0; e < one.episodes; ++e) {
+    environment.Reset(random);
+    Episode episode;
+    for (int step = 0; step < robot.task.steps; ++step) {
+      Eigen::VectorXf action(environment.action_size());
+      for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
+      const Eigen::VectorXd q = environment.reading_q(), v = environment.reading_v();
+      const StepResult result = environment.Step(action);
+      Eigen::VectorXd u(environment.action_size());
+      for (Eigen::Index i = 0; i < u.size(); ++i)
+        u(i) = environment.effort()(environment.task().action_indices()[static_cast<size_t>(i)]) /
+               environment.task().action_unit(static_cast<int>(i));
+      episode.push_back({q, v, u});
+      if (result.terminated) break;
+    }
+    episodes.push_back(std::move(episode));
+  }
+  return episodes;
+}
+
+Log Recorded(const Case& one, const RobotDescription& robot, uint64_t seed) {
+  std::string csv = "t";
+  for (const char* kind : {"q/", "v/"}) {
+    for (const JointDescription& joint : robot.joints) csv += std::string(",") + kind + joint.name;
+  }
+  for (const JointDescription& joint : robot.joints) {
+    if (!joint.passive && joint.effort_limit > 0) csv += ",u/" + joint.name;
+  }
+  csv += ",truncated\n";
+  Random random(seed, {8});
+  for (Episode& episode : [&] { return Motion(one, robot, seed); }()) {
+    one.sensor(episode, robot.task.period, random);
+    for (size_t k = 0; k < episode.size(); ++k) {
+      csv += fmt::format("{}", static_cast<double>(k) * robot.task.period);
+      for (const Eigen::VectorXd* x : {&episode[k].q, &episode[k].v, &episode[k].action}) {
+        for (const double entry : *x) csv += fmt::format(",{}", entry);
+      }
+      csv += k + 1 == episode.size() ? ",1\n" : ",0\n";
+    }
+  }
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / fmt::format("false_alarms.{}.csv", getpid());
+  std::ofstream(file) << csv;
+  Log log = ReadCsvLog(file, robot);
+  std::filesystem::remove(file);
+  return log;
+}
+
+struct Outcome {
+  int logs = 0, alarms = 0, judged = 0, held = 0, intervals = 0;
+  double fit = 0, test = 0;  // [s]
+};
+
+void Run(const Case& one, uint64_t seed, Outcome* outcome) {
+  const RobotDescription robot = LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + one.robot);
+  const Log log = Recorded(one, robot, seed);
+  const auto begin = std::chrono::steady_clock::now();
+  CalibrationOptions options;
+  options.method = "laplace";
+  const auto model = std::make_shared<const Model>(robot);
+  const MethodResult result = RunMethod({model, log.rollouts, options});
+  const auto fitted = std::chrono::steady_clock::now();
+  const Gaussian posterior = Moments(result.posterior);
+  Misspecification found;
+  if (log.differenced.empty()) {
+    int64_t steps = 0;
+    found = TestModel({model, log.rollouts, posterior.mean, result.curriculum->one_step,
+                       result.curriculum->rows, result.noise_sd, result.curriculum->noise_known},
+                      {}, &steps);
+    ++outcome->judged;
+  }
+  const std::chrono::duration<double> fit = fitted - begin,
+                                      test = std::chrono::steady_clock::now() - fitted;
+  outcome->fit += fit.count(), outcome->test += test.count();
+  const Eigen::VectorXd truth = HiddenParameters(robot, seed);
+  for (Eigen::Index i = 0; i < truth.size(); ++i) {
+    const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
+    const bool log_scale = parameter.coordinate == ParameterDescription::Coordinate::kLog;
+    const double off = posterior.mean(i) - (log_scale ? std::log(truth(i)) : truth(i));
+    outcome->held += std::abs(off) < 1.96 * std::sqrt(posterior.covariance(i, i));
+    ++outcome->intervals;
+  }
+  ++outcome->logs, outcome->alarms += found.alarm;
+  fmt::print(stderr, "{}, seed {}: {} {}\n", one.name, seed, found.alarm ? "ALARM" : "quiet",
+             found.summary);
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  using namespace plumb;
+  const int logs = argc > 1 ? std::atoi(argv[1]) : 40;
+  const int first = argc > 2 ? std::atoi(argv[2]) : 1;
+  const std::string only = argc > 3 ? argv[3] : "";
+  fmt::print(
+      "| log | alarms | intervals that hold the truth | [s] to fit | to test |\n"
+      "|---|---|---|---|---|\n");
+  for (const Case& one : Cases()) {
+    if (!one.name.starts_with(only)) continue;
+    Outcome outcome;
+    for (int log = 0; log < logs; ++log) Run(one, static_cast<uint64_t>(first + log), &outcome);
+    fmt::print("| {} | {} | {} of {} | {:.1f} | {:.1f} |\n", one.name,
+               outcome.judged == 0 ? "not judged"
+                                   : fmt::format("{} of {}", outcome.alarms, outcome.judged),
+               outcome.held, outcome.intervals, outcome.fit / logs, outcome.test / logs);
+    std::fflush(stdout);
+  }
+}

@@ -1,0 +1,154 @@
+#include "calibrator/diagnostics/witnesses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "calibrator/fit/recorded_window.h"
+#include "calibrator/fit/whitening.h"
+#include "common/decompositions.h"
+#include "common/gaussian.h"
+#include "common/random.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kFewestPairs = 12;  // of points, for each transition
+constexpr uint64_t kSeed = 1;     // of the axes' directions
+
+// Of each transition that the rows speak of: its first row, and the end.
+std::vector<std::pair<size_t, size_t>> BlocksOf(std::span<const WindowErrors::Row> rows) {
+  std::vector<std::pair<size_t, size_t>> blocks;
+  for (size_t first = 0; first < rows.size();) {
+    size_t end = first;
+    while (end < rows.size() && rows[end].rollout == rows[first].rollout &&
+           rows[end].transition == rows[first].transition) {
+      ++end;
+    }
+    blocks.emplace_back(first, end);
+    first = end;
+  }
+  return blocks;
+}
+
+using Index = std::map<std::pair<int, int>, Eigen::Index>;
+
+Index IndexOf(const OneStep& step) {
+  Index index;
+  for (const OneStep::Step& one : step.steps())
+    index.emplace(std::pair(one.rollout, one.transition), static_cast<Eigen::Index>(index.size()));
+  return index;
+}
+
+// Directions of a transition's pairs, whitened: each turn's are orthogonal, and sqrt(2 n) long.
+Eigen::MatrixXd Directions(Eigen::Index size, int turns, Eigen::Index transition) {
+  Random random(kSeed, {0xbe4d, static_cast<uint32_t>(transition)});
+  Eigen::MatrixXd directions(size, size * turns);
+  for (int turn = 0; turn < turns; ++turn) {
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(StandardNormals(size, size, random));
+    directions.middleCols(turn * size, size) =
+        std::sqrt(static_cast<double>(size)) * FirstColumns(qr.householderQ(), size);
+  }
+  return directions;
+}
+
+Eigen::MatrixXd StartSds(const OneStep& step, const Eigen::VectorXd& noise_sd) {
+  Eigen::MatrixXd sds(noise_sd.size(), static_cast<Eigen::Index>(step.steps().size()));
+  for (size_t i = 0; i < step.steps().size(); ++i) {
+    const Eigen::VectorXd sd = StartSd(*step.steps()[i].recorded);
+    sds.col(static_cast<Eigen::Index>(i)) = sd.array().isNaN().select(noise_sd, sd);
+  }
+  return sds;
+}
+
+}  // namespace
+
+Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
+                     const Eigen::VectorXd& physical, const Eigen::VectorXd& noise_sd) {
+  const Eigen::Index size = noise_sd.size();
+  const auto count = static_cast<Eigen::Index>(step.steps().size());
+  const auto turns = static_cast<int>((kFewestPairs + size - 1) / size);
+  const Eigen::MatrixXd starts = step.Starts(), sds = StartSds(step, noise_sd);
+  const Eigen::MatrixXd middle = step.Predict(physical, starts);
+  std::vector<Eigen::MatrixXd> directions;
+  for (Eigen::Index k = 0; k < count; ++k) directions.push_back(Directions(size, turns, k));
+  const Eigen::Index pairs = size * turns;
+  // Of each transition: by its noise whitened, and the bend of each pair.
+  std::vector<Eigen::MatrixXd> slope(step.steps().size(), Eigen::MatrixXd::Zero(size, size)),
+      bend(step.steps().size(), Eigen::MatrixXd(size, pairs));
+  for (Eigen::Index pair = 0; pair < pairs; ++pair) {
+    Eigen::MatrixXd offset(size, count);
+    for (Eigen::Index k = 0; k < count; ++k)
+      offset.col(k) = sds.col(k).cwiseProduct(directions[static_cast<size_t>(k)].col(pair));
+    const Eigen::MatrixXd above = step.Predict(physical, starts + offset),
+                          below = step.Predict(physical, starts - offset);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const auto at = static_cast<size_t>(k);
+      slope[at] += (above.col(k) - below.col(k)) * directions[at].col(pair).transpose() /
+                   (2 * static_cast<double>(pairs));
+      bend[at].col(pair) = (above.col(k) + below.col(k)) / 2 - middle.col(k);
+    }
+  }
+  const Index index = IndexOf(step);
+  for (const auto& [first, end] : BlocksOf(rows)) {
+    const Eigen::Index k = index.at({rows[first].rollout, rows[first].transition});
+    const Transition& recorded = *step.steps()[static_cast<size_t>(k)].recorded;
+    const auto height = static_cast<Eigen::Index>(end - first);
+    Block block{static_cast<Eigen::Index>(first), height, Eigen::MatrixXd(height, size),
+                Eigen::VectorXd::Ones(size), Eigen::VectorXd(height)};
+    Eigen::MatrixXd bends(height, pairs);
+    for (Eigen::Index i = 0; i < height; ++i) {
+      const int c = rows[first + static_cast<size_t>(i)].coordinate;
+      const double sd = EndSd(recorded, c);
+      block.end_sd(i) = sd > 0 ? sd : noise_sd(c);
+      block.sensitivity.row(i) = slope[static_cast<size_t>(k)].row(c);
+      bends.row(i) = bend[static_cast<size_t>(k)].row(c);
+    }
+    if (!block.sensitivity.allFinite() || !bends.allFinite()) continue;
+    const std::vector<Eigen::Index> steps{0, height};
+    WhitenWindow(steps, block.start_sd, block.sensitivity, block.end_sd, bends);
+    if (bends.rowwise().squaredNorm().maxCoeff() >
+        kLargestBend * kLargestBend * static_cast<double>(pairs)) {
+      continue;
+    }
+    blocks_.push_back(std::move(block));
+    rows_.insert(rows_.end(), rows.begin() + static_cast<std::ptrdiff_t>(first),
+                 rows.begin() + static_cast<std::ptrdiff_t>(end));
+  }
+}
+
+Eigen::MatrixXd Witnesses::Whiten(const Eigen::MatrixXd& raw) const {
+  Eigen::MatrixXd whitened(static_cast<Eigen::Index>(rows_.size()), raw.cols());
+  Eigen::Index at = 0;
+  for (const Block& block : blocks_) {
+    auto part = whitened.middleRows(at, block.count);
+    part = raw.middleRows(block.first, block.count);
+    const std::vector<Eigen::Index> steps{0, block.count};
+    WhitenWindow(steps, block.start_sd, block.sensitivity, block.end_sd, part);
+    at += block.count;
+  }
+  return whitened;
+}
+
+std::vector<Whereabouts> PredictWhereabouts(OneStep& step, std::span<const WindowErrors::Row> rows,
+                                            const Eigen::VectorXd& physical) {
+  const Eigen::Index n = step.num_velocities();
+  Eigen::MatrixXd begin = step.Starts();
+  const Eigen::MatrixXd led_to = step.Predict(physical, begin);
+  for (Eigen::Index k = 1; k < begin.cols(); ++k) {
+    if (step.steps()[static_cast<size_t>(k)].goes_on && led_to.col(k - 1).allFinite())
+      begin.col(k) = led_to.col(k - 1);
+  }
+  const Eigen::MatrixXd end = step.Predict(physical, begin);
+  const Index index = IndexOf(step);
+  std::vector<Whereabouts> all;
+  for (const auto& [first, last] : BlocksOf(rows)) {
+    const Eigen::Index k = index.at({rows[first].rollout, rows[first].transition});
+    all.push_back({begin.col(k).head(n), begin.col(k).tail(n), end.col(k).head(n)});
+  }
+  return all;
+}
+
+}  // namespace plumb

@@ -1,0 +1,80 @@
+#include "calibrator/motion/differences.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace plumb {
+namespace {
+
+constexpr double kFewest = 20;  // places where all kinds of differences can be taken
+// of the speeds: second differences below are rounding's, as in steady acceleration
+constexpr double kRounding = 1e-6;
+
+// Sums of squares over the places: of the difference from each kind, and of second differences.
+struct Squares {
+  std::array<double, 3> beside{};  // backward, forward, central
+  double bent = 0, speeds = 0;
+  double places = 0;
+};
+
+bool Follows(const Transition& before, const Transition& after) {
+  return after.step == before.step + 1 && after.q == before.next_q;
+}
+
+void Add(const Transition& before, const Transition& at, const Transition& after,
+         std::vector<Squares>* squares) {
+  const double last = before.duration(), next = at.duration();
+  for (size_t i = 0; i < squares->size(); ++i) {
+    const auto c = static_cast<Eigen::Index>(i);
+    const double v = at.v(c), back = at.q(c) - before.q(c), ahead = after.q(c) - at.q(c);
+    Squares& sum = (*squares)[i];
+    sum.beside[0] += std::pow(v - back / last, 2);
+    sum.beside[1] += std::pow(v - ahead / next, 2);
+    sum.beside[2] += std::pow(v - (back + ahead) / (last + next), 2);
+    sum.bent += std::pow(after.v(c) - 2 * v + before.v(c), 2);
+    sum.speeds += v * v;
+    ++sum.places;
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> DifferencedJoints(const RobotDescription& robot,
+                                           std::span<const Rollout> rollouts) {
+  const bool euler = robot.simulation.integrator == SimulationSettings::Integrator::kSemiImplicit;
+  if (robot.num_positions() != robot.num_velocities() ||
+      (euler && robot.simulation.substep >= robot.task.period)) {
+    return {};
+  }
+  std::vector<Squares> squares(static_cast<size_t>(robot.num_velocities()));
+  for (const Rollout& rollout : rollouts) {
+    const auto& t = rollout.transitions;
+    for (size_t k = 1; k + 1 < t.size(); ++k) {
+      if (Follows(t[k - 1], t[k]) && Follows(t[k], t[k + 1]))
+        Add(t[k - 1], t[k], t[k + 1], &squares);
+    }
+  }
+  std::vector<std::string> joints;
+  size_t velocity = 0;
+  for (const JointDescription& joint : robot.joints) {
+    const Squares& sum = squares[velocity++];
+    const double least = *std::min_element(sum.beside.begin(), sum.beside.end());
+    if (sum.places >= kFewest && sum.bent > kRounding * kRounding * sum.speeds &&
+        least < kSameDifference * kSameDifference * sum.bent) {
+      joints.push_back(joint.name);
+    }
+  }
+  return joints;
+}
+
+std::string DifferencesWarning(std::span<const std::string> joints) {
+  std::string names;
+  for (const std::string& joint : joints) names += (names.empty() ? "v/" : ", v/") + joint;
+  return names + (joints.size() == 1 ? " is" : " are") +
+         " made of differences of the positions: intervals will be too narrow, whatever the "
+         "model; record velocities that the drives measure, or an LCM log with plumb-estimator, "
+         "which smooths positions read several times in a control step";
+}
+
+}  // namespace plumb

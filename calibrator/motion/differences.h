@@ -1,0 +1,35 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calibrator/motion/transitions.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// The joints whose recorded velocities are but differences of their recorded positions: backward,
+/// forward or central ones, over a control period.
+///
+/// Such velocities know nothing that the positions do not. Their errors are those of two positions,
+/// divided by the time between: errors of neighbouring transitions depend on each other. And where
+/// the acceleration steps, as at every control step, the difference lies beside the velocity by a
+/// quarter or a half of what the step makes of it, which a fit takes for dynamics: intervals hold
+/// the truth in a third of all cases (docs/diagnostics.md).
+///
+/// A joint counts if what its velocities differ by from such differences is, root mean square,
+/// below kSameDifference of their own second differences. Of any motion's true velocities that
+/// ratio is 1/4 where accelerations step, 1/6 where they are smooth, whatever the motion; rounding
+/// of the table's numbers is far below. Joints that hardly move do not count, nor does a robot whose
+/// simulator makes one semi-implicit step of Euler's in a control period: there backward
+/// differences are the velocities. Thread-safe.
+std::vector<std::string> DifferencedJoints(const RobotDescription& robot,
+                                           std::span<const Rollout> rollouts);
+
+/// What that means, and what to do about it: a sentence.
+std::string DifferencesWarning(std::span<const std::string> joints);
+
+inline constexpr double kSameDifference = 0.05;
+
+}  // namespace plumb
