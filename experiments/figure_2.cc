@@ -60,11 +60,11 @@ struct Remembered {
 
 Remembered RecordRun(const Options& options, const PaperTask& task, int run,
                      const std::function<void(double)>& progress) {
-  const int updates = options.quick ? 40 : task.first_updates;
+  const RobotDescription robot = LoadTask(options.robots, task, options.hidden);
+  const int updates = options.quick ? 40 : robot.training.updates;
   const RecordingSettings settings{updates,        options.iterations,         options.noise,
                                    options.hidden, static_cast<uint64_t>(run), options.threads};
-  Remembered remembered{fmt::format("{} {}", task.name, run),
-                        Record(LoadTask(options.robots, task, options.hidden), settings, progress)};
+  Remembered remembered{fmt::format("{} {}", task.name, run), Record(robot, settings, progress)};
   remembered.budget = 25 * static_cast<int64_t>(CountTransitions(remembered.recording.seen));
   return remembered;
 }

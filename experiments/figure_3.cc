@@ -54,8 +54,8 @@ Results::Rows RunLoop(const ExperimentOptions& options, const PaperTask& task,
   settings.strategy = strategy;
   settings.iterations = options.iterations;
   settings.steps_per_iteration = static_cast<int>(kRobotSeconds / robot.task.period);
-  settings.first_updates = options.quick ? 2 : task.first_updates;
-  settings.next_updates = options.quick ? 1 : task.next_updates;
+  settings.first_updates = options.quick ? 2 : robot.training.updates;
+  settings.next_updates = options.quick ? 1 : robot.training.updates_again;
   settings.evaluation_episodes = options.quick ? 2 : 20;
   settings.seed = seed;
   settings.threads = options.threads;
@@ -162,10 +162,11 @@ int MakeFigure(Process& process, const ExperimentOptions& options) {
   std::vector<Job> jobs;
   Remembered remembered;
   for (const PaperTask& task : kPaperTasks) {
+    const TrainingSettings training = LoadTask(options.robots, task, options.hidden).training;
     for (int run = 1; run <= options.runs; ++run) {
       for (const CalibrationStrategy strategy : kStrategies) {
-        const double weight = task.first_updates * (Learns(strategy) ? 0.5 : 1.0) +
-                              options.iterations * task.next_updates;
+        const double weight = training.batch * (training.updates * (Learns(strategy) ? 0.5 : 1.0) +
+                                                options.iterations * training.updates_again);
         jobs.push_back(
             {KeyOf(task, strategy, run), weight, [&, run, strategy](const auto& progress) {
                return RunLoop(options, task, strategy, run, remembered, progress);

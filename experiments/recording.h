@@ -16,12 +16,9 @@ namespace plumb {
 struct PaperTask {
   const char* name;
   const char *paper, *gym;  ///< files below robots/: the paper's robot, and gym's
-  int first_updates;        ///< TRPO's, of a first policy
-  int next_updates;         ///< and of each later one
 };
-inline constexpr PaperTask kPaperTasks[] = {
-    {"pendulum", "pendulum/gym.toml", "pendulum/gym.toml", 60, 15},
-    {"hopper", "hopper/paper.toml", "hopper/gym.toml", 334, 60}};
+inline constexpr PaperTask kPaperTasks[] = {{"pendulum", "pendulum/gym.toml", "pendulum/gym.toml"},
+                                            {"hopper", "hopper/paper.toml", "hopper/gym.toml"}};
 
 /// Where a robot's parameters are drawn from.
 enum class Hidden {

@@ -74,10 +74,9 @@ class Experiment {
           Learns(strategy) ? Calibrated(strategy, counts[i], run)
                            : FirstDistribution(strategy, robot, now_.recording.hidden);
       const double share = static_cast<double>(i) / static_cast<double>(counts.size());
-      rows.push_back(
-          {static_cast<double>(counts[i]), Trained(task, distribution, run, [&](double part) {
-             progress(share + part / static_cast<double>(counts.size()));
-           })});
+      rows.push_back({static_cast<double>(counts[i]), Trained(distribution, run, [&](double part) {
+                        progress(share + part / static_cast<double>(counts.size()));
+                      })});
     }
     return rows;
   }
@@ -122,7 +121,7 @@ class Experiment {
     const std::string of = fmt::format("{} {}", task.name, run);
     if (now_.of == of) return;
     const RobotDescription robot = LoadTask(options_.robots, task, options_.hidden);
-    const RecordingSettings settings{options_.quick ? 40 : task.first_updates,
+    const RecordingSettings settings{options_.quick ? 40 : robot.training.updates,
                                      kUpdates,
                                      1,
                                      options_.hidden,
@@ -144,18 +143,18 @@ class Experiment {
   }
 
   // Return on the robot of a policy that went on from the first one.
-  double Trained(const PaperTask& task, const ParameterDistribution& distribution, int run,
+  double Trained(const ParameterDistribution& distribution, int run,
                  const std::function<void(double)>& progress) {
     const RobotDescription& robot = now_.recording.robot;
     LoopSettings settings;
     settings.seed = static_cast<uint64_t>(run);
     settings.threads = options_.threads;
-    settings.first_updates = options_.quick ? 40 : task.first_updates;
+    settings.first_updates = options_.quick ? 40 : robot.training.updates;
     const auto trainer = now_.recording.loop->TrainFirst(
         Key(CalibrationStrategy::kPrior), ParameterDistribution::Prior(robot), settings, progress);
-    const int updates = options_.quick ? 1 : kIterations * task.next_updates;
+    const int updates = options_.quick ? 1 : kIterations * robot.training.updates_again;
     for (int i = 0; i < updates; ++i) {
-      trainer->Update([&](Random& random) { return distribution.Sample(random); });
+      trainer->Update([&](Random& random) { return distribution.Draw(random); });
       progress(static_cast<double>(i) / updates);
     }
     SimulatedSystem real(robot, now_.recording.hidden, ReadingNoise(robot), settings.seed);
@@ -250,6 +249,7 @@ int Measure(Process& process, const ExperimentOptions& options) {
   Experiment experiment(options);
   std::vector<Job> robot_jobs, simulator_jobs;
   for (const PaperTask& task : kPaperTasks) {
+    const TrainingSettings training = LoadTask(options.robots, task, options.hidden).training;
     for (int run = 1; run <= options.runs; ++run) {
       for (const CalibrationStrategy strategy :
            {CalibrationStrategy::kOriginal, CalibrationStrategy::kStep,
@@ -257,7 +257,8 @@ int Measure(Process& process, const ExperimentOptions& options) {
             CalibrationStrategy::kOracle}) {
         const double weight =
             Learns(strategy) ? static_cast<double>(TransitionCounts(options).size()) : 1;
-        robot_jobs.push_back({KeyOf(task, strategy, run), weight * task.next_updates,
+        robot_jobs.push_back({KeyOf(task, strategy, run),
+                              weight * training.batch * training.updates_again,
                               [&, strategy, run](const auto& progress) {
                                 return experiment.Robot(task, strategy, run, progress);
                               }});
