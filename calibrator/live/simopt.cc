@@ -24,13 +24,23 @@ std::optional<Objective> ParseObjective(const std::string& method) {
 }  // namespace
 
 std::vector<Eigen::VectorXd> Starts(std::span<const Rollout> rollouts) {
+  std::vector<const Transition*> all, first;
+  for (const Rollout& rollout : rollouts) {
+    for (const Transition& t : rollout.transitions) {
+      all.push_back(&t);
+      if (t.step == 0) first.push_back(&t);
+    }
+  }
   std::vector<Eigen::VectorXd> starts;
-  for (size_t i = rollouts.size(); i-- > 0 && starts.size() < kMostStarts;) {
-    const auto& transitions = rollouts[i].transitions;
-    if (transitions.empty() || transitions.front().step != 0) continue;
-    Eigen::VectorXd start(transitions.front().q.size() + transitions.front().v.size());
-    start << transitions.front().q, transitions.front().v;
+  const auto add = [&](const Transition& t) {
+    Eigen::VectorXd start(t.q.size() + t.v.size());
+    start << t.q, t.v;
     starts.push_back(start.cast<float>().cast<double>());  // as messages have it
+  };
+  if (first.empty()) return starts;
+  for (size_t i = 0; i < kStarts / 2; ++i) {
+    add(*first[first.size() - 1 - i % first.size()]);
+    add(*all[i * all.size() / (kStarts / 2)]);
   }
   return starts;
 }

@@ -58,10 +58,11 @@ struct CalibrationReport {
   std::string alarm, gap;             ///< see SimOpt::State
 };
 
-/// States (q, v) in which the newest roll-outs have begun on the robot, kMostStarts of them.
-/// Thread-safe.
+/// States (q, v) of the robot for simulated episodes to begin with, kStarts of them, or none if no
+/// roll-out has its beginning: half of them those in which the newest roll-outs have begun, half
+/// evenly from all of their motion. Thread-safe.
 std::vector<Eigen::VectorXd> Starts(std::span<const Rollout> rollouts);
-inline constexpr size_t kMostStarts = 32;
+inline constexpr size_t kStarts = 32;
 
 /// The loop's inference: the distribution over simulators, from roll-outs that come iteration by
 /// iteration.
