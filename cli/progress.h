@@ -18,8 +18,7 @@ namespace plumb {
 /// summary. Time is an argument. Not thread-safe.
 class Progress {
  public:
-  Progress(const RobotDescription& robot, int iterations)
-      : robot_(robot), iterations_(iterations) {
+  Progress(const RobotDescription& robot, int iterations) : robot_(robot), iterations_(iterations) {
     training_.incumbent = training_.incumbent_since = training_.challenger = -1;
   }
 

@@ -290,10 +290,13 @@ TEST_CASE("Trials, the incumbent and the reason survive an interruption") {
   TrainingSession straight = NewSession(4, 3);
   const auto policies = RunAll(straight, {-2, -1, -1.02}, Lacking);
   // Interrupted after every roll-out and in the middle of every training.
-  auto session = std::make_unique<TrainingSession>(NewSession(4, 3));
+  const auto anew = [] {
+    return std::make_unique<TrainingSession>(Robot(), MakeGymPendulum, 3, 4, 1);
+  };
+  auto session = anew();
   const auto resume = [&] {
     SaveCheckpoint(CheckpointIn(folder), session->MakeCheckpoint());
-    session = std::make_unique<TrainingSession>(NewSession(4, 3));
+    session = anew();
     session->Restore(LoadCheckpoint(CheckpointIn(folder)).value());
   };
   const std::vector<double> rates{-2, -1, -1.02};
@@ -314,8 +317,7 @@ TEST_CASE("Trials, the incumbent and the reason survive an interruption") {
   CHECK(status.decision == expected.decision);
   CHECK(status.probability == expected.probability);
   CHECK(status.challenger_return == expected.challenger_return);
-  CHECK(EncodeCheckpoint(session->MakeCheckpoint()) ==
-        EncodeCheckpoint(straight.MakeCheckpoint()));
+  CHECK(EncodeCheckpoint(session->MakeCheckpoint()) == EncodeCheckpoint(straight.MakeCheckpoint()));
 }
 
 TEST_CASE("A newer distribution of the iteration takes effect at the next batch") {
