@@ -153,7 +153,11 @@ std::string Progress::Row(const Iteration& iteration) const {
 
 std::vector<std::string> Progress::TakeRows() {
   std::vector<std::string> rows;
-  for (; taken_ < done_.size(); ++taken_) rows.push_back(Row(done_[taken_]));
+  for (; taken_ < done_.size(); ++taken_) {
+    rows.push_back(Row(done_[taken_]));
+    const std::string& gap = done_[taken_].calibration.gap;
+    if (!gap.empty()) rows.push_back("      " + gap);
+  }
   rows.insert(rows.end(), decided_.begin(), decided_.end());
   decided_.clear();
   return rows;
@@ -278,6 +282,8 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
            {"hidden", truth.size() > 0 ? json(TrueCombination(c, i, truth)) : json()}});
     }
     summary["iterations"].push_back({{"iteration", c.iteration},
+                                     {"alarm", c.alarm},
+                                     {"gap", c.gap},
                                      {"mean", c.mean},
                                      {"sd", c.sd},
                                      {"combinations", combinations},
