@@ -14,10 +14,10 @@ namespace plumb {
 /// are noisy.
 ///
 /// Errors of a right model are whitened by what the simulator's slope makes of the noise. That is
-/// right where the simulator is linear over the noise. Where a contact or a stop begins within it, errors
-/// are not normal, and larger than whitened ones should be: such a transition tells of the noise
-/// rather than of the model. Which these are depends on the reading that a transition begins with,
-/// and not on how it ends, so leaving them out leaves the others' errors as they are.
+/// right where the simulator is linear over the noise. Where a contact or a stop begins within it,
+/// errors are not normal, and larger than whitened ones should be: such a transition tells of the
+/// noise rather than of the model. Which these are depends on the reading that a transition begins
+/// with, and not on how it ends, so leaving them out leaves the others' errors as they are.
 ///
 /// Points on a sphere of radius sqrt(2 n) standard deviations, in opposite pairs along randomly
 /// turned axes, stand for the noise (a spherical cubature rule; Genz, Monahan, SIAM J. Sci. Comput.

@@ -21,8 +21,8 @@ namespace plumb {
 /// A joint counts if what its velocities differ by from such differences is, root mean square,
 /// below kSameDifference of their own second differences. Of any motion's true velocities that
 /// ratio is 1/4 where accelerations step, 1/6 where they are smooth, whatever the motion; rounding
-/// of the table's numbers is far below. Joints that hardly move do not count, nor does a robot whose
-/// simulator makes one semi-implicit step of Euler's in a control period: there backward
+/// of the table's numbers is far below. Joints that hardly move do not count, nor does a robot
+/// whose simulator makes one semi-implicit step of Euler's in a control period: there backward
 /// differences are the velocities. Thread-safe.
 std::vector<std::string> DifferencedJoints(const RobotDescription& robot,
                                            std::span<const Rollout> rollouts);
