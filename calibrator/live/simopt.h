@@ -139,7 +139,7 @@ class SimOpt {
   Gaussian prior_;
   State state_;
   Discrepancy discrepancy_;
-  int64_t failures_ = 0;     // simulations of RunMethod that have failed
+  int64_t failures_ = 0;  // simulations of RunMethod that have failed
 };
 
 }  // namespace plumb
