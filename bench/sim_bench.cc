@@ -7,10 +7,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
 
 #include "common/random.h"
 #include "sim/environment.h"
+#include "sim/residual_inputs.h"
 #include "sim/simulator.h"
 #include "sim/virtual/simbody_plant.h"
 #include "sim/windows.h"
@@ -128,6 +130,44 @@ void Hopper(benchmark::State& state) {
   });
 }
 BENCHMARK(Hopper);
+
+/// As large as FitResidual makes them, of small numbers: the motion hardly changes.
+std::shared_ptr<const Residual> LearntResidual(const RobotDescription& robot) {
+  constexpr Eigen::Index kWaves = 150;
+  const Eigen::Index inputs = ResidualInputCount(robot), outputs = robot.num_velocities();
+  Random random(7);
+  const auto normal = [&](Eigen::Index rows, Eigen::Index columns) {
+    Eigen::MatrixXd matrix(rows, columns);
+    for (double& number : matrix.reshaped()) number = random.Normal();
+    return matrix;
+  };
+  ResidualFunction f;
+  f.mean = Eigen::VectorXd::Zero(inputs), f.scale = Eigen::VectorXd::Ones(inputs);
+  f.low = Eigen::VectorXd::Constant(inputs, -3), f.high = -f.low;
+  f.frequencies = normal(kWaves, inputs) / 4, f.phases = normal(kWaves, 1);
+  f.weights = {1e-3 * normal(outputs, f.features())};
+  f.noise = 1e-3 * Eigen::MatrixXd::Identity(outputs, outputs);
+  f.bound = Eigen::VectorXd::Ones(outputs);
+  const auto parameters = static_cast<Eigen::Index>(robot.parameters.size());
+  return std::make_shared<const Residual>(Residual{{Eigen::VectorXd::Zero(parameters)}, f, f});
+}
+
+/// A control step as training makes it, without and with a residual.
+void HopperControlStep(benchmark::State& state, bool residual) {
+  const RobotDescription robot = Load("hopper/gym.toml");
+  Environment hopper(robot);
+  if (residual) hopper.SetResidual(LearntResidual(robot));
+  Random random(1);
+  hopper.Reset(random);
+  Eigen::VectorXf action(3);
+  ForEachHop(state, [&](const auto& q, const auto& v, const auto& effort) {
+    hopper.SetState(q, v);
+    action = (effort.tail(3) / 200).template cast<float>();
+    benchmark::DoNotOptimize(hopper.Step(action));
+  });
+}
+BENCHMARK_CAPTURE(HopperControlStep, alone, false);
+BENCHMARK_CAPTURE(HopperControlStep, residual, true);
 
 void HopperInFlight(benchmark::State& state) {
   Simulator simulator(Load("hopper/gym.toml"));

@@ -47,6 +47,25 @@ void PrintLogs(const std::vector<Log>& logs) {
   }
 }
 
+// Errors of one step, each transition predicted by the others.
+void PrintGap(const Gap& gap, const RobotDescription& robot) {
+  std::cout << fmt::format("  {:<28}{:>7}{:>12}{:>12}{:>12}{:>12}\n", "error of one step", "steps",
+                           "without", "residual", "readings", "explained");
+  const auto rows = [&](const char* condition, const ResidualQuality& quality) {
+    const Eigen::VectorXd explained = Explained(quality);
+    for (Eigen::Index i = 0; i < explained.size(); ++i) {
+      const double claimed = quality.claimed(i);
+      std::cout << fmt::format("  {:<28}{:>7}{:>12.3g}{:>12.3g}{:>12}{:>10.0f} %\n",
+                               robot.joints[static_cast<size_t>(i)].name + ", " + condition,
+                               quality.transitions, quality.before(i), quality.after(i),
+                               claimed > 0 ? fmt::format("{:.3g}", claimed) : "not said",
+                               100 * explained(i));
+    }
+  };
+  if (gap.residual->free) rows("free", gap.free);
+  if (gap.residual->touching) rows("touching", gap.touching);
+}
+
 void PrintFindings(const Findings& findings, const RobotDescription& robot) {
   const Summary summary = Summarise(findings, robot);
   std::cout << fmt::format("{:24} {:>22} {:>24} {:>25}\n", "", "prior", "posterior", "95 %");
@@ -63,11 +82,13 @@ void PrintFindings(const Findings& findings, const RobotDescription& robot) {
                              number(summary.mean(at), summary.sd(at)), summary.lower(at),
                              summary.upper(at));
   }
-  for (const std::string* words :
-       {&findings.identifiability.summary, &findings.advice, &findings.misspecification.summary,
-        &findings.holdout.summary, &findings.agreement.summary, &findings.check}) {
-    if (!words->empty()) std::cout << "- " << *words << "\n";
-  }
+  const auto print = [](const std::string& words) {
+    if (!words.empty()) std::cout << "- " << words << "\n";
+  };
+  print(findings.identifiability.summary), print(findings.advice);
+  print(findings.misspecification.summary), print(findings.gap.summary);
+  if (findings.gap.residual) PrintGap(findings.gap, robot);
+  print(findings.holdout.summary), print(findings.agreement.summary), print(findings.check);
   for (const std::string& warning : findings.warnings) std::cout << "! " << warning << "\n";
   std::cout << fmt::format(
       "{}, {} transitions simulated for the fit and {} for the diagnostics, {} failed; {:.2f} s\n",
@@ -89,6 +110,7 @@ uint64_t IdentityOf(const RobotDescription& robot, const CalibrateFlags& flags,
   uint64_t identity = Hash(VersionLine("plumb") + flags.options.method + flags.options.discrepancy,
                            robot.fingerprint);
   identity = Hash(&flags.options.seed, sizeof flags.options.seed, identity);
+  identity = Hash(&flags.options.residual, sizeof flags.options.residual, identity);
   identity = Hash(&flags.options.budget, sizeof flags.options.budget, identity);
   identity =
       Hash(flags.options.horizons.data(), flags.options.horizons.size() * sizeof(int), identity);
@@ -147,6 +169,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
       if (!file.empty()) RequireWritable(file);
     }
   }
+  flags.options.residual = flags.options.residual && robot.calibration.residual;
   const std::vector<Log> logs = ReadLogs(flags, robot);
   if (speaks) PrintLogs(logs);
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
@@ -176,14 +199,17 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
     for (const Log& log : logs) provenance.logs.push_back(log.name);
     provenance.options = {{"horizons", List(flags.options.horizons)},
                           {"budget", std::to_string(flags.options.budget)},
-                          {"discrepancy", flags.options.discrepancy}};
+                          {"discrepancy", flags.options.discrepancy},
+                          {"residual", flags.options.residual ? "yes" : "no"}};
     provenance.command = command;
     provenance.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
     WritePosterior(flags.output, findings, robot, provenance);
     const Summary summary = Summarise(findings, robot);
     if (!flags.report.empty())
       WriteReport(flags.report, findings, robot, provenance, ResidualsOf(findings, robot));
-    if (!flags.urdf.empty()) WriteIdentifiedUrdf(flags.urdf, robot, summary.mean, summary.sd);
+    if (!flags.urdf.empty())
+      WriteIdentifiedUrdf(flags.urdf, robot, summary.mean, summary.sd,
+                          findings.gap.residual != nullptr);
     journal->Finish();
     std::cout << "wrote " << flags.output << (flags.report.empty() ? "" : ", " + flags.report)
               << (flags.urdf.empty() ? "" : ", " + flags.urdf) << std::endl;

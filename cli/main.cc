@@ -111,8 +111,9 @@ int main(int argc, char** argv) {
         sim->add_option("--episodes", sim_flags.episodes, "how many")
             ->check(CLI::Range(1, 1000000))
             ->capture_default_str();
-        auto* posterior = sim->add_option("--posterior", sim_flags.posterior,
-                                          "a posterior.json: its means instead of the prior's");
+        auto* posterior =
+            sim->add_option("--posterior", sim_flags.posterior,
+                            "a posterior.json: its means instead of the prior's, and its residual");
         sim->add_option("--set", sim_flags.set,
                         "parameters other than their prior means, e.g. mass/thigh=4");
         sim->add_flag("--urdf", sim_flags.urdf,
@@ -175,6 +176,8 @@ int main(int argc, char** argv) {
                 "instead: that many runs of simulation-based calibration on motions like these")
             ->check(CLI::Range(0, 1000000))
             ->capture_default_str();
+        calibrate->add_flag("!--no-residual", calibrate_flags.options.residual,
+                            "do not learn what the model lacks where it cannot explain the robot");
         calibrate->add_flag("--strict", calibrate_flags.strict,
                             "exit status 3 if the findings should not be trusted");
         excite = app.add_subcommand(
@@ -193,15 +196,17 @@ int main(int argc, char** argv) {
         excite->add_option("--seconds", excite_flags.seconds, "of each")
             ->check(CLI::Range(0.01, 600.0))
             ->capture_default_str();
-        excite->add_option("--posterior", excite_flags.posterior,
-                           "a posterior.json to start from; default: the prior");
+        excite->add_option(
+            "--posterior", excite_flags.posterior,
+            "a posterior.json to start from, without its residual; default: the prior");
         excite->add_option("--png", excite_flags.png, "draw the best one as a strip of snapshots");
         train =
             app.add_subcommand("train", "train a policy on simulators drawn from a distribution");
         train->add_option("robot", train_flags.robot, "robot folder or TOML file")->required();
         train
             ->add_option("--distribution", train_flags.distribution,
-                         "a posterior.json, 'prior', or 'nominal': the prior's means alone")
+                         "a posterior.json, with the residual that is in it, 'prior', or "
+                         "'nominal': the prior's means alone")
             ->capture_default_str();
         train
             ->add_option("--steps", train_flags.steps,

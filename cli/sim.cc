@@ -8,12 +8,14 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <memory>
+#include <utility>
 
 #include "cli/reading_noise.h"
 #include "cli/roll_out.h"
+#include "cli/simulators.h"
 #include "common/atomic_file.h"
 #include "common/time_units.h"
-#include "robot/posterior_reader.h"
 #include "sim/view/picture.h"
 #include "trainer/policy_file.h"
 
@@ -65,11 +67,24 @@ void Set(const std::string& assignment, RobotDescription& robot) {
   }
 }
 
-/// The posterior's means instead of the prior's.
-void SetMeans(const std::string& posterior, RobotDescription& robot) {
-  const Eigen::VectorXd means = ReadPosterior(posterior, robot).Mean();
+/// The posterior's means instead of the prior's: where there is a residual, of the coordinates, as
+/// its first draw is for these. @return the residual; null = none.
+std::shared_ptr<const Residual> SetMeans(const std::string& posterior, RobotDescription& robot) {
+  const ParameterDistribution simulators = ReadSimulators(posterior, robot);
+  const auto& residual = simulators.residual;
+  const Eigen::VectorXd means =
+      residual ? robot.ToPhysical(residual->coordinates[0]) : simulators.Mean();
   for (size_t i = 0; i < robot.parameters.size(); ++i)
     robot.parameters[i].mean = means(static_cast<Eigen::Index>(i));
+  return residual;
+}
+
+/// The residual's first draw, for a robot whose parameters may have been set to other values, and
+/// other ones added to them.
+std::shared_ptr<const Residual> First(const Residual& residual, const Eigen::VectorXd& means) {
+  Residual first = residual;
+  first.coordinates = {means};
+  return std::make_shared<const Residual>(std::move(first));
 }
 
 Eigen::VectorXd Means(const RobotDescription& robot) {
@@ -139,7 +154,8 @@ int Simulate(Process& process, const SimFlags& flags) {
     throw std::invalid_argument("--policy and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
-  if (!flags.posterior.empty()) SetMeans(flags.posterior, robot);
+  std::shared_ptr<const Residual> residual;
+  if (!flags.posterior.empty()) residual = SetMeans(flags.posterior, robot);
   if (flags.urdf) robot.parameters.clear();
   for (const std::string& assignment : flags.set) Set(assignment, robot);
   const ReadingNoise noise = ParseReadingNoise(flags.noise);
@@ -147,6 +163,7 @@ int Simulate(Process& process, const SimFlags& flags) {
   const Eigen::VectorXd means = Means(robot);
   Environment environment(robot);
   environment.SetParameters(means);
+  if (residual) environment.SetResidual(First(*residual, means));
   const Actor actor = MakeActor(flags, robot, environment.task());
 
   std::cout << fmt::format("{}, task {}, {}, seed {}\n", robot.name, robot.task.name,
@@ -154,7 +171,10 @@ int Simulate(Process& process, const SimFlags& flags) {
                            : flags.policy.empty() ? "no action"
                                                   : flags.policy,
                            flags.seed)
-            << DescribeParameters(robot) << Describe(noise)
+            << DescribeParameters(robot)
+            << (residual ? "residual: what " + flags.posterior + " has learnt that these lack\n"
+                         : "")
+            << Describe(noise)
             << fmt::format("{:>7}  {:>6}  {:>10}  ended by\n", "episode", "steps", "return");
   std::string csv = CsvHeader(robot);
   std::vector<Snapshot> film;  // of the first episode

@@ -15,9 +15,10 @@ struct SimFlags {
   bool random = false;
   uint64_t seed = 1;
   int episodes = 1;
-  std::string noise = "0";       ///< of readings: "0.003" or "0.001,0.05"
-  std::string csv, png, gif;     ///< files; empty = none
-  std::string posterior;         ///< posterior.json, its means for the prior's; empty = the prior
+  std::string noise = "0";    ///< of readings: "0.003" or "0.001,0.05"
+  std::string csv, png, gif;  ///< files; empty = none
+  /// posterior.json, its means for the prior's, and its residual; empty = the prior
+  std::string posterior;
   std::vector<std::string> set;  ///< "mass/thigh=4"
   bool urdf = false;             ///< forget the uncertain parameters' prior means
 };

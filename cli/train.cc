@@ -12,13 +12,14 @@
 #include <sstream>
 #include <thread>
 
+#include "cli/simulators.h"
 #include "cli/training_progress.h"
 #include "common/atomic_file.h"
 #include "common/batch_runner.h"
 #include "common/config.h"
 #include "common/hash.h"
 #include "common/ranks.h"
-#include "robot/posterior_reader.h"
+#include "robot/residual_json.h"
 #include "trainer/checkpoint.h"
 #include "trainer/onnx_policy.h"
 #include "trainer/policy_file.h"
@@ -39,7 +40,7 @@ RobotDescription ReadRobot(const TrainFlags& flags) {
 }
 
 ParameterDistribution ReadDistribution(const std::string& name, const RobotDescription& robot) {
-  if (name != "prior" && name != "nominal") return ReadPosterior(name, robot);
+  if (name != "prior" && name != "nominal") return ReadSimulators(name, robot);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   if (name == "nominal") distribution.mixture.components[0].covariance.setZero();
   return distribution;
@@ -59,6 +60,8 @@ uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
     const Gaussian& component = distribution.mixture.components[i];
     text << distribution.mixture.weights[i] << component.mean << component.covariance;
   }
+  if (distribution.residual) text << ResidualJson(*distribution.residual);
+  for (const Eigen::VectorXd& begin : distribution.starts) text << begin;
   if (start) text << start->parameters << start->observation_mean << start->observation_scale;
   return Hash(text.str());
 }
@@ -90,6 +93,10 @@ class Training {
 
   int Run() {
     const ParameterSampler sample = [this](Random& random) { return distribution_.Draw(random); };
+    if (speaks() && distribution_.residual)
+      std::cout << fmt::format("{:.0f} % of the episodes are simulated with the residual of {}\n",
+                               100 * (1 - ParameterDistribution::kPlainShare), flags_.distribution)
+                << std::flush;
     ProgressTable table(speaks() ? flags_.csv : "", trainer_.updates());
     {
       TrainingProgress line(speaks());

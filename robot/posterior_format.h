@@ -11,7 +11,9 @@
 namespace plumb {
 
 inline constexpr char kPosteriorFormat[] = "plumbline posterior";
-inline constexpr int kPosteriorVersion = 1;
+inline constexpr int kPosteriorVersion = 2;
+/// The version that had no residual: what is not in it is none.
+inline constexpr int kPosteriorBeforeResiduals = 1;
 
 /// As a string: a JSON number is a double to most readers, which has 53 bits.
 inline std::string Hexadecimal(uint64_t number) { return fmt::format("{:#018x}", number); }

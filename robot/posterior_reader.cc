@@ -8,82 +8,20 @@
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "robot/json_field.h"
 #include "robot/physics_fingerprint.h"
 #include "robot/posterior_format.h"
+#include "robot/residual_json.h"
 
 namespace plumb {
 namespace {
 
 using nlohmann::json;
+using Field = JsonField;
 
 constexpr std::uintmax_t kMaxBytes = 256 << 20;
 constexpr size_t kMaxComponents = 1000;
 constexpr double kRounding = 1e-9;
-
-/// A value of the file, and the way to it for complaints.
-class Field {
- public:
-  Field(const json& value, std::string path) : value_(value), path_(std::move(path)) {}
-
-  [[noreturn]] void Fail(const std::string& what) const {
-    throw std::runtime_error(path_ + ": " + what);
-  }
-  void Require(bool holds, const std::string& what) const {
-    if (!holds) Fail(what);
-  }
-
-  Field operator[](const char* key) const {
-    Require(value_.is_object(), "is not an object");
-    const auto found = value_.find(key);
-    const std::string path = path_.empty() ? key : path_ + "." + key;
-    if (found == value_.end()) Field(value_, path).Fail("is missing");
-    return {*found, path};
-  }
-  /// The entries of an array of `size`.
-  std::vector<Field> Entries(size_t size) const {
-    Require(value_.is_array(), "is not an array");
-    Require(value_.size() == size, fmt::format("has {} entries, expected {}", value_.size(), size));
-    std::vector<Field> entries;
-    for (size_t i = 0; i < size; ++i)
-      entries.emplace_back(value_[i], fmt::format("{}[{}]", path_, i));
-    return entries;
-  }
-  size_t size() const {
-    Require(value_.is_array(), "is not an array");
-    return value_.size();
-  }
-  double Number() const {
-    Require(value_.is_number(), "is not a number");
-    const auto number = value_.get<double>();
-    Require(std::isfinite(number), "is not finite");
-    return number;
-  }
-  std::string Text() const {
-    Require(value_.is_string(), "is not a string");
-    return value_.get<std::string>();
-  }
-  void RequireText(const std::string& expected, const std::string& otherwise) const {
-    Require(Text() == expected, fmt::format("{}: it is \"{}\", expected \"{}\"", otherwise,
-                                            Text().substr(0, 80), expected));
-  }
-  Eigen::VectorXd Vector(size_t size) const {
-    Eigen::VectorXd vector(size);
-    Eigen::Index i = 0;
-    for (const Field& entry : Entries(size)) vector(i++) = entry.Number();
-    return vector;
-  }
-  Eigen::MatrixXd Matrix(size_t size) const {
-    const std::vector<Field> rows = Entries(size);
-    Eigen::MatrixXd matrix(size, size);
-    for (size_t i = 0; i < size; ++i)
-      matrix.row(static_cast<Eigen::Index>(i)) = rows[i].Vector(size);
-    return matrix;
-  }
-
- private:
-  const json& value_;
-  std::string path_;
-};
 
 std::string ReadText(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file)) throw std::runtime_error("there is no such file");
@@ -98,8 +36,9 @@ std::string ReadText(const std::filesystem::path& file) {
 void RequireRobot(const Field& root, const RobotDescription& robot) {
   root["format"].RequireText(kPosteriorFormat, "is not a posterior");
   const double version = root["version"].Number();
-  root["version"].Require(version == kPosteriorVersion,
-                          fmt::format("is {}, this program reads {}", version, kPosteriorVersion));
+  root["version"].Require(version == kPosteriorVersion || version == kPosteriorBeforeResiduals,
+                          fmt::format("is {}, this program reads {} and {}", version,
+                                      kPosteriorBeforeResiduals, kPosteriorVersion));
   root["robot"].RequireText(robot.name, "is another robot's");
   const size_t n = robot.parameters.size();
   const std::vector<Field> names = root["names"].Entries(n), units = root["units"].Entries(n),
@@ -157,6 +96,21 @@ ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& 
   return distribution;
 }
 
+// Of what is lacking in the simulators that the mixture is of.
+void ReadGap(const Field& root, const RobotDescription& robot, ParameterDistribution* to) {
+  if (root["version"].Number() == kPosteriorBeforeResiduals) return;
+  const auto velocities = static_cast<size_t>(robot.num_velocities()),
+             state = static_cast<size_t>(robot.num_positions()) + velocities;
+  const Field residual = root["residual"], starts = root["starts"];
+  if (!residual.null()) {
+    to->residual = ReadResidual(residual, robot.parameters.size(), velocities);
+    for (const Eigen::VectorXd& draw : to->residual->coordinates)
+      residual["draws"].Require(to->ToPhysical(draw).allFinite(), "is too wide: it overflows");
+  }
+  for (const Field& start : starts.Entries(starts.size()))
+    to->starts.push_back(start.SingleVector(state));
+}
+
 }  // namespace
 
 ParameterDistribution ReadPosterior(const std::filesystem::path& file,
@@ -166,7 +120,9 @@ ParameterDistribution ReadPosterior(const std::filesystem::path& file,
     const Field root(j, "");
     if (!j.is_object()) throw std::runtime_error("is not a posterior");
     RequireRobot(root, robot);
-    return ReadMixture(root["mixture"], robot);
+    ParameterDistribution distribution = ReadMixture(root["mixture"], robot);
+    ReadGap(root, robot, &distribution);
+    return distribution;
   } catch (const std::exception& error) {
     throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
   }

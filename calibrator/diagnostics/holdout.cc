@@ -109,13 +109,13 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
   } else if (worse.empty()) {
     result.summary = fmt::format(
         "on {} transitions that it has not seen, the posterior predicts no better than the prior: "
-        "do not train with it",
+        "train with the prior, and record motion that tells more",
         result.held_out);
   } else {
     result.summary = fmt::format(
         "on {} transitions that it has not seen, the posterior predicts WORSE than the prior {} "
         "step{} "
-        "ahead: do not train with it",
+        "ahead: train with the prior, until the model explains what was recorded",
         result.held_out, worse, worse == "1" ? "" : "s");
   }
   return result;

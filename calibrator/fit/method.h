@@ -22,6 +22,7 @@ struct CalibrationOptions {
   /// transitions that reps, simopt, the abc's and mixture may simulate
   int64_t budget = 100'000;
   uint64_t seed = 1;
+  bool residual = true;  ///< where the alarm speaks, learn what the model lacks (CloseGap)
   ExecutionOptions execution;
   std::function<void(const std::string& what, double share)> progress = [](const std::string&,
                                                                            double) {};

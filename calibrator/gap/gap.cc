@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "calibrator/diagnostics/model_test.h"
+#include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "robot/parameter_distribution.h"
@@ -17,29 +17,15 @@ namespace {
 
 constexpr uint32_t kDrawStream = 0x4761'7044;  // of random numbers; "GapD"
 
-Misspecification Test(const MethodInput& input, const MethodResult& result, int64_t* steps) {
-  const OneStepView view = ViewOneStep(input, result);
-  *steps += view.simulated_steps;
-  return TestModel(input, result, view, steps);
+double MeanExplained(const ResidualQuality& quality) {
+  const Eigen::VectorXd explained = Explained(quality);
+  return explained.size() == 0 ? 0 : explained.mean();
 }
 
-std::vector<Rollout> FreeOnly(const RobotDescription& robot, std::span<const Rollout> rollouts) {
-  TouchFinder touch(robot, Residual::kTouchMargin);
-  std::vector<Rollout> free(rollouts.begin(), rollouts.end());
-  for (Rollout& rollout : free) {
-    std::erase_if(rollout.transitions, [&](const Transition& t) {
-      return touch.Find(t.q).any() || (t.next_q.allFinite() && touch.Find(t.next_q).any());
-    });
-  }
-  return free;
-}
-
-// Mean share of a velocity's squared errors that a residual explains, left-out transitions judging.
-double Explained(const ResidualQuality& quality) {
-  if (quality.before.size() == 0) return 0;
-  const Eigen::ArrayXd before = quality.before.array().square(),
-                       after = quality.after.array().square();
-  return (1 - after / before.max(1e-300)).max(0).mean();
+bool KnowsLikelihood(const std::string& name) {
+  const std::vector<Method> methods = LikelihoodMethods();
+  return std::any_of(methods.begin(), methods.end(),
+                     [&](const Method& method) { return method.name == name; });
 }
 
 // An alarm tells of every error that is no accident, however small: of the tenth of a per cent that
@@ -47,7 +33,23 @@ double Explained(const ResidualQuality& quality) {
 bool Matters(const MethodInput& input, const MethodResult& result) {
   const ResidualFit fit = FitResidual(input.model, Moments(result.posterior).mean, input.rollouts,
                                       {.seed = input.options.seed});
-  return std::max(Explained(fit.free), Explained(fit.touching)) >= kLeastExplained;
+  return std::max(MeanExplained(fit.free), MeanExplained(fit.touching)) >= kLeastExplained;
+}
+
+// Why nothing is learnt of what the model lacks; empty = it is.
+std::string Obstacle(const MethodInput& input, const MethodResult& result) {
+  if (!input.options.residual) return "residuals are switched off";
+  if (!KnowsLikelihood(input.options.method))
+    return fmt::format("{} does not know the likelihood of steps, as auto does",
+                       input.options.method);
+  if (input.model->num_positions() != input.model->num_velocities())
+    return "a residual is not for robots with spherical joints";
+  if (!Matters(input, result))
+    return fmt::format(
+        "a residual would explain less than {:.0f} % of the velocities' squared "
+        "errors, and the parameters stay as they are",
+        100 * kLeastExplained);
+  return "";
 }
 
 MethodResult PriorAlone(const MethodInput& input, MethodResult all) {
@@ -74,61 +76,100 @@ Eigen::MatrixXd Draws(const MethodInput& input, const GaussianMixture& posterior
   return draws;
 }
 
-std::string Explained(const char* where, const ResidualQuality& quality) {
+std::string InWords(const char* where, const ResidualQuality& quality) {
   return fmt::format("{} {} steps {:.0f} % of the velocities' squared errors", quality.transitions,
-                     where, 100 * Explained(quality));
+                     where, 100 * MeanExplained(quality));
 }
 
-std::string Summarise(const GapFit& gap) {
-  std::string text = gap.free ? "neither free motion nor contact" : "contact";
-  if (gap.free && !gap.touching) text = "the motion";
+std::string Summarise(bool free, bool touching, const Gap& gap) {
+  std::string text = !free      ? "contact"
+                     : touching ? "neither free motion nor contact"
+                                : "the motion";
   text = fmt::format("the model does not explain {}: {}", text,
-                     gap.free ? "nothing informs its parameters"
-                              : "its parameters are learnt from free motion alone");
+                     gap.informed == Informed::kNone
+                         ? "nothing informs its parameters"
+                         : "its parameters are learnt from free motion alone");
   if (!gap.residual) return text + "; too little was recorded to learn what it lacks";
   text += "; of what it lacks, the learnt residual explains, of ";
   std::string parts;
-  if (gap.residual->free) parts += Explained("free", gap.free_quality);
+  if (gap.residual->free) parts += InWords("free", gap.free);
   if (gap.residual->touching)
-    parts += (parts.empty() ? "" : ", of ") + Explained("touching", gap.touching_quality);
+    parts += (parts.empty() ? "" : ", of ") + InWords("touching", gap.touching);
   return text + parts;
+}
+
+// The method on free steps alone. @return false if the model does not explain them, either.
+bool LearnFree(const MethodInput& input, std::span<const Rollout> free, GapFit* fit) {
+  const MethodInput part{input.model, free, input.options, input.start};
+  try {
+    MethodResult result = RunMethod(part);
+    const OneStepView view = ViewOneStep(part, result);
+    fit->simulated_steps += view.simulated_steps;
+    if (TestModel(part, result, view, &fit->simulated_steps).alarm) {
+      fit->result.simulated_steps += result.simulated_steps;
+      fit->result.failures += result.failures;
+      return false;
+    }
+    result.simulated_steps += fit->result.simulated_steps;
+    result.failures += fit->result.failures;
+    fit->result = std::move(result), fit->information = view.information;
+    return true;
+  } catch (const std::invalid_argument&) {
+    return false;
+  }
 }
 
 }  // namespace
 
-GapFit CloseGap(const MethodInput& input, MethodResult all) {
-  GapFit gap;
-  gap.alarm = Test(input, all, &gap.simulated_steps);
-  gap.result = std::move(all);
-  if (!gap.alarm.alarm || !Matters(input, gap.result)) return gap;
-  const std::vector<Rollout> free = FreeOnly(input.model->description(), input.rollouts);
-  const size_t free_count = CountTransitions(free);
-  gap.touching = free_count < CountTransitions(input.rollouts);
-  gap.free = !gap.touching;
-  if (gap.touching && free_count >= static_cast<size_t>(kFewestFree)) {
-    const MethodInput part{input.model, free, input.options, input.start};
-    try {
-      MethodResult result = RunMethod(part);
-      gap.free = Test(part, result, &gap.simulated_steps).alarm;
-      result.simulated_steps += gap.result.simulated_steps;
-      result.failures += gap.result.failures;
-      if (!gap.free) gap.result = std::move(result);
-    } catch (const std::invalid_argument&) {
-      gap.free = true;
-    }
+std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Rollout> rollouts) {
+  TouchFinder touch(robot, Residual::kTouchMargin);
+  std::vector<Rollout> free(rollouts.begin(), rollouts.end());
+  for (Rollout& rollout : free) {
+    std::erase_if(rollout.transitions, [&](const Transition& t) {
+      return touch.Find(t.q).any() || (t.next_q.allFinite() && touch.Find(t.next_q).any());
+    });
   }
-  const bool uninformed = gap.free || free_count < static_cast<size_t>(kFewestFree);
-  if (uninformed) gap.result = PriorAlone(input, std::move(gap.result));
+  return free;
+}
+
+Eigen::VectorXd Explained(const ResidualQuality& quality) {
+  const Eigen::ArrayXd before = quality.before.array().square(),
+                       after = quality.after.array().square();
+  return (1 - after / before.max(1e-300)).max(0);
+}
+
+GapFit CloseGap(const MethodInput& input, MethodResult all) {
+  GapFit fit;
+  fit.view = ViewOneStep(input, all);
+  fit.simulated_steps += fit.view.simulated_steps;
+  fit.alarm = TestModel(input, all, fit.view, &fit.simulated_steps);
+  fit.information = fit.view.information;
+  fit.result = std::move(all);
+  if (!fit.alarm.alarm) return fit;
+  fit.gap.obstacle = Obstacle(input, fit.result);
+  if (!fit.gap.obstacle.empty()) return fit;
+  const std::vector<Rollout> steps = FreeSteps(input.model->description(), input.rollouts);
+  const size_t free_count = CountTransitions(steps);
+  const bool touching = free_count < CountTransitions(input.rollouts),
+             enough = free_count >= static_cast<size_t>(kFewestFree);
+  const bool explained = touching && enough && LearnFree(input, steps, &fit);
+  // of too few free steps nothing is known
+  const bool free = !touching || (enough && !explained);
+  fit.gap.informed = explained ? Informed::kFree : Informed::kNone;
+  if (!explained) {
+    fit.result = PriorAlone(input, std::move(fit.result));
+    fit.information.setZero();
+  }
   ResidualFitOptions options;
-  options.free = gap.free, options.touching = gap.touching;
+  options.free = free, options.touching = touching;
   options.seed = input.options.seed;
-  ResidualFit fit =
-      FitResidual(input.model, Draws(input, gap.result.posterior), input.rollouts, options);
-  gap.free_quality = fit.free, gap.touching_quality = fit.touching;
-  if (fit.residual.free || fit.residual.touching)
-    gap.residual = std::make_shared<const Residual>(std::move(fit.residual));
-  gap.summary = Summarise(gap);
-  return gap;
+  ResidualFit residual =
+      FitResidual(input.model, Draws(input, fit.result.posterior), input.rollouts, options);
+  fit.gap.free = residual.free, fit.gap.touching = residual.touching;
+  if (residual.residual.free || residual.residual.touching)
+    fit.gap.residual = std::make_shared<const Residual>(std::move(residual.residual));
+  fit.gap.summary = Summarise(free, touching, fit.gap);
+  return fit;
 }
 
 }  // namespace plumb

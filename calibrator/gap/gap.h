@@ -1,26 +1,41 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "calibrator/diagnostics/misspecification.h"
+#include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/method.h"
 #include "calibrator/fit/residual_fit.h"
 #include "robot/residual.h"
 
 namespace plumb {
 
-/// A posterior, and what its simulators lack.
-struct GapFit {
-  MethodResult result;     ///< informed by the transitions that the model explains
-  Misspecification alarm;  ///< of the model alone, with the posterior of all transitions
-  /// that the model does not explain
-  bool free = false, touching = false;
+/// Which steps the parameters are learnt from.
+enum class Informed { kAll, kFree, kNone };
+
+/// What a model lacks, as far as it was learnt.
+struct Gap {
+  Informed informed = Informed::kAll;
   /// learnt from all transitions; null where there is no alarm, or too little to learn from
   std::shared_ptr<const Residual> residual;
-  ResidualQuality free_quality, touching_quality;  ///< of the residual's functions
-  std::string summary;                             ///< for people; empty where nothing is lacking
-  int64_t simulated_steps = 0;                     ///< beyond the result's own
+  ResidualQuality free, touching;  ///< of the residual's functions
+  std::string summary;             ///< in words, for people; empty = nothing is lacking
+  /// why nothing is learnt although the alarm speaks, in words; empty = it is, or there is none
+  std::string obstacle;
+};
+
+/// A posterior, and what its simulators lack.
+struct GapFit {
+  MethodResult result;          ///< informed by the transitions that the model explains
+  Misspecification alarm;       ///< of the model alone, with the posterior of all transitions
+  OneStepView view;             ///< that the alarm is of
+  Eigen::MatrixXd information;  ///< that the result rests on, as OneStepView's
+  Gap gap;
+  int64_t simulated_steps = 0;  ///< beyond the result's own
 };
 
 /// Learns what a model lacks where the alarm speaks: the discrepancy of Kennedy and O'Hagan (J. R.
@@ -33,11 +48,20 @@ struct GapFit {
 ///   3. If they do, or if too few are left, nothing informs the parameters: the prior stays.
 ///   4. A residual for what was left out is learnt for draws of that posterior, from all steps.
 ///
+/// Only of methods that know the likelihood of steps (LikelihoodMethods), of robots without
+/// spherical joints, and where input.options.residual says so: else the result stays as it is.
 /// Uses the threads that input.options says, and shares nothing. The same bits for any number of
 /// them.
 /// @param all the method's result for input.rollouts.
 /// @throws std::invalid_argument as FitResidual.
 GapFit CloseGap(const MethodInput& input, MethodResult all);
+
+/// The steps of roll-outs that begin and end away from the ground and from stops. Thread-safe.
+std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Rollout> rollouts);
+
+/// Share of each velocity's squared errors that a residual explains, left-out transitions judging:
+/// 0 to 1; empty where none was learnt. Thread-safe.
+Eigen::VectorXd Explained(const ResidualQuality& quality);
 
 /// Mean share of the velocities' squared errors that a residual must explain to be used.
 inline constexpr double kLeastExplained = 0.2;

@@ -92,6 +92,8 @@ Findings IterationFindings(const RobotDescription& robot, const SimOpt& simopt,
   findings.discrepancy = report.discrepancy;
   findings.identifiability = report.identifiability;
   findings.cramer_rao = report.identifiability.cramer_rao;
+  findings.gap.residual = state.residual;
+  findings.starts = Starts(state.rollouts);
   findings.warnings = report.warnings;
   findings.loop = {report.iteration, Time(state), report.kl, report.ess, report.temperature};
   return findings;

@@ -155,10 +155,10 @@ void SimOpt::Infer() {
   ++state_.search.update;
   if (CountTransitions(state_.rollouts) == 0) return;  // nothing is known: keep it
   try {
-    const GapFit gap = RunFromWhereItIs();
-    const MethodResult& result = gap.result;
-    state_.residual = gap.residual;
-    state_.alarm = gap.alarm.summary, state_.gap = gap.summary;
+    const GapFit fit = RunFromWhereItIs();
+    const MethodResult& result = fit.result;
+    state_.residual = fit.gap.residual;
+    state_.alarm = fit.alarm.summary, state_.gap = fit.gap.summary;
     state_.kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
     state_.ess = result.ess;
     state_.temperature = 1;

@@ -53,7 +53,7 @@ class Report {
            Escape(robot_.name) + "</title>\n<style>" + kReportStyle +
            "</style></head>\n<body><main>\n" + Headline() + Parameters() + Pairs() +
            KnownAndUnknown() + PredictionSection(findings_.holdout) + MisfitSection(findings_) +
-           ResidualSection(residuals_) +
+           GapSection(findings_.gap, robot_) + ResidualSection(residuals_) +
            AgreementSection(findings_.agreement, summary_, robot_, kMaxPairs) + Stages() +
            Reproduce() + "</main></body>\n</html>\n";
   }
@@ -83,6 +83,8 @@ class Report {
                 ? Verdict("", "The model was not tested",
                           "Whether it can explain the robot is not known.")
                 : Verdict("good", "The model explains the robot", model.summary);
+    if (findings_.gap.residual)
+      html += Verdict("", "What it lacks is learnt", findings_.gap.summary);
     const bool tried = std::any_of(findings_.holdout.errors.begin(), findings_.holdout.errors.end(),
                                    [](const HorizonError& e) { return e.windows > 0; });
     html +=

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "calibrator/report/report_html.h"
 #include "calibrator/report/report_plots.h"
@@ -42,6 +43,36 @@ std::string MisfitSection(const Findings& findings) {
                std::isfinite(m.effect) ? fmt::format("{:.0f} %", 100 * m.effect) : "\xe2\x80\x93"});
   }
   return html + table.Print();
+}
+
+std::string GapSection(const Gap& gap, const RobotDescription& robot) {
+  if (gap.summary.empty()) return "";
+  std::string html = "<h2>What the model lacks</h2>\n" + Paragraph(gap.summary);
+  if (!gap.residual) return html;
+  Table table({"joint", "steps", "error of one step", "with the residual", "of readings alone",
+               "explained"});
+  html += "<figure><div class=\"panels\">\n";
+  for (const auto& [condition, quality] :
+       {std::pair{"free", &gap.free}, {"touching", &gap.touching}}) {
+    const Eigen::VectorXd explained = Explained(*quality);
+    if (explained.size() == 0) continue;
+    html += ErrorsLeftPlot(*quality, robot, condition);
+    for (Eigen::Index i = 0; i < explained.size(); ++i) {
+      const JointDescription& joint = robot.joints[static_cast<size_t>(i)];
+      table.Add({Escape(joint.name), fmt::format("{} {}", quality->transitions, condition),
+                 Number(quality->before(i), NAN), Number(quality->after(i), NAN),
+                 Number(quality->claimed(i) > 0 ? quality->claimed(i) : NAN, NAN),
+                 fmt::format("{:.0f} %", 100 * explained(i))});
+    }
+  }
+  return html +
+         "</div><figcaption>What the residual leaves of each joint's error of one control step; "
+         "the "
+         "mark is what the readings' noise alone would make.</figcaption></figure>\n" +
+         table.Print() +
+         "<p class=\"note\">Root mean square errors of the velocities, rad/s or m/s, each step "
+         "predicted by a residual that was learnt from the others. Explained: of the squared "
+         "errors.</p>\n";
 }
 
 std::string AgreementSection(const Agreement& agreement, const Summary& summary,

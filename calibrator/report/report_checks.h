@@ -19,6 +19,10 @@ std::string PredictionSection(const Holdout& holdout);
 /// Whether the model can explain the robot, and what it does not.
 std::string MisfitSection(const Findings& findings);
 
+/// What was learnt that the model lacks, and how much of its errors that explains; empty where
+/// there is nothing to say of it.
+std::string GapSection(const Gap& gap, const RobotDescription& robot);
+
 /// How far each log's own posterior is from that of the others; empty for a single log.
 /// @param most of the parameters that are drawn.
 std::string AgreementSection(const Agreement& agreement, const Summary& summary,

@@ -194,6 +194,27 @@ std::string ResidualsOverTime(const Eigen::VectorXd& residuals,
   return svg.Print();
 }
 
+std::string ErrorsLeftPlot(const ResidualQuality& quality, const RobotDescription& robot,
+                           const std::string& condition) {
+  constexpr double kRow = 20, kNames = 120;
+  const Eigen::Index count = quality.before.size();
+  const double bottom = kTop + kRow * static_cast<double>(count) + 6;
+  Svg svg(kNames + kWidth, bottom + 44, "what the residual leaves of the errors, " + condition);
+  const Axis x(0, 1, kNames + 10, kNames + kRight), y(0, 1, bottom, kTop);
+  svg.Frame(x, y, condition + ", error left", "", 4);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const double at = kTop + 3 + kRow * (static_cast<double>(i) + 0.5),
+                 before = std::max(quality.before(i), 1e-300);
+    svg.Text(kNames + 4, at + 4, Shorten(robot.joints[static_cast<size_t>(i)].name, 18), "tick",
+             Svg::Anchor::kEnd);
+    const double left = std::min(1.0, quality.after(i) / before),
+                 readings = std::min(1.0, quality.claimed(i) / before);
+    svg.Rectangle(x.from(), at - 6, x.Pixel(left) - x.from(), 12, "posterior bar");
+    svg.Line(x.Pixel(readings), at - 8, x.Pixel(readings), at + 8, "reference line");
+  }
+  return svg.Print();
+}
+
 std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary,
                           const RobotDescription& robot, Eigen::Index parameter) {
   const auto fits = [&](const LogAgreement& l) {

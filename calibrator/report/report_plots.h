@@ -40,6 +40,11 @@ std::string ResidualCorrelation(const std::vector<double>& correlation, size_t c
 std::string ResidualsOverTime(const Eigen::VectorXd& residuals,
                               const std::vector<WindowErrors::Row>& rows);
 
+/// Errors of each joint's velocity with a residual in units of those without, and a mark at what
+/// the readings alone would make. @param condition "free" or "touching".
+std::string ErrorsLeftPlot(const ResidualQuality& quality, const RobotDescription& robot,
+                           const std::string& condition);
+
 /// The posterior of a parameter from each log alone, mean and 95 %, and from all as a band.
 std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary,
                           const RobotDescription& robot, Eigen::Index parameter);

@@ -9,9 +9,9 @@
 
 #include "calibrator/design/excitation.h"
 #include "calibrator/diagnostics/holdout.h"
-#include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/robot_least_squares.h"
+#include "calibrator/gap/gap.h"
 #include "calibrator/inference/chi_squared.h"
 #include "calibrator/motion/differences.h"
 #include "common/decompositions.h"
@@ -21,6 +21,13 @@ namespace {
 
 // p below which logs are of different robots, or the model is wrong
 constexpr double kDisagreement = 1e-3;
+constexpr char kNotInformed[] = "nothing that was recorded is explained well enough to tell";
+constexpr char kCure[] =
+    "; train on posterior and residual together (plumb train --distribution), and, as a residual "
+    "is "
+    "right only near what it was learnt from, record the trained policy's motion and calibrate "
+    "with "
+    "all logs";
 
 Eigen::MatrixXd ToPhysical(const RobotDescription& robot, const Eigen::MatrixXd& coordinates) {
   Eigen::MatrixXd physical(coordinates.rows(), coordinates.cols());
@@ -46,7 +53,8 @@ class Calibration {
 
   Findings Run() {
     const auto start = std::chrono::steady_clock::now();
-    MethodResult result = RunMethod({model_, rollouts_, options_});
+    const GapFit fit = Fit();
+    const MethodResult& result = fit.result;
     findings_.method = options_.method;
     findings_.used = result.used;
     findings_.seed = options_.seed;
@@ -59,8 +67,16 @@ class Calibration {
     findings_.failures = result.failures;
     findings_.check = result.check;
     findings_.warnings = result.warnings;
+    findings_.misspecification = fit.alarm;
+    findings_.gap = fit.gap;
+    if (fit.gap.residual) findings_.gap.summary += kCure;
+    if (!fit.gap.obstacle.empty())
+      findings_.gap.summary = "what the model lacks is not learnt: " + fit.gap.obstacle;
+    findings_.diagnostic_steps = fit.simulated_steps;
     mean_ = Moments(result.posterior).mean;
-    DiagnoseOneStep(result);
+    if (result.curriculum) findings_.stages = result.curriculum->stages;
+    TakeOneStep(fit.view);
+    FindWhatIsKnown(fit.information);
     CrossValidate(result);
     CompareLogs();
     findings_.seconds =
@@ -76,24 +92,35 @@ class Calibration {
     return variance.asDiagonal();
   }
 
-  // At the posterior's mean, whatever method has found it.
-  void DiagnoseOneStep(const MethodResult& result) {
+  // With what the model lacks, if errors tell.
+  GapFit Fit() const {
     const MethodInput input{model_, rollouts_, options_};
-    const OneStepView view = ViewOneStep(input, result);
+    MethodResult result = RunMethod(input);
+    const std::string why = NotJudged();
+    if (why.empty()) return CloseGap(input, std::move(result));
+    GapFit alone;
+    alone.view = ViewOneStep(input, result);
+    alone.information = alone.view.information;
+    alone.simulated_steps = alone.view.simulated_steps;
+    alone.alarm.summary = why;
+    alone.result = std::move(result);
+    return alone;
+  }
+
+  // At the mean that all transitions have informed, whatever method has found it.
+  void TakeOneStep(const OneStepView& view) {
     findings_.noise_sd = view.noise_sd;
-    if (result.curriculum) findings_.stages = result.curriculum->stages;
-    information_ = view.information;
-    findings_.diagnostic_steps += view.simulated_steps;
     findings_.discrepancy = view.fit.errors.cwiseAbs2().mean();
     findings_.errors = view.fit.errors;
     findings_.rows = view.rows;
-    if (const std::string why = NotJudged(); !why.empty()) {
-      findings_.misspecification.summary = why;
-    } else {
-      findings_.misspecification = TestModel(input, result, view, &findings_.diagnostic_steps);
-    }
+  }
+
+  void FindWhatIsKnown(const Eigen::MatrixXd& information) {
     findings_.identifiability =
-        FindIdentifiability(robot_, information_, prior_sd(), Moments(findings_.posterior));
+        FindIdentifiability(robot_, information, prior_sd(), Moments(findings_.posterior));
+    if (!informed())
+      findings_.identifiability.summary =
+          fmt::format("no parameter is determined: {}", kNotInformed);
     findings_.cramer_rao = findings_.identifiability.cramer_rao;
     ExcitationSettings settings;
     settings.seed = options_.seed;
@@ -112,20 +139,28 @@ class Calibration {
     return {};
   }
 
+  bool informed() const { return findings_.gap.informed != Informed::kNone; }
+  // The steps that the parameters are learnt from.
+  std::vector<Rollout> Informing(std::span<const Rollout> rollouts) const {
+    if (findings_.gap.informed == Informed::kFree) return FreeSteps(robot_, rollouts);
+    return {rollouts.begin(), rollouts.end()};
+  }
+
   // Fits again without a part of the data, which then judges.
   void CrossValidate(const MethodResult& result) {
     Split split = HoldOut(rollouts_);
     Discrepancy discrepancy(robot_, options_.execution);
     Eigen::VectorXd mean = mean_;
-    if (!split.held_out.empty()) {
+    if (!split.held_out.empty() && informed()) {
       CalibrationOptions again = options_;
       again.progress = [&](const std::string&, double share) {
         options_.progress("hold-out", share);
       };
       if (result.curriculum) again.method = "laplace";
+      const std::vector<Rollout> fitted = Informing(split.fitted);
       try {
         const MethodResult part =
-            RunMethod({model_, split.fitted, again, result.curriculum ? mean_ : Eigen::VectorXd()});
+            RunMethod({model_, fitted, again, result.curriculum ? mean_ : Eigen::VectorXd()});
         mean = Moments(part.posterior).mean;
         findings_.diagnostic_steps += part.simulated_steps;
       } catch (const std::invalid_argument& error) {
@@ -137,6 +172,11 @@ class Calibration {
         Judge(discrepancy, split, robot_.ToPhysical(mean), robot_.ToPhysical(findings_.prior.mean));
     for (const HorizonError& error : findings_.holdout.errors)
       findings_.diagnostic_steps += 2 * error.windows * error.horizon;
+    if (!informed())
+      findings_.holdout.summary =
+          fmt::format("the posterior is the prior, and predicts as it does: {}", kNotInformed);
+    else if (findings_.gap.residual && findings_.holdout.held_out > 0)
+      findings_.holdout.summary += "; both without the residual, which they are to be used with";
   }
 
   // Each log on its own: are they of the same robot?
@@ -146,6 +186,10 @@ class Calibration {
       agreement.summary = "a single log: nothing to compare it with";
       return;
     }
+    if (!informed()) {
+      agreement.summary = fmt::format("the logs cannot be compared: {}", kNotInformed);
+      return;
+    }
     std::vector<LaplaceFit> fits;
     std::vector<std::string> names;
     for (const Log& log : logs_) {
@@ -153,7 +197,7 @@ class Calibration {
         CurriculumOptions options;
         options.horizons = options_.horizons, options.execution = options_.execution,
         options.starts = 1;
-        const CurriculumFit own = FitCurriculum(model_, log.rollouts, options, mean_);
+        const CurriculumFit own = FitCurriculum(model_, Informing(log.rollouts), options, mean_);
         findings_.diagnostic_steps += own.simulated_steps;
         fits.push_back(own.fit);
         names.push_back(log.name);
@@ -270,7 +314,6 @@ class Calibration {
   Prior prior_;
   std::vector<Rollout> rollouts_;
   Eigen::VectorXd mean_;
-  Eigen::MatrixXd information_;
   Findings findings_;
 };
 

@@ -11,6 +11,7 @@
 #include "calibrator/diagnostics/misspecification.h"
 #include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/window_errors.h"
+#include "calibrator/gap/gap.h"
 #include "common/gaussian.h"
 
 namespace plumb {
@@ -51,11 +52,12 @@ struct Findings {
   int64_t simulated_steps = 0;   ///< transitions simulated for the fit
   int64_t diagnostic_steps = 0;  ///< and for the diagnostics
   int64_t failures = 0;          ///< simulations that failed
-  /// mean squared whitened one-step error of the mean; 1 = down to the noise
+  /// mean squared whitened one-step error of the mean that all transitions have informed; 1 = down
+  /// to the noise
   double discrepancy = 0;
   /// of each entry of (q, v), estimated or as recorded, physical units
   Eigen::VectorXd noise_sd;
-  /// one-step errors of the mean, whitened, divided by their estimated scale
+  /// one-step errors of that mean, whitened, divided by their estimated scale
   Eigen::VectorXd errors;
   std::vector<WindowErrors::Row> rows;  ///< coordinate and transition of each
   std::vector<CurriculumStage> stages;
@@ -64,13 +66,17 @@ struct Findings {
   Eigen::VectorXd cramer_rao;
   std::string advice;  ///< which further motion would tell most of what is left open, in words
   Holdout holdout;
-  Misspecification misspecification;
+  Misspecification misspecification;  ///< of the model alone, informed by all transitions
+  Gap gap;
+  /// states (q, v) of the robot for simulated episodes to begin with, of the loop only
+  std::vector<Eigen::VectorXd> starts;
   Agreement agreement;
   std::string check;  ///< how the posterior's shape was verified, in words
   std::vector<std::string> warnings;
   double seconds = 0;  ///< wall time
   /// Of plumb-calibrator only, which fits and looks no further: stages, noise, advice, holdout,
-  /// misspecification, agreement, check and the counts of simulations then say nothing.
+  /// misspecification, the gap but for its residual, agreement, check and the counts of simulations
+  /// then say nothing.
   std::optional<LoopUpdate> loop;
 };
 

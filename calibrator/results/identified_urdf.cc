@@ -112,7 +112,8 @@ std::string Quoted(const std::string& text) {
   return '"' + quoted + '"';
 }
 
-std::string Comment(const RobotDescription& robot, const std::vector<Value>& values) {
+std::string Comment(const RobotDescription& robot, const std::vector<Value>& values,
+                    bool residual) {
   std::string here, elsewhere;
   for (const Value& v : values) {
     const std::string unit = v.unit.empty() ? "" : " " + v.unit;
@@ -134,13 +135,21 @@ std::string Comment(const RobotDescription& robot, const std::vector<Value>& val
         "name:" +
         elsewhere;
   }
+  if (residual) {
+    words +=
+        "\n     The model does not explain the robot. What was learnt that it lacks, the residual "
+        "in "
+        "posterior.json,\n     is in no URDF: a simulator with this file alone errs where it "
+        "stands "
+        "in for it.";
+  }
   return words + "\n    ";
 }
 
 }  // namespace
 
 std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd& mean,
-                           const Eigen::VectorXd& sd) {
+                           const Eigen::VectorXd& sd, bool residual) {
   if (sd.size() != mean.size())
     throw std::invalid_argument("as many standard deviations as means are needed");
   const RobotDescription now = Model(robot).Describe(mean);
@@ -157,13 +166,13 @@ std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd&
     if (v.in_urdf && attribute)
       writer.WriteDynamics(v.name.substr(v.name.find('/') + 1), attribute, v.mean);
   }
-  writer.AddComment(Comment(robot, values));
+  writer.AddComment(Comment(robot, values, residual));
   return writer.Print();
 }
 
 void WriteIdentifiedUrdf(const std::filesystem::path& file, const RobotDescription& robot,
-                         const Eigen::VectorXd& mean, const Eigen::VectorXd& sd) {
-  WriteAtomically(file, IdentifiedUrdf(robot, mean, sd));
+                         const Eigen::VectorXd& mean, const Eigen::VectorXd& sd, bool residual) {
+  WriteAtomically(file, IdentifiedUrdf(robot, mean, sd, residual));
 }
 
 }  // namespace plumb

@@ -21,16 +21,18 @@ namespace plumb {
 ///
 /// @param robot as LoadRobot read it; its files are read again.
 /// @param mean,sd of its parameters, physical units. Frozen parameters have the values that they
-/// are frozen at.
+/// are frozen at. @param residual whether the robot does what these cannot explain, and a residual
+/// was learnt, which no URDF holds: the comment then says so.
 /// @throws ConfigError naming the file if it is not what the robot was read from any more,
 /// std::invalid_argument naming the parameter if its value is not physical. Thread-safe but for the
 /// files.
 std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd& mean,
-                           const Eigen::VectorXd& sd);
+                           const Eigen::VectorXd& sd, bool residual = false);
 
 /// The same into a file, atomically. @throws std::runtime_error too, naming the file, if it cannot
 /// be written.
 void WriteIdentifiedUrdf(const std::filesystem::path& file, const RobotDescription& robot,
-                         const Eigen::VectorXd& mean, const Eigen::VectorXd& sd);
+                         const Eigen::VectorXd& mean, const Eigen::VectorXd& sd,
+                         bool residual = false);
 
 }  // namespace plumb

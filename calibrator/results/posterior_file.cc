@@ -12,6 +12,7 @@
 #include "common/process.h"
 #include "robot/physics_fingerprint.h"
 #include "robot/posterior_format.h"
+#include "robot/residual_json.h"
 
 namespace plumb {
 namespace {
@@ -68,6 +69,34 @@ json ToJson(const Misspecification& found) {
                          {"statistic", m.statistic}, {"p", m.p},
                          {"effect", m.effect}};
            })}};
+}
+
+const char* Name(Informed informed) {
+  switch (informed) {
+    case Informed::kFree:
+      return "free";
+    case Informed::kNone:
+      return "none";
+    default:
+      return "all";
+  }
+}
+
+// One-step errors of each velocity in a condition, in its unit.
+json ToJson(const ResidualQuality& quality) {
+  if (quality.before.size() == 0) return nullptr;
+  return {{"transitions", quality.transitions},
+          {"before", ToJson(quality.before)},
+          {"after", ToJson(quality.after)},
+          {"claimed", ToJson(quality.claimed)},
+          {"explained", ToJson(Explained(quality))}};
+}
+
+json ToJson(const Gap& gap) {
+  return {{"words", gap.summary},
+          {"informed", Name(gap.informed)},
+          {"free", ToJson(gap.free)},
+          {"touching", ToJson(gap.touching)}};
 }
 
 json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao,
@@ -190,6 +219,7 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
          {"mixture", ToJson(findings.posterior)},
          {"check", findings.check},
          {"alarm", ToJson(findings.misspecification)},
+         {"gap", ToJson(findings.gap)},
          {"identifiability", ToJson(findings.identifiability, findings.cramer_rao, names)},
          {"advice", findings.advice},
          {"holdout", ToJson(findings.holdout)},
@@ -204,14 +234,21 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
          {"stages", List(findings.stages, [](const CurriculumStage& s) { return ToJson(s); })},
          {"warnings", findings.warnings},
          {"samples", Samples(summary.samples)},
+         {"residual", findings.gap.residual ? ResidualJson(*findings.gap.residual) : json()},
+         {"starts", List(findings.starts,
+                         [](const Eigen::VectorXd& start) {
+                           json list = json::array();
+                           for (const double number : start) list.push_back(ShortestSingle(number));
+                           return list;
+                         })},
          {"versions",
           {{"plumbline", VersionLine("plumb")},
            {"eigen",
             fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
            {"compiler", __VERSION__}}}};
   if (findings.loop) {
-    for (const char* unknown :
-         {"check", "alarm", "advice", "holdout", "agreement", "noise_sd", "simulations", "stages"})
+    for (const char* unknown : {"check", "alarm", "gap", "advice", "holdout", "agreement",
+                                "noise_sd", "simulations", "stages"})
       j[unknown] = nullptr;
     j["loop"] = ToJson(*findings.loop);
     j["run"] = nullptr;

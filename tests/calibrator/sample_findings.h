@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "calibrator/results/findings.h"
 #include "calibrator/results/posterior_file.h"
@@ -11,6 +12,27 @@
 #include "robot/parameter_distribution.h"
 
 namespace plumb {
+
+/// A residual for steps that touch, of two draws, two inputs and three waves; numbers that single
+/// precision has.
+inline Residual SampleResidual(const RobotDescription& robot) {
+  const Eigen::Index n = robot.num_velocities();
+  Random random(6, {1});
+  const auto singles = [&](Eigen::Index rows, Eigen::Index columns) {
+    Eigen::MatrixXd matrix(rows, columns);
+    for (double& number : matrix.reshaped()) number = static_cast<float>(random.Normal());
+    return matrix;
+  };
+  ResidualFunction f;
+  f.mean = singles(2, 1), f.scale = Eigen::Vector2d(0.5, 2);
+  f.low = Eigen::Vector2d(-2, -1), f.high = Eigen::Vector2d(1, 3);
+  f.frequencies = singles(3, 2), f.phases = singles(3, 1);
+  f.weights = {singles(n, 6), singles(n, 6)};
+  f.noise = singles(n, n);
+  f.bound = Eigen::VectorXd::Constant(n, 4);
+  const Gaussian prior = PriorGaussian(robot);
+  return {{prior.mean, prior.mean + 0.1 * prior.covariance.diagonal().cwiseSqrt()}, {}, f};
+}
 
 /// Findings of a robot that nobody has calibrated: every field holds something, two components, and
 /// some numbers that are not finite where they may be so.
@@ -58,6 +80,12 @@ inline Findings SampleFindings(const RobotDescription& robot) {
       {{"pivot, at ground contact", "pivot", "contact", "structure", 12.5, 1e-6, 0.31},
        {"all joints", "", "", "whiteness", 3.1, 0.004, NAN}},
       "the model does not explain the robot: pivot, at ground contact"};
+  f.gap.informed = Informed::kFree;
+  f.gap.residual = std::make_shared<const Residual>(SampleResidual(robot));
+  f.gap.free.transitions = 700;
+  const Eigen::VectorXd one = Eigen::VectorXd::Ones(robot.num_velocities());
+  f.gap.touching = {295, 0.2 * one, 0.1 * one, 0.05 * one, 4};
+  f.gap.summary = "the model does not explain contact";
   f.agreement = {true,
                  {{"monday.lcm", f.samples.col(0), 0.05 * f.samples.col(0).cwiseAbs(), 1.2, 0.4},
                   {"tuesday.lcm", f.samples.col(1), 0.05 * f.samples.col(1).cwiseAbs(), 0.8, 0.7}},

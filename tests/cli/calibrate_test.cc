@@ -105,6 +105,77 @@ TEST_CASE("ranks that share the work come to the same bits") {
   CHECK(Posterior(folder / "three.json") == Posterior(folder / "one.json"));
 }
 
+// A posterior whose residual has an input more than the robot.
+void AddInput(json* posterior) {
+  json& free = (*posterior)["residual"]["free"];
+  for (const char* list : {"mean", "scale", "low", "high"}) free[list].push_back(1);
+  for (json& row : free["frequencies"]) row.push_back(1);
+  for (json& draw : free["weights"]) {
+    for (json& row : draw) row.push_back(1);
+  }
+}
+
+TEST_CASE("what a model lacks is learnt, told everywhere, and simulated and trained with") {
+  const TemporaryFolder folder;
+  const std::string robot = Robot("pendulum/gym.toml"), table = folder / "a.csv",
+                    posterior = folder / "p.json";
+  REQUIRE(Shell(Plumb() + "sim " + robot +
+                " --random --episodes 3 --seed 3 --noise 0.001 --set friction/pivot=0.5 --csv " +
+                table)
+              .status == 0);
+  const auto calibrate = [&](const std::string& flags) {
+    return Shell(Plumb() + "calibrate " + robot + " --csv " + table +
+                 " --method laplace --horizons 1 --output " + posterior + flags);
+  };
+  const auto says = [](const Outcome& outcome, const std::string& words) {
+    INFO(outcome.text);
+    CHECK(outcome.text.find(words) != std::string::npos);
+  };
+  const Outcome with =
+      calibrate(" --strict --report " + (folder / "r.html") + " --urdf " + (folder / "u.urdf"));
+  CHECK(with.status == 3);  // the model is wrong all the same
+  for (const char* words :
+       {"the learnt residual explains", "pivot, free", "no parameter is determined",
+        "train on posterior and residual together", "record the trained policy's motion"})
+    says(with, words);
+  const json found = Posterior(posterior);
+  CHECK(found["gap"]["informed"] == "none");
+  CHECK(found["gap"]["free"]["explained"][0].get<double>() > 0.5);
+  CHECK(found["coordinate_mean"] == found["prior"]["coordinate_mean"]);
+  CHECK(found["residual"]["draws"].size() == 8);
+  CHECK(Read(folder / "r.html").find("What the model lacks") != std::string::npos);
+  CHECK(Read(folder / "u.urdf").find("is in no URDF") != std::string::npos);
+
+  const Outcome simulated =
+      Shell(Plumb() + "sim " + robot + " --random --seed 5 --posterior " + posterior);
+  CHECK(simulated.status == 0);
+  says(simulated, "residual: what " + posterior + " has learnt");
+  CHECK(Shell(Plumb() + "sim " + robot + " --set gravity=9 damping/pivot=0.1 --posterior " +
+              posterior)
+            .status == 0);
+  const Outcome trained =
+      Shell(Plumb() + "train " + robot + " --steps 1000 --held-out 2 --output " +
+            (folder / "p.onnx") + " --distribution " + posterior);
+  CHECK(trained.status == 0);
+  says(trained, "50 % of the episodes are simulated with the residual of " + posterior);
+
+  json other = json::parse(Read(posterior));
+  AddInput(&other);
+  std::ofstream(folder / "other.json") << other;
+  for (const std::string& command :
+       {"sim " + robot + " --posterior ", "train " + robot + " --distribution "}) {
+    const Outcome refused = Shell(Plumb() + command + (folder / "other.json"));
+    CHECK(refused.status != 0);
+    says(refused, "other.json: residual: the residual is another robot's");
+  }
+
+  const Outcome without = calibrate(" --no-residual");
+  CHECK(without.status == 0);
+  says(without, "what the model lacks is not learnt: residuals are switched off");
+  CHECK(Posterior(posterior)["residual"].is_null());
+  CHECK(Posterior(posterior)["gap"]["informed"] == "all");
+}
+
 TEST_CASE("what cannot be calibrated with is refused in one clear line") {
   const TemporaryFolder folder;
   const auto refused = [&](const std::string& arguments, const std::string& words) {

@@ -62,7 +62,9 @@ TEST_CASE("a right model keeps its posterior to the bit, and lacks nothing") {
   const MethodResult alone = RunMethod(input);
   const GapFit gap = CloseGap(input, alone);
   CHECK_FALSE(gap.alarm.alarm);
-  CHECK_FALSE(gap.residual);
+  CHECK_FALSE(gap.gap.residual);
+  CHECK(gap.gap.summary.empty());
+  CHECK(gap.gap.informed == Informed::kAll);
   CHECK(gap.result.posterior == alone.posterior);
   CHECK(gap.result.samples == alone.samples);
 }
@@ -74,11 +76,12 @@ TEST_CASE("a softer ground: masses are learnt in the air, and the ground apart")
   while (CountTransitions(log) > 3000) unseen.push_back(log.back()), log.pop_back();
   const GapFit gap = Close(robot, log);
   REQUIRE(gap.alarm.alarm);
-  CHECK(gap.touching);
-  CHECK_FALSE(gap.free);
-  REQUIRE(gap.residual);
-  CHECK_FALSE(gap.residual->free);
-  REQUIRE(gap.residual->touching);
+  CHECK(gap.gap.informed == Informed::kFree);
+  REQUIRE(gap.gap.residual);
+  CHECK_FALSE(gap.gap.residual->free);
+  REQUIRE(gap.gap.residual->touching);
+  CHECK(Explained(gap.gap.touching).mean() > kLeastExplained);
+  CHECK(Explained(gap.gap.free).size() == 0);
   const Eigen::VectorXd truth = HiddenParameters(robot, 3);
   const Gaussian posterior = Moments(gap.result.posterior);
   for (Eigen::Index i = 0; i < posterior.mean.size(); ++i) {
@@ -89,7 +92,7 @@ TEST_CASE("a softer ground: masses are learnt in the air, and the ground apart")
     CHECK(sd < 0.05);
   }
   // on motion that was not learnt from
-  const Squares squares = SquaredErrors(robot, *gap.residual, true, unseen);
+  const Squares squares = SquaredErrors(robot, *gap.gap.residual, true, unseen);
   CHECK(squares.after < 0.3 * squares.before);
 }
 
@@ -98,24 +101,40 @@ TEST_CASE("friction in free motion: the prior stays, and the residual goes with 
   const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 600, 3);
   const GapFit gap = Close(robot, log);
   REQUIRE(gap.alarm.alarm);
-  CHECK(gap.free);
-  CHECK_FALSE(gap.touching);
+  CHECK(gap.gap.informed == Informed::kNone);
+  CHECK(gap.information.isZero());
   CHECK(gap.result.used == "prior");
-  REQUIRE(gap.residual);
-  REQUIRE(gap.residual->free);
-  CHECK(gap.residual->coordinates.size() == static_cast<size_t>(kResidualDraws));
-  CHECK(gap.residual->coordinates[1] != gap.residual->coordinates[2]);
-  CHECK(gap.residual->free->weights[1] != gap.residual->free->weights[2]);
-  CHECK(gap.summary.find("nothing informs its parameters") != std::string::npos);
+  REQUIRE(gap.gap.residual);
+  REQUIRE(gap.gap.residual->free);
+  CHECK_FALSE(gap.gap.residual->touching);
+  CHECK(gap.gap.residual->coordinates.size() == static_cast<size_t>(kResidualDraws));
+  CHECK(gap.gap.residual->coordinates[1] != gap.gap.residual->coordinates[2]);
+  CHECK(gap.gap.residual->free->weights[1] != gap.gap.residual->free->weights[2]);
+  CHECK(gap.gap.summary.find("nothing informs its parameters") != std::string::npos);
+}
+
+TEST_CASE("where residuals are switched off an alarm changes nothing, and it is said") {
+  const RobotDescription robot = Robot("pendulum/gym.toml");
+  const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 300, 3);
+  CalibrationOptions options;
+  options.method = "laplace", options.horizons = {1}, options.residual = false;
+  const MethodInput input{std::make_shared<Model>(robot), log, options};
+  const MethodResult alone = RunMethod(input);
+  const GapFit fit = CloseGap(input, alone);
+  CHECK(fit.alarm.alarm);
+  CHECK_FALSE(fit.gap.residual);
+  CHECK(fit.result.posterior == alone.posterior);
+  CHECK(fit.gap.obstacle.find("switched off") != std::string::npos);
+  CHECK(fit.gap.summary.empty());
 }
 
 TEST_CASE("what is lacking has the same bits each time") {
   const RobotDescription robot = Robot("pendulum/gym.toml");
   const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 300, 3);
   const GapFit a = Close(robot, log), b = Close(robot, log);
-  REQUIRE(a.residual);
-  CHECK(a.residual->free->weights == b.residual->free->weights);
-  CHECK(a.residual->free->noise == b.residual->free->noise);
+  REQUIRE(a.gap.residual);
+  CHECK(a.gap.residual->free->weights == b.gap.residual->free->weights);
+  CHECK(a.gap.residual->free->noise == b.gap.residual->free->noise);
 }
 
 }  // namespace plumb

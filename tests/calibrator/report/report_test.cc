@@ -84,11 +84,12 @@ TEST_CASE("the report says in words and drawings what was found") {
         "Warning:</b> 12 transitions were late", "10.40 \xc2\xb1 0.57",
         "only in combination with mass/pole, length/pole", "pivot, at ground contact", "31 %",
         "tuesday.lcm", "robots/pendulum monday.lcm tuesday.lcm --seed 3", "18364758544493064720",
-        "importance weights"}) {
+        "importance weights", "What the model lacks", "What it lacks is learnt", "295 touching",
+        "75 %"}) {
     CHECK_THAT(html, Contains(words));
   }
   CHECK(Count(html, "<svg class=\"plot\"") ==
-        1 + 1 + 1 + 1 + 2 * 3 + 3);  // pairs, scree, errors, time, residuals, logs
+        1 + 1 + 1 + 1 + 1 + 2 * 3 + 3);  // pairs, scree, errors, lacking, time, residuals, logs
   // Two contours each of the prior and two components, in three pairs.
   CHECK(Count(html, "Z\"/>") == 3 * 2 * 3);
   CHECK(html.size() < 1'000'000);

@@ -7,6 +7,7 @@
 
 #include "calibrator/diagnostics/holdout.h"
 #include "common/decompositions.h"
+#include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/inference/statistics.h"
 #include "tests/calibrator/synthetic.h"
@@ -112,6 +113,35 @@ TEST_CASE("the world's mass has no effect, which is said, and keeps its prior") 
       Moments(f.posterior).mean.head(4).array() - truth.head(4).array().log();
   CHECK((off.abs() / Moments(f.posterior).covariance.diagonal().head(4).array().sqrt()).maxCoeff() <
         4);
+}
+
+TEST_CASE("parameters that nothing informs are not determined, and what is lacking is learnt") {
+  const RobotDescription robot = Robot("pendulum/gym.toml");
+  const Truth friction{{{"friction/pivot", 0.5}}, 0, 1e-3};
+  std::vector<Log> logs(2);
+  for (Log& log : logs)
+    log.name = "a log", log.rollouts = RandomLog(robot, friction, 300, logs[0].rollouts.size() + 3);
+  CalibrationOptions options;
+  options.horizons = {1};
+  const Findings f = Calibrate(robot, logs, options);
+  CHECK(f.misspecification.alarm);
+  CHECK(f.gap.informed == Informed::kNone);
+  REQUIRE(f.gap.residual);
+  CHECK(Explained(f.gap.free)(0) > 0.5);
+  CHECK(f.gap.summary.find("train on posterior and residual together") != std::string::npos);
+  CHECK(f.identifiability.summary.find("no parameter is determined") != std::string::npos);
+  CHECK(f.cramer_rao.array().isInf().all());
+  CHECK(Moments(f.posterior).mean == f.prior.mean);
+  CHECK_FALSE(f.holdout.better);
+  CHECK(f.agreement.logs.empty());
+
+  options.residual = false;
+  const Findings alone = Calibrate(robot, logs, options);
+  CHECK(alone.misspecification.summary == f.misspecification.summary);
+  CHECK(alone.gap.informed == Informed::kAll);
+  CHECK_FALSE(alone.gap.residual);
+  CHECK(alone.identifiability.combinations.size() == 2);
+  CHECK(alone.agreement.logs.size() == 2);
 }
 
 TEST_CASE("noise alone raises the alarm, and teaches hardly anything") {

@@ -1,6 +1,8 @@
 #include "calibrator/results/posterior_file.h"
 
+#include <bit>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -9,6 +11,7 @@
 #include "calibrator/results/summary.h"
 #include "robot/physics_fingerprint.h"
 #include "robot/posterior_reader.h"
+#include "robot/residual_json.h"
 #include "tests/calibrator/sample_findings.h"
 #include "tests/calibrator/synthetic.h"
 #include "tests/robot/zoo.h"
@@ -41,6 +44,54 @@ TEST_CASE("a posterior reads back to the same bits") {
   CHECK(read.mixture == findings.posterior);
   CHECK(read.parameters.size() == 3);
   CHECK(read.iteration == 1);
+}
+
+TEST_CASE("a residual and starts read back to the same bits") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  findings.starts = {Eigen::Vector2f(0.1f, -1e-7f).cast<double>(), Eigen::Vector2d(3, 0)};
+  const Residual& residual = *findings.gap.residual;
+  const TemporaryFile file(PosteriorJson(findings, robot, {}), ".json");
+  const ParameterDistribution read = ReadPosterior(file.path(), robot);
+  CHECK(read.starts == findings.starts);
+  REQUIRE(read.residual);
+  CHECK(read.residual->coordinates == residual.coordinates);
+  CHECK(read.residual->margin == residual.margin);
+  CHECK_FALSE(read.residual->free);
+  REQUIRE(read.residual->touching);
+  const ResidualFunction &is = *read.residual->touching, &was = *residual.touching;
+  CHECK(is.mean == was.mean);
+  CHECK(is.scale == was.scale);
+  CHECK(is.low == was.low);
+  CHECK(is.high == was.high);
+  CHECK(is.frequencies == was.frequencies);
+  CHECK(is.phases == was.phases);
+  CHECK(is.weights == was.weights);
+  CHECK(is.noise == was.noise);
+  CHECK(is.bound == was.bound);
+}
+
+TEST_CASE("of the version before residuals a posterior has none") {
+  const RobotDescription robot = Pendulum();
+  json old = json::parse(PosteriorJson(SampleFindings(robot), robot, {}));
+  old["version"] = 1;
+  old.erase("residual"), old.erase("starts"), old.erase("gap");
+  const TemporaryFile file(old.dump(), ".json");
+  const ParameterDistribution read = ReadPosterior(file.path(), robot);
+  CHECK_FALSE(read.residual);
+  CHECK(read.starts.empty());
+}
+
+TEST_CASE("a single-precision number is written with as few digits as tell it") {
+  CHECK(ShortestSingle(0.1f) == 0.1);
+  CHECK(ShortestSingle(1.0 / 3) == 0.33333334);
+  CHECK(ShortestSingle(-0.0) == 0);
+  Random random(4);
+  for (int i = 0; i < 100'000; ++i) {
+    const auto single = std::bit_cast<float>(random.Bits());  // of any size
+    if (!std::isfinite(single)) continue;
+    if (static_cast<float>(ShortestSingle(single)) != single) FAIL(single);
+  }
 }
 
 TEST_CASE("the file says what was found") {
@@ -77,6 +128,10 @@ TEST_CASE("the file says what was found") {
   CHECK(j["identifiability"]["null"][0]["moves"]["mass/pole"] ==
         findings.identifiability.null[0](1));
   CHECK(j["identifiability"]["combinations"][0]["sd"] == 0.02);
+  CHECK(j["gap"]["informed"] == "free");
+  CHECK(j["gap"]["free"].is_null());
+  CHECK(j["gap"]["touching"]["explained"][0].get<double>() == Approx(0.75));
+  CHECK(j["gap"]["touching"]["transitions"] == 295);
   CHECK(j["holdout"]["better"] == true);
   CHECK(j["holdout"]["errors"][2]["prior"] == 0.12);
   CHECK(j["holdout"]["errors"][3]["posterior"].is_null());
@@ -234,7 +289,7 @@ TEST_CASE("hostile posteriors are refused with file and field") {
     return Error(j.dump(), robot);
   };
   CHECK_THAT(spoilt("/format", "plumbline prior"), Contains(": format: "));
-  CHECK_THAT(spoilt("/version", 2), Contains(": version: is 2, this program reads 1"));
+  CHECK_THAT(spoilt("/version", 3), Contains(": version: is 3, this program reads 1 and 2"));
   CHECK_THAT(spoilt("/version", "1"), Contains(": version: is not a number"));
   CHECK_THAT(spoilt("/names", "gravity"), Contains(": names: is not an array"));
   CHECK_THAT(spoilt("/names/0", 7), Contains(": names[0]: is not a string"));
@@ -263,12 +318,65 @@ TEST_CASE("hostile posteriors are refused with file and field") {
              Contains(": mixture.covariances[1]: is not positive definite"));
   CHECK_THAT(Error("[1]", robot), Contains("is not a posterior"));
   CHECK_THAT(Error(std::string(1000000, '['), robot), Contains("parse error"));
-  for (const char* key :
-       {"format", "version", "robot", "physics", "names", "units", "coordinates", "mixture"}) {
+  for (const char* key : {"format", "version", "robot", "physics", "names", "units", "coordinates",
+                          "mixture", "residual", "starts"}) {
     json j = good;
     j.erase(key);
     CHECK_THAT(Error(j.dump(), robot), Contains(std::string(": ") + key + ": is missing"));
   }
+}
+
+TEST_CASE("hostile residuals are refused with file and field") {
+  const RobotDescription robot = Pendulum();
+  Findings findings = SampleFindings(robot);
+  findings.starts = {Eigen::Vector2d(1, 2)};
+  const json good = json::parse(PosteriorJson(findings, robot, {}));
+  REQUIRE(Error(good.dump(), robot) == "");
+  const auto spoilt = [&](const std::string& pointer, const json& value) {
+    json j = good;
+    j[json::json_pointer(pointer)] = value;
+    return Error(j.dump(), robot);
+  };
+  CHECK_THAT(spoilt("/residual", 7), Contains(": residual.draws: ") || Contains(": residual: "));
+  CHECK_THAT(spoilt("/residual", json::object()), Contains(": residual.draws: is missing"));
+  CHECK_THAT(spoilt("/residual/draws", json::array()), Contains(": residual.draws: has 0 entries"));
+  CHECK_THAT(spoilt("/residual/draws/1", {1, 2}),
+             Contains(": residual.draws[1]: has 2 entries, expected 3"));
+  CHECK_THAT(spoilt("/residual/draws/1/0", nullptr),
+             Contains(": residual.draws[1][0]: is not a number"));
+  CHECK_THAT(spoilt("/residual/draws/1/0", 1e9), Contains(": residual.draws: is too wide"));
+  CHECK_THAT(spoilt("/residual/margin", -1), Contains(": residual.margin: is negative"));
+  CHECK_THAT(spoilt("/residual/touching", nullptr),
+             Contains(": residual: has neither free nor touching"));
+  CHECK_THAT(spoilt("/residual/free", "none"), Contains(": residual.free: is not an object"));
+  const std::string touching = "/residual/touching/", path = ": residual.touching.";
+  CHECK_THAT(spoilt(touching + "mean", json::array()), Contains(path + "mean: has 0 entries"));
+  CHECK_THAT(spoilt(touching + "mean", std::vector<double>(20000, 1)),
+             Contains(path + "mean: has 20000 entries"));
+  CHECK_THAT(spoilt(touching + "mean", {1, 2, 3}),
+             Contains(path + "scale: has 2 entries, expected 3"));
+  CHECK_THAT(spoilt(touching + "scale/1", 0), Contains(path + "scale[1]: is not positive"));
+  CHECK_THAT(spoilt(touching + "bound/0", -1), Contains(path + "bound[0]: is not positive"));
+  CHECK_THAT(spoilt(touching + "phases", {1, 2}),
+             Contains(path + "frequencies: has 3 entries, expected 2"));
+  CHECK_THAT(spoilt(touching + "frequencies/2", {1}),
+             Contains(path + "frequencies[2]: has 1 entries, expected 2"));
+  CHECK_THAT(spoilt(touching + "weights/0", json::array()),
+             Contains(path + "weights[0]: has 0 entries, expected 1"));
+  CHECK_THAT(spoilt(touching + "weights/1/0", {1, 2}),
+             Contains(path + "weights[1][0]: has 2 entries, expected 6"));
+  CHECK_THAT(spoilt(touching + "weights/1/0/5", 1e300),
+             Contains(path + "weights[1][0][5]: is not finite in single precision"));
+  CHECK_THAT(spoilt(touching + "weights/1/0/5", nullptr),
+             Contains(path + "weights[1][0][5]: is not a number"));
+  CHECK_THAT(spoilt(touching + "noise/0", {1, 2}),
+             Contains(path + "noise[0]: has 2 entries, expected 1"));
+  CHECK_THAT(spoilt("/starts", 1), Contains(": starts: is not an array"));
+  CHECK_THAT(spoilt("/starts/0", {1}), Contains(": starts[0]: has 1 entries, expected 2"));
+  CHECK_THAT(spoilt("/starts/0/1", "x"), Contains(": starts[0][1]: is not a number"));
+  json j = good;
+  j["residual"]["draws"].push_back({0, 0, 0});
+  CHECK_THAT(Error(j.dump(), robot), Contains(path + "weights: has 2 entries, expected 3"));
 }
 
 TEST_CASE("a posterior that was cut off or has rotten bytes is refused or read, nothing else") {

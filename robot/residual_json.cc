@@ -1,0 +1,107 @@
+#include "robot/residual_json.h"
+
+#include <charconv>
+#include <string>
+
+namespace plumb {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+// More would be no residual but an attack on the memory.
+constexpr size_t kMost = 10'000;
+
+json Singles(const Eigen::VectorXd& x) {
+  json list = json::array();
+  for (const double number : x) list.push_back(ShortestSingle(number));
+  return list;
+}
+
+json Singles(const Eigen::MatrixXd& matrix) {
+  json rows = json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+    rows.push_back(Singles(Eigen::VectorXd(matrix.row(i))));
+  return rows;
+}
+
+json ToJson(const std::optional<ResidualFunction>& function) {
+  if (!function) return nullptr;
+  json weights = json::array();
+  for (const Eigen::MatrixXd& draw : function->weights) weights.push_back(Singles(draw));
+  return {{"mean", Singles(function->mean)},
+          {"scale", Singles(function->scale)},
+          {"low", Singles(function->low)},
+          {"high", Singles(function->high)},
+          {"frequencies", Singles(function->frequencies)},
+          {"phases", Singles(function->phases)},
+          {"weights", weights},
+          {"noise", Singles(function->noise)},
+          {"bound", Singles(function->bound)}};
+}
+
+size_t Count(const JsonField& list) {
+  const size_t count = list.size();
+  list.Require(count >= 1 && count <= kMost, fmt::format("has {} entries", count));
+  return count;
+}
+
+Eigen::VectorXd Positive(const JsonField& list, size_t size) {
+  for (const JsonField& entry : list.Entries(size))
+    entry.Require(entry.Single() > 0, "is not positive");
+  return list.SingleVector(size);
+}
+
+std::optional<ResidualFunction> ReadFunction(const JsonField& field, size_t draws,
+                                             size_t velocities) {
+  if (field.null()) return {};
+  const size_t inputs = Count(field["mean"]), waves = Count(field["phases"]);
+  ResidualFunction function;
+  function.mean = field["mean"].SingleVector(inputs);
+  function.scale = Positive(field["scale"], inputs);
+  function.low = field["low"].SingleVector(inputs);
+  function.high = field["high"].SingleVector(inputs);
+  function.frequencies = field["frequencies"].SingleMatrix(waves, inputs);
+  function.phases = field["phases"].SingleVector(waves);
+  for (const JsonField& weights : field["weights"].Entries(draws))
+    function.weights.push_back(weights.SingleMatrix(velocities, 1 + inputs + waves));
+  function.noise = field["noise"].SingleMatrix(velocities, velocities);
+  function.bound = Positive(field["bound"], velocities);
+  return function;
+}
+
+}  // namespace
+
+double ShortestSingle(double number) {
+  const auto single = static_cast<float>(number);
+  if (!std::isfinite(single)) return single;
+  const std::string text = fmt::format("{}", single);
+  double shortest = 0;
+  std::from_chars(text.data(), text.data() + text.size(), shortest);
+  return shortest;
+}
+
+json ResidualJson(const Residual& residual) {
+  json draws = json::array();
+  for (const Eigen::VectorXd& draw : residual.coordinates)
+    draws.push_back(std::vector<double>(draw.begin(), draw.end()));
+  return {{"draws", draws},
+          {"margin", ShortestSingle(residual.margin)},
+          {"free", ToJson(residual.free)},
+          {"touching", ToJson(residual.touching)}};
+}
+
+std::shared_ptr<const Residual> ReadResidual(const JsonField& field, size_t parameters,
+                                             size_t velocities) {
+  auto residual = std::make_shared<Residual>();
+  const size_t draws = Count(field["draws"]);
+  for (const JsonField& draw : field["draws"].Entries(draws))
+    residual->coordinates.push_back(draw.Vector(parameters));
+  residual->margin = field["margin"].Single();
+  field["margin"].Require(residual->margin >= 0, "is negative");
+  residual->free = ReadFunction(field["free"], draws, velocities);
+  residual->touching = ReadFunction(field["touching"], draws, velocities);
+  field.Require(residual->free || residual->touching, "has neither free nor touching");
+  return residual;
+}
+
+}  // namespace plumb
