@@ -105,6 +105,7 @@ class TrainerProcess {
     if (session_.decision().challenger >= 0)
       spdlog::info("iteration {}: {}", session_.iteration(), Summary(session_.decision()));
     spdlog::info("iteration {}: {} updates", session_.iteration(), session_.updates());
+    PublishStatus();  // the decision, which the next one may follow soon
   }
 
   // Repeated ten times a second.
