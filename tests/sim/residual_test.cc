@@ -103,7 +103,7 @@ TEST_CASE("the inputs are observation, efforts of two steps, and what constraint
   ResidualInputs inputs(model, 0.005);
   REQUIRE(inputs.size() == 11 + 3 + 3 + 6);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(6), v = q, effort = q, before = q;
-  q[1] = 2, q[4] = -1, v[3] = 0.5, effort[3] = 100, before[5] = -200;
+  q[1] = 2, q[3] = -0.5, q[4] = -1, v[3] = 0.5, effort[3] = 100, before[5] = -200;
   simulator.SetState(q, v);
   inputs.Begin(simulator, effort, before, 0.0005);
   simulator.Step(effort, 0.0005);
@@ -114,7 +114,7 @@ TEST_CASE("the inputs are observation, efforts of two steps, and what constraint
   CHECK(inputs.x()[16] == Approx(-1));
   CHECK(inputs.x().tail(6).cwiseAbs().maxCoeff() < 1e-2);  // nothing but a short step's error
   CHECK_FALSE(inputs.touching());
-  q[1] = 1.2, q[4] = 0;  // deep in the ground
+  q[1] = 1.2, q[3] = q[4] = 0;  // deep in the ground
   simulator.SetState(q, v);
   inputs.Begin(simulator, effort, before, 0.0005);
   simulator.Step(effort, 0.0005);

@@ -59,6 +59,7 @@ class Recording {
     controller_status_t s{};
     s.phase = controller_status_t::RUNNING;
     s.num_episodes = 1;
+    s.steps = {20}, s.late_rate = {0}, s.fell = {0};
     s.episode = {episode};
     s.first_state_sequence = {0};
     s.last_state_sequence = {last_state};
