@@ -10,6 +10,7 @@
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "robot/parameter_distribution.h"
+#include "sim/tasks/task.h"
 #include "sim/touch.h"
 
 namespace plumb {
@@ -28,12 +29,22 @@ bool KnowsLikelihood(const std::string& name) {
                      [&](const Method& method) { return method.name == name; });
 }
 
-// An alarm tells of every error that is no accident, however small: of the tenth of a per cent that
-// an integrator's step makes, too. What a residual cannot make much smaller is not worth one.
+// Whether a residual makes errors much smaller, and makes them smaller by an amount that counts.
+bool Worth(const ResidualQuality& quality, const Eigen::VectorXd& units) {
+  if (MeanExplained(quality) < kLeastExplained) return false;
+  const Eigen::ArrayXd explained =
+      (quality.before.array().square() - quality.after.array().square()).max(0).sqrt();
+  return (explained / units.array()).maxCoeff() >= kLeastEffect;
+}
+
+// An alarm tells of every error that is no accident, however small: of those that an integrator's
+// step makes, too, where states are known to six digits.
 bool Matters(const MethodInput& input, const MethodResult& result) {
   const ResidualFit fit = FitResidual(input.model, Moments(result.posterior).mean, input.rollouts,
                                       {.seed = input.options.seed});
-  return std::max(MeanExplained(fit.free), MeanExplained(fit.touching)) >= kLeastExplained;
+  const Eigen::VectorXd units =
+      MakeTask(input.model->description())->state_scale().tail(input.model->num_velocities());
+  return Worth(fit.free, units) || Worth(fit.touching, units);
 }
 
 // Why nothing is learnt of what the model lacks; empty = it is.
@@ -47,7 +58,7 @@ std::string Obstacle(const MethodInput& input, const MethodResult& result) {
   if (!Matters(input, result))
     return fmt::format(
         "a residual would explain less than {:.0f} % of the velocities' squared "
-        "errors, and the parameters stay as they are",
+        "errors, or too little to matter, and the parameters stay as they are",
         100 * kLeastExplained);
   return "";
 }
