@@ -8,7 +8,8 @@
 
 namespace plumb {
 
-/// What sensors add to a state when they read it: independent Gaussian errors, new for every reading.
+/// What sensors add to a state when they read it: independent Gaussian errors, new for every
+/// reading.
 struct ReadingNoise {
   double q = 0;  ///< [rad or m] standard deviation of each position
   double v = 0;  ///< [rad/s or m/s] of each velocity

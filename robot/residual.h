@@ -12,9 +12,9 @@ namespace plumb {
 
 /// The change of n velocities in a control step beyond the simulator's, as a function of D inputs
 /// (ResidualInputs), learnt from recorded transitions: the discrepancy function of Kennedy and
-/// O'Hagan (J. R. Statist. Soc. B 63, 2001), as a Bayesian linear model of M random Fourier features
-/// (Rahimi and Recht, NIPS 2007), which is a Gaussian process with a squared exponential kernel, and
-/// of the inputs themselves:
+/// O'Hagan (J. R. Statist. Soc. B 63, 2001), as a Bayesian linear model of M random Fourier
+/// features (Rahimi and Recht, NIPS 2007), which is a Gaussian process with a squared exponential
+/// kernel, and of the inputs themselves:
 ///   phi(x) = (1, z / sqrt(D), sqrt(2 / M) cos(F z + b)),   z = (x - mean) / scale,
 ///   dv = W phi(x) + L e,   e ~ N(0, 1).
 /// z is kept within what was recorded, and W phi within `bound`: where nothing is known nothing

@@ -40,8 +40,8 @@ class Environment {
   void SetParameters(const Eigen::Ref<const Eigen::VectorXd>& physical) {
     simulator_.SetParameters(physical);
   }
-  /// What has been learnt that the simulator lacks; null = nothing, it is right as it is. Holds from
-  /// the next Reset on. Allocates where it is another one than before.
+  /// What has been learnt that the simulator lacks; null = nothing, it is right as it is. Holds
+  /// from the next Reset on. Allocates where it is another one than before.
   /// @param draw of the residual, to which the parameters belong.
   /// @throws std::invalid_argument if it is another robot's, or there is no such draw.
   void SetResidual(std::shared_ptr<const Residual> residual, size_t draw = 0);

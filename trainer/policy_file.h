@@ -9,8 +9,8 @@
 namespace plumb {
 
 /// Reads a policy from a file: a trainer's checkpoint or an ONNX model that Plumbline has written
-/// (trainer/onnx_policy.h), whichever it is by its contents; of several in a checkpoint the one that
-/// the robot is to be run with. Thread-safe.
+/// (trainer/onnx_policy.h), whichever it is by its contents; of several in a checkpoint the one
+/// that the robot is to be run with. Thread-safe.
 /// @throws std::invalid_argument or CheckpointError, naming the file, if there is none, it is
 /// damaged, or the policy is another robot's or another task's: it sees or does something else, has
 /// other effort limits or, as far as the file says, other names or another control period.

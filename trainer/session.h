@@ -45,7 +45,8 @@ class TrainingSession {
   /// the finished episodes of that policy, or have sizes or numbers that cannot be.
   bool AddTrial(const controller_status_t& status);
   /// Begins the iteration, once the policy of before has been tried. @return false, and nothing
-  /// happens, if it is not the one that is awaited. @throws std::invalid_argument if its residual is another robot's, as Replace does.
+  /// happens, if it is not the one that is awaited. @throws std::invalid_argument if its residual
+  /// is another robot's, as Replace does.
   bool Begin(const ParameterDistribution& distribution);
 
   /// Goes on training with another distribution of the same iteration, from the next batch on.

@@ -15,8 +15,9 @@
 namespace plumb {
 
 /// The settings of the paper where ours learn faster: batches, discounts and KL bound of its table,
-/// value targets in units of return, the whole batch for Fisher's matrix. The paper does not say how long its critic is fitted; targets so
-/// large need 20 passes, 10 leave one seed in ten behind. Thread-safe.
+/// value targets in units of return, the whole batch for Fisher's matrix. The paper does not say
+/// how long its critic is fitted; targets so large need 20 passes, 10 leave one seed in ten behind.
+/// Thread-safe.
 TrainingSettings PaperSettings(TrainingSettings settings);
 
 /// A policy that was judged, and the critic that goes with it.
@@ -82,8 +83,8 @@ class Trainer {
   /// `updates` of the settings.
   bool JudgementDue() const;
   /// Plays the policy without exploration in 30 simulators, always the same and not those held out,
-  /// and remembers it if it is the best so far: by the mean of all returns, or of the worst_share of
-  /// them from which it learns.
+  /// and remembers it if it is the best so far: by the mean of all returns, or of the worst_share
+  /// of them from which it learns.
   void Judge(const ParameterSampler& sample);
   /// TRPO's last policy is not its best. Judges it, too, and goes back to the best one with its
   /// critic; what follows is judged anew. @return after how many updates it stood.

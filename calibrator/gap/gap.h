@@ -65,8 +65,8 @@ Eigen::VectorXd Explained(const ResidualQuality& quality);
 
 /// Mean share of the velocities' squared errors that a residual must explain to be used.
 inline constexpr double kLeastExplained = 0.2;
-/// Part of the velocities' errors in a step that it must explain in one of them at least, in units of
-/// the state (Task::state_scale).
+/// Part of the velocities' errors in a step that it must explain in one of them at least, in units
+/// of the state (Task::state_scale).
 inline constexpr double kLeastEffect = 2e-3;
 /// Draws of the posterior that a residual is learnt for, the mean first.
 inline constexpr int kResidualDraws = 8;

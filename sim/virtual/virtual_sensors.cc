@@ -43,8 +43,8 @@ class VirtualEncoder : public VirtualDevice {
 };
 
 /// At its link's origin. Its orientation counts from the ground, which it has been levelled on; its
-/// force has gravity as that is there. It measures as such sensors do, by the change of its velocity in a period:
-/// the force of an impact is spread over one.
+/// force has gravity as that is there. It measures as such sensors do, by the change of its
+/// velocity in a period: the force of an impact is spread over one.
 class VirtualImu : public VirtualDevice {
  public:
   VirtualImu(const RobotDescription& robot, const SensorDescription& sensor)
