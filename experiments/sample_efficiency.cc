@@ -32,18 +32,19 @@ namespace {
 
 constexpr CalibrationStrategy kStrategies[] = {
     CalibrationStrategy::kOriginal, CalibrationStrategy::kStep, CalibrationStrategy::kDefault};
-constexpr int kUpdates = 40;      // of both SimOpts
 constexpr int kIterations = 5;    // TRPO updates of so many iterations follow
 constexpr double kEnough = 0.95;  // of the oracle's return
 constexpr int kHorizon = 10, kSimulators = 20;
 constexpr double kTargets[] = {0.01, 0.001};  // errors after kHorizon steps, standard units
 
+// Of both SimOpts.
+int Updates(const ExperimentOptions& options) { return options.quick ? 8 : 40; }
 std::vector<int> TransitionCounts(const ExperimentOptions& options) {
   return options.quick ? std::vector<int>{50, 200}
                        : std::vector<int>{12, 25, 50, 100, 200, 400, 800};
 }
 std::vector<int64_t> Budgets(const ExperimentOptions& options) {
-  return options.quick ? std::vector<int64_t>{40'000, 200'000}
+  return options.quick ? std::vector<int64_t>{10'000, 100'000}
                        : std::vector<int64_t>{1000,   2000,    5000,    10'000, 20'000,
                                               50'000, 100'000, 200'000, 500'000};
 }
@@ -111,7 +112,7 @@ class Experiment {
       simopt->Update();
       simulated += 25 * static_cast<int64_t>(rollout.transitions.size());
       judge(simulated, DistributionOf(*simopt, recording.robot));
-      progress(static_cast<double>(rows.size()) / kUpdates);
+      progress(static_cast<double>(rows.size()) / Updates(options_));
     }
     return rows;
   }
@@ -122,7 +123,7 @@ class Experiment {
     if (now_.of == of) return;
     const RobotDescription robot = LoadTask(options_.robots, task, options_.hidden);
     const RecordingSettings settings{options_.quick ? 40 : robot.training.updates,
-                                     kUpdates,
+                                     Updates(options_),
                                      1,
                                      options_.hidden,
                                      static_cast<uint64_t>(run),
@@ -135,7 +136,7 @@ class Experiment {
     const auto simopt = MakeSimOpt(strategy, robot, static_cast<uint64_t>(run), options_.threads);
     // The same transitions again and again: an iteration is an update.
     const std::vector<Rollout> some = FirstTransitions(now_.recording.seen, transitions);
-    for (int i = 0; i < (strategy == CalibrationStrategy::kDefault ? 1 : kUpdates); ++i) {
+    for (int i = 0; i < (strategy == CalibrationStrategy::kDefault ? 1 : Updates(options_)); ++i) {
       simopt->Begin(some);
       simopt->Update();
     }

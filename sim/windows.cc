@@ -121,6 +121,13 @@ struct Windows::Worker {
     }
   }
 
+  // Besides the windows, all that a plan depends on.
+  std::vector<double> Delays() const {
+    std::vector<double> delays;
+    for (const auto& axis : physics.axes) delays.push_back(axis.delay);
+    return delays;
+  }
+
   void Append(std::span<const EffortSegment> segments) {
     for (const EffortSegment& segment : segments)
       track.Append(segment.effort.data(), segment.duration);
@@ -186,10 +193,9 @@ struct Windows::Worker {
   void Run(const Eigen::MatrixXd& parameters, Eigen::Index first, Eigen::Index end,
            std::span<const Window> windows, std::span<const Group* const> groups,
            const Visit& visit, bool last_only) {
-    const bool delays = model.parameters().delays();
     for (size_t begin = 0; begin < groups.size(); begin += kLargestBlock) {
       const size_t size = std::min(kLargestBlock, groups.size() - begin);
-      for (size_t i = 0; i < size && !delays; ++i) MakePlan(*groups[begin + i], windows, &plans[i]);
+      std::vector<double> planned;  // with these delays; most samples have those of the one before
       for (Eigen::Index sample = first; sample < end; ++sample) {
         try {
           model.parameters().Apply(parameters.col(sample), &physics);
@@ -199,10 +205,12 @@ struct Windows::Worker {
           continue;
         }
         engine->SetPhysics(physics);
-        for (size_t i = 0; i < size; ++i) {
-          if (delays) MakePlan(*groups[begin + i], windows, &plans[i]);
-          Simulate(sample, *groups[begin + i], windows, plans[i], visit, last_only);
+        if (const std::vector<double> delays = Delays(); delays != planned) {
+          for (size_t i = 0; i < size; ++i) MakePlan(*groups[begin + i], windows, &plans[i]);
+          planned = delays;
         }
+        for (size_t i = 0; i < size; ++i)
+          Simulate(sample, *groups[begin + i], windows, plans[i], visit, last_only);
       }
     }
   }

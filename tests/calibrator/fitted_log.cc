@@ -90,7 +90,8 @@ FittedLog::FittedLog(const RobotDescription& robot, std::vector<Rollout> log)
     x(static_cast<Eigen::Index>(i)) = robot.parameters[i].coordinate_mean();
   Eigen::VectorXd r;
   Eigen::MatrixXd jacobian;
-  for (int iteration = 0; iteration <= 6; ++iteration) {
+  constexpr int kIterations = 4;
+  for (int iteration = 0; iteration <= kIterations; ++iteration) {
     Eigen::MatrixXd physicals(x.size(), 2 * x.size() + 1);
     const double h = 1e-4;
     for (Eigen::Index k = 0; k < x.size(); ++k) {
@@ -103,7 +104,7 @@ FittedLog::FittedLog(const RobotDescription& robot, std::vector<Rollout> log)
     jacobian.resize(r.size(), x.size());
     for (Eigen::Index k = 0; k < x.size(); ++k)
       jacobian.col(k) = (errors.col(2 * k) - errors.col(2 * k + 1)) / (2 * h);
-    if (iteration == 6) break;
+    if (iteration == kIterations) break;
     // A prior far weaker than the data would hardly matter.
     x -= Eigen::MatrixXd(jacobian.transpose() * jacobian +
                          Eigen::MatrixXd::Identity(x.size(), x.size()))

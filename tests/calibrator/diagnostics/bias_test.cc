@@ -80,21 +80,32 @@ Recording Record(const RobotDescription& robot, uint32_t episode) {
   return recording;
 }
 
+std::vector<Recording> Recordings(const RobotDescription& robot) {
+  std::vector<Recording> recordings;
+  for (uint32_t episode = 0; episode < 4; ++episode) recordings.push_back(Record(robot, episode));
+  return recordings;
+}
+/// The pendulum's as it is, which all tests read that change nothing in the estimator.
+const std::vector<Recording>& Recordings() {
+  static const std::vector<Recording> recordings = Recordings(Pendulum());
+  return recordings;
+}
+
 struct Undone {
   bool latency = false;    // each step is replayed with its command from beginning to end
   bool smoothing = false;  // the causal states are used
 };
 
-std::vector<Rollout> Rollouts(const RobotDescription& robot, Undone undone = {}) {
+std::vector<Rollout> Rollouts(const RobotDescription& robot,
+                              const std::vector<Recording>& recordings, Undone undone = {}) {
   std::vector<Rollout> rollouts;
-  for (uint32_t episode = 0; episode < 4; ++episode) {
-    const Recording recording = Record(robot, episode);
+  for (const Recording& recording : recordings) {
     TransitionJoiner joiner(robot);
     for (const robot_state_t& state : undone.smoothing ? recording.causal : recording.smoothed)
       joiner.OnState(state);
     for (const joint_command_t& command : recording.commands) joiner.OnCommand(command);
     Rollout rollout =
-        joiner.Join(episode, recording.commands.back().state_sequence + kPeriod / kMeasurement);
+        joiner.Join(recording.commands.front().episode, recording.commands.back().state_sequence + kPeriod / kMeasurement);
     REQUIRE(rollout.transitions.size() > 150);
     if (undone.latency) {
       for (Transition& t : rollout.transitions) {
@@ -124,7 +135,7 @@ TEST_CASE(
     "through encoder, latency and estimator the parameters are found within half a percent, and "
     "honestly") {
   const RobotDescription robot = Pendulum();
-  const Errors found = Calibrate(robot, Rollouts(robot));
+  const Errors found = Calibrate(robot, Rollouts(robot, Recordings()));
   INFO("g/l " << found.gravity_over_length << " +- " << found.sd_gravity << ", m l^2 "
               << found.mass_length_squared << " +- " << found.sd_mass);
   CHECK(std::abs(found.gravity_over_length) < 0.005);
@@ -137,7 +148,7 @@ TEST_CASE("what the live calibrator claims to know of smoothed states is true") 
   const RobotDescription robot = Pendulum();
   SimOpt simopt(robot, 1, 2, "auto");
   const Eigen::Vector3d truth = kTruth.array().log();
-  for (Rollout& rollout : Rollouts(robot)) {
+  for (Rollout& rollout : Rollouts(robot, Recordings())) {
     simopt.Begin({std::move(rollout)});
     const auto report = simopt.Update();
     REQUIRE(report);
@@ -154,14 +165,14 @@ TEST_CASE("what the live calibrator claims to know of smoothed states is true") 
 
 TEST_CASE("without the applied effort, latency becomes mass") {
   const RobotDescription robot = Pendulum();
-  const Errors found = Calibrate(robot, Rollouts(robot, {.latency = true}));
+  const Errors found = Calibrate(robot, Rollouts(robot, Recordings(), {.latency = true}));
   INFO("m l^2 " << found.mass_length_squared);
   CHECK(std::abs(found.mass_length_squared) > 0.03);
 }
 
 TEST_CASE("with a coarse integrator, its error becomes gravity or mass") {
   RobotDescription robot = Pendulum();
-  const std::vector<Rollout> rollouts = Rollouts(robot);
+  const std::vector<Rollout> rollouts = Rollouts(robot, Recordings());
   robot.simulation.integrator = SimulationSettings::Integrator::kSemiImplicit;
   robot.simulation.substep = 0.005;
   const Errors found = Calibrate(robot, rollouts);
@@ -173,16 +184,16 @@ TEST_CASE("with corners rounded off by the filter, or lagging states, the effort
   RobotDescription robot = Pendulum();
   SECTION("corners") {
     robot.estimator.jerk = 10;  // a narrow filter has round corners
-    const Errors open = Calibrate(robot, Rollouts(robot));
+    const Errors open = Calibrate(robot, Rollouts(robot, Recordings(robot)));
     robot.estimator.effort_step = 0;
-    const Errors found = Calibrate(robot, Rollouts(robot));
+    const Errors found = Calibrate(robot, Rollouts(robot, Recordings(robot)));
     INFO("m l^2 " << found.mass_length_squared << ", with the corners left open "
                   << open.mass_length_squared);
     CHECK(std::abs(found.mass_length_squared) > 0.01);
     CHECK(std::abs(open.mass_length_squared) < 0.005);
   }
   SECTION("causal") {
-    const Errors found = Calibrate(robot, Rollouts(robot, {.smoothing = true}));
+    const Errors found = Calibrate(robot, Rollouts(robot, Recordings(), {.smoothing = true}));
     INFO("g/l " << found.gravity_over_length << ", m l^2 " << found.mass_length_squared);
     CHECK(std::max(std::abs(found.gravity_over_length), std::abs(found.mass_length_squared)) >
           0.005);
@@ -193,10 +204,10 @@ TEST_CASE(
     "through encoder, latency and estimator a right model raises no alarm, and one without the "
     "latency does") {
   const RobotDescription robot = Pendulum();
-  const Misspecification right = FittedLog(robot, Rollouts(robot)).Find();
+  const Misspecification right = FittedLog(robot, Rollouts(robot, Recordings())).Find();
   INFO(right.summary);
   CHECK_FALSE(right.alarm);
-  const Misspecification wrong = FittedLog(robot, Rollouts(robot, {.latency = true})).Find();
+  const Misspecification wrong = FittedLog(robot, Rollouts(robot, Recordings(), {.latency = true})).Find();
   INFO(wrong.summary);
   CHECK(wrong.alarm);
   CHECK_THAT(wrong.summary, Catch::Contains("delay/pivot 0.007"));

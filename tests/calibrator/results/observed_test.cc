@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "calibrator/results/calibration.h"
+#include "calibrator/fit/methods.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/hop_on_bus.h"
 
@@ -16,16 +16,17 @@ struct Answer {
   double discrepancy;         // 1 = down to the noise
 };
 
-Answer Calibrated(const RobotDescription& robot, const Samples& motion, States states,
+Answer Calibrated(const RobotDescription& robot, const std::vector<Samples>& motions, States states,
                   uint32_t seed) {
-  const std::vector<Log> logs{ObservedLog(robot, motion, states)};
+  const Log log = ObservedLog(robot, motions, states);
   CalibrationOptions options;
   options.method = "laplace";
   options.horizons = {1};
-  const Findings findings = Calibrate(robot, logs, options);
-  const Gaussian posterior = Moments(findings.posterior);
+  const MethodResult result =
+      RunMethod({std::make_shared<const Model>(robot), log.rollouts, options});
+  const Gaussian posterior = Moments(result.posterior);
   return {posterior.mean - HiddenParameters(robot, seed).array().log().matrix(),
-          posterior.covariance.diagonal().cwiseSqrt(), findings.stages.at(0).discrepancy};
+          posterior.covariance.diagonal().cwiseSqrt(), result.curriculum->stages.at(0).discrepancy};
 }
 
 TEST_CASE(
@@ -38,13 +39,13 @@ TEST_CASE(
   for (const uint32_t seed : {1, 2}) {
     const Samples motion = HopOnBus(robot, seed);
     REQUIRE(motion.size() > 900);
-    const Answer truth = Calibrated(robot, motion, States::kTrue, seed);
+    const Answer truth = Calibrated(robot, {motion}, States::kTrue, seed);
     CHECK(truth.error.cwiseAbs().maxCoeff() < 1e-3);
-    const Answer found = Calibrated(robot, motion, States::kSmoothed, seed);
+    const Answer found = Calibrated(robot, {motion}, States::kSmoothed, seed);
     INFO("errors " << found.error.transpose() << ", claimed " << found.sd.transpose());
     CHECK((found.error.array().abs() < 3 * found.sd.array()).all());
     CHECK(found.sd(0) < 0.02);
-    const Answer sure = Calibrated(robot, motion, States::kCertain, seed);
+    const Answer sure = Calibrated(robot, {motion}, States::kCertain, seed);
     unexplained += found.discrepancy / 2;
     unexplained_if_exact += sure.discrepancy / 2;
   }
@@ -59,26 +60,15 @@ TEST_CASE("driven into its stops and into the ground a hopper's masses are found
   robot.estimator.delay = 0;
   constexpr uint32_t kSeed = 1;
   const std::vector<Samples> motions = BangBangOnBus(robot, kSeed);
-  CalibrationOptions options;
-  options.method = "laplace";
-  options.horizons = {1};
-  const auto find = [&] {
-    const std::vector<Log> logs{ObservedLog(robot, motions, States::kSmoothed)};
-    return Calibrate(robot, logs, options);
-  };
-  const Findings found = find();
-  const Gaussian posterior = Moments(found.posterior);
-  const Eigen::ArrayXd error =
-      posterior.mean.array() - HiddenParameters(robot, kSeed).array().log();
-  const Eigen::ArrayXd sd = posterior.covariance.diagonal().cwiseSqrt();
-  INFO("errors " << error.transpose() << ", claimed " << sd.transpose());
-  CHECK((error.abs() < 4 * sd).all());
-  CHECK(sd(0) < 0.01);
-  CHECK(found.stages[0].discrepancy < 1.6);
+  const Answer found = Calibrated(robot, motions, States::kSmoothed, kSeed);
+  INFO("errors " << found.error.transpose() << ", claimed " << found.sd.transpose());
+  CHECK((found.error.array().abs() < 4 * found.sd.array()).all());
+  CHECK(found.sd(0) < 0.01);
+  CHECK(found.discrepancy < 1.6);
   // Without impacts states are further off than they say.
   for (JointDescription& joint : robot.joints)
     joint.noise.ground_impact = joint.noise.stop_impact = 0;
-  CHECK(find().stages[0].discrepancy > 10);
+  CHECK(Calibrated(robot, motions, States::kSmoothed, kSeed).discrepancy > 10);
 }
 
 }  // namespace
