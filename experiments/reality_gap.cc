@@ -120,6 +120,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   const RobotDescription truth = load(gap.truth);
   RobotDescription model = load(model_file);
   model.calibration.residual = method.residual;
+  if (options.quick) model.task.steps = std::min(model.task.steps, 40);
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = HiddenParameters(truth, seed);
   if (const std::string of = fmt::format("{} {} {}", model_file, method.residual, run);

@@ -44,7 +44,7 @@ std::vector<int> TransitionCounts(const ExperimentOptions& options) {
                        : std::vector<int>{12, 25, 50, 100, 200, 400, 800};
 }
 std::vector<int64_t> Budgets(const ExperimentOptions& options) {
-  return options.quick ? std::vector<int64_t>{10'000, 100'000}
+  return options.quick ? std::vector<int64_t>{2000, 20'000, 100'000}
                        : std::vector<int64_t>{1000,   2000,    5000,    10'000, 20'000,
                                               50'000, 100'000, 200'000, 500'000};
 }

@@ -26,10 +26,11 @@ json Posterior(const std::string& file) {
   return j;
 }
 
-std::string HopperTable(const TemporaryFolder& folder) {
+std::string HopperTable(const TemporaryFolder& folder, int episodes = 20) {
   const std::string file = folder / "hopper.csv";
   REQUIRE(Shell(Plumb() + "sim " + Robot("hopper") +
-                " --random --episodes 20 --seed 3 --set mass/torso=3.6 mass/thigh=4.1 "
+                " --random --episodes " + std::to_string(episodes) +
+                " --seed 3 --set mass/torso=3.6 mass/thigh=4.1 "
                 "mass/leg=2.8 mass/foot=5.2 --csv " +
                 file)
               .status == 0);
@@ -68,12 +69,12 @@ TEST_CASE(
   const TemporaryFolder folder;
   const std::string table = HopperTable(folder);
   const std::string command = Plumb() + "calibrate " + Robot("hopper") + " --csv " + table +
-                              " --method reps --budget 200000 --output ";
+                              " --method reps --budget 100000 --output ";
   REQUIRE(Shell(command + (folder / "whole.json") + " --threads 1").status == 0);
   const json whole = Posterior(folder / "whole.json");
   // Killed by the system when its journal has grown so far, within a record or not.
   int killed = 0;
-  for (const int blocks : {1, 600, 1800, 3600, 6000}) {
+  for (const int blocks : {1, 300, 900, 1800, 3000}) {
     const Outcome outcome =
         Shell("ulimit -c 0; ulimit -f " + std::to_string(blocks) + "; exec " + command +
               (folder / "killed.json") + " --threads " + std::to_string(1 + killed % 2));
@@ -93,7 +94,7 @@ TEST_CASE("ranks that share the work come to the same bits") {
     return;
   }
   const TemporaryFolder folder;
-  const std::string table = HopperTable(folder);
+  const std::string table = HopperTable(folder, 6);
   const std::string arguments =
       "calibrate " + Robot("hopper") + " --csv " + table + " --threads 1 --output ";
   REQUIRE(Shell(Plumb() + arguments + (folder / "one.json")).status == 0);
