@@ -28,8 +28,8 @@ json Posterior(const std::string& file) {
 
 std::string HopperTable(const TemporaryFolder& folder, int episodes = 20) {
   const std::string file = folder / "hopper.csv";
-  REQUIRE(Shell(Plumb() + "sim " + Robot("hopper") +
-                " --random --episodes " + std::to_string(episodes) +
+  REQUIRE(Shell(Plumb() + "sim " + Robot("hopper") + " --random --episodes " +
+                std::to_string(episodes) +
                 " --seed 3 --set mass/torso=3.6 mass/thigh=4.1 "
                 "mass/leg=2.8 mass/foot=5.2 --csv " +
                 file)

@@ -105,7 +105,8 @@ std::vector<Rollout> Rollouts(const RobotDescription& robot,
       joiner.OnState(state);
     for (const joint_command_t& command : recording.commands) joiner.OnCommand(command);
     Rollout rollout =
-        joiner.Join(recording.commands.front().episode, recording.commands.back().state_sequence + kPeriod / kMeasurement);
+        joiner.Join(recording.commands.front().episode,
+                    recording.commands.back().state_sequence + kPeriod / kMeasurement);
     REQUIRE(rollout.transitions.size() > 150);
     if (undone.latency) {
       for (Transition& t : rollout.transitions) {
@@ -207,7 +208,8 @@ TEST_CASE(
   const Misspecification right = FittedLog(robot, Rollouts(robot, Recordings())).Find();
   INFO(right.summary);
   CHECK_FALSE(right.alarm);
-  const Misspecification wrong = FittedLog(robot, Rollouts(robot, Recordings(), {.latency = true})).Find();
+  const Misspecification wrong =
+      FittedLog(robot, Rollouts(robot, Recordings(), {.latency = true})).Find();
   INFO(wrong.summary);
   CHECK(wrong.alarm);
   CHECK_THAT(wrong.summary, Catch::Contains("delay/pivot 0.007"));

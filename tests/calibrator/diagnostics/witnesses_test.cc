@@ -108,12 +108,12 @@ TEST_CASE("witnesses are whitened as all errors are where a simulator is linear"
 TEST_CASE("noisy states: a right model is left in peace, and a wrong one is not") {
   const RobotDescription robot = Robot("hopper/gym.toml");
   for (const bool known : {false, true}) {
-    const Misspecification right = Judge(robot, RandomLog(robot, {{}, 1e-3, 1e-3}, 500, 4), known);
+    const Misspecification right = Judge(robot, RandomLog(robot, {{}, 1e-3, 1e-3}, 300, 4), known);
     INFO(right.summary);
     CHECK_FALSE(right.alarm);
     CHECK_THAT(right.summary, Catch::Contains("nothing speaks against the model"));
     const Misspecification wrong =
-        Judge(robot, RandomLog(robot, {{{"inertia/foot", 1.2}}, 1e-3, 1e-3}, 500, 4), known);
+        Judge(robot, RandomLog(robot, {{{"inertia/foot", 1.2}}, 1e-3, 1e-3}, 300, 4), known);
     INFO(wrong.summary);
     CHECK(wrong.alarm);
   }
