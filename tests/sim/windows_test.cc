@@ -124,6 +124,24 @@ TEST_CASE("windows are what a simulator gives, to the bit, for any number of thr
   }
 }
 
+TEST_CASE("each sample's efforts are as late as its own delay, whatever the sample before has") {
+  RobotDescription robot = LoadHopper();
+  robot.parameters.push_back(
+      {"delay/thigh", "", ParameterDescription::Coordinate::kLinear, 0.002, 1});
+  const Record record(30);
+  MatrixXd parameters(5, 5);
+  parameters.topRows(4) = SomeMasses(5);
+  parameters.row(4) << 0.002, 0.002, 0.0031, 0, 0.002;
+  const MatrixXd all = Predict(robot, 1, parameters, record.windows, false);
+  for (Eigen::Index sample = 0; sample < 5; ++sample) {
+    CHECK(SameBits(all.middleCols(sample * 30 * 3, 30 * 3),
+                   Predict(robot, 1, parameters.col(sample), record.windows, false)));
+  }
+  MatrixXd prompt = parameters;
+  prompt.row(4).setZero();
+  CHECK_FALSE(SameBits(all, Predict(robot, 1, prompt, record.windows, false)));
+}
+
 TEST_CASE("only the ends of windows are visited where no more is asked for") {
   const Record record(7);
   const MatrixXd all = Predict(LoadHopper(), 2, SomeMasses(2), record.windows, false);
