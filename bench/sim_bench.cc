@@ -133,8 +133,8 @@ BENCHMARK(Hopper);
 
 /// As large as FitResidual makes them, of small numbers: the motion hardly changes.
 std::shared_ptr<const Residual> LearntResidual(const RobotDescription& robot) {
-  constexpr Eigen::Index kWaves = 150;
-  const Eigen::Index inputs = ResidualInputCount(robot), outputs = robot.num_velocities();
+  constexpr Eigen::Index kCentres = 300;
+  const Eigen::Index inputs = ResidualInputCount(robot), outputs = 2 * robot.num_velocities();
   Random random(7);
   const auto normal = [&](Eigen::Index rows, Eigen::Index columns) {
     Eigen::MatrixXd matrix(rows, columns);
@@ -144,7 +144,7 @@ std::shared_ptr<const Residual> LearntResidual(const RobotDescription& robot) {
   ResidualFunction f;
   f.mean = Eigen::VectorXd::Zero(inputs), f.scale = Eigen::VectorXd::Ones(inputs);
   f.low = Eigen::VectorXd::Constant(inputs, -3), f.high = -f.low;
-  f.frequencies = normal(kWaves, inputs) / 4, f.phases = normal(kWaves, 1);
+  f.centres = normal(kCentres, inputs);
   f.weights = {1e-3 * normal(outputs, f.features())};
   f.noise = 1e-3 * Eigen::MatrixXd::Identity(outputs, outputs);
   f.bound = Eigen::VectorXd::Ones(outputs);

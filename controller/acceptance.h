@@ -67,7 +67,7 @@ class Acceptance {
   const std::map<int, std::vector<Trial>>& trials() const { return trials_; }
 
   static constexpr double kSure = 0.75;
-  static constexpr double kScatter = 0.03;
+  static constexpr double kScatter = 0.015;
 
  private:
   std::vector<double> Returns(int iteration) const;

@@ -256,7 +256,9 @@ std::optional<joint_command_t> Controller::Act(const robot_state_t& state, int64
   }
   task_->Observe(q, v, {observation_.data(), static_cast<size_t>(observation_.size())});
   Eigen::VectorXf action;
-  if (policy_header_.purpose == policy_t::EVALUATE || Trying()) {
+  if (decide_) {
+    action = decide_(observation_, record_);
+  } else if (policy_header_.purpose == policy_t::EVALUATE || Trying()) {
     action = policy_->Mean(observation_);
   } else {  // the policy's own noise excites what is to be learned
     Random random(seed_,

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "controller/acceptance.h"
 #include "controller/policy.h"
@@ -33,6 +35,13 @@ class Controller {
   /// PLACE_ROBOT has the robot put. Otherwise, for a robot that nobody can place: it is given zero
   /// effort for that long and the episode begins wherever it then is.
   Controller(const RobotDescription& robot, uint64_t seed, double rest = -1);
+
+  /// What is to be done, policy units, where this is observed, as a policy has it (not normalised),
+  /// and the episode has come so far.
+  using Decide =
+      std::function<Eigen::VectorXf(const Eigen::VectorXf& observation, const Trial& so_far)>;
+  /// From now on this decides, not the policy: a robot that is trained on itself.
+  void SetDecision(Decide decide) { decide_ = std::move(decide); }
 
   /// A new policy. @throws std::invalid_argument if it does not fit the robot or is damaged.
   void OnPolicy(const policy_t& message);
@@ -68,6 +77,7 @@ class Controller {
   std::unique_ptr<Task> task_;
   uint64_t seed_;
   double rest_;
+  Decide decide_;  // empty: the policy does
   std::unique_ptr<GaussianPolicy> policy_, next_policy_;
   policy_t policy_header_{}, next_header_{};  // without weights
   controller_status_t status_{};

@@ -47,6 +47,9 @@ class BusLoop {
 
   VirtualRobot& robot() { return bus_.robot(); }
   void SetPolicy(const policy_t& policy) { controller_.OnPolicy(policy); }
+  void SetDecision(const Controller::Decide& decide) { controller_.SetDecision(decide); }
+  /// With which the episode has ended.
+  const robot_state_t& last() const { return last_state_; }
   const controller_status_t& status() const { return controller_.status(); }
 
   /// @throws std::runtime_error if it does not come to that.
@@ -83,7 +86,9 @@ class BusLoop {
   void OnMeasurement(const joint_state_t& measured) {
     if (!observer_.OnJointState(measured)) return;
     for (const robot_state_t& state : observer_.smoothed()) joiner_.OnState(state);
+    const bool running = status().phase == controller_status_t::RUNNING;
     Send(controller_.OnState(observer_.state(), bus_.now(), bus_.utime()));
+    if (running) last_state_ = observer_.state();
   }
   void OnCycle() {
     Driver& driver = bus_.driver();
@@ -117,6 +122,7 @@ class BusLoop {
     none.episode = -1;
     return none;
   }();
+  robot_state_t last_state_{};
   uint64_t revision_ = std::numeric_limits<uint64_t>::max();
   int64_t next_status_ = 0;
 };
@@ -131,6 +137,23 @@ RobotEpisode BusRobot::Run(const GaussianPolicy& policy, bool explore, int steps
   policy_t message = policy.ToMessage();
   message.iteration = static_cast<int32_t>(number);
   message.purpose = explore ? policy_t::CALIBRATE : policy_t::EVALUATE;
+  return Episode(message, {}, steps);
+}
+
+RobotEpisode BusRobot::Play(const Controller::Decide& decide, uint32_t number) {
+  const auto task = MakeTask(model_);
+  GaussianPolicy nobody({task->observation_size(), {}, task->action_size()});
+  nobody.action_scale = model_.effort_limits().cast<float>();
+  policy_t message = nobody.ToMessage();
+  message.iteration = static_cast<int32_t>(number);
+  message.purpose = policy_t::EVALUATE;
+  return Episode(message, decide, model_.task.steps);
+}
+
+RobotEpisode BusRobot::Episode(const policy_t& policy, const Controller::Decide& decide,
+                               int steps) {
+  const auto number = static_cast<uint32_t>(policy.iteration);
+  policy_t message = policy;
   message.episodes = 1;
   RobotDescription model = model_;
   model.task.steps = std::min(steps, model.task.steps);
@@ -139,6 +162,7 @@ RobotEpisode BusRobot::Run(const GaussianPolicy& policy, bool explore, int steps
   const int64_t phase = Microseconds(random.Uniform(0, model.driver.cycle));
   BusLoop loop(truth_, model, hidden_, seed_, kFirstStart + number * kBetweenEpisodes, phase);
   loop.SetPolicy(message);
+  loop.SetDecision(decide);
 
   // Switched on, it lies about as it may, but not in the ground.
   Eigen::VectorXd q(model.num_positions()), v(model.num_velocities());
@@ -150,10 +174,13 @@ RobotEpisode BusRobot::Run(const GaussianPolicy& policy, bool explore, int steps
   const controller_status_t& status = loop.status();
   const bool whole = !status.returns.empty();
   stopped_ = whole ? "" : status.reason;
-  RobotEpisode episode{loop.Join(),
-                       whole ? status.returns.back() : status.episode_return,
-                       status.step * model.task.period,
-                       {}};
+  RobotEpisode episode;
+  if (!decide) episode.rollout = loop.Join();
+  episode.sum_of_rewards = whole ? status.returns.back() : status.episode_return;
+  episode.seconds = status.step * model.task.period;
+  const robot_state_t& last = loop.last();
+  episode.last_q = Eigen::VectorXd::Map(last.q.data(), static_cast<Eigen::Index>(last.q.size()));
+  episode.last_v = Eigen::VectorXd::Map(last.v.data(), static_cast<Eigen::Index>(last.v.size()));
   // One that was stopped has failed.
   episode.trial = whole ? Trial{status.steps.back(), status.returns.back(), status.late_rate.back(),
                                 status.fell.back() != 0}

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "controller/controller.h"
 #include "experiments/real_system.h"
 #include "robot/description.h"
 
@@ -25,16 +26,22 @@ class BusRobot : public RealSystem {
   /// causal state; the roll-out has the smoothed ones. The episode ends by the task's termination,
   /// after `steps` or the task's own time limit, or because the controller or the driver stops it:
   /// see stopped().
-  /// @param number < 2^31.
+  /// @param number < 2^22: each has its own time, and seconds have to stay exact.
   /// @throws std::invalid_argument if the policy is not of this robot, or the robot cannot be
   /// simulated.
   /// @throws std::runtime_error if the robot cannot be armed or placed.
   RobotEpisode Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
 
+  /// A whole episode in which `decide` does what a policy would, without a roll-out: for training on
+  /// the robot itself. What it throws ends the episode and is thrown again.
+  RobotEpisode Play(const Controller::Decide& decide, uint32_t number);
+
   /// Why the last episode did not come to its own end; empty if it did.
   const std::string& stopped() const { return stopped_; }
 
  private:
+  RobotEpisode Episode(const policy_t& policy, const Controller::Decide& decide, int steps);
+
   RobotDescription truth_, model_;
   Eigen::VectorXd hidden_;
   uint64_t seed_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "experiments/random_forces.h"
 #include "trainer/robot_simulation.h"
@@ -18,7 +19,7 @@ constexpr uint32_t kJudges = 1u << 20, kTrials = 1u << 21;
 // What the robot did with one policy in an iteration.
 struct Use {
   std::vector<Rollout> rollouts;
-  std::optional<Trial> trial;
+  std::vector<Trial> trials;
   double seconds = 0;
 
   int Add(RobotEpisode episode, int iteration) {
@@ -30,19 +31,21 @@ struct Use {
   }
 };
 
-// So many transitions, in whole episodes but for the last; first a trial without exploration.
+// So many transitions, in whole episodes but for the last; the first ones are trials, without
+// exploration. A rest that is too short for a trial explores.
 Use UseRobot(RealSystem& real, const GaussianPolicy& policy, int steps, int trial_steps,
              int iteration) {
   Use use;
   uint32_t number = 1000 * static_cast<uint32_t>(iteration);
-  if (trial_steps > 0) {
-    RobotEpisode episode = real.Run(policy, false, trial_steps, kTrials + number);
-    use.trial = episode.trial;
-    steps -= use.Add(std::move(episode), iteration);
-  }
+  const int shortest = std::max(1, trial_steps / 4);
   for (int empty = 0; steps > 0; ++number) {
-    const int made = use.Add(real.Run(policy, true, steps, number), iteration);
+    const bool tries = trial_steps >= shortest;
+    RobotEpisode episode = tries ? real.Run(policy, false, trial_steps, kTrials + number)
+                                 : real.Run(policy, true, steps, number);
+    if (tries) use.trials.push_back(episode.trial);
+    const int made = use.Add(std::move(episode), iteration);
     steps -= made;
+    if (tries) trial_steps -= made;
     if (made == 0 && ++empty > 10)
       throw std::runtime_error("the robot does not move: ten episodes without a transition");
   }
@@ -59,6 +62,17 @@ std::unique_ptr<Trainer> Loop::MakeTrainer(const LoopSettings& settings) const {
                                    settings.seed, settings.threads);
 }
 
+void Loop::Train(Trainer& trainer, const ParameterSampler& sample, int updates,
+                 const std::function<void(double)>& progress) {
+  trainer.ForgetBest();
+  for (int i = 0; i < updates; ++i) {
+    if (trainer.JudgementDue()) trainer.Judge(sample);
+    trainer.Update(sample);
+    progress(static_cast<double>(i) / updates);
+  }
+  if (updates > 0) trainer.ReturnToBest(sample);
+}
+
 std::unique_ptr<Trainer> Loop::TrainFirst(const std::string& name,
                                           const ParameterDistribution& distribution,
                                           const LoopSettings& settings,
@@ -69,10 +83,9 @@ std::unique_ptr<Trainer> Loop::TrainFirst(const std::string& name,
     trainer->Restore(known->second);
     return trainer;
   }
-  for (int i = 0; i < settings.first_updates; ++i) {
-    trainer->Update([&](Random& random) { return distribution.Draw(random); });
-    progress(static_cast<double>(i) / settings.first_updates);
-  }
+  Train(
+      *trainer, [&](Random& random) { return distribution.Draw(random); }, settings.first_updates,
+      progress);
   first_.emplace(key, trainer->state());
   return trainer;
 }
@@ -117,7 +130,7 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
                          static_cast<int>(settings.trial_share * steps), iteration);
       seconds += use.seconds;
       transitions += static_cast<int64_t>(CountTransitions(use.rollouts));
-      if (use.trial) acceptance.Add(iteration, *use.trial);
+      for (const Trial& trial : use.trials) acceptance.Add(iteration, trial);
       if (simopt) {
         simopt->Begin(std::move(use.rollouts));
         std::optional<CalibrationReport> report;
@@ -137,10 +150,8 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
           deployed = trainer->policy(), deployed_iteration = iteration;
       }
     }
-    for (int i = 0; i < settings.next_updates; ++i) {
-      trainer->Update(sample);
-      progress(first + next * (iteration + static_cast<double>(i) / settings.next_updates));
-    }
+    Train(*trainer, sample, settings.next_updates,
+          [&](double share) { progress(first + next * (iteration + share)); });
   }
   if (simopt) result.rollouts = simopt->state().rollouts;
   return result;

@@ -21,7 +21,8 @@ struct LoopSettings {
   int steps_per_iteration = 750;
   /// TRPO updates of the first policy and of each later one
   int first_updates = 0, next_updates = 0;
-  /// of an iteration's steps, the first so many try the policy, without exploration; 0 = none
+  /// of an iteration's steps, the first so many try the policy, without exploration, in as many
+  /// episodes as it takes; 0 = none
   double trial_share = 0;
   /// Random forces that are trained with, as shares of the effort limits; 0 = none.
   double forces = 0;
@@ -82,6 +83,10 @@ class Loop {
                                       const ParameterDistribution& distribution,
                                       const LoopSettings& settings,
                                       const std::function<void(double)>& progress);
+
+  /// So many updates; the policy is then the best that was judged, as in plumb-trainer.
+  static void Train(Trainer& trainer, const ParameterSampler& sample, int updates,
+                    const std::function<void(double)>& progress);
 
   const RobotDescription& model() const { return model_; }
 

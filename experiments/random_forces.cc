@@ -26,20 +26,24 @@ std::shared_ptr<const Residual> RandomForces(const RobotDescription& robot, doub
     push.col(driven[a]) =
         robot.task.period * share * limits[static_cast<Eigen::Index>(a)] * inverse.col(driven[a]);
   }
+  // as if its acceleration were constant
+  Eigen::MatrixXd effect = Eigen::MatrixXd::Zero(2 * n, 2 * n);
+  effect.topLeftCorner(n, n) = robot.task.period / 2 * push;
+  effect.bottomLeftCorner(n, n) = push;
   ResidualFunction f;
   f.mean = Eigen::VectorXd::Zero(d), f.scale = Eigen::VectorXd::Ones(d);
   f.low = f.high = Eigen::VectorXd::Zero(d);
-  f.frequencies = Eigen::MatrixXd::Zero(1, d), f.phases = Eigen::VectorXd::Zero(1);
-  f.noise = push;
-  f.bound = Eigen::VectorXd::Constant(n, 1e3);
+  f.centres = Eigen::MatrixXd::Zero(1, d);
+  f.noise = effect;
+  f.bound = Eigen::VectorXd::Constant(2 * n, 1e3);
   auto residual = std::make_shared<Residual>();
   Random random(seed, {kStream});
   const ParameterDistribution prior = ParameterDistribution::Prior(robot);
   for (int k = 0; k < kDraws; ++k) {
     Eigen::VectorXd normal(n);
     for (double& x : normal) x = random.Normal();
-    Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(n, f.features());
-    weights.col(0) = push * normal;
+    Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(2 * n, f.features());
+    weights.col(0) = effect.leftCols(n) * normal;
     f.weights.push_back(weights);
     residual->coordinates.push_back(prior.SampleCoordinates(random));
   }

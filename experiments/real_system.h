@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 
 #include "calibrator/motion/transitions.h"
@@ -12,8 +13,9 @@ namespace plumb {
 struct RobotEpisode {
   Rollout rollout;  ///< as the observer has it
   double sum_of_rewards = 0;
-  double seconds = 0;  ///< of the robot's time
-  Trial trial;         ///< what it tells of the policy, if that did not explore
+  double seconds = 0;              ///< of the robot's time
+  Eigen::VectorXd last_q, last_v;  ///< the causal state that it has ended with
+  Trial trial;                     ///< what it tells of the policy, if that did not explore
 };
 
 /// The system that policies are trained for. Nothing may be learnt of it but from its episodes.

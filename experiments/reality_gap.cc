@@ -11,11 +11,14 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 
 #include "common/atomic_file.h"
 #include "experiments/bus_robot.h"
+#include "experiments/bus_simulation.h"
 #include "experiments/loop.h"
 #include "experiments/options.h"
+#include "experiments/oracle.h"
 #include "experiments/results.h"
 #include "plot/curves.h"
 #include "sim/parameters.h"
@@ -23,8 +26,9 @@
 namespace plumb {
 namespace {
 
-constexpr double kRobotSeconds = 6;  // of an iteration
-constexpr double kTrialShare = 0.5;  // of these, without exploration
+constexpr double kRobotSeconds = 6;   // of an iteration
+constexpr double kTrialShare = 0.75;  // of these, without exploration
+constexpr int kJudged = 10;           // episodes
 constexpr double kForces = 0.05, kTempering = 14;
 
 // Files below robots/: what is there, what is believed, what is believed with contact uncertain,
@@ -58,9 +62,10 @@ struct Method {
   bool residual, accept;
   bool uncertain = false;
   double forces = 0, tempering = 1;
+  bool oracle = false;
 };
 // Those with the same model are neighbours: its first policy is trained once for all of them.
-const std::array<Method, 9> kMethods{
+const std::array<Method, 10> kMethods{
     {{"default", "Plumbline: residual and acceptance", CalibrationStrategy::kDefault, true, true},
      {"residual", "residual without acceptance", CalibrationStrategy::kDefault, true, false},
      {"prior", "the prior, fixed", CalibrationStrategy::kPrior, true, false},
@@ -71,8 +76,9 @@ const std::array<Method, 9> kMethods{
      {"acceptance", "acceptance without residual", CalibrationStrategy::kDefault, false, true},
      {"tempered", "tempered posterior", CalibrationStrategy::kDefault, false, false, false, 0,
       kTempering},
-     {"wide", "the prior, contact uncertain, too", CalibrationStrategy::kPrior, true, false,
-      true}}};
+     {"wide", "the prior, contact uncertain, too", CalibrationStrategy::kPrior, true, false, true},
+     {"oracle", "oracle: TRPO on the robot itself", CalibrationStrategy::kPrior, true, false, false,
+      0, 1, true}}};
 
 struct Options : ExperimentOptions {
   int first_run = 1;
@@ -111,6 +117,24 @@ struct Remembered {
   std::unique_ptr<Loop> loop;
 };
 
+// The same policy in each iteration: it has no share in the loop.
+Results::Rows RunOracle(const Options& options, const RobotDescription& truth,
+                        const RobotDescription& model, const Eigen::VectorXd& hidden, uint64_t seed,
+                        BusRobot& real, const std::function<void(double)>& progress) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const Oracle oracle = TrainOracle(model, SimulateBusRobot(truth, model, hidden, seed), seed,
+                                    options.threads, progress);
+  const auto judged =
+      Loop::Judge(real, oracle.policy, model.task.steps, options.quick ? 1 : kJudged);
+  Results::Rows rows;
+  for (int k = 0; k <= options.iterations; ++k) {
+    rows.push_back({static_cast<double>(k), judged.mean, judged.worst, judged.mean, 0, judged.mean,
+                    kNone, 0, static_cast<double>(oracle.steps),
+                    static_cast<double>(oracle.steps) * model.task.period});
+  }
+  return rows;
+}
+
 Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& method, int run,
                       Remembered& remembered, const std::function<void(double)>& progress) {
   const auto load = [&](const char* file) {
@@ -128,6 +152,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
     remembered = {of, std::make_unique<Loop>(model, hidden)};
   }
   BusRobot real(truth, model, hidden, seed);
+  if (method.oracle) return RunOracle(options, truth, model, hidden, seed, real, progress);
   LoopSettings settings;
   settings.strategy = method.strategy;
   settings.iterations = options.iterations;
@@ -135,7 +160,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
       static_cast<int>((options.quick ? 1 : kRobotSeconds) / model.task.period);
   settings.first_updates = options.quick ? 2 : model.training.updates;
   settings.next_updates = options.quick ? 1 : model.training.updates_again;
-  settings.evaluation_episodes = options.quick ? 1 : 10;
+  settings.evaluation_episodes = options.quick ? 1 : kJudged;
   settings.trial_share = method.accept ? kTrialShare : 0;
   settings.accept = method.accept;
   settings.forces = method.forces, settings.tempering = method.tempering;

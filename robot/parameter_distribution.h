@@ -66,7 +66,7 @@ struct ParameterDistribution {
   /// kPlainShare of the cases, one of the mixture as it is. A residual is right only near what was
   /// recorded: a policy that exploits it elsewhere must not be a good one.
   SimulatorDraw Draw(Random& random) const;
-  static constexpr double kPlainShare = 0.5;
+  static constexpr double kPlainShare = 0.2;
   /// Half of the episodes begin as they did on the robot, if that is known: however it is placed
   /// there, it has moved before the first command arrives.
   static constexpr double kRecordedStarts = 0.5;

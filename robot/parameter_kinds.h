@@ -168,6 +168,8 @@ inline constexpr WorldParameterKind kWorldParameterKinds[] = {
      [](World& world) -> double& { return world.contact.damping; }, {0, 1e12}, kNotNegative, 0.5},
     {"contact/friction", WorldParameterKind::Table::kContact, "friction", "",
      [](World& world) -> double& { return world.contact.friction; }, {0, 1e6}, kNotNegative, 0.5},
+    {"contact/slip_speed", WorldParameterKind::Table::kContact, "slip_speed", "m/s",
+     [](World& world) -> double& { return world.contact.slip_speed; }, {1e-9, 1e6}, kAboveZero, 0.5},
     {"limit/stiffness", WorldParameterKind::Table::kLimit, "stiffness", "Nm/rad",
      [](World& world) -> double& { return world.stop.stiffness; }, {1e-9, 1e12}, kAboveZero, 0.5},
     {"limit/damping", WorldParameterKind::Table::kLimit, "damping", "Nm s/rad",

@@ -103,7 +103,7 @@ void ReadGap(const Field& root, const RobotDescription& robot, ParameterDistribu
              state = static_cast<size_t>(robot.num_positions()) + velocities;
   const Field residual = root["residual"], starts = root["starts"];
   if (!residual.null()) {
-    to->residual = ReadResidual(residual, robot.parameters.size(), velocities);
+    to->residual = ReadResidual(residual, robot.parameters.size(), state);
     for (const Eigen::VectorXd& draw : to->residual->coordinates)
       residual["draws"].Require(to->ToPhysical(draw).allFinite(), "is too wide: it overflows");
   }

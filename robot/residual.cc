@@ -5,19 +5,28 @@
 #include <stdexcept>
 #include <string>
 
+#include "common/exponential.h"
+
 namespace plumb {
 
-void ResidualFunction::Features(const Eigen::Ref<const Eigen::VectorXd>& x,
+ResidualFunction::Work ResidualFunction::MakeWork() const {
+  return {centres.cast<float>(), centres.rowwise().squaredNorm() / 2, Eigen::VectorXf(inputs()),
+          Eigen::VectorXf(centres.rows())};
+}
+
+void ResidualFunction::Features(const Eigen::Ref<const Eigen::VectorXd>& x, Work* work,
                                 Eigen::Ref<Eigen::VectorXd> features) const {
-  const Eigen::Index d = inputs(), m = phases.size();
+  const Eigen::Index d = inputs();
   auto z = features.segment(1, d);
+  auto bumps = features.tail(centres.rows());
   features(0) = 1;
   z = ((x - mean).array() / scale.array()).max(low.array()).min(high.array());
-  auto waves = features.tail(m);
-  waves.noalias() = frequencies * z;
-  waves += phases;
-  const double amplitude = std::sqrt(2 / static_cast<double>(m));
-  for (double& wave : waves) wave = amplitude * std::cos(wave);
+  work->z = z.cast<float>();
+  work->products.noalias() = work->centres * work->z;
+  // rounding may leave a distance that is negative
+  bumps = (work->products.cast<double>().array() - work->half_squares.array() - z.squaredNorm() / 2)
+              .min(0.0);
+  ExpOfNegatives({bumps.data(), static_cast<size_t>(bumps.size())});
   z /= std::sqrt(static_cast<double>(d));
 }
 
@@ -34,7 +43,7 @@ void RequireFinite(const Residual& residual) {
     require(f.mean.allFinite(), "mean is not finite");
     require(f.scale.allFinite() && f.scale.minCoeff() > 0, "scale is not positive");
     require(f.low.allFinite() && f.high.allFinite(), "low or high is not finite");
-    require(f.frequencies.allFinite() && f.phases.allFinite(), "a wave is not finite");
+    require(f.centres.allFinite(), "a centre is not finite");
     for (const Eigen::MatrixXd& weights : f.weights)
       require(weights.allFinite(), "weights are not finite");
     require(f.noise.allFinite(), "noise is not finite");
@@ -43,8 +52,11 @@ void RequireFinite(const Residual& residual) {
 }
 
 ResidualSample::ResidualSample(const Residual& residual) : residual_(&residual) {
-  if (residual.free) free_features_.resize(residual.free->features());
-  if (residual.touching) touching_features_.resize(residual.touching->features());
+  const auto prepare = [](const std::optional<ResidualFunction>& function, Part* part) {
+    if (!function) return;
+    *part = {function->MakeWork(), Eigen::VectorXd(function->features())};
+  };
+  prepare(residual.free, &free_), prepare(residual.touching, &touching_);
   normal_.resize(residual.free       ? residual.free->outputs()
                  : residual.touching ? residual.touching->outputs()
                                      : 0);
@@ -63,9 +75,9 @@ const Eigen::VectorXd& ResidualSample::Step(bool touching,
     change_.setZero();
     return change_;
   }
-  Eigen::VectorXd& features = touching ? touching_features_ : free_features_;
-  function->Features(x, features);
-  change_.noalias() = function->weights[draw_] * features;
+  Part& part = touching ? touching_ : free_;
+  function->Features(x, &part.work, part.features);
+  change_.noalias() = function->weights[draw_] * part.features;
   change_ = change_.cwiseMax(-function->bound).cwiseMin(function->bound);
   for (double& normal : normal_) normal = random_.Normal();
   change_.noalias() += function->noise * normal_;

@@ -10,30 +10,37 @@
 
 namespace plumb {
 
-/// The change of n velocities in a control step beyond the simulator's, as a function of D inputs
-/// (ResidualInputs), learnt from recorded transitions: the discrepancy function of Kennedy and
-/// O'Hagan (J. R. Statist. Soc. B 63, 2001), as a Bayesian linear model of M random Fourier
-/// features (Rahimi and Recht, NIPS 2007), which is a Gaussian process with a squared exponential
-/// kernel, and of the inputs themselves:
-///   phi(x) = (1, z / sqrt(D), sqrt(2 / M) cos(F z + b)),   z = (x - mean) / scale,
-///   dv = W phi(x) + L e,   e ~ N(0, 1).
-/// z is kept within what was recorded, and W phi within `bound`: where nothing is known nothing
-/// grows. Immutable use is thread-safe.
+/// The change of n positions and velocities in a control step beyond the simulator's, as a function
+/// of D inputs (ResidualInputs), learnt from recorded transitions: the discrepancy function of
+/// Kennedy and O'Hagan (J. R. Statist. Soc. B 63, 2001), a Gaussian process with a squared
+/// exponential kernel and a linear one, by M of its inputs ("subset of regressors": Quinonero-Candela
+/// and Rasmussen, JMLR 6, 2005):
+///   phi(x) = (1, z / sqrt(D), exp(-|z - c_m|^2 / 2)),   z = (x - mean) / scale,
+///   change = W phi(x) + L e,   e ~ N(0, 1).
+/// Far from what was recorded only the plane is left, of a z that is kept within it; and W phi stays
+/// within `bound`: where nothing is known nothing grows. Immutable use is thread-safe.
 struct ResidualFunction {
-  Eigen::VectorXd mean, scale;  ///< D, of the inputs; scale > 0
+  Eigen::VectorXd mean, scale;  ///< D, of the inputs; scale > 0: the kernel's length
   Eigen::VectorXd low, high;    ///< D, least and greatest z recorded
-  Eigen::MatrixXd frequencies;  ///< M x D
-  Eigen::VectorXd phases;       ///< M [rad]
-  /// W of each draw, n x (1 + D + M) [rad/s or m/s]
+  Eigen::MatrixXd centres;      ///< M x D, in units of z
+  /// W of each draw, n x (1 + D + M) [rad or m, rad/s or m/s]
   std::vector<Eigen::MatrixXd> weights;
-  Eigen::MatrixXd noise;  ///< n x n, L: what is left, and is not the readings' [rad/s or m/s]
-  Eigen::VectorXd bound;  ///< n, > 0 [rad/s or m/s]
+  Eigen::MatrixXd noise;  ///< n x n, L: what is left, and is not the readings'
+  Eigen::VectorXd bound;  ///< n, > 0
 
   Eigen::Index inputs() const { return mean.size(); }
   Eigen::Index outputs() const { return noise.rows(); }
-  Eigen::Index features() const { return 1 + mean.size() + phases.size(); }
+  Eigen::Index features() const { return 1 + mean.size() + centres.rows(); }
+  /// What Features needs to be fast: products with the centres are in single precision, as these
+  /// are known. Not thread-safe.
+  struct Work {
+    Eigen::MatrixXf centres;
+    Eigen::VectorXd half_squares;  ///< of the centres' lengths
+    Eigen::VectorXf z, products;
+  };
+  Work MakeWork() const;
   /// Writes phi(x). Does not allocate.
-  void Features(const Eigen::Ref<const Eigen::VectorXd>& x,
+  void Features(const Eigen::Ref<const Eigen::VectorXd>& x, Work* work,
                 Eigen::Ref<Eigen::VectorXd> features) const;
 };
 
@@ -63,7 +70,7 @@ class ResidualSample {
 
   /// Begins an episode. @param draw < residual.coordinates.size(). @param random for its noise.
   void Begin(size_t draw, Random& random);
-  /// Change of the velocities in a control step, n entries [rad/s or m/s]; zero where there is no
+  /// Change of positions and velocities in a control step, n entries; zero where there is no
   /// function. @param x see ResidualInputs. Valid until the next call.
   const Eigen::VectorXd& Step(bool touching, const Eigen::Ref<const Eigen::VectorXd>& x);
 
@@ -71,7 +78,13 @@ class ResidualSample {
   const Residual* residual_;
   size_t draw_ = 0;
   Random random_{0};
-  Eigen::VectorXd free_features_, touching_features_, normal_, change_;
+  // of a function
+  struct Part {
+    ResidualFunction::Work work;
+    Eigen::VectorXd features;
+  };
+  Part free_, touching_;
+  Eigen::VectorXd normal_, change_;
 };
 
 }  // namespace plumb

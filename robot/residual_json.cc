@@ -28,15 +28,10 @@ json ToJson(const std::optional<ResidualFunction>& function) {
   if (!function) return nullptr;
   json weights = json::array();
   for (const Eigen::MatrixXd& draw : function->weights) weights.push_back(Singles(draw));
-  return {{"mean", Singles(function->mean)},
-          {"scale", Singles(function->scale)},
-          {"low", Singles(function->low)},
-          {"high", Singles(function->high)},
-          {"frequencies", Singles(function->frequencies)},
-          {"phases", Singles(function->phases)},
-          {"weights", weights},
-          {"noise", Singles(function->noise)},
-          {"bound", Singles(function->bound)}};
+  return {{"mean", Singles(function->mean)},       {"scale", Singles(function->scale)},
+          {"low", Singles(function->low)},         {"high", Singles(function->high)},
+          {"centres", Singles(function->centres)}, {"weights", weights},
+          {"noise", Singles(function->noise)},     {"bound", Singles(function->bound)}};
 }
 
 size_t Count(const JsonField& list) {
@@ -51,21 +46,19 @@ Eigen::VectorXd Positive(const JsonField& list, size_t size) {
   return list.SingleVector(size);
 }
 
-std::optional<ResidualFunction> ReadFunction(const JsonField& field, size_t draws,
-                                             size_t velocities) {
+std::optional<ResidualFunction> ReadFunction(const JsonField& field, size_t draws, size_t outputs) {
   if (field.null()) return {};
-  const size_t inputs = Count(field["mean"]), waves = Count(field["phases"]);
+  const size_t inputs = Count(field["mean"]), centres = Count(field["centres"]);
   ResidualFunction function;
   function.mean = field["mean"].SingleVector(inputs);
   function.scale = Positive(field["scale"], inputs);
   function.low = field["low"].SingleVector(inputs);
   function.high = field["high"].SingleVector(inputs);
-  function.frequencies = field["frequencies"].SingleMatrix(waves, inputs);
-  function.phases = field["phases"].SingleVector(waves);
+  function.centres = field["centres"].SingleMatrix(centres, inputs);
   for (const JsonField& weights : field["weights"].Entries(draws))
-    function.weights.push_back(weights.SingleMatrix(velocities, 1 + inputs + waves));
-  function.noise = field["noise"].SingleMatrix(velocities, velocities);
-  function.bound = Positive(field["bound"], velocities);
+    function.weights.push_back(weights.SingleMatrix(outputs, 1 + inputs + centres));
+  function.noise = field["noise"].SingleMatrix(outputs, outputs);
+  function.bound = Positive(field["bound"], outputs);
   return function;
 }
 
@@ -91,15 +84,15 @@ json ResidualJson(const Residual& residual) {
 }
 
 std::shared_ptr<const Residual> ReadResidual(const JsonField& field, size_t parameters,
-                                             size_t velocities) {
+                                             size_t outputs) {
   auto residual = std::make_shared<Residual>();
   const size_t draws = Count(field["draws"]);
   for (const JsonField& draw : field["draws"].Entries(draws))
     residual->coordinates.push_back(draw.Vector(parameters));
   residual->margin = field["margin"].Single();
   field["margin"].Require(residual->margin >= 0, "is negative");
-  residual->free = ReadFunction(field["free"], draws, velocities);
-  residual->touching = ReadFunction(field["touching"], draws, velocities);
+  residual->free = ReadFunction(field["free"], draws, outputs);
+  residual->touching = ReadFunction(field["touching"], draws, outputs);
   field.Require(residual->free || residual->touching, "has neither free nor touching");
   return residual;
 }

@@ -18,10 +18,10 @@ double ShortestSingle(double number);
 /// single precision, which a residual of FitResidual has anyway, but for the draws' coordinates.
 nlohmann::ordered_json ResidualJson(const Residual& residual);
 
-/// Such an object. @param parameters, velocities of the robot.
+/// Such an object. @param parameters of the robot. @param outputs positions and velocities.
 /// @throws std::runtime_error naming the field that is missing, of another type or size, not
 /// finite, or not positive where it has to be.
 std::shared_ptr<const Residual> ReadResidual(const JsonField& field, size_t parameters,
-                                             size_t velocities);
+                                             size_t outputs);
 
 }  // namespace plumb

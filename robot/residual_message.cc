@@ -36,13 +36,13 @@ Message ToMessage(const ResidualFunction& function, int8_t condition) {
   m.condition = condition;
   m.num_inputs = static_cast<int32_t>(function.inputs());
   m.num_outputs = static_cast<int32_t>(function.outputs());
-  m.num_waves = static_cast<int32_t>(function.phases.size());
+  m.num_centres = static_cast<int32_t>(function.centres.rows());
   m.mean = Floats(function.mean), m.scale = Floats(function.scale);
   m.low = Floats(function.low), m.high = Floats(function.high);
-  m.frequency = Floats(function.frequencies), m.phase = Floats(function.phases);
+  m.centre = Floats(function.centres);
   for (const Eigen::MatrixXd& weights : function.weights) Append(weights, &m.weight);
   m.noise = Floats(function.noise), m.bound = Floats(function.bound);
-  m.num_frequencies = static_cast<int32_t>(m.frequency.size());
+  m.num_coordinates = static_cast<int32_t>(m.centre.size());
   m.num_weights = static_cast<int32_t>(m.weight.size());
   m.num_noise = static_cast<int32_t>(m.noise.size());
   return m;
@@ -54,29 +54,22 @@ ResidualFunction FromMessage(const Message& m, size_t draws) {
   };
   require(m.num_inputs > 0 && m.num_inputs <= kMost, "num_inputs");
   require(m.num_outputs > 0 && m.num_outputs <= kMost, "num_outputs");
-  require(m.num_waves > 0 && m.num_waves <= kMost, "num_waves");
+  require(m.num_centres > 0 && m.num_centres <= kMost, "num_centres");
   const auto d = static_cast<size_t>(m.num_inputs), n = static_cast<size_t>(m.num_outputs),
-             w = static_cast<size_t>(m.num_waves), each = n * (1 + d + w);
+             w = static_cast<size_t>(m.num_centres), each = n * (1 + d + w);
   for (const auto& [field, values] :
        {std::pair{"mean", &m.mean}, {"scale", &m.scale}, {"low", &m.low}, {"high", &m.high}}) {
     require(values->size() == d, field);
   }
-  require(m.frequency.size() == w * d, "frequency");
-  require(m.phase.size() == w, "phase");
+  require(m.centre.size() == w * d, "centre");
   require(m.weight.size() == draws * each, "weight");
   require(m.noise.size() == n * n, "noise");
   require(m.bound.size() == n, "bound");
   const auto di = static_cast<Eigen::Index>(d), ni = static_cast<Eigen::Index>(n),
              wi = static_cast<Eigen::Index>(w);
-  ResidualFunction function{Matrix(m.mean, di, 1),
-                            Matrix(m.scale, di, 1),
-                            Matrix(m.low, di, 1),
-                            Matrix(m.high, di, 1),
-                            Matrix(m.frequency, wi, di),
-                            Matrix(m.phase, wi, 1),
-                            {},
-                            Matrix(m.noise, ni, ni),
-                            Matrix(m.bound, ni, 1)};
+  ResidualFunction function{Matrix(m.mean, di, 1),   Matrix(m.scale, di, 1),   Matrix(m.low, di, 1),
+                            Matrix(m.high, di, 1),   Matrix(m.centre, wi, di), {},
+                            Matrix(m.noise, ni, ni), Matrix(m.bound, ni, 1)};
   for (size_t k = 0; k < draws; ++k)
     function.weights.push_back(Matrix(m.weight, ni, 1 + di + wi, k * each));
   return function;

@@ -16,14 +16,25 @@ Environment::Environment(std::shared_ptr<const Model> model)
       steps_per_episode_(model->description().task.steps),
       period_(model->description().task.period),
       latency_(std::clamp(model->description().simulation.latency, 0.0, period_)),
+      cycle_(period_),
       start_q_(Eigen::VectorXd::Zero(model->num_positions())),
       start_v_(Eigen::VectorXd::Zero(model->num_velocities())),
       effort_(start_v_),
       next_effort_(start_v_),
+      sent_(start_v_),
       mean_effort_(start_v_),
       mean_effort_before_(start_v_),
       reading_q_(simulator_.q()),
       reading_v_(simulator_.v()) {}
+
+void Environment::SendThroughDriver() {
+  const RobotDescription& robot = model_->description();
+  if (robot.num_positions() != robot.num_velocities()) return;
+  cycle_ = robot.driver.cycle;
+  limits_.resize(robot.joints.size());
+  for (const int joint : robot.driven())
+    limits_[static_cast<size_t>(joint)] = LimitsOf(robot.joints[static_cast<size_t>(joint)]);
+}
 
 void Environment::SetResidual(std::shared_ptr<const Residual> residual, size_t draw) {
   if (residual != (lack_ ? lack_->residual : nullptr)) {
@@ -50,6 +61,7 @@ void Environment::SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
                            const Eigen::Ref<const Eigen::VectorXd>& v) {
   simulator_.SetState(q, v);
   effort_.setZero();
+  sent_.setZero();
   mean_effort_before_.setZero();
   Read();
 }
@@ -59,11 +71,11 @@ StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
   start_q_ = q();
   start_v_ = v();
   if (lack_) {
-    mean_effort_ = (latency_ * effort_ + (period_ - latency_) * next_effort_) / period_;
-    lack_->inputs.Begin(simulator_, mean_effort_, mean_effort_before_, period_);
+    lack_->inputs.Begin(simulator_);
+    mean_effort_.setZero();
   }
-  simulator_.Step(effort_, latency_);
-  simulator_.Step(next_effort_, period_ - latency_);
+  Act(effort_, latency_);
+  Act(next_effort_, period_ - latency_);
   effort_.swap(next_effort_);
   if (lack_) Correct();
   Read();
@@ -71,12 +83,28 @@ StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
           !simulator_.finite() || task_->Terminated(q(), v())};
 }
 
+// What is wished for, as the driver lets it through.
+void Environment::Act(const Eigen::VectorXd& wish, double duration) {
+  constexpr double kNothing = 1e-9;  // [s] that rounding leaves
+  while (duration > kNothing) {
+    const double cycle = duration - cycle_ > kNothing ? cycle_ : duration;
+    for (Eigen::Index i = 0; i < wish.size(); ++i) {
+      const bool limited = !limits_.empty() && limits_[static_cast<size_t>(i)];
+      const JointSituation joint{q()[i], v()[i], sent_[i], cycle_};
+      sent_[i] = limited ? LimitEffort(wish[i], joint, *limits_[static_cast<size_t>(i)]).value_or(0)
+                         : wish[i];
+    }
+    simulator_.Step(sent_, cycle);
+    if (lack_) mean_effort_ += cycle / period_ * sent_;
+    duration -= cycle;
+  }
+}
+
 void Environment::Correct() {
-  lack_->inputs.End(simulator_);
-  const Eigen::VectorXd& dv = lack_->sample.Step(lack_->inputs.touching(), lack_->inputs.x());
-  // as if the acceleration that was left out had been constant
-  next_effort_ = period_ / 2 * dv;
-  simulator_.Correct(next_effort_, dv);
+  lack_->inputs.End(simulator_, mean_effort_, mean_effort_before_);
+  const Eigen::VectorXd& change = lack_->sample.Step(lack_->inputs.touching(), lack_->inputs.x());
+  const Eigen::Index n = change.size() / 2;
+  simulator_.Correct(change.head(n), change.tail(n));
   mean_effort_before_.swap(mean_effort_);
 }
 

@@ -2,9 +2,12 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "common/random.h"
 #include "robot/description.h"
+#include "robot/limit_effort.h"
 #include "robot/residual.h"
 #include "sim/residual_inputs.h"
 #include "sim/simulator.h"
@@ -45,6 +48,10 @@ class Environment {
   /// @param draw of the residual, to which the parameters belong.
   /// @throws std::invalid_argument if it is another robot's, or there is no such draw.
   void SetResidual(std::shared_ptr<const Residual> residual, size_t draw = 0);
+  /// From now on efforts come through the robot's driver, which limits them in each of its cycles by
+  /// what the joint is doing then (LimitEffort): against a stop there are none, say. Else actions
+  /// act as they are, as gym's do. Not for robots with spherical joints, which have no limits.
+  void SendThroughDriver();
   /// Draws a state of the task's initial distribution. No effort has been applied yet.
   void Reset(Random& random);
   /// @throws std::invalid_argument if the state is not finite.
@@ -78,6 +85,7 @@ class Environment {
     size_t draw = 0;
   };
 
+  void Act(const Eigen::VectorXd& wish, double duration);
   void Read();
   void Correct();
 
@@ -88,11 +96,15 @@ class Environment {
   int steps_per_episode_;
   double period_;
   double latency_;
+  // the driver's: how often it limits efforts [s], and by what, each velocity's; empty: no driver
+  double cycle_;
+  std::vector<std::optional<JointLimits>> limits_;
   // work space of Reset and Step: where an episode or a step begins
   Eigen::VectorXd start_q_, start_v_;
-  // of the latest action: what acts at the beginning of the next step
+  // of the latest action: what it wishes for at the beginning of the next step
   Eigen::VectorXd effort_;
   Eigen::VectorXd next_effort_;
+  Eigen::VectorXd sent_;  // of it, by the driver
   Eigen::VectorXd mean_effort_, mean_effort_before_;
   Eigen::VectorXd reading_q_, reading_v_;
 };

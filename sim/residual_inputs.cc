@@ -9,13 +9,14 @@ namespace plumb {
 
 int ResidualInputCount(const RobotDescription& robot) {
   const std::unique_ptr<Task> task = MakeTask(robot);
-  return task->observation_size() + 2 * task->action_size() + robot.num_velocities();
+  return task->observation_size() + 2 * task->action_size() + robot.num_velocities() +
+         TouchFinder(robot).num_nearness();
 }
 
 void RequireResidualOf(const RobotDescription& robot, const Residual& residual) {
   for (const auto* part : {&residual.free, &residual.touching}) {
     if (*part && ((*part)->inputs() != ResidualInputCount(robot) ||
-                  (*part)->outputs() != robot.num_velocities()))
+                  (*part)->outputs() != 2 * robot.num_velocities()))
       throw std::invalid_argument(
           "the residual is another robot's: it has other inputs or outputs");
   }
@@ -30,7 +31,7 @@ ResidualInputs::ResidualInputs(const Model& model, double margin)
       limits_(task_->action_size()),
       touch_(model.description(), margin),
       observation_(task_->observation_size()),
-      free_(model.num_velocities()),
+      v_(model.num_velocities()),
       x_(ResidualInputCount(model.description())) {
   if (model.num_positions() != model.num_velocities())
     throw std::invalid_argument("a residual is not for robots with spherical joints");
@@ -38,11 +39,18 @@ ResidualInputs::ResidualInputs(const Model& model, double margin)
   for (Eigen::Index a = 0; a < limits_.size(); ++a) limits_[a] = all[a];
 }
 
-void ResidualInputs::Begin(Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,
-                           const Eigen::Ref<const Eigen::VectorXd>& before, double duration) {
+void ResidualInputs::Begin(const Simulator& simulator) {
   task_->Observe(simulator.q(), simulator.v(),
                  std::span(observation_.data(), static_cast<size_t>(observation_.size())));
   x_.head(observation_.size()) = observation_.cast<double>();
+  v_ = simulator.v();
+  touching_ = touch_.Find(simulator.q()).any();
+  touch_.Nearness(simulator.q(), simulator.v(), x_.tail(touch_.num_nearness()));
+}
+
+void ResidualInputs::End(const Simulator& simulator,
+                         const Eigen::Ref<const Eigen::VectorXd>& effort,
+                         const Eigen::Ref<const Eigen::VectorXd>& before) {
   const Eigen::Index actions = limits_.size();
   auto now = x_.segment(observation_.size(), actions);
   auto then = x_.segment(observation_.size() + actions, actions);
@@ -51,13 +59,7 @@ void ResidualInputs::Begin(Simulator& simulator, const Eigen::Ref<const Eigen::V
     now[a] = effort[joint] / limits_[a];
     then[a] = before[joint] / limits_[a];
   }
-  simulator.Acceleration(effort, &free_);
-  free_ = simulator.v() + duration * free_;
-  touching_ = touch_.Find(simulator.q()).any();
-}
-
-void ResidualInputs::End(const Simulator& simulator) {
-  x_.tail(free_.size()) = simulator.v() - free_;
+  x_.segment(observation_.size() + 2 * actions, v_.size()) = simulator.v() - v_;
   touching_ = touching_ || touch_.Find(simulator.q()).any();
 }
 

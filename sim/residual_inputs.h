@@ -19,8 +19,8 @@ void RequireResidualOf(const RobotDescription& robot, const Residual& residual);
 ///   the task's observation of the state it begins with,
 ///   the mean effort of each driven joint, in units of its limit,
 ///   the same of the step before: a drive may be late,
-///   the change of each velocity that stops, contacts and Coulomb friction made in the simulator,
-///   v' - v - T a_free.
+///   the change of each velocity that the simulator has made, v' - v,
+///   what is near (TouchFinder::Nearness).
 /// Not thread-safe; does not allocate after construction.
 class ResidualInputs {
  public:
@@ -30,12 +30,12 @@ class ResidualInputs {
 
   int size() const { return static_cast<int>(x_.size()); }
 
-  /// Before the simulator makes the step. @param effort, before mean of the step and of the one
-  /// before it, num_velocities entries [Nm or N]. @param duration [s].
-  void Begin(Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,
-             const Eigen::Ref<const Eigen::VectorXd>& before, double duration);
-  /// After it.
-  void End(const Simulator& simulator);
+  /// Before the simulator makes the step.
+  void Begin(const Simulator& simulator);
+  /// After it. @param effort, before mean of the step and of the one before it, num_velocities
+  /// entries [Nm or N].
+  void End(const Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,
+           const Eigen::Ref<const Eigen::VectorXd>& before);
 
   // Of the step that has ended:
   const Eigen::VectorXd& x() const { return x_; }
@@ -47,7 +47,7 @@ class ResidualInputs {
   Eigen::VectorXd limits_;  // of the driven joints
   TouchFinder touch_;
   Eigen::VectorXf observation_;
-  Eigen::VectorXd free_, x_;  // v + T a_free
+  Eigen::VectorXd v_, x_;  // v: that the step begins with
   bool touching_ = false;
 };
 

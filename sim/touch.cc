@@ -28,4 +28,30 @@ Touch TouchFinder::Find(const Eigen::Ref<const Eigen::VectorXd>& q) {
   return {ground, stop};
 }
 
+int TouchFinder::num_nearness() const {
+  return static_cast<int>(4 * points_.size() + stops_.size());
+}
+
+void TouchFinder::Nearness(const Eigen::Ref<const Eigen::VectorXd>& q,
+                           const Eigen::Ref<const Eigen::VectorXd>& v,
+                           Eigen::Ref<Eigen::VectorXd> nearness) {
+  const auto distance = [&](double metres) {
+    return std::clamp(metres / margin_, -kReach, kReach);
+  };
+  kinematics_.Update(q, v);
+  Eigen::Index i = 0;
+  for (const ContactPoint& point : points_) {
+    const double height =
+        distance(kinematics_.Position(point.link, point.centre).z() - point.radius);
+    nearness[i] = height;
+    nearness.segment<3>(i + 1) =
+        std::clamp(kReach - height, 0.0, 1.0) * kinematics_.Velocity(point.link, point.centre);
+    i += 4;
+  }
+  for (const Stop& joint : stops_) {
+    nearness[i++] =
+        distance(q[joint.position] - joint.lower) - distance(joint.upper - q[joint.position]);
+  }
+}
+
 }  // namespace plumb

@@ -15,7 +15,9 @@ class RobotSimulation : public Simulation {
         position_noise_(model->description().training.position_noise),
         velocity_noise_(model->description().training.velocity_noise),
         q_(environment_.q()),
-        v_(environment_.v()) {}
+        v_(environment_.v()) {
+    if (model->description().simulation.latency > 0) environment_.SendThroughDriver();
+  }
 
   int observation_size() const override { return environment_.observation_size(); }
   int action_size() const override { return environment_.action_size(); }

@@ -14,7 +14,7 @@ namespace plumb {
 
 struct ResidualFitOptions {
   bool free = true, touching = true;  ///< where the simulator is to be corrected
-  int features = 150;                 ///< random Fourier features
+  int centres = 300;                  ///< of its functions, at most
   /// of the weights: 0 = their posterior's mean for each draw of the parameters, 1 = as uncertain
   /// as they are
   double width = 0;
@@ -36,10 +36,9 @@ struct ResidualFit {
   ResidualQuality free, touching;
 };
 
-/// Learns what a simulator lacks from one-step errors of the velocities, given its parameters:
-/// Bayesian linear regression on random features, weights ~ N(0, s^2), in closed form. Per velocity
-/// the ratio of noise to s^2, and for all of them the features' length scale, are those of greatest
-/// evidence (MacKay, Neural Computation 4, 1992). Noise is the covariance of leave-one-out errors
+/// Learns what a simulator lacks from one-step errors of positions and velocities, given its
+/// parameters: a Gaussian process in closed form (ResidualRegression), the kernel's length for all
+/// outputs that of the greatest evidence. Noise is the covariance of leave-one-out errors
 /// less that of the readings. A condition of fewer than kFewestForResidual transitions has no
 /// residual. Thread-safe; the same bits each time.
 /// @param coordinates of the simulators to be corrected, a column each, at least one; the first one

@@ -18,8 +18,8 @@ namespace {
 
 using nlohmann::json;
 
-// 2: without the method used, its warnings and a search's samples; 3: without a residual
-constexpr int kVersion = 4;
+// 2: without the method used, its warnings and a search's samples; 3: without a residual, 4: with another
+constexpr int kVersion = 5;
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 

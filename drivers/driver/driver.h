@@ -13,7 +13,6 @@
 #include "drivers/driver/effort_history.h"
 #include "drivers/driver/joint_map.h"
 #include "drivers/driver/joint_sensor.h"
-#include "drivers/driver/limits.h"
 #include "drivers/driver/measurements.h"
 #include "drivers/driver/plausibility.h"
 #include "drivers/protocols/motor.h"
@@ -22,6 +21,7 @@
 #include "plumb/joint_command_t.hpp"
 #include "plumb/joint_state_t.hpp"
 #include "robot/description.h"
+#include "robot/limit_effort.h"
 
 namespace plumb {
 

@@ -22,7 +22,6 @@ World ReadWorld(Config& simulation, const SimulationSettings& settings) {
     kind.of(world) = optional ? table.Number(kind.key, kind.in_file, kind.of(world))
                               : table.Number(kind.key, kind.in_file);
   }
-  if (settings.contact) world.contact.slip_speed = contact.Number("slip_speed", {1e-9, 1e6});
   contact.Finish();
   limit.Finish();
   return world;

@@ -13,10 +13,10 @@
 
 namespace plumb {
 
-/// A residual for steps that touch, of two draws, two inputs and three waves; numbers that single
+/// A residual for steps that touch, of two draws, two inputs and three centres; numbers that single
 /// precision has.
 inline Residual SampleResidual(const RobotDescription& robot) {
-  const Eigen::Index n = robot.num_velocities();
+  const Eigen::Index n = 2 * robot.num_velocities();
   Random random(6, {1});
   const auto singles = [&](Eigen::Index rows, Eigen::Index columns) {
     Eigen::MatrixXd matrix(rows, columns);
@@ -26,7 +26,7 @@ inline Residual SampleResidual(const RobotDescription& robot) {
   ResidualFunction f;
   f.mean = singles(2, 1), f.scale = Eigen::Vector2d(0.5, 2);
   f.low = Eigen::Vector2d(-2, -1), f.high = Eigen::Vector2d(1, 3);
-  f.frequencies = singles(3, 2), f.phases = singles(3, 1);
+  f.centres = singles(3, 2);
   f.weights = {singles(n, 6), singles(n, 6)};
   f.noise = singles(n, n);
   f.bound = Eigen::VectorXd::Constant(n, 4);

@@ -110,7 +110,7 @@ TEST_CASE("ranks that share the work come to the same bits") {
 void AddInput(json* posterior) {
   json& free = (*posterior)["residual"]["free"];
   for (const char* list : {"mean", "scale", "low", "high"}) free[list].push_back(1);
-  for (json& row : free["frequencies"]) row.push_back(1);
+  for (json& row : free["centres"]) row.push_back(1);
   for (json& draw : free["weights"]) {
     for (json& row : draw) row.push_back(1);
   }
@@ -158,7 +158,7 @@ TEST_CASE("what a model lacks is learnt, told everywhere, and simulated and trai
       Shell(Plumb() + "train " + robot + " --steps 1000 --held-out 2 --output " +
             (folder / "p.onnx") + " --distribution " + posterior);
   CHECK(trained.status == 0);
-  says(trained, "50 % of the episodes are simulated with the residual of " + posterior);
+  says(trained, "80 % of the episodes are simulated with the residual of " + posterior);
 
   json other = json::parse(Read(posterior));
   AddInput(&other);

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "tests/sim/allocations.h"
 #include "tests/sim/robots.h"
@@ -106,6 +107,43 @@ TEST_CASE("environment steps do not allocate") {
   environment.Step(action);
   environment.Observe(observation);
   CHECK(Allocations() == before);
+}
+
+TEST_CASE("through a driver efforts against a stop do nothing, and those away from it act") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/robot.toml"));
+  Environment environment(robot), driven(robot);
+  driven.SendThroughDriver();
+  VectorXd q = VectorXd::Zero(6);
+  q[1] = 3, q[3] = -1, q[4] = 0.001;  // in the air; the knee is stretched as far as it goes
+  const auto after = [&](Environment& one, float knee) {
+    one.SetState(q, VectorXd::Zero(6));
+    one.Step(Eigen::Vector3f(0.2f, knee, 0));
+    return std::pair(one.q(), one.v());
+  };
+  CHECK(after(driven, 1) == after(environment, 0));
+  CHECK(after(driven, 1) != after(environment, 1));
+  CHECK(after(driven, -0.5f) == after(environment, -0.5f));
+}
+
+TEST_CASE("a driver looks at a joint in each of its cycles") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/robot.toml"));
+  Environment driven(robot);
+  driven.SendThroughDriver();
+  Simulator simulator(robot);
+  VectorXd q = VectorXd::Zero(6), v = q, effort = q;
+  q[1] = 3, q[3] = -1, q[4] = -0.01, v[4] = 2;  // 5 ms from its stop
+  driven.SetState(q, v);
+  driven.Step(Eigen::Vector3f(0, 1, 0));
+  simulator.SetState(q, v);
+  simulator.Step(effort, robot.simulation.latency);
+  effort[4] = 200;
+  int cut = 0;
+  for (int cycle = 0; cycle < 3; ++cycle) {  // the rest of the period of 8 ms
+    if (simulator.q()[4] > 0) effort[4] = 0, ++cut;
+    simulator.Step(effort, robot.driver.cycle);
+  }
+  CHECK((cut > 0 && cut < 3));
+  CHECK((driven.q() - simulator.q()).norm() < 1e-12);
 }
 
 }  // namespace plumb

@@ -8,15 +8,15 @@
 namespace plumb {
 namespace {
 
-// The same change in every step of a condition.
+// The same change of velocities, or of positions and velocities, in every step of a condition.
 ResidualFunction Constant(const RobotDescription& robot, const Eigen::VectorXd& change) {
-  const Eigen::Index d = ResidualInputCount(robot), n = change.size();
+  const Eigen::Index d = ResidualInputCount(robot), n = 2 * robot.num_velocities();
   ResidualFunction f;
   f.mean = Eigen::VectorXd::Zero(d), f.scale = Eigen::VectorXd::Ones(d);
   f.low = Eigen::VectorXd::Constant(d, -1), f.high = Eigen::VectorXd::Constant(d, 1);
-  f.frequencies = Eigen::MatrixXd::Ones(3, d), f.phases = Eigen::VectorXd::Zero(3);
+  f.centres = Eigen::MatrixXd::Ones(3, d);
   Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(n, f.features());
-  weights.col(0) = change;
+  weights.col(0).tail(change.size()) = change;
   f.weights = {weights};
   f.noise = Eigen::MatrixXd::Zero(n, n);
   f.bound = Eigen::VectorXd::Constant(n, 10);
@@ -55,18 +55,18 @@ TEST_CASE("a residual of nothing changes nothing") {
   }
 }
 
-TEST_CASE("a residual moves velocities by what it says and positions by half of it") {
+TEST_CASE("a residual moves positions and velocities by what it says") {
   const RobotDescription robot = LoadPendulum("robot.toml");
   Environment plain(robot), corrected(robot);
   const auto residual = Of(robot);
-  residual->free = Constant(robot, Eigen::VectorXd::Constant(1, 0.125));
+  residual->free = Constant(robot, Eigen::Vector2d(0.25, 0.125));
   corrected.SetResidual(residual);
   for (Environment* environment : {&plain, &corrected})
     environment->SetState(Eigen::VectorXd::Constant(1, 1), Eigen::VectorXd::Constant(1, 0.5));
   const Eigen::VectorXf action = Eigen::VectorXf::Constant(1, 0.3f);
   plain.Step(action), corrected.Step(action);
   CHECK(corrected.v()[0] - plain.v()[0] == Approx(0.125).epsilon(1e-12));
-  CHECK(corrected.q()[0] - plain.q()[0] == Approx(robot.task.period / 2 * 0.125).epsilon(1e-9));
+  CHECK(corrected.q()[0] - plain.q()[0] == Approx(0.25).epsilon(1e-12));
   corrected.SetResidual(nullptr);
   for (Environment* environment : {&plain, &corrected})
     environment->SetState(Eigen::VectorXd::Constant(1, 1), Eigen::VectorXd::Constant(1, 0.5));
@@ -96,30 +96,36 @@ TEST_CASE("free and touching steps have residuals of their own") {
   CHECK(change(2, -0.1) == 0);
 }
 
-TEST_CASE("the inputs are observation, efforts of two steps, and what constraints did") {
+TEST_CASE("the inputs are observation, efforts of two steps, what changed, and what is near") {
   const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
   const Model model(robot);
   Simulator simulator(robot);
   ResidualInputs inputs(model, 0.005);
-  REQUIRE(inputs.size() == 11 + 3 + 3 + 6);
+  REQUIRE(inputs.size() == 11 + 3 + 3 + 6 + 2 * 4 + 6);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(6), v = q, effort = q, before = q;
   q[1] = 2, q[3] = -0.5, q[4] = -1, v[3] = 0.5, effort[3] = 100, before[5] = -200;
   simulator.SetState(q, v);
-  inputs.Begin(simulator, effort, before, 0.0005);
+  inputs.Begin(simulator);
   simulator.Step(effort, 0.0005);
-  inputs.End(simulator);
+  inputs.End(simulator, effort, before);
   CHECK(inputs.x()[0] == 2);                    // height
   CHECK(inputs.x()[8] == 0.5);                  // v of the thigh
   CHECK(inputs.x()[11] == Approx(100. / 200));  // in units of the limit
   CHECK(inputs.x()[16] == Approx(-1));
-  CHECK(inputs.x().tail(6).cwiseAbs().maxCoeff() < 1e-2);  // nothing but a short step's error
+  CHECK(inputs.x()[17 + 1] == simulator.v()[1]);  // it began at rest
+  CHECK(inputs.x()[23] == TouchFinder::kReach);   // the heel is far from the ground
+  CHECK(inputs.x().segment(24, 3).isZero());
+  CHECK(inputs.x().tail(6).isZero());  // and all joints from their stops
   CHECK_FALSE(inputs.touching());
   q[1] = 1.2, q[3] = q[4] = 0;  // deep in the ground
   simulator.SetState(q, v);
-  inputs.Begin(simulator, effort, before, 0.0005);
+  inputs.Begin(simulator);
   simulator.Step(effort, 0.0005);
-  inputs.End(simulator);
-  CHECK(inputs.x().tail(6).cwiseAbs().maxCoeff() > 0.05);
+  inputs.End(simulator, effort, before);
+  CHECK(inputs.x()[17 + 1] == simulator.v()[1]);
+  CHECK(inputs.x()[23] < 0);
+  CHECK(inputs.x()[24] != 0);                    // the thigh still turns
+  CHECK(inputs.x()[34] == TouchFinder::kReach);  // at its upper stop
   CHECK(inputs.touching());
 }
 

@@ -49,11 +49,10 @@ ParameterDistribution Lacking(int iteration) {
   const int inputs = ResidualInputCount(Robot());
   function.mean = function.low = function.high = Eigen::VectorXd::Zero(inputs);
   function.scale = Eigen::VectorXd::Ones(inputs);
-  function.frequencies = Eigen::MatrixXd::Zero(1, inputs);
-  function.phases = Eigen::VectorXd::Zero(1);
-  function.weights = {Eigen::MatrixXd::Zero(1, function.features())};
-  function.noise = Eigen::MatrixXd::Zero(1, 1);
-  function.bound = Eigen::VectorXd::Ones(1);
+  function.centres = Eigen::MatrixXd::Zero(1, inputs);
+  function.noise = Eigen::MatrixXd::Zero(2, 2);
+  function.weights = {Eigen::MatrixXd::Zero(2, function.features())};
+  function.bound = Eigen::VectorXd::Ones(2);
   ParameterDistribution distribution = Distribution(iteration);
   Residual residual;
   residual.coordinates = {distribution.mixture.components[0].mean};

@@ -32,20 +32,21 @@ Squares SquaredErrors(const RobotDescription& robot, const Residual& residual, b
   ResidualInputs inputs(model, residual.margin);
   const ResidualFunction& function = touching ? *residual.touching : *residual.free;
   Eigen::VectorXd features(function.features());
+  ResidualFunction::Work work = function.MakeWork();
   Squares squares;
   for (const Rollout& rollout : rollouts) {
     for (size_t i = 1; i < rollout.transitions.size(); ++i) {
       const Transition& t = rollout.transitions[i];
       simulator.SetState(t.q, t.v);
-      inputs.Begin(simulator, t.efforts[0].effort, rollout.transitions[i - 1].efforts[0].effort,
-                   t.duration());
+      inputs.Begin(simulator);
       simulator.Step(t.efforts);
-      inputs.End(simulator);
+      inputs.End(simulator, t.efforts[0].effort, rollout.transitions[i - 1].efforts[0].effort);
       if (inputs.touching() != touching) continue;
-      function.Features(inputs.x(), features);
+      function.Features(inputs.x(), &work, features);
       const Eigen::VectorXd error = t.next_v - simulator.v();
       squares.before += error.squaredNorm();
-      squares.after += (error - function.weights[0] * features).squaredNorm();
+      const Eigen::VectorXd change = function.weights[0] * features;
+      squares.after += (error - change.tail(error.size())).squaredNorm();
     }
   }
   return squares;

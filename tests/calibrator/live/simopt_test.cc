@@ -352,7 +352,7 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   CHECK(std::isnan(loaded->ess));
   std::string text =
       (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
-  text.replace(text.find("\"version\": 4"), 12, "\"version\": 1");
+  text.replace(text.find("\"version\": 5"), 12, "\"version\": 1");
   std::ofstream(folder / "calibration.json") << text;
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
 }
@@ -365,7 +365,7 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
   ResidualFunction function;
   function.mean = numbers(6, 1), function.scale = numbers(6, 1).cwiseAbs();
   function.low = numbers(6, 1), function.high = function.low.array() + 1;
-  function.frequencies = numbers(4, 6), function.phases = numbers(4, 1);
+  function.centres = numbers(4, 6);
   function.weights = {numbers(1, 11), numbers(1, 11)};
   function.noise = numbers(1, 1).cwiseAbs(), function.bound = numbers(1, 1).cwiseAbs();
   Residual residual;

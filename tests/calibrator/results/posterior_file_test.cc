@@ -64,8 +64,7 @@ TEST_CASE("a residual and starts read back to the same bits") {
   CHECK(is.scale == was.scale);
   CHECK(is.low == was.low);
   CHECK(is.high == was.high);
-  CHECK(is.frequencies == was.frequencies);
-  CHECK(is.phases == was.phases);
+  CHECK(is.centres == was.centres);
   CHECK(is.weights == was.weights);
   CHECK(is.noise == was.noise);
   CHECK(is.bound == was.bound);
@@ -357,20 +356,18 @@ TEST_CASE("hostile residuals are refused with file and field") {
              Contains(path + "scale: has 2 entries, expected 3"));
   CHECK_THAT(spoilt(touching + "scale/1", 0), Contains(path + "scale[1]: is not positive"));
   CHECK_THAT(spoilt(touching + "bound/0", -1), Contains(path + "bound[0]: is not positive"));
-  CHECK_THAT(spoilt(touching + "phases", {1, 2}),
-             Contains(path + "frequencies: has 3 entries, expected 2"));
-  CHECK_THAT(spoilt(touching + "frequencies/2", {1}),
-             Contains(path + "frequencies[2]: has 1 entries, expected 2"));
+  CHECK_THAT(spoilt(touching + "centres/2", {1}),
+             Contains(path + "centres[2]: has 1 entries, expected 2"));
   CHECK_THAT(spoilt(touching + "weights/0", json::array()),
-             Contains(path + "weights[0]: has 0 entries, expected 1"));
+             Contains(path + "weights[0]: has 0 entries, expected 2"));
   CHECK_THAT(spoilt(touching + "weights/1/0", {1, 2}),
              Contains(path + "weights[1][0]: has 2 entries, expected 6"));
   CHECK_THAT(spoilt(touching + "weights/1/0/5", 1e300),
              Contains(path + "weights[1][0][5]: is not finite in single precision"));
   CHECK_THAT(spoilt(touching + "weights/1/0/5", nullptr),
              Contains(path + "weights[1][0][5]: is not a number"));
-  CHECK_THAT(spoilt(touching + "noise/0", {1, 2}),
-             Contains(path + "noise[0]: has 2 entries, expected 1"));
+  CHECK_THAT(spoilt(touching + "noise/0", {1, 2, 3}),
+             Contains(path + "noise[0]: has 3 entries, expected 2"));
   CHECK_THAT(spoilt("/starts", 1), Contains(": starts: is not an array"));
   CHECK_THAT(spoilt("/starts/0", {1}), Contains(": starts[0]: has 1 entries, expected 2"));
   CHECK_THAT(spoilt("/starts/0/1", "x"), Contains(": starts[0][1]: is not a number"));

@@ -1,4 +1,4 @@
-#include "drivers/driver/limits.h"
+#include "robot/limit_effort.h"
 
 #include <algorithm>
 #include <cmath>
