@@ -20,8 +20,9 @@ void Exp(Pair* x) {
   constexpr double kFirst = 6.93147180369123816490e-01, kSecond = 1.90821492927058770002e-10;
   constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer
   // 1 / n! of n = 10 down to 0; the rest is less than (ln 2 / 2)^11 / 11! = 2.2e-13
-  constexpr double kSeries[] = {1. / 3628800, 1. / 362880, 1. / 40320, 1. / 5040, 1. / 720, 1. / 120,
-                                1. / 24,      1. / 6,      0.5,        1,         1};
+  constexpr double kSeries[] = {1. / 3628800, 1. / 362880, 1. / 40320, 1. / 5040,
+                                1. / 720,     1. / 120,    1. / 24,    1. / 6,
+                                0.5,          1,           1};
   const Pair least{-700, -700};
   Pair shifted[kPairs], r[kPairs], sum[kPairs] = {};
 #pragma GCC unroll 4
