@@ -101,7 +101,7 @@ void Environment::Act(const Eigen::VectorXd& wish, double duration) {
 }
 
 void Environment::Correct() {
-  lack_->inputs.End(simulator_, mean_effort_, mean_effort_before_);
+  lack_->inputs.End(simulator_, mean_effort_, mean_effort_before_, period_);
   const Eigen::VectorXd& change = lack_->sample.Step(lack_->inputs.touching(), lack_->inputs.x());
   const Eigen::Index n = change.size() / 2;
   simulator_.Correct(change.head(n), change.tail(n));

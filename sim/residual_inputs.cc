@@ -32,6 +32,7 @@ ResidualInputs::ResidualInputs(const Model& model, double margin)
       touch_(model.description(), margin),
       observation_(task_->observation_size()),
       v_(model.num_velocities()),
+      acceleration_(v_.size()),
       x_(ResidualInputCount(model.description())) {
   if (model.num_positions() != model.num_velocities())
     throw std::invalid_argument("a residual is not for robots with spherical joints");
@@ -48,9 +49,8 @@ void ResidualInputs::Begin(const Simulator& simulator) {
   touch_.Nearness(simulator.q(), simulator.v(), x_.tail(touch_.num_nearness()));
 }
 
-void ResidualInputs::End(const Simulator& simulator,
-                         const Eigen::Ref<const Eigen::VectorXd>& effort,
-                         const Eigen::Ref<const Eigen::VectorXd>& before) {
+void ResidualInputs::End(Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,
+                         const Eigen::Ref<const Eigen::VectorXd>& before, double duration) {
   const Eigen::Index actions = limits_.size();
   auto now = x_.segment(observation_.size(), actions);
   auto then = x_.segment(observation_.size() + actions, actions);
@@ -59,7 +59,9 @@ void ResidualInputs::End(const Simulator& simulator,
     now[a] = effort[joint] / limits_[a];
     then[a] = before[joint] / limits_[a];
   }
-  x_.segment(observation_.size() + 2 * actions, v_.size()) = simulator.v() - v_;
+  simulator.Acceleration(effort, &acceleration_);
+  x_.segment(observation_.size() + 2 * actions, v_.size()) =
+      simulator.v() - v_ - duration * acceleration_;
   touching_ = touching_ || touch_.Find(simulator.q()).any();
 }
 

@@ -19,7 +19,8 @@ void RequireResidualOf(const RobotDescription& robot, const Residual& residual);
 ///   the task's observation of the state it begins with,
 ///   the mean effort of each driven joint, in units of its limit,
 ///   the same of the step before: a drive may be late,
-///   the change of each velocity that the simulator has made, v' - v,
+///   what stops, contacts and Coulomb friction made of each velocity in the simulator, nearly:
+///   v' - v - T a, with the acceleration a that there is without them at the step's end,
 ///   what is near (TouchFinder::Nearness).
 /// Not thread-safe; does not allocate after construction.
 class ResidualInputs {
@@ -33,9 +34,9 @@ class ResidualInputs {
   /// Before the simulator makes the step.
   void Begin(const Simulator& simulator);
   /// After it. @param effort, before mean of the step and of the one before it, num_velocities
-  /// entries [Nm or N].
-  void End(const Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,
-           const Eigen::Ref<const Eigen::VectorXd>& before);
+  /// entries [Nm or N]. @param duration [s] T.
+  void End(Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,
+           const Eigen::Ref<const Eigen::VectorXd>& before, double duration);
 
   // Of the step that has ended:
   const Eigen::VectorXd& x() const { return x_; }
@@ -47,7 +48,7 @@ class ResidualInputs {
   Eigen::VectorXd limits_;  // of the driven joints
   TouchFinder touch_;
   Eigen::VectorXf observation_;
-  Eigen::VectorXd v_, x_;  // v: that the step begins with
+  Eigen::VectorXd v_, acceleration_, x_;  // v: that the step begins with
   bool touching_ = false;
 };
 

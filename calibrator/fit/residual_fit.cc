@@ -59,7 +59,7 @@ void Collect(const std::shared_ptr<const Model>& model, const Eigen::VectorXd& p
         if (follows) simulator.Recall(last->efforts);
         inputs.Begin(simulator);
         simulator.Step(t.efforts);
-        inputs.End(simulator, effort, before);
+        inputs.End(simulator, effort, before, t.duration());
         if (simulator.finite()) {
           Errors& errors = inputs.touching() ? *touching : *free;
           errors.inputs.push_back(inputs.x());

@@ -96,7 +96,8 @@ TEST_CASE("free and touching steps have residuals of their own") {
   CHECK(change(2, -0.1) == 0);
 }
 
-TEST_CASE("the inputs are observation, efforts of two steps, what changed, and what is near") {
+TEST_CASE(
+    "the inputs are observation, efforts of two steps, what constraints did, and what is near") {
   const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
   const Model model(robot);
   Simulator simulator(robot);
@@ -107,13 +108,14 @@ TEST_CASE("the inputs are observation, efforts of two steps, what changed, and w
   simulator.SetState(q, v);
   inputs.Begin(simulator);
   simulator.Step(effort, 0.0005);
-  inputs.End(simulator, effort, before);
+  inputs.End(simulator, effort, before, 0.0005);
   CHECK(inputs.x()[0] == 2);                    // height
   CHECK(inputs.x()[8] == 0.5);                  // v of the thigh
   CHECK(inputs.x()[11] == Approx(100. / 200));  // in units of the limit
   CHECK(inputs.x()[16] == Approx(-1));
-  CHECK(inputs.x()[17 + 1] == simulator.v()[1]);  // it began at rest
-  CHECK(inputs.x()[23] == TouchFinder::kReach);   // the heel is far from the ground
+  const auto constrained = [&] { return inputs.x().segment(17, 6).cwiseAbs().maxCoeff(); };
+  CHECK(constrained() < 1e-2);                   // nothing but a short step's error
+  CHECK(inputs.x()[23] == TouchFinder::kReach);  // the heel is far from the ground
   CHECK(inputs.x().segment(24, 3).isZero());
   CHECK(inputs.x().tail(6).isZero());  // and all joints from their stops
   CHECK_FALSE(inputs.touching());
@@ -121,8 +123,8 @@ TEST_CASE("the inputs are observation, efforts of two steps, what changed, and w
   simulator.SetState(q, v);
   inputs.Begin(simulator);
   simulator.Step(effort, 0.0005);
-  inputs.End(simulator, effort, before);
-  CHECK(inputs.x()[17 + 1] == simulator.v()[1]);
+  inputs.End(simulator, effort, before, 0.0005);
+  CHECK(constrained() > 0.05);
   CHECK(inputs.x()[23] < 0);
   CHECK(inputs.x()[24] != 0);                    // the thigh still turns
   CHECK(inputs.x()[34] == TouchFinder::kReach);  // at its upper stop

@@ -40,7 +40,8 @@ Squares SquaredErrors(const RobotDescription& robot, const Residual& residual, b
       simulator.SetState(t.q, t.v);
       inputs.Begin(simulator);
       simulator.Step(t.efforts);
-      inputs.End(simulator, t.efforts[0].effort, rollout.transitions[i - 1].efforts[0].effort);
+      inputs.End(simulator, t.efforts[0].effort, rollout.transitions[i - 1].efforts[0].effort,
+                 t.duration());
       if (inputs.touching() != touching) continue;
       function.Features(inputs.x(), &work, features);
       const Eigen::VectorXd error = t.next_v - simulator.v();
