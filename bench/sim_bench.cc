@@ -143,11 +143,12 @@ std::shared_ptr<const Residual> LearntResidual(const RobotDescription& robot) {
   };
   ResidualFunction f;
   f.mean = Eigen::VectorXd::Zero(inputs), f.scale = Eigen::VectorXd::Ones(inputs);
-  f.low = Eigen::VectorXd::Constant(inputs, -3), f.high = -f.low;
-  f.centres = normal(kCentres, inputs);
+  f.low = Eigen::VectorXd::Constant(inputs, -1), f.high = -f.low;
+  f.centres = normal(kCentres, inputs) / 4;
   f.weights = {1e-3 * normal(outputs, f.features())};
   f.noise = 1e-3 * Eigen::MatrixXd::Identity(outputs, outputs);
   f.bound = Eigen::VectorXd::Ones(outputs);
+  f.unknown = Eigen::VectorXd::Constant(outputs, 1e-3);
   const auto parameters = static_cast<Eigen::Index>(robot.parameters.size());
   return std::make_shared<const Residual>(Residual{{Eigen::VectorXd::Zero(parameters)}, f, f});
 }

@@ -36,6 +36,7 @@ std::shared_ptr<const Residual> RandomForces(const RobotDescription& robot, doub
   f.centres = Eigen::MatrixXd::Zero(1, d);
   f.noise = effect;
   f.bound = Eigen::VectorXd::Constant(2 * n, 1e3);
+  f.unknown = Eigen::VectorXd::Zero(2 * n);
   auto residual = std::make_shared<Residual>();
   Random random(seed, {kStream});
   const ParameterDistribution prior = ParameterDistribution::Prior(robot);

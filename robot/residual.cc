@@ -4,30 +4,64 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
-#include "common/exponential.h"
+#include "common/decompositions.h"
 
 namespace plumb {
 
-ResidualFunction::Work ResidualFunction::MakeWork() const {
-  return {centres.cast<float>(), centres.rowwise().squaredNorm() / 2, Eigen::VectorXf(inputs()),
-          Eigen::VectorXf(centres.rows())};
+using residual_kernels::Pack;
+
+namespace {
+
+constexpr float kNothing = 1e-12f;
+
+}  // namespace
+
+PackedMatrix::PackedMatrix(const Eigen::MatrixXd& matrix)
+    : packs_(residual_kernels::Packs(static_cast<int>(matrix.rows()))),
+      columns_(static_cast<int>(matrix.cols())),
+      data_(static_cast<size_t>(packs_ * columns_)) {
+  for (int j = 0; j < columns_; ++j) {
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+      const auto number = static_cast<float>(matrix(i, j));
+      // products of numbers that are next to nothing are subnormal, and slow
+      data_[static_cast<size_t>(j * packs_ + i / Pack::kSize)].x[i % Pack::kSize] =
+          std::abs(number) < kNothing ? 0 : number;
+    }
+  }
 }
 
-void ResidualFunction::Features(const Eigen::Ref<const Eigen::VectorXd>& x, Work* work,
-                                Eigen::Ref<Eigen::VectorXd> features) const {
+ResidualFunction::Work ResidualFunction::MakeWork() const {
+  PackedMatrix packed(centres);
+  Eigen::VectorXf half_squares = Eigen::VectorXf::Zero(packed.rows());
+  half_squares.head(centres.rows()) = (centres.rowwise().squaredNorm() / 2).cast<float>();
+  Eigen::VectorXf features = Eigen::VectorXf::Zero(1 + inputs() + packed.rows());
+  return {std::move(packed), std::move(half_squares), Eigen::VectorXf(inputs()),
+          std::move(features)};
+}
+
+void ResidualFunction::Features(const Eigen::Ref<const Eigen::VectorXd>& x, Work* work) const {
   const Eigen::Index d = inputs();
-  auto z = features.segment(1, d);
-  auto bumps = features.tail(centres.rows());
-  features(0) = 1;
-  z = ((x - mean).array() / scale.array()).max(low.array()).min(high.array());
-  work->z = z.cast<float>();
-  work->products.noalias() = work->centres * work->z;
-  // rounding may leave a distance that is negative
-  bumps = (work->products.cast<double>().array() - work->half_squares.array() - z.squaredNorm() / 2)
-              .min(0.0);
-  ExpOfNegatives({bumps.data(), static_cast<size_t>(bumps.size())});
-  z /= std::sqrt(static_cast<double>(d));
+  work->z = ((x - mean).array() / scale.array()).max(low.array()).min(high.array()).cast<float>();
+  work->features(0) = 1;
+  work->features.segment(1, d) = work->z / std::sqrt(static_cast<float>(d));
+  auto bumps = work->features.tail(work->centres.rows());
+  residual_kernels::Multiply(work->centres.data(), work->centres.packs(), work->centres.columns(),
+                             work->z.data(), bumps.data());
+  bumps -= work->half_squares;
+  bumps.array() -= work->z.squaredNorm() / 2;
+  residual_kernels::ExpOfNegatives(bumps.data(), work->centres.packs());
+}
+
+Eigen::MatrixXd ResidualFunction::KernelFactor() const {
+  const Eigen::ArrayXd halves = centres.rowwise().squaredNorm() / 2;
+  Eigen::ArrayXXd kernel = (centres * centres.transpose()).array();
+  kernel.colwise() -= halves;
+  kernel.rowwise() -= halves.transpose();
+  Eigen::MatrixXd matrix = kernel.exp();
+  matrix.diagonal().array() += kNugget;
+  return matrix.llt().matrixL();
 }
 
 void RequireFinite(const Residual& residual) {
@@ -48,24 +82,39 @@ void RequireFinite(const Residual& residual) {
       require(weights.allFinite(), "weights are not finite");
     require(f.noise.allFinite(), "noise is not finite");
     require(f.bound.allFinite() && f.bound.minCoeff() > 0, "bound is not positive");
+    require(f.unknown.allFinite() && f.unknown.minCoeff() >= 0, "unknown is negative");
   }
 }
 
+ResidualSample::Part ResidualSample::Prepare(const ResidualFunction& function) {
+  Part part;
+  part.work = function.MakeWork();
+  for (const Eigen::MatrixXd& weights : function.weights) part.weights.emplace_back(weights);
+  part.change.resize(part.weights.front().rows());
+  // square with what fills it up, too
+  const Eigen::Index m = function.centres.rows(), filled = part.work.centres.rows();
+  Eigen::MatrixXd inverse = Eigen::MatrixXd::Zero(filled, filled);
+  inverse.topLeftCorner(m, m) =
+      function.KernelFactor().triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(m, m));
+  part.whitening = PackedMatrix(inverse);
+  part.whitened.resize(filled);
+  return part;
+}
+
 ResidualSample::ResidualSample(const Residual& residual) : residual_(&residual) {
-  const auto prepare = [](const std::optional<ResidualFunction>& function, Part* part) {
-    if (!function) return;
-    *part = {function->MakeWork(), Eigen::VectorXd(function->features())};
-  };
-  prepare(residual.free, &free_), prepare(residual.touching, &touching_);
+  if (residual.free) free_ = Prepare(*residual.free);
+  if (residual.touching) touching_ = Prepare(*residual.touching);
   normal_.resize(residual.free       ? residual.free->outputs()
                  : residual.touching ? residual.touching->outputs()
                                      : 0);
   change_ = normal_;
+  lasting_ = normal_;
 }
 
 void ResidualSample::Begin(size_t draw, Random& random) {
   draw_ = draw;
   random_ = Random(uint64_t{random.Bits()} << 32 | random.Bits());
+  for (double& normal : lasting_) normal = random_.Normal();
 }
 
 const Eigen::VectorXd& ResidualSample::Step(bool touching,
@@ -76,8 +125,17 @@ const Eigen::VectorXd& ResidualSample::Step(bool touching,
     return change_;
   }
   Part& part = touching ? touching_ : free_;
-  function->Features(x, &part.work, part.features);
-  change_.noalias() = function->weights[draw_] * part.features;
+  function->Features(x, &part.work);
+  const Eigen::VectorXf& features = part.work.features;
+  const PackedMatrix& weights = part.weights[draw_];
+  residual_kernels::Multiply(weights.data(), weights.packs(), weights.columns(), features.data(),
+                             part.change.data());
+  const auto bumps = features.tail(part.whitened.size());
+  residual_kernels::MultiplyLower(part.whitening.data(), part.whitening.packs(), bumps.data(),
+                                  part.whitened.data());
+  const double unknown = std::max(0.0, 1.0 - static_cast<double>(part.whitened.squaredNorm()));
+  change_ = part.change.head(change_.size()).cast<double>();
+  change_ += std::sqrt(unknown) * function->unknown.cwiseProduct(lasting_);
   change_ = change_.cwiseMax(-function->bound).cwiseMin(function->bound);
   for (double& normal : normal_) normal = random_.Normal();
   change_.noalias() += function->noise * normal_;

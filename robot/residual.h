@@ -7,8 +7,26 @@
 #include <vector>
 
 #include "common/random.h"
+#include "robot/residual_kernels.h"
 
 namespace plumb {
+
+/// A matrix in single precision for residual_kernels, its columns filled up with zeros to packs.
+/// Const use is thread-safe.
+class PackedMatrix {
+ public:
+  PackedMatrix() = default;
+  explicit PackedMatrix(const Eigen::MatrixXd& matrix);
+
+  const residual_kernels::Pack* data() const { return data_.data(); }
+  int packs() const { return packs_; }  ///< of each column
+  int rows() const { return packs_ * residual_kernels::Pack::kSize; }
+  int columns() const { return columns_; }
+
+ private:
+  int packs_ = 0, columns_ = 0;
+  std::vector<residual_kernels::Pack> data_;
+};
 
 /// The change of n positions and velocities in a control step beyond the simulator's, as a function
 /// of D inputs (ResidualInputs), learnt from recorded transitions: the discrepancy function of
@@ -16,32 +34,42 @@ namespace plumb {
 /// exponential kernel and a linear one, by M of its inputs ("subset of regressors": Quinonero-Candela
 /// and Rasmussen, JMLR 6, 2005):
 ///   phi(x) = (1, z / sqrt(D), exp(-|z - c_m|^2 / 2)),   z = (x - mean) / scale,
-///   change = W phi(x) + L e,   e ~ N(0, 1).
-/// Far from what was recorded only the plane is left, of a z that is kept within it; and W phi stays
-/// within `bound`: where nothing is known nothing grows. Immutable use is thread-safe.
+///   change = W phi(x) + sqrt(u(x)) unknown h + L e,   h, e ~ N(0, 1), h once an episode.
+/// u is the share of the kernel's variance that the recorded inputs leave open (ibid., "deterministic
+/// training conditional"): 0 where the residual is known, 1 far away. There only the plane is left,
+/// of a z that is kept within what was recorded, and what an episode has drawn. Without that, a policy
+/// seeks out inputs where what has been learnt is wrong in its favour. Without the noise a change
+/// stays within `bound`: where nothing is known nothing grows. Immutable use is thread-safe.
 struct ResidualFunction {
   Eigen::VectorXd mean, scale;  ///< D, of the inputs; scale > 0: the kernel's length
   Eigen::VectorXd low, high;    ///< D, least and greatest z recorded
   Eigen::MatrixXd centres;      ///< M x D, in units of z
   /// W of each draw, n x (1 + D + M) [rad or m, rad/s or m/s]
   std::vector<Eigen::MatrixXd> weights;
-  Eigen::MatrixXd noise;  ///< n x n, L: what is left, and is not the readings'
-  Eigen::VectorXd bound;  ///< n, > 0
+  Eigen::MatrixXd noise;    ///< n x n, L: what is left, and is not the readings'
+  Eigen::VectorXd bound;    ///< n, > 0
+  Eigen::VectorXd unknown;  ///< n, >= 0: sd of a change where nothing is known
 
   Eigen::Index inputs() const { return mean.size(); }
   Eigen::Index outputs() const { return noise.rows(); }
   Eigen::Index features() const { return 1 + mean.size() + centres.rows(); }
-  /// What Features needs to be fast: products with the centres are in single precision, as these
-  /// are known. Not thread-safe.
+
+  /// What Features needs to be fast, in single precision, as all of it is known: M' is M and what
+  /// fills up the last pack. Not thread-safe.
   struct Work {
-    Eigen::MatrixXf centres;
-    Eigen::VectorXd half_squares;  ///< of the centres' lengths
-    Eigen::VectorXf z, products;
+    PackedMatrix centres;          ///< M' x D
+    Eigen::VectorXf half_squares;  ///< M', of the centres' lengths
+    Eigen::VectorXf z;             ///< D
+    Eigen::VectorXf features;      ///< 1 + D + M': phi(x), and no meaning
   };
   Work MakeWork() const;
-  /// Writes phi(x). Does not allocate.
-  void Features(const Eigen::Ref<const Eigen::VectorXd>& x, Work* work,
-                Eigen::Ref<Eigen::VectorXd> features) const;
+  /// Writes phi(x) into work->features. Does not allocate.
+  void Features(const Eigen::Ref<const Eigen::VectorXd>& x, Work* work) const;
+
+  /// The lower Cholesky factor of the kernel between the centres, its 1 made 1 + kNugget, which
+  /// keeps it well conditioned.
+  Eigen::MatrixXd KernelFactor() const;
+  static constexpr double kNugget = 1e-3;
 };
 
 /// What a simulator lacks, for some draws of its parameters: each of them has its own function, as
@@ -81,9 +109,14 @@ class ResidualSample {
   // of a function
   struct Part {
     ResidualFunction::Work work;
-    Eigen::VectorXd features;
+    std::vector<PackedMatrix> weights;
+    PackedMatrix whitening;  // the kernel factor's inverse
+    Eigen::VectorXf change, whitened;
   };
+  static Part Prepare(const ResidualFunction& function);
+
   Part free_, touching_;
+  Eigen::VectorXd lasting_;  // of the episode: h
   Eigen::VectorXd normal_, change_;
 };
 

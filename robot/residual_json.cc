@@ -31,7 +31,8 @@ json ToJson(const std::optional<ResidualFunction>& function) {
   return {{"mean", Singles(function->mean)},       {"scale", Singles(function->scale)},
           {"low", Singles(function->low)},         {"high", Singles(function->high)},
           {"centres", Singles(function->centres)}, {"weights", weights},
-          {"noise", Singles(function->noise)},     {"bound", Singles(function->bound)}};
+          {"noise", Singles(function->noise)},     {"bound", Singles(function->bound)},
+          {"unknown", Singles(function->unknown)}};
 }
 
 size_t Count(const JsonField& list) {
@@ -59,6 +60,9 @@ std::optional<ResidualFunction> ReadFunction(const JsonField& field, size_t draw
     function.weights.push_back(weights.SingleMatrix(outputs, 1 + inputs + centres));
   function.noise = field["noise"].SingleMatrix(outputs, outputs);
   function.bound = Positive(field["bound"], outputs);
+  for (const JsonField& entry : field["unknown"].Entries(outputs))
+    entry.Require(entry.Single() >= 0, "is negative");
+  function.unknown = field["unknown"].SingleVector(outputs);
   return function;
 }
 

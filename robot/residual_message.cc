@@ -42,6 +42,7 @@ Message ToMessage(const ResidualFunction& function, int8_t condition) {
   m.centre = Floats(function.centres);
   for (const Eigen::MatrixXd& weights : function.weights) Append(weights, &m.weight);
   m.noise = Floats(function.noise), m.bound = Floats(function.bound);
+  m.unknown = Floats(function.unknown);
   m.num_coordinates = static_cast<int32_t>(m.centre.size());
   m.num_weights = static_cast<int32_t>(m.weight.size());
   m.num_noise = static_cast<int32_t>(m.noise.size());
@@ -65,11 +66,13 @@ ResidualFunction FromMessage(const Message& m, size_t draws) {
   require(m.weight.size() == draws * each, "weight");
   require(m.noise.size() == n * n, "noise");
   require(m.bound.size() == n, "bound");
+  require(m.unknown.size() == n, "unknown");
   const auto di = static_cast<Eigen::Index>(d), ni = static_cast<Eigen::Index>(n),
              wi = static_cast<Eigen::Index>(w);
-  ResidualFunction function{Matrix(m.mean, di, 1),   Matrix(m.scale, di, 1),   Matrix(m.low, di, 1),
-                            Matrix(m.high, di, 1),   Matrix(m.centre, wi, di), {},
-                            Matrix(m.noise, ni, ni), Matrix(m.bound, ni, 1)};
+  ResidualFunction function{
+      Matrix(m.mean, di, 1),   Matrix(m.scale, di, 1),   Matrix(m.low, di, 1),
+      Matrix(m.high, di, 1),   Matrix(m.centre, wi, di), {},
+      Matrix(m.noise, ni, ni), Matrix(m.bound, ni, 1),   Matrix(m.unknown, ni, 1)};
   for (size_t k = 0; k < draws; ++k)
     function.weights.push_back(Matrix(m.weight, ni, 1 + di + wi, k * each));
   return function;

@@ -37,22 +37,21 @@ void Environment::SendThroughDriver() {
 }
 
 void Environment::SetResidual(std::shared_ptr<const Residual> residual, size_t draw) {
-  if (residual != (lack_ ? lack_->residual : nullptr)) {
-    lack_.reset();
-    if (!residual) return;
+  lacking_ = residual != nullptr;
+  if (!lacking_) return;
+  if (!lack_ || residual != lack_->residual) {
     RequireResidualOf(model_->description(), *residual);
     ResidualInputs inputs(*model_, residual->margin);
     ResidualSample sample(*residual);
     lack_.reset(new Lack{std::move(residual), std::move(sample), std::move(inputs)});
   }
-  if (!lack_) return;
   if (draw >= lack_->residual->coordinates.size())
     throw std::invalid_argument("the residual has no such draw");
   lack_->draw = draw;
 }
 
 void Environment::Reset(Random& random) {
-  if (lack_) lack_->sample.Begin(lack_->draw, random);
+  if (lacking_) lack_->sample.Begin(lack_->draw, random);
   task_->InitialState(random, start_q_, start_v_);
   SetState(start_q_, start_v_);
 }
@@ -70,14 +69,14 @@ StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
   task_->Effort(std::span(action.data(), static_cast<size_t>(action.size())), next_effort_);
   start_q_ = q();
   start_v_ = v();
-  if (lack_) {
+  if (lacking_) {
     lack_->inputs.Begin(simulator_);
     mean_effort_.setZero();
   }
   Act(effort_, latency_);
   Act(next_effort_, period_ - latency_);
   effort_.swap(next_effort_);
-  if (lack_) Correct();
+  if (lacking_) Correct();
   Read();
   return {task_->Reward(start_q_, start_v_, effort_, q(), v()),
           !simulator_.finite() || task_->Terminated(q(), v())};
@@ -95,7 +94,7 @@ void Environment::Act(const Eigen::VectorXd& wish, double duration) {
                          : wish[i];
     }
     simulator_.Step(sent_, cycle);
-    if (lack_) mean_effort_ += cycle / period_ * sent_;
+    if (lacking_) mean_effort_ += cycle / period_ * sent_;
     duration -= cycle;
   }
 }

@@ -44,7 +44,7 @@ class Environment {
     simulator_.SetParameters(physical);
   }
   /// What has been learnt that the simulator lacks; null = nothing, it is right as it is. Holds
-  /// from the next Reset on. Allocates where it is another one than before.
+  /// from the next Reset on. Allocates where it is another one than the last.
   /// @param draw of the residual, to which the parameters belong.
   /// @throws std::invalid_argument if it is another robot's, or there is no such draw.
   void SetResidual(std::shared_ptr<const Residual> residual, size_t draw = 0);
@@ -93,6 +93,7 @@ class Environment {
   std::shared_ptr<const Model> model_;
   Simulator simulator_;
   std::unique_ptr<Lack> lack_;
+  bool lacking_ = false;  // what has been learnt is in use
   int steps_per_episode_;
   double period_;
   double latency_;

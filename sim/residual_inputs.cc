@@ -45,8 +45,7 @@ void ResidualInputs::Begin(const Simulator& simulator) {
                  std::span(observation_.data(), static_cast<size_t>(observation_.size())));
   x_.head(observation_.size()) = observation_.cast<double>();
   v_ = simulator.v();
-  touching_ = touch_.Find(simulator.q()).any();
-  touch_.Nearness(simulator.q(), simulator.v(), x_.tail(touch_.num_nearness()));
+  touching_ = touch_.Nearness(simulator.q(), simulator.v(), x_.tail(touch_.num_nearness())).any();
 }
 
 void ResidualInputs::End(Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,

@@ -19,6 +19,11 @@ TouchFinder::TouchFinder(const RobotDescription& robot, double margin)
 
 Touch TouchFinder::Find(const Eigen::Ref<const Eigen::VectorXd>& q) {
   kinematics_.Update(q, still_);
+  return Touching(q);
+}
+
+// Of what the kinematics were updated with.
+Touch TouchFinder::Touching(const Eigen::Ref<const Eigen::VectorXd>& q) const {
   const bool ground = std::any_of(points_.begin(), points_.end(), [&](const ContactPoint& point) {
     return kinematics_.Position(point.link, point.centre).z() <= point.radius + margin_;
   });
@@ -32,9 +37,9 @@ int TouchFinder::num_nearness() const {
   return static_cast<int>(4 * points_.size() + stops_.size());
 }
 
-void TouchFinder::Nearness(const Eigen::Ref<const Eigen::VectorXd>& q,
-                           const Eigen::Ref<const Eigen::VectorXd>& v,
-                           Eigen::Ref<Eigen::VectorXd> nearness) {
+Touch TouchFinder::Nearness(const Eigen::Ref<const Eigen::VectorXd>& q,
+                            const Eigen::Ref<const Eigen::VectorXd>& v,
+                            Eigen::Ref<Eigen::VectorXd> nearness) {
   const auto distance = [&](double metres) {
     return std::clamp(metres / margin_, -kReach, kReach);
   };
@@ -52,6 +57,7 @@ void TouchFinder::Nearness(const Eigen::Ref<const Eigen::VectorXd>& q,
     nearness[i++] =
         distance(q[joint.position] - joint.lower) - distance(joint.upper - q[joint.position]);
   }
+  return Touching(q);
 }
 
 }  // namespace plumb

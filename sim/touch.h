@@ -34,9 +34,9 @@ class TouchFinder {
   /// millimetres there, and on nothing farther away. With distances in margins, kept within
   /// kReach: of each contact point its height and, as far as it is near, its velocity [m/s]; of each
   /// joint with stops its distance from the middle between them, of which most is taken away.
-  /// @param margin that the finder has must be above zero. @throws as Find.
-  void Nearness(const Eigen::Ref<const Eigen::VectorXd>& q,
-                const Eigen::Ref<const Eigen::VectorXd>& v, Eigen::Ref<Eigen::VectorXd> nearness);
+  /// Returns what Find does. @param margin that the finder has must be above zero. @throws as Find.
+  Touch Nearness(const Eigen::Ref<const Eigen::VectorXd>& q,
+                 const Eigen::Ref<const Eigen::VectorXd>& v, Eigen::Ref<Eigen::VectorXd> nearness);
   static constexpr double kReach = 4;
 
  private:
@@ -44,6 +44,8 @@ class TouchFinder {
     Eigen::Index position;
     double lower, upper;
   };
+
+  Touch Touching(const Eigen::Ref<const Eigen::VectorXd>& q) const;
 
   double margin_;
   Kinematics kinematics_;

@@ -90,7 +90,8 @@ void Round(Matrix* matrix) {
 }
 
 void Round(ResidualFunction* f) {
-  for (Eigen::VectorXd* x : {&f->mean, &f->scale, &f->low, &f->high, &f->bound}) Round(x);
+  for (Eigen::VectorXd* x : {&f->mean, &f->scale, &f->low, &f->high, &f->bound, &f->unknown})
+    Round(x);
   Round(&f->centres), Round(&f->noise);
   for (Eigen::MatrixXd& weights : f->weights) Round(&weights);
 }
@@ -138,6 +139,7 @@ std::optional<ResidualFunction> FitFunction(const std::vector<Errors>& draws,
   covariance.diagonal() -= claimed;
   function.noise = options.noise * LowerFactor(covariance);
   function.bound = kBoundOfSeen * errors.cwiseAbs().rowwise().maxCoeff().array().max(kStill);
+  function.unknown = options.unknown * (first.variance.array() / first.ratio.array()).sqrt();
   Round(&function);
   return function;
 }

@@ -19,6 +19,8 @@ struct ResidualFitOptions {
   /// as they are
   double width = 0;
   double noise = 1;  ///< factor of what is left
+  /// factor of the sd that the evidence says of a change before anything is known
+  double unknown = 0.3;
   uint64_t seed = 1;
 };
 

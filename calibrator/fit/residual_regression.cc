@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kStill = 1e-9;         // an input's sd below which it does not move
 constexpr double kLeastFreedom = 1e-3;  // 1 - leverage of a column
-constexpr double kNugget = 1e-3;  // of the kernel's 1, which keeps its factor well conditioned
 
 ResidualRegression Project(const Eigen::MatrixXd& features, const Eigen::MatrixXd& outputs) {
   ResidualRegression r;
@@ -46,7 +45,7 @@ Eigen::MatrixXd Pivots(const Eigen::MatrixXd& points, Eigen::Index count) {
     const Eigen::ArrayXd squares = (points.colwise() - points.col(pivot)).colwise().squaredNorm();
     Eigen::VectorXd column = (-squares / 2).exp();
     column.noalias() -= factor.leftCols(k) * factor.row(pivot).head(k).transpose();
-    column /= std::sqrt(std::max(rest, kNugget));
+    column /= std::sqrt(std::max(rest, ResidualFunction::kNugget));
     left -= column.cwiseAbs2();
     factor.col(k) = column;
   }
@@ -127,21 +126,15 @@ void ResidualFeatures::SetLength(double length) {
   function_ = unit_;
   function_.scale *= length;
   function_.low /= length, function_.high /= length, function_.centres /= length;
-  const Eigen::MatrixXd& centres = function_.centres;
-  const Eigen::ArrayXd halves = function_.MakeWork().half_squares;
-  Eigen::ArrayXXd kernel = (centres * centres.transpose()).array();
-  kernel.colwise() -= halves;
-  kernel.rowwise() -= halves.transpose();
-  Eigen::MatrixXd matrix = kernel.exp();
-  matrix.diagonal().array() += kNugget;
-  factor_ = matrix.llt().matrixL();
+  factor_ = function_.KernelFactor();
 }
 
 Eigen::MatrixXd ResidualFeatures::Of(const Eigen::MatrixXd& inputs) const {
   Eigen::MatrixXd features(function_.features(), inputs.cols());
   ResidualFunction::Work work = function_.MakeWork();
   for (Eigen::Index i = 0; i < inputs.cols(); ++i)
-    function_.Features(inputs.col(i), &work, features.col(i));
+    function_.Features(inputs.col(i), &work),
+        features.col(i) = work.features.head(features.rows()).cast<double>();
   auto bumps = features.bottomRows(function_.centres.rows());
   factor_.triangularView<Eigen::Lower>().solveInPlace(bumps);
   return features;

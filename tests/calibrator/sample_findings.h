@@ -30,6 +30,7 @@ inline Residual SampleResidual(const RobotDescription& robot) {
   f.weights = {singles(n, 6), singles(n, 6)};
   f.noise = singles(n, n);
   f.bound = Eigen::VectorXd::Constant(n, 4);
+  f.unknown = singles(n, 1).cwiseAbs();
   const Gaussian prior = PriorGaussian(robot);
   return {{prior.mean, prior.mean + 0.1 * prior.covariance.diagonal().cwiseSqrt()}, {}, f};
 }

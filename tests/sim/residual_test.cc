@@ -20,6 +20,7 @@ ResidualFunction Constant(const RobotDescription& robot, const Eigen::VectorXd& 
   f.weights = {weights};
   f.noise = Eigen::MatrixXd::Zero(n, n);
   f.bound = Eigen::VectorXd::Constant(n, 10);
+  f.unknown = Eigen::VectorXd::Zero(n);
   return f;
 }
 

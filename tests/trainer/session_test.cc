@@ -53,6 +53,7 @@ ParameterDistribution Lacking(int iteration) {
   function.noise = Eigen::MatrixXd::Zero(2, 2);
   function.weights = {Eigen::MatrixXd::Zero(2, function.features())};
   function.bound = Eigen::VectorXd::Ones(2);
+  function.unknown = Eigen::VectorXd::Zero(2);
   ParameterDistribution distribution = Distribution(iteration);
   Residual residual;
   residual.coordinates = {distribution.mixture.components[0].mean};

@@ -31,7 +31,6 @@ Squares SquaredErrors(const RobotDescription& robot, const Residual& residual, b
   simulator.SetParameters(robot.ToPhysical(residual.coordinates[0]));
   ResidualInputs inputs(model, residual.margin);
   const ResidualFunction& function = touching ? *residual.touching : *residual.free;
-  Eigen::VectorXd features(function.features());
   ResidualFunction::Work work = function.MakeWork();
   Squares squares;
   for (const Rollout& rollout : rollouts) {
@@ -43,7 +42,8 @@ Squares SquaredErrors(const RobotDescription& robot, const Residual& residual, b
       inputs.End(simulator, t.efforts[0].effort, rollout.transitions[i - 1].efforts[0].effort,
                  t.duration());
       if (inputs.touching() != touching) continue;
-      function.Features(inputs.x(), &work, features);
+      function.Features(inputs.x(), &work);
+      const Eigen::VectorXd features = work.features.head(function.features()).cast<double>();
       const Eigen::VectorXd error = t.next_v - simulator.v();
       squares.before += error.squaredNorm();
       const Eigen::VectorXd change = function.weights[0] * features;

@@ -352,7 +352,7 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   CHECK(std::isnan(loaded->ess));
   std::string text =
       (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
-  text.replace(text.find("\"version\": 5"), 12, "\"version\": 1");
+  text.replace(text.find("\"version\": 6"), 12, "\"version\": 1");
   std::ofstream(folder / "calibration.json") << text;
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
 }
@@ -368,6 +368,7 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
   function.centres = numbers(4, 6);
   function.weights = {numbers(1, 11), numbers(1, 11)};
   function.noise = numbers(1, 1).cwiseAbs(), function.bound = numbers(1, 1).cwiseAbs();
+  function.unknown = numbers(1, 1).cwiseAbs();
   Residual residual;
   residual.coordinates = {kTruth, kNull};
   residual.touching = function;

@@ -1,0 +1,91 @@
+#include "robot/residual_kernels.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+namespace plumb::residual_kernels {
+namespace {
+
+#if defined(__AVX512F__)
+constexpr int kWidth = 16;
+#elif defined(__AVX__)
+constexpr int kWidth = 8;
+#else
+constexpr int kWidth = 4;
+#endif
+
+using Packet = float __attribute__((vector_size(kWidth * sizeof(float))));
+using IntPacket = int32_t __attribute__((vector_size(kWidth * sizeof(int32_t))));
+
+Packet Load(const float* from) {
+  Packet packet;
+  std::memcpy(&packet, from, sizeof packet);
+  return packet;
+}
+
+void Store(float* to, Packet packet) { std::memcpy(to, &packet, sizeof packet); }
+
+// y = A x of kPackets packets of rows, whose sums stay in registers.
+template <int kPackets>
+void MultiplyRows(const float* a, int rows, int columns, const float* x, float* y) {
+  Packet sums[kPackets] = {};
+  for (int j = 0; j < columns; ++j, a += rows) {
+#pragma GCC unroll 8
+    for (int i = 0; i < kPackets; ++i) sums[i] += Load(a + i * kWidth) * x[j];
+  }
+#pragma GCC unroll 8
+  for (int i = 0; i < kPackets; ++i) Store(y + i * kWidth, sums[i]);
+}
+
+// packets: enough sums at a time that none waits for the one before, and a triangle has few edges
+constexpr int kMany = kWidth == 4 ? 8 : 4;
+
+}  // namespace
+
+void Multiply(const Pack* packed, int packs, int columns, const float* x, float* y) {
+  const float* a = packed->x;
+  const int rows = packs * Pack::kSize;
+  int i = 0;
+  for (; i + kMany * kWidth <= rows; i += kMany * kWidth)
+    MultiplyRows<kMany>(a + i, rows, columns, x, y + i);
+  for (; i < rows; i += kWidth) MultiplyRows<1>(a + i, rows, columns, x, y + i);
+}
+
+void MultiplyLower(const Pack* packed, int packs, const float* x, float* y) {
+  const float* a = packed->x;
+  const int rows = packs * Pack::kSize;
+  int i = 0;
+  for (; i + kMany * kWidth <= rows; i += kMany * kWidth)
+    MultiplyRows<kMany>(a + i, rows, i + kMany * kWidth, x, y + i);
+  for (; i < rows; i += kWidth) MultiplyRows<1>(a + i, rows, i + kWidth, x, y + i);
+}
+
+void ExpOfNegatives(float* x, int packs) {
+  constexpr float kLog2E = 1.44269504f;
+  // ln 2 = first + second; the first has 15 bits, so that k times it is exact
+  constexpr float kFirst = 0.693145752f, kSecond = 1.42860677e-6f;
+  // next to nothing beside 1, and squares of it are still normal numbers, which are faster
+  constexpr float kLeast = 40;
+  constexpr float kRound = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer
+  constexpr float kSeries[] = {1.f / 5040, 1.f / 720, 1.f / 120, 1.f / 24, 1.f / 6, 0.5f, 1, 1};
+  const Packet zero{}, least = zero - kLeast;
+  for (int i = 0; i < packs * Pack::kSize; i += kWidth) {
+    Packet above = Load(x + i);
+    above = above < zero ? above : zero;
+    above = above > least ? above : least;
+    const Packet shifted = above * kLog2E + kRound, k = shifted - kRound;
+    const Packet r = (above - k * kFirst) - k * kSecond;
+    Packet sum{};
+#pragma GCC unroll 8
+    for (const float term : kSeries) sum = sum * r + term;
+    IntPacket bits;  // whose lowest are k's
+    std::memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits + 127) << 23;
+    Packet power;
+    std::memcpy(&power, &bits, sizeof power);
+    Store(x + i, sum * power);
+  }
+}
+
+}  // namespace plumb::residual_kernels
