@@ -133,7 +133,7 @@ BENCHMARK(Hopper);
 
 /// As large as FitResidual makes them, of small numbers: the motion hardly changes.
 std::shared_ptr<const Residual> LearntResidual(const RobotDescription& robot) {
-  constexpr Eigen::Index kCentres = 280;
+  constexpr Eigen::Index kCentres = 256;
   const Eigen::Index inputs = ResidualInputCount(robot), outputs = 2 * robot.num_velocities();
   Random random(7);
   const auto normal = [&](Eigen::Index rows, Eigen::Index columns) {

@@ -1,6 +1,7 @@
 #include "robot/residual_kernels.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 
@@ -26,11 +27,14 @@ Packet Load(const float* from) {
 
 void Store(float* to, Packet packet) { std::memcpy(to, &packet, sizeof packet); }
 
-// y = A x of kPackets packets of rows, whose sums stay in registers.
+// Adds to kPackets packets of y what columns first to last of A give; the sums stay in registers.
 template <int kPackets>
-void MultiplyRows(const float* a, int rows, int columns, const float* x, float* y) {
-  Packet sums[kPackets] = {};
-  for (int j = 0; j < columns; ++j, a += rows) {
+void AddRows(const float* a, int rows, int first, int last, const float* x, float* y) {
+  Packet sums[kPackets];
+#pragma GCC unroll 8
+  for (int i = 0; i < kPackets; ++i) sums[i] = Load(y + i * kWidth);
+  a += ptrdiff_t{first} * rows;
+  for (int j = first; j < last; ++j, a += rows) {
 #pragma GCC unroll 8
     for (int i = 0; i < kPackets; ++i) sums[i] += Load(a + i * kWidth) * x[j];
   }
@@ -38,27 +42,50 @@ void MultiplyRows(const float* a, int rows, int columns, const float* x, float* 
   for (int i = 0; i < kPackets; ++i) Store(y + i * kWidth, sums[i]);
 }
 
-// packets: enough sums at a time that none waits for the one before, and a triangle has few edges
+// packets: enough sums at a time that none waits for the one before, and all in registers
 constexpr int kMany = kWidth == 4 ? 8 : 4;
+
+// One pack has too few sums for that: each fourth column has its own.
+void MultiplyOne(const float* a, int columns, const float* x, float* y) {
+  constexpr int kSums = 4;
+  for (int i = 0; i < Pack::kSize; i += kWidth) {
+    Packet sums[kSums] = {};
+    const float* column = a + i;
+    int j = 0;
+    for (; j + kSums <= columns; j += kSums, column += kSums * Pack::kSize) {
+#pragma GCC unroll 4
+      for (int k = 0; k < kSums; ++k) sums[k] += Load(column + k * Pack::kSize) * x[j + k];
+    }
+    for (; j < columns; ++j, column += Pack::kSize) sums[0] += Load(column) * x[j];
+    Store(y + i, (sums[0] + sums[1]) + (sums[2] + sums[3]));
+  }
+}
 
 }  // namespace
 
 void Multiply(const Pack* packed, int packs, int columns, const float* x, float* y) {
   const float* a = packed->x;
+  if (packs == 1) return MultiplyOne(a, columns, x, y);
   const int rows = packs * Pack::kSize;
+  std::fill_n(y, rows, 0.0f);
   int i = 0;
   for (; i + kMany * kWidth <= rows; i += kMany * kWidth)
-    MultiplyRows<kMany>(a + i, rows, columns, x, y + i);
-  for (; i < rows; i += kWidth) MultiplyRows<1>(a + i, rows, columns, x, y + i);
+    AddRows<kMany>(a + i, rows, 0, columns, x, y + i);
+  for (; i < rows; i += kWidth) AddRows<1>(a + i, rows, 0, columns, x, y + i);
 }
 
 void MultiplyLower(const Pack* packed, int packs, const float* x, float* y) {
   const float* a = packed->x;
   const int rows = packs * Pack::kSize;
-  int i = 0;
-  for (; i + kMany * kWidth <= rows; i += kMany * kWidth)
-    MultiplyRows<kMany>(a + i, rows, i + kMany * kWidth, x, y + i);
-  for (; i < rows; i += kWidth) MultiplyRows<1>(a + i, rows, i + kWidth, x, y + i);
+  std::fill_n(y, rows, 0.0f);
+  // the columns that all rows of a block have, and each packet's others
+  int done = 0;
+  for (; done + kMany * kWidth <= rows; done += kMany * kWidth)
+    AddRows<kMany>(a + done, rows, 0, done, x, y + done);
+  for (int i = 0; i < rows; i += kWidth) {
+    const int common = i < done ? i / (kMany * kWidth) * (kMany * kWidth) : 0;
+    AddRows<1>(a + i, rows, common, i + kWidth, x, y + i);
+  }
 }
 
 void ExpOfNegatives(float* x, int packs) {

@@ -14,7 +14,7 @@ namespace plumb {
 
 struct ResidualFitOptions {
   bool free = true, touching = true;  ///< where the simulator is to be corrected
-  int centres = 280;                  ///< of its functions, at most
+  int centres = 256;                  ///< of its functions, at most
   /// of the weights: 0 = their posterior's mean for each draw of the parameters, 1 = as uncertain
   /// as they are
   double width = 0;
