@@ -143,6 +143,23 @@ std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Ro
   return free;
 }
 
+std::vector<Rollout> InformingSteps(const RobotDescription& robot,
+                                    std::span<const Rollout> rollouts, Informed informed) {
+  if (informed == Informed::kFree) return FreeSteps(robot, rollouts);
+  return {rollouts.begin(), rollouts.end()};
+}
+
+const char* Name(Informed informed) {
+  switch (informed) {
+    case Informed::kFree:
+      return "free";
+    case Informed::kNone:
+      return "none";
+    default:
+      return "all";
+  }
+}
+
 Eigen::VectorXd Explained(const ResidualQuality& quality) {
   const Eigen::ArrayXd before = quality.before.array().square(),
                        after = quality.after.array().square();

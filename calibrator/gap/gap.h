@@ -16,6 +16,10 @@ namespace plumb {
 
 /// Which steps the parameters are learnt from.
 enum class Informed { kAll, kFree, kNone };
+/// "all", "free" or "none".
+const char* Name(Informed informed);
+/// Why, where it is none.
+inline constexpr char kNotInformed[] = "nothing that was recorded is explained well enough to tell";
 
 /// What a model lacks, as far as it was learnt.
 struct Gap {
@@ -58,6 +62,9 @@ GapFit CloseGap(const MethodInput& input, MethodResult all);
 
 /// The steps of roll-outs that begin and end away from the ground and from stops. Thread-safe.
 std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Rollout> rollouts);
+/// The steps that the parameters are learnt from, or would be if anything informed them.
+std::vector<Rollout> InformingSteps(const RobotDescription& robot,
+                                    std::span<const Rollout> rollouts, Informed informed);
 
 /// Share of each velocity's squared errors that a residual explains, left-out transitions judging:
 /// 0 to 1; empty where none was learnt. Thread-safe.

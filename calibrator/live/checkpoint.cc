@@ -28,6 +28,13 @@ Eigen::VectorXd VectorFrom(const json& j) {
   return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
+Informed InformedFrom(const std::string& name) {
+  for (const Informed informed : {Informed::kAll, Informed::kFree, Informed::kNone}) {
+    if (name == Name(informed)) return informed;
+  }
+  throw std::runtime_error(fmt::format("informed: {} is none", name));
+}
+
 json ToJson(const Gaussian& p) {
   const Eigen::MatrixXd& c = p.covariance;
   return {{"mean", ToJson(p.mean)},
@@ -220,6 +227,7 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"residual", ToJson(state.residual, robot_)},
                {"alarm", state.alarm},
                {"gap", state.gap},
+               {"informed", Name(state.informed)},
                {"rollouts_per_iteration", state.rollouts_per_iteration}};
   WriteAtomically(folder_ / "calibration.json", j.dump(1));
 }
@@ -253,6 +261,7 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     state.warnings = j.at("warnings").get<std::vector<std::string>>();
     state.residual = ResidualFrom(j.at("residual"), robot_);
     state.alarm = j.at("alarm"), state.gap = j.at("gap");
+    state.informed = InformedFrom(j.at("informed"));
     state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
     size_t count = 0;
     for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);

@@ -1,5 +1,7 @@
 #include "calibrator/live/simopt.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -157,7 +159,7 @@ void SimOpt::Infer() {
   try {
     const GapFit fit = RunFromWhereItIs();
     const MethodResult& result = fit.result;
-    state_.residual = fit.gap.residual;
+    state_.residual = fit.gap.residual, state_.informed = fit.gap.informed;
     state_.alarm = fit.alarm.summary, state_.gap = fit.gap.summary;
     state_.kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
     state_.ess = result.ess;
@@ -222,8 +224,11 @@ std::optional<CalibrationReport> SimOpt::Report() {
     const Eigen::VectorXd errors = discrepancy_.PredictionError(physical, newest, horizon);
     report.errors.push_back({horizon, errors(0), errors(1), errors(2)});
   }
-  report.identifiability =
-      FindIdentifiability(robot_, discrepancy_, state_.rollouts, Moments(state_.distribution));
+  report.identifiability = FindIdentifiability(
+      robot_, discrepancy_, InformingSteps(robot_, state_.rollouts, state_.informed),
+      Moments(state_.distribution));
+  if (state_.informed == Informed::kNone)
+    report.identifiability.summary = fmt::format("no parameter is determined: {}", kNotInformed);
   report.failures = discrepancy_.failures();
   report.failures.diverged += failures_;
   report.warnings = state_.warnings;

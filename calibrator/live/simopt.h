@@ -84,6 +84,7 @@ class SimOpt {
     std::string used = "prior";
     /// that its simulators lack; null = nothing, or nothing is known of it
     std::shared_ptr<const Residual> residual;
+    Informed informed = Informed::kAll;  ///< which steps the parameters are learnt from
     /// whether the model explains what was recorded, and what was done about it; empty = not looked
     /// at, or nothing
     std::string alarm, gap;

@@ -21,7 +21,6 @@ namespace {
 
 // p below which logs are of different robots, or the model is wrong
 constexpr double kDisagreement = 1e-3;
-constexpr char kNotInformed[] = "nothing that was recorded is explained well enough to tell";
 constexpr char kCure[] =
     "; train on posterior and residual together (plumb train --distribution), and, as a residual "
     "is "
@@ -142,8 +141,7 @@ class Calibration {
   bool informed() const { return findings_.gap.informed != Informed::kNone; }
   // The steps that the parameters are learnt from.
   std::vector<Rollout> Informing(std::span<const Rollout> rollouts) const {
-    if (findings_.gap.informed == Informed::kFree) return FreeSteps(robot_, rollouts);
-    return {rollouts.begin(), rollouts.end()};
+    return InformingSteps(robot_, rollouts, findings_.gap.informed);
   }
 
   // Fits again without a part of the data, which then judges.

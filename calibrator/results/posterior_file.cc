@@ -71,17 +71,6 @@ json ToJson(const Misspecification& found) {
            })}};
 }
 
-const char* Name(Informed informed) {
-  switch (informed) {
-    case Informed::kFree:
-      return "free";
-    case Informed::kNone:
-      return "none";
-    default:
-      return "all";
-  }
-}
-
 // One-step errors of each velocity in a condition, in its unit.
 json ToJson(const ResidualQuality& quality) {
   if (quality.before.size() == 0) return nullptr;

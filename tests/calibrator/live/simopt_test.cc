@@ -330,6 +330,21 @@ TEST_CASE("what an iteration has found is a posterior, and the same bytes after 
   CHECK(PosteriorJson(IterationFindings(robot, resumed, *resumed.Report()), robot, {}) == text);
 }
 
+TEST_CASE("of parameters that nothing informs none is determined, after a resumption, too") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 3, 1, "auto"), resumed(robot, 3, 1, "auto");
+  simopt.Begin({Synthetic(robot, 1)});
+  CHECK_THAT(Finish(simopt).identifiability.summary, !Catch::Contains("no parameter"));
+  SimOpt::State state = simopt.state();
+  state.informed = Informed::kNone;
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 3);
+  checkpoint.Save(state);
+  resumed.Resume(*checkpoint.Load());
+  CHECK_THAT(resumed.Report()->identifiability.summary,
+             Catch::Contains("no parameter is determined: nothing that was recorded"));
+}
+
 TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trainer") {
   const RobotDescription robot = Pendulum();
   SimOpt simopt(robot, 1, 1);
