@@ -70,6 +70,8 @@ struct ResidualFunction {
   /// keeps it well conditioned.
   Eigen::MatrixXd KernelFactor() const;
   static constexpr double kNugget = 1e-3;
+  /// More would be no residual but an attack: their kernel is factorised.
+  static constexpr int kMostCentres = 2000;
 };
 
 /// What a simulator lacks, for some draws of its parameters: each of them has its own function, as

@@ -35,9 +35,9 @@ json ToJson(const std::optional<ResidualFunction>& function) {
           {"unknown", Singles(function->unknown)}};
 }
 
-size_t Count(const JsonField& list) {
+size_t Count(const JsonField& list, size_t most = kMost) {
   const size_t count = list.size();
-  list.Require(count >= 1 && count <= kMost, fmt::format("has {} entries", count));
+  list.Require(count >= 1 && count <= most, fmt::format("has {} entries", count));
   return count;
 }
 
@@ -49,7 +49,8 @@ Eigen::VectorXd Positive(const JsonField& list, size_t size) {
 
 std::optional<ResidualFunction> ReadFunction(const JsonField& field, size_t draws, size_t outputs) {
   if (field.null()) return {};
-  const size_t inputs = Count(field["mean"]), centres = Count(field["centres"]);
+  const size_t inputs = Count(field["mean"]),
+               centres = Count(field["centres"], ResidualFunction::kMostCentres);
   ResidualFunction function;
   function.mean = field["mean"].SingleVector(inputs);
   function.scale = Positive(field["scale"], inputs);

@@ -55,7 +55,7 @@ ResidualFunction FromMessage(const Message& m, size_t draws) {
   };
   require(m.num_inputs > 0 && m.num_inputs <= kMost, "num_inputs");
   require(m.num_outputs > 0 && m.num_outputs <= kMost, "num_outputs");
-  require(m.num_centres > 0 && m.num_centres <= kMost, "num_centres");
+  require(m.num_centres > 0 && m.num_centres <= ResidualFunction::kMostCentres, "num_centres");
   const auto d = static_cast<size_t>(m.num_inputs), n = static_cast<size_t>(m.num_outputs),
              w = static_cast<size_t>(m.num_centres), each = n * (1 + d + w);
   for (const auto& [field, values] :
