@@ -37,7 +37,7 @@ struct Gap {
   const char *key, *title;
   const char *truth, *model, *uncertain;
 };
-constexpr std::array<Gap, 9> kGaps{
+constexpr std::array<Gap, 10> kGaps{
     {{"hopper", "MuJoCo's hopper", "hopper/mujoco.toml", "hopper/robot.toml",
       "hopper/mujoco_fitted.toml"},
      {"stiff", "ground five times stiffer", "hopper/mujoco_stiff.toml", "hopper/robot.toml",
@@ -48,6 +48,7 @@ constexpr std::array<Gap, 9> kGaps{
       "hopper/mujoco_fitted.toml"},
      {"simbody", "Simbody's hopper", "hopper/simbody.toml", "hopper/robot.toml",
       "hopper/mujoco_fitted.toml"},
+     {"ode", "ODE's hopper", "hopper/ode.toml", "hopper/robot.toml", "hopper/mujoco_fitted.toml"},
      {"worn", "worn hopper", "hopper/worn.toml", "hopper/robot.toml", "hopper/mujoco_fitted.toml"},
      {"right", "the model itself", "hopper/robot.toml", "hopper/robot.toml",
       "hopper/mujoco_fitted.toml"},

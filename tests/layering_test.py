@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Dependencies point down only: which folder may include which. Exit status 1 names every line that does not.
 
-Also: SimTK headers only in sim/*.cc and what two of these share, sim/virtual/simbody_tree.h, MuJoCo's only in sim/virtual/mujoco_backend.cc, MPI's only in common/ranks.cc,
-ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in main.cc files, common/ and drivers/can/ (tests aside).
+Also: SimTK headers only in sim/*.cc and what two of these share, sim/virtual/simbody_tree.h, MuJoCo's only in sim/virtual/mujoco_backend.cc, ODE's only in sim/virtual/ode_*,
+MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in main.cc files, common/ and drivers/can/ (tests aside).
 """
 import pathlib
 import re
@@ -63,6 +63,7 @@ EXCEPTIONS = {(file, room) for file in ON_THE_BUS for room in BELOW if room.star
 SYSTEM = {
     r"(SimTK\w*|Simbody)\.h|simbody/": lambda p: p.startswith("sim/") and p.endswith(".cc") or p == "sim/virtual/simbody_tree.h",
     r"mujoco/": lambda p: p == "sim/virtual/mujoco_backend.cc",
+    r"ode/": lambda p: p.startswith("sim/virtual/ode_"),
     r"onnx/|google/protobuf/": lambda p: p.startswith("trainer/onnx_") and p.endswith(".cc"),
     r"lcm/": lambda p: p.startswith(("common/", "drivers/can/")) or p.endswith("main.cc"),
     r"mpi\.h": lambda p: p == "common/ranks.cc",

@@ -49,8 +49,9 @@ UnmodelledGround ReadUnmodelledGround(Config config, const RobotDescription& rob
                 "is of a ground that the robot does not touch: there is no "
                 "[simulation.contact]");
   if (s.slope != 0 && engine == VirtualRobotSettings::Engine::kAuto)
-    config.Fail("slope",
-                "needs engine = \"mujoco\" or \"simbody\": the simulator's ground is level");
+    config.Fail(
+        "slope",
+        "needs engine = \"mujoco\", \"simbody\" or \"ode\": the simulator's ground is level");
   return s;
 }
 
@@ -96,7 +97,7 @@ VirtualRobotSettings ReadVirtualRobot(Config config, const RobotDescription& rob
   s.heartbeat = config.Number("heartbeat", {1e-3, 10});
   s.encoder_bits = config.Integer("encoder_bits", {4, 32});
   s.engine = static_cast<VirtualRobotSettings::Engine>(
-      config.Choice("engine", {"auto", "mujoco", "simbody"}, 0));
+      config.Choice("engine", {"auto", "mujoco", "simbody", "ode"}, 0));
   s.engine_source = config.Position("engine");
   Config hidden = config.Table("hidden", false);
   for (const std::string& name : hidden.Keys()) {

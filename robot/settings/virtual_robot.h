@@ -57,7 +57,7 @@ struct SprungMass {
 /// [virtual_robot].
 struct VirtualRobotSettings {
   /// The physics that integrates its motion, see VirtualPlant.
-  enum class Engine { kAuto, kMujoco, kSimbody };
+  enum class Engine { kAuto, kMujoco, kSimbody, kOde };
 
   double watchdog;   ///< [s]
   double heartbeat;  ///< [s]

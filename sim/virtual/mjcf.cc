@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/decompositions.h"
+#include "sim/virtual/physics_backend.h"
 
 namespace plumb {
 namespace {
@@ -30,16 +31,6 @@ Eigen::Matrix3d Solid(const Eigen::Matrix3d& inertia) {
                                                                    Eigen::EigenvaluesOnly)
                         .eigenvalues()[0] < least;
   return inertia + (thin ? least : 0) * Eigen::Matrix3d::Identity();
-}
-
-void RequireKnown(const JointDescription& joint) {
-  const std::string of = " of joint '" + joint.name + "'";
-  if (joint.type == Type::kSpherical) throw std::invalid_argument("the free rotation" + of);
-  const JointParameterKind* unknown =
-      FirstNotAmong({&JointDynamics::armature, &JointDynamics::damping, &JointDynamics::friction,
-                     &JointDynamics::stiffness, &JointDynamics::rest, &JointDynamics::motor_gain},
-                    joint.dynamics);
-  if (unknown) throw std::invalid_argument(unknown->noun + of);
 }
 
 /// Where a joint is in the frame of a body that it moves, perhaps through links without mass.
@@ -162,7 +153,7 @@ double ContactTime(const RobotDescription& robot) {
 }
 
 std::string Mjcf(const RobotDescription& robot) {
-  for (const JointDescription& joint : robot.joints) RequireKnown(joint);
+  RequireKnownJoints(robot);
   return Writer(robot).Write();
 }
 

@@ -71,12 +71,7 @@ class MujocoBackend : public PhysicsBackend {
   }
 
   void SetState(const Vector& q, const Vector& v) override {
-    if (q.size() != q_.size() || v.size() != v_.size()) {
-      throw std::invalid_argument("a state has " + std::to_string(q_.size()) +
-                                  " positions and velocities");
-    }
-    if (!q.allFinite() || !v.allFinite())
-      throw std::invalid_argument("a robot's state must be finite");
+    RequireState(q, v, q_.size());
     q_ = q;
     v_ = v;
     Restore();

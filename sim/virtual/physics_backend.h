@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "robot/description.h"
+
 namespace plumb {
 
 /// The physics of a virtual robot: integrates the motion of its joints under the efforts of its
@@ -22,5 +24,14 @@ class PhysicsBackend {
   virtual const Eigen::VectorXd& q() const = 0;  ///< [rad or m]
   virtual const Eigen::VectorXd& v() const = 0;  ///< [rad/s or m/s]
 };
+
+/// What every engine of others can be told of a joint: a hinge or a slide with armature, damping,
+/// friction, a spring and a motor's gain. Thread-safe.
+/// @throws std::invalid_argument naming the first thing else that one of the robot's joints has.
+void RequireKnownJoints(const RobotDescription& robot);
+
+/// Thread-safe. @throws std::invalid_argument unless q and v have `size` finite entries each.
+void RequireState(const PhysicsBackend::Vector& q, const PhysicsBackend::Vector& v,
+                  Eigen::Index size);
 
 }  // namespace plumb

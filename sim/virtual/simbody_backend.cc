@@ -17,18 +17,8 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-using Type = JointDescription::Type;
-
 void RequireKnown(const RobotDescription& robot) {
-  for (const JointDescription& joint : robot.joints) {
-    const std::string of = " of joint '" + joint.name + "'";
-    if (joint.type == Type::kSpherical) throw std::invalid_argument("the free rotation" + of);
-    const JointParameterKind* unknown =
-        FirstNotAmong({&JointDynamics::armature, &JointDynamics::damping, &JointDynamics::friction,
-                       &JointDynamics::stiffness, &JointDynamics::rest, &JointDynamics::motor_gain},
-                      joint.dynamics);
-    if (unknown) throw std::invalid_argument(unknown->noun + of);
-  }
+  RequireKnownJoints(robot);
   for (const ContactPoint& point : ContactPoints(robot)) {
     if (point.radius > 0) continue;
     throw std::invalid_argument("the edges of link '" +
@@ -212,12 +202,7 @@ SimbodyBackend::SimbodyBackend(const RobotDescription& robot) {
 SimbodyBackend::~SimbodyBackend() = default;
 
 void SimbodyBackend::SetState(const Vector& q, const Vector& v) {
-  if (q.size() != impl_->q_.size() || v.size() != impl_->v_.size()) {
-    throw std::invalid_argument("a state has " + std::to_string(impl_->q_.size()) +
-                                " positions and velocities");
-  }
-  if (!q.allFinite() || !v.allFinite())
-    throw std::invalid_argument("a robot's state must be finite");
+  RequireState(q, v, impl_->q_.size());
   impl_->SetState(q, v);
 }
 

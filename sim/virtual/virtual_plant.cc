@@ -9,6 +9,7 @@
 
 #include "sim/virtual/fine_simulator.h"
 #include "sim/virtual/mujoco_backend.h"
+#include "sim/virtual/ode_backend.h"
 #include "sim/virtual/simbody_backend.h"
 #include "sim/virtual/simbody_plant.h"
 #include "sim/virtual/sprung_masses.h"
@@ -34,6 +35,7 @@ constexpr Backend kBackends[] = {
     {Engine::kAuto, "auto", &MakeByNeed},
     {Engine::kMujoco, "mujoco", &MakeMujocoBackend},
     {Engine::kSimbody, "simbody", &MakeSimbodyBackend},
+    {Engine::kOde, "ode", &MakeOdeBackend},
 };
 
 std::unique_ptr<PhysicsBackend> MakeBackend(const RobotDescription& robot) {

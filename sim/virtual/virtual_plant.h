@@ -14,9 +14,8 @@ namespace plumb {
 ///           (armature, stops, contact), a fine simulator (see MakeFineSimulator): then reality has
 ///           the simulator's equations, but not its integration errors: errors of a model of
 ///           contact do not show there
-///   mujoco  MuJoCo (see MakeMujocoBackend): another contact, other stops, another integrator than
-///           any model has
-///   simbody a SimbodyBackend: the same, with Simbody's
+///   others  another contact, other stops, another integrator than any model has: those of the
+///           program that it names, see the header of its backend
 /// Coulomb friction and backlash of description.virtual_robot.joints, its ground and its sprung
 /// masses come on top. q and v are the robot's without those masses. Not thread-safe.
 class VirtualPlant {

@@ -12,6 +12,7 @@
 #include "sim/parameters.h"
 #include "sim/tasks/task.h"
 #include "sim/virtual/mujoco_backend.h"
+#include "sim/virtual/ode_backend.h"
 #include "tests/calibrator/hop_on_bus.h"
 
 namespace plumb {
@@ -137,13 +138,19 @@ TEST_CASE("backlash is a gap that the pendulum's parameters do not close") {
   CHECK(Found(model, Trials(system, Wanderer(model, 0.5f), 1)).misspecification.alarm);
 }
 
-TEST_CASE("a hopper that MuJoCo moves is driven through its bus as any other") {
-  const RobotDescription truth = Robot("hopper/mujoco.toml"), model = Robot("hopper");
+TEST_CASE("a hopper that another program moves is driven through its bus as any other") {
+  struct Other {
+    std::string name;
+    bool here;
+  };
+  const auto other = GENERATE(Other{"mujoco", HasMujoco()}, Other{"ode", HasOde()});
+  const RobotDescription truth = Robot("hopper/" + other.name + ".toml"), model = Robot("hopper");
   const Eigen::VectorXd hidden = HiddenParameters(truth, 2);
   BusRobot other_world(truth, model, hidden, 1), own_world(model, model, hidden, 1);
-  if (!HasMujoco()) {
+  if (!other.here) {
     CHECK_THROWS_WITH(other_world.Run(Wanderer(model, 0.5f), true, 100, 0),
-                      Catch::Contains("mujoco.toml:6:10: ") && Catch::Contains("libmujoco-dev"));
+                      Catch::Contains(other.name + ".toml:6:10: ") &&
+                          Catch::Contains("lib" + other.name + "-dev"));
     return;
   }
   const std::vector<Rollout> there = Trials(other_world, Wanderer(model, 0.5f), 5),

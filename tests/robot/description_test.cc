@@ -114,7 +114,7 @@ TEST_CASE(
   refused("rotor = 0.01\n[[virtual_robot.joint]]\nname = \"pole\"",
           "\"pole\" is not a joint with a motor");
   refused("rotor = 0.01\n[virtual_robot]\nengine = \"bullet\"",
-          "is not one of auto, mujoco, simbody");
+          "is not one of auto, mujoco, simbody, ode");
   refused("rotor = 0.01\n[virtual_robot.ground]\nfriction = 1",
           "virtual_robot.ground.friction is of a ground that the robot does not touch");
 }
@@ -135,6 +135,7 @@ TEST_CASE("a ground and sprung masses that no model knows are read, and refused 
   CHECK(battery.travel == 0.05);
   CHECK(LoadRobot(folder + "simbody.toml").virtual_robot.engine ==
         VirtualRobotSettings::Engine::kSimbody);
+  CHECK(LoadRobot(folder + "ode.toml").virtual_robot.engine == VirtualRobotSettings::Engine::kOde);
   CHECK(LoadRobot(folder + "mujoco_stiff.toml").virtual_robot.ground.stiffness_factor == 5);
   CHECK(LoadRobot(folder + "mujoco_slippery.toml").virtual_robot.ground.friction == 0.7);
   const UnmodelledGround slope = LoadRobot(folder + "mujoco_slope.toml").virtual_robot.ground;
@@ -151,7 +152,7 @@ TEST_CASE("a ground and sprung masses that no model knows are read, and refused 
     CHECK_THROWS_WITH(LoadRobot(copies / "other.toml"), Contains("other.toml:") && Contains(why));
   };
   const std::string ground = "[virtual_robot.ground]\n";
-  refused(ground + "slope = 0.1", "virtual_robot.ground.slope needs engine = \"mujoco\" or");
+  refused(ground + "slope = 0.1", "virtual_robot.ground.slope needs engine = \"mujoco\", ");
   refused(ground + "slope = 1.6", "virtual_robot.ground.slope = 1.6 is not");
   refused(ground + "stiffness_factor = 0", "virtual_robot.ground.stiffness_factor = 0 is not");
   refused(ground + "friction = -1", "virtual_robot.ground.friction = -1 is not");

@@ -1,0 +1,31 @@
+#include "sim/virtual/physics_backend.h"
+
+#include <stdexcept>
+#include <string>
+
+namespace plumb {
+
+void RequireKnownJoints(const RobotDescription& robot) {
+  for (const JointDescription& joint : robot.joints) {
+    const std::string of = " of joint '" + joint.name + "'";
+    if (joint.type == JointDescription::Type::kSpherical)
+      throw std::invalid_argument("the free rotation" + of);
+    const JointParameterKind* unknown =
+        FirstNotAmong({&JointDynamics::armature, &JointDynamics::damping, &JointDynamics::friction,
+                       &JointDynamics::stiffness, &JointDynamics::rest, &JointDynamics::motor_gain},
+                      joint.dynamics);
+    if (unknown) throw std::invalid_argument(unknown->noun + of);
+  }
+}
+
+void RequireState(const PhysicsBackend::Vector& q, const PhysicsBackend::Vector& v,
+                  Eigen::Index size) {
+  if (q.size() != size || v.size() != size) {
+    throw std::invalid_argument("a state has " + std::to_string(size) +
+                                " positions and velocities");
+  }
+  if (!q.allFinite() || !v.allFinite())
+    throw std::invalid_argument("a robot's state must be finite");
+}
+
+}  // namespace plumb
