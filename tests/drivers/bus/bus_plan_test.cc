@@ -176,6 +176,21 @@ TEST_CASE("an answer is as late as its question, and then some") {
   CHECK(Response(plan, 0x10) == Approx(470 + 135 + 135));
 }
 
+TEST_CASE("messages of one id: each answer is as late as its own question") {
+  const Layout ask_a{1, "Ask_A"}, ask_b{2, "Ask_B"}, a{1, "A"}, b{2, "B"};
+  BusDevice device{"motor",
+                   "x",
+                   {Message(ask_a, 0x10, 5'000, 8, 200), Message(ask_b, 0x10, 5'000, 8, 200),
+                    Message(a, 0x20, 5'000, 8), Message(b, 0x21, 5'000, 8)},
+                   {}};
+  device.messages[2].answers = 0;
+  device.messages[3].answers = 1;
+  const BusPlan plan = PlanBus({device}, 1e6);
+  // One that has begun, 135 for each, and questions are late by 200.
+  CHECK(Response(plan, 0x20) == Approx((200 + 2 * 135) + 135 + 2 * 135 + 135));
+  CHECK(Response(plan, 0x21) == Approx((200 + 3 * 135) + 3 * 135 + 135));
+}
+
 TEST_CASE("collisions name both and the id") {
   SECTION("factory ids of an ODrive and an Xsens") {
     MotorDescription motor;

@@ -152,6 +152,24 @@ TEST_CASE("canmatrix decodes every message of the hopper as we do") {
   CheckDecodes(BusDevices(LoadRobot(Source() + "/robots/hopper")));
 }
 
+TEST_CASE("messages of one device and one id are told apart by their first field") {
+  BusMessage message;
+  message.id = 0x11;
+  message.direction = BusMessage::Direction::kToDevice;
+  message.layout = {1, "Go", 8, {{{"Code", 0, 8}, {"Speed", 8, 8}}}};
+  message.selector = 1;
+  BusDevice device{"wheel", "x", {message}, {}};
+  message.layout = {2, "Halt", 8, {{{"Code", 0, 8}, {"Speed", 16, 8}}}};
+  message.selector = 2;
+  device.messages.push_back(message);
+  CHECK_THAT(ToDbc({device}),
+             Contains("BO_ 17 wheel_Commands: 8 driver\n"
+                      " SG_ Code M : 0|8@1+ (1,0) [0|255] \"\" wheel\n"
+                      " SG_ Go_Speed m1 : 8|8@1+ (1,0) [0|255] \"\" wheel\n"
+                      " SG_ Halt_Speed m2 : 16|8@1+ (1,0) [0|255] \"\" wheel\n\n"));
+  CheckDecodes({device});
+}
+
 TEST_CASE("a DBC's lines") {
   const std::string dbc = ToDbc(Menagerie());
   CHECK_THAT(dbc, Contains("BU_: _1st driver imu left_hip left_hip_2 pitch yaw\n"));
