@@ -20,6 +20,7 @@ struct MotorTable {
 };
 constexpr MotorTable kMotorTables[] = {
     {"mit", &ReadMit, &CheckMit},
+    {"rmd", &ReadRmd, &CheckRmd},
 };
 
 MotorDescription ReadMotor(Config& config) {

@@ -8,6 +8,7 @@
 #include "common/config.h"
 #include "robot/mit.h"
 #include "robot/parameter_kinds.h"
+#include "robot/rmd.h"
 #include "robot/settings/estimator.h"
 #include "robot/urdf/urdf.h"
 
@@ -22,6 +23,7 @@ struct MotorDescription {
   int sign = 1;                            ///< +1 or -1
   double offset = 0;                       ///< [rad] or [m] joint position at motor position 0
   std::optional<MitDescription> mit = {};  ///< of protocol "mit" and no other
+  std::optional<RmdDescription> rmd = {};  ///< of protocol "rmd" and no other
 };
 
 /// How the driver keeps a joint with a motor within its limits, and how the joint stops.

@@ -131,6 +131,7 @@ bool InheritJitter(BusPlan& plan, const std::vector<BusDevice>& devices) {
     const BusMessage& question = device->messages[static_cast<size_t>(row.message.answers)];
     for (const Row& other : plan.rows) {
       if (other.device != row.device || other.message.id != question.id ||
+          other.message.layout.name != question.layout.name ||
           other.message.remote != question.remote ||
           other.message.direction != question.direction) {
         continue;

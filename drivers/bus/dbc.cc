@@ -64,8 +64,8 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
     for (const BusMessage& message : device.messages) {
       if (message.layout.count() == 0 || message.remote) continue;
       std::vector<Sender>& senders = by_id[message.id | (message.extended ? kExtendedFlag : 0)];
-      // The driver says it once for all.
-      if (senders.empty() || message.direction == Direction::kFromDevice)
+      // What is for all the driver says once.
+      if (senders.empty() || !message.shared || message.direction == Direction::kFromDevice)
         senders.push_back({&device, &message, node});
     }
   }
@@ -74,9 +74,12 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
     const BusMessage& first = *senders[0].message;
     const bool from_device = first.direction == Direction::kFromDevice;
     const bool multiplexed = first.selector >= 0;
-    const std::string label = first.shared ? senders[0].device->protocol : senders[0].device->name;
-    body += fmt::format("BO_ {} {}: {} {}\n", id,
-                        Unique(label + "_" + std::string(first.layout.name), messages),
+    const bool several = multiplexed && !first.shared;  // messages of one device
+    const std::string label = first.shared ? senders[0].device->protocol : senders[0].device->name,
+                      what = !several      ? std::string(first.layout.name)
+                             : from_device ? "Answers"
+                                           : "Commands";
+    body += fmt::format("BO_ {} {}: {} {}\n", id, Unique(label + "_" + what, messages),
                         first.layout.length, from_device ? senders[0].node : kDriver);
     const std::string receiver = from_device    ? kDriver
                                  : first.shared ? "Vector__XXX"
@@ -92,7 +95,7 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
           multiplex = "M";
         } else if (multiplexed) {
           multiplex = fmt::format("m{}", sender.message->selector);
-          name = sender.node + "_" + name;
+          name = (several ? std::string(layout.name) : sender.node) + "_" + name;
         }
         name = Unique(name, signals);
         body += Signal(field, name, multiplex, receiver);

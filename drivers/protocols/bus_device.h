@@ -31,7 +31,8 @@ struct BusMessage {
   /// Other devices of the protocol may have it, too: broadcasts, and replies that say whose they
   /// are.
   bool shared = false;
-  /// of a shared one from the device: value of its first field that says whose it is; -1 = none
+  /// Value of its first field, where that tells it from others of its id: whose it is if it is
+  /// shared, else which of the device's messages; -1 = nothing has to
   int selector = -1;
 };
 

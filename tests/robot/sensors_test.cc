@@ -60,9 +60,9 @@ RobotDescription Load(const std::string& toml) {
   return LoadRobot(RobotFolder(kZooUrdf, toml).path());
 }
 
-std::string WithMit(const std::string& mit) {
+std::string WithMotor(const std::string& motor) {
   return Replaced(kZooToml, "protocol = \"cansimple\"\nnode = 1\ngear = 6.0\n",
-                  "gear = 6.0\n" + mit);
+                  "gear = 6.0\n" + motor);
 }
 
 TEST_CASE("sensors: encoders and an IMU") {
@@ -165,7 +165,7 @@ TEST_CASE("noise: of a count, of an IMU, of a joint") {
 }
 
 TEST_CASE("MIT motors: ranges with their source") {
-  const RobotDescription robot = Load(WithMit(kMit));
+  const RobotDescription robot = Load(WithMotor(kMit));
   const MotorDescription& motor = robot.joints[3].motor;
   CHECK(motor.protocol == "mit");
   CHECK(motor.node == 0x11);
@@ -180,10 +180,42 @@ TEST_CASE("MIT motors: ranges with their source") {
   CHECK_FALSE(robot.joints[9].motor.mit);
 }
 
+TEST_CASE("RMD motors: a torque constant with its source") {
+  const std::string rmd =
+      "protocol = \"rmd\"\nnode = 7\n[joint.rmd]\ntorque_constant = 0.5\ncurrent = 8.0\nsource = "
+      "\"the data sheet\"\n";
+  const RobotDescription robot = Load(WithMotor(rmd));
+  const MotorDescription& motor = robot.joints[3].motor;
+  REQUIRE(motor.rmd);
+  CHECK(motor.node == 7);
+  CHECK(motor.rmd->torque_constant == 0.5);
+  CHECK(motor.rmd->current == 8);
+  CHECK(motor.rmd->watchdog == 0.1);
+  CHECK(motor.rmd->source == "the data sheet");
+  CHECK_FALSE(motor.mit);
+  CHECK(Load(WithMotor(rmd + "watchdog = 0.05\n")).joints[3].motor.rmd->watchdog == 0.05);
+
+  const auto refused = [&](const std::string& from, const std::string& to,
+                           const std::string& what) {
+    INFO(from << " -> " << to);
+    CHECK_THROWS_WITH(Load(WithMotor(Replaced(rmd, from, to))),
+                      Contains("robot.toml:") && Contains(what));
+  };
+  refused(rmd.substr(rmd.find("[joint.rmd]")), "", "rmd");
+  refused("protocol = \"rmd\"", "protocol = \"cansimple\"", "is of protocol \"rmd\"");
+  refused("torque_constant = 0.5", "torque_constant = 0", "torque_constant");
+  refused("current = 8.0", "current = 328", "current");
+  // 20 Nm behind a gear of 6
+  refused("current = 8.0", "current = 6.6", "the joint's limit is 3.33");
+  refused("source = \"the data sheet\"", "source = \"\"", "say where");
+  refused("current = 8.0", "current = 8.0\nwatchdog = 0", "watchdog");
+  refused("current = 8.0", "current = 8.0\ncurent = 8", "did you mean current?");
+}
+
 TEST_CASE("MIT motors: what is refused") {
   const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
     INFO(from << " -> " << to);
-    CHECK_THROWS_WITH(Load(WithMit(Replaced(kMit, from, to))),
+    CHECK_THROWS_WITH(Load(WithMotor(Replaced(kMit, from, to))),
                       Contains("robot.toml:") && Contains(what));
   };
   refused(kMit.substr(kMit.find("[joint.mit]")), "", "mit");

@@ -1,5 +1,6 @@
 #include "drivers/bus/bus_plan.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
@@ -75,6 +76,14 @@ MotorDescription MitMotor(int node, int master) {
   motor.protocol = "mit";
   motor.node = node;
   motor.mit = MitDescription{master, {.velocity = 50, .torque = 18}, "a test"};
+  return motor;
+}
+
+MotorDescription RmdMotor(int node) {
+  MotorDescription motor;
+  motor.protocol = "rmd";
+  motor.node = node;
+  motor.rmd = RmdDescription{.torque_constant = 1, .current = 10, .source = "a test"};
   return motor;
 }
 
@@ -176,6 +185,39 @@ TEST_CASE("an answer is as late as its question, and then some") {
   CHECK(Response(plan, 0x10) == Approx(470 + 135 + 135));
 }
 
+TEST_CASE("messages of one id: each answer is as late as its own question") {
+  const Layout ask_a{1, "Ask_A"}, ask_b{2, "Ask_B"}, a{1, "A"}, b{2, "B"};
+  BusDevice device{"motor",
+                   "x",
+                   {Message(ask_a, 0x10, 5'000, 8, 200), Message(ask_b, 0x10, 5'000, 8, 200),
+                    Message(a, 0x20, 5'000, 8), Message(b, 0x21, 5'000, 8)},
+                   {}};
+  device.messages[2].answers = 0;
+  device.messages[3].answers = 1;
+  const BusPlan plan = PlanBus({device}, 1e6);
+  // One that has begun, 135 for each, and questions are late by 200.
+  CHECK(Response(plan, 0x20) == Approx((200 + 2 * 135) + 135 + 2 * 135 + 135));
+  CHECK(Response(plan, 0x21) == Approx((200 + 3 * 135) + 3 * 135 + 135));
+}
+
+TEST_CASE("an RMD motor: two questions in every cycle, and readings in turn") {
+  const BusPlan plan = PlanBus(Motors({RmdMotor(1)}, 0.002), 1e6);
+  const auto response = [&](std::string_view name) {
+    return std::ranges::find(plan.rows, name,
+                             [](const auto& row) { return row.message.layout.name; })
+        ->response;
+  };
+  // The driver's, behind each other: late by 200, blocked by 135 of an answer, 135 each.
+  CHECK(response("Torque") == Approx(200 + 135 + 135));
+  CHECK(response("Ask_Angle") == Approx(200 + 135 + 135 + 135));
+  CHECK(response("Ask_Status") == Approx(200 + 135 + 2 * 135 + 135));
+  // The answers wait for one lower, for those three, and for each other.
+  CHECK(response("Torque_Answer") == Approx(470 + 135 + 3 * 135 + 135));
+  CHECK(response("Angle") == Approx(605 + 135 + 3 * 135 + 135 + 135));
+  CHECK(plan.errors.empty());
+  CHECK(PlanBus(Motors({RmdMotor(1), RmdMotor(2), RmdMotor(3)}, 0.004), 1e6).errors.empty());
+}
+
 TEST_CASE("collisions name both and the id") {
   SECTION("factory ids of an ODrive and an Xsens") {
     MotorDescription motor;
@@ -205,6 +247,8 @@ TEST_CASE("collisions name both and the id") {
     CHECK_THAT(PlanBus(Motors({motor, motor}), 1e6).errors.front(), Contains("0x041"));
     CHECK_THAT(PlanBus(Motors({MitMotor(3, 0x10), MitMotor(3, 0x10)}), 1e6).errors.front(),
                Contains("0x003") && Contains("obeys Command"));
+    CHECK_THAT(PlanBus(Motors({RmdMotor(3), RmdMotor(3)}, 0.01), 1e6).errors.front(),
+               Contains("0x143") && Contains("obeys Torque"));
   }
   SECTION("a MIT motor's replies are another's commands") {
     CHECK_THAT(PlanBus(Motors({MitMotor(3, 0), MitMotor(4, 3)}), 1e6).errors.front(),

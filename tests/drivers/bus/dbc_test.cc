@@ -27,7 +27,7 @@ std::string Source() {
   return source ? source : ".";
 }
 
-/// Two MIT motors that answer on one id, an ODrive, an encoder and an IMU.
+/// Two MIT motors that answer on one id, an ODrive, an RMD motor, an encoder and an IMU.
 std::vector<BusDevice> Menagerie() {
   RobotDescription robot{};
   robot.driver.cycle = robot.driver.measurement = 0.002;
@@ -44,6 +44,7 @@ std::vector<BusDevice> Menagerie() {
   joint("left hip", "mit", 0x11);
   joint("left/hip", "mit", 0x12);  // the same identifier
   joint("1st", "cansimple", 2);
+  joint("knee", "rmd", 5);
   const auto sensor = [&](const char* name, const char* protocol) {
     SensorDescription& s = robot.sensors.emplace_back();
     s.name = name;
@@ -152,9 +153,27 @@ TEST_CASE("canmatrix decodes every message of the hopper as we do") {
   CheckDecodes(BusDevices(LoadRobot(Source() + "/robots/hopper")));
 }
 
+TEST_CASE("messages of one device and one id are told apart by their first field") {
+  BusMessage message;
+  message.id = 0x11;
+  message.direction = BusMessage::Direction::kToDevice;
+  message.layout = {1, "Go", 8, {{{"Code", 0, 8}, {"Speed", 8, 8}}}};
+  message.selector = 1;
+  BusDevice device{"wheel", "x", {message}, {}};
+  message.layout = {2, "Halt", 8, {{{"Code", 0, 8}, {"Speed", 16, 8}}}};
+  message.selector = 2;
+  device.messages.push_back(message);
+  CHECK_THAT(ToDbc({device}),
+             Contains("BO_ 17 wheel_Commands: 8 driver\n"
+                      " SG_ Code M : 0|8@1+ (1,0) [0|255] \"\" wheel\n"
+                      " SG_ Go_Speed m1 : 8|8@1+ (1,0) [0|255] \"\" wheel\n"
+                      " SG_ Halt_Speed m2 : 16|8@1+ (1,0) [0|255] \"\" wheel\n\n"));
+  CheckDecodes({device});
+}
+
 TEST_CASE("a DBC's lines") {
   const std::string dbc = ToDbc(Menagerie());
-  CHECK_THAT(dbc, Contains("BU_: _1st driver imu left_hip left_hip_2 pitch yaw\n"));
+  CHECK_THAT(dbc, Contains("BU_: _1st driver imu knee left_hip left_hip_2 pitch yaw\n"));
   CHECK_THAT(dbc, Contains("BO_ 73 _1st_Get_Encoder_Estimates: 8 _1st\n"
                            " SG_ Pos_Estimate : 0|32@1- (1,0) [0|0] \"rev\" driver\n"
                            " SG_ Vel_Estimate : 32|32@1- (1,0) [0|0] \"rev/s\" driver\n"));
@@ -168,6 +187,15 @@ TEST_CASE("a DBC's lines") {
   CHECK_THAT(dbc, Contains("BO_ 946 imu_RateOfTurn: 6 imu\n SG_ Gyr_X : 7|16@0- (0.001953125,0) "
                            "[-64|63.998046875] \"rad/s\" driver\n"));
   CHECK_THAT(dbc, Contains("BO_ 0 cia406_NMT: 2 driver\n"));
+  // Messages of one device and one id.
+  CHECK_THAT(dbc,
+             Contains("BO_ 325 knee_Commands: 8 driver\n"
+                      " SG_ Code M : 0|8@1+ (1,0) [0|255] \"\" knee\n"
+                      " SG_ Torque_Current m161 : 32|16@1- (0.01,0) [-327.68|327.67] \"A\" knee\n"
+                      " SG_ Watchdog_Time m179 : 32|32@1+ (1,0) [0|4294967295] \"ms\" knee\n"));
+  CHECK_THAT(dbc, Contains("BO_ 581 knee_Answers: 8 knee\n SG_ Code M : 0|8@1+"));
+  CHECK_THAT(dbc, Contains(" SG_ Angle_Angle m146 : 32|32@1- (0.01,0) "));
+  CHECK_THAT(dbc, Contains("BO_ 640 rmd_Shutdown_All: 8 driver\n"));
 }
 
 }  // namespace
