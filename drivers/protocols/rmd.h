@@ -55,8 +55,9 @@ enum Code : uint8_t {
 namespace detail {
 constexpr Field U(std::string_view name, int bit, int bits, double scale = 1,
                   std::string_view unit = "") {
-  return {name, static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kUnsigned,
-          scale, unit};
+  return {
+      name, static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kUnsigned, scale,
+      unit};
 }
 constexpr Field I(std::string_view name, int bit, int bits, double scale, std::string_view unit) {
   return {name, static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kSigned, scale,
@@ -65,7 +66,9 @@ constexpr Field I(std::string_view name, int bit, int bits, double scale, std::s
 constexpr Field Code() { return U("Code", 0, 8); }
 /// What moves, after the code: of two answers.
 constexpr Layout Motion(uint8_t code, std::string_view name) {
-  return {code, name, 8,
+  return {code,
+          name,
+          8,
           {{Code(), I("Temperature", 8, 8, 1, "degC"), I("Current", 16, 16, 0.01, "A"),
             I("Speed", 32, 16, 1, "deg/s"), I("Coarse_Angle", 48, 16, 1, "deg")}}};
 }

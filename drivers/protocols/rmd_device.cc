@@ -170,12 +170,11 @@ Frame RmdDevice::Reply(const Answer& answer, const Sample& sample, int64_t now) 
     case kTorqueControl:
     case kAskMotion: {
       const Layout& layout = answer.command[0] == kAskMotion ? kMotion : kTorqueAnswer;
-      EncodePayload(layout,
-                    {code, settings_.temperature,
-                     Cut(layout.fields[2], Torque() / settings_.torque_constant),
-                     Cut(layout.fields[3], sample.velocity * kDegrees),
-                     Cut(layout.fields[4], degrees)},
-                    frame);
+      EncodePayload(
+          layout,
+          {code, settings_.temperature, Cut(layout.fields[2], Torque() / settings_.torque_constant),
+           Cut(layout.fields[3], sample.velocity * kDegrees), Cut(layout.fields[4], degrees)},
+          frame);
       return frame;
     }
     case kAskAngle:
@@ -218,7 +217,8 @@ void RmdDevice::Tick(int64_t now, const Sample& sample, FrameBatch& out) noexcep
 
 std::unique_ptr<MotorDevice> MakeRmdDevice(const MotorDescription& motor, const DriverSettings&,
                                            const VirtualRobotSettings& settings) {
-  if (!motor.rmd) throw std::invalid_argument("a motor of protocol 'rmd' needs its torque constant");
+  if (!motor.rmd)
+    throw std::invalid_argument("a motor of protocol 'rmd' needs its torque constant");
   return std::make_unique<Drive>(RmdDevice::Settings{
       .node = motor.node,
       .torque_constant = motor.rmd->torque_constant,

@@ -53,8 +53,8 @@ class RmdDevice {
 
   bool armed() const noexcept { return running_; }  ///< under control of its current
   bool interrupted() const noexcept { return interrupted_; }
-  int64_t watchdog() const noexcept { return watchdog_; }        ///< [us] as stored
-  int watchdog_writes() const noexcept { return writes_; }       ///< each wears its flash
+  int64_t watchdog() const noexcept { return watchdog_; }   ///< [us] as stored
+  int watchdog_writes() const noexcept { return writes_; }  ///< each wears its flash
   bool brake_released() const noexcept { return brake_released_; }
   int64_t rejected() const noexcept { return rejected_; }
   /// Errors also shut it down.

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
 #include "common/time_units.h"
 #include "drivers/protocols/rmd.h"
+#include "drivers/protocols/rmd_reports.h"
 
 namespace plumb {
 namespace {
@@ -19,11 +19,6 @@ constexpr int64_t kRetry = 20'000;    // [us] between repetitions; much longer t
 constexpr int64_t kRemind = 100'000;  // [us] between orders to stop, to one at rest
 constexpr int kShutdowns = 2;         // the first answer may be one to an earlier command
 constexpr int kAnswersToArm = 2;
-constexpr double kDegree = std::numbers::pi / 180;  // [rad]
-// By how much its clock may be behind ours, and by which part of the time between two answers.
-constexpr int64_t kUptimeSlack = 500'000;  // [us]
-constexpr int64_t kDrift = 100;
-
 constexpr Code kPolled[] = {kAskStatus, kAskUptime, kAskVersion, kAskModel};
 
 class RmdMotor : public Motor {
@@ -35,7 +30,8 @@ class RmdMotor : public Motor {
         most_current_(std::floor(settings.current / kTorque.fields[1].scale + 1e-9) *
                       kTorque.fields[1].scale),
         watchdog_(Microseconds(settings.watchdog)),
-        timing_(timing) {}
+        timing_(timing),
+        reports_(settings.torque_constant) {}
 
   Filter filter() const override { return {.id = kAnswers + static_cast<uint32_t>(node_)}; }
 
@@ -58,10 +54,10 @@ class RmdMotor : public Motor {
     return echo ? FrameUse::kConsumed : OnAnswer(frame, now);
   }
 
-  const MotorEstimate& estimate() const noexcept override { return estimate_; }
-  double torque_estimate() const noexcept override { return torque_estimate_; }
-  MotorReadings readings() const noexcept override { return readings_; }
-  std::string_view identity() const noexcept override { return identity_.text(); }
+  const MotorEstimate& estimate() const noexcept override { return reports_.estimate(); }
+  double torque_estimate() const noexcept override { return reports_.torque_estimate(); }
+  MotorReadings readings() const noexcept override { return reports_.readings(); }
+  std::string_view identity() const noexcept override { return reports_.identity(); }
   int64_t saturations() const noexcept override { return saturations_; }
 
   void Arm(int64_t now) noexcept override {
@@ -150,9 +146,9 @@ class RmdMotor : public Motor {
   bool Active() const noexcept { return step_ != Step::kRest && step_ != Step::kDisarming; }
 
   static bool IsAnswer(uint8_t code) noexcept {
-    constexpr Code kKnown[] = {kReleaseBrake, kLockBrake,  kShutdown,   kAskAngle,
-                               kAskStatus,    kAskMotion,  kAskUptime,  kAskVersion,
-                               kSetWatchdog,  kAskModel,   kTorqueControl};
+    constexpr Code kKnown[] = {kReleaseBrake, kLockBrake, kShutdown,     kAskAngle,
+                               kAskStatus,    kAskMotion, kAskUptime,    kAskVersion,
+                               kSetWatchdog,  kAskModel,  kTorqueControl};
     return std::ranges::find(kKnown, code) != std::end(kKnown);
   }
 
@@ -233,30 +229,10 @@ class RmdMotor : public Motor {
   }
 
   FrameUse OnAnswer(const Frame& frame, int64_t now) noexcept {
+    const FrameUse use = reports_.OnAnswer(frame, now);
     switch (frame.data[0]) {
       case kTorqueControl:
         ++setpoints_;
-        return OnMotion(*DecodePayload(kTorqueAnswer, frame), now);
-      case kAskMotion:
-        return OnMotion(*DecodePayload(kMotion, frame), now);
-      case kAskAngle:
-        estimate_.position = (*DecodePayload(kAngle, frame))[1] * kDegree;
-        // Position and velocity of one instant, or it is not an estimate.
-        return std::exchange(moving_known_, false) && now - moving_at_ <= kRetry
-                   ? FrameUse::kEstimate
-                   : FrameUse::kConsumed;
-      case kAskStatus:
-        return OnStatus(*DecodePayload(kStatus, frame), now);
-      case kAskUptime:
-        return OnUptime((*DecodePayload(kUptime, frame))[1], now);
-      case kAskVersion:
-        version_ = static_cast<uint32_t>((*DecodePayload(kVersion, frame))[1]);
-        break;
-      case kAskModel:
-        for (size_t i = 0; i < model_.size(); ++i) {
-          const auto letter = static_cast<char>(frame.data[i + 1]);
-          model_[i] = letter > ' ' && letter <= '~' ? letter : '?';
-        }
         break;
       case kShutdown:
         ++shutdowns_;
@@ -267,54 +243,23 @@ class RmdMotor : public Motor {
       case kReleaseBrake:
         brake_released_ = step_ == Step::kRelease && sent_ > 0;
         break;
+      case kAskStatus:
+        status_known_ = true;
+        if (reports_.errors() != 0 && Active()) {
+          std::array<char, 200> words;
+          Fail(now, "the motor reports {} ({:#06x})", DescribeErrors(reports_.errors(), words),
+               reports_.errors());
+        }
+        break;
       default:
         break;
     }
-    if (version_ != 0 && model_[0] != 0) {
-      identity_.Set("{}, software of {}", std::string_view(model_.data(), model_.size()), version_);
+    if (const auto uptime = reports_.TakeRestart()) {
+      lost_place_ = true;
+      watchdog_set_ = false;  // it may be another motor
+      if (Active()) Fail(now, "it has restarted {} ms ago", *uptime);
     }
-    return FrameUse::kConsumed;
-  }
-
-  FrameUse OnMotion(const FieldValues& values, int64_t now) noexcept {
-    readings_.motor_temperature = values[1];
-    readings_.temperatures_at = now;
-    torque_estimate_ = values[2] * torque_constant_;
-    estimate_.velocity = values[3] * kDegree;
-    moving_known_ = true;
-    moving_at_ = now;
-    return FrameUse::kConsumed;
-  }
-
-  FrameUse OnStatus(const FieldValues& values, int64_t now) noexcept {
-    readings_.motor_temperature = values[1];
-    readings_.temperatures_at = now;
-    readings_.bus_voltage = values[3];
-    const auto errors = static_cast<uint32_t>(values[4]);
-    status_known_ = true;
-    if (errors != 0 && Active()) {
-      std::array<char, 200> words;
-      Fail(now, "the motor reports {} ({:#06x})", DescribeErrors(errors, words), errors);
-    }
-    return FrameUse::kConsumed;
-  }
-
-  FrameUse OnUptime(double milliseconds, int64_t now) noexcept {
-    const auto uptime = static_cast<uint32_t>(milliseconds);  // goes round after 50 days
-    if (uptime_known_) {
-      const int64_t passed = now - uptime_at_;
-      const int64_t short_of = static_cast<int32_t>(
-          static_cast<uint32_t>(uptime_ + static_cast<uint64_t>(passed / 1000)) - uptime);
-      if (short_of * 1000 > kUptimeSlack + passed / kDrift) {
-        lost_place_ = true;
-        watchdog_set_ = false;  // it may be another motor
-        if (Active()) Fail(now, "it has restarted {} ms ago", uptime);
-      }
-    }
-    uptime_known_ = true;
-    uptime_ = uptime;
-    uptime_at_ = now;
-    return FrameUse::kConsumed;
+    return use;
   }
 
   const int node_;
@@ -322,17 +267,7 @@ class RmdMotor : public Motor {
   const int64_t watchdog_;
   const MotorTiming timing_;
 
-  MotorEstimate estimate_;
-  bool moving_known_ = false;  // since the last angle
-  int64_t moving_at_ = 0;
-  double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
-  MotorReadings readings_;
-  uint32_t version_ = 0;
-  std::array<char, 7> model_{};
-  Reason identity_;
-  bool uptime_known_ = false;
-  uint32_t uptime_ = 0;  // [ms]
-  int64_t uptime_at_ = 0;
+  RmdReports reports_;
   bool heard_ = false, present_ = false;  // ever, lately
   int64_t answered_ = 0;                  // time of the last answer
   int64_t saturations_ = 0;

@@ -42,9 +42,9 @@ struct Witness {
   }
 
   Stage& stage;
-  double asked = 0, given = 0;            ///< [A]
-  int64_t told = 0, interrupted = 0;      ///< times of the last command, of the first warning
-  bool stopped = false;                   ///< it said so last
+  double asked = 0, given = 0;        ///< [A]
+  int64_t told = 0, interrupted = 0;  ///< times of the last command, of the first warning
+  bool stopped = false;               ///< it said so last
 };
 
 /// Up to an episode with a torque.

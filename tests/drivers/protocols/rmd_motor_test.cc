@@ -75,8 +75,8 @@ struct Bench {
     return motor->state() == DriveState::kArmed;
   }
   int Count(const Frame& like) const {
-    return static_cast<int>(std::ranges::count_if(
-        sent, [&](const Frame& frame) { return SameOnWire(frame, like); }));
+    return static_cast<int>(
+        std::ranges::count_if(sent, [&](const Frame& frame) { return SameOnWire(frame, like); }));
   }
 
   std::unique_ptr<Motor> motor = MakeRmdMotor(Describe(), {200'000});
@@ -250,8 +250,7 @@ TEST_CASE("errors of an RMD motor are a fault with a name, and keep it from bein
   bench.device.set_errors(0x1010);
   bench.Run(101);  // within which its status is asked for
   CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK(bench.motor->reason() ==
-        "the motor reports over-current, motor over-temperature (0x1010)");
+  CHECK(bench.motor->reason() == "the motor reports over-current, motor over-temperature (0x1010)");
   bench.sent.clear();
   CHECK_FALSE(bench.Arm());
   CHECK(bench.motor->state() == DriveState::kFault);
@@ -409,9 +408,7 @@ TEST_CASE("emergency stops of an RMD motor: ours, and somebody else's") {
   bench.Step();
   CHECK_FALSE(bench.device.armed());
   CHECK(bench.motor->reason() == "emergency stop requested");
-  const auto stops = [&](const char* text) {
-    return bench.motor->IsEstop(*FrameFromText(text));
-  };
+  const auto stops = [&](const char* text) { return bench.motor->IsEstop(*FrameFromText(text)); };
   CHECK(stops("151#8000000000000000"));
   CHECK(stops("280#8000000000000000"));
   CHECK(stops("280#8100000000000000"));

@@ -54,15 +54,15 @@ TEST_CASE("RMD answers say what the manual reads from them") {
   CHECK(motion[1] == 50);
   CHECK(motion[2] == Approx(1));
   CHECK(motion[3] == 500);
-  CHECK(Decode(kAngle, "241#92000000A08C0000")[1] == Approx(360));   // 2.12.4
-  CHECK(Decode(kAngle, "241#920000006073FFFF")[1] == Approx(-360));  // as 2.23.4 writes -360
+  CHECK(Decode(kAngle, "241#92000000A08C0000")[1] == Approx(360));     // 2.12.4
+  CHECK(Decode(kAngle, "241#920000006073FFFF")[1] == Approx(-360));    // as 2.23.4 writes -360
   const FieldValues status = Decode(kStatus, "241#9A320001E5010400");  // 2.14.4
   CHECK(status[1] == 50);
   CHECK(status[2] == 1);
   CHECK(status[3] == Approx(48.5));
   CHECK(status[4] == 4);
-  CHECK(Decode(kUptime, "241#B100000000000010")[1] == 268435456);   // 2.28.4
-  CHECK(Decode(kVersion, "241#B20000002E893401")[1] == 20220206);   // 2.29.4
+  CHECK(Decode(kUptime, "241#B100000000000010")[1] == 268435456);  // 2.28.4
+  CHECK(Decode(kVersion, "241#B20000002E893401")[1] == 20220206);  // 2.29.4
   CHECK_FALSE(DecodePayload(kAngle, *FrameFromText("241#92000000A08C00")));
 }
 
@@ -148,8 +148,8 @@ TEST_CASE("the virtual RMD motor: what makes a torque, and what takes it away") 
   CHECK_FALSE(motor.armed());
   CHECK(motor.rejected() == 0);
   // Foreign ones, and those that are none.
-  for (const char* other : {"142#A1000000C8000000", "243#A1000000C8000000", "00000143#A1",
-                            "143##1A1000000C8000000"}) {
+  for (const char* other :
+       {"142#A1000000C8000000", "243#A1000000C8000000", "00000143#A1", "143##1A1000000C8000000"}) {
     CHECK(Answer(motor, other, rest).empty());
   }
   CHECK(motor.rejected() == 0);
