@@ -5,27 +5,16 @@
 #include <cstdint>
 #include <cstring>
 
+#include "common/packet.h"
+
 namespace plumb::residual_kernels {
 namespace {
 
-#if defined(__AVX512F__)
-constexpr int kWidth = 16;
-#elif defined(__AVX__)
-constexpr int kWidth = 8;
-#else
-constexpr int kWidth = 4;
-#endif
-
-using Packet = float __attribute__((vector_size(kWidth * sizeof(float))));
-using IntPacket = int32_t __attribute__((vector_size(kWidth * sizeof(int32_t))));
-
-Packet Load(const float* from) {
-  Packet packet;
-  std::memcpy(&packet, from, sizeof packet);
-  return packet;
-}
-
-void Store(float* to, Packet packet) { std::memcpy(to, &packet, sizeof packet); }
+using kernels::IntPacket;
+using kernels::kWidth;
+using kernels::Load;
+using kernels::Packet;
+using kernels::Store;
 
 // Adds to kPackets packets of y what columns first to last of A give; the sums stay in registers.
 template <int kPackets>

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <memory>
 
-#include "trainer/kernels/packet.h"
+#include "common/packet.h"
 
 /// Matrices laid out for the kernels, and their product. For this folder only. Not thread-safe.
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "trainer/kernels/matrix.h"
+#include "trainer/kernels/tanh.h"
 
 namespace plumb::kernels {
 namespace {

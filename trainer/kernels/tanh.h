@@ -1,35 +1,14 @@
 #pragma once
 
-#include <cstdint>
 #include <cstring>
 
-/// One vector register of floats, as wide as the compiler's target has them, and what the kernels
-/// need of it: thread-safe. For this folder only: included by others it would be another type.
+#include "common/packet.h"
 
 namespace plumb::kernels {
 
-#if defined(__AVX512F__)
-inline constexpr int kWidth = 16;
-#elif defined(__AVX__)
-inline constexpr int kWidth = 8;
-#else
-inline constexpr int kWidth = 4;
-#endif
-
-using Packet = float __attribute__((vector_size(kWidth * sizeof(float))));
-using IntPacket = int32_t __attribute__((vector_size(kWidth * sizeof(int32_t))));
-
-inline Packet Load(const float* from) {
-  Packet packet;
-  std::memcpy(&packet, from, sizeof packet);
-  return packet;
-}
-
-inline void Store(float* to, Packet packet) { std::memcpy(to, &packet, sizeof packet); }
-
 /// tanh to 2e-7 absolute: 1 - 2 / (e^(2x) + 1), with e^(2x) = 2^n 2^f, n an integer, |f| <= 1/2,
 /// and 2^f by its Taylor polynomial of degree 6, whose error of 1.2e-7 is halved by the division.
-/// NaN gives NaN.
+/// NaN gives NaN. Thread-safe.
 inline Packet Tanh(Packet x) {
   constexpr float kSaturated = 10.0f;  // 1 - tanh(10) = 4e-9, nothing beside 1
   x = x > kSaturated ? kSaturated + Packet{} : x;
