@@ -7,7 +7,7 @@
 #include "sim/virtual/mujoco_backend.h"
 #include "sim/virtual/simbody_backend.h"
 #include "sim/virtual/virtual_plant.h"
-#include "tests/sim/virtual/ball.h"
+#include "tests/sim/virtual/sprung_carrier.h"
 
 namespace plumb {
 namespace {
@@ -17,30 +17,14 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Engine = VirtualRobotSettings::Engine;
 
-constexpr double kCarrier = 2, kMass = 0.5, kFrequency = 5, kDampingRatio = 0.1;
+constexpr double kMass = SprungCarrier::kMass, kCarrier = SprungCarrier::kCarrier,
+                 kFrequency = SprungCarrier::kFrequency,
+                 kDampingRatio = SprungCarrier::kDampingRatio;
 
-/// The ball, with a mass that swings upright in it.
-RobotDescription Carrier(Engine engine) {
-  RobotDescription ball = Ball();
-  ball.virtual_robot.engine = engine;
-  ball.virtual_robot.sprung_masses = {{.name = "load",
-                                       .link = 2,
-                                       .mass = kMass,
-                                       .frequency = kFrequency,
-                                       .damping_ratio = kDampingRatio,
-                                       .axis = Vector3d::UnitZ(),
-                                       .centre = {0.3, 0, 0.2},
-                                       .travel = 0.5}};
-  return ball;
-}
+RobotDescription Carrier(Engine engine) { return SprungCarrier::Robot(engine); }
 
 TEST_CASE("a sprung mass swings against the link that carries it") {
-  // Two masses, one spring: the mass relative to its carrier by the reduced mass, both together by
-  // the force.
-  const double ratio = 1 + kMass / kCarrier, force = 10 * (kMass + kCarrier);
-  const double own = 2 * std::numbers::pi * kFrequency, rate = own * std::sqrt(ratio);
-  const double zeta = kDampingRatio * std::sqrt(ratio), damped = rate * std::sqrt(1 - zeta * zeta);
-  const double rest = -force / kCarrier / (rate * rate);
+  constexpr double kForce = 10 * SprungCarrier::kBoth;
   for (const Engine engine : {Engine::kAuto, Engine::kMujoco, Engine::kSimbody}) {
     RobotDescription carrier = Carrier(engine);
     carrier.simulation.gravity = 0;
@@ -48,14 +32,8 @@ TEST_CASE("a sprung mass swings against the link that carries it") {
     plant.SetState(Vector2d(0, 3), Vector2d::Zero());
     CHECK(plant.q().size() == 2);
     for (int i = 1; i <= 60; ++i) {
-      REQUIRE(plant.Advance(Vector2d(0, force), 0.005));
-      const double t = 0.005 * i;
-      const double swing =
-          rest * (1 - std::exp(-zeta * rate * t) *
-                          (std::cos(damped * t) + zeta * rate / damped * std::sin(damped * t)));
-      const double expected =
-          3 + force * t * t / 2 / (kMass + kCarrier) - swing * kMass / (kMass + kCarrier);
-      REQUIRE(plant.q()[1] == Approx(expected).margin(2e-5));
+      REQUIRE(plant.Advance(Vector2d(0, kForce), 0.005));
+      REQUIRE(plant.q()[1] == Approx(3 + SprungCarrier::Rise(kForce, 0.005 * i)).margin(2e-5));
       REQUIRE(std::abs(plant.q()[0]) < 1e-9);
     }
   }
