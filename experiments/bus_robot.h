@@ -32,8 +32,8 @@ class BusRobot : public RealSystem {
   /// @throws std::runtime_error if the robot cannot be armed or placed.
   RobotEpisode Run(const GaussianPolicy& policy, bool explore, int steps, uint32_t number) override;
 
-  /// A whole episode in which `decide` does what a policy would, without a roll-out: for training on
-  /// the robot itself. What it throws ends the episode and is thrown again.
+  /// A whole episode in which `decide` does what a policy would, without a roll-out: for training
+  /// on the robot itself. What it throws ends the episode and is thrown again.
   RobotEpisode Play(const Controller::Decide& decide, uint32_t number);
 
   /// Why the last episode did not come to its own end; empty if it did.

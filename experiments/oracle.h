@@ -15,8 +15,8 @@ struct Oracle {
 };
 
 /// Trains in simulations that are the reality (SimulateBusRobot) until the best policy so far is
-/// kPatience updates old, or for kMostUpdates. The policy is judged after every kBetween updates, in
-/// 30 episodes without exploration; the best one is the result.
+/// kPatience updates old, or for kMostUpdates. The policy is judged after every kBetween updates,
+/// in 30 episodes without exploration; the best one is the result.
 /// @param progress told the share of kMostUpdates that is done; may throw to break off.
 /// @throws as Trainer.
 Oracle TrainOracle(const RobotDescription& model, const SimulationFactory& reality, uint64_t seed,

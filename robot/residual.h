@@ -31,15 +31,16 @@ class PackedMatrix {
 /// The change of n positions and velocities in a control step beyond the simulator's, as a function
 /// of D inputs (ResidualInputs), learnt from recorded transitions: the discrepancy function of
 /// Kennedy and O'Hagan (J. R. Statist. Soc. B 63, 2001), a Gaussian process with a squared
-/// exponential kernel and a linear one, by M of its inputs ("subset of regressors": Quinonero-Candela
-/// and Rasmussen, JMLR 6, 2005):
+/// exponential kernel and a linear one, by M of its inputs ("subset of regressors":
+/// Quinonero-Candela and Rasmussen, JMLR 6, 2005):
 ///   phi(x) = (1, z / sqrt(D), exp(-|z - c_m|^2 / 2)),   z = (x - mean) / scale,
 ///   change = W phi(x) + sqrt(u(x)) unknown h + L e,   h, e ~ N(0, 1), h once an episode.
-/// u is the share of the kernel's variance that the recorded inputs leave open (ibid., "deterministic
-/// training conditional"): 0 where the residual is known, 1 far away. There only the plane is left,
-/// of a z that is kept within what was recorded, and what an episode has drawn. Without that, a policy
-/// seeks out inputs where what has been learnt is wrong in its favour. Without the noise a change
-/// stays within `bound`: where nothing is known nothing grows. Immutable use is thread-safe.
+/// u is the share of the kernel's variance that the recorded inputs leave open (ibid.,
+/// "deterministic training conditional"): 0 where the residual is known, 1 far away. There only the
+/// plane is left, of a z that is kept within what was recorded, and what an episode has drawn.
+/// Without that, a policy seeks out inputs where what has been learnt is wrong in its favour.
+/// Without the noise a change stays within `bound`: where nothing is known nothing grows. Immutable
+/// use is thread-safe.
 struct ResidualFunction {
   Eigen::VectorXd mean, scale;  ///< D, of the inputs; scale > 0: the kernel's length
   Eigen::VectorXd low, high;    ///< D, least and greatest z recorded

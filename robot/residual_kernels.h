@@ -18,7 +18,7 @@ constexpr int Packs(int count) { return (count + Pack::kSize - 1) / Pack::kSize;
 /// @param y `packs` packs.
 PLUMB_RESIDUAL_KERNELS_EXPORT void Multiply(const Pack* a, int packs, int columns, const float* x,
                                             float* y);
-/// The same of a square matrix, packs * Pack::kSize columns, above whose diagonal everything is zero.
+/// The same of a square matrix, packs * Pack::kSize columns, that is zero above its diagonal.
 PLUMB_RESIDUAL_KERNELS_EXPORT void MultiplyLower(const Pack* a, int packs, const float* x,
                                                  float* y);
 /// Replaces each x by e^min(x, 0), to 3e-7 of its value; below -40 by e^-40. x = k ln 2 + r,

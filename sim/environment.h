@@ -48,9 +48,10 @@ class Environment {
   /// @param draw of the residual, to which the parameters belong.
   /// @throws std::invalid_argument if it is another robot's, or there is no such draw.
   void SetResidual(std::shared_ptr<const Residual> residual, size_t draw = 0);
-  /// From now on efforts come through the robot's driver, which limits them in each of its cycles by
-  /// what the joint is doing then (LimitEffort): against a stop there are none, say. Else actions
-  /// act as they are, as gym's do. Not for robots with spherical joints, which have no limits.
+  /// From now on efforts come through the robot's driver, which limits them in each of its cycles
+  /// by what the joint is doing then (LimitEffort): against a stop there are none, say. Else
+  /// actions act as they are, as gym's do. Not for robots with spherical joints, which have no
+  /// limits.
   void SendThroughDriver();
   /// Draws a state of the task's initial distribution. No effort has been applied yet.
   void Reset(Random& random);

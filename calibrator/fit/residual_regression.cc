@@ -132,9 +132,10 @@ void ResidualFeatures::SetLength(double length) {
 Eigen::MatrixXd ResidualFeatures::Of(const Eigen::MatrixXd& inputs) const {
   Eigen::MatrixXd features(function_.features(), inputs.cols());
   ResidualFunction::Work work = function_.MakeWork();
-  for (Eigen::Index i = 0; i < inputs.cols(); ++i)
-    function_.Features(inputs.col(i), &work),
-        features.col(i) = work.features.head(features.rows()).cast<double>();
+  for (Eigen::Index i = 0; i < inputs.cols(); ++i) {
+    function_.Features(inputs.col(i), &work);
+    features.col(i) = work.features.head(features.rows()).cast<double>();
+  }
   auto bumps = features.bottomRows(function_.centres.rows());
   factor_.triangularView<Eigen::Lower>().solveInPlace(bumps);
   return features;

@@ -9,9 +9,9 @@ namespace plumb {
 
 // Thread-safe, all of it.
 
-/// The regression of k outputs on the same m features, with weights ~ N(0, s^2) and noise: the ratio
-/// of the noise's variance to s^2 is each output's own, that of the greatest evidence (MacKay, Neural
-/// Computation 4, 1992).
+/// The regression of k outputs on the same m features, with weights ~ N(0, s^2) and noise: the
+/// ratio of the noise's variance to s^2 is each output's own, that of the greatest evidence
+/// (MacKay, Neural Computation 4, 1992).
 struct ResidualRegression {
   Eigen::VectorXd eigenvalues;   ///< m, of Phi Phi'
   Eigen::MatrixXd eigenvectors;  ///< m x m, columns

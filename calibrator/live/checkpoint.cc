@@ -18,7 +18,8 @@ namespace {
 
 using nlohmann::json;
 
-// 2: without the method used, its warnings and a search's samples; 3: without a residual, 4, 5: with another
+// 2: without the method used, its warnings and a search's samples; 3: without a residual; 4, 5:
+// with another
 constexpr int kVersion = 6;
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }

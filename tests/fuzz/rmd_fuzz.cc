@@ -108,7 +108,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace plumb;
   Bytes bytes({data, size});
   const uint8_t kind = bytes.Byte();
-  // Of a direct drive and of one behind a great gear; what is stored of the watchdog may be another.
+  // Of a direct drive and of one behind a great gear; what is stored of the watchdog may be
+  // another.
   RmdDevice::Settings settings;
   settings.node = kNode;
   settings.torque_constant = (kind & 1) != 0 ? 0.5 : 7.5;

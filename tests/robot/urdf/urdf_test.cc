@@ -135,9 +135,11 @@ TEST_CASE("solids, masses and joints are carried through rotated welds") {
     <link name="c"><inertial><origin xyz="1 2 3"/><mass value="4"/>
         <inertia ixx="0.5" ixy="0.01" ixz="0.02" iyy="0.6" iyz="0.03" izz="0.7"/></inertial>
       <visual><origin xyz="1 2 3" rpy="0 0 0"/><geometry><box size="1 2 3"/></geometry></visual>
-   <collision><origin xyz="0 0 5"/><geometry><capsule radius="0.1" length="0.4"/></geometry></collision>
+      <collision><origin xyz="0 0 5"/>
+        <geometry><capsule radius="0.1" length="0.4"/></geometry></collision>
       <collision><geometry><mesh filename="m"/></geometry></collision>
-   <collision><origin xyz="0 1 0"/><geometry><cylinder radius="0.2" length="0.3"/></geometry></collision>
+      <collision><origin xyz="0 1 0"/>
+        <geometry><cylinder radius="0.2" length="0.3"/></geometry></collision>
       <collision><origin xyz="0 1 0"/><geometry><sphere radius="0.7"/></geometry></collision>
     </link><link name="d"/>
     <joint name="turn" type="continuous"><parent link="base"/><child link="a"/></joint>
@@ -176,8 +178,8 @@ TEST_CASE("solids, masses and joints are carried through rotated welds") {
   CHECK((model.joints[1].rotation - axes).norm() < 1e-14);
   REQUIRE(model.contact_warnings.size() == 2);
   CHECK_THAT(model.contact_warnings[0],
-             Catch::Contains("robot.urdf:7: link c: a collision cylinder"));
-  CHECK_THAT(model.contact_warnings[1], Catch::Contains("robot.urdf:6: link c: a collision mesh"));
+             Catch::Contains("robot.urdf:9: link c: a collision cylinder"));
+  CHECK_THAT(model.contact_warnings[1], Catch::Contains("robot.urdf:7: link c: a collision mesh"));
 }
 
 TEST_CASE("what nothing reads is said") {
