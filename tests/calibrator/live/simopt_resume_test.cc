@@ -1,0 +1,245 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calibrator/live/calibrator.h"
+#include "calibrator/live/checkpoint.h"
+#include "calibrator/live/simopt.h"
+#include "calibrator/results/posterior_file.h"
+#include "robot/parameter_distribution.h"
+#include "robot/posterior_reader.h"
+#include "tests/calibrator/live/known_pendulum.h"
+#include "tests/calibrator/synthetic.h"
+#include "tests/temporary_file.h"
+#include "tests/temporary_folder.h"
+
+namespace plumb {
+namespace {
+
+bool SameBits(const GaussianMixture& a, const GaussianMixture& b) {
+  const auto same = [](const Gaussian& x, const Gaussian& y) {
+    return x.mean == y.mean && x.covariance == y.covariance;
+  };
+  return a.weights == b.weights && std::equal(a.components.begin(), a.components.end(),
+                                              b.components.begin(), b.components.end(), same);
+}
+
+TEST_CASE("any number of threads and any interruption give the same bits") {
+  const RobotDescription robot = Pendulum();
+  SimOpt straight(robot, 9, 1);
+  Iterate(straight, robot, 2);
+
+  SimOpt threaded(robot, 9, 3);
+  Iterate(threaded, robot, 2);
+  CHECK(SameBits(straight.state().distribution, threaded.state().distribution));
+
+  const TemporaryFolder folder;
+  // A new process, as it were, after every single update.
+  for (int i = 0; i < 2; ++i) {
+    bool begun = false, done = false;
+    for (int update = 0; !done; ++update) {
+      REQUIRE(update < 100);
+      CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
+      SimOpt simopt(robot, 9, 1);
+      if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
+      if (!begun) {
+        simopt.Begin({SyntheticRollout(robot, kTruth, 100, 1e-4, 0.01, static_cast<uint32_t>(i))});
+        begun = true;
+      } else {
+        done = simopt.Update().has_value();
+      }
+      checkpoint.Save(simopt.state());
+    }
+  }
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
+  const auto resumed = checkpoint.Load();
+  REQUIRE(resumed);
+  CHECK(resumed->iteration == 2);
+  CHECK(SameBits(straight.state().distribution, resumed->distribution));
+
+  SECTION("another description's checkpoint is refused") {
+    RobotDescription edited = robot;
+    edited.fingerprint ^= 1;
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), edited, 9).Load(),
+                      Catch::Contains("another robot.toml"));
+  }
+  SECTION("another seed's checkpoint is refused") {
+    CHECK_THROWS_WITH(CalibrationCheckpoint(folder.path(), robot, 10).Load(),
+                      Catch::Contains("another seed"));
+  }
+  SECTION("a damaged checkpoint is refused, naming the file") {
+    std::ofstream(folder / "rollout_1.json") << "{\"episode\": 3";
+    CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("rollout_1.json"));
+  }
+}
+
+TEST_CASE(
+    "an inference makes one update of all roll-outs, the same bits with any threads and after any "
+    "interruption") {
+  const RobotDescription robot = Pendulum();
+  const std::string method = GENERATE("auto", "laplace", "mixture");
+  INFO(method);
+  SimOpt straight(robot, 9, 1, method), threaded(robot, 9, 3, method);
+  for (uint32_t i = 0; i < 3; ++i) {
+    for (SimOpt* simopt : {&straight, &threaded}) {
+      simopt->Begin({Synthetic(robot, i)});
+      const auto report = simopt->Update();
+      REQUIRE(report);
+      CHECK(report->iteration == static_cast<int>(i) + 1);
+      CHECK(report->kl > 0);
+      CHECK(report->errors.size() == robot.calibration.horizons.size());
+    }
+  }
+  CHECK(SameBits(straight.state().distribution, threaded.state().distribution));
+  const Gaussian found = Moments(straight.state().distribution);
+  for (const Eigen::Vector3d& power : {kGravityOverLength, kMassLengthSquared}) {
+    const double error = power.dot(found.mean) - LogTruth(power),
+                 sd = std::sqrt(power.dot(found.covariance * power));
+    INFO(error << " +- " << sd);
+    CHECK(std::abs(error) < 3 * sd);
+    CHECK(sd < 0.01);
+  }
+
+  const TemporaryFolder folder;
+  for (uint32_t i = 0; i < 3; ++i) {
+    for (const bool begins : {true, false}) {  // a new process each time, as it were
+      CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
+      SimOpt simopt(robot, 9, 2, method);
+      if (auto state = checkpoint.Load()) simopt.Resume(std::move(*state));
+      if (begins)
+        simopt.Begin({Synthetic(robot, i)});
+      else
+        CHECK(simopt.Update());
+      checkpoint.Save(simopt.state());
+    }
+  }
+  CHECK(SameBits(straight.state().distribution,
+                 CalibrationCheckpoint(folder.path(), robot, 9).Load()->distribution));
+}
+
+TEST_CASE("what an iteration has found is a posterior, and the same bytes after a resumption") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 3, 1, "auto");
+  simopt.Begin({Synthetic(robot, 1)});
+  const auto report = simopt.Update();
+  REQUIRE(report);
+  const std::string text = PosteriorJson(IterationFindings(robot, simopt, *report), robot, {});
+  const TemporaryFile file(text, ".json");
+  CHECK(ReadPosterior(file.path(), robot).mixture == simopt.state().distribution);
+  const auto j = nlohmann::json::parse(text);
+  CHECK(j["method"] == nlohmann::json{{"asked", "auto"}, {"used", simopt.state().used}});
+  CHECK(j["method"]["used"] != "prior");
+  CHECK(j["seed"] == 3);
+  CHECK(j["loop"]["iteration"] == 1);
+  CHECK(j["loop"]["kl"] == report->kl);
+  CHECK(j["discrepancy"] == report->discrepancy);
+  CHECK(j["identifiability"]["words"] == report->identifiability.summary);
+  CHECK(j["transitions"] == simopt.state().rollouts[0].transitions.size());
+  for (const char* unknown : {"alarm", "holdout", "agreement", "simulations", "run"}) {
+    INFO(unknown);
+    CHECK(j.at(unknown).is_null());
+  }
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 3);
+  checkpoint.Save(simopt.state());
+  SimOpt resumed(robot, 3, 1, "auto");
+  resumed.Resume(*checkpoint.Load());
+  CHECK(PosteriorJson(IterationFindings(robot, resumed, *resumed.Report()), robot, {}) == text);
+}
+
+TEST_CASE("of parameters that nothing informs none is determined, after a resumption, too") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 3, 1, "auto"), resumed(robot, 3, 1, "auto");
+  simopt.Begin({Synthetic(robot, 1)});
+  CHECK_THAT(Finish(simopt).identifiability.summary, !Catch::Contains("no parameter"));
+  SimOpt::State state = simopt.state();
+  state.informed = Informed::kNone;
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 3);
+  checkpoint.Save(state);
+  resumed.Resume(*checkpoint.Load());
+  CHECK_THAT(resumed.Report()->identifiability.summary,
+             Catch::Contains("no parameter is determined: nothing that was recorded"));
+}
+
+TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trainer") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 1, 1);
+  SimOpt::State state = simopt.state();
+  Gaussian second = PriorGaussian(robot);
+  second.mean(0) += 0.5;
+  state.distribution = {{0.25, 0.75}, {PriorGaussian(robot), second}};
+  state.ess = NAN;
+  const ParameterDistribution told =
+      ParameterDistribution::FromMessage(DistributionMessage(robot, state, 1, nullptr), robot);
+  REQUIRE(told.mixture.components.size() == 2);
+  CHECK(told.mixture.weights[1] == 0.75);
+  CHECK(told.mixture.components[1].mean == second.mean);
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 1);
+  checkpoint.Save(state);
+  const auto loaded = checkpoint.Load();
+  REQUIRE(loaded);
+  CHECK(SameBits(loaded->distribution, state.distribution));
+  CHECK(std::isnan(loaded->ess));
+  std::string text =
+      (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
+  text.replace(text.find("\"version\": 6"), 12, "\"version\": 1");
+  std::ofstream(folder / "calibration.json") << text;
+  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
+}
+
+TEST_CASE("what the simulators lack is told to the trainer again after a resumption") {
+  const RobotDescription robot = Pendulum();
+  const auto numbers = [](Eigen::Index rows, Eigen::Index columns) {  // of single precision
+    return Eigen::MatrixXf(Eigen::MatrixXf::Random(rows, columns)).cast<double>().eval();
+  };
+  ResidualFunction function;
+  function.mean = numbers(6, 1), function.scale = numbers(6, 1).cwiseAbs();
+  function.low = numbers(6, 1), function.high = function.low.array() + 1;
+  function.centres = numbers(4, 6);
+  function.weights = {numbers(1, 11), numbers(1, 11)};
+  function.noise = numbers(1, 1).cwiseAbs(), function.bound = numbers(1, 1).cwiseAbs();
+  function.unknown = numbers(1, 1).cwiseAbs();
+  Residual residual;
+  residual.coordinates = {kTruth, kNull};
+  residual.touching = function;
+  SimOpt simopt(robot, 1, 1);
+  SimOpt::State state = simopt.state();
+  state.residual = std::make_shared<const Residual>(residual);
+  const auto told = [&](const SimOpt::State& of) {
+    const parameter_distribution_t message = DistributionMessage(robot, of, 1, nullptr);
+    std::vector<char> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    return bytes;
+  };
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 1);
+  checkpoint.Save(state);
+  const auto loaded = checkpoint.Load();
+  REQUIRE(loaded);
+  REQUIRE(loaded->residual);
+  state.ess = loaded->ess;  // NaN has many bits
+  CHECK(told(*loaded) == told(state));
+  CHECK(told(*loaded) != told(simopt.state()));
+
+  std::string text =
+      (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
+  const size_t at = text.find("\"residual\": \"") + 13;
+  for (const std::string& spoilt : {text.substr(0, at) + text.substr(at + 2),
+                                    text.substr(0, at) + "zz" + text.substr(at + 2)}) {
+    std::ofstream(folder / "calibration.json") << spoilt;
+    CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("calibration.json: the residual is none"));
+  }
+}
+
+}  // namespace
+}  // namespace plumb
