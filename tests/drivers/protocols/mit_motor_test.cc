@@ -2,13 +2,12 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <numbers>
 
 #include "drivers/protocols/mit_device.h"
 #include "drivers/protocols/mit_host.h"
 #include "drivers/protocols/registry.h"
+#include "tests/drivers/protocols/motor_bench.h"
 
 namespace plumb {
 namespace {
@@ -25,66 +24,22 @@ MotorDescription Describe(int node = 0x11, int master = 0x10) {
   return description;
 }
 
-/// Host and motor, a millisecond at a time. The driver's part is played here: zero torque while
-/// arming, `torque` when armed.
-struct Bench {
-  explicit Bench(uint8_t reply_length = mit::kWithTemperature)
-      : device({.node = 0x11, .master = 0x10, .ranges = kAk80, .reply_length = reply_length}) {
-    while (motor->state() == DriveState::kAbsent && now < 1'200'000) Step();
-    Run(60);
-  }
-  void Step() {
-    now += 1000;
-    sample.position += sample.velocity * 1e-3;
-    FrameBatch frames, replies;
-    const DriveState state = motor->state();
-    if (stream && (state == DriveState::kArming || state == DriveState::kArmed)) {
-      frames.Push(motor->Torque(state == DriveState::kArmed ? torque : 0));
-    }
-    motor->Tick(now, true, frames);
-    motor->Transmitted(!bus_full, now);
-    if (!bus_full) {
-      for (const Frame& frame : frames.frames()) {
-        sent.push_back(frame);
-        if (!to_device || to_device(frame)) device.OnFrame(frame, now);
-        applied = std::max(applied, std::abs(device.Torque(sample)));
-      }
-    }
-    device.Tick(now, sample, replies);
-    if (!powered) return;
-    for (const Frame& frame : replies.frames()) motor->OnFrame(frame, now);
-  }
-  void Run(int milliseconds) {
-    for (int i = 0; i < milliseconds; ++i) Step();
-  }
-  bool Arm() {
-    motor->Arm(now);
-    for (int i = 0; i < 100 && motor->state() != DriveState::kArmed; ++i) Step();
-    return motor->state() == DriveState::kArmed;
-  }
-  int Count(uint8_t special) const {
-    int count = 0;
-    for (const Frame& frame : sent)
-      count += SameOnWire(frame, mit::MakeSpecial(0x11, mit::Special(special)));
-    return count;
-  }
+Frame Special(mit::Special special) { return mit::MakeSpecial(0x11, special); }
 
-  std::unique_ptr<Motor> motor = MakeMitMotor(Describe(), {200'000});
-  MitDevice device;
-  MitDevice::Sample sample{1, 0};
-  int64_t now = 1'000'000;
-  bool stream = true, bus_full = false, powered = true;
-  double torque = 0, applied = 0;
-  std::function<bool(const Frame&)> to_device;
-  std::vector<Frame> sent;
+struct Bench : MotorBench<MitDevice> {
+  explicit Bench(uint8_t reply_length = mit::kWithTemperature)
+      : MotorBench(MakeMitMotor(Describe(), {200'000}),
+                   {.node = 0x11, .master = 0x10, .ranges = kAk80, .reply_length = reply_length}) {
+    Start(60);
+  }
 };
 
 TEST_CASE("a MIT motor at rest is heard, told to exit, and polled with zeros") {
   Bench bench;
   CHECK(bench.motor->state() == DriveState::kIdle);
   CHECK(bench.motor->confirmed_idle());
-  CHECK(bench.Count(mit::kExit) >= 2);
-  CHECK(bench.Count(mit::kEnter) == 0);
+  CHECK(bench.Count(Special(mit::kExit)) >= 2);
+  CHECK(bench.Count(Special(mit::kEnter)) == 0);
   CHECK(bench.motor->estimate().position == Approx(1).margin(1e-3));
   bench.sent.clear();
   bench.Run(5);
@@ -113,10 +68,10 @@ TEST_CASE("arming: zeros, enter, an answer, and only then torque") {
   bench.sent.clear();
   CHECK(bench.Arm());
   CHECK(bench.device.armed());
-  CHECK(bench.Count(mit::kEnter) == 2);
+  CHECK(bench.Count(Special(mit::kEnter)) == 2);
   int zeros = 0;
   for (const Frame& frame : bench.sent) {
-    if (SameOnWire(frame, mit::MakeSpecial(0x11, mit::kEnter))) break;
+    if (SameOnWire(frame, Special(mit::kEnter))) break;
     CHECK(ToText(frame) == "011#7FFF7FF0000007FF");
     ++zeros;
   }
@@ -129,7 +84,7 @@ TEST_CASE("arming: zeros, enter, an answer, and only then torque") {
   CHECK(bench.motor->state() == DriveState::kIdle);
   CHECK(bench.motor->confirmed_idle());
   CHECK(bench.device.zeroed() == 0);
-  CHECK(bench.Count(mit::kZero) == 0);
+  CHECK(bench.Count(Special(mit::kZero)) == 0);
 }
 
 TEST_CASE("no kick: what a motor was told before it was switched on is not obeyed") {
@@ -145,7 +100,7 @@ TEST_CASE("no kick: what a motor was told before it was switched on is not obeye
 
   MitDevice other({.node = 0x11, .master = 0x10, .ranges = kAk80});
   other.OnFrame(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.position = 5, .kp = 500}), 0);
-  other.OnFrame(mit::MakeSpecial(0x11, mit::kEnter), 0);
+  other.OnFrame(Special(mit::kEnter), 0);
   CHECK(other.Torque({}) == 18);  // the trap is there
 }
 
@@ -154,14 +109,14 @@ TEST_CASE("the motor's watchdog takes the torque away and leaves it switched on"
   bench.torque = 3;
   CHECK(bench.Arm());
   bench.Run(5);
-  bench.stream = false;
+  bench.setpoints = false;
   bench.Run(23);
   CHECK(bench.device.Torque(bench.sample) == Approx(3).margin(0.01));
   bench.Run(3);
   CHECK(bench.device.Torque(bench.sample) == 0);
   CHECK(bench.device.armed());
   FrameBatch out;
-  bench.device.OnFrame(mit::MakeSpecial(0x11, mit::kEnter), bench.now);  // not a command: no food
+  bench.device.OnFrame(Special(mit::kEnter), bench.now);  // not a command: no food
   CHECK(bench.device.Torque(bench.sample) == 0);
   // Without torque frames there are no replies: the motor counts as absent, and "exit" is tried on.
   bench.Run(300);
@@ -172,11 +127,11 @@ TEST_CASE("the motor's watchdog takes the torque away and leaves it switched on"
 TEST_CASE("silence is a fault; the motor is told to exit when it is back") {
   Bench bench;
   CHECK(bench.Arm());
-  bench.powered = false;
+  bench.to_host = [](const Frame&) { return false; };
   bench.Run(250);
   CHECK(bench.motor->state() == DriveState::kAbsent);
   CHECK_THAT(std::string(bench.motor->reason()), Contains("no reply for 20"));
-  bench.powered = true;
+  bench.to_host = nullptr;
   bench.Run(80);
   CHECK(bench.motor->state() == DriveState::kFault);
   CHECK_FALSE(bench.device.armed());
@@ -193,7 +148,7 @@ TEST_CASE("an error in a reply is a fault, and keeps the motor from being armed"
   CHECK(bench.motor->reason() == "the motor reports over-temperature (error 1)");
   CHECK_FALSE(bench.Arm());
   CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK(bench.Count(mit::kEnter) == 2);  // those of the first time
+  CHECK(bench.Count(Special(mit::kEnter)) == 2);  // those of the first time
 }
 
 TEST_CASE("an error that a stranger reports does not stay") {
@@ -248,7 +203,7 @@ TEST_CASE("one lost frame of any kind does not spoil arming; a bus that takes no
     Bench bench;
     int seen = 0;
     bench.to_device = [&](const Frame& frame) {
-      return !SameOnWire(frame, mit::MakeSpecial(0x11, mit::kEnter)) || ++seen > 1;
+      return !SameOnWire(frame, Special(mit::kEnter)) || ++seen > 1;
     };
     CHECK(bench.Arm());
     CHECK(bench.device.armed());
@@ -272,7 +227,7 @@ TEST_CASE(
   CHECK(bench.Arm());
   int seen = 0;
   bench.to_device = [&](const Frame& frame) {
-    return !SameOnWire(frame, mit::MakeSpecial(0x11, mit::kExit)) || ++seen > 1;
+    return !SameOnWire(frame, Special(mit::kExit)) || ++seen > 1;
   };
   bench.motor->Disarm(bench.now);
   bench.Step();
@@ -293,9 +248,9 @@ TEST_CASE("a motor whose position keeps jumping is told to exit, and believed") 
   CHECK_FALSE(bench.device.armed());
   CHECK(bench.motor->confirmed_idle());
   bench.motor->Estop(bench.now);
-  const int exits = bench.Count(mit::kExit);
+  const int exits = bench.Count(Special(mit::kExit));
   bench.Run(100);
-  CHECK(bench.Count(mit::kExit) >= exits + 2);
+  CHECK(bench.Count(Special(mit::kExit)) >= exits + 2);
   CHECK(bench.motor->confirmed_idle());
 }
 
