@@ -20,7 +20,7 @@
 #include "calibrator/motion/csv_log.h"
 #include "common/random.h"
 #include "sim/environment.h"
-#include "sim/parameters.h"
+#include "tests/calibrator/changed_robot.h"
 
 namespace plumb {
 namespace {
@@ -75,7 +75,7 @@ struct Case {
   const char* robot;
   int episodes;
   Sensor sensor;
-  std::vector<std::pair<std::string, double>> wrong = {};
+  Changes wrong = {};
 };
 
 std::vector<Case> Cases() {
@@ -98,10 +98,9 @@ std::vector<Case> Cases() {
       {"hopper, backward differences, 14 bit", "hopper/gym.toml", 60,
        Differences(Difference::kBackward, 0, true)},
   };
-  const std::vector<std::pair<std::string, double>> faults{
-      {"inertia/torso", 1.2},   {"inertia/thigh", 1.2},     {"inertia/leg", 1.2},
-      {"inertia/foot", 1.2},    {"friction/leg", 5},        {"delay/thigh", 0.002},
-      {"gravity", 9.81 * 1.02}, {"contact/stiffness", 7500}};
+  const Changes faults{{"inertia/torso", 1.2},   {"inertia/thigh", 1.2},     {"inertia/leg", 1.2},
+                       {"inertia/foot", 1.2},    {"friction/leg", 5},        {"delay/thigh", 0.002},
+                       {"gravity", 9.81 * 1.02}, {"contact/stiffness", 7500}};
   for (const auto& fault : faults)
     cases.push_back(
         {"wrong " + fault.first + ", noise 0.003", "hopper/gym.toml", 60, Noise(0.003), {fault}});
@@ -111,23 +110,8 @@ std::vector<Case> Cases() {
   return cases;
 }
 
-RobotDescription Changed(RobotDescription robot,
-                         const std::vector<std::pair<std::string, double>>& changed) {
-  for (const auto& [path, value] : changed) {
-    std::erase_if(robot.frozen,
-                  [&, p = path](const FrozenParameter& frozen) { return frozen.name == p; });
-    robot.parameters.push_back({path, "", ParameterDescription::Coordinate::kLinear, value, 1});
-  }
-  return robot;
-}
-
 std::vector<Episode> Motion(const Case& one, const RobotDescription& fitted, uint64_t seed) {
-  const RobotDescription robot = Changed(fitted, one.wrong);
-  Eigen::VectorXd physical(robot.parameters.size());
-  physical.head(static_cast<Eigen::Index>(fitted.parameters.size())) =
-      HiddenParameters(fitted, seed);
-  for (size_t i = 0; i < one.wrong.size(); ++i)
-    physical(static_cast<Eigen::Index>(fitted.parameters.size() + i)) = one.wrong[i].second;
+  const auto [robot, physical] = Change(fitted, one.wrong, seed);
   Environment environment(robot);
   environment.SetParameters(physical);
   Random random(seed, {7});

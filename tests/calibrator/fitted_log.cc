@@ -17,26 +17,9 @@ RobotDescription Robot(const std::string& name) {
   return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name);
 }
 
-RobotDescription Changed(RobotDescription robot,
-                         const std::vector<std::pair<std::string, double>>& changed) {
-  for (const auto& [path, value] : changed) {
-    std::erase_if(robot.frozen,
-                  [&, p = path](const FrozenParameter& frozen) { return frozen.name == p; });
-    robot.parameters.push_back({path, "", ParameterDescription::Coordinate::kLinear, value, 1});
-  }
-  return robot;
-}
-
 std::vector<Rollout> RandomLog(const RobotDescription& fitted, const Truth& truth, int transitions,
                                uint64_t seed) {
-  const RobotDescription robot = Changed(fitted, truth.changed);
-  Eigen::VectorXd physical(robot.parameters.size());
-  physical << HiddenParameters(fitted, seed), [&] {
-    Eigen::VectorXd values(truth.changed.size());
-    for (size_t i = 0; i < truth.changed.size(); ++i)
-      values(static_cast<Eigen::Index>(i)) = truth.changed[i].second;
-    return values;
-  }();
+  const auto [robot, physical] = Change(fitted, truth.changed, seed);
   Environment environment(robot);
   environment.SetParameters(physical);
   // what is delayed reaches over control steps: one simulator for an episode

@@ -11,6 +11,7 @@
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/motion/transitions.h"
 #include "robot/description.h"
+#include "tests/calibrator/changed_robot.h"
 
 namespace plumb {
 
@@ -18,18 +19,12 @@ RobotDescription Robot(const std::string& name);
 
 /// The robot that a log is recorded from, and its noise.
 struct Truth {
-  std::vector<std::pair<std::string, double>> changed =
-      {};  ///< parameters that are not fitted: paths and values
+  Changes changed = {};  ///< of parameters that are not fitted
   /// noise of the state a transition begins with, which is then the reading at the end of the one
   /// before
   double start_sd = 0;
   double end_sd = std::sqrt(1e-5);
 };
-
-/// The robot with other values of some parameters than it has, as uncertain parameters after its
-/// own.
-RobotDescription Changed(RobotDescription robot,
-                         const std::vector<std::pair<std::string, double>>& changed);
 
 /// Episodes of random actions, begun as the task does, until there are so many transitions.
 std::vector<Rollout> RandomLog(const RobotDescription& fitted, const Truth& truth, int transitions,
