@@ -231,11 +231,7 @@ TEST_CASE(
   };
   bench.motor->Disarm(bench.now);
   bench.Step();
-  CHECK(bench.device.armed());
-  CHECK_FALSE(bench.motor->confirmed_idle());
-  bench.Run(60);
-  CHECK_FALSE(bench.device.armed());
-  CHECK(bench.motor->confirmed_idle());
+  CheckIdleOnlyOnceStopped(bench);
 }
 
 TEST_CASE("a motor whose position keeps jumping is told to exit, and believed") {

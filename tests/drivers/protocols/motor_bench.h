@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -88,5 +89,15 @@ struct MotorBench {
     }
   }
 };
+
+/// The motor still runs and does not count as idle; 60 ms later it has been stopped, and does.
+template <typename Device>
+void CheckIdleOnlyOnceStopped(MotorBench<Device>& bench) {
+  CHECK(bench.device.armed());
+  CHECK_FALSE(bench.motor->confirmed_idle());
+  bench.Run(60);
+  CHECK_FALSE(bench.device.armed());
+  CHECK(bench.motor->confirmed_idle());
+}
 
 }  // namespace plumb

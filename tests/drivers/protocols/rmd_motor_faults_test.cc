@@ -179,11 +179,7 @@ TEST_CASE("the first shutdown may be lost: only an answer to the second counts")
   };
   bench.motor->Disarm(bench.now);
   bench.Step();
-  CHECK(bench.device.armed());
-  CHECK_FALSE(bench.motor->confirmed_idle());
-  bench.Run(60);
-  CHECK_FALSE(bench.device.armed());
-  CHECK(bench.motor->confirmed_idle());
+  CheckIdleOnlyOnceStopped(bench);
 }
 
 TEST_CASE("an answer to an earlier shutdown does not count") {
@@ -197,11 +193,7 @@ TEST_CASE("an answer to an earlier shutdown does not count") {
   bench.Step();
   bench.motor->OnFrame(*FrameFromText("251#8000000000000000"), bench.now);
   bench.Run(25);
-  CHECK(bench.device.armed());
-  CHECK_FALSE(bench.motor->confirmed_idle());
-  bench.Run(60);
-  CHECK_FALSE(bench.device.armed());
-  CHECK(bench.motor->confirmed_idle());
+  CheckIdleOnlyOnceStopped(bench);
 }
 
 }  // namespace
