@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 
+#include "calibrator/fit/residual_fit.h"
 #include "common/random.h"
 #include "sim/environment.h"
 #include "sim/residual_inputs.h"
@@ -131,26 +132,38 @@ void Hopper(benchmark::State& state) {
 }
 BENCHMARK(Hopper);
 
-/// As large as FitResidual makes them, of small numbers: the motion hardly changes.
+/// As FitResidual makes them, of small numbers: the motion hardly changes.
 std::shared_ptr<const Residual> LearntResidual(const RobotDescription& robot) {
-  constexpr Eigen::Index kCentres = 256;
-  const Eigen::Index inputs = ResidualInputCount(robot), outputs = 2 * robot.num_velocities();
   Random random(7);
   const auto normal = [&](Eigen::Index rows, Eigen::Index columns) {
     Eigen::MatrixXd matrix(rows, columns);
     for (double& number : matrix.reshaped()) number = random.Normal();
     return matrix;
   };
-  ResidualFunction f;
-  f.mean = Eigen::VectorXd::Zero(inputs), f.scale = Eigen::VectorXd::Ones(inputs);
-  f.low = Eigen::VectorXd::Constant(inputs, -1), f.high = -f.low;
-  f.centres = normal(kCentres, inputs) / 4;
-  f.weights = {1e-3 * normal(outputs, f.features())};
-  f.noise = 1e-3 * Eigen::MatrixXd::Identity(outputs, outputs);
-  f.bound = Eigen::VectorXd::Ones(outputs);
-  f.unknown = Eigen::VectorXd::Constant(outputs, 1e-3);
-  const auto parameters = static_cast<Eigen::Index>(robot.parameters.size());
-  return std::make_shared<const Residual>(Residual{{Eigen::VectorXd::Zero(parameters)}, f, f});
+  const auto function = [&](Eigen::Index inputs, Eigen::Index outputs, Eigen::Index centres,
+                            double noise) {
+    ResidualFunction f;
+    f.mean = Eigen::VectorXd::Zero(inputs), f.scale = Eigen::VectorXd::Ones(inputs);
+    f.low = Eigen::VectorXd::Constant(inputs, -1), f.high = -f.low;
+    f.centres = normal(centres, inputs) / 4;
+    f.weights = {1e-3 * normal(outputs, f.features())};
+    f.noise = noise * Eigen::MatrixXd::Identity(outputs, outputs);
+    f.bound = Eigen::VectorXd::Ones(outputs);
+    f.unknown = Eigen::VectorXd::Constant(outputs, 1e-3);
+    return f;
+  };
+  const ResidualFitOptions sizes;
+  const Topology topology(robot);
+  const int inputs = ResidualInputCount(robot), outputs = 2 * robot.num_velocities();
+  Residual residual;
+  residual.coordinates = {
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.parameters.size()))};
+  residual.free = function(inputs, outputs, sizes.centres, 1e-3);
+  residual.touching = function(inputs, outputs, sizes.rest_centres, 1e-3);
+  residual.ground = function(StepContacts::GroundInputs(topology),
+                             2 * topology.contact_directions(), sizes.contact_centres, 0);
+  residual.stop = function(StepContacts::kStopInputs, 2, sizes.contact_centres, 0);
+  return std::make_shared<const Residual>(std::move(residual));
 }
 
 /// A control step as training makes it, without and with a residual.

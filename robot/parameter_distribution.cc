@@ -171,6 +171,10 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
   } catch (const std::invalid_argument& error) {
     Reject(error.what());
   }
+  for (size_t k = 0; result.residual && k < result.residual->coordinates.size(); ++k) {
+    if (!result.ToPhysical(result.residual->coordinates[k]).allFinite())
+      Reject("residual: a draw is too wide: it overflows");
+  }
   const auto state =
       static_cast<size_t>(description.num_positions() + description.num_velocities());
   if (message.start.size() % std::max<size_t>(1, state) != 0) Reject("start of the wrong size");

@@ -71,9 +71,9 @@ void RequireFinite(const Residual& residual) {
   require(residual.margin >= 0 && std::isfinite(residual.margin), "margin is not a distance");
   for (const Eigen::VectorXd& draw : residual.coordinates)
     require(draw.allFinite(), "a draw is not finite");
-  for (const auto* part : {&residual.free, &residual.touching}) {
-    if (!*part) continue;
-    const ResidualFunction& f = **part;
+  for (const Residual::Part& part : Residual::kParts) {
+    if (!(residual.*part.function)) continue;
+    const ResidualFunction& f = *(residual.*part.function);
     require(f.mean.allFinite(), "mean is not finite");
     require(f.scale.allFinite() && f.scale.minCoeff() > 0, "scale is not positive");
     require(f.low.allFinite() && f.high.allFinite(), "low or high is not finite");
@@ -86,60 +86,71 @@ void RequireFinite(const Residual& residual) {
   }
 }
 
-ResidualSample::Part ResidualSample::Prepare(const ResidualFunction& function) {
+const std::array<Residual::Part, 4> Residual::kParts{{{"free", &Residual::free, false},
+                                                      {"touching", &Residual::touching, false},
+                                                      {"ground", &Residual::ground, true},
+                                                      {"stop", &Residual::stop, true}}};
+
+ResidualSample::Part ResidualSample::Prepare(const std::optional<ResidualFunction>& function,
+                                             Eigen::Index outputs) {
   Part part;
-  part.work = function.MakeWork();
-  for (const Eigen::MatrixXd& weights : function.weights) part.weights.emplace_back(weights);
-  part.change.resize(part.weights.front().rows());
+  part.change = Eigen::VectorXd::Zero(function ? function->outputs() : outputs);
+  if (!function) return part;
+  part.function = &*function;
+  part.work = function->MakeWork();
+  for (const Eigen::MatrixXd& weights : function->weights) part.weights.emplace_back(weights);
+  part.known.resize(part.weights.front().rows());
   // square with what fills it up, too
-  const Eigen::Index m = function.centres.rows(), filled = part.work.centres.rows();
+  const Eigen::Index m = function->centres.rows(), filled = part.work.centres.rows();
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Zero(filled, filled);
-  inverse.topLeftCorner(m, m) =
-      function.KernelFactor().triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(m, m));
+  inverse.topLeftCorner(m, m) = function->KernelFactor().triangularView<Eigen::Lower>().solve(
+      Eigen::MatrixXd::Identity(m, m));
   part.whitening = PackedMatrix(inverse);
   part.whitened.resize(filled);
+  part.lasting = part.normal = part.change;
+  part.noisy = !function->noise.isZero(0);
   return part;
 }
 
-ResidualSample::ResidualSample(const Residual& residual) : residual_(&residual) {
-  if (residual.free) free_ = Prepare(*residual.free);
-  if (residual.touching) touching_ = Prepare(*residual.touching);
-  normal_.resize(residual.free       ? residual.free->outputs()
-                 : residual.touching ? residual.touching->outputs()
-                                     : 0);
-  change_ = normal_;
-  lasting_ = normal_;
+ResidualSample::ResidualSample(const Residual& residual) {
+  const auto outputs = [](const auto& function, const auto& other) {
+    return function ? function->outputs() : other ? other->outputs() : 0;
+  };
+  free_ = Prepare(residual.free, outputs(residual.touching, residual.free));
+  touching_ = Prepare(residual.touching, outputs(residual.free, residual.touching));
+  ground_ = Prepare(residual.ground, 0);
+  stop_ = Prepare(residual.stop, 0);
 }
 
 void ResidualSample::Begin(size_t draw, Random& random) {
   draw_ = draw;
   random_ = Random(uint64_t{random.Bits()} << 32 | random.Bits());
-  for (double& normal : lasting_) normal = random_.Normal();
+  for (Part* part : {&free_, &touching_, &ground_, &stop_}) {
+    for (double& normal : part->lasting) normal = random_.Normal();
+  }
 }
 
-const Eigen::VectorXd& ResidualSample::Step(bool touching,
-                                            const Eigen::Ref<const Eigen::VectorXd>& x) {
-  const auto& function = touching ? residual_->touching : residual_->free;
-  if (!function) {
-    change_.setZero();
-    return change_;
-  }
-  Part& part = touching ? touching_ : free_;
-  function->Features(x, &part.work);
+const Eigen::VectorXd& ResidualSample::Change(Part& part,
+                                              const Eigen::Ref<const Eigen::VectorXd>& x) {
+  if (!part.function) return part.change;
+  const ResidualFunction& function = *part.function;
+  function.Features(x, &part.work);
   const Eigen::VectorXf& features = part.work.features;
   const PackedMatrix& weights = part.weights[draw_];
   residual_kernels::Multiply(weights.data(), weights.packs(), weights.columns(), features.data(),
-                             part.change.data());
+                             part.known.data());
   const auto bumps = features.tail(part.whitened.size());
   residual_kernels::MultiplyLower(part.whitening.data(), part.whitening.packs(), bumps.data(),
                                   part.whitened.data());
   const double unknown = std::max(0.0, 1.0 - static_cast<double>(part.whitened.squaredNorm()));
-  change_ = part.change.head(change_.size()).cast<double>();
-  change_ += std::sqrt(unknown) * function->unknown.cwiseProduct(lasting_);
-  change_ = change_.cwiseMax(-function->bound).cwiseMin(function->bound);
-  for (double& normal : normal_) normal = random_.Normal();
-  change_.noalias() += function->noise * normal_;
-  return change_;
+  Eigen::VectorXd& change = part.change;
+  change = part.known.head(change.size()).cast<double>();
+  change += std::sqrt(unknown) * function.unknown.cwiseProduct(part.lasting);
+  change = change.cwiseMax(-function.bound).cwiseMin(function.bound);
+  if (!part.noisy) return change;
+  for (double& normal : part.normal) normal = random_.Normal();
+  change.noalias() += function.noise * part.normal;
+  return change;
 }
 
 }  // namespace plumb

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -28,8 +29,8 @@ class PackedMatrix {
   std::vector<residual_kernels::Pack> data_;
 };
 
-/// The change of n positions and velocities in a control step beyond the simulator's, as a function
-/// of D inputs (ResidualInputs), learnt from recorded transitions: the discrepancy function of
+/// The change of n quantities in a control step beyond the simulator's, as a function of D inputs,
+/// learnt from recorded transitions: the discrepancy function of
 /// Kennedy and O'Hagan (J. R. Statist. Soc. B 63, 2001), a Gaussian process with a squared
 /// exponential kernel and a linear one, by M of its inputs ("subset of regressors":
 /// Quinonero-Candela and Rasmussen, JMLR 6, 2005):
@@ -75,18 +76,35 @@ struct ResidualFunction {
   static constexpr int kMostCentres = 2000;
 };
 
-/// What a simulator lacks, for some draws of its parameters: each of them has its own function, as
-/// what is lacking depends on what the parameters explain. Of steps that touch the ground or a stop
-/// and of free ones apart: contact is what simulators have wrong most, and its errors must not be
-/// smeared over the rest. Where there is no function, the simulator is right as it is. Immutable
-/// use is thread-safe.
+/// What a simulator lacks, for some draws of its parameters: each of them has its own functions, as
+/// what is lacking depends on what the parameters explain. Contact is what simulators have wrong
+/// most, and its errors must not be smeared over the rest; and what a contact has wrong it can only
+/// do to the robot as an impulse there, along M^-1 J'. So there is a function of each contact with
+/// the ground and one of each joint at a stop, which know nothing but that contact
+/// (StepContacts::Contact), one of what these leave of steps that touch, and one of free steps.
+/// Where there is no function, the simulator is right as it is. Immutable use is thread-safe.
 struct Residual {
   std::vector<Eigen::VectorXd> coordinates;  ///< of the parameters, of each draw; at least one
+  /// Of 2 n outputs, all positions and velocities, by ResidualInputs: of steps that touch nothing,
+  /// and of those that touch the ground or a stop.
   std::optional<ResidualFunction> free, touching;
+  /// Of 2 k outputs, the displacement and the velocity of a contact point (upwards, and along the
+  /// ground) or of a joint away from its stop.
+  std::optional<ResidualFunction> ground, stop;
   /// [m], [rad] as near to the ground or a stop as this is touching: states are not known better
   double margin = kTouchMargin;
 
   static constexpr double kTouchMargin = 0.0078125;  // 2^-7: the same in single precision
+
+  /// Its functions, in the order of residual_function_t's conditions, and of what they are.
+  struct Part {
+    const char* name;
+    std::optional<ResidualFunction> Residual::*function;
+    bool of_contacts;  ///< not of the whole robot
+  };
+  static const std::array<Part, 4> kParts;
+  /// Whether it has a function at all.
+  bool any() const { return free || touching || ground || stop; }
 };
 
 /// @throws std::invalid_argument naming the field that is not finite, or not positive where it has
@@ -101,26 +119,34 @@ class ResidualSample {
 
   /// Begins an episode. @param draw < residual.coordinates.size(). @param random for its noise.
   void Begin(size_t draw, Random& random);
-  /// Change of positions and velocities in a control step, n entries; zero where there is no
-  /// function. @param x see ResidualInputs. Valid until the next call.
-  const Eigen::VectorXd& Step(bool touching, const Eigen::Ref<const Eigen::VectorXd>& x);
+  // Changes in a control step: zero where there is no function. Valid until the next call.
+  /// Of positions and velocities, 2 n entries. @param x see ResidualInputs.
+  const Eigen::VectorXd& Step(bool touching, const Eigen::Ref<const Eigen::VectorXd>& x) {
+    return Change(touching ? touching_ : free_, x);
+  }
+  /// Of a contact, 2 k entries. @param x see StepContacts::Contact.
+  const Eigen::VectorXd& Contact(bool ground, const Eigen::Ref<const Eigen::VectorXd>& x) {
+    return Change(ground ? ground_ : stop_, x);
+  }
 
  private:
-  const Residual* residual_;
-  size_t draw_ = 0;
-  Random random_{0};
-  // of a function
+  // A function at work; without one all but its change, of zeros, is empty.
   struct Part {
+    const ResidualFunction* function = nullptr;
     ResidualFunction::Work work;
     std::vector<PackedMatrix> weights;
     PackedMatrix whitening;  // the kernel factor's inverse
-    Eigen::VectorXf change, whitened;
+    Eigen::VectorXf known, whitened;
+    Eigen::VectorXd lasting;  // of the episode: h
+    Eigen::VectorXd normal, change;
+    bool noisy = false;
   };
-  static Part Prepare(const ResidualFunction& function);
+  static Part Prepare(const std::optional<ResidualFunction>& function, Eigen::Index outputs);
+  const Eigen::VectorXd& Change(Part& part, const Eigen::Ref<const Eigen::VectorXd>& x);
 
-  Part free_, touching_;
-  Eigen::VectorXd lasting_;  // of the episode: h
-  Eigen::VectorXd normal_, change_;
+  size_t draw_ = 0;
+  Random random_{0};
+  Part free_, touching_, ground_, stop_;
 };
 
 }  // namespace plumb

@@ -10,6 +10,8 @@ using json = nlohmann::ordered_json;
 
 // More would be no residual but an attack on the memory.
 constexpr size_t kMost = 10'000;
+// Displacement and velocity in space.
+constexpr size_t kMostOfContact = 6;
 
 json Singles(const Eigen::VectorXd& x) {
   json list = json::array();
@@ -47,8 +49,7 @@ Eigen::VectorXd Positive(const JsonField& list, size_t size) {
   return list.SingleVector(size);
 }
 
-std::optional<ResidualFunction> ReadFunction(const JsonField& field, size_t draws, size_t outputs) {
-  if (field.null()) return {};
+ResidualFunction ReadFunction(const JsonField& field, size_t draws, size_t outputs) {
   const size_t inputs = Count(field["mean"]),
                centres = Count(field["centres"], ResidualFunction::kMostCentres);
   ResidualFunction function;
@@ -82,10 +83,10 @@ json ResidualJson(const Residual& residual) {
   json draws = json::array();
   for (const Eigen::VectorXd& draw : residual.coordinates)
     draws.push_back(std::vector<double>(draw.begin(), draw.end()));
-  return {{"draws", draws},
-          {"margin", ShortestSingle(residual.margin)},
-          {"free", ToJson(residual.free)},
-          {"touching", ToJson(residual.touching)}};
+  json object{{"draws", draws}, {"margin", ShortestSingle(residual.margin)}};
+  for (const Residual::Part& part : Residual::kParts)
+    object[part.name] = ToJson(residual.*part.function);
+  return object;
 }
 
 std::shared_ptr<const Residual> ReadResidual(const JsonField& field, size_t parameters,
@@ -96,9 +97,13 @@ std::shared_ptr<const Residual> ReadResidual(const JsonField& field, size_t para
     residual->coordinates.push_back(draw.Vector(parameters));
   residual->margin = field["margin"].Single();
   field["margin"].Require(residual->margin >= 0, "is negative");
-  residual->free = ReadFunction(field["free"], draws, outputs);
-  residual->touching = ReadFunction(field["touching"], draws, outputs);
-  field.Require(residual->free || residual->touching, "has neither free nor touching");
+  for (const Residual::Part& part : Residual::kParts) {
+    const JsonField function = field[part.name];
+    if (function.null()) continue;
+    const size_t own = part.of_contacts ? Count(function["bound"], kMostOfContact) : outputs;
+    residual.get()->*part.function = ReadFunction(function, draws, own);
+  }
+  field.Require(residual->any(), "has no function");
   return residual;
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -14,6 +16,9 @@ using RowMajorFloat = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen
 
 // More would be no residual but an attack on the memory.
 constexpr int kMost = 10'000;
+// In the order of Residual::kParts.
+constexpr int8_t kConditions[] = {Message::FREE, Message::TOUCHING, Message::GROUND, Message::STOP};
+static_assert(std::size(kConditions) == Residual::kParts.size());
 
 void Append(const Eigen::MatrixXd& matrix, std::vector<float>* to) {
   const RowMajorFloat rows = matrix.cast<float>();
@@ -82,9 +87,10 @@ ResidualFunction FromMessage(const Message& m, size_t draws) {
 
 void WriteResidual(const Residual& residual, parameter_distribution_t* message) {
   message->residual.clear(), message->draw.clear();
-  if (residual.free) message->residual.push_back(ToMessage(*residual.free, Message::FREE));
-  if (residual.touching)
-    message->residual.push_back(ToMessage(*residual.touching, Message::TOUCHING));
+  for (size_t i = 0; i < Residual::kParts.size(); ++i) {
+    const auto& function = residual.*Residual::kParts[i].function;
+    if (function) message->residual.push_back(ToMessage(*function, kConditions[i]));
+  }
   for (const Eigen::VectorXd& draw : residual.coordinates)
     message->draw.insert(message->draw.end(), draw.begin(), draw.end());
   message->residual_margin = static_cast<float>(residual.margin);
@@ -103,9 +109,11 @@ std::shared_ptr<const Residual> ReadResidual(const parameter_distribution_t& mes
         Eigen::VectorXd::Map(message.draw.data() + i, static_cast<Eigen::Index>(parameters)));
   }
   for (const Message& m : message.residual) {
-    if (m.condition != Message::FREE && m.condition != Message::TOUCHING)
+    const auto* condition = std::find(std::begin(kConditions), std::end(kConditions), m.condition);
+    if (condition == std::end(kConditions))
       throw std::invalid_argument(fmt::format("residual: condition {}", m.condition));
-    auto& function = m.condition == Message::FREE ? residual->free : residual->touching;
+    auto& function =
+        residual.get()->*Residual::kParts[static_cast<size_t>(condition - kConditions)].function;
     if (function) throw std::invalid_argument("residual: two of one condition");
     function = FromMessage(m, residual->coordinates.size());
   }

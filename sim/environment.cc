@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 namespace plumb {
 
@@ -37,21 +38,17 @@ void Environment::SendThroughDriver() {
 }
 
 void Environment::SetResidual(std::shared_ptr<const Residual> residual, size_t draw) {
-  lacking_ = residual != nullptr;
-  if (!lacking_) return;
-  if (!lack_ || residual != lack_->residual) {
-    RequireResidualOf(model_->description(), *residual);
-    ResidualInputs inputs(*model_, residual->margin);
-    ResidualSample sample(*residual);
-    lack_.reset(new Lack{std::move(residual), std::move(sample), std::move(inputs)});
-  }
-  if (draw >= lack_->residual->coordinates.size())
+  corrected_ = residual != nullptr;
+  if (!corrected_) return;
+  if (!correction_ || residual != correction_->residual())
+    correction_ = std::make_unique<Correction>(*model_, std::move(residual));
+  if (draw >= correction_->residual()->coordinates.size())
     throw std::invalid_argument("the residual has no such draw");
-  lack_->draw = draw;
+  draw_ = draw;
 }
 
 void Environment::Reset(Random& random) {
-  if (lacking_) lack_->sample.Begin(lack_->draw, random);
+  if (corrected_) correction_->Begin(draw_, random);
   task_->InitialState(random, start_q_, start_v_);
   SetState(start_q_, start_v_);
 }
@@ -69,14 +66,17 @@ StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
   task_->Effort(std::span(action.data(), static_cast<size_t>(action.size())), next_effort_);
   start_q_ = q();
   start_v_ = v();
-  if (lacking_) {
-    lack_->inputs.Begin(simulator_);
+  if (corrected_) {
+    correction_->BeginStep(simulator_);
     mean_effort_.setZero();
   }
   Act(effort_, latency_);
   Act(next_effort_, period_ - latency_);
   effort_.swap(next_effort_);
-  if (lacking_) Correct();
+  if (corrected_) {
+    correction_->EndStep(simulator_, mean_effort_, mean_effort_before_, period_);
+    mean_effort_before_.swap(mean_effort_);
+  }
   Read();
   return {task_->Reward(start_q_, start_v_, effort_, q(), v()),
           !simulator_.finite() || task_->Terminated(q(), v())};
@@ -94,17 +94,9 @@ void Environment::Act(const Eigen::VectorXd& wish, double duration) {
                          : wish[i];
     }
     simulator_.Step(sent_, cycle);
-    if (lacking_) mean_effort_ += cycle / period_ * sent_;
+    if (corrected_) mean_effort_ += cycle / period_ * sent_;
     duration -= cycle;
   }
-}
-
-void Environment::Correct() {
-  lack_->inputs.End(simulator_, mean_effort_, mean_effort_before_, period_);
-  const Eigen::VectorXd& change = lack_->sample.Step(lack_->inputs.touching(), lack_->inputs.x());
-  const Eigen::Index n = change.size() / 2;
-  simulator_.Correct(change.head(n), change.tail(n));
-  mean_effort_before_.swap(mean_effort_);
 }
 
 void Environment::Read() {

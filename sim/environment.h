@@ -9,7 +9,7 @@
 #include "robot/description.h"
 #include "robot/limit_effort.h"
 #include "robot/residual.h"
-#include "sim/residual_inputs.h"
+#include "sim/correction.h"
 #include "sim/simulator.h"
 #include "sim/tasks/task.h"
 
@@ -78,23 +78,15 @@ class Environment {
   const Task& task() const { return *task_; }
 
  private:
-  // A residual under way.
-  struct Lack {
-    std::shared_ptr<const Residual> residual;
-    ResidualSample sample;
-    ResidualInputs inputs;
-    size_t draw = 0;
-  };
-
   void Act(const Eigen::VectorXd& wish, double duration);
   void Read();
-  void Correct();
 
   std::unique_ptr<Task> task_;
   std::shared_ptr<const Model> model_;
   Simulator simulator_;
-  std::unique_ptr<Lack> lack_;
-  bool lacking_ = false;  // what has been learnt is in use
+  std::unique_ptr<Correction> correction_;  // the last one
+  bool corrected_ = false;                  // it is in use
+  size_t draw_ = 0;                         // of it
   int steps_per_episode_;
   double period_;
   double latency_;

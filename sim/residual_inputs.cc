@@ -10,16 +10,20 @@ namespace plumb {
 int ResidualInputCount(const RobotDescription& robot) {
   const std::unique_ptr<Task> task = MakeTask(robot);
   return task->observation_size() + 2 * task->action_size() + robot.num_velocities() +
-         TouchFinder(robot).num_nearness();
+         StepContacts::NearnessCount(robot, Topology(robot));
 }
 
 void RequireResidualOf(const RobotDescription& robot, const Residual& residual) {
-  for (const auto* part : {&residual.free, &residual.touching}) {
-    if (*part && ((*part)->inputs() != ResidualInputCount(robot) ||
-                  (*part)->outputs() != 2 * robot.num_velocities()))
-      throw std::invalid_argument(
-          "the residual is another robot's: it has other inputs or outputs");
-  }
+  const Topology topology(robot);
+  const int inputs = ResidualInputCount(robot), directions = topology.contact_directions();
+  const auto fits = [](const std::optional<ResidualFunction>& f, int d, int outputs) {
+    return !f || (f->inputs() == d && f->outputs() == outputs);
+  };
+  if (!fits(residual.free, inputs, 2 * robot.num_velocities()) ||
+      !fits(residual.touching, inputs, 2 * robot.num_velocities()) ||
+      !fits(residual.ground, StepContacts::GroundInputs(topology), 2 * directions) ||
+      !fits(residual.stop, StepContacts::kStopInputs, 2))
+    throw std::invalid_argument("the residual is another robot's: it has other inputs or outputs");
   for (const Eigen::VectorXd& draw : residual.coordinates) {
     if (draw.size() != static_cast<Eigen::Index>(robot.parameters.size()))
       throw std::invalid_argument("the residual is another robot's: it has other parameters");
@@ -29,10 +33,11 @@ void RequireResidualOf(const RobotDescription& robot, const Residual& residual) 
 ResidualInputs::ResidualInputs(const Model& model, double margin)
     : task_(MakeTask(model.description())),
       limits_(task_->action_size()),
-      touch_(model.description(), margin),
+      contacts_(model, margin),
       observation_(task_->observation_size()),
       v_(model.num_velocities()),
       acceleration_(v_.size()),
+      constrained_(v_.size()),
       x_(ResidualInputCount(model.description())) {
   if (model.num_positions() != model.num_velocities())
     throw std::invalid_argument("a residual is not for robots with spherical joints");
@@ -40,12 +45,13 @@ ResidualInputs::ResidualInputs(const Model& model, double margin)
   for (Eigen::Index a = 0; a < limits_.size(); ++a) limits_[a] = all[a];
 }
 
-void ResidualInputs::Begin(const Simulator& simulator) {
+void ResidualInputs::Begin(Simulator& simulator) {
   task_->Observe(simulator.q(), simulator.v(),
                  std::span(observation_.data(), static_cast<size_t>(observation_.size())));
   x_.head(observation_.size()) = observation_.cast<double>();
   v_ = simulator.v();
-  touching_ = touch_.Nearness(simulator.q(), simulator.v(), x_.tail(touch_.num_nearness())).any();
+  contacts_.Begin(simulator);
+  contacts_.Nearness(x_.tail(x_.size() - observation_.size() - 2 * limits_.size() - v_.size()));
 }
 
 void ResidualInputs::End(Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,
@@ -59,9 +65,9 @@ void ResidualInputs::End(Simulator& simulator, const Eigen::Ref<const Eigen::Vec
     then[a] = before[joint] / limits_[a];
   }
   simulator.Acceleration(effort, &acceleration_);
-  x_.segment(observation_.size() + 2 * actions, v_.size()) =
-      simulator.v() - v_ - duration * acceleration_;
-  touching_ = touching_ || touch_.Find(simulator.q()).any();
+  constrained_ = simulator.v() - v_ - duration * acceleration_;
+  x_.segment(observation_.size() + 2 * actions, v_.size()) = constrained_;
+  contacts_.End(simulator, constrained_);
 }
 
 }  // namespace plumb

@@ -168,10 +168,20 @@ void Simulator::Acceleration(const Vector& effort, Eigen::VectorXd* acceleration
   *acceleration = Eigen::VectorXd::Map(engine_->Acceleration(effort.data()), num_velocities());
 }
 
+void Simulator::ContactPoints(Eigen::VectorXd* heights, RowMajorMatrix* jacobians) {
+  const Eigen::Index points = num_contact_points(), rows = points * contact_directions();
+  *heights = Eigen::VectorXd::Map(engine_->ContactHeights(), points);
+  *jacobians = RowMajorMatrix::Map(engine_->ContactJacobians(), rows, num_velocities());
+}
+
+void Simulator::ImpulseResponse(const Vector& impulse, Eigen::Ref<Eigen::VectorXd> change) {
+  RequireSize(impulse.size());
+  change = Eigen::VectorXd::Map(engine_->Response(impulse.data()), num_velocities());
+}
+
 Eigen::MatrixXd Simulator::MassMatrix() {
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::MatrixXd lower =
-      RowMajor::Map(engine_->MassMatrix(), num_velocities(), num_velocities());
+      RowMajorMatrix::Map(engine_->MassMatrix(), num_velocities(), num_velocities());
   return lower.selfadjointView<Eigen::Lower>();
 }
 

@@ -23,6 +23,7 @@ namespace plumb {
 class Simulator {
  public:
   using Vector = Eigen::Ref<const Eigen::VectorXd>;
+  using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   /// Starts at the zero state with the prior means as parameters.
   explicit Simulator(std::shared_ptr<const Model> model);
@@ -84,6 +85,15 @@ class Simulator {
   Eigen::VectorXd Acceleration(const Vector& effort);
   /// The same without allocating.
   void Acceleration(const Vector& effort, Eigen::VectorXd* acceleration);
+  /// What contact points do at the current state. Without allocating.
+  /// @param heights [m] of each point's lowest spot above the ground.
+  /// @param jacobians of those spots, contact_directions() rows each: upwards, and along the ground.
+  void ContactPoints(Eigen::VectorXd* heights, RowMajorMatrix* jacobians);
+  int num_contact_points() const { return static_cast<int>(model_->topology().points.size()); }
+  int contact_directions() const { return model_->topology().contact_directions(); }
+  /// The change of velocities that an impulse [Nm s or N s] makes, at the state of the latest
+  /// Acceleration: M^-1 impulse. Without allocating.
+  void ImpulseResponse(const Vector& impulse, Eigen::Ref<Eigen::VectorXd> change);
   /// With armature [kg m^2 or kg].
   Eigen::MatrixXd MassMatrix();
   /// Efforts that gravity and inertia exert at zero accelerations.

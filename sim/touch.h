@@ -28,24 +28,11 @@ class TouchFinder {
   /// @param q as in RobotDescription. @throws std::invalid_argument if q has the wrong size.
   Touch Find(const Eigen::Ref<const Eigen::VectorXd>& q);
 
-  /// Entries of Nearness.
-  int num_nearness() const;
-  /// How near everything is that can be touched, where it is near: what a step does depends on
-  /// millimetres there, and on nothing farther away. With distances in margins, kept within
-  /// kReach: of each contact point its height and, as far as it is near, its velocity [m/s]; of
-  /// each joint with stops its distance from the middle between them, of which most is taken away.
-  /// Returns what Find does. @param margin that the finder has must be above zero. @throws as Find.
-  Touch Nearness(const Eigen::Ref<const Eigen::VectorXd>& q,
-                 const Eigen::Ref<const Eigen::VectorXd>& v, Eigen::Ref<Eigen::VectorXd> nearness);
-  static constexpr double kReach = 4;
-
  private:
   struct Stop {
     Eigen::Index position;
     double lower, upper;
   };
-
-  Touch Touching(const Eigen::Ref<const Eigen::VectorXd>& q) const;
 
   double margin_;
   Kinematics kinematics_;

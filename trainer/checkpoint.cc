@@ -22,7 +22,7 @@ namespace {
 // File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a
 // checkpoint stays where it was written.
 constexpr char kMagic[8] = {'P', 'L', 'U', 'M', 'B', 'T', 'R', 'N'};
-constexpr uint32_t kVersion = 6;  // 3: without trials on the robot, 4, 5: with other residuals
+constexpr uint32_t kVersion = 7;  // 3: without trials on the robot, 4 to 6: with other residuals
 constexpr size_t kHeader = sizeof kMagic + 2 * sizeof(uint32_t);
 
 class Writer {

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "calibrator/fit/residual_function_fit.h"
 #include "calibrator/motion/transitions.h"
 #include "robot/residual.h"
 #include "sim/model.h"
@@ -14,13 +15,18 @@ namespace plumb {
 
 struct ResidualFitOptions {
   bool free = true, touching = true;  ///< where the simulator is to be corrected
-  int centres = 256;                  ///< of its functions, at most
+  /// whether touching steps have functions of their contacts (FitContacts)
+  bool contacts = true;
+  int centres = 256;         ///< of its functions of free steps, or of touching ones without those
+  int contact_centres = 96;  ///< of the functions of contacts
+  int rest_centres = 128;    ///< of the function of what those leave
   /// of the weights: 0 = their posterior's mean for each draw of the parameters, 1 = as uncertain
   /// as they are
   double width = 0;
   double noise = 1;  ///< factor of what is left
-  /// factor of the sd that the evidence says of a change before anything is known
-  double unknown = 0.3;
+  /// factor of the sd that the evidence says of a change before anything is known: without
+  /// functions of contacts, and with them
+  double unknown = 0.3, unknown_by_contacts = 0.1;
   uint64_t seed = 1;
 };
 
@@ -40,7 +46,8 @@ struct ResidualFit {
 
 /// Learns what a simulator lacks from one-step errors of positions and velocities, given its
 /// parameters: a Gaussian process in closed form (ResidualRegression), the kernel's length for all
-/// outputs that of the greatest evidence. Noise is the covariance of leave-one-out errors
+/// outputs that of the greatest evidence. Of touching steps first what their contacts have wrong
+/// (FitContacts), then what is left. Noise is the covariance of leave-one-out errors
 /// less that of the readings. A condition of fewer than kFewestForResidual transitions has no
 /// residual. Thread-safe; the same bits each time.
 /// @param coordinates of the simulators to be corrected, a column each, at least one; the first one
@@ -49,7 +56,5 @@ struct ResidualFit {
 ResidualFit FitResidual(const std::shared_ptr<const Model>& model,
                         const Eigen::MatrixXd& coordinates, std::span<const Rollout> rollouts,
                         const ResidualFitOptions& options);
-
-inline constexpr int kFewestForResidual = 20;
 
 }  // namespace plumb

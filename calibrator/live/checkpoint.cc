@@ -18,9 +18,9 @@ namespace {
 
 using nlohmann::json;
 
-// 2: without the method used, its warnings and a search's samples; 3: without a residual; 4, 5:
-// with another
-constexpr int kVersion = 6;
+// 2: without the method used, its warnings and a search's samples; 3: without a residual; 4 to
+// 6: with another
+constexpr int kVersion = 7;
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 

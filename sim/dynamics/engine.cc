@@ -77,6 +77,11 @@ class EngineOf : public Engine {
   }
   const double* MassMatrix() override { return AsDouble(stepper_.MassMatrix()); }
   const double* Bias() override { return AsDouble(stepper_.Bias()); }
+  const double* ContactHeights() override { return AsDouble(stepper_.ContactHeights()); }
+  const double* ContactJacobians() override { return AsDouble(stepper_.ContactJacobians()); }
+  const double* Response(const double* impulse) override {
+    return AsDouble(stepper_.Response(effort_(impulse)));
+  }
   void FromReading(const double* effort) override { stepper_.FromReading(effort_(effort)); }
   void ToReading(const double* effort) override { stepper_.ToReading(effort_(effort)); }
 

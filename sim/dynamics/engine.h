@@ -28,6 +28,9 @@ class Engine {
   virtual const double* Acceleration(const double* effort) = 0;
   virtual const double* MassMatrix() = 0;
   virtual const double* Bias() = 0;
+  virtual const double* ContactHeights() = 0;
+  virtual const double* ContactJacobians() = 0;
+  virtual const double* Response(const double* impulse) = 0;
   virtual void FromReading(const double* effort) = 0;
   virtual void ToReading(const double* effort) = 0;
 };

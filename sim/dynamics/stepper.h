@@ -46,7 +46,12 @@ class Stepper {
         shift_(n_),
         friction_(n_),
         cholesky_(n_),
-        constraints_(topology, rubs_, terms.stops) {}
+        constraints_(topology, rubs_, terms.stops),
+        heights_(topology.points.size()),
+        jacobians_(heights_.size() * kContactDirections * n_) {}
+
+  /// In which a contact point can be pushed: upwards, and along the ground.
+  static constexpr size_t kContactDirections = 1 + Tree<Real>::kTangents;
 
   /// One substep of h > 0 seconds, which may differ from lane to lane. Arrays of one per velocity:
   /// @param effort mean over the substep of what is commanded.
@@ -107,6 +112,25 @@ class Stepper {
     return bias_.data();
   }
 
+  /// [m] of each contact point's lowest spot above the ground, at q.
+  const Real* ContactHeights() {
+    tree_.MoveTo(physics, q.data());
+    for (size_t p = 0; p < heights_.size(); ++p) heights_[p] = tree_.Height(physics, p);
+    return heights_.data();
+  }
+  /// Those spots' Jacobians, at the q of ContactHeights: kContactDirections rows each.
+  const Real* ContactJacobians() {
+    for (size_t p = 0; p < heights_.size(); ++p)
+      tree_.Jacobian(physics, p, &jacobians_[p * kContactDirections * n_]);
+    return jacobians_.data();
+  }
+  /// The change of velocities that an impulse makes, at the q of the latest Acceleration.
+  const Real* Response(const Real* impulse) {
+    for (size_t i = 0; i < n_; ++i) change_[i] = impulse[i];
+    cholesky_.Solve(topology_.ancestors, matrix_.data(), change_.data());
+    return change_.data();
+  }
+
   /// q, v are readings of sensors (JointDynamics): makes them the state that these are of, to
   /// second order in the delay, and back.
   void FromReading(const Real* effort) {
@@ -149,6 +173,7 @@ class Stepper {
   std::vector<Real> bias_, change_, trial_, tried_, shift_, friction_;
   SparseCholesky<Real> cholesky_;
   Constraints<Real, Tree> constraints_;
+  std::vector<Real> heights_, jacobians_;  // of contact points, for ContactHeights
 
   // A torque along the speed is limited by it: see JointDynamics::no_load_speed.
   Real Slowed(size_t i, const Real& effort, const Real& speed, double limit) const {

@@ -47,6 +47,9 @@ struct Topology {
   /// each link's (from the base on) in working axes, at q = 0
   std::vector<Eigen::Matrix3d> link_axes;
 
+  /// In which a contact point can be pushed: upwards, and along the ground.
+  int contact_directions() const { return planar ? 2 : 3; }
+
   /// @throws std::invalid_argument unless joint i moves link i + 1 and hangs on a link before it.
   explicit Topology(const RobotDescription& description);
 };

@@ -13,7 +13,7 @@
 
 namespace plumb {
 
-/// A residual for steps that touch, of two draws, two inputs and three centres; numbers that single
+/// A residual for steps that touch and for contacts with the ground, of two draws, two inputs and three centres; numbers that single
 /// precision has.
 inline Residual SampleResidual(const RobotDescription& robot) {
   const Eigen::Index n = 2 * robot.num_velocities();
@@ -23,16 +23,22 @@ inline Residual SampleResidual(const RobotDescription& robot) {
     for (double& number : matrix.reshaped()) number = static_cast<float>(random.Normal());
     return matrix;
   };
-  ResidualFunction f;
-  f.mean = singles(2, 1), f.scale = Eigen::Vector2d(0.5, 2);
-  f.low = Eigen::Vector2d(-2, -1), f.high = Eigen::Vector2d(1, 3);
-  f.centres = singles(3, 2);
-  f.weights = {singles(n, 6), singles(n, 6)};
-  f.noise = singles(n, n);
-  f.bound = Eigen::VectorXd::Constant(n, 4);
-  f.unknown = singles(n, 1).cwiseAbs();
+  const auto function = [&](Eigen::Index outputs) {
+    ResidualFunction f;
+    f.mean = singles(2, 1), f.scale = Eigen::Vector2d(0.5, 2);
+    f.low = Eigen::Vector2d(-2, -1), f.high = Eigen::Vector2d(1, 3);
+    f.centres = singles(3, 2);
+    f.weights = {singles(outputs, 6), singles(outputs, 6)};
+    f.noise = singles(outputs, outputs);
+    f.bound = Eigen::VectorXd::Constant(outputs, 4);
+    f.unknown = singles(outputs, 1).cwiseAbs();
+    return f;
+  };
+  Residual residual;
   const Gaussian prior = PriorGaussian(robot);
-  return {{prior.mean, prior.mean + 0.1 * prior.covariance.diagonal().cwiseSqrt()}, {}, f};
+  residual.coordinates = {prior.mean, prior.mean + 0.1 * prior.covariance.diagonal().cwiseSqrt()};
+  residual.touching = function(n), residual.ground = function(4);
+  return residual;
 }
 
 /// Findings of a robot that nobody has calibrated: every field holds something, two components, and

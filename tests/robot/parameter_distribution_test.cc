@@ -161,6 +161,7 @@ TEST_CASE("Hostile distributions are refused with a reason") {
   SECTION("negative variance") {
     message.covariance[3] = -.01, refused_for("not positive semidefinite");
   }
+  SECTION("a draw of a residual") { message.draw = {1e5, 0}, refused_for("a draw is too wide"); }
   SECTION("overflow") { message.mean[0] = 1e5, refused_for("overflow"); }
 }
 

@@ -150,7 +150,7 @@ TEST_CASE("a residual that is none is refused by its field") {
                               {[](auto& m) { m.residual[0].unknown.clear(); }, "unknown"},
                               {[](auto& m) { m.residual[0].num_inputs = -1; }, "num_inputs"},
                               {[](auto& m) { m.residual[0].num_centres = 2001; }, "num_centres"},
-                              {[](auto& m) { m.residual[0].condition = 2; }, "condition"},
+                              {[](auto& m) { m.residual[0].condition = 4; }, "condition"},
                               {[](auto& m) { m.residual.push_back(m.residual[0]); }, "two of one"},
                               {[](auto& m) { m.draw.clear(); }, "draw"},
                               {[](auto& m) { m.draw[0] = NAN; }, "draw"},

@@ -103,7 +103,7 @@ TEST_CASE(
   const Model model(robot);
   Simulator simulator(robot);
   ResidualInputs inputs(model, 0.005);
-  REQUIRE(inputs.size() == 11 + 3 + 3 + 6 + 2 * 4 + 6);
+  REQUIRE(inputs.size() == 11 + 3 + 3 + 6 + 2 * 3 + 3);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(6), v = q, effort = q, before = q;
   q[1] = 2, q[3] = -0.5, q[4] = -1, v[3] = 0.5, effort[3] = 100, before[5] = -200;
   simulator.SetState(q, v);
@@ -115,10 +115,10 @@ TEST_CASE(
   CHECK(inputs.x()[11] == Approx(100. / 200));  // in units of the limit
   CHECK(inputs.x()[16] == Approx(-1));
   const auto constrained = [&] { return inputs.x().segment(17, 6).cwiseAbs().maxCoeff(); };
-  CHECK(constrained() < 1e-2);                   // nothing but a short step's error
-  CHECK(inputs.x()[23] == TouchFinder::kReach);  // the heel is far from the ground
-  CHECK(inputs.x().segment(24, 3).isZero());
-  CHECK(inputs.x().tail(6).isZero());  // and all joints from their stops
+  CHECK(constrained() < 1e-2);                    // nothing but a short step's error
+  CHECK(inputs.x()[23] == StepContacts::kReach);  // the heel is far from the ground
+  CHECK(inputs.x().segment(24, 2).isZero());
+  CHECK(inputs.x().tail(3).isZero());  // and all joints from their stops
   CHECK_FALSE(inputs.touching());
   q[1] = 1.2, q[3] = q[4] = 0;  // deep in the ground
   simulator.SetState(q, v);
@@ -127,8 +127,8 @@ TEST_CASE(
   inputs.End(simulator, effort, before, 0.0005);
   CHECK(constrained() > 0.05);
   CHECK(inputs.x()[23] < 0);
-  CHECK(inputs.x()[24] != 0);                    // the thigh still turns
-  CHECK(inputs.x()[34] == TouchFinder::kReach);  // at its upper stop
+  CHECK(inputs.x()[25] != 0);                     // the thigh still turns
+  CHECK(inputs.x()[29] == StepContacts::kReach);  // at its upper stop
   CHECK(inputs.touching());
 }
 

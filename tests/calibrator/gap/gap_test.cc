@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "calibrator/fit/methods.h"
+#include "sim/correction.h"
 #include "sim/parameters.h"
-#include "sim/residual_inputs.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/hopper.h"
 
@@ -24,30 +24,32 @@ GapFit Close(const RobotDescription& robot, const std::vector<Rollout>& rollouts
 struct Squares {
   double before = 0, after = 0;
 };
-Squares SquaredErrors(const RobotDescription& robot, const Residual& residual, bool touching,
+Squares SquaredErrors(const RobotDescription& robot, const Residual& learnt, bool touching,
                       const std::vector<Rollout>& rollouts) {
+  auto residual = std::make_shared<Residual>(learnt);
+  for (const Residual::Part& part : Residual::kParts) {
+    auto& function = residual.get()->*part.function;
+    if (function) function->noise.setZero(), function->unknown.setZero();
+  }
   const Model model(robot);
   Simulator simulator(robot);
-  simulator.SetParameters(robot.ToPhysical(residual.coordinates[0]));
-  ResidualInputs inputs(model, residual.margin);
-  const ResidualFunction& function = touching ? *residual.touching : *residual.free;
-  ResidualFunction::Work work = function.MakeWork();
+  simulator.SetParameters(robot.ToPhysical(residual->coordinates[0]));
+  Correction correction(model, residual);
+  Random random(1);
+  correction.Begin(0, random);
   Squares squares;
   for (const Rollout& rollout : rollouts) {
     for (size_t i = 1; i < rollout.transitions.size(); ++i) {
       const Transition& t = rollout.transitions[i];
       simulator.SetState(t.q, t.v);
-      inputs.Begin(simulator);
+      correction.BeginStep(simulator);
       simulator.Step(t.efforts);
-      inputs.End(simulator, t.efforts[0].effort, rollout.transitions[i - 1].efforts[0].effort,
-                 t.duration());
-      if (inputs.touching() != touching) continue;
-      function.Features(inputs.x(), &work);
-      const Eigen::VectorXd features = work.features.head(function.features()).cast<double>();
-      const Eigen::VectorXd error = t.next_v - simulator.v();
-      squares.before += error.squaredNorm();
-      const Eigen::VectorXd change = function.weights[0] * features;
-      squares.after += (error - change.tail(error.size())).squaredNorm();
+      const double before = (t.next_v - simulator.v()).squaredNorm();
+      correction.EndStep(simulator, t.efforts[0].effort,
+                         rollout.transitions[i - 1].efforts[0].effort, t.duration());
+      if (correction.touching() != touching) continue;
+      squares.before += before;
+      squares.after += (t.next_v - simulator.v()).squaredNorm();
     }
   }
   return squares;

@@ -192,7 +192,7 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   CHECK(std::isnan(loaded->ess));
   std::string text =
       (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
-  text.replace(text.find("\"version\": 6"), 12, "\"version\": 1");
+  text.replace(text.find("\"version\": 7"), 12, "\"version\": 1");
   std::ofstream(folder / "calibration.json") << text;
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
 }

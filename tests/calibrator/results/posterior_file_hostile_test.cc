@@ -157,8 +157,7 @@ TEST_CASE("hostile residuals are refused with file and field") {
              Contains(": residual.draws[1][0]: is not a number"));
   CHECK_THAT(spoilt("/residual/draws/1/0", 1e9), Contains(": residual.draws: is too wide"));
   CHECK_THAT(spoilt("/residual/margin", -1), Contains(": residual.margin: is negative"));
-  CHECK_THAT(spoilt("/residual/touching", nullptr),
-             Contains(": residual: has neither free nor touching"));
+  CHECK(spoilt("/residual/touching", nullptr).empty());  // there is that of the ground
   CHECK_THAT(spoilt("/residual/free", "none"), Contains(": residual.free: is not an object"));
   const std::string touching = "/residual/touching/", path = ": residual.touching.";
   CHECK_THAT(spoilt(touching + "mean", json::array()), Contains(path + "mean: has 0 entries"));
@@ -186,6 +185,26 @@ TEST_CASE("hostile residuals are refused with file and field") {
   json j = good;
   j["residual"]["draws"].push_back({0, 0, 0});
   CHECK_THAT(Error(j.dump(), robot), Contains(path + "weights: has 2 entries, expected 3"));
+}
+
+TEST_CASE("hostile residuals of contacts are refused with file and field") {
+  const RobotDescription robot = Pendulum();
+  const json good = json::parse(PosteriorJson(SampleFindings(robot), robot, {}));
+  const auto spoilt = [&](const std::string& field, const json& value) {
+    json j = good;
+    j[json::json_pointer("/residual/" + field)] = value;
+    return Error(j.dump(), robot);
+  };
+  CHECK_THAT(spoilt("ground/bound", std::vector<double>(7, 1)),
+             Contains(": residual.ground.bound: has 7 entries"));
+  CHECK_THAT(spoilt("ground/bound", {1, 1}), Contains(": residual.ground.weights[0]: has 4"));
+  CHECK_THAT(spoilt("ground/noise/3/3", "x"),
+             Contains(": residual.ground.noise[3][3]: is not a number"));
+  json j = good;
+  j["residual"]["touching"] = j["residual"]["ground"] = nullptr;
+  CHECK_THAT(Error(j.dump(), robot), Contains(": residual: has no function"));
+  j["residual"].erase("stop");
+  CHECK_THAT(Error(j.dump(), robot), Contains(": residual.stop: is missing"));
 }
 
 TEST_CASE("a posterior that was cut off or has rotten bytes is refused or read, nothing else") {

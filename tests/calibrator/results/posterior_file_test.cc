@@ -46,16 +46,19 @@ TEST_CASE("a residual and starts read back to the same bits") {
   CHECK(read.residual->coordinates == residual.coordinates);
   CHECK(read.residual->margin == residual.margin);
   CHECK_FALSE(read.residual->free);
-  REQUIRE(read.residual->touching);
-  const ResidualFunction &is = *read.residual->touching, &was = *residual.touching;
-  CHECK(is.mean == was.mean);
-  CHECK(is.scale == was.scale);
-  CHECK(is.low == was.low);
-  CHECK(is.high == was.high);
-  CHECK(is.centres == was.centres);
-  CHECK(is.weights == was.weights);
-  CHECK(is.noise == was.noise);
-  CHECK(is.bound == was.bound);
+  CHECK_FALSE(read.residual->stop);
+  for (const auto part : {&Residual::touching, &Residual::ground}) {
+    REQUIRE((*read.residual).*part);
+    const ResidualFunction &is = *((*read.residual).*part), &was = *(residual.*part);
+    CHECK(is.mean == was.mean);
+    CHECK(is.scale == was.scale);
+    CHECK(is.low == was.low);
+    CHECK(is.high == was.high);
+    CHECK(is.centres == was.centres);
+    CHECK(is.weights == was.weights);
+    CHECK(is.noise == was.noise);
+    CHECK(is.bound == was.bound);
+  }
 }
 
 TEST_CASE("of the version before residuals a posterior has none") {

@@ -1,0 +1,67 @@
+#include "calibrator/fit/step_errors.h"
+
+#include "sim/residual_inputs.h"
+#include "sim/simulator.h"
+
+namespace plumb {
+namespace {
+
+Eigen::VectorXd MeanEffort(const Transition& transition) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(transition.efforts.front().effort.size());
+  for (const EffortSegment& segment : transition.efforts) sum += segment.duration * segment.effort;
+  return sum / transition.duration();
+}
+
+Eigen::VectorXd Stack(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
+  Eigen::VectorXd both(q.size() + v.size());
+  both << q, v;
+  return both;
+}
+
+void Add(const ResidualInputs& inputs, const Transition& t, const Simulator& simulator,
+         StepErrors* to) {
+  to->inputs.push_back(inputs.x());
+  to->errors.push_back(Stack(t.next_q - simulator.q(), t.next_v - simulator.v()));
+  to->variances.push_back(Stack(t.next_q_sd.cwiseAbs2() + t.q_sd.cwiseAbs2(),
+                                t.next_v_sd.cwiseAbs2() + t.v_sd.cwiseAbs2()));
+  std::vector<StepContacts::Contact>& contacts = to->contacts.emplace_back();
+  for (const StepContacts::Contact* contact : inputs.contacts().touching())
+    contacts.push_back(*contact);
+}
+
+}  // namespace
+
+SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
+                           const Eigen::VectorXd& physical, std::span<const Rollout> rollouts,
+                           double margin) {
+  SortedErrors errors;
+  ResidualInputs inputs(*model, margin);
+  Simulator simulator(model);
+  simulator.SetParameters(physical);
+  for (const Rollout& rollout : rollouts) {
+    const Transition* last = nullptr;
+    for (const Transition& t : rollout.transitions) {
+      const bool follows = last && last->step + 1 == t.step;
+      const Eigen::VectorXd effort = MeanEffort(t), before = follows ? MeanEffort(*last) : effort;
+      if (t.next_q.allFinite() && t.next_v.allFinite()) {
+        simulator.SetState(t.q, t.v);
+        if (follows) simulator.Recall(last->efforts);
+        inputs.Begin(simulator);
+        simulator.Step(t.efforts);
+        inputs.End(simulator, effort, before, t.duration());
+        if (simulator.finite())
+          Add(inputs, t, simulator, inputs.touching() ? &errors.touching : &errors.free);
+      }
+      last = &t;
+    }
+  }
+  return errors;
+}
+
+Eigen::MatrixXd Columns(std::span<const Eigen::VectorXd> columns) {
+  Eigen::MatrixXd matrix(columns.front().size(), static_cast<Eigen::Index>(columns.size()));
+  for (size_t i = 0; i < columns.size(); ++i) matrix.col(static_cast<Eigen::Index>(i)) = columns[i];
+  return matrix;
+}
+
+}  // namespace plumb
