@@ -87,7 +87,8 @@ class Simulator {
   void Acceleration(const Vector& effort, Eigen::VectorXd* acceleration);
   /// What contact points do at the current state. Without allocating.
   /// @param heights [m] of each point's lowest spot above the ground.
-  /// @param jacobians of those spots, contact_directions() rows each: upwards, and along the ground.
+  /// @param jacobians of those spots, contact_directions() rows each: upwards, and along the
+  /// ground.
   void ContactPoints(Eigen::VectorXd* heights, RowMajorMatrix* jacobians);
   int num_contact_points() const { return static_cast<int>(model_->topology().points.size()); }
   int contact_directions() const { return model_->topology().contact_directions(); }

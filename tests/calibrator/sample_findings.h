@@ -13,8 +13,8 @@
 
 namespace plumb {
 
-/// A residual for steps that touch and for contacts with the ground, of two draws, two inputs and three centres; numbers that single
-/// precision has.
+/// A residual for steps that touch and for contacts with the ground, of two draws, two inputs and
+/// three centres; numbers that single precision has.
 inline Residual SampleResidual(const RobotDescription& robot) {
   const Eigen::Index n = 2 * robot.num_velocities();
   Random random(6, {1});

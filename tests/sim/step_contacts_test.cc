@@ -12,7 +12,8 @@ namespace {
 
 RobotDescription Gym() { return LoadRobot(SourceFile("robots/hopper/gym.toml")); }
 
-// The tree in space over the ground, with a ball at the end of its longer arm, which moves it each way.
+// The tree in space over the ground, with a ball at the end of its longer arm, which moves it each
+// way.
 RobotDescription TreeOverGround() {
   RobotDescription tree = MakeTree();
   tree.simulation = Gym().simulation;
