@@ -103,7 +103,7 @@ TEST_CASE(
   const Model model(robot);
   Simulator simulator(robot);
   ResidualInputs inputs(model, 0.005);
-  REQUIRE(inputs.size() == 11 + 3 + 3 + 6 + 2 * 3 + 3);
+  REQUIRE(inputs.size() == 11 + 3 + 3 + 6 + 2 * 3 + 5);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(6), v = q, effort = q, before = q;
   q[1] = 2, q[3] = -0.5, q[4] = -1, v[3] = 0.5, effort[3] = 100, before[5] = -200;
   simulator.SetState(q, v);
@@ -118,7 +118,7 @@ TEST_CASE(
   CHECK(constrained() < 1e-2);                    // nothing but a short step's error
   CHECK(inputs.x()[23] == StepContacts::kReach);  // the heel is far from the ground
   CHECK(inputs.x().segment(24, 2).isZero());
-  CHECK(inputs.x().tail(3).isZero());  // and all joints from their stops
+  CHECK(inputs.x().tail(5).isZero());  // and all joints from their stops
   CHECK_FALSE(inputs.touching());
   q[1] = 1.2, q[3] = q[4] = 0;  // deep in the ground
   simulator.SetState(q, v);
@@ -128,7 +128,7 @@ TEST_CASE(
   CHECK(constrained() > 0.05);
   CHECK(inputs.x()[23] < 0);
   CHECK(inputs.x()[25] != 0);                     // the thigh still turns
-  CHECK(inputs.x()[29] == StepContacts::kReach);  // at its upper stop
+  CHECK(inputs.x()[31] == StepContacts::kReach);  // at its upper stop
   CHECK(inputs.touching());
 }
 

@@ -19,7 +19,9 @@ inline RobotDescription PendulumRobot() {
                       {"mass/pole", "kg", log, 1, .03},
                       {"length/pole", "m", log, 1, .03}};
   robot.joints.resize(1);
+  robot.joints[0].child = 1, robot.joints[0].axis = {0, 1, 0};
   robot.joints[0].effort_limit = 2;
+  robot.links.resize(2);
   robot.task.name = "pendulum";
   robot.task.steps = 200;
   robot.training = PendulumSettings();
