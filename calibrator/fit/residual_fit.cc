@@ -52,12 +52,10 @@ ResidualFunction FitWhole(const std::vector<StepErrors>& draws, const FunctionFi
   return function;
 }
 
-void Describe(const StepErrors& steps, ResidualQuality* quality) {
-  quality->transitions = steps.size();
-  if (steps.size() == 0) return;
+// Root mean square of the velocities' errors.
+Eigen::VectorXd VelocityErrors(const StepErrors& steps) {
   const Eigen::MatrixXd errors = Columns(steps.errors);
-  quality->before =
-      (errors.bottomRows(errors.rows() / 2).rowwise().squaredNorm() / steps.size()).cwiseSqrt();
+  return (errors.bottomRows(errors.rows() / 2).rowwise().squaredNorm() / steps.size()).cwiseSqrt();
 }
 
 }  // namespace
@@ -77,11 +75,13 @@ ResidualFit FitResidual(const std::shared_ptr<const Model>& model,
     return Random(options.seed, {kDrawStream, condition});
   };
   FunctionFitOptions whole{options.centres, options.width, options.unknown};
-  if (options.free) Describe(free.front(), &fit.free);
-  if (options.free && Enough(free))
+  fit.free.transitions = free.front().size(), fit.touching.transitions = touching.front().size();
+  if (options.free && Enough(free)) {
+    fit.free.before = VelocityErrors(free.front());
     fit.residual.free = FitWhole(free, whole, options.noise, random(0), &fit.free);
-  if (options.touching) Describe(touching.front(), &fit.touching);
+  }
   if (options.touching && Enough(touching)) {
+    fit.touching.before = VelocityErrors(touching.front());
     if (options.contacts) {
       ContactFunctions contacts =
           FitContacts({options.contact_centres, options.width, options.unknown_by_contacts},

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calibrator/fit/methods.h"
+#include "robot/parameter_distribution.h"
 #include "sim/correction.h"
 #include "sim/parameters.h"
 #include "tests/calibrator/fitted_log.h"
@@ -130,6 +131,17 @@ TEST_CASE("where residuals are switched off an alarm changes nothing, and it is 
   CHECK(fit.result.posterior == alone.posterior);
   CHECK(fit.gap.obstacle.find("switched off") != std::string::npos);
   CHECK(fit.gap.summary.empty());
+}
+
+TEST_CASE("of too few steps nothing is learnt, and there is nothing that it explains") {
+  const RobotDescription robot = Hopper();
+  const std::vector<Rollout> log = RandomLog(robot, {}, kFewestForResidual - 1, 3);
+  const auto model = std::make_shared<Model>(robot);
+  const ResidualFit fit = FitResidual(model, PriorGaussian(robot).mean, log, {});
+  CHECK_FALSE(fit.residual.any());
+  CHECK(fit.free.transitions + fit.touching.transitions == kFewestForResidual - 1);
+  CHECK(Explained(fit.free).size() == 0);
+  CHECK(Explained(fit.touching).size() == 0);
 }
 
 TEST_CASE("what is lacking has the same bits each time") {
