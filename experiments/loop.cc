@@ -107,19 +107,17 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
   const ParameterSampler sample = [&](Random& random) { return distribution.Draw(random); };
   LoopResult result;
   Acceptance acceptance(model_.task.steps);
-  GaussianPolicy deployed = trainer->policy();
   int deployed_iteration = 0;
   int64_t transitions = 0;
   double seconds = 0, discrepancy = std::numeric_limits<double>::quiet_NaN();
-  const auto judge = [&](const GaussianPolicy& policy) {
-    return Judge(real, policy, model_.task.steps, settings.evaluation_episodes);
-  };
+  std::vector<Judgement> judged;  // of each iteration's policy
   for (int iteration = 0;; ++iteration) {
-    if (!settings.accept) deployed = trainer->policy(), deployed_iteration = iteration;
-    const Judgement judged = judge(deployed);
-    const bool newest = deployed_iteration == iteration;
-    result.rows.push_back({iteration, judged.mean, judged.worst,
-                           newest ? judged.mean : judge(trainer->policy()).mean, deployed_iteration,
+    judged.push_back(
+        Judge(real, trainer->policy(), model_.task.steps, settings.evaluation_episodes));
+    if (!settings.accept) deployed_iteration = iteration;
+    const Judgement& deployed = judged[static_cast<size_t>(deployed_iteration)];
+    result.rows.push_back({iteration, deployed.mean, deployed.worst, judged.back().mean,
+                           deployed_iteration,
                            trainer->EvaluateHeldOut(sample, settings.evaluation_episodes).mean,
                            discrepancy, distribution.residual != nullptr, transitions, seconds,
                            distribution.Mean(), distribution.Sd()});
@@ -146,8 +144,7 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
         const Acceptance::Decision decision =
             right ? acceptance.Trust(iteration) : acceptance.Decide(iteration);
         result.decisions.push_back(Summary(decision));
-        if (acceptance.incumbent() == iteration)
-          deployed = trainer->policy(), deployed_iteration = iteration;
+        if (acceptance.incumbent() == iteration) deployed_iteration = iteration;
       }
     }
     Train(*trainer, sample, settings.next_updates,
