@@ -170,10 +170,7 @@ struct Outcome {
 };
 
 void Run(const Case& one, uint64_t seed, Outcome* outcome) {
-  RobotDescription robot = LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + one.robot);
-  // An environment begins a substep where the effort changes, a window does not: with a latency
-  // that is no whole number of substeps a log of the one is, to 4e-4 rad/s, none of the other.
-  robot.simulation.latency = 0;
+  const RobotDescription robot = LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + one.robot);
   const Log log = Recorded(one, robot, seed);
   const auto begin = std::chrono::steady_clock::now();
   CalibrationOptions options;

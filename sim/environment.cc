@@ -22,6 +22,7 @@ Environment::Environment(std::shared_ptr<const Model> model)
       start_v_(Eigen::VectorXd::Zero(model->num_velocities())),
       effort_(start_v_),
       next_effort_(start_v_),
+      profile_{{{latency_, start_v_}, {period_ - latency_, start_v_}}},
       sent_(start_v_),
       mean_effort_(start_v_),
       mean_effort_before_(start_v_),
@@ -70,8 +71,12 @@ StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
     correction_->BeginStep(simulator_);
     mean_effort_.setZero();
   }
-  Act(effort_, latency_);
-  Act(next_effort_, period_ - latency_);
+  if (limits_.empty()) {
+    Play();
+  } else {
+    Act(effort_, latency_);
+    Act(next_effort_, period_ - latency_);
+  }
   effort_.swap(next_effort_);
   if (corrected_) {
     correction_->EndStep(simulator_, mean_effort_, mean_effort_before_, period_);
@@ -82,16 +87,28 @@ StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
           !simulator_.finite() || task_->Terminated(q(), v())};
 }
 
+// As a recorded step with these efforts is simulated, in the same substeps: a log of this
+// environment is its model's to the last bit.
+void Environment::Play() {
+  profile_[0].effort = effort_, profile_[1].effort = next_effort_;
+  if (latency_ > 0)
+    simulator_.Step(profile_);
+  else
+    simulator_.Step(next_effort_, period_);
+  if (!corrected_) return;
+  for (const EffortSegment& segment : profile_)
+    mean_effort_ += segment.duration / period_ * segment.effort;
+}
+
 // What is wished for, as the driver lets it through.
 void Environment::Act(const Eigen::VectorXd& wish, double duration) {
   constexpr double kNothing = 1e-9;  // [s] that rounding leaves
   while (duration > kNothing) {
     const double cycle = duration - cycle_ > kNothing ? cycle_ : duration;
     for (Eigen::Index i = 0; i < wish.size(); ++i) {
-      const bool limited = !limits_.empty() && limits_[static_cast<size_t>(i)];
+      const auto& limits = limits_[static_cast<size_t>(i)];
       const JointSituation joint{q()[i], v()[i], sent_[i], cycle_};
-      sent_[i] = limited ? LimitEffort(wish[i], joint, *limits_[static_cast<size_t>(i)]).value_or(0)
-                         : wish[i];
+      sent_[i] = limits ? LimitEffort(wish[i], joint, *limits).value_or(0) : wish[i];
     }
     simulator_.Step(sent_, cycle);
     if (corrected_) mean_effort_ += cycle / period_ * sent_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "robot/limit_effort.h"
 #include "robot/residual.h"
 #include "sim/correction.h"
+#include "sim/effort_track.h"
 #include "sim/simulator.h"
 #include "sim/tasks/task.h"
 
@@ -78,6 +80,7 @@ class Environment {
   const Task& task() const { return *task_; }
 
  private:
+  void Play();
   void Act(const Eigen::VectorXd& wish, double duration);
   void Read();
 
@@ -98,7 +101,8 @@ class Environment {
   // of the latest action: what it wishes for at the beginning of the next step
   Eigen::VectorXd effort_;
   Eigen::VectorXd next_effort_;
-  Eigen::VectorXd sent_;  // of it, by the driver
+  std::array<EffortSegment, 2> profile_;  // of a step without a driver
+  Eigen::VectorXd sent_;                  // of it, by the driver
   Eigen::VectorXd mean_effort_, mean_effort_before_;
   Eigen::VectorXd reading_q_, reading_v_;
 };

@@ -73,6 +73,26 @@ TEST_CASE("with latency the previous action acts first") {
   CHECK(environment.v() == fresh.v());
 }
 
+TEST_CASE("a step without a driver has the bits of the recorded one, wherever its effort changes") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/double_pendulum/robot.toml"));
+  const double latency = robot.simulation.latency, period = robot.task.period;
+  REQUIRE(std::remainder(latency, robot.simulation.substep) != 0);
+  Environment environment(robot);
+  Simulator simulator(robot);
+  VectorXd q(2), v(2), before = VectorXd::Zero(2);
+  q << 0.5, -1, v << 1, 2;
+  environment.SetState(q, v);
+  simulator.SetState(q, v);
+  for (const float a : {0.5f, -1.0f, 0.25f}) {
+    environment.Step(VectorXf::Constant(environment.action_size(), a));
+    const VectorXd effort = environment.effort();
+    simulator.Step(std::vector<EffortSegment>{{latency, before}, {period - latency, effort}});
+    CHECK(environment.q() == simulator.q());
+    CHECK(environment.v() == simulator.v());
+    before = effort;
+  }
+}
+
 TEST_CASE("resets are the generator's alone") {
   Environment one(LoadPendulum("robot.toml")), other(LoadPendulum("robot.toml"));
   other.Step(Action(1));
