@@ -30,7 +30,8 @@ struct ResidualFitOptions {
   uint64_t seed = 1;
 };
 
-/// A condition's fit in numbers, each of n entries, of velocities; empty where there is no function.
+/// A condition's fit in numbers, each of n entries, of velocities; empty where there is no
+/// function.
 struct ResidualQuality {
   int transitions = 0;
   Eigen::VectorXd before;   ///< rms error of one step without the residual [rad/s or m/s]
