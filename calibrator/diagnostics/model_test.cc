@@ -27,7 +27,7 @@ class Test {
         candidates_(FindCandidates(robot_)),
         extended_(std::make_shared<Model>(WithCandidates(robot_, candidates_))),
         errors_(extended_, fit.rollouts, 1, execution),
-        step_(fit.model, fit.rollouts, execution.threads) {
+        step_(extended_, fit.rollouts, execution.threads) {
     errors_.set_noise_sd(fit.noise_sd);
     nominal_ = extended_->parameters().means();
     nominal_.head(physical_.size()) = physical_;
@@ -57,12 +57,12 @@ class Test {
   Misspecification AskWitnesses() {
     const Eigen::MatrixXd raw = errors_.Raw(nominal_);
     Eigen::VectorXd noise_sd = fit_.noise_sd;
-    Witnesses witnesses(step_, fit_.rows, physical_, noise_sd);
+    Witnesses witnesses(step_, fit_.rows, nominal_, noise_sd);
     // What has made other errors larger has made the noise seem larger.
     for (int round = 1; round < kNoiseRounds && !fit_.noise_known; ++round) {
       if (witnesses.count() < kFewestWitnesses) break;
       noise_sd.array() *= ScaleOf(witnesses.rows(), witnesses.Whiten(raw));
-      witnesses = Witnesses(step_, fit_.rows, physical_, noise_sd);
+      witnesses = Witnesses(step_, fit_.rows, nominal_, noise_sd);
     }
     const std::string share = fmt::format(
         "{} of {} transitions, as predictions of the others are not linear over the "
@@ -76,9 +76,15 @@ class Test {
     FitResiduals residuals = Residuals(witnesses.rows());
     residuals.errors = witnesses.Whiten(raw);
     residuals.jacobian = witnesses.Whiten(Slopes());
-    residuals.columns =
-        CandidateColumns([&](const Eigen::MatrixXd& x) { return witnesses.Whiten(errors_.Raw(x)); },
-                         physical_, candidates_);
+    // What a candidate would change is asked where the reading before leads to. The reading itself
+    // shares its noise with the error: where it says that a foot is deep in the ground the foot is
+    // less so, the ground pushes less than predicted, and a right stiffness would look too large.
+    const Eigen::MatrixXd starts = PredictStarts(step_, nominal_);
+    residuals.columns = CandidateColumns(
+        [&](const Eigen::MatrixXd& x) {
+          return witnesses.Whiten(PredictRows(step_, fit_.rows, x, starts));
+        },
+        physical_, candidates_);
     if (fit_.noise_known) {
       Eigen::MatrixXd errors = residuals.errors;
       DivideByScale(residuals.rows, &errors);
@@ -86,7 +92,7 @@ class Test {
       DivideByScale(residuals.rows, &residuals.jacobian);
       DivideByScale(residuals.rows, &residuals.columns);
     }
-    residuals.where = PredictWhereabouts(step_, witnesses.rows(), physical_);
+    residuals.where = FindWhereabouts(step_, witnesses.rows(), nominal_, starts);
     found = FindMisspecification(Known(), residuals);
     found.summary += "; judged by " + share;
     return found;

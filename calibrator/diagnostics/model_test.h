@@ -34,7 +34,7 @@ struct TestedFit {
 ///
 /// Errors are whitened as if simulators were linear over the noise of the states that transitions
 /// begin with. If these are noisy and there is an alarm, it may be that which is wrong: then
-/// Witnesses alone are asked again, with their own noise (and PredictWhereabouts): theirs is the
+/// Witnesses alone are asked again, with their own noise (and PredictStarts): theirs is the
 /// answer. Fewer than kFewestWitnesses give none: no alarm, and the summary says so.
 /// @param simulated_steps is added to. @throws std::invalid_argument if sizes do not fit together.
 Misspecification TestModel(const TestedFit& fit, ExecutionOptions execution,

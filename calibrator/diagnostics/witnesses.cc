@@ -132,21 +132,40 @@ Eigen::MatrixXd Witnesses::Whiten(const Eigen::MatrixXd& raw) const {
   return whitened;
 }
 
-std::vector<Whereabouts> PredictWhereabouts(OneStep& step, std::span<const WindowErrors::Row> rows,
-                                            const Eigen::VectorXd& physical) {
-  const Eigen::Index n = step.num_velocities();
-  Eigen::MatrixXd begin = step.Starts();
-  const Eigen::MatrixXd led_to = step.Predict(physical, begin);
-  for (Eigen::Index k = 1; k < begin.cols(); ++k) {
+Eigen::MatrixXd PredictStarts(OneStep& step, const Eigen::VectorXd& physical) {
+  Eigen::MatrixXd starts = step.Starts();
+  const Eigen::MatrixXd led_to = step.Predict(physical, starts);
+  for (Eigen::Index k = 1; k < starts.cols(); ++k) {
     if (step.steps()[static_cast<size_t>(k)].goes_on && led_to.col(k - 1).allFinite())
-      begin.col(k) = led_to.col(k - 1);
+      starts.col(k) = led_to.col(k - 1);
   }
-  const Eigen::MatrixXd end = step.Predict(physical, begin);
+  return starts;
+}
+
+Eigen::MatrixXd PredictRows(OneStep& step, std::span<const WindowErrors::Row> rows,
+                            const Eigen::MatrixXd& physical, const Eigen::MatrixXd& starts) {
+  const Index index = IndexOf(step);
+  Eigen::MatrixXd predicted(static_cast<Eigen::Index>(rows.size()), physical.cols());
+  for (Eigen::Index s = 0; s < physical.cols(); ++s) {
+    const Eigen::MatrixXd ends = step.Predict(physical.col(s), starts);
+    for (size_t i = 0; i < rows.size(); ++i) {
+      predicted(static_cast<Eigen::Index>(i), s) =
+          ends(rows[i].coordinate, index.at({rows[i].rollout, rows[i].transition}));
+    }
+  }
+  return predicted;
+}
+
+std::vector<Whereabouts> FindWhereabouts(OneStep& step, std::span<const WindowErrors::Row> rows,
+                                         const Eigen::VectorXd& physical,
+                                         const Eigen::MatrixXd& starts) {
+  const Eigen::Index n = step.num_velocities();
+  const Eigen::MatrixXd ends = step.Predict(physical, starts);
   const Index index = IndexOf(step);
   std::vector<Whereabouts> all;
   for (const auto& [first, last] : BlocksOf(rows)) {
     const Eigen::Index k = index.at({rows[first].rollout, rows[first].transition});
-    all.push_back({begin.col(k).head(n), begin.col(k).tail(n), end.col(k).head(n)});
+    all.push_back({starts.col(k).head(n), starts.col(k).tail(n), ends.col(k).head(n)});
   }
   return all;
 }

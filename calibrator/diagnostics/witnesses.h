@@ -51,11 +51,21 @@ class Witnesses {
   std::vector<WindowErrors::Row> rows_;
 };
 
-/// Where each transition of the rows was, as far as the reading before it tells: the state that the
-/// simulator leads to from there. Unlike the reading itself it shares no noise with the
+/// Where each transition began, as far as the reading before it tells: the state that the simulator
+/// leads to from there, 2 n x steps. Unlike the reading itself it shares no noise with the
 /// transition's error, so that errors of a right model cannot depend on it. The first one of a
-/// stretch has nothing but its reading. Simulates twice as many steps as there are.
-std::vector<Whereabouts> PredictWhereabouts(OneStep& step, std::span<const WindowErrors::Row> rows,
-                                            const Eigen::VectorXd& physical);
+/// stretch has nothing but its reading. Simulates as many steps as there are.
+Eigen::MatrixXd PredictStarts(OneStep& step, const Eigen::VectorXd& physical);
+
+/// What simulators predict of each row, from these states: a column for each column of parameters,
+/// physical units. NaN where a simulation fails.
+Eigen::MatrixXd PredictRows(OneStep& step, std::span<const WindowErrors::Row> rows,
+                            const Eigen::MatrixXd& physical, const Eigen::MatrixXd& starts);
+
+/// The transitions of the rows, each from its state among `starts`. Simulates as many steps as there
+/// are.
+std::vector<Whereabouts> FindWhereabouts(OneStep& step, std::span<const WindowErrors::Row> rows,
+                                         const Eigen::VectorXd& physical,
+                                         const Eigen::MatrixXd& starts);
 
 }  // namespace plumb
