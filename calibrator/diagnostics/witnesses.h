@@ -62,8 +62,8 @@ Eigen::MatrixXd PredictStarts(OneStep& step, const Eigen::VectorXd& physical);
 Eigen::MatrixXd PredictRows(OneStep& step, std::span<const WindowErrors::Row> rows,
                             const Eigen::MatrixXd& physical, const Eigen::MatrixXd& starts);
 
-/// The transitions of the rows, each from its state among `starts`. Simulates as many steps as there
-/// are.
+/// The transitions of the rows, each from its state among `starts`. Simulates as many steps as
+/// there are.
 std::vector<Whereabouts> FindWhereabouts(OneStep& step, std::span<const WindowErrors::Row> rows,
                                          const Eigen::VectorXd& physical,
                                          const Eigen::MatrixXd& starts);
