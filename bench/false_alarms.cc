@@ -1,5 +1,6 @@
 // How often the misspecification alarm speaks of a right model and of wrong ones, and how often
-// intervals hold the truth: a table for docs/diagnostics.md.
+// intervals hold the truth, of all steps' posterior and of the one that is left where the alarm
+// speaks (calibrator/gap/gap.h): a table for docs/diagnostics.md.
 // build/bench/false_alarms [logs [first seed [how the case's name begins]]]
 
 #include <fmt/format.h>
@@ -15,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "calibrator/diagnostics/model_test.h"
 #include "calibrator/fit/methods.h"
+#include "calibrator/gap/gap.h"
 #include "calibrator/motion/csv_log.h"
 #include "common/random.h"
 #include "sim/environment.h"
@@ -76,6 +77,7 @@ struct Case {
   int episodes;
   Sensor sensor;
   Changes wrong = {};
+  std::string not_fitted = {};  // a parameter of the robot that the model takes as it is
 };
 
 std::vector<Case> Cases() {
@@ -98,15 +100,41 @@ std::vector<Case> Cases() {
       {"hopper, backward differences, 14 bit", "hopper/gym.toml", 60,
        Differences(Difference::kBackward, 0, true)},
   };
-  const Changes faults{{"inertia/torso", 1.2},   {"inertia/thigh", 1.2},     {"inertia/leg", 1.2},
-                       {"inertia/foot", 1.2},    {"friction/leg", 5},        {"delay/thigh", 0.002},
-                       {"gravity", 9.81 * 1.02}, {"contact/stiffness", 7500}};
-  for (const auto& fault : faults)
-    cases.push_back(
-        {"wrong " + fault.first + ", noise 0.003", "hopper/gym.toml", 60, Noise(0.003), {fault}});
-  for (const auto& fault : faults)
-    cases.push_back(
-        {"wrong " + fault.first + ", noise 0.0003", "hopper/gym.toml", 60, Noise(0.0003), {fault}});
+  const Changes large{{"inertia/torso", 1.2},   {"inertia/thigh", 1.2},     {"inertia/leg", 1.2},
+                      {"inertia/foot", 1.2},    {"friction/leg", 5},        {"delay/thigh", 0.002},
+                      {"gravity", 9.81 * 1.02}, {"contact/stiffness", 7500}};
+  for (const double noise : {0.003, 0.0003}) {
+    for (const auto& fault : large) {
+      cases.push_back({fmt::format("wrong {}, noise {}", fault.first, noise),
+                       "hopper/gym.toml",
+                       60,
+                       Noise(noise),
+                       {fault}});
+    }
+  }
+  const Changes small{{"inertia/leg", 1.05}, {"gain/leg", 1.02}, {"armature/leg", 1.02}};
+  for (const auto& fault : small) {
+    cases.push_back({fmt::format("slightly wrong {}, noise 0.0003", fault.first),
+                     "hopper/gym.toml",
+                     60,
+                     Noise(0.0003),
+                     {fault}});
+  }
+  cases.push_back({"slightly wrong mass/torso, not fitted, noise 0.0003",
+                   "hopper/gym.toml",
+                   60,
+                   Noise(0.0003),
+                   {{"mass/torso", 3.665 * 1.02}},
+                   "mass/torso"});
+  const Changes pendulum{
+      {"gravity", 9.81 * 1.01}, {"delay/shoulder", 0.003}, {"length/upper", 1.02}};
+  for (const auto& fault : pendulum) {
+    cases.push_back({fmt::format("double pendulum, wrong {}, noise 0.0003", fault.first),
+                     "double_pendulum",
+                     3,
+                     Noise(0.0003),
+                     {fault}});
+  }
   return cases;
 }
 
@@ -165,39 +193,58 @@ Log Recorded(const Case& one, const RobotDescription& robot, uint64_t seed) {
 }
 
 struct Outcome {
-  int logs = 0, alarms = 0, judged = 0, held = 0, intervals = 0;
+  int logs = 0, alarms = 0, judged = 0, intervals = 0, held = 0;
+  // of the posterior that is left: of what informs the parameters, and by how many logs
+  int left = 0, left_held = 0, free = 0, nothing = 0;
   double fit = 0, test = 0;  // [s]
 };
 
+// How many intervals hold the truth.
+int Held(const RobotDescription& robot, const Gaussian& posterior, uint64_t seed) {
+  const Eigen::VectorXd truth = HiddenParameters(robot, seed);
+  int held = 0;
+  for (Eigen::Index i = 0; i < truth.size(); ++i) {
+    const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
+    const bool log_scale = parameter.coordinate == ParameterDescription::Coordinate::kLog;
+    const double off = posterior.mean(i) - (log_scale ? std::log(truth(i)) : truth(i));
+    held += std::abs(off) < 1.96 * std::sqrt(posterior.covariance(i, i));
+  }
+  return held;
+}
+
 void Run(const Case& one, uint64_t seed, Outcome* outcome) {
-  const RobotDescription robot = LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + one.robot);
+  RobotDescription robot = LoadRobot(std::string(PLUMBLINE_SOURCE) + "/robots/" + one.robot);
+  std::erase_if(robot.parameters, [&](const ParameterDescription& parameter) {
+    return parameter.name == one.not_fitted;
+  });
+  std::erase_if(robot.virtual_robot.hidden,
+                [&](const HiddenParameter& hidden) { return hidden.name == one.not_fitted; });
   const Log log = Recorded(one, robot, seed);
   const auto begin = std::chrono::steady_clock::now();
   CalibrationOptions options;
   options.method = "laplace";
   const auto model = std::make_shared<const Model>(robot);
-  const MethodResult result = RunMethod({model, log.rollouts, options});
+  const MethodInput input{model, log.rollouts, options};
+  MethodResult result = RunMethod(input);
   const auto fitted = std::chrono::steady_clock::now();
-  const Gaussian posterior = Moments(result.posterior);
+  const auto parameters = static_cast<int>(robot.parameters.size());
+  outcome->held += Held(robot, Moments(result.posterior), seed);
+  outcome->intervals += parameters;
   Misspecification found;
   if (log.differenced.empty()) {
-    int64_t steps = 0;
-    found = TestModel({model, log.rollouts, posterior.mean, result.curriculum->one_step,
-                       result.curriculum->rows, result.noise_sd, result.curriculum->noise_known},
-                      {}, &steps);
+    const GapFit gap = CloseGap(input, std::move(result));
+    found = gap.alarm;
     ++outcome->judged;
+    outcome->free += gap.gap.informed == Informed::kFree;
+    outcome->nothing += gap.gap.informed == Informed::kNone;
+    if (gap.gap.informed != Informed::kNone) {
+      outcome->left += parameters;
+      outcome->left_held += Held(robot, Moments(gap.result.posterior), seed);
+    }
   }
   const std::chrono::duration<double> fit = fitted - begin,
                                       test = std::chrono::steady_clock::now() - fitted;
   outcome->fit += fit.count(), outcome->test += test.count();
-  const Eigen::VectorXd truth = HiddenParameters(robot, seed);
-  for (Eigen::Index i = 0; i < truth.size(); ++i) {
-    const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
-    const bool log_scale = parameter.coordinate == ParameterDescription::Coordinate::kLog;
-    const double off = posterior.mean(i) - (log_scale ? std::log(truth(i)) : truth(i));
-    outcome->held += std::abs(off) < 1.96 * std::sqrt(posterior.covariance(i, i));
-    ++outcome->intervals;
-  }
   ++outcome->logs, outcome->alarms += found.alarm;
   fmt::print(stderr, "{}, seed {}: {} {}\n", one.name, seed, found.alarm ? "ALARM" : "quiet",
              found.summary);
@@ -212,16 +259,18 @@ int main(int argc, char** argv) {
   const int first = argc > 2 ? std::atoi(argv[2]) : 1;
   const std::string only = argc > 3 ? argv[3] : "";
   fmt::print(
-      "| log | alarms | intervals that hold the truth | [s] to fit | to test |\n"
-      "|---|---|---|---|---|\n");
+      "| log | alarms | intervals that hold the truth | informed by all, free steps, nothing "
+      "| intervals then | [s] to fit | to test |\n|---|---|---|---|---|---|---|\n");
   for (const Case& one : Cases()) {
     if (!one.name.starts_with(only)) continue;
     Outcome outcome;
     for (int log = 0; log < logs; ++log) Run(one, static_cast<uint64_t>(first + log), &outcome);
-    fmt::print("| {} | {} | {} of {} | {:.1f} | {:.1f} |\n", one.name,
+    fmt::print("| {} | {} | {} of {} | {}, {}, {} | {} of {} | {:.1f} | {:.1f} |\n", one.name,
                outcome.judged == 0 ? "not judged"
                                    : fmt::format("{} of {}", outcome.alarms, outcome.judged),
-               outcome.held, outcome.intervals, outcome.fit / logs, outcome.test / logs);
+               outcome.held, outcome.intervals, outcome.judged - outcome.free - outcome.nothing,
+               outcome.free, outcome.nothing, outcome.left_held, outcome.left, outcome.fit / logs,
+               outcome.test / logs);
     std::fflush(stdout);
   }
 }

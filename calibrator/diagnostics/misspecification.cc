@@ -170,6 +170,8 @@ Misspecification FindMisspecification(const RobotDescription& robot,
   }
   std::vector<Misfit> tests = TestErrors(errors, residuals.noise_known);
   std::vector<Explanation> explanations = FindExplanations(errors, residuals);
+  for (const Explanation& explanation : explanations)
+    found.changes.push_back({explanation.index, explanation.score.change, explanation.score.gain});
   const size_t count = tests.size() + explanations.size();
   Correct(count, &tests);
   found.alarm = std::any_of(tests.begin(), tests.end(), Counts);

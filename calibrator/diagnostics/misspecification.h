@@ -25,11 +25,20 @@ struct Misfit {
   double effect;
 };
 
+/// By how much a candidate would have to be larger to make the errors smallest, alone with the
+/// fitted parameters.
+struct CandidateChange {
+  size_t candidate;  ///< index
+  double change;     ///< physical units
+  double gain;       ///< of the sum of squares, >= 0
+};
+
 /// Whether the model can explain the robot at all.
 struct Misspecification {
   bool alarm = false;
   std::vector<Misfit> misfits;  ///< those that count, worst first
   std::string summary;
+  std::vector<CandidateChange> changes{};  ///< of all candidates that can be tested, best first
 };
 
 /// A state, and the positions at a transition's end.

@@ -6,10 +6,13 @@
 #include <vector>
 
 #include "calibrator/diagnostics/candidates.h"
+#include "calibrator/diagnostics/projected_errors.h"
 #include "calibrator/diagnostics/witnesses.h"
 #include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/one_step.h"
 #include "calibrator/fit/robot_least_squares.h"
+#include "common/decompositions.h"
+#include "robot/parameter_distribution.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -23,7 +26,7 @@ class Test {
   Test(const TestedFit& fit, ExecutionOptions execution)
       : fit_(fit),
         robot_(fit.model->description()),
-        physical_(robot_.ToPhysical(fit.mean)),
+        physical_(robot_.ToPhysical(fit.posterior.mean)),
         candidates_(FindCandidates(robot_)),
         extended_(std::make_shared<Model>(WithCandidates(robot_, candidates_))),
         errors_(extended_, fit.rollouts, 1, execution),
@@ -33,15 +36,18 @@ class Test {
     nominal_.head(physical_.size()) = physical_;
   }
 
-  Misspecification Run() {
-    const Misspecification found = AskAll();
-    return found.alarm && !errors_.starts_known() ? AskWitnesses() : found;
+  ModelTest Run() {
+    const FitResiduals residuals = OfAll();
+    Misspecification found = FindMisspecification(Known(), residuals);
+    if (found.alarm && !errors_.starts_known()) found = AskWitnesses();
+    Gaussian considered = Consider(residuals, found);
+    return {std::move(found), std::move(considered)};
   }
 
   int64_t simulated_steps() const { return errors_.simulated_steps() + step_.simulated_steps(); }
 
  private:
-  Misspecification AskAll() {
+  FitResiduals OfAll() {
     errors_.Linearise(nominal_);
     FitResiduals residuals = Residuals(fit_.rows);
     residuals.errors = fit_.one_step.errors;
@@ -51,7 +57,30 @@ class Test {
     // Whitened with the noise as estimated, or as known; then by what the errors' scale makes of
     // it, as the errors are.
     if (fit_.noise_known) DivideByScale(fit_.rows, &residuals.columns);
-    return FindMisspecification(Known(), residuals);
+    return residuals;
+  }
+
+  // By what the parameters would change with each candidate that changed, second moments added to
+  // the fit's.
+  Gaussian Consider(const FitResiduals& residuals, const Misspecification& found) const {
+    double best = 0;
+    for (const CandidateChange& change : found.changes) best = std::max(best, change.gain);
+    if (best == 0) return fit_.posterior;
+    const Eigen::VectorXd squares =
+        ProjectedErrors(Known(), residuals).weight.cwiseAbs2();  // outliers count less
+    const Eigen::MatrixXd weighted = squares.asDiagonal() * residuals.jacobian;
+    const Eigen::MatrixXd covariance = Inverse(weighted.transpose() * residuals.jacobian +
+                                               Inverse(PriorGaussian(robot_).covariance));
+    Gaussian considered = fit_.posterior;
+    for (const CandidateChange& change : found.changes) {
+      const Eigen::VectorXd moved =
+          covariance *
+          (weighted.transpose() *
+           residuals.columns.col(static_cast<Eigen::Index>(change.candidate))) *
+          change.change;
+      considered.covariance += change.gain / best * moved * moved.transpose();
+    }
+    return considered;
   }
 
   Misspecification AskWitnesses() {
@@ -132,7 +161,7 @@ class Test {
     const Prior prior = PriorOf(robot_);
     Eigen::MatrixXd at = nominal_.replicate(1, prior.size() + 1);
     for (Eigen::Index i = 0; i < prior.size(); ++i) {
-      Eigen::VectorXd moved = fit_.mean;
+      Eigen::VectorXd moved = fit_.posterior.mean;
       moved(i) += kSlopeDifference * prior.marginals()[static_cast<size_t>(i)].b;
       at.col(i).head(physical_.size()) = robot_.ToPhysical(moved);
     }
@@ -151,18 +180,17 @@ class Test {
 
 }  // namespace
 
-Misspecification TestModel(const TestedFit& fit, ExecutionOptions execution,
-                           int64_t* simulated_steps) {
+ModelTest TestModel(const TestedFit& fit, ExecutionOptions execution, int64_t* simulated_steps) {
   const Eigen::VectorXd units = MakeTask(fit.model->description())->state_scale();
   if ((fit.noise_sd.array() <= kNegligible * units.array()).all()) {
-    Misspecification none;
-    none.summary = "the model reproduces this log to five digits";
+    ModelTest none{{}, fit.posterior};
+    none.found.summary = "the model reproduces this log to five digits";
     return none;
   }
   Test test(fit, execution);
-  const Misspecification found = test.Run();
+  ModelTest tested = test.Run();
   *simulated_steps += test.simulated_steps();
-  return found;
+  return tested;
 }
 
 OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result) {
@@ -192,10 +220,10 @@ OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result) {
   return view;
 }
 
-Misspecification TestModel(const MethodInput& input, const MethodResult& result,
-                           const OneStepView& view, int64_t* simulated_steps) {
-  return TestModel({input.model, input.rollouts, Moments(result.posterior).mean, view.fit,
-                    view.rows, view.noise_sd, view.noise_known},
+ModelTest TestModel(const MethodInput& input, const MethodResult& result, const OneStepView& view,
+                    int64_t* simulated_steps) {
+  return TestModel({input.model, input.rollouts, Moments(result.posterior), view.fit, view.rows,
+                    view.noise_sd, view.noise_known},
                    input.options.execution, simulated_steps);
 }
 

@@ -20,12 +20,23 @@ namespace plumb {
 struct TestedFit {
   std::shared_ptr<const Model> model;
   std::span<const Rollout> rollouts;
-  Eigen::VectorXd mean;                     ///< of the posterior, coordinates
+  Gaussian posterior;                       ///< coordinates
   const LaplaceFit& one_step;               ///< errors and slopes at the mean
   std::span<const WindowErrors::Row> rows;  ///< what its errors are about
   /// of each entry of (q, v), as estimated or as recorded, physical units
   Eigen::VectorXd noise_sd;
   bool noise_known;
+};
+
+/// What a fit's errors say of its model.
+struct ModelTest {
+  Misspecification found;
+  /// The posterior as wide as what may be wrong makes it, coordinates. Each candidate that would
+  /// explain errors takes the parameters elsewhere if it changes ("consider parameters": Schmidt,
+  /// Adv. Control Syst. 3, 1966): the squares of these displacements are added to the covariance,
+  /// each times the share of the best one's gain that its own is. The mean stays: which of the
+  /// candidates it is, if it is one, is not known.
+  Gaussian considered;
 };
 
 /// Whether the model can explain the log at all, whatever its parameters: FindMisspecification of
@@ -37,8 +48,7 @@ struct TestedFit {
 /// Witnesses alone are asked again, with their own noise (and PredictStarts): theirs is the
 /// answer. Fewer than kFewestWitnesses give none: no alarm, and the summary says so.
 /// @param simulated_steps is added to. @throws std::invalid_argument if sizes do not fit together.
-Misspecification TestModel(const TestedFit& fit, ExecutionOptions execution,
-                           int64_t* simulated_steps);
+ModelTest TestModel(const TestedFit& fit, ExecutionOptions execution, int64_t* simulated_steps);
 
 inline constexpr int kFewestWitnesses = 50;
 
@@ -57,7 +67,7 @@ struct OneStepView {
 OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result);
 
 /// TestModel of a method's result.
-Misspecification TestModel(const MethodInput& input, const MethodResult& result,
-                           const OneStepView& view, int64_t* simulated_steps);
+ModelTest TestModel(const MethodInput& input, const MethodResult& result, const OneStepView& view,
+                    int64_t* simulated_steps);
 
 }  // namespace plumb

@@ -48,18 +48,13 @@ bool Matters(const MethodInput& input, const MethodResult& result) {
 }
 
 // Why nothing is learnt of what the model lacks; empty = it is.
-std::string Obstacle(const MethodInput& input, const MethodResult& result) {
+std::string Obstacle(const MethodInput& input) {
   if (!input.options.residual) return "residuals are switched off";
   if (!KnowsLikelihood(input.options.method))
     return fmt::format("{} does not know the likelihood of steps, as auto does",
                        input.options.method);
   if (input.model->num_positions() != input.model->num_velocities())
     return "a residual is not for robots with spherical joints";
-  if (!Matters(input, result))
-    return fmt::format(
-        "a residual would explain less than {:.0f} % of the velocities' squared "
-        "errors, or too little to matter, and the parameters stay as they are",
-        100 * kLeastExplained);
   return "";
 }
 
@@ -109,6 +104,18 @@ std::string Summarise(bool free, bool touching, const Gap& gap) {
   return text + parts;
 }
 
+// Candidates for what is wrong are unknown, too, but what they are is not told.
+void TakeConsidered(const MethodInput& input, const Gaussian& considered, GapFit* fit) {
+  const Eigen::VectorXd prior_precision =
+      PriorGaussian(input.model->description()).covariance.diagonal().cwiseInverse();
+  const Eigen::Index n = considered.mean.size();
+  fit->information = considered.covariance.llt().solve(Eigen::MatrixXd::Identity(n, n));
+  fit->information.diagonal() -= prior_precision;
+  fit->result.posterior = {{1}, {considered}};
+  Random random = SampleStream(input);
+  fit->result.samples = Transform(considered, StandardNormals(n, kPosteriorSamples, random));
+}
+
 // The method on free steps alone. @return false if the model does not explain them, either.
 bool LearnFree(const MethodInput& input, std::span<const Rollout> free, GapFit* fit) {
   const MethodInput part{input.model, free, input.options, input.start};
@@ -116,14 +123,16 @@ bool LearnFree(const MethodInput& input, std::span<const Rollout> free, GapFit* 
     MethodResult result = RunMethod(part);
     const OneStepView view = ViewOneStep(part, result);
     fit->simulated_steps += view.simulated_steps;
-    if (TestModel(part, result, view, &fit->simulated_steps).alarm) {
+    const ModelTest test = TestModel(part, result, view, &fit->simulated_steps);
+    if (test.found.alarm) {
       fit->result.simulated_steps += result.simulated_steps;
       fit->result.failures += result.failures;
       return false;
     }
     result.simulated_steps += fit->result.simulated_steps;
     result.failures += fit->result.failures;
-    fit->result = std::move(result), fit->information = view.information;
+    fit->result = std::move(result);
+    TakeConsidered(part, test.considered, fit);
     return true;
   } catch (const std::invalid_argument&) {
     return false;
@@ -170,12 +179,22 @@ GapFit CloseGap(const MethodInput& input, MethodResult all) {
   GapFit fit;
   fit.view = ViewOneStep(input, all);
   fit.simulated_steps += fit.view.simulated_steps;
-  fit.alarm = TestModel(input, all, fit.view, &fit.simulated_steps);
+  ModelTest test = TestModel(input, all, fit.view, &fit.simulated_steps);
+  fit.alarm = std::move(test.found);
   fit.information = fit.view.information;
   fit.result = std::move(all);
   if (!fit.alarm.alarm) return fit;
-  fit.gap.obstacle = Obstacle(input, fit.result);
+  fit.gap.obstacle = Obstacle(input);
   if (!fit.gap.obstacle.empty()) return fit;
+  if (!Matters(input, fit.result)) {
+    fit.gap.obstacle = fmt::format(
+        "a residual would explain less than {:.0f} % of the velocities' squared errors, or too "
+        "little to matter; the parameters are as unsure as what may be wrong with the model makes "
+        "them",
+        100 * kLeastExplained);
+    TakeConsidered(input, test.considered, &fit);
+    return fit;
+  }
   const std::vector<Rollout> steps = FreeSteps(input.model->description(), input.rollouts);
   const size_t free_count = CountTransitions(steps);
   const bool touching = free_count < CountTransitions(input.rollouts),

@@ -47,10 +47,13 @@ struct GapFit {
 /// that parameters are not bent to explain what they are not the cause of.
 ///
 ///   1. No alarm: the result stays as it is, to the bit, and there is no residual.
-///   2. Else steps that touch the ground or a stop are left out, if there are any, and the method
-///      runs again on the others. If these do not raise the alarm, the parameters are theirs.
-///   3. If they do, or if too few are left, nothing informs the parameters: the prior stays.
-///   4. A residual for what was left out is learnt for draws of that posterior, from all steps.
+///   2. If a residual would not be worth it (kLeastExplained, kLeastEffect), there is none, and the
+///      posterior is ModelTest's considered one: as wide as what may be wrong makes it.
+///   3. Else steps that touch the ground or a stop are left out, if there are any, and the method
+///      runs again on the others. If these do not raise the alarm, the parameters are theirs, the
+///      considered ones again: the alarm does not see everything.
+///   4. If they do, or if too few are left, nothing informs the parameters: the prior stays.
+///   5. A residual for what was left out is learnt for draws of that posterior, from all steps.
 ///
 /// Only of methods that know the likelihood of steps (LikelihoodMethods), of robots without
 /// spherical joints, and where input.options.residual says so: else the result stays as it is.

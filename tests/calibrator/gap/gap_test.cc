@@ -118,6 +118,40 @@ TEST_CASE("friction in free motion: the prior stays, and the residual goes with 
   CHECK(gap.gap.summary.find("nothing informs its parameters") != std::string::npos);
 }
 
+TEST_CASE(
+    "where no residual is worth it, parameters are as unsure as what is wrong may make them") {
+  const RobotDescription robot = Robot("double_pendulum");
+  const auto log = RandomLog(robot, {{{"gravity", 1.01 * 9.81}}, 3e-4, 3e-4}, 1000, 3);
+  CalibrationOptions options;
+  options.method = "laplace", options.horizons = {1};
+  const MethodInput input{std::make_shared<Model>(robot), log, options};
+  const MethodResult alone = RunMethod(input);
+  const GapFit fit = CloseGap(input, alone);
+  REQUIRE(fit.alarm.alarm);
+  CHECK(fit.gap.informed == Informed::kAll);
+  CHECK_FALSE(fit.gap.residual);
+  CHECK(fit.gap.obstacle.find("as unsure as what may be wrong") != std::string::npos);
+  const Eigen::VectorXd truth = HiddenParameters(robot, 3);
+  const Gaussian narrow = Moments(alone.posterior), wide = Moments(fit.result.posterior);
+  CHECK(wide.mean == narrow.mean);
+  double farthest = 0;  // of the truth, in standard deviations of the posterior alone
+  for (Eigen::Index i = 0; i < truth.size(); ++i) {
+    const ParameterDescription& p = robot.parameters[static_cast<size_t>(i)];
+    const double off = std::abs(wide.mean(i) - p.ToCoordinate(truth(i)));
+    CAPTURE(p.name, off, std::sqrt(wide.covariance(i, i)));
+    CHECK(off < 2.5 * std::sqrt(wide.covariance(i, i)));
+    CHECK(wide.covariance(i, i) >= narrow.covariance(i, i));
+    farthest = std::max(farthest, off / std::sqrt(narrow.covariance(i, i)));
+  }
+  CHECK(farthest > 10);
+  CHECK(std::sqrt(wide.covariance(0, 0)) < 0.05);  // a prior's is 0.3: the mass is still known
+  const Eigen::VectorXd spread =
+      (fit.result.samples.colwise() - wide.mean).rowwise().squaredNorm() /
+      fit.result.samples.cols();
+  for (Eigen::Index i = 0; i < spread.size(); ++i)
+    CHECK(spread(i) == Approx(wide.covariance(i, i)).epsilon(0.2));
+}
+
 TEST_CASE("where residuals are switched off an alarm changes nothing, and it is said") {
   const RobotDescription robot = Robot("pendulum/gym.toml");
   const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 300, 3);
