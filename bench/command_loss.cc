@@ -93,7 +93,7 @@ class Bench {
 
   static int64_t Now() { return Clock().Utime(); }
   void Wait() {
-    messenger_.lcm().handleTimeout(1);
+    messenger_.Await(1);
     messenger_.Drain();
     wire_.Listen();
   }

@@ -1,7 +1,6 @@
 #include "cli/doctor.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -54,24 +53,15 @@ Finding Signatures(const std::string& lcm_url, const std::string& key) {
                 " leaves this machine: anybody on the network can command the robot",
             "plumb key FILE, and --key FILE for launch, arm, plumb-driver and plumb-controller"};
   }
-  const std::vector<std::string> open = OpenInterfaces(lcm_url);
-  if (open.empty()) {
-    return {Level::kGood,
-            "commands are not signed, and LCM stays on this machine, whose users are trusted", ""};
-  }
-  return {
-      Level::kAdvice,
-      fmt::format(
-          "commands are not signed; nothing of ours leaves this machine, but others can send to "
-          "it through {}",
-          fmt::join(open, ", ")),
-      "ip route add 224.0.0.0/4 dev lo, or plumb key FILE and --key FILE"};
+  return {Level::kGood,
+          "commands are not signed, and LCM stays on this machine, whose users are trusted", ""};
 }
 
 /// Findings about a driver that is running, from its own status; none if there is no driver.
 std::vector<Finding> RunningDriver(Messenger& messenger, const std::string& lcm_url) {
   const Subscriber<driver_status_t> drivers(messenger, "DRIVER_STATUS");
-  if (messenger.lcm().handleTimeout(kListen) > 0) messenger.Drain();
+  messenger.Await(kListen);
+  messenger.Drain();
   if (drivers.received() == 0) return {};
   const driver_status_t& driver = drivers.newest();
   const std::string what =
@@ -86,13 +76,12 @@ std::vector<Finding> RunningDriver(Messenger& messenger, const std::string& lcm_
 
 std::vector<Finding> Lcm(const std::string& url, const std::string& key) {
   try {
-    Messenger messenger(url);  // as long as it lives, the multicast group is received
+    Messenger messenger(url);
     std::vector<Finding> findings{{Level::kGood, "LCM opens at " + url, ""}, Signatures(url, key)};
     for (const Finding& finding : RunningDriver(messenger, url)) findings.push_back(finding);
     return findings;
-  } catch (const std::exception&) {
-    return {{Level::kBad, "LCM cannot open " + url + ": no route for multicast",
-             "ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"}};
+  } catch (const std::exception& error) {
+    return {Split(Level::kBad, error.what(), "")};
   }
 }
 
@@ -181,7 +170,7 @@ std::vector<Finding> Packages() {
   std::vector<Finding> findings;
   const struct {
     const char *program, *package, *purpose;
-  } programs[] = {{"lcm-logger", "liblcm-bin", "records runs"},
+  } programs[] = {{"lcm-logplayer", "liblcm-bin", "plays what was recorded"},
                   {"candump", "can-utils", "shows SocketCAN frames"},
                   {"can_viewer", "python3-can", "shows the udp: bus"},
                   {"linux.uml", "user-mode-linux", "tests SocketCAN where the kernel has none"}};

@@ -28,8 +28,9 @@ using SteadyClock = std::chrono::steady_clock;
 
 // of a virtual robot; a real one is armed by a person, every time
 constexpr int kMaxRearms = 20;
-constexpr int64_t kArmAgain = 500'000;  // [us]
-constexpr int64_t kLook = 50'000;       // [us]
+constexpr int64_t kArmAgain = 500'000;      // [us]
+constexpr int64_t kLook = 50'000;           // [us]
+constexpr size_t kMaxStrangeChannels = 10;  // that are named: strangers choose how many there are
 
 double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
@@ -118,7 +119,8 @@ class ClosedLoop {
         (request.request == driver_request_t::DISARM ||
          request.request == driver_request_t::ESTOP)) {
       stopped_from_outside_ = true;
-    } else if (strange_channels_.insert(channel).second) {
+    } else if (strange_channels_.size() < kMaxStrangeChannels &&
+               strange_channels_.insert(channel).second) {
       Print("plumb: somebody outside the run says " + channel +
             ": not heard; --real-time hears everybody");
     }

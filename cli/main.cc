@@ -10,6 +10,7 @@
 #include "cli/doctor.h"
 #include "cli/excite.h"
 #include "cli/launch.h"
+#include "cli/record.h"
 #include "cli/request.h"
 #include "cli/sim.h"
 #include "cli/train.h"
@@ -42,12 +43,12 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  std::string can_robot, dbc_output, tune_robot, tune_log, key, new_key;
+  std::string can_robot, dbc_output, tune_robot, tune_log, key, new_key, record_file;
   bool homed = false;
   CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr,
            *train = nullptr, *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr,
            *arm = nullptr, *disarm = nullptr, *estop = nullptr, *make_key = nullptr,
-           *tune = nullptr;
+           *tune = nullptr, *record = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -272,11 +273,14 @@ int main(int argc, char** argv) {
         estop = app.add_subcommand("estop", "emergency stop");
         for (CLI::App* request : {arm, disarm, estop})
           request->add_option("--key", key, "sign with the driver's key; only arm needs it");
+        record = app.add_subcommand("record", "record all messages to an LCM log, until Ctrl-C");
+        record->add_option("file", record_file, "the log; lcm-logplayer and --log read it")
+            ->required();
         make_key = app.add_subcommand("key", "make a key to sign commands with");
         make_key->add_option("file", new_key, "a new file, which only its owner may read")
             ->required();
         for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc,
-                              estimate, tune, arm, disarm, estop, make_key})
+                              estimate, tune, arm, disarm, estop, record, make_key})
           sub->fallthrough();
       },
       [&](plumb::Process& process) {
@@ -296,6 +300,7 @@ int main(int argc, char** argv) {
         }
         if (disarm->parsed())
           return plumb::RequestDriver(process, plumb::driver_request_t::DISARM, key);
+        if (record->parsed()) return plumb::Record(process, record_file);
         if (make_key->parsed()) return plumb::MakeKey(new_key);
         return plumb::RequestDriver(process, plumb::driver_request_t::ESTOP, key);
       });

@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr char kRobot[] = "plumb-robot", kDriver[] = "plumb-driver", kLogger[] = "setpriv";
+constexpr char kRobot[] = "plumb-robot", kDriver[] = "plumb-driver", kRecorder[] = "plumb-record";
 
 double SecondsSince(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
@@ -23,14 +23,11 @@ double SecondsSince(SteadyClock::time_point start) {
 
 void RunProcesses::Start(const std::string& name, std::vector<std::string> arguments) {
   const fs::path here = fs::read_symlink("/proc/self/exe").parent_path();
-  const bool ours = name.starts_with("plumb-");
-  arguments.insert(arguments.begin(), ours ? (here / name).string() : name);
-  if (ours) {
-    arguments.insert(arguments.end(), {"--lcm-url", where_.lcm_url, "--clock", where_.clock,
-                                       "--parent", std::to_string(getpid())});
-  }
+  arguments.insert(arguments.begin(), here / (name == kRecorder ? "plumb" : name));
+  arguments.insert(arguments.end(), {"--lcm-url", where_.lcm_url, "--clock", where_.clock,
+                                     "--parent", std::to_string(getpid())});
   children_.emplace_back(name, arguments, where_.output / (name + ".log"));
-  if (ours && coordinator_) coordinator_->Expect(name, children_.back().pid());
+  if (coordinator_) coordinator_->Expect(name, children_.back().pid());
 }
 
 void RunProcesses::Start() {
@@ -41,11 +38,7 @@ void RunProcesses::Start() {
       arguments.insert(arguments.end(), {"--realtime-priority", std::to_string(priority)});
     return arguments;
   };
-  if (!flags_.log.empty() && !coordinator_) {
-    // It knows no --parent of ours.
-    Start(kLogger, {"--pdeathsig", "TERM", "lcm-logger", "--lcm-url=" + where_.lcm_url, "-q", "-f",
-                    flags_.log});
-  }
+  if (!flags_.log.empty() && !coordinator_) Start(kRecorder, {"record", flags_.log});
   if (!flags_.real)
     Start(kRobot, with_priority({flags_.robot, "--bus", where_.bus, "--seed", seed}, 5));
   std::vector<std::string> driver{flags_.robot, "--bus", where_.bus, "--flight-recorder",
@@ -127,7 +120,7 @@ void RunProcesses::StopInVirtualTime(bool hurry) {
 
 void RunProcesses::StopInRealTime() {
   for (Child& child : children_) {
-    if (child.name() != kRobot && child.name() != kLogger) child.Signal(SIGTERM);
+    if (child.name() != kRobot && child.name() != kRecorder) child.Signal(SIGTERM);
   }
   for (Child& child : children_) {
     if (child.name() == kDriver) child.WaitFor(0.5);

@@ -1,21 +1,36 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
-#include <vector>
 
 namespace plumb {
 
 /// All functions of this header are thread-safe.
 
-/// True if what is sent to this LCM URL reaches no other machine: memq:, file:, or udpm: with a TTL
-/// of 0, which is liblcm's default. An empty URL is what liblcm makes of it: $LCM_DEFAULT_URL, or
-/// udpm: with TTL 0.
-bool StaysOnMachine(const std::string& url);
+/// LCM by multicast on this machine only (TTL 0), with a receive buffer large enough for a policy.
+inline constexpr char kDefaultLcmUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
 
-/// The network interfaces, the loopback aside, through which this machine receives a udpm: URL's
-/// multicast group while somebody on it listens. Whoever is on those networks can send to it,
-/// whatever our own TTL is. Read from /proc/net/igmp; empty where there is none.
-std::vector<std::string> OpenInterfaces(const std::string& url);
+/// The URL itself; for an empty one $LCM_DEFAULT_URL or, without that, kDefaultLcmUrl.
+std::string ResolvedLcmUrl(const std::string& url);
+
+/// Where the messages of a udpm: URL go.
+struct MulticastAddress {
+  std::string group;       ///< IPv4, e.g. "239.255.76.67"
+  uint16_t port;           ///< 1 to 65535
+  int ttl = 0;             ///< 0 to 255; 0 = stays on this machine
+  int receive_buffer = 0;  ///< of the kernel [bytes]; 0 = its default
+  bool operator==(const MulticastAddress&) const = default;
+};
+
+/// Reads udpm://GROUP:PORT?ttl=N&recv_buf_size=N, in which everything but "udpm://" may be left
+/// out. Stricter than liblcm, which takes what it does not understand for 0.
+/// @throws std::invalid_argument naming what is wrong.
+MulticastAddress ParseUdpm(const std::string& url);
+
+/// True if what is sent to this LCM URL reaches no other machine: memq:, file:, or udpm: with a TTL
+/// of 0, which is liblcm's default. In udpm: both directions hold: with a TTL of
+/// 0 nothing that others send comes in (LcmReceiver).
+bool StaysOnMachine(const std::string& url);
 
 /// Makes sure that commands are signed where others on the network could send some, too.
 /// @param key whether there is a key. @param allow_unsigned whether a person has taken the risk.

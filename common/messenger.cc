@@ -1,38 +1,79 @@
 #include "common/messenger.h"
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <stdexcept>
 
-#include "common/lcm_guard.h"
+#include "common/clock.h"
 
 namespace plumb {
 namespace {
 
-constexpr int kMaxAttempts = 3;
+constexpr char kSelfTest[] = "LCM_SELF_TEST";  // the channel that liblcm has for it
+constexpr int64_t kPatience = 10'000'000;      // [us], as liblcm has it
+constexpr int kAgain = 100;                    // [ms]
+
+bool IsMulticast(const std::string& url) { return url.starts_with("udpm:"); }
+
+/// What liblcm is opened with. It reads multicast URLs less strictly than we do: it gets one that
+/// cannot be misunderstood.
+std::string SendingUrl(const std::string& url) {
+  if (url.starts_with("mpudpm:"))
+    throw std::runtime_error(
+        url + ": mpudpm: is not supported, its sockets cannot be guarded; cure: udpm:");
+  if (!IsMulticast(url)) return url;
+  const MulticastAddress address = ParseUdpm(url);
+  return fmt::format("udpm://{}:{}?ttl={}", address.group, address.port, address.ttl);
+}
+
+std::runtime_error CannotOpen(const std::string& url, const std::string& reason = {}) {
+  return std::runtime_error(fmt::format(
+      "cannot open LCM at '{}'{}{}", url, reason.empty() ? "" : " (" + reason + ")",
+      IsMulticast(url) ? ": no route for multicast?; cure: ip link set lo up multicast on && "
+                         "ip route add 224.0.0.0/4 dev lo"
+                       : ""));
+}
 
 }  // namespace
 
-Messenger::Messenger(const std::string& url) : url_(url), lcm_(url) {
-  // liblcm tests itself when its file descriptor is first wanted, in two tenths of a second: a busy
-  // machine may need another go. A subscription made where that fails is a null pointer.
-  bool works = lcm_.good();
-  for (int attempt = 0; works && lcm_.getFileno() < 0; ++attempt) works = attempt < kMaxAttempts;
-  if (!works) {
-    const bool multicast = url.empty() || url.rfind("udpm", 0) == 0;
-    throw std::runtime_error(fmt::format("cannot open LCM at '{}'{}", url,
-                                         multicast
-                                             ? ": no route for multicast? Cure: ip link set lo up "
-                                               "multicast on && ip route add 224.0.0.0/4 dev lo"
-                                             : ""));
+Messenger::Messenger(const std::string& url) : lcm_(SendingUrl(ResolvedLcmUrl(url))) {
+  const std::string resolved = ResolvedLcmUrl(url);
+  if (!lcm_.good()) throw CannotOpen(resolved);
+  if (IsMulticast(resolved)) {
+    try {
+      receiver_.emplace(ParseUdpm(resolved));
+    } catch (const std::system_error& error) {
+      throw CannotOpen(resolved, error.what());
+    }
+    TestItself(resolved);
+  } else if (lcm_.getFileno() < 0) {
+    // A subscription made now would be a null pointer.
+    throw CannotOpen(resolved);
   }
-  Guard();
 }
 
 // liblcm has nothing to do in virtual time: what the coordinator brings goes straight to the
 // subscribers.
-Messenger::Messenger(Participant& participant)
-    : url_("memq://"), participant_(&participant), lcm_(url_) {}
+Messenger::Messenger(Participant& participant) : participant_(&participant), lcm_("memq://") {}
+
+/// Where a firewall or a route keeps our messages from coming back, nobody else gets them either.
+void Messenger::TestItself(const std::string& url) {
+  const Clock clock;
+  const std::string word = fmt::format("{} {}", getpid(), clock.Now());
+  const std::span<const uint8_t> bytes(reinterpret_cast<const uint8_t*>(word.data()), word.size());
+  bool heard = false;
+  const auto test = Subscribe(kSelfTest, [&](const std::string&, std::span<const uint8_t> message) {
+    heard = heard || std::ranges::equal(message, bytes);
+  });
+  for (const int64_t end = clock.Now() + kPatience; !heard && clock.Now() < end; Drain()) {
+    Publish(kSelfTest, bytes);
+    Await(kAgain);
+  }
+  if (!heard) throw CannotOpen(url, "what is sent does not come back");
+}
 
 bool Messenger::Publish(const std::string& channel, std::span<const uint8_t> message) {
   if (!participant_) {
@@ -53,15 +94,17 @@ Messenger::Subscription::Subscription(Messenger& messenger, const std::string& c
   if (messenger.participant_) {
     messenger.participant_->Listen(ChannelTopic(channel));
     messenger.subscriptions_.push_back(this);
+  } else if (messenger.receiver_) {
+    queue_ = messenger.receiver_->Listen(channel, handler_);
   } else {
     subscription_ = messenger.lcm_.subscribe(channel, &Subscription::OnBuffer, this);
     subscription_->setQueueCapacity(0);
-    messenger.Guard();
   }
 }
 
 Messenger::Subscription::~Subscription() {
   if (subscription_) messenger_.lcm_.unsubscribe(subscription_);
+  if (queue_) messenger_.receiver_->Forget(queue_);
   std::erase(messenger_.subscriptions_, this);
 }
 
@@ -70,7 +113,13 @@ void Messenger::Subscription::OnBuffer(const lcm::ReceiveBuffer* buffer,
   handler_(channel, {static_cast<const uint8_t*>(buffer->data), buffer->data_size});
 }
 
+void Messenger::Await(int timeout) {
+  pollfd polled{fd(), POLLIN, 0};
+  poll(&polled, 1, timeout);
+}
+
 int Messenger::Drain(int max_messages) {
+  if (receiver_) return receiver_->Drain(max_messages);
   int handled = 0;
   if (participant_) {
     std::deque<lockstep_post_t>& heard = participant_->messages();
@@ -90,18 +139,6 @@ int Messenger::Drain(int max_messages) {
     if (result == 0) return handled;
   }
   return max_messages;
-}
-
-void Messenger::Guard() {
-  if (guarded_ || url_.rfind("udpm", 0) != 0) return;
-  // udpm://GROUP:PORT?...
-  const auto colon = url_.find(':', sizeof("udpm://") - 1);
-  const int port = colon == std::string::npos ? 7667 : std::atoi(url_.c_str() + colon + 1);
-  if (AttachLcmGuard(static_cast<uint16_t>(port)) <= 0) {
-    throw std::runtime_error(
-        fmt::format("cannot guard LCM's socket on port {} against malformed packets", port));
-  }
-  guarded_ = true;
 }
 
 }  // namespace plumb

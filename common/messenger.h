@@ -5,53 +5,57 @@
 #include <functional>
 #include <lcm/lcm-cpp.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/lcm_receiver.h"
+#include "common/lcm_url.h"
 #include "common/lockstep/participant.h"
 
 namespace plumb {
 
-/// LCM by multicast on this machine only (TTL 0), with a receive buffer large enough for a policy.
-inline constexpr char kDefaultLcmUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
-
-/// One process's connection to LCM. Not thread-safe.
+/// One process's connection to LCM. Messages go out by liblcm and, where the URL is one of
+/// multicast, come in by LcmReceiver. Not thread-safe.
 class Messenger {
  public:
-  /// @param url an LCM URL; udpm, memq or file.
+  /// @param url an LCM URL: udpm, memq, file or tcpq; empty as ResolvedLcmUrl has it.
   /// @throws std::runtime_error that says how to cure it (no multicast route is the usual cause).
   explicit Messenger(const std::string& url);
   /// The messages of a run in virtual time, which its coordinator carries.
   explicit Messenger(Participant& participant);
 
-  lcm::LCM& lcm() { return lcm_; }
-  /// For poll; not in virtual time. Calling it starts LCM's receive thread.
-  int fd() { return lcm_.getFileno(); }
+  /// For poll: readable while messages wait. Not in virtual time.
+  int fd() { return receiver_ ? receiver_->fd() : lcm_.getFileno(); }
+  /// Sleeps until messages wait, or for `timeout` [ms] of the machine's time. Not in virtual time.
+  void Await(int timeout);
   /// @return false if the message was not sent (liblcm says no more).
   bool Publish(const std::string& channel, std::span<const uint8_t> message);
   /// Handles the messages that have arrived, at most `max_messages`, so that a flood does not keep
   /// the caller from its other duties; what is left keeps fd() readable. @return how many, -1 at
   /// the end of a file or on failure.
   int Drain(int max_messages = 1000);
+  /// Messages that came faster than they were drained, since the last call: of each listener
+  /// LcmReceiver::kMaxQueued bytes are kept.
+  std::vector<LcmReceiver::Loss> TakeLosses() {
+    return receiver_ ? receiver_->TakeLosses() : std::vector<LcmReceiver::Loss>();
+  }
   /// Called with a message's bytes as they arrived; must not throw.
-  using Handler = std::function<void(const std::string& channel, std::span<const uint8_t> message)>;
+  using Handler = LcmReceiver::Handler;
   class Subscription;
-  /// Listens to a channel (in real time: to all whose names match a regular expression), without
-  /// bound, as long as the subscription lives. In order of arrival.
+  /// Listens to a channel (in real time: ".*" is all of them) as long as the subscription lives. In
+  /// order of arrival.
   std::unique_ptr<Subscription> Subscribe(const std::string& channel, Handler handler);
 
  private:
-  /// Keeps malformed LCM datagrams from liblcm (see lcm_guard.h), once. The constructor does, and
-  /// Subscribe where that was too early.
-  void Guard();
+  void TestItself(const std::string& url);
 
-  std::string url_;
   Participant* participant_ = nullptr;  // of a run in virtual time
   lcm::LCM lcm_;
-  bool guarded_ = false;
-  std::vector<Subscription*> subscriptions_;
+  std::optional<LcmReceiver> receiver_;       // of multicast
+  std::vector<Subscription*> subscriptions_;  // in virtual time
 };
 
 /// Ends with its destruction. Must not outlive the Messenger.
@@ -69,13 +73,14 @@ class Messenger::Subscription {
   Messenger& messenger_;
   const std::string channel_;
   const Handler handler_;
-  lcm::Subscription* subscription_ = nullptr;  // null in virtual time
+  // One of them, or none in virtual time.
+  LcmReceiver::Queue* queue_ = nullptr;
+  lcm::Subscription* subscription_ = nullptr;
 };
 
 /// Receives messages of one type on one channel. Decodes them itself, because an exception must
-/// never cross liblcm's C frames: what does not decode is counted and forgotten. The queue is
-/// unbounded, since a bounded one keeps the oldest messages; Messenger::Drain empties it. Not
-/// thread-safe; must not outlive the Messenger.
+/// never cross liblcm's C frames: what does not decode is counted and forgotten. Not thread-safe;
+/// must not outlive the Messenger.
 template <class Message>
 class Subscriber {
  public:

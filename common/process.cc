@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/prctl.h>
@@ -14,9 +15,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
+#include <limits>
 #include <stdexcept>
 
+#include "common/log_limit.h"
 #include "common/program_version.h"
 #include "common/realtime.h"
 #include "common/time_units.h"
@@ -38,11 +40,37 @@ int BlockStopSignals() {
   return fd;
 }
 
+/// Writes to standard error what LogLimit lets through. What a person has asked for in detail, from
+/// debug on, is not limited.
+class LimitedSink : public spdlog::sinks::base_sink<std::mutex> {
+ private:
+  void sink_it_(const spdlog::details::log_msg& line) override {
+    if (line.level < spdlog::level::info) return out_.log(line);
+    const std::optional<int64_t> held_back =
+        limit_.Admit({line.payload.data(), line.payload.size()}, clock_.Now());
+    if (!held_back) return;
+    if (*held_back > 0) {
+      const std::string note = fmt::format("{} lines like the next one are left out", *held_back);
+      out_.log({line.logger_name, line.level, note});
+    }
+    out_.log(line);
+  }
+  void flush_() override { out_.flush(); }
+  void set_pattern_(const std::string& pattern) override { out_.set_pattern(pattern); }
+  void set_formatter_(std::unique_ptr<spdlog::formatter> formatter) override {
+    out_.set_formatter(std::move(formatter));
+  }
+
+  spdlog::sinks::stderr_color_sink_st out_;
+  LogLimit limit_;
+  const Clock clock_;
+};
+
 }  // namespace
 
-Process::Process(std::string name, std::string lcm_url, const std::string& clock)
+Process::Process(std::string name, const std::string& lcm_url, const std::string& clock)
     : name_(std::move(name)),
-      lcm_url_(std::move(lcm_url)),
+      lcm_url_(ResolvedLcmUrl(lcm_url)),
       stop_fd_(BlockStopSignals()),
       joined_(clock.starts_with(kVirtual) ? JoinRun(clock.substr(kVirtual.size()), name_)
                                           : nullptr),
@@ -79,9 +107,23 @@ void Process::Doze(int64_t timeout, int fd) {
   ppoll(polled.data(), fd < 0 ? 2 : 3, &real, nullptr);
 }
 
+/// In real time all that has arrived by now, or whoever computes for long between two turns would
+/// be late for ever after a flood.
+void Process::Hear() {
+  if (participant_) {
+    messenger().Drain();
+    return;
+  }
+  messenger().Drain(std::numeric_limits<int>::max());
+  for (const auto& [channel, messages] : messenger().TakeLosses()) {
+    spdlog::warn("{}: {} messages lost, they came faster than they were dealt with", channel,
+                 messages);
+  }
+}
+
 bool Process::Wait(int64_t timeout, int fd) {
   Doze(timeout, fd);
-  messenger().Drain();
+  Hear();
   return !stopping();
 }
 
@@ -96,7 +138,7 @@ bool Process::Sleep(int64_t timeout, const std::function<void()>& meanwhile) {
     const timespec real = clock_.RealDuration(std::max<int64_t>(end - clock_.Now(), 0));
     ppoll(&stop, 1, &real, nullptr);
   }
-  messenger().Drain();
+  Hear();
   return !stopping();
 }
 
@@ -120,8 +162,7 @@ std::string VersionLine(const std::string& name) { return name + " " + ProgramVe
 int Run(const std::string& name, const std::string& description, int argc, char** argv,
         const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body) {
   CLI::App app{description, name};
-  const char* environment_url = std::getenv("LCM_DEFAULT_URL");
-  std::string lcm_url = environment_url && *environment_url ? environment_url : kDefaultLcmUrl;
+  std::string lcm_url = ResolvedLcmUrl("");
   std::string clock = "1";
   std::string level = "info";
   int parent = 0;
@@ -143,7 +184,8 @@ int Run(const std::string& name, const std::string& description, int argc, char*
     const int status = app.exit(error);
     return status == 0 ? 0 : 2;
   }
-  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>(name, std::make_shared<LimitedSink>()));
   spdlog::set_pattern("%H:%M:%S.%e %n %^%l%$ %v");
   spdlog::set_level(spdlog::level::from_str(level));
   try {

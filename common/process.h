@@ -26,7 +26,7 @@ class Process {
  public:
   /// @param clock SCALE, SCALE@EPOCH, or virtual:PATH of a coordinator. @throws std::exception if
   /// it is none of these, or nobody keeps time there.
-  Process(std::string name, std::string lcm_url, const std::string& clock);
+  Process(std::string name, const std::string& lcm_url, const std::string& clock);
 
   const std::string& name() const { return name_; }
   const Clock& clock() const { return clock_; }
@@ -62,6 +62,8 @@ class Process {
   void TakeVirtualTime(double seconds);
 
  private:
+  void Hear();
+
   std::string name_;
   std::string lcm_url_;
   int stop_fd_;
@@ -77,7 +79,8 @@ std::string VersionLine(const std::string& name);
 
 /// Parses the flags (the common ones and `add_flags`), starts the log, blocks the stop signals,
 /// runs `body`, and turns any exception into one clear line and exit status 1. Usage errors exit
-/// with 2.
+/// with 2. Of the log's lines that are alike, whoever provokes them, no more are written than
+/// LogLimit lets through.
 int Run(const std::string& name, const std::string& description, int argc, char** argv,
         const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body);
 

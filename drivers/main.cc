@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
@@ -51,13 +50,6 @@ void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {
   if (commands_signed) return spdlog::info("takes signed commands only");
   if (!StaysOnMachine(lcm_url))
     return spdlog::warn("takes unsigned commands of anybody on the network");
-  const std::vector<std::string> open = OpenInterfaces(lcm_url);
-  if (open.empty()) return;
-  spdlog::warn(
-      "takes the commands of anybody who reaches LCM through {}: they are not signed; cure: --key "
-      "FILE, or "
-      "ip route add 224.0.0.0/4 dev lo",
-      fmt::join(open, ", "));
 }
 
 class DriverProcess {

@@ -57,7 +57,7 @@ void Echo(const std::string& lcm_url) {
   Publisher<joint_state_t> pong(messenger, "PONG");
   Subscriber<joint_state_t> ping(messenger, "PING",
                                  [&](const joint_state_t& message) { pong.Publish(message); });
-  while (messenger.lcm().handle() == 0) continue;
+  for (;; messenger.Drain()) messenger.Await(-1);
 }
 
 }  // namespace

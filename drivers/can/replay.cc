@@ -8,8 +8,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "common/file_descriptor.h"
 #include "drivers/can/candump.h"
-#include "drivers/can/file_descriptor.h"
 
 namespace plumb {
 namespace {

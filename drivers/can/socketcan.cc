@@ -18,10 +18,10 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "common/file_descriptor.h"
 #include "drivers/can/can_link.h"
 #include "drivers/can/datagram_transport.h"
 #include "drivers/can/error_frame.h"
-#include "drivers/can/file_descriptor.h"
 
 namespace plumb {
 namespace {

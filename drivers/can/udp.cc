@@ -12,8 +12,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "common/file_descriptor.h"
 #include "drivers/can/datagram_transport.h"
-#include "drivers/can/file_descriptor.h"
 #include "drivers/can/udp_codec.h"
 
 namespace plumb {

@@ -47,7 +47,8 @@ TEST_CASE("the loop closes in real time") {
                  stage.folder / "replayed.log");
   const auto until = [&](const std::function<bool()>& so, double seconds) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-    while (!so() && std::chrono::steady_clock::now() < deadline) listener.lcm().handleTimeout(10);
+    while (!so() && std::chrono::steady_clock::now() < deadline)
+      listener.Await(10), listener.Drain();
     return so();
   };
   REQUIRE(until([&] { return distributions.received() > 0; }, 60));  // it listens

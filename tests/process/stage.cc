@@ -124,7 +124,7 @@ bool Stage::WaitUntil(const std::function<bool()>& so, double seconds) {
     if (coordinator) {
       coordinator->participant().Wait(deadline, Participant::Wake::kWhenHeard);
     } else {
-      messenger.lcm().handleTimeout(2);
+      messenger.Await(2);
     }
     messenger.Drain();
     Witness();

@@ -15,8 +15,8 @@
 #include <memory>
 #include <string>
 
+#include "common/file_descriptor.h"
 #include "drivers/can/error_frame.h"
-#include "drivers/can/file_descriptor.h"
 #include "tests/drivers/can/socketcan/vcan.h"
 
 namespace plumb {
