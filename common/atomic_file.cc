@@ -1,9 +1,12 @@
 #include "common/atomic_file.h"
 
 #include <fcntl.h>
+#include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -31,19 +34,62 @@ bool SyncFolder(const std::filesystem::path& file) {
   return ok;
 }
 
-std::string Temporary(const std::filesystem::path& file) { return file.string() + ".part"; }
+// Names nobody else gives: of this file, and of this process.
+std::string TemporaryPrefix(const std::filesystem::path& file) { return file.string() + ".part-"; }
+
+struct Temporary {
+  int fd = -1;
+  std::string name;
+};
+
+// What is there already, a link among it, is somebody else's: left alone, and not written through.
+Temporary MakeTemporary(const std::filesystem::path& file) {
+  constexpr int kMostTries = 100;
+  Temporary temporary;
+  for (int i = 0; i < kMostTries; ++i) {
+    temporary.name = TemporaryPrefix(file) + std::to_string(getpid());
+    if (i > 0) temporary.name += "-" + std::to_string(i);
+    temporary.fd =
+        open(temporary.name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
+    if (temporary.fd >= 0 || errno != EEXIST) break;
+  }
+  return temporary;
+}
+
+// Temporary files of processes that were killed.
+void RemoveLeftovers(const std::filesystem::path& file) {
+  namespace fs = std::filesystem;
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  const std::string prefix = TemporaryPrefix(file.filename());
+  std::error_code ignored;  // of what cannot be removed nobody is worse off
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    pid_t pid = 0;
+    const char *begin = name.data() + prefix.size(), *end = name.data() + name.size();
+    const char* const rest = std::from_chars(begin, end, pid).ptr;
+    struct stat status {};
+    const bool ours = rest != begin && (rest == end || *rest == '-') && pid > 0 &&
+                      lstat(entry.path().c_str(), &status) == 0 && S_ISREG(status.st_mode) &&
+                      status.st_uid == geteuid();
+    if (ours && kill(pid, 0) != 0 && errno == ESRCH) fs::remove(entry.path(), ignored);
+  }
+}
 
 }  // namespace
 
 void WriteAtomically(const std::filesystem::path& file, std::string_view content) {
-  const std::string temporary = Temporary(file);
-  const int fd = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  bool ok = fd >= 0 && WriteAll(fd, content) && fsync(fd) == 0;
-  const int error = errno;
+  const Temporary temporary = MakeTemporary(file);
+  const int fd = temporary.fd;
+  const bool whole = fd >= 0 && WriteAll(fd, content) && fsync(fd) == 0;
+  int error = errno;
   if (fd >= 0) close(fd);
-  if (!ok) throw std::runtime_error(file.string() + ": cannot be written: " + std::strerror(error));
-  ok = rename(temporary.c_str(), file.c_str()) == 0 && SyncFolder(file);
-  if (!ok) throw std::runtime_error(file.string() + ": cannot be written: " + std::strerror(errno));
+  const bool renamed = whole && rename(temporary.name.c_str(), file.c_str()) == 0;
+  if (whole && !renamed) error = errno;
+  if (fd >= 0 && !renamed) unlink(temporary.name.c_str());
+  if (renamed && SyncFolder(file)) return;
+  throw std::runtime_error(file.string() +
+                           ": cannot be written: " + std::strerror(renamed ? errno : error));
 }
 
 void RequireWritable(const std::filesystem::path& file) {
@@ -55,12 +101,11 @@ void RequireWritable(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(status) || !file.has_filename()) fail("it is a folder");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     fail("it is not a regular file");
-  const std::string temporary = Temporary(file);
-  // Without waiting, should that be a pipe.
-  const int fd = open(temporary.c_str(), O_WRONLY | O_CREAT | O_NONBLOCK | O_CLOEXEC, 0644);
-  if (fd < 0) fail(std::strerror(errno));
-  close(fd);
-  unlink(temporary.c_str());
+  RemoveLeftovers(file);
+  const Temporary temporary = MakeTemporary(file);
+  if (temporary.fd < 0) fail(std::strerror(errno));
+  close(temporary.fd);
+  unlink(temporary.name.c_str());
 }
 
 }  // namespace plumb

@@ -6,13 +6,14 @@
 namespace plumb {
 
 /// Writes a file so that a reader sees the old or the new content, never a part, whenever the
-/// process or the machine dies: temporary file beside it, fsync, rename. Thread-safe for different
-/// files. @throws std::runtime_error naming the file and the cause.
+/// process or the machine dies: temporary file beside it (its name, ".part-" and the process's
+/// number), fsync, rename. Thread-safe for different files. @throws std::runtime_error naming the
+/// file and the cause.
 void WriteAtomically(const std::filesystem::path& file, std::string_view content);
 
 /// Looks whether WriteAtomically could write the file, before a long computation rather than after
-/// it: makes the temporary file and removes it. A device or a pipe is refused, too: the rename
-/// would replace it.
+/// it: makes the temporary file and removes it, with those that killed processes have left. A
+/// device or a pipe is refused, too: the rename would replace it.
 /// @throws std::runtime_error naming the file and the cause.
 void RequireWritable(const std::filesystem::path& file);
 

@@ -1,6 +1,11 @@
 #include "common/batch_runner.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <stdexcept>
 
 #include "common/hash.h"
@@ -21,6 +26,36 @@ uint64_t CheckOf(const Header& header, const Eigen::MatrixXd& batch) {
   return Hash(batch, Hash(&header, offsetof(Header, check)));
 }
 
+// A journal, or what a killed process has left of its first bytes; else a new file. What is
+// somebody else's, or a link to it, is not written over.
+class Opened {
+ public:
+  explicit Opened(const std::filesystem::path& file)
+      : fd_(open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0644)) {
+    if (fd_ < 0 && errno == ELOOP) Fail(file, "is a link: a journal is not written through one");
+    if (fd_ < 0) Fail(file, std::string("cannot be written: ") + std::strerror(errno));
+    std::array<char, sizeof kMagic> begin{};
+    const ssize_t size = pread(fd_, begin.data(), begin.size(), 0);
+    if (size < 0 || std::memcmp(begin.data(), &kMagic, static_cast<size_t>(size)) != 0)
+      Fail(file, "is in the way and no journal: it is not written over");
+  }
+  ~Opened() {
+    if (fd_ >= 0) close(fd_);
+  }
+  Opened(const Opened&) = delete;
+  Opened& operator=(const Opened&) = delete;
+
+  /// A name of this very file, whatever becomes of its own.
+  std::string name() const { return "/proc/self/fd/" + std::to_string(fd_); }
+
+ private:
+  [[noreturn]] void Fail(const std::filesystem::path& file, const std::string& why) {
+    if (fd_ >= 0) close(fd_);
+    throw std::runtime_error(file.string() + ": " + why);
+  }
+  int fd_;
+};
+
 }  // namespace
 
 Eigen::MatrixXd BatchRunner::Run(uint64_t, Eigen::Index rows, Eigen::Index columns,
@@ -32,13 +67,15 @@ Eigen::MatrixXd BatchRunner::Run(uint64_t, Eigen::Index rows, Eigen::Index colum
 }
 
 Journal::Journal(std::filesystem::path file, uint64_t identity) : file_(std::move(file)) {
+  const Opened opened(file_);
   std::array<uint64_t, 2> head{};
-  stream_.open(file_, std::ios::in | std::ios::out | std::ios::binary);
+  stream_.open(opened.name(), std::ios::in | std::ios::out | std::ios::binary);
   const bool same = stream_ && stream_.read(reinterpret_cast<char*>(head.data()), sizeof head) &&
                     head[0] == kMagic && head[1] == identity;
   if (same) return;
   reading_ = false;
-  stream_ = std::fstream(file_, std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
+  stream_ = std::fstream(opened.name(),
+                         std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
   head = {kMagic, identity};
   stream_.write(reinterpret_cast<const char*>(head.data()), sizeof head);
   stream_.flush();

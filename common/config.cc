@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "common/nearest_name.h"
+#include "common/outside_text.h"
 #include "common/toml_files.h"
 
 namespace plumb {
@@ -146,7 +147,9 @@ std::string Config::String(const std::string& key, std::optional<std::string> fa
   }
   const toml::node* node = table().get(key);
   if (!node->is_string()) Fail(key, "is not a string");
-  return *node->value<std::string>();
+  std::string text = *node->value<std::string>();
+  if (text != Printable(text)) Fail(key, "contains what cannot be printed");
+  return text;
 }
 
 int Config::Choice(const std::string& key, const std::vector<std::string>& choices,

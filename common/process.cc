@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -15,10 +16,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iostream>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 
 #include "common/log_limit.h"
+#include "common/outside_text.h"
 #include "common/program_version.h"
 #include "common/realtime.h"
 #include "common/time_units.h"
@@ -27,6 +31,28 @@ namespace plumb {
 namespace {
 
 constexpr std::string_view kVirtual = "virtual:";
+
+/// Messages of the log quote what came from outside.
+class PrintableFormatter : public spdlog::formatter {
+ public:
+  explicit PrintableFormatter(std::unique_ptr<spdlog::formatter> inner)
+      : inner_(std::move(inner)) {}
+
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
+    const std::string text = Printable({message.payload.data(), message.payload.size()});
+    spdlog::details::log_msg printable = message;
+    printable.payload = text;
+    inner_->format(printable, line);
+    message.color_range_start = printable.color_range_start;
+    message.color_range_end = printable.color_range_end;
+  }
+  std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<PrintableFormatter>(inner_->clone());
+  }
+
+ private:
+  std::unique_ptr<spdlog::formatter> inner_;
+};
 
 int BlockStopSignals() {
   sigset_t set;
@@ -161,6 +187,7 @@ std::string VersionLine(const std::string& name) { return name + " " + ProgramVe
 
 int Run(const std::string& name, const std::string& description, int argc, char** argv,
         const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body) {
+  const PrintableStream out(std::cout), err(std::cerr);
   CLI::App app{description, name};
   std::string lcm_url = ResolvedLcmUrl("");
   std::string clock = "1";
@@ -186,7 +213,8 @@ int Run(const std::string& name, const std::string& description, int argc, char*
   }
   spdlog::set_default_logger(
       std::make_shared<spdlog::logger>(name, std::make_shared<LimitedSink>()));
-  spdlog::set_pattern("%H:%M:%S.%e %n %^%l%$ %v");
+  spdlog::set_formatter(std::make_unique<PrintableFormatter>(
+      std::make_unique<spdlog::pattern_formatter>("%H:%M:%S.%e %n %^%l%$ %v")));
   spdlog::set_level(spdlog::level::from_str(level));
   try {
     if (parent != 0) {

@@ -3,15 +3,31 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <string_view>
+
+#include "common/outside_text.h"
+
 namespace plumb {
+namespace {
+
+constexpr std::string_view kAnew = "\r\033[K";
+
+}  // namespace
 
 ProgressLine::ProgressLine(bool speaks, std::ostream& stream)
     : stream_(stream),
-      shown_(speaks && isatty(&stream == &std::cout ? STDOUT_FILENO : STDERR_FILENO)) {}
+      fd_(&stream == &std::cout ? STDOUT_FILENO : STDERR_FILENO),
+      shown_(speaks && isatty(fd_)) {}
+
+// Past the stream, which lets nobody control the terminal.
+void ProgressLine::Put(std::string_view text) {
+  stream_.flush();
+  if (write(fd_, text.data(), text.size()) < 0) shown_ = false;
+}
 
 void ProgressLine::Show(const std::string& line) {
   if (!shown_) return;
-  stream_ << "\r\033[K" << line << std::flush;
+  Put(std::string(kAnew) + Printable(line));
   open_ = true;
 }
 
@@ -20,7 +36,7 @@ void ProgressLine::Show(const std::string& what, double share) {
 }
 
 void ProgressLine::Clear() {
-  if (open_) stream_ << "\r\033[K" << std::flush;
+  if (open_) Put(kAnew);
   open_ = false;
 }
 

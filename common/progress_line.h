@@ -2,6 +2,7 @@
 
 #include <iostream>
 #include <string>
+#include <string_view>
 
 namespace plumb {
 
@@ -26,7 +27,10 @@ class ProgressLine {
   void Keep();
 
  private:
+  void Put(std::string_view text);
+
   std::ostream& stream_;
+  int fd_;
   bool shown_;
   bool open_ = false;  // something stands there
 };

@@ -49,6 +49,12 @@ void ReadKeyText(const std::filesystem::path& file, KeyText& key) {
                      "somebody has read it",
                      status.st_mode & 07777, file.string()));
   }
+  if (status.st_uid != geteuid()) {
+    Fail(file,
+         fmt::format("the key belongs to another user ({}), who may know or change it; cure: a "
+                     "copy of one\'s own, made by install -m 600",
+                     status.st_uid));
+  }
   if (size < 0) Fail(file, "the key cannot be read");
   key.size = static_cast<size_t>(size);
   if (key.size > 0 && key.text[key.size - 1] == '\n') --key.size;

@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -14,6 +17,58 @@ namespace plumb {
 namespace {
 
 constexpr int kLongestChain = 8;  // of files that extend each other
+// Far beyond any robot; what has more keeps the reader busy for minutes, or ends it by recursion.
+constexpr int kDeepestKey = 16;          // parts of a.b.c
+constexpr size_t kMostEntries = 10'000;  // of a table or an array
+
+// The reader makes a table of each part of a dotted key, and descends into them by recursion.
+// Strings and comments are passed over: their dots are none.
+void RequireShallowKeys(const std::string& text, const std::string& name) {
+  size_t line = 1;
+  int parts = 1;
+  const auto pass = [&](size_t& at, std::string_view end, bool escapes) {
+    for (; at < text.size() && text.compare(at, end.size(), end) != 0; ++at) {
+      if (text[at] == '\n' && end.size() == 1) return;  // a string that has no end
+      line += text[at] == '\n';
+      if (escapes && text[at] == '\\') ++at;
+    }
+    at += end.size() - 1;
+  };
+  for (size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    if (c == '"' || c == '\'') {
+      const std::string triple(3, c);
+      const bool many_lines = text.compare(at, 3, triple) == 0;
+      at += many_lines ? 3 : 1;
+      pass(at, many_lines ? triple : std::string(1, c), c == '"');
+    } else if (c == '#') {
+      at = std::min(text.find('\n', at), text.size()) - 1;
+    } else if (c == '.') {
+      if (++parts > kDeepestKey) {
+        throw ConfigError(
+            fmt::format("{}:{}: a key of more than {} parts", name, line, kDeepestKey));
+      }
+    } else if (std::string_view("=,[]{}\n").find(c) != std::string_view::npos) {
+      parts = 1;
+      line += c == '\n';
+    }
+  }
+}
+
+void RequireModest(const toml::node& node, const std::string& name) {
+  const auto require = [&](size_t entries) {
+    if (entries <= kMostEntries) return;
+    throw ConfigError(fmt::format("{}{} entries, more than {}", TomlPlace(name, node.source()),
+                                  entries, kMostEntries));
+  };
+  if (const toml::table* table = node.as_table()) {
+    require(table->size());
+    for (auto&& [key, entry] : *table) RequireModest(entry, name);
+  } else if (const toml::array* array = node.as_array()) {
+    require(array->size());
+    for (const toml::node& entry : *array) RequireModest(entry, name);
+  }
+}
 
 bool IsTables(const toml::node& node) {
   return node.is_array() && !node.as_array()->empty() &&
@@ -41,15 +96,17 @@ void Merge(toml::table& base, toml::table& own) {
 }
 
 void MergeByName(toml::array& base, toml::array& own) {
-  const size_t count = base.size();
+  std::map<std::string, size_t> places;  // where the name is first
+  for (size_t i = 0; i < base.size(); ++i) {
+    if (const auto name = NameOf(*base.get(i))) places.emplace(*name, i);
+  }
   std::set<std::string> seen;
   for (toml::node& node : own) {
     const std::optional<std::string> name = NameOf(node);
-    size_t i = 0;
-    while (i < count && !(name && NameOf(*base.get(i)) == name)) ++i;
+    const auto place = name ? places.find(*name) : places.end();
     // A name that occurs twice in one file is for the reader to refuse.
-    if (i < count && seen.insert(*name).second) {
-      Merge(*base.get(i)->as_table(), *node.as_table());
+    if (place != places.end() && seen.insert(*name).second) {
+      Merge(*base.get(place->second)->as_table(), *node.as_table());
     } else {
       base.push_back(std::move(*node.as_table()));
     }
@@ -65,8 +122,11 @@ std::string TomlPlace(const std::string& file, const toml::source_region& source
 }
 
 toml::table ParseToml(const std::string& text, const std::string& name) {
+  RequireShallowKeys(text, name);
   try {
-    return toml::parse(text, name);
+    toml::table table = toml::parse(text, name);
+    RequireModest(table, name);
+    return table;
   } catch (const toml::parse_error& error) {
     throw ConfigError(TomlPlace(name, error.source()) + std::string(error.description()));
   }

@@ -104,6 +104,10 @@ void BaseObserver::Read(int64_t utime, const ImuInbox::Reading& reading) {
   odometry_.Predict(elapsed, Eigen::Map<const Vector3d>(reading.rate.data()),
                     Eigen::Map<const Vector3d>(reading.force.data()));
   odometry_.Correct(feet_);
+  if (!odometry_.finite()) {
+    started_ = false;
+    return;
+  }
   angle_ += std::remainder(Angle() - angle_, 2 * std::numbers::pi);
 }
 

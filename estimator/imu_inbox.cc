@@ -3,15 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robot/physical.h"
+
 namespace plumb {
 namespace {
 
 constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
 
 bool Sane(const imu_t& imu) {
-  const auto finite = [](double x) { return std::isfinite(x); };
   if (imu.utime < 0 || imu.utime >= kEndOfTime) return false;
-  if (!std::ranges::all_of(imu.rate, finite) || !std::ranges::all_of(imu.force, finite))
+  if (!std::ranges::all_of(imu.rate, IsPhysical) || !std::ranges::all_of(imu.force, IsPhysical))
     return false;
   double norm = 0;
   for (const double x : imu.orientation) norm += x * x;

@@ -34,7 +34,8 @@ KinematicFilter::KinematicFilter(const EstimatorSettings& settings)
 
 void KinematicFilter::Restart(double position, double velocity) {
   const bool known = std::isfinite(velocity);
-  const double bias = mean_(kBias), bias_variance = covariance_(kBias, kBias);
+  const double bias = sound() ? mean_(kBias) : 0,
+               bias_variance = sound() ? covariance_(kBias, kBias) : Square(settings_.bias_sd);
   mean_ << position, known ? velocity : 0, 0, 0, bias, 0;
   covariance_ =
       KinematicState(Square(settings_.position_sd) + Square(mean_(kVelocity) * settings_.timing_sd),

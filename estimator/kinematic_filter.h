@@ -77,6 +77,14 @@ class KinematicFilter {
 
   const KinematicState& mean() const { return mean_; }
   const KinematicCovariance& covariance() const { return covariance_; }
+  /// Times the bias's sd: beyond it the filter has lost its way.
+  static constexpr double kBiasLost = 1000;
+  /// Finite, with variances of position and velocity that are some and a bias that may be one.
+  /// Otherwise it can only restart, and then forgets the bias, too.
+  bool sound() const {
+    return mean_.allFinite() && covariance_.allFinite() && covariance_(0, 0) >= 0 &&
+           covariance_(1, 1) >= 0 && std::abs(bias()) <= kBiasLost * settings_.bias_sd;
+  }
   double bias() const { return mean_(4); }  ///< [rad/s] of a gyro or [m/s^2] of an accelerometer
 
   struct Smoothed {

@@ -85,6 +85,12 @@ class LegOdometry {
   /// A foot rests where no ground should be, or is far below it, or the body is held up although no
   /// foot rests: the filter must restart.
   bool astray() const { return astray_; }
+  /// Otherwise it must begin as one that stands: nothing of what it knew is left.
+  bool finite() const {
+    return position_.allFinite() && velocity_.allFinite() && orientation_.coeffs().allFinite() &&
+           rate_.allFinite() && acceleration_.allFinite() && rate_bias_.allFinite() &&
+           acceleration_bias_.allFinite() && covariance_.allFinite();
+  }
 
   /// Standard deviations along a direction of the world. The orientation's is [rad] about it.
   double position_sd(const Eigen::Vector3d& direction) const { return Sd(kPosition, direction); }

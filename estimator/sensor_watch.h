@@ -13,6 +13,7 @@ class NisAverage {
 
   /// @param elapsed [s] since the last reading.
   void Add(double nis, double elapsed) {
+    if (!std::isfinite(nis)) return;  // of a filter that is about to restart
     const double weight = std::isnan(value_) ? 1 : -std::expm1(-elapsed / kTime);
     value_ = std::isnan(value_) ? nis : value_ + weight * (nis - value_);
   }

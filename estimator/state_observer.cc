@@ -5,6 +5,7 @@
 
 #include "estimator/impact.h"
 #include "robot/motion_noise.h"
+#include "robot/physical.h"
 
 namespace plumb {
 namespace {
@@ -23,6 +24,10 @@ constexpr double kRoundedEffort = 1e-9;  // [Nm] or [N]: what rounding makes of 
 
 double Square(double x) { return x * x; }
 
+bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
 AgreementWatch::Settings VelocityWatch(const EstimatorSettings& s, bool gyro) {
   return {s.position_sd, s.velocity_sd, gyro ? kBiasesInOrder * s.bias_sd : 0,
           gyro ? 0 : kVelocityLag};
@@ -39,6 +44,7 @@ AgreementWatch::Settings AccelerationWatch(const EstimatorSettings& s) {
 StateObserver::StateObserver(const RobotDescription& robot)
     : lag_(robot.estimator.lag),
       gravity_(robot.simulation.gravity),
+      greatest_effort_(GreatestEffort(robot)),
       unknown_step_(2 * robot.effort_limits().maxCoeff()),
       contact_(robot) {
   if (robot.estimator.base == EstimatorSettings::Base::kLegs) base_.emplace(robot);
@@ -91,12 +97,17 @@ StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
       measured.utime >= kEndOfTime)
     return Use::kRefuse;
   for (size_t i = 0; i < joints_.size(); ++i) {
-    if (std::isinf(measured.velocity[i])) return Use::kRefuse;  // NaN: not measured
+    const auto within = [](double x, double greatest) { return !(std::abs(x) > greatest); };
+    // NaN: not known.
+    if (!within(measured.velocity[i], kGreatestQuantity) ||
+        !within(measured.effort_applied[i], greatest_effort_) ||
+        !within(measured.effort_sent[i], greatest_effort_))
+      return Use::kRefuse;
     if (!measured.valid[i]) continue;
     const int64_t t = measured.measured[i];
     const bool of_that_time = t >= 0 && t < kEndOfTime && t - measured.utime <= kMaxAhead &&
                               measured.utime - t <= kLongestGap;
-    if (!of_that_time || !std::isfinite(measured.position[i])) return Use::kRefuse;
+    if (!of_that_time || !IsPhysical(measured.position[i])) return Use::kRefuse;
   }
   if (!started_) return Use::kUse;
   if (measured.utime == state_.utime) return Use::kDuplicate;
@@ -127,7 +138,9 @@ void StateObserver::Restart(const joint_state_t& measured) {
     Joint& joint = joints_[i];
     const bool known = measured.valid[i];
     // Where an invalid joint is, it will tell when it is back.
-    const double position = known ? measured.position[i] : joint.filter.mean()(0);
+    const double position = known                  ? measured.position[i]
+                            : joint.filter.sound() ? joint.filter.mean()(0)
+                                                   : 0;
     joint.filter.Restart(position, known && !joint.gyro ? measured.velocity[i]
                                                         : std::numeric_limits<double>::quiet_NaN());
     if (std::isfinite(measured.effort_applied[i])) joint.effort = measured.effort_applied[i];
@@ -271,6 +284,11 @@ bool StateObserver::OnJointState(const joint_state_t& measured) {
       if (!restarted) UseImu(imu, *reading, measured);
     }
   }
+  const auto sound = [](const Joint& joint) { return joint.filter.sound(); };
+  if (!restarted && !std::all_of(joints_.begin(), joints_.end(), sound)) {
+    Restart(measured);
+    restarted = true;
+  }
   for (size_t i = 0; i < joints_.size(); ++i) {
     joints_[i].measured = measured.measured[i];
     if (!restarted) joints_[i].filter.Keep();
@@ -297,6 +315,8 @@ void StateObserver::FillState(const joint_state_t& measured, bool restarted) {
     if (joint.out) state_.valid = false;
   }
   if (base_) base_->Fill(measured.utime, state_);
+  for (const auto* values : {&state_.q, &state_.v, &state_.q_sd, &state_.v_sd})
+    state_.valid = state_.valid && AllFinite(*values);
   if (state_.valid != was_valid) ++reasons_changed_;
   contact_.Judge(state_);
   const auto room = static_cast<int>(waiting_.size());
@@ -311,7 +331,8 @@ void StateObserver::EmitSmoothed() {
   --num_waiting_;
   for (size_t i = 0; i < joints_.size(); ++i) {
     const KinematicFilter::Smoothed smoothed = joints_[i].filter.TakeOldest();
-    if (joints_[i].of_base) continue;  // causal as it was
+    const bool finite = smoothed.mean.allFinite() && smoothed.covariance.allFinite();
+    if (joints_[i].of_base || !finite) continue;  // causal as it was
     state.q[i] = smoothed.mean(0);
     state.v[i] = smoothed.mean(1);
     state.q_sd[i] = std::sqrt(std::max(0.0, smoothed.covariance(0, 0)));

@@ -35,7 +35,8 @@ namespace plumb {
 /// The filter restarts after a jump of time (backwards, or more than a second forwards), when a
 /// joint comes back after an outage, and when the robot has evidently been moved by hand
 /// (innovation above reset_after and all uncertainty); such a state says `restarted`. It is `valid`
-/// when all joints are and the filter has settled.
+/// when all joints are, the filter has settled and all of its numbers are finite. A filter that is
+/// not finite restarts.
 ///
 /// OnJointState and OnImu do not allocate after construction, but for strings in what they are
 /// given.
@@ -43,8 +44,8 @@ class StateObserver {
  public:
   explicit StateObserver(const RobotDescription& robot);
 
-  /// Handles a measurement. @return false if it was not used: wrong number of joints, not finite,
-  /// not newer.
+  /// Handles a measurement. @return false if it was not used: wrong number of joints, not physical
+  /// (robot/physical.h), not newer.
   bool OnJointState(const joint_state_t& measured);
   /// Keeps a reading until the JOINT_STATE of its time or a later one.
   void OnImu(const imu_t& imu);
@@ -122,6 +123,7 @@ class StateObserver {
   std::vector<Joint> joints_;
   std::vector<Imu> imus_;
   std::optional<BaseObserver> base_;
+  double greatest_effort_;  // [Nm] that a motor may have
   // [Nm] assumed change of an effort that is not known: from full one way to full the other
   double unknown_step_;
   GroundContact contact_;

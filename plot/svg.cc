@@ -6,33 +6,10 @@
 #include <cmath>
 
 #include "common/decompositions.h"
+#include "common/outside_text.h"
 
 namespace plumb {
 namespace {
-
-// Length of the UTF-8 character that begins here, 0 if none does (RFC 3629).
-size_t CharacterLength(const std::string& text, size_t at) {
-  const auto byte = [&](size_t i) {
-    return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u;
-  };
-  const unsigned first = byte(0);
-  const auto continues = [&](size_t count) {
-    for (size_t i = 1; i <= count; ++i) {
-      if ((byte(i) & 0xc0) != 0x80) return false;
-    }
-    return true;
-  };
-  if (first < 0x80) return 1;
-  if (first >= 0xc2 && first <= 0xdf && continues(1)) return 2;
-  const bool overlong = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xf0 && byte(1) < 0x90);
-  const bool surrogate = first == 0xed && byte(1) >= 0xa0,
-             beyond = first == 0xf4 && byte(1) >= 0x90;
-  const bool not_xml = first == 0xef && byte(1) == 0xbf && byte(2) >= 0xbe;  // U+FFFE and U+FFFF
-  if (overlong || surrogate || beyond || not_xml) return 0;
-  if (first >= 0xe0 && first <= 0xef && continues(2)) return 3;
-  if (first >= 0xf0 && first <= 0xf4 && continues(3)) return 4;
-  return 0;
-}
 
 // 1e-04 -> 1e-4, 1e+05 -> 1e5.
 std::string General(double value) {
@@ -56,13 +33,8 @@ std::string Label(double value, double step) {
 
 std::string Escape(const std::string& text) {
   std::string escaped;
-  for (size_t at = 0; at < text.size();) {
-    const size_t length = CharacterLength(text, at);
-    const char c = text[at];
-    if (length == 0 || (static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t') ||
-        c == 127) {
-      escaped += "\xef\xbf\xbd";  // U+FFFD, replacement character
-    } else if (c == '&') {
+  for (const char c : Printable(text, Lines::kMany)) {
+    if (c == '&') {
       escaped += "&amp;";
     } else if (c == '<') {
       escaped += "&lt;";
@@ -73,9 +45,8 @@ std::string Escape(const std::string& text) {
     } else if (c == '\'') {
       escaped += "&#39;";
     } else {
-      escaped += text.substr(at, length);
+      escaped += c;
     }
-    at += std::max<size_t>(length, 1);
   }
   return escaped;
 }

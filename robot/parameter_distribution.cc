@@ -58,6 +58,33 @@ void RequireSameParameters(const parameter_distribution_t& message,
   }
 }
 
+// Nobody's posterior is so far from the prior, or so wide: [sd] of the prior.
+constexpr double kFarthest = 1000, kWidest = 100;
+constexpr double kGreatest = 1e12;  // in any unit
+
+// Of each parameter apart, so that it can be named; as it is and as simulators have it.
+void RequirePlausible(const ParameterDistribution& distribution, const RobotDescription& robot) {
+  const Eigen::VectorXd means = distribution.Mean(), sds = distribution.Sd();
+  const Gaussian prior = PriorGaussian(robot);
+  for (Eigen::Index i = 0; i < means.size(); ++i) {
+    const std::string& name = robot.parameters[static_cast<size_t>(i)].name;
+    if (!(std::abs(means[i]) <= kGreatest) || !(sds[i] <= kGreatest))
+      Reject(fmt::format("'{}' is {} with a standard deviation of {}", name, means[i], sds[i]));
+    const double sd = std::sqrt(prior.covariance(i, i));
+    for (const Gaussian& component : distribution.mixture.components) {
+      const double from_prior = std::abs(component.mean[i] - prior.mean[i]) / sd,
+                   width = std::sqrt(std::max(0., component.covariance(i, i))) / sd;
+      if (from_prior > kFarthest)
+        Reject(
+            fmt::format("the mean of '{}' is {:.3g} standard deviations of the prior away from it",
+                        name, from_prior));
+      if (width > kWidest)
+        Reject(
+            fmt::format("the variance of '{}' is {:.3g} times the prior's", name, width * width));
+    }
+  }
+}
+
 void RequireCovariance(const Eigen::MatrixXd& covariance) {
   const double scale = covariance.cwiseAbs().maxCoeff();
   if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > kRounding * scale) {
@@ -164,8 +191,7 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
     result.mixture.components.push_back(std::move(component));
   }
   if (std::abs(total - 1) > kRounding) Reject(fmt::format("weights sum to {}", total));
-  if (!result.Mean().allFinite() || !result.Sd().allFinite())
-    Reject("too wide: its moments overflow");
+  RequirePlausible(result, description);
   try {
     result.residual = ReadResidual(message);
   } catch (const std::invalid_argument& error) {

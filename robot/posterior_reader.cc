@@ -9,6 +9,7 @@
 
 #include "common/decompositions.h"
 #include "robot/json_field.h"
+#include "robot/json_text.h"
 #include "robot/physics_fingerprint.h"
 #include "robot/posterior_format.h"
 #include "robot/residual_json.h"
@@ -116,7 +117,7 @@ void ReadGap(const Field& root, const RobotDescription& robot, ParameterDistribu
 ParameterDistribution ReadPosterior(const std::filesystem::path& file,
                                     const RobotDescription& robot) {
   try {
-    const json j = json::parse(ReadText(file));
+    const json j = ParseJson(ReadText(file));
     const Field root(j, "");
     if (!j.is_object()) throw std::runtime_error("is not a posterior");
     RequireRobot(root, robot);

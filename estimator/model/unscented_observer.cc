@@ -131,13 +131,20 @@ bool UnscentedObserver::Advance(const joint_state_t& measured, double elapsed) {
     const bool fresh = measured.valid[i] && measured.measured[i] != joints_[i].measured;
     if (fresh && !UseReading(measured, i)) return false;
   }
-  return true;
+  return filter_.mean().allFinite() && filter_.covariance().allFinite() &&
+         filter_.covariance().diagonal().minCoeff() >= 0;
 }
 
 // Of the biases it keeps what it knows.
 void UnscentedObserver::TakeOver(const robot_state_t& kinematic) {
   mean_ = filter_.mean();
   sd_ = filter_.covariance().diagonal().cwiseMax(0).cwiseSqrt();
+  for (const Joint& joint : joints_) {
+    if (joint.bias < 0 || (std::isfinite(mean_(joint.bias)) && std::isfinite(sd_(joint.bias))))
+      continue;
+    mean_(joint.bias) = 0;
+    sd_(joint.bias) = joint.settings.bias_sd;
+  }
   for (Eigen::Index i = 0; i < n_; ++i) {
     const auto joint = static_cast<size_t>(i);
     mean_(i) = kinematic.q[joint];

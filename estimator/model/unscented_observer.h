@@ -44,8 +44,8 @@ class UnscentedObserver {
   /// After the last measurement: as the kinematic one, but for q, v, their standard deviations,
   /// model_based, which is always true, and restarted.
   const robot_state_t& state() const { return state_; }
-  /// How often a kinematic state was taken over because the filter had failed: a prediction was not
-  /// finite or out of reach, a covariance not positive definite, or a position further than
+  /// How often a kinematic state was taken over because the filter had failed: the filter was
+  /// not finite or out of reach, a covariance not positive definite, or a position further than
   /// reset_after, and five standard deviations, from what was expected.
   int64_t restarts() const { return restarts_; }
 

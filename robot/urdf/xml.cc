@@ -21,10 +21,19 @@ bool IsName(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || !IsAscii(c);
 }
 
-// TinyXML descends into elements by recursion: how deep is known before. @return the line where it
-// gets too deep, or 0.
-int LineTooDeep(const std::string& text, int limit) {
+// TinyXML descends into elements by recursion, and looks through all attributes of an element for
+// each: how deep and how many is known before.
+struct Excess {
+  int line = 0;  // 0 = there is none
+  std::string what = {};
+};
+
+Excess FindExcess(const std::string& text, int most_nested, int most_attributes) {
   int depth = 0;
+  const auto line_of = [&](size_t place) {
+    return 1 + static_cast<int>(
+                   std::count(text.begin(), text.begin() + static_cast<long>(place), '\n'));
+  };
   size_t at = 0;
   while ((at = text.find('<', at)) != std::string::npos) {
     const auto skip_to = [&](const char* end) { at = std::min(text.find(end, at), text.size()); };
@@ -36,19 +45,23 @@ int LineTooDeep(const std::string& text, int limit) {
       --depth;
       ++at;
     } else if (at + 1 < text.size() && IsName(text[at + 1])) {
-      if (++depth > limit)
-        return 1 + static_cast<int>(
-                       std::count(text.begin(), text.begin() + static_cast<long>(at), '\n'));
+      if (++depth > most_nested)
+        return {line_of(at), fmt::format("nests more than {} elements", most_nested)};
+      int attributes = 0;
       for (char quote = 0; at < text.size() && (quote != 0 || text[at] != '>'); ++at) {
         if (quote != 0 ? text[at] == quote : text[at] == '"' || text[at] == '\'')
           quote = quote ? '\0' : text[at];
+        attributes += quote == 0 && text[at] == '=';
+        if (attributes > most_attributes)
+          return {line_of(at),
+                  fmt::format("an element of more than {} attributes", most_attributes)};
       }
       if (at < text.size() && text[at - 1] == '/') --depth;
     } else {
       ++at;
     }
   }
-  return 0;
+  return {};
 }
 
 }  // namespace
@@ -60,9 +73,8 @@ Xml::Xml(const std::string& text, std::string file) : file_(std::move(file)) {
     Fail(1 + static_cast<int>(std::count(text.begin(), odd, '\n')),
          fmt::format("contains the byte {:#04x}", *odd));
   }
-  if (const int line = LineTooDeep(text, kMaxDepth)) {
-    Fail(line, fmt::format("nests more than {} elements", kMaxDepth));
-  }
+  const Excess excess = FindExcess(text, kMaxDepth, kMaxAttributes);
+  if (excess.line > 0) Fail(excess.line, excess.what);
   document_.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
   if (document_.Error()) {
     const auto lines = 1 + static_cast<int>(std::count(text.begin(), text.end(), '\n'));

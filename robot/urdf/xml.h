@@ -11,11 +11,11 @@ namespace plumb {
 /// An XML text, all of whose errors name their line. Immutable, hence thread-safe.
 class Xml {
  public:
-  /// @throws ConfigError "file:line: ..." if the text is not XML, nests deeper than kMaxDepth or
-  /// contains bytes that XML may not.
+  /// @throws ConfigError "file:line: ..." if the text is not XML, nests deeper than kMaxDepth,
+  /// has an element of more than kMaxAttributes, or contains bytes that XML may not.
   Xml(const std::string& text, std::string file);
 
-  static constexpr int kMaxDepth = 100;
+  static constexpr int kMaxDepth = 100, kMaxAttributes = 100;
 
   const TiXmlElement& root() const { return *document_.FirstChildElement(); }
 

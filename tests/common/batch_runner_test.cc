@@ -6,6 +6,8 @@
 #include <fstream>
 #include <stdexcept>
 #include <string>
+#include "common/config.h"
+#include "tests/temporary_folder.h"
 
 #include "common/random.h"
 #include "common/rank_batch_runner.h"
@@ -110,6 +112,11 @@ TEST_CASE("damage at any byte of a journal is found out") {
     int64_t before = 0;
     for (size_t i = 1; i < ends.size() && ends[i] <= at; ++i) ++before;
     CAPTURE(at);
+    if (at < 8) {  // it does not say any more what it is
+      REQUIRE_THROWS_WITH(Journal(file.path(), 77), Catch::Contains("no journal"));
+      REQUIRE(Contents(file.path()) == damaged);
+      continue;
+    }
     {
       Journal journal(file.path(), 77);
       const Inference again = Infer(&journal);
@@ -174,6 +181,18 @@ TEST_CASE(
   CHECK_FALSE(std::filesystem::exists(file.path()));
   CHECK_THROWS_WITH(Journal("/no/such/folder/journal", 1),
                     Catch::Contains("/no/such/folder/journal"));
+}
+
+TEST_CASE("what is in a journal's way and none is left alone, and no link is written through") {
+  const TemporaryFolder folder;
+  const std::string file = folder / "x.journal", precious = folder / "precious";
+  std::ofstream(precious) << "mine";
+  std::filesystem::create_symlink(precious, file);
+  CHECK_THROWS_WITH(Journal(file, 77), Catch::Contains("x.journal: is a link"));
+  CHECK(ReadFile(precious) == "mine");
+  CHECK_THROWS_WITH(Journal(precious, 77),
+                    Catch::Contains("precious: is in the way and no journal"));
+  CHECK(ReadFile(precious) == "mine");
 }
 
 }  // namespace

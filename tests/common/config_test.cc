@@ -164,5 +164,43 @@ TEST_CASE("a key may hold a table or something else") {
   config.Finish();
 }
 
+TEST_CASE("what would keep the reader busy for minutes, or end it, is one line") {
+  std::string deep = "[driver]\nx = 1\n", entries = "extends = [", names, tables;
+  for (int i = 0; i < 200'000; ++i) deep += "a.";
+  CHECK_THROWS_WITH(Read(deep + "a = 1\n"), Equals("robot.toml:3: a key of more than 16 parts"));
+  for (const char* quoted : {"\"=\"", "'#'", "\"\\\"\"", "\"\""}) {
+    std::string key = quoted;
+    for (int i = 0; i < 20; ++i) key += std::string(" . ") + quoted;
+    CHECK_THROWS_WITH(Read("[" + key + "]\n"), Equals("robot.toml:1: a key of more than 16 parts"));
+  }
+  for (int i = 0; i < 20'000; ++i) {
+    entries += "\"base.toml\",";
+    names += "name" + std::to_string(i) + " = 1\n";
+    tables += "[[joint]]\nname = \"a" + std::to_string(i) + "\"\n";
+  }
+  CHECK_THROWS_WITH(Read(entries + "]\n"),
+                    Equals("robot.toml:1:11: 20000 entries, more than 10000"));
+  CHECK_THROWS_WITH(Read(names), Catch::Contains("20000 entries, more than 10000"));
+  CHECK_THROWS_WITH(Read(tables), Catch::Contains("20000 entries, more than 10000"));
+}
+
+TEST_CASE("dots in strings, comments and numbers are no parts of keys") {
+  const std::string dots(100, '.');
+  Config config =
+      Read("a = \"" + dots + "\" # " + dots + "\nb = '" + dots + "'\nc = \"\"\"\n" + dots +
+           "\n\\\"\"\" " + dots + "\"\"\"\nd = [1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, " +
+           "1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5]\n" + "e.f.g.h.i.j = 1\n");
+  CHECK(config.String("a") == dots);
+  CHECK(config.String("b") == dots);
+  CHECK(config.Numbers("d", 18)[17] == 1.5);
+}
+
+TEST_CASE("a text that controls a terminal is refused where it stands") {
+  Config config = Read("name = \"\\u001b]0;title\\u0007\"\nother = \"m\\u00fc\"\n");
+  CHECK_THROWS_WITH(config.String("name"),
+                    Equals("robot.toml:1:8: name contains what cannot be printed"));
+  CHECK(config.String("other") == "m\xc3\xbc");
+}
+
 }  // namespace
 }  // namespace plumb

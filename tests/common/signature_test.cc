@@ -266,6 +266,16 @@ TEST_CASE("a new key file is its owner's alone, random, and never replaces anoth
                     Catch::Contains("cannot be written"));
 }
 
+TEST_CASE("a key that belongs to another user is refused") {
+  if (geteuid() != 0) return;  // to nobody else can one give a file
+  const Folder folder;
+  const fs::path file = folder.Write("key", std::string(64, 'a'));
+  REQUIRE(chown(file.c_str(), 12345, 12345) == 0);
+  CHECK_THAT(WhatIsWrong(file), Catch::Contains(file.string()) &&
+                                    Catch::Contains("belongs to another user (12345)") &&
+                                    Catch::Contains("cure: "));
+}
+
 TEST_CASE("a key that others may read, or that is none, is refused with the cure") {
   const Folder folder;
   const std::string digits(64, 'a');

@@ -162,7 +162,17 @@ TEST_CASE("Hostile distributions are refused with a reason") {
     message.covariance[3] = -.01, refused_for("not positive semidefinite");
   }
   SECTION("a draw of a residual") { message.draw = {1e5, 0}, refused_for("a draw is too wide"); }
-  SECTION("overflow") { message.mean[0] = 1e5, refused_for("overflow"); }
+  SECTION("overflow") { message.mean[0] = 1e5, refused_for("'gravity' is inf"); }
+  SECTION("a mean of e^150") { message.mean[0] = 150, refused_for("'gravity'"); }
+  SECTION("a variance of e^150") {
+    message.covariance[3] = std::exp(150.), refused_for("'offset'");
+  }
+  SECTION("far from the prior") {
+    message.mean[1] = 101, refused_for("the mean of 'offset' is 1.01e+03");
+  }
+  SECTION("wide") {
+    message.covariance[3] = 101, refused_for("the variance of 'offset' is 1.01e+04");
+  }
 }
 
 }  // namespace

@@ -164,6 +164,10 @@ TEST_CASE("absurd sizes are refused") {
   std::string nested;
   for (int i = 0; i < 200000; ++i) nested += "<a>\n";
   CHECK_THAT(Error(nested), Contains("robot.urdf:101: nests more than 100 elements"));
+  std::string attributes;
+  for (int i = 0; i < 500'000; ++i) attributes += " a" + std::to_string(i) + "='<'";
+  CHECK_THAT(Error("<robot name='r'>\n<link" + attributes + "/></robot>"),
+             Contains("robot.urdf:2: an element of more than 100 attributes"));
   CHECK_THAT(Error("<robot name='r'>" + std::string(17 << 20, ' ')),
              Contains("robot.urdf: is longer than 16 MB"));
   CHECK_THAT(Error(Replaced(kZooUrdf, "name=\"hip\"", "name=\"" + std::string(1000, 'h') + "\"")),

@@ -1,0 +1,40 @@
+#include "robot/json_text.h"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace plumb {
+namespace {
+
+constexpr int kDeepest = 100;
+constexpr size_t kLongestNumber = 100;  // a double has 17 digits
+
+void RequireModest(std::string_view text) {
+  int depth = 0;
+  size_t number = 0;
+  for (size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    const bool of_a_number = std::isdigit(static_cast<unsigned char>(c)) || c == '.';
+    number = of_a_number ? number + 1 : 0;
+    if (number > kLongestNumber)
+      throw std::runtime_error(
+          fmt::format("byte {}: a number of more than {} digits", at, kLongestNumber));
+    depth += (c == '[' || c == '{') - (c == ']' || c == '}');
+    if (depth > kDeepest)
+      throw std::runtime_error(fmt::format("byte {}: nests deeper than {}", at, kDeepest));
+    if (c != '"') continue;
+    for (++at; at < text.size() && text[at] != '"'; ++at) at += text[at] == '\\';
+  }
+}
+
+}  // namespace
+
+nlohmann::json ParseJson(std::string_view text) {
+  RequireModest(text);
+  return nlohmann::json::parse(text);
+}
+
+}  // namespace plumb

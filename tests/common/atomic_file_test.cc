@@ -1,0 +1,61 @@
+#include "common/atomic_file.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+
+#include "common/config.h"
+#include "tests/temporary_folder.h"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST_CASE("what lies where a temporary file would be is left alone, and no link is followed") {
+  const TemporaryFolder folder;
+  const std::string file = folder / "x", precious = folder / "precious";
+  const std::string own = file + ".part-" + std::to_string(getpid());
+  std::ofstream(precious) << "mine";
+  std::ofstream(file + ".part") << "somebody else's";
+  fs::create_symlink(precious, own);
+  WriteAtomically(file, "content");
+  RequireWritable(file);
+  CHECK(ReadFile(file) == "content");
+  CHECK(ReadFile(precious) == "mine");
+  CHECK(ReadFile(file + ".part") == "somebody else's");
+  CHECK(fs::is_symlink(own));
+  CHECK(std::distance(fs::directory_iterator(folder.path()), {}) == 4);
+}
+
+TEST_CASE("what killed processes have left is removed, what others are writing is not") {
+  const TemporaryFolder folder;
+  const std::string file = folder / "x";
+  const pid_t gone = fork();
+  if (gone == 0) _exit(0);
+  waitpid(gone, nullptr, 0);
+  const std::string left = file + ".part-" + std::to_string(gone),
+                    other = file + ".part-" + std::to_string(getppid()),
+                    name = file + ".part-of-speech";
+  for (const std::string& there : {left, other, name}) std::ofstream(there) << "half";
+  RequireWritable(file);
+  CHECK_FALSE(fs::exists(left));
+  CHECK(fs::exists(other));
+  CHECK(fs::exists(name));
+}
+
+TEST_CASE("what cannot be written is told, and leaves nothing") {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "folder");
+  CHECK_THROWS_WITH(WriteAtomically(folder / "folder", "x"),
+                    Catch::Contains("cannot be written: Is a directory"));
+  CHECK_THROWS_WITH(WriteAtomically(folder / "none/x", "x"),
+                    Catch::Contains("cannot be written: No such file"));
+  CHECK(std::distance(fs::directory_iterator(folder.path()), {}) == 1);
+}
+
+}  // namespace
+}  // namespace plumb
