@@ -134,8 +134,9 @@ class Session {
   double seconds_ = 0;  // that the last one took, real ones
 };
 
-int RunLive(Process& process, Session& session, double duration) {
+int RunLive(Process& process, Session& session, const RobotDescription& robot) {
   Messenger& messenger = process.messenger();
+  messenger.Follow(robot.name);
   Publisher<parameter_distribution_t> distribution(messenger, "PARAMETER_DISTRIBUTION");
   Publisher<calibration_status_t> status(messenger, "CALIBRATION_STATUS");
   Subscriber<robot_state_t> states(messenger, "ROBOT_STATE_SMOOTHED",
@@ -157,7 +158,7 @@ int RunLive(Process& process, Session& session, double duration) {
   while (session.busy() ? process.Sleep(0) : process.Sleep(kLook, stream)) {
     states.Rethrow(), commands.Rethrow(), controller.Rethrow();
     const bool complete = session.Work();
-    if (complete) process.TakeVirtualTime(duration);
+    if (complete) process.TakeVirtualTime(robot.calibration.duration);
     if (complete || process.clock().Now() - last >= kRepeat) {
       publish();
       last = process.clock().Now();
@@ -220,7 +221,7 @@ int main(int argc, char** argv) {
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(flags.robot);
         plumb::Session session(robot, flags, process.clock());
-        return flags.log.empty() ? plumb::RunLive(process, session, robot.calibration.duration)
+        return flags.log.empty() ? plumb::RunLive(process, session, robot)
                                  : plumb::RunLog(process, session, robot, flags.log);
       });
 }

@@ -17,7 +17,7 @@
 #include "cli/run_setting.h"
 #include "common/atomic_file.h"
 #include "common/progress_line.h"
-#include "common/signature.h"
+#include "common/seal.h"
 #include "common/time_units.h"
 #include "plumb/driver_request_t.hpp"
 
@@ -30,6 +30,7 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr int kMaxRearms = 20;
 constexpr int64_t kArmAgain = 500'000;      // [us]
 constexpr int64_t kLook = 50'000;           // [us]
+constexpr int64_t kDoubt = 300'000;         // [us]; three statuses of the controller
 constexpr size_t kMaxStrangeChannels = 10;  // that are named: strangers choose how many there are
 
 double SecondsSince(SteadyClock::time_point start) {
@@ -61,9 +62,8 @@ class ClosedLoop {
         processes_(flags,
                    {setting.bus, process.lcm_url(),
                     setting.coordinator() ? setting.coordinator()->clock() : clock_.ToString(),
-                    setting.output},
+                    process.key_file(), setting.run, setting.output},
                    setting.coordinator()) {
-    if (!flags.key.empty()) signer_.emplace(SigningKey(flags.key), "DRIVER_REQUEST");
     if (!setting.virtual_run) return;
     setting.coordinator()->on_note = [this](const std::string& line) { Print("plumb: " + line); };
     setting.coordinator()->go_on = [this] { return GoOn(); };
@@ -82,12 +82,17 @@ class ClosedLoop {
       if (status != 0) return status;
     }
     std::cout << progress_.Header() << std::endl;
-    while (!progress_.finished()) {
+    // In real time anybody might have said that it is finished: the controller, which repeats it,
+    // is given the time to speak, and two speakers end the run.
+    const int64_t doubt = setting_.virtual_run ? 0 : kDoubt;
+    int64_t finished = 0;
+    while (!progress_.finished() || clock_.Now() < finished + doubt) {
       if (!process_.Wait(kLook)) {
         line_.Clear();
         std::cout << "interrupted" << std::endl;
         return 130;
       }
+      if (progress_.finished() && finished == 0) finished = clock_.Now();
       progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
       if (!AllRunning() || !KeepArmed()) return 1;
       for (const std::string& row : progress_.TakeRows()) Print(row);
@@ -113,12 +118,13 @@ class ClosedLoop {
   /// A run in virtual time hears nobody else; but whoever wants it to stop is obeyed.
   void OnStranger(const std::string& channel, const std::vector<uint8_t>& message) {
     driver_request_t request;
-    if (channel == "DRIVER_REQUEST" &&
-        request.decode(message.data(), 0, static_cast<int>(message.size())) ==
-            static_cast<int>(message.size()) &&
+    const std::span<const uint8_t> bytes = Unsealed(message);
+    const int size = static_cast<int>(bytes.size());
+    if (channel == "DRIVER_REQUEST" && request.decode(bytes.data(), 0, size) == size &&
         (request.request == driver_request_t::DISARM ||
          request.request == driver_request_t::ESTOP)) {
       stopped_from_outside_ = true;
+      requests_.Publish(request);  // so that whoever has asked is answered
     } else if (strange_channels_.size() < kMaxStrangeChannels &&
                strange_channels_.insert(channel).second) {
       Print("plumb: somebody outside the run says " + channel +
@@ -216,14 +222,13 @@ class ClosedLoop {
     return "plumb arm --lcm-url '" + process_.lcm_url() + "'" +
            (setting_.virtual_run ? " --clock '" + setting_.virtual_run->coordinator().clock() + "'"
                                  : "") +
-           (flags_.key.empty() ? "" : " --key '" + flags_.key + "'");
+           (process_.key_file().empty() ? "" : " --key '" + process_.key_file() + "'");
   }
 
   void Request(int8_t what) {
     driver_request_t request{};
     request.utime = clock_.Utime();
     request.request = what;
-    if (signer_) signer_->Sign(request, clock_.SigningUtime());
     requests_.Publish(request);
   }
 
@@ -259,7 +264,6 @@ class ClosedLoop {
   const int64_t start_;
   Progress progress_;
   Publisher<driver_request_t> requests_;
-  std::optional<Signer> signer_;
   Subscriber<driver_status_t> drivers_;
   Subscriber<controller_status_t> controllers_;
   Subscriber<calibration_status_t> calibrations_;
@@ -279,6 +283,7 @@ class ClosedLoop {
 int Launch(Process& process, const LaunchFlags& flags) {
   RunSetting setting(process, flags);
   if (setting.virtual_run) process.Enter(setting.coordinator()->participant());
+  process.TakePart(setting.run);
   return ClosedLoop(process, flags, setting).Run();
 }
 

@@ -18,7 +18,6 @@ struct LaunchFlags {
   /// in real time scaled seconds per second, 0 = 1; in virtual time the most, 0 = no limit
   double speed = 0;
   bool real = false;  ///< the robot is on the bus: start no virtual one, ask before arming
-  std::string key;    ///< file of the key that commands are signed with; empty = they are not
   bool allow_unsigned = false;  ///< although LCM leaves this machine
   /// SCHED_FIFO of the driver; robot, estimator and controller come right behind it. 0 = off
   int priority = 0;

@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  std::string can_robot, dbc_output, tune_robot, tune_log, key, new_key, record_file;
+  std::string can_robot, dbc_output, tune_robot, tune_log, new_key, record_file;
   bool homed = false;
   CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr,
            *train = nullptr, *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr,
@@ -85,13 +85,10 @@ int main(int argc, char** argv) {
             ->add_flag("--real", flags.real,
                        "the robot itself is on the bus: no virtual one, ask before arming")
             ->excludes(real_time);
-        auto* launch_key = launch->add_option("--key", flags.key,
-                                              "the controller signs with this key and the driver "
-                                              "obeys nothing else (plumb key makes one)");
         launch
             ->add_flag("--unsigned", flags.allow_unsigned,
                        "let the driver obey anybody, although LCM leaves this machine")
-            ->excludes(launch_key);
+            ->excludes(app.get_option("--key"));
         launch->add_option("--log", flags.log, "record all messages to this LCM log");
         launch->add_option("--can-log", flags.can_log,
                            "in virtual time: record all frames to this file, as candump -l does");
@@ -251,7 +248,6 @@ int main(int argc, char** argv) {
         doctor = app.add_subcommand("doctor", "check that this machine is ready for a run");
         doctor->add_option("--bus", doctor_bus, "CAN bus that is going to be used")
             ->capture_default_str();
-        doctor->add_option("--key", key, "key that the commands are going to be signed with");
         CLI::App* can = app.add_subcommand("can", "the plan of the robot's CAN bus");
         can->require_subcommand(1);
         can_plan = can->add_subcommand(
@@ -271,8 +267,6 @@ int main(int argc, char** argv) {
                       "joints whose drives have restarted are where their encoders say");
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
-        for (CLI::App* request : {arm, disarm, estop})
-          request->add_option("--key", key, "sign with the driver's key; only arm needs it");
         record = app.add_subcommand("record", "record all messages to an LCM log, until Ctrl-C");
         record->add_option("file", record_file, "the log; lcm-logplayer and --log read it")
             ->required();
@@ -289,19 +283,18 @@ int main(int argc, char** argv) {
         if (calibrate->parsed()) return plumb::CalibrateLogs(process, calibrate_flags, command);
         if (excite->parsed()) return plumb::Excite(process, excite_flags);
         if (train->parsed()) return plumb::Train(process, train_flags);
-        if (doctor->parsed()) return plumb::Doctor(process.lcm_url(), doctor_bus, key);
+        if (doctor->parsed())
+          return plumb::Doctor(process.lcm_url(), doctor_bus, process.key_file());
         if (can_plan->parsed()) return plumb::PrintBusPlan(can_robot);
         if (can_dbc->parsed()) return plumb::WriteDbc(can_robot, dbc_output);
         if (tune->parsed()) return plumb::TuneEstimator(tune_robot, tune_log);
         if (arm->parsed()) {
           return plumb::RequestDriver(
-              process, homed ? plumb::driver_request_t::ARM_HOMED : plumb::driver_request_t::ARM,
-              key);
+              process, homed ? plumb::driver_request_t::ARM_HOMED : plumb::driver_request_t::ARM);
         }
-        if (disarm->parsed())
-          return plumb::RequestDriver(process, plumb::driver_request_t::DISARM, key);
+        if (disarm->parsed()) return plumb::RequestDriver(process, plumb::driver_request_t::DISARM);
         if (record->parsed()) return plumb::Record(process, record_file);
         if (make_key->parsed()) return plumb::MakeKey(new_key);
-        return plumb::RequestDriver(process, plumb::driver_request_t::ESTOP, key);
+        return plumb::RequestDriver(process, plumb::driver_request_t::ESTOP);
       });
 }

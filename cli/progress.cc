@@ -75,6 +75,8 @@ double RobotReturn(const RobotDescription& robot, const controller_status_t& sta
 
 void Progress::OnController(const controller_status_t& status) {
   controller_ = status;
+  // Nothing is remembered of policies that this run does not have.
+  if (status.policy_iteration < 0 || status.policy_iteration > iterations_) return;
   if (status.phase != controller_status_t::COMPLETE) return;
   robot_return_[status.policy_iteration] = RobotReturn(robot_, status);
   if (status.purpose == policy_t::EVALUATE && status.policy_iteration == iterations_) {
@@ -85,7 +87,8 @@ void Progress::OnController(const controller_status_t& status) {
 
 void Progress::OnTraining(const training_status_t& status) {
   training_ = status;
-  if (status.complete) simulated_return_[status.iteration] = status.evaluation_return;
+  const bool known = status.iteration >= 0 && status.iteration <= iterations_;
+  if (status.complete && known) simulated_return_[status.iteration] = status.evaluation_return;
   if (status.decision.empty() || status.challenger < 0 || status.challenger > iterations_ ||
       decisions_.contains(status.challenger))
     return;

@@ -24,8 +24,10 @@ double SecondsSince(SteadyClock::time_point start) {
 void RunProcesses::Start(const std::string& name, std::vector<std::string> arguments) {
   const fs::path here = fs::read_symlink("/proc/self/exe").parent_path();
   arguments.insert(arguments.begin(), here / (name == kRecorder ? "plumb" : name));
-  arguments.insert(arguments.end(), {"--lcm-url", where_.lcm_url, "--clock", where_.clock,
-                                     "--parent", std::to_string(getpid())});
+  arguments.insert(arguments.end(),
+                   {"--lcm-url", where_.lcm_url, "--clock", where_.clock, "--parent",
+                    std::to_string(getpid()), "--run", std::to_string(where_.run)});
+  if (!where_.key_file.empty()) arguments.insert(arguments.end(), {"--key", where_.key_file});
   children_.emplace_back(name, arguments, where_.output / (name + ".log"));
   if (coordinator_) coordinator_->Expect(name, children_.back().pid());
 }
@@ -48,10 +50,6 @@ void RunProcesses::Start() {
   std::vector<std::string> controller{flags_.robot, "--seed", seed};
   // a real robot cannot be placed: it rests, then its episode begins where it is
   if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});
-  if (!flags_.key.empty()) {
-    for (auto* arguments : {&driver, &controller})
-      arguments->insert(arguments->end(), {"--key", flags_.key});
-  }
   Start(kDriver, with_priority(driver, 0));
   Start("plumb-estimator", with_priority({flags_.robot}, 5));
   Start("plumb-controller", with_priority(controller, 5));

@@ -17,6 +17,8 @@ class RunProcesses {
   struct Where {
     std::string bus, lcm_url;
     std::string clock;             ///< value of their option --clock
+    std::string key_file;          ///< empty = none
+    int64_t run;                   ///< value of their option --run
     std::filesystem::path output;  ///< for their logs and checkpoints
   };
 

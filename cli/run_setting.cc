@@ -10,6 +10,7 @@
 
 #include "cli/preflight.h"
 #include "common/lcm_url.h"
+#include "common/process_number.h"
 #include "drivers/driver/driver.h"
 #include "sim/parameters.h"
 
@@ -40,10 +41,12 @@ fs::path MakeFolder(const std::string& wanted) {
 }  // namespace
 
 RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
-    : robot(LoadRobot(flags.robot)), bus(flags.bus.empty() ? robot.bus_url : flags.bus) {
+    : robot(LoadRobot(flags.robot)),
+      bus(flags.bus.empty() ? robot.bus_url : flags.bus),
+      run(flags.real || flags.real_time ? ProcessNumber(getpid()) : 0) {
   for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
   RequireDrivable(robot);
-  RequireKey(process.lcm_url(), !flags.key.empty(), flags.allow_unsigned);
+  RequireKey(process.lcm_url(), !process.key_file().empty(), flags.allow_unsigned);
   if (flags.real && flags.speed != 0)
     throw std::invalid_argument("a real robot runs at its own speed, without --speed");
   if (!flags.real) truth = HiddenParameters(robot, flags.seed);

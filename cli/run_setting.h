@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -25,6 +26,7 @@ struct RunSetting {
 
   RobotDescription robot;
   std::string bus;
+  int64_t run;  ///< its number among all runs, see Identity; 0 in virtual time, which is alone
   Eigen::VectorXd truth;         ///< hidden parameters, physical; empty: nobody knows them
   std::filesystem::path output;  ///< the run's folder
   std::optional<FolderLock> lock;

@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <stdexcept>
 
 #include "common/clock.h"
+#include "plumb/driver_status_t.hpp"
 
 namespace plumb {
 namespace {
@@ -35,6 +37,15 @@ std::runtime_error CannotOpen(const std::string& url, const std::string& reason 
       IsMulticast(url) ? ": no route for multicast?; cure: ip link set lo up multicast on && "
                          "ip route add 224.0.0.0/4 dev lo"
                        : ""));
+}
+
+constexpr char kDriverChannel[] = "DRIVER_STATUS";
+
+/// The first, the 10th, the 100th ...: whoever floods us is not to fill the disk.
+void WarnNowAndThen(std::string_view channel, std::string_view why, int64_t count) noexcept {
+  int64_t power = 1;
+  while (power < count) power *= 10;
+  if (power == count) spdlog::warn("{} refused: {} ({} so far)", channel, why, count);
 }
 
 }  // namespace
@@ -92,7 +103,10 @@ Messenger::Subscription::Subscription(Messenger& messenger, const std::string& c
                                       Handler handler)
     : messenger_(messenger), channel_(channel), handler_(std::move(handler)) {
   if (messenger.participant_) {
-    messenger.participant_->Listen(ChannelTopic(channel));
+    // Who listens twice would hear all of it twice.
+    const bool listens = std::ranges::any_of(
+        messenger.subscriptions_, [&](const auto* other) { return other->channel_ == channel; });
+    if (!listens) messenger.participant_->Listen(ChannelTopic(channel));
     messenger.subscriptions_.push_back(this);
   } else if (messenger.receiver_) {
     queue_ = messenger.receiver_->Listen(channel, handler_);
@@ -118,7 +132,65 @@ void Messenger::Await(int timeout) {
   poll(&polled, 1, timeout);
 }
 
+void Messenger::Become(Identity identity) {
+  identity_ = std::move(identity);
+  if (!identity_.has_key()) return;
+  driver_ = Subscribe(kDriverChannel, [this](const std::string&, std::span<const uint8_t> bytes) {
+    OnDriverStatus(bytes);
+  });
+}
+
+/// Before any Subscriber hears it, which then knows the run.
+void Messenger::OnDriverStatus(std::span<const uint8_t> bytes) noexcept {
+  const std::optional<Seal> seal = FindSeal(bytes);
+  if (seal && seal->run == identity_.run()) return;
+  try {
+    driver_status_t status;
+    const std::span<const uint8_t> message = Unsealed(bytes);
+    const int length = static_cast<int>(message.size());
+    if (status.decode(message.data(), 0, length) != length) return;
+    if (!identity_.Follows(status.robot)) return OnForeignDriver("of another robot");
+    const ChannelJudge::Verdict verdict =
+        driver_judge_.HearDriver(identity_, status.robot, status.bus, bytes);
+    if (verdict.two_speakers) return Refuse(kDriverChannel, driver_judge_, verdict, 0);
+    if (!verdict.refusal.empty()) return OnForeignDriver(verdict.refusal);
+    identity_.Join(seal->run, status.robot, status.bus);
+  } catch (...) {  // it did not decode: the Subscribers count it
+  }
+}
+
+/// Said here, as nothing else is while there is no run.
+void Messenger::OnForeignDriver(std::string_view why) noexcept {
+  ++foreign_drivers_;
+  if (identity_.run() == 0) WarnNowAndThen(kDriverChannel, why, foreign_drivers_);
+}
+
+void Messenger::Refuse(const std::string& channel, const ChannelJudge& judge,
+                       const ChannelJudge::Verdict& verdict, int64_t count) noexcept {
+  // A driver may come up later than those who listen.
+  const bool early = identity_.has_key() && identity_.run() == 0;
+  if (!verdict.two_speakers && count > 0 && !early) WarnNowAndThen(channel, verdict.refusal, count);
+  if (!verdict.two_speakers || !two_speakers_.empty()) return;
+  try {
+    const std::string latest = judge.latest();
+    std::string owner = judge.owner();
+    if (owner == latest) owner = "whoever is of this run";
+    two_speakers_ = fmt::format(
+        "two speak on {}: {} and {}; whom to believe cannot be told: cure: stop one of them, or "
+        "--key FILE for all",
+        channel, owner, latest);
+  } catch (...) {  // no memory for the names
+    two_speakers_ = "two speak";
+  }
+}
+
 int Messenger::Drain(int max_messages) {
+  const int handled = Handle(max_messages);
+  if (!two_speakers_.empty()) throw std::runtime_error(std::exchange(two_speakers_, {}));
+  return handled;
+}
+
+int Messenger::Handle(int max_messages) {
   if (receiver_) return receiver_->Drain(max_messages);
   int handled = 0;
   if (participant_) {

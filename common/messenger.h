@@ -8,9 +8,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "common/identity.h"
 #include "common/lcm_receiver.h"
 #include "common/lcm_url.h"
 #include "common/lockstep/participant.h"
@@ -27,15 +29,30 @@ class Messenger {
   /// The messages of a run in virtual time, which its coordinator carries.
   explicit Messenger(Participant& participant);
 
+  /// From now on what Publishers say is sealed, and what Subscribers hear is judged, as this
+  /// process's. Before there are any.
+  void Become(Identity identity);
+  Identity& identity() { return identity_; }
+  /// With a key: this process, the driver, hands out the run (see Identity).
+  void Lead(const std::string& robot, const std::string& bus) { identity_.Lead(robot, bus); }
+  /// With a key: takes part in the run of this robot's driver only.
+  void Follow(const std::string& robot) { identity_.Follow(robot); }
+  /// A Subscriber has heard what is not to be believed. Two speakers end the next Drain; the others
+  /// are said once, and then less and less often. @param count of them on that channel; 0: somebody
+  /// else says it.
+  void Refuse(const std::string& channel, const ChannelJudge& judge,
+              const ChannelJudge::Verdict& verdict, int64_t count) noexcept;
+
   /// For poll: readable while messages wait. Not in virtual time.
   int fd() { return receiver_ ? receiver_->fd() : lcm_.getFileno(); }
   /// Sleeps until messages wait, or for `timeout` [ms] of the machine's time. Not in virtual time.
   void Await(int timeout);
-  /// @return false if the message was not sent (liblcm says no more).
+  /// Says the bytes as they are. @return false if the message was not sent (liblcm says no more).
   bool Publish(const std::string& channel, std::span<const uint8_t> message);
   /// Handles the messages that have arrived, at most `max_messages`, so that a flood does not keep
   /// the caller from its other duties; what is left keeps fd() readable. @return how many, -1 at
   /// the end of a file or on failure.
+  /// @throws std::runtime_error if two speak on a channel that is one's, naming channel and both.
   int Drain(int max_messages = 1000);
   /// Messages that came faster than they were drained, since the last call: of each listener
   /// LcmReceiver::kMaxQueued bytes are kept.
@@ -51,11 +68,19 @@ class Messenger {
 
  private:
   void TestItself(const std::string& url);
+  int Handle(int max_messages);
+  void OnDriverStatus(std::span<const uint8_t> message) noexcept;
+  void OnForeignDriver(std::string_view why) noexcept;
 
   Participant* participant_ = nullptr;  // of a run in virtual time
   lcm::LCM lcm_;
   std::optional<LcmReceiver> receiver_;       // of multicast
   std::vector<Subscription*> subscriptions_;  // in virtual time
+  Identity identity_;
+  ChannelJudge driver_judge_;
+  std::unique_ptr<Subscription> driver_;  // whose run we may join, with a key
+  int64_t foreign_drivers_ = 0;           // statuses of drivers whose run we do not join
+  std::string two_speakers_;              // empty: there are none
 };
 
 /// Ends with its destruction. Must not outlive the Messenger.
@@ -78,18 +103,26 @@ class Messenger::Subscription {
   lcm::Subscription* subscription_ = nullptr;
 };
 
-/// Receives messages of one type on one channel. Decodes them itself, because an exception must
-/// never cross liblcm's C frames: what does not decode is counted and forgotten. Not thread-safe;
-/// must not outlive the Messenger.
+/// Receives messages of one type on one channel, and judges whether they are to be believed
+/// (Identity). Decodes them itself, because an exception must never cross liblcm's C frames: what
+/// does not decode is counted and forgotten. Not thread-safe; must not outlive the Messenger.
 template <class Message>
 class Subscriber {
  public:
   using Callback = std::function<void(const Message&)>;
+  /// Of a message that decodes and is not to be believed. @param why a literal.
+  using RefusalCallback = std::function<void(const Message&, std::string_view why)>;
 
   /// @param callback called for every message, in order of arrival; may be empty when newest() is
   /// enough. It may throw: the exception is kept and thrown again by Rethrow().
-  Subscriber(Messenger& messenger, const std::string& channel, Callback callback = {})
-      : callback_(std::move(callback)),
+  /// @param on_refused must not throw.
+  Subscriber(Messenger& messenger, const std::string& channel, Callback callback = {},
+             Speakers speakers = Speakers::kOne, RefusalCallback on_refused = {})
+      : messenger_(messenger),
+        channel_(channel),
+        callback_(std::move(callback)),
+        on_refused_(std::move(on_refused)),
+        judge_(speakers),
         subscription_(messenger.Subscribe(
             channel,
             [this](const std::string&, std::span<const uint8_t> bytes) { OnMessage(bytes); })) {}
@@ -100,10 +133,10 @@ class Subscriber {
   /// received() is 0.
   const Message& newest() const { return newest_; }
   int64_t received() const { return received_; }
-  /// The bytes that newest() was decoded from, all of them. Valid within the callback only.
-  std::span<const uint8_t> encoding() const { return encoding_; }
   /// Messages that did not decode: wrong type, wrong length, hostile counts.
   int64_t rejected() const { return rejected_; }
+  /// Messages that decoded and are not to be believed.
+  int64_t refused() const { return refused_; }
   /// Throws what the callback threw, if it did.
   void Rethrow() {
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
@@ -114,9 +147,17 @@ class Subscriber {
     try {
       // The two members take turns and keep their vectors' capacity: no allocation for messages of
       // equal size.
-      const int length = static_cast<int>(bytes.size());
-      if (arriving_.decode(bytes.data(), 0, length) != length) {
+      const std::span<const uint8_t> message = Unsealed(bytes);
+      const int length = static_cast<int>(message.size());
+      if (arriving_.decode(message.data(), 0, length) != length) {
         ++rejected_;
+        return;
+      }
+      const ChannelJudge::Verdict verdict = judge_.Hear(messenger_.identity(), channel_, bytes);
+      if (!verdict.refusal.empty()) {
+        ++refused_;
+        messenger_.Refuse(channel_, judge_, verdict, on_refused_ ? 0 : refused_);
+        if (on_refused_) on_refused_(arriving_, verdict.refusal);
         return;
       }
       std::swap(newest_, arriving_);
@@ -126,24 +167,26 @@ class Subscriber {
     }
     ++received_;
     try {
-      encoding_ = bytes;
       if (callback_) callback_(newest_);
     } catch (...) {
       failure_ = std::current_exception();
     }
   }
 
+  Messenger& messenger_;
+  const std::string channel_;
   Callback callback_;
+  RefusalCallback on_refused_;
+  ChannelJudge judge_;
   Message newest_{}, arriving_{};
-  std::span<const uint8_t> encoding_;
-  int64_t received_ = 0;
-  int64_t rejected_ = 0;
+  int64_t received_ = 0, rejected_ = 0, refused_ = 0;
   std::exception_ptr failure_;
   std::unique_ptr<Messenger::Subscription> subscription_;  // ends first
 };
 
-/// Publishes messages of one type on one channel, encoding into its own buffer: no allocation once
-/// the largest message has been sent. Not thread-safe; must not outlive the Messenger.
+/// Publishes messages of one type on one channel, sealed (Identity), encoding into its own buffer:
+/// no allocation once the largest message has been sent. Not thread-safe; must not outlive the
+/// Messenger.
 template <class Message>
 class Publisher {
  public:
@@ -153,9 +196,13 @@ class Publisher {
   /// @return false if the message was not sent (liblcm says no more).
   bool Publish(const Message& message) {
     const int size = message.getEncodedSize();
-    if (static_cast<size_t>(size) > buffer_.size()) buffer_.resize(static_cast<size_t>(size));
+    const bool sealed = messenger_->identity().known();
+    const size_t whole = static_cast<size_t>(size) + (sealed ? kSealSize : 0);
+    if (whole > buffer_.size()) buffer_.resize(whole);
     if (message.encode(buffer_.data(), 0, size) != size) return false;
-    return messenger_->Publish(channel_, std::span(buffer_).first(static_cast<size_t>(size)));
+    const std::span<uint8_t> bytes = std::span(buffer_).first(whole);
+    if (sealed) messenger_->identity().Seal(channel_, bytes);
+    return messenger_->Publish(channel_, bytes);
   }
 
  private:

@@ -21,6 +21,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "common/lcm_url.h"
 #include "common/log_limit.h"
 #include "common/outside_text.h"
 #include "common/program_version.h"
@@ -108,10 +109,19 @@ void Process::Enter(Participant& participant) {
   clock_ = Clock(participant.time());
 }
 
+void Process::UseKey(const std::string& file) {
+  key_file_ = file;
+  key_.emplace(file);
+}
+
 Messenger& Process::messenger() {
   if (!messenger_) {
     messenger_ = participant_ ? std::make_unique<Messenger>(*participant_)
                               : std::make_unique<Messenger>(lcm_url_);
+    const auto reach = participant_               ? Identity::Reach::kRun
+                       : StaysOnMachine(lcm_url_) ? Identity::Reach::kMachine
+                                                  : Identity::Reach::kNetwork;
+    messenger_->Become(Identity(name_, key_, clock_, reach, run_));
   }
   return *messenger_;
 }
@@ -192,6 +202,8 @@ int Run(const std::string& name, const std::string& description, int argc, char*
   std::string lcm_url = ResolvedLcmUrl("");
   std::string clock = "1";
   std::string level = "info";
+  std::string key;
+  int64_t run = 0;
   int parent = 0;
   int niceness = 0;
   app.add_option("--lcm-url", lcm_url,
@@ -200,6 +212,10 @@ int Run(const std::string& name, const std::string& description, int argc, char*
   app.add_option("--clock", clock,
                  "clock scale, or SCALE@EPOCH or virtual:PATH as plumb launch passes it")
       ->capture_default_str();
+  app.add_option("--key", key,
+                 "sign what is said on LCM with this key, and believe nothing else; stopping needs "
+                 "none (plumb key makes one)");
+  app.add_option("--run", run, "the run that this process is part of, as plumb launch numbers it");
   app.add_option("--log-level", level, "trace, debug, info, warning, error")->capture_default_str();
   app.add_option("--parent", parent, "stop when this process, which started us, is gone");
   app.add_option("--nice", niceness, "give way to the others: 0 to 19")->check(CLI::Range(0, 19));
@@ -223,6 +239,8 @@ int Run(const std::string& name, const std::string& description, int argc, char*
     }
     if (niceness != 0) setpriority(PRIO_PROCESS, 0, niceness);
     Process process(name, lcm_url, clock);
+    if (!key.empty()) process.UseKey(key);
+    process.TakePart(run);
     spdlog::debug("{}", VersionLine(name));
     return body(process);
   } catch (const std::exception& error) {

@@ -2,11 +2,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/clock.h"
 #include "common/lockstep/participant.h"
 #include "common/messenger.h"
+#include "common/signature.h"
 
 namespace CLI {
 class App;
@@ -27,6 +29,14 @@ class Process {
   /// @param clock SCALE, SCALE@EPOCH, or virtual:PATH of a coordinator. @throws std::exception if
   /// it is none of these, or nobody keeps time there.
   Process(std::string name, const std::string& lcm_url, const std::string& clock);
+  /// Signs what is said, and believes what is signed. Before the first use of messenger().
+  /// @throws std::runtime_error if the key cannot be used.
+  void UseKey(const std::string& file);
+  /// File of the key; empty = there is none.
+  const std::string& key_file() const { return key_file_; }
+  /// Without a key: takes part in a run (see Identity) of that number; 0 = in none. Before the
+  /// first use of messenger().
+  void TakePart(int64_t run) { run_ = run; }
 
   const std::string& name() const { return name_; }
   const Clock& clock() const { return clock_; }
@@ -66,6 +76,9 @@ class Process {
 
   std::string name_;
   std::string lcm_url_;
+  std::string key_file_;
+  std::optional<SigningKey> key_;
+  int64_t run_ = 0;
   int stop_fd_;
   bool stopping_ = false;
   std::unique_ptr<Participant> joined_;  // to a coordinator in another process

@@ -14,7 +14,6 @@ namespace plumb {
 namespace {
 
 constexpr size_t kDigits = 64;
-constexpr size_t kCounterSize = 8;
 
 [[noreturn]] void Fail(const std::filesystem::path& file, const std::string& why) {
   throw std::runtime_error(file.string() + ": " + why);
@@ -81,17 +80,19 @@ SigningKey::SigningKey(const std::filesystem::path& file) {
 
 SigningKey::~SigningKey() { sodium_memzero(key_.data(), key_.size()); }
 
-Signature SigningKey::Sign(std::string_view channel, std::span<const uint8_t> body) const noexcept {
+Signature SigningKey::Sign(std::initializer_list<std::string_view> words,
+                           std::span<const uint8_t> message) const noexcept {
   static_assert(crypto_generichash_BYTES == sizeof(Signature) &&
                 crypto_generichash_KEYBYTES == sizeof key_);
   const uint8_t zero = 0;
   Signature signature;
   crypto_generichash_state state;
   crypto_generichash_init(&state, key_.data(), key_.size(), signature.size());
-  crypto_generichash_update(&state, reinterpret_cast<const uint8_t*>(channel.data()),
-                            channel.size());
-  crypto_generichash_update(&state, &zero, 1);
-  crypto_generichash_update(&state, body.data(), body.size());
+  for (const std::string_view word : words) {
+    crypto_generichash_update(&state, reinterpret_cast<const uint8_t*>(word.data()), word.size());
+    crypto_generichash_update(&state, &zero, 1);
+  }
+  crypto_generichash_update(&state, message.data(), message.size());
   crypto_generichash_final(&state, signature.data(), signature.size());
   return signature;
 }
@@ -113,24 +114,6 @@ void MakeKeyFile(const std::filesystem::path& file) {
   if (written) return;
   unlink(file.c_str());
   Fail(file, fmt::format("cannot be written: {}", std::strerror(error)));
-}
-
-std::string_view Verifier::Judge(std::span<const uint8_t> encoding, int64_t real_utime) noexcept {
-  if (encoding.size() < kCounterSize + sizeof(Signature)) return "not signed with the driver's key";
-  const std::span<const uint8_t> body = encoding.first(encoding.size() - sizeof(Signature));
-  const Signature expected = key_.Sign(channel_, body);
-  if (sodium_memcmp(expected.data(), encoding.data() + body.size(), expected.size()) != 0) {
-    return "not signed with the driver's key";
-  }
-  uint64_t counter = 0;
-  for (const uint8_t byte : body.last(kCounterSize)) counter = counter << 8 | byte;
-  const auto signed_at = static_cast<int64_t>(counter);
-  if (signed_at <= newest_) return "signed, but a repetition, or from before the driver's start";
-  // One from far ahead would make void all that come after it.
-  if (signed_at < real_utime - kOldest) return "signed too long ago: are the clocks the same?";
-  if (signed_at > real_utime + kClockError) return "signed in the future: are the clocks the same?";
-  newest_ = signed_at;
-  return {};
 }
 
 }  // namespace plumb

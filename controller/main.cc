@@ -8,11 +8,10 @@
 
 #include "common/process.h"
 #include "common/realtime.h"
-#include "common/signature.h"
 #include "controller/controller.h"
 
 int main(int argc, char** argv) {
-  std::string robot_path, key;
+  std::string robot_path;
   uint64_t seed = 1;
   double rest = -1;
   int priority = 0;
@@ -25,9 +24,6 @@ int main(int argc, char** argv) {
         app.add_option(
             "--rest", rest,
             "[s] do not have the robot placed: let it rest that long, then begin where it is");
-        app.add_option(
-            "--key", key,
-            "sign the commands with this key, which the driver shares (plumb key makes one)");
       },
       [&](plumb::Process& process) {
         process.BecomeFast(priority);
@@ -35,16 +31,13 @@ int main(int argc, char** argv) {
         const plumb::Clock& clock = process.clock();
         plumb::Controller controller(robot, seed, rest);
         plumb::Messenger& messenger = process.messenger();
+        messenger.Follow(robot.name);
         plumb::Publisher<plumb::joint_command_t> commands(messenger, "JOINT_COMMAND");
         plumb::Publisher<plumb::place_robot_t> places(messenger, "PLACE_ROBOT");
         plumb::Publisher<plumb::controller_status_t> statuses(messenger, "CONTROLLER_STATUS");
 
-        std::optional<plumb::Signer> signer;
-        if (!key.empty()) signer.emplace(plumb::SigningKey(key), "JOINT_COMMAND");
-        const auto send = [&](std::optional<plumb::joint_command_t> command) {
-          if (!command) return;
-          if (signer) signer->Sign(*command, clock.SigningUtime());
-          commands.Publish(*command);
+        const auto send = [&](const std::optional<plumb::joint_command_t>& command) {
+          if (command) commands.Publish(*command);
         };
         plumb::Subscriber<plumb::robot_state_t> states(
             messenger, "ROBOT_STATE", [&](const plumb::robot_state_t& state) {

@@ -5,14 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <stdexcept>
 
 #include "common/lcm_url.h"
 #include "common/messenger.h"
 #include "common/process.h"
 #include "common/realtime.h"
-#include "common/signature.h"
 #include "common/time_units.h"
 #include "drivers/driver/driver.h"
 #include "drivers/driver/flight_recorder.h"
@@ -39,13 +37,6 @@ void WriteState(int8_t state, std::string_view reason) {
               reason);
 }
 
-/// Judges signed messages; without a key, obeys all.
-std::optional<Verifier> VerifierOf(const std::optional<SigningKey>& key, const std::string& channel,
-                                   const Clock& clock) {
-  if (!key) return std::nullopt;
-  return Verifier(*key, channel, clock.SigningUtime());
-}
-
 void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {
   if (commands_signed) return spdlog::info("takes signed commands only");
   if (!StaysOnMachine(lcm_url))
@@ -55,8 +46,7 @@ void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {
 class DriverProcess {
  public:
   DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus,
-                const std::string& flight_recorder, const std::optional<SigningKey>& key,
-                bool is_virtual)
+                const std::string& flight_recorder, bool is_virtual)
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
@@ -66,12 +56,16 @@ class DriverProcess {
         states_(process.messenger(), "JOINT_STATE"),
         imus_(process.messenger(), "IMU"),
         statuses_(process.messenger(), "DRIVER_STATUS"),
-        command_signatures_(VerifierOf(key, "JOINT_COMMAND", clock_)),
-        request_signatures_(VerifierOf(key, "DRIVER_REQUEST", clock_)),
-        commands_(process.messenger(), "JOINT_COMMAND",
-                  [this](const joint_command_t& command) { OnCommand(command); }),
-        requests_(process.messenger(), "DRIVER_REQUEST",
-                  [this](const driver_request_t& request) { OnRequest(request); }),
+        commands_(
+            process.messenger(), "JOINT_COMMAND",
+            [this](const joint_command_t& command) { OnCommand(command); }, Speakers::kOne,
+            [this](const joint_command_t&, std::string_view why) { driver_.OnForgedCommand(why); }),
+        requests_(
+            process.messenger(), "DRIVER_REQUEST",
+            [this](const driver_request_t& request) { OnRequest(request); }, Speakers::kSeveral,
+            [this](const driver_request_t& request, std::string_view why) {
+              OnForgedRequest(request, why);
+            }),
         recorder_(flight_recorder, bus, kFlightFrames,
                   [](const std::string& file, const std::string& error) {
                     if (error.empty())
@@ -81,8 +75,10 @@ class DriverProcess {
                   }) {
     driver_.set_bus(bus);
     driver_.set_virtual(is_virtual);
-    driver_.set_commands_signed(key.has_value());
-    LogCommandPolicy(process.lcm_url(), key.has_value());
+    const bool commands_signed = !process.key_file().empty();
+    driver_.set_commands_signed(commands_signed);
+    LogCommandPolicy(process.lcm_url(), commands_signed);
+    process.messenger().Lead(robot.name, bus);
     driver_.set_replay(transport_->is_replay());
     for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
@@ -90,7 +86,13 @@ class DriverProcess {
   }
 
   int Run() {
-    while (!process_.stopping()) Step();
+    try {
+      while (!process_.stopping()) Step();
+    } catch (const std::exception&) {  // whatever it is, the motors come first
+      deaf_ = true;
+      DisarmAndStop();
+      throw;
+    }
     return DisarmAndStop();
   }
 
@@ -106,7 +108,7 @@ class DriverProcess {
     if (ReceiveFrames()) phases_.End(PhaseTimes::kReceive);
     if (Publish()) phases_.End(PhaseTimes::kPublish);
     phases_.Mark();
-    if (process_.messenger().Drain() > 0) phases_.End(PhaseTimes::kCommand);
+    if (!deaf_ && process_.messenger().Drain() > 0) phases_.End(PhaseTimes::kCommand);
     if (cycle_.Due(clock_.Now())) {
       Cycle();
     } else {
@@ -115,24 +117,18 @@ class DriverProcess {
   }
 
   void OnCommand(const joint_command_t& command) {
-    if (command_signatures_) {
-      const std::string_view refusal =
-          command_signatures_->Judge(commands_.encoding(), clock_.SigningUtime());
-      if (!refusal.empty()) return driver_.OnForgedCommand(refusal);
-    }
     driver_.OnCommand(command, clock_.Now(), clock_.Utime());
   }
 
   void OnRequest(const driver_request_t& request) {
-    // Stopping must never need a key.
-    const bool stops =
-        request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP;
-    if (request_signatures_ && !stops) {
-      const std::string_view refusal =
-          request_signatures_->Judge(requests_.encoding(), clock_.SigningUtime());
-      if (!refusal.empty()) return driver_.OnForgedArm(refusal);
-    }
     driver_.OnRequest(request, clock_.Now(), clock_.Utime());
+  }
+
+  void OnForgedRequest(const driver_request_t& request, std::string_view why) {
+    // Stopping must never need a key.
+    if (request.request == driver_request_t::DISARM || request.request == driver_request_t::ESTOP)
+      return OnRequest(request);
+    driver_.OnForgedArm(why);
   }
 
   /// @return whether there were any.
@@ -234,13 +230,13 @@ class DriverProcess {
   Publisher<joint_state_t> states_;
   Publisher<imu_t> imus_;
   Publisher<driver_status_t> statuses_;
-  std::optional<Verifier> command_signatures_, request_signatures_;
   Subscriber<joint_command_t> commands_;
   Subscriber<driver_request_t> requests_;
   std::array<Frame, 64> received_;
   FlightRecorder recorder_;
   PhaseTimes phases_{!clock_.is_virtual()};
   bool faulty_ = false;
+  bool deaf_ = false;  // whom to believe on LCM cannot be told any more
   int64_t next_reopen_ = 0;
   int64_t next_status_ = 0;
   uint64_t revision_ = 0;
@@ -251,7 +247,7 @@ class DriverProcess {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  std::string robot_path, bus, flight_recorder, key_file;
+  std::string robot_path, bus, flight_recorder;
   bool allow_unsigned = false;
   int priority = 0;
   bool is_virtual = false;
@@ -266,22 +262,17 @@ int main(int argc, char** argv) {
                        "folder: on every fault the frames of the last 2 s are written there");
         app.add_flag("--virtual", is_virtual,
                      "the robot is plumb-robot: while no effort is sent, its positions may jump");
-        auto* key = app.add_option(
-            "--key", key_file,
-            "obey only commands and ARM requests signed with this key (plumb key makes one)");
         app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")
-            ->excludes(key);
+            ->excludes(app.get_option("--key"));
         plumb::AddRealtimeFlag(app, priority);
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
-        plumb::RequireKey(process.lcm_url(), !key_file.empty(), allow_unsigned);
-        std::optional<plumb::SigningKey> key;
-        if (!key_file.empty()) key.emplace(key_file);
+        plumb::RequireKey(process.lcm_url(), !process.key_file().empty(), allow_unsigned);
         // LCM's thread comes right behind the cycle: what it brings is part of it.
         process.BecomeFast(std::max(priority - 1, 0));
         plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus,
-                                    flight_recorder, key, is_virtual);
+                                    flight_recorder, is_virtual);
         process.BecomeFast(priority);
         return driver.Run();
       });

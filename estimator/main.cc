@@ -48,6 +48,7 @@ int main(int argc, char** argv) {
         plumb::StateObserver observer(robot);
         std::optional<plumb::UnscentedObserver> model_observer;
         if (!model.empty()) model_observer.emplace(AssumedRobot(robot, model));
+        process.messenger().Follow(robot.name);
         plumb::Publisher<plumb::robot_state_t> causal(process.messenger(), "ROBOT_STATE");
         plumb::Publisher<plumb::robot_state_t> smoothed(process.messenger(),
                                                         "ROBOT_STATE_SMOOTHED");

@@ -76,6 +76,7 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
   Stand(description, seed, robot);
   const std::unique_ptr<Transport> transport = OpenTransport(
       bus_url, robot.filters(), {process.participant(), Microseconds(description.estimator.delay)});
+  process.messenger().Follow(description.name);
   Subscriber<place_robot_t> places(
       process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
         const Eigen::Map<const Eigen::VectorXd> q(wish.q.data(),

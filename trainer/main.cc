@@ -44,6 +44,7 @@ class TrainerProcess {
         controller_(process.messenger(), "CONTROLLER_STATUS",
                     [this](const controller_status_t& message) { OnController(message); }),
         repeat_(kRepeat, process.clock().Now()) {
+    process.messenger().Follow(robot_.name);
     if (!options.checkpoint.empty()) checkpoint_file_ = options.checkpoint + "/trainer.checkpoint";
   }
 

@@ -6,8 +6,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <stdexcept>
 #include <vector>
+
+#include "common/seal.h"
 
 namespace plumb {
 namespace {
@@ -57,7 +60,9 @@ int64_t ReadLog(
     if (!stream.read(channel.data(), channel_length) || !stream.read(data.data(), data_length))
       return events;
     ++events;
-    if (!on_event(channel, data.data(), static_cast<int>(data_length),
+    const std::span<const uint8_t> message =
+        Unsealed({reinterpret_cast<const uint8_t*>(data.data()), data.size()});
+    if (!on_event(channel, message.data(), static_cast<int>(message.size()),
                   static_cast<int64_t>(BigEndian<uint64_t>(header + 12)))) {
       return events;
     }

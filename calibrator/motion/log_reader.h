@@ -10,7 +10,8 @@ namespace plumb {
 // calls.
 
 /// Reads an LCM log event by event, in the file's order.
-/// @param on_event channel, data, size, time of reception [us]; return false to stop.
+/// @param on_event channel, data and size of the message without its seal, time of reception [us];
+/// return false to stop.
 /// @return the number of events. A log cut off in the middle of an event (a logger that was killed)
 /// ends there.
 /// @throws std::runtime_error naming the file if it is a folder, cannot be opened or is no LCM log,

@@ -14,6 +14,7 @@ namespace {
 
 constexpr size_t kMaxStates = 200'000;  // a quarter of an hour at 200 Hz
 constexpr size_t kMaxEpisodes = 64;
+constexpr size_t kMaxCommands = 200'000;
 constexpr int kMaxSteps = 1'000'000;
 
 Eigen::VectorXd ToEigen(const std::vector<double>& values) {
@@ -82,11 +83,13 @@ TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
     : n_(robot.num_joints()),
       period_(robot.task.period),
       max_states_(kMaxStates),
-      max_episodes_(kMaxEpisodes) {}
+      max_episodes_(kMaxEpisodes),
+      max_commands_(kMaxCommands) {}
 
 TransitionJoiner TransitionJoiner::Unbounded(const RobotDescription& robot) {
   TransitionJoiner joiner(robot);
-  joiner.max_states_ = joiner.max_episodes_ = std::numeric_limits<size_t>::max();
+  joiner.max_states_ = joiner.max_episodes_ = joiner.max_commands_ =
+      std::numeric_limits<size_t>::max();
   return joiner;
 }
 
@@ -103,8 +106,12 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
       smoothed.utime > states_.rbegin()->second.utime) {
     states_.clear();
     commands_.clear();
+    num_commands_ = 0;
   }
-  states_.insert_or_assign(smoothed.sequence, smoothed);
+  robot_state_t& state = states_.insert_or_assign(smoothed.sequence, smoothed).first->second;
+  // Nobody asks for them, and a forged message may have a million.
+  state.num_contacts = 0;
+  std::vector<int8_t>().swap(state.contact);
   if (states_.size() > max_states_) states_.erase(states_.begin());
 }
 
@@ -112,8 +119,21 @@ void TransitionJoiner::OnCommand(const joint_command_t& command) {
   if (command.num_joints != n_ || command.episode < 0 || command.step < 0 ||
       command.step >= kMaxSteps)
     return;
-  commands_[command.episode].insert_or_assign(command.step, command);
-  if (commands_.size() > max_episodes_) commands_.erase(commands_.begin());
+  const bool is_new =
+      commands_[command.episode]
+          .insert_or_assign(command.step, Answer{command.state_sequence, command.policy_iteration})
+          .second;
+  if (is_new) ++num_commands_;
+  if (commands_.size() > max_episodes_) ForgetEpisode(commands_.begin());
+  if (num_commands_ <= max_commands_) return;
+  if (commands_.size() > 1) return ForgetEpisode(commands_.begin());
+  commands_.begin()->second.erase(commands_.begin()->second.begin());
+  --num_commands_;
+}
+
+void TransitionJoiner::ForgetEpisode(Commands::iterator episode) {
+  num_commands_ -= episode->second.size();
+  commands_.erase(episode);
 }
 
 Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
@@ -121,7 +141,7 @@ Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
   rollout.episode = episode;
   const auto found = commands_.find(episode);
   if (found == commands_.end()) return rollout;
-  const std::map<int, joint_command_t>& commands = found->second;
+  const std::map<int, Answer>& commands = found->second;
   for (auto command = commands.begin(); command != commands.end(); ++command) {
     rollout.policy_iteration = command->second.policy_iteration;
     const auto next = std::next(command);
@@ -135,7 +155,7 @@ Rollout TransitionJoiner::Join(int64_t episode, int64_t last_state) {
     if (JoinOne(command->second.state_sequence, to, &transition, &drops_))
       rollout.transitions.push_back(std::move(transition));
   }
-  commands_.erase(found);
+  ForgetEpisode(found);
   return rollout;
 }
 

@@ -73,6 +73,9 @@ void LcmMirror::Work() {
       messenger_.Drain(kMaxRead);
       batch.clear();
     }
+    // The last words of a run that was stopped, its driver's among them.
+    const std::lock_guard lock(mutex_);
+    for (const Message& message : queue_) messenger_.Publish(message.channel, message.bytes);
   } catch (...) {
     const std::lock_guard lock(mutex_);
     failure_ = std::current_exception();

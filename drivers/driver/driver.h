@@ -65,7 +65,7 @@ class Driver {
   void OnLink(LinkState link) noexcept;
   void OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept;
   void OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
-  /// Instead of the two above, what is not to be obeyed because its signature is wrong. @param why
+  /// Instead of the two above, what is not to be obeyed because of who said it. @param why
   /// a literal.
   void OnForgedArm(std::string_view why) noexcept;
   void OnForgedCommand(std::string_view why) noexcept;
@@ -132,6 +132,7 @@ class Driver {
   bool DispatchToSensors(const Frame& frame, int64_t now, int64_t utime) noexcept;
   void Refuse(std::string_view why) noexcept;
   void Disarm() noexcept;
+  void Answer(const driver_request_t& request) noexcept;
   void Estop(std::string_view reason) noexcept;
   void StampStopTime() noexcept;
   void RequestArm(int64_t made, bool homed) noexcept;

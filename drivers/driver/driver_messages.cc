@@ -27,6 +27,7 @@ void Driver::PrepareMessages() {
   status_.commands_accepted = status_.commands_rejected = status_.commands_expired = 0;
   status_.messages_rejected = status_.cycles = status_.overruns = status_.measurements_lost = 0;
   status_.stopped_by_request = false;
+  status_.answered = 0;
   status_.num_joints = static_cast<int32_t>(size);
   status_.joint_name = names_;
   status_.joint_state.resize(size);

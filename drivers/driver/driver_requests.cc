@@ -15,6 +15,7 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
   now_ = now;
   utime_ = utime;
   StampStopTime();
+  Answer(request);
   switch (request.request) {
     case driver_request_t::ARM:
       return RequestArm(request.utime, false);
@@ -36,6 +37,13 @@ void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t uti
       ++requests_rejected_;
       return;
   }
+}
+
+/// With the next status, which tells of its effect.
+void Driver::Answer(const driver_request_t& request) noexcept {
+  if (request.identity == 0) return;
+  status_.answered = request.identity;
+  ++revision_;
 }
 
 void Driver::Estop(std::string_view reason) noexcept {
@@ -121,7 +129,8 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
   reason_.Set("arming");
 }
 
-// Neither is taken for a sign of a controller: a forger could keep the robot from being armed.
+// Neither is taken for a sign of a controller: a forger could keep the robot from being armed. Nor
+// is a forged request answered: genuine ones would not find their answers among them.
 void Driver::OnForgedArm(std::string_view why) noexcept {
   ++status_.commands_forged;
   if (!Active()) Refuse(why);

@@ -71,6 +71,7 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
   effort_sent_.assign(num_joints_, 0);
   scratch_.resize(joints_.size());
   PrepareMessages();
+  status_.robot = robot.name;
   reason_.Set("waiting for ARM");
 }
 

@@ -1,5 +1,7 @@
 #include "cli/progress.h"
 
+#include <malloc.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
@@ -197,6 +199,17 @@ TEST_CASE_METHOD(Fixture, "the status line says what is waited for") {
   d.reason = "no command for 250 ms";
   progress.OnDriver(d);
   CHECK_THAT(progress.StatusLine(3), Catch::Contains("FAULT: no command for 250 ms"));
+}
+
+TEST_CASE_METHOD(Fixture, "of policies that the run does not have nothing is remembered") {
+  const size_t before = mallinfo2().uordblks;
+  for (int i = 3; i < 100'000; ++i) {
+    Rollout(i, policy_t::CALIBRATE, {1});
+    Rollout(-i, policy_t::CALIBRATE, {1});
+    Trained(i, 1);
+    Trained(-i, 1);
+  }
+  CHECK(mallinfo2().uordblks - before < 10'000);
 }
 
 }  // namespace

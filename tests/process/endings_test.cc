@@ -99,8 +99,14 @@ TEST_CASE("what a person stops, the launcher does not start again") {
     REQUIRE(stage.WaitUntil([&] { return !launch.running(); }, kLong));
     CHECK(launch.ending() == "exit status 1");
     CHECK_THAT(launch.Tail(5), Contains("somebody outside the run has asked for a stop"));
-    CHECK_THAT(LastFrame(can_log, "021"), StartsWith("0000000001"));
+    // Idle; after an Estop with the error that says so.
+    CHECK(LastFrame(can_log, "021").substr(8, 2) == "01");
     CHECK_THAT(LastFrame(can_log, "02E"), StartsWith("00000000"));
+    // And whoever has asked is told.
+    REQUIRE(stage.WaitUntil([&] { return !request.running(); }, kLong));
+    INFO(request.Tail(5));
+    CHECK_FALSE(request.failed());
+    CHECK_THAT(request.Tail(5), Contains("not armed: "));
   }
 }
 

@@ -192,6 +192,26 @@ TEST_CASE("an effort beyond the limit is clipped before it reaches the bus") {
   CHECK(greatest == 2);
 }
 
+TEST_CASE("commands that decode and are mad are refused") {
+  Stage stage(11);
+  stage.StartRobotAndDriver();
+  REQUIRE(stage.Arm());
+  Publisher<joint_command_t> publisher(stage.messenger, "JOINT_COMMAND");
+  joint_command_t command{};
+  command.utime = stage.Now();
+  command.num_joints = 1;
+  command.position = command.velocity = command.kp = command.kd = {NAN};
+  for (const double effort : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    ++command.sequence;
+    command.effort = {effort};
+    publisher.Publish(command);
+  }
+  stage.Listen(0.2);
+  CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
+  CHECK(stage.drivers.newest().commands_rejected == 3);
+  CHECK(stage.last_torque_time == 0);
+}
+
 TEST_CASE("an emergency stop") {
   Stage stage(9);
   stage.RunWithTorque();

@@ -41,31 +41,44 @@ std::string InTheRun(Stage& stage, std::vector<std::string> arguments, bool fail
   return child.Tail(50);
 }
 
-/// Somebody without the key, who has seen what a command looks like.
+/// Somebody without the key, who has seen what is said, and copies its seals.
 struct Stranger {
-  explicit Stranger(Stage& s)
-      : stage(s), commands(s.messenger, "JOINT_COMMAND"), requests(s.messenger, "DRIVER_REQUEST") {}
+  explicit Stranger(Stage& s) : stage(s) {
+    stage.coordinator->on_post = [this](const lockstep_post_t& post, const std::string&) {
+      if (const std::optional<Seal> seal = FindSeal(post.data)) seen[post.topic.name] = *seal;
+    };
+  }
+  ~Stranger() {
+    stage.coordinator->on_post = [](const auto&, const auto&) {};
+  }
+  template <class Message>
+  void Say(const std::string& channel, const Message& message) {
+    const auto size = static_cast<size_t>(message.getEncodedSize());
+    std::vector<uint8_t> bytes(size + kSealSize);
+    message.encode(bytes.data(), 0, static_cast<int>(size));
+    Seal seal = seen[channel];
+    seal.counter = stage.Now();
+    WriteSeal(seal, nullptr, "", "", "", bytes);  // its signature, too
+    stage.messenger.Publish(channel, bytes);
+  }
   void Command() {
-    joint_command_t command =
-        // its signature, too
-        stage.commands.received() > 0 ? stage.commands.newest() : joint_command_t{};
+    joint_command_t command{};
+    if (stage.commands.received() > 0) command = stage.commands.newest();
     command.utime = stage.Now();
-    command.counter = stage.Now();
     command.sequence += 1000;
     command.num_joints = 1;
     command.effort = {stage.robot.joints[0].effort_limit};
     command.position = command.velocity = command.kp = command.kd = {NAN};
-    commands.Publish(command);
+    Say("JOINT_COMMAND", command);
   }
   void Request(int8_t what) {
     driver_request_t request{};
-    request.utime = request.counter = stage.Now();
+    request.utime = stage.Now();
     request.request = what;
-    requests.Publish(request);
+    Say("DRIVER_REQUEST", request);
   }
   Stage& stage;
-  Publisher<joint_command_t> commands;
-  Publisher<driver_request_t> requests;
+  std::map<std::string, Seal> seen;  // the newest one of each channel
 };
 
 /// Everything signed that was said on the two channels, byte for byte.
@@ -118,7 +131,8 @@ TEST_CASE("a signed loop moves the robot, a stranger does not, and stopping need
   stranger.Request(driver_request_t::ARM);
   REQUIRE(stage.WaitUntil([&] { return stage.drivers.newest().commands_forged == 51; }, 2));
   CHECK(stage.drivers.newest().reason ==
-        "disarmed on request; ARM refused: not signed with the driver's key");
+        "disarmed on request; ARM refused: not signed with the driver's key, for its robot and its "
+        "bus");
   CHECK_THAT(InTheRun(stage, {"arm"}, true), Contains("--key FILE"));
   stage.Listen(0.3);
   CHECK(stage.axis_state == kIdle);
@@ -174,14 +188,14 @@ TEST_CASE(
   CHECK(stage.drivers.newest().state == driver_status_t::IDLE);
   CHECK(stage.drivers.newest().commands_forged == forged);
   CHECK_THAT(stage.drivers.newest().reason,
-             Contains("ARM refused") &&
-                 Contains("signed, but a repetition, or from before the driver's start"));
+             Contains("ARM refused") && Contains("signed for another run of the driver"));
   // Nor when a person arms.
   REQUIRE(stage.Arm());
   replay();
   CHECK(stage.drivers.newest().commands_forged == 2 * forged);
   CHECK(stage.drivers.newest().state == driver_status_t::FAULT);
-  CHECK_THAT(stage.drivers.newest().reason, Contains("commands refused: signed, but a repetition"));
+  CHECK_THAT(stage.drivers.newest().reason,
+             Contains("commands refused: signed for another run of the driver"));
   CHECK(stage.last_torque_time == torque);
 }
 

@@ -73,6 +73,7 @@ Child& Stage::Start(const std::string& name, std::vector<std::string> arguments)
   arguments.insert(arguments.begin(), {Binary(name), robot_folder, "--lcm-url", lcm_url, "--parent",
                                        std::to_string(getpid())});
   if (coordinator) arguments.insert(arguments.end(), {"--clock", coordinator->clock()});
+  arguments.insert(arguments.end(), key_arguments_.begin(), key_arguments_.end());
   if (children.contains(name)) Kill(name);
   children.erase(name);
   Child& child =
@@ -85,7 +86,6 @@ Child& Stage::Start(const std::string& name, std::vector<std::string> arguments)
 void Stage::StartDriver() {
   std::vector<std::string> arguments{"--bus", bus_url, "--virtual", "--flight-recorder",
                                      folder / "faults"};
-  arguments.insert(arguments.end(), key_arguments_.begin(), key_arguments_.end());
   Start("plumb-driver", arguments);
 }
 
@@ -97,7 +97,7 @@ void Stage::StartRobotAndDriver() {
 void Stage::StartAll() {
   StartRobotAndDriver();
   Start("plumb-estimator");
-  Start("plumb-controller", key_arguments_);
+  Start("plumb-controller");
 }
 
 void Stage::Kill(const std::string& name) {
@@ -114,7 +114,8 @@ std::filesystem::path Stage::UseKey() {
   const std::filesystem::path file = folder / "key";
   MakeKeyFile(file);
   key_arguments_ = {"--key", file};
-  signer_.emplace(SigningKey(file), "DRIVER_REQUEST");
+  messenger.Become(Identity("stage", SigningKey(file), clock,
+                            coordinator ? Identity::Reach::kRun : Identity::Reach::kMachine, 0));
   return file;
 }
 
@@ -142,7 +143,6 @@ void Stage::Request(int8_t what) {
   driver_request_t request{};
   request.utime = Now();
   request.request = what;
-  if (signer_) signer_->Sign(request, clock.SigningUtime());
   requests_.Publish(request);
 }
 

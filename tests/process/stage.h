@@ -127,7 +127,6 @@ class Stage {
   void Witness();
 
   std::vector<std::string> key_arguments_;
-  std::optional<Signer> signer_;
   Publisher<driver_request_t> requests_;
   Publisher<policy_t> policies_;
 };

@@ -1,5 +1,7 @@
 #include "calibrator/motion/transitions.h"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -233,6 +235,53 @@ TEST_CASE("an iteration begins when its roll-outs are complete, whatever came fi
   status.purpose = 1;  // evaluation roll-outs are for judging
   calibrator.OnControllerStatus(status);
   CHECK_FALSE(calibrator.ready());
+}
+
+// Whoever can send messages can send any number of them.
+TEST_CASE("what is remembered of messages has a bound in megabytes") {
+  const RobotDescription robot = Pendulum();
+  const auto used = [] { return mallinfo2().uordblks + mallinfo2().hblkhd; };
+  const size_t before = used();
+  TransitionJoiner joiner(robot);
+  SECTION("of commands, in one episode or in many") {
+    for (const int episodes : {1, 50}) {
+      joint_command_t command = Command(0);
+      for (int i = 0; i < 1'000'000; ++i) {
+        command.episode = i % episodes;
+        command.step = i / episodes;
+        joiner.OnCommand(command);
+      }
+      CHECK(used() - before < 20'000'000);
+    }
+  }
+  SECTION("of states, however many contacts they have") {
+    robot_state_t state = State(0);
+    state.num_contacts = 1'000'000;
+    state.contact.resize(1'000'000);
+    for (int i = 0; i < 200; ++i) {
+      state.sequence = i;
+      joiner.OnState(state);
+    }
+    CHECK(used() - before < 3'000'000);  // this test's own message is the most of it
+  }
+  SECTION("of states, however many there are") {
+    for (int i = 0; i < 300'000; ++i) joiner.OnState(State(i));
+    CHECK(used() - before < 90'000'000);
+  }
+}
+
+TEST_CASE_METHOD(Fixture,
+                 "commands of other episodes beyond the bound do not cost the newest one") {
+  States();
+  for (int episode = 0; episode < 40; ++episode) {
+    for (int step = 0; step < 6000; ++step) {
+      joint_command_t command = Command(step);
+      command.episode = episode;
+      joiner.OnCommand(command);
+    }
+  }
+  Commands();
+  CHECK(joiner.Join(42, 300).transitions.size() == 20);
 }
 
 }  // namespace

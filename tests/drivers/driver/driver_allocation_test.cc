@@ -10,7 +10,7 @@
 #include <new>
 #include <vector>
 
-#include "common/signature.h"
+#include "common/identity.h"
 #include "drivers/can/transport.h"
 #include "tests/drivers/driver/rig.h"
 #include "tests/temporary_folder.h"
@@ -114,18 +114,23 @@ TEST_CASE("judging signatures, and what comes of it, allocates nothing") {
   Rig rig;
   rig.Start();
   REQUIRE(rig.Arm(1));
-  const int64_t start = Rig::kEpoch;
-  Signer signer(key, "JOINT_COMMAND");
-  Verifier verifier(key, "JOINT_COMMAND", start);
+  const auto time = std::make_shared<std::atomic<int64_t>>(Rig::kEpoch);
+  Identity driver("driver", key, Clock(time), Identity::Reach::kRun, 0);
+  Identity controller("controller", key, Clock(time), Identity::Reach::kRun, 0);
+  driver.Lead("robot", "bus");
+  controller.Join(driver.run(), "robot", "bus");
+  ChannelJudge judge;
   joint_command_t command = rig.MakeCommand(1);
-  std::vector<uint8_t> encoding(static_cast<size_t>(command.getEncodedSize()));
+  const auto size = static_cast<size_t>(command.getEncodedSize());
+  std::vector<uint8_t> encoding(size + kSealSize);
   long counted = 0, genuine = 0, forged = 0;
   for (int i = 1; i <= 1000; ++i) {
-    signer.Sign(command, start + i);
-    command.encode(encoding.data(), 0, static_cast<int>(encoding.size()));
-    if (i % 3 == 0) encoding.back() ^= 1;
+    *time += 1;
     const long before = allocations;
-    const std::string_view refusal = verifier.Judge(encoding, start + i);
+    command.encode(encoding.data(), 0, static_cast<int>(size));
+    controller.Seal("JOINT_COMMAND", encoding);
+    if (i % 3 == 0) encoding.back() ^= 1;
+    const std::string_view refusal = judge.Hear(driver, "JOINT_COMMAND", encoding).refusal;
     ++(refusal.empty() ? genuine : forged);
     if (!refusal.empty()) rig.driver->OnForgedCommand(refusal);
     if (!refusal.empty()) rig.driver->OnForgedArm(refusal);

@@ -80,6 +80,36 @@ TEST_CASE("forged commands after the start do not keep the robot from being arme
   CHECK(rig.drives[0].Torque() == 1);
 }
 
+TEST_CASE(
+    "a request is answered by its identity, whether it is obeyed or refused; a forged one is not") {
+  Rig rig;
+  rig.Start();
+  const auto ask = [&](int8_t what, int64_t identity) {
+    driver_request_t request{};
+    request.utime = rig.utime();
+    request.request = what;
+    request.identity = identity;
+    rig.driver->OnRequest(request, rig.now, rig.utime());
+  };
+  CHECK(rig.Status().answered == 0);
+  ask(driver_request_t::ARM, 11);  // too early
+  CHECK(rig.Status().answered == 11);
+  CHECK_THAT(rig.Reason(), Catch::Contains("ARM refused"));
+  rig.Run(300);
+  const uint64_t revision = rig.driver->revision();
+  ask(driver_request_t::ARM, 12);
+  CHECK(rig.driver->revision() != revision);  // it is said at once
+  CHECK(rig.Status().answered == 12);
+  ask(driver_request_t::DISARM, 13);
+  CHECK(rig.Status().answered == 13);
+  ask(driver_request_t::DISARM, 0);  // of somebody who does not want to know
+  rig.driver->OnForgedArm(kWhy);
+  CHECK(rig.Status().answered == 13);
+  ask(driver_request_t::ESTOP, -5);
+  CHECK(rig.Status().answered == -5);
+  CHECK(rig.driver->state() == DriveState::kFault);
+}
+
 TEST_CASE("the status says whether commands must be signed") {
   Rig rig;
   rig.Start();
