@@ -16,6 +16,7 @@
 #include "cli/run_processes.h"
 #include "cli/run_setting.h"
 #include "common/atomic_file.h"
+#include "common/outside_text.h"
 #include "common/progress_line.h"
 #include "common/signature.h"
 #include "common/time_units.h"
@@ -119,7 +120,7 @@ class ClosedLoop {
          request.request == driver_request_t::ESTOP)) {
       stopped_from_outside_ = true;
     } else if (strange_channels_.insert(channel).second) {
-      Print("plumb: somebody outside the run says " + channel +
+      Print("plumb: somebody outside the run says " + Printable(channel) +
             ": not heard; --real-time hears everybody");
     }
   }
@@ -234,7 +235,8 @@ class ClosedLoop {
     summary["bus"] = setting_.bus;
     summary["rearms"] = rearms_;
     summary["version"] = VersionLine("plumb");
-    WriteAtomically(flags_.summary, summary.dump(1) + "\n");
+    WriteAtomically(flags_.summary,
+                    summary.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   }
 
   void Print(const std::string& line) {
