@@ -10,6 +10,7 @@
 
 #include "cli/outputs.h"
 #include "cli/preflight.h"
+#include "common/atomic_file.h"
 #include "common/lcm_url.h"
 #include "drivers/driver/driver.h"
 #include "sim/parameters.h"
@@ -43,8 +44,7 @@ fs::path MakeFolder(const std::string& wanted) {
 void RequireFiles(const LaunchFlags& flags, const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
   inputs.push_back(flags.key);
-  RequireNotRead({flags.log, flags.can_log}, inputs);  // which may be pipes
-  RequireOutputs({flags.summary}, inputs);
+  RequireNotRead({flags.log, flags.can_log, flags.summary}, inputs);
   RequireSameKind(flags.log, "\xed\xa1\xda\x01", "an LCM log");
   RequireSameKind(flags.can_log, "(", "a log of candump's");
   RequireSameKind(flags.summary, "{", "a summary");
@@ -80,6 +80,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   RequireFree(process.lcm_url(), bus, flags.real);
   output = MakeFolder(flags.output);
   lock.emplace(output);
+  if (!flags.summary.empty()) RequireWritable(flags.summary);  // perhaps in that folder
   if (flags.real || flags.real_time) return;
   virtual_run.emplace(output, process.lcm_url(), VirtualRun::Records{flags.log, flags.can_log});
   virtual_run->coordinator().max_speed = flags.speed;

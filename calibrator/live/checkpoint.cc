@@ -214,6 +214,19 @@ std::shared_ptr<const Residual> ResidualFrom(const json& j, const RobotDescripti
 
 }  // namespace
 
+std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
+  std::vector<Rollout> rollouts;
+  for (;;) {
+    const std::filesystem::path file = folder / RolloutFile(rollouts.size());
+    if (!std::filesystem::exists(file)) return rollouts;
+    try {
+      rollouts.push_back(RolloutFrom(ReadJson(file)));
+    } catch (const std::exception& error) {
+      throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+    }
+  }
+}
+
 CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
                                              const RobotDescription& robot, uint64_t seed)
     : folder_(std::move(folder)), robot_(robot), seed_(seed) {

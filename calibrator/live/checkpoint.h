@@ -29,4 +29,8 @@ class CalibrationCheckpoint {
   size_t saved_rollouts_ = 0;
 };
 
+/// The roll-outs a checkpoint folder holds, in order. @throws std::runtime_error naming the file if
+/// one is damaged.
+std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder);
+
 }  // namespace plumb
