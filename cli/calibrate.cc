@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <ctime>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <thread>
@@ -17,8 +18,9 @@
 #include "calibrator/results/identified_urdf.h"
 #include "calibrator/results/posterior_file.h"
 #include "calibrator/results/summary.h"
-#include "common/atomic_file.h"
+#include "cli/outputs.h"
 #include "common/hash.h"
+#include "common/name_lock.h"
 #include "common/progress_line.h"
 #include "common/rank_batch_runner.h"
 
@@ -165,9 +167,10 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   if (flags.logs.empty() && flags.tables.empty())
     throw std::invalid_argument("there is nothing to calibrate with: give a --log or a --csv");
   if (speaks) {
-    for (const std::string& file : {flags.output, flags.report, flags.urdf}) {
-      if (!file.empty()) RequireWritable(file);
-    }
+    std::vector<std::string> inputs = FilesOf(robot);
+    inputs.insert(inputs.end(), flags.logs.begin(), flags.logs.end());
+    inputs.insert(inputs.end(), flags.tables.begin(), flags.tables.end());
+    RequireOutputs({flags.output, flags.report, flags.urdf}, inputs);
   }
   flags.options.residual = flags.options.residual && robot.calibration.residual;
   const std::vector<Log> logs = ReadLogs(flags, robot);
@@ -182,7 +185,12 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const std::string journal_file = flags.output + ".journal";
   try {
     if (flags.sbc > 0) return Sbc(flags, robot, logs, line, look);
+    std::optional<NameLock> lock;
     std::optional<Journal> journal;
+    if (speaks) {
+      lock.emplace("journal " + std::filesystem::weakly_canonical(journal_file).string(),
+                   journal_file + ": another process is at work on it: give another --output");
+    }
     if (speaks) journal.emplace(journal_file, IdentityOf(robot, flags, logs));
     RankBatchRunner batches(ranks, journal ? &*journal : nullptr);
     flags.options.execution.batches = &batches;

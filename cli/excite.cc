@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "calibrator/design/excitation.h"
+#include "cli/outputs.h"
 #include "common/atomic_file.h"
 #include "robot/description.h"
 #include "robot/posterior_reader.h"
@@ -85,12 +86,11 @@ std::vector<Snapshot> Film(const RobotDescription& robot, const RatedExcitation&
 int Excite(Process& process, const ExciteFlags& flags) {
   const RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
-  RequireWritable(flags.output);
-  if (!flags.png.empty()) {
-    if (flags.png == flags.output)
-      throw std::invalid_argument(flags.png + ": --output and --png need a file each");
-    RequireWritable(flags.png);
-  }
+  if (flags.png == flags.output)
+    throw std::invalid_argument(flags.png + ": --output and --png need a file each");
+  std::vector<std::string> inputs = FilesOf(robot);
+  inputs.push_back(flags.posterior);
+  RequireOutputs({flags.output, flags.png}, inputs);
   ExcitationSettings settings;
   settings.candidates = flags.candidates;
   settings.seconds = flags.seconds;

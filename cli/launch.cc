@@ -16,6 +16,7 @@
 #include "cli/run_processes.h"
 #include "cli/run_setting.h"
 #include "common/atomic_file.h"
+#include "common/outside_text.h"
 #include "common/progress_line.h"
 #include "common/seal.h"
 #include "common/time_units.h"
@@ -127,7 +128,7 @@ class ClosedLoop {
       requests_.Publish(request);  // so that whoever has asked is answered
     } else if (strange_channels_.size() < kMaxStrangeChannels &&
                strange_channels_.insert(channel).second) {
-      Print("plumb: somebody outside the run says " + channel +
+      Print("plumb: somebody outside the run says " + Printable(channel) +
             ": not heard; --real-time hears everybody");
     }
   }
@@ -241,7 +242,8 @@ class ClosedLoop {
     summary["bus"] = setting_.bus;
     summary["rearms"] = rearms_;
     summary["version"] = VersionLine("plumb");
-    WriteAtomically(flags_.summary, summary.dump(1) + "\n");
+    WriteAtomically(flags_.summary,
+                    summary.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   }
 
   void Print(const std::string& line) {

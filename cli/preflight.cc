@@ -21,8 +21,9 @@ bool StartsWith(const std::string& text, const std::string& start) {
   return text.rfind(start, 0) == 0;
 }
 
-/// The bus behind the faults of "faulty:FAULTS:URL".
-std::string Innermost(std::string url) {
+}  // namespace
+
+std::string InnermostBus(std::string url) {
   constexpr size_t kScheme = 7;
   while (StartsWith(url, "faulty:")) {
     const size_t colon = url.find(':', kScheme);
@@ -31,10 +32,8 @@ std::string Innermost(std::string url) {
   return url;
 }
 
-}  // namespace
-
 void RequireFree(const std::string& lcm_url, const std::string& bus_url, bool real) {
-  const std::string innermost = Innermost(bus_url);
+  const std::string innermost = InnermostBus(bus_url);
   if (!real && !StartsWith(innermost, "udp:") && !StartsWith(innermost, "socketcan:vcan") &&
       !StartsWith(innermost, "loop:")) {
     throw std::invalid_argument(

@@ -4,6 +4,9 @@
 
 namespace plumb {
 
+/// The bus behind the faults of "faulty:FAULTS:URL". Thread-safe.
+std::string InnermostBus(std::string url);
+
 /// Makes sure, before anything is started, that a run will be alone: listens for half a second to
 /// LCM and to the bus. Two runs on one LCM or one bus would command each other's robots; and a
 /// robot that already talks on a bus meant for a virtual one is a real one.

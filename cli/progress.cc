@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/outside_text.h"
 #include "controller/acceptance.h"
 #include "plumb/policy_t.hpp"
 
@@ -73,8 +74,14 @@ double RobotReturn(const RobotDescription& robot, const controller_status_t& sta
 
 }  // namespace
 
+void Progress::OnDriver(const driver_status_t& status) {
+  driver_ = status;
+  driver_.reason = Printable(status.reason);
+}
+
 void Progress::OnController(const controller_status_t& status) {
   controller_ = status;
+  controller_.reason = Printable(status.reason);
   // Nothing is remembered of policies that this run does not have.
   if (status.policy_iteration < 0 || status.policy_iteration > iterations_) return;
   if (status.phase != controller_status_t::COMPLETE) return;
@@ -87,15 +94,16 @@ void Progress::OnController(const controller_status_t& status) {
 
 void Progress::OnTraining(const training_status_t& status) {
   training_ = status;
+  training_.decision = Printable(status.decision);
   const bool known = status.iteration >= 0 && status.iteration <= iterations_;
   if (status.complete && known) simulated_return_[status.iteration] = status.evaluation_return;
   if (status.decision.empty() || status.challenger < 0 || status.challenger > iterations_ ||
       decisions_.contains(status.challenger))
     return;
-  decisions_[status.challenger] = {status.decision, status.incumbent == status.challenger,
+  decisions_[status.challenger] = {training_.decision, status.incumbent == status.challenger,
                                    status.probability, status.challenger_return,
                                    status.incumbent_return};
-  decided_.push_back("      " + status.decision);
+  decided_.push_back("      " + training_.decision);
 }
 
 void Progress::OnCalibration(const calibration_status_t& status) {
@@ -111,7 +119,11 @@ void Progress::OnCalibration(const calibration_status_t& status) {
     return found == values.end() ? NAN : found->second;
   };
   // Distribution k rests on the roll-out of policy k - 1.
-  done_.push_back({status, or_nan(simulated_return_, status.iteration - 1),
+  calibration_status_t printable = status;
+  for (std::string* text : {&printable.alarm, &printable.gap, &printable.identifiability})
+    *text = Printable(*text);
+  for (std::string& name : printable.combination) name = Printable(name);
+  done_.push_back({std::move(printable), or_nan(simulated_return_, status.iteration - 1),
                    or_nan(robot_return_, status.iteration - 1), spent_.accounted - last_row_});
   last_row_ = spent_.accounted;
 }

@@ -22,7 +22,7 @@ class Progress {
     training_.incumbent = training_.incumbent_since = training_.challenger = -1;
   }
 
-  void OnDriver(const driver_status_t& status) { driver_ = status; }
+  void OnDriver(const driver_status_t& status);
   void OnController(const controller_status_t& status);
   void OnCalibration(const calibration_status_t& status);
   void OnTraining(const training_status_t& status);

@@ -8,11 +8,14 @@
 #include <ctime>
 #include <stdexcept>
 
+#include "cli/outputs.h"
 #include "cli/preflight.h"
+#include "common/atomic_file.h"
 #include "common/lcm_url.h"
 #include "common/process_number.h"
 #include "drivers/driver/driver.h"
 #include "sim/parameters.h"
+#include "trainer/session.h"
 
 namespace plumb {
 namespace {
@@ -38,7 +41,31 @@ fs::path MakeFolder(const std::string& wanted) {
   return folder;
 }
 
+// LCM's log begins with the sync word of its first event.
+void RequireFiles(const Process& process, const LaunchFlags& flags, const RobotDescription& robot) {
+  std::vector<std::string> inputs = FilesOf(robot);
+  inputs.push_back(process.key_file());
+  RequireNotRead({flags.log, flags.can_log, flags.summary}, inputs);
+  RequireSameKind(flags.log, "\xed\xa1\xda\x01", "an LCM log");
+  RequireSameKind(flags.can_log, "(", "a log of candump's");
+  RequireSameKind(flags.summary, "{", "a summary");
+}
+
 }  // namespace
+
+// Listening, as RequireFree does, tells nothing of who has just begun to listen, too. What stays
+// within a process is nobody else's.
+void RunSetting::Lock(const std::string& lcm_url) {
+  if (!lcm_url.starts_with("memq:")) {
+    messages_lock.emplace("messages " + lcm_url, "another run is under way on " + lcm_url +
+                                                     ": stop it, or give --lcm-url");
+  }
+  const std::string innermost = InnermostBus(bus);
+  if (!innermost.starts_with("loop:")) {
+    bus_lock.emplace("bus " + innermost, "another run is under way on " + innermost +
+                                             ": stop it, or give another --bus");
+  }
+}
 
 RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
     : robot(LoadRobot(flags.robot)),
@@ -46,13 +73,17 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
       run(flags.real || flags.real_time ? ProcessNumber(getpid()) : 0) {
   for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
   RequireDrivable(robot);
+  RequireSendable(robot);
   RequireKey(process.lcm_url(), !process.key_file().empty(), flags.allow_unsigned);
   if (flags.real && flags.speed != 0)
     throw std::invalid_argument("a real robot runs at its own speed, without --speed");
   if (!flags.real) truth = HiddenParameters(robot, flags.seed);
+  RequireFiles(process, flags, robot);
+  Lock(process.lcm_url());
   RequireFree(process.lcm_url(), bus, flags.real);
   output = MakeFolder(flags.output);
   lock.emplace(output);
+  if (!flags.summary.empty()) RequireWritable(flags.summary);  // perhaps in that folder
   if (flags.real || flags.real_time) return;
   virtual_run.emplace(output, process.lcm_url(), VirtualRun::Records{flags.log, flags.can_log});
   virtual_run->coordinator().max_speed = flags.speed;

@@ -9,6 +9,7 @@
 #include "cli/folder_lock.h"
 #include "cli/launch.h"
 #include "cli/virtual_run.h"
+#include "common/name_lock.h"
 #include "common/process.h"
 #include "robot/description.h"
 
@@ -30,7 +31,11 @@ struct RunSetting {
   Eigen::VectorXd truth;         ///< hidden parameters, physical; empty: nobody knows them
   std::filesystem::path output;  ///< the run's folder
   std::optional<FolderLock> lock;
+  std::optional<NameLock> messages_lock, bus_lock;
   std::optional<VirtualRun> virtual_run;  ///< none in real time
+
+ private:
+  void Lock(const std::string& lcm_url);
 };
 
 }  // namespace plumb

@@ -11,6 +11,7 @@
 #include <memory>
 #include <utility>
 
+#include "cli/outputs.h"
 #include "cli/reading_noise.h"
 #include "cli/roll_out.h"
 #include "cli/simulators.h"
@@ -27,21 +28,20 @@ constexpr size_t kLineLength = 110;
 constexpr uint32_t kReadingStream = 0x52454144;  // "READ", second word of the random streams
 
 /// Before a long simulation rather than after it.
-void RequireOutputs(const SimFlags& flags) {
+void RequireFiles(const SimFlags& flags, const RobotDescription& robot) {
   namespace fs = std::filesystem;
   std::vector<fs::path> taken;
   for (const std::string& file : {flags.csv, flags.png, flags.gif}) {
     if (file.empty()) continue;
-    RequireWritable(file);
-    // Its temporary file is in the way, too.
-    for (const std::string& name : {file, file + ".part"}) {
-      const fs::path path = fs::weakly_canonical(fs::absolute(name));
-      if (std::find(taken.begin(), taken.end(), path) != taken.end()) {
-        throw std::invalid_argument(file + ": --csv, --png and --gif need a file each");
-      }
-      taken.push_back(path);
+    const fs::path path = fs::weakly_canonical(fs::absolute(file));
+    if (std::find(taken.begin(), taken.end(), path) != taken.end()) {
+      throw std::invalid_argument(file + ": --csv, --png and --gif need a file each");
     }
+    taken.push_back(path);
   }
+  std::vector<std::string> inputs = FilesOf(robot);
+  inputs.insert(inputs.end(), {flags.policy, flags.posterior});
+  RequireOutputs({flags.csv, flags.png, flags.gif}, inputs);
 }
 
 /// "mass/thigh=4": gives the parameter that value. One that is not among the uncertain ones joins
@@ -159,7 +159,7 @@ int Simulate(Process& process, const SimFlags& flags) {
   if (flags.urdf) robot.parameters.clear();
   for (const std::string& assignment : flags.set) Set(assignment, robot);
   const ReadingNoise noise = ParseReadingNoise(flags.noise);
-  RequireOutputs(flags);
+  RequireFiles(flags, robot);
   const Eigen::VectorXd means = Means(robot);
   Environment environment(robot);
   environment.SetParameters(means);

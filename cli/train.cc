@@ -12,12 +12,13 @@
 #include <sstream>
 #include <thread>
 
+#include "cli/outputs.h"
 #include "cli/simulators.h"
 #include "cli/training_progress.h"
-#include "common/atomic_file.h"
 #include "common/batch_runner.h"
 #include "common/config.h"
 #include "common/hash.h"
+#include "common/name_lock.h"
 #include "common/ranks.h"
 #include "robot/residual_json.h"
 #include "trainer/checkpoint.h"
@@ -79,8 +80,14 @@ class Training {
     if (flags_.checkpoint.empty()) flags_.checkpoint = flags_.output + ".checkpoint";
     steps_ = flags_.steps > 0 ? static_cast<int64_t>(flags_.steps)
                               : int64_t{robot_.training.updates} * robot_.training.batch;
-    for (const std::string& file : {flags_.output, flags_.checkpoint, flags_.csv}) {
-      if (speaks() && !file.empty()) RequireWritable(file);
+    if (speaks()) {
+      std::vector<std::string> inputs = FilesOf(robot_);
+      inputs.insert(inputs.end(), {flags_.distribution, flags_.from});
+      RequireOutputs({flags_.output, flags_.checkpoint, flags_.csv}, inputs);
+      lock_.emplace("checkpoint " + std::filesystem::weakly_canonical(flags_.checkpoint).string(),
+                    flags_.checkpoint +
+                        ": another process is at work on it: give another "
+                        "--output or --checkpoint");
     }
     std::optional<GaussianPolicy> start;
     if (!flags_.from.empty()) {
@@ -253,6 +260,7 @@ class Training {
   RobotDescription robot_;
   ParameterDistribution distribution_;
   Trainer trainer_;
+  std::optional<NameLock> lock_;
   double training_return_ = 0;
   int64_t steps_ = 0;
   uint64_t identity_ = 0;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <boost/crc.hpp>
 #include <cerrno>
 #include <concepts>
 #include <cstdio>
@@ -15,15 +14,14 @@
 #include <vector>
 
 #include "common/atomic_file.h"
+#include "common/sealed.h"
 
 namespace plumb {
 namespace {
 
-// File: magic, version, CRC-32 of the rest, the rest. Numbers as this machine has them: a
-// checkpoint stays where it was written.
-constexpr char kMagic[8] = {'P', 'L', 'U', 'M', 'B', 'T', 'R', 'N'};
-constexpr uint32_t kVersion = 7;  // 3: without trials on the robot, 4 to 6: with other residuals
-constexpr size_t kHeader = sizeof kMagic + 2 * sizeof(uint32_t);
+// Numbers as this machine has them: a checkpoint stays where it was written. Version 3: without
+// trials on the robot, 4 to 6: with other residuals.
+constexpr Seal kSeal{"PLUMBTRN", 7, "a trainer's checkpoint"};
 
 class Writer {
  public:
@@ -174,12 +172,6 @@ void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.best_return);
 }
 
-uint32_t Crc(const char* data, size_t size) {
-  boost::crc_32_type crc;
-  crc.process_bytes(data, size);
-  return crc.checksum();
-}
-
 }  // namespace
 
 const policy_t& DeployedPolicy(const Checkpoint& checkpoint) {
@@ -217,30 +209,20 @@ void SetTrainerState(const TrainerState& state, Checkpoint& checkpoint) {
 std::string EncodeCheckpoint(const Checkpoint& checkpoint) {
   Writer body;
   Transfer(body, checkpoint);
-  std::string bytes(kHeader, '\0');
-  const uint32_t crc = Crc(body.bytes().data(), body.bytes().size());
-  std::memcpy(bytes.data(), kMagic, sizeof kMagic);
-  std::memcpy(bytes.data() + sizeof kMagic, &kVersion, sizeof kVersion);
-  std::memcpy(bytes.data() + sizeof kMagic + sizeof kVersion, &crc, sizeof crc);
-  bytes.append(body.bytes().data(), body.bytes().size());
-  return bytes;
+  return Sealed(kSeal, {body.bytes().data(), body.bytes().size()});
 }
 
 Checkpoint DecodeCheckpoint(std::string_view bytes) {
-  if (bytes.size() < kHeader || !IsCheckpoint(bytes))
-    throw CheckpointError("is not a trainer's checkpoint");
-  uint32_t version = 0, crc = 0;
-  std::memcpy(&version, bytes.data() + sizeof kMagic, sizeof version);
-  std::memcpy(&crc, bytes.data() + sizeof kMagic + sizeof version, sizeof crc);
-  if (version != kVersion)
-    throw CheckpointError(fmt::format("has version {}, not {}", version, kVersion));
-  if (crc != Crc(bytes.data() + kHeader, bytes.size() - kHeader))
-    throw CheckpointError("is damaged");
-  Reader body(bytes.data() + kHeader, bytes.size() - kHeader);
-  Checkpoint checkpoint;
-  Transfer(body, checkpoint);
-  if (body.left() != 0) throw CheckpointError("is too long");
-  return checkpoint;
+  try {
+    const std::string_view content = Unsealed(kSeal, bytes);
+    Reader body(content.data(), content.size());
+    Checkpoint checkpoint;
+    Transfer(body, checkpoint);
+    if (body.left() != 0) throw CheckpointError("is too long");
+    return checkpoint;
+  } catch (const SealError& error) {
+    throw CheckpointError(error.what());
+  }
 }
 
 void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
@@ -254,9 +236,7 @@ void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
   }
 }
 
-bool IsCheckpoint(std::string_view bytes) {
-  return bytes.starts_with(std::string_view(kMagic, sizeof kMagic));
-}
+bool IsCheckpoint(std::string_view bytes) { return bytes.starts_with(kSeal.magic); }
 
 std::optional<Checkpoint> LoadCheckpoint(const std::string& file) {
   std::error_code ignored;  // whatever is wrong, opening the file tells

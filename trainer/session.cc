@@ -11,15 +11,30 @@
 #include <vector>
 
 #include "sim/residual_inputs.h"
+#include "sim/tasks/task.h"
 
 namespace plumb {
 namespace {
 
 constexpr int kHeldOut = 50;             // simulators
+constexpr int kTried = 20;               // of a distribution, before it is trained with
 constexpr int kTrialAndExploration = 2;  // episodes of a roll-out that begins with a trial
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
+
+void RequireSendable(const RobotDescription& robot) {
+  const auto task = MakeTask(robot);
+  const GaussianPolicy policy(
+      {task->observation_size(), robot.training.hidden, task->action_size()});
+  const double megabyte = 1 << 20;
+  const int size = policy.ToMessage().getEncodedSize();
+  if (size <= kLargestPolicy) return;
+  throw std::invalid_argument(fmt::format(
+      "[training] hidden: its policy is a message of {:.1f} MB, and what has more than {:.0f} MB "
+      "gets through to nobody: take fewer units",
+      size / megabyte, kLargestPolicy / megabyte));
+}
 
 TrainingSession::TrainingSession(const RobotDescription& description, const SimulationFactory& make,
                                  int iterations, uint64_t seed, int threads)
@@ -27,7 +42,9 @@ TrainingSession::TrainingSession(const RobotDescription& description, const Simu
       iterations_(iterations),
       seed_(seed),
       trainer_(description.training, make, description.effort_limits(), seed, threads),
-      acceptance_(description.task.steps) {}
+      acceptance_(description.task.steps) {
+  RequireSendable(description);
+}
 
 int TrainingSession::updates() const {
   return iteration_ == 0 ? description_.training.updates : description_.training.updates_again;
@@ -85,9 +102,20 @@ int TrainingSession::incumbent_since() const {
   return trial_steps() > 0 ? incumbent_since_ : incumbent();
 }
 
+// Anybody can send anything: training with simulators that cannot be simulated would end.
+void TrainingSession::RequireSimulable(const ParameterDistribution& distribution) {
+  const Evaluation tried =
+      trainer_.EvaluateHeldOut([&](Random& random) { return distribution.Draw(random); }, kTried);
+  if (2 * tried.failed < tried.episodes) return;
+  throw std::invalid_argument(
+      fmt::format("parameter distribution: of {} simulators drawn from it {} cannot be simulated",
+                  tried.episodes, tried.failed));
+}
+
 bool TrainingSession::Begin(const ParameterDistribution& distribution) {
   if (distribution.iteration != awaited() || awaits_trial()) return false;
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
+  RequireSimulable(distribution);
   if (complete_ && trial_steps() > 0) {
     Choose(distribution.residual ? acceptance_.Decide(iteration_) : acceptance_.Trust(iteration_),
            distribution.iteration);
@@ -106,6 +134,7 @@ bool TrainingSession::Replace(const ParameterDistribution& distribution) {
       distribution.mixture == distribution_.mixture)
     return false;
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
+  RequireSimulable(distribution);
   distribution_ = distribution;
   trainer_.ForgetBest();
   return true;

@@ -13,6 +13,13 @@
 
 namespace plumb {
 
+/// [bytes] of a POLICY: what has more does not pass LCM's guard (common/lcm_guard.h).
+inline constexpr int kLargestPolicy = 4 << 20;
+
+/// Whether the policy that [training] `hidden` makes can be sent. Thread-safe.
+/// @throws std::invalid_argument if it cannot, one line for people.
+void RequireSendable(const RobotDescription& robot);
+
 /// The trainer's part of SimOpt: for each distribution of simulators a policy. Iteration 0 trains
 /// from scratch, each later one from where the last ended.
 ///
@@ -29,6 +36,7 @@ class TrainingSession {
   /// @param iterations number N of distributions that follow the prior: the policy of iteration N
   /// is the last.
   /// @param make makes simulations. @param threads 0 = as many as the machine has.
+  /// @throws std::invalid_argument as RequireSendable.
   TrainingSession(const RobotDescription& description, const SimulationFactory& make,
                   int iterations, uint64_t seed, int threads);
 
@@ -45,8 +53,9 @@ class TrainingSession {
   /// the finished episodes of that policy, or have sizes or numbers that cannot be.
   bool AddTrial(const controller_status_t& status);
   /// Begins the iteration, once the policy of before has been tried. @return false, and nothing
-  /// happens, if it is not the one that is awaited. @throws std::invalid_argument if its residual
-  /// is another robot's, as Replace does.
+  /// happens, if it is not the one that is awaited. @throws std::invalid_argument, and nothing
+  /// happens, if its residual is another robot's, or half of the simulators that are drawn from it
+  /// cannot be simulated, as Replace does.
   bool Begin(const ParameterDistribution& distribution);
 
   /// Goes on training with another distribution of the same iteration, from the next batch on.
@@ -86,6 +95,7 @@ class TrainingSession {
   training_status_t Status() const;
 
  private:
+  void RequireSimulable(const ParameterDistribution& distribution);
   int trial_steps() const;
   void Choose(const Acceptance::Decision& decision, int iteration);
 

@@ -48,6 +48,8 @@ class Curriculum {
       noise = one_step.noise_sd();
       result_.noise_sd = NoiseOf(one_step, modes.back());
     }
+    if (noise.size() == 0)
+      throw std::invalid_argument("the errors are so great that none explains them better");
     if (modes.size() > 1) one_step.set_noise_sd(noise);
     std::stable_sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) {
       return a.log_posterior > b.log_posterior;

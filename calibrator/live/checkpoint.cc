@@ -6,21 +6,25 @@
 #include <algorithm>
 #include <charconv>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "common/atomic_file.h"
+#include "common/sealed.h"
+#include "robot/json_text.h"
 #include "robot/parameter_distribution.h"
+#include "robot/physical.h"
 
 namespace plumb {
 namespace {
 
 using nlohmann::json;
 
-// 2: without the method used, its warnings and a search's samples; 3: without a residual; 4 to
-// 6: with another
-constexpr int kVersion = 7;
+// Version 2: without the method used, its warnings and a search's samples; 3: without a residual; 4
+// to 6: with another; 7: without a seal
+constexpr Seal kSeal{"PLUMBCAL", 8, "a calibrator's checkpoint"};
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -146,13 +150,40 @@ Rollout RolloutFrom(const json& j) {
   return rollout;
 }
 
-json ReadJson(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream) throw std::runtime_error("cannot be opened");
-  return json::parse(stream);
+void RequireTransitions(const Rollout& rollout, const RobotDescription& robot) {
+  const auto require = [](const Eigen::VectorXd& x, int size, bool (*good)(double)) {
+    if (x.size() != size || !std::all_of(x.begin(), x.end(), good))
+      throw std::runtime_error("a transition has the wrong size or is not physical");
+  };
+  const int positions = robot.num_positions(), velocities = robot.num_velocities();
+  for (const Transition& t : rollout.transitions) {
+    for (const Eigen::VectorXd* q : {&t.q, &t.next_q}) require(*q, positions, IsPhysical);
+    for (const Eigen::VectorXd* v : {&t.v, &t.next_v}) require(*v, velocities, IsPhysical);
+    for (const Eigen::VectorXd* sd : {&t.q_sd, &t.next_q_sd}) require(*sd, positions, IsPhysicalSd);
+    for (const Eigen::VectorXd* sd : {&t.v_sd, &t.next_v_sd})
+      require(*sd, velocities, IsPhysicalSd);
+    for (const EffortSegment& segment : t.efforts) {
+      require(segment.effort, velocities, IsPhysical);
+      if (!(segment.duration > 0)) throw std::runtime_error("an effort lasts no time");
+    }
+  }
 }
 
-std::string RolloutFile(size_t index) { return fmt::format("rollout_{}.json", index); }
+json ReadJson(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) throw std::runtime_error("is not a file");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw std::runtime_error("cannot be opened");
+  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+  return ParseJson(Unsealed(kSeal, bytes));
+}
+
+void WriteJson(const std::filesystem::path& file, const json& j) {
+  WriteAtomically(file, Sealed(kSeal, j.dump()));
+}
+
+constexpr char kStateFile[] = "calibration.checkpoint";
+
+std::string RolloutFile(size_t index) { return fmt::format("rollout_{}.checkpoint", index); }
 
 // As the message that carries it, in hexadecimal digits; null if there is none.
 json ToJson(const std::shared_ptr<const Residual>& residual, const RobotDescription& robot) {
@@ -207,11 +238,9 @@ CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
 
 void CalibrationCheckpoint::Save(const SimOpt::State& state) {
   for (; saved_rollouts_ < state.rollouts.size(); ++saved_rollouts_) {
-    WriteAtomically(folder_ / RolloutFile(saved_rollouts_),
-                    ToJson(state.rollouts[saved_rollouts_]).dump());
+    WriteJson(folder_ / RolloutFile(saved_rollouts_), ToJson(state.rollouts[saved_rollouts_]));
   }
-  const json j{{"version", kVersion},
-               {"robot", robot_.name},
+  const json j{{"robot", robot_.name},
                {"parameters", parameters_},
                {"seed", seed_},
                {"fingerprint", robot_.fingerprint},
@@ -230,15 +259,14 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"gap", state.gap},
                {"informed", Name(state.informed)},
                {"rollouts_per_iteration", state.rollouts_per_iteration}};
-  WriteAtomically(folder_ / "calibration.json", j.dump(1));
+  WriteJson(folder_ / kStateFile, j);
 }
 
 std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
-  std::filesystem::path file = folder_ / "calibration.json";
+  std::filesystem::path file = folder_ / kStateFile;
   if (!std::filesystem::exists(file)) return {};
   try {
     const json j = ReadJson(file);
-    if (j.at("version") != kVersion) throw std::runtime_error("is of another version");
     if (j.at("robot") != robot_.name || j.at("parameters") != parameters_)
       throw std::runtime_error("is another robot's");
     if (j.at("seed") != seed_) throw std::runtime_error("has another seed; choose another folder");
@@ -269,6 +297,7 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     for (size_t i = 0; i < count; ++i) {
       file = folder_ / RolloutFile(i);
       state.rollouts.push_back(RolloutFrom(ReadJson(file)));
+      RequireTransitions(state.rollouts.back(), robot_);
     }
     return state;
   } catch (const std::exception& error) {

@@ -35,10 +35,10 @@ namespace plumb {
 ///
 /// Fields are separated by commas and may be quoted; blank lines and those that begin with # are
 /// skipped. Numbers have a decimal point in every locale.
-/// @throws std::runtime_error "file:line: ..." for what is no number, or infinite, too few or too
-/// many fields, a missing, repeated or unknown column (naming the nearest), the same time twice in
-/// a row; and "file: ..." if it cannot be opened or no transition can be used (and why).
-/// Thread-safe.
+/// @throws std::runtime_error "file:line: ..." for what is no number, or infinite or not physical
+/// (robot/physical.h), too few or too many fields, a missing, repeated or unknown column (naming
+/// the nearest), the same time twice in a row; and "file: ..." if it cannot be opened or no
+/// transition can be used (and why). Thread-safe.
 Log ReadCsvLog(const std::string& file, const RobotDescription& robot);
 
 }  // namespace plumb

@@ -21,6 +21,8 @@ constexpr int64_t kPatience = 5000;
 // [states] The same within a channel, where messages keep their order but for a few: further back
 // is another run.
 constexpr int64_t kReordered = 1000;
+// Episodes under way at once: in a robot's log an episode has a state of its own at least.
+constexpr size_t kMostEpisodes = kPatience;
 // No counter and no clock gets there; beyond it, sums and differences overflow.
 constexpr int64_t kLargest = int64_t{1} << 53;
 
@@ -64,6 +66,7 @@ class EpisodeJoiner {
       found->last_command = std::max(found->last_command, command.state_sequence);
     }
     joiner_.OnCommand(command);
+    for (; episodes_.size() > kMostEpisodes; ++cut_off_) JoinFirst();
   }
 
   void OnControllerStatus(const controller_status_t& status) {
@@ -87,6 +90,8 @@ class EpisodeJoiner {
   /// Messages of a robot with another number of joints, and the newest such number.
   int64_t foreign() const { return foreign_; }
   int foreign_joints() const { return foreign_joints_; }
+  /// Episodes that were not over when too many others were under way.
+  int64_t cut_off() const { return cut_off_; }
 
  private:
   struct Episode {
@@ -143,6 +148,7 @@ class EpisodeJoiner {
   DropCounts drops_of_earlier_runs_;
   int64_t fitting_ = 0, foreign_ = 0;
   int foreign_joints_ = 0;
+  int64_t cut_off_ = 0;
 };
 
 }  // namespace
@@ -155,6 +161,10 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
   log.drops = joiner.drops();
   if (counts.undecodable > 0) {
     log.warnings.push_back(fmt::format("{} messages do not decode", counts.undecodable));
+  }
+  if (joiner.cut_off() > 0) {
+    log.warnings.push_back(fmt::format("{} episodes never end: more than {} are under way at once",
+                                       joiner.cut_off(), kMostEpisodes));
   }
   if (joiner.foreign() > 0) {
     log.warnings.push_back(fmt::format("{} messages are of a robot with {} joints, '{}' has {}",

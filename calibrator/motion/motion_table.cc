@@ -10,11 +10,13 @@
 
 #include "calibrator/motion/csv_table.h"
 #include "common/nearest_name.h"
+#include "robot/physical.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
 namespace {
 
+constexpr double kLatest = 1e12;  // [s]; Unix time in nanoseconds is none
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
 
@@ -101,10 +103,19 @@ Columns FindColumns(const CsvTable& table, const Names& names, const std::string
   return columns;
 }
 
+double Number(const CsvTable& table, int column, double greatest = kGreatestQuantity) {
+  const double number = table.Number(column);
+  if (std::abs(number) > greatest) {
+    table.Fail(fmt::format("{} is {}: beyond {} nothing is a robot's",
+                           Quoted(table.names()[static_cast<size_t>(column)]), number, greatest));
+  }
+  return number;
+}
+
 Eigen::VectorXd Numbers(const CsvTable& table, const std::vector<int>& columns) {
   Eigen::VectorXd numbers(columns.size());
   std::transform(columns.begin(), columns.end(), numbers.begin(),
-                 [&](int column) { return table.Number(column); });
+                 [&](int column) { return Number(table, column); });
   return numbers;
 }
 
@@ -147,7 +158,7 @@ class Efforts {
 std::vector<MotionRow> ReadRows(CsvTable& table, const Columns& columns, Efforts& efforts) {
   std::vector<MotionRow> rows;
   while (table.Next()) {
-    MotionRow row{table.Number(columns.t),
+    MotionRow row{Number(table, columns.t, kLatest),
                   Flag(table, columns.terminated) || Flag(table, columns.truncated),
                   efforts(Numbers(table, columns.u)),
                   {}};

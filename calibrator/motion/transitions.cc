@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "common/time_units.h"
+#include "robot/physical.h"
 
 namespace plumb {
 namespace {
@@ -82,6 +83,7 @@ DropCounts& DropCounts::operator+=(const DropCounts& other) {
 TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
     : n_(robot.num_joints()),
       period_(robot.task.period),
+      greatest_effort_(GreatestEffort(robot)),
       max_states_(kMaxStates),
       max_episodes_(kMaxEpisodes),
       max_commands_(kMaxCommands) {}
@@ -191,7 +193,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
     ++drops->late;
     return false;
   }
-  bool finite = true;
+  bool physical = true;
   int64_t expected = from;
   for (auto state = first; expected <= to; ++state, ++expected) {
     if (state == states_.end() || state->first != expected) {
@@ -210,7 +212,8 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
       return false;
     }
     EffortSegment segment{Seconds(now.utime - before.utime), ToEigen(now.effort)};
-    finite = finite && segment.duration > 0 && segment.effort.allFinite();
+    physical = physical && segment.duration > 0 &&
+               (segment.effort.array().abs() <= greatest_effort_).all();
     transition->efforts.push_back(std::move(segment));
   }
   const robot_state_t& s = first->second;
@@ -220,15 +223,17 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
   transition->q_sd = ToEigen(s.q_sd), transition->v_sd = ToEigen(s.v_sd);
   transition->next_q_sd = ToEigen(t.q_sd), transition->next_v_sd = ToEigen(t.v_sd);
   for (const Eigen::VectorXd* x :
-       {&transition->q, &transition->v, &transition->next_q, &transition->next_v, &transition->q_sd,
-        &transition->v_sd, &transition->next_q_sd, &transition->next_v_sd}) {
-    finite = finite && x->allFinite();
-  }
-  if (!finite) {
+       {&transition->q, &transition->v, &transition->next_q, &transition->next_v})
+    physical = physical && std::all_of(x->begin(), x->end(), IsPhysical);
+  for (const Eigen::VectorXd* sd :
+       {&transition->q_sd, &transition->v_sd, &transition->next_q_sd, &transition->next_v_sd})
+    physical = physical && std::all_of(sd->begin(), sd->end(), IsPhysicalSd);
+  if (!physical) {
     ++drops->not_finite;
     return false;
   }
-  if (const Eigen::VectorXd before = ToEigen(s.effort); before.allFinite())
+  if (const Eigen::VectorXd before = ToEigen(s.effort);
+      (before.array().abs() <= greatest_effort_).all())
     RestoreStep(before, &transition->efforts);
   return true;
 }

@@ -41,7 +41,7 @@ size_t CountTransitions(std::span<const Rollout> rollouts);
 struct DropCounts {
   int64_t gap = 0;         ///< a state or a command is missing
   int64_t late = 0;        ///< the interval is not one control period (within 20 %)
-  int64_t not_finite = 0;  ///< or an effort is unknown
+  int64_t not_finite = 0;  ///< or not physical (robot/physical.h), or an effort is unknown
   int64_t restart = 0;     ///< the estimator's filter restarted within the interval
   /// the simulator's dynamics are in a state: what it tells of parameters is what was put in
   int64_t model_based = 0;
@@ -102,7 +102,7 @@ class TransitionJoiner {
   void ForgetEpisode(Commands::iterator episode);
 
   int n_;
-  double period_;
+  double period_, greatest_effort_;
   size_t max_states_, max_episodes_, max_commands_;
   std::map<int64_t, robot_state_t> states_;  // by sequence
   Commands commands_;

@@ -208,5 +208,56 @@ TEST_CASE("what cannot be calibrated with is refused in one clear line") {
   refused(Robot("pendulum") + " --csv " + write("x.csv", "t\n") + " --method laplas", "laplas");
 }
 
+TEST_CASE("what is read, or is somebody else's, is not written over") {
+  const TemporaryFolder folder;
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::ofstream(folder / name) << text;
+    return folder / name;
+  };
+  std::string rows = "t,q/pivot,v/pivot,u/pivot\n";
+  for (int i = 0; i < 30; ++i)
+    rows += std::to_string(0.05 * i) + ",0.1," + std::to_string(i % 3) + ",1\n";
+  const std::string table = write("x.csv", rows), robot = folder / "robot";
+  fs::copy(Robot("pendulum"), robot);
+  const std::string description = Read(robot + "/robot.toml");
+  fs::create_symlink(table, folder / "link.csv");
+  const auto refused = [&](const std::string& arguments, const std::string& words) {
+    const Outcome outcome = Shell(Plumb() + arguments);
+    INFO(arguments << ": " << outcome.text);
+    CHECK(outcome.status == 1);
+    CHECK(outcome.text.find(words) != std::string::npos);
+    CHECK(Read(table) == rows);
+    CHECK(Read(robot + "/robot.toml") == description);
+  };
+  const std::string calibrate = "calibrate " + robot + " --csv " + table + " --output ";
+  refused(calibrate + table, "is read, too");
+  refused(calibrate + (folder / "link.csv"), "is read, too");
+  refused(calibrate + robot + "/robot.urdf", "is read, too");
+  refused("sim " + robot + " --csv " + robot + "/robot.toml", "is read, too");
+  refused("train " + robot + " --output " + robot + "/robot.toml", "is read, too");
+  for (const char* flag : {"--log ", "--can-log ", "--summary "})
+    refused("launch " + robot + " --lcm-url memq:// --bus loop: --output " + (folder / "run") +
+                " " + flag + robot + "/robot.toml",
+            "is read, too");
+  refused("launch " + robot + " --lcm-url memq:// --bus loop: --output " + (folder / "run") +
+              " --log " + table,
+          "is there and not an LCM log");
+  write("p.json.journal", "a diary");
+  refused(calibrate + (folder / "p.json"), "in the way and no journal");
+  CHECK(Read(folder / "p.json.journal") == "a diary");
+}
+
+TEST_CASE("names and files cannot control the terminal") {
+  const TemporaryFolder folder;
+  const std::string file = folder / "a\x1b]0;title\x07z.csv";
+  std::ofstream(file) << "t,q/pivot,v/pivot,u/pivot\n0,0,0,x\n";
+  const Outcome outcome = Shell(Plumb() + "calibrate " + Robot("pendulum") + " --csv '" + file +
+                                "' --output " + (folder / "p.json"));
+  INFO(outcome.text);
+  CHECK(outcome.status == 1);
+  CHECK(outcome.text.find("]0;title") != std::string::npos);
+  CHECK(outcome.text.find_first_of("\x1b\x07") == std::string::npos);
+}
+
 }  // namespace
 }  // namespace plumb

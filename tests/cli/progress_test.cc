@@ -212,5 +212,21 @@ TEST_CASE_METHOD(Fixture, "of policies that the run does not have nothing is rem
   CHECK(mallinfo2().uordblks - before < 10'000);
 }
 
+TEST_CASE_METHOD(Fixture, "what others say is shown without what would control the terminal") {
+  driver_status_t driver{};
+  driver.state = driver_status_t::FAULT;
+  driver.reason = "\x1b[2Jcable\noff\xff";
+  progress.OnDriver(driver);
+  const std::string bad = "\xef\xbf\xbd";
+  CHECK_THAT(progress.StatusLine(1), Catch::Contains("FAULT: " + bad + "[2Jcable off" + bad));
+  calibration_status_t status = Calibration(1);
+  status.combination[0] = "gravity\xff", status.gap = "\x1b]0;title\x07";
+  status.identifiability = "\xc3", status.alarm = "\xed\xa0\x80";
+  progress.OnCalibration(status);
+  CHECK(progress.TakeRows()[1] == "      " + bad + "]0;title" + bad);
+  CHECK_NOTHROW(progress.Summary({}).dump());  // valid UTF-8
+  CHECK_THAT(progress.Conclusion({}), !Catch::Contains("\xff"));
+}
+
 }  // namespace
 }  // namespace plumb

@@ -17,8 +17,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 bool Finite(const robot_state_t& state) {
   bool finite = true;
   for (const auto* values : {&state.q, &state.v, &state.q_sd, &state.v_sd})
-    finite = finite && std::all_of(values->begin(), values->end(),
-                                   [](double x) { return std::isfinite(x); });
+    finite = finite &&
+             std::all_of(values->begin(), values->end(), [](double x) { return std::isfinite(x); });
   return finite;
 }
 
@@ -49,7 +49,8 @@ imu_t StillImu(const RobotDescription& robot, int64_t k) {
   return imu;
 }
 
-TEST_CASE("one effort, velocity or position that is not physical is refused, and the next is used") {
+TEST_CASE(
+    "one effort, velocity or position that is not physical is refused, and the next is used") {
   const RobotDescription robot = LoadPendulum("robot.toml");
   for (const double forged : {1e308, -1e308, 1e200, 1e150, 1e10, kInfinity}) {
     for (std::vector<double> joint_state_t::*field :
@@ -120,7 +121,8 @@ TEST_CASE("a state that is valid is finite, whatever the sensors say") {
       }
       for (const int64_t end = k + 600; k < end; ++k) look(Still(robot, k), StillImu(robot, k));
       for (int i = 0; i < robot.num_joints(); ++i) {
-        if (!observer.of_base(i)) REQUIRE(std::abs(observer.state().q[static_cast<size_t>(i)]) < 0.05);
+        if (!observer.of_base(i))
+          REQUIRE(std::abs(observer.state().q[static_cast<size_t>(i)]) < 0.05);
       }
     }
   }

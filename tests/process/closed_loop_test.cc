@@ -262,7 +262,7 @@ TEST_CASE("a second run beside the first, and a bus that may carry a real robot,
              Contains("another run is under way"));
   stage.Listen(0.1);
   CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", stage.bus_url, "second"),
-             Contains("somebody talks on"));
+             Contains("another run is under way on " + stage.bus_url));
   stage.Listen(0.1);
   CHECK_THAT(refusal("udpm://239.255.76.67:17760?ttl=0", "udp:239.74.163.2:23260", "run"),
              Contains("in use by process " + std::to_string(launch.pid())));

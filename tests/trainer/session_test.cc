@@ -162,5 +162,36 @@ TEST_CASE("A newer distribution of the iteration takes effect at the next batch"
   CHECK_FALSE(session.Replace(Distribution(0)));  // its policy is out
 }
 
+// Nothing that is sent may end the trainer.
+TEST_CASE("a distribution that cannot be simulated is refused, and a good one begins after it") {
+  TrainingSession session = NewSession();
+  ParameterDistribution impossible = Distribution(0);
+  impossible.mixture.components[0].mean[0] = 800;  // gravity and length are infinite
+  impossible.mixture.components[0].mean[2] = 800;
+  CHECK_THROWS_WITH(
+      session.Begin(impossible),
+      Catch::Equals("parameter distribution: of 20 simulators drawn from it 20 cannot be "
+                    "simulated"));
+  CHECK(session.awaited() == 0);
+  REQUIRE(session.Begin(Distribution(0)));
+  CHECK_THROWS(session.Replace(impossible));
+  TrainToTheEnd(session);
+  TrainingSession undisturbed = NewSession();
+  REQUIRE(undisturbed.Begin(Distribution(0)));
+  TrainToTheEnd(undisturbed);
+  CHECK(session.Policy(1).weight == undisturbed.Policy(1).weight);
+}
+
+TEST_CASE("a policy that is too large to be sent is refused before it is trained") {
+  RobotDescription robot = PendulumRobot();
+  robot.training.hidden = {1000, 1000};
+  CHECK_NOTHROW(RequireSendable(robot));
+  robot.training.hidden = {1100, 1000};
+  CHECK_THROWS_WITH(RequireSendable(robot), Catch::Contains("[training] hidden") &&
+                                                Catch::Contains("4.2 MB") &&
+                                                Catch::Contains("4 MB"));
+  CHECK_THROWS(TrainingSession(robot, MakeGymPendulum, 1, 1, 1));
+}
+
 }  // namespace
 }  // namespace plumb

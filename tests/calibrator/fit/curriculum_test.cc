@@ -9,6 +9,7 @@
 #include "common/decompositions.h"
 #include "sim/windows.h"
 #include "tests/calibrator/hopper.h"
+#include "tests/calibrator/synthetic.h"
 
 namespace plumb {
 namespace {
@@ -261,6 +262,26 @@ TEST_CASE("stages say what they did") {
   CHECK((fit.one_step.errors.array() * fit.noise_sd.replicate(400, 1).array() - raw.array())
             .abs()
             .maxCoeff() < 1e-12);
+}
+
+// Their squares overflow: no mode explains them, and there is no noise to go on with.
+TEST_CASE("errors beyond all numbers are refused") {
+  const RobotDescription robot = Pendulum();
+  Eigen::VectorXd truth(robot.parameters.size());
+  for (size_t i = 0; i < robot.parameters.size(); ++i)
+    truth(static_cast<Eigen::Index>(i)) = robot.parameters[i].mean;
+  for (const bool surely : {false, true}) {
+    Rollout rollout = SyntheticRollout(robot, truth, 60, 1e-3, 1e-2, 1);
+    for (Transition& t : rollout.transitions) {
+      if (surely) {
+        for (auto* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd}) sd->setConstant(1e-160);
+      } else {
+        t.next_q.setConstant(1e160), t.next_v.setConstant(1e160);
+      }
+    }
+    CHECK_THROWS_AS(FitCurriculum(std::make_shared<Model>(robot), std::span(&rollout, 1), {}),
+                    std::invalid_argument);
+  }
 }
 
 }  // namespace

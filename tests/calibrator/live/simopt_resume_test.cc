@@ -14,6 +14,8 @@
 #include "calibrator/live/checkpoint.h"
 #include "calibrator/live/simopt.h"
 #include "calibrator/results/posterior_file.h"
+#include "common/config.h"
+#include "common/sealed.h"
 #include "robot/parameter_distribution.h"
 #include "robot/posterior_reader.h"
 #include "tests/calibrator/live/known_pendulum.h"
@@ -76,8 +78,8 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
                       Catch::Contains("another seed"));
   }
   SECTION("a damaged checkpoint is refused, naming the file") {
-    std::ofstream(folder / "rollout_1.json") << "{\"episode\": 3";
-    CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("rollout_1.json"));
+    std::ofstream(folder / "rollout_1.checkpoint") << "{\"episode\": 3";
+    CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("rollout_1.checkpoint"));
   }
 }
 
@@ -190,11 +192,10 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   REQUIRE(loaded);
   CHECK(SameBits(loaded->distribution, state.distribution));
   CHECK(std::isnan(loaded->ess));
-  std::string text =
-      (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
-  text.replace(text.find("\"version\": 7"), 12, "\"version\": 1");
-  std::ofstream(folder / "calibration.json") << text;
-  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("another version"));
+  std::string bytes = ReadFile(folder / "calibration.checkpoint");
+  bytes[8] = 7;  // the version
+  std::ofstream(folder / "calibration.checkpoint") << bytes;
+  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("has version 7, not 8"));
 }
 
 TEST_CASE("what the simulators lack is told to the trainer again after a resumption") {
@@ -231,14 +232,48 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
   CHECK(told(*loaded) == told(state));
   CHECK(told(*loaded) != told(simopt.state()));
 
-  std::string text =
-      (std::stringstream() << std::ifstream(folder / "calibration.json").rdbuf()).str();
-  const size_t at = text.find("\"residual\": \"") + 13;
+  const Seal seal{"PLUMBCAL", 8, "a calibrator's checkpoint"};
+  const std::string bytes = ReadFile(folder / "calibration.checkpoint");
+  const std::string text(Unsealed(seal, bytes));
+  const size_t at = text.find("\"residual\":\"") + 12;
   for (const std::string& spoilt : {text.substr(0, at) + text.substr(at + 2),
                                     text.substr(0, at) + "zz" + text.substr(at + 2)}) {
-    std::ofstream(folder / "calibration.json") << spoilt;
-    CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("calibration.json: the residual is none"));
+    std::ofstream(folder / "calibration.checkpoint") << Sealed(seal, spoilt);
+    CHECK_THROWS_WITH(checkpoint.Load(),
+                      Catch::Contains("calibration.checkpoint: the residual is none"));
   }
+}
+
+TEST_CASE("no bit of a checkpoint can be changed unnoticed, nor a size be wrong") {
+  const RobotDescription robot = Pendulum();
+  SimOpt::State state = SimOpt(robot, 1, 1).state();
+  Transition t{};
+  for (auto* x : {&t.q, &t.v, &t.next_q, &t.next_v, &t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
+    x->setConstant(1, 0.25);
+  t.efforts = {{0.05, Eigen::VectorXd::Ones(1)}};
+  state.rollouts = {{1, 0, {t}}};
+  state.rollouts_per_iteration = {1};
+  const TemporaryFolder folder;
+  const auto load = [&] { return CalibrationCheckpoint(folder.path(), robot, 1).Load(); };
+  CalibrationCheckpoint(folder.path(), robot, 1).Save(state);
+  REQUIRE(load()->rollouts.size() == 1);
+  for (const char* name : {"calibration.checkpoint", "rollout_0.checkpoint"}) {
+    const std::string good = ReadFile(folder / name);
+    for (size_t bit = 0; bit < 8 * good.size(); ++bit) {
+      std::string damaged = good;
+      damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ (1 << bit % 8));
+      std::ofstream(folder / name) << damaged;
+      REQUIRE_THROWS_WITH(load(), Catch::Contains(name));
+    }
+    std::ofstream(folder / name) << good;
+  }
+  // Whole, but of no such robot, or of none at all.
+  state.rollouts[0].transitions[0].v_sd.setConstant(2, 0.25);
+  CalibrationCheckpoint(folder.path(), robot, 1).Save(state);
+  CHECK_THROWS_WITH(load(), Catch::Contains("wrong size"));
+  state.rollouts[0].transitions[0].v_sd.setConstant(1, 1e-160);
+  CalibrationCheckpoint(folder.path(), robot, 1).Save(state);
+  CHECK_THROWS_WITH(load(), Catch::Contains("not physical"));
 }
 
 }  // namespace

@@ -41,6 +41,10 @@ TEST_CASE("a table that cannot be right is refused with its line and the reason"
       {"two signs", head + "0,1,0,+-1\n", ":2: 'u/pivot' is '+-1': that is no number"},
       {"infinite", two + "0.1,inf,0,0\n",
        ":4: 'q/pivot' is 'inf': it must be finite, or nan where nothing was observed"},
+      {"not physical", two + "0.1,-1e150,0,0\n",
+       ":4: 'q/pivot' is -1e+150: beyond 1000000000 nothing is a robot's"},
+      {"time", two + "1e150,0,0,0\n",
+       ":4: 't' is 1e+150: beyond 1000000000000 nothing is a robot's"},
       {"too large", two + "0.1,1e999,0,0\n",
        ":4: 'q/pivot' is '1e999': a number too large or too small for a double"},
       {"no time", head + "nan,1,0,0\n", ":2: t must be known"},
@@ -128,7 +132,7 @@ TEST_CASE("whatever happens to a table, it is refused or read as finite transiti
   Random random(21);
   int refused = 0, read = 0;
   const TemporaryFile file("", ".csv");
-  for (int i = 0; i < 6000; ++i) {
+  for (int i = 0; i < 7000; ++i) {
     const std::string mutant = Mutant(originals[i % 2], random);
     file.Write(mutant);
     INFO(mutant);
@@ -141,7 +145,7 @@ TEST_CASE("whatever happens to a table, it is refused or read as finite transiti
         for (const Transition& t : rollout.transitions) {
           REQUIRE(t.step > step);
           step = t.step;
-          REQUIRE((t.q.allFinite() && t.v.allFinite()));
+          REQUIRE((t.q.cwiseAbs().maxCoeff() <= 1e9 && t.v.cwiseAbs().maxCoeff() <= 1e9));
           REQUIRE((!std::isnan(t.next_q(0)) || !std::isnan(t.next_v(0))));
           REQUIRE_FALSE((std::isinf(t.next_q(0)) || std::isinf(t.next_v(0))));
           REQUIRE(t.duration() == Approx(0.05).epsilon(0.21));

@@ -327,5 +327,17 @@ TEST_CASE("whatever happens to a log, it is refused or read as finite transition
   }
 }
 
+// Each stays until it is over: 200 000 would be looked through for each of 200 000 commands.
+TEST_CASE("episodes that never end are cut off, and counted") {
+  Recording recording;
+  recording.Episode(7, 0, 20);
+  recording.States(181, 210);
+  for (int i = 0; i < 20'000; ++i) recording.Command(100'000, 1'000 + i, 0);
+  const Log log = Read(recording.bytes);
+  CHECK(CountTransitions(log.rollouts) == 20);
+  REQUIRE(log.warnings.size() == 1);
+  CHECK(log.warnings[0] == "15001 episodes never end: more than 5000 are under way at once");
+}
+
 }  // namespace
 }  // namespace plumb

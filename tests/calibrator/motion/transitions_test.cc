@@ -284,5 +284,26 @@ TEST_CASE_METHOD(Fixture,
   CHECK(joiner.Join(42, 300).transitions.size() == 20);
 }
 
+TEST_CASE_METHOD(Fixture, "one state that is not physical takes its own transition, and no other") {
+  const std::pair<std::vector<double> robot_state_t::*, double> forgeries[] = {
+      {&robot_state_t::effort, 1e150}, {&robot_state_t::effort, -21 * robot.joints[0].effort_limit},
+      {&robot_state_t::q, 1e150},      {&robot_state_t::v, -1e10},
+      {&robot_state_t::q_sd, 1e-160},  {&robot_state_t::v_sd, -1}};
+  for (const auto& [member, value] : forgeries) {
+    joiner = TransitionJoiner(robot);
+    States();
+    robot_state_t forged = State(130);
+    (forged.*member)[0] = value;
+    joiner.OnState(forged);
+    Commands();
+    const Rollout rollout = joiner.Join(42, 300);
+    CHECK(rollout.transitions.size() >= 18);
+    CHECK(joiner.drops().not_finite == 20 - static_cast<int64_t>(rollout.transitions.size()));
+    for (const Transition& t : rollout.transitions) {
+      for (const EffortSegment& segment : t.efforts) CHECK(std::abs(segment.effort(0)) < 10);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace plumb

@@ -241,5 +241,26 @@ TEST_CASE("a spherical joint is refused by name") {
   CHECK_THROWS_WITH(UnscentedObserver(robot), Catch::Contains("joint pivot is spherical"));
 }
 
+TEST_CASE("a state that is valid is finite, whatever the drives say, and the truth comes back") {
+  UnscentedObserver observer(Slide());
+  int64_t k = 0;
+  const auto tell = [&](double velocity, double effort) {
+    const joint_state_t measured = Measured(k++, 0.1, velocity, effort);
+    observer.OnJointState(measured, Kinematic(measured, 0.1, 0));
+    const robot_state_t& state = observer.state();
+    if (state.valid) {
+      REQUIRE((std::isfinite(state.q[0]) && std::isfinite(state.v[0]) &&
+               std::isfinite(state.q_sd[0]) && std::isfinite(state.v_sd[0])));
+    }
+  };
+  for (int i = 0; i < 20; ++i) tell(0, 0);
+  for (const double size : {1e5, 1e7, 9.9e8}) {
+    for (const double sign : {-1., 1.}) tell(sign * size, 0), tell(0, sign * size);
+    for (int i = 0; i < 50; ++i) tell(0, 0);
+    CHECK(std::abs(observer.state().q[0] - 0.1) < 1e-2);
+    CHECK(std::abs(observer.state().v[0]) < 0.1);
+  }
+}
+
 }  // namespace
 }  // namespace plumb

@@ -1,0 +1,51 @@
+#include "cli/outputs.h"
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
+
+#include "common/atomic_file.h"
+#include "common/config.h"
+
+namespace plumb {
+
+void RequireNotRead(const std::vector<std::string>& outputs,
+                    const std::vector<std::string>& inputs) {
+  std::error_code none;  // one that is not there is nobody's input
+  for (const std::string& output : outputs) {
+    for (const std::string& input : inputs) {
+      if (!output.empty() && !input.empty() && std::filesystem::equivalent(output, input, none))
+        throw std::invalid_argument(output + ": is read, too: give another file to write");
+    }
+  }
+}
+
+void RequireOutputs(const std::vector<std::string>& outputs,
+                    const std::vector<std::string>& inputs) {
+  RequireNotRead(outputs, inputs);
+  for (const std::string& output : outputs) {
+    if (!output.empty()) RequireWritable(output);
+  }
+}
+
+std::vector<std::string> FilesOf(const RobotDescription& robot) {
+  std::vector<std::string> files;
+  Config root = Config::Load(robot.file, &files);
+  const std::filesystem::path folder = std::filesystem::path(robot.file).parent_path();
+  files.push_back((folder / root.Table("robot").String("urdf")).string());
+  return files;
+}
+
+void RequireSameKind(const std::string& file, const std::string& begins, const std::string& kind) {
+  std::error_code none;
+  if (file.empty() || !std::filesystem::is_regular_file(file, none)) return;
+  std::string found(begins.size(), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(found.data(), static_cast<std::streamsize>(found.size()));
+  found.resize(static_cast<size_t>(stream.gcount()));
+  if (!begins.starts_with(found))
+    throw std::invalid_argument(file + ": is there and not " + kind + ": it is not written over");
+}
+
+}  // namespace plumb

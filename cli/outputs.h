@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "robot/description.h"
+
+namespace plumb {
+
+// Before a long computation rather than after it. Empty names are passed over.
+
+/// No output is one of the inputs, whatever name it goes by. Thread-safe.
+/// @throws std::invalid_argument naming the file.
+void RequireNotRead(const std::vector<std::string>& outputs,
+                    const std::vector<std::string>& inputs);
+
+/// Every output can be written (RequireWritable), too. Thread-safe.
+/// @throws std::runtime_error or std::invalid_argument naming the file.
+void RequireOutputs(const std::vector<std::string>& outputs,
+                    const std::vector<std::string>& inputs);
+
+/// robot.toml, the files that it extends, and its URDF. Not thread-safe.
+std::vector<std::string> FilesOf(const RobotDescription& robot);
+
+/// A file that would be written over is of the kind that is going to be written, or empty.
+/// @param begins what files of that kind begin with. @param kind "an LCM log"
+/// @throws std::invalid_argument naming the file.
+void RequireSameKind(const std::string& file, const std::string& begins, const std::string& kind);
+
+}  // namespace plumb

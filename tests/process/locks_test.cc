@@ -1,0 +1,56 @@
+// Two runs that begin at the same moment.
+
+#include <chrono>
+#include <thread>
+#include <vector>
+
+#include "tests/process/launch.h"
+
+namespace plumb {
+namespace {
+
+using Catch::Contains;
+
+// One of the two, whichever it is, is refused at once; the other goes on until it is stopped.
+void OneIsRefused(std::vector<Child>& runs, const std::string& words) {
+  while (runs[0].running() && runs[1].running())
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  Child &refused = runs[runs[0].running() ? 1 : 0], &other = runs[runs[0].running() ? 0 : 1];
+  INFO(refused.Tail(20));
+  CHECK(refused.ending() == "exit status 1");
+  CHECK_THAT(refused.Tail(1), Contains(words));
+  CHECK(other.running());
+  other.Signal(SIGINT);
+  REQUIRE(other.WaitFor(120));
+}
+
+TEST_CASE("two launches on one bus, one LCM group or in one folder at the same moment") {
+  Stage stage(62);
+  const auto launch = [&](const std::string& lcm_url, const std::string& bus,
+                          const std::string& output, const std::string& log) {
+    return Child("plumb",
+                 {Stage::Binary("plumb"), "launch", stage.robot_folder, "--lcm-url", lcm_url,
+                  "--bus", bus, "--output", stage.folder / output},
+                 stage.folder / log);
+  };
+  const std::string lcm = stage.lcm_url, bus = stage.bus_url;
+  std::vector<Child> runs;
+  SECTION("the bus") {
+    runs.push_back(launch("memq://", bus, "a", "a.log"));
+    runs.push_back(launch("memq://", bus, "b", "b.log"));
+    OneIsRefused(runs, "another run is under way on " + bus);
+  }
+  SECTION("the group") {
+    runs.push_back(launch(lcm, "loop:", "a", "a.log"));
+    runs.push_back(launch(lcm, "loop:", "b", "b.log"));
+    OneIsRefused(runs, "another run is under way on " + lcm);
+  }
+  SECTION("the folder") {
+    runs.push_back(launch("memq://", "loop:", "a", "a.log"));
+    runs.push_back(launch("memq://", "loop:", "a", "b.log"));
+    OneIsRefused(runs, "in use by process");
+  }
+}
+
+}  // namespace
+}  // namespace plumb
