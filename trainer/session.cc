@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/lcm_datagrams.h"
+#include "common/seal.h"
 #include "sim/residual_inputs.h"
 #include "sim/tasks/task.h"
 
@@ -28,12 +30,12 @@ void RequireSendable(const RobotDescription& robot) {
   const GaussianPolicy policy(
       {task->observation_size(), robot.training.hidden, task->action_size()});
   const double megabyte = 1 << 20;
-  const int size = policy.ToMessage().getEncodedSize();
-  if (size <= kLargestPolicy) return;
+  const auto size = static_cast<size_t>(policy.ToMessage().getEncodedSize()) + kSealSize;
+  if (size <= kMaxLcmMessage) return;
   throw std::invalid_argument(fmt::format(
       "[training] hidden: its policy is a message of {:.1f} MB, and what has more than {:.0f} MB "
       "gets through to nobody: take fewer units",
-      size / megabyte, kLargestPolicy / megabyte));
+      static_cast<double>(size) / megabyte, static_cast<double>(kMaxLcmMessage) / megabyte));
 }
 
 TrainingSession::TrainingSession(const RobotDescription& description, const SimulationFactory& make,

@@ -13,10 +13,8 @@
 
 namespace plumb {
 
-/// [bytes] of a POLICY: what has more does not pass LCM's guard (common/lcm_guard.h).
-inline constexpr int kLargestPolicy = 4 << 20;
-
-/// Whether the policy that [training] `hidden` makes can be sent. Thread-safe.
+/// Whether the policy that [training] `hidden` makes can be sent: sealed it may have kMaxLcmMessage
+/// bytes. Thread-safe.
 /// @throws std::invalid_argument if it cannot, one line for people.
 void RequireSendable(const RobotDescription& robot);
 
