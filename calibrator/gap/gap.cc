@@ -116,7 +116,8 @@ void TakeConsidered(const MethodInput& input, const Gaussian& considered, GapFit
   fit->result.samples = Transform(considered, StandardNormals(n, kPosteriorSamples, random));
 }
 
-// The method on free steps alone. @return false if the model does not explain them, either.
+// The method on free steps alone. @return false if the model does not explain them, either, and by
+// an amount that counts.
 bool LearnFree(const MethodInput& input, std::span<const Rollout> free, GapFit* fit) {
   const MethodInput part{input.model, free, input.options, input.start};
   try {
@@ -124,7 +125,7 @@ bool LearnFree(const MethodInput& input, std::span<const Rollout> free, GapFit* 
     const OneStepView view = ViewOneStep(part, result);
     fit->simulated_steps += view.simulated_steps;
     const ModelTest test = TestModel(part, result, view, &fit->simulated_steps);
-    if (test.found.alarm) {
+    if (test.found.alarm && Matters(part, result)) {
       fit->result.simulated_steps += result.simulated_steps;
       fit->result.failures += result.failures;
       return false;

@@ -50,8 +50,8 @@ struct GapFit {
 ///   2. If a residual would not be worth it (kLeastExplained, kLeastEffect), there is none, and the
 ///      posterior is ModelTest's considered one: as wide as what may be wrong makes it.
 ///   3. Else steps that touch the ground or a stop are left out, if there are any, and the method
-///      runs again on the others. If these do not raise the alarm, the parameters are theirs, the
-///      considered ones again: the alarm does not see everything.
+///      runs again on the others. If these do not raise the alarm, or a residual of theirs would
+///      not be worth it, the parameters are theirs, the considered ones again.
 ///   4. If they do, or if too few are left, nothing informs the parameters: the prior stays.
 ///   5. A residual for what was left out is learnt for draws of that posterior, from all steps.
 ///
