@@ -12,10 +12,11 @@ namespace plumb {
 
 void RequireNotRead(const std::vector<std::string>& outputs,
                     const std::vector<std::string>& inputs) {
-  std::error_code none;  // one that is not there is nobody's input
+  std::error_code not_there;  // a file that does not exist yet is the input of nothing
   for (const std::string& output : outputs) {
     for (const std::string& input : inputs) {
-      if (!output.empty() && !input.empty() && std::filesystem::equivalent(output, input, none))
+      if (!output.empty() && !input.empty() &&
+          std::filesystem::equivalent(output, input, not_there))
         throw std::invalid_argument(output + ": is read, too: give another file to write");
     }
   }
@@ -38,8 +39,8 @@ std::vector<std::string> FilesOf(const RobotDescription& robot) {
 }
 
 void RequireSameKind(const std::string& file, const std::string& begins, const std::string& kind) {
-  std::error_code none;
-  if (file.empty() || !std::filesystem::is_regular_file(file, none)) return;
+  std::error_code not_there;
+  if (file.empty() || !std::filesystem::is_regular_file(file, not_there)) return;
   std::string found(begins.size(), '\0');
   std::ifstream stream(file, std::ios::binary);
   stream.read(found.data(), static_cast<std::streamsize>(found.size()));

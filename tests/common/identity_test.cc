@@ -1,29 +1,23 @@
-// Who says what, and who is believed: signed and unsigned.
+// Who is believed with a key.
 
 #include "common/identity.h"
 
 #include <sodium.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
-#include "common/process_number.h"
-#include "plumb/joint_command_t.hpp"
+#include "tests/common/sealed_message.h"
 #include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
 
-using Bytes = std::vector<uint8_t>;
 using Catch::Contains;
 using Reach = Identity::Reach;
 
-constexpr int64_t kNow = 1'700'000'000'000'000;  // [us]
-constexpr char kChannel[] = "JOINT_COMMAND";
 constexpr char kForeign[] = "not signed with the driver's key, for its robot and its bus";
 
 std::string Hex(const Bytes& bytes) {
@@ -31,24 +25,6 @@ std::string Hex(const Bytes& bytes) {
   sodium_bin2hex(text.data(), text.size(), bytes.data(), bytes.size());
   text.pop_back();
   return text;
-}
-
-Bytes Encoded(double effort = 0.5) {
-  joint_command_t command{};
-  command.utime = kNow;
-  command.num_joints = 1;
-  command.effort = {effort};
-  command.position = command.velocity = command.kp = command.kd = {0};
-  Bytes bytes(static_cast<size_t>(command.getEncodedSize()));
-  command.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
-
-Bytes Say(Identity& who, std::string_view channel = kChannel) {
-  Bytes bytes = Encoded();
-  bytes.resize(bytes.size() + kSealSize);
-  who.Seal(channel, bytes);
-  return bytes;
 }
 
 /// Processes that share a key and a clock that the test sets.
@@ -75,10 +51,6 @@ struct Signed {
   TemporaryFolder folder;
   std::shared_ptr<std::atomic<int64_t>> time = std::make_shared<std::atomic<int64_t>>();
 };
-
-std::string Heard(ChannelJudge& judge, const Identity& me, const Bytes& bytes) {
-  return std::string(judge.Hear(me, kChannel, bytes).refusal);
-}
 
 TEST_CASE_METHOD(Signed, "a message with any bit changed, cut short or lengthened is not genuine") {
   Identity driver = Driver(), controller = Controller(driver);
@@ -217,152 +189,6 @@ TEST_CASE_METHOD(Signed, "Python signs what we accept") {
   REQUIRE(fread(theirs.data(), 1, theirs.size(), pipe) == theirs.size());
   CHECK(pclose(pipe) == 0);
   CHECK(theirs == Hex(ours));
-}
-
-/// Processes without a key on one machine.
-struct Unsigned {
-  ChannelJudge judge;
-  Identity listener = Member(), one = Member(), two = Member();
-  static Identity Member(int64_t run = 0, Reach reach = Reach::kMachine) {
-    return Identity("test", {}, Clock(), reach, run);
-  }
-  bool Believed(const Bytes& bytes) { return Heard(judge, listener, bytes).empty(); }
-  bool Two(const Bytes& bytes) { return judge.Hear(listener, kChannel, bytes).two_speakers; }
-  /// A message of a process that has ended.
-  static Bytes SayOfTheDead(int64_t sender, int64_t counter) {
-    int ends[2];
-    REQUIRE(pipe(ends) == 0);
-    const pid_t child = fork();
-    if (child == 0) {
-      const int64_t number = ProcessNumber(getpid());
-      _exit(write(ends[1], &number, sizeof number) == sizeof number ? 0 : 1);
-    }
-    int64_t number = 0;
-    REQUIRE(read(ends[0], &number, sizeof number) == sizeof number);
-    REQUIRE(waitpid(child, nullptr, 0) == child);
-    close(ends[0]), close(ends[1]);
-    REQUIRE(number != 0);
-    REQUIRE_FALSE(Runs(number));
-    Bytes bytes = Encoded();
-    bytes.resize(bytes.size() + kSealSize);
-    WriteSeal({0, sender, number, counter, {}}, nullptr, "", "", kChannel, bytes);
-    return bytes;
-  }
-};
-
-TEST_CASE_METHOD(Unsigned, "without a key, whoever speaks beside a process that runs is a second") {
-  REQUIRE(Believed(Say(one)));
-  REQUIRE(Believed(Say(one)));
-  CHECK(Two(Say(two)));
-  CHECK(Two(Encoded()));  // of a program that is not ours
-  CHECK_THAT(judge.owner(), Contains("process " + std::to_string(getpid())));
-  CHECK(judge.latest() == "somebody who does not say who");
-  CHECK(Believed(Say(one)));
-}
-
-TEST_CASE_METHOD(Unsigned, "who copies another's seal is found out when either of them speaks") {
-  REQUIRE(Believed(Say(one)));
-  const Bytes copied = Say(one);
-  REQUIRE(Believed(copied));
-  CHECK(Two(copied));
-  // It counts on for the one that it copies, and that one speaks again.
-  Bytes forged = Say(one);
-  const Bytes genuine = Say(one);
-  const Seal seal = *FindSeal(genuine);
-  WriteSeal({0, seal.sender, seal.process, seal.counter + 5, {}}, nullptr, "", "", kChannel,
-            forged);
-  REQUIRE(Believed(forged));
-  CHECK(Two(genuine));
-}
-
-TEST_CASE_METHOD(Unsigned, "a process that was started again takes its channel over at once") {
-  REQUIRE(Believed(SayOfTheDead(7, 1000)));
-  CHECK(Believed(Say(one)));
-  CHECK(Believed(Say(one)));
-}
-
-TEST_CASE_METHOD(Unsigned, "a log may be played twice, with all that was started again in it") {
-  for (int times = 0; times < 2; ++times) {
-    CHECK(Believed(SayOfTheDead(7, 1000)));
-    CHECK(Believed(SayOfTheDead(7, 1001)));
-    CHECK(Believed(SayOfTheDead(8, 2000)));
-  }
-}
-
-TEST_CASE_METHOD(Unsigned,
-                 "a program that is not ours may speak alone, and not in turns with another") {
-  CHECK(Believed(Encoded()));
-  CHECK(Believed(Encoded()));
-  CHECK(Believed(Say(one)));  // it may have ended: nobody knows
-  CHECK(Two(Encoded()));
-}
-
-TEST_CASE_METHOD(Unsigned, "of a run only its processes are believed, but anybody may ask") {
-  listener = Member(4711);
-  Identity member = Member(4711), other_run = Member(4712);
-  CHECK(Two(Encoded()));
-  CHECK(Two(Say(one)));
-  CHECK(Two(Say(other_run)));
-  CHECK(Believed(Say(member)));
-  ChannelJudge requests(Speakers::kSeveral);
-  for (const Bytes& bytes : {Encoded(), Say(one), Say(two), Say(one), Encoded()})
-    CHECK(Heard(requests, listener, bytes).empty());
-}
-
-TEST_CASE_METHOD(Unsigned, "on a network a repetition is one, and says nothing of who speaks") {
-  listener = Member(0, Reach::kNetwork);
-  const Bytes first = Say(one), second = Say(one);
-  REQUIRE(Believed(first));
-  REQUIRE(Believed(second));
-  CHECK(Heard(judge, listener, second) == "a repetition");
-  CHECK_FALSE(Two(first));
-  // Where nobody can see whether the first one still runs, it is two when it speaks again.
-  CHECK(Believed(Say(two)));
-  CHECK(Two(Say(one)));
-}
-
-TEST_CASE("who only looks on believes everything and says nothing of himself") {
-  Identity nobody;
-  ChannelJudge judge;
-  CHECK_FALSE(nobody.known());
-  Identity one = Unsigned::Member(), two = Unsigned::Member();
-  for (const Bytes& bytes : {Say(one), Say(two), Encoded(), Say(one)})
-    CHECK(Heard(judge, nobody, bytes).empty());
-}
-
-TEST_CASE("a process has a number of its own, as long as it runs") {
-  const int64_t number = ProcessNumber(getpid());
-  REQUIRE(number != 0);
-  CHECK(ProcessId(number) == getpid());
-  CHECK(Runs(number));
-  CHECK_FALSE(Runs(number + (1 << 22)));  // of the same id, started later
-  CHECK_FALSE(Runs(0));
-  CHECK(ProcessNumber(-1) == 0);
-  const pid_t child = fork();
-  if (child == 0) pause();
-  const int64_t its = ProcessNumber(child);
-  CHECK(its != number);
-  CHECK(Runs(its));
-  kill(child, SIGKILL);
-  siginfo_t info;
-  REQUIRE(waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOWAIT) == 0);
-  CHECK_FALSE(Runs(its));  // dead, and not buried
-  REQUIRE(waitpid(child, nullptr, 0) == child);
-  CHECK_FALSE(Runs(its));
-}
-
-TEST_CASE("a message without a seal is all message, and with one it is found behind it") {
-  CHECK(Unsealed(Encoded()).size() == Encoded().size());
-  CHECK_FALSE(FindSeal(Encoded()));
-  CHECK(Unsealed({}).empty());
-  Identity one = Unsigned::Member(12);
-  const Bytes sealed = Say(one);
-  const std::span<const uint8_t> message = Unsealed(sealed);
-  CHECK(Bytes(message.begin(), message.end()) == Encoded());
-  REQUIRE(FindSeal(sealed));
-  CHECK(FindSeal(sealed)->run == 12);
-  CHECK(FindSeal(sealed)->sender == one.sender());
-  CHECK(FindSeal(sealed)->signature == Signature{});
 }
 
 }  // namespace
