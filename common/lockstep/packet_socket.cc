@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -17,11 +19,21 @@ namespace plumb {
 namespace {
 
 constexpr size_t kHead = sizeof(uint32_t);
-constexpr size_t kChunk = size_t{1} << 16;  // [bytes] read in one go
-constexpr int kSoon = 100;                  // [ms] for which a Read waits, at most
+constexpr size_t kChunk = size_t{1} << 16;  // [bytes] sent in one go
+constexpr timeval kSoon{0, 100'000};        // for which a Read waits, at most
 
 [[noreturn]] void Fail(const std::string& path, const char* what) {
   throw std::runtime_error(fmt::format("{}: {} ({})", path, what, std::strerror(errno)));
+}
+
+/// Chunks, rather than a stream: who waits in a blocking recv on a stream is woken, for nothing,
+/// when the other end reads what was sent before.
+PacketSocket MakeSocket(int flags) {
+  return PacketSocket(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | flags, 0));
+}
+
+void LimitWaiting(const PacketSocket& socket) {
+  if (socket.open()) setsockopt(socket.fd(), SOL_SOCKET, SO_RCVTIMEO, &kSoon, sizeof kSoon);
 }
 
 /// An address has room for 107 bytes only, a path may be longer: its folder is opened, and named by
@@ -49,10 +61,6 @@ struct Address {
   sockaddr_un name{};
   int directory;
 };
-
-PacketSocket MakeSocket(int flags) {
-  return PacketSocket(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | flags, 0));
-}
 
 }  // namespace
 
@@ -90,11 +98,14 @@ PacketSocket PacketSocket::Connect(const std::string& path) {
   if (!socket.open() || connect(socket.fd(), address.get(), sizeof address.name) != 0) {
     Fail(path, "nobody keeps a run's time there");
   }
+  LimitWaiting(socket);
   return socket;
 }
 
 PacketSocket PacketSocket::Accept() const {
-  return PacketSocket(accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC));
+  PacketSocket socket(accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC));
+  LimitWaiting(socket);
+  return socket;
 }
 
 bool PacketSocket::Send(std::span<const uint8_t> packet, const std::function<bool()>& waiting) {
@@ -103,8 +114,8 @@ bool PacketSocket::Send(std::span<const uint8_t> packet, const std::function<boo
   std::memcpy(out_.data(), &length, kHead);
   if (!packet.empty()) std::memcpy(out_.data() + kHead, packet.data(), packet.size());
   for (size_t sent = 0; sent < out_.size();) {
-    const ssize_t n =
-        send(fd_, out_.data() + sent, out_.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+    const size_t size = std::min(kChunk, out_.size() - sent);
+    const ssize_t n = send(fd_, out_.data() + sent, size, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (n > 0) {
       sent += static_cast<size_t>(n);
     } else if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) {
@@ -118,21 +129,18 @@ bool PacketSocket::Send(std::span<const uint8_t> packet, const std::function<boo
 }
 
 bool PacketSocket::Read(When when) {
-  // Rather than with a blocking recv: that is woken, for nothing, when the other end reads what we
-  // have sent.
-  pollfd readable{fd_, POLLIN, 0};
-  if (when == When::kSoon && poll(&readable, 1, kSoon) == 0) return true;
   for (bool more = true; more;) {
     if (begin_ == end_) begin_ = end_ = 0;
     if (in_.size() - end_ < kChunk) in_.resize(end_ + kChunk);
-    const size_t room = in_.size() - end_;
-    const ssize_t n = recv(fd_, in_.data() + end_, room, MSG_DONTWAIT);
+    const ssize_t n =
+        recv(fd_, in_.data() + end_, kChunk, when == When::kNow ? MSG_DONTWAIT : 0);
     if (n < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
     if (n == 0) return false;
     end_ += static_cast<size_t>(n);
     const size_t length = Length();
     if (length == 0 || length > kLongest) return end_ - begin_ < kHead;
-    more = static_cast<size_t>(n) == room;
+    more = static_cast<size_t>(n) == kChunk;
+    when = When::kNow;
   }
   return true;
 }

@@ -8,7 +8,7 @@
 
 namespace plumb {
 
-/// Packets on a Unix stream socket: four bytes of length, then the packet. Not thread-safe.
+/// Packets on a Unix socket, in chunks: four bytes of length, then the packet. Not thread-safe.
 class PacketSocket {
  public:
   /// [bytes] a longer packet is not one of ours

@@ -83,8 +83,9 @@ class LockstepTransport : public Transport {
 
   /// Frames that have come by the bus and have not been handed out yet.
   void ReadBus() noexcept {
-    for (int count; (count = bus_->Receive(batch_)) > 0;) {
-      for (const Frame& frame : std::span(batch_).first(static_cast<size_t>(count))) {
+    for (size_t count = batch_.size(); count == batch_.size();) {
+      count = static_cast<size_t>(bus_->Receive(batch_));
+      for (const Frame& frame : std::span(batch_).first(count)) {
         // The bus controller's own reports come from no participant.
         if (!frame.error) early_.push_back({frame, run_.now()});
       }
