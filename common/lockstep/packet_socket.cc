@@ -132,8 +132,7 @@ bool PacketSocket::Read(When when) {
   for (bool more = true; more;) {
     if (begin_ == end_) begin_ = end_ = 0;
     if (in_.size() - end_ < kChunk) in_.resize(end_ + kChunk);
-    const ssize_t n =
-        recv(fd_, in_.data() + end_, kChunk, when == When::kNow ? MSG_DONTWAIT : 0);
+    const ssize_t n = recv(fd_, in_.data() + end_, kChunk, when == When::kNow ? MSG_DONTWAIT : 0);
     if (n < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
     if (n == 0) return false;
     end_ += static_cast<size_t>(n);
