@@ -98,6 +98,7 @@ void Trainer::Start(const GaussianPolicy& policy) {
   if (policy.shape() != policy_.shape())
     throw std::invalid_argument("trainer: the policy to begin with is another network");
   policy_ = policy;
+  first_step_ = kCriticFirst;
   if (!settings_.normalise_observations) return;
   observations_.count = kTrustedBatches * settings_.batch;
   observations_.mean = policy.observation_mean.cast<double>();
@@ -124,6 +125,7 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   // Neither needs the other's result.
   workers_.Together(
       [&] {
+        if (updates_ < first_step_) return;
         report.step =
             trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage});
       },

@@ -13,11 +13,19 @@
 namespace plumb {
 namespace {
 
-GapFit Close(const RobotDescription& robot, const std::vector<Rollout>& rollouts) {
+// What the method says by itself, and what becomes of it.
+struct Closed {
+  MethodResult alone;
+  GapFit fit;
+};
+Closed Close(const RobotDescription& robot, const std::vector<Rollout>& rollouts,
+             bool residual = true) {
   CalibrationOptions options;
-  options.method = "laplace", options.horizons = {1};
+  options.method = "laplace", options.horizons = {1}, options.residual = residual;
   const MethodInput input{std::make_shared<Model>(robot), rollouts, options};
-  return CloseGap(input, RunMethod(input));
+  MethodResult alone = RunMethod(input);
+  GapFit fit = CloseGap(input, alone);
+  return {std::move(alone), std::move(fit)};
 }
 
 // Mean squared errors of the velocities of a log's steps of a condition, without and with the
@@ -61,11 +69,7 @@ Squares SquaredErrors(const RobotDescription& robot, const Residual& learnt, boo
 TEST_CASE("a right model keeps its posterior to the bit, and lacks nothing") {
   const RobotDescription robot = Hopper();
   const auto log = RandomLog(robot, {}, 400, 3);
-  CalibrationOptions options;
-  options.method = "laplace", options.horizons = {1};
-  const MethodInput input{std::make_shared<Model>(robot), log, options};
-  const MethodResult alone = RunMethod(input);
-  const GapFit gap = CloseGap(input, alone);
+  const auto [alone, gap] = Close(robot, log);
   CHECK_FALSE(gap.alarm.alarm);
   CHECK_FALSE(gap.gap.residual);
   CHECK(gap.gap.summary.empty());
@@ -79,7 +83,7 @@ TEST_CASE("a softer ground: masses are learnt in the air, and the ground apart")
   const Truth softer{{{"contact/stiffness", 0.3 * robot.simulation.contact->stiffness}}};
   std::vector<Rollout> log = RandomLog(robot, softer, 4000, 3), unseen;
   while (CountTransitions(log) > 3000) unseen.push_back(log.back()), log.pop_back();
-  const GapFit gap = Close(robot, log);
+  const GapFit gap = Close(robot, log).fit;
   REQUIRE(gap.alarm.alarm);
   CHECK(gap.gap.informed == Informed::kFree);
   REQUIRE(gap.gap.residual);
@@ -101,10 +105,34 @@ TEST_CASE("a softer ground: masses are learnt in the air, and the ground apart")
   CHECK(squares.after < 0.3 * squares.before);
 }
 
+TEST_CASE("free steps whose own error is too little to matter inform the parameters") {
+  const RobotDescription robot = Hopper();
+  const Truth wrong{{{"contact/stiffness", 0.3 * robot.simulation.contact->stiffness},
+                     {"inertia/leg", 1.03}},
+                    3e-4,
+                    3e-4};
+  const std::vector<Rollout> log = RandomLog(robot, wrong, 3000, 3);
+  const GapFit gap = Close(robot, log).fit;
+  REQUIRE(gap.alarm.alarm);
+  const std::vector<Rollout> free = FreeSteps(robot, log);
+  const Closed in_the_air = Close(robot, free);
+  REQUIRE(in_the_air.fit.alarm.alarm);
+  CHECK(gap.gap.informed == Informed::kFree);
+  CHECK(Moments(gap.result.posterior).mean == Moments(in_the_air.alone.posterior).mean);
+  const Eigen::VectorXd truth = HiddenParameters(robot, 3);
+  const Gaussian posterior = Moments(gap.result.posterior);
+  for (Eigen::Index i = 0; i < truth.size(); ++i) {
+    const ParameterDescription& p = robot.parameters[static_cast<size_t>(i)];
+    const double sd = std::sqrt(posterior.covariance(i, i));
+    CAPTURE(p.name, p.ToPhysical(posterior.mean(i)), sd);
+    CHECK(std::abs(posterior.mean(i) - p.ToCoordinate(truth(i))) < 3 * sd);
+  }
+}
+
 TEST_CASE("friction in free motion: the prior stays, and the residual goes with each draw of it") {
   const RobotDescription robot = Robot("pendulum/gym.toml");
   const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 600, 3);
-  const GapFit gap = Close(robot, log);
+  const GapFit gap = Close(robot, log).fit;
   REQUIRE(gap.alarm.alarm);
   CHECK(gap.gap.informed == Informed::kNone);
   CHECK(gap.information.isZero());
@@ -122,11 +150,7 @@ TEST_CASE(
     "where no residual is worth it, parameters are as unsure as what is wrong may make them") {
   const RobotDescription robot = Robot("double_pendulum");
   const auto log = RandomLog(robot, {{{"gravity", 1.01 * 9.81}}, 3e-4, 3e-4}, 1000, 3);
-  CalibrationOptions options;
-  options.method = "laplace", options.horizons = {1};
-  const MethodInput input{std::make_shared<Model>(robot), log, options};
-  const MethodResult alone = RunMethod(input);
-  const GapFit fit = CloseGap(input, alone);
+  const auto [alone, fit] = Close(robot, log);
   REQUIRE(fit.alarm.alarm);
   CHECK(fit.gap.informed == Informed::kAll);
   CHECK_FALSE(fit.gap.residual);
@@ -155,11 +179,7 @@ TEST_CASE(
 TEST_CASE("where residuals are switched off an alarm changes nothing, and it is said") {
   const RobotDescription robot = Robot("pendulum/gym.toml");
   const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 300, 3);
-  CalibrationOptions options;
-  options.method = "laplace", options.horizons = {1}, options.residual = false;
-  const MethodInput input{std::make_shared<Model>(robot), log, options};
-  const MethodResult alone = RunMethod(input);
-  const GapFit fit = CloseGap(input, alone);
+  const auto [alone, fit] = Close(robot, log, false);
   CHECK(fit.alarm.alarm);
   CHECK_FALSE(fit.gap.residual);
   CHECK(fit.result.posterior == alone.posterior);
@@ -181,7 +201,7 @@ TEST_CASE("of too few steps nothing is learnt, and there is nothing that it expl
 TEST_CASE("what is lacking has the same bits each time") {
   const RobotDescription robot = Robot("pendulum/gym.toml");
   const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 300, 3);
-  const GapFit a = Close(robot, log), b = Close(robot, log);
+  const GapFit a = Close(robot, log).fit, b = Close(robot, log).fit;
   REQUIRE(a.gap.residual);
   CHECK(a.gap.residual->free->weights == b.gap.residual->free->weights);
   CHECK(a.gap.residual->free->noise == b.gap.residual->free->noise);
