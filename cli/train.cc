@@ -207,7 +207,7 @@ class Training {
   }
 
   void Warn(const UpdateReport& report) {
-    if (!report.step.failure.empty())
+    if (!report.step.accepted)
       spdlog::warn(fmt::format("update {} skipped: {}", trainer_.updates(), report.step.failure));
     if (!report.critic_fitted)
       spdlog::warn(fmt::format("update {}: the critic's fit was not finite", trainer_.updates()));

@@ -119,7 +119,7 @@ class TrainerProcess {
     seconds_ = Elapsed();
     spdlog::debug("update {}: return {:.1f}, KL {:.4f}, explained variance {:.3f}",
                   session_.update(), report.mean_return, report.step.kl, report.explained_variance);
-    if (!report.step.failure.empty())
+    if (!report.step.accepted)
       spdlog::warn("update {} skipped: {}", session_.update(), report.step.failure);
     if (!report.critic_fitted)
       spdlog::warn("update {}: the critic's fit was not finite", session_.update());

@@ -28,8 +28,7 @@ enum Stream : uint32_t {
 };
 
 constexpr int kJudgements = 16, kJudgementEpisodes = 30;
-constexpr double kTrustedBatches = 10;  // that a normaliser to begin with counts for
-constexpr double kOutputGain = 0.01;    // of a fresh policy: every mean action is near 0
+constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
 
 GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFactory& make,
                            const Eigen::VectorXd& action_scale, uint64_t seed) {
@@ -98,9 +97,8 @@ void Trainer::Start(const GaussianPolicy& policy) {
   if (policy.shape() != policy_.shape())
     throw std::invalid_argument("trainer: the policy to begin with is another network");
   policy_ = policy;
-  first_step_ = kCriticFirst;
   if (!settings_.normalise_observations) return;
-  observations_.count = kTrustedBatches * settings_.batch;
+  observations_.count = static_cast<double>(settings_.updates) * settings_.batch;
   observations_.mean = policy.observation_mean.cast<double>();
   observations_.squares = observations_.count * policy.observation_scale.cast<double>().cwiseAbs2();
 }
@@ -125,7 +123,6 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
   // Neither needs the other's result.
   workers_.Together(
       [&] {
-        if (updates_ < first_step_) return;
         report.step =
             trpo_.Improve(policy_, {batch.observations, batch.actions, advantages.advantage});
       },

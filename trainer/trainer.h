@@ -42,7 +42,7 @@ struct TrainerState {
 
 /// One update in numbers.
 struct UpdateReport {
-  Trpo::Step step;  ///< none in the first updates of a policy to begin with
+  Trpo::Step step;
   int batch = 0;  ///< steps it rests on
   int dropped_episodes = 0;
   double mean_return = 0;         ///< of all episodes played, undiscounted
@@ -68,9 +68,10 @@ class Trainer {
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.
   void Restore(TrainerState state);
-  /// Begins with another policy, before the first update; its normaliser counts as much as ten
-  /// batches. The critic that is to judge it knows nothing of it: in the first kCriticFirst updates
-  /// it is fitted, and the policy stays. @throws std::invalid_argument if its network is another's.
+  /// Begins with another policy, before the first update; its normaliser counts as much as all
+  /// batches of the settings. (As ten batches, what is seen moves it, and with it the policy, by
+  /// more than any step's KL bound: returns fell by half.) @throws std::invalid_argument if its
+  /// network is another's.
   void Start(const GaussianPolicy& policy);
   const GaussianPolicy& policy() const { return policy_; }
   int64_t updates() const { return updates_; }
@@ -93,9 +94,6 @@ class Trainer {
   /// Other simulators than those of the judgements so far: they are void.
   void ForgetBest() { best_.reset(); }
 
-  /// Updates after Start in which nothing but the critic learns.
-  static constexpr int64_t kCriticFirst = 5;
-
   /// The policy without exploration on simulators drawn anew. Changes nothing.
   Evaluation Evaluate(const ParameterSampler& sample, int episodes);
   /// The same on simulators and initial states that are always the same for a seed, so that
@@ -114,7 +112,6 @@ class Trainer {
   Trpo trpo_;
   Critic critic_;
   ObservationMoments observations_;
-  int64_t first_step_ = 0;  // number of the update in which the policy makes its first step
   int64_t updates_ = 0;
   int64_t steps_ = 0;
   int64_t dropped_episodes_ = 0;

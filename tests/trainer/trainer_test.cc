@@ -121,6 +121,21 @@ TEST_CASE("The normaliser follows the observations, between updates") {
   CHECK(other.policy().observation_scale == trainer.policy().observation_scale);
 }
 
+TEST_CASE("A policy to begin with keeps its normaliser as if a whole training had made it") {
+  TrainingSettings settings = SmallSettings();
+  settings.normalise_observations = true;
+  const auto make = [] { return std::make_unique<FarAway>(); };
+  Trainer trainer(settings, make, Eigen::VectorXd::Ones(1), 3, 1);
+  GaussianPolicy policy = trainer.policy();
+  policy.observation_mean << 900, 7;
+  policy.observation_scale << 5, 1;
+  trainer.Start(policy);
+  const double before = static_cast<double>(settings.updates) * settings.batch;
+  const double seen = trainer.Update(GymParameters).batch;
+  CHECK(trainer.policy().observation_mean[0] ==
+        Approx((before * 900 + seen * 1000) / (before + seen)).margin(.2));
+}
+
 TEST_CASE("Returns are summed up by mean, tenth percentile and worst") {
   std::vector<double> returns;
   for (int i = 10; i >= 0; --i) returns.push_back(i * i);

@@ -107,10 +107,10 @@ TEST_CASE("a softer ground: masses are learnt in the air, and the ground apart")
 
 TEST_CASE("free steps whose own error is too little to matter inform the parameters") {
   const RobotDescription robot = Hopper();
-  const Truth wrong{{{"contact/stiffness", 0.3 * robot.simulation.contact->stiffness},
-                     {"inertia/leg", 1.03}},
-                    3e-4,
-                    3e-4};
+  const Truth wrong{
+      {{"contact/stiffness", 0.3 * robot.simulation.contact->stiffness}, {"inertia/leg", 1.03}},
+      3e-4,
+      3e-4};
   const std::vector<Rollout> log = RandomLog(robot, wrong, 3000, 3);
   const GapFit gap = Close(robot, log).fit;
   REQUIRE(gap.alarm.alarm);
