@@ -31,6 +31,8 @@ bool Inside(double value, Range range) { return value >= range.lower && value <=
 
 }  // namespace
 
+ConfigError::ConfigError(const std::string& message) : std::runtime_error(Printable(message)) {}
+
 std::string ReadFile(const std::string& file) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(file, error);

@@ -19,9 +19,10 @@ class table;
 
 namespace plumb {
 
-/// A configuration file that cannot be used. The message begins with "file:line:column: ".
+/// A configuration file that cannot be used. The message begins with "file:line:column: ", and is
+/// one line whatever it quotes of the file.
 struct ConfigError : std::runtime_error {
-  using std::runtime_error::runtime_error;
+  explicit ConfigError(const std::string& message);
 };
 
 /// Closed interval a number must lie in.

@@ -21,9 +21,12 @@ constexpr int kLongestChain = 8;  // of files that extend each other
 constexpr int kDeepestKey = 16;          // parts of a.b.c
 constexpr size_t kMostEntries = 10'000;  // of a table or an array
 
-// The reader makes a table of each part of a dotted key, and descends into them by recursion.
+// What the reader must not be given. It makes a table of each part of a dotted key, and descends
+// into them by recursion; and of letters outside ASCII, which TOML has in strings and comments
+// only, toml++ 3.3 asks what it then holds to be impossible (is_non_ascii_horizontal_whitespace).
 // Strings and comments are passed over: their dots are none.
-void RequireShallowKeys(const std::string& text, const std::string& name) {
+void RequirePlainKeys(const std::string& text, const std::string& name) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   size_t line = 1;
   int parts = 1;
   const auto pass = [&](size_t& at, std::string_view end, bool escapes) {
@@ -34,9 +37,12 @@ void RequireShallowKeys(const std::string& text, const std::string& name) {
     }
     at += end.size() - 1;
   };
-  for (size_t at = 0; at < text.size(); ++at) {
+  for (size_t at = text.starts_with(kByteOrderMark) ? 3 : 0; at < text.size(); ++at) {
     const char c = text[at];
-    if (c == '"' || c == '\'') {
+    if (static_cast<unsigned char>(c) > 127) {
+      throw ConfigError(
+          fmt::format("{}:{}: a character outside ASCII, and not within quotes", name, line));
+    } else if (c == '"' || c == '\'') {
       const std::string triple(3, c);
       const bool many_lines = text.compare(at, 3, triple) == 0;
       at += many_lines ? 3 : 1;
@@ -122,7 +128,7 @@ std::string TomlPlace(const std::string& file, const toml::source_region& source
 }
 
 toml::table ParseToml(const std::string& text, const std::string& name) {
-  RequireShallowKeys(text, name);
+  RequirePlainKeys(text, name);
   try {
     toml::table table = toml::parse(text, name);
     RequireModest(table, name);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "common/outside_text.h"
 #include "robot/residual_message.h"
 
 namespace plumb {
@@ -32,7 +33,7 @@ int8_t ToCode(Coordinate coordinate) {
 }
 
 [[noreturn]] void Reject(const std::string& what) {
-  throw std::invalid_argument("parameter distribution: " + what);
+  throw std::invalid_argument("parameter distribution: " + Printable(what));
 }
 
 void RequireSize(const char* what, int64_t announced, size_t actual, int64_t expected) {

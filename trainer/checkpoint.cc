@@ -65,11 +65,13 @@ class Reader {
     static_assert(std::is_arithmetic_v<T>);
     std::memcpy(&value, Take(sizeof value), sizeof value);
   }
+  void operator()(bool& value) { value = *Take(1) != 0; }
   template <class Number>
   void operator()(Eigen::VectorX<Number>& values) {
     const size_t count = Count(sizeof(Number));
     values.resize(static_cast<Eigen::Index>(count));
-    std::memcpy(values.data(), Take(count * sizeof(Number)), count * sizeof(Number));
+    const char* const bytes = Take(count * sizeof(Number));
+    if (count > 0) std::memcpy(values.data(), bytes, count * sizeof(Number));
   }
   template <class Element>
   void Size(std::vector<Element>& elements) {

@@ -195,6 +195,20 @@ TEST_CASE("dots in strings, comments and numbers are no parts of keys") {
   CHECK(config.Numbers("d", 18)[17] == 1.5);
 }
 
+TEST_CASE("an error is one line, whatever it quotes") {
+  CHECK_THROWS_WITH(Read("\"a\\nb\" = 1\n").Finish(),
+                    Catch::Contains("a b is not a known key") && !Catch::Contains("\n"));
+}
+
+TEST_CASE("letters outside ASCII stand within quotes and comments only") {
+  Config config = Read("\xEF\xBB\xBF# gr\u00fc\u00dfe\n\"m\u00fc\" = '\u00df'\n");
+  CHECK(config.String("m\u00fc") == "\u00df");
+  for (const char* text : {"a = 1\nm\u00fc = 1\n", "a = 1\n[\u00fc]\n", "a = 1\nb =\u00a01\n"}) {
+    CHECK_THROWS_WITH(Read(text),
+                      Equals("robot.toml:2: a character outside ASCII, and not within quotes"));
+  }
+}
+
 TEST_CASE("a text that controls a terminal is refused where it stands") {
   Config config = Read("name = \"\\u001b]0;title\\u0007\"\nother = \"m\\u00fc\"\n");
   CHECK_THROWS_WITH(config.String("name"),

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include "robot/description.h"
+#include "tests/fuzz/bytes.h"
+
+namespace plumb {
+
+/// A folder of this process, with a file in it that becomes each of a fuzzer's inputs.
+class InputFile {
+ public:
+  explicit InputFile(const std::string& name)
+      : folder_(std::filesystem::temp_directory_path() /
+                ("plumb_fuzz_" + std::to_string(::getpid()))),
+        path_(folder_ / name) {
+    std::filesystem::create_directories(folder_);
+  }
+  ~InputFile() {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+
+  const std::filesystem::path& folder() const { return folder_; }
+  const std::filesystem::path& path() const { return path_; }
+  void Write(std::string_view content) const {
+    std::ofstream(path_, std::ios::binary)
+        .write(content.data(), static_cast<std::streamsize>(content.size()));
+  }
+
+ private:
+  const std::filesystem::path folder_, path_;
+};
+
+inline std::string_view Text(const uint8_t* data, size_t size) {
+  return {reinterpret_cast<const char*>(data), size};
+}
+
+/// The pendulum, whose parameters, observations and actions inputs are to fit.
+inline const RobotDescription& FuzzRobot() {
+  static const RobotDescription robot = [] {
+    const char* source = std::getenv("PLUMBLINE_SOURCE");
+    return LoadRobot(std::string(source ? source : ".") + "/robots/pendulum");
+  }();
+  return robot;
+}
+
+/// Reads, or is refused with an Error that says something; any other exception ends the program.
+template <class Error, class Read>
+void ReadOrRefuse(Read read) {
+  try {
+    read();
+  } catch (const Error& error) {
+    const std::string_view what = error.what();
+    if (!what.empty() && what.find('\n') == std::string_view::npos) return;
+    std::fprintf(stderr, "refused, but not by one line: %s\n", error.what());
+    std::abort();
+  }
+}
+
+}  // namespace plumb
