@@ -169,7 +169,11 @@ class TrainerProcess {
   }
 
   void Save() {
-    if (checkpoint_file_.empty() || (past_ && past_->repeating())) return;
+    if (checkpoint_file_.empty()) return;
+    if (past_ && session_.training()) {
+      if (!past_->repeating()) past_->Keep(session_);
+      return;
+    }
     SaveCheckpoint(checkpoint_file_,
                    past_ ? past_->MakeCheckpoint(session_) : session_.MakeCheckpoint());
   }

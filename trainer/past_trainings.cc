@@ -15,14 +15,9 @@ void PastTrainings::Begin(const TrainingSession& session) {
   past_.reset();
   const bool last = session.last();
   beginning_ = Hash(EncodeCheckpoint(session.MakeCheckpoint()), Hash(&last, sizeof last, run_));
-  const auto known = [&](const std::optional<Checkpoint>& checkpoint) {
-    return checkpoint && checkpoint->identity == beginning_ && !checkpoint->statuses.empty();
-  };
-  // A complete one in the newest checkpoint may have been tried on the robot since.
   past_ = LoadCheckpoint(FileOf(session.iteration()).string());
-  if (known(past_)) return;
-  past_ = LoadCheckpoint((folder_ / "trainer.checkpoint").string());
-  if (!known(past_) || past_->complete) past_.reset();
+  const bool known = past_ && past_->identity == beginning_ && !past_->statuses.empty();
+  if (!known) past_.reset();
 }
 
 std::optional<training_status_t> PastTrainings::Repeat(TrainingSession& session) {

@@ -14,7 +14,8 @@ namespace plumb {
 /// and comes to the same bits; what is trained then has been trained before, with the same
 /// statuses. They are said again, one for each update, but not computed again.
 ///
-/// Keeps a checkpoint of every iteration in the trainer's folder, `trainer_<iteration>.checkpoint`.
+/// Keeps the newest checkpoint of every iteration's training in the trainer's folder,
+/// `trainer_<iteration>.checkpoint`: what happens to the policy on the robot is not in it.
 /// Not thread-safe.
 class PastTrainings {
  public:
@@ -36,7 +37,7 @@ class PastTrainings {
   void Add(const training_status_t& status) { statuses_.push_back(status); }
   /// The session's checkpoint, with which it can be repeated.
   Checkpoint MakeCheckpoint(const TrainingSession& session) const;
-  /// The iteration is complete. @throws CheckpointError naming the file if it cannot be written.
+  /// For the next life, while training and when it is complete. @throws CheckpointError naming the file if it cannot be written.
   void Keep(const TrainingSession& session) const;
 
  private:

@@ -91,6 +91,23 @@ TEST_CASE("disarm and estop reach the driver through a flood of well-formed mess
   if (with_key) CHECK(stage.drivers.newest().commands_forged > 1000);
 }
 
+TEST_CASE("an estop reaches the driver though others speak in the driver's name, without a key") {
+  Stage stage(99, "pendulum", Stage::Time::kReal);
+  stage.StartRobotAndDriver();
+  REQUIRE(stage.WaitUntil([&] { return stage.drivers.received() > 0; }, kLong));
+  driver_status_t status{};
+  status.utime = stage.Now(), status.state = driver_status_t::IDLE;
+  const Flood flood(stage.lcm_url, {Said("DRIVER_STATUS", status)}, 10'000);
+  Child request("plumb", {Stage::Binary("plumb"), "estop", "--lcm-url", stage.lcm_url},
+                stage.folder / "stop.log");
+  constexpr uint32_t kEstop = 0x022;  // CANSimple, node 1
+  CHECK(stage.WaitUntil([&] { return stage.frames_by_id[kEstop] > 0; }, kLong));
+  REQUIRE(stage.WaitUntil([&] { return !request.running(); }, kLong));
+  // Whose answer it has heard it cannot know, and says so.
+  CHECK(request.ending() == "exit status 1");
+  CHECK_THAT(request.Tail(5), Contains("two speak on DRIVER_STATUS"));
+}
+
 TEST_CASE("disarm and estop end a run in virtual time through such a flood") {
   const char* stop = GENERATE("disarm", "estop");
   Stage stage(97, "pendulum", Stage::Time::kReal);
