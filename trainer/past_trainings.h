@@ -37,7 +37,8 @@ class PastTrainings {
   void Add(const training_status_t& status) { statuses_.push_back(status); }
   /// The session's checkpoint, with which it can be repeated.
   Checkpoint MakeCheckpoint(const TrainingSession& session) const;
-  /// For the next life, while training and when it is complete. @throws CheckpointError naming the file if it cannot be written.
+  /// For the next life, while training and when it is complete.
+  /// @throws CheckpointError naming the file if it cannot be written.
   void Keep(const TrainingSession& session) const;
 
  private:
