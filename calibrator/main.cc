@@ -40,7 +40,8 @@ class Session {
                 flags.method.empty() ? robot.calibration.method : flags.method),
         calibrator(robot, simopt_),
         checkpoint_(flags.checkpoint, robot, flags.seed) {
-    if (auto state = checkpoint_.Load()) {
+    // A run in virtual time begins anew, and comes to the same: its roll-outs are what they were.
+    if (auto state = checkpoint_.Load(); state && !clock.is_virtual()) {
       simopt_.Resume(std::move(*state));
       spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration,
                    simopt_.state().search.update);

@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "cli/outputs.h"
 #include "common/atomic_file.h"
 #include "drivers/bus/bus_plan.h"
 #include "drivers/bus/dbc.h"
@@ -18,7 +19,9 @@ int PrintBusPlan(const std::string& robot) {
 }
 
 int WriteDbc(const std::string& robot, const std::string& output) {
-  const std::string text = ToDbc(BusDevices(LoadRobot(robot)));
+  const RobotDescription description = LoadRobot(robot);
+  RequireOutputs({output}, FilesOf(description));
+  const std::string text = ToDbc(BusDevices(description));
   if (output.empty()) {
     std::cout << text << std::flush;
   } else {

@@ -11,7 +11,7 @@ int PrintBusPlan(const std::string& robot);
 
 /// `plumb can dbc ROBOT`: writes the DBC file (see drivers/bus/dbc.h). @param output file; "" =
 /// standard output.
-/// @return exit status
+/// @return exit status. @throws std::invalid_argument, too, if the robot is read from that file.
 int WriteDbc(const std::string& robot, const std::string& output);
 
 }  // namespace plumb

@@ -90,9 +90,11 @@ class ClosedLoop {
     while (!progress_.finished() || clock_.Now() < finished + doubt) {
       if (!process_.Wait(kLook)) {
         line_.Clear();
+        processes_.Hurry();
         std::cout << "interrupted" << std::endl;
         return 130;
       }
+      if (setting_.virtual_run) setting_.virtual_run->Rethrow();
       if (progress_.finished() && finished == 0) finished = clock_.Now();
       progress_.Account(Seconds(clock_.Now() - start_), SecondsSince(really_started_));
       if (!AllRunning() || !KeepArmed()) return 1;

@@ -31,6 +31,7 @@ int Record(Process& process, const std::string& file) {
   while (process.Wait(1'000'000)) {
     if (failure) std::rethrow_exception(failure);
   }
+  log.Flush();
   spdlog::info("{} messages in {}", messages, file);
   return 0;
 }

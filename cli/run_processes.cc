@@ -93,10 +93,8 @@ void RunProcesses::Stop(bool hurry) noexcept {
 /// goes last.
 void RunProcesses::StopInVirtualTime(bool hurry) {
   constexpr int64_t kStopTimeout = 1'000'000, kSlice = 10'000;  // [us]
-  // [s] of real time, with a person who waits
-  constexpr double kPatience = 0.5;
   const auto start = SteadyClock::now();
-  const auto in_time = [&] { return !hurry || SecondsSince(start) < kPatience; };
+  const auto in_time = [&] { return !hurry || SecondsSince(start) < patience_; };
   coordinator_->go_on = in_time;
   const auto anybody = [&](const auto& whom) {
     return std::ranges::any_of(children_, [&](const Child& child) {

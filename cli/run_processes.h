@@ -31,9 +31,11 @@ class RunProcesses {
   void Start();
   /// A process that has ended though nobody has asked it to; null if all run.
   Child* Ended();
-  /// Motors first, the virtual robot last. Does not throw. @param hurry whatever they do: within a
-  /// second, for a person who waits. Otherwise, in virtual time, always in the same way.
+  /// Motors first, the virtual robot last. Does not throw. @param hurry whatever they do: within
+  /// six seconds, or one if a person waits. Otherwise, in virtual time, always in the same way.
   void Stop(bool hurry) noexcept;
+  /// A person waits for the end.
+  void Hurry() { patience_ = 0.5; }
 
  private:
   void Start(const std::string& name, std::vector<std::string> arguments);
@@ -43,6 +45,7 @@ class RunProcesses {
   const LaunchFlags& flags_;
   const Where where_;
   Coordinator* coordinator_;
+  double patience_ = 5;  // [s] of real time for the motors to be switched off in virtual time
   std::vector<Child> children_;
 };
 

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <iostream>
 #include <stdexcept>
 
@@ -47,7 +49,7 @@ void ProgressTable::Add(const Trainer& trainer, const UpdateReport& report, doub
                          report.step.kl, report.step.surrogate_gain, report.explained_variance,
                          report.entropy, report.step.accepted, report.dropped_episodes, seconds)
           << std::flush;
-  if (!stream_) throw std::runtime_error(file_ + ": cannot be written");
+  if (!stream_) throw std::runtime_error(file_ + ": cannot be written: " + std::strerror(errno));
 }
 
 void TrainingProgress::Show(const Trainer& trainer, const UpdateReport& report, int64_t steps,

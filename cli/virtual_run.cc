@@ -30,9 +30,9 @@ VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& l
   }
   if (!records.messages.empty()) messages_.emplace(records.messages);
   if (!records.frames.empty()) {
-    frames_.open(records.frames);
-    if (!frames_)
-      throw std::runtime_error(fmt::format("{}: {}", records.frames, std::strerror(errno)));
+    frames_file_ = records.frames;
+    frames_.open(frames_file_);
+    RequireFrames();
   }
   coordinator_.on_post = [this](const lockstep_post_t& post, const std::string&) { OnPost(post); };
 }
@@ -40,24 +40,46 @@ VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& l
 VirtualRun::~VirtualRun() = default;
 
 void VirtualRun::OnPost(const lockstep_post_t& post) {
+  if (failure_) return;
+  try {
+    Record(post);
+  } catch (...) {
+    failure_ = std::current_exception();
+  }
+}
+
+void VirtualRun::Record(const lockstep_post_t& post) {
   if (post.topic.kind == lockstep_topic_t::FRAME) {
     if (!frames_.is_open()) return;
     frames_ << fmt::format("({}.{:06}) {} ", post.arrival / 1'000'000, post.arrival % 1'000'000,
                            Interface(post.topic.name));
     frames_.write(reinterpret_cast<const char*>(post.data.data()), post.size);
     frames_ << '\n';
+    RequireFrames();
     return;
   }
   if (mirror_) mirror_->Publish(post.topic.name, post.data);
   if (messages_) messages_->Write(post.arrival, post.topic.name, post.data);
 }
 
+void VirtualRun::RequireFrames() const {
+  if (!frames_)
+    throw std::runtime_error(
+        fmt::format("{}: cannot be written: {}", frames_file_, std::strerror(errno)));
+}
+
+void VirtualRun::Rethrow() {
+  if (failure_) std::rethrow_exception(failure_);
+}
+
 void VirtualRun::Finish() {
+  Rethrow();
   if (mirror_) mirror_->Flush();
+  if (messages_) messages_->Flush();
   messages_.reset();
   if (!frames_.is_open()) return;
   frames_.close();
-  if (!frames_) throw std::runtime_error("the CAN log cannot be written: is the disk full?");
+  RequireFrames();
 }
 
 }  // namespace plumb

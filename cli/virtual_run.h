@@ -1,5 +1,6 @@
 #pragma once
 
+#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -36,18 +37,25 @@ class VirtualRun {
   std::vector<LcmMirror::Message> TakeStrangers() {
     return mirror_ ? mirror_->TakeStrangers() : std::vector<LcmMirror::Message>();
   }
-  /// All is said. Its record is complete afterwards. @throws std::runtime_error if something was
-  /// lost.
+  /// Throws what has gone wrong with mirror or records, if something has: they have ended there,
+  /// and the run, which is in the middle of something, has gone on until it looks.
+  /// @throws std::runtime_error naming the file, or the channel, and the cause.
+  void Rethrow();
+  /// All is said. Its record is complete afterwards. @throws std::runtime_error as Rethrow.
   void Finish();
 
  private:
   void OnPost(const lockstep_post_t& post);
+  void Record(const lockstep_post_t& post);
+  void RequireFrames() const;
 
   Coordinator coordinator_;
   std::optional<LcmMirror> mirror_;
   std::string mirror_failure_;
   std::optional<LcmLogWriter> messages_;
+  std::string frames_file_;
   std::ofstream frames_;
+  std::exception_ptr failure_;
 };
 
 }  // namespace plumb

@@ -35,7 +35,8 @@ bool SyncFolder(const std::filesystem::path& file) {
 }
 
 // Names nobody else gives: of this file, and of this process.
-std::string TemporaryPrefix(const std::filesystem::path& file) { return file.string() + ".part-"; }
+constexpr char kPart[] = ".part-";
+std::string TemporaryPrefix(const std::filesystem::path& file) { return file.string() + kPart; }
 
 struct Temporary {
   int fd = -1;
@@ -56,23 +57,31 @@ Temporary MakeTemporary(const std::filesystem::path& file) {
   return temporary;
 }
 
-// Temporary files of processes that were killed.
-void RemoveLeftovers(const std::filesystem::path& file) {
+// Whether it is a temporary file of ours, of a process that is no more. @param number how its name
+// goes on behind ".part-".
+bool IsLeftover(const std::filesystem::path& file, std::string_view number) {
+  pid_t pid = 0;
+  const char *const begin = number.data(), *const end = begin + number.size();
+  const char* const rest = std::from_chars(begin, end, pid).ptr;
+  struct stat status {};
+  const bool ours = rest != begin && (rest == end || *rest == '-') && pid > 0 &&
+                    lstat(file.c_str(), &status) == 0 && S_ISREG(status.st_mode) &&
+                    status.st_uid == geteuid();
+  return ours && kill(pid, 0) != 0 && errno == ESRCH;
+}
+
+// @param prefix of their names, up to the process's number; empty: of any file.
+void RemoveLeftovers(const std::filesystem::path& folder, const std::string& prefix) {
   namespace fs = std::filesystem;
-  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  const std::string prefix = TemporaryPrefix(file.filename());
   std::error_code ignored;  // of what cannot be removed nobody is worse off
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with(prefix)) continue;
-    pid_t pid = 0;
-    const char *begin = name.data() + prefix.size(), *end = name.data() + name.size();
-    const char* const rest = std::from_chars(begin, end, pid).ptr;
-    struct stat status {};
-    const bool ours = rest != begin && (rest == end || *rest == '-') && pid > 0 &&
-                      lstat(entry.path().c_str(), &status) == 0 && S_ISREG(status.st_mode) &&
-                      status.st_uid == geteuid();
-    if (ours && kill(pid, 0) != 0 && errno == ESRCH) fs::remove(entry.path(), ignored);
+    const size_t part = name.rfind(kPart);
+    if (part == std::string::npos) continue;
+    const size_t number = part + std::strlen(kPart);
+    if (!prefix.empty() && name.substr(0, number) != prefix) continue;
+    if (IsLeftover(entry.path(), std::string_view(name).substr(number)))
+      fs::remove(entry.path(), ignored);
   }
 }
 
@@ -101,11 +110,14 @@ void RequireWritable(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(status) || !file.has_filename()) fail("it is a folder");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     fail("it is not a regular file");
-  RemoveLeftovers(file);
+  RemoveLeftovers(file.has_parent_path() ? file.parent_path() : ".",
+                  TemporaryPrefix(file.filename()));
   const Temporary temporary = MakeTemporary(file);
   if (temporary.fd < 0) fail(std::strerror(errno));
   close(temporary.fd);
   unlink(temporary.name.c_str());
 }
+
+void RemoveLeftovers(const std::filesystem::path& folder) { RemoveLeftovers(folder, ""); }
 
 }  // namespace plumb

@@ -17,4 +17,8 @@ void WriteAtomically(const std::filesystem::path& file, std::string_view content
 /// @throws std::runtime_error naming the file and the cause.
 void RequireWritable(const std::filesystem::path& file);
 
+/// Removes the temporary files that killed processes have left in a folder, whatever files they
+/// were for: on a full disk they take the room of what replaces them. Thread-safe.
+void RemoveLeftovers(const std::filesystem::path& folder);
+
 }  // namespace plumb

@@ -79,7 +79,7 @@ Journal::Journal(std::filesystem::path file, uint64_t identity) : file_(std::mov
   head = {kMagic, identity};
   stream_.write(reinterpret_cast<const char*>(head.data()), sizeof head);
   stream_.flush();
-  if (!stream_) throw std::runtime_error(file_.string() + ": cannot be written");
+  RequireWritten();
 }
 
 bool Journal::Read(uint64_t identity, Eigen::MatrixXd* batch) {
@@ -104,6 +104,11 @@ bool Journal::Read(uint64_t identity, Eigen::MatrixXd* batch) {
   return false;
 }
 
+void Journal::RequireWritten() const {
+  if (!stream_)
+    throw std::runtime_error(file_.string() + ": cannot be written: " + std::strerror(errno));
+}
+
 void Journal::Append(uint64_t identity, const Eigen::MatrixXd& batch) {
   Header header{identity, batch.rows(), batch.cols(), 0};
   header.check = CheckOf(header, batch);
@@ -111,7 +116,7 @@ void Journal::Append(uint64_t identity, const Eigen::MatrixXd& batch) {
   stream_.write(reinterpret_cast<const char*>(batch.data()),
                 static_cast<std::streamsize>(static_cast<size_t>(batch.size()) * sizeof(double)));
   stream_.flush();
-  if (!stream_) throw std::runtime_error(file_.string() + ": cannot be written");
+  RequireWritten();
 }
 
 void Journal::Finish() {

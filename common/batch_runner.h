@@ -44,6 +44,8 @@ class Journal {
   void Finish();
 
  private:
+  void RequireWritten() const;
+
   std::filesystem::path file_;
   std::fstream stream_;
   bool reading_ = true;

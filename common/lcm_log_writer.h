@@ -21,8 +21,13 @@ class LcmLogWriter {
 
   /// @param utime of the message [us]. @throws std::runtime_error if the disk is full.
   void Write(int64_t utime, const std::string& channel, std::span<const uint8_t> message);
+  /// What has been written is out of this process's hands. @throws std::runtime_error as Write:
+  /// without this nobody would know that the last of it found no room.
+  void Flush();
 
  private:
+  [[noreturn]] void Fail() const;
+
   std::string file_;
   std::unique_ptr<lcm::LogFile> log_;
 };

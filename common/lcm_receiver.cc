@@ -1,9 +1,6 @@
 #include "common/lcm_receiver.h"
 
 #include <arpa/inet.h>
-#include <linux/filter.h>
-#include <linux/if_packet.h>
-#include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/eventfd.h>
@@ -14,6 +11,8 @@
 #include <cerrno>
 #include <system_error>
 #include <utility>
+
+#include "common/own_machine.h"
 
 namespace plumb {
 namespace {
@@ -30,23 +29,6 @@ constexpr size_t kOverhead = 128;
 template <class Value>
 void SetOption(int fd, int level, int option, const Value& value, const char* what) {
   if (setsockopt(fd, level, option, &value, sizeof value) != 0) Fail(what);
-}
-
-/// Lets in what this machine has sent: it comes by the loopback interface or, where multicast is
-/// routed to another one, as that one's looped back copy. From outside comes neither.
-void AdmitOwnMachineOnly(int fd) {
-  const auto loopback = if_nametoindex("lo");
-  constexpr auto kField = [](int field) { return static_cast<uint32_t>(SKF_AD_OFF + field); };
-  std::array<sock_filter, 6> program{{
-      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kField(SKF_AD_IFINDEX)),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, loopback, 2, 0),
-      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kField(SKF_AD_PKTTYPE)),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, PACKET_LOOPBACK, 0, 1),
-      BPF_STMT(BPF_RET | BPF_K, 0xffffffff),
-      BPF_STMT(BPF_RET | BPF_K, 0),
-  }};
-  const sock_fprog filter{static_cast<unsigned short>(program.size()), program.data()};
-  SetOption(fd, SOL_SOCKET, SO_ATTACH_FILTER, filter, "cannot filter LCM's socket");
 }
 
 /// The descriptor is not readable any more.

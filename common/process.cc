@@ -62,6 +62,8 @@ int BlockStopSignals() {
   // Before any thread exists (LCM starts one), so that all of them inherit the mask.
   sigprocmask(SIG_BLOCK, &set, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
+  // A file that may not grow is an error with its name, as a full disk is.
+  ::signal(SIGXFSZ, SIG_IGN);
   const int fd = signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
   if (fd < 0) throw std::runtime_error("signalfd failed");
   return fd;

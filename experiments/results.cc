@@ -27,7 +27,9 @@ std::string Duration(double seconds) {
 
 Results::Results(std::filesystem::path file, const std::string& settings,
                  std::vector<std::string> keys, std::vector<std::string> values)
-    : file_(std::move(file)) {
+    : file_(std::move(file)),
+      lock_("results " + std::filesystem::weakly_canonical(file_).string(),
+            file_.string() + ": another process is at work on it: give another --output") {
   const std::string columns = fmt::format("{},{}", fmt::join(keys, ","), fmt::join(values, ","));
   header_ = "# " + settings + "\n" + columns;
   if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path());

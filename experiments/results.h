@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/name_lock.h"
 #include "common/process.h"
 
 namespace plumb {
@@ -17,10 +18,11 @@ class Results {
  public:
   using Rows = std::vector<std::vector<double>>;
 
-  /// Reads what is there. @param settings that all results depend on, in words: the first line,
-  /// after a #.
-  /// @param keys,values names of the columns. @throws std::runtime_error if the file is no such
-  /// table, or one of other settings.
+  /// Reads what is there; the table is this process's from now on.
+  /// @param settings that all results depend on, in words: the first line, after a #.
+  /// @param keys,values names of the columns.
+  /// @throws std::runtime_error if the file is no such table, or one of other settings, or another
+  /// process is at work on it.
   Results(std::filesystem::path file, const std::string& settings, std::vector<std::string> keys,
           std::vector<std::string> values);
 
@@ -33,6 +35,7 @@ class Results {
 
  private:
   std::filesystem::path file_;
+  NameLock lock_;
   std::string header_;
   std::vector<std::pair<std::string, Rows>> groups_;  // in the order in which they came
   std::map<std::string, size_t> index_;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Links between the documents lead somewhere: to a file that is there, and to a heading that it has. Exit status 1 names every one
-that does not."""
+"""Links between the documents lead somewhere: to a file that is there, and to a heading that it has; and so do tests that are named
+as `folder/file`: "words" or "words": to a file in tests/ that has these words. Exit status 1 names every one that does not."""
 import pathlib
 import re
 import sys
@@ -8,6 +8,17 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CODE = re.compile(r"^```.*?^```", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+
+
+TEST = re.compile(r'`([\w/]+_test\.(?:cc|py))`:((?: (?:and )?"[^"]+")+)')
+
+
+def missing_tests(text):
+    """Tests that are named and are not there. A name in C++ may go on in the next line."""
+    for name, words in TEST.findall(text):
+        file = ROOT / "tests" / name
+        source = re.sub(r'"\s*"', "", file.read_text()) if file.exists() else ""
+        yield from (f'{name}: "{word}"' for word in re.findall(r'"([^"]+)"', words) if word not in source)
 
 
 def anchors(text):
@@ -20,6 +31,7 @@ def main():
     files = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
     wrong, count = [], 0
     for file in sorted(files):
+        wrong += [f"{file.relative_to(ROOT)}: there is no {test}" for test in missing_tests(file.read_text())]
         for link in LINK.findall(CODE.sub("", file.read_text())):
             if re.match(r"[a-z]+:", link):
                 continue

@@ -20,8 +20,8 @@ namespace plumb {
 namespace {
 
 // Numbers as this machine has them: a checkpoint stays where it was written. Version 3: without
-// trials on the robot, 4 to 6: with other residuals.
-constexpr Seal kSeal{"PLUMBTRN", 7, "a trainer's checkpoint"};
+// trials on the robot, 4 to 6: with other residuals, 7: without the updates' statuses.
+constexpr Seal kSeal{"PLUMBTRN", 8, "a trainer's checkpoint"};
 
 class Writer {
  public:
@@ -166,6 +166,8 @@ void Transfer(Archive& archive, C& checkpoint) {
   archive(checkpoint.incumbent);
   archive(checkpoint.incumbent_since);
   if (checkpoint.incumbent >= 0) archive.EncodedMessage(checkpoint.incumbent_policy);
+  archive.Size(checkpoint.statuses);
+  for (auto& status : checkpoint.statuses) archive.EncodedMessage(status);
   archive(checkpoint.judged);
   if (!checkpoint.judged) return;
   archive.EncodedMessage(checkpoint.best_policy);

@@ -10,6 +10,7 @@
 #include "controller/acceptance.h"
 #include "plumb/parameter_distribution_t.hpp"
 #include "plumb/policy_t.hpp"
+#include "plumb/training_status_t.hpp"
 #include "trainer/critic.h"
 #include "trainer/evaluation.h"
 #include "trainer/trainer.h"
@@ -32,7 +33,8 @@ struct TriedPolicy {
 /// the same bits. All functions of this header are thread-safe for different files.
 struct Checkpoint {
   uint64_t seed = 0;
-  /// of all that a run of `plumb train` depends on; 0 in the trainer process
+  /// of all that a run of `plumb train` depends on; in the trainer process of all that the
+  /// iteration depends on, in virtual time, and else 0
   uint64_t identity = 0;
   int64_t updates = 0, steps = 0, dropped_episodes = 0;  ///< as in TrainerState
   int32_t iteration = 0;          ///< of SimOpt; the one under way or, if complete, just done
@@ -56,6 +58,8 @@ struct Checkpoint {
   Acceptance::Decision decision;
   int32_t incumbent = -1, incumbent_since = -1;
   policy_t incumbent_policy;
+  /// of the iteration's updates, in virtual time; see PastTrainings
+  std::vector<training_status_t> statuses;
 };
 
 /// The policy that the robot is to be run with: the incumbent's, else the newest. Thread-safe.

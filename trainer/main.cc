@@ -5,11 +5,15 @@
 #include <string>
 #include <utility>
 
+#include "common/atomic_file.h"
+#include "common/config.h"
+#include "common/hash.h"
 #include "common/process.h"
 #include "common/time_units.h"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
 #include "trainer/kernels/network.h"
+#include "trainer/past_trainings.h"
 #include "trainer/robot_simulation.h"
 #include "trainer/session.h"
 
@@ -27,6 +31,15 @@ struct Options {
   int threads = 0;
   int evaluation_episodes = 10;
 };
+
+/// All that training depends on, but for what a session's checkpoint tells.
+uint64_t FingerprintOf(const RobotDescription& robot) {
+  std::vector<std::string> files;
+  Config::Load(robot.file, &files);
+  uint64_t fingerprint = Hash(VersionLine("plumb-trainer"), robot.fingerprint);
+  for (const std::string& file : files) fingerprint = Hash(ReadFile(file), fingerprint);
+  return fingerprint;
+}
 
 /// plumb-trainer: turns each PARAMETER_DISTRIBUTION into a POLICY, and chooses among them by what
 /// CONTROLLER_STATUS says of their trials.
@@ -68,6 +81,11 @@ class TrainerProcess {
   void Resume() {
     start_ = process_.clock().Now();
     if (checkpoint_file_.empty()) return;
+    RemoveLeftovers(options_.checkpoint);
+    if (process_.participant()) {
+      past_.emplace(options_.checkpoint, FingerprintOf(robot_));
+      return;
+    }
     const std::optional<Checkpoint> checkpoint = LoadCheckpoint(checkpoint_file_);
     if (!checkpoint) return;
     session_.Restore(*checkpoint);
@@ -91,12 +109,14 @@ class TrainerProcess {
       const ParameterDistribution distribution =
           ParameterDistribution::FromMessage(message, robot_);
       if (newer) {
-        if (session_.Replace(distribution))
-          spdlog::info("iteration {}: a newer distribution from update {} on", session_.iteration(),
-                       session_.update() + 1);
+        if (!session_.Replace(distribution)) return;
+        if (past_) past_->Forget();
+        spdlog::info("iteration {}: a newer distribution from update {} on", session_.iteration(),
+                     session_.update() + 1);
         return;
       }
-      session_.Begin(distribution);
+      if (session_.Begin(distribution) && past_) past_->Begin(session_);
+      repeated_.reset();
     } catch (const std::invalid_argument& error) {
       spdlog::warn("ignored: {}", error.what());
       return;
@@ -115,6 +135,24 @@ class TrainerProcess {
   }
 
   void Train() {
+    repeated_ = past_ ? past_->Repeat(session_) : std::nullopt;
+    if (!repeated_) Update();
+    if (session_.complete()) {
+      spdlog::info(
+          "iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s",
+          session_.iteration(), session_.evaluation().episodes, Summary(session_.evaluation()),
+          seconds_);
+      if (past_) past_->Keep(session_);
+      Save();
+      process_.TakeVirtualTime(robot_.training.duration);
+      Publish();
+    } else {
+      if (session_.update() % kUpdatesPerCheckpoint == 0) Save();
+      PublishStatus();
+    }
+  }
+
+  void Update() {
     const UpdateReport report = session_.Advance();
     seconds_ = Elapsed();
     spdlog::debug("update {}: return {:.1f}, KL {:.4f}, explained variance {:.3f}",
@@ -127,22 +165,17 @@ class TrainerProcess {
       spdlog::warn("update {}: {} episodes dropped, not finite", session_.update(),
                    report.dropped_episodes);
     }
-    if (session_.complete()) {
-      spdlog::info(
-          "iteration {} complete: return without exploration, {} simulators held out: {}; {:.1f} s",
-          session_.iteration(), session_.evaluation().episodes, Summary(session_.evaluation()),
-          seconds_);
-      Save();
-      process_.TakeVirtualTime(robot_.training.duration);
-      Publish();
-    } else {
-      if (session_.update() % kUpdatesPerCheckpoint == 0) Save();
-      PublishStatus();
-    }
+    if (past_) past_->Add(session_.Status());
   }
 
   void Save() {
-    if (!checkpoint_file_.empty()) SaveCheckpoint(checkpoint_file_, session_.MakeCheckpoint());
+    if (checkpoint_file_.empty()) return;
+    if (past_ && session_.training()) {
+      if (!past_->repeating()) past_->Keep(session_);
+      return;
+    }
+    SaveCheckpoint(checkpoint_file_,
+                   past_ ? past_->MakeCheckpoint(session_) : session_.MakeCheckpoint());
   }
 
   void Publish() {
@@ -154,7 +187,8 @@ class TrainerProcess {
   }
 
   void PublishStatus() {
-    training_status_t message = session_.Status();
+    training_status_t message =
+        past_ && past_->repeating() && repeated_ ? *repeated_ : session_.Status();
     message.utime = process_.clock().Utime();
     message.seconds = seconds_;
     status_.Publish(message);
@@ -174,10 +208,12 @@ class TrainerProcess {
   Subscriber<parameter_distribution_t> distribution_;
   Subscriber<controller_status_t> controller_;
   Periodic repeat_;
-  std::string checkpoint_file_;  // empty = none
-  int64_t start_ = 0;            // of the iteration, monotonic
-  double seconds_ = 0;           // spent on the iteration
-  int missed_ = -1;              // policy whose trial was not there when it was needed
+  std::string checkpoint_file_;                // empty = none
+  std::optional<PastTrainings> past_;          // in virtual time, if there are checkpoints
+  std::optional<training_status_t> repeated_;  // of the last update, if it was made before
+  int64_t start_ = 0;                          // of the iteration, monotonic
+  double seconds_ = 0;                         // spent on the iteration
+  int missed_ = -1;  // policy whose trial was not there when it was needed
 };
 
 }  // namespace

@@ -23,6 +23,16 @@ constexpr int kTried = 20;               // of a distribution, before it is trai
 constexpr int kTrialAndExploration = 2;  // episodes of a roll-out that begins with a trial
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
+// What a status tells of an update.
+UpdateReport ReportOf(const training_status_t& status) {
+  UpdateReport report;
+  report.batch = 1;  // there was one
+  report.mean_return = status.mean_return;
+  report.step.kl = status.kl, report.step.surrogate_gain = status.surrogate_gain;
+  report.explained_variance = status.explained_variance;
+  return report;
+}
+
 }  // namespace
 
 void RequireSendable(const RobotDescription& robot) {
@@ -250,6 +260,7 @@ void TrainingSession::Restore(const Checkpoint& checkpoint) {
   update_ = checkpoint.iteration_updates;
   complete_ = checkpoint.complete;
   evaluation_ = checkpoint.evaluation;
+  last_ = checkpoint.statuses.empty() ? UpdateReport{} : ReportOf(checkpoint.statuses.back());
 }
 
 }  // namespace plumb

@@ -69,7 +69,9 @@ class TrainingSession {
   /// There is a policy to be sent: that of the latest iteration, until the next one begins.
   bool complete() const { return complete_; }
   /// Of the last iteration.
-  bool finished() const { return complete_ && iteration_ == iterations_; }
+  bool finished() const { return complete_ && last(); }
+  /// The iteration is the last.
+  bool last() const { return iteration_ == iterations_; }
   int iteration() const { return iteration_; }
   /// TRPO updates done and planned in this iteration.
   int update() const { return update_; }

@@ -13,8 +13,8 @@ namespace {
 
 constexpr int kNap = 2;           // [ms] of real time for which there was nothing to do
 constexpr int kMaxRead = 10'000;  // messages in one go
-constexpr size_t kMaxMessages = 400, kMaxBytes = 500'000;    // on their way
-constexpr size_t kMaxBehind = 20'000, kMaxStrangers = 1000;  // messages
+constexpr size_t kMaxMessages = 400, kMaxBytes = 500'000;  // on their way
+constexpr size_t kMaxBehind = 20'000;                      // messages
 constexpr char kSelfTest[] = "LCM_SELF_TEST";  // which liblcm says to itself when it starts
 
 size_t Hash(std::span<const uint8_t> message) {
@@ -46,6 +46,7 @@ void LcmMirror::Publish(const std::string& channel, std::span<const uint8_t> mes
 
 std::vector<LcmMirror::Message> LcmMirror::TakeStrangers() {
   const std::lock_guard lock(mutex_);
+  stranger_bytes_ = 0;
   return std::exchange(strangers_, {});
 }
 
@@ -119,8 +120,10 @@ void LcmMirror::OnMessage(const std::string& channel, std::span<const uint8_t> m
     --unfinished_;
   } else if (channel != kSelfTest) {
     const std::lock_guard lock(mutex_);
-    if (strangers_.size() < kMaxStrangers)
-      strangers_.push_back({channel, {message.begin(), message.end()}});
+    const size_t cost = message.size() + kStrangerOverhead;
+    if (stranger_bytes_ + cost > kMaxStrangers) return;
+    stranger_bytes_ += cost;
+    strangers_.push_back({channel, {message.begin(), message.end()}});
   }
 }
 

@@ -28,6 +28,10 @@ class LcmMirror {
     std::vector<uint8_t> bytes;
   };
 
+  /// Of strangers' messages that wait to be taken, with what they cost [bytes]: room for the
+  /// longest that there are, and for ten thousand requests.
+  static constexpr size_t kMaxStrangers = 2 * kMaxLcmMessage, kStrangerOverhead = 256;
+
   /// @param patience [0.1 s] of real time until a message that has not come back is lost.
   /// @throws std::runtime_error as Messenger.
   explicit LcmMirror(const std::string& url, int patience = 100);
@@ -38,7 +42,8 @@ class LcmMirror {
   /// Soon. Waits where it is far behind. @throws std::runtime_error naming channel and number, if
   /// an earlier message has not come back.
   void Publish(const std::string& channel, std::span<const uint8_t> message);
-  /// Messages that somebody outside the run has sent since the last call.
+  /// Messages that somebody outside the run has sent since the last call: the first of them, up to
+  /// kMaxStrangers.
   std::vector<Message> TakeStrangers();
   /// Waits until everything has come back. @throws std::runtime_error as Publish.
   void Flush() { AwaitRoom(0); }
@@ -67,6 +72,7 @@ class LcmMirror {
   std::mutex mutex_;
   std::vector<Message> queue_;
   std::vector<Message> strangers_;
+  size_t stranger_bytes_ = 0;  // that they cost
   std::exception_ptr failure_;
   std::atomic<size_t> unfinished_ = 0;  // that were published and have not come back
   std::atomic<bool> ended_ = false;

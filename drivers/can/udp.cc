@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "common/file_descriptor.h"
+#include "common/own_machine.h"
 #include "drivers/can/datagram_transport.h"
 #include "drivers/can/udp_codec.h"
 
@@ -59,6 +60,9 @@ class Udp : public DatagramTransport {
     SetOption(in, SOL_SOCKET, SO_RCVBUF, 4 << 20);
     SetOption(in, SOL_SOCKET, SO_RXQ_OVFL, 1);
     SetOption(in, SOL_SOCKET, SO_TIMESTAMPNS, 1);
+    // The bus is this machine's, as what we send is: nobody outside has a place on it, wherever
+    // multicast is routed.
+    AdmitOwnMachineOnly(in);
     // Without this a socket hears every group that anybody on the machine has joined.
     SetOption(in, IPPROTO_IP, IP_MULTICAST_ALL, 0);
     if (bind(in, reinterpret_cast<const sockaddr*>(&group_), sizeof group_) != 0)

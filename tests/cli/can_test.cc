@@ -1,5 +1,6 @@
 // `plumb can`, run as a person would.
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <string>
 
 #include "tests/cli/shell.h"
@@ -38,6 +39,20 @@ TEST_CASE("can dbc: to the screen or a file, the same") {
   CHECK(Shell(Plumb() + "can dbc " + Robot("hopper") + " --output " + folder / "bus.dbc").status ==
         0);
   CHECK(Read(folder / "bus.dbc") == printed.text);
+}
+
+TEST_CASE("can dbc: what the robot is read from is not written over") {
+  const TemporaryFolder folder;
+  std::filesystem::copy(Robot("pendulum"), folder / "pendulum");
+  for (const char* file : {"robot.toml", "robot.urdf", "gym.toml"}) {
+    const std::string input = folder / "pendulum/" + file, before = Read(input);
+    const Outcome outcome =
+        Shell(Plumb() + "can dbc " + folder / "pendulum/gym.toml" + " --output " + input);
+    INFO(outcome.text);
+    CHECK(outcome.status == 1);
+    CHECK_THAT(outcome.text, Catch::Contains(input + ": is read, too"));
+    CHECK(Read(input) == before);
+  }
 }
 
 TEST_CASE("can: usage") {

@@ -173,15 +173,43 @@ TEST_CASE("what would keep the reader busy for minutes, or end it, is one line")
     for (int i = 0; i < 20; ++i) key += std::string(" . ") + quoted;
     CHECK_THROWS_WITH(Read("[" + key + "]\n"), Equals("robot.toml:1: a key of more than 16 parts"));
   }
+  for (int i = 0; i < 60'000; ++i) names += "name" + std::to_string(i) + " = 1\n";
   for (int i = 0; i < 20'000; ++i) {
     entries += "\"base.toml\",";
-    names += "name" + std::to_string(i) + " = 1\n";
     tables += "[[joint]]\nname = \"a" + std::to_string(i) + "\"\n";
   }
   CHECK_THROWS_WITH(Read(entries + "]\n"),
                     Equals("robot.toml:1:11: 20000 entries, more than 10000"));
-  CHECK_THROWS_WITH(Read(names), Catch::Contains("20000 entries, more than 10000"));
+  CHECK_THROWS_WITH(Read(names), Catch::Contains("60000 entries, more than 10000"));
   CHECK_THROWS_WITH(Read(tables), Catch::Contains("20000 entries, more than 10000"));
+}
+
+TEST_CASE("a file that is extended is as modest as one that is read, and names its own line") {
+  const Folder folder;
+  folder.Write("own.toml", "extends = \"base.toml\"\na = 1\n");
+  const auto refused = [&](const std::string& base, const std::string& why) {
+    folder.Write("base.toml", base);
+    CHECK_THROWS_WITH(Config::Load(folder / "own.toml"), Equals((folder / "base.toml") + why));
+  };
+  std::string names = "[t]\n", list = "list = [", tables;
+  for (int i = 0; i < 60'000; ++i) {
+    names += "name" + std::to_string(i) + " = 1\n";
+    tables += "[[joint]]\nname = \"a" + std::to_string(i) + "\"\n";
+  }
+  for (int i = 0; i < 20'000; ++i) list += "1,";
+  refused(names, ":1:1: 60000 entries, more than 10000");
+  refused(list + "]\n", ":1:8: 20000 entries, more than 10000");
+  refused(tables, ":1:1: 60000 entries, more than 10000");
+}
+
+TEST_CASE("two files of as many names as may be are merged") {
+  const Folder folder;
+  std::string tables;
+  for (int i = 0; i < 10'000; ++i)
+    tables += "[[joint]]\nname = \"a" + std::to_string(i) + "\"\nm = 1\n";
+  folder.Write("base.toml", tables);
+  folder.Write("own.toml", "extends = \"base.toml\"\n" + tables);
+  CHECK(Config::Load(folder / "own.toml").Tables("joint").size() == 10'000);
 }
 
 TEST_CASE("dots in strings, comments and numbers are no parts of keys") {

@@ -46,6 +46,31 @@ TEST_CASE("others hear all of it, and are heard apart from it") {
   CHECK(heard[1999] == "ROBOT_STATE 1999");
 }
 
+TEST_CASE("of strangers 8 MB are remembered, the first, until they are taken") {
+  LcmMirror mirror(Url());
+  Messenger other(Url());
+  // No more in one go than fits into the socket's buffer.
+  constexpr size_t kSize = 50'000, kFit = LcmMirror::kMaxStrangers / kSize;
+  const auto say = [&](const std::string& text) {
+    other.Publish("JOINT_COMMAND", Bytes(text));
+    // What comes back afterwards has been behind it.
+    mirror.Publish("JOINT_STATE", Bytes("behind " + text.substr(0, 10)));
+    mirror.Flush();
+  };
+  for (size_t i = 0; i < 3 * kFit; ++i) say(std::to_string(i) + std::string(kSize, ' '));
+  std::vector<LcmMirror::Message> strangers = mirror.TakeStrangers();
+  size_t bytes = 0;
+  for (const LcmMirror::Message& stranger : strangers) bytes += stranger.bytes.size();
+  CHECK(bytes <= LcmMirror::kMaxStrangers);
+  CHECK(bytes > LcmMirror::kMaxStrangers - 2 * kSize);
+  REQUIRE_FALSE(strangers.empty());
+  CHECK(strangers[0].bytes[0] == '0');
+  say("there is room again");
+  strangers = mirror.TakeStrangers();
+  REQUIRE(strangers.size() == 1);
+  CHECK(strangers[0].bytes[0] == 't');
+}
+
 TEST_CASE("a message that does not come back has been lost: an error with channel and number") {
   LcmMirror mirror(Url(), 5);
   mirror.Publish("POLICY", Bytes("first"));

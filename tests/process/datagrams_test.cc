@@ -1,11 +1,10 @@
 // A flood of malformed datagrams on LCM's group while real processes start, run and are asked to
 // stop. In real time: datagrams have no other.
 
-#include <atomic>
-#include <thread>
+#include <map>
 
 #include "calibrator/motion/log_reader.h"
-#include "tests/common/datagrams.h"
+#include "tests/process/flood.h"
 #include "tests/process/launch.h"
 
 namespace plumb {
@@ -13,50 +12,22 @@ namespace {
 
 using Catch::Contains;
 
-/// Sends, again and again, the fragments by which liblcm 1.3.1 writes 4 GB out of bounds, on a
-/// channel that everybody listens to at the start, in between others that are cut off or say
-/// nothing.
-class Flood {
- public:
-  /// @param rate [1/s]
-  Flood(const std::string& lcm_url, int rate)
-      : sender_(ParseUdpm(lcm_url).group, ParseUdpm(lcm_url).port),
-        rate_(rate),
-        thread_([this] { Send(); }) {}
-  ~Flood() {
-    ended_ = true;
-    thread_.join();
-  }
-
- private:
-  void Send() {
-    const std::vector<std::vector<uint8_t>> datagrams{
-        FragmentWith("LCM_SELF_TEST", 1000, 0, 7, 0, 2, 500),
-        FragmentWith("", 1000, 0xffffff00, 7, 1, 2, 512),
-        FragmentWith("DRIVER_STATUS", 0xffffffff, 0, 8, 0, 2, 500),
-        FragmentWith("DRIVER_STATUS", 100, 0, 9, 0, 0, 10),
-        {'L', 'C', '0', '2'},
-        Whole(std::string(100, 'x'), "")};
-    const Clock clock;
-    const int64_t start = clock.Now();
-    for (int64_t sent = 0; !ended_;) {
-      for (const int64_t due = (clock.Now() - start) * rate_ / 1'000'000; sent < due; ++sent)
-        sender_.Send(datagrams[static_cast<size_t>(sent) % datagrams.size()]);
-      usleep(1000);
-    }
-  }
-
-  const RawSender sender_;
-  const int64_t rate_;
-  std::atomic<bool> ended_ = false;
-  std::thread thread_;
-};
+/// Again and again the fragments by which liblcm 1.3.1 writes 4 GB out of bounds, on a channel that
+/// everybody listens to at the start, in between others that are cut off or say nothing.
+std::vector<std::vector<uint8_t>> Malformed() {
+  return {FragmentWith("LCM_SELF_TEST", 1000, 0, 7, 0, 2, 500),
+          FragmentWith("", 1000, 0xffffff00, 7, 1, 2, 512),
+          FragmentWith("DRIVER_STATUS", 0xffffffff, 0, 8, 0, 2, 500),
+          FragmentWith("DRIVER_STATUS", 100, 0, 9, 0, 0, 10),
+          {'L', 'C', '0', '2'},
+          Whole(std::string(100, 'x'), "")};
+}
 
 TEST_CASE("an emergency stop gets through a flood of malformed datagrams") {
   const int rate = GENERATE(70, 10'000);
   INFO(rate << " datagrams a second");
   Stage stage(92, "pendulum", Stage::Time::kReal);
-  const Flood flood(stage.lcm_url, rate);
+  const Flood flood(stage.lcm_url, Malformed(), rate);
   stage.StartRobotAndDriver();
   for (int i = 0; i < 10; ++i) {
     REQUIRE(stage.Arm(60));
@@ -90,7 +61,7 @@ TEST_CASE(
       {"plumb-calibrator", {stage.robot_folder, "--checkpoint", stage.folder / "calibration"}},
       {"plumb-trainer", {stage.robot_folder, "--checkpoint", stage.folder / "training"}},
       {"plumb", {"record", stage.folder / "all.lcmlog"}}};
-  const Flood flood(stage.lcm_url, 10'000);
+  const Flood flood(stage.lcm_url, Malformed(), 10'000);
   for (auto [name, arguments] : programs) {
     arguments.insert(arguments.begin(), Stage::Binary(name));
     arguments.insert(arguments.end(), {"--lcm-url", url});
@@ -113,7 +84,7 @@ TEST_CASE("a run and its record go on under a flood") {
   Stage stage(94, "pendulum", Stage::Time::kReal);
   const std::filesystem::path log = stage.folder / "run.lcmlog";
   {
-    const Flood flood(stage.lcm_url, 10'000);
+    const Flood flood(stage.lcm_url, Malformed(), 10'000);
     Child launch = Launch(stage, {"--real-time", "--log", log});
     REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 60));
     stage.Listen(1);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What LCM's socket lets in: `plumb record` in a network of its own, on whose wire (a tap interface) anything can be
-put. Argument: the program plumb. Exit status 77 where nobody may make a network, or the machine has no tap interfaces.
+"""What LCM's socket and that of a udp: bus let in: `plumb record` and a listener to a bus in a network of their own, on
+whose wire (a tap interface) anything can be put. Arguments: the programs plumb and hear_bus. Exit status 77 where nobody may make a network, or the machine has no tap interfaces.
 """
 import fcntl
 import os
@@ -91,6 +91,30 @@ def recorded(plumb, wire, ttl, folder):
     return channels(log) - {"LCM_SELF_TEST", "END"}
 
 
+def frame(number):
+    """A standard CAN frame without data, as python-can's udp_multicast sends it: a msgpack map of 11 pairs."""
+    def text(word):
+        return bytes([0xA0 | len(word)]) + word.encode()
+    values = {"timestamp": b"\xcb" + struct.pack(">d", 0), "arbitration_id": b"\xcd" + struct.pack(">H", number),
+              "is_extended_id": b"\xc2", "is_remote_frame": b"\xc2", "is_error_frame": b"\xc2", "channel": b"\xc0", "dlc": b"\x00",
+              "data": b"\xc4\x00", "is_fd": b"\xc2", "bitrate_switch": b"\xc2", "error_state_indicator": b"\xc2"}
+    return b"\x8b" + b"".join(text(name) + value for name, value in values.items())
+
+
+def heard_on_the_bus(listener, wire):
+    """@return the frames that a udp: bus hands out of everything that is sent."""
+    with subprocess.Popen([listener, f"udp:{GROUP}:{PORT}"], stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout.readline() == "listening\n"
+        send_from_outside(wire, STRANGER, GROUP, frame(1))
+        send_from_outside(wire, "127.0.0.1", GROUP, frame(2))
+        send_from_outside(wire, OURS, GROUP, frame(3))
+        send_from_here(OURS, frame(4))
+        send_from_here(OTHER_GROUP, frame(5))
+        send_from_here(GROUP, frame(6))
+        send_from_here(GROUP, frame(0x7FF))
+        return set(program.communicate()[0].split())
+
+
 def main():
     wire = open_wire()
     # The other group has a member on this machine, too: the kernel takes what is sent to it.
@@ -102,10 +126,14 @@ def main():
             print(f"TTL {ttl}: {', '.join(sorted(found))}")
             if found != expected:
                 sys.exit(f"expected {', '.join(sorted(expected))}")
+        found = heard_on_the_bus(sys.argv[2], wire)
+        print(f"bus: {', '.join(sorted(found))}")
+        if found != {"006#"}:
+            sys.exit("expected 006#")
 
 
 OWN_NETWORK = ["unshare", "-rn"]
-if sys.argv[2:] == ["inside"]:
+if sys.argv[3:] == ["inside"]:
     main()
 elif (refused := subprocess.run([*OWN_NETWORK, "true"], capture_output=True, text=True)).returncode != 0:
     print(f"skipped: no network of one's own: {refused.stderr.strip()}")

@@ -332,11 +332,11 @@ TEST_CASE("episodes that never end are cut off, and counted") {
   Recording recording;
   recording.Episode(7, 0, 20);
   recording.States(181, 210);
-  for (int i = 0; i < 20'000; ++i) recording.Command(100'000, 1'000 + i, 0);
+  for (int i = 0; i < 200'000; ++i) recording.Command(100'000, 1'000 + i, 0);
   const Log log = Read(recording.bytes);
   CHECK(CountTransitions(log.rollouts) == 20);
   REQUIRE(log.warnings.size() == 1);
-  CHECK(log.warnings[0] == "15001 episodes never end: more than 5000 are under way at once");
+  CHECK(log.warnings[0] == "195001 episodes never end: more than 5000 are under way at once");
 }
 
 }  // namespace
