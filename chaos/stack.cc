@@ -1,0 +1,112 @@
+#include "chaos/stack.h"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "chaos/script.h"
+
+namespace plumb {
+namespace {
+
+constexpr double kPatience = 60;  // [s] of real time for a process that is dead to be gone
+
+/// For processes that are started from now on: a file that may not become longer is an error of
+/// writing, as a full disk is, and not a signal.
+void HaveWritesFail() { ::signal(SIGXFSZ, SIG_IGN); }
+
+void LimitFilesOf(pid_t process, double bytes) {
+  rlimit limit{};
+  if (prlimit(process, RLIMIT_FSIZE, nullptr, &limit) != 0) return;  // it is gone already
+  limit.rlim_cur = std::isfinite(bytes) ? static_cast<rlim_t>(bytes) : limit.rlim_max;
+  prlimit(process, RLIMIT_FSIZE, &limit, nullptr);
+}
+
+}  // namespace
+
+Stack::Stack(Coordinator& coordinator, Setting setting)
+    : coordinator_(coordinator), setting_(std::move(setting)) {
+  HaveWritesFail();
+}
+
+std::vector<std::string> Stack::Arguments(const std::string& name) const {
+  const std::string seed = std::to_string(setting_.seed);
+  const auto in_folder = [&](const char* what) { return (setting_.folder / what).string(); };
+  const std::vector<std::string> bus{"--bus", "loop:chaos"};
+  std::vector<std::string> more;
+  if (name == "plumb-robot") {
+    more = {bus[0], bus[1], "--seed", seed};
+  } else if (name == "plumb-driver") {
+    more = {bus[0], bus[1], "--virtual", "--flight-recorder", in_folder("faults")};
+  } else if (name == "plumb-controller") {
+    more = {"--seed", seed};
+  } else if (name == "plumb-calibrator") {
+    more = {"--seed", seed, "--threads", "1", "--checkpoint", calibration()};
+  } else if (name == "plumb-trainer") {
+    more = {"--seed",
+            seed,
+            "--threads",
+            "1",
+            "--checkpoint",
+            in_folder("training"),
+            "--iterations",
+            std::to_string(setting_.iterations),
+            "--evaluation-episodes",
+            std::to_string(setting_.evaluation_episodes)};
+  }
+  const auto here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  std::vector<std::string> all{here / name,           setting_.robot, "--lcm-url", "memq://",
+                               "--clock",             coordinator_.clock(),
+                               "--key",               setting_.key,   "--parent",
+                               std::to_string(getpid())};
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+void Stack::StartAll() {
+  for (const std::string& name : ProcessNames()) Start(name);
+}
+
+void Stack::Start(const std::string& name) {
+  children_.erase(name);
+  const auto log = setting_.folder / (name + ".log");
+  Child& child =
+      *children_.emplace(name, std::make_unique<Child>(name, Arguments(name), log)).first->second;
+  // It joins the run first, and that in our turn: what it writes is written after this.
+  if (const auto limit = file_limits_.find(name); limit != file_limits_.end())
+    LimitFilesOf(child.pid(), limit->second);
+  coordinator_.Expect(name, child.pid());
+  running_.insert(name);
+}
+
+void Stack::Kill(const std::string& name) {
+  Child& child = *children_.at(name);
+  child.Signal(SIGKILL);
+  if (!child.WaitFor(kPatience)) throw std::runtime_error(name + " cannot be killed");
+  coordinator_.AwaitEnd(name);
+  running_.erase(name);
+}
+
+void Stack::LimitFiles(const std::string& name, double bytes) {
+  file_limits_[name] = bytes;
+  if (runs(name)) LimitFilesOf(children_.at(name)->pid(), bytes);
+}
+
+std::vector<Stack::Ending> Stack::TakeEndings() {
+  std::vector<Ending> endings;
+  for (const std::string& name : ProcessNames()) {
+    if (!runs(name) || coordinator_.present(name)) continue;
+    Child& child = *children_.at(name);
+    if (!child.WaitFor(kPatience)) throw std::runtime_error(name + " has left, and does not end");
+    running_.erase(name);
+    endings.push_back({name, child.ending(), child.Tail(1)});
+  }
+  return endings;
+}
+
+}  // namespace plumb
