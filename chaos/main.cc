@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 struct Flags {
   std::string seeds;  // FIRST:LAST
-  bool verbose = false;
+  bool verbose = false, first = false;
   std::string keep;
   TrialSetting setting;
 };
@@ -75,7 +75,7 @@ int Run(const Flags& flags) {
   std::cout << "  seed  pranks  endings  transitions  messages    frames  seconds  fingerprint"
                "       violates\n"
             << std::flush;
-  int violated = 0;
+  int played = 0, violated = 0;
   int64_t pranks = 0;
   for (uint64_t seed = seeds.first; seed <= seeds.last; ++seed) {
     const Folder folder;
@@ -86,6 +86,7 @@ int Run(const Flags& flags) {
     const Outcome outcome = Play(setting, [&](const std::string& line) {
       if (flags.verbose) std::cout << line << std::endl;
     });
+    ++played;
     pranks += outcome.pranks;
     std::cout << Row(seed, outcome) << std::endl;
     if (outcome.invariant == 0) continue;
@@ -93,9 +94,10 @@ int Run(const Flags& flags) {
     std::cout << fmt::format("seed {} violates \"{}\"\n{}", seed,
                              NameOfInvariant(outcome.invariant), outcome.story)
               << std::endl;
+    if (flags.first) break;
   }
-  std::cout << fmt::format("{} seeds, {} pranks, {} seeds with a violation\n",
-                           seeds.last - seeds.first + 1, pranks, violated);
+  std::cout << fmt::format("{} seeds, {} pranks, {} seeds with a violation\n", played, pranks,
+                           violated);
   return violated == 0 ? 0 : 1;
 }
 
@@ -120,6 +122,7 @@ int main(int argc, char** argv) {
   app.add_option("--iterations", setting.iterations, "of calibration")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
+  app.add_flag("--first", flags.first, "stop at the first seed that violates something");
   app.add_flag("--verbose", flags.verbose, "print what the monkey does");
   app.add_option("--keep", flags.keep, "a new folder to leave logs and checkpoints in");
   CLI11_PARSE(app, argc, argv);

@@ -126,6 +126,7 @@ TEST_CASE("a torque has nothing against it") {
     armed.Pass(5);
     armed.Request(driver_request_t::ARM);
     CHECK(armed.Torque(1) == 0);
+    armed.Pass(1);
     armed.Request(driver_request_t::ESTOP);
     armed.Pass(5);
     CHECK(armed.Torque(1) == 2);
