@@ -81,8 +81,9 @@ int Run(const Flags& flags) {
     const Folder folder;
     TrialSetting setting = flags.setting;
     setting.seed = seed;
-    setting.folder = flags.keep.empty() ? folder.path() : fs::path(flags.keep);
-    if (!flags.keep.empty()) fs::create_directories(setting.folder);
+    setting.folder =
+        flags.keep.empty() ? folder.path() : fs::path(flags.keep) / std::to_string(seed);
+    fs::create_directories(setting.folder);
     const Outcome outcome = Play(setting, [&](const std::string& line) {
       if (flags.verbose) std::cout << line << std::endl;
     });
@@ -122,9 +123,13 @@ int main(int argc, char** argv) {
   app.add_option("--iterations", setting.iterations, "of calibration")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
+  app.add_option("--patience", setting.patience,
+                 "[s] of virtual time after the last of them until there has to be a result")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   app.add_flag("--first", flags.first, "stop at the first seed that violates something");
   app.add_flag("--verbose", flags.verbose, "print what the monkey does");
-  app.add_option("--keep", flags.keep, "a new folder to leave logs and checkpoints in");
+  app.add_option("--keep", flags.keep, "a folder to leave each seed's logs and checkpoints in");
   CLI11_PARSE(app, argc, argv);
   spdlog::set_level(spdlog::level::off);  // whom we do not believe is part of the game
   try {

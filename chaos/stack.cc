@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "chaos/script.h"
@@ -25,6 +26,19 @@ void LimitFilesOf(pid_t process, double bytes) {
   if (prlimit(process, RLIMIT_FSIZE, nullptr, &limit) != 0) return;  // it is gone already
   limit.rlim_cur = std::isfinite(bytes) ? static_cast<rlim_t>(bytes) : limit.rlim_max;
   prlimit(process, RLIMIT_FSIZE, &limit, nullptr);
+}
+
+/// The error that a log's line tells, without what differs from run to run: the time of day and
+/// the folder's name. Empty if it tells none.
+std::string ErrorIn(std::string line, const std::string& folder) {
+  constexpr std::string_view kError = " error ";
+  const size_t error = line.find(kError);
+  if (error == std::string::npos) return "";
+  line.erase(0, error + kError.size());
+  while (!line.empty() && line.back() == '\n') line.pop_back();
+  const std::string prefix = folder + "/";
+  for (size_t at; (at = line.find(prefix)) != std::string::npos;) line.erase(at, prefix.size());
+  return line;
 }
 
 }  // namespace
@@ -104,7 +118,7 @@ std::vector<Stack::Ending> Stack::TakeEndings() {
     Child& child = *children_.at(name);
     if (!child.WaitFor(kPatience)) throw std::runtime_error(name + " has left, and does not end");
     running_.erase(name);
-    endings.push_back({name, child.ending(), child.Tail(1)});
+    endings.push_back({name, child.ending(), ErrorIn(child.Tail(1), setting_.folder)});
   }
   return endings;
 }

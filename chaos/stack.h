@@ -28,7 +28,7 @@ class Stack {
   struct Ending {
     std::string name;
     std::string how;  ///< "exit status 1", "killed by signal 11"
-    std::string why;  ///< the last line of its log
+    std::string why;  ///< the error that is the last line of its log; empty if none is
   };
 
   Stack(Coordinator& coordinator, Setting setting);

@@ -49,15 +49,19 @@ constexpr auto kRealPatience = std::chrono::seconds(120);  // with one who compu
 /// The robot, but that it learns so little that a run takes a second.
 std::string LearnLittle(const TrialSetting& setting) {
   const fs::path given = fs::absolute(setting.robot);
-  const fs::path base = fs::is_directory(given) ? given / "robot.toml" : given;
+  const bool is_folder = fs::is_directory(given);
+  const fs::path base = is_folder ? given / "robot.toml" : given;
   const RobotDescription robot = LoadRobot(base);
-  const fs::path file = setting.folder / "robot.toml";
+  // Beside copies of all that it may refer to.
+  const fs::path folder = setting.folder / "robot";
+  fs::copy(base.parent_path(), folder, fs::copy_options::recursive);
+  const fs::path file = folder / "little.toml";
   // An episode of two seconds, or a tenth of its steps where they are short.
   const int steps = std::clamp(static_cast<int>(2 / robot.task.period), 20, 100);
   std::ofstream(file) << fmt::format(
-      "extends = \"{}\"\n[robot]\nurdf = \"{}\"\n[task]\nsteps = {}\n[training]\nbatch = {}\n"
-      "updates = 1\nupdates_again = 1\nhidden = [8]\ncritic_epochs = 1\n",
-      base.string(), (base.parent_path() / "robot.urdf").string(), steps, 4 * steps);
+      "extends = \"{}\"\n[task]\nsteps = {}\n[training]\nbatch = {}\nupdates = 1\n"
+      "updates_again = 1\nhidden = [8]\ncritic_epochs = 1\n",
+      base.filename().string(), steps, 4 * steps);
   return file;
 }
 
@@ -169,6 +173,7 @@ class Trial {
       const std::string line =
           fmt::format("{} ended ({}): {}", ending.name, ending.how, ending.why);
       chronicle_.AddTurn(Now(), line);
+      if (on_prank_) on_prank_(line);
       const bool could_say = !full_disks_.contains(ending.name);
       if (ending.how != "exit status 1" || (could_say && ending.why.empty()))
         chronicle_.Violate(7, Now(), line);
