@@ -17,10 +17,6 @@ namespace {
 
 constexpr double kPatience = 60;  // [s] of real time for a process that is dead to be gone
 
-/// For processes that are started from now on: a file that may not become longer is an error of
-/// writing, as a full disk is, and not a signal.
-void HaveWritesFail() { ::signal(SIGXFSZ, SIG_IGN); }
-
 void LimitFilesOf(pid_t process, double bytes) {
   rlimit limit{};
   if (prlimit(process, RLIMIT_FSIZE, nullptr, &limit) != 0) return;  // it is gone already
@@ -44,8 +40,15 @@ std::string ErrorIn(std::string line, const std::string& folder) {
 }  // namespace
 
 Stack::Stack(Coordinator& coordinator, Setting setting)
-    : coordinator_(coordinator), setting_(std::move(setting)) {
-  HaveWritesFail();
+    : coordinator_(coordinator), setting_(std::move(setting)) {}
+
+/// Others write in threads of their own, so that the moment would be the machine's.
+bool Stack::MayBeCut(const std::string& name) const {
+  return setting_.cuts && (name == "plumb-calibrator" || name == "plumb-trainer");
+}
+
+bool Stack::IsCut(const Ending& ending) const {
+  return MayBeCut(ending.name) && ending.how == fmt::format("killed by signal {}", SIGXFSZ);
 }
 
 std::vector<std::string> Stack::Arguments(const std::string& name) const {
@@ -79,6 +82,8 @@ std::vector<std::string> Stack::Arguments(const std::string& name) const {
                                "--key",               setting_.key,   "--parent",
                                std::to_string(getpid())};
   all.insert(all.end(), more.begin(), more.end());
+  // Its log is a file like others: what it may tell before it ends is all that is in it.
+  if (MayBeCut(name)) all.insert(all.end(), {"--log-level", "error"});
   return all;
 }
 
@@ -89,6 +94,7 @@ void Stack::StartAll() {
 void Stack::Start(const std::string& name) {
   children_.erase(name);
   const auto log = setting_.folder / (name + ".log");
+  ::signal(SIGXFSZ, MayBeCut(name) ? SIG_DFL : SIG_IGN);  // which it inherits
   Child& child =
       *children_.emplace(name, std::make_unique<Child>(name, Arguments(name), log)).first->second;
   // It joins the run first, and that in our turn: what it writes is written after this.

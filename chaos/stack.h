@@ -23,6 +23,9 @@ class Stack {
     uint64_t seed = 1;
     int iterations = 1;
     int evaluation_episodes = 1;
+    /// Where a file may not become longer, calibrator and trainer are killed in the middle of
+    /// writing it, as by a power cut; otherwise the write fails, as on a full disk.
+    bool cuts = false;
   };
   /// How a process has ended that nobody has killed.
   struct Ending {
@@ -45,9 +48,12 @@ class Stack {
   /// Those who have ended by themselves since the last call.
   std::vector<Ending> TakeEndings();
 
+  /// Whether a process ends so in the middle of writing.
+  bool IsCut(const Ending& ending) const;
   std::filesystem::path calibration() const { return setting_.folder / "calibration"; }
 
  private:
+  bool MayBeCut(const std::string& name) const;
   std::vector<std::string> Arguments(const std::string& name) const;
 
   Coordinator& coordinator_;

@@ -70,6 +70,8 @@ TorqueWitness::TorqueWitness(const RobotDescription& robot, Chronicle& chronicle
       stale_after_(Microseconds(robot.driver.stale_after)),
       heartbeat_timeout_(Microseconds(robot.driver.heartbeat_timeout)),
       watchdog_(Microseconds(robot.virtual_robot.watchdog)) {
+  if (robot.driver.stop != DriverSettings::Stop::kZero)
+    throw std::invalid_argument(robot.file + ": [driver] stop: only stops by zero are watched");
   for (const int joint : robot.driven()) {
     const JointDescription& description = robot.joints[static_cast<size_t>(joint)];
     const MotorDescription& motor = description.motor;

@@ -21,7 +21,8 @@ namespace plumb {
 /// CANSimple's frames by itself, and of the driver nothing. Not thread-safe.
 class TorqueWitness {
  public:
-  /// @throws std::invalid_argument if a motor has another protocol.
+  /// @throws std::invalid_argument if a motor has another protocol, or it stops otherwise than by
+  /// zero torque.
   TorqueWitness(const RobotDescription& robot, Chronicle& chronicle);
 
   /// Times are the run's [us].
