@@ -101,9 +101,10 @@ int JournalWitness::Judge(int64_t time, const std::filesystem::path& folder, uin
     const auto counted_then = said.transitions().find(k);
     if (counted_then != said.transitions().end() &&
         static_cast<size_t>(counted_then->second) != in_use) {
-      chronicle_.Violate(4, time, fmt::format("{} transitions in use after iteration {}, {} in the "
-                                              "journal",
-                                              counted_then->second, k, in_use));
+      chronicle_.Violate(4, time,
+                         fmt::format("{} transitions in use after iteration {}, {} in the "
+                                     "journal",
+                                     counted_then->second, k, in_use));
     }
   }
   return static_cast<int>(CountTransitions(journal->rollouts));

@@ -61,9 +61,8 @@ void Madden(joint_command_t& m, Random& random) {
 }
 void Madden(joint_state_t& m, Random& random) {
   if (Often(random)) {
-    return MaddenOne({&m.position, &m.velocity, &m.effort_measured, &m.effort_sent,
-                      &m.effort_applied},
-                     random);
+    return MaddenOne(
+        {&m.position, &m.velocity, &m.effort_measured, &m.effort_sent, &m.effort_applied}, random);
   }
   m.utime = MadInteger(m.utime, random);
 }

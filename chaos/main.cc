@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <CLI/CLI.hpp>
 
-#include <charconv>
 #include <cerrno>
+#include <charconv>
 #include <iostream>
 #include <string>
 #include <system_error>

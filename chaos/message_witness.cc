@@ -50,8 +50,8 @@ void MessageWitness::OnStart(const std::string& name) {
 void MessageWitness::RequireRising(int64_t time, const std::string& what, int iteration) {
   const auto [known, first] = iterations_.try_emplace(what, iteration);
   if (iteration < known->second) {
-    chronicle_.Violate(
-        6, time, fmt::format("{} of iteration {} after {}", what, iteration, known->second));
+    chronicle_.Violate(6, time,
+                       fmt::format("{} of iteration {} after {}", what, iteration, known->second));
   }
   known->second = std::max(known->second, iteration);
 }
@@ -66,8 +66,7 @@ void MessageWitness::NoteChange(int64_t time, const std::string& who, const std:
   told = state;
 }
 
-void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post,
-                            const std::string& speaker) {
+void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std::string& speaker) {
   if (post.topic.kind == lockstep_topic_t::FRAME || speaker.empty()) return;
   const std::string& channel = post.topic.name;
   if (channel == "JOINT_STATE") {
@@ -100,15 +99,15 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post,
     calibration_status_t m;
     if (!Read(post, m)) return;
     RequireRising(time, channel, m.iteration);
-    NoteChange(time, "calibrator", fmt::format("iteration {}, {} transitions", m.iteration,
-                                               m.transitions));
+    NoteChange(time, "calibrator",
+               fmt::format("iteration {}, {} transitions", m.iteration, m.transitions));
     // With those of a roll-out under way: what is in use when the iteration is complete.
     transitions_.try_emplace(m.iteration, m.transitions);
   } else if (channel == "TRAINING_STATUS") {
     training_status_t m;
     if (!Read(post, m)) return;
-    NoteChange(time, "trainer", fmt::format("iteration {}{}", m.iteration,
-                                            m.complete ? " complete" : ""));
+    NoteChange(time, "trainer",
+               fmt::format("iteration {}{}", m.iteration, m.complete ? " complete" : ""));
     // One that was not complete may be begun anew.
     if (m.complete) RequireRising(time, channel, m.iteration);
   } else if (channel == "CONTROLLER_STATUS") {

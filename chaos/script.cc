@@ -38,20 +38,20 @@ constexpr std::array kHearings{
 
 struct Kind {
   Mischief what;
-  int weight;       // how often, among all
+  int weight;                // how often, among all
   double shortest, longest;  // [s] of its duration, log-uniform
 };
 
 // What stops the robot is rarer than what only tries to: in a run that is always stopped nothing
 // is calibrated.
 constexpr std::array kKinds{
-    Kind{Mischief::kKill, 6, 0.02, 0.6},     Kind{Mischief::kStall, 6, 0.005, 0.6},
-    Kind{Mischief::kDrop, 10, 0.005, 0.2},   Kind{Mischief::kDelay, 10, 0.005, 0.2},
-    Kind{Mischief::kDouble, 10, 0.01, 0.5},  Kind{Mischief::kCorrupt, 8, 0.005, 0.1},
-    Kind{Mischief::kReplay, 10, 0, 0},       Kind{Mischief::kMadden, 8, 0.01, 0.4},
-    Kind{Mischief::kGarbage, 10, 0, 0},      Kind{Mischief::kForge, 10, 0, 0},
-    Kind{Mischief::kForgeFrame, 4, 0, 0},    Kind{Mischief::kBusDown, 2, 0.005, 0.3},
-    Kind{Mischief::kDiskFull, 5, 0.1, 2.0},  Kind{Mischief::kSetClock, 3, 0.05, 1.0},
+    Kind{Mischief::kKill, 6, 0.02, 0.6},    Kind{Mischief::kStall, 6, 0.005, 0.6},
+    Kind{Mischief::kDrop, 10, 0.005, 0.2},  Kind{Mischief::kDelay, 10, 0.005, 0.2},
+    Kind{Mischief::kDouble, 10, 0.01, 0.5}, Kind{Mischief::kCorrupt, 8, 0.005, 0.1},
+    Kind{Mischief::kReplay, 10, 0, 0},      Kind{Mischief::kMadden, 8, 0.01, 0.4},
+    Kind{Mischief::kGarbage, 10, 0, 0},     Kind{Mischief::kForge, 10, 0, 0},
+    Kind{Mischief::kForgeFrame, 4, 0, 0},   Kind{Mischief::kBusDown, 2, 0.005, 0.3},
+    Kind{Mischief::kDiskFull, 5, 0.1, 2.0}, Kind{Mischief::kSetClock, 3, 0.05, 1.0},
     Kind{Mischief::kStop, 2, 0, 0},
 };
 static_assert(kKinds.size() == kMischiefs);
@@ -139,10 +139,21 @@ double PickAmount(Random& random, Mischief what) {
 }
 
 const char* Name(Mischief what) {
-  constexpr std::array kNames{"kills",  "stalls",  "drops",  "delays",        "doubles",
-                              "corrupts", "replays", "maddens", "says garbage on", "forges",
-                              "forges a frame on", "takes down", "fills the disk of",
-                              "sets the clock of", "stops the robot by"};
+  constexpr std::array kNames{"kills",
+                              "stalls",
+                              "drops",
+                              "delays",
+                              "doubles",
+                              "corrupts",
+                              "replays",
+                              "maddens",
+                              "says garbage on",
+                              "forges",
+                              "forges a frame on",
+                              "takes down",
+                              "fills the disk of",
+                              "sets the clock of",
+                              "stops the robot by"};
   return kNames[static_cast<size_t>(what)];
 }
 

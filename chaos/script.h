@@ -8,27 +8,27 @@ namespace plumb {
 
 /// What the monkey can do.
 enum class Mischief {
-  kKill,       ///< a process dies, and is started again after a while
-  kStall,      ///< a process stands still
-  kDrop,       ///< of what one process is to hear of a topic, some is lost
-  kDelay,      ///< some comes late, and so out of order
-  kDouble,     ///< some comes twice
-  kCorrupt,    ///< one bit of some is another
-  kReplay,     ///< something genuine, said long ago, is said again
-  kMadden,     ///< numbers in what a process says are mad, though its seal is right
-  kGarbage,    ///< bytes that mean nothing, on a channel or on the bus
-  kForge,      ///< a well-formed message with hostile values, unsealed or with a wrong seal
-  kForgeFrame, ///< a well-formed frame that somebody else is to send
-  kBusDown,    ///< nobody hears a frame
-  kDiskFull,   ///< a process cannot write files, or no more than some bytes of each
-  kSetClock,   ///< a process has the wrong date
-  kStop,       ///< a person's DISARM or ESTOP
+  kKill,        ///< a process dies, and is started again after a while
+  kStall,       ///< a process stands still
+  kDrop,        ///< of what one process is to hear of a topic, some is lost
+  kDelay,       ///< some comes late, and so out of order
+  kDouble,      ///< some comes twice
+  kCorrupt,     ///< one bit of some is another
+  kReplay,      ///< something genuine, said long ago, is said again
+  kMadden,      ///< numbers in what a process says are mad, though its seal is right
+  kGarbage,     ///< bytes that mean nothing, on a channel or on the bus
+  kForge,       ///< a well-formed message with hostile values, unsealed or with a wrong seal
+  kForgeFrame,  ///< a well-formed frame that somebody else is to send
+  kBusDown,     ///< nobody hears a frame
+  kDiskFull,    ///< a process cannot write files, or no more than some bytes of each
+  kSetClock,    ///< a process has the wrong date
+  kStop,        ///< a person's DISARM or ESTOP
 };
 inline constexpr int kMischiefs = 15;
 
 /// One thing that the monkey does.
 struct Prank {
-  int64_t time = 0;      ///< [us] since the run's beginning
+  int64_t time = 0;  ///< [us] since the run's beginning
   Mischief what = Mischief::kKill;
   std::string whom;      ///< the process that it befalls; empty: everybody
   std::string topic;     ///< LCM channel, or kBus; empty: none

@@ -77,10 +77,9 @@ std::vector<std::string> Stack::Arguments(const std::string& name) const {
             std::to_string(setting_.evaluation_episodes)};
   }
   const auto here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
-  std::vector<std::string> all{here / name,           setting_.robot, "--lcm-url", "memq://",
-                               "--clock",             coordinator_.clock(),
-                               "--key",               setting_.key,   "--parent",
-                               std::to_string(getpid())};
+  std::vector<std::string> all{here / name, setting_.robot,          "--lcm-url", "memq://",
+                               "--clock",   coordinator_.clock(),    "--key",     setting_.key,
+                               "--parent",  std::to_string(getpid())};
   all.insert(all.end(), more.begin(), more.end());
   // Its log is a file like others: what it may tell before it ends is all that is in it.
   if (MayBeCut(name)) all.insert(all.end(), {"--log-level", "error"});

@@ -21,8 +21,8 @@ namespace {
 // CANSimple's commands, in the last five bits of an id.
 constexpr uint32_t kHeartbeat = 0x01, kEstop = 0x02, kSetAxisState = 0x07, kEstimates = 0x09,
                    kSetMode = 0x0B, kSetTorque = 0x0E;
-constexpr uint32_t kEverybody = 0x3F;  // a node
-constexpr uint8_t kRunning = 8;        // axis state
+constexpr uint32_t kEverybody = 0x3F;       // a node
+constexpr uint8_t kRunning = 8;             // axis state
 constexpr int64_t kRemembered = 3'000'000;  // [us]
 
 template <class Message>
@@ -160,8 +160,7 @@ void TorqueWitness::OnHeard(const lockstep_post_t& post, const std::string& spea
     const bool plain = std::ranges::all_of(command->kp, [](double x) { return std::isnan(x); }) &&
                        std::ranges::all_of(command->kd, [](double x) { return std::isnan(x); });
     Forget(commands_, post.arrival - kRemembered);
-    commands_.push_back(
-        {post.arrival, command->utime, command->expiry, command->effort, plain});
+    commands_.push_back({post.arrival, command->utime, command->expiry, command->effort, plain});
   }
 }
 
@@ -188,8 +187,8 @@ void TorqueWitness::OnDriverHears(const Frame& frame, int64_t arrival) {
 void TorqueWitness::OnTorque(int64_t time, Node& node, double torque) {
   const std::string& joint = robot_.joints[node.joint].name;
   if (!std::isfinite(torque) || std::abs(torque) > node.limit * (1 + 1e-6)) {
-    return chronicle_.Violate(1, time, fmt::format("{} Nm for {}, whose limit is {}", torque, joint,
-                                                   node.limit));
+    return chronicle_.Violate(
+        1, time, fmt::format("{} Nm for {}, whose limit is {}", torque, joint, node.limit));
   }
   if (torque == 0) return;
   if (!Wanted(time, node, torque)) {
@@ -247,9 +246,10 @@ void TorqueWitness::OnDriverState(int64_t time, bool active) {
   if (active) return;
   for (const auto& [id, node] : nodes_) {
     if (!node.told_to_run) continue;
-    chronicle_.Violate(2, time, fmt::format("the driver is not armed, and has not told the drive of "
-                                            "{} to stop",
-                                            robot_.joints[node.joint].name));
+    chronicle_.Violate(2, time,
+                       fmt::format("the driver is not armed, and has not told the drive of "
+                                   "{} to stop",
+                                   robot_.joints[node.joint].name));
   }
 }
 
@@ -257,10 +257,10 @@ void TorqueWitness::OnDriverState(int64_t time, bool active) {
 void TorqueWitness::OnDriveHeartbeat(int64_t time, const Node& node, const Frame& frame) {
   if (watchdog_ <= 0 || frame.length != 8 || frame.data[4] != kRunning) return;
   const auto stalls = stalls_.find("plumb-robot");
-  const bool doubtful = stalls != stalls_.end() &&
-                        std::ranges::any_of(stalls->second, [&](const Stall& stall) {
-                          return time >= stall.from && time <= stall.until + 2 * watchdog_;
-                        });
+  const bool doubtful =
+      stalls != stalls_.end() && std::ranges::any_of(stalls->second, [&](const Stall& stall) {
+        return time >= stall.from && time <= stall.until + 2 * watchdog_;
+      });
   if (!doubtful && time - node.fed > watchdog_ + cycle_) {
     chronicle_.Violate(2, time,
                        fmt::format("the drive of {} runs {} ms after it was spoken to last",

@@ -46,7 +46,7 @@ class TorqueWitness {
     double per_effort;
     std::deque<int64_t> estimates;  // arrivals
     std::deque<Heartbeat> heartbeats;
-    int64_t fed = 0;   // arrival of the last frame that the drive was sent
+    int64_t fed = 0;           // arrival of the last frame that the drive was sent
     bool told_to_run = false;  // by the driver, and not to stop since
   };
   struct Command {
@@ -68,9 +68,9 @@ class TorqueWitness {
   Chronicle& chronicle_;
   const int64_t cycle_, expiry_, stale_after_, heartbeat_timeout_, watchdog_;
   std::map<uint32_t, Node> nodes_;
-  std::deque<Command> commands_;       // that the driver has been told
-  std::deque<int64_t> stops_, arms_;   // likewise, arrivals
-  bool armed_ = false;                 // as the driver says
+  std::deque<Command> commands_;      // that the driver has been told
+  std::deque<int64_t> stops_, arms_;  // likewise, arrivals
+  bool armed_ = false;                // as the driver says
   bool dates_agree_ = true;
   struct Stall {
     int64_t from, until;

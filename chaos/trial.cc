@@ -93,9 +93,8 @@ class Trial {
         journal_(robot_, kBusUrl, key_, chronicle_),
         coordinator_((setting.folder / "clock").string()),
         messenger_(coordinator_.participant()),
-        stack_(coordinator_,
-               {robot_file_, setting.folder, key_file_, setting.seed, setting.iterations, 1,
-                setting.seed % 2 == 0}) {
+        stack_(coordinator_, {robot_file_, setting.folder, key_file_, setting.seed,
+                              setting.iterations, 1, setting.seed % 2 == 0}) {
     messenger_.Become(Identity("chaos", key_, Clock(coordinator_.participant().time()),
                                Identity::Reach::kRun, 0));
     requests_.emplace(messenger_, "DRIVER_REQUEST");
@@ -154,18 +153,18 @@ class Trial {
   }
 
   std::string Situation() const {
-    return fmt::format("the driver's state is {} ({}), the controller's phase {} ({}) with policy "
-                       "{}, the newest distribution {}",
-                       int{drivers_->newest().state}, drivers_->newest().reason,
-                       int{controllers_->newest().phase}, controllers_->newest().reason,
-                       controllers_->newest().policy_iteration, messages_.iteration());
+    return fmt::format(
+        "the driver's state is {} ({}), the controller's phase {} ({}) with policy "
+        "{}, the newest distribution {}",
+        int{drivers_->newest().state}, drivers_->newest().reason, int{controllers_->newest().phase},
+        controllers_->newest().reason, controllers_->newest().policy_iteration,
+        messages_.iteration());
   }
 
   bool Finished() const {
     const controller_status_t& status = controllers_->newest();
     return controllers_->received() > 0 && status.phase == controller_status_t::COMPLETE &&
-           status.purpose == policy_t::EVALUATE &&
-           status.policy_iteration == setting_.iterations;
+           status.purpose == policy_t::EVALUATE && status.policy_iteration == setting_.iterations;
   }
 
   /// Whoever has ended had a reason to; it is started again.
@@ -178,8 +177,7 @@ class Trial {
       const bool full = full_disks_.contains(ending.name);
       const bool reason = ending.how == "exit status 1" && (full || !ending.why.empty());
       if (!reason && !(full && stack_.IsCut(ending))) chronicle_.Violate(7, Now(), line);
-      if (++endings_ > kMostEndings)
-        chronicle_.Violate(7, Now(), "it does not come back: " + line);
+      if (++endings_ > kMostEndings) chronicle_.Violate(7, Now(), "it does not come back: " + line);
       At(Now() + kRestart, [this, name = ending.name] {
         if (!stack_.runs(name)) Start(name);
       });
@@ -310,7 +308,8 @@ class Trial {
   std::multiset<std::string> full_disks_;
   int64_t asked_ = 0, calm_since_ = kBeginning;
   int played_ = 0, endings_ = 0;
-  std::chrono::steady_clock::time_point real_deadline_ = std::chrono::steady_clock::time_point::max();
+  std::chrono::steady_clock::time_point real_deadline_ =
+      std::chrono::steady_clock::time_point::max();
   Stack stack_;  // is stopped first
 };
 
@@ -328,8 +327,7 @@ const char* NameOfInvariant(int invariant) {
   return kNames[static_cast<size_t>(invariant)];
 }
 
-Outcome Play(const TrialSetting& setting,
-             const std::function<void(const std::string&)>& on_prank) {
+Outcome Play(const TrialSetting& setting, const std::function<void(const std::string&)>& on_prank) {
   return Trial(setting, on_prank).Run();
 }
 

@@ -22,13 +22,13 @@ struct TrialSetting {
 };
 
 struct Outcome {
-  int invariant = 0;   ///< that was violated first; 0 = none
-  std::string story;   ///< of the violation, for people
-  int pranks = 0;      ///< that were played
-  int endings = 0;     ///< of processes that ended by themselves, with a reason
-  int transitions = 0; ///< accepted
+  int invariant = 0;    ///< that was violated first; 0 = none
+  std::string story;    ///< of the violation, for people
+  int pranks = 0;       ///< that were played
+  int endings = 0;      ///< of processes that ended by themselves, with a reason
+  int transitions = 0;  ///< accepted
   int64_t messages = 0, frames = 0;
-  double seconds = 0;  ///< of virtual time
+  double seconds = 0;        ///< of virtual time
   uint64_t fingerprint = 0;  ///< of all that was said: the same for the same setting
 };
 

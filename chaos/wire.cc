@@ -34,8 +34,8 @@ void Wire::Begin(const Prank& prank, int64_t now) {
   windows_.push_back({prank, now + prank.duration, Random(seed_, {kWireStream, prank.number})});
 }
 
-std::vector<lockstep_post_t> Wire::Carry(const lockstep_post_t& post,
-                                         const std::string& listener, int64_t now) {
+std::vector<lockstep_post_t> Wire::Carry(const lockstep_post_t& post, const std::string& listener,
+                                         int64_t now) {
   std::erase_if(windows_, [&](const Window& window) { return window.end <= now; });
   std::vector<lockstep_post_t> arrivals{post};
   for (Window& window : windows_) {

@@ -23,7 +23,8 @@ class Wire {
   /// From now on, for its duration. @param now [us]
   void Begin(const Prank& prank, int64_t now);
   /// @param now [us] @return what the listener hears of it.
-  std::vector<lockstep_post_t> Carry(const lockstep_post_t& post, const std::string& listener, int64_t now);
+  std::vector<lockstep_post_t> Carry(const lockstep_post_t& post, const std::string& listener,
+                                     int64_t now);
 
  private:
   struct Window {

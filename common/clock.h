@@ -26,8 +26,8 @@ class Clock {
   /// @param epoch real CLOCK_REALTIME microseconds at which scaled and real time agree.
   /// @throws std::invalid_argument if scale is out of range.
   explicit Clock(double scale = 1, int64_t epoch = 0);
-  /// The virtual time of a run: Participant::time(). Utime and Now are the same, unless somebody has
-  /// set the clock.
+  /// The virtual time of a run: Participant::time(). Utime and Now are the same, unless somebody
+  /// has set the clock.
   explicit Clock(std::shared_ptr<const VirtualTime> virtual_time);
 
   /// Reads the form "SCALE" or "SCALE@EPOCH". @throws std::invalid_argument naming the text.
@@ -44,7 +44,8 @@ class Clock {
   /// The date of signatures [us]: real time, not scaled, so that it rises from run to run; virtual
   /// time in a run in virtual time.
   int64_t SigningUtime() const;
-  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds); in virtual time, of the run's.
+  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds); in virtual time of one of
+  /// the run's.
   int64_t UtimeFromRealtimeNs(int64_t ns) const;
   /// Real time that corresponds to a scaled duration, for ppoll; negative durations give zero.
   timespec RealDuration(int64_t scaled_us) const;

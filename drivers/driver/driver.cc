@@ -12,7 +12,7 @@ constexpr int kRefusedCycles = 10;  // consecutive cycles whose frames were not 
 // in a cycle while arming: the kernel holds about ten in flight
 constexpr size_t kMaxFrames = 8;
 constexpr int64_t kClockSet = 10'000;  // [us] of real against monotonic time: not by itself
-constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
+constexpr int kUnacknowledged = 16;    // consecutive no-acknowledge error frames: nobody is there
 
 // By division, so that whole cycles sum up to the settings' seconds: a ramp ends at zero.
 double InSeconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }

@@ -180,9 +180,9 @@ class Driver {
   Reason reason_;
   // what stopped it: a fault or a request; the beginning of the reason
   Reason cause_;
-  int arms_refused_ = 0;           // since it was armed last
-  int64_t now_, utime_;            // latest times given
-  int64_t clock_offset_;           // utime - now, as long as nobody sets the clock
+  int arms_refused_ = 0;  // since it was armed last
+  int64_t now_, utime_;   // latest times given
+  int64_t clock_offset_;  // utime - now, as long as nobody sets the clock
   int64_t start_utime_;
   int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
   bool stop_stamped_ = true;       // false: that time is the last one known before it
