@@ -1,12 +1,10 @@
 #include "chaos/trial.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <fstream>
 #include <functional>
 #include <limits>
 #include <map>
@@ -17,6 +15,7 @@
 #include "chaos/chronicle.h"
 #include "chaos/forgery.h"
 #include "chaos/journal_witness.h"
+#include "chaos/little_robot.h"
 #include "chaos/message_witness.h"
 #include "chaos/script.h"
 #include "chaos/stack.h"
@@ -35,8 +34,6 @@
 namespace plumb {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr int64_t kBeginning = Coordinator::kBeginning;
 constexpr int64_t kLook = 50'000;       // [us] between two looks at how all are
 constexpr int64_t kArmAgain = 500'000;  // [us]
@@ -46,46 +43,17 @@ constexpr uint32_t kDeedStream = 0x44656564;  // "Deed"
 constexpr char kBusUrl[] = "loop:chaos";
 constexpr auto kRealPatience = std::chrono::seconds(120);  // with one who computes
 
-/// The robot, but that it learns so little that a run takes a second.
-std::string LearnLittle(const TrialSetting& setting) {
-  const fs::path given = fs::absolute(setting.robot);
-  const bool is_folder = fs::is_directory(given);
-  const fs::path base = is_folder ? given / "robot.toml" : given;
-  const RobotDescription robot = LoadRobot(base);
-  // Beside copies of all that it may refer to.
-  const fs::path folder = setting.folder / "robot";
-  fs::copy(base.parent_path(), folder, fs::copy_options::recursive);
-  const fs::path file = folder / "little.toml";
-  // An episode of two seconds, or a tenth of its steps where they are short.
-  const int steps = std::clamp(static_cast<int>(2 / robot.task.period), 20, 100);
-  std::ofstream(file) << fmt::format(
-      "extends = \"{}\"\n[task]\nsteps = {}\n[training]\nbatch = {}\nupdates = 1\n"
-      "updates_again = 1\nhidden = [8]\ncritic_epochs = 1\n",
-      base.filename().string(), steps, 4 * steps);
-  return file;
-}
-
-/// A key that follows from the seed: what is signed is the same in every run.
-std::string MakeKey(const fs::path& file, uint64_t seed, uint32_t stream) {
-  Random random(seed, {stream});
-  std::string digits;
-  for (int i = 0; i < 8; ++i) digits += fmt::format("{:08x}", random.Bits());
-  std::ofstream(file) << digits << "\n";
-  fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
-  return file;
-}
-
 class Trial {
  public:
   Trial(const TrialSetting& setting, std::function<void(const std::string&)> on_prank)
       : setting_(setting),
         on_prank_(std::move(on_prank)),
-        robot_file_(LearnLittle(setting)),
+        robot_file_(MakeLittleRobot(setting.robot, setting.folder)),
         robot_(LoadRobot(robot_file_)),
-        key_file_(MakeKey(setting.folder / "key", setting.seed, 1)),
+        key_file_(MakeKnownKey(setting.folder / "key", setting.seed, 1)),
         key_(key_file_),
         forgery_(robot_, kBusUrl, key_,
-                 SigningKey(MakeKey(setting.folder / "wrong_key", setting.seed, 2))),
+                 SigningKey(MakeKnownKey(setting.folder / "wrong_key", setting.seed, 2))),
         wire_(setting.seed,
               [this](auto& post, auto& random) { return forgery_.Madden(post, random); }),
         messages_(chronicle_),
