@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "common/hash.h"
 #include "common/lockstep/coordinator.h"
 #include "common/time_units.h"
 
@@ -21,9 +20,7 @@ std::string At(int64_t time) {
 
 }  // namespace
 
-Chronicle::Chronicle() : fingerprint_(kEmptyHash) {}
-
-void Chronicle::AddPrank(int64_t, const std::string& text) { Keep(pranks_, text, kPranksTold); }
+void Chronicle::AddPrank(const std::string& text) { Keep(pranks_, text, kPranksTold); }
 
 void Chronicle::AddTurn(int64_t time, const std::string& text) {
   if (!violated()) Keep(turns_, At(time) + text, kTurnsTold);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "common/hash.h"
 #include "plumb/lockstep_post_t.hpp"
 
 namespace plumb {
@@ -15,8 +16,9 @@ class Chronicle {
  public:
   static constexpr size_t kPranksTold = 12, kPostsTold = 24, kTurnsTold = 16;
 
+  /// @param text with its time.
+  void AddPrank(const std::string& text);
   /// Times are the run's [us].
-  void AddPrank(int64_t time, const std::string& text);
   void AddPost(int64_t time, const lockstep_post_t& post, const std::string& speaker);
   /// Something of note: a state that has changed, a process that has ended.
   void AddTurn(int64_t time, const std::string& text);
@@ -45,11 +47,8 @@ class Chronicle {
   std::deque<Said> posts_;
   std::optional<std::string> violation_;
   int invariant_ = 0;
-  uint64_t fingerprint_;
+  uint64_t fingerprint_ = kEmptyHash;
   int64_t messages_ = 0, frames_ = 0;
-
- public:
-  Chronicle();
 };
 
 }  // namespace plumb

@@ -170,7 +170,7 @@ class Trial {
 
   void Do(const Prank& prank) {
     const std::string line = Describe(prank);
-    chronicle_.AddPrank(Now(), line);
+    chronicle_.AddPrank(line);
     if (on_prank_) on_prank_(line);
     ++played_;
     const std::string& whom = prank.whom;
