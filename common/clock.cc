@@ -23,7 +23,7 @@ Clock::Clock(double scale, int64_t epoch) : scale_(scale), epoch_(epoch) {
   }
 }
 
-Clock::Clock(std::shared_ptr<const std::atomic<int64_t>> virtual_time)
+Clock::Clock(std::shared_ptr<const VirtualTime> virtual_time)
     : scale_(1), epoch_(0), virtual_time_(std::move(virtual_time)) {}
 
 Clock Clock::Parse(const std::string& text) {
@@ -49,21 +49,22 @@ Clock Clock::Parse(const std::string& text) {
 std::string Clock::ToString() const { return fmt::format("{}@{}", scale_, epoch_); }
 
 int64_t Clock::UtimeFromRealtimeNs(int64_t ns) const {
+  if (virtual_time_) return ns / 1000 + virtual_time_->error;
   if (scale_ == 1) return ns / 1000;
   const int64_t since_ns = ns - epoch_ * 1000;
   return epoch_ + std::llround(static_cast<double>(since_ns) * 1e-3 * scale_);
 }
 
 int64_t Clock::Utime() const {
-  return virtual_time_ ? virtual_time_->load() : UtimeFromRealtimeNs(RealNs(CLOCK_REALTIME));
+  return virtual_time_ ? VirtualDate() : UtimeFromRealtimeNs(RealNs(CLOCK_REALTIME));
 }
 
 int64_t Clock::SigningUtime() const {
-  return virtual_time_ ? virtual_time_->load() : RealNs(CLOCK_REALTIME) / 1000;
+  return virtual_time_ ? VirtualDate() : RealNs(CLOCK_REALTIME) / 1000;
 }
 
 int64_t Clock::Now() const {
-  if (virtual_time_) return virtual_time_->load();
+  if (virtual_time_) return virtual_time_->now;
   return std::llround(static_cast<double>(RealNs(CLOCK_MONOTONIC)) * 1e-3 * scale_);
 }
 

@@ -9,6 +9,12 @@
 
 namespace plumb {
 
+/// The time of a run in virtual time, as one of its processes knows it [us]. Thread-safe.
+struct VirtualTime {
+  std::atomic<int64_t> now = 0;
+  std::atomic<int64_t> error = 0;  ///< of the date: now + error
+};
+
 /// The time of a whole run. Real, or scaled: one factor lets a closed loop with a virtual robot run
 /// faster (or slower) than real time, scaled = epoch + (real - epoch) * scale; every process of a
 /// run is given the same scale and epoch (flag `--clock SCALE@EPOCH`). Or virtual: it stands still
@@ -20,8 +26,9 @@ class Clock {
   /// @param epoch real CLOCK_REALTIME microseconds at which scaled and real time agree.
   /// @throws std::invalid_argument if scale is out of range.
   explicit Clock(double scale = 1, int64_t epoch = 0);
-  /// The virtual time of a run: Participant::time(). Utime and Now are the same.
-  explicit Clock(std::shared_ptr<const std::atomic<int64_t>> virtual_time);
+  /// The virtual time of a run: Participant::time(). Utime and Now are the same, unless somebody
+  /// has set the clock.
+  explicit Clock(std::shared_ptr<const VirtualTime> virtual_time);
 
   /// Reads the form "SCALE" or "SCALE@EPOCH". @throws std::invalid_argument naming the text.
   static Clock Parse(const std::string& text);
@@ -37,16 +44,18 @@ class Clock {
   /// The date of signatures [us]: real time, not scaled, so that it rises from run to run; virtual
   /// time in a run in virtual time.
   int64_t SigningUtime() const;
-  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds). Not of virtual time, which
-  /// no kernel knows.
+  /// Scaled utime of a kernel time stamp (CLOCK_REALTIME nanoseconds); in virtual time of one of
+  /// the run's.
   int64_t UtimeFromRealtimeNs(int64_t ns) const;
   /// Real time that corresponds to a scaled duration, for ppoll; negative durations give zero.
   timespec RealDuration(int64_t scaled_us) const;
 
  private:
+  int64_t VirtualDate() const { return virtual_time_->now + virtual_time_->error; }
+
   double scale_;
   int64_t epoch_;
-  std::shared_ptr<const std::atomic<int64_t>> virtual_time_;  // null: it is not virtual
+  std::shared_ptr<const VirtualTime> virtual_time_;  // null: it is not virtual
 };
 
 /// Deadlines of a periodic loop, absolute, so that lateness does not accumulate. Not thread-safe.

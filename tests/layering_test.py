@@ -40,6 +40,7 @@ STANDS_ON = {
     "calibrator": {"calibrator/report", "calibrator/live"},
     "trainer": {"sim", "controller"},
     "cli": {"drivers", "sim/virtual", "sim/view", "estimator", "controller", "calibrator", "trainer"},
+    "chaos": {"cli"},
     "experiments": {"drivers", "sim/virtual", "estimator", "controller", "calibrator", "trainer"},
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "plumb/policy_t.hpp"
 #include "robot/parameter_distribution.h"
@@ -10,14 +11,22 @@
 namespace plumb {
 namespace {
 
+/// Without those of an iteration under way: what is said of the one before stays as it is.
+std::span<const Rollout> Completed(const SimOpt::State& state) {
+  const bool running = static_cast<int>(state.rollouts_per_iteration.size()) > state.iteration;
+  const int newest = running ? state.rollouts_per_iteration.back() : 0;
+  return std::span(state.rollouts).first(state.rollouts.size() - static_cast<size_t>(newest));
+}
+
 ParameterDistribution Distribution(const RobotDescription& robot, const SimOpt::State& state) {
   return {state.iteration, robot.parameters, state.distribution, state.residual,
-          Starts(state.rollouts)};
+          Starts(Completed(state))};
 }
 
 // An iteration's identity is its newest episode's start: a time that live run and replay share.
 int64_t Time(const SimOpt::State& state) {
-  return state.rollouts.empty() ? 0 : state.rollouts.back().episode;
+  const std::span<const Rollout> rollouts = Completed(state);
+  return rollouts.empty() ? 0 : rollouts.back().episode;
 }
 
 }  // namespace
@@ -106,8 +115,8 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
   calibration_status_t m{};
   m.utime = Time(state);
   m.iteration = state.iteration;
-  m.transitions = static_cast<int32_t>(CountTransitions(state.rollouts));
-  m.rollouts = static_cast<int32_t>(state.rollouts.size());
+  m.transitions = static_cast<int32_t>(CountTransitions(Completed(state)));
+  m.rollouts = static_cast<int32_t>(Completed(state).size());
   m.dropped_gap = drops.gap;
   m.dropped_late = drops.late;
   m.dropped_not_finite = drops.not_finite;

@@ -103,6 +103,10 @@ void Coordinator::Stall(const std::string& name, int64_t duration) {
   if (LockstepMember* member = Find(name)) member->stalled_until = now() + duration;
 }
 
+void Coordinator::SetClockError(const std::string& name, int64_t error) {
+  if (LockstepMember* member = Find(name)) member->clock_error = error;
+}
+
 bool Coordinator::present(const std::string& name) const {
   const LockstepMember* member = Find(name);
   return member && member->state != LockstepMember::State::kAbsent;
@@ -172,6 +176,7 @@ void Coordinator::Grant(LockstepMember& member) {
   lockstep_grant_t grant;
   grant.number = ++member.grants;
   grant.now = now();
+  grant.clock_error = member.clock_error;
   grant.stop = member.stop;
   for (; member.heard(now()); member.mail.pop_front())
     grant.post.push_back(std::move(member.mail.front()));
@@ -328,13 +333,18 @@ void Coordinator::Leave(LockstepMember& member) {
 }
 
 void Coordinator::Route(const lockstep_post_t& post, const LockstepMember& speaker) {
-  on_post(post, &speaker == &owner_->seat ? "" : speaker.name);
+  on_post(post, speaker.name);
   const auto listeners = listeners_.find(Key(post.topic));
   if (listeners == listeners_.end()) return;
   for (LockstepMember* listener : listeners->second) {
     // On a bus nobody hears itself; LCM's messages come back.
     if (listener == &speaker && post.topic.kind == lockstep_topic_t::FRAME) continue;
-    listener->Put(post);
+    if (!on_way) {
+      listener->Put(post);
+      continue;
+    }
+    for (const lockstep_post_t& heard : on_way(post, speaker.name, listener->name))
+      listener->Put(heard);
   }
 }
 

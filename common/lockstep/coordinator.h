@@ -53,6 +53,9 @@ class Coordinator {
   void Stop(const std::string& name);
   /// A fault: it has no turn for that long [us], whatever it hears.
   void Stall(const std::string& name, int64_t duration);
+  /// A fault: from now on its clock is wrong by that much [us], what dates are made of; intervals
+  /// are right. One that is started later has the right time.
+  void SetClockError(const std::string& name, int64_t error);
   /// Waits, in real time, until a participant that was killed is gone: it is dead at this moment of
   /// the run.
   /// @return false if go_on has ended the wait.
@@ -66,6 +69,12 @@ class Coordinator {
   /// Called, in order, with all that is said, when it is said.
   std::function<void(const lockstep_post_t&, const std::string& speaker)> on_post =
       [](const auto&, const auto&) {};
+  /// A fault on the way: called for each who listens to what is said, with that one's name ("" is
+  /// the owner). Hears what it returns, by arrival: nothing, the same later, twice, something else.
+  /// Without it everybody hears everything.
+  using Way = std::function<std::vector<lockstep_post_t>(
+      const lockstep_post_t&, const std::string& speaker, const std::string& listener)>;
+  Way on_way;
   /// Called about every tenth of a second of real time while a participant is at work; false ends
   /// the wait.
   std::function<bool()> go_on = [] { return true; };

@@ -50,6 +50,7 @@ struct LockstepMember {
   bool stop = false;           ///< is to be told to stop, or has been
   bool told = false;           ///< has been told to stop
   int64_t stalled_until = std::numeric_limits<int64_t>::min();
+  int64_t clock_error = 0;           ///< of what it takes for the date
   std::deque<lockstep_post_t> mail;  ///< by time of arrival
 };
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -9,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/clock.h"
 #include "plumb/lockstep_post_t.hpp"
 
 namespace plumb {
@@ -26,10 +26,10 @@ class Participant {
 
   virtual ~Participant() = default;
 
-  /// The run's time [us], utime and monotonic time alike.
-  int64_t now() const { return time_->load(std::memory_order_relaxed); }
+  /// The run's time [us], which is also the date as long as nobody has set the clock.
+  int64_t now() const { return time_->now.load(std::memory_order_relaxed); }
   /// The same, for Clock.
-  std::shared_ptr<const std::atomic<int64_t>> time() const { return time_; }
+  std::shared_ptr<const VirtualTime> time() const { return time_; }
 
   /// From now on hears what others say on a bus, or anybody on a channel.
   virtual void Listen(const lockstep_topic_t& topic) = 0;
@@ -60,14 +60,15 @@ class Participant {
 
  protected:
   Participant() = default;
-  void SetNow(int64_t now) { time_->store(now, std::memory_order_relaxed); }
+  void SetNow(int64_t now) { time_->now.store(now, std::memory_order_relaxed); }
+  void SetClockError(int64_t error) { time_->error.store(error, std::memory_order_relaxed); }
   void Hear(lockstep_post_t&& post);
   bool heard() const;
 
   bool stopping_ = false;
 
  private:
-  std::shared_ptr<std::atomic<int64_t>> time_ = std::make_shared<std::atomic<int64_t>>(0);
+  std::shared_ptr<VirtualTime> time_ = std::make_shared<VirtualTime>();
   std::deque<lockstep_post_t> messages_;
   std::map<std::string, std::deque<lockstep_post_t>> frames_;
 };

@@ -98,6 +98,7 @@ class RemoteParticipant : public Participant {
     }
     if (!Decode(packet, grant_)) throw std::runtime_error(path_ + ": the run is another version's");
     SetNow(grant_.now);
+    SetClockError(grant_.clock_error);
     stopping_ = stopping_ || grant_.stop;
     for (lockstep_post_t& post : grant_.post) Hear(std::move(post));
   }

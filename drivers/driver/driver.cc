@@ -1,6 +1,7 @@
 #include "drivers/driver/driver.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "drivers/driver/stop.h"
 
@@ -10,7 +11,8 @@ namespace {
 constexpr int kRefusedCycles = 10;  // consecutive cycles whose frames were not accepted
 // in a cycle while arming: the kernel holds about ten in flight
 constexpr size_t kMaxFrames = 8;
-constexpr int kUnacknowledged = 16;  // consecutive no-acknowledge error frames: nobody is there
+constexpr int64_t kClockSet = 10'000;  // [us] of real against monotonic time: not by itself
+constexpr int kUnacknowledged = 16;    // consecutive no-acknowledge error frames: nobody is there
 
 // By division, so that whole cycles sum up to the settings' seconds: a ramp ends at zero.
 double InSeconds(int64_t microseconds) { return static_cast<double>(microseconds) / 1e6; }
@@ -33,6 +35,18 @@ void Driver::Disarm() noexcept {
 void Driver::StampStopTime() noexcept {
   if (!stop_stamped_) stopped_utime_ = utime_;
   stop_stamped_ = true;
+}
+
+/// Where somebody has set the clock, what has been dated is as long ago as it was before: a clock
+/// that is set right would else make void what people ask for until it has caught up.
+void Driver::SetTime(int64_t now, int64_t utime) noexcept {
+  const int64_t set_by = utime - now - clock_offset_;
+  if (std::abs(set_by) > kClockSet) {
+    for (int64_t* date : {&start_utime_, &stopped_utime_, &armed_by_}) *date += set_by;
+    clock_offset_ += set_by;
+  }
+  now_ = now;
+  utime_ = utime;
 }
 
 void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
@@ -116,8 +130,7 @@ void Driver::OnLink(LinkState link) noexcept {
 }
 
 std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
-  now_ = now;
-  utime_ = utime;
+  SetTime(now, utime);
   StampStopTime();
   NoteLateness(lateness);
   housekeeping_.Clear();

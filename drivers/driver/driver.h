@@ -135,6 +135,7 @@ class Driver {
   void Answer(const driver_request_t& request) noexcept;
   void Estop(std::string_view reason) noexcept;
   void StampStopTime() noexcept;
+  void SetTime(int64_t now, int64_t utime) noexcept;
   void RequestArm(int64_t made, bool homed) noexcept;
   void CheckHealth() noexcept;
   void CheckCommand() noexcept;
@@ -155,7 +156,7 @@ class Driver {
 
   const DriverSettings settings_;
   const int64_t cycle_, measurement_, disarm_after_, stale_after_, start_guard_, effort_delay_;
-  const int64_t start_now_, start_utime_;
+  const int64_t start_now_;
   const size_t num_joints_;  // of the robot
   std::vector<std::string> names_;
   std::vector<Joint> joints_;  // with a motor
@@ -179,8 +180,10 @@ class Driver {
   Reason reason_;
   // what stopped it: a fault or a request; the beginning of the reason
   Reason cause_;
-  int arms_refused_ = 0;           // since it was armed last
-  int64_t now_, utime_;            // latest times given
+  int arms_refused_ = 0;  // since it was armed last
+  int64_t now_, utime_;   // latest times given
+  int64_t clock_offset_;  // utime - now, as long as nobody sets the clock
+  int64_t start_utime_;
   int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
   bool stop_stamped_ = true;       // false: that time is the last one known before it
   int64_t armed_by_;               // utime of the last ARM request that was obeyed

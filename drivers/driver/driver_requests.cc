@@ -12,8 +12,7 @@ constexpr int64_t kClockError = 1'000'000;
 }  // namespace
 
 void Driver::OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept {
-  now_ = now;
-  utime_ = utime;
+  SetTime(now, utime);
   StampStopTime();
   Answer(request);
   switch (request.request) {
@@ -142,8 +141,7 @@ void Driver::OnForgedCommand(std::string_view why) noexcept {
 }
 
 void Driver::OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept {
-  now_ = now;
-  utime_ = utime;
+  SetTime(now, utime);
   last_command_ = now;
   forgery_ = {};
   if (now - start_now_ < start_guard_) {

@@ -44,7 +44,6 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       start_guard_(Microseconds(robot.driver.start_guard)),
       effort_delay_(Microseconds(robot.driver.effort_delay)),
       start_now_(now),
-      start_utime_(utime),
       num_joints_(robot.joints.size()),
       joints_(DrivenJoints(robot)),
       measurements_(static_cast<int>(joints_.size()), measurement_),
@@ -52,6 +51,8 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       history_(robot.num_joints(), kHistory),
       now_(now),
       utime_(utime),
+      clock_offset_(utime - now),
+      start_utime_(utime),
       stopped_utime_(utime - 1),
       armed_by_(utime - 1),
       foreign_at_(now - start_guard_ - 1) {

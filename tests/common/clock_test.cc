@@ -50,16 +50,23 @@ TEST_CASE("absolute deadlines do not drift, missed ones are skipped and counted"
 }
 
 TEST_CASE("virtual time is what it is told to be, everywhere the same") {
-  const auto time = std::make_shared<std::atomic<int64_t>>(1'000'000);
+  const auto time = std::make_shared<VirtualTime>();
+  time->now = 1'000'000;
   const Clock clock(time);
   CHECK(clock.is_virtual());
   CHECK_FALSE(Clock().is_virtual());
-  for (int i = 0; i < 2; ++i, *time += 250) {
-    CHECK(clock.Utime() == *time);
-    CHECK(clock.Now() == *time);
-    CHECK(clock.SigningUtime() == *time);
+  for (int i = 0; i < 2; ++i, time->now += 250) {
+    CHECK(clock.Utime() == time->now);
+    CHECK(clock.Now() == time->now);
+    CHECK(clock.SigningUtime() == time->now);
   }
   CHECK(clock.UtimeFromRealtimeNs(1'000'250'000) == 1'000'250);  // of a frame's stamp
+  // Somebody sets the clock: dates are other ones, intervals are not.
+  time->error = -30;
+  CHECK(clock.Utime() == time->now - 30);
+  CHECK(clock.SigningUtime() == time->now - 30);
+  CHECK(clock.UtimeFromRealtimeNs(1'000'250'000) == 1'000'220);
+  CHECK(clock.Now() == time->now);
 }
 
 }  // namespace

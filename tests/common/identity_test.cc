@@ -29,7 +29,7 @@ std::string Hex(const Bytes& bytes) {
 
 /// Processes that share a key and a clock that the test sets.
 struct Signed {
-  Signed() { time->store(kNow); }
+  Signed() { time->now = kNow; }
   Identity Member(const std::string& name, const std::string& key_file = "key") {
     const std::string file = folder / key_file;
     if (!std::filesystem::exists(file)) MakeKeyFile(file);
@@ -39,7 +39,7 @@ struct Signed {
                   const std::string& bus = "socketcan:can0") {
     Identity driver = Member(name);
     driver.Lead(robot, bus);
-    *time += 1;
+    time->now += 1;
     return driver;
   }
   /// Somebody who has heard that driver.
@@ -49,7 +49,7 @@ struct Signed {
     return controller;
   }
   TemporaryFolder folder;
-  std::shared_ptr<std::atomic<int64_t>> time = std::make_shared<std::atomic<int64_t>>();
+  std::shared_ptr<VirtualTime> time = std::make_shared<VirtualTime>();
 };
 
 TEST_CASE_METHOD(Signed, "a message with any bit changed, cut short or lengthened is not genuine") {
@@ -97,12 +97,12 @@ TEST_CASE_METHOD(Signed, "what is signed belongs to one channel, one robot and o
 TEST_CASE_METHOD(Signed,
                  "what was signed for another run of the driver is void, whatever the clock") {
   Identity first = Driver(), controller = Controller(first);
-  *time += 60'000'000;
+  time->now += 60'000'000;
   const Bytes recorded = Say(controller);
   // The clock is set back to before the recording, and the driver is started again.
-  *time = kNow + 59'000'000;
+  time->now = kNow + 59'000'000;
   Identity second = Driver("driver, again");
-  *time = kNow + 60'000'000;
+  time->now = kNow + 60'000'000;
   ChannelJudge judge;
   CHECK(Heard(judge, second, recorded) == "signed for another run of the driver");
   Identity genuine = Controller(second);
@@ -112,21 +112,21 @@ TEST_CASE_METHOD(Signed,
 TEST_CASE_METHOD(Signed, "what was recorded, withheld or dated ahead is not taken") {
   Identity driver = Driver(), controller = Controller(driver);
   ChannelJudge judge;
-  *time = kNow - 1000;
+  time->now = kNow - 1000;
   const Bytes recorded = Say(controller);
-  *time = kNow + 1000;
+  time->now = kNow + 1000;
   const Bytes withheld = Say(controller);
-  *time = kNow + 4'000'000;
+  time->now = kNow + 4'000'000;
   const Bytes ahead = Say(controller);
-  *time = kNow + 1000;
+  time->now = kNow + 1000;
   CHECK_THAT(Heard(judge, driver, recorded), Contains("before we started"));
   CHECK_THAT(Heard(judge, driver, ahead), Contains("in the future"));
-  *time = kNow + 10'001'001;
+  time->now = kNow + 10'001'001;
   CHECK_THAT(Heard(judge, driver, withheld), Contains("too long ago"));
   // It has not been shut out by them, nor by a moment's delay.
   Identity honest = Controller(driver, "honest");
   const Bytes late = Say(honest);
-  *time += 10'000'000;
+  time->now += 10'000'000;
   CHECK(Heard(judge, driver, late).empty());
 }
 
@@ -136,7 +136,7 @@ TEST_CASE_METHOD(Signed, "only later messages are taken, though the clock goes b
   const Bytes first = Say(controller), second = Say(controller);
   CHECK(Heard(judge, driver, second).empty());
   CHECK_THAT(Heard(judge, driver, first), Contains("repetition"));
-  *time -= 500'000;
+  time->now -= 500'000;
   CHECK(Heard(judge, driver, Say(controller)).empty());
 }
 
@@ -148,7 +148,7 @@ TEST_CASE_METHOD(Signed, "a driver hands out its run by a status that it has sig
   };
   // Until then nothing is believed.
   Identity controller = Controller(driver);
-  *time += 10;
+  time->now += 10;
   CHECK_THAT(Heard(commands, listener, Say(controller)), Contains("has not been heard yet"));
   const Bytes status = Say(driver, "DRIVER_STATUS");
   CHECK_FALSE(adopted(status, "hopper", "socketcan:can0"));
@@ -168,7 +168,7 @@ TEST_CASE_METHOD(Signed, "a driver hands out its run by a status that it has sig
   Identity other = Driver("driver 2");
   REQUIRE(adopted(Say(other, "DRIVER_STATUS"), "pendulum", "socketcan:can0"));
   listener.Join(other.run(), "pendulum", "socketcan:can0");
-  *time += 10;
+  time->now += 10;
   CHECK(judge.HearDriver(listener, "pendulum", "socketcan:can0", Say(driver, "DRIVER_STATUS"))
             .two_speakers);
 }

@@ -11,6 +11,7 @@
 #include <optional>
 #include <thread>
 
+#include "common/clock.h"
 #include "common/lockstep/coordinator.h"
 #include "common/lockstep/packet_socket.h"
 #include "plumb/lockstep_grant_t.hpp"
@@ -172,6 +173,55 @@ TEST_CASE("a stalled participant has no turn; then it hears all of it") {
   run.Pass(25);
   CHECK(run.transcript ==
         "20 a A tick\n30 a A tick\n35 c C to tick\n35 c C to tick\n40 a A tick\n40 c C to tick\n");
+}
+
+TEST_CASE("on the way to a listener things get lost, late, doubled and altered") {
+  Run run;
+  run.Start("a", Ticker("A", 10));
+  run.Start("b", Answerer("A", "B"));
+  run.Start("c", Answerer("A", "C"));
+  run.coordinator->on_way = [&](lockstep_post_t post, const std::string& speaker,
+                                const std::string& listener) {
+    std::vector<lockstep_post_t> heard{post};
+    if (listener != "c") return heard;
+    CHECK(speaker == "a");
+    switch ((run.coordinator->now() - kStart) / 10) {
+      case 1:
+        heard.clear();
+        break;
+      case 2:
+        heard[0].arrival += 15;
+        break;
+      case 3:
+        heard[0].data = Bytes("TICK");
+        heard[0].size = 4;
+        heard.push_back(post);
+        break;
+    }
+    return heard;
+  };
+  run.Pass(40);
+  CHECK(run.transcript ==
+        "10 a A tick\n10 b B to tick\n20 a A tick\n20 b B to tick\n"
+        "30 a A tick\n30 b B to tick\n30 c C to TICK\n30 c C to tick\n35 c C to tick\n"
+        "40 a A tick\n40 b B to tick\n40 c C to tick\n");
+}
+
+TEST_CASE("who has the wrong date has it until it is set right, and sleeps as long as ever") {
+  Run run;
+  run.Start("a", [](Participant& self) {
+    const Clock clock(self.time());
+    for (int i = 1; !self.stopping(); ++i) {
+      while (self.now() < kStart + 10 * i) self.Wait(kStart + 10 * i, Wake::kOnTime);
+      self.Say(ChannelTopic("A"), Bytes(std::to_string(clock.Utime() - clock.Now())));
+    }
+  });
+  run.Pass(15);
+  run.coordinator->SetClockError("a", -3'600'000'000);
+  run.Pass(10);
+  run.coordinator->SetClockError("a", 0);
+  run.Pass(10);
+  CHECK(run.transcript == "10 a A 0\n20 a A -3600000000\n30 a A 0\n");
 }
 
 TEST_CASE(

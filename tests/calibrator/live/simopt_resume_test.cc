@@ -198,6 +198,27 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("has version 7, not 8"));
 }
 
+TEST_CASE("what is said of an iteration stays as it is while the next one is under way") {
+  const RobotDescription robot = Pendulum();
+  SimOpt simopt(robot, 1, 1);
+  const auto rollout = [&](uint32_t number) {
+    return SyntheticRollout(robot, kTruth, 20, 1e-4, 0.01, number);
+  };
+  for (uint32_t iteration = 0; iteration < 2; ++iteration) {
+    const SimOpt::State& state = simopt.state();
+    const auto before = DistributionMessage(robot, state, 1, nullptr);
+    const auto status = StatusMessage(robot, state, {}, nullptr, 0);
+    simopt.Begin({rollout(iteration)});
+    // As after a resumption that comes before the update.
+    const auto during = DistributionMessage(robot, state, 1, nullptr);
+    CHECK(during.utime == before.utime);
+    CHECK(during.start == before.start);
+    CHECK(StatusMessage(robot, state, {}, nullptr, 0).transitions == status.transitions);
+    while (simopt.running()) simopt.Update();
+    CHECK(DistributionMessage(robot, state, 1, nullptr).start != before.start);
+  }
+}
+
 TEST_CASE("what the simulators lack is told to the trainer again after a resumption") {
   const RobotDescription robot = Pendulum();
   const auto numbers = [](Eigen::Index rows, Eigen::Index columns) {  // of single precision

@@ -195,5 +195,27 @@ TEST_CASE("a heartbeat from before the order to run was obeyed does not confirm 
   CHECK_FALSE(rig.drives[0].armed());
 }
 
+TEST_CASE("once the clock is right again it can be armed again, and old requests stay void") {
+  const int64_t wrong = GENERATE(-3'600'000'000, 3'600'000'000);  // [us]
+  Rig rig;
+  SECTION("it stops while the clock is wrong") {
+    rig.Start();
+    rig.set_back = wrong;
+    REQUIRE(rig.Arm(1));
+    rig.Request(driver_request_t::DISARM);
+  }
+  SECTION("it starts while the clock is wrong") {
+    rig.set_back = wrong;
+    rig.Start();
+  }
+  rig.Run(300);
+  REQUIRE(rig.driver->state() != DriveState::kArmed);
+  rig.set_back = 0;
+  rig.Request(driver_request_t::ARM, 400'000);
+  rig.Run(10);
+  CHECK_THAT(rig.Reason(), Catch::Contains("it was made before the driver st"));
+  CHECK(rig.Arm(1));
+}
+
 }  // namespace
 }  // namespace plumb

@@ -114,7 +114,8 @@ TEST_CASE("judging signatures, and what comes of it, allocates nothing") {
   Rig rig;
   rig.Start();
   REQUIRE(rig.Arm(1));
-  const auto time = std::make_shared<std::atomic<int64_t>>(Rig::kEpoch);
+  const auto time = std::make_shared<VirtualTime>();
+  time->now = Rig::kEpoch;
   Identity driver("driver", key, Clock(time), Identity::Reach::kRun, 0);
   Identity controller("controller", key, Clock(time), Identity::Reach::kRun, 0);
   driver.Lead("robot", "bus");
@@ -125,7 +126,7 @@ TEST_CASE("judging signatures, and what comes of it, allocates nothing") {
   std::vector<uint8_t> encoding(size + kSealSize);
   long counted = 0, genuine = 0, forged = 0;
   for (int i = 1; i <= 1000; ++i) {
-    *time += 1;
+    time->now += 1;
     const long before = allocations;
     command.encode(encoding.data(), 0, static_cast<int>(size));
     controller.Seal("JOINT_COMMAND", encoding);

@@ -1,0 +1,129 @@
+#include "chaos/message_witness.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "common/seal.h"
+#include "plumb/calibration_status_t.hpp"
+#include "plumb/controller_status_t.hpp"
+#include "plumb/driver_status_t.hpp"
+#include "plumb/imu_t.hpp"
+#include "plumb/joint_command_t.hpp"
+#include "plumb/joint_state_t.hpp"
+#include "plumb/parameter_distribution_t.hpp"
+#include "plumb/policy_t.hpp"
+#include "plumb/robot_state_t.hpp"
+#include "plumb/training_status_t.hpp"
+
+namespace plumb {
+namespace {
+
+template <class Numbers>
+bool Finite(const Numbers& numbers) {
+  return std::ranges::all_of(numbers, [](auto x) { return std::isfinite(x); });
+}
+
+bool IsFinite(const robot_state_t& m) {
+  return Finite(m.q) && Finite(m.v) && Finite(m.q_sd) && Finite(m.v_sd);
+}
+
+/// Decodes it, if it is of that type.
+template <class Message>
+bool Read(const lockstep_post_t& post, Message& message) {
+  const std::span<const uint8_t> bytes = Unsealed(post.data);
+  const int size = static_cast<int>(bytes.size());
+  return message.decode(bytes.data(), 0, size) == size;
+}
+
+constexpr const char* kDriverStates[] = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
+constexpr const char* kPhases[] = {"WAITING", "PLACING", "RUNNING", "COMPLETE", "HALTED"};
+
+}  // namespace
+
+void MessageWitness::OnStart(const std::string& name) {
+  if (name == "plumb-controller") iterations_.erase("CONTROLLER_STATUS");
+}
+
+void MessageWitness::RequireRising(int64_t time, const std::string& what, int iteration) {
+  const auto [known, first] = iterations_.try_emplace(what, iteration);
+  if (iteration < known->second) {
+    chronicle_.Violate(6, time,
+                       fmt::format("{} of iteration {} after {}", what, iteration, known->second));
+  }
+  known->second = std::max(known->second, iteration);
+}
+
+void MessageWitness::RequireFinite(int64_t time, const std::string& what, bool finite) {
+  if (!finite) chronicle_.Violate(3, time, what + " is valid and not finite");
+}
+
+void MessageWitness::NoteChange(int64_t time, const std::string& who, const std::string& state) {
+  std::string& told = states_[who];
+  if (told != state) chronicle_.AddTurn(time, who + " " + state);
+  told = state;
+}
+
+void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std::string& speaker) {
+  if (post.topic.kind == lockstep_topic_t::FRAME || speaker.empty()) return;
+  const std::string& channel = post.topic.name;
+  if (channel == "JOINT_STATE") {
+    if (joint_state_t m; Read(post, m)) {
+      for (size_t i = 0; i < m.valid.size(); ++i)
+        RequireFinite(time, channel, !m.valid[i] || std::isfinite(m.position[i]));
+    }
+  } else if (channel == "ROBOT_STATE" || channel == "ROBOT_STATE_SMOOTHED") {
+    if (robot_state_t m; Read(post, m)) RequireFinite(time, channel, !m.valid || IsFinite(m));
+  } else if (channel == "IMU") {
+    if (imu_t m; Read(post, m)) RequireFinite(time, channel, Finite(m.rate) && Finite(m.force));
+  } else if (channel == "JOINT_COMMAND") {
+    if (joint_command_t m; Read(post, m)) RequireFinite(time, channel, Finite(m.effort));
+  } else if (channel == "POLICY") {
+    policy_t m;
+    if (!Read(post, m)) return;
+    RequireFinite(time, channel, Finite(m.weight) && Finite(m.action_scale));
+    RequireRising(time, channel, m.iteration);
+  } else if (channel == "PARAMETER_DISTRIBUTION") {
+    parameter_distribution_t m;
+    if (!Read(post, m)) return;
+    RequireFinite(time, channel, Finite(m.weight) && Finite(m.mean) && Finite(m.covariance));
+    RequireRising(time, channel, m.iteration);
+    const std::span<const uint8_t> bytes = Unsealed(post.data);
+    const auto [said, first] = distributions_.try_emplace(m.iteration, bytes.begin(), bytes.end());
+    if (!std::ranges::equal(said->second, bytes))
+      chronicle_.Violate(6, time, fmt::format("distribution {} has changed", m.iteration));
+    iteration_ = std::max(iteration_, m.iteration);
+  } else if (channel == "CALIBRATION_STATUS") {
+    calibration_status_t m;
+    if (!Read(post, m)) return;
+    RequireRising(time, channel, m.iteration);
+    NoteChange(time, "calibrator",
+               fmt::format("iteration {}, {} transitions", m.iteration, m.transitions));
+    // With those of a roll-out under way: what is in use when the iteration is complete.
+    transitions_.try_emplace(m.iteration, m.transitions);
+  } else if (channel == "TRAINING_STATUS") {
+    training_status_t m;
+    if (!Read(post, m)) return;
+    NoteChange(time, "trainer",
+               fmt::format("iteration {}{}", m.iteration, m.complete ? " complete" : ""));
+    // One that was not complete may be begun anew.
+    if (m.complete) RequireRising(time, channel, m.iteration);
+  } else if (channel == "CONTROLLER_STATUS") {
+    controller_status_t m;
+    if (!Read(post, m)) return;
+    NoteChange(time, "controller",
+               fmt::format("policy {}: {} {}", m.policy_iteration,
+                           kPhases[static_cast<size_t>(m.phase)], m.reason));
+    RequireFinite(time, channel, Finite(m.returns) && Finite(m.late_rate));
+    RequireRising(time, channel, m.policy_iteration);
+  } else if (channel == "DRIVER_STATUS") {
+    if (driver_status_t m; Read(post, m)) {
+      NoteChange(time, "driver",
+                 std::string(kDriverStates[static_cast<size_t>(m.state)]) + " " + m.reason);
+    }
+  }
+}
+
+}  // namespace plumb
