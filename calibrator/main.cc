@@ -30,7 +30,7 @@ struct Flags {
 /// SimOpt fed with messages: common to the live run and to a log.
 class Session {
  public:
-  Session(const RobotDescription& robot, const Flags& flags, const Clock& clock)
+  Session(const RobotDescription& robot, const Flags& flags, const Clock& clock, bool anew)
       : robot_(robot),
         clock_(clock),
         folder_(flags.checkpoint),
@@ -41,7 +41,7 @@ class Session {
         calibrator(robot, simopt_),
         checkpoint_(flags.checkpoint, robot, flags.seed) {
     // A run in virtual time begins anew, and comes to the same: its roll-outs are what they were.
-    if (auto state = checkpoint_.Load(); state && !clock.is_virtual()) {
+    if (auto state = checkpoint_.Load(); state && !anew) {
       simopt_.Resume(std::move(*state));
       spdlog::info("resumed after iteration {}, update {}", simopt_.state().iteration,
                    simopt_.state().search.update);
@@ -221,7 +221,7 @@ int main(int argc, char** argv) {
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(flags.robot);
-        plumb::Session session(robot, flags, process.clock());
+        plumb::Session session(robot, flags, process.clock(), process.begins_virtual_run());
         return flags.log.empty() ? plumb::RunLive(process, session, robot)
                                  : plumb::RunLog(process, session, robot, flags.log);
       });

@@ -45,6 +45,9 @@ class Process {
   const std::string& lcm_url() const { return lcm_url_; }
   /// The place in a run in virtual time; null if there is none.
   Participant* participant() { return participant_; }
+  /// Whether this is the beginning of a run in virtual time, which comes to the same whatever an
+  /// earlier life of it has left; not so for who is started again in the middle.
+  bool begins_virtual_run() const { return participant_ && participant_->begins_run(); }
   /// From now on takes part in a run whose coordinator lives in this process. Before the first use
   /// of messenger().
   void Enter(Participant& participant);

@@ -82,10 +82,8 @@ class TrainerProcess {
     start_ = process_.clock().Now();
     if (checkpoint_file_.empty()) return;
     RemoveLeftovers(options_.checkpoint);
-    if (process_.participant()) {
-      past_.emplace(options_.checkpoint, FingerprintOf(robot_));
-      return;
-    }
+    if (process_.participant()) past_.emplace(options_.checkpoint, FingerprintOf(robot_));
+    if (process_.begins_virtual_run()) return;
     const std::optional<Checkpoint> checkpoint = LoadCheckpoint(checkpoint_file_);
     if (!checkpoint) return;
     session_.Restore(*checkpoint);

@@ -30,6 +30,9 @@ class Participant {
   int64_t now() const { return time_->now.load(std::memory_order_relaxed); }
   /// The same, for Clock.
   std::shared_ptr<const VirtualTime> time() const { return time_; }
+  /// Whether it has been there from the run's first moment, and not been started again in the
+  /// middle of it: then there is nothing that it could go on from.
+  bool begins_run() const { return begins_run_; }
 
   /// From now on hears what others say on a bus, or anybody on a channel.
   virtual void Listen(const lockstep_topic_t& topic) = 0;
@@ -66,6 +69,7 @@ class Participant {
   bool heard() const;
 
   bool stopping_ = false;
+  bool begins_run_ = true;
 
  private:
   std::shared_ptr<VirtualTime> time_ = std::make_shared<VirtualTime>();

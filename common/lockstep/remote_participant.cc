@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/lockstep/coordinator.h"
 #include "common/lockstep/packet_socket.h"
 #include "common/lockstep/participant.h"
 #include "common/program_version.h"
@@ -29,6 +30,7 @@ class RemoteParticipant : public Participant {
     hello.pid = getpid();
     Send(hello);
     AwaitGrant(-1);
+    begins_run_ = now() == Coordinator::kBeginning;
     if (!grant_.refusal.empty()) throw std::runtime_error(path + ": " + grant_.refusal);
   }
 
