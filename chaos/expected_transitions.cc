@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "chaos/decoded.h"
 #include "common/seal.h"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/policy_t.hpp"
@@ -13,15 +14,6 @@ namespace {
 
 constexpr double kGreatest = 1e9, kLeastSd = 1e-12, kOverload = 10, kPeriodTolerance = 0.2;
 constexpr int64_t kOldest = 10'000'000, kAhead = 1'000'000;  // [us] of a counter
-
-template <class Message>
-std::optional<Message> Decoded(const lockstep_post_t& post) {
-  Message message;
-  const std::span<const uint8_t> bytes = Unsealed(post.data);
-  const int size = static_cast<int>(bytes.size());
-  if (message.decode(bytes.data(), 0, size) != size) return std::nullopt;
-  return message;
-}
 
 }  // namespace
 

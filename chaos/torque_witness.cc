@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "chaos/decoded.h"
 #include "common/seal.h"
 #include "common/time_units.h"
 #include "plumb/driver_request_t.hpp"
@@ -24,15 +25,6 @@ constexpr uint32_t kHeartbeat = 0x01, kEstop = 0x02, kSetAxisState = 0x07, kEsti
 constexpr uint32_t kEverybody = 0x3F;       // a node
 constexpr uint8_t kRunning = 8;             // axis state
 constexpr int64_t kRemembered = 3'000'000;  // [us]
-
-template <class Message>
-std::optional<Message> Decoded(const lockstep_post_t& post) {
-  Message message;
-  const std::span<const uint8_t> bytes = Unsealed(post.data);
-  const int size = static_cast<int>(bytes.size());
-  if (message.decode(bytes.data(), 0, size) != size) return std::nullopt;
-  return message;
-}
 
 std::optional<Frame> FrameOf(const lockstep_post_t& post) {
   if (post.topic.kind != lockstep_topic_t::FRAME) return std::nullopt;

@@ -98,6 +98,7 @@ class Coordinator {
   void Read(LockstepMember& member, PacketSocket::When when);
   void Digest(LockstepMember& member);
   void Leave(LockstepMember& member);
+  void AddListener(const lockstep_topic_t& topic, LockstepMember& member);
   void Route(const lockstep_post_t& post, const LockstepMember& speaker);
 
   std::string path_;
