@@ -16,14 +16,24 @@
 
 namespace plumb {
 
+/// A file of the pendulum.
+inline std::filesystem::path PendulumFile(const std::string& name) {
+  const char* const source = std::getenv("PLUMBLINE_SOURCE");
+  return std::filesystem::path(source ? source : ".") / "robots/pendulum" / name;
+}
+
 /// A folder of this process, with a file in it that becomes each of a fuzzer's inputs.
 class InputFile {
  public:
-  explicit InputFile(const std::string& name)
+  /// @param neighbour a file of the pendulum that is to be there, too; empty = none
+  explicit InputFile(const std::string& name, const std::string& neighbour = {})
       : folder_(std::filesystem::temp_directory_path() /
                 ("plumb_fuzz_" + std::to_string(::getpid()))),
         path_(folder_ / name) {
     std::filesystem::create_directories(folder_);
+    if (!neighbour.empty())
+      std::filesystem::copy_file(PendulumFile(neighbour), folder_ / neighbour,
+                                 std::filesystem::copy_options::overwrite_existing);
   }
   ~InputFile() {
     std::error_code ignored;
@@ -47,10 +57,7 @@ inline std::string_view Text(const uint8_t* data, size_t size) {
 
 /// The pendulum, whose parameters, observations and actions inputs are to fit.
 inline const RobotDescription& FuzzRobot() {
-  static const RobotDescription robot = [] {
-    const char* source = std::getenv("PLUMBLINE_SOURCE");
-    return LoadRobot(std::string(source ? source : ".") + "/robots/pendulum");
-  }();
+  static const RobotDescription robot = LoadRobot(PendulumFile("robot.toml"));
   return robot;
 }
 

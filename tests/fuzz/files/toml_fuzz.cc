@@ -5,11 +5,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace plumb;
-  static const InputFile file("robot.toml");
-  static const bool urdf = std::filesystem::copy_file(
-      std::filesystem::path(std::getenv("PLUMBLINE_SOURCE")) / "robots/pendulum/robot.urdf",
-      file.folder() / "robot.urdf", std::filesystem::copy_options::overwrite_existing);
-  Require(urdf);
+  static const InputFile file("robot.toml", "robot.urdf");
   file.Write(Text(data, size));
   ReadOrRefuse<ConfigError>([&] { LoadRobot(file.path()); });
   return 0;
