@@ -18,15 +18,15 @@ namespace {
 
 constexpr int kLongestChain = 8;  // of files that extend each other
 // Far beyond any robot; what has more keeps the reader busy for minutes, or ends it by recursion.
-constexpr int kDeepestKey = 16;          // parts of a.b.c
-constexpr size_t kMostEntries = 10'000;  // of a table or an array
+constexpr int kDeepestKey = 16;                              // parts of a.b.c
+constexpr size_t kMostEntries = 10'000;                      // of a table or an array
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // which a file may begin with
 
 // What the reader must not be given. It makes a table of each part of a dotted key, and descends
 // into them by recursion; and of letters outside ASCII, which TOML has in strings and comments
 // only, toml++ 3.3 asks what it then holds to be impossible (is_non_ascii_horizontal_whitespace).
 // Strings and comments are passed over: their dots are none.
 void RequirePlainKeys(const std::string& text, const std::string& name) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   size_t line = 1;
   int parts = 1;
   const auto pass = [&](size_t& at, std::string_view end, bool escapes) {
@@ -37,7 +37,8 @@ void RequirePlainKeys(const std::string& text, const std::string& name) {
     }
     at += end.size() - 1;
   };
-  for (size_t at = text.starts_with(kByteOrderMark) ? 3 : 0; at < text.size(); ++at) {
+  for (size_t at = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0; at < text.size();
+       ++at) {
     const char c = text[at];
     if (static_cast<unsigned char>(c) > 127) {
       throw ConfigError(
@@ -59,6 +60,22 @@ void RequirePlainKeys(const std::string& text, const std::string& name) {
       line += c == '\n';
     }
   }
+}
+
+// The text with an x for each character outside ASCII, so that places in it stay what they are.
+std::string InAscii(std::string_view text) {
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  std::string ascii;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool continues = byte >= 0x80 && byte < 0xC0;  // a character's second byte, or later
+    if (!continues) ascii += byte < 0x80 ? c : 'x';
+  }
+  return ascii;
+}
+
+bool IsAscii(std::string_view text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return (c & 0x80) == 0; });
 }
 
 void RequireModest(const toml::node& node, const std::string& name) {
@@ -130,6 +147,9 @@ std::string TomlPlace(const std::string& file, const toml::source_region& source
 toml::table ParseToml(const std::string& text, const std::string& name) {
   RequirePlainKeys(text, name);
   try {
+    // Where quotes begin and end is known of a text that is TOML; what is none may have a quote that
+    // opens no string, and toml++ would meet the letters behind it.
+    if (!IsAscii(text)) (void)toml::parse(InAscii(text), name);
     toml::table table = toml::parse(text, name);
     RequireModest(table, name);
     return table;

@@ -235,6 +235,8 @@ TEST_CASE("letters outside ASCII stand within quotes and comments only") {
     CHECK_THROWS_WITH(Read(text),
                       Equals("robot.toml:2: a character outside ASCII, and not within quotes"));
   }
+  // A quote that opens no string.
+  CHECK_THROWS_WITH(Read("a = -m\"\ufe3f"), Catch::StartsWith("robot.toml:1:"));
 }
 
 TEST_CASE("a text that controls a terminal is refused where it stands") {
