@@ -25,8 +25,10 @@ int Fail(const std::string& why) {
 int RequestDriver(Process& process, int8_t what) {
   Messenger& messenger = process.messenger();
   Publisher<driver_request_t> requests(messenger, "DRIVER_REQUEST");
-  Subscriber<driver_status_t> statuses(messenger, "DRIVER_STATUS");
   const bool arming = what == driver_request_t::ARM || what == driver_request_t::ARM_HOMED;
+  // A stop goes on whoever else speaks in the driver's name: what counts is the answer to it.
+  Subscriber<driver_status_t> statuses(messenger, "DRIVER_STATUS", {},
+                                       arming ? Speakers::kOne : Speakers::kSeveral);
   driver_request_t request{};
   request.request = what;
   request.utime = process.clock().Utime();

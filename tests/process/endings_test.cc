@@ -11,6 +11,15 @@ using Catch::StartsWith;
 
 constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
 
+/// To the run's process of that name.
+void Signal(const Stage& stage, const std::string& process, int signal) {
+  for (const auto& entry : fs::directory_iterator("/proc")) {
+    const std::string line = Read(entry.path() / "cmdline");
+    if (line.find(stage.lcm_url) != std::string::npos && line.find(process) != std::string::npos)
+      kill(std::atoi(entry.path().filename().c_str()), signal);
+  }
+}
+
 TEST_CASE("Ctrl-C stops everything, motors disarmed, nothing left") {
   Stage stage(31, "pendulum", Stage::Time::kReal);
   const std::string can_log = stage.folder / "can.log";
@@ -51,13 +60,7 @@ TEST_CASE("a process that is killed ends the run, which says so") {
   Stage stage(36, "pendulum", Stage::Time::kReal);
   Child launch = Launch(stage, {});
   REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, kLong));
-  for (const auto& entry : fs::directory_iterator("/proc")) {
-    const std::string line = Read(entry.path() / "cmdline");
-    if (line.find(stage.lcm_url) == std::string::npos ||
-        line.find("plumb-estimator") == std::string::npos)
-      continue;
-    kill(std::atoi(entry.path().filename().c_str()), SIGKILL);
-  }
+  Signal(stage, "plumb-estimator", SIGKILL);
   REQUIRE(stage.WaitUntil([&] { return !launch.running(); }, kLong));
   CHECK(launch.ending() == "exit status 1");
   CHECK_THAT(launch.Tail(10), Contains("plumb-estimator ended (killed by signal 9)"));
@@ -94,8 +97,12 @@ TEST_CASE("what a person stops, the launcher does not start again") {
   }
   SECTION("from outside: for good") {
     const char* stop = GENERATE("disarm", "estop");
+    const bool busy = GENERATE(false, true);  // the driver gets no turn for a second
+    INFO(stop << (busy ? ", busy" : ""));
+    if (busy) Signal(stage, "plumb-driver", SIGSTOP);
     Child request("plumb", {Stage::Binary("plumb"), stop, "--lcm-url", stage.lcm_url},
                   stage.folder / "stop.log");
+    if (busy) stage.Listen(1), Signal(stage, "plumb-driver", SIGCONT);
     REQUIRE(stage.WaitUntil([&] { return !launch.running(); }, kLong));
     CHECK(launch.ending() == "exit status 1");
     CHECK_THAT(launch.Tail(5), Contains("somebody outside the run has asked for a stop"));

@@ -23,8 +23,8 @@ using Catch::Contains;
 constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
 
 /// One of each that the processes say to each other, plausible but for who says it. Without a key
-/// whoever speaks on DRIVER_STATUS beside the driver ends `plumb disarm`, and the first request to
-/// arm is obeyed, whoever it comes from: neither is sent then.
+/// whoever speaks on DRIVER_STATUS beside the driver ends `plumb arm`, and the first request to arm
+/// is obeyed, whoever it comes from: neither is sent then.
 std::vector<std::vector<uint8_t>> OneOfEach(const Stage& stage, bool with_key) {
   joint_state_t measured{};
   measured.utime = stage.Now(), measured.num_joints = 1;
@@ -106,8 +106,9 @@ TEST_CASE("an estop reaches the driver though others speak in the driver's name,
                 stage.folder / "stop.log");
   constexpr uint32_t kEstop = 0x022;  // CANSimple, node 1
   CHECK(stage.WaitUntil([&] { return stage.frames_by_id[kEstop] > 0; }, kLong));
-  // What it tells its user is another thing: it says that two speak, unless it is answered first.
   REQUIRE(stage.WaitUntil([&] { return !request.running(); }, kLong));
+  INFO(request.ending() << ": " << request.Tail(5));
+  CHECK_FALSE(request.failed());  // the driver's answer to it is found among the others
 }
 
 TEST_CASE("disarm and estop end a run in virtual time through such a flood") {
