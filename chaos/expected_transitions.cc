@@ -70,6 +70,8 @@ void ExpectedTransitions::OnState(const robot_state_t& state) {
   // A driver that was started again counts anew.
   if (!states_.empty() && state.sequence <= states_.rbegin()->first &&
       state.utime > states_.rbegin()->second.utime) {
+    cut_off_.clear();
+    for (const auto& [episode, commands] : commands_) cut_off_.insert(episode);
     states_.clear();
     commands_.clear();
   }
@@ -84,7 +86,10 @@ void ExpectedTransitions::OnCommand(const joint_command_t& command) {
 
 void ExpectedTransitions::Complete() {
   const auto& last = complete_->last_state_sequence;
-  if (states_.empty() || states_.rbegin()->first < *std::ranges::max_element(last)) return;
+  const int64_t newest = states_.empty() ? -1 : states_.rbegin()->first;
+  for (size_t i = 0; i < last.size(); ++i) {
+    if (newest < last[i] && !cut_off_.contains(complete_->episode[i])) return;
+  }
   for (size_t i = 0; i < complete_->episode.size(); ++i) {
     std::vector<Episode>& seen = episodes_[complete_->episode[i]];
     // It is said again and again.

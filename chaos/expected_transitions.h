@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,7 @@ class ExpectedTransitions {
   std::map<std::string, int64_t> newest_;  // counter, by channel
   std::map<int64_t, robot_state_t> states_;
   std::map<int64_t, std::map<int, int64_t>> commands_;  // by episode, by step: state
+  std::set<int64_t> cut_off_;  // episodes of before the driver was started again
   std::optional<controller_status_t> complete_;
   std::map<int64_t, std::vector<Episode>> episodes_;
 };

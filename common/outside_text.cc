@@ -8,30 +8,6 @@ namespace {
 
 constexpr std::string_view kReplacement = "\xef\xbf\xbd";  // U+FFFD
 
-// Bytes of the valid character at text[at], 1 to 4; 0 if there is none.
-size_t CharacterLength(std::string_view text, size_t at) {
-  const auto byte = [&](size_t i) {
-    return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u;
-  };
-  const auto continues = [&](size_t count) {
-    for (size_t i = 1; i <= count; ++i) {
-      if ((byte(i) & 0xc0) != 0x80) return false;
-    }
-    return true;
-  };
-  const unsigned first = byte(0);
-  if (first < 0x80) return 1;
-  if (first >= 0xc2 && first <= 0xdf && continues(1)) return 2;
-  const bool overlong = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xf0 && byte(1) < 0x90);
-  const bool surrogate = first == 0xed && byte(1) >= 0xa0,
-             beyond = first == 0xf4 && byte(1) >= 0x90;
-  const bool not_xml = first == 0xef && byte(1) == 0xbf && byte(2) >= 0xbe;  // U+FFFE and U+FFFF
-  if (overlong || surrogate || beyond || not_xml) return 0;
-  if (first >= 0xe0 && first <= 0xef && continues(2)) return 3;
-  if (first >= 0xf0 && first <= 0xf4 && continues(3)) return 4;
-  return 0;
-}
-
 uint32_t CodePoint(std::string_view character) {
   const auto first = static_cast<unsigned char>(character[0]);
   uint32_t code = character.size() == 1 ? first : first & (0x7f >> character.size());
@@ -78,6 +54,29 @@ class Filter : public std::streambuf {
 };
 
 }  // namespace
+
+size_t CharacterLength(std::string_view text, size_t at) {
+  const auto byte = [&](size_t i) {
+    return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u;
+  };
+  const auto continues = [&](size_t count) {
+    for (size_t i = 1; i <= count; ++i) {
+      if ((byte(i) & 0xc0) != 0x80) return false;
+    }
+    return true;
+  };
+  const unsigned first = byte(0);
+  if (first < 0x80) return 1;
+  if (first >= 0xc2 && first <= 0xdf && continues(1)) return 2;
+  const bool overlong = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xf0 && byte(1) < 0x90);
+  const bool surrogate = first == 0xed && byte(1) >= 0xa0,
+             beyond = first == 0xf4 && byte(1) >= 0x90;
+  const bool not_xml = first == 0xef && byte(1) == 0xbf && byte(2) >= 0xbe;  // U+FFFE and U+FFFF
+  if (overlong || surrogate || beyond || not_xml) return 0;
+  if (first >= 0xe0 && first <= 0xef && continues(2)) return 3;
+  if (first >= 0xf0 && first <= 0xf4 && continues(3)) return 4;
+  return 0;
+}
 
 std::string Printable(std::string_view text, Lines lines) {
   std::string printable;

@@ -56,10 +56,12 @@ void Calibrator::OnControllerStatus(const controller_status_t& status) {
 }
 
 bool Calibrator::ready() const {
-  return complete_ && !simopt_.running() &&
-         complete_->policy_iteration == simopt_.state().iteration &&
-         joiner_.newest_state() >= *std::max_element(complete_->last_state_sequence.begin(),
-                                                     complete_->last_state_sequence.end());
+  if (!complete_ || simopt_.running() || complete_->policy_iteration != simopt_.state().iteration)
+    return false;
+  for (size_t i = 0; i < complete_->episode.size(); ++i) {
+    if (joiner_.Awaits(complete_->episode[i], complete_->last_state_sequence[i])) return false;
+  }
+  return true;
 }
 
 size_t Calibrator::Begin() {

@@ -106,6 +106,8 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
   // it.
   if (!states_.empty() && smoothed.sequence <= newest_state() &&
       smoothed.utime > states_.rbegin()->second.utime) {
+    cut_off_.clear();
+    for (const auto& [episode, commands] : commands_) cut_off_.insert(episode);
     states_.clear();
     commands_.clear();
     num_commands_ = 0;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -70,6 +71,12 @@ class TransitionJoiner {
   /// Sequence number of the newest state, -1 before the first.
   int64_t newest_state() const { return states_.empty() ? -1 : states_.rbegin()->first; }
 
+  /// Whether states of an episode that ended with that one may still come: not where the driver has
+  /// been started again since, which counts from 0 then.
+  bool Awaits(int64_t episode, int64_t last_state) const {
+    return newest_state() < last_state && !cut_off_.contains(episode);
+  }
+
   /// The state of that sequence number, null if it was not received or has been forgotten. Valid
   /// until the next call.
   const robot_state_t* FindState(int64_t sequence) const;
@@ -107,6 +114,7 @@ class TransitionJoiner {
   std::map<int64_t, robot_state_t> states_;  // by sequence
   Commands commands_;
   size_t num_commands_ = 0;
+  std::set<int64_t> cut_off_;  // episodes that the driver's last restart has taken
   DropCounts drops_;
 };
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/config.h"
+#include "common/outside_text.h"
 
 namespace plumb {
 namespace {
@@ -21,6 +22,23 @@ bool IsName(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || !IsAscii(c);
 }
 
+int LineOf(const std::string& text, size_t place) {
+  return 1 +
+         static_cast<int>(std::count(text.begin(), text.begin() + static_cast<long>(place), '\n'));
+}
+
+// Where the first byte is that no text has; text.size() if there is none. TinyXML passes over as
+// many bytes as the first of a character promises, beyond the end of the text as well.
+size_t FindOdd(const std::string& text) {
+  size_t at = 0;
+  while (at < text.size() && (!IsControl(text[at]) || IsSpace(text[at]))) {
+    const size_t length = CharacterLength(text, at);
+    if (length == 0) break;
+    at += length;
+  }
+  return at;
+}
+
 // TinyXML descends into elements by recursion, and looks through all attributes of an element for
 // each: how deep and how many is known before.
 struct Excess {
@@ -30,10 +48,6 @@ struct Excess {
 
 Excess FindExcess(const std::string& text, int most_nested, int most_attributes) {
   int depth = 0;
-  const auto line_of = [&](size_t place) {
-    return 1 + static_cast<int>(
-                   std::count(text.begin(), text.begin() + static_cast<long>(place), '\n'));
-  };
   size_t at = 0;
   while ((at = text.find('<', at)) != std::string::npos) {
     const auto skip_to = [&](const char* end) { at = std::min(text.find(end, at), text.size()); };
@@ -46,14 +60,14 @@ Excess FindExcess(const std::string& text, int most_nested, int most_attributes)
       ++at;
     } else if (at + 1 < text.size() && IsName(text[at + 1])) {
       if (++depth > most_nested)
-        return {line_of(at), fmt::format("nests more than {} elements", most_nested)};
+        return {LineOf(text, at), fmt::format("nests more than {} elements", most_nested)};
       int attributes = 0;
       for (char quote = 0; at < text.size() && (quote != 0 || text[at] != '>'); ++at) {
         if (quote != 0 ? text[at] == quote : text[at] == '"' || text[at] == '\'')
           quote = quote ? '\0' : text[at];
         attributes += quote == 0 && text[at] == '=';
         if (attributes > most_attributes)
-          return {line_of(at),
+          return {LineOf(text, at),
                   fmt::format("an element of more than {} attributes", most_attributes)};
       }
       if (at < text.size() && text[at - 1] == '/') --depth;
@@ -67,18 +81,16 @@ Excess FindExcess(const std::string& text, int most_nested, int most_attributes)
 }  // namespace
 
 Xml::Xml(const std::string& text, std::string file) : file_(std::move(file)) {
-  const auto odd =
-      std::find_if(text.begin(), text.end(), [](char c) { return IsControl(c) && !IsSpace(c); });
-  if (odd != text.end()) {
-    Fail(1 + static_cast<int>(std::count(text.begin(), odd, '\n')),
-         fmt::format("contains the byte {:#04x}", *odd));
+  if (const size_t odd = FindOdd(text); odd < text.size()) {
+    Fail(LineOf(text, odd), fmt::format("contains the byte {:#04x}: a URDF is text in UTF-8",
+                                        static_cast<unsigned char>(text[odd])));
   }
   const Excess excess = FindExcess(text, kMaxDepth, kMaxAttributes);
   if (excess.line > 0) Fail(excess.line, excess.what);
   document_.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
   if (document_.Error()) {
-    const auto lines = 1 + static_cast<int>(std::count(text.begin(), text.end(), '\n'));
-    Fail(document_.ErrorRow() > 0 ? document_.ErrorRow() : lines, document_.ErrorDesc());
+    Fail(document_.ErrorRow() > 0 ? document_.ErrorRow() : LineOf(text, text.size()),
+         document_.ErrorDesc());
   }
   if (!document_.FirstChildElement()) Fail(1, "contains no element");
   if (const TiXmlElement* second = document_.FirstChildElement()->NextSiblingElement()) {

@@ -225,6 +225,19 @@ TEST_CASE("an iteration begins when its roll-outs are complete, whatever came fi
     CHECK_FALSE(calibrator.ready());
     calibrator.OnControllerStatus(status);
   }
+  SECTION("the driver has been started again, and counts from 0: what is lacking never comes") {
+    for (int i = 0; i < 20; ++i) calibrator.OnCommand(Command(i));
+    for (int64_t i = 90; i < 300; ++i) calibrator.OnState(State(i));
+    robot_state_t again = State(300);
+    again.sequence = 0;
+    calibrator.OnState(again);
+    calibrator.OnControllerStatus(status);
+    CHECK(calibrator.ready());
+    status.episode = {43};  // one that has been seen to begin since does wait
+    calibrator.OnControllerStatus(status);
+    CHECK_FALSE(calibrator.ready());
+    return;
+  }
   REQUIRE(calibrator.ready());
   CHECK(calibrator.Begin() == 20);
   CHECK(CountTransitions(simopt.state().rollouts) == 20);

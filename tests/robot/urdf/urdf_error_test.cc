@@ -50,6 +50,9 @@ TEST_CASE("broken XML is an error with its row") {
         "<dynamics damping=\"0.5\"");  // TinyXML's row
   Check("<axis xyz=\"0 0 3\"/>", "<axis xyz=0 0 3/>", "");
   Check("<axis xyz=\"0 0 3\"/>", "<axis \x01/>", "contains the byte 0x01");
+  for (const char* not_utf8 : {"<axis \xe1/>", "<axis \xc3\"/>", "<axis \xff/>"})
+    Check("<axis xyz=\"0 0 3\"/>", not_utf8, "a URDF is text in UTF-8");
+  CHECK_THAT(Error(kZooUrdf + "\n\xe1"), Contains("contains the byte 0xe1"));
   CHECK_THAT(Error(Replaced(kZooUrdf, "</robot>\n", "")),
              Contains("robot.urdf:" + std::to_string(LineOf(kZooUrdf, "</robot>"))));
 }
