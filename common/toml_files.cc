@@ -147,8 +147,8 @@ std::string TomlPlace(const std::string& file, const toml::source_region& source
 toml::table ParseToml(const std::string& text, const std::string& name) {
   RequirePlainKeys(text, name);
   try {
-    // Where quotes begin and end is known of a text that is TOML; what is none may have a quote that
-    // opens no string, and toml++ would meet the letters behind it.
+    // Where quotes begin and end is known of what is TOML. Else one may open no string, and toml++
+    // would meet the letters behind it.
     if (!IsAscii(text)) (void)toml::parse(InAscii(text), name);
     toml::table table = toml::parse(text, name);
     RequireModest(table, name);
