@@ -81,7 +81,8 @@ TEST_CASE("every mistake is at its line") {
   Check("izz=\"1e-4\"", "", "<inertia> has no izz");
   Check("<link name=\"slider\"/>", "<link name=\"ball\"/>", "a second link is called ball",
         "<link name=\"ball\">\n");
-  Check("<link name=\"slider\"/>", "<link name=\"s\xfclider\"/>", "not printable ASCII");
+  Check("<link name=\"slider\"/>", "<link name=\"s\xc3\xbclider\"/>", "not printable ASCII");
+  Check("<link name=\"slider\"/>", "<link name=\"s\xfclider\"/>", "a URDF is text in UTF-8");
   Check("<link name=\"slider\"/>", "<link/>", "<link> has no name");
   Check("<link name=\"slider\"/>", "<link name=\"slider\"/><link name=\"lost\"/>",
         "link lost hangs on no joint");
