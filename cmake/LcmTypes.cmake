@@ -2,6 +2,7 @@
 #
 # Generates from one .lcm file per struct:
 #   <name>          interface library: C++11 headers "<package>/<struct>.hpp", hardened against hostile lengths
+#   <name>_c        static library: what lcm-gen says of each type's fields, for reflection (common/message_type)
 #   <name>_python   custom target: Python modules in <build>/lcmtypes/python/<package>
 #   <name>_java     custom target (where javac and lcm.jar are): <build>/lcmtypes/<name>.jar, for lcm-spy
 find_package(Java COMPONENTS Development QUIET)
@@ -9,6 +10,7 @@ find_package(Java COMPONENTS Development QUIET)
 function(add_lcm_types name)
   cmake_parse_arguments(ARG "" "PACKAGE" "TYPES" ${ARGN})
   set(cpp ${CMAKE_CURRENT_BINARY_DIR}/cpp)
+  set(c ${CMAKE_CURRENT_BINARY_DIR}/c)
   set(python ${CMAKE_CURRENT_BINARY_DIR}/python)
   set(java ${CMAKE_CURRENT_BINARY_DIR}/java)
   set(harden ${PROJECT_SOURCE_DIR}/cmake/harden_lcm_gen.sh)
@@ -22,6 +24,12 @@ function(add_lcm_types name)
       COMMAND ${harden} ${header}
       DEPENDS ${source} ${harden} VERBATIM)
     list(APPEND headers ${header})
+    set(c_files ${c}/${ARG_PACKAGE}_${struct}.c ${c}/${ARG_PACKAGE}_${struct}.h)
+    add_custom_command(OUTPUT ${c_files}
+      COMMAND ${LCM_GEN_EXECUTABLE} -c --c-typeinfo --c-cpath ${c} --c-hpath ${c} ${source} DEPENDS ${source} VERBATIM)
+    list(APPEND c_sources ${c_files})
+    string(APPEND c_includes "#include \"${ARG_PACKAGE}_${struct}.h\"\n")
+    string(APPEND c_entries "  {\"${struct}\", ${ARG_PACKAGE}_${struct}_get_type_info},\n")
     set(module ${python}/${ARG_PACKAGE}/${struct}.py)
     add_custom_command(OUTPUT ${module}
       COMMAND ${LCM_GEN_EXECUTABLE} -p --ppath ${python} ${source} DEPENDS ${source} VERBATIM)
@@ -36,6 +44,12 @@ function(add_lcm_types name)
   # SYSTEM: generated code is not held to our warnings.
   target_include_directories(${name} SYSTEM INTERFACE ${cpp})
   target_link_libraries(${name} INTERFACE LCM::LCM)
+
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/message_types.c.in ${c}/message_types.c @ONLY)
+  add_library(${name}_c STATIC ${c_sources} ${c}/message_types.c)
+  target_include_directories(${name}_c SYSTEM PRIVATE ${c})
+  target_link_libraries(${name}_c PRIVATE LCM::LCM)
+  target_compile_options(${name}_c PRIVATE -w)  # nor is this
 
   add_custom_target(${name}_python DEPENDS ${modules})
   if(Java_JAVAC_EXECUTABLE AND Java_JAR_EXECUTABLE AND LCM_JAR)
