@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/clock.h"
 #include "common/own_machine.h"
 
 namespace plumb {
@@ -45,6 +46,7 @@ class LcmReceiver::Queue {
     uint64_t number;  // in the order of arrival, in all queues
     std::string channel;
     std::vector<uint8_t> data;
+    int64_t arrival;  // monotonic [us]
     size_t cost() const { return data.size() + kOverhead; }
   };
 
@@ -136,6 +138,7 @@ int LcmReceiver::Drain(int max_messages) {
     Queue* const queue = Oldest();
     const Queue::Message message = queue->Pop();
     --waiting_;
+    arrival_ = message.arrival;
     lock.unlock();
     queue->Handle(message);
     lock.lock();
@@ -182,8 +185,10 @@ void LcmReceiver::Keep(const LcmDatagrams::Message& message) {
   for (Queue& queue : queues_) {
     if (!queue.Wants(message.channel)) continue;
     ++waiting_;
-    waiting_ -= queue.Push(
-        {number, std::string(message.channel), {message.data.begin(), message.data.end()}});
+    waiting_ -= queue.Push({number,
+                            std::string(message.channel),
+                            {message.data.begin(), message.data.end()},
+                            Clock().Now()});
   }
   if (none_waited && waiting_ > 0) eventfd_write(waiting_fd_.get(), 1);
 }

@@ -54,6 +54,8 @@ class LcmReceiver {
   /// Handles the messages that are there when it is called, at most `max_messages`, in the order in
   /// which they arrived, whoever they are for. @return how many.
   int Drain(int max_messages);
+  /// When the message that is being handled arrived, monotonic [us].
+  int64_t arrival() const { return arrival_; }
   /// Since the last call.
   std::vector<Loss> TakeLosses();
 
@@ -71,6 +73,7 @@ class LcmReceiver {
   std::list<Queue> queues_;
   uint64_t arrived_ = 0;  // messages so far
   size_t waiting_ = 0;    // messages in all queues
+  int64_t arrival_ = 0;   // of the message that is being handled
   std::thread thread_;
 };
 

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/clock.h"
 #include "common/identity.h"
 #include "common/lcm_receiver.h"
 #include "common/lcm_url.h"
@@ -61,6 +62,8 @@ class Messenger {
   }
   /// Called with a message's bytes as they arrived; must not throw.
   using Handler = LcmReceiver::Handler;
+  /// When the message that is being handled arrived, by the machine's monotonic clock [us].
+  int64_t Arrival() const { return receiver_ ? receiver_->arrival() : Clock().Now(); }
   class Subscription;
   /// Listens to a channel (in real time: ".*" is all of them) as long as the subscription lives. In
   /// order of arrival.

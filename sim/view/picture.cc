@@ -16,17 +16,8 @@
 namespace plumb {
 namespace {
 
-struct Color {
-  double red, green, blue;
-};
 constexpr Color kPaper{1, 1, 1}, kInk{0.25, 0.27, 0.30}, kGround{0.93, 0.92, 0.90},
     kLine{0.62, 0.62, 0.62};
-constexpr Color kBase{0.72, 0.74, 0.76};
-// Of the links that move, in turn: told apart by everybody (Okabe and Ito, "Color Universal
-// Design", 2008).
-constexpr Color kLinks[] = {{0.34, 0.71, 0.91}, {0.90, 0.62, 0.00}, {0.00, 0.62, 0.45},
-                            {0.80, 0.47, 0.65}, {0.00, 0.45, 0.70}, {0.84, 0.37, 0.00}};
-
 /// [m], to the right and up.
 struct Box {
   Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity()),
@@ -190,14 +181,7 @@ void Canvas::Draw(const Framing& framing, const Snapshot& snapshot, double x, do
     for (const Eigen::Vector2d& point : silhouette.outline)
       cairo_line_to(cairo_, to_x(point.x()), to_y(point.y()));
     cairo_close_path(cairo_);
-    // Links without a shape take no colour.
-    int moving = 0;
-    for (int link = 1; link < silhouette.link; ++link) {
-      const LinkDescription& other = framing.robot().links[static_cast<size_t>(link)];
-      if (!other.visuals.empty() || !other.collisions.empty()) ++moving;
-    }
-    const Color color =
-        silhouette.link == 0 ? kBase : kLinks[static_cast<size_t>(moving) % std::size(kLinks)];
+    const Color color = ColorOf(framing.robot(), silhouette.link);
     Fill(color);
     cairo_fill_preserve(cairo_);
     Fill({color.red * 0.6, color.green * 0.6, color.blue * 0.6});

@@ -28,6 +28,8 @@ Shape Stick(const Eigen::Vector3d& end) {
           Eigen::Vector3d(kStick, end.norm(), 0)};
 }
 
+}  // namespace
+
 std::vector<std::vector<Shape>> ShapesOf(const RobotDescription& robot) {
   std::vector<std::vector<Shape>> shapes;
   bool any = false;
@@ -45,7 +47,19 @@ std::vector<std::vector<Shape>> ShapesOf(const RobotDescription& robot) {
   return shapes;
 }
 
-}  // namespace
+// Of the links that move, in turn: told apart by everybody (Okabe and Ito, "Color Universal
+// Design", 2008). Links without a shape take no colour.
+Color ColorOf(const RobotDescription& robot, int link) {
+  static constexpr Color kBase{0.72, 0.74, 0.76};
+  static constexpr Color kLinks[] = {{0.34, 0.71, 0.91}, {0.90, 0.62, 0.00}, {0.00, 0.62, 0.45},
+                                     {0.80, 0.47, 0.65}, {0.00, 0.45, 0.70}, {0.84, 0.37, 0.00}};
+  if (link == 0) return kBase;
+  const auto moving = std::count_if(
+      robot.links.begin() + 1, robot.links.begin() + link, [](const LinkDescription& other) {
+        return !other.visuals.empty() || !other.collisions.empty();
+      });
+  return kLinks[static_cast<size_t>(moving) % std::size(kLinks)];
+}
 
 std::vector<Eigen::Vector2d> ConvexHull(std::vector<Eigen::Vector2d> points) {
   std::sort(points.begin(), points.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {

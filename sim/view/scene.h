@@ -8,6 +8,16 @@
 
 namespace plumb {
 
+/// Of each link: its visual shapes, or collision shapes where it has none of these; a robot without
+/// any shape is a stick figure.
+std::vector<std::vector<Shape>> ShapesOf(const RobotDescription& robot);
+
+struct Color {
+  double red, green, blue;  ///< 0 to 1
+};
+/// Of a link, in which it is drawn wherever robots are.
+Color ColorOf(const RobotDescription& robot, int link);
+
 /// A solid as seen from the side: the convex outline of its projection, counterclockwise [m].
 struct Silhouette {
   int link;

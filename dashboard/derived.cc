@@ -1,0 +1,90 @@
+#include "dashboard/derived.h"
+
+#include <spdlog/spdlog.h>
+
+#include <stdexcept>
+#include <vector>
+
+#include "dashboard/posterior_json.h"
+
+namespace plumb {
+namespace {
+
+constexpr char kNumbers[] = R"({"type":"array","items":{"type":"number"}})";
+
+std::string Schema(const std::string& title, const std::string& properties) {
+  return R"({"$schema":"https://json-schema.org/draft/2020-12/schema","title":")" + title +
+         R"(","type":"object","properties":{"utime":{"type":"integer"},)" + properties + "}}";
+}
+
+std::string PredictionSchema() {
+  const std::string numbers = kNumbers;
+  return Schema("plumb.prediction", R"("sequence":{"type":"integer"},"q":)" + numbers +
+                                        R"(,"v":)" + numbers + R"(,"q_measured":)" + numbers);
+}
+
+std::string PosteriorSchema() {
+  const std::string numbers = kNumbers;
+  return Schema(
+      "plumb.posterior",
+      R"("iteration":{"type":"integer"},"parameters":{"type":"array","items":{"type":"object",)"
+      R"("properties":{"name":{"type":"string"},"unit":{"type":"string"},"mean":{"type":"number"},)"
+      R"("sd":{"type":"number"},"quantiles":)" +
+          numbers +
+          R"(,"prior_mean":{"type":"number"},"prior_sd":{"type":"number"},)"
+          R"("determined":{"type":"boolean"}}}},"samples":{"type":"array","items":)" +
+          numbers + R"(},"prior_samples":{"type":"array","items":)" + numbers + "}");
+}
+
+}  // namespace
+
+Derived::Derived(const RobotDescription& robot, Topics& topics)
+    : robot_(robot),
+      prior_(ParameterDistribution::Prior(robot)),
+      topics_(topics),
+      predictions_(topics.Add("PLUMB_PREDICTION", "plumb.prediction", PredictionSchema(),
+                              Topics::Keep::kNothing)),
+      scenes_(topics.Add("PLUMB_SCENE", "foxglove.SceneUpdate", SceneUpdate::Schema(),
+                         Topics::Keep::kNothing)),
+      posteriors_(topics.Add("PLUMB_POSTERIOR", "plumb.posterior", PosteriorSchema(),
+                             Topics::Keep::kHistory)),
+      scene_(robot) {
+  try {
+    prediction_.emplace(robot);
+  } catch (const std::invalid_argument& error) {
+    spdlog::warn("no predictions: {}", error.what());
+  }
+}
+
+void Derived::OnState(const robot_state_t& state, int64_t now) {
+  if (prediction_) prediction_->OnState(state);
+  const bool sees = topics_.watched(scenes_) && now >= next_scene_;
+  const bool compares = topics_.watched(predictions_) && now >= next_prediction_;
+  const Eigen::VectorXd q =
+      Eigen::VectorXd::Map(state.q.data(), static_cast<Eigen::Index>(state.q.size()));
+  if ((!sees && !compares) || q.size() != robot_.num_positions() || !q.allFinite()) return;
+  const auto predicted = prediction_ ? prediction_->Predict() : std::nullopt;
+  if (compares && predicted) {
+    next_prediction_ = now + kPredictionPeriod;
+    topics_.Publish(predictions_, state.utime, predicted->Json());
+  }
+  if (sees) {
+    next_scene_ = now + kScenePeriod;
+    topics_.Publish(scenes_, state.utime,
+                    scene_.Json(state.utime, q, predicted ? &predicted->q : nullptr));
+  }
+}
+
+void Derived::OnDistribution(const parameter_distribution_t& message) {
+  try {
+    const auto distribution = ParameterDistribution::FromMessage(message, robot_);
+    topics_.Publish(posteriors_, message.utime,
+                    PosteriorJson(distribution, prior_, message.utime),
+                    History::Step{message.iteration, 0});
+    if (prediction_) prediction_->SetParameters(distribution.Mean());
+  } catch (const std::invalid_argument& error) {
+    spdlog::warn("PARAMETER_DISTRIBUTION refused: {}", error.what());
+  }
+}
+
+}  // namespace plumb

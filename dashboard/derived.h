@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "dashboard/prediction.h"
+#include "dashboard/topics.h"
+#include "plumb/parameter_distribution_t.hpp"
+#include "plumb/robot_state_t.hpp"
+#include "robot/parameter_distribution.h"
+#include "sim/view/scene_update.h"
+
+namespace plumb {
+
+/// What is not said on LCM, but follows from it: PLUMB_PREDICTION, PLUMB_SCENE and PLUMB_POSTERIOR.
+/// Computed where somebody listens, and at most so often as eyes can follow. Not thread-safe.
+class Derived {
+ public:
+  static constexpr int64_t kPredictionPeriod = 20'000, kScenePeriod = 33'333;  ///< [us]
+
+  /// A robot that cannot be simulated has no predictions.
+  Derived(const RobotDescription& robot, Topics& topics);
+
+  /// @param now monotonic [us].
+  void OnState(const robot_state_t& state, int64_t now);
+  /// What is no distribution of this robot's is passed over.
+  void OnDistribution(const parameter_distribution_t& message);
+
+ private:
+  std::optional<OneStepPrediction::Predicted> Predict(int64_t now);
+
+  const RobotDescription robot_;
+  const ParameterDistribution prior_;
+  Topics& topics_;
+  const uint32_t predictions_, scenes_, posteriors_;
+  const SceneUpdate scene_;
+  std::optional<OneStepPrediction> prediction_;
+  int64_t next_prediction_ = 0, next_scene_ = 0;
+};
+
+}  // namespace plumb

@@ -1,0 +1,252 @@
+#include "dashboard/gateway.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "common/message_json.h"
+#include "common/message_schema.h"
+#include "common/message_walk.h"
+#include "dashboard/channels.h"
+#include "plumb/driver_status_t.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kStatisticsPeriod = 500'000, kStatusPeriod = 1'000'000;  // [us]
+
+// In the order of their numbers, from 1 on.
+constexpr std::string_view kServices[] = {"emergency_stop", "arm", "disarm", "confirm_placed"};
+
+constexpr char kVirtual[] = "a run in virtual time hears nobody from outside";
+
+constexpr char kGatewaySchema[] =
+    R"({"title":"plumb.gateway","type":"object","properties":{"utime":{"type":"integer"},)"
+    R"("clock":{"type":"string"},"speed":{"type":"number"},"clients":{"type":"integer"},)"
+    R"("dropped":{"type":"integer"}}})";
+constexpr char kChannelsSchema[] =
+    R"({"title":"plumb.channels","type":"object","properties":{"utime":{"type":"integer"},)"
+    R"("channels":{"type":"array","items":{"type":"object","properties":{)"
+    R"("channel":{"type":"string"},"type":{"type":"string"},"count":{"type":"integer"},)"
+    R"("rate":{"type":"number"},"jitter_ms":{"type":"number"},)"
+    R"("bytes_per_second":{"type":"number"},"undecodable":{"type":"integer"},)"
+    R"("refused":{"type":"integer"},"age_ms":{"type":"number"}}}}}})";
+
+/// The numbers by which messages are told apart, if the type has them, and when it is.
+class Numbers : public MessageVisitor {
+ public:
+  std::optional<History::Step> step() const {
+    if (!iteration_) return std::nullopt;
+    return History::Step{*iteration_, update_};
+  }
+  int64_t utime() const { return utime_; }
+
+ private:
+  void Field(std::string_view name) override { name_ = name; }
+  void BeginStruct() override { ++depth_; }
+  void EndStruct() override { --depth_; }
+  void BeginArray(size_t) override { name_ = {}; }
+  void EndArray() override {}
+  void Integer(int64_t value) override {
+    if (depth_ != 1) return;
+    if (name_ == "iteration") iteration_ = value;
+    if (name_ == "update") update_ = value;
+    if (name_ == "utime") utime_ = value;
+  }
+  void Float(float) override {}
+  void Double(double) override {}
+  void Boolean(bool) override {}
+  void Text(std::string_view) override {}
+
+  std::string_view name_;
+  int depth_ = 0;
+  std::optional<int64_t> iteration_;
+  int64_t update_ = 0, utime_ = 0;
+};
+
+template <class Message>
+std::optional<Message> Decode(std::span<const uint8_t> bytes) {
+  Message message;
+  const std::span<const uint8_t> content = Unsealed(bytes);
+  const int size = static_cast<int>(content.size());
+  if (message.decode(content.data(), 0, size) != size) return std::nullopt;
+  return message;
+}
+
+}  // namespace
+
+Gateway::Gateway(const RobotDescription& robot, Setting setting, Wishes::Request request)
+    : robot_(robot),
+      setting_(std::move(setting)),
+      time_(setting_.kind),
+      derived_(robot, topics_),
+      wishes_(std::move(request), setting_.identity, setting_.has_key, setting_.lcm_url),
+      statistics_topic_(topics_.Add("PLUMB_CHANNELS", "plumb.channels", kChannelsSchema,
+                                    Topics::Keep::kNothing)),
+      gateway_topic_(
+          topics_.Add("PLUMB_GATEWAY", "plumb.gateway", kGatewaySchema, Topics::Keep::kNothing)) {
+  for (const ChannelOfPage& channel : ChannelsOfPage()) {
+    const MessageType* const type = FindMessageType(channel.type);
+    const auto keep = channel.fast ? Topics::Keep::kNothing : Topics::Keep::kHistory;
+    const uint32_t topic =
+        topics_.Add(std::string(channel.name), QualifiedName(*type), JsonSchema(*type), keep);
+    channels_[std::string(channel.name)] = {type, topic, channel.fast, channel.tells_time, {}};
+  }
+}
+
+/// One that docs/messages.md does not know is offered when it is first heard, as if it were fast.
+Gateway::Channel* Gateway::Find(const std::string& name, const MessageType* type) {
+  const auto found = channels_.find(name);
+  if (found != channels_.end()) return &found->second;
+  if (!type || channels_.size() >= Topics::kMaxTopics) return nullptr;
+  const uint32_t topic =
+      topics_.Add(name, QualifiedName(*type), JsonSchema(*type), Topics::Keep::kNothing);
+  return &(channels_[name] = {type, topic, true, false, {}});
+}
+
+void Gateway::OnMessage(const std::string& name, std::span<const uint8_t> message, bool believed,
+                        int64_t arrival, const Moment& moment) {
+  using Verdict = ChannelStatistics::Verdict;
+  const MessageType* const type = TypeOf(message);
+  Channel* const channel = believed ? Find(name, type) : nullptr;
+  Numbers numbers;
+  const bool good = channel && channel->type == type && WalkMessage(*type, message, numbers);
+  statistics_.Add(name, type ? type->name : "", message.size(), arrival,
+                  !believed ? Verdict::kRefused
+                  : good    ? Verdict::kGood
+                            : Verdict::kUndecodable);
+  if (!believed && name == "DRIVER_STATUS") wishes_.OnUnbelieved();
+  if (!good) return;
+  if (channel->tells_time)
+    time_.OnMessage(numbers.utime(), FindSeal(message), moment.date, moment.now);
+  const std::span<const uint8_t> content = Unsealed(message);
+  const bool repeated = std::ranges::equal(content, channel->last);
+  if (topics_.watched(channel->topic) || (topics_.wanted(channel->topic) && !repeated)) {
+    std::string json;
+    AppendJson(*type, message, json);
+    topics_.Publish(channel->topic, Utime(moment), std::move(json), numbers.step());
+  }
+  Use(name, message, repeated, moment);
+  if (!channel->fast) channel->last.assign(content.begin(), content.end());
+}
+
+void Gateway::Use(const std::string& channel, std::span<const uint8_t> message, bool repeated,
+                  const Moment& moment) {
+  if (channel == "ROBOT_STATE") {
+    state_ = Decode<robot_state_t>(message);
+    if (state_) derived_.OnState(*state_, moment.now);
+  } else if (channel == "DRIVER_STATUS") {
+    if (const auto status = Decode<driver_status_t>(message))
+      wishes_.OnStatus(*status, moment.now);
+  } else if (channel == "PLACE_ROBOT") {
+    place_ = Decode<place_robot_t>(message);
+  } else if (channel == "CONTROLLER_STATUS") {
+    controller_ = Decode<controller_status_t>(message);
+  } else if (channel == "PARAMETER_DISTRIBUTION" && !repeated) {
+    if (const auto distribution = Decode<parameter_distribution_t>(message))
+      derived_.OnDistribution(*distribution);
+  }
+}
+
+void Gateway::Tick(const Moment& moment) {
+  wishes_.Tick(moment.now);
+  if (moment.now >= next_statistics_) {
+    next_statistics_ = moment.now + kStatisticsPeriod;
+    topics_.Publish(statistics_topic_, Utime(moment),
+                    statistics_.Json(Utime(moment), moment.now));
+  }
+  if (moment.now >= next_status_) {
+    next_status_ = moment.now + kStatusPeriod;
+    topics_.Publish(
+        gateway_topic_, Utime(moment),
+        fmt::format(R"({{"utime":{},"clock":"{}","speed":{:.4g},"clients":{},"dropped":{}}})",
+                    Utime(moment), time_.kind_name(), time_.Speed(moment.now), topics_.viewers(),
+                    topics_.dropped()));
+  }
+}
+
+void Gateway::Join(Viewer& viewer) {
+  viewer.Say(ServerInfoText("Plumbline: " + robot_.name, fmt::format("{:x}", setting_.identity)));
+  topics_.Join(viewer);
+  viewer.Say(AdvertiseServicesText(kServices));
+}
+
+void Gateway::Leave(Viewer& viewer) {
+  wishes_.Leave(viewer);
+  topics_.Leave(viewer);
+}
+
+void Gateway::OnText(Viewer& viewer, std::string_view text) {
+  try {
+    const ClientMessage said = ParseClientText(text);
+    topics_.Unsubscribe(viewer, said.unsubscribe);
+    topics_.Subscribe(viewer, said.subscribe);
+  } catch (const std::runtime_error& error) {
+    viewer.Say(StatusText(2, error.what()));
+  }
+}
+
+void Gateway::OnBinary(Viewer& viewer, std::span<const uint8_t> frame, const Moment& moment) {
+  try {
+    Call(viewer, *ParseClientBinary(frame).call, moment);
+  } catch (const std::runtime_error& error) {
+    viewer.Say(StatusText(2, error.what()));
+  }
+}
+
+std::string Gateway::WhyNotArm() const {
+  return time_.kind() == RunTime::Kind::kVirtual ? kVirtual : "";
+}
+
+// A stop is asked for whatever the run is: in virtual time it ends the run.
+void Gateway::Call(Viewer& viewer, const ClientMessage::Call& call, const Moment& moment) {
+  const auto ask = [&](int8_t request) {
+    wishes_.Ask(request, viewer, call, moment.utime, moment.now);
+  };
+  const auto refuse = [&](const std::string& why) { AnswerCall(viewer, call, false, why); };
+  if (call.service == 0 || call.service > std::size(kServices)) {
+    viewer.Say(ServiceFailureText(call.service, call.id, "there is no such service"));
+  } else if (kServices[call.service - 1] == "emergency_stop") {
+    ask(driver_request_t::ESTOP);
+  } else if (const std::string why = WhyNotArm(); !why.empty()) {
+    refuse(why);
+  } else if (kServices[call.service - 1] == "disarm") {
+    ask(driver_request_t::DISARM);
+  } else if (!viewer.why_not_arm.empty()) {
+    refuse(viewer.why_not_arm);
+  } else if (kServices[call.service - 1] == "arm") {
+    ask(driver_request_t::ARM);
+  } else {
+    const DriverWish::Answer answer = Placed();
+    AnswerCall(viewer, call, answer.granted, answer.text);
+  }
+}
+
+/// The controller sees for itself when the robot is where it is to be, and begins: what a person
+/// needs is to be told what is still missing.
+DriverWish::Answer Gateway::Placed() const {
+  if (!controller_) return {false, "no controller is heard"};
+  if (controller_->phase == controller_status_t::RUNNING) return {true, "the episode has begun"};
+  if (controller_->phase != controller_status_t::PLACING)
+    return {false, "the controller does not ask for the robot to be placed" +
+                       (controller_->reason.empty() ? "" : ": " + controller_->reason)};
+  if (!place_ || !state_ || place_->q.size() != state_->q.size() ||
+      state_->q.size() != robot_.joints.size())
+    return {false, "the controller begins by itself when the robot has rested"};
+  for (size_t i = 0; i < state_->q.size(); ++i) {
+    if (!(std::abs(state_->q[i] - place_->q[i]) <= robot_.controller.place_tolerance))
+      return {false, fmt::format("{} is at {:.3f}, and is to be at {:.3f}, within {:.3f}",
+                                 robot_.joints[i].name, state_->q[i], place_->q[i],
+                                 robot_.controller.place_tolerance)};
+  }
+  return {true, "the robot is where it is to be"};
+}
+
+int64_t Gateway::Utime(const Moment& moment) const {
+  return time_.utime() != 0 ? time_.utime() : moment.utime;
+}
+
+}  // namespace plumb

@@ -1,0 +1,52 @@
+#include "dashboard/outbox.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace plumb {
+namespace {
+
+constexpr size_t kOverhead = 64;  // of an item, beyond its payload
+
+}  // namespace
+
+void Outbox::Push(Item item) {
+  Account(item, true);
+  items_.push_back(std::move(item));
+  MakeRoom();
+}
+
+Outbox::Item Outbox::Pop() {
+  Item item = std::move(items_.front());
+  items_.pop_front();
+  Account(item, false);
+  return item;
+}
+
+void Outbox::Forget(uint32_t subscription) {
+  std::erase_if(items_, [&](const Item& item) {
+    const bool gone = item.kind != Kind::kControl && item.subscription == subscription;
+    if (gone) Account(item, false);
+    return gone;
+  });
+}
+
+void Outbox::MakeRoom() {
+  for (const Kind kind : {Kind::kFast, Kind::kSlow}) {
+    while (bytes_ > kMaxBytes) {
+      const auto oldest = std::ranges::find(items_, kind, &Item::kind);
+      if (oldest == items_.end()) break;
+      Account(*oldest, false);
+      items_.erase(oldest);
+      ++dropped_;
+    }
+  }
+}
+
+void Outbox::Account(const Item& item, bool added) {
+  const size_t size = item.payload->size() + kOverhead;
+  size_t& count = item.kind == Kind::kControl ? control_bytes_ : bytes_;
+  if (item.kind != Kind::kHistory) count += added ? size : -size;
+}
+
+}  // namespace plumb

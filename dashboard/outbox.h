@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "dashboard/foxglove.h"
+
+namespace plumb {
+
+/// What waits to be sent to one client, so that a slow one holds up nobody. What the newest replaces
+/// anyway goes when there is no more room, the oldest first, and is counted. Not thread-safe.
+class Outbox {
+ public:
+  static constexpr size_t kMaxBytes = 4 << 20;         ///< of messages that may go
+  static constexpr size_t kMaxControlBytes = 1 << 20;  ///< of answers, which may not
+
+  enum class Kind {
+    kControl,  ///< the conversation itself: never goes
+    kHistory,  ///< what was before the client came; others hold it, too, so that it costs nothing
+    kSlow,
+    kFast  ///< goes first where there is no room
+  };
+  struct Item {
+    Kind kind;
+    bool binary = true;
+    uint32_t subscription = 0;
+    std::optional<MessageHead> head;            ///< before the payload
+    std::shared_ptr<const std::string> payload;  ///< which other clients get, too
+  };
+
+  void Push(Item item);
+  bool empty() const { return items_.empty(); }
+  Item Pop();
+  /// Nothing more of a subscription that has ended.
+  void Forget(uint32_t subscription);
+  /// Messages that had to go.
+  int64_t dropped() const { return dropped_; }
+  /// The client makes us answer and does not listen: no use in going on with it.
+  bool hopeless() const { return control_bytes_ > kMaxControlBytes; }
+
+ private:
+  void MakeRoom();
+  void Account(const Item& item, bool added);
+
+  std::deque<Item> items_;
+  size_t bytes_ = 0, control_bytes_ = 0;
+  int64_t dropped_ = 0;
+};
+
+}  // namespace plumb

@@ -1,0 +1,66 @@
+#include "dashboard/page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uintmax_t kMaxSize = 16 << 20;  // [bytes]
+constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kTypes{{
+    {".html", "text/html; charset=utf-8"},
+    {".js", "text/javascript; charset=utf-8"},
+    {".css", "text/css; charset=utf-8"},
+    {".svg", "image/svg+xml"},
+    {".png", "image/png"},
+    {".woff2", "font/woff2"},
+    {".txt", "text/plain; charset=utf-8"},
+}};
+
+bool IsPlain(std::string_view name) {
+  return !name.empty() && name.front() != '.' && std::ranges::all_of(name, [](unsigned char c) {
+    return std::isalnum(c) || c == '.' || c == '-' || c == '_';
+  });
+}
+
+}  // namespace
+
+std::optional<Page::File> Page::Find(std::string_view path) const {
+  const bool first = path == "/";
+  const std::string_view name = first ? "index.html" : path.substr(std::min<size_t>(1, path.size()));
+  if (!path.starts_with('/') || !IsPlain(name)) return std::nullopt;
+  const fs::path file = folder_ / name;
+  const auto type = std::ranges::find(kTypes, file.extension().string(),
+                                      &decltype(kTypes)::value_type::first);
+  std::error_code error;
+  const bool regular = fs::symlink_status(file, error).type() == fs::file_type::regular;
+  if (type != kTypes.end() && regular && fs::file_size(file, error) <= kMaxSize) {
+    std::ifstream stream(file, std::ios::binary);
+    std::ostringstream content;
+    content << stream.rdbuf();
+    if (stream) return File{std::string(type->second), content.str()};
+  }
+  if (!first) return std::nullopt;
+  return File{"text/plain; charset=utf-8",
+              fmt::format("The page has not been built: there is no {}.\n"
+                          "With node 18 or newer, `ninja -C build dashboard_page` builds it.\n"
+                          "Foxglove and Lichtblick can connect to this address without it.\n",
+                          file.string())};
+}
+
+fs::path DefaultPageFolder() {
+  std::error_code error;
+  const fs::path programs = fs::read_symlink("/proc/self/exe", error).parent_path();
+  const fs::path installed = programs.parent_path() / "share/plumbline/dashboard";
+  return fs::exists(installed, error) ? installed : programs.parent_path() / "dashboard/page";
+}
+
+}  // namespace plumb

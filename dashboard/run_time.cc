@@ -1,0 +1,34 @@
+#include "dashboard/run_time.h"
+
+namespace plumb {
+namespace {
+
+constexpr int64_t kOld = 10'000'000;  // [us], as ChannelJudge has it
+
+}  // namespace
+
+void RunTime::OnMessage(int64_t utime, const std::optional<Seal>& seal, int64_t date,
+                        int64_t now) {
+  utime_ = utime;
+  if (seal) {
+    heard_ = seal->process == 0          ? Kind::kVirtual
+             : seal->counter < date - kOld ? Kind::kReplay
+                                           : Kind::kReal;
+  }
+  // Another run, or one that has been set back.
+  if (!moments_.empty() && utime < moments_.back().utime - kWindow) moments_.clear();
+  if (moments_.empty() || now >= moments_.back().now + kStep) moments_.push_back({now, utime});
+}
+
+double RunTime::Speed(int64_t now) {
+  while (moments_.size() > 1 && moments_.front().now < now - kWindow) moments_.pop_front();
+  if (moments_.empty() || now <= moments_.front().now) return 0;
+  const Moment& first = moments_.front();
+  return static_cast<double>(utime_ - first.utime) / static_cast<double>(now - first.now);
+}
+
+std::string_view RunTime::kind_name() const {
+  return kind() == Kind::kVirtual ? "virtual" : kind() == Kind::kReplay ? "replay" : "real";
+}
+
+}  // namespace plumb

@@ -1,0 +1,88 @@
+#include "dashboard/topics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace plumb {
+
+uint32_t Topics::Add(std::string name, std::string schema_name, std::string schema, Keep keep) {
+  const auto id = static_cast<uint32_t>(topics_.size()) + 1;
+  topics_.push_back({keep, {}, {}});
+  described_.push_back({id, std::move(name), std::move(schema_name), std::move(schema)});
+  for (Viewer* viewer : viewers_) viewer->Say(AdvertiseText(std::span(&described_.back(), 1)));
+  return id;
+}
+
+bool Topics::wanted(uint32_t topic) const {
+  return Of(topic).keep == Keep::kHistory || watched(topic);
+}
+
+void Topics::Publish(uint32_t id, int64_t utime, std::string json,
+                     std::optional<History::Step> step) {
+  Topic& topic = Of(id);
+  const auto payload = std::make_shared<const std::string>(std::move(json));
+  const auto kind = topic.keep == Keep::kHistory ? Outbox::Kind::kSlow : Outbox::Kind::kFast;
+  for (const auto& [viewer, subscription] : topic.watchers) {
+    viewer->outbox.Push({kind, true, subscription, MessageHeadOf(subscription, utime), payload});
+    viewer->wake();
+  }
+  if (topic.keep == Keep::kHistory) topic.history.Add({++said_, utime, step, payload});
+}
+
+void Topics::Join(Viewer& viewer) {
+  viewers_.insert(&viewer);
+  viewer.Say(AdvertiseText(described_));
+}
+
+void Topics::Leave(Viewer& viewer) {
+  for (const auto& [subscription, topic] : viewer.subscriptions)
+    Of(topic).watchers.erase({&viewer, subscription});
+  if (viewers_.erase(&viewer) > 0) dropped_ += viewer.outbox.dropped();
+}
+
+int64_t Topics::dropped() const {
+  int64_t dropped = dropped_;
+  for (const Viewer* viewer : viewers_) dropped += viewer->outbox.dropped();
+  return dropped;
+}
+
+void Topics::Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscription> wishes) {
+  std::vector<std::pair<const History::Entry*, uint32_t>> kept;  // with their subscription
+  std::string wrong;
+  for (const auto& [id, topic] : wishes) {
+    if (topic == 0 || topic > topics_.size()) {
+      wrong = fmt::format("channelId: there is no channel {}", topic);
+    } else if (viewer.subscriptions.contains(id)) {
+      wrong = fmt::format("id: there is a subscription {} already", id);
+    } else if (viewer.subscriptions.size() >= kMaxSubscriptions) {
+      wrong = fmt::format("subscriptions: {} are enough", kMaxSubscriptions);
+    }
+    if (!wrong.empty()) break;
+    viewer.subscriptions[id] = topic;
+    Of(topic).watchers.insert({&viewer, id});
+    for (const History::Entry& entry : Of(topic).history.entries()) kept.push_back({&entry, id});
+  }
+  std::ranges::sort(kept, {}, [](const auto& one) { return one.first->order; });
+  for (const auto& [entry, id] : kept) {
+    viewer.outbox.Push(
+        {Outbox::Kind::kHistory, true, id, MessageHeadOf(id, entry->utime), entry->json});
+  }
+  viewer.wake();
+  if (!wrong.empty()) throw std::runtime_error(wrong);
+}
+
+void Topics::Unsubscribe(Viewer& viewer, std::span<const uint32_t> subscriptions) {
+  for (const uint32_t id : subscriptions) {
+    const auto found = viewer.subscriptions.find(id);
+    if (found == viewer.subscriptions.end())
+      throw std::runtime_error(fmt::format("subscriptionIds: there is no subscription {}", id));
+    Of(found->second).watchers.erase({&viewer, id});
+    viewer.subscriptions.erase(found);
+    viewer.outbox.Forget(id);
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dashboard/foxglove.h"
+#include "dashboard/history.h"
+#include "dashboard/viewer.h"
+
+namespace plumb {
+
+/// What the gateway has to say, and who listens to what of it. Not thread-safe.
+class Topics {
+ public:
+  static constexpr size_t kMaxTopics = 200;
+  static constexpr size_t kMaxSubscriptions = 400;  ///< of a viewer
+
+  enum class Keep {
+    kNothing,  ///< of what is fast: only the newest matters
+    kHistory
+  };
+
+  /// Offers it to everybody. @return its id, from 1 on.
+  uint32_t Add(std::string name, std::string schema_name, std::string schema, Keep keep);
+  /// Whether anybody would notice a message: it is listened to, or kept.
+  bool wanted(uint32_t topic) const;
+  bool watched(uint32_t topic) const { return !Of(topic).watchers.empty(); }
+
+  /// @param utime [us] of the run.
+  void Publish(uint32_t topic, int64_t utime, std::string json,
+               std::optional<History::Step> step = {});
+
+  void Join(Viewer& viewer);
+  void Leave(Viewer& viewer);
+  size_t viewers() const { return viewers_.size(); }
+  int64_t dropped() const;  ///< for viewers that are there or have left
+
+  /// What is kept comes first, in the order in which it was said.
+  /// @throws std::runtime_error, one line for the client; the subscriptions before it hold.
+  void Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscription> subscriptions);
+  void Unsubscribe(Viewer& viewer, std::span<const uint32_t> subscriptions);
+
+ private:
+  struct Topic {
+    Keep keep;
+    History history;
+    std::set<std::pair<Viewer*, uint32_t>> watchers;  // with their subscription
+  };
+  Topic& Of(uint32_t topic) { return topics_[topic - 1]; }
+  const Topic& Of(uint32_t topic) const { return topics_[topic - 1]; }
+
+  std::vector<Topic> topics_;
+  std::vector<FoxgloveTopic> described_;
+  std::set<Viewer*> viewers_;
+  uint64_t said_ = 0;     // messages that were kept so far
+  int64_t dropped_ = 0;  // for viewers that have left
+};
+
+}  // namespace plumb
