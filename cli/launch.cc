@@ -77,6 +77,7 @@ class ClosedLoop {
       std::cout << "nobody else can listen: " << setting_.virtual_run->mirror_failure()
                 << std::endl;
     }
+    if (!flags_.dashboard.empty()) std::cout << processes_.StartDashboard() << std::endl;
     processes_.Start();
     if (flags_.real) {
       const int status = ArmByPerson();

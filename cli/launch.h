@@ -24,7 +24,9 @@ struct LaunchFlags {
   std::string log;      ///< record all messages here; empty = do not
   std::string can_log;  ///< record all frames here, in virtual time; empty = do not
   std::string summary;  ///< JSON of the outcome; empty = do not
-  std::string output;   ///< folder for logs and checkpoints; empty = a new one
+  /// where a page shows the run, ADDRESS:PORT; empty: nowhere
+  std::string dashboard;
+  std::string output;  ///< folder for logs and checkpoints; empty = a new one
 };
 
 /// `plumb launch`: starts every process of a run, arms, shows progress, stops everything again

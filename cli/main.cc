@@ -92,6 +92,11 @@ int main(int argc, char** argv) {
         launch->add_option("--log", flags.log, "record all messages to this LCM log");
         launch->add_option("--can-log", flags.can_log,
                            "in virtual time: record all frames to this file, as candump -l does");
+        launch
+            ->add_option("--dashboard", flags.dashboard,
+                         "show the run in browsers; where to listen, default: 127.0.0.1:8765")
+            ->expected(0, 1)
+            ->type_name("ADDRESS:PORT");
         launch->add_option("--summary", flags.summary, "write the outcome to this JSON file");
         launch->add_option("--output", flags.output,
                            "folder for logs and checkpoints; default: a new one in runs/");
@@ -278,6 +283,8 @@ int main(int argc, char** argv) {
           sub->fallthrough();
       },
       [&](plumb::Process& process) {
+        if (launch->count("--dashboard") > 0 && flags.dashboard.empty())
+          flags.dashboard = "127.0.0.1:8765";
         if (launch->parsed()) return plumb::Launch(process, flags);
         if (sim->parsed()) return plumb::Simulate(process, sim_flags);
         if (calibrate->parsed()) return plumb::CalibrateLogs(process, calibrate_flags, command);

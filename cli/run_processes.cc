@@ -21,15 +21,41 @@ double SecondsSince(SteadyClock::time_point start) {
 
 }  // namespace
 
-void RunProcesses::Start(const std::string& name, std::vector<std::string> arguments) {
+std::vector<std::string> RunProcesses::Command(const std::string& name,
+                                               std::vector<std::string> arguments,
+                                               const std::string& clock) const {
   const fs::path here = fs::read_symlink("/proc/self/exe").parent_path();
   arguments.insert(arguments.begin(), here / (name == kRecorder ? "plumb" : name));
   arguments.insert(arguments.end(),
-                   {"--lcm-url", where_.lcm_url, "--clock", where_.clock, "--parent",
+                   {"--lcm-url", where_.lcm_url, "--clock", clock, "--parent",
                     std::to_string(getpid()), "--run", std::to_string(where_.run)});
   if (!where_.key_file.empty()) arguments.insert(arguments.end(), {"--key", where_.key_file});
-  children_.emplace_back(name, arguments, where_.output / (name + ".log"));
+  return arguments;
+}
+
+void RunProcesses::Start(const std::string& name, std::vector<std::string> arguments) {
+  children_.emplace_back(name, Command(name, std::move(arguments), where_.clock),
+                         where_.output / (name + ".log"));
   if (coordinator_) coordinator_->Expect(name, children_.back().pid());
+}
+
+std::string RunProcesses::StartDashboard() {
+  constexpr double kPatience = 10;  // [s]
+  constexpr char kName[] = "plumb-dashboard", kSays[] = "dashboard: ";
+  std::vector<std::string> arguments{flags_.robot, "--address", flags_.dashboard};
+  if (coordinator_) arguments.push_back("--virtual");
+  dashboard_.emplace(kName, Command(kName, arguments, coordinator_ ? "1" : where_.clock),
+                     where_.output / (std::string(kName) + ".log"));
+  const auto start = SteadyClock::now();
+  while (dashboard_->running() && SecondsSince(start) < kPatience) {
+    const std::string log = dashboard_->Tail(10);
+    const size_t begin = log.find(kSays), end = log.find('\n', begin);
+    if (begin != std::string::npos && end != std::string::npos)
+      return log.substr(begin, end - begin);
+    dashboard_->WaitFor(0.02);
+  }
+  const std::string why = dashboard_->Tail(1);
+  return "no dashboard: " + why.substr(0, why.find_last_not_of(" \n") + 1);
 }
 
 void RunProcesses::Start() {
@@ -79,7 +105,7 @@ Child* RunProcesses::Ended() {
 }
 
 void RunProcesses::Stop(bool hurry) noexcept {
-  if (children_.empty()) return;
+  if (children_.empty() && !dashboard_) return;
   try {
     if (coordinator_) StopInVirtualTime(hurry);
   } catch (const std::exception& error) {
@@ -87,6 +113,10 @@ void RunProcesses::Stop(bool hurry) noexcept {
   }
   StopInRealTime();
   children_.clear();
+  if (!dashboard_) return;  // it has seen the end
+  dashboard_->Signal(SIGTERM);
+  if (!dashboard_->WaitFor(0.3)) dashboard_->Signal(SIGKILL);
+  dashboard_.reset();
 }
 
 /// Everything that could command ends at one moment; the driver disarms and confirms; the robot

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,9 @@ class RunProcesses {
 
   /// @throws std::runtime_error if one cannot be started.
   void Start();
+  /// Starts the page before all others, so that it sees all they say, and awaits its address.
+  /// @return a line for people: where it is, or why there is none; a run goes on without it.
+  std::string StartDashboard();
   /// A process that has ended though nobody has asked it to; null if all run.
   Child* Ended();
   /// Motors first, the virtual robot last. Does not throw. @param hurry whatever they do: within
@@ -39,6 +43,8 @@ class RunProcesses {
 
  private:
   void Start(const std::string& name, std::vector<std::string> arguments);
+  std::vector<std::string> Command(const std::string& name, std::vector<std::string> arguments,
+                                   const std::string& clock) const;
   void StopInVirtualTime(bool hurry);
   void StopInRealTime();
 
@@ -47,6 +53,7 @@ class RunProcesses {
   Coordinator* coordinator_;
   double patience_ = 5;  // [s] of real time for the motors to be switched off in virtual time
   std::vector<Child> children_;
+  std::optional<Child> dashboard_;  // looks on, in virtual time from outside
 };
 
 }  // namespace plumb

@@ -12,6 +12,7 @@
 #include "cli/preflight.h"
 #include "common/atomic_file.h"
 #include "common/lcm_url.h"
+#include "common/listen_address.h"
 #include "common/process_number.h"
 #include "drivers/driver/driver.h"
 #include "sim/parameters.h"
@@ -72,6 +73,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
       bus(flags.bus.empty() ? robot.bus_url : flags.bus),
       run(flags.real || flags.real_time ? ProcessNumber(getpid()) : 0) {
   for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
+  if (!flags.dashboard.empty()) ListenAddress::Parse(flags.dashboard);
   RequireDrivable(robot);
   RequireSendable(robot);
   RequireKey(process.lcm_url(), !process.key_file().empty(), flags.allow_unsigned);

@@ -1,22 +1,10 @@
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace plumb {
-
-/// Where a server listens. @throws std::invalid_argument from Parse.
-struct ListenAddress {
-  std::string address = "127.0.0.1";  ///< a number, not a name
-  uint16_t port = 8765;               ///< 0 = the kernel's choice
-
-  /// "ADDRESS:PORT", "ADDRESS", ":PORT", "[::1]:PORT"; ADDRESS may be "localhost".
-  static ListenAddress Parse(const std::string& text);
-  /// Whether it can only be reached from this machine.
-  bool local() const;
-};
 
 /// Who may look, and who may move the robot, by what a browser says of itself. A page from elsewhere
 /// that the person has open, too, must not get at us: neither under a name of its own that leads to
@@ -25,7 +13,7 @@ struct ListenAddress {
 struct Access {
   std::vector<std::string> hosts;    ///< names by which we may be called, besides localhost
   std::vector<std::string> origins;  ///< of other pages that may talk to us, "https://example.org"
-  std::string token;                 ///< that whoever wants to arm must have; empty: nobody needs one
+  std::string token;  ///< that whoever wants to arm must have; empty: nobody needs one
 
   /// @param host the header "Host". Numbers are no names: nobody can rebind them.
   bool HostAllowed(std::string_view host) const;

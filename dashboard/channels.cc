@@ -4,7 +4,7 @@ namespace plumb {
 
 std::span<const ChannelOfPage> ChannelsOfPage() {
   static constexpr ChannelOfPage kChannels[] = {
-      {"CALIBRATION_STATUS", "calibration_status_t", false, true},
+      {"CALIBRATION_STATUS", "calibration_status_t", false, false},
       {"CONTROLLER_STATUS", "controller_status_t", false, true},
       {"DRIVER_REQUEST", "driver_request_t", false, false},
       {"DRIVER_STATUS", "driver_status_t", false, true},

@@ -19,8 +19,8 @@ std::string Schema(const std::string& title, const std::string& properties) {
 
 std::string PredictionSchema() {
   const std::string numbers = kNumbers;
-  return Schema("plumb.prediction", R"("sequence":{"type":"integer"},"q":)" + numbers +
-                                        R"(,"v":)" + numbers + R"(,"q_measured":)" + numbers);
+  return Schema("plumb.prediction", R"("sequence":{"type":"integer"},"q":)" + numbers + R"(,"v":)" +
+                                        numbers + R"(,"q_measured":)" + numbers);
 }
 
 std::string PosteriorSchema() {
@@ -78,8 +78,7 @@ void Derived::OnState(const robot_state_t& state, int64_t now) {
 void Derived::OnDistribution(const parameter_distribution_t& message) {
   try {
     const auto distribution = ParameterDistribution::FromMessage(message, robot_);
-    topics_.Publish(posteriors_, message.utime,
-                    PosteriorJson(distribution, prior_, message.utime),
+    topics_.Publish(posteriors_, message.utime, PosteriorJson(distribution, prior_, message.utime),
                     History::Step{message.iteration, 0});
     if (prediction_) prediction_->SetParameters(distribution.Mean());
   } catch (const std::invalid_argument& error) {

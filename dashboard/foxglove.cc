@@ -15,7 +15,15 @@ namespace {
 using nlohmann::json;
 
 constexpr uint8_t kMessageData = 1, kServiceRequest = 2, kServiceResponse = 3;  // opcodes
-constexpr size_t kMaxEntries = 1000;  // of one message
+constexpr size_t kMaxEntries = 1000;                                            // of one message
+
+json Parse(std::string_view text) {
+  try {
+    return ParseJson(text);
+  } catch (const json::exception&) {
+    throw std::runtime_error("this is no JSON");
+  }
+}
 
 std::string Quoted(std::string_view text) {
   std::string quoted;
@@ -79,8 +87,8 @@ std::string AdvertiseServicesText(std::span<const std::string_view> services) {
       R"({"type":"object","properties":{"ok":{"type":"boolean"},"text":{"type":"string"}}})";
   const auto described = [](const char* name, const std::string& schema) {
     return fmt::format(
-        R"({{"encoding":"json","schemaName":"{}","schemaEncoding":"jsonschema","schema":{}}})", name,
-        Quoted(schema));
+        R"({{"encoding":"json","schemaName":"{}","schemaEncoding":"jsonschema","schema":{}}})",
+        name, Quoted(schema));
   };
   std::string text;
   for (size_t i = 0; i < services.size(); ++i) {
@@ -98,9 +106,8 @@ std::string StatusText(int level, std::string_view message) {
 }
 
 std::string ServiceFailureText(uint32_t service, uint32_t call, std::string_view message) {
-  return fmt::format(
-      R"({{"op":"serviceCallFailure","serviceId":{},"callId":{},"message":{}}})", service, call,
-      Quoted(message));
+  return fmt::format(R"({{"op":"serviceCallFailure","serviceId":{},"callId":{},"message":{}}})",
+                     service, call, Quoted(message));
 }
 
 MessageHead MessageHeadOf(uint32_t subscription, int64_t utime) {
@@ -120,7 +127,7 @@ std::string ServiceResponse(uint32_t service, uint32_t call, std::string_view js
 }
 
 ClientMessage ParseClientText(std::string_view text) {
-  const json message = ParseJson(text);
+  const json message = Parse(text);
   const auto op = message.is_object() ? message.find("op") : message.end();
   if (!message.is_object() || op == message.end() || !op->is_string())
     throw std::runtime_error("op: must be a text");

@@ -84,8 +84,8 @@ Gateway::Gateway(const RobotDescription& robot, Setting setting, Wishes::Request
       time_(setting_.kind),
       derived_(robot, topics_),
       wishes_(std::move(request), setting_.identity, setting_.has_key, setting_.lcm_url),
-      statistics_topic_(topics_.Add("PLUMB_CHANNELS", "plumb.channels", kChannelsSchema,
-                                    Topics::Keep::kNothing)),
+      statistics_topic_(
+          topics_.Add("PLUMB_CHANNELS", "plumb.channels", kChannelsSchema, Topics::Keep::kNothing)),
       gateway_topic_(
           topics_.Add("PLUMB_GATEWAY", "plumb.gateway", kGatewaySchema, Topics::Keep::kNothing)) {
   for (const ChannelOfPage& channel : ChannelsOfPage()) {
@@ -139,8 +139,7 @@ void Gateway::Use(const std::string& channel, std::span<const uint8_t> message, 
     state_ = Decode<robot_state_t>(message);
     if (state_) derived_.OnState(*state_, moment.now);
   } else if (channel == "DRIVER_STATUS") {
-    if (const auto status = Decode<driver_status_t>(message))
-      wishes_.OnStatus(*status, moment.now);
+    if (const auto status = Decode<driver_status_t>(message)) wishes_.OnStatus(*status, moment.now);
   } else if (channel == "PLACE_ROBOT") {
     place_ = Decode<place_robot_t>(message);
   } else if (channel == "CONTROLLER_STATUS") {
@@ -155,8 +154,7 @@ void Gateway::Tick(const Moment& moment) {
   wishes_.Tick(moment.now);
   if (moment.now >= next_statistics_) {
     next_statistics_ = moment.now + kStatisticsPeriod;
-    topics_.Publish(statistics_topic_, Utime(moment),
-                    statistics_.Json(Utime(moment), moment.now));
+    topics_.Publish(statistics_topic_, Utime(moment), statistics_.Json(Utime(moment), moment.now));
   }
   if (moment.now >= next_status_) {
     next_status_ = moment.now + kStatusPeriod;

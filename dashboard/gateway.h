@@ -80,8 +80,8 @@ class Gateway {
   Wishes wishes_;
   const uint32_t statistics_topic_, gateway_topic_;
   int64_t next_statistics_ = 0, next_status_ = 0;
-  std::optional<robot_state_t> state_;           // the newest
-  std::optional<place_robot_t> place_;           // the newest wish
+  std::optional<robot_state_t> state_;             // the newest
+  std::optional<place_robot_t> place_;             // the newest wish
   std::optional<controller_status_t> controller_;  // the newest
 };
 

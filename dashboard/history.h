@@ -13,8 +13,8 @@ namespace plumb {
 /// message, of what has none the newest messages, without repetitions. Bounded. Not thread-safe.
 class History {
  public:
-  static constexpr size_t kMaxMessages = 500;         ///< that have no iteration
-  static constexpr size_t kMaxSteps = 5000;           ///< that have one
+  static constexpr size_t kMaxMessages = 500;  ///< that have no iteration
+  static constexpr size_t kMaxSteps = 5000;    ///< that have one
   static constexpr size_t kMaxBytes = size_t{16} << 20;
 
   /// Of a message: its fields `iteration` and `update`, 0 where there is only one of them.

@@ -59,11 +59,9 @@ class Dashboard {
         requests_(messenger_, "DRIVER_REQUEST"),
         gateway_(robot, GatewaySetting(flags),
                  [this](const driver_request_t& request) { requests_.Publish(request); }),
-        all_(messenger_.Subscribe(".*",
-                                  [this](const std::string& channel,
-                                         std::span<const uint8_t> message) {
-                                    OnMessage(channel, message);
-                                  })),
+        all_(messenger_.Subscribe(
+            ".*", [this](const std::string& channel,
+                         std::span<const uint8_t> message) { OnMessage(channel, message); })),
         server_(context_, robot, gateway_, ServerSetting(flags)),
         lcm_(context_, messenger_.fd()),
         stop_(context_, process.stop_fd()),
@@ -88,7 +86,8 @@ class Dashboard {
   }
 
  private:
-  static constexpr auto kPause = std::chrono::milliseconds(10), kTick = std::chrono::milliseconds(50);
+  static constexpr auto kPause = std::chrono::milliseconds(10),
+                        kTick = std::chrono::milliseconds(50);
 
   Gateway::Setting GatewaySetting(const Flags& flags) {
     Gateway::Setting setting;
@@ -137,11 +136,10 @@ class Dashboard {
   }
 
   void AwaitStop() {
-    stop_.async_wait(asio::posix::stream_descriptor::wait_read,
-                     [this](boost::system::error_code) {
-                       if (process_.stopping()) return context_.stop();
-                       AwaitStop();
-                     });
+    stop_.async_wait(asio::posix::stream_descriptor::wait_read, [this](boost::system::error_code) {
+      if (process_.stopping()) return context_.stop();
+      AwaitStop();
+    });
   }
 
   void Tick() {
@@ -176,7 +174,8 @@ int main(int argc, char** argv) {
   plumb::Flags flags;
   return plumb::Run(
       "plumb-dashboard",
-      "Shows a run in browsers, Foxglove and Lichtblick: plumb-dashboard robots/pendulum", argc, argv,
+      "Shows a run in browsers, Foxglove and Lichtblick: plumb-dashboard robots/pendulum", argc,
+      argv,
       [&](CLI::App& app) {
         app.add_option("robot", flags.robot, "robot folder or TOML file")->required();
         app.add_option("--address", flags.address, "where to listen, ADDRESS:PORT")

@@ -27,7 +27,7 @@ class Outbox {
     Kind kind;
     bool binary = true;
     uint32_t subscription = 0;
-    std::optional<MessageHead> head;            ///< before the payload
+    std::optional<MessageHead> head;             ///< before the payload
     std::shared_ptr<const std::string> payload;  ///< which other clients get, too
   };
 

@@ -35,11 +35,12 @@ bool IsPlain(std::string_view name) {
 
 std::optional<Page::File> Page::Find(std::string_view path) const {
   const bool first = path == "/";
-  const std::string_view name = first ? "index.html" : path.substr(std::min<size_t>(1, path.size()));
+  const std::string_view name =
+      first ? "index.html" : path.substr(std::min<size_t>(1, path.size()));
   if (!path.starts_with('/') || !IsPlain(name)) return std::nullopt;
   const fs::path file = folder_ / name;
-  const auto type = std::ranges::find(kTypes, file.extension().string(),
-                                      &decltype(kTypes)::value_type::first);
+  const auto type =
+      std::ranges::find(kTypes, file.extension().string(), &decltype(kTypes)::value_type::first);
   std::error_code error;
   const bool regular = fs::symlink_status(file, error).type() == fs::file_type::regular;
   if (type != kTypes.end() && regular && fs::file_size(file, error) <= kMaxSize) {

@@ -60,8 +60,8 @@ std::string PosteriorJson(const ParameterDistribution& distribution,
     ordered_json quantiles = ordered_json::array();
     for (const double p : kProbabilities)
       quantiles.push_back(parameter.ToPhysical(Quantile(distribution.mixture, moments, i, p)));
-    const bool determined = std::sqrt(moments.covariance(i, i)) <
-                            kDetermined * std::sqrt(before.covariance(i, i));
+    const bool determined =
+        std::sqrt(moments.covariance(i, i)) < kDetermined * std::sqrt(before.covariance(i, i));
     parameters.push_back({{"name", parameter.name},
                           {"unit", parameter.unit},
                           {"mean", mean(i)},

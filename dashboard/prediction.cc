@@ -41,8 +41,8 @@ OneStepPrediction::OneStepPrediction(const RobotDescription& robot)
     : simulator_(robot), period_(Microseconds(robot.task.period)) {}
 
 void OneStepPrediction::OnState(const robot_state_t& state) {
-  State next{state.utime,        state.sequence,        ToEigen(state.q), ToEigen(state.v),
-             ToEigen(state.effort), state.restarted != 0};
+  State next{state.utime,      state.sequence,        ToEigen(state.q),
+             ToEigen(state.v), ToEigen(state.effort), state.restarted != 0};
   const bool ours = next.q.size() == simulator_.num_positions() &&
                     next.v.size() == simulator_.num_velocities() && next.q.allFinite() &&
                     next.v.allFinite() && next.effort.size() == next.v.size();

@@ -35,7 +35,9 @@ ordered_json Joint(const JointDescription& joint) {
   const bool has_effort = !joint.passive && joint.effort_limit > 0;
   return {{"name", joint.name},
           {"type", Name(joint.type)},
-          {"unit_position", slides ? "m" : joint.type == Type::kSpherical ? "1" : "rad"},
+          {"unit_position", slides                           ? "m"
+                            : joint.type == Type::kSpherical ? "1"
+                                                             : "rad"},
           {"unit_velocity", slides ? "m/s" : "rad/s"},
           {"unit_effort", slides ? "N" : "Nm"},
           {"lower", FiniteOrNull(joint.lower)},
@@ -62,7 +64,10 @@ std::string RobotJson(const RobotDescription& robot, const std::string& why_not)
     joints.push_back(Joint(joint));
     const bool slides = joint.type == Type::kPrismatic;
     AppendEntries(joint, joint.num_positions(), "wxyz",
-                  slides ? "m" : joint.num_positions() == 1 ? "rad" : "1", coordinates);
+                  slides                       ? "m"
+                  : joint.num_positions() == 1 ? "rad"
+                                               : "1",
+                  coordinates);
     AppendEntries(joint, joint.num_velocities(), "xyz", slides ? "m/s" : "rad/s", velocities);
   }
   for (const ParameterDescription& parameter : robot.parameters) {

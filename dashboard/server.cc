@@ -37,7 +37,8 @@ constexpr auto kResponseTime = std::chrono::seconds(30);  // for whoever reads s
 constexpr auto kSilence = std::chrono::seconds(60);       // of a WebSocket, then it is asked
 constexpr auto kAcceptAgain = std::chrono::milliseconds(100);
 constexpr size_t kMaxHeader = 8 << 10;  // [bytes]
-constexpr int kSendBuffer = 256 << 10;  // [bytes] of the kernel: what is older, a slow client misses
+constexpr int kSendBuffer =
+    256 << 10;  // [bytes] of the kernel: what is older, a slow client misses
 
 std::string_view View(boost::string_view text) { return {text.data(), text.size()}; }
 
@@ -51,15 +52,21 @@ struct Connection {
 /// What all connections share. They hold it, and it knows them.
 struct Server::Parts {
   Parts(asio::io_context& where, const RobotDescription& description, Gateway& to, Setting with)
-      : context(where), robot(description), gateway(to), setting(std::move(with)), page(setting.page),
-        acceptor(context), again(context) {}
+      : context(where),
+        robot(description),
+        gateway(to),
+        setting(std::move(with)),
+        page(setting.page),
+        acceptor(context),
+        again(context) {}
 
   using Places = std::list<std::weak_ptr<Connection>>;
 
   std::string WhyNotArm(const Request& request) const {
     const std::string why = gateway.WhyNotArm();
     if (!why.empty() || setting.access.TokenGiven(View(request[http::field::cookie]))) return why;
-    return "whoever wants to arm must open the page by the address that was printed, with its token";
+    return "whoever wants to arm must open the page by the address that was printed, with its "
+           "token";
   }
 
   asio::io_context& context;
@@ -149,8 +156,7 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
     const auto data = buffer_.data();
     const std::span<const uint8_t> bytes(static_cast<const uint8_t*>(data.data()), data.size());
     if (socket_.got_text()) {
-      parts_->gateway.OnText(viewer_,
-                             {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+      parts_->gateway.OnText(viewer_, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     } else {
       parts_->gateway.OnBinary(viewer_, bytes, parts_->setting.moment());
     }
@@ -184,7 +190,8 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
 };
 
 /// A client that asks for files, one after the other.
-class RequestConnection : public Connection, public std::enable_shared_from_this<RequestConnection> {
+class RequestConnection : public Connection,
+                          public std::enable_shared_from_this<RequestConnection> {
  public:
   RequestConnection(std::shared_ptr<Parts> parts, tcp::socket&& socket)
       : parts_(std::move(parts)), stream_(std::move(socket)) {}
@@ -212,11 +219,13 @@ class RequestConnection : public Connection, public std::enable_shared_from_this
   }
 
   void OnBadRequest(error_code error) {
-    const bool theirs = error.category() == http::make_error_code(http::error::end_of_stream).category();
+    const bool theirs =
+        error.category() == http::make_error_code(http::error::end_of_stream).category();
     if (!theirs || error == http::error::end_of_stream || error == http::error::partial_message)
       return Close();
     request_ = {};
-    Respond(Text(http::status::bad_request, "no request that can be read: " + error.message()), false);
+    Respond(Text(http::status::bad_request, "no request that can be read: " + error.message()),
+            false);
   }
 
   void OnRequest() {
@@ -238,7 +247,8 @@ class RequestConnection : public Connection, public std::enable_shared_from_this
     constexpr std::string_view kToken = "token=";
     if (path == "/" && query.starts_with(kToken)) return TakeToken(query.substr(kToken.size()));
     if (path == "/robot.json") {
-      Response response = Text(http::status::ok, RobotJson(parts_->robot, parts_->WhyNotArm(request_)));
+      Response response =
+          Text(http::status::ok, RobotJson(parts_->robot, parts_->WhyNotArm(request_)));
       response.set(http::field::content_type, "application/json");
       return Respond(std::move(response));
     }
@@ -256,8 +266,8 @@ class RequestConnection : public Connection, public std::enable_shared_from_this
       return Respond(Text(http::status::forbidden, "this token is not, or no longer, right"));
     Response response = Text(http::status::see_other, "");
     response.set(http::field::location, "/");
-    response.set(http::field::set_cookie, fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/",
-                                                      kTokenCookie, token));
+    response.set(http::field::set_cookie,
+                 fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", kTokenCookie, token));
     Respond(std::move(response));
   }
 
@@ -267,8 +277,8 @@ class RequestConnection : public Connection, public std::enable_shared_from_this
     if (!access.OriginAllowed(View(request_[http::field::origin]), host))
       return Respond(Text(http::status::forbidden, "another page may not talk to us: --origin"));
     if (!offered.exists(kFoxgloveProtocol))
-      return Respond(Text(http::status::bad_request,
-                          fmt::format("the subprotocol is {}", kFoxgloveProtocol)));
+      return Respond(
+          Text(http::status::bad_request, fmt::format("the subprotocol is {}", kFoxgloveProtocol)));
     if (parts_->viewers.size() >= Server::kMaxViewers)
       return Respond(Text(http::status::service_unavailable, "too many look on already"));
     stream_.expires_never();

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "common/listen_address.h"
 #include "dashboard/access.h"
 #include "dashboard/gateway.h"
 #include "dashboard/page.h"

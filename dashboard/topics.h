@@ -58,7 +58,7 @@ class Topics {
   std::vector<Topic> topics_;
   std::vector<FoxgloveTopic> described_;
   std::set<Viewer*> viewers_;
-  uint64_t said_ = 0;     // messages that were kept so far
+  uint64_t said_ = 0;    // messages that were kept so far
   int64_t dropped_ = 0;  // for viewers that have left
 };
 

@@ -18,7 +18,11 @@ struct Viewer {
       : why_not_arm(std::move(why_not)), wake(std::move(on_item)) {}
 
   void Say(std::string text, bool binary = false) {
-    outbox.Push({Outbox::Kind::kControl, binary, 0, {}, std::make_shared<const std::string>(std::move(text))});
+    outbox.Push({Outbox::Kind::kControl,
+                 binary,
+                 0,
+                 {},
+                 std::make_shared<const std::string>(std::move(text))});
     wake();
   }
 

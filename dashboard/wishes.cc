@@ -21,18 +21,20 @@ void Wishes::Ask(int8_t request, Viewer& viewer, const ClientMessage::Call& call
                  int64_t now) {
   auto same = std::ranges::find(open_, request, &Open::request);
   if (same == open_.end()) {
-    open_.push_back(
-        {request, DriverWish(request, ++identity_, utime, now, has_key_), now, {}});
+    open_.push_back({request, DriverWish(request, ++identity_, utime, now, has_key_), now, {}});
     same = std::prev(open_.end());
   }
   if (same->askers.size() >= kMaxAskers)
     return AnswerCall(viewer, call, false, "too many are asking for it already");
   same->askers.push_back({&viewer, call});
-  if (!same->wish.arms() || same->again == now) Say(*same, now);
+  if (!same->wish.arms()) Say(*same, now);
 }
 
 void Wishes::OnStatus(const driver_status_t& status, int64_t now) {
-  for (Open& open : open_) open.wish.OnStatus(status);
+  for (Open& open : open_) {
+    open.wish.OnStatus(status);
+    if (open.wish.arms()) Say(open, now);
+  }
   Answer(now);
 }
 

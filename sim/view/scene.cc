@@ -54,10 +54,10 @@ Color ColorOf(const RobotDescription& robot, int link) {
   static constexpr Color kLinks[] = {{0.34, 0.71, 0.91}, {0.90, 0.62, 0.00}, {0.00, 0.62, 0.45},
                                      {0.80, 0.47, 0.65}, {0.00, 0.45, 0.70}, {0.84, 0.37, 0.00}};
   if (link == 0) return kBase;
-  const auto moving = std::count_if(
-      robot.links.begin() + 1, robot.links.begin() + link, [](const LinkDescription& other) {
-        return !other.visuals.empty() || !other.collisions.empty();
-      });
+  const auto moving = std::count_if(robot.links.begin() + 1, robot.links.begin() + link,
+                                    [](const LinkDescription& other) {
+                                      return !other.visuals.empty() || !other.collisions.empty();
+                                    });
   return kLinks[static_cast<size_t>(moving) % std::size(kLinks)];
 }
 

@@ -107,9 +107,8 @@ std::string SceneUpdate::Json(int64_t utime, const Eigen::VectorXd& q,
   ground.Add({}, plate, kGroundColor);
   std::string deletions;
   if (!prediction) {
-    deletions = fmt::format(
-        R"({{"timestamp":{{"sec":{},"nsec":{}}},"type":0,"id":"prediction"}})", utime / 1'000'000,
-        utime % 1'000'000 * 1000);
+    deletions = fmt::format(R"({{"timestamp":{{"sec":{},"nsec":{}}},"type":0,"id":"prediction"}})",
+                            utime / 1'000'000, utime % 1'000'000 * 1000);
   }
   std::string entities = ground.Json() + "," + robot_at("robot", q, 1);
   if (prediction) entities += "," + robot_at("prediction", *prediction, kTranslucent);
@@ -144,10 +143,10 @@ std::string SceneUpdate::Schema() {
       R"(,"frame_id":{"type":"string"},"id":{"type":"string"},"lifetime":)" + time +
       R"(,"frame_locked":{"type":"boolean"},"metadata":)" + unused + R"(,"arrows":)" + unused +
       R"(,"cubes":)" + array(object(solid)) + R"(,"spheres":)" + array(object(solid)) +
-      R"(,"cylinders":)" + array(object(cylinder)) + R"(,"lines":)" + unused +
-      R"(,"triangles":)" + unused + R"(,"texts":)" + unused + R"(,"models":)" + unused);
-  const std::string deletion = object(
-      R"("timestamp":)" + time + R"(,"type":{"type":"integer"},"id":{"type":"string"})");
+      R"(,"cylinders":)" + array(object(cylinder)) + R"(,"lines":)" + unused + R"(,"triangles":)" +
+      unused + R"(,"texts":)" + unused + R"(,"models":)" + unused);
+  const std::string deletion =
+      object(R"("timestamp":)" + time + R"(,"type":{"type":"integer"},"id":{"type":"string"})");
   return R"({"$schema":"https://json-schema.org/draft/2020-12/schema","title":"foxglove.SceneUpdate",)"
          R"("type":"object","properties":{"deletions":)" +
          array(deletion) + R"(,"entities":)" + array(entity) + "}}";
