@@ -19,9 +19,8 @@ HostAndPort HostAndPort::Split(std::string_view text) {
   parts.host = text.substr(0, end);
   if (parts.bracketed) parts.host = parts.host.substr(1, parts.host.size() - 2);
   if (end != std::string_view::npos) parts.port = text.substr(end + 1);
-  std::ranges::transform(parts.host, parts.host.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
+  std::ranges::transform(parts.host, parts.host.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return parts;
 }
 

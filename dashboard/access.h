@@ -6,10 +6,10 @@
 
 namespace plumb {
 
-/// Who may look, and who may move the robot, by what a browser says of itself. A page from elsewhere
-/// that the person has open, too, must not get at us: neither under a name of its own that leads to
-/// this machine (DNS rebinding), nor by a WebSocket, which browsers open to anybody. Thread-safe
-/// (immutable).
+/// Who may look, and who may move the robot, by what a browser says of itself. A page from
+/// elsewhere that the person has open, too, must not get at us: neither under a name of its own
+/// that leads to this machine (DNS rebinding), nor by a WebSocket, which browsers open to anybody.
+/// Thread-safe (immutable).
 struct Access {
   std::vector<std::string> hosts;    ///< names by which we may be called, besides localhost
   std::vector<std::string> origins;  ///< of other pages that may talk to us, "https://example.org"

@@ -182,7 +182,7 @@ void Gateway::OnText(Viewer& viewer, std::string_view text) {
     const ClientMessage said = ParseClientText(text);
     topics_.Unsubscribe(viewer, said.unsubscribe);
     topics_.Subscribe(viewer, said.subscribe);
-  } catch (const std::runtime_error& error) {
+  } catch (const std::exception& error) {
     viewer.Say(StatusText(2, error.what()));
   }
 }
@@ -190,7 +190,7 @@ void Gateway::OnText(Viewer& viewer, std::string_view text) {
 void Gateway::OnBinary(Viewer& viewer, std::span<const uint8_t> frame, const Moment& moment) {
   try {
     Call(viewer, *ParseClientBinary(frame).call, moment);
-  } catch (const std::runtime_error& error) {
+  } catch (const std::exception& error) {
     viewer.Say(StatusText(2, error.what()));
   }
 }

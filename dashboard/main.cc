@@ -27,8 +27,8 @@ struct Flags {
   bool virtual_time = false;
 };
 
-/// Whether messages are to be believed: with a key, those that are signed. Without one nobody can be
-/// kept out, and somebody who only looks on ends no run.
+/// Whether messages are to be believed: with a key, those that are signed. Without one nobody can
+/// be kept out, and somebody who only looks on ends no run.
 class Judges {
  public:
   explicit Judges(const Identity& me) : me_(me) {}

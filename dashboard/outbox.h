@@ -10,8 +10,9 @@
 
 namespace plumb {
 
-/// What waits to be sent to one client, so that a slow one holds up nobody. What the newest replaces
-/// anyway goes when there is no more room, the oldest first, and is counted. Not thread-safe.
+/// What waits to be sent to one client, so that a slow one holds up nobody. What the newest
+/// replaces anyway goes when there is no more room, the oldest first, and is counted. Not
+/// thread-safe.
 class Outbox {
  public:
   static constexpr size_t kMaxBytes = 4 << 20;         ///< of messages that may go

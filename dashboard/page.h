@@ -18,9 +18,9 @@ class Page {
   explicit Page(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   /// @param path of a URL, without its query: "/", which is index.html, or "/page.js".
-  /// @return none if there is no such file. Names with anything in them but letters, digits, '.', '-'
-  /// and '_', and files behind links, are none of ours. Without a built page "/" says how to build
-  /// it.
+  /// @return none if there is no such file. Names with anything in them but letters, digits, '.',
+  /// '-' and '_', and files behind links, are none of ours. Without a built page "/" says how to
+  /// build it.
   std::optional<File> Find(std::string_view path) const;
 
  private:

@@ -147,7 +147,8 @@ std::string SceneUpdate::Schema() {
       unused + R"(,"texts":)" + unused + R"(,"models":)" + unused);
   const std::string deletion =
       object(R"("timestamp":)" + time + R"(,"type":{"type":"integer"},"id":{"type":"string"})");
-  return R"({"$schema":"https://json-schema.org/draft/2020-12/schema","title":"foxglove.SceneUpdate",)"
+  return R"({"$schema":"https://json-schema.org/draft/2020-12/schema",)"
+         R"("title":"foxglove.SceneUpdate",)"
          R"("type":"object","properties":{"deletions":)" +
          array(deletion) + R"(,"entities":)" + array(entity) + "}}";
 }

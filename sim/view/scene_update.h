@@ -12,14 +12,14 @@ namespace plumb {
 
 /// A robot as foxglove.SceneUpdate in JSON: Foxglove and Lichtblick draw it in three dimensions
 /// without a URDF, and so does the dashboard's page. Entities "ground", "robot" and, translucent,
-/// "prediction", of cubes, spheres and cylinders (capsules are these) in the frame "world", which is
-/// the base's. Thread-safe.
+/// "prediction", of cubes, spheres and cylinders (capsules are these) in the frame "world", which
+/// is the base's. Thread-safe.
 class SceneUpdate {
  public:
   explicit SceneUpdate(const RobotDescription& robot);
 
-  /// @param utime [us] @param q measured, as in RobotDescription. @param prediction what a simulator
-  /// says that q is; null: nothing is known, and none is drawn.
+  /// @param utime [us] @param q measured, as in RobotDescription. @param prediction what a
+  /// simulator says that q is; null: nothing is known, and none is drawn.
   /// @throws std::invalid_argument if one has the wrong size.
   std::string Json(int64_t utime, const Eigen::VectorXd& q,
                    const Eigen::VectorXd* prediction = nullptr) const;

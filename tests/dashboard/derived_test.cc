@@ -33,7 +33,8 @@ robot_state_t StateOf(const Simulator& simulator, int64_t sequence, double perio
 /// A robot that is the simulator with these parameters, pushed by changing efforts.
 std::optional<OneStepPrediction::Predicted> Follow(const RobotDescription& robot,
                                                    OneStepPrediction& prediction,
-                                                   const Eigen::VectorXd& truth, int64_t lost = -1) {
+                                                   const Eigen::VectorXd& truth,
+                                                   int64_t lost = -1) {
   constexpr double kPeriod = 0.005;
   Simulator simulator(robot);
   simulator.SetParameters(truth);
@@ -175,7 +176,8 @@ TEST_CASE("a history has a bound, in messages and in bytes") {
   for (uint64_t i = 0; i < 1000; ++i) add(i, std::to_string(i));
   CHECK(history.entries().size() == History::kMaxMessages);
   CHECK(*history.entries().back().json == "999");
-  for (uint64_t i = 0; i < 10; ++i) add(i, std::string(size_t{3} << 20, static_cast<char>('a' + i)));
+  for (uint64_t i = 0; i < 10; ++i)
+    add(i, std::string(size_t{3} << 20, static_cast<char>('a' + i)));
   CHECK(history.entries().size() == 5);
   History steps;
   for (int64_t i = 0; i < 2000; ++i)

@@ -52,9 +52,7 @@ struct Stand {
   void Listen(const std::string& topic) {
     gateway.OnText(looker.viewer, looker.Subscription(topic));
   }
-  void Call(uint8_t service) {
-    gateway.OnBinary(looker.viewer, Looker::CallOf(service), moment);
-  }
+  void Call(uint8_t service) { gateway.OnBinary(looker.viewer, Looker::CallOf(service), moment); }
   void Pass(int64_t us) {
     moment.now += us, moment.utime += us, moment.date += us;
     gateway.Tick(moment);
@@ -137,9 +135,9 @@ TEST_CASE("whoever has asked for a channel hears each of its messages, and nobod
   CHECK(stand.looker.heard[123].json["sequence"] == 123);
   CHECK(stand.looker.heard[123].json["q"] == json{0.123});
   CHECK(stand.looker.heard[123].utime == State(123).utime);
-  stand.gateway.OnText(stand.looker.viewer,
-                       R"({"op":"unsubscribe","subscriptionIds":[)" +
-                           stand.looker.topics["ROBOT_STATE"]["id"].dump() + "]}");
+  stand.gateway.OnText(stand.looker.viewer, R"({"op":"unsubscribe","subscriptionIds":[)" +
+                                                stand.looker.topics["ROBOT_STATE"]["id"].dump() +
+                                                "]}");
   stand.Hear("ROBOT_STATE", State(500));
   stand.looker.Take();
   CHECK(stand.looker.heard.size() == 500);
@@ -185,9 +183,9 @@ TEST_CASE("the table of channels counts every message, and what does not decode"
   Bytes cut = Encode(State(0));
   cut.pop_back();
   stand.gateway.OnMessage("ROBOT_STATE", cut, true, stand.moment.now, stand.moment);
-  stand.Hear("JOINT_STATE", State(0));                                      // of another type
+  stand.Hear("JOINT_STATE", State(0));                                        // of another type
   stand.gateway.OnMessage("STRANGE", Bytes{1, 2, 3}, true, 0, stand.moment);  // of none
-  stand.Hear("POLICY", State(0), false);                                    // not to be believed
+  stand.Hear("POLICY", State(0), false);                                      // not to be believed
   stand.Pass(0);
   stand.looker.Take();
   const json channels = stand.looker.heard.back().json["channels"];
@@ -296,8 +294,8 @@ TEST_CASE(
   Gateway::Setting setting;
   if (told) setting.kind = RunTime::Kind::kVirtual;
   Stand stand(setting);
-  Identity sender("plumb-driver", {}, Clock(std::make_shared<VirtualTime>()),
-                  Identity::Reach::kRun, 0);
+  Identity sender("plumb-driver", {}, Clock(std::make_shared<VirtualTime>()), Identity::Reach::kRun,
+                  0);
   Bytes message = Encode(Driver(driver_status_t::IDLE));
   message.resize(message.size() + kSealSize);
   sender.Seal("DRIVER_STATUS", message);
@@ -378,8 +376,7 @@ TEST_CASE("what a client says wrongly is answered, and changes nothing") {
         std::string(R"({"op":"subscribe"})"),
         std::string(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":4000}]})"),
         std::string(R"({"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]})"),
-        std::string(R"({"op":"unsubscribe","subscriptionIds":[5]})"),
-        std::string(2000, '[')}) {
+        std::string(R"({"op":"unsubscribe","subscriptionIds":[5]})"), std::string(2000, '[')}) {
     const size_t before = stand.looker.texts.size();
     stand.gateway.OnText(stand.looker.viewer, text);
     stand.looker.Take();
@@ -387,9 +384,9 @@ TEST_CASE("what a client says wrongly is answered, and changes nothing") {
     REQUIRE(stand.looker.texts.size() == before + 1);
     CHECK(stand.looker.texts.back()["op"] == "status");
   }
-  for (const Bytes& frame : {Bytes{}, Bytes{1, 2, 3}, Bytes{2, 1, 0, 0}, Looker::CallOf(0),
-                             Looker::CallOf(99),
-                             Bytes{2, 1, 0, 0, 0, 1, 0, 0, 0, 255, 255, 255, 255}}) {
+  for (const Bytes& frame :
+       {Bytes{}, Bytes{1, 2, 3}, Bytes{2, 1, 0, 0}, Looker::CallOf(0), Looker::CallOf(99),
+        Bytes{2, 1, 0, 0, 0, 1, 0, 0, 0, 255, 255, 255, 255}}) {
     const size_t before = stand.looker.texts.size();
     stand.gateway.OnBinary(stand.looker.viewer, frame, stand.moment);
     stand.looker.Take();

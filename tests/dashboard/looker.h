@@ -38,8 +38,7 @@ struct Looker {
   /// The subscription's number is the topic's.
   std::string Subscription(const std::string& topic) {
     const auto id = topics.at(topic)["id"];
-    return nlohmann::json{{"op", "subscribe"},
-                          {"subscriptions", {{{"id", id}, {"channelId", id}}}}}
+    return nlohmann::json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", id}}}}}
         .dump();
   }
   static std::vector<uint8_t> CallOf(uint8_t service, uint8_t number = 7) {

@@ -26,10 +26,9 @@ TEST_CASE("the page's files are served, and nothing else on the disk") {
   CHECK(page.Find("/")->content == "<!doctype html>");
   CHECK(page.Find("/")->type == "text/html; charset=utf-8");
   CHECK(page.Find("/page.js")->content == "hello");
-  for (const char* path :
-       {"", "page.js", "//page.js", "/../outside.js", "/..%2foutside.js", "/./page.js", "/link.js",
-        "/inner.js", "/.secret.js", "/notes.key", "/missing.js", "/page.js/", "/..", "/\\page.js",
-        "/etc/passwd"}) {
+  for (const char* path : {"", "page.js", "//page.js", "/../outside.js", "/..%2foutside.js",
+                           "/./page.js", "/link.js", "/inner.js", "/.secret.js", "/notes.key",
+                           "/missing.js", "/page.js/", "/..", "/\\page.js", "/etc/passwd"}) {
     INFO(path);
     CHECK_FALSE(page.Find(path));
   }

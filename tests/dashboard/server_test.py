@@ -1,0 +1,391 @@
+#!/usr/bin/python3
+"""server_test.py PROGRAMS ROBOTS: plumb-dashboard as its clients know it, with hostile ones among them, and with a driver.
+
+A client is Python's standard library (client.py). What is said on LCM is what lcm-gen's Python encodes, sent as LCM sends it.
+"""
+import contextlib
+import json
+import os
+import pathlib
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+import client
+
+PROGRAMS, ROBOTS = (pathlib.Path(argument) for argument in sys.argv[1:3])
+sys.path.insert(0, str(PROGRAMS.parent / "lcmtypes" / "python"))
+import plumb  # noqa: E402
+
+GROUP, PORT = "239.255.76.62", 20000 + os.getpid() % 12000
+LCM_URL = f"udpm://{GROUP}:{PORT}?ttl=0&recv_buf_size=2097152"
+PATIENCE = 60  # [s]; who is as late as that hangs
+
+
+class Lcm:
+    """Says messages on LCM, each in one datagram."""
+
+    def __init__(self):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        self.number = 0
+
+    def say(self, channel, message):
+        self.number += 1
+        self.socket.sendto(struct.pack(">II", 0x4C433032, self.number) + channel.encode() + b"\0" + message.encode(), (GROUP, PORT))
+
+
+def state(sequence, q=0.25):
+    message = plumb.robot_state_t()
+    message.utime = 1_700_000_000_000_000 + 2000 * sequence
+    message.sequence, message.num_joints, message.valid = sequence, 1, True
+    message.q, message.v, message.q_sd, message.v_sd, message.effort = [q], [0.5], [0.01], [0.1], [0.0]
+    return message
+
+
+class Process:
+    """A program of ours, until the test ends."""
+
+    def __init__(self, test, name, *arguments):
+        self.log = tempfile.TemporaryFile(mode="w+")
+        command = [PROGRAMS / name, ROBOTS / "pendulum", "--lcm-url", LCM_URL, "--parent", str(os.getpid()), *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True)
+        test.addCleanup(self.stop)
+
+    def stop(self):
+        self.process.send_signal(signal.SIGCONT)
+        self.process.terminate()
+        self.process.wait(PATIENCE)
+        self.process.stdout.close()
+        self.log.close()
+
+
+class Dashboard(Process):
+    def __init__(self, test, *arguments, page="/nowhere", port=0):
+        super().__init__(test, "plumb-dashboard", "--address", f"127.0.0.1:{port}", "--page", page, *arguments)
+        self.url = self.process.stdout.readline().split()[1]
+        self.address = ("127.0.0.1", int(re.search(r":(\d+)/", self.url)[1]))
+
+    def works(self, test):
+        """Whoever comes now is served: a file, and a conversation."""
+        test.assertIn(b"200 OK", client.get(self.address, "/robot.json"))
+        with contextlib.closing(client.Page(self.address)) as page:
+            test.assertIn("ROBOT_STATE", page.topics)
+        test.assertIsNone(self.process.poll())
+
+    def peak(self):
+        """[MB] of memory, the most so far."""
+        return int(re.search(r"VmHWM:\s+(\d+)", pathlib.Path(f"/proc/{self.process.pid}/status").read_text())[1]) / 1024
+
+
+class Served(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.page = pathlib.Path(self.folder.name) / "page"
+        self.page.mkdir()
+        (self.page / "index.html").write_text("<!doctype html><title>page</title>")
+        (self.page / "page.js").write_text("'use strict';")
+        (pathlib.Path(self.folder.name) / "secret.js").write_text("secret")
+
+    def test_the_page_is_served_with_what_keeps_others_out(self):
+        dashboard = Dashboard(self, page=self.page)
+        answer = client.get(dashboard.address, "/?anything")
+        self.assertIn(b"<title>page</title>", answer)
+        self.assertIn(b"default-src 'self'", answer)
+        self.assertIn(b"X-Content-Type-Options: nosniff", answer)
+        self.assertIn(b"text/javascript", client.get(dashboard.address, "/page.js"))
+        robot = json.loads(client.body(client.get(dashboard.address, "/robot.json")))
+        self.assertEqual(robot["name"], "pendulum")
+        self.assertTrue(robot["may_control"])
+        two = "GET /page.js HTTP/1.1\r\nHost: localhost\r\n\r\n" * 2
+        with socket.create_connection(dashboard.address, PATIENCE) as connection:  # one after the other on one connection
+            connection.sendall(two.encode())
+            answer = b""
+            while answer.count(b"'use strict';") < 2:
+                answer += connection.recv(4096) or self.fail(answer)
+
+    def test_nothing_else_on_the_disk_is_served(self):
+        dashboard = Dashboard(self, page=self.page)
+        for path in ("/../secret.js", "/%2e%2e/secret.js", "/..%2fsecret.js", "//etc/passwd", "/etc/passwd", "/.", "/..", "/page.js/",
+                     "/page.js%00.html", "/\\..\\secret.js", "http://evil/page.js", "*", "/" + "a" * 5000):
+            self.assertIn(b" 404 ", client.get(dashboard.address, path), path)
+        dashboard.works(self)
+
+    def test_a_name_or_a_page_from_elsewhere_is_turned_away(self):
+        dashboard = Dashboard(self)
+        for host in ("evil.example", "evil.example:8765", "127.0.0.1.evil.example", ""):
+            self.assertIn(b" 403 ", client.get(dashboard.address, "/robot.json", host=host or " "), host)
+            with self.assertRaises(client.Refused):
+                client.WebSocket(dashboard.address, host=host or " ")
+        self.assertIn(b" 403 ", client.http(dashboard.address, b"GET / HTTP/1.0\r\n\r\n"))
+        for origin in ("http://evil.example", "null", f"http://127.0.0.1:{dashboard.address[1] + 1}"):
+            with self.assertRaisesRegex(client.Refused, "403"):
+                client.WebSocket(dashboard.address, origin=origin)
+        client.Page(dashboard.address, origin=f"http://127.0.0.1:{dashboard.address[1]}").close()
+        with self.assertRaisesRegex(client.Refused, "400"):
+            client.WebSocket(dashboard.address, protocol="chat")
+        other = Dashboard(self, "--origin", "https://app.foxglove.dev", "--host", "robot.lab")
+        client.Page(other.address, origin="https://app.foxglove.dev").close()
+        client.Page(other.address, origin="http://robot.lab:1", host="robot.lab:1").close()
+
+    def test_with_a_key_arming_takes_the_token_and_stopping_does_not(self):
+        key = pathlib.Path(self.folder.name) / "key"
+        subprocess.run([PROGRAMS / "plumb", "key", key], check=True, capture_output=True)
+        dashboard = Dashboard(self, "--key", key)
+        token = re.search(r"\?token=(\w{32})$", dashboard.url)[1]
+        robot = json.loads(client.body(client.get(dashboard.address, "/robot.json")))
+        self.assertFalse(robot["may_control"])
+        self.assertIn("token", robot["why_not"])
+        self.assertIn(b" 403 ", client.get(dashboard.address, "/?token=" + "0" * 32))
+        answer = client.get(dashboard.address, f"/?token={token}")
+        self.assertIn(b" 303 ", answer)
+        cookie = re.search(rb"Set-Cookie: ([^;]+); HttpOnly; SameSite=Strict", answer)[1].decode()
+        more = f"Cookie: {cookie}\r\n"
+        self.assertTrue(json.loads(client.body(client.get(dashboard.address, "/robot.json", more=more)))["may_control"])
+        page = client.Page(dashboard.address)
+        self.assertIn("token", page.call("arm")["text"])
+        self.assertIn("no driver answers", page.call("emergency_stop")["text"])
+        self.assertIn("no driver answers", client.Page(dashboard.address, more=more).call("arm")["text"])
+
+    def test_requests_that_are_none_are_answered_or_closed(self):
+        dashboard = Dashboard(self)
+        for request in (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", b"\0" * 20000, b"GET\r\n\r\n", b"G" * 100000,
+                        b"GET / HTTP/9.9\r\n\r\n", b"GET / HTTP/1.1\r\nHost\r\n\r\n",
+                        b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 20000 + b"\r\n",
+                        b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999\r\n\r\n",
+                        b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nFFFFFFFFFFFFFFFF\r\n",
+                        b"DELETE / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"):
+            with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+                answer = client.http(dashboard.address, request)
+                self.assertRegex(answer[:12], rb"^$|HTTP/1\.1 4\d\d", request[:60])
+        dashboard.works(self)
+
+    def test_frames_that_are_none_end_their_own_connection(self):
+        dashboard = Dashboard(self)
+        watcher = client.Page(dashboard.address)
+
+        def hostile(act):
+            page = client.Page(dashboard.address)
+            with contextlib.suppress(ConnectionError, BrokenPipeError):
+                act(page)
+                while True:
+                    page.receive()
+            page.close()
+
+        hostile(lambda page: page.send_frame(1, b"{}", masked=False))
+        hostile(lambda page: page.send_frame(3, b"reserved"))
+        hostile(lambda page: page.send_frame(1, b"x" * (65 << 10)))
+        hostile(lambda page: page.socket.sendall(b"\x82\xff" + struct.pack(">Q", 1 << 62) + b"mask"))
+        hostile(lambda page: page.socket.sendall(b"\xff" * 5000))
+        hostile(lambda page: page.send_frame(1, b"\xff\xfe not UTF-8"))
+        hostile(lambda page: page.send_frame(9, b"p" * 200))
+        hostile(lambda page: [page.send_frame(1 if i == 0 else 0, b"x" * 1000, final=False) for i in range(100)])
+        fragmented = client.Page(dashboard.address)  # in as many parts as there are bytes: fine
+        text = json.dumps({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": fragmented.topics["PLUMB_GATEWAY"]["id"]}]}).encode()
+        for i, byte in enumerate(text):
+            fragmented.send_frame(1 if i == 0 else 0, bytes([byte]), final=i == len(text) - 1)
+        fragmented.names[1] = "PLUMB_GATEWAY"
+        fragmented.until(lambda one: one and one[0] == "PLUMB_GATEWAY")
+        for wrong in ("{", "[" * 60000, '{"op":"advertise"}', '{"op":"subscribe","subscriptions":[{"id":1,"channelId":77777}]}'):
+            fragmented.send(wrong)
+            fragmented.until(lambda _: fragmented.statuses)
+            self.assertEqual(fragmented.statuses.pop()["op"], "status")
+        self.assertIn("no driver", watcher.call("emergency_stop")["text"])
+        dashboard.works(self)
+
+    def test_a_thousand_connections_that_say_nothing_keep_nobody_out(self):
+        dashboard = Dashboard(self)
+        connections = []
+        for i in range(1000):
+            connection = socket.create_connection(dashboard.address, PATIENCE)
+            if i % 2:
+                connection.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: ")  # and never ends
+            connections.append(connection)
+        dashboard.works(self)
+        for connection in connections:
+            with contextlib.suppress(OSError):
+                connection.sendall(b"a")
+        dashboard.works(self)
+        for connection in connections:
+            connection.close()
+        dashboard.works(self)
+        self.assertLess(dashboard.peak(), 100)
+
+    def test_who_does_not_end_a_request_is_not_waited_for(self):
+        dashboard = Dashboard(self)
+        with socket.create_connection(dashboard.address, PATIENCE) as slow:
+            slow.sendall(b"GET / HTTP/1.1\r\nHost: local")
+            begun, heard = time.monotonic(), None
+            while heard is None:
+                try:
+                    heard = slow.recv(100)  # closed, ten seconds from the first byte on, however it trickles
+                except TimeoutError:
+                    self.fail("it is still waited for")
+            self.assertEqual(heard, b"")
+            self.assertLess(time.monotonic() - begun, PATIENCE)
+
+    def test_not_more_look_on_than_there_is_room_for(self):
+        dashboard = Dashboard(self)
+        pages = []
+        with self.assertRaisesRegex(client.Refused, "503"):
+            for _ in range(65):
+                pages.append(client.Page(dashboard.address))
+        self.assertEqual(len(pages), 64)
+        for page in pages:
+            page.close()
+        dashboard.works(self)
+
+
+class Heard(unittest.TestCase):
+    """What is said on LCM."""
+
+    def listen(self, dashboard, *topics, **options):
+        """A page, when it hears LCM: what is said before that is nobody's fault."""
+        page = client.Page(dashboard.address, **options)
+        page.subscribe(*topics)
+        return page
+
+    def test_every_message_of_500_a_second_comes_to_three_browsers_and_is_counted(self):
+        dashboard, lcm = Dashboard(self), Lcm()
+        pages = [self.listen(dashboard, "ROBOT_STATE", "PLUMB_CHANNELS") for _ in range(3)]
+        for page in pages:  # it has dealt with the subscriptions
+            page.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
+
+        def say():
+            for sequence in range(1500):
+                lcm.say("ROBOT_STATE", state(sequence, sequence / 8))
+                time.sleep(0.002)
+
+        speaker = threading.Thread(target=say)
+        speaker.start()
+        for page in pages:
+            counts = []
+
+            def counted(one):
+                if one and one[0] == "PLUMB_CHANNELS":
+                    counts.extend(row["count"] for row in one[2]["channels"] if row["channel"] == "ROBOT_STATE")
+                return counts and counts[-1] == 1500
+
+            states = [one for one in page.until(counted) if one[0] == "ROBOT_STATE"]
+            self.assertEqual([one[2]["sequence"] for one in states], list(range(1500)))
+            self.assertTrue(all(one[2]["q"] == [one[2]["sequence"] / 8] for one in states))
+            self.assertTrue(all(one[1] == 1000 * one[2]["utime"] for one in states))
+        speaker.join()
+
+    def test_one_that_does_not_read_harms_nobody(self):
+        dashboard, lcm = Dashboard(self), Lcm()
+        stalled = self.listen(dashboard, "ROBOT_STATE", "PLUMB_SCENE", receive_buffer=4096)
+        reader = self.listen(dashboard, "ROBOT_STATE", "PLUMB_GATEWAY")
+        reader.until(lambda one: one and one[0] == "PLUMB_GATEWAY")
+        many = 60000
+
+        def say():
+            for sequence in range(many):
+                lcm.say("ROBOT_STATE", state(sequence))
+                if sequence % 20 == 0:
+                    time.sleep(0.004)
+
+        speaker = threading.Thread(target=say)
+        speaker.start()
+        dropped, sequences = [0], []
+
+        def done(one):
+            if one and one[0] == "ROBOT_STATE":
+                sequences.append(one[2]["sequence"])
+            if one and one[0] == "PLUMB_GATEWAY":
+                dropped.append(one[2]["dropped"])
+            return dropped[-1] > 0 and sequences and sequences[-1] == many - 1
+
+        reader.until(done, 2 * PATIENCE)
+        speaker.join()
+        self.assertEqual(sequences, list(range(many)))
+        self.assertIn("no driver", reader.call("emergency_stop")["text"])
+        self.assertLess(dashboard.peak(), 120)
+        last = 0
+        while last < many - 1:  # it goes on with the newest
+            one = stalled.hear()
+            if one and one[0] == "ROBOT_STATE":
+                self.assertTrue(one[2]["sequence"] >= last)
+                last = one[2]["sequence"]
+
+    def test_who_asks_and_never_listens_is_sent_away(self):
+        dashboard = Dashboard(self)
+        page = client.Page(dashboard.address, receive_buffer=4096)
+        with self.assertRaises(OSError):
+            for _ in range(200000):
+                page.send("{")
+        dashboard.works(self)
+        self.assertLess(dashboard.peak(), 100)
+
+    def test_who_comes_late_sees_what_was(self):
+        dashboard, lcm = Dashboard(self), Lcm()
+        early = self.listen(dashboard, "TRAINING_STATUS", "PARAMETER_DISTRIBUTION", "PLUMB_CHANNELS")
+        early.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
+        for update in range(1, 31):
+            message = plumb.training_status_t()
+            message.utime, message.iteration, message.update, message.mean_return = update, 1, update, float(-update)
+            lcm.say("TRAINING_STATUS", message)
+            lcm.say("TRAINING_STATUS", message)
+        early.until(lambda one: one and one[0] == "TRAINING_STATUS" and one[2]["update"] == 30)
+        late = self.listen(dashboard, "TRAINING_STATUS")
+        heard = late.until(lambda one: one and one[2]["update"] == 30)
+        self.assertEqual([one[2]["mean_return"] for one in heard], [-float(update) for update in range(1, 31)])
+
+    def test_a_server_that_restarts_is_found_again(self):
+        dashboard = Dashboard(self)
+        page = client.Page(dashboard.address)
+        dashboard.process.terminate()
+        self.assertEqual(dashboard.process.wait(PATIENCE), 0)
+        with self.assertRaises(ConnectionError):
+            page.receive()
+        dashboard = Dashboard(self, port=dashboard.address[1])
+        dashboard.works(self)
+
+    def test_malformed_messages_are_counted_and_nothing_more(self):
+        dashboard, lcm = Dashboard(self), Lcm()
+        page = self.listen(dashboard, "ROBOT_STATE", "PLUMB_CHANNELS", "PLUMB_POSTERIOR", "PLUMB_SCENE")
+        page.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
+
+        class Raw(bytes):
+            def encode(self):
+                return bytes(self)
+
+        good = state(1).encode()
+        for raw in (b"", good[:-1], good + b"\0", good[:24] + b"\x7f\xff\xff\xff" + good[28:], os.urandom(300)):
+            lcm.say("ROBOT_STATE", Raw(raw))
+        lcm.say("ROBOT_STATE", state(2))
+        heard = page.until(lambda one: one and one[0] == "PLUMB_CHANNELS" and
+                           any(row["count"] == 6 and row["undecodable"] == 5 for row in one[2]["channels"]))
+        self.assertEqual([one[2]["sequence"] for one in heard if one[0] == "ROBOT_STATE"], [2])
+        dashboard.works(self)
+
+
+class Stopped(unittest.TestCase):
+    def test_an_emergency_stop_disarms_the_driver(self):
+        bus = f"udp:239.74.163.60:{PORT}"
+        Process(self, "plumb-robot", "--bus", bus)
+        Process(self, "plumb-driver", "--bus", bus, "--virtual")
+        dashboard = Dashboard(self)
+        page = client.Page(dashboard.address)
+        page.subscribe("DRIVER_STATUS")
+        page.until(lambda one: one and one[2]["state"] == plumb.driver_status_t.IDLE)
+        end = time.monotonic() + PATIENCE
+        while not page.call("arm")["ok"]:  # until the driver's start guard is over
+            self.assertLess(time.monotonic(), end)
+        # armed until the silence of commands ends it: a stop is another reason
+        answer = page.call("emergency_stop")
+        self.assertEqual(answer["ok"], True, answer)
+        heard = page.until(lambda one: one and one[2]["state"] != plumb.driver_status_t.ARMED and one[2]["stopped_by_request"])
+        self.assertIn("emergency stop", heard[-1][2]["reason"])
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:])
