@@ -19,27 +19,14 @@ import time
 import unittest
 
 import client
+import lcm_sender
 
 PROGRAMS, ROBOTS = (pathlib.Path(argument) for argument in sys.argv[1:3])
 sys.path.insert(0, str(PROGRAMS.parent / "lcmtypes" / "python"))
 import plumb  # noqa: E402
 
-GROUP, PORT = "239.255.76.62", 20000 + os.getpid() % 12000
-LCM_URL = f"udpm://{GROUP}:{PORT}?ttl=0&recv_buf_size=2097152"
+LCM = lcm_sender.Sender()
 PATIENCE = 60  # [s]; who is as late as that hangs
-
-
-class Lcm:
-    """Says messages on LCM, each in one datagram."""
-
-    def __init__(self):
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-        self.number = 0
-
-    def say(self, channel, message):
-        self.number += 1
-        self.socket.sendto(struct.pack(">II", 0x4C433032, self.number) + channel.encode() + b"\0" + message.encode(), (GROUP, PORT))
 
 
 def state(sequence, q=0.25):
@@ -55,7 +42,7 @@ class Process:
 
     def __init__(self, test, name, *arguments):
         self.log = tempfile.TemporaryFile(mode="w+")
-        command = [PROGRAMS / name, ROBOTS / "pendulum", "--lcm-url", LCM_URL, "--parent", str(os.getpid()), *arguments]
+        command = [PROGRAMS / name, ROBOTS / "pendulum", "--lcm-url", LCM.url, "--parent", str(os.getpid()), *arguments]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True)
         test.addCleanup(self.stop)
 
@@ -254,7 +241,7 @@ class Heard(unittest.TestCase):
         return page
 
     def test_every_message_of_500_a_second_comes_to_three_browsers_and_is_counted(self):
-        dashboard, lcm = Dashboard(self), Lcm()
+        dashboard, lcm = Dashboard(self), LCM
         pages = [self.listen(dashboard, "ROBOT_STATE", "PLUMB_CHANNELS") for _ in range(3)]
         for page in pages:  # it has dealt with the subscriptions
             page.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
@@ -281,11 +268,11 @@ class Heard(unittest.TestCase):
         speaker.join()
 
     def test_one_that_does_not_read_harms_nobody(self):
-        dashboard, lcm = Dashboard(self), Lcm()
+        dashboard, lcm = Dashboard(self), LCM
         stalled = self.listen(dashboard, "ROBOT_STATE", "PLUMB_SCENE", receive_buffer=4096)
         reader = self.listen(dashboard, "ROBOT_STATE", "PLUMB_GATEWAY")
         reader.until(lambda one: one and one[0] == "PLUMB_GATEWAY")
-        many = 60000
+        many = 40000
 
         def say():
             for sequence in range(many):
@@ -326,7 +313,7 @@ class Heard(unittest.TestCase):
         self.assertLess(dashboard.peak(), 100)
 
     def test_who_comes_late_sees_what_was(self):
-        dashboard, lcm = Dashboard(self), Lcm()
+        dashboard, lcm = Dashboard(self), LCM
         early = self.listen(dashboard, "TRAINING_STATUS", "PARAMETER_DISTRIBUTION", "PLUMB_CHANNELS")
         early.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
         for update in range(1, 31):
@@ -350,17 +337,12 @@ class Heard(unittest.TestCase):
         dashboard.works(self)
 
     def test_malformed_messages_are_counted_and_nothing_more(self):
-        dashboard, lcm = Dashboard(self), Lcm()
+        dashboard, lcm = Dashboard(self), LCM
         page = self.listen(dashboard, "ROBOT_STATE", "PLUMB_CHANNELS", "PLUMB_POSTERIOR", "PLUMB_SCENE")
         page.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
-
-        class Raw(bytes):
-            def encode(self):
-                return bytes(self)
-
         good = state(1).encode()
         for raw in (b"", good[:-1], good + b"\0", good[:24] + b"\x7f\xff\xff\xff" + good[28:], os.urandom(300)):
-            lcm.say("ROBOT_STATE", Raw(raw))
+            lcm.say("ROBOT_STATE", raw)
         lcm.say("ROBOT_STATE", state(2))
         heard = page.until(lambda one: one and one[0] == "PLUMB_CHANNELS" and
                            any(row["count"] == 6 and row["undecodable"] == 5 for row in one[2]["channels"]))
@@ -370,7 +352,7 @@ class Heard(unittest.TestCase):
 
 class Stopped(unittest.TestCase):
     def test_an_emergency_stop_disarms_the_driver(self):
-        bus = f"udp:239.74.163.60:{PORT}"
+        bus = f"udp:239.74.163.60:{LCM.port}"
         Process(self, "plumb-robot", "--bus", bus)
         Process(self, "plumb-driver", "--bus", bus, "--virtual")
         dashboard = Dashboard(self)
@@ -385,6 +367,54 @@ class Stopped(unittest.TestCase):
         self.assertEqual(answer["ok"], True, answer)
         heard = page.until(lambda one: one and one[2]["state"] != plumb.driver_status_t.ARMED and one[2]["stopped_by_request"])
         self.assertIn("emergency stop", heard[-1][2]["reason"])
+
+
+class Launched(unittest.TestCase):
+    def launch(self, *flags):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        run = subprocess.Popen([PROGRAMS / "plumb", "launch", ROBOTS / "pendulum", "--lcm-url", LCM.url, "--bus",
+                                f"udp:239.74.163.60:{LCM.port}", "--output", pathlib.Path(folder.name) / "run", *flags],
+                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+        def stop():
+            run.send_signal(signal.SIGINT)
+            run.wait(PATIENCE)
+            run.stdout.close()
+
+        self.addCleanup(stop)
+        return run, [run.stdout.readline(), run.stdout.readline()][1]
+
+    def test_a_run_in_virtual_time_is_shown_and_hears_nothing_but_a_stop(self):
+        run, line = self.launch("--dashboard", "127.0.0.1:0")
+        address = ("127.0.0.1", int(re.match(r"dashboard: http://127.0.0.1:(\d+)/$", line)[1]))
+        page = client.Page(address)
+        page.subscribe("DRIVER_STATUS", "PLUMB_GATEWAY")
+        heard = page.until(lambda one: one and one[0] == "DRIVER_STATUS" and one[2]["state"] == plumb.driver_status_t.ARMED)
+        gateway = page.until(lambda one: one and one[0] == "PLUMB_GATEWAY" and one[2]["utime"] >= heard[-1][2]["utime"])[-1][2]
+        self.assertEqual(gateway["clock"], "virtual")
+        self.assertFalse(json.loads(client.body(client.get(address, "/robot.json")))["may_control"])
+        for service in ("arm", "disarm", "confirm_placed"):
+            self.assertEqual(page.call(service), {"ok": False, "text": "a run in virtual time hears nobody from outside"})
+        answer = page.call("emergency_stop")
+        self.assertTrue(answer["ok"], answer)
+        self.assertEqual(run.wait(PATIENCE), 1)
+        self.assertIn("asked for a stop: the run ends here", run.stdout.read())
+        with self.assertRaises(OSError):
+            while True:
+                page.receive()
+
+    def test_a_dashboard_that_cannot_be_does_not_keep_the_robot_from_running(self):
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            taken.listen()
+            port = taken.getsockname()[1]
+            run, line = self.launch("--dashboard", f"127.0.0.1:{port}")
+            self.assertRegex(line, rf"^no dashboard: .*cannot listen on 127.0.0.1:{port}: Address already in use\n$")
+            self.assertIn("iter", run.stdout.readline())
+        bad = subprocess.run([PROGRAMS / "plumb", "launch", ROBOTS / "pendulum", "--dashboard", "http://x"], capture_output=True, text=True)
+        self.assertEqual(bad.returncode, 1)
+        self.assertIn("'http://x' is no ADDRESS:PORT such as 127.0.0.1:8765", bad.stderr)
 
 
 if __name__ == "__main__":
