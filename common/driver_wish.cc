@@ -1,5 +1,7 @@
 #include "common/driver_wish.h"
 
+#include <limits>
+
 namespace plumb {
 namespace {
 
@@ -23,7 +25,8 @@ bool DriverWish::arms() const {
 
 std::optional<driver_request_t> DriverWish::Tick() {
   // In a run with a scaled clock the driver's time is not ours.
-  if (heard_) request_.utime = status_.utime + 1;
+  if (heard_ && status_.utime < std::numeric_limits<int64_t>::max())
+    request_.utime = status_.utime + 1;
   if (arms()) {
     if (asked_ || !heard_ || (status_.commands_signed && !has_key_)) return std::nullopt;
     asked_ = true;

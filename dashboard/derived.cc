@@ -43,9 +43,9 @@ Derived::Derived(const RobotDescription& robot, Topics& topics)
       prior_(ParameterDistribution::Prior(robot)),
       topics_(topics),
       predictions_(topics.Add("PLUMB_PREDICTION", "plumb.prediction", PredictionSchema(),
-                              Topics::Keep::kNothing)),
+                              Topics::Keep::kNewest)),
       scenes_(topics.Add("PLUMB_SCENE", "foxglove.SceneUpdate", SceneUpdate::Schema(),
-                         Topics::Keep::kNothing)),
+                         Topics::Keep::kNewest)),
       posteriors_(topics.Add("PLUMB_POSTERIOR", "plumb.posterior", PosteriorSchema(),
                              Topics::Keep::kHistory)),
       scene_(robot) {
@@ -58,11 +58,14 @@ Derived::Derived(const RobotDescription& robot, Topics& topics)
 
 void Derived::OnState(const robot_state_t& state, int64_t now) {
   if (prediction_) prediction_->OnState(state);
-  const bool sees = topics_.watched(scenes_) && now >= next_scene_;
-  const bool compares = topics_.watched(predictions_) && now >= next_prediction_;
   const Eigen::VectorXd q =
       Eigen::VectorXd::Map(state.q.data(), static_cast<Eigen::Index>(state.q.size()));
-  if ((!sees && !compares) || q.size() != robot_.num_positions() || !q.allFinite()) return;
+  if (q.size() != robot_.num_positions() || !q.allFinite()) return;
+  utime_ = state.utime;
+  q_ = q;
+  const bool sees = topics_.watched(scenes_) && now >= next_scene_;
+  const bool compares = topics_.watched(predictions_) && now >= next_prediction_;
+  if (!sees && !compares) return;
   const auto predicted = prediction_ ? prediction_->Predict() : std::nullopt;
   if (compares && predicted) {
     next_prediction_ = now + kPredictionPeriod;
@@ -73,6 +76,11 @@ void Derived::OnState(const robot_state_t& state, int64_t now) {
     topics_.Publish(scenes_, state.utime,
                     scene_.Json(state.utime, q, predicted ? &predicted->q : nullptr));
   }
+}
+
+std::optional<Topics::Message> Derived::Scene() const {
+  if (q_.size() == 0) return std::nullopt;
+  return Topics::Message{utime_, scene_.Json(utime_, q_)};
 }
 
 void Derived::OnDistribution(const parameter_distribution_t& message) {

@@ -25,6 +25,9 @@ class Derived {
 
   /// @param now monotonic [us].
   void OnState(const robot_state_t& state, int64_t now);
+  /// The robot as it was last seen, without a prediction.
+  std::optional<Topics::Message> Scene() const;
+  uint32_t scenes() const { return scenes_; }
   /// What is no distribution of this robot's is passed over.
   void OnDistribution(const parameter_distribution_t& message);
 
@@ -37,6 +40,8 @@ class Derived {
   const uint32_t predictions_, scenes_, posteriors_;
   const SceneUpdate scene_;
   std::optional<OneStepPrediction> prediction_;
+  int64_t utime_ = 0;  // of the newest state that is one of this robot's
+  Eigen::VectorXd q_;  // of the same; empty: there is none
   int64_t next_prediction_ = 0, next_scene_ = 0;
 };
 

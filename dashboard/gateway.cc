@@ -85,26 +85,38 @@ Gateway::Gateway(const RobotDescription& robot, Setting setting, Wishes::Request
       derived_(robot, topics_),
       wishes_(std::move(request), setting_.identity, setting_.has_key, setting_.lcm_url),
       statistics_topic_(
-          topics_.Add("PLUMB_CHANNELS", "plumb.channels", kChannelsSchema, Topics::Keep::kNothing)),
+          topics_.Add("PLUMB_CHANNELS", "plumb.channels", kChannelsSchema, Topics::Keep::kNewest)),
       gateway_topic_(
-          topics_.Add("PLUMB_GATEWAY", "plumb.gateway", kGatewaySchema, Topics::Keep::kNothing)) {
+          topics_.Add("PLUMB_GATEWAY", "plumb.gateway", kGatewaySchema, Topics::Keep::kNewest)) {
+  topics_.newest = [this](uint32_t topic) { return Newest(topic); };
   for (const ChannelOfPage& channel : ChannelsOfPage()) {
     const MessageType* const type = FindMessageType(channel.type);
-    const auto keep = channel.fast ? Topics::Keep::kNothing : Topics::Keep::kHistory;
+    const auto keep = channel.fast ? Topics::Keep::kNewest : Topics::Keep::kHistory;
     const uint32_t topic =
         topics_.Add(std::string(channel.name), QualifiedName(*type), JsonSchema(*type), keep);
-    channels_[std::string(channel.name)] = {type, topic, channel.fast, channel.tells_time, {}};
+    channels_[std::string(channel.name)] = {type, topic, channel.tells_time, {}};
   }
+}
+
+std::optional<Topics::Message> Gateway::Newest(uint32_t topic) const {
+  if (topic == derived_.scenes()) return derived_.Scene();
+  const auto found =
+      std::ranges::find(channels_, topic, [](const auto& channel) { return channel.second.topic; });
+  if (found == channels_.end() || found->second.last.empty()) return std::nullopt;
+  Topics::Message message{time_.utime(), {}};
+  AppendJson(*found->second.type, found->second.last, message.json);
+  return message;
 }
 
 /// One that docs/messages.md does not know is offered when it is first heard, as if it were fast.
 Gateway::Channel* Gateway::Find(const std::string& name, const MessageType* type) {
   const auto found = channels_.find(name);
   if (found != channels_.end()) return &found->second;
-  if (!type || channels_.size() >= Topics::kMaxTopics) return nullptr;
+  // Nobody says in our place what only we say.
+  if (!type || name.starts_with("PLUMB_") || channels_.size() >= Topics::kMaxTopics) return nullptr;
   const uint32_t topic =
-      topics_.Add(name, QualifiedName(*type), JsonSchema(*type), Topics::Keep::kNothing);
-  return &(channels_[name] = {type, topic, true, false, {}});
+      topics_.Add(name, QualifiedName(*type), JsonSchema(*type), Topics::Keep::kNewest);
+  return &(channels_[name] = {type, topic, false, {}});
 }
 
 void Gateway::OnMessage(const std::string& name, std::span<const uint8_t> message, bool believed,
@@ -130,7 +142,7 @@ void Gateway::OnMessage(const std::string& name, std::span<const uint8_t> messag
     topics_.Publish(channel->topic, Utime(moment), std::move(json), numbers.step());
   }
   Use(name, message, repeated, moment);
-  if (!channel->fast) channel->last.assign(content.begin(), content.end());
+  channel->last.assign(content.begin(), content.end());
 }
 
 void Gateway::Use(const std::string& channel, std::span<const uint8_t> message, bool repeated,

@@ -60,12 +60,13 @@ class Gateway {
   struct Channel {
     const MessageType* type;
     uint32_t topic;
-    bool fast, tells_time;
-    std::vector<uint8_t> last;  // message, of one that is not fast
+    bool tells_time;
+    std::vector<uint8_t> last;  // message
   };
   Channel* Find(const std::string& name, const MessageType* type);
   void Use(const std::string& channel, std::span<const uint8_t> message, bool repeated,
            const Moment& moment);
+  std::optional<Topics::Message> Newest(uint32_t topic) const;
   void Call(Viewer& viewer, const ClientMessage::Call& call, const Moment& moment);
   DriverWish::Answer Placed() const;
   int64_t Utime(const Moment& moment) const;

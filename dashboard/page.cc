@@ -52,7 +52,8 @@ std::optional<Page::File> Page::Find(std::string_view path) const {
   if (!first) return std::nullopt;
   return File{"text/plain; charset=utf-8",
               fmt::format("The page has not been built: there is no {}.\n"
-                          "With node 18 or newer, `ninja -C build dashboard_page` builds it.\n"
+                          "`scripts/setup --page` installs what that takes, `ninja -C build "
+                          "dashboard_page` builds it.\n"
                           "Foxglove and Lichtblick can connect to this address without it.\n",
                           file.string())};
 }

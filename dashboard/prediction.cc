@@ -8,6 +8,7 @@
 
 #include "common/message_json.h"
 #include "common/time_units.h"
+#include "dashboard/run_time.h"
 
 namespace plumb {
 namespace {
@@ -43,7 +44,8 @@ OneStepPrediction::OneStepPrediction(const RobotDescription& robot)
 void OneStepPrediction::OnState(const robot_state_t& state) {
   State next{state.utime,      state.sequence,        ToEigen(state.q),
              ToEigen(state.v), ToEigen(state.effort), state.restarted != 0};
-  const bool ours = next.q.size() == simulator_.num_positions() &&
+  const bool ours = IsTime(next.utime) && IsTime(next.sequence) &&
+                    next.q.size() == simulator_.num_positions() &&
                     next.v.size() == simulator_.num_velocities() && next.q.allFinite() &&
                     next.v.allFinite() && next.effort.size() == next.v.size();
   const bool follows = !states_.empty() && next.sequence == states_.back().sequence + 1 &&

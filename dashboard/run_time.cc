@@ -8,6 +8,7 @@ constexpr int64_t kOld = 10'000'000;  // [us], as ChannelJudge has it
 }  // namespace
 
 void RunTime::OnMessage(int64_t utime, const std::optional<Seal>& seal, int64_t date, int64_t now) {
+  if (!IsTime(utime)) return;
   utime_ = utime;
   if (seal) {
     heard_ = seal->process == 0            ? Kind::kVirtual

@@ -9,6 +9,9 @@
 
 namespace plumb {
 
+/// Times that a message may have [us]: with others, differences would overflow. Up to 2255.
+inline bool IsTime(int64_t utime) { return utime >= 0 && utime <= int64_t{1} << 53; }
+
 /// What time it is in the run that is heard, how fast it goes, and of what kind it is: as its
 /// messages say. Not thread-safe.
 class RunTime {
@@ -18,8 +21,8 @@ class RunTime {
   /// @param known of what kind it is, if somebody who started it has said so.
   explicit RunTime(std::optional<Kind> known = {}) : known_(known) {}
 
-  /// A message whose utime is the time of saying. @param date of seals [us]. @param now monotonic
-  /// [us].
+  /// A message whose utime is the time of saying; one that is no time is passed over.
+  /// @param date of seals [us]. @param now monotonic [us].
   void OnMessage(int64_t utime, const std::optional<Seal>& seal, int64_t date, int64_t now);
 
   /// The newest such time [us], 0 before the first.

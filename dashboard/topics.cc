@@ -64,6 +64,11 @@ void Topics::Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscripti
     viewer.subscriptions[id] = topic;
     Of(topic).watchers.insert({&viewer, id});
     for (const History::Entry& entry : Of(topic).history.entries()) kept.push_back({&entry, id});
+    if (Of(topic).keep != Keep::kNewest) continue;
+    if (auto message = newest(topic)) {
+      viewer.outbox.Push({Outbox::Kind::kFast, true, id, MessageHeadOf(id, message->utime),
+                          std::make_shared<const std::string>(std::move(message->json))});
+    }
   }
   std::ranges::sort(kept, {}, [](const auto& one) { return one.first->order; });
   for (const auto& [entry, id] : kept) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -22,8 +23,17 @@ class Topics {
   static constexpr size_t kMaxSubscriptions = 400;  ///< of a viewer
 
   enum class Keep {
-    kNothing,  ///< of what is fast: only the newest matters
+    kNewest,  ///< of what is fast: whoever comes late hears what `newest` gives
     kHistory
+  };
+  struct Message {
+    int64_t utime;  ///< [us] of the run
+    std::string json;
+  };
+  /// The newest message of a topic of which only that is kept, so that a page that is opened while
+  /// time stands still shows something; none if there is none.
+  std::function<std::optional<Message>(uint32_t topic)> newest = [](uint32_t) {
+    return std::nullopt;
   };
 
   /// Offers it to everybody. @return its id, from 1 on.

@@ -1,8 +1,10 @@
 #include "dashboard/gateway.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <regex>
 #include <sstream>
 
@@ -163,6 +165,20 @@ TEST_CASE("whoever comes late hears of each update once, its newest word, in ord
   CHECK(stand.looker.heard.size() == 4 + 4);  // a status that repeats the one before is not kept
 }
 
+TEST_CASE("whoever comes while time stands still sees where the robot is") {
+  Stand stand;
+  stand.Hear("ROBOT_STATE", State(1, 0.5));
+  stand.Hear("ROBOT_STATE", State(2, 0.75));
+  stand.Listen("ROBOT_STATE");
+  stand.Listen("PLUMB_SCENE");
+  stand.Listen("JOINT_STATE");  // of which nothing has been heard
+  stand.looker.Take();
+  REQUIRE(stand.looker.heard.size() == 2);
+  CHECK(stand.looker.heard[0].json["q"] == json{0.75});
+  CHECK(stand.looker.heard[0].utime == State(2).utime);
+  CHECK(stand.looker.heard[1].json["entities"][1]["id"] == "robot");
+}
+
 TEST_CASE("a run that begins anew is a page that begins anew") {
   Stand stand;
   for (const int iteration : {1, 2, 3, 1}) stand.Hear("TRAINING_STATUS", Training(iteration, 1));
@@ -213,8 +229,36 @@ TEST_CASE("a channel that no document knows is offered when it is heard") {
   stand.Listen("TRUE_STATE");
   stand.Hear("TRUE_STATE", State(2));
   stand.looker.Take();
-  REQUIRE(stand.looker.heard.size() == 1);
-  CHECK(stand.looker.heard[0].json["sequence"] == 2);
+  REQUIRE(stand.looker.heard.size() == 2);  // what was there, and what came
+  CHECK(stand.looker.heard[0].json["sequence"] == 1);
+  CHECK(stand.looker.heard[1].json["sequence"] == 2);
+}
+
+TEST_CASE("times that are none, and names that are ours, do no harm") {
+  Stand stand;
+  for (const char* topic : {"PLUMB_SCENE", "PLUMB_PREDICTION", "PLUMB_GATEWAY"})
+    stand.Listen(topic);
+  const int64_t last = std::numeric_limits<int64_t>::max();
+  for (const int64_t utime : {last, -last - 1, kUtime, last, int64_t{0}}) {
+    robot_state_t state = State(1);
+    state.utime = utime;
+    state.sequence = utime;
+    stand.Pass(1'000'000);
+    stand.Hear("ROBOT_STATE", state);
+    driver_status_t status = Driver(driver_status_t::ARMED);
+    status.utime = utime;
+    stand.Call(kEmergencyStop);
+    stand.Hear("DRIVER_STATUS", status);
+    stand.Pass(100'000);
+  }
+  stand.looker.Take();
+  CHECK(std::ranges::count_if(stand.looker.heard, [](const Looker::Heard& heard) {
+          return heard.json.contains("speed") && heard.json["speed"].is_number();
+        }) == 5);
+  const size_t topics = stand.looker.topics.size();
+  stand.Hear("PLUMB_SCENE", State(1));
+  stand.looker.Take();
+  CHECK(stand.looker.topics.size() == topics);
 }
 
 TEST_CASE("what follows from messages: a picture, a prediction, a posterior beside its prior") {

@@ -40,7 +40,7 @@ TEST_CASE("without a built page it says how to build it") {
   const TemporaryFolder temporary;
   const Page page(temporary.path() / "nowhere");
   REQUIRE(page.Find("/"));
-  CHECK(page.Find("/")->content.find("ninja -C build dashboard_page") != std::string::npos);
+  CHECK(page.Find("/")->content.find("scripts/setup --page") != std::string::npos);
   CHECK_FALSE(page.Find("/page.js"));
 }
 
