@@ -351,12 +351,8 @@ class Heard(unittest.TestCase):
 
 
 class Stopped(unittest.TestCase):
-    def test_an_emergency_stop_disarms_the_driver(self):
-        bus = f"udp:239.74.163.60:{LCM.port}"
-        Process(self, "plumb-robot", "--bus", bus)
-        Process(self, "plumb-driver", "--bus", bus, "--virtual")
-        dashboard = Dashboard(self)
-        page = client.Page(dashboard.address)
+    def arm_and_stop(self, dashboard, more=""):
+        page = client.Page(dashboard.address, more=more)
         page.subscribe("DRIVER_STATUS")
         page.until(lambda one: one and one[2]["state"] == plumb.driver_status_t.IDLE)
         end = time.monotonic() + PATIENCE
@@ -367,6 +363,31 @@ class Stopped(unittest.TestCase):
         self.assertEqual(answer["ok"], True, answer)
         heard = page.until(lambda one: one and one[2]["state"] != plumb.driver_status_t.ARMED and one[2]["stopped_by_request"])
         self.assertIn("emergency stop", heard[-1][2]["reason"])
+
+    def test_an_emergency_stop_disarms_the_driver(self):
+        bus = f"udp:239.74.163.60:{LCM.port}"
+        Process(self, "plumb-robot", "--bus", bus)
+        Process(self, "plumb-driver", "--bus", bus, "--virtual")
+        self.arm_and_stop(Dashboard(self))
+
+    def test_with_a_key_what_is_signed_is_shown_and_what_is_asked_for_is_signed(self):
+        bus = f"udp:239.74.163.60:{LCM.port}"
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        key = pathlib.Path(folder.name) / "key"
+        subprocess.run([PROGRAMS / "plumb", "key", key], check=True, capture_output=True)
+        Process(self, "plumb-robot", "--bus", bus, "--key", key)
+        Process(self, "plumb-driver", "--bus", bus, "--virtual", "--key", key)
+        dashboard = Dashboard(self, "--key", key)
+        token = dashboard.url.rpartition("=")[2]
+        self.arm_and_stop(dashboard, f"Cookie: plumb_token={token}\r\n")
+        page = client.Page(dashboard.address)
+        page.subscribe("ROBOT_STATE", "PLUMB_CHANNELS")
+        page.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
+        LCM.say("ROBOT_STATE", state(1))
+        heard = page.until(lambda one: one and one[0] == "PLUMB_CHANNELS" and
+                           any(row["channel"] == "ROBOT_STATE" and row["refused"] == 1 for row in one[2]["channels"]))
+        self.assertEqual({one[0] for one in heard}, {"PLUMB_CHANNELS"})
 
 
 class Launched(unittest.TestCase):
