@@ -12,6 +12,8 @@
 namespace plumb {
 bool Access::HostAllowed(std::string_view header) const {
   const HostAndPort parts = HostAndPort::Split(header);
+  const bool port = std::ranges::all_of(parts.port, [](char c) { return c >= '0' && c <= '9'; });
+  if (!port) return false;
   return parts.is_number() || parts.host == "localhost" ||
          std::ranges::find(hosts, parts.host) != hosts.end();
 }

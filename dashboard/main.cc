@@ -12,6 +12,7 @@
 #include <iostream>
 #include <limits>
 #include <map>
+#include <stdexcept>
 
 #include "common/process.h"
 #include "dashboard/server.h"
@@ -103,7 +104,8 @@ class Dashboard {
   Server::Setting ServerSetting(const Flags& flags) {
     Server::Setting setting;
     setting.listen = ListenAddress::Parse(flags.address);
-    setting.access.hosts = flags.hosts;
+    for (const std::string& name : flags.hosts)
+      setting.access.hosts.push_back(HostAndPort::Split(name).host);
     setting.access.origins = flags.origins;
     if (!process_.key_file().empty() || !setting.listen.local()) setting.access.token = NewToken();
     setting.page = flags.page.empty() ? DefaultPageFolder() : std::filesystem::path(flags.page);
@@ -182,12 +184,19 @@ int main(int argc, char** argv) {
             ->capture_default_str();
         app.add_option("--page", flags.page, "folder of the built page");
         app.add_option("--host", flags.hosts,
-                       "another name by which browsers may call this machine");
+                       "another name by which browsers may call this machine; may be repeated")
+            ->allow_extra_args(false);
         app.add_option("--origin", flags.origins,
-                       "another page that may talk to us, such as https://app.foxglove.dev");
+                       "another page that may talk to us, such as https://app.foxglove.dev; may be "
+                       "repeated")
+            ->allow_extra_args(false);
         app.add_flag("--virtual", flags.virtual_time, "the run is in virtual time: only listen");
       },
       [&](plumb::Process& process) {
+        if (process.participant()) {
+          throw std::invalid_argument(
+              "the dashboard looks on from outside: without --clock virtual:PATH");
+        }
         const plumb::RobotDescription robot = plumb::LoadRobot(flags.robot);
         process.messenger().Follow(robot.name);
         return plumb::Dashboard(process, flags, robot).Run();

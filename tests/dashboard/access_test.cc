@@ -12,9 +12,9 @@ TEST_CASE("a name that somebody else may lead to this machine is none of ours") 
   for (const char* host : {"127.0.0.1:8765", "localhost:8765", "LOCALHOST", "[::1]:8765",
                            "192.168.1.7:80", "robot.lab:9000", "Robot.Lab"})
     CHECK(access.HostAllowed(host));
-  for (const char* host :
-       {"", "evil.example", "evil.example:8765", "127.0.0.1.evil.example", "localhost.evil.example",
-        "[::1", "[evil]:8765", "robot.lab.evil:8765", "127.0.0.1@evil.example", "0x7f000001"}) {
+  for (const char* host : {"", "evil.example", "evil.example:8765", "127.0.0.1.evil.example",
+                           "localhost.evil.example", "[::1", "[evil]:8765", "robot.lab.evil:8765",
+                           "127.0.0.1@evil.example", "0x7f000001", "localhost:; script-src *"}) {
     INFO(host);
     CHECK_FALSE(access.HostAllowed(host));
   }
