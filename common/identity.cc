@@ -100,11 +100,15 @@ ChannelJudge::Verdict ChannelJudge::JudgeSigned(const Identity& me, std::string_
 ChannelJudge::Verdict ChannelJudge::JudgeSpeaker(const Identity& me, const Seal& seal) noexcept {
   constexpr Verdict kTwo{"said by two", true};
   latest_ = seal;
+  const bool here = me.reach() == Identity::Reach::kMachine;
+  if (me.leads() && here && seal.sender != 0 && seal.counter < me.Now() - kOldest &&
+      !Runs(seal.process)) {
+    return {"said long ago by a process that is gone: a recording"};
+  }
   if (speakers_ == Speakers::kSeveral) {
     newest_ = std::max(newest_, seal.counter);
     return {};
   }
-  const bool here = me.reach() == Identity::Reach::kMachine;
   // A log that is played tells of processes that are gone.
   const auto gone = [&](const plumb::Seal& who) {
     return here && who.process != 0 && !Runs(who.process);

@@ -43,8 +43,9 @@ class Identity {
   int64_t beginning() const { return beginning_; }
   int64_t Now() const noexcept;
 
-  /// With a key: this process, the driver, hands out the run.
+  /// This process is the driver, and obeys no recording; with a key, it hands out the run.
   void Lead(const std::string& robot, const std::string& bus);
+  bool leads() const { return leads_; }
   /// With a key: takes part in the run of this robot's driver only. @param robot its name.
   void Follow(const std::string& robot) { wanted_robot_ = robot; }
   /// Whether a driver of that robot may lead this process.

@@ -84,6 +84,24 @@ TEST_CASE_METHOD(Unsigned, "a log may be played twice, with all that was started
   }
 }
 
+TEST_CASE_METHOD(Unsigned, "a driver obeys no recording, neither of commands nor of requests") {
+  const int64_t now = listener.Now(), long_ago = now - 2 * ChannelJudge::kOldest;
+  CHECK(Believed(SayOfTheDead(7, long_ago)));
+  listener.Lead("robot", "bus");
+  ChannelJudge requests(Speakers::kSeveral);
+  const std::string why = "said long ago by a process that is gone: a recording";
+  for (ChannelJudge* const channel : {&judge, &requests}) {
+    CHECK(Heard(*channel, listener, SayOfTheDead(7, long_ago)) == why);
+    CHECK(Heard(*channel, listener, Say(one)).empty());  // nor does it keep others from speaking
+    CHECK(Heard(*channel, listener, SayOfTheDead(7, long_ago + 1)) == why);
+  }
+  // In virtual time processes have no numbers.
+  Bytes virtual_time = Encoded();
+  virtual_time.resize(virtual_time.size() + kSealSize);
+  WriteSeal({0, 7, 0, 1'000'000, {}}, nullptr, "", "", kChannel, virtual_time);
+  CHECK(Heard(requests, listener, virtual_time) == why);
+}
+
 TEST_CASE_METHOD(Unsigned,
                  "a program that is not ours may speak alone, and not in turns with another") {
   CHECK(Believed(Encoded()));
