@@ -129,6 +129,8 @@ class ClosedLoop {
          request.request == driver_request_t::ESTOP)) {
       stopped_from_outside_ = true;
       requests_.Publish(request);  // so that whoever has asked is answered
+    } else if (channel.starts_with("DRAKE_VIEWER_")) {
+      // Who shows the robot says nothing to the run.
     } else if (strange_channels_.size() < kMaxStrangeChannels &&
                strange_channels_.insert(channel).second) {
       Print("plumb: somebody outside the run says " + Printable(channel) +

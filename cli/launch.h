@@ -26,7 +26,8 @@ struct LaunchFlags {
   std::string summary;  ///< JSON of the outcome; empty = do not
   /// where a page shows the run, ADDRESS:PORT; empty: nowhere
   std::string dashboard;
-  std::string output;  ///< folder for logs and checkpoints; empty = a new one
+  std::string command;  ///< that was given
+  std::string output;   ///< folder for logs and checkpoints; empty = a new one
 };
 
 /// `plumb launch`: starts every process of a run, arms, shows progress, stops everything again

@@ -9,8 +9,11 @@
 #include "cli/can.h"
 #include "cli/doctor.h"
 #include "cli/excite.h"
+#include "cli/export.h"
 #include "cli/launch.h"
+#include "cli/meldis.h"
 #include "cli/record.h"
+#include "cli/replay.h"
 #include "cli/request.h"
 #include "cli/sim.h"
 #include "cli/train.h"
@@ -39,16 +42,21 @@ int main(int argc, char** argv) {
   plumb::SimFlags sim_flags;
   plumb::CalibrateFlags calibrate_flags;
   plumb::TrainFlags train_flags;
+  plumb::RecordFlags record_flags;
+  plumb::ReplayFlags replay_flags;
+  plumb::ExportFlags export_flags;
   std::string command = "plumb";
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
+  flags.command = record_flags.command = command;
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
-  std::string can_robot, dbc_output, tune_robot, tune_log, new_key, record_file;
+  std::string can_robot, dbc_output, meldis_robot, tune_robot, tune_log, new_key;
   bool homed = false;
   CLI::App *launch = nullptr, *sim = nullptr, *calibrate = nullptr, *excite = nullptr,
            *train = nullptr, *doctor = nullptr, *can_plan = nullptr, *can_dbc = nullptr,
            *arm = nullptr, *disarm = nullptr, *estop = nullptr, *make_key = nullptr,
-           *tune = nullptr, *record = nullptr;
+           *tune = nullptr, *record = nullptr, *replay = nullptr, *meldis = nullptr,
+           *export_log = nullptr;
   return plumb::Run(
       "plumb", "Keeps a simulator plumb with its robot.", argc, argv,
       [&](CLI::App& app) {
@@ -273,13 +281,42 @@ int main(int argc, char** argv) {
         disarm = app.add_subcommand("disarm", "switch the motors off");
         estop = app.add_subcommand("estop", "emergency stop");
         record = app.add_subcommand("record", "record all messages to an LCM log, until Ctrl-C");
-        record->add_option("file", record_file, "the log; lcm-logplayer and --log read it")
+        record->add_option("file", record_flags.log, "the log; lcm-logplayer and --log read it")
             ->required();
+        record->add_option("--robot", record_flags.robot,
+                           "robot folder or TOML file, of which a copy is kept beside the log");
+        record->add_option("--note", record_flags.note, "what this is, kept beside the log");
+        replay = app.add_subcommand(
+            "replay", "say on LCM what a log has, when it has it; keys pause, seek, change speed");
+        replay->add_option("log", replay_flags.log, "LCM log")->required();
+        replay->add_option("--from", replay_flags.part.from, "seconds from the log's beginning")
+            ->check(CLI::Range(0.0, 1e9))
+            ->capture_default_str();
+        replay->add_option("--to", replay_flags.part.to, "default: to the end")
+            ->check(CLI::Range(0.0, 1e9));
+        replay
+            ->add_option("--speed", replay_flags.speed,
+                         "times the log's own; 0 = as fast as all who listen on this machine can")
+            ->check(CLI::Range(0.0, 1000.0))
+            ->capture_default_str();
+        replay->add_flag("--loop", replay_flags.part.again, "again and again");
+        export_log = app.add_subcommand(
+            "export", "write what a log has for Foxglove, Lichtblick, PlotJuggler, spreadsheets");
+        export_log->add_option("log", export_flags.log, "LCM log")->required();
+        export_log->add_option("--mcap", export_flags.mcap,
+                               "an MCAP file: messages in JSON, and the robot in pictures");
+        export_log->add_option("--csv", export_flags.csv, "a folder: a table for each channel");
+        export_log->add_option("--robot", export_flags.robot,
+                               "robot folder or TOML file; default: the one beside the log");
+        meldis = app.add_subcommand(
+            "meldis", "say what Drake's meldis draws of the state that is heard, until Ctrl-C");
+        meldis->add_option("robot", meldis_robot, "robot folder or TOML file")->required();
         make_key = app.add_subcommand("key", "make a key to sign commands with");
         make_key->add_option("file", new_key, "a new file, which only its owner may read")
             ->required();
-        for (CLI::App* sub : {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc,
-                              estimate, tune, arm, disarm, estop, record, make_key})
+        for (CLI::App* sub :
+             {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, estimate, tune,
+              arm, disarm, estop, record, replay, export_log, meldis, make_key})
           sub->fallthrough();
       },
       [&](plumb::Process& process) {
@@ -300,7 +337,10 @@ int main(int argc, char** argv) {
               process, homed ? plumb::driver_request_t::ARM_HOMED : plumb::driver_request_t::ARM);
         }
         if (disarm->parsed()) return plumb::RequestDriver(process, plumb::driver_request_t::DISARM);
-        if (record->parsed()) return plumb::Record(process, record_file);
+        if (record->parsed()) return plumb::Record(process, record_flags);
+        if (replay->parsed()) return plumb::Replay(process, replay_flags);
+        if (export_log->parsed()) return plumb::Export(export_flags);
+        if (meldis->parsed()) return plumb::ShowInMeldis(process, meldis_robot);
         if (make_key->parsed()) return plumb::MakeKey(new_key);
         return plumb::RequestDriver(process, plumb::driver_request_t::ESTOP);
       });

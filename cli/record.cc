@@ -6,33 +6,38 @@
 #include <stdexcept>
 
 #include "common/lcm_log_writer.h"
+#include "records/record_folder.h"
 
 namespace plumb {
 
-int Record(Process& process, const std::string& file) {
+int Record(Process& process, const RecordFlags& flags) {
   if (process.participant()) {
     throw std::invalid_argument(
         "a run in virtual time is recorded without loss by plumb launch --log");
   }
   Messenger& messenger = process.messenger();
-  LcmLogWriter log(file);
+  // First, for a robot that cannot be read: what an earlier log has is not lost for it.
+  RecordFolder folder(flags.log,
+                      {VersionLine("plumb"), flags.command, flags.note, "real", flags.robot});
+  LcmLogWriter log(flags.log);
   std::exception_ptr failure;
   int64_t messages = 0;
   const auto all =
       messenger.Subscribe(".*", [&](const std::string& channel, std::span<const uint8_t> message) {
         try {
           log.Write(process.clock().Utime(), channel, message);
+          folder.Hear(channel, message);
           ++messages;
         } catch (...) {
           failure = std::current_exception();
         }
       });
-  spdlog::info("recording to {}", file);
+  spdlog::info("recording to {}", flags.log);
   while (process.Wait(1'000'000)) {
     if (failure) std::rethrow_exception(failure);
   }
   log.Flush();
-  spdlog::info("{} messages in {}", messages, file);
+  spdlog::info("{} messages in {}", messages, flags.log);
   return 0;
 }
 

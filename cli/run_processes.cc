@@ -66,7 +66,9 @@ void RunProcesses::Start() {
       arguments.insert(arguments.end(), {"--realtime-priority", std::to_string(priority)});
     return arguments;
   };
-  if (!flags_.log.empty() && !coordinator_) Start(kRecorder, {"record", flags_.log});
+  if (!flags_.log.empty() && !coordinator_) {
+    Start(kRecorder, {"record", flags_.log, "--robot", flags_.robot, "--note", flags_.command});
+  }
   if (!flags_.real)
     Start(kRobot, with_priority({flags_.robot, "--bus", where_.bus, "--seed", seed}, 5));
   std::vector<std::string> driver{flags_.robot, "--bus", where_.bus, "--flight-recorder",

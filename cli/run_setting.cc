@@ -87,7 +87,9 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   lock.emplace(output);
   if (!flags.summary.empty()) RequireWritable(flags.summary);  // perhaps in that folder
   if (flags.real || flags.real_time) return;
-  virtual_run.emplace(output, process.lcm_url(), VirtualRun::Records{flags.log, flags.can_log});
+  const RecordFolder::About about{VersionLine("plumb"), flags.command, "", "virtual", flags.robot};
+  virtual_run.emplace(output, process.lcm_url(),
+                      VirtualRun::Records{flags.log, about, flags.can_log});
   virtual_run->coordinator().max_speed = flags.speed;
 }
 

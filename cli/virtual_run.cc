@@ -28,7 +28,10 @@ VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& l
       mirror_failure_ = error.what();
     }
   }
-  if (!records.messages.empty()) messages_.emplace(records.messages);
+  if (!records.messages.empty()) {
+    messages_.emplace(records.messages);
+    beside_messages_.emplace(records.messages, records.about);
+  }
   if (!records.frames.empty()) {
     frames_file_ = records.frames;
     frames_.open(frames_file_);
@@ -59,7 +62,9 @@ void VirtualRun::Record(const lockstep_post_t& post) {
     return;
   }
   if (mirror_) mirror_->Publish(post.topic.name, post.data);
-  if (messages_) messages_->Write(post.arrival, post.topic.name, post.data);
+  if (!messages_) return;
+  messages_->Write(post.arrival, post.topic.name, post.data);
+  beside_messages_->Hear(post.topic.name, post.data);
 }
 
 void VirtualRun::RequireFrames() const {

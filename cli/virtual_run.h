@@ -10,6 +10,7 @@
 #include "common/lcm_log_writer.h"
 #include "common/lockstep/coordinator.h"
 #include "common/lockstep/lcm_mirror.h"
+#include "records/record_folder.h"
 
 namespace plumb {
 
@@ -20,7 +21,8 @@ class VirtualRun {
   struct Records {
     /// LCM log to write, in lcm-logger's format, with the run's times; empty: none
     std::string messages;
-    std::string frames;  ///< CAN log to write, as candump -l does; empty: none
+    RecordFolder::About about = {};  ///< what is to be said beside that log
+    std::string frames = {};         ///< CAN log to write, as candump -l does; empty: none
   };
 
   /// @param folder of the run, which no other has. @param lcm_url where its messages are mirrored;
@@ -53,6 +55,7 @@ class VirtualRun {
   std::optional<LcmMirror> mirror_;
   std::string mirror_failure_;
   std::optional<LcmLogWriter> messages_;
+  std::optional<RecordFolder> beside_messages_;
   std::string frames_file_;
   std::ofstream frames_;
   std::exception_ptr failure_;

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <utility>
 
 namespace plumb {
 namespace {
@@ -87,18 +88,50 @@ void RemoveLeftovers(const std::filesystem::path& folder, const std::string& pre
 
 }  // namespace
 
+AtomicFile::AtomicFile(std::filesystem::path file) : file_(std::move(file)) {
+  Temporary temporary = MakeTemporary(file_);
+  if (temporary.fd < 0) Fail(errno);
+  fd_ = FileDescriptor(temporary.fd);
+  temporary_ = std::move(temporary.name);
+}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : file_(std::move(other.file_)),
+      fd_(std::move(other.fd_)),
+      temporary_(std::exchange(other.temporary_, {})),
+      buffer_(std::move(other.buffer_)) {}
+
+AtomicFile::~AtomicFile() {
+  if (!temporary_.empty()) unlink(temporary_.c_str());
+}
+
+void AtomicFile::Fail(int error) const {
+  throw std::runtime_error(file_.string() + ": cannot be written: " + std::strerror(error));
+}
+
+void AtomicFile::Write(std::string_view bytes) {
+  constexpr size_t kBuffer = size_t{64} << 10;
+  buffer_ += bytes;
+  if (buffer_.size() >= kBuffer) WriteOut();
+}
+
+void AtomicFile::WriteOut() {
+  if (!WriteAll(fd_.get(), buffer_)) Fail(errno);
+  buffer_.clear();
+}
+
+void AtomicFile::Commit() {
+  WriteOut();
+  if (fsync(fd_.get()) != 0 || rename(temporary_.c_str(), file_.c_str()) != 0) Fail(errno);
+  temporary_.clear();
+  fd_ = {};
+  if (!SyncFolder(file_)) Fail(errno);
+}
+
 void WriteAtomically(const std::filesystem::path& file, std::string_view content) {
-  const Temporary temporary = MakeTemporary(file);
-  const int fd = temporary.fd;
-  const bool whole = fd >= 0 && WriteAll(fd, content) && fsync(fd) == 0;
-  int error = errno;
-  if (fd >= 0) close(fd);
-  const bool renamed = whole && rename(temporary.name.c_str(), file.c_str()) == 0;
-  if (whole && !renamed) error = errno;
-  if (fd >= 0 && !renamed) unlink(temporary.name.c_str());
-  if (renamed && SyncFolder(file)) return;
-  throw std::runtime_error(file.string() +
-                           ": cannot be written: " + std::strerror(renamed ? errno : error));
+  AtomicFile atomic(file);
+  atomic.Write(content);
+  atomic.Commit();
 }
 
 void RequireWritable(const std::filesystem::path& file) {

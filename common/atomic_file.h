@@ -1,7 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
+
+#include "common/file_descriptor.h"
 
 namespace plumb {
 
@@ -10,6 +13,29 @@ namespace plumb {
 /// number), fsync, rename. Thread-safe for different files. @throws std::runtime_error naming the
 /// file and the cause.
 void WriteAtomically(const std::filesystem::path& file, std::string_view content);
+
+/// The same for a file that is written bit by bit, and is there once it is committed. What is not
+/// committed is gone with this. Not thread-safe.
+class AtomicFile {
+ public:
+  /// @throws std::runtime_error naming the file and the cause, as all that follows.
+  explicit AtomicFile(std::filesystem::path file);
+  ~AtomicFile();
+  AtomicFile(AtomicFile&& other) noexcept;
+  AtomicFile& operator=(AtomicFile&&) = delete;
+
+  void Write(std::string_view bytes);
+  void Commit();
+
+ private:
+  [[noreturn]] void Fail(int error) const;
+  void WriteOut();
+
+  std::filesystem::path file_;
+  FileDescriptor fd_;
+  std::string temporary_;  // its name; empty once it is no more
+  std::string buffer_;
+};
 
 /// Looks whether WriteAtomically could write the file, before a long computation rather than after
 /// it: makes the temporary file and removes it, with those that killed processes have left. A

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <tuple>
 
 #include "common/nearest_name.h"
@@ -51,6 +52,19 @@ std::string ReadFile(const std::string& file) {
   } while (stream);
   if (stream.bad()) throw ConfigError(file + ": cannot be read");
   return text;
+}
+
+std::string MergedToml(const std::string& file, const std::string& table, const std::string& key,
+                       const std::string& text) {
+  std::vector<std::string> chain;
+  toml::table root = LoadTomlChain(file, chain);
+  if (toml::table* const inner = root[table].as_table()) {
+    if (toml::value<std::string>* const value = inner->get_as<std::string>(key)) *value = text;
+  }
+  std::ostringstream stream;
+  // Plain: no form that older readers do not know.
+  stream << toml::toml_formatter(root, toml::format_flags::none) << '\n';
+  return stream.str();
 }
 
 Config::Config(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file,

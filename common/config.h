@@ -101,6 +101,13 @@ class Config {
   mutable std::set<std::string> known_;
 };
 
+/// A file with all that it extends merged in, as TOML text that reads back to the same values and
+/// extends nothing. Comments are lost.
+/// @param table, key, text a string in it that is to be another one, e.g. a file's new name.
+/// @throws ConfigError as Config::Load does.
+std::string MergedToml(const std::string& file, const std::string& table, const std::string& key,
+                       const std::string& text);
+
 /// The bytes of a regular file. @throws ConfigError if it is none, cannot be read or is longer than
 /// 16 MB.
 std::string ReadFile(const std::string& file);

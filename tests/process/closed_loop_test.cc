@@ -37,6 +37,14 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   CHECK_THAT(LastFrame(can_log, "021"),
              StartsWith("0000000001"));  // the heartbeat of a drive that is disarmed
 
+  // What it takes to understand the log is beside it.
+  const fs::path beside = log.string() + ".d";
+  CHECK(LoadRobot(beside).parameters.size() == 3);
+  CHECK(nlohmann::json::parse(Read(beside / "parameter_distribution.json")).at("iteration") == 2);
+  const auto record = nlohmann::json::parse(Read(beside / "record.json"));
+  CHECK(record.at("clock") == "virtual");
+  CHECK_THAT(record.at("command").get<std::string>(), Contains("--seed 3"));
+
   const auto summary = nlohmann::json::parse(Read(summary_file));
   CHECK(summary.at("seed") == 3);
   REQUIRE(summary.at("iterations").size() == 2);

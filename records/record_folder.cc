@@ -1,0 +1,97 @@
+#include "records/record_folder.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <ctime>
+#include <optional>
+#include <stdexcept>
+#include <system_error>
+
+#include "common/atomic_file.h"
+#include "common/config.h"
+#include "common/message_json.h"
+#include "common/message_type.h"
+#include "common/seal.h"
+#include "records/message_definitions.h"
+#include "robot/description.h"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kRecord[] = "record.json", kToml[] = "robot.toml", kUrdf[] = "robot.urdf",
+               kDistribution[] = "parameter_distribution.json", kTypes[] = "lcmtypes";
+
+std::string RecordJson(const std::string& log, const RecordFolder::About& about,
+                       const std::string& robot_name) {
+  std::string json = "{";
+  const auto add = [&](const char* key, const std::string& value) {
+    json += fmt::format("{}\n \"{}\": ", json.size() > 1 ? "," : "", key);
+    if (value.empty())
+      json += "null";
+    else
+      AppendJsonText(value, json);
+  };
+  add("log", fs::path(log).filename().string());
+  add("begun", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))));
+  add("program", about.program);
+  add("command", about.command);
+  add("note", about.note);
+  add("clock", about.clock);
+  add("robot", robot_name);
+  return json + "\n}\n";
+}
+
+struct Robot {
+  std::string name, toml, urdf;
+};
+
+Robot ReadRobot(const std::string& folder_or_file) {
+  const RobotDescription robot = LoadRobot(folder_or_file);
+  const fs::path urdf =
+      fs::path(robot.file).parent_path() / Config::Load(robot.file).Table("robot").String("urdf");
+  return {robot.name, MergedToml(robot.file, "robot", "urdf", kUrdf), ReadFile(urdf.string())};
+}
+
+}  // namespace
+
+std::vector<std::string> RecordFolder::Files(const std::string& log) {
+  std::vector<std::string> files;
+  for (const char* name : {kRecord, kToml, kUrdf, kDistribution})
+    files.push_back((Of(log) / name).string());
+  return files;
+}
+
+RecordFolder::RecordFolder(const std::string& log, const About& about) : folder_(Of(log)) {
+  // Read before anything is removed: it may be the folder of an earlier recording.
+  std::optional<Robot> robot;
+  if (!about.robot.empty()) robot = ReadRobot(about.robot);
+  std::error_code error;
+  fs::create_directories(folder_ / kTypes, error);
+  if (error)
+    throw std::runtime_error(
+        fmt::format("{}: cannot be made: {}", (folder_ / kTypes).string(), error.message()));
+  for (const std::string& file : Files(log)) fs::remove(file, error);
+  for (const MessageDefinition& definition : MessageDefinitions())
+    WriteAtomically(folder_ / kTypes / definition.file, definition.text);
+  WriteAtomically(folder_ / kRecord, RecordJson(log, about, robot ? robot->name : ""));
+  if (!robot) return;
+  WriteAtomically(folder_ / kUrdf, robot->urdf);
+  WriteAtomically(folder_ / kToml, robot->toml);
+}
+
+void RecordFolder::Hear(const std::string& channel, std::span<const uint8_t> message) {
+  if (channel != "PARAMETER_DISTRIBUTION") return;
+  const std::span<const uint8_t> bytes = Unsealed(message);
+  if (std::ranges::equal(bytes, distribution_)) return;  // it is repeated
+  std::string json;
+  const MessageType* const type = FindMessageType("parameter_distribution_t");
+  if (!type || !AppendJson(*type, bytes, json)) return;
+  WriteAtomically(folder_ / kDistribution, json + "\n");
+  distribution_.assign(bytes.begin(), bytes.end());
+}
+
+}  // namespace plumb

@@ -1,0 +1,114 @@
+#include "records/record_folder.h"
+
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "common/config.h"
+#include "common/message_type.h"
+#include "records/message_definitions.h"
+#include "robot/parameter_distribution.h"
+#include "robot/physics_fingerprint.h"
+#include "tests/temporary_folder.h"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Robots() { return std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/"; }
+
+TEST_CASE("a log's folder has the robot, whatever its file extends, to the last number") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "run.lcmlog";
+  const std::string file = GENERATE("pendulum", "pendulum/worn_weak.toml", "hopper",
+                                    "hopper/mit.toml", "cartpole/balance.toml");
+  INFO(file);
+  const RecordFolder record(log, {"plumb 1", "plumb record", "", "real", Robots() + file});
+  const RobotDescription was = LoadRobot(Robots() + file), is = LoadRobot(log + ".d");
+  CHECK(is.name == was.name);
+  CHECK(PhysicsFingerprint(is) == PhysicsFingerprint(was));
+  CHECK(is.bus_url == was.bus_url);
+  CHECK(is.warnings.size() == was.warnings.size());
+  const Gaussian prior_is = PriorGaussian(is), prior_was = PriorGaussian(was);
+  CHECK(prior_is.mean == prior_was.mean);
+  // Again, over itself.
+  const RecordFolder again(log, {"plumb 1", "plumb record", "", "real", log + ".d"});
+  CHECK(PhysicsFingerprint(LoadRobot(log + ".d")) == PhysicsFingerprint(was));
+}
+
+TEST_CASE("what was recorded is said, and what an earlier recording has left is gone") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "run.lcmlog";
+  { const RecordFolder first(log, {"plumb 1", "one", "", "real", Robots() + "pendulum"}); }
+  REQUIRE(fs::exists(log + ".d/robot.toml"));
+  const RecordFolder second(log, {"plumb 2", "two \"quoted\"", "a note", "virtual", ""});
+  CHECK_FALSE(fs::exists(log + ".d/robot.toml"));
+  const auto record = nlohmann::json::parse(ReadFile(log + ".d/record.json"));
+  CHECK(record.at("log") == "run.lcmlog");
+  CHECK(record.at("program") == "plumb 2");
+  CHECK(record.at("command") == "two \"quoted\"");
+  CHECK(record.at("note") == "a note");
+  CHECK(record.at("clock") == "virtual");
+  CHECK(record.at("robot").is_null());
+  CHECK(record.at("begun").get<std::string>().size() == 20);
+}
+
+TEST_CASE("the newest distribution of the parameters is kept, and nothing that is none") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "run.lcmlog", file = log + ".d/parameter_distribution.json";
+  RecordFolder record(log, {"plumb 1", "", "", "real", ""});
+  parameter_distribution_t message =
+      ParameterDistribution::Prior(LoadRobot(Robots() + "pendulum")).ToMessage();
+  const auto say = [&](const std::string& channel) {
+    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    record.Hear(channel, bytes);
+  };
+  say("ROBOT_STATE");
+  CHECK_FALSE(fs::exists(file));
+  record.Hear("PARAMETER_DISTRIBUTION", std::vector<uint8_t>(100));
+  CHECK_FALSE(fs::exists(file));
+  for (const int iteration : {0, 1, 1}) {
+    message.iteration = iteration;
+    say("PARAMETER_DISTRIBUTION");
+  }
+  const auto json = nlohmann::json::parse(ReadFile(file));
+  CHECK(json.at("iteration") == 1);
+  CHECK(json.at("name") == nlohmann::json(message.name));
+  // It is repeated once a second: the disk is left alone.
+  fs::remove(file);
+  say("PARAMETER_DISTRIBUTION");
+  CHECK_FALSE(fs::exists(file));
+}
+
+TEST_CASE("what messages mean is beside the log: all that go over LCM") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "run.lcmlog";
+  const RecordFolder record(log, {"plumb 1", "", "", "real", ""});
+  size_t ours = 0;
+  for (const MessageType& type : MessageTypes()) {
+    if (type.name.starts_with("lockstep_")) continue;
+    ++ours;
+    INFO(type.name);
+    CHECK(
+        ReadFile(log + ".d/lcmtypes/" + type.name + ".lcm") ==
+        ReadFile(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/lcmtypes/" + type.name + ".lcm"));
+  }
+  CHECK(MessageDefinitions().size() == ours);
+}
+
+TEST_CASE("a folder that cannot be made, and a robot that cannot be read, are named") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "run.lcmlog";
+  CHECK_THROWS_WITH(RecordFolder(log, {"", "", "", "", folder / "none"}),
+                    folder / "none" + ": there is no such robot");
+  std::ofstream(log + ".d") << "a file";
+  CHECK_THROWS_WITH(RecordFolder(log, {}),
+                    Catch::StartsWith(log + ".d/lcmtypes: cannot be made: "));
+}
+
+}  // namespace
+}  // namespace plumb
