@@ -30,10 +30,7 @@ function(add_lcm_types name)
     list(APPEND c_sources ${c_files})
     string(APPEND c_includes "#include \"${ARG_PACKAGE}_${struct}.h\"\n")
     string(APPEND c_entries "  {\"${struct}\", ${ARG_PACKAGE}_${struct}_get_type_info},\n")
-    set(module ${python}/${ARG_PACKAGE}/${struct}.py)
-    add_custom_command(OUTPUT ${module}
-      COMMAND ${LCM_GEN_EXECUTABLE} -p --ppath ${python} ${source} DEPENDS ${source} VERBATIM)
-    list(APPEND modules ${module})
+    list(APPEND modules ${python}/${ARG_PACKAGE}/${struct}.py)
     list(APPEND java_sources ${java}/${ARG_PACKAGE}/${struct}.java)
     list(APPEND sources ${source})
   endforeach()
@@ -51,6 +48,9 @@ function(add_lcm_types name)
   target_link_libraries(${name}_c PRIVATE LCM::LCM)
   target_compile_options(${name}_c PRIVATE -w)  # nor is this
 
+  # By one command: each adds its struct to the package's __init__.py, and of two at once one would be lost.
+  add_custom_command(OUTPUT ${modules}
+    COMMAND ${LCM_GEN_EXECUTABLE} -p --ppath ${python} ${sources} DEPENDS ${sources} VERBATIM)
   add_custom_target(${name}_python DEPENDS ${modules})
   if(Java_JAVAC_EXECUTABLE AND Java_JAR_EXECUTABLE AND LCM_JAR)
     set(jar ${CMAKE_CURRENT_BINARY_DIR}/${name}.jar)

@@ -1,0 +1,107 @@
+// What a person may do: stop at any time, and with care the rest.
+import { signal } from "@preact/signals";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { ask, state } from "./connection";
+import type { Service } from "./contract";
+import { number, withUnit } from "./format";
+import { driver_status_t } from "./messages";
+import { controller, driver, note, placing, robot } from "./run";
+
+const NAMES: Record<Service, string> = { emergency_stop: "Emergency stop", arm: "Arm", disarm: "Disarm", confirm_placed: "Robot placed" };
+
+export interface Outcome {
+  what: string;
+  text: string;
+  state: "asked" | "done" | "failed";
+}
+/** Of what was asked last. */
+export const outcome = signal<Outcome | null>(null);
+/** Which confirmation is open. */
+export const confirming = signal<"arm" | null>(null);
+
+export async function request(service: Service) {
+  const what = NAMES[service];
+  outcome.value = { what, text: "asked; waiting for the driver's answer", state: "asked" };
+  const { ok, text } = await ask(service);
+  outcome.value = { what, text: text || (ok ? "done" : "refused"), state: ok ? "done" : "failed" };
+  note(Date.now() * 1000, "this page", `${what}: ${outcome.value.text}`, ok ? "note" : "bad");
+}
+
+export function stop() {
+  confirming.value = null;
+  void request("emergency_stop");
+}
+
+export function StopButton() {
+  const dead = state.value !== "open";
+  return (
+    <button class="stop" onClick={stop} aria-keyshortcuts="Escape" title="Esc">
+      Emergency stop{dead && <small>not connected: use the robot's own</small>}
+    </button>
+  );
+}
+
+export function Outcome() {
+  const now = outcome.value;
+  return (
+    <div class="outcome" role="status" aria-live="assertive">
+      {now && (
+        <p class={now.state}>
+          <b>{now.what}</b>: {now.text}
+          {now.state !== "asked" && <button class="quiet" aria-label="Close this message" onClick={() => (outcome.value = null)}>×</button>}
+        </p>
+      )}
+    </div>
+  );
+}
+
+function ArmDialog() {
+  const dialog = useRef<HTMLDialogElement>(null);
+  const [sure, setSure] = useState(false);
+  useEffect(() => dialog.current!.showModal(), []);
+  const close = () => (confirming.value = null);
+  return (
+    <dialog ref={dialog} onClose={close} aria-labelledby="arm-title">
+      <h2 id="arm-title">Switch the motors of {robot.value?.name ?? "the robot"} on?</h2>
+      <p>It will move as soon as a controller commands it. Faults are cleared.</p>
+      <label><input type="checkbox" checked={sure} onChange={(change) => setSure(change.currentTarget.checked)} /> Nobody is within the robot's reach, and somebody's hand is at its own emergency stop.</label>
+      <p class="buttons">
+        <button onClick={close}>Cancel</button>
+        <button class="careful" disabled={!sure} onClick={() => { close(); void request("arm"); }}>Arm</button>
+      </p>
+      <p class="aside">Esc stops the robot, here as everywhere.</p>
+    </dialog>
+  );
+}
+
+/** The controller waits for a person to put the robot where an episode begins. */
+function Placing() {
+  const wish = placing.value;
+  if (controller.value?.phase !== 1 || !wish) return null;
+  const { coordinates = [], velocities = [] } = robot.value ?? {};
+  const at = wish.q.map((q, i) => `${withUnit(coordinates[i]?.name ?? `q[${i}]`, coordinates[i]?.unit)} ${number(q, 3)}`);
+  const moving = wish.v.flatMap((v, i) => (v ? [`${withUnit(velocities[i]?.name ?? `v[${i}]`, velocities[i]?.unit)} ${number(v, 3)}`] : []));
+  return (
+    <div class="placing">
+      <p><b>Place the robot</b> at {at.join(", ")}{moving.length ? `, moving with ${moving.join(", ")}` : ""}.</p>
+      <button disabled={!robot.value?.may_control || state.value !== "open"} onClick={() => void request("confirm_placed")}>It is placed</button>
+    </div>
+  );
+}
+
+export function Controls() {
+  const may = !!robot.value?.may_control && state.value === "open";
+  const armed = driver.value?.state === driver_status_t.ARMED || driver.value?.state === driver_status_t.ARMING;
+  const why = robot.value && !robot.value.may_control ? robot.value.why_not : "";
+  return (
+    <>
+      <div class="controls" role="group" aria-label="Motors">
+        <button disabled={!may || armed} onClick={() => (confirming.value = "arm")}>Arm…</button>
+        <button disabled={!may || !armed} onClick={() => void request("disarm")}>Disarm</button>
+        {why && <p class="aside">{why}</p>}
+      </div>
+      <Placing />
+      {confirming.value === "arm" && <ArmDialog />}
+    </>
+  );
+}

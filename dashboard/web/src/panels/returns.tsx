@@ -1,0 +1,71 @@
+import type { Value } from "../contract";
+import { number } from "../format";
+import { Chart } from "../parts/chart";
+import { Key, Panel } from "../parts/panel";
+import { outcomes, trainings } from "../run";
+
+interface Outcome {
+  policy: number;
+  robot: Value[]; // of each episode
+  simulated: Value;
+  tenth: Value;
+  worst: Value;
+}
+
+const mean = (values: Value[]): Value => {
+  const given = values.filter((value): value is number => value !== null);
+  return given.length ? given.reduce((sum, value) => sum + value, 0) / given.length : null;
+};
+
+/** What each policy has returned: in simulation when its training was complete, and on the robot. */
+function byPolicy(): Outcome[] {
+  const found = new Map<number, Outcome>();
+  const of = (policy: number) => {
+    if (!found.has(policy)) found.set(policy, { policy, robot: [], simulated: null, tenth: null, worst: null });
+    return found.get(policy)!;
+  };
+  for (const { policy_iteration, returns } of outcomes.value) if (returns.length) of(policy_iteration).robot.push(...returns);
+  for (const one of trainings.value) {
+    if (one.complete) Object.assign(of(one.iteration), { simulated: one.evaluation_return, tenth: one.evaluation_tenth, worst: one.evaluation_worst });
+  }
+  return [...found.values()].sort((a, b) => a.policy - b.policy);
+}
+
+export function ReturnsPanel() {
+  const all = byPolicy();
+  // Where several episodes were made each is a point of its own.
+  const x: number[] = [], robot: Value[] = [], mine: Value[] = [], simulated: Value[] = [], tenth: Value[] = [], worst: Value[] = [];
+  for (const one of all) {
+    const episodes = one.robot.length ? one.robot : [null];
+    episodes.forEach((value, i) => {
+      const first = i === 0;
+      x.push(one.policy);
+      robot.push(value);
+      mine.push(first ? mean(one.robot) : null);
+      simulated.push(first ? one.simulated : null);
+      tenth.push(first ? one.tenth : null);
+      worst.push(first ? one.worst : null);
+    });
+  }
+  const decision = trainings.value.findLast((one) => one.decision)?.decision;
+  return (
+    <Panel id="returns" title="Return, on the robot and in simulation" empty={!all.length && "No policy has been judged yet."}
+      what="What each policy earns in an episode: on simulators held out (mean, the worst tenth shaded), and on the robot, each episode a dot."
+      numbers={() => [
+        { caption: "Return by policy", columns: ["policy", "robot, mean", "episodes", "simulation", "tenth", "worst"], rows: all.map((one) => [one.policy, mean(one.robot), one.robot.length, one.simulated, one.tenth, one.worst]) },
+        { caption: "Episodes on the robot", columns: ["policy", "episode", "return"], rows: all.flatMap((one) => one.robot.map((value, i) => [one.policy, i + 1, value])) },
+      ]}>
+      <Key items={[["robot", "robot, mean"], ["robot dot", "its episodes"], ["simulation", "simulation"], ["simulation dash", "its worst"]]} />
+      <Chart height={230} whole label={`Return of ${all.length} policies; the newest: ${number(all[all.length - 1]?.simulated)} in simulation, ${number(mean(all[all.length - 1]?.robot ?? []))} on the robot`}
+        x={x} x_label="policy"
+        series={[
+          { label: "simulation", values: simulated, colour: "simulation", points: true, width: 2, to: "tenth" },
+          { label: "tenth", values: tenth, colour: "simulation", width: 0, points: false },
+          { label: "worst", values: worst, colour: "simulation", width: 1, dash: [3, 3], points: false },
+          { label: "episodes", values: robot, colour: "robot", opacity: 0.45, width: 0, points: true },
+          { label: "robot", values: mine, colour: "robot", width: 2, points: true },
+        ]} />
+      {decision && <p class="line">{decision}</p>}
+    </Panel>
+  );
+}
