@@ -1,6 +1,6 @@
 // Builds the page into the folder given (../../build/dashboard/page): page.js, page.css, robot.js, index.html, favicon.svg.
 import { build } from "esbuild";
-import { copyFileSync, mkdirSync } from "node:fs";
+import { copyFileSync, mkdirSync, renameSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
@@ -12,6 +12,6 @@ await build({
   bundle: true, minify: true, format: "esm", target: "es2023", jsx: "automatic", jsxImportSource: "preact",
   legalComments: "none", logLevel: "warning", charset: "utf8",
 });
-const { renameSync } = await import("node:fs");
+// An entry point of its own name would write over the script's.
 renameSync(`${folder}/page-style.css`, `${folder}/page.css`);
 for (const file of ["index.html", "favicon.svg"]) copyFileSync(here(`src/${file}`), `${folder}/${file}`);

@@ -18,7 +18,7 @@ import { listen } from "./run";
 
 const SECTIONS: [id: string, name: string, panels: (() => preact.JSX.Element)[]][] = [
   ["now", "Robot", [RobotPanel, MotionPanel]],
-  ["learnt", "Learning", [PosteriorPanel, PairsPanel, FanPanel, GapPanel, UpdatePanel]],
+  ["learnt", "Learning", [PosteriorPanel, PairsPanel, FanPanel, UpdatePanel, GapPanel]],
   ["policies", "Policies", [ReturnsPanel, TrainingPanel]],
   ["health", "Health", [ProcessesPanel, CyclePanel, BusPanel, ChannelsPanel]],
   ["history", "Events", [EventsPanel]],

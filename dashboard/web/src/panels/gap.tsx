@@ -32,17 +32,25 @@ export function GapPanel() {
   const newest = calibrations.value[calibrations.value.length - 1];
   const residuals = distribution.value?.residual ?? [];
   return (
-    <Panel id="gap" title="Whether the model explains the robot" empty={!newest && "The calibrator has said nothing yet."}
+    <Panel id="gap" size="full" title="Whether the model explains the robot" empty={!newest && "The calibrator has said nothing yet."}
       what="What the alarm says, what the simulator was found to lack and what was learnt of that; the discrepancy is the squared error of a step in units of its uncertainty: 1 is explained down to the noise."
       numbers={() => [{
         caption: "Discrepancy", columns: ["iteration", "posterior", "prior"],
         rows: all.map((one) => [one.iteration, one.discrepancy, one.prior_discrepancy]),
       }]}>
+      <div class="split">
+      <div>
       <p class={`verdict ${newest?.alarm ? "bad" : "good"}`} data-alarm>
         <b>{newest?.alarm ? "Alarm" : all.length ? "No alarm" : "Nothing to judge yet"}</b>
         {newest?.alarm || (all.length ? "The model explains what was recorded." : "No roll-out has been recorded.")}
       </p>
       {newest?.gap && <p class="line">{newest.gap}</p>}
+      {newest?.identifiability && <p class="line">{newest.identifiability}.</p>}
+      {!!newest?.num_combinations && (
+        <Table shown caption="What the motion determines" columns={["combination", "mean", "sd"]} rows={newest.combination.map((name, i) => [name, newest.combination_mean[i], newest.combination_sd[i]])} />
+      )}
+      </div>
+      <div>
       {all.length > 0 && (
         <>
           <Key items={[["posterior", "posterior's mean"], ["prior dash", "prior's mean"]]} />
@@ -54,10 +62,8 @@ export function GapPanel() {
         </>
       )}
       {residuals.map((one) => <Residual key={one.condition} residual={one} />)}
-      {newest?.identifiability && <p class="line">{newest.identifiability}.</p>}
-      {!!newest?.num_combinations && (
-        <Table shown caption="What the motion determines" columns={["combination", "mean", "sd"]} rows={newest.combination.map((name, i) => [name, newest.combination_mean[i], newest.combination_sd[i]])} />
-      )}
+      </div>
+      </div>
     </Panel>
   );
 }

@@ -137,7 +137,7 @@ export function PairsPanel() {
   const shown = parameters.map((_, i) => i).filter((i) => !hidden.has(parameters[i]!.name)).slice(0, MOST);
   const toggle = (name: string) => setHidden((now) => new Set(now.has(name) ? [...now].filter((one) => one !== name) : [...now, name]));
   return (
-    <Panel id="pairs" title="Which parameters go together" empty={!newest && "The calibrator has said nothing yet."}
+    <Panel id="pairs" size="tall" title="Which parameters go together" empty={!newest && "The calibrator has said nothing yet."}
       aside={<Choice name="Scale of the pairs" options={PAIR_SCALES} value={scale.value} choose={(to) => (scale.value = to)} />}
       what="Samples of the posterior and of the prior, of each pair of parameters, and the posterior's correlations: parameters on a line can only be known together."
       numbers={() => [{

@@ -107,7 +107,7 @@ export function BusPanel() {
   const d = driver.value, e = estimator.value;
   const trusted = (i: number): Cell[] => [e?.position_nis[i], e?.velocity_nis[i], e?.acceleration_nis[i]];
   return (
-    <Panel id="bus" title="Bus, drives and sensors" empty={!d && "The driver has said nothing yet."}
+    <Panel id="bus" size="full" title="Bus, drives and sensors" empty={!d && "The driver has said nothing yet."}
       what="The state of the CAN bus and of each drive, what they report of themselves, everything that was counted since the driver's start, and how far the observer trusts each joint (1 on average if noise is as described).">
       {d && (
         <>

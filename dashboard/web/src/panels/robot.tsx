@@ -10,16 +10,18 @@ import { PHASES } from "../events";
 
 type Eye = "in space" | "from the side";
 const eye = signal<Eye>("in space");
+const wished = signal(false); // in space, even if it is slow
 
-/** The view that was asked for, or from the side where there is no WebGL. */
+/** The view that was asked for, or from the side where there is no WebGL, or no quick one and nobody insists. */
 async function open(canvas: HTMLCanvasElement, how: Eye): Promise<View> {
   if (how === "in space") {
     try {
       const address = "/robot.js"; // loaded when it is looked at, not bundled
       const { open: openInSpace } = (await import(address)) as { open: OpenView };
-      return openInSpace(canvas, colour);
+      return openInSpace(canvas, colour, wished.value);
     } catch {
       eye.value = "from the side";
+      return { draw() {}, close() {} }; // the canvas gives way to another
     }
   }
   return sideView(canvas);
@@ -103,7 +105,7 @@ export function RobotPanel() {
   const how = eye.value;
   const contacts = now?.contact.map((one) => (one === 1 ? "●" : one === 0 ? "○" : "?")).join(" ");
   return (
-    <Panel id="robot" title="The robot" size="wide" aside={<Choice name="View" options={["in space", "from the side"] as const} value={how} choose={(to) => (eye.value = to)} />}
+    <Panel id="robot" title="The robot" size="wide" aside={<Choice name="View" options={["in space", "from the side"] as const} value={how} choose={(to) => { wished.value = true; eye.value = to; }} />}
       what="Solid: the robot as the observer sees it. Translucent: where the simulator at the posterior's mean says that it should be, from the state and the command before.">
       <div class="stage">
         <Picture key={how} how={how} />

@@ -34,7 +34,7 @@ export function TrainingPanel() {
   const x = numbered(all).filter(kept);
   const shown = all.filter(kept);
   return (
-    <Panel id="training" title="Training" size="full" empty={!newest && "The trainer has said nothing yet."}
+    <Panel id="training" title="Training" size="wide" empty={!newest && "The trainer has said nothing yet."}
       what="TRPO's updates of the policy, of all iterations one after the other: what a batch earned, how far the policy moved, what was to be gained, how well the critic foresaw it, and how much it still tries out."
       numbers={() => [{
         caption: "Updates", columns: ["iteration", "update", "steps", ...CURVES.map(([label]) => label)],

@@ -34,7 +34,7 @@ interface PanelProperties {
   id: string;
   title: string;
   what: ComponentChildren; // one sentence: what it shows
-  size?: "third" | "half" | "wide" | "full";
+  size?: "third" | "half" | "tall" | "wide" | "full";
   numbers?: () => Numbers[]; // the same, to be read
   empty?: string | false; // why there is nothing to see yet
   aside?: ComponentChildren; // beside the title

@@ -8,6 +8,7 @@ import type { Cube, Cylinder, Entity, Scene } from "../contract";
 import { entity, Gaze } from "./solids";
 import type { OpenView } from "./view";
 
+const FAR = 2.3; // sizes of the robot's room between it and the camera
 const BALL = new SphereGeometry(0.5, 32, 20);
 const CUBE = new BoxGeometry(1, 1, 1);
 const tubes = new Map<string, BufferGeometry>();
@@ -52,9 +53,20 @@ class Body {
   }
 }
 
-export const open: OpenView = (canvas, colour) => {
-  const renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
-  renderer.shadowMap.enabled = true;
+/** Whether the browser draws without a graphics processor. */
+function byProcessor(renderer: WebGLRenderer): boolean {
+  const gl = renderer.getContext();
+  const told = gl.getExtension("WEBGL_debug_renderer_info");
+  return /swiftshader|llvmpipe|software/i.test(String(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER)));
+}
+
+export const open: OpenView = (canvas, colour, slow) => {
+  const renderer = new WebGLRenderer({ canvas, antialias: !slow, alpha: true });
+  if (!slow && byProcessor(renderer)) {
+    renderer.dispose();
+    throw new Error("no graphics processor");
+  }
+  renderer.shadowMap.enabled = !slow;
   renderer.shadowMap.type = PCFShadowMap;
   const stage = new Stage();
   const camera = new PerspectiveCamera(32, 1, 0.01, 500);
@@ -69,7 +81,7 @@ export const open: OpenView = (canvas, colour) => {
   sun.shadow.bias = -0.001;
   stage.add(new HemisphereLight(0xffffff, 0x667080, 1.5), new AmbientLight(0xffffff, 0.35), sun, sun.target);
   const ground = new Group();
-  const shade = new Mesh(new PlaneGeometry(200, 200), new ShadowMaterial({ opacity: 0.22 }));
+  const shade = new Mesh(new PlaneGeometry(200, 200), new ShadowMaterial({ opacity: 0.22, depthWrite: false }));
   shade.receiveShadow = true;
   let grid: GridHelper | null = null;
   let gridColour = "";
@@ -80,7 +92,9 @@ export const open: OpenView = (canvas, colour) => {
 
   const gaze = new Gaze();
   const middle = new Vector3();
-  let looking = false; // the camera has a place
+  let far = 0; // of the camera, from what it looks at; 0: it has no place yet
+  let turned = false; // by hand: from then on the camera is the person's
+  controls.addEventListener("start", () => (turned = true));
   let last: Scene | null = null;
 
   function lookAt(scene: Scene) {
@@ -89,11 +103,10 @@ export const open: OpenView = (canvas, colour) => {
     const size = Math.max(room.size("x"), room.size("y"), room.size("z"), 0.1);
     middle.set(room.middle("x"), room.middle("y"), room.middle("z"));
     const flat = room.size("x") >= room.size("y");
-    if (!looking) {
-      const far = size * 2.3;
+    if (!turned && size * FAR > far) {
+      far = size * FAR;
       controls.target.copy(middle);
       camera.position.set(middle.x + far * (flat ? 0.34 : 0.9), middle.y - far * (flat ? 0.9 : 0.34), middle.z + far * 0.26);
-      looking = true;
     } else {
       const moved = middle.clone().sub(controls.target).multiplyScalar(0.15);
       controls.target.add(moved);

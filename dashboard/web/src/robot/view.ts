@@ -6,5 +6,6 @@ export interface View {
   close(): void;
 }
 
-/** What /robot.js offers. @param colour of style/colours.css, as CSS has it. Throws where there is no WebGL. */
-export type OpenView = (canvas: HTMLCanvasElement, colour: (name: string) => string) => View;
+/** What /robot.js offers. @param colour of style/colours.css, as CSS has it. @param slow: it may be drawn without a graphics
+ * processor, which takes more time than the rest of the page. Throws where there is no WebGL, or only such a one. */
+export type OpenView = (canvas: HTMLCanvasElement, colour: (name: string) => string, slow: boolean) => View;
