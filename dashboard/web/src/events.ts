@@ -32,7 +32,10 @@ function driver(now: driver_status_t, before: driver_status_t | null): Said[] {
 
 function estimator(now: estimator_status_t, before: estimator_status_t | null): Said[] {
   const said: Said[] = [];
-  if (!before || now.valid !== before.valid) said.push(now.valid ? ["the state is valid", "good"] : [`the state is not valid${because(now.reason)}`, "note"]);
+  // That a filter begins anew where the robot was placed is no event.
+  const lacking = (one: estimator_status_t | null) => (one && !one.valid && !/just started/.test(one.reason) ? one.reason : "");
+  if (lacking(now) && lacking(now) !== lacking(before)) said.push([`the state is not valid: ${lacking(now)}`, "bad"]);
+  if (now.valid && (!before || lacking(before))) said.push(["the state is valid", "good"]);
   now.joint_name.forEach((name, i) => {
     const reason = now.joint_reason[i];
     if (reason && reason !== before?.joint_reason[i]) said.push([`${name}: ${reason}`, "bad"]);

@@ -6,6 +6,8 @@ import { predictions, robot } from "../run";
 
 const WINDOW = 10; // [s] of the robot
 
+const HEIGHTS = [330, 165, 110]; // of one coordinate, of two, of three
+
 /** Of each coordinate, in the last seconds: measured, and predicted one step before. */
 export function MotionPanel() {
   const all = predictions.value;
@@ -23,7 +25,7 @@ export function MotionPanel() {
       {newest?.q.map((_, i) => (
         <figure key={i}>
           <figcaption>{name(i)}</figcaption>
-          <Chart height={newest.q.length > 2 ? 84 : 150} label={`${name(i)}: measured and predicted`} x={x}
+          <Chart height={HEIGHTS[newest.q.length - 1] ?? 84} label={`${name(i)}: measured and predicted`} x={x}
             series={[
               { label: "measured", values: pick((one) => one.q_measured, i), colour: "robot", width: 2 },
               { label: "predicted", values: pick((one) => one.q, i), colour: "simulation", width: 1.4, dash: [4, 3] },

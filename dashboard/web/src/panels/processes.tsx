@@ -85,6 +85,7 @@ export function CyclePanel() {
             all but one in a hundred less than {share(d.lateness, 0.99)}, all less than {share(d.lateness, 1)}.
           </p>
           <Histogram counts={d.lateness} label={`Lateness of ${d.cycles} cycles: median below ${share(d.lateness, 0.5)}, longest below ${share(d.lateness, 1)}`} />
+          <div class="scroll" tabIndex={0} role="region" aria-label="Phases of a cycle">
           <table class="phases">
             <thead><tr><th scope="col">phase</th><th scope="col">how long</th><th scope="col">half below</th><th scope="col">99 %</th><th scope="col">all</th></tr></thead>
             <tbody>
@@ -97,6 +98,7 @@ export function CyclePanel() {
               ))}
             </tbody>
           </table>
+          </div>
         </>
       )}
     </Panel>
@@ -119,13 +121,13 @@ export function BusPanel() {
               </div>
             ))}
           </dl>
-          <Table caption="Drives" columns={["joint", "drive", "motor [°C]", "power stage [°C]", "supply [V]", "says"]}
+          <Table shown caption="Drives" columns={["joint", "drive", "motor [°C]", "power stage [°C]", "supply [V]", "says"]}
             rows={d.joint_name.map((name, i) => [name, DRIVER_STATES[d.joint_state[i] ?? 0] ?? "", d.motor_temperature[i], d.drive_temperature[i], d.bus_voltage[i], d.joint_reason[i]])} />
           {d.num_sensors > 0 && (
-            <Table caption="Sensors" columns={["sensor", "state", "says"]} rows={d.sensor_name.map((name, i) => [name, ["absent", "starting", "running", "fault"][d.sensor_state[i] ?? 0] ?? "", d.sensor_reason[i]])} />
+            <Table shown caption="Sensors" columns={["sensor", "state", "says"]} rows={d.sensor_name.map((name, i) => [name, ["absent", "starting", "running", "fault"][d.sensor_state[i] ?? 0] ?? "", d.sensor_reason[i]])} />
           )}
           {e && (
-            <Table caption="What the observer makes of its readings" columns={["joint", "age [s]", "position", "velocity", "acceleration", "bias", "says"]}
+            <Table shown caption="What the observer makes of its readings" columns={["joint", "age [s]", "position", "velocity", "acceleration", "bias", "says"]}
               rows={e.joint_name.map((name, i) => [name, e.age[i], ...trusted(i), e.bias[i], e.joint_reason[i]])} />
           )}
         </>

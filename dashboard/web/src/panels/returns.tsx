@@ -49,7 +49,7 @@ export function ReturnsPanel() {
   }
   const decision = trainings.value.findLast((one) => one.decision)?.decision;
   return (
-    <Panel id="returns" size="third" title="Return, on the robot and in simulation" empty={!all.length && "No policy has been judged yet."}
+    <Panel id="returns" size="third" title="Return: robot and simulation" empty={!all.length && "No policy has been judged yet."}
       what="What each policy earns in an episode: on simulators held out (mean, the worst tenth shaded), and on the robot, each episode a dot."
       numbers={() => [
         { caption: "Return by policy", columns: ["policy", "robot, mean", "episodes", "simulation", "tenth", "worst"], rows: all.map((one) => [one.policy, mean(one.robot), one.robot.length, one.simulated, one.tenth, one.worst]) },

@@ -46,7 +46,8 @@ function spread([low, high]: [number, number], logarithmic: boolean): [number, n
 /** Numbers of an axis, to as many digits as tell them apart. */
 function tickLabels(ticks: (number | null)[]): string[] {
   const given = ticks.filter((tick): tick is number => tick !== null);
-  const step = given.length > 1 ? Math.abs(given[1]! - given[0]!) : 1;
+  if (given.length < 2) return ticks.map((tick) => (tick === null ? "" : number(tick, 3)));
+  const step = Math.abs(given[1]! - given[0]!);
   const size = Math.max(...given.map(Math.abs), 0);
   return ticks.map((tick) => {
     if (tick === null) return "";
@@ -55,6 +56,14 @@ function tickLabels(ticks: (number | null)[]): string[] {
     const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     return tick.toFixed(Math.min(decimals, 8)).replace("-", "−");
   });
+}
+
+/** Of a logarithmic axis: powers of ten, with 2 and 5 between where there are few. */
+function logarithmicLabels(ticks: (number | null)[]): string[] {
+  const given = ticks.filter((tick): tick is number => tick !== null);
+  const few = Math.max(...given) < 30 * Math.min(...given);
+  const leading = (tick: number) => Math.round(tick / 10 ** Math.floor(Math.log10(tick) + 1e-9));
+  return ticks.map((tick) => (tick !== null && (leading(tick) === 1 || (few && [2, 5].includes(leading(tick)))) ? number(tick, 1) : ""));
 }
 
 function options(properties: ChartProperties, width: number): uPlot.Options {
@@ -78,8 +87,9 @@ function options(properties: ChartProperties, width: number): uPlot.Options {
         values: (_, splits) => splits.map((tick) => (tick === null ? "" : number(tick))),
       },
       {
-        ...axis, size: (_, values) => 16 + 6.2 * Math.max(2, ...(values ?? []).map((value) => value?.length ?? 0)), gap: 5, space: logarithmic ? 22 : 28,
-        values: logarithmic ? (_, splits) => splits.map((tick) => (tick !== null && Math.abs(Math.log10(tick) % 1) < 1e-6 ? number(tick, 1) : "")) : (_, splits) => tickLabels(splits),
+        ...axis, size: (_, values) => 16 + 6.2 * Math.max(2, ...(values ?? []).map((value) => value?.length ?? 0)), gap: 5, space: logarithmic ? 22 : 24,
+        values: (_, splits) => (logarithmic ? logarithmicLabels(splits) : tickLabels(splits)),
+        ...(logarithmic ? { filter: (_, splits) => splits } : {}),
       },
     ],
     series: [

@@ -1,0 +1,58 @@
+// A headless Chromium that looks at the page, and what it must never do: complain, or ask anybody but the gateway. Without
+// Chromium, the page's packages or the built page a test ends as skipped, with the reason.
+import assert from "node:assert/strict";
+import { existsSync } from "node:fs";
+import { createRequire } from "node:module";
+
+const web = new URL("../../dashboard/web/", import.meta.url);
+export const build = process.env.PLUMBLINE_BUILD ?? new URL("../../build", import.meta.url).pathname;
+export const pageFolder = `${build}/dashboard/page`;
+const CHROMIUM = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
+
+function skipUnless(there, reason) {
+  if (there) return;
+  console.log(`skipped: ${reason} (scripts/setup --page)`);
+  process.exit(77);
+}
+skipUnless(CHROMIUM, "Chromium is not installed");
+skipUnless(existsSync(new URL("node_modules/playwright-core", web)), "the page's packages are not installed");
+skipUnless(existsSync(`${pageFolder}/page.js`), `there is no built page in ${pageFolder}`);
+
+const { chromium } = createRequire(new URL("package.json", web))("playwright-core");
+export const PATIENCE = 120_000; // [ms] for a busy machine: nothing here is about how fast it is
+
+export const launch = () => chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+
+/** Opens the page. `complaints` has what the console said, `strangers` who else was asked. A reason to be silent is `expected`. */
+export async function look(browser, url, { expected = /^$/, ...context } = {}) {
+  const page = await (await browser.newContext({ viewport: { width: 1440, height: 1000 }, ...context })).newPage();
+  page.setDefaultTimeout(PATIENCE);
+  const complaints = [], strangers = [];
+  page.on("console", (said) => ["error", "warning"].includes(said.type()) && !expected.test(said.text()) && complaints.push(said.text()));
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("request", (request) => new URL(request.url()).host !== new URL(url).host && strangers.push(request.url()));
+  page.on("websocket", (socket) => new URL(socket.url()).host !== new URL(url).host && strangers.push(socket.url()));
+  await page.goto(url);
+  await page.locator("[data-connection=open]").waitFor();
+  return { page, complaints, strangers };
+}
+
+/** What no page may have done. */
+export function clean({ complaints, strangers }) {
+  assert.deepEqual(complaints, []);
+  assert.deepEqual(strangers, []);
+}
+
+/** The numbers of a table behind a panel, to all digits: rows of cells, numbers where they are numbers. */
+export async function numbers(page, panel, table = 0) {
+  const button = page.locator(`#${panel} > header button[aria-expanded]`);
+  if ((await button.getAttribute("aria-expanded")) === "false") await button.click();
+  return page.locator(`#${panel} > .scroll table`).nth(table).evaluate((found) =>
+    [...found.tBodies[0].rows].map((row) => [...row.cells].map((cell) => ("value" in cell.dataset ? (cell.dataset.value === "null" ? null : Number(cell.dataset.value)) : cell.textContent))));
+}
+
+/** The number that an element shows, to all digits. */
+export const value = async (found) => {
+  const text = await found.getAttribute("data-value");
+  return text === "null" ? null : Number(text);
+};
