@@ -26,7 +26,7 @@ def plain(value):
         return value if math.isfinite(value) else None
     if isinstance(value, bytes):
         return base64.b64encode(value).decode()
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, (list, tuple, map)):  # booleans come as a map
         return [plain(one) for one in value]
     if hasattr(value, "__slots__"):
         return {name: plain(getattr(value, name)) for name in value.__slots__}
