@@ -52,8 +52,10 @@ class Numbers : public MessageVisitor {
   void EndArray() override {}
   void Integer(int64_t value) override {
     if (depth_ != 1) return;
-    if (name_ == "iteration") iteration_ = value;
-    if (name_ == "update") update_ = value;
+    // A controller counts policies, and the episodes of each: what each returned is not forgotten.
+    const bool policy = name_ == "policy_iteration" && value >= 0;
+    if (name_ == "iteration" || policy) iteration_ = value;
+    if (name_ == "update" || name_ == "num_episodes") update_ = value;
     if (name_ == "utime") utime_ = value;
   }
   void Float(float) override {}

@@ -47,7 +47,7 @@ export function clean({ complaints, strangers }) {
 export async function numbers(page, panel, table = 0) {
   const button = page.locator(`#${panel} > header button[aria-expanded]`);
   if ((await button.getAttribute("aria-expanded")) === "false") await button.click();
-  return page.locator(`#${panel} > .scroll table`).nth(table).evaluate((found) =>
+  return page.locator(`#${panel} > .numbers table`).nth(table).evaluate((found) =>
     [...found.tBodies[0].rows].map((row) => [...row.cells].map((cell) => ("value" in cell.dataset ? (cell.dataset.value === "null" ? null : Number(cell.dataset.value)) : cell.textContent))));
 }
 

@@ -55,7 +55,7 @@ export function Panel({ id, title, what, size = "half", numbers, empty, aside, c
       </header>
       <p class="what">{what}</p>
       {empty ? <p class="empty">{empty}</p> : children}
-      {open && !empty && numbers?.().map((one) => <Table key={one.caption} {...one} shown />)}
+      {open && !empty && numbers && <div class="numbers">{numbers().map((one) => <Table key={one.caption} {...one} shown />)}</div>}
     </section>
   );
 }
