@@ -180,6 +180,11 @@ void Gateway::Tick(const Moment& moment) {
   }
 }
 
+void Gateway::Finish(const Moment& moment) {
+  next_statistics_ = next_status_ = moment.now;
+  Tick(moment);
+}
+
 void Gateway::Join(Viewer& viewer) {
   viewer.Say(ServerInfoText("Plumbline: " + robot_.name, fmt::format("{:x}", setting_.identity)));
   topics_.Join(viewer);

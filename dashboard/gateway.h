@@ -45,6 +45,8 @@ class Gateway {
                  int64_t arrival, const Moment& moment);
   /// Call at least every 50 ms.
   void Tick(const Moment& moment);
+  /// Nothing more comes: the last counts are said.
+  void Finish(const Moment& moment);
 
   void Join(Viewer& viewer);
   void Leave(Viewer& viewer);

@@ -139,9 +139,19 @@ class Dashboard {
 
   void AwaitStop() {
     stop_.async_wait(asio::posix::stream_descriptor::wait_read, [this](boost::system::error_code) {
-      if (process_.stopping()) return context_.stop();
-      AwaitStop();
+      if (!process_.stopping()) return AwaitStop();
+      messenger_.Drain(kMaxAtOnce);
+      gateway_.Finish(Now());
+      last_ = Clock().Now() + kLastWords;
+      AwaitSent();
     });
+  }
+
+  /// Whoever looks on sees the run to its end, if they are not too slow for it.
+  void AwaitSent() {
+    if (!server_.sending() || Clock().Now() > last_) return context_.stop();
+    tick_.expires_after(kPause);
+    tick_.async_wait([this](boost::system::error_code) { AwaitSent(); });
   }
 
   void Tick() {
@@ -155,6 +165,7 @@ class Dashboard {
   }
 
   static constexpr int kMaxAtOnce = 2000;  // messages between two looks at the clients
+  static constexpr int64_t kLastWords = 150'000;  // [us], less than plumb launch waits for us
 
   Process& process_;
   Messenger& messenger_;
@@ -167,6 +178,7 @@ class Dashboard {
   Server server_;
   asio::posix::stream_descriptor lcm_, stop_;
   asio::steady_timer pause_, tick_;
+  int64_t last_ = 0;  // when we end at the latest, once we are to [us]
 };
 
 }  // namespace

@@ -45,6 +45,7 @@ std::string_view View(boost::string_view text) { return {text.data(), text.size(
 struct Connection {
   virtual ~Connection() = default;
   virtual void Close() = 0;
+  virtual bool sending() const { return false; }
 };
 
 }  // namespace
@@ -129,6 +130,7 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
     Leave();
     beast::get_lowest_layer(socket_).close();
   }
+  bool sending() const override { return sending_.has_value() || !viewer_.outbox.empty(); }
 
  private:
   void Leave() {
@@ -376,6 +378,13 @@ Server::~Server() {
       if (const auto open = connection.lock()) open->Close();
     }
   }
+}
+
+bool Server::sending() const {
+  return std::ranges::any_of(parts_->viewers, [](const auto& connection) {
+    const auto open = connection.lock();
+    return open && open->sending();
+  });
 }
 
 uint16_t Server::port() const { return parts_->acceptor.local_endpoint().port(); }

@@ -34,6 +34,8 @@ class Server {
   ~Server();  ///< closes all connections
 
   uint16_t port() const;
+  /// Whether somebody who looks on has not been sent everything yet.
+  bool sending() const;
 
   struct Parts;
 

@@ -14,7 +14,7 @@ const PARAMETERS = [["gravity", "m/s^2", 10.4, 0.57, 10.418], ["mass/pole", "kg"
 const ROBOT = {
   name: "pendulum", version: "0.1.0", joints: [{ name: "pivot", type: "continuous", unit_position: "rad", unit_velocity: "rad/s", unit_effort: "Nm", lower: null, upper: null, effort: 2, velocity: 8 }],
   coordinates: [{ name: "pivot", unit: "rad" }], velocities: [{ name: "pivot", unit: "rad/s" }],
-  parameters: PARAMETERS.map(([name, unit, prior_mean, prior_sd]) => ({ name, unit, prior_mean, prior_sd })), task: { name: "pendulum" }, channels: [], may_control: true, why_not: "",
+  parameters: PARAMETERS.map(([name, unit, prior_mean, prior_sd]) => ({ name, unit, prior_mean, prior_sd })), task: { name: "pendulum", period: 0.02, steps: 200 }, channels: [], may_control: true, why_not: "",
 };
 
 /** Numbers between -1 and 1 that are the same every time. */
@@ -57,7 +57,7 @@ const training = (iteration, update) => ({
   incumbent: iteration - 1, incumbent_since: Math.max(0, iteration - 1), decision: iteration ? `policy ${iteration - 1} trusted: the model explains the robot` : "",
 });
 
-const controller = (policy_iteration, phase = 3) => ({ utime: BEGIN, policy_iteration, phase, reason: "", step: 171, episode_return: -365.2, num_episodes: 3, returns: [-300 + 20 * policy_iteration, -280 + 12 * policy_iteration, -330 + 25 * policy_iteration], episodes_wanted: 3, purpose: 0, episodes_aborted: 0 });
+const controller = (policy_iteration, phase = 3) => ({ utime: BEGIN, policy_iteration, phase, reason: "", step: 171, episode_return: -365.2, num_episodes: 3, returns: [-300 + 20 * policy_iteration, -280 + 12 * policy_iteration, -330 + 25 * policy_iteration], steps: [200, 100, 150], late_rate: [-0.5, -0.25, -0.5], fell: [false, false, true], episodes_wanted: 3, purpose: 0, episodes_aborted: 0 });
 
 const zeros = Array(20).fill(0);
 const driver = (state, reason, cycles) => ({

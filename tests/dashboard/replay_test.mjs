@@ -1,5 +1,5 @@
-// A run is recorded and replayed to the gateway: what the page shows are LCM's own numbers, decoded from the log by lcm-gen's
-// Python types. In three browsers, beside one that stalls, and in one that comes when all is over.
+// A run is looked at, recorded, and replayed to the gateway: what the page shows are LCM's own numbers, decoded from the log by
+// lcm-gen's Python types. Live; then replayed in three browsers, beside one that stalls, and in one that comes when all is over.
 import assert from "node:assert/strict";
 import { execFile, spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
@@ -17,7 +17,8 @@ const here = (name) => new URL(name, import.meta.url).pathname;
 const url = `udpm://239.255.76.67:${20000 + (process.pid % 20000)}?ttl=0&recv_buf_size=2097152`;
 const folder = mkdtempSync(`${tmpdir()}/page-replay.`);
 const log = `${folder}/run.lcmlog`;
-let browser, gateway, address;
+let browser, gateway, address, live;
+const robotSteps = 200; // of an episode: robots/pendulum/robot.toml
 const said = {}; // messages of the log, by channel
 const last = (channel) => said[channel].at(-1);
 
@@ -31,13 +32,19 @@ async function startGateway(at) {
   throw new Error("the gateway has not come up");
 }
 
-/** A browser that asks for everything and reads nothing. */
+async function stopGateway() {
+  const gone = new Promise((resolve) => gateway.once("exit", resolve));
+  gateway.kill();
+  await gone;
+}
+
+/** A browser that asks for everything, ten times over, and reads nothing. */
 function stall({ hostname, port }) {
   const socket = connect(Number(port), hostname);
   socket.write(`GET / HTTP/1.1\r\nHost: ${hostname}:${port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: foxglove.websocket.v1\r\n\r\n`);
   return new Promise((resolve) => socket.once("data", () => {
     socket.pause();
-    const text = Buffer.from(JSON.stringify({ op: "subscribe", subscriptions: Array.from({ length: 40 }, (_, id) => ({ id, channelId: id })) }));
+    const text = Buffer.from(JSON.stringify({ op: "subscribe", subscriptions: Array.from({ length: 400 }, (_, id) => ({ id, channelId: id % 40 })) }));
     const head = Buffer.from([0x81, 0xfe, text.length >> 8, text.length & 255, 0, 0, 0, 0]); // the mask is zero
     socket.write(Buffer.concat([head, text]));
     resolve(socket);
@@ -45,13 +52,14 @@ function stall({ hostname, port }) {
 }
 
 before(async () => {
+  [browser, [gateway, address]] = [await launch(), await startGateway("127.0.0.1:0")];
+  live = await look(browser, address);
   await run(`${build}/bin/plumb`, ["launch", robot, "--seed", "1", "--iterations", "1", "--log", log, "--output", `${folder}/run`, "--lcm-url", url], { maxBuffer: 1e8 });
   const { stdout } = await run("/usr/bin/python3", [here("log_json.py"), `${build}/lcmtypes/python`, log], { maxBuffer: 1e9 });
   for (const line of stdout.trim().split("\n")) {
     const { channel, message } = JSON.parse(line);
     (said[channel] ??= []).push(message);
   }
-  [browser, [gateway, address]] = [await launch(), await startGateway("127.0.0.1:0")];
 });
 after(async () => {
   await browser?.close();
@@ -88,7 +96,7 @@ async function compare({ page }, fast) {
   assert.deepEqual((await numbers(page, "training")).at(-1), [training.iteration, training.update, training.steps, training.mean_return, training.kl, training.surrogate_gain, training.explained_variance, training.entropy]);
   const controller = last("CONTROLLER_STATUS");
   const lastOf = new Map(said.CONTROLLER_STATUS.filter((one) => one.policy_iteration >= 0).map((one) => [one.policy_iteration, one]));
-  assert.deepEqual(await numbers(page, "returns", 1), [...lastOf].flatMap(([policy, { returns }]) => returns.map((one, i) => [policy, i + 1, one])));
+  assert.deepEqual(await numbers(page, "returns", 1), [...lastOf].flatMap(([policy, one]) => one.returns.map((sum, i) => [policy, i + 1, one.steps[i], sum, one.fell[i] ? sum : sum + one.late_rate[i] * (robotSteps - one.steps[i])])));
   const [, , , simulated, tenth, worst] = (await numbers(page, "returns")).find(([policy]) => policy === training.iteration);
   assert.deepEqual([simulated, tenth, worst], [training.evaluation_return, training.evaluation_tenth, training.evaluation_worst]);
   near(await value(page.locator("[data-episode] [data-value]").last()), controller.episode_return, "return so far");
@@ -104,7 +112,15 @@ async function compare({ page }, fast) {
   near(await value(page.locator("table.state td").nth(2)), robotState.v[0], "velocity");
 }
 
+test("live, to the end of the run", { timeout: 4 * PATIENCE }, async () => {
+  await compare(live, true);
+  clean(live);
+  await live.page.context().close();
+});
+
 test("replayed to three browsers and one that stalls, and to a late one", { timeout: 8 * PATIENCE }, async () => {
+  await stopGateway();
+  [gateway, address] = await startGateway("127.0.0.1:0");
   const stalled = await stall(new URL(address));
   const browsers = await Promise.all([1, 2, 3].map(() => look(browser, address)));
   const counted = browsers[0].page.locator("#processes [data-process=gateway]");
@@ -121,9 +137,7 @@ test("replayed to three browsers and one that stalls, and to a late one", { time
 
 test("the gateway is started again, and the page comes back by itself", { timeout: 4 * PATIENCE }, async () => {
   const seen = await look(browser, address, { expected: /ERR_CONNECTION_REFUSED/ });
-  const gone = new Promise((resolve) => gateway.once("exit", resolve));
-  gateway.kill();
-  await gone;
+  await stopGateway();
   await seen.page.locator("[data-connection=lost]").waitFor();
   [gateway] = await startGateway(new URL(address).host);
   await seen.page.locator("[data-connection=open]").waitFor();

@@ -27,7 +27,7 @@ export interface Robot {
   coordinates: Named[]; // of q
   velocities: Named[]; // of v
   parameters: (Named & { prior_mean: Value; prior_sd: Value })[];
-  task: { name: string } | null;
+  task: { name: string; period: number; steps: number } | null; // steps of a whole episode
   channels: string[];
   may_control: boolean;
   why_not: string;

@@ -2,20 +2,37 @@ import type { Value } from "../contract";
 import { number } from "../format";
 import { Chart } from "../parts/chart";
 import { Key, Panel } from "../parts/panel";
-import { outcomes, trainings } from "../run";
+import type { controller_status_t } from "../messages";
+import { outcomes, robot, trainings } from "../run";
+
+interface Episode {
+  steps: Value;
+  said: Value; // the sum of its rewards
+  whole: Value; // what it would have been over a whole episode
+}
 
 interface Outcome {
   policy: number;
-  robot: Value[]; // of each episode
+  robot: Episode[];
   simulated: Value;
   tenth: Value;
   worst: Value;
 }
 
-const mean = (values: Value[]): Value => {
-  const given = values.filter((value): value is number => value !== null);
+const mean = (of: Episode[]): Value => {
+  const given = of.map(({ whole }) => whole).filter((value): value is number => value !== null);
   return given.length ? given.reduce((sum, value) => sum + value, 0) / given.length : null;
 };
+
+/** Its episodes. A trial that time has cut off counts on at its late rate, as where policies are compared (controller/acceptance.h). */
+function episodes({ returns, steps, late_rate, fell }: controller_status_t): Episode[] {
+  const longest = robot.value?.task?.steps;
+  return returns.map((said, i) => {
+    const lasted = steps[i] ?? null, rate = late_rate[i] ?? null;
+    const cut = said !== null && lasted !== null && rate !== null && longest !== undefined && !fell[i] && lasted < longest;
+    return { steps: lasted, said, whole: cut ? said + rate * (longest - lasted) : said };
+  });
+}
 
 /** What each policy has returned: in simulation when its training was complete, and on the robot. */
 function byPolicy(): Outcome[] {
@@ -24,7 +41,7 @@ function byPolicy(): Outcome[] {
     if (!found.has(policy)) found.set(policy, { policy, robot: [], simulated: null, tenth: null, worst: null });
     return found.get(policy)!;
   };
-  for (const { policy_iteration, returns } of outcomes.value) if (returns.length) of(policy_iteration).robot.push(...returns);
+  for (const status of outcomes.value) if (status.returns.length) of(status.policy_iteration).robot.push(...episodes(status));
   for (const one of trainings.value) {
     if (one.complete) Object.assign(of(one.iteration), { simulated: one.evaluation_return, tenth: one.evaluation_tenth, worst: one.evaluation_worst });
   }
@@ -36,8 +53,8 @@ export function ReturnsPanel() {
   // Where several episodes were made each is a point of its own.
   const x: number[] = [], robot: Value[] = [], mine: Value[] = [], simulated: Value[] = [], tenth: Value[] = [], worst: Value[] = [];
   for (const one of all) {
-    const episodes = one.robot.length ? one.robot : [null];
-    episodes.forEach((value, i) => {
+    const dots = one.robot.length ? one.robot.map(({ whole }) => whole) : [null];
+    dots.forEach((value, i) => {
       const first = i === 0;
       x.push(one.policy);
       robot.push(value);
@@ -50,10 +67,10 @@ export function ReturnsPanel() {
   const decision = trainings.value.findLast((one) => one.decision)?.decision;
   return (
     <Panel id="returns" size="third" title="Return: robot and simulation" empty={!all.length && "No policy has been judged yet."}
-      what="What each policy earns in an episode: on simulators held out (mean, the worst tenth shaded), and on the robot, each episode a dot."
+      what="What each policy earns in an episode: on simulators held out (mean, the worst tenth shaded), and on the robot, each episode a dot; a trial that was cut short counts as a whole episode at its late rate."
       numbers={() => [
         { caption: "Return by policy", columns: ["policy", "robot, mean", "episodes", "simulation", "tenth", "worst"], rows: all.map((one) => [one.policy, mean(one.robot), one.robot.length, one.simulated, one.tenth, one.worst]) },
-        { caption: "Episodes on the robot", columns: ["policy", "episode", "return"], rows: all.flatMap((one) => one.robot.map((value, i) => [one.policy, i + 1, value])) },
+        { caption: "Episodes on the robot", columns: ["policy", "episode", "steps", "return", "of a whole one"], rows: all.flatMap((one) => one.robot.map(({ steps, said, whole }, i) => [one.policy, i + 1, steps, said, whole])) },
       ]}>
       <Key items={[["robot", "robot, mean"], ["robot dot", "its episodes"], ["simulation", "simulation"], ["simulation dash", "its worst"]]} />
       <Chart height={230} whole label={`Return of ${all.length} policies; the newest: ${number(all[all.length - 1]?.simulated)} in simulation, ${number(mean(all[all.length - 1]?.robot ?? []))} on the robot`}

@@ -84,7 +84,7 @@ function options(properties: ChartProperties, width: number): uPlot.Options {
         ...axis, size: x_label ? 24 : 22, gap: 4, space: 44, ...(x_label ? { label: x_label, labelSize: 16, labelGap: -2 } : {}),
         ...(whole ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1e3, 2e3, 5e3, 1e4, 1e5] } : {}),
         ...(ticks ? { splits: () => ticks, filter: (_, splits) => splits } : {}),
-        values: (_, splits) => splits.map((tick) => (tick === null ? "" : number(tick))),
+        values: (_, splits) => (logarithmic_x ? splits.map((tick) => (tick === null ? "" : number(tick))) : tickLabels(splits)),
       },
       {
         ...axis, size: (_, values) => 16 + 6.2 * Math.max(2, ...(values ?? []).map((value) => value?.length ?? 0)), gap: 5, space: logarithmic ? 22 : 24,
