@@ -15,7 +15,9 @@ source, build = map(pathlib.Path, sys.argv[1:])
 jars = ["lcm", "jchart2d", "jide-oss", "xmlgraphics-commons"]
 missing = [program for program in ("java", "xvfb-run") if not shutil.which(program)]
 missing += [f"{jar}.jar" for jar in jars if not pathlib.Path(f"/usr/share/java/{jar}.jar").exists()]
-missing += [] if (build / "lcmtypes/plumb_lcmtypes.jar").exists() else ["plumb_lcmtypes.jar (ninja plumb_lcmtypes_java)"]
+for types, folder in ("plumb", ""), ("drake", "drake/"):
+    if not (build / f"lcmtypes/{folder}{types}_lcmtypes.jar").exists():
+        missing.append(f"{types}_lcmtypes.jar (ninja {types}_lcmtypes_java)")
 if missing:
     print("skipped: not there: " + ", ".join(missing))
     sys.exit(77)
