@@ -164,7 +164,7 @@ class Dashboard {
     });
   }
 
-  static constexpr int kMaxAtOnce = 2000;  // messages between two looks at the clients
+  static constexpr int kMaxAtOnce = 2000;         // messages between two looks at the clients
   static constexpr int64_t kLastWords = 150'000;  // [us], less than plumb launch waits for us
 
   Process& process_;

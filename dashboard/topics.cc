@@ -49,18 +49,24 @@ int64_t Topics::dropped() const {
   return dropped;
 }
 
+std::string Topics::WhyNot(const Viewer& viewer, uint32_t id, uint32_t topic) const {
+  if (topic == 0 || topic > topics_.size())
+    return fmt::format("channelId: there is no channel {}", topic);
+  if (viewer.subscriptions.contains(id))
+    return fmt::format("id: there is a subscription {} already", id);
+  if (viewer.subscriptions.size() >= kMaxSubscriptions)
+    return fmt::format("subscriptions: {} are enough", kMaxSubscriptions);
+  return "";
+}
+
 void Topics::Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscription> wishes) {
   std::vector<std::pair<const History::Entry*, uint32_t>> kept;  // with their subscription
-  std::string wrong;
+  std::string first_wrong;  // what cannot be had is no reason to withhold the rest
   for (const auto& [id, topic] : wishes) {
-    if (topic == 0 || topic > topics_.size()) {
-      wrong = fmt::format("channelId: there is no channel {}", topic);
-    } else if (viewer.subscriptions.contains(id)) {
-      wrong = fmt::format("id: there is a subscription {} already", id);
-    } else if (viewer.subscriptions.size() >= kMaxSubscriptions) {
-      wrong = fmt::format("subscriptions: {} are enough", kMaxSubscriptions);
+    if (const std::string wrong = WhyNot(viewer, id, topic); !wrong.empty()) {
+      if (first_wrong.empty()) first_wrong = wrong;
+      continue;
     }
-    if (!wrong.empty()) break;
     viewer.subscriptions[id] = topic;
     Of(topic).watchers.insert({&viewer, id});
     for (const History::Entry& entry : Of(topic).history.entries()) kept.push_back({&entry, id});
@@ -76,18 +82,23 @@ void Topics::Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscripti
         {Outbox::Kind::kHistory, true, id, MessageHeadOf(id, entry->utime), entry->json});
   }
   viewer.wake();
-  if (!wrong.empty()) throw std::runtime_error(wrong);
+  if (!first_wrong.empty()) throw std::runtime_error(first_wrong);
 }
 
 void Topics::Unsubscribe(Viewer& viewer, std::span<const uint32_t> subscriptions) {
+  std::string first_wrong;
   for (const uint32_t id : subscriptions) {
     const auto found = viewer.subscriptions.find(id);
-    if (found == viewer.subscriptions.end())
-      throw std::runtime_error(fmt::format("subscriptionIds: there is no subscription {}", id));
+    if (found == viewer.subscriptions.end()) {
+      if (first_wrong.empty())
+        first_wrong = fmt::format("subscriptionIds: there is no subscription {}", id);
+      continue;
+    }
     Of(found->second).watchers.erase({&viewer, id});
     viewer.subscriptions.erase(found);
     viewer.outbox.Forget(id);
   }
+  if (!first_wrong.empty()) throw std::runtime_error(first_wrong);
 }
 
 }  // namespace plumb

@@ -52,7 +52,7 @@ class Topics {
   int64_t dropped() const;  ///< for viewers that are there or have left
 
   /// What is kept comes first, in the order in which it was said.
-  /// @throws std::runtime_error, one line for the client; the subscriptions before it hold.
+  /// @throws std::runtime_error, one line for the client, about the first that cannot be had; the others hold.
   void Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscription> subscriptions);
   void Unsubscribe(Viewer& viewer, std::span<const uint32_t> subscriptions);
 
@@ -62,6 +62,8 @@ class Topics {
     History history;
     std::set<std::pair<Viewer*, uint32_t>> watchers;  // with their subscription
   };
+  /// Why a viewer cannot have a topic under that subscription; empty if he can.
+  std::string WhyNot(const Viewer& viewer, uint32_t subscription, uint32_t topic) const;
   Topic& Of(uint32_t topic) { return topics_[topic - 1]; }
   const Topic& Of(uint32_t topic) const { return topics_[topic - 1]; }
 

@@ -440,5 +440,31 @@ TEST_CASE("what a client says wrongly is answered, and changes nothing") {
   CHECK(stand.looker.answers.empty());
 }
 
+TEST_CASE("one wrong wish of many is named, and the others are granted") {
+  Stand stand;
+  const auto topic = stand.looker.topics.at("ROBOT_STATE")["id"];
+  const nlohmann::json wishes = {{{"id", 1}, {"channelId", 0}},
+                                 {{"id", 2}, {"channelId", topic}},
+                                 {{"id", 2}, {"channelId", topic}},
+                                 {{"id", 3}, {"channelId", topic}}};
+  const auto said = [&] {
+    stand.looker.heard.clear();
+    stand.Hear("ROBOT_STATE", State(1));
+    stand.looker.Take();
+    std::vector<uint32_t> subscriptions;
+    for (const auto& heard : stand.looker.heard) subscriptions.push_back(heard.subscription);
+    return subscriptions;
+  };
+  stand.gateway.OnText(stand.looker.viewer,
+                       nlohmann::json{{"op", "subscribe"}, {"subscriptions", wishes}}.dump());
+  stand.looker.Take();
+  CHECK(stand.looker.texts.back()["op"] == "status");
+  CHECK(said() == std::vector<uint32_t>{2, 3});
+  stand.gateway.OnText(stand.looker.viewer, R"({"op":"unsubscribe","subscriptionIds":[9,2]})");
+  stand.looker.Take();
+  CHECK(stand.looker.texts.back()["op"] == "status");
+  CHECK(said() == std::vector<uint32_t>{3});
+}
+
 }  // namespace
 }  // namespace plumb

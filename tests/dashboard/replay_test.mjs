@@ -44,7 +44,7 @@ function stall({ hostname, port }) {
   socket.write(`GET / HTTP/1.1\r\nHost: ${hostname}:${port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: foxglove.websocket.v1\r\n\r\n`);
   return new Promise((resolve) => socket.once("data", () => {
     socket.pause();
-    const text = Buffer.from(JSON.stringify({ op: "subscribe", subscriptions: Array.from({ length: 400 }, (_, id) => ({ id, channelId: id % 40 })) }));
+    const text = Buffer.from(JSON.stringify({ op: "subscribe", subscriptions: Array.from({ length: 400 }, (_, id) => ({ id, channelId: 1 + (id % 40) })) }));
     const head = Buffer.from([0x81, 0xfe, text.length >> 8, text.length & 255, 0, 0, 0, 0]); // the mask is zero
     socket.write(Buffer.concat([head, text]));
     resolve(socket);
