@@ -12,6 +12,7 @@
 #include "calibrator/live/checkpoint.h"
 #include "calibrator/motion/motion_log.h"
 #include "calibrator/results/posterior_file.h"
+#include "common/examples.h"
 #include "common/process.h"
 #include "common/time_units.h"
 
@@ -218,6 +219,7 @@ int main(int argc, char** argv) {
         app.add_option("--threads", flags.threads,
                        "0 = one per core; the result does not depend on it")
             ->capture_default_str();
+        plumb::AddExamples(app, {"plumb-calibrator robots/pendulum --output run"});
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(flags.robot);

@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "chaos/trial.h"
+#include "common/examples.h"
 
 namespace plumb {
 namespace {
@@ -130,6 +131,8 @@ int main(int argc, char** argv) {
   app.add_flag("--first", flags.first, "stop at the first seed that violates something");
   app.add_flag("--verbose", flags.verbose, "print what the monkey does");
   app.add_option("--keep", flags.keep, "a folder to leave each seed's logs and checkpoints in");
+  plumb::AddExamples(app, {"plumb-chaos robots/pendulum --seed 7 --verbose",
+                           "plumb-chaos robots/pendulum --seeds 1:200 --first"});
   CLI11_PARSE(app, argc, argv);
   spdlog::set_level(spdlog::level::off);  // whom we do not believe is part of the game
   try {

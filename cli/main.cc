@@ -8,6 +8,7 @@
 #include "cli/calibrate.h"
 #include "cli/can.h"
 #include "cli/doctor.h"
+#include "cli/examples.h"
 #include "cli/excite.h"
 #include "cli/export.h"
 #include "cli/launch.h"
@@ -318,6 +319,7 @@ int main(int argc, char** argv) {
              {launch, sim, calibrate, excite, train, doctor, can, can_plan, can_dbc, estimate, tune,
               arm, disarm, estop, record, replay, export_log, meldis, make_key})
           sub->fallthrough();
+        plumb::AddCommandExamples(app);
       },
       [&](plumb::Process& process) {
         if (launch->count("--dashboard") > 0 && flags.dashboard.empty())

@@ -44,7 +44,7 @@ class Ranks {
   /// other ones.
   void AllGather(void* items, size_t item_size, std::span<const int> bounds) const;
 
-  /// A value of each rank, in their order. @param T trivially copyable.
+  /// A value of each rank, in their order. T is trivially copyable.
   template <class T>
   std::vector<T> Collect(const T& mine) const {
     std::vector<T> all(static_cast<size_t>(size_), mine);

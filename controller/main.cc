@@ -6,6 +6,7 @@
 
 #include <optional>
 
+#include "common/examples.h"
 #include "common/process.h"
 #include "common/realtime.h"
 #include "controller/controller.h"
@@ -24,6 +25,7 @@ int main(int argc, char** argv) {
         app.add_option(
             "--rest", rest,
             "[s] do not have the robot placed: let it rest that long, then begin where it is");
+        plumb::AddExamples(app, {"plumb-controller robots/pendulum --rest 2"});
       },
       [&](plumb::Process& process) {
         process.BecomeFast(priority);

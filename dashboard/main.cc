@@ -14,6 +14,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "common/examples.h"
 #include "common/process.h"
 #include "dashboard/server.h"
 
@@ -203,6 +204,9 @@ int main(int argc, char** argv) {
                        "repeated")
             ->allow_extra_args(false);
         app.add_flag("--virtual", flags.virtual_time, "the run is in virtual time: only listen");
+        plumb::AddExamples(
+            app, {"plumb-dashboard robots/pendulum",
+                  "plumb-dashboard robots/pendulum --address 0.0.0.0:8765 --host robot.local"});
       },
       [&](plumb::Process& process) {
         if (process.participant()) {

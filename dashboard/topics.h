@@ -52,7 +52,8 @@ class Topics {
   int64_t dropped() const;  ///< for viewers that are there or have left
 
   /// What is kept comes first, in the order in which it was said.
-  /// @throws std::runtime_error, one line for the client, about the first that cannot be had; the others hold.
+  /// @throws std::runtime_error, one line for the client, about the first that cannot be had; the
+  /// others hold.
   void Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscription> subscriptions);
   void Unsubscribe(Viewer& viewer, std::span<const uint32_t> subscriptions);
 

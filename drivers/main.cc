@@ -7,6 +7,7 @@
 #include <array>
 #include <stdexcept>
 
+#include "common/examples.h"
 #include "common/lcm_url.h"
 #include "common/messenger.h"
 #include "common/process.h"
@@ -265,6 +266,8 @@ int main(int argc, char** argv) {
         app.add_flag("--unsigned", allow_unsigned, "obey anybody, although LCM leaves this machine")
             ->excludes(app.get_option("--key"));
         plumb::AddRealtimeFlag(app, priority);
+        plumb::AddExamples(app, {"plumb-driver robots/hopper --bus socketcan:can0 "
+                                 "--realtime-priority 80 --key robot.key"});
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);

@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "common/examples.h"
 #include "common/process.h"
 #include "common/realtime.h"
 #include "estimator/model/unscented_observer.h"
@@ -41,6 +42,7 @@ int main(int argc, char** argv) {
                        "these parameters: a "
                        "posterior.json, or 'nominal', the prior's means; default: without");
         plumb::AddRealtimeFlag(app, priority);
+        plumb::AddExamples(app, {"plumb-estimator robots/hopper --realtime-priority 70"});
       },
       [&](plumb::Process& process) {
         process.BecomeFast(priority);

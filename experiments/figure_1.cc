@@ -17,6 +17,7 @@
 #include "calibrator/inference/conditional_mixture.h"
 #include "calibrator/inference/reps_search.h"
 #include "common/atomic_file.h"
+#include "common/examples.h"
 #include "experiments/options.h"
 #include "experiments/population_weights.h"
 #include "experiments/results.h"
@@ -296,6 +297,7 @@ int main(int argc, char** argv) {
         plumb::AddOutputFlag(app, output, "figure_1.csv and figure_1.svg");
         app.add_option("--seed", seed, "of all random numbers")->capture_default_str();
         app.add_flag("--quick", quick, "a twentieth of the transitions, in a second");
+        plumb::AddExamples(app, {"plumb-figure-1 --quick"});
       },
       [&](plumb::Process& process) { return plumb::MakeFigure(process, output, seed, quick); });
 }

@@ -16,6 +16,7 @@
 #include <iostream>
 
 #include "common/atomic_file.h"
+#include "common/examples.h"
 #include "experiments/budget.h"
 #include "experiments/n_step_error.h"
 #include "experiments/options.h"
@@ -207,6 +208,7 @@ int main(int argc, char** argv) {
         app.add_option("--noise", options.noise, "of the readings: a factor; the paper's are exact")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();
+        plumb::AddExamples(app, {"plumb-figure-2 robots --hidden gym --output figures"});
       },
       [&](plumb::Process& process) { return plumb::MakeFigure(process, options); });
 }

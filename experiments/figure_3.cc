@@ -16,6 +16,7 @@
 #include <set>
 
 #include "common/atomic_file.h"
+#include "common/examples.h"
 #include "experiments/options.h"
 #include "experiments/recording.h"
 #include "experiments/results.h"
@@ -200,6 +201,7 @@ int main(int argc, char** argv) {
         plumb::AddExperimentFlags(app, options, "figure_3.csv and figure_3.svg");
         plumb::AddIterationsFlag(app, options.iterations);
         plumb::AddHiddenFlag(app, options.hidden);
+        plumb::AddExamples(app, {"plumb-figure-3 robots --runs 2 --output figures"});
       },
       [&](plumb::Process& process) { return plumb::MakeFigure(process, options); });
 }

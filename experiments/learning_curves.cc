@@ -19,6 +19,7 @@
 #include <numeric>
 
 #include "common/atomic_file.h"
+#include "common/examples.h"
 #include "common/process.h"
 #include "common/progress_line.h"
 #include "experiments/options.h"
@@ -260,6 +261,7 @@ int main(int argc, char** argv) {
                        "return to say when it is reached, over 5 batches");
         plumb::AddThreadsFlag(app, options.threads);
         app.add_flag("--paper", options.paper, "the paper's settings");
+        plumb::AddExamples(app, {"plumb-learning-curves robots/pendulum/gym.toml"});
       },
       [&](plumb::Process& process) { return plumb::RunSeeds(process, options); });
 }

@@ -14,6 +14,7 @@
 #include <limits>
 
 #include "common/atomic_file.h"
+#include "common/examples.h"
 #include "experiments/bus_robot.h"
 #include "experiments/bus_simulation.h"
 #include "experiments/loop.h"
@@ -287,6 +288,9 @@ int main(int argc, char** argv) {
         app.add_option("--methods", options.methods, "some of the methods, by their keys")
             ->check(plumb::OneOf(plumb::kMethods))
             ->delimiter(',');
+        plumb::AddExamples(
+            app,
+            {"plumb-reality-gap robots --gaps hopper,stiff --methods default,oracle --runs 1"});
       },
       [&](plumb::Process& process) { return plumb::Compare(process, options); });
 }

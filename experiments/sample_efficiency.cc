@@ -19,6 +19,7 @@
 #include <iostream>
 
 #include "common/atomic_file.h"
+#include "common/examples.h"
 #include "experiments/budget.h"
 #include "experiments/n_step_error.h"
 #include "experiments/options.h"
@@ -333,6 +334,7 @@ int main(int argc, char** argv) {
       [&](CLI::App& app) {
         plumb::AddExperimentFlags(app, options, "the tables and sample_efficiency.svg");
         plumb::AddHiddenFlag(app, options.hidden);
+        plumb::AddExamples(app, {"plumb-sample-efficiency robots --hidden prior --output figures"});
       },
       [&](plumb::Process& process) { return plumb::Measure(process, options); });
 }

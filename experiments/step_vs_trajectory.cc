@@ -14,6 +14,7 @@
 
 #include "calibrator/live/checkpoint.h"
 #include "calibrator/live/simopt.h"
+#include "common/examples.h"
 #include "common/process.h"
 
 namespace plumb {
@@ -118,6 +119,7 @@ int main(int argc, char** argv) {
         app.add_option("runs", folders, "output folders of plumb launch")->required();
         app.add_option("--seeds", seeds, "of the calibration, per run")->capture_default_str();
         app.add_option("--csv", csv, "write every single result here");
+        plumb::AddExamples(app, {"plumb-step-vs-trajectory robots/pendulum runs/1 runs/2"});
       },
       [&](plumb::Process&) { return plumb::Compare(robot, folders, seeds, csv); });
 }

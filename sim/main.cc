@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/examples.h"
 #include "common/process.h"
 #include "common/random.h"
 #include "common/realtime.h"
@@ -151,6 +152,7 @@ int main(int argc, char** argv) {
             ->capture_default_str();
         app.add_option("--set", assignments,
                        "NAME=VALUE: this parameter is not drawn, may be repeated");
+        plumb::AddExamples(app, {"plumb-robot robots/pendulum --seed 3 --bus socketcan:vcan0"});
       },
       [&](plumb::Process& process) {
         process.BecomeFast(priority);

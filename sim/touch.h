@@ -17,8 +17,8 @@ struct Touch {
 };
 
 /// Finds what a robot touches. Only what its simulator knows counts: the ground with
-/// SimulationSettings::contact, stops with ::stop. Not thread-safe; does not allocate after
-/// construction.
+/// SimulationSettings::contact, stops with SimulationSettings::stop. Not thread-safe; does not
+/// allocate after construction.
 class TouchFinder {
  public:
   /// @param robot with known parameters (Model::Describe), as lengths decide how far down it

@@ -7,6 +7,7 @@
 
 #include "common/atomic_file.h"
 #include "common/config.h"
+#include "common/examples.h"
 #include "common/hash.h"
 #include "common/process.h"
 #include "common/time_units.h"
@@ -239,6 +240,7 @@ int main(int argc, char** argv) {
                        "roll-outs of the last policy")
             ->check(CLI::Range(1, 1000000))
             ->capture_default_str();
+        plumb::AddExamples(app, {"plumb-trainer robots/pendulum --seed 3"});
       },
       [&](plumb::Process& process) { return plumb::TrainerProcess(process, options).Run(); });
 }

@@ -41,6 +41,8 @@ GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFac
   Random random(seed, {kPolicyStream});
   const Eigen::VectorXf weights = OrthogonalParameters(policy.shape().sizes(), kOutputGain, random);
   policy.parameters.head(weights.size()) = weights;
+  policy.parameters.tail(policy.shape().actions)
+      .setConstant(static_cast<float>(std::log(settings.initial_sd)));
   return policy;
 }
 

@@ -11,7 +11,8 @@
 
 namespace plumb {
 
-/// Residual::ground and ::stop; empty where fewer than kFewestForResidual contacts were seen.
+/// Residual::ground and Residual::stop; empty where fewer than kFewestForResidual contacts were
+/// seen.
 struct ContactFunctions {
   std::optional<ResidualFunction> ground, stop;
 };

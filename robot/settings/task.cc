@@ -69,6 +69,7 @@ TaskSettings ReadTask(Config config, const std::vector<JointDescription>& joints
                 std::fill_n(&s.fall[at], joint.num_positions(),
                             table.Number(joint.name, kPositive));
               });
+  s.velocity = config.Numbers("velocity", 3, {-10, 10}, s.velocity);
   config.Finish();
   return s;
 }

@@ -19,6 +19,8 @@ struct TaskSettings {
   std::vector<double> target = {}, spread = {};
   /// Task balance: how far from the target the robot has fallen; likewise, 0 = never.
   std::vector<double> fall = {};
+  /// Task walk: forward, to the left [m/s], turning to the left [rad/s], in the robot's heading.
+  std::vector<double> velocity = {0, 0, 0};
 };
 
 /// Thread-safe. @throws ConfigError

@@ -16,6 +16,7 @@ TrainingSettings ReadTraining(Config config) {
   s.updates_again = config.Integer("updates_again", {0, 1e9});
   s.trial = config.Number("trial", {0, 0.9}, 0.5);
   s.hidden = config.Integers("hidden", {1, 4096});
+  s.initial_sd = config.Number("initial_sd", {1e-3, 10}, 1);
   s.gamma = config.Number("gamma", {0, 1});
   s.lambda = config.Number("lambda", {0, 1});
   s.kl = config.Number("kl", kSanePositive);

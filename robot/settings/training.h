@@ -13,6 +13,7 @@ struct TrainingSettings {
   /// on the robot is not deployed there. 0 = no trials, the newest policy is deployed
   double trial = 0.5;
   std::vector<int> hidden;
+  double initial_sd = 1;  ///< of a fresh policy's actions, in policy units, > 0
   double gamma, lambda, kl, damping;
   int cg_iterations;
   double fisher_fraction;

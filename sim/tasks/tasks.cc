@@ -7,6 +7,7 @@
 #include "sim/tasks/pendulum.h"
 #include "sim/tasks/reach.h"
 #include "sim/tasks/task.h"
+#include "sim/tasks/walk.h"
 
 namespace plumb {
 namespace {
@@ -25,6 +26,7 @@ constexpr struct {
     {"reach", Make<ReachTask>},        // go to a target from anywhere
     {"hold", Make<HoldTask>},          // stay near a target
     {"balance", Make<BalanceTask>},    // and do not fall
+    {"walk", Make<WalkTask>},          // on legs, at a commanded velocity
 };
 
 }  // namespace

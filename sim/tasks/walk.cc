@@ -1,0 +1,149 @@
+#include "sim/tasks/walk.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "robot/contact_points.h"
+#include "robot/kinematics.h"
+
+namespace plumb {
+namespace {
+
+using Type = JointDescription::Type;
+
+constexpr int kBaseJoints = 4, kBaseQ = 7, kBaseV = 6;
+constexpr double kTracking = 0.25;  // [m^2/s^2]
+constexpr double kStartNoise = 0.1;
+constexpr double kSteepest = 0.5;  // cosine of the trunk's lean
+constexpr double kLowest = 0.5;    // of the standing height
+
+bool IsLegged(const RobotDescription& description) {
+  if (description.num_joints() <= kBaseJoints) return false;
+  for (int i = 0; i < description.num_joints(); ++i) {
+    const JointDescription& joint = description.joints[static_cast<size_t>(i)];
+    const Type type = joint.type;
+    const bool fits = i < 3             ? type == Type::kPrismatic
+                      : i < kBaseJoints ? type == Type::kSpherical
+                                        : type == Type::kRevolute || type == Type::kContinuous;
+    if (!fits || joint.passive != (i < kBaseJoints)) return false;
+  }
+  return true;
+}
+
+std::vector<std::string> ObservationNames(const RobotDescription& description) {
+  std::vector<std::string> names;
+  for (const char* of : {"gravity/", "v/base/", "rate/base/"}) {
+    const char* unit = *of == 'v' ? " [m/s]" : *of == 'r' ? " [rad/s]" : "";
+    for (const char* axis : {"x", "y", "z"}) names.push_back(std::string(of) + axis + unit);
+  }
+  names.emplace_back("height [m]");
+  for (const char* of : {"e/", "v/"}) {
+    for (const JointDescription& joint : description.joints) {
+      if (!joint.passive) names.push_back(of + joint.name + (*of == 'e' ? " [rad]" : " [rad/s]"));
+    }
+  }
+  return names;
+}
+
+/// Of what a step of walking makes of each: 0.1 m and 0.1 rad of the trunk, 0.5 rad of the legs;
+/// half a metre and a radian a second, 5 rad/s.
+Eigen::VectorXd StateScale(const RobotDescription& description) {
+  const Eigen::Index nq = description.num_positions(), nv = description.num_velocities();
+  Eigen::VectorXd scale = Eigen::VectorXd::Constant(nq + nv, 5);
+  scale.head(nq).setConstant(0.5);
+  scale.head(std::min<Eigen::Index>(nq, kBaseQ)).setConstant(0.1);
+  scale.segment(nq, std::min<Eigen::Index>(nv, 3)).setConstant(0.5);
+  if (nv >= kBaseV) scale.segment(nq + 3, 3).setConstant(1);
+  return scale;
+}
+
+Eigen::Quaterniond Orientation(const Task::State& q) {
+  return Eigen::Quaterniond(q[3], q[4], q[5], q[6]).normalized();
+}
+
+}  // namespace
+
+WalkTask::WalkTask(const RobotDescription& description)
+    : Task(description, ObservationNames(description), StateScale(description)),
+      command_(description.task.velocity.data()),
+      period_(description.task.period),
+      height_(0) {
+  if (!IsLegged(description)) {
+    throw std::invalid_argument(
+        "task 'walk' needs a floating base without motors, then turning "
+        "joints with; '" +
+        description.name + "' has others");
+  }
+  const auto driven = static_cast<Eigen::Index>(action_size());
+  rest_.resize(driven), stiffness_.resize(driven), damping_.resize(driven);
+  for (Eigen::Index i = 0; i < driven; ++i) {
+    const JointDynamics& dynamics =
+        description.joints[static_cast<size_t>(kBaseJoints + i)].dynamics;
+    rest_[i] = dynamics.rest;
+    stiffness_[i] = dynamics.stiffness;
+    damping_[i] = dynamics.damping;
+  }
+  Eigen::VectorXd q(description.num_positions());
+  q << 0, 0, 0, 1, 0, 0, 0, rest_;
+  const std::vector<Pose> poses = LinkPoses(description, q);
+  for (const ContactPoint& point : ContactPoints(description)) {
+    const Pose& pose = poses[static_cast<size_t>(point.link)];
+    const double lowest = (pose.position + pose.rotation * point.centre).z() - point.radius;
+    height_ = std::max(height_, -lowest);
+  }
+}
+
+void WalkTask::Observe(const State& q, const State& v, std::span<float> observation) const {
+  const Eigen::Quaterniond to_trunk = Orientation(q).conjugate();
+  Eigen::Map<Eigen::VectorXf> out(observation.data(),
+                                  static_cast<Eigen::Index>(observation.size()));
+  out.segment<3>(0) = (to_trunk * -Eigen::Vector3d::UnitZ()).cast<float>();
+  out.segment<3>(3) = (to_trunk * v.head<3>()).cast<float>();
+  out.segment<3>(6) = v.segment<3>(3).cast<float>();
+  out[9] = static_cast<float>(q[2]);
+  out.segment(10, rest_.size()) = (q.tail(rest_.size()) - rest_).cast<float>();
+  out.tail(rest_.size()) = v.tail(rest_.size()).cast<float>();
+}
+
+double WalkTask::Reward(const State&, const State& v, const State& effort, const State& next_q,
+                        const State& next_v) const {
+  if (Terminated(next_q, next_v)) return 0;
+  const Eigen::Quaterniond to_trunk = Orientation(next_q).conjugate();
+  const Eigen::Vector3d velocity = to_trunk * next_v.head<3>();
+  const Eigen::Vector3d rate = next_v.segment<3>(3);
+  const Eigen::Vector3d gravity = to_trunk * -Eigen::Vector3d::UnitZ();
+  const auto angle = next_q.tail(rest_.size()), speed = next_v.tail(rest_.size());
+  const double off = (velocity.head<2>() - command_.head<2>()).squaredNorm();
+  const double off_turn = rate.z() - command_.z();
+  const double torques = (effort.tail(rest_.size()) + stiffness_.cwiseProduct(rest_ - angle) -
+                          damping_.cwiseProduct(speed))
+                             .squaredNorm();
+  const double accelerations = (speed - v.tail(rest_.size())).squaredNorm() / (period_ * period_);
+  return std::exp(-off / kTracking) + 0.5 * std::exp(-off_turn * off_turn / kTracking) -
+         2 * velocity.z() * velocity.z() - 0.05 * rate.head<2>().squaredNorm() -
+         5 * gravity.head<2>().squaredNorm() - 2e-4 * torques - 2.5e-7 * accelerations -
+         0.1 * (angle - rest_).squaredNorm() / static_cast<double>(rest_.size());
+}
+
+bool WalkTask::Terminated(const State& q, const State& v) const {
+  if (!q.allFinite() || !v.allFinite()) return true;
+  const double lean = (Orientation(q) * Eigen::Vector3d::UnitZ()).z();
+  return lean < kSteepest || q[2] < kLowest * height_;
+}
+
+void WalkTask::InitialState(Random& random, Eigen::Ref<Eigen::VectorXd> q,
+                            Eigen::Ref<Eigen::VectorXd> v) const {
+  const double half_heading = random.Uniform(-std::numbers::pi, std::numbers::pi) / 2;
+  q.head<kBaseQ>() << 0, 0, height_, std::cos(half_heading), 0, 0, std::sin(half_heading);
+  v.setZero();
+  for (Eigen::Index i = 0; i < rest_.size(); ++i) {
+    q[kBaseQ + i] = rest_[i] + random.Uniform(-kStartNoise, kStartNoise);
+    v[kBaseV + i] = random.Uniform(-kStartNoise, kStartNoise);
+  }
+}
+
+}  // namespace plumb
