@@ -26,7 +26,8 @@ const struct {
     {{"excite"}, {"plumb excite robots/double_pendulum --seconds 4 --output excitation.csv"}},
     {{"train"},
      {"plumb train robots/pendulum --output policy.onnx",
-      "plumb train robots/hopper --distribution posterior.json --steps 1e6 --csv training.csv"}},
+      "plumb train robots/hopper --distribution posterior.json --steps 1e6 --report "
+      "training.html"}},
     {{"doctor"}, {"plumb doctor --bus socketcan:can0 --key robot.key"}},
     {{"can"}, {"plumb can plan robots/hopper"}},
     {{"can", "plan"}, {"plumb can plan robots/hopper"}},

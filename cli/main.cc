@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
   plumb::ExportFlags export_flags;
   std::string command = "plumb";
   for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
-  flags.command = record_flags.command = command;
+  flags.command = record_flags.command = train_flags.command = command;
   plumb::ExciteFlags excite_flags;
   std::string doctor_bus = "udp:239.74.163.2:43113";
   std::string can_robot, dbc_output, meldis_robot, tune_robot, tune_log, new_key;
@@ -237,6 +237,8 @@ int main(int argc, char** argv) {
                           "to resume from; default: the output's name and .checkpoint");
         train->add_option("--csv", train_flags.csv,
                           "write a line of numbers for each update to this file");
+        train->add_option("--report", train_flags.report,
+                          "how it went, for people: an HTML page; the table is then written, too");
         train->add_option("--from", train_flags.from,
                           "begin with this policy; default: from scratch");
         train->add_flag("--paper", train_flags.paper,

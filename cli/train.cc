@@ -15,6 +15,8 @@
 #include "cli/outputs.h"
 #include "cli/simulators.h"
 #include "cli/training_progress.h"
+#include "cli/training_report.h"
+#include "common/atomic_file.h"
 #include "common/batch_runner.h"
 #include "common/config.h"
 #include "common/hash.h"
@@ -78,12 +80,13 @@ class Training {
                  Threads(), ranks_) {
     if (!speaks()) spdlog::set_level(spdlog::level::err);
     if (flags_.checkpoint.empty()) flags_.checkpoint = flags_.output + ".checkpoint";
+    if (flags_.csv.empty() && !flags_.report.empty()) flags_.csv = flags_.report + ".csv";
     steps_ = flags_.steps > 0 ? static_cast<int64_t>(flags_.steps)
                               : int64_t{robot_.training.updates} * robot_.training.batch;
     if (speaks()) {
       std::vector<std::string> inputs = FilesOf(robot_);
       inputs.insert(inputs.end(), {flags_.distribution, flags_.from});
-      RequireOutputs({flags_.output, flags_.checkpoint, flags_.csv}, inputs);
+      RequireOutputs({flags_.output, flags_.checkpoint, flags_.csv, flags_.report}, inputs);
       lock_.emplace("checkpoint " + std::filesystem::weakly_canonical(flags_.checkpoint).string(),
                     flags_.checkpoint +
                         ": another process is at work on it: give another "
@@ -231,7 +234,25 @@ class Training {
     std::cout << fmt::format("  {:24} {}\n", flags_.distribution, Summary(own));
     if (flags_.distribution != "prior")
       std::cout << fmt::format("  {:24} {}\n", "prior", Summary(on_prior));
-    std::cout << "wrote " << flags_.output << std::endl;
+    if (!flags_.report.empty()) WriteReport(from, own, on_prior);
+    std::cout << "wrote " << flags_.output
+              << (flags_.report.empty() ? "" : ", " + flags_.report + ", " + flags_.csv)
+              << std::endl;
+  }
+
+  void WriteReport(int64_t from, const Evaluation& own, const Evaluation& on_prior) const {
+    const TrainingOutcome outcome{.command = flags_.command,
+                                  .distribution = flags_.distribution,
+                                  .from = from,
+                                  .updates = trainer_.updates(),
+                                  .steps = trainer_.steps(),
+                                  .seed = flags_.seed,
+                                  .seconds = clock_.seconds(),
+                                  .chosen = !flags_.paper,
+                                  .own = own,
+                                  .on_prior = on_prior};
+    WriteAtomically(flags_.report,
+                    TrainingReport(robot_, distribution_, outcome, ReadTrainingRows(flags_.csv)));
   }
 
   void WritePolicy(const Evaluation& evaluation) const {

@@ -17,7 +17,9 @@ struct TrainFlags {
   int threads = 0;  ///< 0 = one per core
   std::string output = "policy.onnx";
   std::string checkpoint;  ///< file; empty = output + ".checkpoint"
-  std::string csv;         ///< file; empty = none
+  std::string csv;         ///< file; empty = none, with a report the report's name and .csv
+  std::string report;      ///< file; empty = none
+  std::string command;     ///< as it was given, for the report
   /// a policy or checkpoint to begin with; empty = from scratch
   std::string from;
   bool paper = false;      ///< see PaperSettings

@@ -16,7 +16,7 @@ class Walk {
  public:
   Walk(std::span<const uint8_t> bytes, MessageVisitor& visitor) : rest_(bytes), visitor_(visitor) {}
 
-  bool ended() const { return rest_.empty(); }
+  std::span<const uint8_t> rest() const { return rest_; }
 
   bool Struct(const MessageType& type) {
     visitor_.BeginStruct();
@@ -112,6 +112,8 @@ class Walk {
   MessageVisitor& visitor_;
 };
 
+bool IsSeal(std::span<const uint8_t> bytes) { return bytes.size() == kSealSize && FindSeal(bytes); }
+
 class Nobody : public MessageVisitor {
   void Field(std::string_view) override {}
   void BeginStruct() override {}
@@ -129,10 +131,10 @@ class Nobody : public MessageVisitor {
 
 bool WalkMessage(const MessageType& type, std::span<const uint8_t> message,
                  MessageVisitor& visitor) {
-  const std::span<const uint8_t> bytes = Unsealed(message);
-  if (TypeOf(bytes) != &type) return false;
-  Walk walk(bytes.subspan(sizeof(type.fingerprint)), visitor);
-  return walk.Struct(type) && walk.ended();
+  if (TypeOf(message) != &type) return false;
+  Walk walk(message.subspan(sizeof(type.fingerprint)), visitor);
+  // Where the message ends, it says itself: its last bytes may look like a seal.
+  return walk.Struct(type) && (walk.rest().empty() || IsSeal(walk.rest()));
 }
 
 bool Decodes(const MessageType& type, std::span<const uint8_t> message) {

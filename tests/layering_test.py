@@ -40,7 +40,7 @@ STANDS_ON = {
     "calibrator/live": {"calibrator/results"},
     "calibrator": {"calibrator/report", "calibrator/live"},
     "trainer": {"sim", "controller"},
-    "cli": {"records", "drivers", "sim/virtual", "sim/view", "estimator", "controller", "calibrator", "trainer"},
+    "cli": {"records", "plot", "drivers", "sim/virtual", "sim/view", "estimator", "controller", "calibrator", "trainer"},
     "dashboard": {"sim/view"},
     "chaos": {"cli"},
     "experiments": {"drivers", "sim/virtual", "estimator", "controller", "calibrator", "trainer"},

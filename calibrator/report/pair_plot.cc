@@ -15,6 +15,14 @@ using Points = std::vector<Eigen::Vector2d>;
 
 double Density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * M_PI); }
 
+// What is shown of a prior: most of it.
+std::pair<double, double> PriorSpan(const Findings& findings, const ParameterDescription& p,
+                                    Eigen::Index i) {
+  constexpr double kSpan = 2.3;  // [sd]
+  const double mean = findings.prior.mean(i), sd = std::sqrt(findings.prior.covariance(i, i));
+  return {p.ToPhysical(mean - kSpan * sd), p.ToPhysical(mean + kSpan * sd)};
+}
+
 /// The numbers between which all of a parameter that matters lies.
 std::pair<double, double> Extent(const Findings& findings, const Summary& summary,
                                  const ParameterDescription& p, Eigen::Index i) {
@@ -22,9 +30,7 @@ std::pair<double, double> Extent(const Findings& findings, const Summary& summar
   std::sort(sorted.begin(), sorted.end());
   const double low = Quantile(sorted, 0.002), high = Quantile(sorted, 0.998),
                width = std::max(high - low, 1e-12);
-  const double sd = std::sqrt(findings.prior.covariance(i, i));
-  const double prior_low = p.ToPhysical(findings.prior.mean(i) - 2.3 * sd);
-  const double prior_high = p.ToPhysical(findings.prior.mean(i) + 2.3 * sd);
+  const auto [prior_low, prior_high] = PriorSpan(findings, p, i);
   // Of a posterior much narrower than its prior only the surroundings: a dot would show nothing.
   constexpr double kNarrow = 8, kSurroundings = 0.8;
   if (prior_high - prior_low > kNarrow * width)
@@ -147,7 +153,8 @@ class Pairs {
     for (const auto& point : prior) {
       if (std::isfinite(point.y())) highest = std::max(highest, point.y());
     }
-    const Axis y(0, highest * 1.08, Top(row) + cell_ - kGap, Top(row));
+    const double room = WithinPrior(row) ? 1.4 : 1.08;  // above the bars
+    const Axis y(0, highest * room, Top(row) + cell_ - kGap, Top(row));
     BeginCell(row, row);
     for (size_t k = 0; k < kBins; ++k) {
       const double from = x.Pixel(low + width * static_cast<double>(k));
@@ -158,6 +165,34 @@ class Pairs {
     for (auto& point : prior) point = {x.Pixel(point.x()), y.Pixel(point.y())};
     svg_.Path(prior, "prior line");
     EndCell(row, row);
+    DrawWithinPrior(row);
+  }
+
+  bool WithinPrior(size_t row) const {
+    const auto [low, high] = PriorSpan(findings_, parameter(shown_[row]), shown_[row]);
+    return extents_[row].first > low || extents_[row].second < high;
+  }
+
+  // Of a posterior that is shown at a scale of its own: where it is in its prior.
+  void DrawWithinPrior(size_t row) {
+    const Eigen::Index i = shown_[row];
+    const ParameterDescription& p = parameter(i);
+    if (!WithinPrior(row)) return;
+    const auto [low, high] = PriorSpan(findings_, p, i);
+    constexpr double kInset = 10, kRule = 12, kLeast = 2.5;
+    const Axis whole(low, high, X(row).from() + kInset, X(row).to() - kInset);
+    const double at = Top(row) + kRule;
+    const auto pixel = [&](double value) { return whole.Pixel(std::clamp(value, low, high)); };
+    svg_.Line(whole.from(), at, whole.to(), at, "prior line");
+    const double from = pixel(summary_.lower(i)), to = pixel(summary_.upper(i));
+    const double width = std::max(kLeast, to - from);
+    svg_.Rectangle((from + to - width) / 2, at - 4, width, 8, "posterior mark");
+    const double ratio = summary_.prior_sd(i) / summary_.sd(i);
+    if (std::isfinite(ratio) && ratio >= 2) {
+      svg_.Text(X(row).from() + kInset, at + 18,
+                fmt::format("{:.4g} times narrower", std::round(ratio)), "tick",
+                Svg::Anchor::kStart);
+    }
   }
 
   void DrawCorrelation(size_t row, size_t column) {

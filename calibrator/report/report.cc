@@ -10,14 +10,13 @@
 
 #include "calibrator/report/pair_plot.h"
 #include "calibrator/report/report_checks.h"
-#include "calibrator/report/report_html.h"
 #include "calibrator/report/report_plots.h"
 #include "calibrator/report/report_residuals.h"
-#include "calibrator/report/report_style.h"
 #include "calibrator/results/summary.h"
 #include "common/atomic_file.h"
 #include "common/decompositions.h"
 #include "common/process.h"
+#include "plot/html.h"
 #include "plot/svg.h"
 
 namespace plumb {
@@ -31,10 +30,6 @@ constexpr double kNull = 1e-6;  // as FindIdentifiability has it
 constexpr double kInvolved = 1e-3;
 constexpr double kHardly = 0.22;  // nat: the data made the sd smaller by less than a fifth
 
-std::string Verdict(const std::string& css, const std::string& title, const std::string& words) {
-  return "<div class=\"verdict " + css + "\"><b>" + title + "</b>" + Escape(words) + "</div>\n";
-}
-
 class Report {
  public:
   Report(const Findings& findings, const RobotDescription& robot, const Provenance& provenance,
@@ -46,16 +41,12 @@ class Report {
         summary_(Summarise(findings, robot)) {}
 
   std::string Print() const {
-    return "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/>"
-           "<meta name=\"viewport\" content=\"width=device-width, "
-           "initial-scale=1\"/>\n<title>Calibration "
-           "of " +
-           Escape(robot_.name) + "</title>\n<style>" + kReportStyle +
-           "</style></head>\n<body><main>\n" + Headline() + Parameters() + Pairs() +
-           KnownAndUnknown() + PredictionSection(findings_.holdout) + MisfitSection(findings_) +
-           GapSection(findings_.gap, robot_) + ResidualSection(residuals_) +
-           AgreementSection(findings_.agreement, summary_, robot_, kMaxPairs) + Stages() +
-           Reproduce() + "</main></body>\n</html>\n";
+    return Page("Calibration of " + robot_.name,
+                Headline() + Parameters() + Pairs() + KnownAndUnknown() +
+                    PredictionSection(findings_.holdout) + MisfitSection(findings_) +
+                    GapSection(findings_.gap, robot_) + ResidualSection(residuals_) +
+                    AgreementSection(findings_.agreement, summary_, robot_, kMaxPairs) + Stages() +
+                    Reproduce());
   }
 
  private:
@@ -189,7 +180,9 @@ class Report {
                       "Ellipses: 1 and 2 sigma, one pair for each component of the posterior; dots "
                       "are its "
                       "samples. Where the "
-                      "posterior is much narrower than the prior, only its surroundings are shown. "
+                      "posterior is much narrower than the prior, only its surroundings are shown, "
+                      "and the "
+                      "rule above shows where in the prior they are, and how much narrower it is. "
                       "Numbers: "
                       "the posterior's "
                       "correlation of the coordinates.") +

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "calibrator/report/report_html.h"
 #include "calibrator/report/report_plots.h"
+#include "plot/html.h"
 #include "plot/svg.h"
 
 namespace plumb {

@@ -73,6 +73,35 @@ TEST_CASE("train writes a policy, a table and what to expect of it") {
   CHECK(rows[2].find(",nan,") == std::string::npos);
 }
 
+TEST_CASE("a report has the table's curves and the run's numbers, and loads nothing") {
+  const TemporaryFolder folder;
+  const std::string report = folder / "training.html";
+  const Outcome outcome = Shell(Plumb() + "train " + Robot("pendulum") +
+                                " --held-out 5 --steps 6400 --evaluate-every 2 --output " +
+                                folder / "policy.onnx" + " --report " + report);
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  CHECK(outcome.text.find("wrote " + folder / "policy.onnx" + ", " + report + ", " + report +
+                          ".csv") != std::string::npos);
+  CHECK(Rows(report + ".csv").size() == 5);
+  const std::string page = Read(report);
+  const auto has = [&](const std::string& text) { return page.find(text) != std::string::npos; };
+  CHECK(has("<h1>Training of pendulum</h1>"));
+  CHECK(has("4 updates, 6400 simulated steps"));
+  CHECK(has("train " + Robot("pendulum")));  // the command
+  std::smatch mean;
+  REQUIRE(std::regex_search(outcome.text, mean, std::regex("prior +(-[0-9]+)")));
+  CHECK(has("mean " + mean[1].str()));
+  for (const char* curve : {"return", "KL [nat]", "gain", "explained", "entropy [nat]"})
+    CHECK(has("<title>" + std::string(curve) + "</title>"));
+  CHECK(has("gravity"));
+  CHECK(has("--posterior: light-dark("));  // the live page's colours
+  CHECK_FALSE(std::regex_search(page, std::regex("(src|href)=|url\\(|@import")));
+  // Two evaluations on the way are two dots.
+  const std::regex dot("posterior mark");
+  CHECK(std::distance(std::sregex_iterator(page.begin(), page.end(), dot), {}) == 2);
+}
+
 TEST_CASE("an interrupted training goes on to the same bits, with any number of threads") {
   const TemporaryFolder folder;
   REQUIRE(Shell(Train(folder, "straight", "--steps 24000 --threads 1")).status == 0);

@@ -9,7 +9,9 @@
 #include "common/message_scalars.h"
 #include "common/message_schema.h"
 #include "common/message_walk.h"
+#include "common/seal.h"
 #include "plumb/driver_status_t.hpp"
+#include "plumb/imu_t.hpp"
 #include "plumb/joint_state_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
 #include "plumb/robot_state_t.hpp"
@@ -156,6 +158,17 @@ TEST_CASE("a seal behind a message is not a part of it") {
   Identity sender("plumb-controller", {}, Clock(), Identity::Reach::kMachine, 0);
   const MessageType& type = *FindMessageType("joint_command_t");
   CHECK(Json(type, Say(sender)) == Json(type, Encoded()));
+}
+
+TEST_CASE("a message without a seal whose last bytes look like one is whole") {
+  std::vector<uint8_t> bytes = Encode(imu_t{});
+  const std::string magic = "PLUMSEAL";  // in the midst of its numbers
+  std::copy(magic.begin(), magic.end(), bytes.end() - static_cast<ptrdiff_t>(kSealSize));
+  imu_t own;
+  REQUIRE(own.decode(bytes.data(), 0, static_cast<int>(bytes.size())) ==
+          static_cast<int>(bytes.size()));
+  std::string text;
+  CHECK(AppendJson(*FindMessageType("imu_t"), bytes, text));
 }
 
 TEST_CASE("a single has its own shortest digits, and text from outside cannot break out") {

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
+#include <regex>
 #include <sstream>
 
 #include "calibrator/report/report_residuals.h"
@@ -206,6 +207,10 @@ TEST_CASE("a posterior much narrower than its prior is drawn with its surroundin
     low = std::min(low, x), high = std::max(high, x);
   CHECK(high - low > 25);
   CHECK(high - low < 250);
+  // And where that is in the prior.
+  std::smatch narrower;
+  REQUIRE(std::regex_search(html, narrower, std::regex(">([0-9.]+) times narrower")));
+  CHECK(std::stod(narrower[1]) == Approx(1000).epsilon(0.1));
   CHECK_THAT(html, Contains("<td class=\"n\">yes</td>"));
 }
 

@@ -3,10 +3,17 @@
 #include <string>
 #include <vector>
 
-// The report's HTML: verdicts, tables, figures.
+// Reports as HTML: one page that loads nothing, of verdicts, tables and figures.
 namespace plumb {
 
 // The functions here share nothing: thread-safe.
+
+/// The page's style sheet: light and dark.
+extern const char kPageStyle[];
+/// A whole page. @param title text. @param body HTML.
+std::string Page(const std::string& title, const std::string& body);
+/// A card. @param css "good", "bad" or empty. @param title, words text.
+std::string Verdict(const std::string& css, const std::string& title, const std::string& words);
 
 /// The key to drawings of prior and posterior. HTML, for the beginning of a caption.
 inline constexpr char kPriorPosteriorKey[] =

@@ -1,4 +1,4 @@
-#include "calibrator/report/report_html.h"
+#include "plot/html.h"
 
 #include <fmt/format.h>
 
@@ -8,6 +8,18 @@
 #include "plot/svg.h"
 
 namespace plumb {
+
+std::string Page(const std::string& title, const std::string& body) {
+  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/>"
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>" +
+         Escape(title) + "</title>\n<style>" + kPageStyle + "</style></head>\n<body><main>\n" +
+         body + "</main></body>\n</html>\n";
+}
+
+std::string Verdict(const std::string& css, const std::string& title, const std::string& words) {
+  return "<div class=\"verdict " + css + "\"><b>" + Escape(title) + "</b>" + Escape(words) +
+         "</div>\n";
+}
 
 std::string Number(double value, double sd) {
   if (std::isnan(value)) return "\xe2\x80\x93";  // en dash
