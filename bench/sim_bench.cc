@@ -15,6 +15,7 @@
 #include "sim/environment.h"
 #include "sim/residual_inputs.h"
 #include "sim/simulator.h"
+#include "sim/virtual/mujoco_backend.h"
 #include "sim/virtual/simbody_plant.h"
 #include "sim/windows.h"
 #include "tests/sim/allocations.h"
@@ -297,6 +298,45 @@ void MujocoHopperStep(benchmark::State& state, MujocoHopper::Integrator integrat
 }
 BENCHMARK_CAPTURE(MujocoHopperStep, RK4, MujocoHopper::Integrator::kRungeKutta);
 BENCHMARK_CAPTURE(MujocoHopperStep, Euler, MujocoHopper::Integrator::kEuler);
+
+// 20 ms of a quadruped on its feet: five of our substeps, ten of MuJoCo's.
+RobotDescription Quadruped() {
+  RobotDescription robot = Load("quadruped");
+  robot.parameters.clear();
+  return robot;
+}
+
+Eigen::VectorXd Standing(const RobotDescription& robot) {
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(robot.num_positions());
+  q[2] = 0.3, q[3] = 1;
+  for (Eigen::Index i = 7; i < q.size(); ++i)
+    q[i] = robot.joints[static_cast<size_t>(i - 3)].dynamics.rest;
+  return q;
+}
+
+void QuadrupedStep(benchmark::State& state) {
+  const RobotDescription robot = Quadruped();
+  Simulator simulator(robot);
+  const Eigen::VectorXd q = Standing(robot), none = Eigen::VectorXd::Zero(18);
+  for (auto _ : state) {
+    simulator.SetState(q, none);
+    for (int i = 0; i < 50; ++i) simulator.Step(none, 0.02);
+  }
+  state.SetItemsProcessed(state.iterations() * 50);
+}
+BENCHMARK(QuadrupedStep);
+
+void MujocoQuadrupedStep(benchmark::State& state) {
+  const RobotDescription robot = Quadruped();
+  const auto mujoco = MakeMujocoBackend(robot);
+  const Eigen::VectorXd q = Standing(robot), none = Eigen::VectorXd::Zero(18);
+  for (auto _ : state) {
+    mujoco->SetState(q, none);
+    for (int i = 0; i < 50; ++i) mujoco->Advance(none, 0.02);
+  }
+  state.SetItemsProcessed(state.iterations() * 50);
+}
+BENCHMARK(MujocoQuadrupedStep);
 
 void MujocoHopperMasses(benchmark::State& state) {
   MujocoHopper mujoco;

@@ -107,6 +107,11 @@ class Writer {
 
   void WriteJoint(size_t index, const Eigen::Isometry3d& in_body) {
     const JointDescription& j = joint(index);
+    if (j.type == Type::kSpherical) {
+      text_ += fmt::format("<joint name=\"{}\" type=\"ball\" pos=\"{}\"/>\n", MjcfJoint(index),
+                           Words(in_body.translation()));
+      return;
+    }
     const bool limited = robot_.simulation.stop && std::isfinite(j.upper);
     text_ += fmt::format(
         "<joint name=\"{}\" type=\"{}\" pos=\"{}\" axis=\"{}\" armature=\"{:.17g}\" "

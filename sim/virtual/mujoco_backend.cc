@@ -61,17 +61,24 @@ class MujocoBackend : public PhysicsBackend {
     data_.reset(mj_makeData(model_.get()));
     if (!data_) throw std::invalid_argument("MuJoCo has no memory for the robot");
     longest_step_ = std::min(kLongestStep, ContactTime(robot) / 10);
-    q_ = v_ = Eigen::VectorXd::Zero(robot.num_velocities());
-    gain_ = q_;
+    q_ = Eigen::VectorXd::Zero(robot.num_positions());
+    v_ = Eigen::VectorXd::Zero(robot.num_velocities());
+    gain_ = v_;
     for (size_t i = 0; i < robot.joints.size(); ++i) {
-      gain_[static_cast<Eigen::Index>(i)] = robot.joints[i].dynamics.motor_gain;
-      const int joint = mj_name2id(model_.get(), mjOBJ_JOINT, MjcfJoint(i).c_str());
-      address_.push_back(model_->jnt_dofadr[joint]);
+      const JointDescription& joint = robot.joints[i];
+      const int theirs = mj_name2id(model_.get(), mjOBJ_JOINT, MjcfJoint(i).c_str());
+      if (joint.num_positions() == 4) q_[static_cast<Eigen::Index>(q_address_.size())] = 1;
+      gain_.segment(static_cast<Eigen::Index>(v_address_.size()), joint.num_velocities())
+          .setConstant(joint.dynamics.motor_gain);
+      for (int k = 0; k < joint.num_positions(); ++k)
+        q_address_.push_back(model_->jnt_qposadr[theirs] + k);
+      for (int k = 0; k < joint.num_velocities(); ++k)
+        v_address_.push_back(model_->jnt_dofadr[theirs] + k);
     }
   }
 
   void SetState(const Vector& q, const Vector& v) override {
-    RequireState(q, v, q_.size());
+    RequireState(q, v, q_.size(), v_.size());
     q_ = q;
     v_ = v;
     Restore();
@@ -83,7 +90,7 @@ class MujocoBackend : public PhysicsBackend {
     const int count = static_cast<int>(std::max(1.0, std::ceil(duration / longest_step_ - 1e-6)));
     model_->opt.timestep = duration / count;
     for (Eigen::Index i = 0; i < effort.size(); ++i)
-      data_->qfrc_applied[Address(i)] = gain_[i] * effort[i];
+      data_->qfrc_applied[AddressOfV(i)] = gain_[i] * effort[i];
     for (int i = 0; i < count && !GivenUp(); ++i) mj_step(model_.get(), data_.get());
     const auto q = Eigen::VectorXd::Map(data_->qpos, q_.size()),
                v = Eigen::VectorXd::Map(data_->qvel, v_.size());
@@ -91,10 +98,8 @@ class MujocoBackend : public PhysicsBackend {
       Restore();
       return false;
     }
-    for (Eigen::Index i = 0; i < effort.size(); ++i) {
-      q_[i] = q[Address(i)];
-      v_[i] = v[Address(i)];
-    }
+    for (Eigen::Index i = 0; i < q_.size(); ++i) q_[i] = q[AddressOfQ(i)];
+    for (Eigen::Index i = 0; i < v_.size(); ++i) v_[i] = v[AddressOfV(i)];
     return true;
   }
 
@@ -110,17 +115,17 @@ class MujocoBackend : public PhysicsBackend {
   }
   void Restore() {
     mj_resetData(model_.get(), data_.get());  // forgets the solver's warm start
-    for (Eigen::Index i = 0; i < q_.size(); ++i) {
-      data_->qpos[Address(i)] = q_[i];
-      data_->qvel[Address(i)] = v_[i];
-    }
+    for (Eigen::Index i = 0; i < q_.size(); ++i) data_->qpos[AddressOfQ(i)] = q_[i];
+    for (Eigen::Index i = 0; i < v_.size(); ++i) data_->qvel[AddressOfV(i)] = v_[i];
   }
-  int Address(Eigen::Index i) const { return address_[static_cast<size_t>(i)]; }
+  int AddressOfQ(Eigen::Index i) const { return q_address_[static_cast<size_t>(i)]; }
+  int AddressOfV(Eigen::Index i) const { return v_address_[static_cast<size_t>(i)]; }
 
   std::unique_ptr<mjModel, Delete> model_;
   std::unique_ptr<mjData, Delete> data_;
-  double longest_step_;       // [s]
-  std::vector<int> address_;  // of our coordinates in MuJoCo's, which is depth first
+  double longest_step_;  // [s]
+  // Of our positions and velocities in MuJoCo's, which are depth first.
+  std::vector<int> q_address_, v_address_;
   Eigen::VectorXd q_, v_, gain_;
 };
 

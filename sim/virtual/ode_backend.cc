@@ -36,6 +36,7 @@ class OdeBackend : public PhysicsBackend {
  public:
   explicit OdeBackend(const RobotDescription& robot)
       : links_(robot.links), kinematics_(robot), points_(ContactPoints(robot)) {
+    RequireHingesAndSlides(robot);
     RequireKnownJoints(robot);
     Initialise();
     world_.reset(dWorldCreate());
@@ -60,7 +61,7 @@ class OdeBackend : public PhysicsBackend {
   }
 
   void SetState(const Vector& q, const Vector& v) override {
-    RequireState(q, v, q_.size());
+    RequireState(q, v, q_.size(), v_.size());
     q_ = q;
     v_ = v;
     Place();

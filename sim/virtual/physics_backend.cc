@@ -5,11 +5,16 @@
 
 namespace plumb {
 
+void RequireHingesAndSlides(const RobotDescription& robot) {
+  for (const JointDescription& joint : robot.joints) {
+    if (joint.type == JointDescription::Type::kSpherical)
+      throw std::invalid_argument("the free rotation of joint '" + joint.name + "'");
+  }
+}
+
 void RequireKnownJoints(const RobotDescription& robot) {
   for (const JointDescription& joint : robot.joints) {
     const std::string of = " of joint '" + joint.name + "'";
-    if (joint.type == JointDescription::Type::kSpherical)
-      throw std::invalid_argument("the free rotation" + of);
     const JointParameterKind* unknown =
         FirstNotAmong({&JointDynamics::armature, &JointDynamics::damping, &JointDynamics::friction,
                        &JointDynamics::stiffness, &JointDynamics::rest, &JointDynamics::motor_gain},
@@ -19,10 +24,10 @@ void RequireKnownJoints(const RobotDescription& robot) {
 }
 
 void RequireState(const PhysicsBackend::Vector& q, const PhysicsBackend::Vector& v,
-                  Eigen::Index size) {
-  if (q.size() != size || v.size() != size) {
-    throw std::invalid_argument("a state has " + std::to_string(size) +
-                                " positions and velocities");
+                  Eigen::Index positions, Eigen::Index velocities) {
+  if (q.size() != positions || v.size() != velocities) {
+    throw std::invalid_argument("a state has " + std::to_string(positions) + " positions and " +
+                                std::to_string(velocities) + " velocities");
   }
   if (!q.allFinite() || !v.allFinite())
     throw std::invalid_argument("a robot's state must be finite");

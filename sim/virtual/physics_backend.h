@@ -25,13 +25,16 @@ class PhysicsBackend {
   virtual const Eigen::VectorXd& v() const = 0;  ///< [rad/s or m/s]
 };
 
-/// What every engine of others can be told of a joint: a hinge or a slide with armature, damping,
-/// friction, a spring and a motor's gain. Thread-safe.
+/// Thread-safe. @throws std::invalid_argument naming a joint that turns about all axes.
+void RequireHingesAndSlides(const RobotDescription& robot);
+
+/// What every engine of others can be told of a joint: armature, damping, friction, a spring and a
+/// motor's gain. Thread-safe.
 /// @throws std::invalid_argument naming the first thing else that one of the robot's joints has.
 void RequireKnownJoints(const RobotDescription& robot);
 
-/// Thread-safe. @throws std::invalid_argument unless q and v have `size` finite entries each.
+/// Thread-safe. @throws std::invalid_argument unless q and v have so many entries, all finite.
 void RequireState(const PhysicsBackend::Vector& q, const PhysicsBackend::Vector& v,
-                  Eigen::Index size);
+                  Eigen::Index positions, Eigen::Index velocities);
 
 }  // namespace plumb

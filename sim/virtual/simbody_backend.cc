@@ -18,6 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 void RequireKnown(const RobotDescription& robot) {
+  RequireHingesAndSlides(robot);
   RequireKnownJoints(robot);
   for (const ContactPoint& point : ContactPoints(robot)) {
     if (point.radius > 0) continue;
@@ -202,7 +203,7 @@ SimbodyBackend::SimbodyBackend(const RobotDescription& robot) {
 SimbodyBackend::~SimbodyBackend() = default;
 
 void SimbodyBackend::SetState(const Vector& q, const Vector& v) {
-  RequireState(q, v, impl_->q_.size());
+  RequireState(q, v, impl_->q_.size(), impl_->v_.size());
   impl_->SetState(q, v);
 }
 
