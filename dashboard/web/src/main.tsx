@@ -74,5 +74,10 @@ function Page() {
 
 // Before a dialog takes the key to close itself.
 document.addEventListener("keydown", pressed, { capture: true });
-listen();
-render(<Page />, document.getElementById("page")!);
+const start = () => {
+  listen();
+  render(<Page />, document.getElementById("page")!);
+};
+// The bar of index.html is painted first; a tab that nobody looks at paints nothing.
+if (document.hidden) start();
+else requestAnimationFrame(() => setTimeout(start));
