@@ -26,7 +26,7 @@ namespace plumb {
 ///   }
 class Process {
  public:
-  /// @param clock SCALE, SCALE@EPOCH, or virtual:PATH of a coordinator. @throws std::exception if
+  /// @param clock SCALE, `SCALE@EPOCH`, or virtual:PATH of a coordinator. @throws std::exception if
   /// it is none of these, or nobody keeps time there.
   Process(std::string name, const std::string& lcm_url, const std::string& clock);
   /// Signs what is said, and believes what is signed. Before the first use of messenger().

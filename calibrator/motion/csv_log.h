@@ -12,9 +12,9 @@ namespace plumb {
 ///   t   [s]; begins anew, or goes on, with every episode
 ///   q/<joint>, v/<joint>   [rad or m], [rad/s or m/s]: the state s. Where it is not known in full,
 ///       no transition begins. A spherical joint has /w, /x, /y, /z in q and /x, /y, /z in v
-///   u/<driven joint>   effort / Task::action_unit, held for one control period. As in the
-///       simulator, it is clipped to the effort limits and acts simulation.latency late, the one
-///       before until then; before an episode there was none
+///   u/<joint>   of each driven joint: effort / Task::action_unit, held for one control period. As
+///       in the simulator, it is clipped to the effort limits and acts simulation.latency late, the
+///       one before until then; before an episode there was none
 ///   next_q/<joint>, next_v/<joint>   the state s' that it led to. Without these columns, as
 ///       `plumb sim --csv` writes the table, s' is the next row's state
 ///   terminated, truncated   optional: other than 0 where an episode ends with this row

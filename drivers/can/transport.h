@@ -59,7 +59,7 @@ class Transport {
   /// frame that waits for a time does not show here.
   virtual int fd() const noexcept = 0;
   /// Tells the time; call it before Send and Receive. The same calls with the same times have the
-  /// same outcome. @param now scaled monotonic [us]; one before the latest counts as the latest.
+  /// same outcome. It is scaled monotonic [us]; one before the latest counts as the latest.
   virtual void SetTime(int64_t) noexcept {}
   /// The time of SetTime at which a frame becomes due, in the past if one is; kNever: none waits
   /// for a time.

@@ -28,13 +28,13 @@ namespace plumb {
 /// The driver without sockets and clock: frames and messages go in, frames and messages come out.
 /// One cycle:
 ///
-///   for (received frame) driver.OnFrame(frame, now, utime of its arrival);
-///   while (const joint_state_t* state = driver.NextState()) publish(*state);
-///   while (const imu_t* imu = driver.NextImu()) publish(*imu);
-///   driver.OnLink(...); driver.OnRequest(...); driver.OnCommand(...);   // what came since
-///   frames = driver.Tick(now, utime, lateness);                         // once per cycle
-///   driver.Transmitted(transport.Send(frames), utime right after it);
-///   // after every Tick: what was not accepted is given again
+///     for (received frame) driver.OnFrame(frame, now, utime of its arrival);
+///     while (const joint_state_t* state = driver.NextState()) publish(*state);
+///     while (const imu_t* imu = driver.NextImu()) publish(*imu);
+///     driver.OnLink(...); driver.OnRequest(...); driver.OnCommand(...);   // what came since
+///     frames = driver.Tick(now, utime, lateness);                         // once per cycle
+///     driver.Transmitted(transport.Send(frames), utime right after it);
+///     // after every Tick: what was not accepted is given again
 ///
 /// It arms only on a request, made after its start and after whatever stopped it last. Armed, it
 /// transmits a torque in every cycle, within the joint's limits: zero when the command has expired,

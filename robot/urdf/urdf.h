@@ -20,8 +20,8 @@ struct UrdfJoint : JointGeometry {
 /// plane (its y axis if <axis> is along x), and (x, y, axis) are right-handed. A <limit>'s lower
 /// and upper do not bind the parts, its effort, and <dynamics>, count for each.
 ///
-/// Beyond the URDF standard, <capsule radius="" length=""/> is a solid like <cylinder>, with its
-/// caps added at both ends.
+/// Beyond the URDF standard, `<capsule radius="" length=""/>` is a solid like `<cylinder>`, with
+/// its caps added at both ends.
 struct UrdfModel {
   std::string file;
   std::string name;
