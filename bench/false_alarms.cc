@@ -195,7 +195,7 @@ Log Recorded(const Case& one, const RobotDescription& robot, uint64_t seed) {
 struct Outcome {
   int logs = 0, alarms = 0, judged = 0, intervals = 0, held = 0;
   // of the posterior that is left: of what informs the parameters, and by how many logs
-  int left = 0, left_held = 0, free = 0, nothing = 0;
+  int left = 0, left_held = 0, beside = 0, free = 0, nothing = 0;
   double fit = 0, test = 0;  // [s]
 };
 
@@ -235,6 +235,7 @@ void Run(const Case& one, uint64_t seed, Outcome* outcome) {
     const GapFit gap = CloseGap(input, std::move(result));
     found = gap.alarm;
     ++outcome->judged;
+    outcome->beside += gap.gap.informed == Informed::kBesideContacts;
     outcome->free += gap.gap.informed == Informed::kFree;
     outcome->nothing += gap.gap.informed == Informed::kNone;
     if (gap.gap.informed != Informed::kNone) {
@@ -259,16 +260,17 @@ int main(int argc, char** argv) {
   const int first = argc > 2 ? std::atoi(argv[2]) : 1;
   const std::string only = argc > 3 ? argv[3] : "";
   fmt::print(
-      "| log | alarms | intervals that hold the truth | informed by all, free steps, nothing "
-      "| intervals then | [s] to fit | to test |\n|---|---|---|---|---|---|---|\n");
+      "| log | alarms | intervals that hold the truth | informed by all, beside contacts, free "
+      "steps, nothing | intervals then | [s] to fit | to test |\n|---|---|---|---|---|---|---|\n");
   for (const Case& one : Cases()) {
     if (!one.name.starts_with(only)) continue;
     Outcome outcome;
     for (int log = 0; log < logs; ++log) Run(one, static_cast<uint64_t>(first + log), &outcome);
-    fmt::print("| {} | {} | {} of {} | {}, {}, {} | {} of {} | {:.1f} | {:.1f} |\n", one.name,
+    fmt::print("| {} | {} | {} of {} | {}, {}, {}, {} | {} of {} | {:.1f} | {:.1f} |\n", one.name,
                outcome.judged == 0 ? "not judged"
                                    : fmt::format("{} of {}", outcome.alarms, outcome.judged),
-               outcome.held, outcome.intervals, outcome.judged - outcome.free - outcome.nothing,
+               outcome.held, outcome.intervals,
+               outcome.judged - outcome.beside - outcome.free - outcome.nothing, outcome.beside,
                outcome.free, outcome.nothing, outcome.left_held, outcome.left, outcome.fit / logs,
                outcome.test / logs);
     std::fflush(stdout);

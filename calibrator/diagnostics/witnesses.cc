@@ -99,14 +99,17 @@ Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
     Block block{static_cast<Eigen::Index>(first), height, Eigen::MatrixXd(height, size),
                 Eigen::VectorXd::Ones(size), Eigen::VectorXd(height)};
     Eigen::MatrixXd bends(height, pairs);
+    std::vector<int> coordinates;
     for (Eigen::Index i = 0; i < height; ++i) {
       const int c = rows[first + static_cast<size_t>(i)].coordinate;
+      coordinates.push_back(c);
       const double sd = EndSd(recorded, c);
       block.end_sd(i) = sd > 0 ? sd : noise_sd(c);
       block.sensitivity.row(i) = slope[static_cast<size_t>(k)].row(c);
       bends.row(i) = bend[static_cast<size_t>(k)].row(c);
     }
     if (!block.sensitivity.allFinite() || !bends.allFinite()) continue;
+    AddDisturbance(recorded, coordinates, &block.start_sd, &block.sensitivity);
     const std::vector<Eigen::Index> steps{0, height};
     WhitenWindow(steps, block.start_sd, block.sensitivity, block.end_sd, bends);
     if (bends.rowwise().squaredNorm().maxCoeff() >

@@ -44,7 +44,7 @@ class Witnesses {
  private:
   struct Block {
     Eigen::Index first, count;    // among all rows
-    Eigen::MatrixXd sensitivity;  // count x 2 n
+    Eigen::MatrixXd sensitivity;  // count x 2 n, and what has disturbed it
     Eigen::VectorXd start_sd, end_sd;
   };
   std::vector<Block> blocks_;

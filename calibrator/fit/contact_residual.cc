@@ -100,6 +100,20 @@ std::vector<Eigen::VectorXd> OwnErrors(const std::vector<Contact>& contacts,
   return own;
 }
 
+void SetContactsAside(StepErrors* touching) {
+  for (size_t i = 0; i < touching->contacts.size(); ++i) {
+    const std::vector<Contact>& contacts = touching->contacts[i];
+    Eigen::VectorXd& errors = touching->errors[i];
+    const Eigen::Index n = errors.size() / 2;
+    const auto displacements = OwnErrors(contacts, errors.head(n)),
+               velocities = OwnErrors(contacts, errors.tail(n));
+    for (size_t c = 0; c < contacts.size(); ++c) {
+      errors.head(n) -= contacts[c].response * displacements[c];
+      errors.tail(n) -= contacts[c].response * velocities[c];
+    }
+  }
+}
+
 ContactFunctions FitContacts(const FunctionFitOptions& options, uint64_t seed,
                              std::vector<StepErrors>* draws) {
   ContactFunctions functions;

@@ -31,4 +31,8 @@ ContactFunctions FitContacts(const FunctionFitOptions& options, uint64_t seed,
 std::vector<Eigen::VectorXd> OwnErrors(const std::vector<StepContacts::Contact>& contacts,
                                        const Eigen::VectorXd& errors);
 
+/// Takes from the errors of touching steps all that their contacts can have made (OwnErrors).
+/// Thread-safe.
+void SetContactsAside(StepErrors* touching);
+
 }  // namespace plumb

@@ -103,6 +103,11 @@ Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters,
             }
           });
   const std::array<Eigen::Index, 2> step{0, size};
+  std::vector<int> coordinates;  // of a transition's errors
+  for (int i = 0; i < static_cast<int>(n_); ++i) {
+    coordinates.push_back(static_cast<int>(n_) + i);
+    coordinates.push_back(i);
+  }
   for (size_t window = 0; window < ends.size(); ++window) {
     const Transition& t = *ends[window];
     const Eigen::MatrixXd free_motion = FreeMotion(n_, t.duration());
@@ -115,7 +120,9 @@ Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters,
       end_sd(2 * i + 1) = t.next_q_sd(i);
     }
     auto errors = residuals.middleRows(static_cast<Eigen::Index>(window) * size, size);
-    WhitenWindow(step, StartSd(t), sensitivity, end_sd, errors);
+    Eigen::VectorXd start_sd = StartSd(t);
+    AddDisturbance(t, coordinates, &start_sd, &sensitivity);
+    WhitenWindow(step, start_sd, sensitivity, end_sd, errors);
     for (Eigen::Index j = 0; j < errors.cols(); ++j) {
       if (!errors.col(j).allFinite()) errors.col(j).setConstant(kInfinity);
     }

@@ -4,8 +4,11 @@ namespace plumb {
 
 size_t StretchLength(const Rollout& rollout, size_t first) {
   const auto& t = rollout.transitions;
+  const auto disturbed = [&](size_t i) { return t[i].disturbance.cols() > 0; };
   size_t end = first + 1;
-  while (end < t.size() && t[end].step == t[end - 1].step + 1) ++end;
+  while (end < t.size() && t[end].step == t[end - 1].step + 1 && !disturbed(end - 1) &&
+         !disturbed(end))
+    ++end;
   return end - first;
 }
 
@@ -35,6 +38,18 @@ Eigen::VectorXd StartSd(const Transition& t) {
   Eigen::VectorXd sd(t.q_sd.size() + t.v_sd.size());
   sd << t.q_sd, t.v_sd;
   return sd;
+}
+
+void AddDisturbance(const Transition& t, std::span<const int> coordinates,
+                    Eigen::VectorXd* start_sd, Eigen::MatrixXd* sensitivity) {
+  const Eigen::Index added = t.disturbance.cols(), before = sensitivity->cols(),
+                     rows = static_cast<Eigen::Index>(coordinates.size());
+  if (added == 0) return;
+  start_sd->conservativeResize(before + added);
+  start_sd->tail(added).setOnes();
+  sensitivity->conservativeResize(rows, before + added);
+  for (Eigen::Index i = 0; i < rows; ++i)
+    sensitivity->row(i).tail(added) = t.disturbance.row(coordinates[static_cast<size_t>(i)]);
 }
 
 }  // namespace plumb

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <span>
 
 #include "calibrator/motion/transitions.h"
 #include "sim/model.h"
@@ -13,6 +14,7 @@ namespace plumb {
 // positions, n velocities. All of these are thread-safe.
 
 /// How many transitions of a roll-out from `first` on follow each other without a gap, at least 1.
+/// What has disturbed one of them is not simulated: it is a stretch of its own.
 size_t StretchLength(const Rollout& rollout, size_t first);
 
 /// `length` recorded steps from transition `first` on: the state that it begins with, and the
@@ -28,5 +30,11 @@ double EndSd(const Transition& transition, Eigen::Index c);
 
 /// Standard deviations of (q, v) at a transition's beginning: 0 = exact, NaN = not known.
 Eigen::VectorXd StartSd(const Transition& transition);
+
+/// Makes what has disturbed a transition part of the uncertain state that it begins with, for
+/// WhitenWindow: a standard deviation of 1 for each direction, and the direction as a column.
+/// @param coordinates of the sensitivity's rows: 0 ... n - 1: q, n ... 2 n - 1: v.
+void AddDisturbance(const Transition& transition, std::span<const int> coordinates,
+                    Eigen::VectorXd* start_sd, Eigen::MatrixXd* sensitivity);
 
 }  // namespace plumb

@@ -81,8 +81,10 @@ ResidualFit FitResidual(const std::shared_ptr<const Model>& model,
     fit.residual.free = FitWhole(free, whole, options.noise, random(0), &fit.free);
   }
   if (options.touching && Enough(touching)) {
+    if (options.contacts == ResidualFitOptions::Contacts::kSetAside)
+      for (StepErrors& draw : touching) SetContactsAside(&draw);
     fit.touching.before = VelocityErrors(touching.front());
-    if (options.contacts) {
+    if (options.contacts == ResidualFitOptions::Contacts::kLearnt) {
       ContactFunctions contacts =
           FitContacts({options.contact_centres, options.width, options.unknown_by_contacts},
                       options.seed, &touching);

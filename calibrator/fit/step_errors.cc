@@ -19,7 +19,8 @@ Eigen::VectorXd Stack(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
 }
 
 void Add(const ResidualInputs& inputs, const Transition& t, const Simulator& simulator,
-         StepErrors* to) {
+         StepErrors::Place place, StepErrors* to) {
+  to->places.push_back(place);
   to->inputs.push_back(inputs.x());
   to->errors.push_back(Stack(t.next_q - simulator.q(), t.next_v - simulator.v()));
   to->variances.push_back(Stack(t.next_q_sd.cwiseAbs2() + t.q_sd.cwiseAbs2(),
@@ -38,9 +39,10 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
   ResidualInputs inputs(*model, margin);
   Simulator simulator(model);
   simulator.SetParameters(physical);
-  for (const Rollout& rollout : rollouts) {
+  for (size_t r = 0; r < rollouts.size(); ++r) {
     const Transition* last = nullptr;
-    for (const Transition& t : rollout.transitions) {
+    for (size_t i = 0; i < rollouts[r].transitions.size(); ++i) {
+      const Transition& t = rollouts[r].transitions[i];
       const bool follows = last && last->step + 1 == t.step;
       const Eigen::VectorXd effort = MeanEffort(t), before = follows ? MeanEffort(*last) : effort;
       if (t.next_q.allFinite() && t.next_v.allFinite()) {
@@ -50,7 +52,7 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
         simulator.Step(t.efforts);
         inputs.End(simulator, effort, before, t.duration());
         if (simulator.finite())
-          Add(inputs, t, simulator, inputs.touching() ? &errors.touching : &errors.free);
+          Add(inputs, t, simulator, {r, i}, inputs.touching() ? &errors.touching : &errors.free);
       }
       last = &t;
     }

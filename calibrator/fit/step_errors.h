@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <memory>
 #include <span>
 #include <vector>
@@ -18,6 +19,10 @@ struct StepErrors {
   std::vector<Eigen::VectorXd> errors;     ///< 2 n: recorded less simulated
   std::vector<Eigen::VectorXd> variances;  ///< 2 n, that readings alone would make; may be infinite
   std::vector<std::vector<StepContacts::Contact>> contacts;  ///< what touched
+  struct Place {
+    size_t rollout, transition;
+  };
+  std::vector<Place> places;
 
   int size() const { return static_cast<int>(inputs.size()); }
 };

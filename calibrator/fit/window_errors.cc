@@ -218,10 +218,22 @@ double WindowErrors::WhitenWindow(size_t w, Eigen::MatrixXd* errors) const {
   const Eigen::Index first = steps.front(), count = steps.back() - first;
   const Start& start = starts_[w];
   Eigen::VectorXd end_sd(count);
-  for (Eigen::Index i = 0; i < count; ++i)
-    end_sd(i) = NoiseOf(rows_[static_cast<size_t>(first + i)]);
-  return plumb::WhitenWindow(steps, start.sd.array().isNaN().select(noise_sd_, start.sd),
-                             start.sensitivity, end_sd, errors->middleRows(first, count));
+  std::vector<int> coordinates;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Row& row = rows_[static_cast<size_t>(first + i)];
+    end_sd(i) = NoiseOf(row);
+    coordinates.push_back(row.coordinate);
+  }
+  Eigen::VectorXd start_sd = start.sd.array().isNaN().select(noise_sd_, start.sd);
+  const Transition& begins = TransitionOf(rows_[static_cast<size_t>(first)]);
+  if (begins.disturbance.cols() == 0)
+    return plumb::WhitenWindow(steps, start_sd, start.sensitivity, end_sd,
+                               errors->middleRows(first, count));
+  if (start.sensitivity.size() == 0) start_sd.resize(0);  // exact
+  Eigen::MatrixXd sensitivity = start.sensitivity;
+  AddDisturbance(begins, coordinates, &start_sd, &sensitivity);
+  return plumb::WhitenWindow(steps, start_sd, sensitivity, end_sd,
+                             errors->middleRows(first, count));
 }
 
 }  // namespace plumb

@@ -30,7 +30,8 @@ Eigen::VectorXd StartDifferences(const Eigen::VectorXd& noise_sd);
 /// included: that is carried along by the simulator's own sensitivity, and reduced by the window's
 /// earlier errors (a Kalman filter of the initial state; errors-in-variables, WhitenWindow). For
 /// the right simulator whitened errors are independent, with mean zero and variance one; where the
-/// noise is not known (sd NaN) it is `noise_sd`.
+/// noise is not known (sd NaN) it is `noise_sd`. What has disturbed a transition is part of the
+/// uncertainty of its own window.
 ///
 /// Not thread-safe. The same bits for any number of threads and whoever does the work.
 class WindowErrors {

@@ -9,6 +9,7 @@
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/robot_least_squares.h"
+#include "calibrator/gap/disturbances.h"
 #include "robot/parameter_distribution.h"
 #include "sim/tasks/task.h"
 #include "sim/touch.h"
@@ -37,11 +38,14 @@ bool Worth(const ResidualQuality& quality, const Eigen::VectorXd& units) {
   return (explained / units.array()).maxCoeff() >= kLeastEffect;
 }
 
+using Contacts = ResidualFitOptions::Contacts;
+
 // An alarm tells of every error that is no accident, however small: of those that an integrator's
 // step makes, too, where states are known to six digits.
-bool Matters(const MethodInput& input, const MethodResult& result) {
+bool Matters(const MethodInput& input, const MethodResult& result,
+             Contacts contacts = Contacts::kLearnt) {
   const ResidualFit fit = FitResidual(input.model, Moments(result.posterior).mean, input.rollouts,
-                                      {.seed = input.options.seed});
+                                      {.contacts = contacts, .seed = input.options.seed});
   const Eigen::VectorXd units =
       MakeTask(input.model->description())->state_scale().tail(input.model->num_velocities());
   return Worth(fit.free, units) || Worth(fit.touching, units);
@@ -91,10 +95,11 @@ std::string Summarise(bool free, bool touching, const Gap& gap) {
   std::string text = !free      ? "contact"
                      : touching ? "neither free motion nor contact"
                                 : "the motion";
-  text = fmt::format("the model does not explain {}: {}", text,
-                     gap.informed == Informed::kNone
-                         ? "nothing informs its parameters"
-                         : "its parameters are learnt from free motion alone");
+  const char* informed = gap.informed == Informed::kNone ? "nothing informs its parameters"
+                         : gap.informed == Informed::kFree
+                             ? "its parameters are learnt from free motion alone"
+                             : "its parameters are learnt from what contacts cannot have done";
+  text = fmt::format("the model does not explain {}: {}", text, informed);
   if (!gap.residual) return text + "; too little was recorded to learn what it lacks";
   text += "; of what it lacks, the learnt residual explains, of ";
   std::string parts;
@@ -104,8 +109,8 @@ std::string Summarise(bool free, bool touching, const Gap& gap) {
   return text + parts;
 }
 
-// Candidates for what is wrong are unknown, too, but what they are is not told.
-void TakeConsidered(const MethodInput& input, const Gaussian& considered, GapFit* fit) {
+// A posterior of another covariance than the method's.
+void Take(const MethodInput& input, const Gaussian& considered, GapFit* fit) {
   const Eigen::VectorXd prior_precision =
       PriorGaussian(input.model->description()).covariance.diagonal().cwiseInverse();
   const Eigen::Index n = considered.mean.size();
@@ -116,16 +121,15 @@ void TakeConsidered(const MethodInput& input, const Gaussian& considered, GapFit
   fit->result.samples = Transform(considered, StandardNormals(n, kPosteriorSamples, random));
 }
 
-// The method on free steps alone. @return false if the model does not explain them, either, and by
-// an amount that counts.
-bool LearnFree(const MethodInput& input, std::span<const Rollout> free, GapFit* fit) {
-  const MethodInput part{input.model, free, input.options, input.start};
+// The method on a part of what was recorded. @return false if the model does not explain that,
+// either, and by an amount that counts.
+bool LearnFrom(const MethodInput& part, Contacts contacts, GapFit* fit) {
   try {
     MethodResult result = RunMethod(part);
     const OneStepView view = ViewOneStep(part, result);
     fit->simulated_steps += view.simulated_steps;
     const ModelTest test = TestModel(part, result, view, &fit->simulated_steps);
-    if (test.found.alarm && Matters(part, result)) {
+    if (test.found.alarm && Matters(part, result, contacts)) {
       fit->result.simulated_steps += result.simulated_steps;
       fit->result.failures += result.failures;
       return false;
@@ -133,7 +137,31 @@ bool LearnFree(const MethodInput& input, std::span<const Rollout> free, GapFit* 
     result.simulated_steps += fit->result.simulated_steps;
     result.failures += fit->result.failures;
     fit->result = std::move(result);
-    TakeConsidered(part, test.considered, fit);
+    Take(part, test.considered, fit);
+    return true;
+  } catch (const std::invalid_argument&) {
+    return false;
+  }
+}
+
+// The method on all steps, contacts set aside: in directions and sizes that depend on the
+// parameters, which are therefore learnt twice.
+bool LearnBesideContacts(const MethodInput& input, GapFit* fit) {
+  Eigen::VectorXd mean = Moments(fit->result.posterior).mean;
+  try {
+    const std::vector<Rollout> first =
+        InformingSteps(input.model, mean, input.rollouts, Informed::kBesideContacts);
+    MethodResult result = RunMethod({input.model, first, input.options, mean});
+    fit->result.simulated_steps += result.simulated_steps;
+    fit->result.failures += result.failures;
+    mean = Moments(result.posterior).mean;
+    const std::vector<Rollout> steps =
+        InformingSteps(input.model, mean, input.rollouts, Informed::kBesideContacts);
+    if (!LearnFrom({input.model, steps, input.options, mean}, Contacts::kSetAside, fit))
+      return false;
+    Gaussian wider = Moments(fit->result.posterior);
+    wider.covariance *= kContactsLeave * kContactsLeave;
+    Take(input, wider, fit);
     return true;
   } catch (const std::invalid_argument&) {
     return false;
@@ -153,16 +181,26 @@ std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Ro
   return free;
 }
 
-std::vector<Rollout> InformingSteps(const RobotDescription& robot,
+std::vector<Rollout> InformingSteps(const std::shared_ptr<const Model>& model,
+                                    const Eigen::VectorXd& coordinates,
                                     std::span<const Rollout> rollouts, Informed informed) {
-  if (informed == Informed::kFree) return FreeSteps(robot, rollouts);
-  return {rollouts.begin(), rollouts.end()};
+  const RobotDescription& robot = model->description();
+  switch (informed) {
+    case Informed::kFree:
+      return FreeSteps(robot, rollouts);
+    case Informed::kBesideContacts:
+      return DisturbedByContacts(model, robot.ToPhysical(coordinates), rollouts);
+    default:
+      return {rollouts.begin(), rollouts.end()};
+  }
 }
 
 const char* Name(Informed informed) {
   switch (informed) {
     case Informed::kFree:
       return "free";
+    case Informed::kBesideContacts:
+      return "beside contacts";
     case Informed::kNone:
       return "none";
     default:
@@ -193,18 +231,23 @@ GapFit CloseGap(const MethodInput& input, MethodResult all) {
         "little to matter; the parameters are as unsure as what may be wrong with the model makes "
         "them",
         100 * kLeastExplained);
-    TakeConsidered(input, test.considered, &fit);
+    Take(input, test.considered, &fit);
     return fit;
   }
   const std::vector<Rollout> steps = FreeSteps(input.model->description(), input.rollouts);
   const size_t free_count = CountTransitions(steps);
   const bool touching = free_count < CountTransitions(input.rollouts),
              enough = free_count >= static_cast<size_t>(kFewestFree);
-  const bool explained = touching && enough && LearnFree(input, steps, &fit);
+  const bool explained =
+      touching && enough &&
+      LearnFrom({input.model, steps, input.options, input.start}, Contacts::kLearnt, &fit);
   // of too few free steps nothing is known
   const bool free = !touching || (enough && !explained);
-  fit.gap.informed = explained ? Informed::kFree : Informed::kNone;
-  if (!explained) {
+  const bool beside = touching && !free && LearnBesideContacts(input, &fit);
+  fit.gap.informed = beside      ? Informed::kBesideContacts
+                     : explained ? Informed::kFree
+                                 : Informed::kNone;
+  if (fit.gap.informed == Informed::kNone) {
     fit.result = PriorAlone(input, std::move(fit.result));
     fit.information.setZero();
   }

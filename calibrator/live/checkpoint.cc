@@ -34,7 +34,7 @@ Eigen::VectorXd VectorFrom(const json& j) {
 }
 
 Informed InformedFrom(const std::string& name) {
-  for (const Informed informed : {Informed::kAll, Informed::kFree, Informed::kNone}) {
+  for (const Informed informed : kAllInformed) {
     if (name == Name(informed)) return informed;
   }
   throw std::runtime_error(fmt::format("informed: {} is none", name));

@@ -225,7 +225,8 @@ std::optional<CalibrationReport> SimOpt::Report() {
     report.errors.push_back({horizon, errors(0), errors(1), errors(2)});
   }
   report.identifiability = FindIdentifiability(
-      robot_, discrepancy_, InformingSteps(robot_, state_.rollouts, state_.informed),
+      robot_, discrepancy_,
+      InformingSteps(model_, Moments(state_.distribution).mean, state_.rollouts, state_.informed),
       Moments(state_.distribution));
   if (state_.informed == Informed::kNone)
     report.identifiability.summary = fmt::format("no parameter is determined: {}", kNotInformed);

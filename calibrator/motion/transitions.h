@@ -25,6 +25,9 @@ struct Transition {
   /// Their standard deviations. 0 = exact; NaN = not known, to be estimated from the errors.
   Eigen::VectorXd q_sd, v_sd, next_q_sd, next_v_sd;
   std::vector<EffortSegment> efforts;  ///< from s to s', gapless
+  /// Directions, columns of 2 n entries (positions, velocities), each a standard deviation long, in
+  /// which something that no simulator is asked for has moved the end; none = nothing has.
+  Eigen::MatrixXd disturbance = {};
   double duration() const;
 };
 

@@ -141,7 +141,7 @@ class Calibration {
   bool informed() const { return findings_.gap.informed != Informed::kNone; }
   // The steps that the parameters are learnt from.
   std::vector<Rollout> Informing(std::span<const Rollout> rollouts) const {
-    return InformingSteps(robot_, rollouts, findings_.gap.informed);
+    return InformingSteps(model_, mean_, rollouts, findings_.gap.informed);
   }
 
   // Fits again without a part of the data, which then judges.

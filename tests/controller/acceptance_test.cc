@@ -71,8 +71,8 @@ TEST_CASE("equals do not replace each other") {
   const auto decision = acceptance.Decide(1);
   CHECK(decision.probability == Approx(0.5).margin(0.03));
   CHECK_FALSE(decision.accepted);
-  // 1.5 of 100 apart, each with 1.5 of 100 of scatter: Phi(1 / sqrt 2) = 0.76
-  acceptance.Add(2, Hops(500, 3.045, false));
+  // 0.8 of 100 apart, each with 0.8 of 100 of scatter: Phi(1 / sqrt 2) = 0.76
+  acceptance.Add(2, Hops(500, 3.024, false));
   CHECK(acceptance.Decide(2).probability == Approx(0.76).margin(0.02));
 }
 

@@ -300,4 +300,45 @@ TEST_CASE("without a simulator to linearise, motion is taken to be free") {
 }
 
 }  // namespace
+TEST_CASE("what has disturbed a transition is part of its errors' covariance") {
+  const Eigen::VectorXd truth = Model(Pendulum()).parameters().means();
+  for (const double start_sd : {0.0, 1e-3}) {
+    std::vector<Rollout> log = Swings(1, 6, truth);
+    for (Transition& t : log[0].transitions) {
+      t.q_sd = t.v_sd = Eigen::VectorXd::Constant(1, start_sd);
+      t.next_q_sd = t.next_v_sd = Eigen::VectorXd::Constant(1, 2e-3);
+    }
+    const Eigen::MatrixXd direction = (Eigen::MatrixXd(2, 1) << 0.01, 0.3).finished();
+    log[0].transitions[2].disturbance = direction;
+    const auto model = std::make_shared<Model>(Pendulum());
+    const Eigen::VectorXd other = 1.1 * truth;
+    WindowErrors disturbed(model, log, 1, 1);
+    disturbed.Linearise(truth);
+    const Eigen::VectorXd whitened = disturbed.Whitened(other), raw = disturbed.Raw(other);
+    log[0].transitions[2].disturbance.resize(2, 0);
+    WindowErrors plain(model, log, 1, 1);
+    plain.Linearise(truth);
+    const Eigen::VectorXd before = plain.Whitened(other);
+    CHECK(whitened.head(4) == before.head(4));
+    CHECK(whitened.tail(6) == before.tail(6));
+    // S = W^-1 W^-T of the undisturbed one, and the direction's square
+    const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(2, 2);
+    if (start_sd == 0) {
+      const Eigen::MatrixXd covariance = 4e-6 * unit + direction * direction.transpose();
+      const Eigen::VectorXd errors = raw.segment(4, 2);
+      CHECK(whitened.segment(4, 2).squaredNorm() ==
+            Approx(errors.dot(covariance.llt().solve(errors))));
+    } else {
+      CHECK(whitened.segment(4, 2).squaredNorm() < before.segment(4, 2).squaredNorm());
+    }
+  }
+}
+
+TEST_CASE("no window goes through a disturbed transition") {
+  std::vector<Rollout> log = Swings(1, 6, Model(Pendulum()).parameters().means());
+  log[0].transitions[2].disturbance = Eigen::MatrixXd::Ones(2, 1);
+  const WindowErrors errors(std::make_shared<Model>(Pendulum()), log, 50, 1);
+  CHECK(errors.windows() == 3);  // of 2, 1 and 3 steps
+}
+
 }  // namespace plumb
