@@ -63,8 +63,7 @@ Eigen::MatrixXd DisturbanceOf(const std::vector<Contact>& contacts, const Eigen:
     const Contact& contact = contacts[c];
     const Eigen::Index k = contact.response.cols();
     disturbance.block(0, column, n, k) =
-        contact.response *
-        sd(sizes.displacement[contact.ground], displacements[c]).asDiagonal();
+        contact.response * sd(sizes.displacement[contact.ground], displacements[c]).asDiagonal();
     disturbance.block(n, column + k, n, k) =
         contact.response * sd(sizes.velocity[contact.ground], velocities[c]).asDiagonal();
     column += 2 * k;

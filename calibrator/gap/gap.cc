@@ -145,13 +145,15 @@ bool LearnFrom(const MethodInput& part, Contacts contacts, GapFit* fit) {
 }
 
 // The method on all steps, contacts set aside: in directions and sizes that depend on the
-// parameters, which are therefore learnt twice.
+// parameters, for which a first guess by single steps is enough.
 bool LearnBesideContacts(const MethodInput& input, GapFit* fit) {
   Eigen::VectorXd mean = Moments(fit->result.posterior).mean;
+  CalibrationOptions quick = input.options;
+  quick.method = "laplace", quick.horizons = {1};
   try {
     const std::vector<Rollout> first =
         InformingSteps(input.model, mean, input.rollouts, Informed::kBesideContacts);
-    MethodResult result = RunMethod({input.model, first, input.options, mean});
+    MethodResult result = RunMethod({input.model, first, quick, mean});
     fit->result.simulated_steps += result.simulated_steps;
     fit->result.failures += result.failures;
     mean = Moments(result.posterior).mean;

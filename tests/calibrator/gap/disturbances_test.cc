@@ -30,14 +30,13 @@ double Farthest(const RobotDescription& robot, std::span<const Rollout> steps) {
 
 TEST_CASE("with contacts set aside, touching steps of a wrong ground give the right masses") {
   const RobotDescription robot = Hopper();
-  const Truth softer{
-      {{"contact/stiffness", 0.1 * robot.simulation.contact->stiffness}}};
+  const Truth softer{{{"contact/stiffness", 0.1 * robot.simulation.contact->stiffness}}};
   std::vector<Rollout> touching = RandomLog(robot, softer, 1000, 3);
   for (Rollout& rollout : touching) {
-    std::erase_if(rollout.transitions, [&, finder = TouchFinder(robot, 0.01)](
-                                           const Transition& t) mutable {
-      return !finder.Find(t.q).ground || !finder.Find(t.next_q).ground;
-    });
+    std::erase_if(rollout.transitions,
+                  [&, finder = TouchFinder(robot, 0.01)](const Transition& t) mutable {
+                    return !finder.Find(t.q).ground || !finder.Find(t.next_q).ground;
+                  });
   }
   REQUIRE(CountTransitions(touching) > 200);
   const auto model = std::make_shared<Model>(robot);
