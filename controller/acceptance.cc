@@ -4,20 +4,16 @@
 
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
-
-#include "common/random.h"
 
 namespace plumb {
 namespace {
 
-constexpr int kDraws = 4000;
-constexpr uint32_t kStream = 0x4163'6365;  // of random numbers; "Acce"
-
-// Expected steps until a fall, at most m.
-double ExpectedSteps(double hazard, double m) {
-  return hazard * m < 1e-9 ? m : (1 - std::exp(-hazard * m)) / hazard;
+// E of the steps until a fall, at most m, of a hazard ~ Gamma(1 + falls, rate):
+//   E (1 - e^(-lambda m)) / lambda = integral over x < m of (rate / (rate + x))^(1 + falls)
+double ExpectedSteps(int falls, double rate, double m) {
+  if (falls == 0) return rate * std::log1p(m / rate);
+  return rate / falls * (1 - std::pow(rate / (rate + m), falls));
 }
 
 }  // namespace
@@ -38,8 +34,7 @@ void Acceptance::Add(int iteration, const Trial& trial) {
   if (incumbent_ < 0) incumbent_ = iteration;
 }
 
-// Draws of a policy's return: its falls and its scatter are uncertain.
-std::vector<double> Acceptance::Returns(int iteration) const {
+double Acceptance::MeanReturn(int iteration) const {
   const auto found = trials_.find(iteration);
   if (found == trials_.end())
     throw std::invalid_argument(fmt::format("policy {} has had no trial", iteration));
@@ -51,35 +46,26 @@ std::vector<double> Acceptance::Returns(int iteration) const {
       if (policy == iteration) steps += trial.steps, falls += trial.fell;
     }
   }
-  Random random(0, {kStream, static_cast<uint32_t>(iteration)});
-  std::vector<double> returns(kDraws);
-  for (double& one : returns) {
-    double hazard = 0;
-    if (all_falls > 0) {
-      for (int i = 0; i <= falls; ++i) hazard -= std::log(1 - random.Uniform());
-      hazard /= all_steps / all_falls + steps;
-    }
-    for (const Trial& trial : found->second) {
-      one += trial.sum_of_rewards;
-      if (!trial.fell) one += trial.late_rate * ExpectedSteps(hazard, steps_ - trial.steps);
-    }
-    const auto n = static_cast<double>(found->second.size());
-    one /= n;
-    one += kScatter / std::sqrt(n) * std::abs(one) * random.Normal();
+  double sum = 0;
+  for (const Trial& trial : found->second) {
+    const double left = steps_ - trial.steps;
+    sum += trial.sum_of_rewards;
+    if (trial.fell) continue;
+    sum += trial.late_rate *
+           (all_falls > 0 ? ExpectedSteps(falls, all_steps / all_falls + steps, left) : left);
   }
-  return returns;
-}
-
-double Acceptance::MeanReturn(int iteration) const {
-  const std::vector<double> returns = Returns(iteration);
-  return std::accumulate(returns.begin(), returns.end(), 0.0) / kDraws;
+  return sum / static_cast<double>(found->second.size());
 }
 
 double Acceptance::Better(int challenger) const {
-  const std::vector<double> theirs = Returns(challenger), ours = Returns(incumbent_);
-  int better = 0;
-  for (size_t i = 0; i < theirs.size(); ++i) better += theirs[i] > ours[i];
-  return static_cast<double>(better) / kDraws;
+  const auto variance = [&](int iteration) {
+    const double scatter = kScatter * MeanReturn(iteration);
+    return scatter * scatter / static_cast<double>(trials_.at(iteration).size());
+  };
+  const double difference = MeanReturn(challenger) - MeanReturn(incumbent_),
+               sd = std::sqrt(variance(challenger) + variance(incumbent_));
+  if (sd == 0) return difference > 0 ? 1 : difference < 0 ? 0 : 0.5;
+  return std::erfc(-difference / sd / std::sqrt(2.0)) / 2;
 }
 
 Acceptance::Decision Acceptance::Decide(int challenger) {

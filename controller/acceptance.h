@@ -31,10 +31,11 @@ struct Trial {
 /// lambda being the policy's probability of a fall per step. Of n trials with S steps and F falls
 ///   lambda ~ Gamma(1 + F, S_all / F_all + S),
 /// the conjugate posterior where the prior is the exponential distribution with the mean of all
-/// policies that this robot has tried; zero where none has fallen. Returns of trials that begin
-/// alike scatter by kScatter of themselves, falls apart, the mean of n by 1 / sqrt(n) of that.
-/// kScatter is that of 29 trials of four hoppers without a fall, each against the mean of ten whole
-/// episodes (docs/gap.md).
+/// policies that this robot has tried; zero where none has fallen. What counts is the expectation
+/// over lambda, in closed form: how unsure lambda is says nothing for or against a challenger that
+/// has been tried as long as the incumbent. Returns of trials that begin alike scatter by kScatter
+/// of themselves, falls apart, the mean of n by 1 / sqrt(n) of that. kScatter is that of 29 trials
+/// of four hoppers without a fall, each against the mean of ten whole episodes (docs/gap.md).
 /// Not thread-safe; the same bits for the same trials.
 class Acceptance {
  public:
@@ -51,11 +52,11 @@ class Acceptance {
   struct Decision {
     int challenger = -1, incumbent = -1;  ///< iterations; the incumbent of before
     bool accepted = false, trusted = false;
-    double probability = 0;  ///< that the challenger returns more
+    double probability = 0;  ///< that the challenger's expected return is more
     /// of an episode, means; with the probability NaN where there has been no trial
     double challenger_return = 0, incumbent_return = 0;
   };
-  /// Makes the challenger the incumbent if it returns more with probability kSure.
+  /// Makes the challenger the incumbent if its expected return is more with probability kSure.
   /// @throws std::invalid_argument if it has had no trial.
   Decision Decide(int challenger);
   /// Makes it the incumbent whatever the trials say: where the model explains the robot, training
@@ -72,7 +73,6 @@ class Acceptance {
   static constexpr double kScatter = 0.008;
 
  private:
-  std::vector<double> Returns(int iteration) const;
   double Better(int challenger) const;
 
   int steps_;

@@ -76,6 +76,18 @@ TEST_CASE("equals do not replace each other") {
   CHECK(acceptance.Decide(2).probability == Approx(0.76).margin(0.02));
 }
 
+TEST_CASE("the falls of one policy do not keep others from being told apart") {
+  Acceptance acceptance(1000);
+  acceptance.Add(0, Hops(60, 2, true));
+  acceptance.Add(1, Hops(500, 3, false));
+  REQUIRE(acceptance.Decide(1).accepted);
+  acceptance.Add(2, Hops(500, 3.06, false));
+  const auto decision = acceptance.Decide(2);
+  CHECK(decision.challenger_return / decision.incumbent_return == Approx(1.02));
+  CHECK(decision.probability == Approx(0.96).margin(0.01));  // Phi(2 / 0.8 / sqrt 2)
+  CHECK(decision.accepted);
+}
+
 TEST_CASE("costs are returns, too") {
   Acceptance acceptance(200);
   Trial swing, fails;
