@@ -13,7 +13,8 @@ namespace plumb {
 /// Roll-outs that say nothing of contact: what each contact may have done to the robot in a step,
 /// a displacement and a change of velocity along M^-1 J' A^-1 (StepContacts::Contact::response),
 /// is a disturbance of that step, as large as the errors of such contacts are (root mean square,
-/// per direction, of points of the ground and of stops). What a contact cannot do still informs:
+/// per direction, of points of the ground and of stops) and, added in squares, its own. What a
+/// contact cannot do still informs:
 /// with its two points on the ground, a foot leaves three of the hopper's six directions. Where
 /// a model is wrong in contact alone, parameters can so be learnt from all of the motion
 /// (nothing is assumed of the contact's force; cf. Mistry, Buchli, Schaal, ICRA 2010, who learn and
