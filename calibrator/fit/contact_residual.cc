@@ -14,11 +14,11 @@ constexpr double kRidge = 1e-3;
 
 using Contact = StepContacts::Contact;
 
-// Displacement and velocity errors of one contact, 2 k entries.
-Eigen::VectorXd Stack(const Eigen::VectorXd& displacement, const Eigen::VectorXd& velocity) {
-  Eigen::VectorXd both(displacement.size() + velocity.size());
-  both << displacement, velocity;
-  return both;
+// Takes from a step's errors what an own error of one of its contacts, 2 k entries, has made.
+void Take(const Contact& contact, const Eigen::VectorXd& own, Eigen::VectorXd* errors) {
+  const Eigen::Index n = errors->size() / 2, k = own.size() / 2;
+  errors->head(n) -= contact.response * own.head(k);
+  errors->tail(n) -= contact.response * own.tail(k);
 }
 
 // Of the contacts of one kind, in the order of steps; nothing where there are too few.
@@ -26,13 +26,11 @@ std::optional<Examples> ExamplesOf(bool ground, const StepErrors& steps) {
   std::vector<Eigen::VectorXd> inputs, outputs;
   for (size_t i = 0; i < steps.contacts.size(); ++i) {
     const std::vector<Contact>& contacts = steps.contacts[i];
-    const Eigen::Index n = steps.errors[i].size() / 2;
-    const auto displacements = OwnErrors(contacts, steps.errors[i].head(n)),
-               velocities = OwnErrors(contacts, steps.errors[i].tail(n));
+    const std::vector<Eigen::VectorXd> own = OwnStepErrors(contacts, steps.errors[i]);
     for (size_t c = 0; c < contacts.size(); ++c) {
       if (contacts[c].ground != ground) continue;
       inputs.push_back(contacts[c].x);
-      outputs.push_back(Stack(displacements[c], velocities[c]));
+      outputs.push_back(own[c]);
     }
   }
   if (inputs.size() < static_cast<size_t>(kFewestForResidual)) return {};
@@ -43,13 +41,8 @@ std::optional<Examples> ExamplesOf(bool ground, const StepErrors& steps) {
 void Take(bool ground, const Eigen::MatrixXd& explained, StepErrors* steps) {
   Eigen::Index column = 0;
   for (size_t i = 0; i < steps->contacts.size(); ++i) {
-    const Eigen::Index n = steps->errors[i].size() / 2;
     for (const Contact& contact : steps->contacts[i]) {
-      if (contact.ground != ground) continue;
-      const Eigen::Index k = contact.response.cols();
-      steps->errors[i].head(n) -= contact.response * explained.col(column).head(k);
-      steps->errors[i].tail(n) -= contact.response * explained.col(column).tail(k);
-      ++column;
+      if (contact.ground == ground) Take(contact, explained.col(column++), &steps->errors[i]);
     }
   }
 }
@@ -100,17 +93,24 @@ std::vector<Eigen::VectorXd> OwnErrors(const std::vector<Contact>& contacts,
   return own;
 }
 
+std::vector<Eigen::VectorXd> OwnStepErrors(const std::vector<Contact>& contacts,
+                                           const Eigen::VectorXd& errors) {
+  const Eigen::Index n = errors.size() / 2;
+  std::vector<Eigen::VectorXd> own = OwnErrors(contacts, errors.head(n));
+  const std::vector<Eigen::VectorXd> velocities = OwnErrors(contacts, errors.tail(n));
+  for (size_t c = 0; c < own.size(); ++c) {
+    const Eigen::Index k = own[c].size();
+    own[c].conservativeResize(2 * k);
+    own[c].tail(k) = velocities[c];
+  }
+  return own;
+}
+
 void SetContactsAside(StepErrors* touching) {
   for (size_t i = 0; i < touching->contacts.size(); ++i) {
     const std::vector<Contact>& contacts = touching->contacts[i];
-    Eigen::VectorXd& errors = touching->errors[i];
-    const Eigen::Index n = errors.size() / 2;
-    const auto displacements = OwnErrors(contacts, errors.head(n)),
-               velocities = OwnErrors(contacts, errors.tail(n));
-    for (size_t c = 0; c < contacts.size(); ++c) {
-      errors.head(n) -= contacts[c].response * displacements[c];
-      errors.tail(n) -= contacts[c].response * velocities[c];
-    }
+    const std::vector<Eigen::VectorXd> own = OwnStepErrors(contacts, touching->errors[i]);
+    for (size_t c = 0; c < contacts.size(); ++c) Take(contacts[c], own[c], &touching->errors[i]);
   }
 }
 

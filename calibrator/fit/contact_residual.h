@@ -31,7 +31,12 @@ ContactFunctions FitContacts(const FunctionFitOptions& options, uint64_t seed,
 std::vector<Eigen::VectorXd> OwnErrors(const std::vector<StepContacts::Contact>& contacts,
                                        const Eigen::VectorXd& errors);
 
-/// Takes from the errors of touching steps all that their contacts can have made (OwnErrors).
+/// The same of a step's errors in n positions and n velocities: 2 k entries of each contact, its
+/// displacement and its velocity. Thread-safe.
+std::vector<Eigen::VectorXd> OwnStepErrors(const std::vector<StepContacts::Contact>& contacts,
+                                           const Eigen::VectorXd& errors);
+
+/// Takes from the errors of touching steps all that their contacts can have made (OwnStepErrors).
 /// Thread-safe.
 void SetContactsAside(StepErrors* touching);
 

@@ -1,6 +1,6 @@
 #include "calibrator/gap/disturbances.h"
 
-#include <cmath>
+#include <array>
 #include <cstddef>
 
 #include "calibrator/fit/contact_residual.h"
@@ -12,60 +12,48 @@ namespace {
 
 using Contact = StepContacts::Contact;
 
-// Root mean square of contacts' own errors, for each of their directions.
-class Size {
+// Mean squares of contacts' own errors, for each of their 2 k entries.
+class MeanSquares {
  public:
   void Add(const Eigen::VectorXd& own) {
-    if (squares_.size() == 0) squares_ = Eigen::VectorXd::Zero(own.size());
-    squares_ += own.cwiseAbs2();
+    if (sums_.size() == 0) sums_ = Eigen::VectorXd::Zero(own.size());
+    sums_ += own.cwiseAbs2();
     ++count_;
   }
-  Eigen::VectorXd sd() const { return (squares_ / count_).cwiseSqrt(); }
+  Eigen::VectorXd operator()() const { return sums_ / count_; }
 
  private:
-  Eigen::VectorXd squares_;
+  Eigen::VectorXd sums_;
   int count_ = 0;
 };
 
-// Of contacts with the ground, and of those at stops.
-struct Sizes {
-  Size displacement[2], velocity[2];
-};
+// Of joints at their stops, and of points of the ground.
+using BothKinds = std::array<MeanSquares, 2>;
 
-Sizes SizesOf(const StepErrors& touching) {
-  Sizes sizes;
+BothKinds SizesOf(const StepErrors& touching) {
+  BothKinds sizes;
   for (size_t i = 0; i < touching.contacts.size(); ++i) {
     const std::vector<Contact>& contacts = touching.contacts[i];
-    const Eigen::Index n = touching.errors[i].size() / 2;
-    const auto displacements = OwnErrors(contacts, touching.errors[i].head(n)),
-               velocities = OwnErrors(contacts, touching.errors[i].tail(n));
-    for (size_t c = 0; c < contacts.size(); ++c) {
-      sizes.displacement[contacts[c].ground].Add(displacements[c]);
-      sizes.velocity[contacts[c].ground].Add(velocities[c]);
-    }
+    const std::vector<Eigen::VectorXd> own = OwnStepErrors(contacts, touching.errors[i]);
+    for (size_t c = 0; c < contacts.size(); ++c) sizes[contacts[c].ground].Add(own[c]);
   }
   return sizes;
 }
 
 Eigen::MatrixXd DisturbanceOf(const std::vector<Contact>& contacts, const Eigen::VectorXd& errors,
-                              const Sizes& sizes) {
+                              const BothKinds& sizes) {
+  const std::vector<Eigen::VectorXd> own = OwnStepErrors(contacts, errors);
   Eigen::Index columns = 0;
-  for (const Contact& contact : contacts) columns += 2 * contact.response.cols();
-  const Eigen::Index n = contacts.front().response.rows();
-  const auto displacements = OwnErrors(contacts, errors.head(n)),
-             velocities = OwnErrors(contacts, errors.tail(n));
-  const auto sd = [](const Size& size, const Eigen::VectorXd& own) -> Eigen::VectorXd {
-    return (size.sd().cwiseAbs2() + own.cwiseAbs2()).cwiseSqrt();
-  };
+  for (const Eigen::VectorXd& one : own) columns += one.size();
+  const Eigen::Index n = errors.size() / 2;
   Eigen::MatrixXd disturbance = Eigen::MatrixXd::Zero(2 * n, columns);
   Eigen::Index column = 0;
   for (size_t c = 0; c < contacts.size(); ++c) {
-    const Contact& contact = contacts[c];
-    const Eigen::Index k = contact.response.cols();
-    disturbance.block(0, column, n, k) =
-        contact.response * sd(sizes.displacement[contact.ground], displacements[c]).asDiagonal();
-    disturbance.block(n, column + k, n, k) =
-        contact.response * sd(sizes.velocity[contact.ground], velocities[c]).asDiagonal();
+    const Eigen::MatrixXd& response = contacts[c].response;
+    const Eigen::Index k = response.cols();
+    const Eigen::VectorXd sd = (sizes[contacts[c].ground]() + own[c].cwiseAbs2()).cwiseSqrt();
+    disturbance.block(0, column, n, k) = response * sd.head(k).asDiagonal();
+    disturbance.block(n, column + k, n, k) = response * sd.tail(k).asDiagonal();
     column += 2 * k;
   }
   return disturbance;
@@ -77,7 +65,7 @@ std::vector<Rollout> DisturbedByContacts(const std::shared_ptr<const Model>& mod
                                          const Eigen::VectorXd& physical,
                                          std::span<const Rollout> rollouts) {
   const SortedErrors errors = CollectErrors(model, physical, rollouts, Residual::kTouchMargin);
-  const Sizes sizes = SizesOf(errors.touching);
+  const BothKinds sizes = SizesOf(errors.touching);
   std::vector<Rollout> disturbed(rollouts.begin(), rollouts.end());
   std::vector<std::vector<bool>> known;
   for (const Rollout& rollout : rollouts) known.emplace_back(rollout.transitions.size(), false);
