@@ -15,6 +15,7 @@
 #include "sim/environment.h"
 #include "sim/residual_inputs.h"
 #include "sim/simulator.h"
+#include "sim/simulator_lanes.h"
 #include "sim/virtual/mujoco_backend.h"
 #include "sim/virtual/simbody_plant.h"
 #include "sim/windows.h"
@@ -183,6 +184,30 @@ void HopperControlStep(benchmark::State& state, bool residual) {
 }
 BENCHMARK_CAPTURE(HopperControlStep, alone, false);
 BENCHMARK_CAPTURE(HopperControlStep, residual, true);
+
+// As training does it: episodes side by side, each a robot of its own. Items are control steps.
+void HopperSideBySide(benchmark::State& state) {
+  const auto model = std::make_shared<const Model>(Load("hopper/robot.toml"));
+  std::vector<Environment> hoppers;
+  std::vector<Environment::Move> moves;
+  SimulatorLanes lanes(model);
+  Random random(1);
+  const Eigen::Vector3f action(0.1f, -0.1f, 0.1f);
+  for (int i = 0; i < state.range(0); ++i) hoppers.emplace_back(model).SendThroughDriver();
+  for (Environment& hopper : hoppers) {
+    hopper.SetParameters(Eigen::Vector4d::NullaryExpr([&] { return random.Uniform(2.5, 5); }));
+    moves.push_back({&hopper, {action.data(), 3}});
+  }
+  int step = 0;
+  for (auto _ : state) {
+    if (step++ % 100 == 0) {
+      for (Environment& hopper : hoppers) hopper.Reset(random);
+    }
+    Environment::Step(moves, lanes);
+  }
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+BENCHMARK(HopperSideBySide)->Arg(1)->Arg(2)->Arg(4)->Arg(8);
 
 void HopperInFlight(benchmark::State& state) {
   Simulator simulator(Load("hopper/gym.toml"));

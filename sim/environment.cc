@@ -17,7 +17,7 @@ Environment::Environment(std::shared_ptr<const Model> model)
       steps_per_episode_(model->description().task.steps),
       period_(model->description().task.period),
       latency_(std::clamp(model->description().simulation.latency, 0.0, period_)),
-      cycle_(period_),
+      parts_{{period_, true}},
       start_q_(Eigen::VectorXd::Zero(model->num_positions())),
       start_v_(Eigen::VectorXd::Zero(model->num_velocities())),
       effort_(start_v_),
@@ -32,7 +32,15 @@ Environment::Environment(std::shared_ptr<const Model> model)
 void Environment::SendThroughDriver() {
   const RobotDescription& robot = model_->description();
   if (robot.num_positions() != robot.num_velocities()) return;
-  cycle_ = robot.driver.cycle;
+  constexpr double kNothing = 1e-9;  // [s] that rounding leaves
+  parts_.clear();
+  for (const bool late : {false, true}) {
+    double left = late ? period_ - latency_ : latency_;
+    for (double cycle = 0; left > kNothing; left -= cycle) {
+      cycle = left - robot.driver.cycle > kNothing ? robot.driver.cycle : left;
+      parts_.push_back({cycle, late});
+    }
+  }
   limits_.resize(robot.joints.size());
   for (const int joint : robot.driven())
     limits_[static_cast<size_t>(joint)] = LimitsOf(robot.joints[static_cast<size_t>(joint)]);
@@ -64,19 +72,61 @@ void Environment::SetState(const Eigen::Ref<const Eigen::VectorXd>& q,
 }
 
 StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
+  Begin(action);
+  for (const Part& part : parts_) {
+    Send(part);
+    simulator_.Run();
+  }
+  return End();
+}
+
+void Environment::Step(std::span<Move> moves, SimulatorLanes& lanes) {
+  if (moves.empty()) return;
+  for (const Move& move : moves) move.environment->Begin(move.action);
+  for (size_t part = 0; part < moves[0].environment->parts_.size(); ++part) {
+    for (const Move& move : moves) {
+      move.environment->Send(move.environment->parts_[part]);
+      lanes.Add(move.environment->simulator_);
+    }
+    lanes.Run();
+  }
+  for (Move& move : moves) move.result = move.environment->End();
+}
+
+void Environment::Begin(const Eigen::Ref<const Eigen::VectorXf>& action) {
   task_->Effort(std::span(action.data(), static_cast<size_t>(action.size())), next_effort_);
   start_q_ = q();
   start_v_ = v();
-  if (corrected_) {
-    correction_->BeginStep(simulator_);
-    mean_effort_.setZero();
+  if (!corrected_) return;
+  correction_->BeginStep(simulator_);
+  mean_effort_.setZero();
+}
+
+// Without a driver as a recorded step with these efforts is simulated, in the same substeps: a log
+// of this environment is its model's to the last bit.
+void Environment::Send(const Part& part) {
+  if (!limits_.empty()) {
+    const Eigen::VectorXd& wish = part.late ? next_effort_ : effort_;
+    for (Eigen::Index i = 0; i < wish.size(); ++i) {
+      const auto& limits = limits_[static_cast<size_t>(i)];
+      const JointSituation joint{q()[i], v()[i], sent_[i], part.duration};
+      sent_[i] = limits ? LimitEffort(wish[i], joint, *limits).value_or(0) : wish[i];
+    }
+    simulator_.Prepare(sent_, part.duration);
+    if (corrected_) mean_effort_ += part.duration / period_ * sent_;
+    return;
   }
-  if (limits_.empty()) {
-    Play();
-  } else {
-    Act(effort_, latency_);
-    Act(next_effort_, period_ - latency_);
-  }
+  profile_[0].effort = effort_, profile_[1].effort = next_effort_;
+  if (latency_ > 0)
+    simulator_.Prepare(profile_);
+  else
+    simulator_.Prepare(next_effort_, part.duration);
+  if (!corrected_) return;
+  for (const EffortSegment& segment : profile_)
+    mean_effort_ += segment.duration / period_ * segment.effort;
+}
+
+StepResult Environment::End() {
   effort_.swap(next_effort_);
   if (corrected_) {
     correction_->EndStep(simulator_, mean_effort_, mean_effort_before_, period_);
@@ -85,35 +135,6 @@ StepResult Environment::Step(const Eigen::Ref<const Eigen::VectorXf>& action) {
   Read();
   return {task_->Reward(start_q_, start_v_, effort_, q(), v()),
           !simulator_.finite() || task_->Terminated(q(), v())};
-}
-
-// As a recorded step with these efforts is simulated, in the same substeps: a log of this
-// environment is its model's to the last bit.
-void Environment::Play() {
-  profile_[0].effort = effort_, profile_[1].effort = next_effort_;
-  if (latency_ > 0)
-    simulator_.Step(profile_);
-  else
-    simulator_.Step(next_effort_, period_);
-  if (!corrected_) return;
-  for (const EffortSegment& segment : profile_)
-    mean_effort_ += segment.duration / period_ * segment.effort;
-}
-
-// What is wished for, as the driver lets it through.
-void Environment::Act(const Eigen::VectorXd& wish, double duration) {
-  constexpr double kNothing = 1e-9;  // [s] that rounding leaves
-  while (duration > kNothing) {
-    const double cycle = duration - cycle_ > kNothing ? cycle_ : duration;
-    for (Eigen::Index i = 0; i < wish.size(); ++i) {
-      const auto& limits = limits_[static_cast<size_t>(i)];
-      const JointSituation joint{q()[i], v()[i], sent_[i], cycle_};
-      sent_[i] = limits ? LimitEffort(wish[i], joint, *limits).value_or(0) : wish[i];
-    }
-    simulator_.Step(sent_, cycle);
-    if (corrected_) mean_effort_ += cycle / period_ * sent_;
-    duration -= cycle;
-  }
 }
 
 void Environment::Read() {

@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/random.h"
@@ -13,6 +14,7 @@
 #include "sim/correction.h"
 #include "sim/effort_track.h"
 #include "sim/simulator.h"
+#include "sim/simulator_lanes.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -66,6 +68,16 @@ class Environment {
   /// @param action policy units, [-1, 1] = effort limits; clipped here.
   StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action);
 
+  /// One environment's part in a step of several.
+  struct Move {
+    Environment* environment;
+    Eigen::Map<const Eigen::VectorXf> action;
+    StepResult result{};  ///< is written
+  };
+  /// Step of several environments of one model, side by side: each gets the bits of its own Step.
+  /// @param lanes of that model. @throws std::invalid_argument, see SimulatorLanes::Run.
+  static void Step(std::span<Move> moves, SimulatorLanes& lanes);
+
   /// Writes what the policy sees of the sensors' readings (JointDynamics), observation_size()
   /// entries.
   void Observe(Eigen::Ref<Eigen::VectorXf> observation) const;
@@ -80,8 +92,14 @@ class Environment {
   const Task& task() const { return *task_; }
 
  private:
-  void Play();
-  void Act(const Eigen::VectorXd& wish, double duration);
+  // A step is sent in parts: without a driver it is one, with it one for each of its cycles.
+  struct Part {
+    double duration;  // [s]
+    bool late;        // of the time when the previous action no longer acts
+  };
+  void Begin(const Eigen::Ref<const Eigen::VectorXf>& action);
+  void Send(const Part& part);
+  StepResult End();
   void Read();
 
   std::unique_ptr<Task> task_;
@@ -93,9 +111,8 @@ class Environment {
   int steps_per_episode_;
   double period_;
   double latency_;
-  // the driver's: how often it limits efforts [s], and by what, each velocity's; empty: no driver
-  double cycle_;
-  std::vector<std::optional<JointLimits>> limits_;
+  std::vector<std::optional<JointLimits>> limits_;  // the driver's, of each velocity; empty: none
+  std::vector<Part> parts_;
   // work space of Reset and Step: where an episode or a step begins
   Eigen::VectorXd start_q_, start_v_;
   // of the latest action: what it wishes for at the beginning of the next step

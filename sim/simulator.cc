@@ -1,6 +1,7 @@
 #include "sim/simulator.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -10,6 +11,12 @@ namespace {
 
 // Beyond which nobody waits for a step.
 constexpr double kMaxSubsteps = 1e9;
+
+// Each time another number, in all threads.
+uint64_t NextName() {
+  static std::atomic<uint64_t> latest{0};
+  return ++latest;
+}
 
 }  // namespace
 
@@ -37,6 +44,7 @@ Simulator::~Simulator() = default;
 void Simulator::SetParameters(const Vector& physical) {
   model_->parameters().Apply(physical, &physics_);
   engine_->SetPhysics(0, physics_);
+  robot_ = NextName();
 }
 
 void Simulator::SetState(const Vector& q, const Vector& v) {
@@ -71,33 +79,57 @@ void Simulator::Recall(std::span<const EffortSegment> before) {
 }
 
 void Simulator::Step(const Vector& effort, double duration) {
-  RequireSize(effort.size());
-  RequireEnd(duration);
-  if (!(duration > 0) || !finite_) return;
-  if (model_->parameters().delays()) {
-    track_.Append(effort.data(), duration);
-    Run(duration);
-    return;
-  }
-  std::copy(effort.begin(), effort.end(), arriving_.begin());
-  const double count = SubstepCount(duration, model_->description().simulation.substep);
-  const double h = duration / count;
-  for (double i = 0; i < count; ++i) engine_->Substep(&h, effort.data(), nullptr);
-  Take();
+  Prepare(effort, duration);
+  Run();
 }
 
 void Simulator::Step(std::span<const EffortSegment> profile) {
+  Prepare(profile);
+  Run();
+}
+
+void Simulator::Prepare(const Vector& effort, double duration) {
+  RequireSize(effort.size());
+  RequireEnd(duration);
+  prepared_ = {};
+  if (!(duration > 0) || !finite_) return;
+  const bool held = !model_->parameters().delays();
+  if (held) {
+    std::copy(effort.begin(), effort.end(), mean_.begin());
+    std::fill(moment_.begin(), moment_.end(), 0.0);
+  } else {
+    track_.Append(effort.data(), duration);
+  }
+  Divide(duration, held);
+}
+
+void Simulator::Prepare(std::span<const EffortSegment> profile) {
   double duration = 0;
   for (const EffortSegment& segment : profile) {
     RequireSize(segment.effort.size());
     duration += std::max(0.0, segment.duration);
   }
   RequireEnd(duration);
+  prepared_ = {};
   if (!finite_) return;
   if (!model_->parameters().delays()) track_.Clear();
   for (const EffortSegment& segment : profile)
     track_.Append(segment.effort.data(), segment.duration);
-  if (duration > 0) Run(duration);
+  if (duration > 0) Divide(duration, false);
+}
+
+void Simulator::Divide(double duration, bool held) {
+  const double count = SubstepCount(duration, model_->description().simulation.substep);
+  prepared_ = {count, duration / count, held};
+}
+
+void Simulator::Run() {
+  if (prepared_.count == 0) return;
+  for (double i = 0; i < prepared_.count; ++i) {
+    const bool steady = FindEfforts(i);
+    engine_->Substep(&prepared_.length, mean_.data(), steady ? nullptr : moment_.data());
+  }
+  Finish();
 }
 
 void Simulator::Correct(const Vector& dq, const Vector& dv) {
@@ -121,24 +153,31 @@ void Simulator::RequireSize(Eigen::Index size) const {
   }
 }
 
-// Time 0 is the present; the track goes on to `duration`.
-void Simulator::Run(double duration) {
-  const double count = SubstepCount(duration, model_->description().simulation.substep);
-  const double h = duration / count;
-  for (double i = 0; i < count; ++i) {
-    bool steady = true;
-    for (size_t k = 0; k < mean_.size(); ++k) {
-      const EffortTrack::Moments moments =
-          track_.Over(k, i * h, (i + 1) * h, physics_.axes[k].delay);
-      mean_[k] = moments.mean;
-      moment_[k] = moments.first;
-      steady = steady && moments.first == 0;
-    }
-    engine_->Substep(&h, mean_.data(), steady ? nullptr : moment_.data());
+// Of the prepared step's i-th substep, whether no effort changes within it. Time 0 is the present;
+// the track goes on to the step's end.
+bool Simulator::FindEfforts(double i) {
+  if (prepared_.held) return true;
+  const double h = prepared_.length;
+  bool steady = true;
+  for (size_t k = 0; k < mean_.size(); ++k) {
+    const EffortTrack::Moments moments = track_.Over(k, i * h, (i + 1) * h, physics_.axes[k].delay);
+    mean_[k] = moments.mean;
+    moment_[k] = moments.first;
+    steady = steady && moments.first == 0;
   }
-  track_.Advance();
-  for (size_t k = 0; k < arriving_.size(); ++k)
-    arriving_[k] = track_.At(k, 0, physics_.axes[k].delay);
+  return steady;
+}
+
+// The prepared step has been run.
+void Simulator::Finish() {
+  if (prepared_.held) {
+    arriving_ = mean_;
+  } else {
+    track_.Advance();
+    for (size_t k = 0; k < arriving_.size(); ++k)
+      arriving_[k] = track_.At(k, 0, physics_.axes[k].delay);
+  }
+  prepared_ = {};
   Take();
 }
 

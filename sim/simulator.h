@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -64,6 +65,11 @@ class Simulator {
   void Step(const Vector& effort, double duration);
   /// The same for efforts one after the other: the profile that was really applied to a robot.
   void Step(std::span<const EffortSegment> profile);
+  /// A step in two halves, for those who run several simulators side by side (SimulatorLanes): what
+  /// will act, and the motion. Step is Prepare and Run.
+  void Prepare(const Vector& effort, double duration);
+  void Prepare(std::span<const EffortSegment> profile);
+  void Run();
   /// Adds to the state what a residual says that the step has left out; efforts on their way stay.
   void Correct(const Vector& dq, const Vector& dv);
 
@@ -101,15 +107,27 @@ class Simulator {
   Eigen::VectorXd Bias();
 
  private:
+  friend class SimulatorLanes;
+
+  // The step that comes next: in so many substeps of such a length [s]; 0 = none.
+  struct Prepared {
+    double count = 0, length = 0;
+    bool held = false;  // mean_ acts all the time; else what the track says
+  };
+
   void RequireSize(Eigen::Index size) const;
   void RequireEnd(double duration) const;
-  void Run(double duration);
+  void Divide(double duration, bool held);
+  bool FindEfforts(double substep);
+  void Finish();
   void Take();
 
   std::shared_ptr<const Model> model_;
   std::unique_ptr<Engine> engine_;
   Physics<double> physics_;
+  uint64_t robot_ = 0;  // names physics_: another number, other parameters
   EffortTrack track_;
+  Prepared prepared_;
   std::vector<double> mean_, moment_;
   std::vector<double> arriving_;  // efforts that act now
   Eigen::VectorXd q_, v_, reading_q_, reading_v_;

@@ -1,9 +1,12 @@
 #include "trainer/robot_simulation.h"
 
 #include <memory>
+#include <span>
 #include <stdexcept>
+#include <vector>
 
 #include "sim/environment.h"
+#include "sim/simulator_lanes.h"
 
 namespace plumb {
 namespace {
@@ -11,7 +14,8 @@ namespace {
 class RobotSimulation : public Simulation {
  public:
   explicit RobotSimulation(std::shared_ptr<const Model> model)
-      : environment_(model),
+      : model_(model),
+        environment_(model),
         position_noise_(model->description().training.position_noise),
         velocity_noise_(model->description().training.velocity_noise),
         q_(environment_.q()),
@@ -39,6 +43,18 @@ class RobotSimulation : public Simulation {
     Read();
     return result;
   }
+  void StepTogether(std::span<Move> moves) override {
+    moves_.clear();
+    for (const Move& move : moves)
+      moves_.push_back(
+          {&static_cast<RobotSimulation*>(move.simulation)->environment_, move.action});
+    if (!lanes_) lanes_ = std::make_unique<SimulatorLanes>(model_);
+    Environment::Step(moves_, *lanes_);
+    for (size_t i = 0; i < moves.size(); ++i) {
+      moves[i].result = moves_[i].result;
+      static_cast<RobotSimulation*>(moves[i].simulation)->Read();
+    }
+  }
 
  private:
   bool noisy() const { return position_noise_ > 0 || velocity_noise_ > 0; }
@@ -50,10 +66,14 @@ class RobotSimulation : public Simulation {
     for (double& v : v_) v += velocity_noise_ * noise_.Normal();
   }
 
+  std::shared_ptr<const Model> model_;
   Environment environment_;
   double position_noise_, velocity_noise_;
   Random noise_{0};
   Eigen::VectorXd q_, v_;  // what the policy is told
+  // of the one that steps others with itself
+  std::unique_ptr<SimulatorLanes> lanes_;
+  std::vector<Environment::Move> moves_;
 };
 
 }  // namespace

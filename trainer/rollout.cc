@@ -11,9 +11,8 @@
 namespace plumb {
 namespace {
 
-// Episodes side by side: the kernels gain little from more columns. Tasks: enough for as many
-// threads, in a number that two and four of them share evenly.
-constexpr int kMaxTogether = 8, kTasks = 8;
+// Episodes side by side: the kernels gain little from more columns, simulators nothing.
+constexpr int kMaxTogether = 8;
 
 }  // namespace
 
@@ -52,24 +51,23 @@ struct RolloutSampler::Player {
     std::copy(normalised.begin(), normalised.end(), observation);
   }
 
-  /// @param action the mean in, what was done out.
-  void Step(const float* observation, Eigen::Ref<Eigen::VectorXf> action, const Eigen::ArrayXf& sd,
-            bool explore) {
+  /// @param action the mean in, what is to be done out; not finite: the episode is of no use.
+  void Choose(Eigen::Ref<Eigen::VectorXf> action, const Eigen::ArrayXf& sd, bool explore) {
     if (explore) {
       for (Eigen::Index a = 0; a < action.size(); ++a)
         action[a] += sd[a] * static_cast<float>(random.Normal());
     }
-    if (!action.allFinite()) {
-      record = nullptr;
-      return;
-    }
-    const StepResult result = simulation->Step(action);
-    record->rewards.push_back(result.reward);
-    record->sum += result.reward;
-    record->terminated = result.terminated;
+    if (!action.allFinite()) record = nullptr;
+  }
+
+  /// Takes down a step that was done.
+  void Record(const float* observation, const Simulation::Move& move, bool explore) {
+    record->rewards.push_back(move.result.reward);
+    record->sum += move.result.reward;
+    record->terminated = move.result.terminated;
     if (!explore) return;
     record->observations.insert(record->observations.end(), observation, observation + raw.size());
-    record->actions.insert(record->actions.end(), action.begin(), action.end());
+    record->actions.insert(record->actions.end(), move.action.begin(), move.action.end());
   }
 };
 
@@ -78,6 +76,7 @@ struct RolloutSampler::Worker {
   std::vector<Player> players;
   kernels::Tape tape;
   Eigen::MatrixXf observations, actions;  // a column for each episode under way
+  std::vector<Simulation::Move> moves;    // likewise
 
   /// @param begin gives a player an episode. Plays `count` of them in lock-step.
   void Play(const GaussianPolicy& policy, const kernels::Network& network, int count, bool explore,
@@ -104,9 +103,18 @@ void RolloutSampler::Worker::Play(const GaussianPolicy& policy, const kernels::N
     std::erase_if(playing, [](const Player* player) { return player->record == nullptr; });
     if (playing.empty()) return;
     tape.Forward(network, observations.data(), column, actions.data());
+    moves.clear();
     for (column = 0; column < static_cast<int>(playing.size()); ++column) {
-      playing[static_cast<size_t>(column)]->Step(observations.col(column).data(),
-                                                 actions.col(column), sd, explore);
+      Player& player = *playing[static_cast<size_t>(column)];
+      player.Choose(actions.col(column), sd, explore);
+      if (!player.record) continue;
+      moves.push_back({player.simulation.get(), {actions.col(column).data(), actions.rows()}});
+    }
+    players.front().simulation->StepTogether(moves);
+    size_t done = 0;
+    for (column = 0; column < static_cast<int>(playing.size()); ++column) {
+      Player& player = *playing[static_cast<size_t>(column)];
+      if (player.record) player.Record(observations.col(column).data(), moves[done++], explore);
     }
   }
 }
@@ -118,7 +126,8 @@ RolloutSampler::RolloutSampler(const SimulationFactory& make, const PolicyShape&
     auto worker = std::make_unique<Worker>(Worker{{},
                                                   kernels::Tape(shape.sizes(), kMaxTogether),
                                                   Eigen::MatrixXf(shape.observations, kMaxTogether),
-                                                  Eigen::MatrixXf(shape.actions, kMaxTogether)});
+                                                  Eigen::MatrixXf(shape.actions, kMaxTogether),
+                                                  {}});
     for (int k = 0; k < kMaxTogether; ++k) {
       worker->players.push_back({.simulation = make(), .raw = Eigen::VectorXf(shape.observations)});
     }
@@ -139,8 +148,10 @@ std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy,
   const int own = bounds[rank + 1] - bounds[rank];
   first += bounds[rank];
   std::vector<EpisodeRecord> records(static_cast<size_t>(own));
+  // Full ones, in a number that the threads share evenly.
+  const int threads = workers_->size();
   int tasks = (own + kMaxTogether - 1) / kMaxTogether;
-  tasks = std::min(own, (tasks + kTasks - 1) / kTasks * kTasks);
+  tasks = std::min(own, (tasks + threads - 1) / threads * threads);
   workers_->Run(tasks, [&](int task, int worker) {
     const int begin = own * task / tasks, end = own * (task + 1) / tasks;
     state_[static_cast<size_t>(worker)]->Play(

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "common/random.h"
@@ -32,6 +33,18 @@ class Simulation {
   virtual void Observe(Eigen::Ref<Eigen::VectorXf> observation) const = 0;
   /// @param action policy units; clipped by the simulation.
   virtual StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) = 0;
+
+  /// One simulation's part in a step of several.
+  struct Move {
+    Simulation* simulation;
+    Eigen::Map<const Eigen::VectorXf> action;
+    StepResult result{};  ///< is written
+  };
+  /// Steps several that the same factory has made, itself perhaps among them: with the results of
+  /// Step, but perhaps sooner. One after the other unless a simulation knows better.
+  virtual void StepTogether(std::span<Move> moves) {
+    for (Move& move : moves) move.result = move.simulation->Step(move.action);
+  }
 };
 
 using SimulationFactory = std::function<std::unique_ptr<Simulation>()>;
