@@ -13,7 +13,7 @@
 #include "cli/outputs.h"
 #include "common/atomic_file.h"
 #include "robot/description.h"
-#include "robot/posterior_reader.h"
+#include "sim/simulators.h"
 #include "sim/tasks/task.h"
 #include "sim/view/picture.h"
 
@@ -97,7 +97,7 @@ int Excite(Process& process, const ExciteFlags& flags) {
   settings.seed = flags.seed;
   const Gaussian prior = flags.posterior.empty()
                              ? PriorGaussian(robot)
-                             : Moments(ReadPosterior(flags.posterior, robot).mixture);
+                             : Moments(ReadSimulators(flags.posterior, robot).mixture);
   const std::vector<RatedExcitation> rated = RateExcitations(robot, prior, settings);
   if (process.stopping()) return 130;
   std::cout << fmt::format("{}, task {}, seed {}: {} of {} excitations keep within the limits\n",

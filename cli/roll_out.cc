@@ -80,7 +80,7 @@ std::string Totals(const std::vector<EpisodeSummary>& episodes) {
     text += fmt::format(", standard deviation {:.1f}", std::sqrt(squares / (count - 1)));
   const size_t failures = episodes.size() - static_cast<size_t>(count);
   if (failures > 0) {
-    text += fmt::format("; {} failed: no longer finite{}", failures,
+    text += fmt::format("; {} failed: the simulation has blown up{}", failures,
                         count > 0 ? ", left out of the mean" : "");
   }
   return text;

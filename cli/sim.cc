@@ -14,9 +14,9 @@
 #include "cli/outputs.h"
 #include "cli/reading_noise.h"
 #include "cli/roll_out.h"
-#include "cli/simulators.h"
 #include "common/atomic_file.h"
 #include "common/time_units.h"
+#include "sim/simulators.h"
 #include "sim/view/picture.h"
 #include "trainer/policy_file.h"
 
@@ -116,7 +116,7 @@ const char* Describe(EpisodeSummary::End end) {
     case EpisodeSummary::End::kTerminated:
       return "terminated by the task";
     case EpisodeSummary::End::kNotFinite:
-      return "the simulation is no longer finite";
+      return "the simulation has blown up";
     case EpisodeSummary::End::kInterrupted:
       return "interrupted";
   }

@@ -13,7 +13,6 @@
 #include <thread>
 
 #include "cli/outputs.h"
-#include "cli/simulators.h"
 #include "cli/training_progress.h"
 #include "cli/training_report.h"
 #include "common/atomic_file.h"
@@ -23,6 +22,7 @@
 #include "common/name_lock.h"
 #include "common/ranks.h"
 #include "robot/residual_json.h"
+#include "sim/simulators.h"
 #include "trainer/checkpoint.h"
 #include "trainer/onnx_policy.h"
 #include "trainer/policy_file.h"

@@ -10,8 +10,8 @@
 #include "common/realtime.h"
 #include "estimator/model/unscented_observer.h"
 #include "estimator/state_observer.h"
-#include "robot/posterior_reader.h"
 #include "sim/model.h"
+#include "sim/simulators.h"
 
 namespace {
 
@@ -24,7 +24,7 @@ plumb::RobotDescription AssumedRobot(const plumb::RobotDescription& robot,
   const plumb::Model simulated(robot);
   const bool nominal = model == "nominal";
   return simulated.Describe(nominal ? simulated.parameters().means()
-                                    : plumb::ReadPosterior(model, robot).Mean());
+                                    : plumb::ReadSimulators(model, robot).Mean());
 }
 
 }  // namespace

@@ -64,9 +64,12 @@ Eigen::MatrixXd ResidualFunction::KernelFactor() const {
   return matrix.llt().matrixL();
 }
 
-void RequireFinite(const Residual& residual) {
+void RequirePlausible(const Residual& residual) {
   const auto require = [](bool good, const char* field) {
     if (!good) throw std::invalid_argument(std::string("residual: ") + field);
+  };
+  const auto small = [](const auto& x) {
+    return (x.array().abs() <= ResidualFunction::kMostChange).all();  // NaN is not
   };
   require(residual.margin >= 0 && std::isfinite(residual.margin), "margin is not a distance");
   for (const Eigen::VectorXd& draw : residual.coordinates)
@@ -77,12 +80,15 @@ void RequireFinite(const Residual& residual) {
     require(f.mean.allFinite(), "mean is not finite");
     require(f.scale.allFinite() && f.scale.minCoeff() > 0, "scale is not positive");
     require(f.low.allFinite() && f.high.allFinite(), "low or high is not finite");
+    require((f.low.array() <= f.high.array()).all(), "low is above high");
     require(f.centres.allFinite(), "a centre is not finite");
     for (const Eigen::MatrixXd& weights : f.weights)
       require(weights.allFinite(), "weights are not finite");
-    require(f.noise.allFinite(), "noise is not finite");
-    require(f.bound.allFinite() && f.bound.minCoeff() > 0, "bound is not positive");
-    require(f.unknown.allFinite() && f.unknown.minCoeff() >= 0, "unknown is negative");
+    require(small(f.noise), "noise is larger than what a simulator can lack");
+    require(f.bound.minCoeff() > 0, "bound is not positive");
+    require(small(f.bound), "bound is larger than what a simulator can lack");
+    require(f.unknown.minCoeff() >= 0, "unknown is negative");
+    require(small(f.unknown), "unknown is larger than what a simulator can lack");
   }
 }
 

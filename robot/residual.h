@@ -74,6 +74,8 @@ struct ResidualFunction {
   static constexpr double kNugget = 1e-3;
   /// More would be no residual but an attack: their kernel is factorised.
   static constexpr int kMostCentres = 2000;
+  /// [rad, m, rad/s, m/s] what no simulator lacks in a step: bound, noise and unknown are less.
+  static constexpr double kMostChange = 1000;
 };
 
 /// What a simulator lacks, for some draws of its parameters: each of them has its own functions, as
@@ -107,9 +109,9 @@ struct Residual {
   bool any() const { return free || touching || ground || stop; }
 };
 
-/// @throws std::invalid_argument naming the field that is not finite, or not positive where it has
-/// to be. Thread-safe.
-void RequireFinite(const Residual& residual);
+/// @throws std::invalid_argument naming the field that is not finite, not positive where it has to
+/// be, or larger than what a simulator can lack. Thread-safe.
+void RequirePlausible(const Residual& residual);
 
 /// A residual as one episode has it. Not thread-safe; does not allocate after construction.
 class ResidualSample {

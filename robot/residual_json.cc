@@ -1,6 +1,7 @@
 #include "robot/residual_json.h"
 
 #include <charconv>
+#include <cmath>
 #include <string>
 
 namespace plumb {
@@ -49,6 +50,13 @@ Eigen::VectorXd Positive(const JsonField& list, size_t size) {
   return list.SingleVector(size);
 }
 
+void RequireSmall(const JsonField& list, size_t size) {
+  for (const JsonField& entry : list.Entries(size)) {
+    entry.Require(std::abs(entry.Single()) <= ResidualFunction::kMostChange,
+                  "is larger than what a simulator can lack");
+  }
+}
+
 ResidualFunction ReadFunction(const JsonField& field, size_t draws, size_t outputs) {
   const size_t inputs = Count(field["mean"]),
                centres = Count(field["centres"], ResidualFunction::kMostCentres);
@@ -57,13 +65,17 @@ ResidualFunction ReadFunction(const JsonField& field, size_t draws, size_t outpu
   function.scale = Positive(field["scale"], inputs);
   function.low = field["low"].SingleVector(inputs);
   function.high = field["high"].SingleVector(inputs);
+  field["low"].Require((function.low.array() <= function.high.array()).all(), "is above high");
   function.centres = field["centres"].SingleMatrix(centres, inputs);
   for (const JsonField& weights : field["weights"].Entries(draws))
     function.weights.push_back(weights.SingleMatrix(outputs, 1 + inputs + centres));
+  for (const JsonField& row : field["noise"].Entries(outputs)) RequireSmall(row, outputs);
   function.noise = field["noise"].SingleMatrix(outputs, outputs);
   function.bound = Positive(field["bound"], outputs);
+  RequireSmall(field["bound"], outputs);
   for (const JsonField& entry : field["unknown"].Entries(outputs))
     entry.Require(entry.Single() >= 0, "is negative");
+  RequireSmall(field["unknown"], outputs);
   function.unknown = field["unknown"].SingleVector(outputs);
   return function;
 }

@@ -118,7 +118,7 @@ std::shared_ptr<const Residual> ReadResidual(const parameter_distribution_t& mes
     function = FromMessage(m, residual->coordinates.size());
   }
   residual->margin = message.residual_margin;
-  RequireFinite(*residual);
+  RequirePlausible(*residual);
   return residual;
 }
 

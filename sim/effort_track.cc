@@ -43,10 +43,12 @@ void EffortTrack::Advance() {
   efforts_.erase(efforts_.begin(), efforts_.begin() + static_cast<std::ptrdiff_t>(old * n_));
 }
 
-EffortTrack::Moments EffortTrack::Over(size_t i, double begin, double end, double delay) const {
+EffortTrack::Moments EffortTrack::Over(size_t i, double begin, double end, double delay) {
   const double from = begin - delay, to = end - delay;
-  size_t k = 0;
+  const bool earlier = latest_ >= ends_.size() || (latest_ > 0 && ends_[latest_ - 1] > from);
+  size_t k = earlier ? 0 : latest_;
   while (k + 1 < ends_.size() && ends_[k] <= from) ++k;
+  latest_ = k;
   if (k + 1 == ends_.size() || ends_[k] >= to) return {efforts_[k * n_ + i], 0};
   const double middle = (from + to) / 2;
   double impulse = 0, first = 0;

@@ -42,16 +42,17 @@ class EffortTrack {
   };
   /// Of the effort of velocity i over [begin, end] minus delay. Beyond the end of the track, its
   /// last effort.
-  Moments Over(size_t i, double begin, double end, double delay) const;
+  Moments Over(size_t i, double begin, double end, double delay);
 
   /// The effort that arrives at time t. @param i velocity.
-  double At(size_t i, double t, double delay) const { return Over(i, t, t, delay).mean; }
+  double At(size_t i, double t, double delay) { return Over(i, t, t, delay).mean; }
 
  private:
   size_t n_;
   double remembered_;
   std::vector<double> ends_;     // of each segment, increasing; the first begins at -infinity
   std::vector<double> efforts_;  // n of each
+  size_t latest_ = 0;            // segment in which the latest interval began: the next is near
 };
 
 }  // namespace plumb

@@ -21,8 +21,8 @@ namespace plumb {
 
 /// The outcome of a control step.
 struct StepResult {
-  double reward;    ///< of this step
-  bool terminated;  ///< by the task, or because the simulation is no longer finite; never by time
+  double reward;    ///< of this step; NaN where the simulation has blown up
+  bool terminated;  ///< by the task, or because the simulation has blown up; never by time
 };
 
 /// A task on a simulated robot, in control steps. One per worker; not thread-safe. After

@@ -10,6 +10,9 @@
 
 namespace plumb {
 
+/// Beyond this many rad, m, rad/s or m/s a simulation has failed: it has blown up.
+inline constexpr double kFarthest = 1e6;
+
 /// A robot that can be simulated: how it hangs together, and what its parameters do to it.
 /// Immutable, hence thread-safe: one for all workers.
 class Model {

@@ -184,7 +184,11 @@ void Simulator::Finish() {
 void Simulator::Take() {
   std::copy_n(engine_->q(), q_.size(), q_.begin());
   std::copy_n(engine_->v(), v_.size(), v_.begin());
-  finite_ = q_.allFinite() && v_.allFinite();
+  const auto near = [](const Eigen::VectorXd& x) { return (x.array().abs() < kFarthest).all(); };
+  finite_ = near(q_) && near(v_);  // NaN is not
+  if (finite_) return;
+  q_.setConstant(std::numeric_limits<double>::quiet_NaN());
+  v_.setConstant(std::numeric_limits<double>::quiet_NaN());
 }
 
 Simulator::State Simulator::Reading() {

@@ -83,7 +83,7 @@ class Simulator {
     const Eigen::VectorXd& v;
   };
   State Reading();
-  /// False once the state has blown up, or an effort was not finite.
+  /// False once the state has blown up, beyond kFarthest or not finite: its entries are NaN then.
   bool finite() const { return finite_; }
 
   /// At the current state under `effort` [rad/s^2 or m/s^2], without stops, contacts and Coulomb

@@ -24,8 +24,7 @@ void SimulatorLanes::Add(Simulator& simulator) {
 void SimulatorLanes::Run() {
   for (size_t begin = 0, end = 0; begin < added_.size(); begin = end) {
     const double substeps = added_[begin]->prepared_.count;
-    while (end < added_.size() && end - begin < lanes_ &&
-           added_[end]->prepared_.count == substeps)
+    while (end < added_.size() && end - begin < lanes_ && added_[end]->prepared_.count == substeps)
       ++end;
     Run({&added_[begin], end - begin});
   }
@@ -51,8 +50,7 @@ void SimulatorLanes::Run(std::span<Simulator* const> simulators) {
   }
   for (double substep = 0; substep < simulators[0]->prepared_.count; ++substep) {
     bool steady = true;
-    for (Simulator* simulator : simulators)
-      steady = simulator->FindEfforts(substep) && steady;
+    for (Simulator* simulator : simulators) steady = simulator->FindEfforts(substep) && steady;
     for (size_t lane = 0; lane < lanes_; ++lane) {
       const Simulator& simulator = in_lane(lane);
       for (size_t i = 0; i < n; ++i) {

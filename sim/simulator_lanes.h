@@ -33,9 +33,9 @@ class SimulatorLanes {
   std::shared_ptr<const Model> model_;
   std::unique_ptr<Engine> engine_;
   size_t lanes_;
-  std::vector<uint64_t> robots_;                // whose parameters each lane has
-  std::vector<double> lengths_;                 // [lane]: of a substep
-  std::vector<double> efforts_, moments_;       // [velocity][lane]
+  std::vector<uint64_t> robots_;           // whose parameters each lane has
+  std::vector<double> lengths_;            // [lane]: of a substep
+  std::vector<double> efforts_, moments_;  // [velocity][lane]
   std::vector<Simulator*> added_;
 };
 

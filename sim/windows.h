@@ -30,9 +30,6 @@ struct Window {
 /// lanes and companions. Not thread-safe itself.
 class Windows {
  public:
-  /// Beyond this many rad, m, rad/s or m/s a simulation has failed.
-  static constexpr double kFarthest = 1e6;
-
   /// @param threads fewer than one count as one.
   Windows(std::shared_ptr<const Model> model, int threads);
   Windows(Windows&&) noexcept;

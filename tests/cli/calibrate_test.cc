@@ -166,7 +166,8 @@ TEST_CASE("what a model lacks is learnt, told everywhere, and simulated and trai
   AddInput(&other);
   std::ofstream(folder / "other.json") << other;
   for (const std::string& command :
-       {"sim " + robot + " --posterior ", "train " + robot + " --distribution "}) {
+       {"sim " + robot + " --posterior ", "train " + robot + " --distribution ",
+        "excite " + robot + " --posterior "}) {
     const Outcome refused = Shell(Plumb() + command + (folder / "other.json"));
     CHECK(refused.status != 0);
     says(refused, "other.json: residual: the residual is another robot's");

@@ -162,7 +162,7 @@ TEST_CASE("sim: episodes that failed have no return") {
         "finite, left out "
         "of the mean");
   CHECK(Totals({good}) == "1 episode, 10 steps, mean return 1.0");
-  CHECK(Totals({failed, failed}) == "2 episodes, 10 steps; 2 failed: no longer finite");
+  CHECK(Totals({failed, failed}) == "2 episodes, 10 steps; 2 failed: the simulation has blown up");
 }
 
 TEST_CASE("sim: pictures") {

@@ -1,35 +1,14 @@
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "sim/environment.h"
 #include "sim/residual_inputs.h"
 #include "tests/sim/allocations.h"
+#include "tests/sim/residuals.h"
 #include "tests/sim/robots.h"
 
 namespace plumb {
 namespace {
-
-// The same change of velocities, or of positions and velocities, in every step of a condition.
-ResidualFunction Constant(const RobotDescription& robot, const Eigen::VectorXd& change) {
-  const Eigen::Index d = ResidualInputCount(robot), n = 2 * robot.num_velocities();
-  ResidualFunction f;
-  f.mean = Eigen::VectorXd::Zero(d), f.scale = Eigen::VectorXd::Ones(d);
-  f.low = Eigen::VectorXd::Constant(d, -1), f.high = Eigen::VectorXd::Constant(d, 1);
-  f.centres = Eigen::MatrixXd::Ones(3, d);
-  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(n, f.features());
-  weights.col(0).tail(change.size()) = change;
-  f.weights = {weights};
-  f.noise = Eigen::MatrixXd::Zero(n, n);
-  f.bound = Eigen::VectorXd::Constant(n, 10);
-  f.unknown = Eigen::VectorXd::Zero(n);
-  return f;
-}
-
-std::shared_ptr<Residual> Of(const RobotDescription& robot) {
-  auto residual = std::make_shared<Residual>();
-  residual->coordinates = {
-      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.parameters.size()))};
-  return residual;
-}
 
 Eigen::VectorXf Action(const Environment& environment, Random& random) {
   Eigen::VectorXf action(environment.action_size());
@@ -141,6 +120,23 @@ TEST_CASE("a residual of another robot is refused") {
   CHECK_THROWS_WITH(environment.SetResidual(residual), Catch::Contains("another robot's"));
   Environment own(pendulum);
   CHECK_THROWS_WITH(own.SetResidual(residual, 1), Catch::Contains("no such draw"));
+}
+
+TEST_CASE("an episode that its residual blows up ends, with a return that is none") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
+  const auto residual = Of(robot);
+  residual->free = residual->touching = Constant(robot, Eigen::VectorXd::Constant(6, 1e7));
+  residual->free->bound.setConstant(1e7), residual->touching->bound.setConstant(1e7);
+  Environment environment(robot);
+  environment.SetResidual(residual);
+  Random random(1);
+  environment.Reset(random);
+  const StepResult result = environment.Step(Eigen::VectorXf::Zero(3));
+  CHECK(result.terminated);
+  CHECK(std::isnan(result.reward));
+  environment.SetResidual(nullptr);
+  environment.Reset(random);
+  CHECK_FALSE(environment.Step(Eigen::VectorXf::Zero(3)).terminated);
 }
 
 TEST_CASE("steps with a residual do not allocate") {

@@ -8,6 +8,7 @@
 
 #include "sim/environment.h"
 #include "tests/sim/allocations.h"
+#include "tests/sim/residuals.h"
 #include "tests/sim/robots.h"
 
 namespace plumb {
@@ -38,6 +39,13 @@ struct Fleet {
     actions.resize(environments[0].action_size(), count);
   }
 
+  // Every second one has a residual.
+  void Lack(const std::shared_ptr<const Residual>& residual) {
+    for (size_t i = 0; i < environments.size(); i += 2) {
+      environments[i].SetResidual(residual);
+      environments[i].Reset(randoms[i]);
+    }
+  }
   void Choose() {
     for (Eigen::Index i = 0; i < actions.cols(); ++i) {
       for (float& action : actions.col(i))
@@ -48,8 +56,8 @@ struct Fleet {
     std::vector<Environment::Move> moves;
     for (size_t i = 0; i < environments.size(); ++i) {
       if (there[i])
-        moves.push_back({&environments[i],
-                         {actions.col(static_cast<Eigen::Index>(i)).data(), actions.rows()}});
+        moves.push_back(
+            {&environments[i], {actions.col(static_cast<Eigen::Index>(i)).data(), actions.rows()}});
     }
     return moves;
   }
@@ -66,19 +74,28 @@ struct Fleet {
 TEST_CASE("environments side by side have the bits of each alone") {
   struct Case {
     const char* file;
-    bool driver;
+    bool driver, residual;
   };
-  const auto [file, driver] = GENERATE(values<Case>({{"hopper/gym.toml", false},
-                                                     {"hopper/robot.toml", true},
-                                                     {"pendulum/gym.toml", false},
-                                                     {"pendulum/worn_fitted.toml", true},
-                                                     {"double_pendulum/robot.toml", false},
-                                                     {"quadruped/robot.toml", true}}));
+  const auto [file, driver, residual] =
+      GENERATE(values<Case>({{"hopper/gym.toml", false, false},
+                             {"hopper/robot.toml", true, false},
+                             {"hopper/robot.toml", true, true},
+                             {"pendulum/gym.toml", false, false},
+                             {"pendulum/worn_fitted.toml", true, true},  // with a delay
+                             {"double_pendulum/robot.toml", false, true},
+                             {"quadruped/robot.toml", true, false}}));
   CAPTURE(file);
   constexpr int kCount = 11;  // more than lanes, and not as many as make them full
-  const auto model = std::make_shared<const Model>(
-      LoadRobot(SourceFile(std::string("robots/") + file)));
+  const auto model =
+      std::make_shared<const Model>(LoadRobot(SourceFile(std::string("robots/") + file)));
   Fleet alone(model, kCount, driver), together(model, kCount, driver);
+  if (residual) {
+    const auto learnt = Of(model->description());
+    learnt->free = learnt->touching =
+        Constant(model->description(), VectorXd::Constant(model->num_velocities(), 0.125));
+    learnt->free->noise.diagonal().setConstant(0.01);
+    for (Fleet* fleet : {&alone, &together}) fleet->Lack(learnt);
+  }
   SimulatorLanes lanes(model);
   for (int step = 0; step < 30; ++step) {
     // Some leave, so that others change lanes; one comes back as another robot.

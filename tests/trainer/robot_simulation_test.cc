@@ -5,6 +5,8 @@
 #include <cstdlib>
 
 #include "robot/parameter_distribution.h"
+#include "tests/sim/residuals.h"
+#include "trainer/rollout.h"
 
 namespace plumb {
 namespace {
@@ -72,6 +74,26 @@ TEST_CASE("a simulator that cannot be is refused") {
   Eigen::VectorXd impossible = Nominal(robot);
   impossible(1) = -1;
   CHECK_THROWS_AS(simulation->Reset(impossible, random), std::invalid_argument);
+}
+
+TEST_CASE("episodes that a residual blows up are dropped and counted, whatever they would pay") {
+  const RobotDescription robot = Robot("hopper", 0, 0);
+  const auto residual = Of(robot);
+  residual->free = residual->touching = Constant(robot, Eigen::VectorXd::Constant(6, 1e7));
+  residual->free->bound.setConstant(1e7), residual->touching->bound.setConstant(1e7);
+  const ParameterSampler sample = [&](Random& random) {
+    SimulatorDraw draw(Nominal(robot));
+    if (random.Uniform(0, 1) < 0.3) draw.residual = residual;
+    return draw;
+  };
+  Workers workers(1);
+  const PolicyShape shape{11, {8}, 3};
+  RolloutSampler rollout(SimulateRobot(robot), shape, workers);
+  GaussianPolicy policy(shape);
+  const Batch batch = rollout.Collect(policy, sample, 500, 1, 7, 1, 2);
+  CHECK(batch.dropped > 0);
+  CHECK(batch.dropped < batch.played);
+  for (const double reward : batch.rewards) CHECK(std::abs(reward) < 100);
 }
 
 }  // namespace

@@ -167,6 +167,13 @@ TEST_CASE("hostile residuals are refused with file and field") {
              Contains(path + "scale: has 2 entries, expected 3"));
   CHECK_THAT(spoilt(touching + "scale/1", 0), Contains(path + "scale[1]: is not positive"));
   CHECK_THAT(spoilt(touching + "bound/0", -1), Contains(path + "bound[0]: is not positive"));
+  CHECK_THAT(spoilt(touching + "bound/0", 3e38),
+             Contains(path + "bound[0]: is larger than what a simulator can lack"));
+  CHECK_THAT(spoilt(touching + "unknown/0", 2000),
+             Contains(path + "unknown[0]: is larger than what a simulator can lack"));
+  CHECK_THAT(spoilt(touching + "noise/1/0", -2000),
+             Contains(path + "noise[1][0]: is larger than what a simulator can lack"));
+  CHECK_THAT(spoilt(touching + "low/0", 1e6), Contains(path + "low: is above high"));
   CHECK_THAT(spoilt(touching + "centres/2", {1}),
              Contains(path + "centres[2]: has 1 entries, expected 2"));
   CHECK_THAT(spoilt(touching + "weights/0", json::array()),

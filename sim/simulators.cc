@@ -1,4 +1,4 @@
-#include "cli/simulators.h"
+#include "sim/simulators.h"
 
 #include <fmt/format.h>
 
