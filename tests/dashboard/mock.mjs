@@ -57,7 +57,7 @@ const training = (iteration, update) => ({
   incumbent: iteration - 1, incumbent_since: Math.max(0, iteration - 1), decision: iteration ? `policy ${iteration - 1} trusted: the model explains the robot` : "",
 });
 
-const controller = (policy_iteration, phase = 3) => ({ utime: BEGIN, policy_iteration, phase, reason: "", step: 171, episode_return: -365.2, num_episodes: 3, returns: [-300 + 20 * policy_iteration, -280 + 12 * policy_iteration, -330 + 25 * policy_iteration], steps: [200, 100, 150], late_rate: [-0.5, -0.25, -0.5], fell: [false, false, true], episodes_wanted: 3, purpose: 0, episodes_aborted: 0 });
+const controller = (policy_iteration, phase = 3, purpose = 0) => ({ utime: BEGIN, policy_iteration, phase, reason: "", step: 171, episode_return: -365.2, num_episodes: 3, returns: [-300 + 20 * policy_iteration, -280 + 12 * policy_iteration, -330 + 25 * policy_iteration], steps: [200, 100, 150], late_rate: [-0.5, -0.25, -0.5], fell: [false, false, true], episodes_wanted: 3, purpose, episodes_aborted: 0 });
 
 const zeros = Array(20).fill(0);
 const driver = (state, reason, cycles) => ({
@@ -76,12 +76,12 @@ function solids(angle, alpha) {
 }
 
 /** What has been said before anybody came. */
-function past({ alarm = "", iterations = 6 }) {
+function past({ alarm = "", iterations = 6, judged = false }) {
   const said = [];
   for (let i = 0; i <= iterations; i++) {
     said.push(["CALIBRATION_STATUS", calibration(i, i === iterations ? alarm : "")], ["PLUMB_POSTERIOR", posterior(i)]);
     for (let update = 0; update <= 40; update += 2) said.push(["TRAINING_STATUS", training(i, update)]);
-    said.push(["CONTROLLER_STATUS", controller(i)]);
+    said.push(["CONTROLLER_STATUS", controller(i, 3, Number(judged && i === iterations))]);
   }
   said.push(["PARAMETER_DISTRIBUTION", { iteration: iterations, residual: alarm ? [residual] : [] }], ["ESTIMATOR_STATUS", estimator], ["DRIVER_STATUS", driver(1, "", 1000)]);
   return said;
@@ -141,7 +141,7 @@ export async function serve(folder, port = 0, story = {}) {
       tell("PLUMB_PREDICTION", { sequence: tick, q: [angle + off], v: [3.4 * Math.cos(1.3 * t)], q_measured: [angle] });
       tell("PLUMB_SCENE", { deletions: [], entities: [{ id: "robot", ...solids(angle, 1) }, { id: "prediction", ...solids(angle + 0.09, 0.4) }, { id: "ground" }] });
       tell("ROBOT_STATE", { sequence: tick, num_joints: 1, q: [angle], v: [3.4 * Math.cos(1.3 * t)], q_sd: [1.2e-4], v_sd: [0.02], effort: [0.3], contact: [], valid: true });
-      if (tick % 5 === 0) tell("DRIVER_STATUS", driver(state, state === 4 ? "emergency stop by request" : "", tick + 1000)), tell("CONTROLLER_STATUS", controller(6, story.placing ? 1 : 2)), tell("ESTIMATOR_STATUS", estimator);
+      if (tick % 5 === 0) tell("DRIVER_STATUS", driver(state, state === 4 ? "emergency stop by request" : "", tick + 1000)), tell("CONTROLLER_STATUS", controller(6, story.placing ? 1 : 2, Number(story.judged ?? false))), tell("ESTIMATOR_STATUS", estimator);
       if (tick % 25 === 0) tell("PLUMB_CHANNELS", { channels: topics.slice(5).concat("IMU").map((channel, k) => ({ channel, type: `${channel.toLowerCase()}_t`, count: channel === "IMU" ? 0 : tick * (k + 1), rate: channel === "IMU" ? null : 50 / (k + 1), jitter_ms: channel === "IMU" ? null : 0.3 * k, bytes_per_second: channel === "IMU" ? null : 9000 / (k + 1), undecodable: 0, age_ms: channel === "IMU" ? null : 20 })) });
       if (tick % 25 === 0 && story.placing) tell("PLACE_ROBOT", { q: [-0.773], v: [0.812] });
       if (tick % 50 === 0) tell("PLUMB_GATEWAY", { clock: story.clock ?? "real", speed: story.clock ? 14 : 1, clients: clients.size, dropped: 0 });

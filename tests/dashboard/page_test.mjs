@@ -73,6 +73,13 @@ test("a trial that was cut short counts as a whole episode, one that fell as it 
   assert.deepEqual((await numbers(page, "returns", 1)).slice(0, 3), [[0, 1, 200, -300, -300], [0, 2, 100, -280, -305], [0, 3, 150, -330, -330]]);
 }));
 
+test("what the robot returns in the end is the incumbent's, whose policy runs then", visit({ judged: true }, {}, async ({ page }) => {
+  await page.locator("#returns .chart canvas").waitFor();
+  const [fifth, sixth] = (await numbers(page, "returns")).slice(-2);
+  assert.deepEqual([fifth[0], fifth[2], fifth[3]], [5, 6, -170]);
+  assert.deepEqual(sixth.slice(0, 4), [6, null, 0, -152]);
+}));
+
 test("the discrepancy that was learnt is told", visit({ alarm: ALARM }, {}, async ({ page }) => {
   const table = page.locator("#gap table").filter({ hasText: "learnt, rms" });
   const cells = await table.locator("tbody tr").first().locator("td").evaluateAll((all) => all.map((one) => one.dataset.value ?? one.textContent));

@@ -2,7 +2,7 @@ import type { Value } from "../contract";
 import { number } from "../format";
 import { Chart } from "../parts/chart";
 import { Key, Panel } from "../parts/panel";
-import type { controller_status_t } from "../messages";
+import { type controller_status_t, policy_t } from "../messages";
 import { outcomes, robot, trainings } from "../run";
 
 interface Episode {
@@ -34,6 +34,12 @@ function episodes({ returns, steps, late_rate, fell }: controller_status_t): Epi
   });
 }
 
+/** The iteration in which its policy was trained: in the last one the robot is run with the incumbent, which may be an earlier one's. */
+function trainedIn({ policy_iteration, purpose }: controller_status_t): number {
+  const said = purpose === policy_t.EVALUATE ? trainings.value.findLast((one) => one.iteration === policy_iteration && one.complete) : undefined;
+  return said && said.incumbent >= 0 ? said.incumbent : policy_iteration;
+}
+
 /** What each policy has returned: in simulation when its training was complete, and on the robot. */
 function byPolicy(): Outcome[] {
   const found = new Map<number, Outcome>();
@@ -41,7 +47,7 @@ function byPolicy(): Outcome[] {
     if (!found.has(policy)) found.set(policy, { policy, robot: [], simulated: null, tenth: null, worst: null });
     return found.get(policy)!;
   };
-  for (const status of outcomes.value) if (status.returns.length) of(status.policy_iteration).robot.push(...episodes(status));
+  for (const status of outcomes.value) if (status.returns.length) of(trainedIn(status)).robot.push(...episodes(status));
   for (const one of trainings.value) {
     if (one.complete) Object.assign(of(one.iteration), { simulated: one.evaluation_return, tenth: one.evaluation_tenth, worst: one.evaluation_worst });
   }
