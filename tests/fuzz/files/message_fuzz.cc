@@ -32,7 +32,7 @@ bool Decodes(std::span<const uint8_t> body, Message& message) {
   for (size_t i = 0; i < 8; ++i) bytes[i] = static_cast<uint8_t>(hash >> (56 - 8 * i));
   bytes.insert(bytes.end(), body.begin(), body.end());
   const int used = message.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  if (used < 0) return false;
+  if (used < 0) return Refuse("it does not decode"), false;
   Require(used <= static_cast<int>(bytes.size()));
   Require(message.getEncodedSize() == used);
   return true;
