@@ -96,6 +96,7 @@ void ExpectedTransitions::Complete() {
     Episode episode = Join(complete_->episode[i], last[i]);
     if (seen.empty() || seen.back() != episode) seen.push_back(std::move(episode));
   }
+  completed_[complete_->policy_iteration].insert(complete_->episode);
   complete_.reset();
 }
 

@@ -37,6 +37,9 @@ class ExpectedTransitions {
   void Hear(const lockstep_post_t& post);
   /// Each completed episode whose states were all there, as it then was.
   const std::map<int64_t, std::vector<Episode>>& episodes() const { return episodes_; }
+  /// The episodes that were completed with each policy, as it was told: another list where the
+  /// controller has begun anew.
+  const std::map<int, std::set<std::vector<int64_t>>>& completed() const { return completed_; }
 
  private:
   bool Believed(const lockstep_post_t& post);
@@ -60,6 +63,7 @@ class ExpectedTransitions {
   std::set<int64_t> cut_off_;  // episodes of before the driver was started again
   std::optional<controller_status_t> complete_;
   std::map<int64_t, std::vector<Episode>> episodes_;
+  std::map<int, std::set<std::vector<int64_t>>> completed_;
 };
 
 }  // namespace plumb

@@ -1,6 +1,7 @@
 #include "chaos/journal_witness.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <fstream>
@@ -53,18 +54,34 @@ int JournalWitness::Judge(int64_t time, const std::filesystem::path& folder, uin
     journal = CalibrationCheckpoint(folder, robot_, seed).Load();
   } catch (const std::exception& error) {
     chronicle_.Violate(4, time, error.what());
+    return 0;
+  }
+  const int iterations = journal ? journal->iteration : 0;
+  if (iterations < said.iteration()) {
+    chronicle_.Violate(4, time,
+                       fmt::format("distribution {} was said, the journal has {} iterations",
+                                   said.iteration(), iterations));
   }
   if (!journal) return 0;
+  JudgeRollouts(time, *journal);
+  JudgeFindings(time, folder, seed, *journal, said);
+  return static_cast<int>(CountTransitions(journal->rollouts));
+}
+
+void JournalWitness::JudgeRollouts(int64_t time, const SimOpt::State& journal) {
   std::map<int64_t, std::vector<Episode>> expected;
+  std::map<int, std::set<std::vector<int64_t>>> completed;
   for (Life& life : lives_) {
     std::ranges::stable_sort(life.heard, {}, &lockstep_post_t::arrival);
     ExpectedTransitions transitions(robot_, bus_, key_, life.beginning);
     for (const lockstep_post_t& post : life.heard) transitions.Hear(post);
     for (const auto& [episode, seen] : transitions.episodes())
       std::ranges::copy(seen, std::back_inserter(expected[episode]));
+    for (const auto& [policy, lists] : transitions.completed())
+      completed[policy].insert(lists.begin(), lists.end());
   }
   std::set<int64_t> counted;
-  for (const Rollout& rollout : journal->rollouts) {
+  for (const Rollout& rollout : journal.rollouts) {
     if (!counted.insert(rollout.episode).second) {
       chronicle_.Violate(4, time, fmt::format("episode {} counts twice", rollout.episode));
       continue;
@@ -78,12 +95,28 @@ int JournalWitness::Judge(int64_t time, const std::filesystem::path& folder, uin
                        fmt::format("{} transitions of episode {} count, and {}", steps.size(),
                                    rollout.episode, told));
   }
-  // The same transitions again, by a calibrator whom nobody disturbs.
+  // None of a policy's episodes is missing.
+  auto rollout = journal.rollouts.begin();
+  for (int policy = 0; policy < journal.iteration; ++policy) {
+    std::vector<int64_t> episodes;
+    for (int i = 0; i < journal.rollouts_per_iteration[static_cast<size_t>(policy)]; ++i)
+      episodes.push_back((rollout++)->episode);
+    if (completed[policy].contains(episodes)) continue;
+    chronicle_.Violate(4, time,
+                       fmt::format("of policy {} the episodes {} count, which are not those that "
+                                   "it was told",
+                                   policy, fmt::join(episodes, ", ")));
+  }
+}
+
+/// The same transitions again, by a calibrator whom nobody disturbs.
+void JournalWitness::JudgeFindings(int64_t time, const std::filesystem::path& folder, uint64_t seed,
+                                   const SimOpt::State& journal, const MessageWitness& said) {
   SimOpt again(robot_, seed, 1, robot_.calibration.method);
-  auto next = journal->rollouts.begin();
+  auto next = journal.rollouts.begin();
   size_t in_use = 0;
-  for (int k = 1; k <= journal->iteration; ++k) {
-    const auto end = next + journal->rollouts_per_iteration[static_cast<size_t>(k - 1)];
+  for (int k = 1; k <= journal.iteration; ++k) {
+    const auto end = next + journal.rollouts_per_iteration[static_cast<size_t>(k - 1)];
     std::vector<Rollout> rollouts(next, end);
     next = end;
     in_use += CountTransitions(rollouts);
@@ -107,7 +140,6 @@ int JournalWitness::Judge(int64_t time, const std::filesystem::path& folder, uin
                                      counted_then->second, k, in_use));
     }
   }
-  return static_cast<int>(CountTransitions(journal->rollouts));
 }
 
 }  // namespace plumb

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "calibrator/live/simopt.h"
 #include "chaos/chronicle.h"
 #include "chaos/message_witness.h"
 #include "common/signature.h"
@@ -15,8 +16,8 @@
 namespace plumb {
 
 /// Sees, when a run is over, from the calibrator's journal and what it was told that
-/// - each transition which it had to accept counts once, with the states that were said, and no
-///   other does (invariant 4);
+/// - each episode which was completed, and each transition of it which it had to accept, counts
+///   once, with the states that were said, and no other does (invariant 4);
 /// - its posteriors and distributions are those of an undisturbed calibration of the same
 ///   transitions, to the bit (5).
 /// Not thread-safe.
@@ -39,6 +40,10 @@ class JournalWitness {
     int64_t beginning;
     std::vector<lockstep_post_t> heard;
   };
+
+  void JudgeRollouts(int64_t time, const SimOpt::State& journal);
+  void JudgeFindings(int64_t time, const std::filesystem::path& folder, uint64_t seed,
+                     const SimOpt::State& journal, const MessageWitness& said);
 
   const RobotDescription& robot_;
   const std::string bus_;

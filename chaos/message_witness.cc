@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -15,19 +16,69 @@
 #include "plumb/joint_state_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
 #include "plumb/policy_t.hpp"
+#include "plumb/residual_function_t.hpp"
 #include "plumb/robot_state_t.hpp"
 #include "plumb/training_status_t.hpp"
 
 namespace plumb {
 namespace {
 
-template <class Numbers>
-bool Finite(const Numbers& numbers) {
-  return std::ranges::all_of(numbers, [](auto x) { return std::isfinite(x); });
+template <class... Numbers>
+bool Finite(const Numbers&... numbers) {
+  return (std::ranges::all_of(numbers, [](auto x) { return std::isfinite(x); }) && ...);
+}
+
+/// NaN stands for what is not known.
+template <class... Numbers>
+bool FiniteOrUnknown(const Numbers&... numbers) {
+  return (std::ranges::none_of(numbers, [](auto x) { return std::isinf(x); }) && ...);
+}
+
+// Of what counts as valid, every field that lcmtypes does not allow to be NaN is finite, and no
+// other one is infinite.
+
+bool IsFinite(const joint_state_t& m) {
+  for (size_t i = 0; i < m.valid.size(); ++i) {
+    const std::array others{m.velocity[i], m.effort_measured[i], m.effort_sent[i],
+                            m.effort_applied[i]};
+    if (m.valid[i] && !(std::isfinite(m.position[i]) && FiniteOrUnknown(others))) return false;
+  }
+  return true;
 }
 
 bool IsFinite(const robot_state_t& m) {
-  return Finite(m.q) && Finite(m.v) && Finite(m.q_sd) && Finite(m.v_sd);
+  return !m.valid || (Finite(m.q, m.v, m.q_sd, m.v_sd) && FiniteOrUnknown(m.effort));
+}
+
+bool IsFinite(const imu_t& m) {
+  return Finite(m.rate, m.force) && (!m.orientation_valid || Finite(m.orientation));
+}
+
+bool IsFinite(const joint_command_t& m) {
+  return Finite(m.effort) && FiniteOrUnknown(m.position, m.velocity, m.kp, m.kd);
+}
+
+bool IsFinite(const policy_t& m) {
+  return Finite(m.weight, m.observation_mean, m.observation_scale, m.action_scale);
+}
+
+bool IsFinite(const residual_function_t& m) {
+  return Finite(m.mean, m.scale, m.low, m.high, m.centre, m.weight, m.noise, m.bound, m.unknown);
+}
+
+bool IsFinite(const parameter_distribution_t& m) {
+  const std::array update{m.kl, m.ess, m.temperature, m.discrepancy};
+  return Finite(m.weight, m.mean, m.covariance, m.draw, m.start) &&
+         std::isfinite(m.residual_margin) && FiniteOrUnknown(update) &&
+         std::ranges::all_of(m.residual, [](const auto& residual) { return IsFinite(residual); });
+}
+
+bool IsFinite(const calibration_status_t& m) {
+  return Finite(m.mean, m.sd, m.streamed_mean, m.streamed_sd);
+}
+
+bool IsFinite(const controller_status_t& m) {
+  return Finite(m.returns, m.late_rate) && std::isfinite(m.episode_return);
 }
 
 /// Decodes it, if it is of that type.
@@ -56,8 +107,9 @@ void MessageWitness::RequireRising(int64_t time, const std::string& what, int it
   known->second = std::max(known->second, iteration);
 }
 
-void MessageWitness::RequireFinite(int64_t time, const std::string& what, bool finite) {
-  if (!finite) chronicle_.Violate(3, time, what + " is valid and not finite");
+template <class Message>
+void MessageWitness::RequireFinite(int64_t time, const std::string& what, const Message& m) {
+  if (!IsFinite(m)) chronicle_.Violate(3, time, what + " is valid and not finite");
 }
 
 void MessageWitness::NoteChange(int64_t time, const std::string& who, const std::string& state) {
@@ -70,25 +122,22 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
   if (post.topic.kind == lockstep_topic_t::FRAME || speaker.empty()) return;
   const std::string& channel = post.topic.name;
   if (channel == "JOINT_STATE") {
-    if (joint_state_t m; Read(post, m)) {
-      for (size_t i = 0; i < m.valid.size(); ++i)
-        RequireFinite(time, channel, !m.valid[i] || std::isfinite(m.position[i]));
-    }
+    if (joint_state_t m; Read(post, m)) RequireFinite(time, channel, m);
   } else if (channel == "ROBOT_STATE" || channel == "ROBOT_STATE_SMOOTHED") {
-    if (robot_state_t m; Read(post, m)) RequireFinite(time, channel, !m.valid || IsFinite(m));
+    if (robot_state_t m; Read(post, m)) RequireFinite(time, channel, m);
   } else if (channel == "IMU") {
-    if (imu_t m; Read(post, m)) RequireFinite(time, channel, Finite(m.rate) && Finite(m.force));
+    if (imu_t m; Read(post, m)) RequireFinite(time, channel, m);
   } else if (channel == "JOINT_COMMAND") {
-    if (joint_command_t m; Read(post, m)) RequireFinite(time, channel, Finite(m.effort));
+    if (joint_command_t m; Read(post, m)) RequireFinite(time, channel, m);
   } else if (channel == "POLICY") {
     policy_t m;
     if (!Read(post, m)) return;
-    RequireFinite(time, channel, Finite(m.weight) && Finite(m.action_scale));
+    RequireFinite(time, channel, m);
     RequireRising(time, channel, m.iteration);
   } else if (channel == "PARAMETER_DISTRIBUTION") {
     parameter_distribution_t m;
     if (!Read(post, m)) return;
-    RequireFinite(time, channel, Finite(m.weight) && Finite(m.mean) && Finite(m.covariance));
+    RequireFinite(time, channel, m);
     RequireRising(time, channel, m.iteration);
     const std::span<const uint8_t> bytes = Unsealed(post.data);
     const auto [said, first] = distributions_.try_emplace(m.iteration, bytes.begin(), bytes.end());
@@ -98,6 +147,7 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
   } else if (channel == "CALIBRATION_STATUS") {
     calibration_status_t m;
     if (!Read(post, m)) return;
+    RequireFinite(time, channel, m);
     RequireRising(time, channel, m.iteration);
     NoteChange(time, "calibrator",
                fmt::format("iteration {}, {} transitions", m.iteration, m.transitions));
@@ -116,7 +166,7 @@ void MessageWitness::OnSaid(int64_t time, const lockstep_post_t& post, const std
     NoteChange(time, "controller",
                fmt::format("policy {}: {} {}", m.policy_iteration,
                            kPhases[static_cast<size_t>(m.phase)], m.reason));
-    RequireFinite(time, channel, Finite(m.returns) && Finite(m.late_rate));
+    RequireFinite(time, channel, m);
     RequireRising(time, channel, m.policy_iteration);
   } else if (channel == "DRIVER_STATUS") {
     if (driver_status_t m; Read(post, m)) {

@@ -32,7 +32,8 @@ class MessageWitness {
 
  private:
   void RequireRising(int64_t time, const std::string& what, int iteration);
-  void RequireFinite(int64_t time, const std::string& what, bool finite);
+  template <class Message>
+  void RequireFinite(int64_t time, const std::string& what, const Message& m);
   void NoteChange(int64_t time, const std::string& who, const std::string& state);
 
   Chronicle& chronicle_;

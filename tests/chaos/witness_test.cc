@@ -11,6 +11,8 @@
 #include "plumb/driver_request_t.hpp"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/joint_command_t.hpp"
+#include "plumb/joint_state_t.hpp"
+#include "plumb/parameter_distribution_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "plumb/robot_state_t.hpp"
 
@@ -195,6 +197,42 @@ TEST_CASE("what is valid is finite, and iterations do not count down") {
   SECTION("not finite") {
     state.valid = true;
     witness.OnSaid(3, Post("ROBOT_STATE", state, 3), "plumb-estimator");
+    CHECK(chronicle.invariant() == 3);
+  }
+  SECTION("an effort may be unknown, and not infinite") {
+    state.valid = true;
+    state.q = {0}, state.effort = {NAN};
+    witness.OnSaid(3, Post("ROBOT_STATE", state, 3), "plumb-estimator");
+    CHECK_FALSE(chronicle.violated());
+    state.effort = {INFINITY};
+    witness.OnSaid(4, Post("ROBOT_STATE", state, 4), "plumb-estimator");
+    CHECK(chronicle.invariant() == 3);
+  }
+  SECTION("of a joint that is not valid nothing is demanded") {
+    joint_state_t joints{};
+    joints.num_joints = 2;
+    joints.measured = {0, 0};
+    joints.position = {0, NAN}, joints.velocity = {NAN, INFINITY};
+    joints.effort_measured = joints.effort_sent = joints.effort_applied = {NAN, NAN};
+    joints.valid = {1, 0};
+    witness.OnSaid(3, Post("JOINT_STATE", joints, 3), "plumb-driver");
+    CHECK_FALSE(chronicle.violated());
+    joints.effort_applied[0] = -INFINITY;
+    witness.OnSaid(4, Post("JOINT_STATE", joints, 4), "plumb-driver");
+    CHECK(chronicle.invariant() == 3);
+  }
+  SECTION("a policy's normalisation, a distribution's starts") {
+    const bool of_policy = GENERATE(true, false);
+    if (of_policy) {
+      policy.num_observations = 1;
+      policy.observation_mean = {0}, policy.observation_scale = {NAN};
+      witness.OnSaid(3, Post("POLICY", policy, 3), "plumb-trainer");
+    } else {
+      parameter_distribution_t distribution{};
+      distribution.num_starts = 1;
+      distribution.start = {NAN};
+      witness.OnSaid(3, Post("PARAMETER_DISTRIBUTION", distribution, 3), "plumb-calibrator");
+    }
     CHECK(chronicle.invariant() == 3);
   }
   SECTION("counted back") {
