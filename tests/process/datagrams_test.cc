@@ -60,7 +60,10 @@ TEST_CASE(
       {"plumb-controller", {stage.robot_folder}},
       {"plumb-calibrator", {stage.robot_folder, "--checkpoint", stage.folder / "calibration"}},
       {"plumb-trainer", {stage.robot_folder, "--checkpoint", stage.folder / "training"}},
-      {"plumb", {"record", stage.folder / "all.lcmlog"}}};
+      {"plumb-dashboard",
+       {stage.robot_folder, "--address", "127.0.0.1:0", "--page", stage.folder.string()}},
+      {"plumb", {"record", stage.folder / "all.lcmlog"}},
+      {"plumb", {"meldis", stage.robot_folder}}};
   const Flood flood(stage.lcm_url, Malformed(), 10'000);
   for (auto [name, arguments] : programs) {
     arguments.insert(arguments.begin(), Stage::Binary(name));
