@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "calibrator/diagnostics/corrected_prediction.h"
+
 namespace plumb {
 namespace {
 
@@ -73,7 +75,7 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
   int tried = 0, better = 0;
   std::string worse, alike;
   for (const int horizon : kHorizons) {
-    HorizonError error{horizon, CountWindows(split.held_out, horizon), NAN, NAN};
+    HorizonError error{horizon, CountWindows(split.held_out, horizon), NAN, NAN, NAN};
     if (error.windows > 0) {
       const Eigen::VectorXd errors = discrepancy.PredictionError(both, split.held_out, horizon);
       error.posterior = errors(0), error.prior = errors(1);
@@ -119,6 +121,23 @@ Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorX
         result.held_out, worse, worse == "1" ? "" : "s");
   }
   return result;
+}
+
+void JudgeResidual(const std::shared_ptr<const Model>& model, const Residual& residual,
+                   const Split& split, const Eigen::VectorXd& posterior, Holdout* holdout) {
+  const Eigen::VectorXd errors =
+      CorrectedPredictionErrors(model, posterior, residual, split.held_out, kHorizons);
+  const HorizonError* last = nullptr;
+  for (size_t i = 0; i < holdout->errors.size(); ++i) {
+    holdout->errors[i].corrected = errors[static_cast<Eigen::Index>(i)];
+    if (holdout->errors[i].windows > 0) last = &holdout->errors[i];
+  }
+  if (!last) return;
+  const auto ratio = [](const HorizonError& error) { return error.corrected / error.posterior; };
+  holdout->summary += fmt::format(
+      "; with the residual of what was fitted its errors are {:.3g} times those "
+      "without after 1 step, {:.3g} times after {}",
+      ratio(holdout->errors[0]), ratio(*last), last->horizon);
 }
 
 }  // namespace plumb

@@ -2,11 +2,15 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "calibrator/fit/discrepancy.h"
+#include "robot/residual.h"
+#include "sim/model.h"
 
 namespace plumb {
 
@@ -19,6 +23,9 @@ struct HorizonError {
   int64_t windows;   ///< predicted; with 0 the errors are NaN
   double posterior;  ///< of the posterior's mean
   double prior;      ///< of the prior's mean
+  /// of the posterior's mean with the residual of the transitions that were fitted; NaN where there
+  /// is none
+  double corrected = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct Holdout {
@@ -42,5 +49,9 @@ Split HoldOut(std::span<const Rollout> rollouts);
 /// units.
 Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorXd& posterior,
               const Eigen::VectorXd& prior);
+/// Predicts with a residual, too, and says so. @param residual of split.fitted, for the posterior's
+/// mean. @throws std::invalid_argument as CorrectedPredictionErrors.
+void JudgeResidual(const std::shared_ptr<const Model>& model, const Residual& residual,
+                   const Split& split, const Eigen::VectorXd& posterior, Holdout* holdout);
 
 }  // namespace plumb

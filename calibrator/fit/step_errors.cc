@@ -6,12 +6,6 @@
 namespace plumb {
 namespace {
 
-Eigen::VectorXd MeanEffort(const Transition& transition) {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(transition.efforts.front().effort.size());
-  for (const EffortSegment& segment : transition.efforts) sum += segment.duration * segment.effort;
-  return sum / transition.duration();
-}
-
 Eigen::VectorXd Stack(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   Eigen::VectorXd both(q.size() + v.size());
   both << q, v;
@@ -31,6 +25,12 @@ void Add(const ResidualInputs& inputs, const Transition& t, const Simulator& sim
 }
 
 }  // namespace
+
+Eigen::VectorXd MeanEffort(const Transition& transition) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(transition.efforts.front().effort.size());
+  for (const EffortSegment& segment : transition.efforts) sum += segment.duration * segment.effort;
+  return sum / transition.duration();
+}
 
 SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
                            const Eigen::VectorXd& physical, std::span<const Rollout> rollouts,

@@ -21,10 +21,18 @@ std::string PredictionSection(const Holdout& holdout) {
                                              "steps ahead, of {} transitions that "
                                              "the fit has not seen.",
                                              holdout.held_out));
-  Table table({"steps ahead", "windows", "posterior", "prior", "ratio"});
+  const bool corrected =
+      std::any_of(holdout.errors.begin(), holdout.errors.end(),
+                  [](const HorizonError& e) { return std::isfinite(e.corrected); });
+  std::vector<std::string> head{"steps ahead", "windows", "posterior", "prior", "ratio"};
+  if (corrected) head.emplace_back("posterior with residual");
+  Table table(head);
   for (const HorizonError& e : holdout.errors) {
-    table.Add({std::to_string(e.horizon), std::to_string(e.windows), Number(e.posterior, NAN),
-               Number(e.prior, NAN), Number(e.posterior / e.prior, 0.01)});
+    std::vector<std::string> row{std::to_string(e.horizon), std::to_string(e.windows),
+                                 Number(e.posterior, NAN), Number(e.prior, NAN),
+                                 Number(e.posterior / e.prior, 0.01)};
+    if (corrected) row.push_back(Number(e.corrected, NAN));
+    table.Add(row);
   }
   return html + table.Print();
 }

@@ -173,8 +173,18 @@ class Calibration {
     if (!informed())
       findings_.holdout.summary =
           fmt::format("the posterior is the prior, and predicts as it does: {}", kNotInformed);
-    else if (findings_.gap.residual && findings_.holdout.held_out > 0)
-      findings_.holdout.summary += "; both without the residual, which they are to be used with";
+    if (findings_.gap.residual && !split.held_out.empty()) JudgeResidualOf(split, mean);
+  }
+
+  // Learns what the model lacks from the same part of the data, too.
+  void JudgeResidualOf(const Split& split, const Eigen::VectorXd& mean) {
+    ResidualFitOptions options;
+    options.free = findings_.gap.residual->free.has_value();
+    options.touching = findings_.gap.residual->touching.has_value();
+    options.seed = options_.seed;
+    const Residual residual = FitResidual(model_, mean, split.fitted, options).residual;
+    if (residual.any())
+      JudgeResidual(model_, residual, split, robot_.ToPhysical(mean), &findings_.holdout);
   }
 
   // Each log on its own: are they of the same robot?

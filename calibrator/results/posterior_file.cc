@@ -117,7 +117,8 @@ json ToJson(const Holdout& holdout) {
              return json{{"horizon", e.horizon},
                          {"windows", e.windows},
                          {"posterior", e.posterior},
-                         {"prior", e.prior}};
+                         {"prior", e.prior},
+                         {"corrected", e.corrected}};
            })}};
 }
 

@@ -1,0 +1,82 @@
+#include "calibrator/diagnostics/corrected_prediction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "calibrator/fit/step_errors.h"
+#include "sim/correction.h"
+#include "sim/tasks/task.h"
+
+namespace plumb {
+namespace {
+
+std::shared_ptr<const Residual> MeanOf(const Residual& residual) {
+  auto mean = std::make_shared<Residual>(residual);
+  for (const Residual::Part& part : Residual::kParts) {
+    std::optional<ResidualFunction>& function = mean.get()->*part.function;
+    if (!function) continue;
+    function->noise.setZero();
+    function->unknown.setZero();
+  }
+  return mean;
+}
+
+// Mean over the entries that were observed, in standard units.
+double SquaredError(const Simulator& simulator, const Transition& t, const Eigen::VectorXd& scale) {
+  Eigen::ArrayXd error(scale.size()), recorded(scale.size());
+  recorded << t.next_q, t.next_v;
+  error << simulator.q() - t.next_q, simulator.v() - t.next_v;
+  const auto observed = recorded.isFinite();
+  const double mean = observed.select((error / scale.array()).square(), 0.0).sum() /
+                      static_cast<double>(observed.count());
+  return std::isfinite(mean) ? mean : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& model,
+                                          const Eigen::VectorXd& physical, const Residual& residual,
+                                          std::span<const Rollout> rollouts,
+                                          std::span<const int> horizons) {
+  const Eigen::VectorXd scale = MakeTask(model->description())->state_scale();
+  const auto longest =
+      static_cast<size_t>(*std::max_element(horizons.begin(), horizons.end()));
+  Simulator simulator(model);
+  simulator.SetParameters(physical);
+  Correction correction(*model, MeanOf(residual));
+  Random random(0);  // of noise that there is none of
+  correction.Begin(0, random);
+  Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(static_cast<Eigen::Index>(horizons.size())),
+                 windows = squares;
+  for (const Rollout& rollout : rollouts) {
+    const auto& transitions = rollout.transitions;
+    const auto follows = [&](size_t i) {
+      return i > 0 && transitions[i - 1].step + 1 == transitions[i].step;
+    };
+    for (size_t start = 0; start < transitions.size(); ++start) {
+      simulator.SetState(transitions[start].q, transitions[start].v);
+      if (follows(start)) simulator.Recall(transitions[start - 1].efforts);
+      const size_t end = std::min(transitions.size(), start + longest);
+      for (size_t i = start; i < end && (i == start || follows(i)); ++i) {
+        const Transition& t = transitions[i];
+        const Eigen::VectorXd effort = MeanEffort(t),
+                              before = follows(i) ? MeanEffort(transitions[i - 1]) : effort;
+        correction.BeginStep(simulator);
+        simulator.Step(t.efforts);
+        correction.EndStep(simulator, effort, before, t.duration());
+        const auto* horizon =
+            std::find(horizons.data(), horizons.data() + horizons.size(),
+                      static_cast<int>(i - start + 1));
+        if (horizon == horizons.data() + horizons.size()) continue;
+        if (!t.next_q.array().isFinite().any() && !t.next_v.array().isFinite().any()) continue;
+        squares[horizon - horizons.data()] += SquaredError(simulator, t, scale);
+        ++windows[horizon - horizons.data()];
+      }
+    }
+  }
+  return (squares / windows).sqrt();  // 0 / 0 is NaN
+}
+
+}  // namespace plumb
