@@ -27,7 +27,7 @@ struct ResidualFitOptions {
   double noise = 1;  ///< factor of what is left
   /// factor of the sd that the evidence says of a change before anything is known: without
   /// functions of contacts, and with them
-  double unknown = 0.3, unknown_by_contacts = 0.03;
+  double unknown = 0.3, unknown_by_contacts = 0.1;
   uint64_t seed = 1;
 };
 
