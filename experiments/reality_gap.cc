@@ -184,7 +184,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   return rows;
 }
 
-constexpr size_t kReturn = 1, kResidual = 7;  // columns
+constexpr size_t kReturn = 1, kNewest = 3, kResidual = 7;  // columns
 
 std::vector<double> Column(const Options& options, const Gap& gap, const Method& method,
                            const Results& results, int iteration, size_t column) {
@@ -200,18 +200,27 @@ double Median(const std::vector<double>& sorted) {
   return (sorted[(n - 1) / 2] + sorted[n / 2]) / 2;
 }
 
+// Of each iteration the median, and a band from the worst run to the best.
+Curve CurveOf(const std::string& label, const Options& options, const Gap& gap,
+              const Method& method, const Results& results, size_t column) {
+  Curve curve{label, {}, {}, {}, {}};
+  for (int k = 0; k <= options.iterations; ++k) {
+    const auto values = Column(options, gap, method, results, k, column);
+    curve.x.push_back(k), curve.middle.push_back(Median(values)),
+        curve.low.push_back(values.front()), curve.high.push_back(values.back());
+  }
+  return curve;
+}
+
 Panel Draw(const Options& options, const Gap& gap, const Results& results) {
   Panel panel{
       gap.title, "iterations, 6 s of the robot each", "return of the deployed policy", false, {}};
-  for (const Method& method : Chosen(kMethods, options.methods)) {
-    Curve curve{method.label, {}, {}, {}, {}};
-    for (int k = 0; k <= options.iterations; ++k) {
-      const auto returns = Column(options, gap, method, results, k, kReturn);
-      curve.x.push_back(k), curve.middle.push_back(Median(returns)),
-          curve.low.push_back(returns.front()), curve.high.push_back(returns.back());
-    }
-    panel.curves.push_back(std::move(curve));
-  }
+  const std::vector<Method> methods = Chosen(kMethods, options.methods);
+  for (const Method& method : methods)
+    panel.curves.push_back(CurveOf(method.label, options, gap, method, results, kReturn));
+  if (methods.size() == 1 && methods[0].accept)
+    panel.curves.push_back(
+        CurveOf("the newest policy", options, gap, methods[0], results, kNewest));
   return panel;
 }
 
