@@ -83,10 +83,10 @@ std::optional<Topics::Message> Derived::Scene() const {
   return Topics::Message{utime_, scene_.Json(utime_, q_)};
 }
 
-void Derived::OnDistribution(const parameter_distribution_t& message) {
+void Derived::OnDistribution(const parameter_distribution_t& message, int64_t utime) {
   try {
     const auto distribution = ParameterDistribution::FromMessage(message, robot_);
-    topics_.Publish(posteriors_, message.utime, PosteriorJson(distribution, prior_, message.utime),
+    topics_.Publish(posteriors_, utime, PosteriorJson(distribution, prior_, message.utime),
                     History::Step{message.iteration, 0});
     if (prediction_) prediction_->SetParameters(distribution.Mean());
   } catch (const std::invalid_argument& error) {

@@ -28,8 +28,8 @@ class Derived {
   /// The robot as it was last seen, without a prediction.
   std::optional<Topics::Message> Scene() const;
   uint32_t scenes() const { return scenes_; }
-  /// What is no distribution of this robot's is passed over.
-  void OnDistribution(const parameter_distribution_t& message);
+  /// What is no distribution of this robot's is passed over. @param utime [us] of the run.
+  void OnDistribution(const parameter_distribution_t& message, int64_t utime);
 
  private:
   std::optional<OneStepPrediction::Predicted> Predict(int64_t now);

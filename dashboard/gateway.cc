@@ -17,6 +17,7 @@ namespace plumb {
 namespace {
 
 constexpr int64_t kStatisticsPeriod = 500'000, kStatusPeriod = 1'000'000;  // [us]
+constexpr int64_t kRewindPeriod = 100'000;  // [us]; that one has been is not news any faster
 
 // In the order of their numbers, from 1 on.
 constexpr std::string_view kServices[] = {"emergency_stop", "arm", "disarm", "confirm_placed"};
@@ -26,7 +27,7 @@ constexpr char kVirtual[] = "a run in virtual time hears nobody from outside";
 constexpr char kGatewaySchema[] =
     R"({"title":"plumb.gateway","type":"object","properties":{"utime":{"type":"integer"},)"
     R"("clock":{"type":"string"},"speed":{"type":"number"},"clients":{"type":"integer"},)"
-    R"("dropped":{"type":"integer"}}})";
+    R"("dropped":{"type":"integer"},"rewinds":{"type":"integer"}}})";
 constexpr char kChannelsSchema[] =
     R"({"title":"plumb.channels","type":"object","properties":{"utime":{"type":"integer"},)"
     R"("channels":{"type":"array","items":{"type":"object","properties":{)"
@@ -35,7 +36,8 @@ constexpr char kChannelsSchema[] =
     R"("bytes_per_second":{"type":"number"},"undecodable":{"type":"integer"},)"
     R"("refused":{"type":"integer"},"age_ms":{"type":"number"}}}}}})";
 
-/// The numbers by which messages are told apart, if the type has them, and when it is.
+/// The numbers by which messages are told apart, if the type has them, when it is, and what it says
+/// besides numbers.
 class Numbers : public MessageVisitor {
  public:
   std::optional<History::Step> step() const {
@@ -43,6 +45,7 @@ class Numbers : public MessageVisitor {
     return History::Step{*iteration_, update_};
   }
   int64_t utime() const { return utime_; }
+  size_t words() const { return words_; }
 
  private:
   void Field(std::string_view name) override { name_ = name; }
@@ -57,16 +60,19 @@ class Numbers : public MessageVisitor {
     if (name_ == "iteration" || policy) iteration_ = value;
     if (name_ == "update" || name_ == "num_episodes") update_ = value;
     if (name_ == "utime") utime_ = value;
+    if (name_ == "state" || name_ == "phase") Word(static_cast<size_t>(value));  // names, in fact
   }
   void Float(float) override {}
   void Double(double) override {}
-  void Boolean(bool) override {}
-  void Text(std::string_view) override {}
+  void Boolean(bool value) override { Word(value); }
+  void Text(std::string_view text) override { Word(std::hash<std::string_view>()(text)); }
+  void Word(size_t hash) { words_ = words_ * 31 + hash; }
 
   std::string_view name_;
   int depth_ = 0;
   std::optional<int64_t> iteration_;
   int64_t update_ = 0, utime_ = 0;
+  size_t words_ = 0;
 };
 
 template <class Message>
@@ -134,17 +140,36 @@ void Gateway::OnMessage(const std::string& name, std::span<const uint8_t> messag
                             : Verdict::kUndecodable);
   if (!believed && name == "DRIVER_STATUS") wishes_.OnUnbelieved();
   if (!good) return;
-  if (channel->tells_time)
+  if (channel->tells_time && IsTime(numbers.utime())) {
+    // One speaker's words come in order. A time of 0 is none.
+    if (numbers.utime() > 0 && numbers.utime() < channel->utime)
+      Rewind(numbers.utime(), moment.now);
+    channel->utime = numbers.utime();
     time_.OnMessage(numbers.utime(), FindSeal(message), moment.date, moment.now);
+  }
   const std::span<const uint8_t> content = Unsealed(message);
   const bool repeated = std::ranges::equal(content, channel->last);
   if (topics_.watched(channel->topic) || (topics_.wanted(channel->topic) && !repeated)) {
     std::string json;
     AppendJson(*type, message, json);
-    topics_.Publish(channel->topic, Utime(moment), std::move(json), numbers.step());
+    topics_.Publish(channel->topic, Utime(moment), std::move(json), numbers.step(),
+                    numbers.words());
   }
   Use(name, message, repeated, moment);
   channel->last.assign(content.begin(), content.end());
+}
+
+/// A log is played from an earlier place on, or another run has begun: what was said later has not
+/// been said yet, and what repeats it is news.
+void Gateway::Rewind(int64_t utime, int64_t now) {
+  ++rewinds_;
+  next_status_ = std::min(next_status_, now + kRewindPeriod);
+  time_.Rewind(utime);
+  topics_.Rewind(utime);
+  for (auto& [name, channel] : channels_) {
+    channel.utime = 0;
+    channel.last.clear();
+  }
 }
 
 void Gateway::Use(const std::string& channel, std::span<const uint8_t> message, bool repeated,
@@ -160,7 +185,7 @@ void Gateway::Use(const std::string& channel, std::span<const uint8_t> message, 
     controller_ = Decode<controller_status_t>(message);
   } else if (channel == "PARAMETER_DISTRIBUTION" && !repeated) {
     if (const auto distribution = Decode<parameter_distribution_t>(message))
-      derived_.OnDistribution(*distribution);
+      derived_.OnDistribution(*distribution, Utime(moment));
   }
 }
 
@@ -174,9 +199,10 @@ void Gateway::Tick(const Moment& moment) {
     next_status_ = moment.now + kStatusPeriod;
     topics_.Publish(
         gateway_topic_, Utime(moment),
-        fmt::format(R"({{"utime":{},"clock":"{}","speed":{:.4g},"clients":{},"dropped":{}}})",
+        fmt::format(R"({{"utime":{},"clock":"{}","speed":{:.4g},"clients":{},"dropped":{},)"
+                    R"("rewinds":{}}})",
                     Utime(moment), time_.kind_name(), time_.Speed(moment.now), topics_.viewers(),
-                    topics_.dropped()));
+                    topics_.dropped(), rewinds_));
   }
 }
 

@@ -64,7 +64,9 @@ class Gateway {
     uint32_t topic;
     bool tells_time;
     std::vector<uint8_t> last;  // message
+    int64_t utime = 0;          // of the newest message, if it tells the time
   };
+  void Rewind(int64_t utime, int64_t now);
   Channel* Find(const std::string& name, const MessageType* type);
   void Use(const std::string& channel, std::span<const uint8_t> message, bool repeated,
            const Moment& moment);
@@ -83,6 +85,7 @@ class Gateway {
   Wishes wishes_;
   const uint32_t statistics_topic_, gateway_topic_;
   int64_t next_statistics_ = 0, next_status_ = 0;
+  int64_t rewinds_ = 0;                            // how often the run has been set back
   std::optional<robot_state_t> state_;             // the newest
   std::optional<place_robot_t> place_;             // the newest wish
   std::optional<controller_status_t> controller_;  // the newest

@@ -9,8 +9,9 @@
 
 namespace plumb {
 
-/// What a topic has said so far, for those who come late: of each iteration and update its newest
-/// message, of what has none the newest messages, without repetitions. Bounded. Not thread-safe.
+/// What a topic has said so far, for those who come late: of messages that differ in nothing but
+/// numbers, those of one iteration and update, the first, which tells since when it is so, and the
+/// newest. Bounded. Not thread-safe.
 class History {
  public:
   static constexpr size_t kMaxMessages = 500;  ///< that have no iteration
@@ -24,14 +25,17 @@ class History {
   };
   struct Entry {
     uint64_t order;  ///< of arrival, among all topics
-    int64_t utime;
+    int64_t utime;   ///< [us] of the run
     std::optional<Step> step;
+    size_t words;  ///< a hash of what it says besides numbers
     std::shared_ptr<const std::string> json;
   };
 
-  /// A message in the order of arrival. An iteration that goes back begins a new run: what was
-  /// before is forgotten.
+  /// A message in the order of arrival. Where a step goes back, what was said of it and of later ones
+  /// is forgotten: it is said again, by a run that begins anew or goes on from there.
   void Add(Entry entry);
+  /// The run has been set back to this time: what was said from then on is forgotten.
+  void Rewind(int64_t utime);
   /// In order of arrival.
   const std::deque<Entry>& entries() const { return entries_; }
 

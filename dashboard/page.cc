@@ -31,9 +31,20 @@ bool IsPlain(std::string_view name) {
   });
 }
 
+std::optional<std::string> Read(const fs::path& file) {
+  std::error_code error;
+  if (fs::symlink_status(file, error).type() != fs::file_type::regular ||
+      fs::file_size(file, error) > kMaxSize)
+    return std::nullopt;
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream content;
+  content << stream.rdbuf();
+  return stream ? std::optional(content.str()) : std::nullopt;
+}
+
 }  // namespace
 
-std::optional<Page::File> Page::Find(std::string_view path) const {
+std::optional<Page::File> Page::Find(std::string_view path, bool gzip) const {
   const bool first = path == "/";
   const std::string_view name =
       first ? "index.html" : path.substr(std::min<size_t>(1, path.size()));
@@ -41,13 +52,12 @@ std::optional<Page::File> Page::Find(std::string_view path) const {
   const fs::path file = folder_ / name;
   const auto type =
       std::ranges::find(kTypes, file.extension().string(), &decltype(kTypes)::value_type::first);
-  std::error_code error;
-  const bool regular = fs::symlink_status(file, error).type() == fs::file_type::regular;
-  if (type != kTypes.end() && regular && fs::file_size(file, error) <= kMaxSize) {
-    std::ifstream stream(file, std::ios::binary);
-    std::ostringstream content;
-    content << stream.rdbuf();
-    if (stream) return File{std::string(type->second), content.str()};
+  if (type != kTypes.end()) {
+    for (const bool gzipped : {true, false}) {
+      if (gzipped && !gzip) continue;
+      if (auto content = Read(gzipped ? fs::path(file) += ".gz" : file))
+        return File{std::string(type->second), std::move(*content), gzipped};
+    }
   }
   if (!first) return std::nullopt;
   return File{"text/plain; charset=utf-8",
@@ -55,7 +65,8 @@ std::optional<Page::File> Page::Find(std::string_view path) const {
                           "`scripts/setup --page` installs what that takes, `ninja -C build "
                           "dashboard_page` builds it.\n"
                           "Foxglove and Lichtblick can connect to this address without it.\n",
-                          file.string())};
+                          file.string()),
+              false};
 }
 
 fs::path DefaultPageFolder() {

@@ -13,15 +13,17 @@ class Page {
   struct File {
     std::string type;  ///< "text/html; charset=utf-8"
     std::string content;
+    bool gzipped;
   };
 
   explicit Page(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   /// @param path of a URL, without its query: "/", which is index.html, or "/page.js".
+  /// @param gzip whether it may be the compressed file beside it, page.js.gz, if there is one.
   /// @return none if there is no such file. Names with anything in them but letters, digits, '.',
   /// '-' and '_', and files behind links, are none of ours. Without a built page "/" says how to
   /// build it.
-  std::optional<File> Find(std::string_view path) const;
+  std::optional<File> Find(std::string_view path, bool gzip = false) const;
 
  private:
   const std::filesystem::path folder_;

@@ -1,5 +1,7 @@
 #include "dashboard/run_time.h"
 
+#include <algorithm>
+
 namespace plumb {
 namespace {
 
@@ -9,15 +11,18 @@ constexpr int64_t kOld = 10'000'000;  // [us], as ChannelJudge has it
 
 void RunTime::OnMessage(int64_t utime, const std::optional<Seal>& seal, int64_t date, int64_t now) {
   if (!IsTime(utime)) return;
-  utime_ = utime;
+  utime_ = std::max(utime_, utime);  // processes' words come a little out of order
   if (seal) {
     heard_ = seal->process == 0            ? Kind::kVirtual
              : seal->counter < date - kOld ? Kind::kReplay
                                            : Kind::kReal;
   }
-  // Another run, or one that has been set back.
-  if (!moments_.empty() && utime < moments_.back().utime - kWindow) moments_.clear();
-  if (moments_.empty() || now >= moments_.back().now + kStep) moments_.push_back({now, utime});
+  if (moments_.empty() || now >= moments_.back().now + kStep) moments_.push_back({now, utime_});
+}
+
+void RunTime::Rewind(int64_t utime) {
+  utime_ = utime;
+  moments_.clear();
 }
 
 double RunTime::Speed(int64_t now) {

@@ -24,8 +24,10 @@ class RunTime {
   /// A message whose utime is the time of saying; one that is no time is passed over.
   /// @param date of seals [us]. @param now monotonic [us].
   void OnMessage(int64_t utime, const std::optional<Seal>& seal, int64_t date, int64_t now);
+  /// The run has been set back: it is as late as that again [us].
+  void Rewind(int64_t utime);
 
-  /// The newest such time [us], 0 before the first.
+  /// The latest such time [us], 0 before the first.
   int64_t utime() const { return utime_; }
   Kind kind() const { return known_.value_or(heard_); }
   std::string_view kind_name() const;

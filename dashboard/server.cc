@@ -10,9 +10,11 @@
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <list>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "dashboard/foxglove.h"
 #include "dashboard/robot_json.h"
@@ -46,7 +48,13 @@ struct Connection {
   virtual ~Connection() = default;
   virtual void Close() = 0;
   virtual bool sending() const { return false; }
+  asio::ip::address address;  // of the other side
 };
+
+asio::ip::address AddressOf(const tcp::socket& socket) {
+  error_code gone;
+  return socket.remote_endpoint(gone).address();
+}
 
 }  // namespace
 
@@ -62,6 +70,22 @@ struct Server::Parts {
         again(context) {}
 
   using Places = std::list<std::weak_ptr<Connection>>;
+
+  /// Whoever opens any number of WebSockets keeps nobody else from the emergency stop: of the
+  /// address that has most of them the oldest goes.
+  void MakeRoomForViewer() {
+    if (viewers.size() < kMaxViewers) return;
+    std::map<asio::ip::address, size_t> of;
+    size_t most = 0;
+    std::vector<std::shared_ptr<Connection>> open;
+    for (const auto& viewer : viewers) {
+      open.push_back(viewer.lock());
+      most = std::max(most, ++of[open.back()->address]);
+    }
+    (*std::ranges::find_if(open, [&](const auto& one) {
+      return of[one->address] == most;
+    }))->Close();
+  }
 
   std::string WhyNotArm(const Request& request) const {
     const std::string why = gateway.WhyNotArm();
@@ -105,7 +129,9 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
   ViewerConnection(std::shared_ptr<Parts> parts, beast::tcp_stream&& stream, const Request& request)
       : parts_(std::move(parts)),
         socket_(std::move(stream)),
-        viewer_(parts_->WhyNotArm(request), [this] { Send(); }) {}
+        viewer_(parts_->WhyNotArm(request), [this] { Send(); }) {
+    address = AddressOf(beast::get_lowest_layer(socket_).socket());
+  }
   ~ViewerConnection() override { Leave(); }
 
   void Begin(Request request) {
@@ -128,6 +154,7 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
 
   void Close() override {
     Leave();
+    place_.reset();
     beast::get_lowest_layer(socket_).close();
   }
   bool sending() const override { return sending_.has_value() || !viewer_.outbox.empty(); }
@@ -254,10 +281,13 @@ class RequestConnection : public Connection,
       response.set(http::field::content_type, "application/json");
       return Respond(std::move(response));
     }
-    auto file = parts_->page.Find(path);
+    auto file = parts_->page.Find(
+        path, http::ext_list(request_[http::field::accept_encoding]).exists("gzip"));
     if (!file) return Respond(Text(http::status::not_found, "there is no such file"));
     Response response = Text(http::status::ok, std::move(file->content));
     response.set(http::field::content_type, file->type);
+    response.set(http::field::vary, "Accept-Encoding");
+    if (file->gzipped) response.set(http::field::content_encoding, "gzip");
     Respond(std::move(response));
   }
 
@@ -281,8 +311,7 @@ class RequestConnection : public Connection,
     if (!offered.exists(kFoxgloveProtocol))
       return Respond(
           Text(http::status::bad_request, fmt::format("the subprotocol is {}", kFoxgloveProtocol)));
-    if (parts_->viewers.size() >= Server::kMaxViewers)
-      return Respond(Text(http::status::service_unavailable, "too many look on already"));
+    parts_->MakeRoomForViewer();
     stream_.expires_never();
     std::make_shared<ViewerConnection>(parts_, std::move(stream_), request_)->Begin(request_);
   }

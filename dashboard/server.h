@@ -16,7 +16,8 @@ namespace plumb {
 /// HTTP and WebSocket, on one thread, that of the context: the page, /robot.json, and what
 /// Foxglove's protocol has. Everything that comes in has a bound: requests 8 kB and 10 s, messages
 /// kMaxClientMessage, kMaxConnections that are no WebSockets, of which the one that has waited
-/// longest makes room for a new one, and kMaxViewers that are. Not thread-safe.
+/// longest makes room for a new one, and kMaxViewers that are, of which the oldest of the address
+/// that has most does. Not thread-safe.
 class Server {
  public:
   static constexpr size_t kMaxConnections = 128, kMaxViewers = 64;

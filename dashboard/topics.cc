@@ -21,7 +21,7 @@ bool Topics::wanted(uint32_t topic) const {
 }
 
 void Topics::Publish(uint32_t id, int64_t utime, std::string json,
-                     std::optional<History::Step> step) {
+                     std::optional<History::Step> step, size_t words) {
   Topic& topic = Of(id);
   const auto payload = std::make_shared<const std::string>(std::move(json));
   const auto kind = topic.keep == Keep::kHistory ? Outbox::Kind::kSlow : Outbox::Kind::kFast;
@@ -29,7 +29,11 @@ void Topics::Publish(uint32_t id, int64_t utime, std::string json,
     viewer->outbox.Push({kind, true, subscription, MessageHeadOf(subscription, utime), payload});
     viewer->wake();
   }
-  if (topic.keep == Keep::kHistory) topic.history.Add({++said_, utime, step, payload});
+  if (topic.keep == Keep::kHistory) topic.history.Add({++said_, utime, step, words, payload});
+}
+
+void Topics::Rewind(int64_t utime) {
+  for (Topic& topic : topics_) topic.history.Rewind(utime);
 }
 
 void Topics::Join(Viewer& viewer) {

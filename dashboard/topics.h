@@ -42,9 +42,12 @@ class Topics {
   bool wanted(uint32_t topic) const;
   bool watched(uint32_t topic) const { return !Of(topic).watchers.empty(); }
 
-  /// @param utime [us] of the run.
+  /// @param utime [us] of the run. @param step, words as in History::Entry.
   void Publish(uint32_t topic, int64_t utime, std::string json,
-               std::optional<History::Step> step = {});
+               std::optional<History::Step> step = {}, size_t words = 0);
+
+  /// The run has been set back to this time: what was said from then on is forgotten.
+  void Rewind(int64_t utime);
 
   void Join(Viewer& viewer);
   void Leave(Viewer& viewer);

@@ -41,8 +41,7 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
                                           std::span<const Rollout> rollouts,
                                           std::span<const int> horizons) {
   const Eigen::VectorXd scale = MakeTask(model->description())->state_scale();
-  const auto longest =
-      static_cast<size_t>(*std::max_element(horizons.begin(), horizons.end()));
+  const auto longest = static_cast<size_t>(*std::max_element(horizons.begin(), horizons.end()));
   Simulator simulator(model);
   simulator.SetParameters(physical);
   Correction correction(*model, MeanOf(residual));
@@ -66,9 +65,8 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
         correction.BeginStep(simulator);
         simulator.Step(t.efforts);
         correction.EndStep(simulator, effort, before, t.duration());
-        const auto* horizon =
-            std::find(horizons.data(), horizons.data() + horizons.size(),
-                      static_cast<int>(i - start + 1));
+        const auto* horizon = std::find(horizons.data(), horizons.data() + horizons.size(),
+                                        static_cast<int>(i - start + 1));
         if (horizon == horizons.data() + horizons.size()) continue;
         if (!t.next_q.array().isFinite().any() && !t.next_v.array().isFinite().any()) continue;
         squares[horizon - horizons.data()] += SquaredError(simulator, t, scale);

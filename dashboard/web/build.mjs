@@ -1,7 +1,9 @@
-// Builds the page into the folder given (../../build/dashboard/page): page.js, page.css, robot.js, index.html, favicon.svg.
+// Builds the page into the folder given (../../build/dashboard/page): page.js, page.css, robot.js,
+// index.html, favicon.svg, and each of them compressed beside it.
 import { build } from "esbuild";
-import { copyFileSync, mkdirSync, renameSync } from "node:fs";
+import { copyFileSync, mkdirSync, readFileSync, renameSync, writeFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
 const folder = process.argv[2] ?? here("../../build/dashboard/page");
@@ -15,3 +17,4 @@ await build({
 // An entry point of its own name would write over the script's.
 renameSync(`${folder}/page-style.css`, `${folder}/page.css`);
 for (const file of ["index.html", "favicon.svg"]) copyFileSync(here(`src/${file}`), `${folder}/${file}`);
+for (const file of ["page.js", "page.css", "robot.js", "index.html", "favicon.svg"]) writeFileSync(`${folder}/${file}.gz`, gzipSync(readFileSync(`${folder}/${file}`), { level: 9 }));

@@ -43,11 +43,12 @@ def body(answer):
 
 
 class WebSocket:
-    def __init__(self, address, origin=None, host=None, protocol=PROTOCOL, more="", receive_buffer=None):
+    def __init__(self, address, origin=None, host=None, protocol=PROTOCOL, more="", receive_buffer=None, source=""):
         self.socket = socket.socket()
         if receive_buffer:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
         self.socket.settimeout(20)
+        self.socket.bind((source, 0))
         self.socket.connect(address)
         key = base64.b64encode(os.urandom(16)).decode()
         lines = [f"Host: {host or f'{address[0]}:{address[1]}'}", "Upgrade: websocket", "Connection: Upgrade",

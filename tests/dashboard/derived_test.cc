@@ -170,8 +170,8 @@ TEST_CASE("the page is told of joints, coordinates, priors, and whether it may a
 
 TEST_CASE("a history has a bound, in messages and in bytes") {
   History history;
-  const auto add = [&](uint64_t order, std::string text, std::optional<History::Step> step = {}) {
-    history.Add({order, 0, step, std::make_shared<const std::string>(std::move(text))});
+  const auto add = [&](uint64_t order, std::string text) {
+    history.Add({order, 0, {}, order, std::make_shared<const std::string>(std::move(text))});
   };
   for (uint64_t i = 0; i < 1000; ++i) add(i, std::to_string(i));
   CHECK(history.entries().size() == History::kMaxMessages);
@@ -181,7 +181,7 @@ TEST_CASE("a history has a bound, in messages and in bytes") {
   CHECK(history.entries().size() == 5);
   History steps;
   for (int64_t i = 0; i < 2000; ++i)
-    steps.Add({static_cast<uint64_t>(i), 0, History::Step{i / 100, i % 100},
+    steps.Add({static_cast<uint64_t>(i), 0, History::Step{i / 100, i % 100}, 0,
                std::make_shared<const std::string>(std::to_string(i))});
   CHECK(steps.entries().size() == 2000);
 }

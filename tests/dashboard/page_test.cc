@@ -16,6 +16,7 @@ TEST_CASE("the page's files are served, and nothing else on the disk") {
   fs::create_directories(folder / "inner.js");
   const auto write = [](const fs::path& file, const char* text) { std::ofstream(file) << text; };
   write(folder / "index.html", "<!doctype html>");
+  write(folder / "page.js.gz", "compressed");
   write(folder / "page.js", "hello");
   write(folder / ".secret.js", "secret");
   write(folder / "notes.key", "secret");
@@ -26,9 +27,15 @@ TEST_CASE("the page's files are served, and nothing else on the disk") {
   CHECK(page.Find("/")->content == "<!doctype html>");
   CHECK(page.Find("/")->type == "text/html; charset=utf-8");
   CHECK(page.Find("/page.js")->content == "hello");
-  for (const char* path : {"", "page.js", "//page.js", "/../outside.js", "/..%2foutside.js",
-                           "/./page.js", "/link.js", "/inner.js", "/.secret.js", "/notes.key",
-                           "/missing.js", "/page.js/", "/..", "/\\page.js", "/etc/passwd"}) {
+  CHECK_FALSE(page.Find("/page.js")->gzipped);
+  CHECK(page.Find("/page.js", true)->content == "compressed");
+  CHECK(page.Find("/page.js", true)->type == "text/javascript; charset=utf-8");
+  CHECK(page.Find("/page.js", true)->gzipped);
+  CHECK(page.Find("/", true)->content == "<!doctype html>");  // there is no other
+  for (const char* path :
+       {"", "page.js", "//page.js", "/../outside.js", "/..%2foutside.js", "/./page.js", "/link.js",
+        "/inner.js", "/.secret.js", "/notes.key", "/missing.js", "/page.js/", "/page.js.gz", "/..",
+        "/\\page.js", "/etc/passwd"}) {
     INFO(path);
     CHECK_FALSE(page.Find(path));
   }

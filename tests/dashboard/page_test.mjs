@@ -1,5 +1,6 @@
 // The page against a gateway that makes its data up: what it shows, what a person may do on it, and that it comes back.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { after, before, test } from "node:test";
 import { clean, launch, look, numbers, pageFolder } from "./browser.mjs";
 import { serve } from "./mock.mjs";
@@ -34,6 +35,11 @@ test("every panel says in a sentence what it shows, and shows something", visit(
   assert.equal(await page.locator("[role=img]:not([aria-label]), canvas.picture:not([aria-label])").count(), 0);
   assert.equal(await page.locator(".chart canvas").count(), 15);
 }));
+
+test("the page is loaded quickly: 60 kB before anything is drawn in space", () => {
+  const size = ["index.html", "page.js", "page.css", "favicon.svg"].reduce((sum, file) => sum + readFileSync(`${pageFolder}/${file}.gz`).length, 0);
+  assert.ok(size <= 60_000, `${size} bytes`);
+});
 
 test("what is said from outside is text, whatever it looks like", visit({ alarm: ALARM }, {}, async ({ page }) => {
   await page.locator("[data-alarm].bad").waitFor();
@@ -78,6 +84,20 @@ test("what the robot returns in the end is the incumbent's, whose policy runs th
   const [fifth, sixth] = (await numbers(page, "returns")).slice(-2);
   assert.deepEqual([fifth[0], fifth[2], fifth[3]], [5, 6, -170]);
   assert.deepEqual(sixth.slice(0, 4), [6, null, 0, -152]);
+}));
+
+test("channels and processes are shown as they are counted", visit({}, {}, async ({ page }) => {
+  const row = (of) => page.locator(of).evaluate((found) => [...found.cells].slice(1).map((cell) => cell.dataset.value ?? cell.textContent));
+  const status = page.locator('[data-channel="DRIVER_STATUS"]');
+  await status.waitFor();
+  // The fourth that the mock counts: 50 / 4 a second, and so on.
+  const [type, , ...counted] = await row('[data-channel="DRIVER_STATUS"]');
+  assert.deepEqual([type, ...counted.slice(0, 4)], ["driver_status_t", "12.5", String(0.3 * 3), "2250", "0"]);
+  assert.match(counted[4], /^(now|[\d.]+ m?s)$/);
+  assert.deepEqual(await row('[data-channel="IMU"]'), ["imu_t", "0", "null", "null", "null", "0", "never heard"]);
+  const [age, ...rest] = await row('[data-process="driver"]');
+  assert.match(age, /^(now|[\d.]+ m?s)$/);
+  assert.deepEqual(rest, ["idle", "12.5"]);
 }));
 
 test("the discrepancy that was learnt is told", visit({ alarm: ALARM }, {}, async ({ page }) => {

@@ -4,6 +4,7 @@
 A client is Python's standard library (client.py). What is said on LCM is what lcm-gen's Python encodes, sent as LCM sends it.
 """
 import contextlib
+import gzip
 import json
 import os
 import pathlib
@@ -219,16 +220,31 @@ class Served(unittest.TestCase):
             self.assertEqual(heard, b"")
             self.assertLess(time.monotonic() - begun, PATIENCE)
 
-    def test_not_more_look_on_than_there_is_room_for(self):
+    def test_nobody_takes_all_places_from_whoever_wants_to_stop_the_robot(self):
         dashboard = Dashboard(self)
-        pages = []
-        with self.assertRaisesRegex(client.Refused, "503"):
-            for _ in range(65):
-                pages.append(client.Page(dashboard.address))
-        self.assertEqual(len(pages), 64)
+        other = client.Page(dashboard.address, source="127.0.0.2")
+        pages = [client.Page(dashboard.address) for _ in range(63)]
+        last = client.Page(dashboard.address)  # one more than there is room for
+        with self.assertRaises(OSError):  # the oldest of the address that has most
+            while True:
+                pages[0].receive()
+        for page in (other, last, pages[1]):
+            self.assertIn("no driver answers", page.call("emergency_stop")["text"])
         for page in pages:
             page.close()
         dashboard.works(self)
+
+    def test_the_page_is_compressed_for_whoever_takes_it(self):
+        (self.page / "page.js.gz").write_bytes(gzip.compress(b"'compressed';"))
+        dashboard = Dashboard(self, page=self.page)
+        head, _, content = client.get(dashboard.address, "/page.js", more="Accept-Encoding: deflate, gzip;q=1.0, br\r\n").partition(b"\r\n\r\n")
+        self.assertIn(b"Content-Encoding: gzip", head)
+        self.assertIn(b"text/javascript", head)
+        self.assertEqual(gzip.decompress(content), b"'compressed';")
+        for more in ("", "Accept-Encoding: identity\r\n"):
+            head, _, content = client.get(dashboard.address, "/page.js", more=more).partition(b"\r\n\r\n")
+            self.assertNotIn(b"Content-Encoding", head)
+            self.assertEqual(content, b"'use strict';")
 
 
 class Heard(unittest.TestCase):
@@ -246,26 +262,35 @@ class Heard(unittest.TestCase):
         for page in pages:  # it has dealt with the subscriptions
             page.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
 
-        def say():
-            for sequence in range(1500):
-                lcm.say("ROBOT_STATE", state(sequence, sequence / 8))
-                time.sleep(0.002)
+        rates = []
 
-        speaker = threading.Thread(target=say)
-        speaker.start()
-        for page in pages:
-            counts = []
+        def say(first):
+            messages = [state(sequence, sequence / 8).encode() for sequence in range(first, first + 1500)]
+            begun = time.monotonic()
+            for i, message in enumerate(messages):
+                time.sleep(max(0, begun + i / 520 - time.monotonic()))
+                lcm.say("ROBOT_STATE", message)
+            rates.append(len(messages) / (time.monotonic() - begun))
 
-            def counted(one):
-                if one and one[0] == "PLUMB_CHANNELS":
-                    counts.extend(row["count"] for row in one[2]["channels"] if row["channel"] == "ROBOT_STATE")
-                return counts and counts[-1] == 1500
+        for turn in range(10):
+            speaker = threading.Thread(target=say, args=[1500 * turn])
+            speaker.start()
+            for page in pages:
+                counts = []
 
-            states = [one for one in page.until(counted) if one[0] == "ROBOT_STATE"]
-            self.assertEqual([one[2]["sequence"] for one in states], list(range(1500)))
-            self.assertTrue(all(one[2]["q"] == [one[2]["sequence"] / 8] for one in states))
-            self.assertTrue(all(one[1] == 1000 * one[2]["utime"] for one in states))
-        speaker.join()
+                def counted(one):
+                    if one and one[0] == "PLUMB_CHANNELS":
+                        counts.extend(row["count"] for row in one[2]["channels"] if row["channel"] == "ROBOT_STATE")
+                    return counts and counts[-1] == 1500 * (turn + 1)
+
+                states = [one for one in page.until(counted) if one[0] == "ROBOT_STATE"]
+                self.assertEqual([one[2]["sequence"] for one in states], list(range(1500 * turn, 1500 * (turn + 1))))
+                self.assertTrue(all(one[2]["q"] == [one[2]["sequence"] / 8] for one in states))
+                self.assertTrue(all(one[1] == 1000 * one[2]["utime"] for one in states))
+            speaker.join()
+            if rates[-1] >= 500:  # a busy machine may have kept the speaker back
+                return
+        self.skipTest(f"this machine says no more than {max(rates):.0f} messages a second")
 
     def test_one_that_does_not_read_harms_nobody(self):
         dashboard, lcm = Dashboard(self), LCM

@@ -19,7 +19,9 @@ const DOWN = "The page has no connection to the robot's computer. Use the robot'
 
 interface Open {
   client: FoxgloveClient;
+  offered: [topic: string, id: number][]; // that are listened to
   topics: Map<number, string>; // by subscription
+  begin: () => void;
   serviceIds: Map<string, number>;
   waiting: Map<number, (answer: Answer) => void>; // by call
 }
@@ -32,7 +34,7 @@ export function connect(url: string, listeners: Map<string, Listener>, begin: ()
   const socket = new WebSocket(url, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]);
   // Of what the client sets on a socket, its types know less than the browser's do.
   const client = new FoxgloveClient({ ws: socket as never });
-  const here: Open = { client, topics: new Map(), serviceIds: new Map(), waiting: new Map() };
+  const here: Open = { client, offered: [], topics: new Map(), begin, serviceIds: new Map(), waiting: new Map() };
 
   client.on("serverInfo", () => {
     open = here;
@@ -40,7 +42,11 @@ export function connect(url: string, listeners: Map<string, Listener>, begin: ()
     state.value = "open";
   });
   client.on("advertise", (channels) => {
-    for (const { id, topic } of channels) if (listeners.has(topic)) here.topics.set(client.subscribe(id), topic);
+    for (const { id, topic } of channels) {
+      if (!listeners.has(topic)) continue;
+      here.offered.push([topic, id]);
+      here.topics.set(client.subscribe(id), topic);
+    }
   });
   client.on("advertiseServices", (offered) => {
     for (const { id, name } of offered) here.serviceIds.set(name, id);
@@ -62,6 +68,16 @@ export function connect(url: string, listeners: Map<string, Listener>, begin: ()
     state.value = "lost";
     setTimeout(() => connect(url, listeners, begin), RETRY_AFTER);
   });
+}
+
+/** Hears all that the gateway keeps once more, as after a new connection. */
+export function renew() {
+  if (!open) return;
+  const { client, offered, topics, begin } = open;
+  for (const subscription of topics.keys()) client.unsubscribe(subscription);
+  topics.clear();
+  begin();
+  for (const [topic, id] of offered) topics.set(client.subscribe(id), topic);
 }
 
 /** Asks for a service. Never throws: what went wrong is in the answer. */

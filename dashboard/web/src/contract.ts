@@ -84,6 +84,7 @@ export interface Gateway {
   speed: Value; // seconds of the run in a second
   clients: number;
   dropped: number;
+  rewinds: number; // how often the run has been set back
 }
 
 export interface Vector {

@@ -2,7 +2,7 @@
 // log looks as a live run does for that reason.
 import { batch, signal, type Signal } from "@preact/signals";
 import type { Channels, Gateway, Posterior, Prediction, Robot, Scene } from "./contract";
-import { connect, type Listener } from "./connection";
+import { connect, type Listener, renew } from "./connection";
 import { type Event, TELLERS, type Weight } from "./events";
 import type {
   calibration_status_t, controller_status_t, driver_status_t, estimator_status_t, parameter_distribution_t, place_robot_t,
@@ -86,9 +86,9 @@ function keepPrediction(json: DataView) {
 
 export function note(time: number, from: string, text: string, weight: Weight = "note") {
   const kept = events.value;
-  // Histories come channel by channel.
+  // Histories come channel by channel; what was said at the same time has an order all the same.
   let place = 0;
-  while (place < kept.length && kept[place]!.time > time) place++;
+  while (place < kept.length && (kept[place]!.time - time || (kept[place]!.from > from ? 1 : 0)) > 0) place++;
   kept.splice(place, 0, { time, from, text, weight });
   if (kept.length > EVENTS) kept.length = EVENTS;
   publish(events, () => (events.value = [...kept]));
@@ -107,12 +107,19 @@ function telling<T>(channel: string, target: Signal<T | null> | null, keep?: (no
 }
 const before = new Map<string, unknown>();
 
+/** Where the run has been set back, as a log that is played from an earlier place on, the gateway knows what it was then. */
+function keepGateway(json: DataView) {
+  const now = decode<Gateway>(json);
+  if (gateway.value && now.rewinds !== gateway.value.rewinds) renew();
+  publish(gateway, () => (gateway.value = now));
+}
+
 const listeners = new Map<string, Listener>([
   ["ROBOT_STATE", newest(robotState)],
   ["PLACE_ROBOT", newest(placing)],
   ["PARAMETER_DISTRIBUTION", newest(distribution)],
   ["PLUMB_CHANNELS", newest(channels)],
-  ["PLUMB_GATEWAY", newest(gateway)],
+  ["PLUMB_GATEWAY", keepGateway],
   ["PLUMB_PREDICTION", keepPrediction],
   ["PLUMB_POSTERIOR", (json) => keepPosterior(decode<Posterior>(json))],
   ["DRIVER_STATUS", telling("DRIVER_STATUS", driver)],
