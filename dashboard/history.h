@@ -31,8 +31,8 @@ class History {
     std::shared_ptr<const std::string> json;
   };
 
-  /// A message in the order of arrival. Where a step goes back, what was said of it and of later ones
-  /// is forgotten: it is said again, by a run that begins anew or goes on from there.
+  /// A message in the order of arrival. Where a step goes back, what was said of it and of later
+  /// ones is forgotten: it is said again, by a run that begins anew or goes on from there.
   void Add(Entry entry);
   /// The run has been set back to this time: what was said from then on is forgotten.
   void Rewind(int64_t utime);
