@@ -158,9 +158,8 @@ TEST_CASE("sim: episodes that failed have no return") {
   const EpisodeSummary good{10, 1, End::kTimeLimit}, better{20, 3, End::kTerminated},
       failed{5, NAN, End::kNotFinite};
   CHECK(Totals({good, failed, better}) ==
-        "3 episodes, 35 steps, mean return 2.0, standard deviation 1.4; 1 failed: no longer "
-        "finite, left out "
-        "of the mean");
+        "3 episodes, 35 steps, mean return 2.0, standard deviation 1.4; 1 failed: the simulation "
+        "has blown up, left out of the mean");
   CHECK(Totals({good}) == "1 episode, 10 steps, mean return 1.0");
   CHECK(Totals({failed, failed}) == "2 episodes, 10 steps; 2 failed: the simulation has blown up");
 }
