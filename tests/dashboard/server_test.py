@@ -262,35 +262,30 @@ class Heard(unittest.TestCase):
         for page in pages:  # it has dealt with the subscriptions
             page.until(lambda one: one and one[0] == "PLUMB_CHANNELS")
 
-        rates = []
+        many = 1500
 
-        def say(first):
-            messages = [state(sequence, sequence / 8).encode() for sequence in range(first, first + 1500)]
+        def say():  # 520 a second: a machine that is kept from it catches up
+            messages = [state(sequence, sequence / 8).encode() for sequence in range(many)]
             begun = time.monotonic()
             for i, message in enumerate(messages):
                 time.sleep(max(0, begun + i / 520 - time.monotonic()))
                 lcm.say("ROBOT_STATE", message)
-            rates.append(len(messages) / (time.monotonic() - begun))
 
-        for turn in range(10):
-            speaker = threading.Thread(target=say, args=[1500 * turn])
-            speaker.start()
-            for page in pages:
-                counts = []
+        speaker = threading.Thread(target=say)
+        speaker.start()
+        for page in pages:
+            counts = []
 
-                def counted(one):
-                    if one and one[0] == "PLUMB_CHANNELS":
-                        counts.extend(row["count"] for row in one[2]["channels"] if row["channel"] == "ROBOT_STATE")
-                    return counts and counts[-1] == 1500 * (turn + 1)
+            def counted(one):
+                if one and one[0] == "PLUMB_CHANNELS":
+                    counts.extend(row["count"] for row in one[2]["channels"] if row["channel"] == "ROBOT_STATE")
+                return counts and counts[-1] == many
 
-                states = [one for one in page.until(counted) if one[0] == "ROBOT_STATE"]
-                self.assertEqual([one[2]["sequence"] for one in states], list(range(1500 * turn, 1500 * (turn + 1))))
-                self.assertTrue(all(one[2]["q"] == [one[2]["sequence"] / 8] for one in states))
-                self.assertTrue(all(one[1] == 1000 * one[2]["utime"] for one in states))
-            speaker.join()
-            if rates[-1] >= 500:  # a busy machine may have kept the speaker back
-                return
-        self.skipTest(f"this machine says no more than {max(rates):.0f} messages a second")
+            states = [one for one in page.until(counted) if one[0] == "ROBOT_STATE"]
+            self.assertEqual([one[2]["sequence"] for one in states], list(range(many)))
+            self.assertTrue(all(one[2]["q"] == [one[2]["sequence"] / 8] for one in states))
+            self.assertTrue(all(one[1] == 1000 * one[2]["utime"] for one in states))
+        speaker.join()
 
     def test_one_that_does_not_read_harms_nobody(self):
         dashboard, lcm = Dashboard(self), LCM
