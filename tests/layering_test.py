@@ -70,7 +70,8 @@ SYSTEM = {
     r"onnx/|google/protobuf/": lambda p: p.startswith("trainer/onnx_") and p.endswith(".cc"),
     r"lcm/": lambda p: p.startswith(("common/", "drivers/can/")) or p.endswith("main.cc"),
     r"mpi\.h": lambda p: p == "common/ranks.cc",
-    r"boost/(asio|beast)": lambda p: p in ("dashboard/server.h", "dashboard/server.cc", "dashboard/main.cc"),
+    r"boost/(asio|beast)": lambda p: p in ("dashboard/server.h", "dashboard/server.cc", "dashboard/connection.h", "dashboard/request_connection.cc",
+                                       "dashboard/viewer_connection.cc", "dashboard/main.cc"),
     r"sys/socket\.h|netinet/|linux/can": lambda p: p.startswith(("common/", "drivers/can/", "cli/doctor"))
     or p.endswith("main.cc"),
 }
