@@ -87,7 +87,8 @@ TEST_CASE("what a client says wrongly is answered, and changes nothing") {
     CHECK(stand.looker.texts.back()["op"] == "status");
   }
   for (const std::vector<uint8_t>& frame :
-       {std::vector<uint8_t>{}, std::vector<uint8_t>{1, 2, 3}, std::vector<uint8_t>{2, 1, 0, 0}, Looker::CallOf(0), Looker::CallOf(99),
+       {std::vector<uint8_t>{}, std::vector<uint8_t>{1, 2, 3}, std::vector<uint8_t>{2, 1, 0, 0},
+        Looker::CallOf(0), Looker::CallOf(99),
         std::vector<uint8_t>{2, 1, 0, 0, 0, 1, 0, 0, 0, 255, 255, 255, 255}}) {
     const size_t before = stand.looker.texts.size();
     stand.gateway.OnBinary(stand.looker.viewer, frame, stand.moment);
