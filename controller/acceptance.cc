@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -57,10 +58,10 @@ double Acceptance::MeanReturn(int iteration) const {
   return sum / static_cast<double>(found->second.size());
 }
 
-double Acceptance::Better(int challenger) const {
+double Acceptance::Better(int challenger, double scatter) const {
   const auto variance = [&](int iteration) {
-    const double scatter = kScatter * MeanReturn(iteration);
-    return scatter * scatter / static_cast<double>(trials_.at(iteration).size());
+    const double sd = std::max(scatter, kScatter * std::abs(MeanReturn(iteration)));
+    return sd * sd / static_cast<double>(trials_.at(iteration).size());
   };
   const double difference = MeanReturn(challenger) - MeanReturn(incumbent_),
                sd = std::sqrt(variance(challenger) + variance(incumbent_));
@@ -68,12 +69,12 @@ double Acceptance::Better(int challenger) const {
   return std::erfc(-difference / sd / std::sqrt(2.0)) / 2;
 }
 
-Acceptance::Decision Acceptance::Decide(int challenger) {
+Acceptance::Decision Acceptance::Decide(int challenger, double scatter) {
   Decision decision{challenger,
                     incumbent_,
                     false,
                     false,
-                    Better(challenger),
+                    Better(challenger, scatter),
                     MeanReturn(challenger),
                     MeanReturn(incumbent_)};
   decision.accepted = challenger != incumbent_ && decision.probability >= kSure;
@@ -81,13 +82,13 @@ Acceptance::Decision Acceptance::Decide(int challenger) {
   return decision;
 }
 
-Acceptance::Decision Acceptance::Trust(int challenger) {
+Acceptance::Decision Acceptance::Trust(int challenger, double scatter) {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const auto tried = [&](int iteration) { return trials_.contains(iteration); };
   Decision decision{challenger, incumbent_, true, true, kUnknown, kUnknown, kUnknown};
   if (tried(challenger)) decision.challenger_return = MeanReturn(challenger);
   if (tried(incumbent_)) decision.incumbent_return = MeanReturn(incumbent_);
-  if (tried(challenger) && tried(incumbent_)) decision.probability = Better(challenger);
+  if (tried(challenger) && tried(incumbent_)) decision.probability = Better(challenger, scatter);
   incumbent_ = challenger;
   return decision;
 }

@@ -33,9 +33,10 @@ struct Trial {
 /// the conjugate posterior where the prior is the exponential distribution with the mean of all
 /// policies that this robot has tried; zero where none has fallen. What counts is the expectation
 /// over lambda, in closed form: how unsure lambda is says nothing for or against a challenger that
-/// has been tried as long as the incumbent. Returns of trials that begin alike scatter by kScatter
-/// of themselves, falls apart, the mean of n by 1 / sqrt(n) of that. kScatter is that of 29 trials
-/// of four hoppers without a fall, each against the mean of ten whole episodes (docs/gap.md).
+/// has been tried as long as the incumbent. Returns of trials scatter, falls apart, by kScatter of
+/// themselves or, where it is more, by what it makes where an episode begins; the mean of n by
+/// 1 / sqrt(n) of that. kScatter is that of 29 trials of four hoppers without a fall, which begin
+/// alike, each against the mean of ten whole episodes (docs/gap.md).
 /// Not thread-safe; the same bits for the same trials.
 class Acceptance {
  public:
@@ -57,11 +58,12 @@ class Acceptance {
     double challenger_return = 0, incumbent_return = 0;
   };
   /// Makes the challenger the incumbent if its expected return is more with probability kSure.
+  /// @param scatter of a trial's return by where it begins, sd, >= 0
   /// @throws std::invalid_argument if it has had no trial.
-  Decision Decide(int challenger);
+  Decision Decide(int challenger, double scatter);
   /// Makes it the incumbent whatever the trials say: where the model explains the robot, training
-  /// on it is the better judge. It need not have had a trial.
-  Decision Trust(int challenger);
+  /// on it is the better judge. It need not have had a trial. @param scatter as above
+  Decision Trust(int challenger, double scatter);
 
   /// -1 = none yet.
   int incumbent() const { return incumbent_; }
@@ -73,7 +75,7 @@ class Acceptance {
   static constexpr double kScatter = 0.008;
 
  private:
-  double Better(int challenger) const;
+  double Better(int challenger, double scatter) const;
 
   int steps_;
   int incumbent_ = -1;

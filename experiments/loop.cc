@@ -141,8 +141,9 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
       }
       if (settings.accept) {
         const bool right = simopt && model_.calibration.residual && !simopt->state().residual;
+        const double scatter = trainer->ScatterOfStarts(distribution.Mean());
         const Acceptance::Decision decision =
-            right ? acceptance.Trust(iteration) : acceptance.Decide(iteration);
+            right ? acceptance.Trust(iteration, scatter) : acceptance.Decide(iteration, scatter);
         result.decisions.push_back(Summary(decision));
         if (acceptance.incumbent() == iteration) deployed_iteration = iteration;
       }

@@ -19,6 +19,14 @@ std::vector<double> Ordered(std::span<const double> returns) {
   return ordered;
 }
 
+// Interpolated linearly. @param ordered not empty
+double Quantile(const std::vector<double>& ordered, double share) {
+  const double at = share * static_cast<double>(ordered.size() - 1);
+  const auto below = static_cast<size_t>(at);
+  const double above = ordered[std::min(below + 1, ordered.size() - 1)];
+  return ordered[below] + (at - std::floor(at)) * (above - ordered[below]);
+}
+
 }  // namespace
 
 Evaluation Evaluate(std::span<const double> returns) {
@@ -29,10 +37,7 @@ Evaluation Evaluate(std::span<const double> returns) {
   if (ordered.empty()) return evaluation;
   evaluation.mean =
       std::accumulate(ordered.begin(), ordered.end(), 0.) / static_cast<double>(ordered.size());
-  const double at = 0.1 * static_cast<double>(ordered.size() - 1);
-  const auto below = static_cast<size_t>(at);
-  const double above = ordered[std::min(below + 1, ordered.size() - 1)];
-  evaluation.tenth = ordered[below] + (at - std::floor(at)) * (above - ordered[below]);
+  evaluation.tenth = Quantile(ordered, 0.1);
   evaluation.worst = ordered.front();
   return evaluation;
 }
@@ -41,6 +46,13 @@ double MeanOfWorst(std::span<const double> returns, double share) {
   const std::vector<double> ordered = Ordered(returns);
   const auto count = static_cast<ptrdiff_t>(std::ceil(share * static_cast<double>(ordered.size())));
   return std::accumulate(ordered.begin(), ordered.begin() + count, 0.) / static_cast<double>(count);
+}
+
+double UpperScatter(std::span<const double> returns) {
+  constexpr double kNormalQuartile = 0.6745;
+  const std::vector<double> ordered = Ordered(returns);
+  if (ordered.empty()) return 0;
+  return (Quantile(ordered, 0.75) - Quantile(ordered, 0.5)) / kNormalQuartile;
 }
 
 std::string Summary(const Evaluation& evaluation) {

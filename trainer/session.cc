@@ -129,7 +129,9 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
   RequireSimulable(distribution);
   if (complete_ && trial_steps() > 0) {
-    Choose(distribution.residual ? acceptance_.Decide(iteration_) : acceptance_.Trust(iteration_),
+    const double scatter = trainer_.ScatterOfStarts(distribution.Mean());
+    Choose(distribution.residual ? acceptance_.Decide(iteration_, scatter)
+                                 : acceptance_.Trust(iteration_, scatter),
            distribution.iteration);
   }
   distribution_ = distribution;
@@ -165,7 +167,7 @@ UpdateReport TrainingSession::Advance() {
     complete_ = true;
     // The last one has no trial: it is trusted, or nothing but one that has had a trial is run.
     if (finished() && trial_steps() > 0 && !(distribution_.residual && incumbent_policy_))
-      Choose(acceptance_.Trust(iteration_), iteration_);
+      Choose(acceptance_.Trust(iteration_, 0), iteration_);
   }
   return last_;
 }

@@ -27,7 +27,7 @@ enum Stream : uint32_t {
   kJudgementStream
 };
 
-constexpr int kJudgements = 16, kJudgementEpisodes = 30;
+constexpr int kJudgements = 16, kJudgementEpisodes = 30, kScatterEpisodes = 40;
 constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
 
 GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFactory& make,
@@ -190,6 +190,11 @@ Evaluation Trainer::Evaluate(const ParameterSampler& sample, int episodes) {
 
 Evaluation Trainer::EvaluateHeldOut(const ParameterSampler& sample, int episodes) {
   return plumb::Evaluate(rollout_.Returns(policy_, sample, episodes, seed_, kHeldOutStream, 0));
+}
+
+double Trainer::ScatterOfStarts(const SimulatorDraw& simulator) {
+  return UpperScatter(rollout_.Returns(
+      policy_, [&](Random&) { return simulator; }, kScatterEpisodes, seed_, kHeldOutStream, 0));
 }
 
 }  // namespace plumb

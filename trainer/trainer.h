@@ -99,6 +99,9 @@ class Trainer {
   /// The same on simulators and initial states that are always the same for a seed, so that
   /// policies can be compared.
   Evaluation EvaluateHeldOut(const ParameterSampler& sample, int episodes);
+  /// By how much (sd) the policy's returns in one simulator differ for where the task lets an
+  /// episode begin, falls apart: UpperScatter of 40 episodes without exploration, always the same.
+  double ScatterOfStarts(const SimulatorDraw& simulator);
 
  private:
   void CompareRanks() const;

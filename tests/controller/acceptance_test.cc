@@ -48,7 +48,7 @@ TEST_CASE("who falls does not replace who does not, and the other way round") {
   Acceptance acceptance(1000);
   acceptance.Add(0, Hops(500, 3, false));
   acceptance.Add(1, Hops(200, 3.3, true));
-  const auto worse = acceptance.Decide(1);
+  const auto worse = acceptance.Decide(1, 0);
   CHECK_FALSE(worse.accepted);
   CHECK(worse.probability < 0.02);
   CHECK(acceptance.incumbent() == 0);
@@ -56,7 +56,7 @@ TEST_CASE("who falls does not replace who does not, and the other way round") {
   Acceptance other(1000);
   other.Add(0, Hops(200, 3.3, true));
   other.Add(1, Hops(500, 3, false));
-  const auto better = other.Decide(1);
+  const auto better = other.Decide(1, 0);
   CHECK(better.accepted);
   CHECK(better.probability > 0.98);
   CHECK(better.incumbent == 0);
@@ -68,24 +68,36 @@ TEST_CASE("equals do not replace each other") {
   Acceptance acceptance(1000);
   acceptance.Add(0, Hops(500, 3, false));
   acceptance.Add(1, Hops(500, 3, false));
-  const auto decision = acceptance.Decide(1);
+  const auto decision = acceptance.Decide(1, 0);
   CHECK(decision.probability == Approx(0.5).margin(0.03));
   CHECK_FALSE(decision.accepted);
   // 0.8 of 100 apart, each with 0.8 of 100 of scatter: Phi(1 / sqrt 2) = 0.76
   acceptance.Add(2, Hops(500, 3.024, false));
-  CHECK(acceptance.Decide(2).probability == Approx(0.76).margin(0.02));
+  CHECK(acceptance.Decide(2, 0).probability == Approx(0.76).margin(0.02));
 }
 
 TEST_CASE("the falls of one policy do not keep others from being told apart") {
   Acceptance acceptance(1000);
   acceptance.Add(0, Hops(60, 2, true));
   acceptance.Add(1, Hops(500, 3, false));
-  REQUIRE(acceptance.Decide(1).accepted);
+  REQUIRE(acceptance.Decide(1, 0).accepted);
   acceptance.Add(2, Hops(500, 3.06, false));
-  const auto decision = acceptance.Decide(2);
+  const auto decision = acceptance.Decide(2, 0);
   CHECK(decision.challenger_return / decision.incumbent_return == Approx(1.02));
   CHECK(decision.probability == Approx(0.96).margin(0.01));  // Phi(2 / 0.8 / sqrt 2)
   CHECK(decision.accepted);
+}
+
+TEST_CASE("who begins better has not done better") {
+  Acceptance acceptance(1000);
+  acceptance.Add(0, Hops(500, 3, false));
+  acceptance.Add(1, Hops(500, 3.6, false));
+  // 600 apart, each with 600 of scatter by where it begins: Phi(1 / sqrt 2) = 0.76
+  CHECK(acceptance.Decide(1, 600).probability == Approx(0.76).margin(0.005));
+  // less than trials scatter by that begin alike: as if there were none
+  acceptance.Add(2, Hops(500, 3.6288, false));
+  Acceptance alike = acceptance;
+  CHECK(acceptance.Decide(2, 1).probability == alike.Decide(2, 0).probability);
 }
 
 TEST_CASE("costs are returns, too") {
@@ -96,17 +108,17 @@ TEST_CASE("costs are returns, too") {
   acceptance.Add(1, swing);
   CHECK(acceptance.MeanReturn(0) == Approx(-1200).epsilon(0.01));
   CHECK(acceptance.MeanReturn(1) == Approx(-140).epsilon(0.01));
-  CHECK(acceptance.Decide(1).accepted);
+  CHECK(acceptance.Decide(1, 0).accepted);
 }
 
 TEST_CASE("a trusted policy is taken whatever the trials say") {
   Acceptance acceptance(1000);
   acceptance.Add(0, Hops(500, 3, false));
   acceptance.Add(1, Hops(500, 2, false));
-  CHECK(acceptance.Trust(1).accepted);
+  CHECK(acceptance.Trust(1, 0).accepted);
   CHECK(acceptance.incumbent() == 1);
-  CHECK_THROWS_AS(acceptance.Decide(7), std::invalid_argument);
-  const auto untried = acceptance.Trust(7);
+  CHECK_THROWS_AS(acceptance.Decide(7, 0), std::invalid_argument);
+  const auto untried = acceptance.Trust(7, 0);
   CHECK(untried.accepted);
   CHECK(std::isnan(untried.probability));
   CHECK(std::isnan(untried.challenger_return));
@@ -131,10 +143,10 @@ TEST_CASE("who goes on where another stood decides alike") {
   Acceptance straight(1000);
   straight.Add(0, Hops(500, 3, false));
   straight.Add(1, Hops(500, 3.2, false));
-  straight.Decide(1);
+  straight.Decide(1, 0);
   straight.Add(2, Hops(300, 3.3, true));
   Acceptance resumed(1000, straight.trials(), straight.incumbent());
-  const auto expected = straight.Decide(2), decision = resumed.Decide(2);
+  const auto expected = straight.Decide(2, 0), decision = resumed.Decide(2, 0);
   CHECK(decision.incumbent == expected.incumbent);
   CHECK(decision.probability == expected.probability);
   CHECK(decision.challenger_return == expected.challenger_return);

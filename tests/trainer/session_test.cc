@@ -59,7 +59,9 @@ TEST_CASE("Where the model is wrong, what does best on the robot is what it is r
     CHECK(status.incumbent_since == 0);
     CHECK(status.challenger == 2);
     CHECK(status.decision.find("policy 2 not accepted (-400") == 0);
-    CHECK(status.probability < 0.01);
+    // 200 apart, where trials that begin anywhere are about 200 apart, too
+    CHECK(status.probability < 0.4);
+    CHECK(status.probability > 0.05);
     CHECK(status.challenger_return == Approx(-400).epsilon(0.01));
     CHECK(status.incumbent_return == Approx(-200).epsilon(0.01));
   }

@@ -1,5 +1,6 @@
 #include "trainer/trainer.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -159,6 +160,19 @@ TEST_CASE("The mean of the worst returns") {
   CHECK(MeanOfWorst(returns, .3) == Approx(1.5));
   CHECK(MeanOfWorst(returns, .25) == Approx(1));
   CHECK(std::isnan(MeanOfWorst(std::vector<double>{NAN}, 1)));
+}
+
+TEST_CASE("returns scatter as they would without falls") {
+  const std::vector<double> returns{4, NAN, -900, 2, 3, 1, 0};
+  CHECK(UpperScatter(returns) == Approx((2.75 - 1.5) / 0.6745));
+  CHECK(UpperScatter(std::vector<double>{NAN}) == 0);
+  // Of a normal distribution, the three in ten that are lowest replaced by falls
+  Random random(1);
+  std::vector<double> normal;
+  for (int i = 0; i < 20000; ++i) normal.push_back(3000 + 50 * random.Normal());
+  std::sort(normal.begin(), normal.end());
+  std::fill(normal.begin(), normal.begin() + 6000, 100.);
+  CHECK(UpperScatter(normal) == Approx(50).epsilon(0.03));
 }
 
 TEST_CASE("Training returns to the best policy that was judged") {
