@@ -63,7 +63,11 @@ double Acceptance::Better(int challenger, double scatter) const {
     const double sd = std::max(scatter, kScatter * std::abs(MeanReturn(iteration)));
     return sd * sd / static_cast<double>(trials_.at(iteration).size());
   };
-  const double difference = MeanReturn(challenger) - MeanReturn(incumbent_),
+  const auto value = [&](int iteration) {
+    const double mean = MeanReturn(iteration);
+    return iteration == 0 ? mean - kUnseen * std::abs(mean) : mean;
+  };
+  const double difference = value(challenger) - value(incumbent_),
                sd = std::sqrt(variance(challenger) + variance(incumbent_));
   if (sd == 0) return difference > 0 ? 1 : difference < 0 ? 0 : 0.5;
   return std::erfc(-difference / sd / std::sqrt(2.0)) / 2;
@@ -103,8 +107,10 @@ std::string Summary(const Acceptance::Decision& d) {
   if (!std::isfinite(d.challenger_return)) return text;
   text += fmt::format(" ({:.4g}", d.challenger_return);
   if (!first && std::isfinite(d.incumbent_return)) {
-    text += fmt::format("; incumbent {}: {:.4g}; better with {:.0f} %", d.incumbent,
-                        d.incumbent_return, 100 * d.probability);
+    const std::string less =
+        d.incumbent == 0 ? fmt::format(" less {:.0f} %", 100 * Acceptance::kUnseen) : "";
+    text += fmt::format("; incumbent {}: {:.4g}{}; better with {:.0f} %", d.incumbent,
+                        d.incumbent_return, less, 100 * d.probability);
   }
   return text + ")";
 }

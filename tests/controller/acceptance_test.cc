@@ -66,14 +66,30 @@ TEST_CASE("who falls does not replace who does not, and the other way round") {
 
 TEST_CASE("equals do not replace each other") {
   Acceptance acceptance(1000);
-  acceptance.Add(0, Hops(500, 3, false));
   acceptance.Add(1, Hops(500, 3, false));
-  const auto decision = acceptance.Decide(1, 0);
+  acceptance.Add(2, Hops(500, 3, false));
+  const auto decision = acceptance.Decide(2, 0);
   CHECK(decision.probability == Approx(0.5).margin(0.03));
   CHECK_FALSE(decision.accepted);
   // 0.8 of 100 apart, each with 0.8 of 100 of scatter: Phi(1 / sqrt 2) = 0.76
-  acceptance.Add(2, Hops(500, 3.024, false));
-  CHECK(acceptance.Decide(2, 0).probability == Approx(0.76).margin(0.02));
+  acceptance.Add(3, Hops(500, 3.024, false));
+  CHECK(acceptance.Decide(3, 0).probability == Approx(0.76).margin(0.02));
+}
+
+TEST_CASE("the first policy, which has learnt nothing of the robot, is worth 5 of 100 less") {
+  Acceptance acceptance(1000);
+  acceptance.Add(0, Hops(500, 3, false));
+  acceptance.Add(1, Hops(500, 0.95 * 3, false));
+  const auto equal = acceptance.Decide(1, 0);
+  CHECK(equal.probability == Approx(0.5).margin(1e-9));
+  CHECK(equal.incumbent_return == Approx(3000));
+  acceptance.Add(2, Hops(500, 0.97 * 3, false));
+  CHECK(acceptance.Decide(2, 0).accepted);
+
+  Acceptance costs(1000);
+  costs.Add(0, Hops(500, -3, false));
+  costs.Add(1, Hops(500, -1.05 * 3, false));
+  CHECK(costs.Decide(1, 0).probability == Approx(0.5).margin(1e-9));
 }
 
 TEST_CASE("the falls of one policy do not keep others from being told apart") {
@@ -90,14 +106,14 @@ TEST_CASE("the falls of one policy do not keep others from being told apart") {
 
 TEST_CASE("who begins better has not done better") {
   Acceptance acceptance(1000);
-  acceptance.Add(0, Hops(500, 3, false));
-  acceptance.Add(1, Hops(500, 3.6, false));
+  acceptance.Add(1, Hops(500, 3, false));
+  acceptance.Add(2, Hops(500, 3.6, false));
   // 600 apart, each with 600 of scatter by where it begins: Phi(1 / sqrt 2) = 0.76
-  CHECK(acceptance.Decide(1, 600).probability == Approx(0.76).margin(0.005));
+  CHECK(acceptance.Decide(2, 600).probability == Approx(0.76).margin(0.005));
   // less than trials scatter by that begin alike: as if there were none
-  acceptance.Add(2, Hops(500, 3.6288, false));
+  acceptance.Add(3, Hops(500, 3.6288, false));
   Acceptance alike = acceptance;
-  CHECK(acceptance.Decide(2, 1).probability == alike.Decide(2, 0).probability);
+  CHECK(acceptance.Decide(3, 1).probability == alike.Decide(3, 0).probability);
 }
 
 TEST_CASE("costs are returns, too") {
@@ -127,10 +143,10 @@ TEST_CASE("a trusted policy is taken whatever the trials say") {
 }
 
 TEST_CASE("a decision says who, why and how sure") {
-  CHECK(Summary({3, 0, true, false, 0.98, 2951, 1846}) ==
-        "policy 3 accepted (2951; incumbent 0: 1846; better with 98 %)");
+  CHECK(Summary({3, 2, true, false, 0.98, 2951, 1846}) ==
+        "policy 3 accepted (2951; incumbent 2: 1846; better with 98 %)");
   CHECK(Summary({3, 0, false, false, 0.1, 846, 1846}) ==
-        "policy 3 not accepted (846; incumbent 0: 1846; better with 10 %)");
+        "policy 3 not accepted (846; incumbent 0: 1846 less 5 %; better with 10 %)");
   CHECK(Summary({3, 2, true, true, 0.5, 1850, 1846}) ==
         "policy 3 trusted: the model explains the robot (1850; incumbent 2: 1846; better with 50 "
         "%)");
