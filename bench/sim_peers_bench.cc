@@ -1,5 +1,5 @@
-// The simulator's peers, in the same run as sim_bench.cc: MuJoCo 2.2.2 (where libmujoco-dev is installed) and Simbody the
-// textbook way.
+// The simulator's peers, in the same run as sim_bench.cc: MuJoCo 2.2.2 (where libmujoco-dev is
+// installed) and Simbody the textbook way.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

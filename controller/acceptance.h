@@ -39,9 +39,9 @@ struct Trial {
 /// alike, each against the mean of ten whole episodes (docs/gap.md).
 ///
 /// Policy 0 has been trained without any motion of this robot, and falls more often where its trial
-/// does not see it: after it, or from other starts. It counts for kUnseen less: in whole episodes 18
-/// such policies returned 4 % less than their trials said, which had not fallen, and 82 later ones
-/// 1 % more (docs/gap.md).
+/// does not see it: after it, or from other starts. It counts for kUnseen less: in whole episodes
+/// 18 such policies returned 4 % less than their trials said, which had not fallen, and 82 later
+/// ones 1 % more (docs/gap.md).
 /// Not thread-safe; the same bits for the same trials.
 class Acceptance {
  public:
