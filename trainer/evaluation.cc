@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -19,14 +20,6 @@ std::vector<double> Ordered(std::span<const double> returns) {
   return ordered;
 }
 
-// Interpolated linearly. @param ordered not empty
-double Quantile(const std::vector<double>& ordered, double share) {
-  const double at = share * static_cast<double>(ordered.size() - 1);
-  const auto below = static_cast<size_t>(at);
-  const double above = ordered[std::min(below + 1, ordered.size() - 1)];
-  return ordered[below] + (at - std::floor(at)) * (above - ordered[below]);
-}
-
 }  // namespace
 
 Evaluation Evaluate(std::span<const double> returns) {
@@ -37,7 +30,10 @@ Evaluation Evaluate(std::span<const double> returns) {
   if (ordered.empty()) return evaluation;
   evaluation.mean =
       std::accumulate(ordered.begin(), ordered.end(), 0.) / static_cast<double>(ordered.size());
-  evaluation.tenth = Quantile(ordered, 0.1);
+  const double at = 0.1 * static_cast<double>(ordered.size() - 1);
+  const auto below = static_cast<size_t>(at);
+  const double above = ordered[std::min(below + 1, ordered.size() - 1)];
+  evaluation.tenth = ordered[below] + (at - std::floor(at)) * (above - ordered[below]);
   evaluation.worst = ordered.front();
   return evaluation;
 }
@@ -48,11 +44,12 @@ double MeanOfWorst(std::span<const double> returns, double share) {
   return std::accumulate(ordered.begin(), ordered.begin() + count, 0.) / static_cast<double>(count);
 }
 
-double UpperScatter(std::span<const double> returns) {
-  constexpr double kNormalQuartile = 0.6745;
+double Scatter(std::span<const double> returns) {
   const std::vector<double> ordered = Ordered(returns);
-  if (ordered.empty()) return 0;
-  return (Quantile(ordered, 0.75) - Quantile(ordered, 0.5)) / kNormalQuartile;
+  if (ordered.size() < 2) return 0;
+  const Eigen::Map<const Eigen::ArrayXd> values(ordered.data(), std::ssize(ordered));
+  return std::sqrt((values - values.mean()).square().sum() /
+                   static_cast<double>(ordered.size() - 1));
 }
 
 std::string Summary(const Evaluation& evaluation) {

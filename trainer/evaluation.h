@@ -24,10 +24,8 @@ Evaluation Evaluate(std::span<const double> returns);
 /// NaN if there are no others. Thread-safe.
 double MeanOfWorst(std::span<const double> returns, double share);
 
-/// Standard deviation that returns would have without those that a fall has cut short: the distance
-/// from their median to the upper quartile over the normal distribution's, 0.6745. NaN are left
-/// out; 0 if there are no others. Thread-safe.
-double UpperScatter(std::span<const double> returns);
+/// Standard deviation of returns; NaN are left out, and 0 if fewer than two are left. Thread-safe.
+double Scatter(std::span<const double> returns);
 
 /// "-142.1 mean, -263.3 10th percentile, -370.2 worst", and how many failed.
 std::string Summary(const Evaluation& evaluation);

@@ -236,4 +236,16 @@ std::vector<double> RolloutSampler::Returns(const GaussianPolicy& policy,
   return returns;
 }
 
+std::vector<double> RolloutSampler::WholeReturns(const GaussianPolicy& policy,
+                                                 const ParameterSampler& sample, int episodes,
+                                                 uint64_t seed, uint32_t stream, uint32_t number) {
+  std::vector<double> returns;
+  for (const EpisodeRecord& record :
+       Run(policy, sample, 0, episodes, false, seed, stream, number)) {
+    const bool whole = record.usable && !record.terminated;
+    returns.push_back(whole ? record.sum : std::numeric_limits<double>::quiet_NaN());
+  }
+  return returns;
+}
+
 }  // namespace plumb

@@ -93,6 +93,9 @@ class RolloutSampler {
   /// finite.
   std::vector<double> Returns(const GaussianPolicy& policy, const ParameterSampler& sample,
                               int episodes, uint64_t seed, uint32_t stream, uint32_t number);
+  /// The same; NaN where an episode ended before the time limit, too.
+  std::vector<double> WholeReturns(const GaussianPolicy& policy, const ParameterSampler& sample,
+                                   int episodes, uint64_t seed, uint32_t stream, uint32_t number);
 
  private:
   struct Player;

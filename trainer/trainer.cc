@@ -193,7 +193,7 @@ Evaluation Trainer::EvaluateHeldOut(const ParameterSampler& sample, int episodes
 }
 
 double Trainer::ScatterOfStarts(const SimulatorDraw& simulator) {
-  return UpperScatter(rollout_.Returns(
+  return Scatter(rollout_.WholeReturns(
       policy_, [&](Random&) { return simulator; }, kScatterEpisodes, seed_, kHeldOutStream, 0));
 }
 

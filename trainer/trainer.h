@@ -100,7 +100,8 @@ class Trainer {
   /// policies can be compared.
   Evaluation EvaluateHeldOut(const ParameterSampler& sample, int episodes);
   /// By how much (sd) the policy's returns in one simulator differ for where the task lets an
-  /// episode begin, falls apart: UpperScatter of 40 episodes without exploration, always the same.
+  /// episode begin: Scatter of those of 40 episodes without exploration, always the same, that last
+  /// until the time limit.
   double ScatterOfStarts(const SimulatorDraw& simulator);
 
  private:

@@ -1,6 +1,5 @@
 #include "trainer/trainer.h"
 
-#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -162,17 +161,33 @@ TEST_CASE("The mean of the worst returns") {
   CHECK(std::isnan(MeanOfWorst(std::vector<double>{NAN}, 1)));
 }
 
-TEST_CASE("returns scatter as they would without falls") {
-  const std::vector<double> returns{4, NAN, -900, 2, 3, 1, 0};
-  CHECK(UpperScatter(returns) == Approx((2.75 - 1.5) / 0.6745));
-  CHECK(UpperScatter(std::vector<double>{NAN}) == 0);
-  // Of a normal distribution, the three in ten that are lowest replaced by falls
-  Random random(1);
-  std::vector<double> normal;
-  for (int i = 0; i < 20000; ++i) normal.push_back(3000 + 50 * random.Normal());
-  std::sort(normal.begin(), normal.end());
-  std::fill(normal.begin(), normal.begin() + 6000, 100.);
-  CHECK(UpperScatter(normal) == Approx(50).epsilon(0.03));
+/// Begins with u anywhere in [0, 1), which is the reward of each of ten steps; falls at once if it
+/// is below 0.3.
+class StartDecides : public GymPendulum {
+ public:
+  int steps_per_episode() const override { return 10; }
+  void Reset(const SimulatorDraw& simulator, Random& random) override {
+    GymPendulum::Reset(simulator, random);
+    start_ = random.Uniform();
+  }
+  StepResult Step(const Eigen::Ref<const Eigen::VectorXf>&) override {
+    return {start_, start_ < 0.3};
+  }
+
+ private:
+  double start_ = 0;
+};
+
+TEST_CASE("returns scatter by where episodes begin") {
+  CHECK(Scatter(std::vector<double>{4, NAN, 2, 3, 1, 0}) == Approx(std::sqrt(2.5)));
+  CHECK(Scatter(std::vector<double>{7}) == 0);
+  CHECK(Scatter(std::vector<double>{NAN}) == 0);
+
+  // of u between 0.3 and 1, where they do not fall: 10 u scatters by 7 / sqrt 12
+  const auto make = [] { return std::make_unique<StartDecides>(); };
+  Trainer trainer(SmallSettings(), make, PendulumScale(), 5, 2);
+  CHECK(trainer.ScatterOfStarts({Eigen::Vector3d(10, 1, 1)}) ==
+        Approx(7 / std::sqrt(12)).epsilon(0.15));
 }
 
 TEST_CASE("Training returns to the best policy that was judged") {
