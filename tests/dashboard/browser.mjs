@@ -58,6 +58,17 @@ export const value = async (found) => {
   return text === "null" ? null : Number(text);
 };
 
+/** The ages that a page shows [s], the least and the most that each may be: they are rounded to two digits, to minutes, to hours. */
+export function ages(texts) {
+  return texts.map((text) => {
+    if (text === "now") return [0, 0.1];
+    const [, figure, unit] = /^([\d.]+) (ms|s|min|h)$/.exec(text) ?? [];
+    assert.ok(unit, `${text} is no age`);
+    const length = { ms: 1e-3, s: 1, min: 60, h: 3600 }[unit], half = unit === "min" || unit === "h" ? 0.5 : 0.05 * figure;
+    return [(figure - half) * length, (Number(figure) + half) * length];
+  });
+}
+
 /** Of a browser that asks for everything, ten times over, and reads nothing: its socket, when it has asked. */
 export function stall(address) {
   const { hostname, port } = new URL(address);

@@ -87,9 +87,16 @@ function past({ alarm = "", iterations = 6, judged = false }) {
   return said;
 }
 
-/** Starts it. @returns its address, what was asked of it, and how to end it. `story` is changed as the test likes. */
+/** What is counted of a channel, the k-th; one that was never heard has no numbers. */
+function counted(channel, k, tick, age_ms) {
+  const type = `${channel.toLowerCase()}_t`;
+  if (channel === "IMU") return { channel, type, count: 0, rate: null, jitter_ms: null, bytes_per_second: null, undecodable: 0, refused: 0, age_ms: null };
+  return { channel, type, count: tick * (k + 1), rate: 50 / (k + 1), jitter_ms: k === 6 ? null : 0.3 * k, bytes_per_second: 9000 / (k + 1), undecodable: k % 3 === 2 ? 7 * k : 0, refused: k % 4 === 1 ? 12345 + k : 0, age_ms };
+}
+
+/** Starts it. @returns its address, what it has said of all channels, what was asked of it, and how to end it. `story` is changed as the test likes. */
 export async function serve(folder, port = 0, story = {}) {
-  const asked = [], clients = new Set(), topics = ["PLUMB_CHANNELS", "PLUMB_GATEWAY", "PLUMB_PREDICTION", "PLUMB_SCENE", "PLUMB_POSTERIOR", "ROBOT_STATE", "PLACE_ROBOT", "PARAMETER_DISTRIBUTION", "DRIVER_STATUS", "ESTIMATOR_STATUS", "CONTROLLER_STATUS", "CALIBRATION_STATUS", "TRAINING_STATUS"];
+  const asked = [], saidOfChannels = [], spoken = new Map(), begun = Date.now(), clients = new Set(), topics = ["PLUMB_CHANNELS", "PLUMB_GATEWAY", "PLUMB_PREDICTION", "PLUMB_SCENE", "PLUMB_POSTERIOR", "ROBOT_STATE", "PLACE_ROBOT", "PARAMETER_DISTRIBUTION", "DRIVER_STATUS", "ESTIMATOR_STATUS", "CONTROLLER_STATUS", "CALIBRATION_STATUS", "TRAINING_STATUS"];
   let state = 1;
   const http = createServer((request, response) => {
     const name = request.url === "/" ? "index.html" : request.url.slice(1);
@@ -132,17 +139,29 @@ export async function serve(folder, port = 0, story = {}) {
       }
     });
   });
+  // Of the newest message, or of a process that has fallen silent before anybody came: story.ages [ms].
+  const age = (channel) => {
+    const old = story.ages?.[channel];
+    return old !== undefined ? old + Date.now() - begun : spoken.has(channel) ? Date.now() - spoken.get(channel) : null;
+  };
   let tick = 0;
   const timer = setInterval(() => {
+    if (story.still) return;
     tick++;
     const utime = BEGIN + 80e6 + tick * 20_000, t = tick * 0.02, angle = 2.6 * Math.sin(1.3 * t), off = 4e-3 * Math.sin(9 * t);
     for (const client of clients) {
-      const tell = (topic, message) => send(client, topic, { utime, ...message }, utime);
+      const tell = (topic, message) => {
+        spoken.set(topic, Date.now());
+        send(client, topic, { utime, ...message }, utime);
+      };
       tell("PLUMB_PREDICTION", { sequence: tick, q: [angle + off], v: [3.4 * Math.cos(1.3 * t)], q_measured: [angle] });
       tell("PLUMB_SCENE", { deletions: [], entities: [{ id: "robot", ...solids(angle, 1) }, { id: "prediction", ...solids(angle + 0.09, 0.4) }, { id: "ground" }] });
       tell("ROBOT_STATE", { sequence: tick, num_joints: 1, q: [angle], v: [3.4 * Math.cos(1.3 * t)], q_sd: [1.2e-4], v_sd: [0.02], effort: [0.3], contact: [], valid: true });
-      if (tick % 5 === 0) tell("DRIVER_STATUS", driver(state, state === 4 ? "emergency stop by request" : "", tick + 1000)), tell("CONTROLLER_STATUS", controller(6, story.placing ? 1 : 2, Number(story.judged ?? false))), tell("ESTIMATOR_STATUS", estimator);
-      if (tick % 25 === 0) tell("PLUMB_CHANNELS", { channels: topics.slice(5).concat("IMU").map((channel, k) => ({ channel, type: `${channel.toLowerCase()}_t`, count: channel === "IMU" ? 0 : tick * (k + 1), rate: channel === "IMU" ? null : 50 / (k + 1), jitter_ms: channel === "IMU" ? null : 0.3 * k, bytes_per_second: channel === "IMU" ? null : 9000 / (k + 1), undecodable: 0, age_ms: channel === "IMU" ? null : 20 })) });
+      if (tick % 5 === 0 && !story.silent) tell("DRIVER_STATUS", driver(state, state === 4 ? "emergency stop by request" : "", tick + 1000)), tell("CONTROLLER_STATUS", controller(6, story.placing ? 1 : 2, Number(story.judged ?? false))), tell("ESTIMATOR_STATUS", estimator);
+      if (tick % 25 === 0) {
+        saidOfChannels.push(topics.slice(5).concat("IMU").map((channel, k) => counted(channel, k, tick, age(channel))));
+        tell("PLUMB_CHANNELS", { channels: saidOfChannels.at(-1) });
+      }
       if (tick % 25 === 0 && story.placing) tell("PLACE_ROBOT", { q: [-0.773], v: [0.812] });
       if (tick % 50 === 0) tell("PLUMB_GATEWAY", { clock: story.clock ?? "real", speed: story.clock ? 14 : 1, clients: clients.size, dropped: 0 });
     }
@@ -153,7 +172,7 @@ export async function serve(folder, port = 0, story = {}) {
     for (const client of clients) client.terminate();
     return new Promise((resolve) => http.close(resolve), http.closeAllConnections());
   };
-  return { url: `http://127.0.0.1:${http.address().port}/`, port: http.address().port, asked, close };
+  return { url: `http://127.0.0.1:${http.address().port}/`, port: http.address().port, begun, asked, saidOfChannels, close };
 }
 
 if (import.meta.url === pathToFileURL(process.argv[1] ?? "").href) {

@@ -2,27 +2,14 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { after, before, test } from "node:test";
-import { clean, launch, look, numbers, pageFolder } from "./browser.mjs";
+import { clean, numbers, pageFolder } from "./browser.mjs";
 import { serve } from "./mock.mjs";
+import { closeBrowser, lookAt, openBrowser, visit } from "./visit.mjs";
 
 const PANELS = ["robot", "motion", "posterior", "pairs", "fan", "update", "gap", "returns", "training", "processes", "cycle", "bus", "channels", "events"];
 const ALARM = "the model cannot explain this log: <b>pivot</b>";
-let browser;
-before(async () => (browser = await launch()));
-after(() => browser.close());
-
-/** The page of a mock with this story, for a test. */
-const visit = (story, context, todo) => async () => {
-  const mock = await serve(pageFolder, 0, story);
-  const seen = await look(browser, mock.url, context);
-  try {
-    await todo({ ...seen, mock });
-    clean(seen);
-  } finally {
-    await seen.page.context().close();
-    await mock.close();
-  }
-};
+before(openBrowser);
+after(closeBrowser);
 
 test("every panel says in a sentence what it shows, and shows something", visit({ alarm: ALARM }, {}, async ({ page }) => {
   await page.locator("#posterior .parameter").first().waitFor();
@@ -86,20 +73,6 @@ test("what the robot returns in the end is the incumbent's, whose policy runs th
   assert.deepEqual(sixth.slice(0, 4), [6, null, 0, -152]);
 }));
 
-test("channels and processes are shown as they are counted", visit({}, {}, async ({ page }) => {
-  const row = (of) => page.locator(of).evaluate((found) => [...found.cells].slice(1).map((cell) => cell.dataset.value ?? cell.textContent));
-  const status = page.locator('[data-channel="DRIVER_STATUS"]');
-  await status.waitFor();
-  // The fourth that the mock counts: 50 / 4 a second, and so on.
-  const [type, , ...counted] = await row('[data-channel="DRIVER_STATUS"]');
-  assert.deepEqual([type, ...counted.slice(0, 4)], ["driver_status_t", "12.5", String(0.3 * 3), "2250", "0"]);
-  assert.match(counted[4], /^(now|[\d.]+ m?s)$/);
-  assert.deepEqual(await row('[data-channel="IMU"]'), ["imu_t", "0", "null", "null", "null", "0", "never heard"]);
-  const [age, ...rest] = await row('[data-process="driver"]');
-  assert.match(age, /^(now|[\d.]+ m?s)$/);
-  assert.deepEqual(rest, ["idle", "12.5"]);
-}));
-
 test("the discrepancy that was learnt is told", visit({ alarm: ALARM }, {}, async ({ page }) => {
   const table = page.locator("#gap table").filter({ hasText: "learnt, rms" });
   const cells = await table.locator("tbody tr").first().locator("td").evaluateAll((all) => all.map((one) => one.dataset.value ?? one.textContent));
@@ -150,7 +123,7 @@ test("a wish to place the robot is shown, and confirmed", visit({ placing: true 
 
 test("it says when it is not connected, and comes back with all that was said", async () => {
   const mock = await serve(pageFolder, 0, {});
-  const seen = await look(browser, mock.url, { expected: /ERR_CONNECTION_REFUSED/ });
+  const seen = await lookAt(mock.url, { expected: /ERR_CONNECTION_REFUSED/ });
   await seen.page.locator("#posterior .parameter").first().waitFor();
   const shown = await numbers(seen.page, "posterior");
   await mock.close();

@@ -4,11 +4,11 @@ import assert from "node:assert/strict";
 import { execFile, spawn } from "node:child_process";
 import { copyFileSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 import { promisify } from "node:util";
-import { build, clean, launch, look, PATIENCE, stall, value } from "./browser.mjs";
+import { ages, build, clean, launch, look, PATIENCE, stall, value } from "./browser.mjs";
 import { compare, everything, read } from "./expected.mjs";
+import { startGateway, stop } from "./gateway.mjs";
 
 const run = promisify(execFile);
 const source = process.env.PLUMBLINE_SOURCE ?? new URL("../..", import.meta.url).pathname;
@@ -19,25 +19,9 @@ const folder = mkdtempSync(`${tmpdir()}/page-replay.`);
 const log = `${folder}/run.lcmlog`;
 let browser, gateway, address, live, messages;
 
-/** The gateway, and where it listens. */
-async function startGateway(at) {
-  const process = spawn(`${build}/bin/plumb-dashboard`, [robot, "--address", at, "--lcm-url", url], { stdio: ["ignore", "pipe", "inherit"] });
-  for await (const line of createInterface({ input: process.stdout })) {
-    const found = /http:\/\/\S+/.exec(line);
-    if (found) return [process, found[0]];
-  }
-  throw new Error("the gateway has not come up");
-}
-
-async function stopGateway() {
-  const gone = new Promise((resolve) => gateway.once("exit", resolve));
-  gateway.kill();
-  await gone;
-}
-
 async function newGateway() {
-  await stopGateway();
-  [gateway, address] = await startGateway("127.0.0.1:0");
+  await stop(gateway);
+  [gateway, address] = await startGateway(robot, "127.0.0.1:0", url);
 }
 
 const record = (of, file) => run(`${build}/bin/plumb`, ["launch", of, "--seed", "1", "--iterations", "2", "--evaluation-episodes", "1", "--log", file, "--output", `${file}.run`, "--lcm-url", url], { maxBuffer: 1e8 });
@@ -45,7 +29,7 @@ const record = (of, file) => run(`${build}/bin/plumb`, ["launch", of, "--seed", 
 const replay = (speed, ...part) => [`${build}/bin/plumb`, ["replay", log, "--lcm-url", url, "--speed", String(speed), ...part]];
 
 before(async () => {
-  [browser, [gateway, address]] = [await launch(), await startGateway("127.0.0.1:0")];
+  [browser, [gateway, address]] = [await launch(), await startGateway(robot, "127.0.0.1:0", url)];
   live = await look(browser, address);
   await record(robot, log);
   messages = await read(log);
@@ -76,14 +60,9 @@ test("replayed to three browsers and one that stalls, and to a late one", { time
   await compare(late, messages, { fast: false });
   // How old each process's last word is, which came while the log was played.
   const asked = Date.now();
-  const ages = await late.page.locator("#processes tr[data-process]:not([data-process=gateway]) .age").allInnerTexts();
-  assert.equal(ages.length, 5);
-  for (const text of ages) {
-    const [, figure, unit] = /^([\d.]+) (s|min)$/.exec(text) ?? [];
-    const [least, most] = unit === "min" ? [(figure - 0.5) * 60, (Number(figure) + 0.5) * 60] : [figure * 0.95, figure * 1.05];
-    assert.ok(unit, text);
-    assert.ok(most >= (asked - ended) / 1000 - 1 && least <= (Date.now() - begun) / 1000, `${text} old`);
-  }
+  const shown = await late.page.locator("#processes tr[data-process]:not([data-process=gateway]) .age").allInnerTexts();
+  assert.equal(shown.length, 5);
+  ages(shown).forEach(([least, most], i) => assert.ok(most >= (asked - ended) / 1000 - 1 && least <= (Date.now() - begun) / 1000, `${shown[i]} old`));
   // The gateway has left out what the stalled one did not fetch, for nobody else's loss.
   assert.doesNotMatch(await counted.innerText(), /, 0 messages left out/);
   stalled.destroy();
@@ -140,9 +119,9 @@ test("an update that samples says on how many effective ones it rests", { timeou
 
 test("the gateway is started again, and the page comes back by itself", { timeout: 4 * PATIENCE }, async () => {
   const seen = await look(browser, address, { expected: /ERR_CONNECTION_REFUSED/ });
-  await stopGateway();
+  await stop(gateway);
   await seen.page.locator("[data-connection=lost]").waitFor();
-  [gateway] = await startGateway(new URL(address).host);
+  [gateway] = await startGateway(robot, new URL(address).host, url);
   await seen.page.locator("[data-connection=open]").waitFor();
   clean(seen);
 });

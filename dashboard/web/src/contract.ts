@@ -41,6 +41,7 @@ export interface ChannelCount {
   jitter_ms: Value;
   bytes_per_second: Value;
   undecodable: number;
+  refused: number;
   age_ms: Value;
 }
 
