@@ -26,6 +26,7 @@
 #include "common/outside_text.h"
 #include "common/program_version.h"
 #include "common/realtime.h"
+#include "common/service_notice.h"
 #include "common/time_units.h"
 
 namespace plumb {
@@ -54,6 +55,13 @@ class PrintableFormatter : public spdlog::formatter {
  private:
   std::unique_ptr<spdlog::formatter> inner_;
 };
+
+/// The service manager is the whole process's, as its log is. In real time only: virtual time may
+/// stand still for as long as somebody computes.
+ServiceNotice& Notice() {
+  static ServiceNotice notice;
+  return notice;
+}
 
 int BlockStopSignals() {
   sigset_t set;
@@ -130,7 +138,10 @@ Messenger& Process::messenger() {
 
 bool Process::stopping() {
   signalfd_siginfo info;
-  if (read(stop_fd_, &info, sizeof info) == sizeof info) stopping_ = true;
+  if (read(stop_fd_, &info, sizeof info) == sizeof info) {
+    stopping_ = true;
+    if (!participant_) Notice().Stopping();
+  }
   return stopping_ || (participant_ && participant_->stopping());
 }
 
@@ -142,6 +153,7 @@ void Process::Doze(int64_t timeout, int fd) {
   std::array<pollfd, 3> polled{
       {{stop_fd_, POLLIN, 0}, {messenger().fd(), POLLIN, 0}, {fd, POLLIN, 0}}};
   const timespec real = clock_.RealDuration(timeout);
+  Notice().Alive();
   ppoll(polled.data(), fd < 0 ? 2 : 3, &real, nullptr);
 }
 
@@ -173,6 +185,7 @@ bool Process::Sleep(int64_t timeout, const std::function<void()>& meanwhile) {
     const int64_t end = clock_.Now() + timeout;
     if (meanwhile) meanwhile();
     pollfd stop{stop_fd_, POLLIN, 0};
+    Notice().Alive();
     const timespec real = clock_.RealDuration(std::max<int64_t>(end - clock_.Now(), 0));
     ppoll(&stop, 1, &real, nullptr);
   }
