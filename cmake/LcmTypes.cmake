@@ -39,7 +39,7 @@ function(add_lcm_types name)
   add_library(${name} INTERFACE)
   add_dependencies(${name} ${name}_headers)
   # SYSTEM: generated code is not held to our warnings.
-  target_include_directories(${name} SYSTEM INTERFACE ${cpp})
+  target_include_directories(${name} SYSTEM INTERFACE $<BUILD_INTERFACE:${cpp}>)
   target_link_libraries(${name} INTERFACE LCM::LCM)
 
   configure_file(${PROJECT_SOURCE_DIR}/cmake/message_types.c.in ${c}/message_types.c @ONLY)

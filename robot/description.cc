@@ -54,12 +54,35 @@ int RobotDescription::FindParameter(const std::string& parameter) const {
   return -1;
 }
 
-RobotDescription LoadRobot(const std::string& folder_or_file) {
-  namespace fs = std::filesystem;
-  fs::path file(folder_or_file);
+namespace {
+
+namespace fs = std::filesystem;
+
+// The TOML file of a folder.
+fs::path FileOf(const fs::path& folder_or_file) {
   std::error_code error;
-  if (fs::is_directory(file, error)) file /= "robot.toml";
-  if (!fs::exists(file, error)) throw ConfigError(file.string() + ": there is no such robot");
+  return fs::is_directory(folder_or_file, error) ? folder_or_file / "robot.toml" : folder_or_file;
+}
+
+// Where robots are installed with the programs; a build has none there.
+fs::path Installed(const fs::path& robot) {
+  std::error_code error;
+  const fs::path programs = fs::read_symlink("/proc/self/exe", error).parent_path();
+  return robot.is_relative() ? FileOf(programs.parent_path() / "share/plumbline" / robot) : robot;
+}
+
+}  // namespace
+
+RobotDescription LoadRobot(const std::string& folder_or_file) {
+  fs::path file = FileOf(folder_or_file);
+  std::error_code error;
+  const bool here = fs::exists(file, error);
+  if (!here) {
+    const fs::path installed = Installed(folder_or_file);
+    if (!fs::exists(installed, error))
+      throw ConfigError(file.string() + ": there is no such robot");
+    file = installed;
+  }
   std::vector<std::string> files;
   Config root = Config::Load(file.string(), &files);
 
@@ -90,6 +113,10 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.simulation = ReadSimulation(root.Table("simulation"), robot.task.period);
   robot.estimator = ReadEstimator(root.Table("estimator"), robot);
   robot.warnings = std::move(urdf.warnings);
+  // Whoever meant his own must see that it is another one.
+  if (!here)
+    robot.warnings.push_back(folder_or_file +
+                             " is not here, the installed one is taken: " + file.string());
   if (robot.simulation.contact) {
     robot.warnings.insert(robot.warnings.end(), urdf.contact_warnings.begin(),
                           urdf.contact_warnings.end());

@@ -59,7 +59,9 @@ struct RobotDescription {
   int FindParameter(const std::string& parameter) const;
 };
 
-/// Reads a robot from a folder (its robot.toml) or from a TOML file.
+/// Reads a robot from a folder (its robot.toml) or from a TOML file. A relative path that is not
+/// there is one of the robots that are installed with the program, share/plumbline/robots/hopper
+/// as robots/hopper; `warnings` says so.
 /// @throws ConfigError naming file, line and field for anything missing, unknown, out of range or
 /// inconsistent between URDF and TOML. Thread-safe but for the files.
 RobotDescription LoadRobot(const std::string& folder_or_file);
