@@ -59,6 +59,8 @@ plumb_package(python python3-plumbline SECTION python ALL
   SUMMARY "reads Plumbline's logs in Python"
   TEXT "${what}\n.\nThis package reads LCM logs with Python's standard library alone, and\ndecodes Plumbline's messages."
   DEPENDS "python3:any")
+set(scripts ${PROJECT_SOURCE_DIR}/packaging/python3-plumbline)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${scripts}/postinst ${scripts}/prerm)
 plumb_package(doc plumbline-doc SECTION doc ALL
   SUMMARY "documentation of Plumbline"
   TEXT "${what}\n.\nThis package has the documents, as Markdown and for browsers.")
