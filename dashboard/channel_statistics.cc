@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "common/message_json.h"
@@ -31,6 +32,8 @@ void ChannelStatistics::Add(std::string_view name, std::string_view type, size_t
     ++part.intervals;
     part.sum += interval;
     part.square += interval * interval;
+    const auto us = static_cast<uint64_t>(std::max<int64_t>(arrival - channel.last, 1));
+    ++channel.intervals[std::min<size_t>(std::bit_width(us) - 1, kBins - 1)];
   }
   channel.last = arrival;
 }
@@ -60,8 +63,8 @@ std::string ChannelStatistics::Json(int64_t utime, int64_t now) {
     AppendJsonNumber(all.intervals > 1 ? jitter / 1000 : std::nan(""), json);
     json += R"(,"bytes_per_second":)";
     AppendJsonNumber(static_cast<double>(all.bytes) / seconds, json);
-    json += fmt::format(R"(,"undecodable":{},"refused":{},"age_ms":)", channel.undecodable,
-                        channel.refused);
+    json += fmt::format(R"(,"undecodable":{},"refused":{},"intervals":[{}],"age_ms":)",
+                        channel.undecodable, channel.refused, fmt::join(channel.intervals, ","));
     AppendJsonNumber(static_cast<double>(now - channel.last) / 1000, json);
     json += '}';
   }

@@ -21,10 +21,13 @@ class ChannelStatistics {
   void Add(std::string_view channel, std::string_view type, size_t bytes, int64_t arrival,
            Verdict verdict);
   /// Call twice a second: rates are of the last kParts calls. @param now monotonic [us].
+  /// "intervals" are counts since the beginning: bin i has those of [2^i, 2^(i+1)) us, the last
+  /// also all that are longer.
   /// @return {"utime":..,"channels":[..]}
   std::string Json(int64_t utime, int64_t now);
 
  private:
+  static constexpr size_t kBins = 24;
   static constexpr size_t kParts = 4;  // of the time over which rates are taken
   struct Part {
     int64_t messages = 0, bytes = 0, intervals = 0;
@@ -34,6 +37,7 @@ class ChannelStatistics {
     std::string type;
     int64_t count = 0, undecodable = 0, refused = 0;
     int64_t last = -1;  // arrival
+    std::array<int64_t, kBins> intervals{};
     std::array<Part, kParts> parts{};
   };
   std::map<std::string, Channel, std::less<>> channels_;

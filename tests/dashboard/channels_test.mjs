@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { createInterface } from "node:readline";
 import { test } from "node:test";
-import { build, clean, launch, look, PATIENCE } from "./browser.mjs";
+import { build, clean, launch, look, numbers, PATIENCE } from "./browser.mjs";
 import { startGateway, stop } from "./gateway.mjs";
 
 const source = process.env.PLUMBLINE_SOURCE ?? new URL("../..", import.meta.url).pathname;
@@ -45,6 +45,13 @@ test("what is said on a channel is counted, and how regularly, and what does not
     // Of sizes there are two, one byte apart.
     const size = bytes / rate, whole = counted[0][1];
     assert.ok(size > whole - 1 && size < whole, `${size} bytes a message are shown, ${whole} or one less was said`);
+    // How regularly the estimator works, whose results these are.
+    const bins = (await numbers(seen.page, "processes")).map(([, , results]) => results), heard = bins.reduce((sum, one) => sum + one, 0) + 1;
+    while (said.length < heard) await seen.page.waitForTimeout(100);
+    const meant = Array(24).fill(0);
+    for (let i = 1; i < heard; i++) meant[Math.floor(Math.log2((said[i][0] - said[i - 1][0]) * 1e6))]++;
+    // Of 40 ms and 160 ms; what comes late may be in a bin further up.
+    bins.forEach((results, bin) => assert.ok(Math.abs(results - meant[bin]) <= 2 + 0.1 * heard, `${results} intervals of 2^${bin} us are shown, ${meant[bin]} were said`));
     clean(seen);
   } finally {
     await browser.close();

@@ -52,13 +52,19 @@ async function compareEvents(page, said) {
 
 async function compareDriver(page, status) {
   await page.waitForFunction((cycles) => document.querySelector("[data-counter=cycles]")?.dataset.value === String(cycles), status.cycles);
-  for (const counter of await page.locator("[data-counter]").all()) {
-    const name = await counter.getAttribute("data-counter");
-    near(await value(counter), status[name], name);
-  }
   const bins = await numbers(page, "cycle");
   status.lateness.forEach((count, i) => near(bins[i][1], count, `lateness, bin ${i}`));
   status.phase_duration.forEach((phase, p) => phase.forEach((count, i) => near(bins[i][2 + p], count, `${status.phase_name[p]}, bin ${i}`)));
+}
+
+async function compareCounters(page, said) {
+  const measurements = said.ESTIMATOR_STATUS.at(-1).measurements;
+  await page.waitForFunction((meant) => document.querySelector("[data-counter=measurements]")?.dataset.value === String(meant), measurements);
+  for (const channel of ["DRIVER_STATUS", "ESTIMATOR_STATUS", "CONTROLLER_STATUS", "CALIBRATION_STATUS"]) {
+    const shown = await page.locator(`[data-of=${channel}] [data-counter]`).evaluateAll((all) => all.map((one) => [one.dataset.counter, Number(one.dataset.value)]));
+    assert.ok(shown.length > 0, channel);
+    for (const [name, count] of shown) near(count, said[channel].at(-1)[name], `${name} of ${channel}`);
+  }
 }
 
 async function comparePosterior(page, { CALIBRATION_STATUS, PARAMETER_DISTRIBUTION }, posteriors) {
@@ -133,6 +139,7 @@ export async function compare({ page }, messages, { fast = true, counted = true 
   }
   const last = (channel) => said[channel].at(-1);
   await compareDriver(page, last("DRIVER_STATUS"));
+  await compareCounters(page, said);
   const learnt = [...lastOf(said.CALIBRATION_STATUS, (one) => one.iteration).values()].filter((one) => one.iteration > 0);
   assert.deepEqual(await numbers(page, "update"), learnt.map((one) => [one.iteration, one.kl, one.ess, one.temperature, one.transitions, one.rollouts, one.seconds]));
   assert.deepEqual(await numbers(page, "fan"), learnt.flatMap((one) => one.horizon.map((n, i) => [one.iteration, n, one.error_prior[i], one.error_before[i], one.error_after[i]])));

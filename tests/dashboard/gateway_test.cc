@@ -85,6 +85,12 @@ TEST_CASE("the table of channels counts every message, and what does not decode"
   CHECK(row("ROBOT_STATE")["type"] == "robot_state_t");
   CHECK(row("ROBOT_STATE")["rate"].get<double>() == Approx(500).epsilon(0.01));
   CHECK(row("ROBOT_STATE")["jitter_ms"].get<double>() < 0.1);
+  // 2 ms each: in the bin of 1024 to 2047 us, but for the last, at the same moment.
+  const json intervals = row("ROBOT_STATE")["intervals"];
+  CHECK(intervals.size() == 24);
+  CHECK(intervals[10] == 999);
+  CHECK(intervals[0] == 1);
+  CHECK(row("POLICY")["intervals"] == json(std::vector<int>(24)));
   CHECK(row("JOINT_STATE")["undecodable"] == 1);
   CHECK(row("STRANGE")["undecodable"] == 1);
   CHECK(row("POLICY")["refused"] == 1);

@@ -1,7 +1,7 @@
 // The page's numbers of the processes' health against those of a gateway that makes them up: every one, to all digits.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { ages } from "./browser.mjs";
+import { ages, numbers, value } from "./browser.mjs";
 import { closeBrowser, openBrowser, visit } from "./visit.mjs";
 
 const STATUS = { driver: "DRIVER_STATUS", estimator: "ESTIMATOR_STATUS", controller: "CONTROLLER_STATUS", calibrator: "CALIBRATION_STATUS", trainer: "TRAINING_STATUS" };
@@ -50,4 +50,39 @@ test("a process that falls silent grows old", visit({}, {}, async ({ page, story
   await page.waitForTimeout(2500);
   const silent = (Date.now() - before) / 1000, [[least, most]] = await agesOf(page, ["driver"]);
   assert.ok(most >= silent - 1.5 && least <= (Date.now() - before) / 1000 + 1, `silent for ${silent} s, ${least} to ${most} s are shown`);
+}));
+
+test("of every process is shown what it says, how regularly it works and what it has counted", visit({}, {}, async ({ page, mock }) => {
+  await page.locator("[data-channel]").first().waitFor();
+  const words = await page.locator("#processes tr[data-process]").evaluateAll((all) => all.map((row) => [row.dataset.process, row.cells[2].textContent, row.cells[3].textContent]));
+  assert.deepEqual(words, [["driver", "idle", "12.5"], ["estimator", "the state is valid", "10"], ["controller", "running", "8.33"], ["calibrator", "iteration 6", "7.14"], ["trainer", "policy 6, complete", "6.25"], ["gateway", "1 browser, 0 messages left out for slow ones", "–"]]);
+  const shown = await numbers(page, "processes");
+  const of = (all, channel) => all.find((one) => one.channel === channel).intervals;
+  const columns = (all) => ["JOINT_STATE", "ROBOT_STATE", "JOINT_COMMAND"].map((channel) => of(all, channel));
+  const said = mock.saidOfChannels.find((all) => of(all, "ROBOT_STATE")[9] === shown[9][2]);
+  assert.deepEqual(shown, said[0].intervals.map((_, bin) => [2 ** bin, ...columns(said).map((counts) => counts[bin])]));
+  // Of the estimator's results half come within [512, 1024) us, and all but one in a hundred within 2048.
+  assert.match(await page.locator("[data-process=estimator] td").last().innerText(), /99 % below 2\.0 ms/);
+  assert.equal(await page.locator("[data-process=calibrator] td").last().innerText(), "–");
+  for (const [channel, message] of Object.entries(mock.counting)) {
+    const all = await page.locator(`[data-of=${channel}] [data-counter]`).all();
+    assert.ok(all.length > 0, channel);
+    for (const one of all) {
+      const name = await one.getAttribute("data-counter");
+      assert.equal(await value(one), message[name], `${channel}.${name}`);
+    }
+  }
+  // What is bad if it happens at all.
+  assert.deepEqual(await page.locator("#counted .bad dd").evaluateAll((all) => all.map((one) => one.dataset.counter)), ["refused", "outages", "episodes_aborted", "dropped_not_finite"]);
+}));
+
+test("a bus that is down says why, and who may command", visit({ driver: { state: 4, reason: "the CAN controller went bus-off", bus_up: false, commands_signed: true, frames_foreign: 6 } }, {}, async ({ page }) => {
+  const line = page.locator("#bus p.line").first();
+  await line.filter({ hasText: "down" }).waitFor();
+  assert.equal(await line.innerText(), "socketcan:can0 is down: the CAN controller went bus-off");
+  assert.equal(await page.locator("#bus .lamp.bad").count(), 1);
+  await page.locator("#bus").getByText("Only commands that are signed with its key are obeyed.").waitFor();
+  assert.deepEqual(await page.locator("#bus .counters .bad dd").evaluateAll((all) => all.map((one) => one.dataset.counter)), ["overruns", "frames_foreign", "measurements_lost"]);
+  await page.locator("#events").getByText("fault: the CAN controller went bus-off").waitFor();
+  await page.locator("#events").getByText("the bus is down").waitFor();
 }));

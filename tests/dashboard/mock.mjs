@@ -45,7 +45,7 @@ function calibration(iteration, alarm) {
     utime: BEGIN + iteration * 12e6, iteration, transitions: 200 * iteration, rollouts: iteration, discrepancy: iteration ? 0.4 + 1 / iteration : null, prior_discrepancy: iteration ? 4.9 : null,
     num_horizons: iteration ? 3 : 0, horizon: iteration ? [1, 5, 20] : [], error_before: iteration ? learnt.map((one) => 1.4 * one) : [], error_after: iteration ? learnt : [], error_prior: iteration ? [0.0027, 0.0156, 0.24] : [],
     kl: iteration ? 14 / iteration ** 2 : null, ess: null, temperature: iteration ? 1 : null, num_combinations: iteration ? 2 : 0, combination: ["gravity / length", "mass length^2"], combination_mean: [9.4477, 1.3034], combination_sd: [2e-4, 6e-5],
-    identifiability: iteration ? "only gravity / length and mass length^2 can be known from this motion" : "", seconds: 0.4, streamed_transitions: 0, alarm, gap: alarm && "the learnt residual explains, of 600 free steps, 86 % of the velocities' squared errors",
+    identifiability: iteration ? "only gravity / length and mass length^2 can be known from this motion" : "", seconds: 0.4, streamed_transitions: 0, dropped_gap: 11 * iteration, dropped_late: 3, dropped_not_finite: 1, dropped_restart: 7, dropped_model_based: 0, alarm, gap: alarm && "the learnt residual explains, of 600 free steps, 86 % of the velocities' squared errors",
   };
 }
 
@@ -57,16 +57,16 @@ const training = (iteration, update) => ({
   incumbent: iteration - 1, incumbent_since: Math.max(0, iteration - 1), decision: iteration ? `policy ${iteration - 1} trusted: the model explains the robot` : "",
 });
 
-const controller = (policy_iteration, phase = 3, purpose = 0) => ({ utime: BEGIN, policy_iteration, phase, reason: "", step: 171, episode_return: -365.2, num_episodes: 3, returns: [-300 + 20 * policy_iteration, -280 + 12 * policy_iteration, -330 + 25 * policy_iteration], steps: [200, 100, 150], late_rate: [-0.5, -0.25, -0.5], fell: [false, false, true], episodes_wanted: 3, purpose, episodes_aborted: 0 });
+const controller = (policy_iteration, phase = 3, purpose = 0) => ({ utime: BEGIN, policy_iteration, phase, reason: "", step: 171, episode_return: -365.2, num_episodes: 3, returns: [-300 + 20 * policy_iteration, -280 + 12 * policy_iteration, -330 + 25 * policy_iteration], steps: [200, 100, 150], late_rate: [-0.5, -0.25, -0.5], fell: [false, false, true], episodes_wanted: 3, purpose, episodes_aborted: 4 });
 
 const zeros = Array(20).fill(0);
 const driver = (state, reason, cycles) => ({
   utime: BEGIN, state, reason, bus: "socketcan:can0", bus_up: true, joint_name: ["pivot"], joint_state: [state], joint_reason: [""], motor_temperature: [31.5], drive_temperature: [28], bus_voltage: [null], num_sensors: 0, sensor_name: [], sensor_state: [], sensor_reason: [],
-  frames_received: cycles * 2, frames_sent: cycles, frames_rejected: 0, frames_dropped: 0, frames_foreign: 0, measurements_lost: 1, commands_accepted: Math.floor(cycles / 10), commands_rejected: 0, commands_expired: 0, commands_limited: 12, commands_forged: 0, messages_rejected: 0, cycles, overruns: 3, num_bins: 20,
+  frames_received: cycles * 2, frames_sent: cycles, frames_rejected: 0, frames_dropped: 0, frames_foreign: 0, measurements_lost: 1, commands_accepted: Math.floor(cycles / 10), commands_rejected: 0, commands_expired: 0, commands_limited: 12, commands_signed: false, commands_forged: 0, messages_rejected: 0, cycles, overruns: 3, num_bins: 20,
   lateness: zeros.map((_, i) => Math.round(cycles * 0.4 * Math.exp(-((i - 4) ** 2) / 3))).map((one, i) => (i === 13 ? 3 : one)), phase_name: ["receive", "publish", "command", "control", "send"],
   phase_duration: [2, 3, 1, 4, 5].flatMap((middle) => zeros.map((_, i) => Math.round(cycles * 0.5 * Math.exp(-((i - middle) ** 2) / 2)))),
 });
-const estimator = { valid: true, reason: "", joint_name: ["pivot"], age: [0.001], position_nis: [0.93], velocity_nis: [1.1], acceleration_nis: [null], bias: [null], joint_reason: [""] };
+const estimator = { valid: true, reason: "", joint_name: ["pivot"], age: [0.001], position_nis: [0.93], velocity_nis: [1.1], acceleration_nis: [null], bias: [null], joint_reason: [""], measurements: 123456, refused: 2, duplicates: 5, reordered: 0, restarts: 17, outages: 1, imu_readings: 654321, imu_refused: 0, imu_duplicates: 13, imu_reordered: 19, model_restarts: 0 };
 
 function solids(angle, alpha) {
   const colour = { r: 0.35, g: 0.6, b: 0.58, a: alpha };
@@ -90,8 +90,9 @@ function past({ alarm = "", iterations = 6, judged = false }) {
 /** What is counted of a channel, the k-th; one that was never heard has no numbers. */
 function counted(channel, k, tick, age_ms) {
   const type = `${channel.toLowerCase()}_t`;
-  if (channel === "IMU") return { channel, type, count: 0, rate: null, jitter_ms: null, bytes_per_second: null, undecodable: 0, refused: 0, age_ms: null };
-  return { channel, type, count: tick * (k + 1), rate: 50 / (k + 1), jitter_ms: k === 6 ? null : 0.3 * k, bytes_per_second: 9000 / (k + 1), undecodable: k % 3 === 2 ? 7 * k : 0, refused: k % 4 === 1 ? 12345 + k : 0, age_ms };
+  const intervals = Array.from({ length: 24 }, (_, bin) => (channel === "IMU" ? 0 : Math.round(tick * Math.exp(-((bin - 9 - k / 2) ** 2)))));
+  if (channel === "IMU") return { channel, type, count: 0, rate: null, jitter_ms: null, bytes_per_second: null, undecodable: 0, refused: 0, intervals, age_ms: null };
+  return { channel, type, count: tick * (k + 1), rate: 50 / (k + 1), jitter_ms: k === 6 ? null : 0.3 * k, bytes_per_second: 9000 / (k + 1), undecodable: k % 3 === 2 ? 7 * k : 0, refused: k % 4 === 1 ? 12345 + k : 0, intervals, age_ms };
 }
 
 /** Starts it. @returns its address, what it has said of all channels, what was asked of it, and how to end it. `story` is changed as the test likes. */
@@ -157,9 +158,9 @@ export async function serve(folder, port = 0, story = {}) {
       tell("PLUMB_PREDICTION", { sequence: tick, q: [angle + off], v: [3.4 * Math.cos(1.3 * t)], q_measured: [angle] });
       tell("PLUMB_SCENE", { deletions: [], entities: [{ id: "robot", ...solids(angle, 1) }, { id: "prediction", ...solids(angle + 0.09, 0.4) }, { id: "ground" }] });
       tell("ROBOT_STATE", { sequence: tick, num_joints: 1, q: [angle], v: [3.4 * Math.cos(1.3 * t)], q_sd: [1.2e-4], v_sd: [0.02], effort: [0.3], contact: [], valid: true });
-      if (tick % 5 === 0 && !story.silent) tell("DRIVER_STATUS", driver(state, state === 4 ? "emergency stop by request" : "", tick + 1000)), tell("CONTROLLER_STATUS", controller(6, story.placing ? 1 : 2, Number(story.judged ?? false))), tell("ESTIMATOR_STATUS", estimator);
+      if (tick % 5 === 0 && !story.silent) tell("DRIVER_STATUS", { ...driver(state, state === 4 ? "emergency stop by request" : "", tick + 1000), ...story.driver }), tell("CONTROLLER_STATUS", controller(6, story.placing ? 1 : 2, Number(story.judged ?? false))), tell("ESTIMATOR_STATUS", estimator);
       if (tick % 25 === 0) {
-        saidOfChannels.push(topics.slice(5).concat("IMU").map((channel, k) => counted(channel, k, tick, age(channel))));
+        saidOfChannels.push(topics.slice(5).concat("JOINT_STATE", "JOINT_COMMAND", "IMU").map((channel, k) => counted(channel, k, tick, age(channel))));
         tell("PLUMB_CHANNELS", { channels: saidOfChannels.at(-1) });
       }
       if (tick % 25 === 0 && story.placing) tell("PLACE_ROBOT", { q: [-0.773], v: [0.812] });
@@ -172,7 +173,7 @@ export async function serve(folder, port = 0, story = {}) {
     for (const client of clients) client.terminate();
     return new Promise((resolve) => http.close(resolve), http.closeAllConnections());
   };
-  return { url: `http://127.0.0.1:${http.address().port}/`, port: http.address().port, begun, asked, saidOfChannels, close };
+  return { url: `http://127.0.0.1:${http.address().port}/`, port: http.address().port, begun, asked, saidOfChannels, counting: { ESTIMATOR_STATUS: estimator, CONTROLLER_STATUS: controller(6), CALIBRATION_STATUS: calibration(6, "") }, close };
 }
 
 if (import.meta.url === pathToFileURL(process.argv[1] ?? "").href) {

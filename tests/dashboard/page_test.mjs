@@ -6,7 +6,7 @@ import { clean, numbers, pageFolder } from "./browser.mjs";
 import { serve } from "./mock.mjs";
 import { closeBrowser, lookAt, openBrowser, visit } from "./visit.mjs";
 
-const PANELS = ["robot", "motion", "posterior", "pairs", "fan", "update", "gap", "returns", "training", "processes", "cycle", "bus", "channels", "events"];
+const PANELS = ["robot", "motion", "posterior", "pairs", "fan", "update", "gap", "returns", "training", "processes", "cycle", "bus", "counted", "channels", "events"];
 const ALARM = "the model cannot explain this log: <b>pivot</b>";
 before(openBrowser);
 after(closeBrowser);

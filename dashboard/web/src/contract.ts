@@ -42,6 +42,7 @@ export interface ChannelCount {
   bytes_per_second: Value;
   undecodable: number;
   refused: number;
+  intervals: number[]; // between two arrivals, counted in the bins of DRIVER_STATUS
   age_ms: Value;
 }
 

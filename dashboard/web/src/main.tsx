@@ -2,14 +2,16 @@ import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { Controls, Outcome, stop } from "./controls";
 import { Header, helping, Warning } from "./header";
+import { BusPanel } from "./panels/bus";
 import { ChannelsPanel } from "./panels/channels";
+import { CountedPanel } from "./panels/counted";
 import { EventsPanel } from "./panels/events";
 import { FanPanel } from "./panels/fan";
 import { GapPanel } from "./panels/gap";
 import { MotionPanel } from "./panels/motion";
 import { PairsPanel } from "./panels/pairs";
 import { PosteriorPanel } from "./panels/posterior";
-import { BusPanel, CyclePanel, ProcessesPanel } from "./panels/processes";
+import { CyclePanel, ProcessesPanel } from "./panels/processes";
 import { ReturnsPanel } from "./panels/returns";
 import { RobotPanel } from "./panels/robot";
 import { TrainingPanel } from "./panels/trpo";
@@ -20,7 +22,7 @@ const SECTIONS: [id: string, name: string, panels: (() => preact.JSX.Element)[]]
   ["now", "Robot", [RobotPanel, MotionPanel]],
   ["learnt", "Learning", [PosteriorPanel, PairsPanel, FanPanel, UpdatePanel, GapPanel]],
   ["policies", "Policies", [ReturnsPanel, TrainingPanel]],
-  ["health", "Health", [ProcessesPanel, CyclePanel, BusPanel, ChannelsPanel]],
+  ["health", "Health", [ProcessesPanel, CyclePanel, BusPanel, CountedPanel, ChannelsPanel]],
   ["history", "Events", [EventsPanel]],
 ];
 
