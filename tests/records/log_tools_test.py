@@ -1,23 +1,14 @@
 #!/usr/bin/env python3
-"""Logs read in Python, and MCAP files of them by MCAP's official reader.
-
-    log_tools_test.py SOURCE BUILD python      the reader in python/plumb_log.py, with the generated types
-    log_tools_test.py SOURCE BUILD mcap        plumb export --mcap, read by @mcap/core. Exit status 77, with the reason, where
-                                               node or its modules are missing: npm install in tests/records/mcap_core,
-                                               or $MCAP_MODULES names a folder with them in its node_modules
-"""
-import json
+"""Logs read in Python, by python/plumb_log.py, with the generated types. log_tools_test.py SOURCE BUILD"""
 import math
-import os
 import pathlib
 import re
-import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 
-SOURCE, BUILD, WHAT = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
+SOURCE, BUILD = map(pathlib.Path, sys.argv[1:])
 sys.path += [str(SOURCE / "python"), str(BUILD / "lcmtypes/python")]
 import plumb  # noqa: E402
 import plumb_log  # noqa: E402
@@ -110,44 +101,7 @@ def run_example(folder):
     require(done.returncode == 0 and len(done.stdout.splitlines()) == 3, f"the example: {done.stderr}")
 
 
-def modules():
-    for folder in filter(None, (os.environ.get("MCAP_MODULES"), SOURCE / "tests/records/mcap_core")):
-        if (pathlib.Path(folder) / "node_modules/@mcap/core").is_dir():
-            return str(folder)
-    return None
-
-
-def test_mcap(folder):
-    if not shutil.which("node") or not modules():
-        print("skipped: " + ("node is not installed" if not shutil.which("node") else
-                             "@mcap/core is missing: npm install in tests/records/mcap_core, or set MCAP_MODULES"))
-        sys.exit(77)
-    log, mcap = folder / "a.lcmlog", folder / "a.mcap"
-    write_log(log, sample(20_000))
-    exported = subprocess.run([BUILD / "bin/plumb", "export", log, "--mcap", mcap], capture_output=True, text=True)
-    require(exported.returncode == 0, exported.stdout + exported.stderr)
-    read = subprocess.run(["node", SOURCE / "tests/records/mcap_core/read.mjs", mcap], capture_output=True, text=True,
-                          env={**os.environ, "MCAP_MODULES": modules()})
-    require(read.returncode == 0, read.stderr)
-    messages = [json.loads(line) for line in read.stdout.splitlines()]
-    require(len(messages) == 20_001, f"{len(messages)} messages")
-    states = [message for message in messages if message["topic"] == "ROBOT_STATE"]
-    for i, message in enumerate(states):
-        data, expected = message["data"], state(i)
-        require(message["schema"] == "plumb.robot_state_t" and message["schemaEncoding"] == "jsonschema", "its schema")
-        require(message["encoding"] == "json", "its encoding")
-        require(message["logged"] == str(1000 * (BEGIN + 1000 * i)), "when it was logged")
-        require(message["published"] == str(1000 * expected.utime), "when it was published")
-        require(data["q"] == expected.q and data["v"] == [None, 1e-300], f"values of {data}")
-        require(data["sequence"] == i and data["valid"] is False, "integers and truths")
-    others = [message for message in messages if message["topic"] == "DRIVER_STATUS"]
-    require(len(others) == 1 and others[0]["data"]["reason"].startswith("it says \"no\""), "texts")
-
-
 with tempfile.TemporaryDirectory() as temporary:
-    if WHAT == "python":
-        test_python(pathlib.Path(temporary))
-        run_example(pathlib.Path(temporary))
-    else:
-        test_mcap(pathlib.Path(temporary))
+    test_python(pathlib.Path(temporary))
+    run_example(pathlib.Path(temporary))
 print("all as it must be")
