@@ -9,6 +9,7 @@
 
 #include "common/decompositions.h"
 #include "common/outside_text.h"
+#include "robot/physical.h"
 #include "robot/residual_message.h"
 
 namespace plumb {
@@ -63,26 +64,39 @@ void RequireSameParameters(const parameter_distribution_t& message,
 constexpr double kFarthest = 1000, kWidest = 100;
 constexpr double kGreatest = 1e12;  // in any unit
 
-// Of each parameter apart, so that it can be named; as it is and as simulators have it.
-void RequirePlausible(const ParameterDistribution& distribution, const RobotDescription& robot) {
-  const Eigen::VectorXd means = distribution.Mean(), sds = distribution.Sd();
+// In coordinates, of each parameter apart, so that it and the field can be named.
+void RequireNear(const Eigen::VectorXd& coordinates, const char* field,
+                 const RobotDescription& robot) {
   const Gaussian prior = PriorGaussian(robot);
+  for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
+    const double sds = std::abs(coordinates[i] - prior.mean[i]) / std::sqrt(prior.covariance(i, i));
+    if (sds > kFarthest)
+      Reject(fmt::format("the {} of '{}' is {:.3g} standard deviations of the prior away from it",
+                         field, robot.parameters[static_cast<size_t>(i)].name, sds));
+  }
+}
+
+void RequireNarrow(const Eigen::MatrixXd& covariance, const RobotDescription& robot) {
+  const Gaussian prior = PriorGaussian(robot);
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    const double times = covariance(i, i) / prior.covariance(i, i);
+    if (times > kWidest * kWidest)
+      Reject(fmt::format("the variance of '{}' is {:.3g} times the prior's",
+                         robot.parameters[static_cast<size_t>(i)].name, times));
+  }
+}
+
+// As they are, and as simulators have them.
+void RequirePlausible(const ParameterDistribution& distribution, const RobotDescription& robot) {
+  for (const Gaussian& component : distribution.mixture.components) {
+    RequireNear(component.mean, "mean", robot);
+    RequireNarrow(component.covariance, robot);
+  }
+  const Eigen::VectorXd means = distribution.Mean(), sds = distribution.Sd();
   for (Eigen::Index i = 0; i < means.size(); ++i) {
-    const std::string& name = robot.parameters[static_cast<size_t>(i)].name;
     if (!(std::abs(means[i]) <= kGreatest) || !(sds[i] <= kGreatest))
-      Reject(fmt::format("'{}' is {} with a standard deviation of {}", name, means[i], sds[i]));
-    const double sd = std::sqrt(prior.covariance(i, i));
-    for (const Gaussian& component : distribution.mixture.components) {
-      const double from_prior = std::abs(component.mean[i] - prior.mean[i]) / sd,
-                   width = std::sqrt(std::max(0., component.covariance(i, i))) / sd;
-      if (from_prior > kFarthest)
-        Reject(
-            fmt::format("the mean of '{}' is {:.3g} standard deviations of the prior away from it",
-                        name, from_prior));
-      if (width > kWidest)
-        Reject(
-            fmt::format("the variance of '{}' is {:.3g} times the prior's", name, width * width));
-    }
+      Reject(fmt::format("'{}' is {} with a standard deviation of {}",
+                         robot.parameters[static_cast<size_t>(i)].name, means[i], sds[i]));
   }
 }
 
@@ -198,9 +212,9 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
   } catch (const std::invalid_argument& error) {
     Reject(error.what());
   }
-  for (size_t k = 0; result.residual && k < result.residual->coordinates.size(); ++k) {
-    if (!result.ToPhysical(result.residual->coordinates[k]).allFinite())
-      Reject("residual: a draw is too wide: it overflows");
+  if (result.residual) {
+    for (const Eigen::VectorXd& draw : result.residual->coordinates)
+      RequireNear(draw, "residual's draw", description);
   }
   const auto state =
       static_cast<size_t>(description.num_positions() + description.num_velocities());
@@ -209,7 +223,8 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
     result.starts.push_back(
         Eigen::VectorXf::Map(message.start.data() + i, static_cast<Eigen::Index>(state))
             .cast<double>());
-    if (!result.starts.back().allFinite()) Reject("start is not finite");
+    if (!std::ranges::all_of(result.starts.back(), IsPhysical))
+      Reject(fmt::format("a start is beyond {:g}, or not finite", kGreatestQuantity));
   }
   return result;
 }

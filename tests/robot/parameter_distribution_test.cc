@@ -161,11 +161,20 @@ TEST_CASE("Hostile distributions are refused with a reason") {
   SECTION("negative variance") {
     message.covariance[3] = -.01, refused_for("not positive semidefinite");
   }
-  SECTION("a draw of a residual") { message.draw = {1e5, 0}, refused_for("a draw is too wide"); }
-  SECTION("overflow") { message.mean[0] = 1e5, refused_for("'gravity' is inf"); }
-  SECTION("a mean of e^150") { message.mean[0] = 150, refused_for("'gravity'"); }
+  SECTION("a draw of a residual") {
+    message.draw = {0, 150}, refused_for("the residual's draw of 'offset'");
+  }
+  SECTION("a start") {
+    RobotDescription robot = Robot();
+    robot.joints.resize(1);
+    message.start = {0, 1e10f};
+    CHECK_THROWS_WITH(ParameterDistribution::FromMessage(message, robot),
+                      Catch::Contains("a start is beyond 1e+09"));
+  }
+  SECTION("overflow") { message.covariance[0] = 28, refused_for("'gravity' is"); }
+  SECTION("a mean of e^150") { message.mean[0] = 150, refused_for("the mean of 'gravity'"); }
   SECTION("a variance of e^150") {
-    message.covariance[3] = std::exp(150.), refused_for("'offset'");
+    message.covariance[3] = std::exp(150.), refused_for("the variance of 'offset'");
   }
   SECTION("far from the prior") {
     message.mean[1] = 101, refused_for("the mean of 'offset' is 1.01e+03");

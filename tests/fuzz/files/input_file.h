@@ -17,10 +17,15 @@
 
 namespace plumb {
 
+/// The folder of the robots that we have.
+inline std::filesystem::path Robots() {
+  const char* const source = std::getenv("PLUMBLINE_SOURCE");
+  return std::filesystem::path(source ? source : ".") / "robots";
+}
+
 /// A file of the pendulum.
 inline std::filesystem::path PendulumFile(const std::string& name) {
-  const char* const source = std::getenv("PLUMBLINE_SOURCE");
-  return std::filesystem::path(source ? source : ".") / "robots/pendulum" / name;
+  return Robots() / "pendulum" / name;
 }
 
 /// A folder of this process, with a file in it that becomes each of a fuzzer's inputs.

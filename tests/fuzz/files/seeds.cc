@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "calibrator/live/checkpoint.h"
+#include "common/config.h"
 #include "common/lcm_log_writer.h"
 #include "common/time_units.h"
 #include "controller/policy.h"
@@ -119,6 +120,18 @@ void WritePosterior(const RobotDescription& robot, const fs::path& file) {
   Write(file, PosteriorJson(findings, robot, SampleProvenance()));
 }
 
+/// Every robot's every file with all that it extends, and with its URDF where toml_fuzz has it: one
+/// that is new in robots/ is a seed without further ado.
+void WriteRobots(const fs::path& folder) {
+  for (const auto& entry : fs::recursive_directory_iterator(Robots())) {
+    if (entry.path().extension() != ".toml") continue;
+    const std::string file = entry.path(), robot = entry.path().parent_path().filename();
+    const std::string urdf = Config::Load(file).Table("robot").String("urdf");
+    Write(folder / (robot + "_" + entry.path().stem().string()),
+          MergedToml(file, "robot", "urdf", robot + "/" + urdf));
+  }
+}
+
 // Of an episode of kSteps steps.
 void WriteLog(const RobotDescription& robot, const fs::path& file) {
   LcmLogWriter log(file);
@@ -170,6 +183,7 @@ int main(int argc, char** argv) {
     fs::create_directories(folder / fuzzer);
     return folder / fuzzer;
   };
+  WriteRobots(in("toml"));
   WriteCalibrationCheckpoint(robot, in("calibration_checkpoint") / "made");
   WriteTrainerCheckpoint(robot, in("trainer_checkpoint") / "made");
   WriteLog(robot, in("lcm_log") / "made");
