@@ -92,7 +92,7 @@ test("played again from an earlier place on, the page shows what it did then, to
   const before = await value(count);
   const loop = spawn(...replay(8, "--from", String(from), "--to", String(to), "--loop"), { stdio: "ignore" });
   const ended = new Promise((resolve) => loop.once("exit", resolve));
-  await seen.page.waitForFunction((many) => Number(document.querySelectorAll('[data-channel="DRIVER_STATUS"] td')[1]?.dataset.value) >= many, before + 2.5 * played).finally(() => loop.kill("SIGINT"));
+  await seen.page.waitForFunction((many) => Number(document.querySelectorAll('[data-channel="DRIVER_STATUS"] td')[1]?.dataset.value) >= many, before + 2.5 * played, { timeout: 4 * PATIENCE }).finally(() => loop.kill("SIGINT"));
   await ended;
   const last = await look(browser, address);
   await last.page.locator("#events li").first().waitFor();
