@@ -90,7 +90,7 @@ function past({ alarm = "", iterations = 6, judged = false }) {
 /** What is counted of a channel, the k-th; one that was never heard has no numbers. */
 function counted(channel, k, tick, age_ms) {
   const type = `${channel.toLowerCase()}_t`;
-  const intervals = Array.from({ length: 24 }, (_, bin) => (channel === "IMU" ? 0 : Math.round(tick * Math.exp(-((bin - 9 - k / 2) ** 2)))));
+  const intervals = Array.from({ length: 24 }, (_, bin) => (channel === "IMU" ? 0 : tick * ([10, 80, 9, 1][bin - 8 - Math.floor(k / 2)] ?? 0)));
   if (channel === "IMU") return { channel, type, count: 0, rate: null, jitter_ms: null, bytes_per_second: null, undecodable: 0, refused: 0, intervals, age_ms: null };
   return { channel, type, count: tick * (k + 1), rate: 50 / (k + 1), jitter_ms: k === 6 ? null : 0.3 * k, bytes_per_second: 9000 / (k + 1), undecodable: k % 3 === 2 ? 7 * k : 0, refused: k % 4 === 1 ? 12345 + k : 0, intervals, age_ms };
 }
