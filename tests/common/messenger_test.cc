@@ -110,6 +110,25 @@ TEST_CASE("a message that does not decode leaves the newest good one alone") {
   CHECK(subscriber.newest().sequence == 7);
 }
 
+// lcm-gen's decoders leave an array alone that has no elements in a message.
+TEST_CASE("nothing of an earlier message is left in a later one") {
+  Messenger messenger("memq://");
+  Subscriber<parameter_distribution_t> subscriber(messenger, "X");
+  Publisher<parameter_distribution_t> publisher(messenger, "X");
+  parameter_distribution_t full{};
+  full.num_means = 2, full.mean = {1, 2};
+  full.num_draws = 1, full.draw = {3};
+  full.num_starts = 3, full.start = {4, 5, 6};
+  for (int i = 0; i < 2; ++i) publisher.Publish(full);  // a subscriber has two, and takes turns
+  for (int i = 0; i < 2; ++i) {
+    publisher.Publish(parameter_distribution_t{});
+    messenger.Drain();
+    CHECK(subscriber.newest().mean.empty());
+    CHECK(subscriber.newest().draw.empty());
+    CHECK(subscriber.newest().start.empty());
+  }
+}
+
 TEST_CASE("a callback's exception does not cross LCM's C frames") {
   Messenger messenger("memq://");
   Subscriber<joint_state_t> subscriber(

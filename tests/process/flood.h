@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -11,8 +12,19 @@
 #include "common/clock.h"
 #include "common/lcm_url.h"
 #include "tests/common/datagrams.h"
+#include "tests/process/stage.h"
 
 namespace plumb {
+
+/// [kB] that a process has had in memory at most; -1 if it is gone.
+inline int64_t MostMemory(const Child& child) {
+  std::istringstream status(Read("/proc/" + std::to_string(child.pid()) + "/status"));
+  for (std::string key; status >> key;) {
+    int64_t kilobytes = 0;
+    if (key == "VmHWM:" && status >> kilobytes) return kilobytes;
+  }
+  return -1;
+}
 
 /// A message as anybody can say it: without a seal, in one datagram.
 template <class Message>

@@ -2,7 +2,6 @@
 // grows beyond what docs/security.md says. In real time: datagrams have no other.
 
 #include <cmath>
-#include <sstream>
 
 #include "controller/policy.h"
 #include "plumb/calibration_status_t.hpp"
@@ -126,16 +125,6 @@ TEST_CASE("disarm and estop end a run in virtual time through such a flood") {
   CHECK_THAT(launch.Tail(5), Contains("somebody outside the run has asked for a stop"));
   CHECK(LastFrame(can_log, "021").substr(8, 2) == "01");
   CHECK(Left(stage) <= 1);  // the request, which waits for its answer
-}
-
-/// [kB] that a process has had in memory at most.
-int64_t MostMemory(const Child& child) {
-  std::istringstream status(Read("/proc/" + std::to_string(child.pid()) + "/status"));
-  for (std::string key; status >> key;) {
-    int64_t kilobytes = 0;
-    if (key == "VmHWM:" && status >> kilobytes) return kilobytes;
-  }
-  return -1;
 }
 
 TEST_CASE("the trainer's memory has a bound while it trains") {

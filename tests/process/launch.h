@@ -23,12 +23,12 @@ inline Child Launch(Stage& stage, std::vector<std::string> flags,
 }
 
 /// The stage's robot becomes one that learns so little that a run takes seconds.
-inline void LearnLittle(Stage& stage) {
+inline void LearnLittle(Stage& stage, int updates = 3) {
   const std::filesystem::path file = stage.folder / "robot.toml";
   std::ofstream(file) << fmt::format(
       "extends = \"{0}/robot.toml\"\n[robot]\nurdf = \"{0}/robot.urdf\"\n[training]\nupdates = "
-      "3\nupdates_again = 1\n",
-      stage.robot_folder);
+      "{1}\nupdates_again = 1\n",
+      stage.robot_folder, updates);
   stage.robot_folder = file;
 }
 
