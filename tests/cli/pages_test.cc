@@ -90,8 +90,8 @@ TEST_CASE("in a figure, text from outside is text") {
                 {"title", "panel", "x", "y", "curve"});
 }
 
-// Who else writes HTML belongs above, and then here; SVG is escaped where all of it is drawn, as the
-// figure's is.
+// Who else writes HTML belongs above, and then here; SVG is escaped where all of it is drawn, as
+// the figure's is.
 TEST_CASE("nothing else writes HTML or SVG") {
   std::set<std::string> writers;
   for (auto entry = fs::recursive_directory_iterator(kSource); entry != end(entry); ++entry) {
