@@ -12,6 +12,7 @@
 #include <optional>
 #include <set>
 
+#include "cli/launch_report.h"
 #include "cli/progress.h"
 #include "cli/run_processes.h"
 #include "cli/run_setting.h"
@@ -106,7 +107,7 @@ class ClosedLoop {
     processes_.Stop(false);
     if (setting_.virtual_run) setting_.virtual_run->Finish();
     std::cout << progress_.Conclusion(setting_.truth);
-    WriteSummary();
+    WriteOutcome();
     return 0;
   }
 
@@ -238,8 +239,7 @@ class ClosedLoop {
     requests_.Publish(request);
   }
 
-  void WriteSummary() {
-    if (flags_.summary.empty()) return;
+  void WriteOutcome() {
     nlohmann::json summary = progress_.Summary(setting_.truth);
     summary["seed"] = flags_.seed;
     summary["time"] = setting_.virtual_run ? "virtual" : "real";
@@ -247,8 +247,12 @@ class ClosedLoop {
     summary["bus"] = setting_.bus;
     summary["rearms"] = rearms_;
     summary["version"] = VersionLine("plumb");
-    WriteAtomically(flags_.summary,
-                    summary.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    if (!flags_.summary.empty()) {
+      WriteAtomically(flags_.summary,
+                      summary.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    }
+    if (!flags_.report.empty())
+      WriteAtomically(flags_.report, LaunchReport(robot_, summary, flags_.command));
   }
 
   void Print(const std::string& line) {

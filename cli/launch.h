@@ -24,6 +24,7 @@ struct LaunchFlags {
   std::string log;      ///< record all messages here; empty = do not
   std::string can_log;  ///< record all frames here, in virtual time; empty = do not
   std::string summary;  ///< JSON of the outcome; empty = do not
+  std::string report;   ///< the same as an HTML page; empty = do not
   /// where a page shows the run, ADDRESS:PORT; empty: nowhere
   std::string dashboard;
   std::string command;  ///< that was given

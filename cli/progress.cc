@@ -208,6 +208,8 @@ std::string Progress::StatusLine(double seconds) const {
     line += fmt::format("  training policy {}: update {}/{}, return {:.0f}, {:.0f} k steps",
                         training_.iteration, training_.update, training_.updates,
                         training_.mean_return, static_cast<double>(training_.steps) / 1000);
+    if (training_.dropped_episodes > 0)
+      line += fmt::format(", {} episodes dropped", training_.dropped_episodes);
     if (training_.incumbent >= 0) line += fmt::format("; policy {} runs", training_.incumbent);
     return line;
   }
@@ -328,6 +330,7 @@ nlohmann::json Progress::Summary(const Eigen::VectorXd& truth) const {
                                     {"summary", decision.text}});
   }
   summary["evaluation_returns"] = evaluation_;
+  summary["dropped_episodes"] = training_.dropped_episodes;
   summary["seconds"] = {{"robot", spent_.robot},
                         {"training", spent_.training},
                         {"other", spent_.other},

@@ -46,10 +46,11 @@ fs::path MakeFolder(const std::string& wanted) {
 void RequireFiles(const Process& process, const LaunchFlags& flags, const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
   inputs.push_back(process.key_file());
-  RequireNotRead({flags.log, flags.can_log, flags.summary}, inputs);
+  RequireNotRead({flags.log, flags.can_log, flags.summary, flags.report}, inputs);
   RequireSameKind(flags.log, "\xed\xa1\xda\x01", "an LCM log");
   RequireSameKind(flags.can_log, "(", "a log of candump's");
   RequireSameKind(flags.summary, "{", "a summary");
+  RequireSameKind(flags.report, "<!DOCTYPE html>", "a report");
 }
 
 }  // namespace
@@ -85,7 +86,9 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   RequireFree(process.lcm_url(), bus, flags.real);
   output = MakeFolder(flags.output);
   lock.emplace(output);
-  if (!flags.summary.empty()) RequireWritable(flags.summary);  // perhaps in that folder
+  for (const std::string& file : {flags.summary, flags.report}) {
+    if (!file.empty()) RequireWritable(file);  // perhaps in that folder
+  }
   if (flags.real || flags.real_time) return;
   const RecordFolder::About about{VersionLine("plumb"), flags.command, "", "virtual", flags.robot};
   virtual_run.emplace(output, process.lcm_url(),

@@ -15,6 +15,7 @@ plumb("calibrate", `${robots}/pendulum/gym.toml`, "--csv", "swing.csv", "--repor
 plumb("sim", `${robots}/hopper/gym.toml`, "--random", "--episodes", "60", "--seed", "3", "--noise", "0.003", "--csv", "hop.csv");
 plumb("calibrate", `${robots}/hopper/gym.toml`, "--csv", "hop.csv", "--report", "hopper.html");
 plumb("train", `${robots}/pendulum`, "--steps", "3e5", "--evaluate-every", "5", "--report", "training.html");
+plumb("launch", `${robots}/pendulum`, "--iterations", "4", "--report", "run.html");
 
 const browser = await launch();
 const desk = { viewport: { width: 1060, height: 900 } };
@@ -24,6 +25,7 @@ const PICTURES = [ // file, page, how it is looked at, section by its heading; n
   ["report-pairs-hopper", "hopper", desk, "Prior and posterior"],
   ["report-fit-pendulum", "pendulum", desk, "Residuals"],
   ["report-training", "training", { ...desk, viewport: { width: 1060, height: 1000 } }, ""],
+  ["report-run", "run", { ...desk, viewport: { width: 1060, height: 1000 } }, ""],
   ["report-phone", "hopper", { ...phone, colorScheme: "dark" }, ""],
 ];
 try {

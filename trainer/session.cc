@@ -193,6 +193,7 @@ training_status_t TrainingSession::Status() const {
   status.update = update_;
   status.updates = updates();
   status.steps = trainer_.steps();
+  status.dropped_episodes = trainer_.dropped_episodes();
   const bool any = last_.batch > 0;  // in this run of the process
   status.mean_return = any ? last_.mean_return : kUnknown;
   status.kl = any ? last_.step.kl : kUnknown;

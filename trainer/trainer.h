@@ -76,6 +76,7 @@ class Trainer {
   const GaussianPolicy& policy() const { return policy_; }
   int64_t updates() const { return updates_; }
   int64_t steps() const { return steps_; }
+  int64_t dropped_episodes() const { return dropped_episodes_; }
 
   /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used,
   /// or if ranks have come to different results.

@@ -9,10 +9,12 @@
 #include <string>
 
 #include "calibrator/report/report.h"
+#include "cli/launch_report.h"
 #include "cli/training_report.h"
 #include "plot/curves.h"
 #include "robot/urdf/xml.h"
 #include "tests/calibrator/sample_findings.h"
+#include "tests/cli/sample_summary.h"
 
 namespace plumb {
 namespace {
@@ -84,6 +86,19 @@ TEST_CASE("in a training's report, text from outside is text") {
                 {"robot", "file", "task", "parameter", "unit", "command", "distribution"});
 }
 
+TEST_CASE("in a run's report, text from outside is text") {
+  const RobotDescription robot = EvilRobot();
+  nlohmann::json summary = SampleSummary();
+  for (const char* field : {"bus", "time", "version", "identifiability"})
+    summary[field] = Evil(field);
+  summary["policy"]["why"] = Evil("why"), summary["decisions"][0]["summary"] = Evil("decision");
+  summary["iterations"][1]["alarm"] = Evil("alarm"), summary["iterations"][1]["gap"] = Evil("gap");
+  summary["iterations"][1]["combinations"][0]["name"] = Evil("combination");
+  CheckHarmless(LaunchReport(robot, summary, Evil("command")),
+                {"robot", "file", "parameter", "unit", "bus", "time", "version", "identifiability",
+                 "why", "decision", "alarm", "gap", "combination", "command"});
+}
+
 TEST_CASE("in a figure, text from outside is text") {
   const Curve curve{Evil("curve"), {1, 2}, {1, 2}, {0, 1}, {2, 3}};
   CheckHarmless(DrawCurves(Evil("title"), {{Evil("panel"), Evil("x"), Evil("y"), false, {curve}}}),
@@ -110,9 +125,10 @@ TEST_CASE("nothing else writes HTML or SVG") {
   CHECK(writers == std::set<std::string>{
                        "calibrator/report/pair_plot.cc", "calibrator/report/report.cc",
                        "calibrator/report/report_checks.cc", "calibrator/report/report_plots.cc",
-                       "calibrator/report/report_residuals.cc", "cli/training_report.cc",
-                       "experiments/figure_1.cc", "experiments/learning_curves.cc",
-                       "plot/curves.cc", "plot/html.cc", "plot/svg.cc"});
+                       "calibrator/report/report_residuals.cc", "cli/launch_report.cc",
+                       "cli/run_plots.cc", "cli/training_report.cc", "experiments/figure_1.cc",
+                       "experiments/learning_curves.cc", "plot/curves.cc", "plot/html.cc",
+                       "plot/svg.cc"});
 }
 
 }  // namespace

@@ -194,6 +194,11 @@ TEST_CASE_METHOD(Fixture, "the status line says what is waited for") {
   t.updates = 60, t.update = 7;
   progress.OnTraining(t);
   CHECK_THAT(progress.StatusLine(3), Catch::Contains("training policy 0: update 7/60"));
+  CHECK_THAT(progress.StatusLine(3), !Catch::Contains("dropped"));
+  t.dropped_episodes = 12;
+  progress.OnTraining(t);
+  CHECK_THAT(progress.StatusLine(3), Catch::Contains(", 12 episodes dropped"));
+  CHECK(progress.Summary({})["dropped_episodes"] == 12);
   driver_status_t d{};
   d.state = driver_status_t::FAULT;
   d.reason = "no command for 250 ms";

@@ -52,7 +52,7 @@ function calibration(iteration, alarm) {
 const residual = { condition: 0, num_inputs: 2, num_outputs: 2, num_centres: 3, mean: [0, 0], scale: [1, 1], low: [-2, -2], high: [2, 2], centre: [0, 0, 1, 1, -1, 0.5], weight: Array.from({ length: 12 }, (_, i) => (i < 6 ? 1e-3 : 2e-2) * Math.cos(i)), noise: [1e-3, 0, 6e-3, 2e-2], bound: [0.0106, 0.429], unknown: [3e-4, 2e-2] };
 
 const training = (iteration, update) => ({
-  utime: BEGIN + iteration * 12e6, iteration, update, updates: 40, steps: (iteration * 40 + update) * 1600, mean_return: -1200 * Math.exp(-(update + 20 * iteration) / 25) - 150, kl: 0.0075 + 0.002 * Math.sin(update), surrogate_gain: 0.03 * Math.exp(-update / 60),
+  utime: BEGIN + iteration * 12e6, iteration, update, updates: 40, steps: (iteration * 40 + update) * 1600, dropped_episodes: iteration, mean_return: -1200 * Math.exp(-(update + 20 * iteration) / 25) - 150, kl: 0.0075 + 0.002 * Math.sin(update), surrogate_gain: 0.03 * Math.exp(-update / 60),
   explained_variance: 1 - Math.exp(-update / 9), entropy: 1.42 - 0.02 * update - 0.03 * iteration, complete: update === 40, evaluation_return: update === 40 ? -260 + 18 * iteration : null, evaluation_tenth: update === 40 ? -420 + 24 * iteration : null, evaluation_worst: update === 40 ? -610 + 20 * iteration : null,
   incumbent: iteration - 1, incumbent_since: Math.max(0, iteration - 1), decision: iteration ? `policy ${iteration - 1} trusted: the model explains the robot` : "",
 });

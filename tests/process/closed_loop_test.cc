@@ -29,9 +29,10 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
   Stage stage(30, "pendulum", Stage::Time::kReal);
   LearnLittle(stage);
   const fs::path summary_file = stage.folder / "summary.json", log = stage.folder / "run.lcmlog",
-                 can_log = stage.folder / "can.log";
-  Child launch = Launch(stage, {"--iterations", "2", "--evaluation-episodes", "2", "--seed", "3",
-                                "--log", log, "--can-log", can_log, "--summary", summary_file});
+                 can_log = stage.folder / "can.log", report = stage.folder / "report.html";
+  Child launch =
+      Launch(stage, {"--iterations", "2", "--evaluation-episodes", "2", "--seed", "3", "--log", log,
+                     "--can-log", can_log, "--summary", summary_file, "--report", report});
   Finish(stage, launch);
   CHECK(Left(stage) == 0);
   CHECK_THAT(LastFrame(can_log, "021"),
@@ -47,6 +48,8 @@ TEST_CASE("the loop closes, and its log gives the same distributions bit by bit"
 
   const auto summary = nlohmann::json::parse(Read(summary_file));
   CHECK(summary.at("seed") == 3);
+  CHECK(summary.at("dropped_episodes") == 0);
+  CHECK_THAT(Read(report), Contains("Policy 2 runs since iteration 2") && Contains("--seed 3"));
   REQUIRE(summary.at("iterations").size() == 2);
   CHECK(summary.at("hidden").size() == 3);
   CHECK(summary.at("evaluation_returns").size() == 2);

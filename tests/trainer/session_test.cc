@@ -90,6 +90,35 @@ TEST_CASE("Where the model explains the robot the newest policy is trusted") {
   CHECK(std::isnan(status.probability));  // it has not been tried
 }
 
+/// Of the prior a good third cannot be simulated.
+class Breaking : public GymPendulum {
+ public:
+  void Reset(const SimulatorDraw& simulator, Random& random) override {
+    GymPendulum::Reset(simulator, random);
+    breaks_ = simulator.parameters[0] < 9.8;
+  }
+  StepResult Step(const Eigen::Ref<const Eigen::VectorXf>& action) override {
+    const StepResult result = GymPendulum::Step(action);
+    return breaks_ ? StepResult{NAN, false} : result;
+  }
+
+ private:
+  bool breaks_ = false;
+};
+
+TEST_CASE("Episodes that are dropped are counted in the status") {
+  TrainingSession session(
+      PendulumRobot(), [] { return std::make_unique<Breaking>(); }, 1, 4, 1);
+  REQUIRE(session.Begin(Distribution(0)));
+  CHECK(session.Status().dropped_episodes == 0);
+  int64_t dropped = 0;
+  while (session.training()) {
+    dropped += session.Advance().dropped_episodes;
+    CHECK(session.Status().dropped_episodes == dropped);
+  }
+  CHECK(dropped > 3);
+}
+
 TEST_CASE("Without trials the newest policy is run") {
   RobotDescription robot = PendulumRobot();
   robot.training.trial = 0;

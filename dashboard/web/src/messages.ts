@@ -270,6 +270,7 @@ export interface training_status_t {
   update: number;
   updates: number;
   steps: number;
+  dropped_episodes: number;
   mean_return: number | null;
   evaluation_return: number | null;
   evaluation_tenth: number | null;

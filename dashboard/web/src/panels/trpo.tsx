@@ -44,6 +44,7 @@ export function TrainingPanel() {
         <p class="line">
           Policy <b data-value={newest.iteration}>{newest.iteration}</b>: update <span data-value={newest.update}>{newest.update}</span> of {newest.updates}
           {newest.complete ? ", complete" : ""}; <span data-value={newest.steps}>{grouped(newest.steps)}</span> simulated steps in all.
+          {newest.dropped_episodes > 0 && <> <span data-value={newest.dropped_episodes}>{grouped(newest.dropped_episodes)}</span> episodes were dropped, as their simulation did not stay finite.</>}
           {newest.incumbent >= 0 && ` Policy ${newest.incumbent} runs the robot since iteration ${newest.incumbent_since}.`}
         </p>
       )}

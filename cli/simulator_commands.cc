@@ -1,0 +1,181 @@
+#include "cli/calibrate.h"
+#include "cli/command.h"
+#include "cli/excite.h"
+#include "cli/sim.h"
+#include "cli/train.h"
+
+namespace plumb {
+namespace {
+
+void AddSim(CLI::App& app, Action& action) {
+  const auto flags = std::make_shared<SimFlags>();
+  CLI::App* sim =
+      AddCommand(app, "sim", "simulate the robot's task here and now, without any other process");
+  sim->add_option("robot", flags->robot, "robot folder or TOML file")->required();
+  auto* policy = sim->add_option("--policy", flags->policy,
+                                 "a trainer's checkpoint or an ONNX model that Plumbline has "
+                                 "written; its mean action is taken");
+  sim->add_flag("--random", flags->random, "random actions; default: none")->excludes(policy);
+  sim->add_option("--seed", flags->seed, "of all random numbers")
+      ->check(SeedRange())
+      ->capture_default_str();
+  sim->add_option("--episodes", flags->episodes, "how many")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  auto* posterior =
+      sim->add_option("--posterior", flags->posterior,
+                      "a posterior.json: its means instead of the prior's, and its residual");
+  sim->add_option("--set", flags->set,
+                  "parameters other than their prior means, e.g. mass/thigh=4");
+  sim->add_flag("--urdf", flags->urdf,
+                "the robot as its URDF and TOML tables have it, without the prior's means")
+      ->excludes(posterior);
+  sim->add_option("--noise", flags->noise,
+                  "SD or SD,SD of what sensors add to every q [rad or m] and v [rad/s or "
+                  "m/s] in the files; one number is for both");
+  sim->add_option("--csv", flags->csv, "write every step to this file");
+  sim->add_option("--png", flags->png, "draw the first episode as a strip of snapshots");
+  sim->add_option("--gif", flags->gif, "draw the first episode as a film");
+  SetAction(*sim, action, [flags](Process& process) { return Simulate(process, *flags); });
+}
+
+void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
+  const auto flags = std::make_shared<CalibrateFlags>();
+  CLI::App* calibrate = AddCommand(
+      app, "calibrate", "infer from logs which simulators could have produced the robot's motion");
+  calibrate->add_option("robot", flags->robot, "robot folder or TOML file")->required();
+  calibrate->add_option("--log", flags->logs, "LCM log; may be given several times")
+      ->allow_extra_args(false);
+  calibrate
+      ->add_option("--csv", flags->tables,
+                   "table of transitions, columns as in README.md; may be given several times")
+      ->allow_extra_args(false);
+  calibrate->add_option("--method", flags->options.method, "of inference")
+      ->check(CLI::IsMember(CalibrationMethods()))
+      ->capture_default_str();
+  calibrate->footer(MethodHelp());
+  calibrate->add_option("--seed", flags->options.seed, "of all random numbers")
+      ->check(SeedRange())
+      ->capture_default_str();
+  calibrate->add_option("--output", flags->output, "the posterior, for programs (JSON)")
+      ->capture_default_str();
+  calibrate->add_option("--report", flags->report, "the findings, for people: an HTML page");
+  calibrate->add_option("--urdf", flags->urdf, "the robot's URDF with the identified parameters");
+  calibrate
+      ->add_option("--horizons", flags->options.horizons,
+                   "control steps of the windows, stage by stage")
+      ->check(CLI::Range(1, 1000))
+      ->delimiter(',')
+      ->capture_default_str();
+  calibrate
+      ->add_option("--budget", flags->options.budget,
+                   "transitions that sampling methods may simulate")
+      ->check(CLI::Range(100.0, 1e12))
+      ->capture_default_str();
+  calibrate
+      ->add_option("--discrepancy", flags->options.discrepancy,
+                   "of methods that know only simulations")
+      ->capture_default_str();
+  calibrate
+      ->add_option("--threads", flags->threads,
+                   "0 = one per core; the result does not depend on it")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  calibrate
+      ->add_option("--sbc", flags->sbc,
+                   "instead: that many runs of simulation-based calibration on motions like these")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  calibrate->add_flag("!--no-residual", flags->options.residual,
+                      "do not learn what the model lacks where it cannot explain the robot");
+  calibrate->add_flag("--strict", flags->strict,
+                      "exit status 3 if the findings should not be trusted");
+  SetAction(*calibrate, action,
+            [flags, line](Process& process) { return CalibrateLogs(process, *flags, line); });
+}
+
+void AddExcite(CLI::App& app, Action& action) {
+  const auto flags = std::make_shared<ExciteFlags>();
+  CLI::App* excite =
+      AddCommand(app, "excite", "find the efforts that would tell most of the robot's parameters");
+  excite->add_option("robot", flags->robot, "robot folder or TOML file")->required();
+  excite->add_option("--seed", flags->seed, "of all random numbers, and of where the robot begins")
+      ->check(SeedRange())
+      ->capture_default_str();
+  excite->add_option("--output", flags->output, "write the best efforts to this table")
+      ->capture_default_str();
+  excite->add_option("--candidates", flags->candidates, "how many are tried")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  excite->add_option("--seconds", flags->seconds, "of each")
+      ->check(CLI::Range(0.01, 600.0))
+      ->capture_default_str();
+  excite->add_option("--posterior", flags->posterior,
+                     "a posterior.json to start from, without its residual; default: the prior");
+  excite->add_option("--png", flags->png, "draw the best one as a strip of snapshots");
+  SetAction(*excite, action, [flags](Process& process) { return Excite(process, *flags); });
+}
+
+void AddTrain(CLI::App& app, const std::string& line, Action& action) {
+  const auto flags = std::make_shared<TrainFlags>();
+  flags->command = line;
+  CLI::App* train =
+      AddCommand(app, "train", "train a policy on simulators drawn from a distribution");
+  train->add_option("robot", flags->robot, "robot folder or TOML file")->required();
+  train
+      ->add_option("--distribution", flags->distribution,
+                   "a posterior.json, with the residual that is in it, 'prior', or "
+                   "'nominal': the prior's means alone")
+      ->capture_default_str();
+  train
+      ->add_option("--steps", flags->steps,
+                   "to simulate, e.g. 2e6; default: updates x batch of robot.toml")
+      ->check(CLI::Range(1.0, 1e15));
+  train->add_option("--seed", flags->seed, "of all random numbers")
+      ->check(SeedRange())
+      ->capture_default_str();
+  train
+      ->add_option("--threads", flags->threads,
+                   "0 = one per core; the result does not depend on it")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  train->add_option("--output", flags->output, "the policy")->capture_default_str();
+  train->add_option("--checkpoint", flags->checkpoint,
+                    "to resume from; default: the output's name and .checkpoint");
+  train->add_option("--csv", flags->csv, "write a line of numbers for each update to this file");
+  train->add_option("--report", flags->report,
+                    "how it went, for people: an HTML page; the table is then written, too");
+  train->add_option("--from", flags->from, "begin with this policy; default: from scratch");
+  train->add_flag("--paper", flags->paper,
+                  "as the paper has it: value targets not normalised, Fisher's matrix of the "
+                  "whole batch; 20 passes of the critic");
+  train
+      ->add_option("--worst-share", flags->worst_share,
+                   "learn from that share of the episodes, those of lowest return; default: "
+                   "robot.toml's")
+      ->check(CLI::Range(0.01, 1.0));
+  train
+      ->add_option("--worst-after", flags->worst_after,
+                   "updates that learn from all episodes first; default: robot.toml's")
+      ->check(CLI::Range(0, 1000000000));
+  train
+      ->add_option("--evaluate-every", flags->evaluate_every,
+                   "updates, for the table's evaluation_return; 0 = never")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  train->add_option("--held-out", flags->held_out, "simulators to judge the policy by")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  SetAction(*train, action, [flags](Process& process) { return Train(process, *flags); });
+}
+
+}  // namespace
+
+void AddSimulatorCommands(CLI::App& app, const std::string& line, Action& action) {
+  AddSim(app, action);
+  AddCalibrate(app, line, action);
+  AddExcite(app, action);
+  AddTrain(app, line, action);
+}
+
+}  // namespace plumb
