@@ -1,6 +1,5 @@
 #include "cli/calibrate.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -129,10 +128,6 @@ uint64_t IdentityOf(const RobotDescription& robot, const CalibrateFlags& flags,
   return identity;
 }
 
-std::string List(const std::vector<int>& numbers) {
-  return fmt::format("{}", fmt::join(numbers, ", "));
-}
-
 int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::vector<Log>& logs,
         ProgressLine& line, const std::function<void()>& look) {
   CalibrationOptions options = flags.options;
@@ -203,14 +198,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
       std::cout << fmt::format("went on from {}: {} batches of simulations were there\n",
                                journal_file, journal->resumed());
     PrintFindings(findings, robot);
-    Provenance provenance;
-    for (const Log& log : logs) provenance.logs.push_back(log.name);
-    provenance.options = {{"horizons", List(flags.options.horizons)},
-                          {"budget", std::to_string(flags.options.budget)},
-                          {"discrepancy", flags.options.discrepancy},
-                          {"residual", flags.options.residual ? "yes" : "no"}};
-    provenance.command = command;
-    provenance.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+    const Provenance provenance = ProvenanceOf(logs, flags.options, command, std::time(nullptr));
     WritePosterior(flags.output, findings, robot, provenance);
     const Summary summary = Summarise(findings, robot);
     if (!flags.report.empty())

@@ -99,14 +99,7 @@ Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task
     return [policy = LoadPolicy(flags.policy, robot, task)](
                const Eigen::VectorXf& observation, Random&) { return policy.Mean(observation); };
   }
-  const int size = task.action_size();
-  if (!flags.random)
-    return [size](const Eigen::VectorXf&, Random&) { return Eigen::VectorXf::Zero(size).eval(); };
-  return [size](const Eigen::VectorXf&, Random& random) {
-    Eigen::VectorXf action(size);
-    for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
-    return action;
-  };
+  return flags.random ? RandomActions(task.action_size()) : NoAction(task.action_size());
 }
 
 const char* Describe(EpisodeSummary::End end) {

@@ -11,21 +11,10 @@
 
 #include "trainer/gae.h"
 #include "trainer/initialization.h"
+#include "trainer/streams.h"
 
 namespace plumb {
 namespace {
-
-/// Names of the trainer's streams of random numbers; the other words are the update and the
-/// episode.
-enum Stream : uint32_t {
-  kPolicyStream = 0x7472'0000,
-  kCriticStream,
-  kRolloutStream,
-  kFitStream,
-  kEvaluationStream,
-  kHeldOutStream,
-  kJudgementStream
-};
 
 constexpr int kJudgements = 16, kJudgementEpisodes = 30, kScatterEpisodes = 40;
 constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0

@@ -205,7 +205,11 @@ class Assembly {
 Log ReadCsvLog(const std::string& file, const RobotDescription& robot) {
   MotionTable table = ReadMotionTable(file, robot);
   if (table.rows.empty()) throw std::runtime_error(file + ": has a head but no rows");
-  Log log{file, {}, {}, std::move(table.warnings)};
+  return JoinMotion(file, std::move(table), robot);
+}
+
+Log JoinMotion(const std::string& name, MotionTable table, const RobotDescription& robot) {
+  Log log{name, {}, {}, std::move(table.warnings)};
   const std::vector<Link> links =
       table.has_next ? LinksByState(table.rows) : LinksByTime(table.rows);
   Assembly assembly(robot, table.has_next, &log);
@@ -224,7 +228,7 @@ Log ReadCsvLog(const std::string& file, const RobotDescription& robot) {
   } else {
     why = log.drops.summary();
   }
-  throw std::runtime_error(file + ": no transition can be used: " + why);
+  throw std::runtime_error(name + ": no transition can be used: " + why);
 }
 
 }  // namespace plumb

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "calibrator/motion/log.h"
+#include "calibrator/motion/motion_table.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -40,5 +41,9 @@ namespace plumb {
 /// the nearest), the same time twice in a row; and "file: ..." if it cannot be opened or no
 /// transition can be used (and why). Thread-safe.
 Log ReadCsvLog(const std::string& file, const RobotDescription& robot);
+
+/// The same of a table in memory (MakeMotionTable). @param name what messages call it.
+/// @throws std::runtime_error "name: ..." if no transition can be used. Thread-safe.
+Log JoinMotion(const std::string& name, MotionTable table, const RobotDescription& robot);
 
 }  // namespace plumb

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 
 #include "calibrator/motion/csv_table.h"
@@ -203,6 +204,30 @@ std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Name
   return warnings;
 }
 
+/// Whatever comes from a program is checked as what comes from a file.
+class CheckedColumns {
+ public:
+  explicit CheckedColumns(const MotionColumns& columns) : rows_(columns.t.size()) {}
+
+  void Require(const char* name, const Eigen::Ref<const Eigen::MatrixXd>& numbers,
+               Eigen::Index columns, double greatest = kGreatestQuantity) const {
+    if (numbers.rows() != rows_ || numbers.cols() != columns) {
+      throw std::invalid_argument(fmt::format("{}: is {} x {}, needs {} x {}", name, numbers.rows(),
+                                              numbers.cols(), rows_, columns));
+    }
+    for (Eigen::Index row = 0; row < rows_; ++row) {
+      for (const double number : numbers.row(row)) {
+        if (!(std::abs(number) > greatest)) continue;
+        throw std::invalid_argument(fmt::format(
+            "{}: is {} in row {}: beyond {} nothing is a robot's", name, number, row, greatest));
+      }
+    }
+  }
+
+ private:
+  Eigen::Index rows_;
+};
+
 }  // namespace
 
 MotionTable ReadMotionTable(const std::string& file, const RobotDescription& robot) {
@@ -212,6 +237,38 @@ MotionTable ReadMotionTable(const std::string& file, const RobotDescription& rob
   Efforts efforts(robot);
   MotionTable motion{ReadRows(table, columns, efforts), columns.has_next(), {}};
   motion.warnings = Warnings(motion.rows, names, efforts.clipped());
+  return motion;
+}
+
+MotionTable MakeMotionTable(const MotionColumns& columns, const RobotDescription& robot) {
+  const Eigen::Index rows = columns.t.size(), n = robot.num_positions(), m = robot.num_velocities();
+  const CheckedColumns checked(columns);
+  checked.Require("t", columns.t, 1, kLatest);
+  checked.Require("q", columns.q, n), checked.Require("v", columns.v, m);
+  checked.Require("u", columns.u, static_cast<Eigen::Index>(robot.driven().size()));
+  const bool has_next = columns.next_q.size() > 0 || columns.next_v.size() > 0;
+  if (has_next)
+    checked.Require("next_q", columns.next_q, n), checked.Require("next_v", columns.next_v, m);
+  if (!columns.ends.empty() && columns.ends.size() != static_cast<size_t>(rows))
+    throw std::invalid_argument("terminated, truncated: one entry for each row");
+  Efforts efforts(robot);
+  MotionTable motion{{}, has_next, {}};
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    MotionRow row{columns.t(i),
+                  !columns.ends.empty() && columns.ends[static_cast<size_t>(i)],
+                  efforts(columns.u.row(i)),
+                  {}};
+    if (std::isnan(row.t)) throw std::invalid_argument(fmt::format("t: is not known in row {}", i));
+    if (!motion.rows.empty() && !motion.rows.back().ends && motion.rows.back().t == row.t) {
+      throw std::invalid_argument(
+          fmt::format("t: is {} in row {}, as in the row before", row.t, i));
+    }
+    row.transition.q = columns.q.row(i), row.transition.v = columns.v.row(i);
+    if (has_next)
+      row.transition.next_q = columns.next_q.row(i), row.transition.next_v = columns.next_v.row(i);
+    motion.rows.push_back(std::move(row));
+  }
+  motion.warnings = Warnings(motion.rows, Names(robot), efforts.clipped());
   return motion;
 }
 

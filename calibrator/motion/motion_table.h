@@ -31,6 +31,19 @@ struct MotionTable {
 /// @throws std::runtime_error for all that is wrong with columns and fields: see ReadCsvLog.
 MotionTable ReadMotionTable(const std::string& file, const RobotDescription& robot);
 
+/// Columns of a table in memory, a row for each control step: as in a file (ReadCsvLog), NaN = not
+/// known.
+struct MotionColumns {
+  Eigen::VectorXd t;               ///< [s]
+  Eigen::MatrixXd q, v, u;         ///< rows x num_positions, num_velocities, driven joints
+  Eigen::MatrixXd next_q, next_v;  ///< likewise, or both empty
+  std::vector<bool> ends;          ///< the episode; empty = none does
+};
+
+/// The same of numbers in memory. @throws std::invalid_argument naming the column that is of the
+/// wrong size, infinite or not physical, and its row, counted from 0.
+MotionTable MakeMotionTable(const MotionColumns& columns, const RobotDescription& robot);
+
 /// Standard deviation of each coordinate of (q, v) over the rows; NaN where it was never observed.
 /// Empty without rows.
 Eigen::VectorXd Spread(const std::vector<MotionRow>& rows);

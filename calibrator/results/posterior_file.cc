@@ -1,11 +1,13 @@
 #include "calibrator/results/posterior_file.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "calibrator/results/summary.h"
 #include "common/atomic_file.h"
@@ -174,6 +176,19 @@ std::string Print(const json& j, const std::string& indent) {
 }
 
 }  // namespace
+
+Provenance ProvenanceOf(std::span<const Log> logs, const CalibrationOptions& options,
+                        std::string command, std::time_t now) {
+  Provenance provenance;
+  for (const Log& log : logs) provenance.logs.push_back(log.name);
+  provenance.options = {{"horizons", fmt::format("{}", fmt::join(options.horizons, ", "))},
+                        {"budget", std::to_string(options.budget)},
+                        {"discrepancy", options.discrepancy},
+                        {"residual", options.residual ? "yes" : "no"}};
+  provenance.command = std::move(command);
+  provenance.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
+  return provenance;
+}
 
 std::string PosteriorJson(const Findings& findings, const RobotDescription& robot,
                           const Provenance& provenance) {

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <ctime>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "calibrator/fit/method.h"
+#include "calibrator/motion/log.h"
 #include "calibrator/results/findings.h"
 #include "robot/description.h"
 
@@ -19,6 +23,11 @@ struct Provenance {
   std::string command;
   std::string date;  ///< ISO 8601, UTC
 };
+
+/// Of a calibration of these logs. @param command see Provenance. @param now Unix time [s].
+/// Thread-safe.
+Provenance ProvenanceOf(std::span<const Log> logs, const CalibrationOptions& options,
+                        std::string command, std::time_t now);
 
 /// The contents of posterior.json; docs/posterior.md has its schema. What may differ between two
 /// runs of the same calibration is in its last object, "run": all that comes before it is the same
