@@ -43,6 +43,7 @@ STANDS_ON = {
     "cli": {"records", "plot", "drivers", "sim/virtual", "sim/view", "estimator", "controller", "calibrator", "trainer"},
     "dashboard": {"sim/view"},
     "chaos": {"cli"},
+    "python": {"calibrator", "trainer"},
     "experiments": {"drivers", "sim/virtual", "estimator", "controller", "calibrator", "trainer"},
 }
 
