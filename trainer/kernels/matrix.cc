@@ -137,31 +137,53 @@ void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdif
 
 namespace {
 
-/// The sum of a packet's entries, always in the same order.
-float Sum(Packet packet) {
-  float entries[kWidth];
-  Store(entries, packet);
-  for (int width = kWidth / 2; width > 0; width /= 2) {
-    for (int i = 0; i < width; ++i) entries[i] += entries[i + width];
+// A scalar product is eight sums side by side, however many a register holds: its bits are the same
+// at all levels that fuse multiplications and additions.
+constexpr int kSums = 8;
+using Sums = float __attribute__((vector_size(kSums * sizeof(float))));
+
+Sums LoadSums(const float* from) {
+  Sums sums;
+  std::memcpy(&sums, from, sizeof sums);
+  return sums;
+}
+
+/// Each of the first half and its counterpart of the second, and so on.
+float Total(Sums sums) {
+  float entries[kSums];
+  std::memcpy(entries, &sums, sizeof sums);
+  for (int half = kSums / 2; half > 0; half /= 2) {
+    for (int i = 0; i < half; ++i) entries[i] += entries[i + half];
   }
   return entries[0];
+}
+
+/// a b + c, rounded once where that can be. Said so, as the compiler multiplies several at a time
+/// where sums have to be taken in order, and then does not fuse them.
+float MultiplyAdd(float a, float b, float c) {
+#if defined(__FMA__)
+  return __builtin_fmaf(a, b, c);
+#else
+  return a * b + c;
+#endif
 }
 
 /// kColumns scalar products at a time: their sums do not wait for each other.
 template <int kColumns>
 void ScalarProducts(int k, const float* a, const float* b, ptrdiff_t b_stride, float* products) {
-  Packet sum[kColumns] = {};
+  Sums sums[kColumns] = {};
   int l = 0;
-  for (; l + kWidth <= k; l += kWidth) {
-    const Packet left = Load(a + l);
+  for (; l + kSums <= k; l += kSums) {
+    const Sums left = LoadSums(a + l);
 #pragma GCC unroll 8
-    for (int j = 0; j < kColumns; ++j) sum[j] += left * Load(b + j * b_stride + l);
+    for (int j = 0; j < kColumns; ++j) sums[j] += left * LoadSums(b + j * b_stride + l);
   }
 #pragma GCC unroll 8
-  for (int j = 0; j < kColumns; ++j) products[j] = Sum(sum[j]);
+  for (int j = 0; j < kColumns; ++j) products[j] = Total(sums[j]);
   // Not the padding: where an entry above it is infinite it is no zero.
   for (; l < k; ++l) {
-    for (int j = 0; j < kColumns; ++j) products[j] += a[l] * b[j * b_stride + l];
+    for (int j = 0; j < kColumns; ++j)
+      products[j] = MultiplyAdd(a[l], b[j * b_stride + l], products[j]);
   }
 }
 

@@ -63,7 +63,8 @@ void Multiply(int m, int n, int k, LeftFactor a, RightFactor b, float* c, ptrdif
               Onto onto, const float* bias = nullptr);
 
 /// Whether a matrix has so few rows that padding them to whole packets would be most of the work.
-constexpr bool FewRows(int rows) { return 4 * rows <= kWidth; }
+/// The same at each level of instruction set, as its sums are others then.
+constexpr bool FewRows(int rows) { return rows <= 2; }
 
 /// The same product for a C of few rows, by scalar products of columns: C(i, j) = onto(i, j) +
 /// A'(:, i) . B(:, j).
