@@ -44,7 +44,6 @@ function(add_lcm_types name)
 
   configure_file(${PROJECT_SOURCE_DIR}/cmake/message_types.c.in ${c}/message_types.c @ONLY)
   add_library(${name}_c STATIC ${c_sources} ${c}/message_types.c)
-  set_target_properties(${name}_c PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_include_directories(${name}_c SYSTEM PRIVATE ${c})
   target_link_libraries(${name}_c PRIVATE LCM::LCM)
   target_compile_options(${name}_c PRIVATE -w)  # nor is this

@@ -12,17 +12,6 @@ set(plumb_precompiled <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem
   <memory> <numeric> <optional> <set> <span> <sstream> <stdexcept> <string> <string_view> <utility> <vector>
   <Eigen/Dense> <fmt/format.h>)
 
-# What a shared object may be linked to as well as a program, the Python module or one of somebody else: what is installed, and
-# what trains. It is compiled with -fPIC and has precompiled headers of its own, as GCC takes none that were compiled without;
-# plumb_common, whose headers the others take, does without.
-set(plumb_position_independent common urdf robot tasks sim plot controller ranks trainer inference motion fit diagnostics gap design
-  results report live batches)
-add_library(plumb_precompiled OBJECT ${PROJECT_SOURCE_DIR}/common/precompiled.cc)
-set_target_properties(plumb_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON)
-target_link_libraries(plumb_precompiled PRIVATE Eigen3::Eigen fmt::fmt spdlog::spdlog plumb_warnings)
-target_compile_definitions(plumb_precompiled PRIVATE SPDLOG_FMT_EXTERNAL)
-target_precompile_headers(plumb_precompiled PRIVATE ${plumb_precompiled})
-
 # plumb_library(<folder> SOURCES a.cc ... LINKS other ...) -> static library plumb_<folder>
 function(plumb_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
@@ -31,10 +20,6 @@ function(plumb_library name)
   target_link_libraries(plumb_${name} PUBLIC ${ARG_LINKS} PRIVATE $<BUILD_INTERFACE:plumb_warnings>)
   if(name STREQUAL common)
     target_precompile_headers(plumb_common PRIVATE ${plumb_precompiled})
-    set_source_files_properties(${ARG_SOURCES} PROPERTIES COMPILE_OPTIONS -fPIC SKIP_PRECOMPILE_HEADERS ON)
-  elseif(name IN_LIST plumb_position_independent)
-    set_target_properties(plumb_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-    target_precompile_headers(plumb_${name} REUSE_FROM plumb_precompiled)
   else()
     target_precompile_headers(plumb_${name} REUSE_FROM plumb_common)
   endif()
