@@ -12,7 +12,8 @@ namespace plumb {
 
 int PrintBusPlan(const std::string& robot) {
   const RobotDescription description = LoadRobot(robot);
-  const BusPlan plan = PlanBus(BusDevices(description), description.bus_bit_rate);
+  const BusPlan plan =
+      PlanBus(BusDevices(description), description.bus_bit_rate, description.bus_data_bit_rate);
   std::cout << description.name << " on " << description.bus_url << "\n"
             << ToText(plan) << std::flush;
   return plan.errors.empty() ? 0 : 1;

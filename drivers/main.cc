@@ -74,6 +74,12 @@ class DriverProcess {
                     else
                       spdlog::error("the frames before the fault are lost: {}", error);
                   }) {
+    if (robot.bus_data_bit_rate > 0 && !transport_->carries_fd()) {
+      throw std::runtime_error(fmt::format(
+          "{}: the interface is not set up for CAN FD, which {} needs; cure: ip link set CAN type "
+          "can bitrate {:.0f} dbitrate {:.0f} fd on, or of a vcan: mtu 72",
+          bus, robot.name, robot.bus_bit_rate, robot.bus_data_bit_rate));
+    }
     driver_.set_bus(bus);
     driver_.set_virtual(is_virtual);
     const bool commands_signed = !process.key_file().empty();

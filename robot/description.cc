@@ -106,6 +106,15 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   Config bus = root.Table("bus");
   robot.bus_url = bus.String("url");
   robot.bus_bit_rate = bus.Number("bit_rate", {1e4, 1e6}, robot.bus_bit_rate);
+  if (bus.Has("data_bit_rate"))
+    robot.bus_data_bit_rate = bus.Number("data_bit_rate", {robot.bus_bit_rate, 8e6});
+  for (const JointDescription& joint : robot.joints) {
+    if (!joint.passive && NeedsFd(joint.motor) && robot.bus_data_bit_rate == 0) {
+      bus.Fail("data_bit_rate",
+               fmt::format("is missing: joint \"{}\" speaks {}, which needs a bus of CAN FD",
+                           joint.name, joint.motor.protocol));
+    }
+  }
   bus.Finish();
   robot.sensors = ReadSensors(root, robot);
   robot.driver = ReadDriver(root.Table("driver"), robot.joints);

@@ -32,7 +32,8 @@ struct RobotDescription {
   std::vector<LinkDescription> links;
   std::vector<JointDescription> joints;
   std::string bus_url;
-  double bus_bit_rate = 1e6;  ///< [bit/s]
+  double bus_bit_rate = 1e6;     ///< [bit/s]
+  double bus_data_bit_rate = 0;  ///< [bit/s] of the data of CAN FD frames; 0 = it carries none
   std::vector<SensorDescription> sensors;
   DriverSettings driver;
   EstimatorSettings estimator;

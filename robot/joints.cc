@@ -17,9 +17,11 @@ struct MotorTable {
   void (*read)(Config& joint, MotorDescription& motor);
   /// against the joint's limits
   void (*check)(const Config& config, const JointDescription& joint);
+  bool fd = false;  ///< it is spoken in frames of CAN FD
 };
 constexpr MotorTable kMotorTables[] = {
     {"mit", &ReadMit, &CheckMit},
+    {"moteus", &ReadMoteus, &CheckMoteus, true},
     {"rmd", &ReadRmd, &CheckRmd},
 };
 
@@ -131,6 +133,12 @@ bool JointDescription::IsOf(JointGroup group) const {
     default:
       return true;
   }
+}
+
+bool NeedsFd(const MotorDescription& motor) {
+  return std::ranges::any_of(kMotorTables, [&](const MotorTable& table) {
+    return table.fd && motor.protocol == table.protocol;
+  });
 }
 
 std::vector<JointDescription> JointsOf(const UrdfModel& urdf) {

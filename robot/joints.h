@@ -7,6 +7,7 @@
 
 #include "common/config.h"
 #include "robot/mit.h"
+#include "robot/moteus.h"
 #include "robot/parameter_kinds.h"
 #include "robot/rmd.h"
 #include "robot/settings/estimator.h"
@@ -24,6 +25,7 @@ struct MotorDescription {
   double offset = 0;                       ///< [rad] or [m] joint position at motor position 0
   std::optional<MitDescription> mit = {};  ///< of protocol "mit" and no other
   std::optional<RmdDescription> rmd = {};  ///< of protocol "rmd" and no other
+  std::optional<MoteusDescription> moteus = {};  ///< of protocol "moteus" and no other
 };
 
 /// How the driver keeps a joint with a motor within its limits, and how the joint stops.
@@ -46,6 +48,9 @@ struct JointDescription : JointGeometry {
 
   bool IsOf(JointGroup group) const;
 };
+
+/// Whether the motor's protocol needs a bus that carries CAN FD. Thread-safe.
+bool NeedsFd(const MotorDescription& motor);
 
 /// The URDF's joints as they are without robot.toml: none passive, no motor known. Thread-safe.
 std::vector<JointDescription> JointsOf(const UrdfModel& urdf);

@@ -25,6 +25,15 @@ constexpr int kStuffed = 34, kStuffedExtended = 54;
 // CRC delimiter, acknowledgement, end of frame, interframe space.
 constexpr int kUnstuffed = 13;
 
+// Of CAN FD, as ISO 11898-1:2015 has it. From start of frame to the bit that says that the rate is
+// switched: start 1, id 11, RRS, IDE, FDF, res, BRS; of an extended one SRR and 18 more bits of id.
+constexpr int kSlowFd = 17, kSlowFdExtended = 36;
+// ESI and the length's code, which are stuffed like the data behind them.
+constexpr int kFastFd = 5;
+// Stuff count 4 and CRC of 17 or, beyond 16 bytes, 21 bits, with a stuff bit before the first and
+// behind each fourth of them, whatever they say.
+constexpr int kShortCrcFd = 4 + 17 + 6, kLongCrcFd = 4 + 21 + 7;
+
 // The order in which ids win: the 11 bits that both formats have, then standard before extended.
 uint64_t Priority(const BusMessage& message) {
   const uint64_t id = message.id;
@@ -35,6 +44,11 @@ uint64_t Priority(const BusMessage& message) {
 struct Task {
   int64_t cost, period, jitter;
 };
+
+/// [ns] of a bit, rounded up.
+int64_t BitTime(double rate) { return static_cast<int64_t>(std::ceil(1e9 / rate)); }
+
+int64_t Cost(const Row& row) { return std::llround(row.worst_time * kNanoseconds); }
 
 int64_t Releases(const Task& task, int64_t window) {
   return (window + task.jitter + task.period - 1) / task.period;
@@ -75,13 +89,13 @@ int64_t Response(const std::vector<Task>& tasks, int64_t blocking, int64_t bit) 
 
 /// Of the polled messages of a direction one waits at a time: together they are one, the longest,
 /// as often as all of them.
-Task PolledTask(const BusPlan& plan, Direction direction, int64_t bit) {
+Task PolledTask(const BusPlan& plan, Direction direction) {
   Task all{0, 0, 0};
   double rate = 0;
   for (const Row& row : plan.rows) {
     const BusMessage& message = row.message;
     if (!message.polled || message.direction != direction) continue;
-    all.cost = std::max(all.cost, row.worst_bits * bit);
+    all.cost = std::max(all.cost, Cost(row));
     all.jitter = std::max(all.jitter, message.jitter * kNanoseconds);
     rate += 1 / static_cast<double>(message.period * kNanoseconds);
   }
@@ -90,7 +104,7 @@ Task PolledTask(const BusPlan& plan, Direction direction, int64_t bit) {
 }
 
 void ComputeResponses(BusPlan& plan) {
-  const auto bit = static_cast<int64_t>(std::ceil(1e9 / plan.bit_rate));
+  const int64_t bit = BitTime(plan.bit_rate);
   std::vector<Task> higher;
   std::map<Direction, size_t> polled;  // where in `higher`
   for (size_t i = 0; i < plan.rows.size(); ++i) {
@@ -98,11 +112,11 @@ void ComputeResponses(BusPlan& plan) {
     if (row.message.period <= 0) continue;
     int64_t blocking = 0;
     for (size_t j = i + 1; j < plan.rows.size(); ++j)
-      blocking = std::max(blocking, plan.rows[j].worst_bits * bit);
+      blocking = std::max(blocking, Cost(plan.rows[j]));
     row.deadline = static_cast<double>(row.message.period);
     int64_t response;
     if (row.message.polled) {
-      const Task all = PolledTask(plan, row.message.direction, bit);
+      const Task all = PolledTask(plan, row.message.direction);
       // It must be there before the next one is asked for.
       row.deadline = static_cast<double>(all.period) / static_cast<double>(kNanoseconds);
       const auto [counted, first] = polled.try_emplace(row.message.direction, higher.size());
@@ -112,8 +126,8 @@ void ComputeResponses(BusPlan& plan) {
                   tasks.begin() + static_cast<std::ptrdiff_t>(counted->second) + 1, tasks.end());
       response = Response(tasks, blocking, bit);
     } else {
-      higher.push_back({row.worst_bits * bit, row.message.period * kNanoseconds,
-                        row.message.jitter * kNanoseconds});
+      higher.push_back(
+          {Cost(row), row.message.period * kNanoseconds, row.message.jitter * kNanoseconds});
       response = Response(higher, blocking, bit);
     }
     row.response = response < 0 ? std::numeric_limits<double>::infinity()
@@ -144,6 +158,51 @@ bool InheritJitter(BusPlan& plan, const std::vector<BusDevice>& devices) {
     }
   }
   return changed;
+}
+
+Row MakeRow(const std::string& device, const BusMessage& message, const BusPlan& plan) {
+  const int length = message.remote ? 0 : message.layout.length;
+  FdBits nominal{NominalBits(message.extended, length), 0},
+      worst{WorstCaseBits(message.extended, length), 0};
+  if (message.fd) {
+    nominal = NominalFdBits(message.extended, length);
+    worst = WorstCaseFdBits(message.extended, length);
+  }
+  // A bus that carries no FD has an error already.
+  const double fast = plan.data_bit_rate > 0 ? plan.data_bit_rate : plan.bit_rate;
+  const auto time = [&](const FdBits& bits) {
+    return bits.slow * 1e6 / plan.bit_rate + bits.fast * 1e6 / fast;
+  };
+  return {device,
+          message,
+          nominal.slow + nominal.fast,
+          worst.slow + worst.fast,
+          time(nominal),
+          time(worst),
+          0,
+          std::numeric_limits<double>::quiet_NaN(),
+          0};
+}
+
+// A controller that knows no FD takes an FD frame for an error, and destroys it.
+void RequireFd(const std::vector<BusDevice>& devices, BusPlan& plan) {
+  const auto with = [&](bool fd) {
+    return std::ranges::find_if(devices, [&](const BusDevice& device) {
+      return std::ranges::any_of(device.messages,
+                                 [&](const BusMessage& message) { return message.fd == fd; });
+    });
+  };
+  const auto fd = with(true), classic = with(false);
+  if (fd == devices.end()) return;
+  if (plan.data_bit_rate <= 0) {
+    plan.errors.push_back(fmt::format(
+        "'{}' speaks CAN FD, which the bus does not carry: [bus] data_bit_rate", fd->name));
+  }
+  if (classic == devices.end()) return;
+  plan.warnings.push_back(fmt::format(
+      "'{}' speaks CAN FD and '{}' does not: a controller that cannot stand FD destroys "
+      "its frames",
+      fd->name, classic->name));
 }
 
 void Judge(BusPlan& plan) {
@@ -179,9 +238,26 @@ int WorstCaseBits(bool extended, int length) {
   return stuffed + kUnstuffed + (stuffed - 1) / 4;
 }
 
-BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate) {
+FdBits NominalFdBits(bool extended, int length) {
+  return {(extended ? kSlowFdExtended : kSlowFd) + kUnstuffed,
+          kFastFd + 8 * length + (length > 16 ? kLongCrcFd : kShortCrcFd)};
+}
+
+FdBits WorstCaseFdBits(bool extended, int length) {
+  const int slow = extended ? kSlowFdExtended : kSlowFd, fast = kFastFd + 8 * length;
+  // What is stuffed goes on across the switch of rates.
+  const int all = (slow + fast - 1) / 4, before = (slow - 1) / 4;
+  FdBits bits = NominalFdBits(extended, length);
+  bits.slow += before;
+  bits.fast += all - before;
+  return bits;
+}
+
+BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate, double data_bit_rate) {
   BusPlan plan;
   plan.bit_rate = bit_rate;
+  plan.data_bit_rate = data_bit_rate;
+  RequireFd(devices, plan);
   // from the driver to several devices: sent once
   std::set<std::pair<uint64_t, Direction>> broadcasts;
   for (const BusDevice& device : devices) {
@@ -190,19 +266,12 @@ BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate) {
           !broadcasts.insert({Priority(message), message.direction}).second) {
         continue;
       }
-      const int length = message.remote ? 0 : message.layout.length;
-      Row row{device.name,
-              message,
-              NominalBits(message.extended, length),
-              WorstCaseBits(message.extended, length),
-              0,
-              std::numeric_limits<double>::quiet_NaN(),
-              0};
+      Row row = MakeRow(device.name, message, plan);
       if (message.period > 0) {
-        const double rate = 1e6 / static_cast<double>(message.period) / bit_rate;
-        row.worst_load = row.worst_bits * rate;
+        const auto period = static_cast<double>(message.period);
+        row.worst_load = row.worst_time / period;
         plan.worst_load += row.worst_load;
-        plan.nominal_load += row.nominal_bits * rate;
+        plan.nominal_load += row.nominal_time / period;
       }
       plan.rows.push_back(row);
     }
@@ -246,8 +315,11 @@ std::string ToText(const BusPlan& plan) {
         message.direction == Direction::kToDevice ? "driver" : "device",
         periodic ? fmt::format("{:.2f}", row.response / 1000) : "-");
   }
-  text += fmt::format("load {:.1f} % nominal, {:.1f} % at worst, of {:g} bit/s\n",
-                      100 * plan.nominal_load, 100 * plan.worst_load, plan.bit_rate);
+  text += fmt::format("load {:.1f} % nominal, {:.1f} % at worst, of {:g} bit/s{}\n",
+                      100 * plan.nominal_load, 100 * plan.worst_load, plan.bit_rate,
+                      plan.data_bit_rate > 0
+                          ? fmt::format(", data of FD frames at {:g} bit/s", plan.data_bit_rate)
+                          : "");
   for (const std::string& error : plan.errors) text += "error: " + error + "\n";
   for (const std::string& warning : plan.warnings) text += "warning: " + warning + "\n";
   if (plan.errors.empty()) text += "all deadlines are met\n";

@@ -15,6 +15,16 @@ int NominalBits(bool extended, int length);
 /// With the most stuff bits that there can be.
 int WorstCaseBits(bool extended, int length);
 
+/// Bits of a frame of CAN FD whose bit rate is switched.
+struct FdBits {
+  int slow;  ///< at the bus's bit rate, those of the interframe space included
+  int fast;  ///< at that of the data
+};
+/// Without the stuff bits that depend on contents; those at fixed places are counted.
+FdBits NominalFdBits(bool extended, int length);
+/// With the most stuff bits that there can be.
+FdBits WorstCaseFdBits(bool extended, int length);
+
 /// Whether all messages of a bus get through in time, whatever they say.
 ///
 /// Response times by the exact analysis of Davis, Burns, Bril and Lukkien, "Controller Area Network
@@ -31,13 +41,16 @@ struct BusPlan {
   struct Row {
     std::string device;
     BusMessage message;
-    int nominal_bits, worst_bits;
+    int nominal_bits, worst_bits;  ///< of either rate
+    /// [us] that it takes, without stuff bits and with the most
+    double nominal_time, worst_time;
     double worst_load;  ///< share of the bus; 0 without a period
     /// [us] from being due to having been sent, at worst; NaN without a period, else maybe infinite
     double response;
     double deadline;  ///< [us] after which it is too late
   };
   double bit_rate;                  ///< [bit/s]
+  double data_bit_rate;             ///< [bit/s] of the data of CAN FD frames; 0 = it carries none
   std::vector<Row> rows;            ///< highest priority first
   double nominal_load = 0;          ///< share of the bus without stuff bits
   double worst_load = 0;            ///< with the most there can be
@@ -47,7 +60,8 @@ struct BusPlan {
 
 /// @param devices as their protocols declare them, named.
 /// @param bit_rate [bit/s] > 0
-BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate);
+/// @param data_bit_rate [bit/s] of the data of CAN FD frames; 0 = the bus carries none.
+BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate, double data_bit_rate = 0);
 
 /// All of a robot's motors and sensors, each under its joint's or its own name.
 /// @throws std::invalid_argument for an unknown protocol.

@@ -13,6 +13,13 @@ using Direction = BusMessage::Direction;
 
 constexpr char kDriver[] = "driver";
 constexpr uint32_t kExtendedFlag = 0x80000000;
+// The attribute by which others tell frames of CAN FD; the last two of its values are those.
+constexpr char kFormats[] =
+    "BA_DEF_ BO_ \"VFrameFormat\" ENUM \"StandardCAN\",\"ExtendedCAN\",\"reserved\",\"J1939PG\","
+    "\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"reserved\",\"reserved\","
+    "\"reserved\",\"reserved\",\"reserved\",\"StandardCAN_FD\",\"ExtendedCAN_FD\";\n"
+    "BA_DEF_DEF_ \"VFrameFormat\" \"StandardCAN\";\n";
+constexpr int kStandardFd = 14, kExtendedFd = 15;
 
 // C identifiers are all that a DBC allows.
 std::string Identifier(const std::string& text) {
@@ -69,7 +76,7 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
         senders.push_back({&device, &message, node});
     }
   }
-  std::string body, floats;
+  std::string body, floats, formats;
   for (const auto& [id, senders] : by_id) {
     const BusMessage& first = *senders[0].message;
     const bool from_device = first.direction == Direction::kFromDevice;
@@ -84,6 +91,10 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
     const std::string receiver = from_device    ? kDriver
                                  : first.shared ? "Vector__XXX"
                                                 : senders[0].node;
+    if (first.fd) {
+      formats += fmt::format("BA_ \"VFrameFormat\" BO_ {} {};\n", id,
+                             first.extended ? kExtendedFd : kStandardFd);
+    }
     std::set<std::string> signals;
     for (const Sender& sender : senders) {
       const Layout& layout = sender.message->layout;
@@ -107,7 +118,8 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
   }
   std::string text = "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_:";
   for (const std::string& node : nodes) text += " " + node;
-  return text + "\n\n" + body + floats;
+  if (!formats.empty()) formats.insert(0, kFormats);
+  return text + "\n\n" + body + formats + floats;
 }
 
 }  // namespace plumb

@@ -42,6 +42,7 @@ class Faulty : public Transport {
 
   int fd() const noexcept override { return bus_->fd(); }
   bool is_replay() const noexcept override { return bus_->is_replay(); }
+  bool carries_fd() const noexcept override { return bus_->carries_fd(); }
 
   void SetTime(int64_t now) noexcept override {
     now_ = std::max(now_, now);

@@ -37,6 +37,7 @@ class LockstepTransport : public Transport {
   }
 
   int fd() const noexcept override { return bus_ ? bus_->fd() : -1; }
+  bool carries_fd() const noexcept override { return !bus_ || bus_->carries_fd(); }
 
   int Send(std::span<const Frame> frames) noexcept override {
     if (bus_) bus_->SetTime(run_.now());

@@ -74,7 +74,7 @@ class SocketCan : public DatagramTransport {
     // mask they pass.
     for (const Filter& filter : filters_) {
       kernel_filters_.push_back(
-          {.can_id = filter.id,
+          {.can_id = filter.id | (filter.extended ? CAN_EFF_FLAG : 0),
            .can_mask = filter.mask | CAN_EFF_FLAG | (filter.remote ? 0 : CAN_RTR_FLAG)});
     }
     epoll_ = FileDescriptor(epoll_create1(EPOLL_CLOEXEC));
@@ -102,6 +102,11 @@ class SocketCan : public DatagramTransport {
   }
 
   int fd() const noexcept override { return epoll_.get(); }
+  // One that is away may come back with it.
+  bool carries_fd() const noexcept override {
+    ifreq request = Request();
+    return ioctl(socket_.get(), SIOCGIFMTU, &request) != 0 || request.ifr_mtu != CAN_MTU;
+  }
 
   LinkState Reopen() noexcept override {
     const LinkState state = InterfaceState();

@@ -16,8 +16,8 @@ namespace plumb {
 namespace {
 
 bool Matches(const Filter& filter, const Frame& frame) noexcept {
-  return !frame.extended && (frame.id & filter.mask) == (filter.id & filter.mask) &&
-         (filter.remote || !frame.remote);
+  return frame.extended == filter.extended &&
+         (frame.id & filter.mask) == (filter.id & filter.mask) && (filter.remote || !frame.remote);
 }
 
 }  // namespace

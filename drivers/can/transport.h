@@ -13,13 +13,16 @@ namespace plumb {
 
 class Participant;
 
-/// Standard (11-bit) frames a transport lets in: those with (frame.id & mask) == (id & mask).
-/// Remote frames pass only with `remote`; extended frames never do; error frames always do.
+/// Frames a transport lets in: those with (frame.id & mask) == (id & mask) and ids of that many
+/// bits, classic and FD. Remote frames pass only with `remote`, error frames always.
 struct Filter {
+  static constexpr uint32_t kAllExtended = 0x1FFFFFFF;  ///< mask of one extended id
+
   uint32_t id;
   uint32_t mask = 0x7FF;
   bool remote = false;
   bool own = false;  ///< nobody but us may send these: another's are let in marked Frame::foreign
+  bool extended = false;  ///< ids of 29 bits, else of 11
 };
 
 enum class LinkState {
@@ -77,6 +80,9 @@ class Transport {
   /// True if what is received is a recording: no drive hears what is sent, so nothing must be
   /// armed.
   virtual bool is_replay() const noexcept { return false; }
+
+  /// False if the interface is not set up for frames of CAN FD: it would refuse them.
+  virtual bool carries_fd() const noexcept { return true; }
 
   LinkState link() const noexcept { return link_; }
   const TransportStats& stats() const noexcept { return stats_; }

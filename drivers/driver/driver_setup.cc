@@ -61,7 +61,7 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
     sensors_.emplace_back(robot, sensor, stale_after_);
   FindMeasuring(robot);
   FindSecondEncoders(robot);
-  const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
+  const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate, robot.bus_data_bit_rate);
   if (!plan.errors.empty())
     throw std::invalid_argument(
         fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
@@ -92,10 +92,11 @@ void Driver::FindMeasuring(const RobotDescription& robot) {
     const JointDescription& joint = robot.joints[i];
     if (!joint.passive) {
       for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
-        if (message.direction != BusMessage::Direction::kToDevice || message.remote ||
-            message.extended)
-          continue;
-        own_.push_back({.id = message.id, .own = true});
+        if (message.direction != BusMessage::Direction::kToDevice || message.remote) continue;
+        own_.push_back({.id = message.id,
+                        .mask = message.extended ? Filter::kAllExtended : 0x7FF,
+                        .own = true,
+                        .extended = message.extended});
       }
       continue;
     }

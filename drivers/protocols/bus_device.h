@@ -19,6 +19,7 @@ struct BusMessage {
   uint32_t id = 0;  ///< 11 bits, or 29 if extended
   bool extended = false;
   bool remote = false;  ///< a request: no data
+  bool fd = false;      ///< a frame of CAN FD, its data at the faster rate
   Direction direction = Direction::kFromDevice;
   int64_t period = 0;  ///< [us]; 0 = now and then, not while the robot moves
   int64_t jitter = 0;  ///< [us] by which it may be queued late

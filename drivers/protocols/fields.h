@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -14,7 +15,7 @@
 
 namespace plumb {
 
-/// A number in a classic CAN payload: value = raw * scale + offset. Constant, so thread-safe.
+/// A number in a CAN payload: value = raw * scale + offset. Constant, so thread-safe.
 ///
 /// `bit` counts in the order in which the field's bytes follow each other:
 ///   kLittleEndian (Intel)     from bit 0 of byte 0, its least significant; the field's least
@@ -28,10 +29,9 @@ struct Field {
   enum class Order : uint8_t { kLittleEndian, kBigEndian };
 
   std::string_view name;
-  uint8_t bit = 0;
-  uint8_t bits =
-      /// width; 32 for kFloat (IEEE 754 binary32); at most 48, so that a double holds it exactly
-      0;
+  uint16_t bit = 0;
+  /// width; 32 for kFloat (IEEE 754 binary32); at most 48, so that a double holds it exactly
+  uint8_t bits = 0;
   Kind kind = Kind::kUnsigned;
   double scale = 1;
   std::string_view unit = "";
@@ -53,7 +53,7 @@ struct Field {
   /// Whether Encode keeps the value, but for rounding. False for not-a-number.
   constexpr bool Holds(double value) const { return value >= lowest() && value <= highest(); }
 
-  /// @param payload the payload's bytes as a little-endian number.
+  /// @param payload eight bytes as a little-endian number, which the field lies in.
   constexpr double Decode(uint64_t payload) const {
     const uint64_t raw =
         (order == Order::kBigEndian ? SwapBytes(payload) : payload) >> shift() & mask();
@@ -72,6 +72,13 @@ struct Field {
   constexpr uint64_t Encode(double value) const {
     const uint64_t raw = Raw(value) << shift();
     return order == Order::kBigEndian ? SwapBytes(raw) : raw;
+  }
+
+  /// The same field, in the bytes from its own first one on.
+  constexpr Field InOwnBytes() const {
+    Field field = *this;
+    field.bit = bit % 8;
+    return field;
   }
 
  private:
@@ -105,7 +112,7 @@ constexpr Field RangeField(std::string_view name, int bit, int bits, double min,
                            std::string_view unit = "",
                            Field::Order order = Field::Order::kBigEndian) {
   Field field{
-      name, static_cast<uint8_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kUnsigned, 1, unit,
+      name, static_cast<uint16_t>(bit), static_cast<uint8_t>(bits), Field::Kind::kUnsigned, 1, unit,
       order};
   field.scale = (max - min) / static_cast<double>(field.mask());
   field.offset = min;
@@ -114,7 +121,7 @@ constexpr Field RangeField(std::string_view name, int bit, int bits, double min,
 
 /// A message's layout.
 struct Layout {
-  static constexpr size_t kMaxFields = 8;
+  static constexpr size_t kMaxFields = 12;
 
   uint16_t command = 0;  ///< the protocol's number of it, which the id is made of
   std::string_view name;
@@ -140,26 +147,43 @@ struct Layout {
 /// Values of a message in the order of its fields.
 using FieldValues = std::array<double, Layout::kMaxFields>;
 
+/// Writes values into a frame's payload, where their fields' bits are 0; leaves all else. Missing
+/// values are 0.
+constexpr void EncodeFields(const Layout& layout, std::initializer_list<double> values,
+                            Frame& frame) {
+  size_t i = 0;
+  for (const double value : values) {
+    const Field& field = layout.fields[i++];
+    const uint64_t bytes = field.InOwnBytes().Encode(value);
+    const size_t first = field.bit / 8u, last = std::min(first + 8, frame.data.size());
+    for (size_t byte = first; byte < last; ++byte)
+      frame.data[byte] |= static_cast<uint8_t>(bytes >> (8 * (byte - first)));
+  }
+}
+
 /// Fills a frame's payload. Missing values are 0.
 constexpr void EncodePayload(const Layout& layout, std::initializer_list<double> values,
                              Frame& frame) {
-  uint64_t payload = 0;
-  size_t i = 0;
-  for (const double value : values) payload |= layout.fields[i++].Encode(value);
   frame.length = layout.length;
-  for (size_t byte = 0; byte < layout.length; ++byte)
-    frame.data[byte] = static_cast<uint8_t>(payload >> (8 * byte));
+  for (size_t byte = 0; byte < layout.length; ++byte) frame.data[byte] = 0;
+  EncodeFields(layout, values, frame);
 }
 
-/// Reads a frame's payload. @return nothing if it is too short or too long for a classic frame. The
-/// values may not be finite.
+/// Reads a frame's payload. @return nothing if it is too short, or longer than a classic frame
+/// and the layout's own. The values may not be finite.
 constexpr std::optional<FieldValues> DecodePayload(const Layout& layout, const Frame& frame) {
-  if (frame.remote || frame.length < layout.needed() || frame.length > 8) return {};
-  uint64_t payload = 0;
-  for (size_t byte = 0; byte < frame.length; ++byte)
-    payload |= uint64_t{frame.data[byte]} << (8 * byte);
+  if (frame.remote || frame.length < layout.needed() ||
+      frame.length > std::max<size_t>(8, layout.length))
+    return {};
   FieldValues values{};
-  for (size_t i = 0; i < layout.count(); ++i) values[i] = layout.fields[i].Decode(payload);
+  for (size_t i = 0; i < layout.count(); ++i) {
+    const Field& field = layout.fields[i];
+    const size_t first = field.bit / 8u, last = std::min<size_t>(first + 8, frame.length);
+    uint64_t bytes = 0;
+    for (size_t byte = first; byte < last; ++byte)
+      bytes |= uint64_t{frame.data[byte]} << (8 * (byte - first));
+    values[i] = field.InOwnBytes().Decode(bytes);
+  }
   return values;
 }
 

@@ -11,6 +11,8 @@
 #include "drivers/protocols/cia406_host.h"
 #include "drivers/protocols/mit_device.h"
 #include "drivers/protocols/mit_host.h"
+#include "drivers/protocols/moteus_device.h"
+#include "drivers/protocols/moteus_host.h"
 #include "drivers/protocols/rmd_device.h"
 #include "drivers/protocols/rmd_host.h"
 #include "drivers/protocols/xsens_device.h"
@@ -28,6 +30,7 @@ struct MotorProtocol {
 };
 constexpr MotorProtocol kMotors[] = {
     {"cansimple", &MakeCanSimpleMotor, &CanSimpleBusDevice, &MakeCanSimpleDevice},
+    {"moteus", &MakeMoteusMotor, &MoteusBusDevice, &MakeMoteusDevice},
     {"mit", &MakeMitMotor, &MitBusDevice, &MakeMitDevice},
     {"rmd", &MakeRmdMotor, &RmdBusDevice, &MakeRmdDevice},
 };

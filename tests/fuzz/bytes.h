@@ -65,7 +65,8 @@ class Bytes {
   double Modest(double most) { return most * Value<int16_t>() / 32768.; }
 
   /// A well-formed frame, as transports hand them out, with one of the ids or one near it.
-  Frame AnyFrame(std::span<const uint32_t> ids) {
+  /// @param fd whether most shall be of CAN FD, with ids of 29 bits where 11 do not do.
+  Frame AnyFrame(std::span<const uint32_t> ids, bool fd = false) {
     Frame frame;
     const uint8_t kind = Byte();
     frame.id = Pick(ids);
@@ -73,10 +74,12 @@ class Bytes {
     frame.extended = (kind & 0x18) == 0x18;
     frame.remote = (kind & 0x28) == 0x28;
     frame.error = (kind & 0x48) == 0x48;
-    frame.fd = (kind & 0x88) == 0x88;
+    frame.fd = ((kind & 0x88) == 0x88) != fd;
+    frame.extended = frame.extended != (fd && frame.id > 0x7FF);
     frame.bit_rate_switch = frame.fd && (kind & 1) != 0;
-    static constexpr uint8_t kLengths[] = {8, 8, 8, 0, 1, 2, 3, 4, 5, 6, 7, 12, 64};
-    frame.length = Pick(kLengths);
+    static constexpr uint8_t kLengths[] = {8, 8, 8, 0, 1, 2, 3, 4, 5, 6, 7, 12, 64},
+                             kFdLengths[] = {32, 48, 12, 6, 16, 3, 0, 64};
+    frame.length = fd ? Pick(kFdLengths) : Pick(kLengths);
     if (!frame.fd) frame.length = std::min<uint8_t>(frame.length, 8);
     for (size_t i = 0; i < frame.length; ++i) frame.data[i] = Byte();
     if (!IsWellFormed(frame)) frame.extended = frame.remote = frame.error = false;
@@ -106,7 +109,7 @@ class BadWire {
     --frames_;
     if ((how_ & 1) != 0 && frames_ % 2 == 0) return;
     if ((how_ & 2) != 0) frame.length = std::min<uint8_t>(frame.length, where_ >> 4 & 7);
-    frame.data[where_ & 7] ^= flip_;
+    frame.data[where_ & (frame.fd ? 31 : 7)] ^= flip_;
     if ((how_ & 4) != 0) frame.id ^= 1u << (where_ >> 4) % 11;
     deliver(frame);
     if ((how_ & 8) != 0) deliver(frame);

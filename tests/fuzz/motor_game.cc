@@ -53,10 +53,10 @@ void MotorGame::Operate() {
     case 7:
       return drive_->Surprise(bytes_, clean_, now_);
     case 8:
-      if (!clean_) TellHost(bytes_.AnyFrame(ids_));
+      if (!clean_) TellHost(bytes_.AnyFrame(ids_, drive_->fd()));
       return;
     case 9:
-      if (!clean_) TellDrive(bytes_.AnyFrame(ids_));
+      if (!clean_) TellDrive(bytes_.AnyFrame(ids_, drive_->fd()));
       return;
     case 10:
       if (!clean_) wire_.Spoil(bytes_);
@@ -77,7 +77,8 @@ void MotorGame::Cycle(int64_t dt) {
   drive_->Tick(now_, said_);
   Require(drive_->NextDue() > now_);
   for (const Frame& frame : said_.frames()) {
-    Require(IsWellFormed(frame) && !frame.fd && !frame.extended && !frame.error);
+    Require(IsWellFormed(frame) && !frame.error && (drive_->fd() || !frame.fd) &&
+            frame.extended == (frame.id > 0x7FF));
     on_the_way_.push_back({frame, cycle_ + latency_});
   }
   while (!on_the_way_.empty() && on_the_way_.front().cycle <= cycle_) {

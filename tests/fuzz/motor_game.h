@@ -39,6 +39,8 @@ class VirtualDrive {
   virtual double max_torque() const = 0;
   /// By how much it may differ from what was asked for.
   virtual double Rounding(double torque) const = 0;
+  /// Whether its frames are of CAN FD, then with ids of 29 bits where 11 do not do.
+  virtual bool fd() const { return false; }
   /// Whether Motor::Tick may give this frame.
   virtual bool MayBeTold(const Frame& frame, DriveState state) const = 0;
   /// Of a clean link: the host knows where the shaft is.

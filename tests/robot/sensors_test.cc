@@ -212,6 +212,44 @@ TEST_CASE("RMD motors: a torque constant with its source") {
   refused("current = 8.0", "current = 8.0\ncurent = 8", "did you mean current?");
 }
 
+TEST_CASE("moteus: a greatest torque, and a bus that carries CAN FD") {
+  const std::string moteus = "protocol = \"moteus\"\nnode = 7\n[joint.moteus]\ntorque = 8.0\n",
+                    fd = "data_bit_rate = 5e6\n[driver]";
+  const auto load = [&](const std::string& motor) {
+    return Load(Replaced(WithMotor(motor), "[driver]", fd));
+  };
+  const RobotDescription robot = load(moteus);
+  const MotorDescription& motor = robot.joints[3].motor;
+  REQUIRE(motor.moteus);
+  CHECK(motor.node == 7);
+  CHECK(motor.moteus->torque == 8);
+  CHECK(motor.moteus->watchdog == 0.1);
+  CHECK(NeedsFd(motor));
+  CHECK_FALSE(NeedsFd(robot.joints[9].motor));
+  CHECK(robot.bus_data_bit_rate == 5e6);
+  CHECK(load(moteus + "watchdog = 0.05\n").joints[3].motor.moteus->watchdog == 0.05);
+
+  const auto refused = [&](const std::string& from, const std::string& to,
+                           const std::string& what) {
+    INFO(from << " -> " << to);
+    CHECK_THROWS_WITH(load(Replaced(moteus, from, to)), Contains("robot.toml:") && Contains(what));
+  };
+  refused(moteus.substr(moteus.find("[joint.moteus]")), "", "moteus");
+  refused("protocol = \"moteus\"", "protocol = \"cansimple\"", "is of protocol \"moteus\"");
+  refused("node = 7", "node = 0", "an id from 1 to 126");
+  refused("node = 7", "node = 127", "an id from 1 to 126");
+  refused("torque = 8.0", "torque = 0", "torque");
+  refused("torque = 8.0", "torque = 3.0", "the joint's limit is 3.33");  // 20 Nm behind a gear of 6
+  refused("torque = 8.0", "torque = 8.0\nwatchdog = 0", "watchdog");
+  refused("torque = 8.0", "torque = 8.0\ntorqe = 8", "did you mean torque?");
+  // On a bus that has no FD: the table's line.
+  CHECK_THROWS_WITH(Load(WithMotor(moteus)),
+                    Contains("robot.toml:4:") && Contains("bus.data_bit_rate is missing") &&
+                        Contains("speaks moteus, which needs a bus of CAN FD"));
+  CHECK_THROWS_WITH(Load(Replaced(WithMotor(moteus), "[driver]", "data_bit_rate = 5e5\n[driver]")),
+                    Contains("robot.toml:") && Contains("data_bit_rate"));
+}
+
 TEST_CASE("MIT motors: what is refused") {
   const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
     INFO(from << " -> " << to);

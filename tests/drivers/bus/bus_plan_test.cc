@@ -87,6 +87,14 @@ MotorDescription RmdMotor(int node) {
   return motor;
 }
 
+MotorDescription Moteus(int node) {
+  MotorDescription motor;
+  motor.protocol = "moteus";
+  motor.node = node;
+  motor.moteus = MoteusDescription{.torque = 10};
+  return motor;
+}
+
 std::vector<BusDevice> Motors(std::vector<MotorDescription> motors, double cycle = 0.001) {
   std::vector<BusDevice> devices;
   DriverSettings driver{};
@@ -109,6 +117,58 @@ TEST_CASE("bits of a frame") {
     CHECK(NominalBits(true, length) == extended);
     CHECK(WorstCaseBits(true, length) == extended_worst);
   }
+}
+
+TEST_CASE("bits of a frame of CAN FD, at either rate") {
+  // By hand. Slow: start, id, RRS, IDE, FDF, res, BRS (extended: SRR and 18 of the id, too); CRC
+  // delimiter, acknowledgement 2, end 7, interframe space 3. Fast: ESI, length 4, data, stuff count
+  // 4, CRC 17 or 21, its stuff bits 6 or 7. At worst a stuff bit after each 4 up to the data's end.
+  struct Row {
+    bool extended;
+    int length, slow, fast, worst_slow, worst_fast;
+  };
+  for (const Row& row : {Row{false, 0, 30, 32, 34, 33}, Row{false, 8, 30, 96, 34, 113},
+                         Row{false, 16, 30, 160, 34, 193}, Row{false, 20, 30, 197, 34, 238},
+                         Row{false, 32, 30, 293, 34, 358}, Row{false, 64, 30, 549, 34, 678},
+                         Row{true, 48, 49, 421, 57, 519}}) {
+    INFO(row.extended << " " << row.length);
+    CHECK(NominalFdBits(row.extended, row.length).slow == row.slow);
+    CHECK(NominalFdBits(row.extended, row.length).fast == row.fast);
+    CHECK(WorstCaseFdBits(row.extended, row.length).slow == row.worst_slow);
+    CHECK(WorstCaseFdBits(row.extended, row.length).fast == row.worst_fast);
+  }
+}
+
+TEST_CASE("moteus on a bus of CAN FD: a command and an answer in every cycle") {
+  // 49 + 421 / 5 us and 30 + 293 / 5; at worst 57 + 519 / 5 and 34 + 358 / 5.
+  const double command = 160.8, answer = 105.6;
+  const BusPlan plan = PlanBus(Motors({Moteus(1), Moteus(2), Moteus(3)}, 0.002), 1e6, 5e6);
+  CHECK(plan.errors.empty());
+  CHECK(plan.warnings.empty());
+  CHECK(plan.nominal_load == Approx(3 * (133.2 + 88.6) / 2000));
+  CHECK(plan.worst_load == Approx(3 * (command + answer) / 2000));
+  // Commands go first, as their ids begin with zeros; the longest that may have begun is one of
+  // those that come now and then, text of 64 bytes.
+  const double text = 34 + 678 / 5.;
+  CHECK(Response(plan, 0x8001) == Approx(200 + text + command));
+  CHECK(Response(plan, 0x8003) == Approx(200 + text + 3 * command));
+  CHECK_THAT(ToText(plan), Contains("0x00008001") && Contains("data of FD frames at 5e+06 bit/s") &&
+                               Contains("470-576") && Contains("all deadlines are met"));
+  CHECK(PlanBus(Motors({Moteus(1), Moteus(2), Moteus(3)}, 0.001), 1e6, 5e6).worst_load ==
+        Approx(0.7992));
+  CHECK(PlanBus(Motors({Moteus(1)}, 0.005), 5e5, 2e6).errors.empty());
+}
+
+TEST_CASE("CAN FD on a bus that carries none, and beside those who cannot stand it") {
+  CHECK_THAT(PlanBus(Motors({Moteus(1)}), 1e6).errors.front(),
+             Contains("'motor1' speaks CAN FD, which the bus does not carry"));
+  auto devices = Motors({Moteus(1)}, 0.002);
+  devices.push_back(Encoder(5, 2'000));
+  const BusPlan plan = PlanBus(devices, 1e6, 5e6);
+  CHECK(plan.errors.empty());
+  REQUIRE(plan.warnings.size() == 1);
+  CHECK_THAT(plan.warnings[0],
+             Contains("'motor1' speaks CAN FD and 'encoder5' does not: a controller that cannot"));
 }
 
 TEST_CASE("a leg at 500 Hz fits: loads and response times as computed by hand") {
@@ -249,6 +309,8 @@ TEST_CASE("collisions name both and the id") {
                Contains("0x003") && Contains("obeys Command"));
     CHECK_THAT(PlanBus(Motors({RmdMotor(3), RmdMotor(3)}, 0.01), 1e6).errors.front(),
                Contains("0x143") && Contains("obeys Torque"));
+    CHECK_THAT(PlanBus(Motors({Moteus(3), Moteus(3)}), 1e6, 5e6).errors.front(),
+               Contains("0x8003") && Contains("obeys Command"));
   }
   SECTION("a MIT motor's replies are another's commands") {
     CHECK_THAT(PlanBus(Motors({MitMotor(3, 0), MitMotor(4, 3)}), 1e6).errors.front(),
@@ -275,6 +337,17 @@ TEST_CASE("collisions name both and the id") {
     CHECK_THAT(PlanBus(devices, 1e6).errors.front(),
                Contains("0x000: 'encoder1' obeys NMT and 'motor3' sends Reply"));
   }
+  SECTION("whatever ends with a moteus' number is for it") {
+    auto devices = Motors({Moteus(1)});
+    SensorDescription sensor;
+    sensor.name = "encoder";
+    sensor.protocol = "cia406";
+    sensor.period = 0.002;
+    sensor.node = 1;
+    devices.push_back(SensorBusDevice(sensor));
+    CHECK_THAT(PlanBus(devices, 1e6, 5e6).errors.front(),
+               Contains("'encoder'") && Contains("are 'motor1's"));
+  }
   SECTION("a standard and an extended frame never collide") {
     BusDevice a{"a", "x", {Message(cansimple::kGetIq, 0x123, 1000, 8)}, {}}, b = a;
     b.name = "b";
@@ -289,11 +362,12 @@ TEST_CASE("slower buses are fuller") {
 
 TEST_CASE("the robots we ship fit their buses") {
   const char* source = std::getenv("PLUMBLINE_SOURCE");
-  for (const char* name : {"pendulum", "double_pendulum", "cartpole", "hopper"}) {
+  for (const char* name : {"pendulum", "pendulum/moteus.toml", "pendulum/rmd.toml",
+                           "double_pendulum", "cartpole", "hopper"}) {
     INFO(name);
     const RobotDescription robot =
         LoadRobot(std::string(source ? source : ".") + "/robots/" + name);
-    const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate);
+    const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate, robot.bus_data_bit_rate);
     INFO(ToText(plan));
     CHECK(plan.errors.empty());
     CHECK(plan.warnings.empty());

@@ -27,7 +27,8 @@ std::string Source() {
   return source ? source : ".";
 }
 
-/// Two MIT motors that answer on one id, an ODrive, an RMD motor, an encoder and an IMU.
+/// Two MIT motors that answer on one id, an ODrive, an RMD motor, two moteus, an encoder and an
+/// IMU.
 std::vector<BusDevice> Menagerie() {
   RobotDescription robot{};
   robot.driver.cycle = robot.driver.measurement = 0.002;
@@ -45,6 +46,8 @@ std::vector<BusDevice> Menagerie() {
   joint("left/hip", "mit", 0x12);  // the same identifier
   joint("1st", "cansimple", 2);
   joint("knee", "rmd", 5);
+  joint("ankle", "moteus", 6);
+  joint("toe", "moteus", 60);
   const auto sensor = [&](const char* name, const char* protocol) {
     SensorDescription& s = robot.sensors.emplace_back();
     s.name = name;
@@ -74,6 +77,8 @@ std::vector<Sent> RandomFrames(const std::vector<BusDevice>& devices, int each) 
       for (int i = 0; i < each; ++i) {
         Frame frame;
         frame.id = message.id;
+        frame.extended = message.extended;
+        frame.fd = message.fd;
         frame.length = message.layout.length;
         int tries = 0;
         do {
@@ -97,7 +102,8 @@ void CheckDecodes(const std::vector<BusDevice>& devices) {
   {
     std::ofstream file(list);
     for (const Sent& one : sent) {
-      file << one.frame.id << " " << ToText(one.frame).substr(4) << "\n";
+      const std::string text = ToText(one.frame);
+      file << one.frame.id << " " << text.substr(text.rfind('#') + (one.frame.fd ? 2 : 1)) << "\n";
     }
   }
   FILE* pipe = popen(("timeout 60 /usr/bin/python3 " + Source() +
@@ -173,7 +179,7 @@ TEST_CASE("messages of one device and one id are told apart by their first field
 
 TEST_CASE("a DBC's lines") {
   const std::string dbc = ToDbc(Menagerie());
-  CHECK_THAT(dbc, Contains("BU_: _1st driver imu knee left_hip left_hip_2 pitch yaw\n"));
+  CHECK_THAT(dbc, Contains("BU_: _1st ankle driver imu knee left_hip left_hip_2 pitch toe yaw\n"));
   CHECK_THAT(dbc, Contains("BO_ 73 _1st_Get_Encoder_Estimates: 8 _1st\n"
                            " SG_ Pos_Estimate : 0|32@1- (1,0) [0|0] \"rev\" driver\n"
                            " SG_ Vel_Estimate : 32|32@1- (1,0) [0|0] \"rev/s\" driver\n"));
@@ -196,6 +202,15 @@ TEST_CASE("a DBC's lines") {
   CHECK_THAT(dbc, Contains("BO_ 581 knee_Answers: 8 knee\n SG_ Code M : 0|8@1+"));
   CHECK_THAT(dbc, Contains(" SG_ Angle_Angle m146 : 32|32@1- (0.01,0) "));
   CHECK_THAT(dbc, Contains("BO_ 640 rmd_Shutdown_All: 8 driver\n"));
+  // Frames of CAN FD, with ids of 11 bits and of 29.
+  CHECK_THAT(dbc, Contains("BO_ 1536 ankle_Answer: 32 ankle\n"
+                           " SG_ Mode : 16|8@1- (1,0) [-128|127] \"\" driver\n"
+                           " SG_ Position : 40|32@1- (1,0) [0|0] \"rev\" driver\n"));
+  CHECK_THAT(dbc, Contains("BO_ 2147516422 ankle_Command: 48 driver\n"));
+  CHECK_THAT(dbc, Contains(" SG_ Timeout : 256|16@1- (1,0) [-32768|32767] \"ms\" ankle\n"));
+  CHECK_THAT(dbc, Contains("BA_ \"VFrameFormat\" BO_ 1536 14;\n"));
+  CHECK_THAT(dbc, Contains("BA_ \"VFrameFormat\" BO_ 2147499008 15;\n"));
+  CHECK_THAT(dbc, Contains("BA_ \"VFrameFormat\" BO_ 2147516422 15;\n"));
 }
 
 }  // namespace

@@ -83,6 +83,10 @@ TEST_CASE("python-can understands us and we understand it") {
   CHECK(exchange("028#R") == "029#72656D6F7465");
   CHECK(exchange("124##1000102030405060708090A0B") == "125##10B0A09080706050403020100");
   CHECK(exchange("022#") == "023#");
+  // The longest there are, with ids of 29 bits: what a moteus speaks.
+  const std::string half = "000102030405060708090A0B0C0D0E0F101112131415161718191A1B1C1D1E1F";
+  const std::string back = "1F1E1D1C1B1A191817161514131211100F0E0D0C0B0A09080706050403020100";
+  CHECK(exchange(("00008002##1" + half + half).c_str()) == "00008003##1" + back + back);
 
   const Frame end = *FrameFromText("7FF#");
   bus->Send({&end, 1});

@@ -144,6 +144,35 @@ TEST_CASE("filters let in what they name") {
         std::vector<std::string>{"029#11", "029#R", "7E6#01", "20000040#0000000000000000"});
 }
 
+TEST_CASE("a filter is about ids of 11 bits or of 29, and FD frames pass as others do") {
+  for (const std::string& url : {std::string("loop:extended"), UdpUrl()}) {
+    INFO(url);
+    const auto a = OpenTransport(url), host = OpenTransport(url, {{.id = 0x100}}),
+               far = OpenTransport(
+                   url,
+                   {{.id = 0x1200, .mask = Filter::kAllExtended, .own = true, .extended = true}}),
+               device = OpenTransport(url, {{.id = 0x12, .mask = 0x1FFF00FF, .extended = true}});
+    const std::string longest(128, '5');
+    std::vector<Frame> frames;
+    for (const std::string& text :
+         {"100##1" + longest, "00000100##1" + longest, "00001200##1" + longest,
+          "00008012##1" + longest, "012##1" + longest, "00018012##1" + longest}) {
+      frames.push_back(*FrameFromText(text));
+    }
+    REQUIRE(a->Send(frames) == 6);
+    const auto gets = [&](Transport& transport) {
+      const std::vector<Frame> received = ReceiveAll(transport, 1);
+      REQUIRE(received.size() == 1);
+      CHECK(received[0].foreign == (&transport == far.get()));
+      return ToText(received[0]);
+    };
+    CHECK(gets(*host) == "100##1" + longest);
+    CHECK(gets(*far) == "00001200##1" + longest);
+    CHECK(gets(*device) == "00008012##1" + longest);
+    CHECK(a->carries_fd());
+  }
+}
+
 TEST_CASE("udp multicast carries frames, stamps their arrival and drops the sender's echo") {
   const auto a = OpenTransport(UdpUrl()), b = OpenTransport(UdpUrl());
   const auto other_group = OpenTransport("udp:239.74.163.78:" + std::to_string(Port()));

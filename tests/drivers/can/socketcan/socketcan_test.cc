@@ -28,9 +28,15 @@ TEST_CASE("frames of every kind cross vcan, stamped; the sender's echo is only c
   FreshVcan();
   const auto a = OpenTransport("socketcan:vcan0"), b = OpenTransport("socketcan:vcan0");
   CHECK(a->link() == LinkState::kUp);
-  const Texts texts = {"02E#0000C03F00000000",           "029#R", "029#R8", "1ABCDEF0#0011",
-                       "124##1000102030405060708090A0B", "022#"};
-  CHECK(Send(*a, texts) == 6);
+  const Texts texts = {"02E#0000C03F00000000",
+                       "029#R",
+                       "029#R8",
+                       "1ABCDEF0#0011",
+                       "124##1000102030405060708090A0B",
+                       "00008001##1" + std::string(128, '5'),
+                       "022#"};
+  CHECK(a->carries_fd());
+  CHECK(Send(*a, texts) == 7);
   std::array<Frame, 1> first;
   REQUIRE(Readable(*b));
   REQUIRE(b->Receive(first) == 1);
@@ -38,9 +44,9 @@ TEST_CASE("frames of every kind cross vcan, stamped; the sender's echo is only c
   Texts received = {ToText(first[0])};
   for (const std::string& text : ReceiveAll(*b, texts.size() - 1)) received.push_back(text);
   CHECK(received == texts);
-  CheckEchoes(*a, 6);
-  CHECK(a->stats().sent == 6);
-  CHECK(b->stats().received == 6);
+  CheckEchoes(*a, 7);
+  CHECK(a->stats().sent == 7);
+  CHECK(b->stats().received == 7);
   CHECK(b->stats().malformed == 0);
 }
 
