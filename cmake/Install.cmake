@@ -44,10 +44,17 @@ install(DIRECTORY packaging/systemd/ DESTINATION lib/systemd/system COMPONENT ru
 install(DIRECTORY packaging/networkd DESTINATION share/doc/plumbline/examples COMPONENT runtime)
 install(FILES packaging/can0.conf DESTINATION share/doc/plumbline/examples COMPONENT runtime)
 
-# --- Python: logs, and the types of their messages -------------------------------------------------------------------
+# --- Python: logs and the types of their messages, and, where it is built, plumbline --------------------------------
 install(FILES python/plumb_log.py DESTINATION ${PLUMBLINE_PYTHON_DIR} COMPONENT python)
 install(DIRECTORY ${PROJECT_BINARY_DIR}/lcmtypes/python/plumb DESTINATION ${PLUMBLINE_PYTHON_DIR} COMPONENT python OPTIONAL
   FILES_MATCHING PATTERN "*.py")
+if(TARGET plumbline_native)
+  file(RELATIVE_PATH kernels_of_python /${PLUMBLINE_PYTHON_DIR}/plumbline /${kernels})
+  set_target_properties(plumbline_native PROPERTIES INSTALL_RPATH "$ORIGIN/${kernels_of_python}")
+  install(DIRECTORY python/plumbline DESTINATION ${PLUMBLINE_PYTHON_DIR} COMPONENT python
+    FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN py.typed PATTERN __pycache__ EXCLUDE)
+  install(TARGETS plumbline_native LIBRARY DESTINATION ${PLUMBLINE_PYTHON_DIR}/plumbline COMPONENT python OPTIONAL)
+endif()
 
 # --- For programs of others: plumb::sim, plumb::calibrator and what they stand on ------------------------------------
 set(libraries lcmtypes lcmtypes_c common urdf robot tasks sim plot inference motion fit diagnostics gap design results report live

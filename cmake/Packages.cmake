@@ -55,10 +55,18 @@ plumb_package(dev plumbline-dev SECTION libdevel
   DEPENDS "plumbline ${this}, liblcm-dev, libsodium-dev, libeigen3-dev, libfmt-dev, libspdlog-dev, nlohmann-json3-dev, libcli11-dev, \
 libboost-dev, libtinyxml-dev, libtomlplusplus-dev, librandom123-dev"
   SUGGESTS "cmake, g++")
-plumb_package(python python3-plumbline SECTION python ALL
-  SUMMARY "reads Plumbline's logs in Python"
-  TEXT "${what}\n.\nThis package reads LCM logs with Python's standard library alone, and\ndecodes Plumbline's messages."
-  DEPENDS "python3:any")
+if(TARGET plumbline_native)
+  plumb_package(python python3-plumbline SECTION python
+    SUMMARY "Plumbline's simulator, calibration and policies in Python"
+    TEXT "${what}\n.\nThis package is for Python: simulation in batches, calibration, policies, a\nvector environment for \
+reinforcement learning, and a reader of LCM logs."
+    DEPENDS "plumbline ${this}, ${PLUMBLINE_PYTHON_VERSIONS}, python3-numpy")
+else()
+  plumb_package(python python3-plumbline SECTION python ALL
+    SUMMARY "reads Plumbline's logs in Python"
+    TEXT "${what}\n.\nThis package reads LCM logs with Python's standard library alone, and\ndecodes Plumbline's messages."
+    DEPENDS "python3:any")
+endif()
 set(scripts ${PROJECT_SOURCE_DIR}/packaging/python3-plumbline)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${scripts}/postinst ${scripts}/prerm)
 plumb_package(doc plumbline-doc SECTION doc ALL

@@ -5,9 +5,11 @@
 #include <pybind11/pybind11.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -24,11 +26,19 @@ template <class T>
 using Matrix = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 constexpr py::ssize_t kAny = -1;  // a length that is not asked for
 
-inline std::string ShapeText(const std::vector<py::ssize_t>& shape) {
+using Shape = std::span<const py::ssize_t>;
+
+inline std::string ShapeText(Shape shape) {
   std::vector<std::string> lengths;
   for (const py::ssize_t length : shape)
     lengths.push_back(length == kAny ? "any" : std::to_string(length));
   return fmt::format("({}{})", fmt::join(lengths, ", "), shape.size() == 1 ? "," : "");
+}
+
+inline bool Fits(Shape shape, Shape may) {
+  return std::equal(
+      shape.begin(), shape.end(), may.begin(), may.end(),
+      [](py::ssize_t has, py::ssize_t needs) { return needs == kAny || has == needs; });
 }
 
 /// Numbers as a C-contiguous array: the object itself where it is one, else a copy.
@@ -36,7 +46,8 @@ inline std::string ShapeText(const std::vector<py::ssize_t>& shape) {
 /// shapes, or not finite.
 template <class T>
 Array<T> Numbers(const char* name, const py::object& object,
-                 const std::vector<std::vector<py::ssize_t>>& shapes, bool finite = true) {
+                 std::initializer_list<std::initializer_list<py::ssize_t>> shapes,
+                 bool finite = true) {
   const py::array given = py::array::ensure(object);
   if (!given) {
     PyErr_Clear();
@@ -47,16 +58,13 @@ Array<T> Numbers(const char* name, const py::object& object,
     throw py::value_error(fmt::format("{}: has dtype {}, needs real numbers", name,
                                       std::string(py::str(given.dtype()))));
   }
-  const std::vector<py::ssize_t> shape(given.shape(), given.shape() + given.ndim());
-  bool fits = false;
-  std::string wanted;
-  for (const auto& may : shapes) {
-    bool same = may.size() == shape.size();
-    for (size_t i = 0; same && i < may.size(); ++i) same = may[i] == kAny || may[i] == shape[i];
-    fits = fits || same;
-    wanted += (wanted.empty() ? "" : " or ") + ShapeText(may);
-  }
-  if (!fits) {
+  const std::span shape(given.shape(), static_cast<size_t>(given.ndim()));
+  if (std::none_of(shapes.begin(), shapes.end(), [&](std::initializer_list<py::ssize_t> may) {
+        return Fits(shape, {may.begin(), may.size()});
+      })) {
+    std::string wanted;
+    for (const auto& may : shapes)
+      wanted += (wanted.empty() ? "" : " or ") + ShapeText({may.begin(), may.size()});
     throw py::value_error(
         fmt::format("{}: has shape {}, needs {}", name, ShapeText(shape), wanted));
   }

@@ -23,13 +23,16 @@ constexpr const char* kHelp =
     R"(What calibrate has found. Arrays are in the order of `names`, physical units. Immutable.)";
 
 constexpr const char* kCalibrateHelp =
-    R"(Learns from motions which simulators could have produced them, as `plumb calibrate` does, with the same bits.
+    R"(Learns from motions which simulators could have produced them, as `plumb calibrate` does,
+with the same bits.
 
 motions   a Motion, or a list of them: each is a log of its own, and they are compared
-method, seed, horizons, budget, discrepancy, residual   as the command's flags (plumb calibrate --help)
+method, seed, horizons, budget, discrepancy, residual   as the command's flags
 threads   0 = one per core; the result does not depend on it
-progress  is called as progress(what, share), share from 0 to 1, from this thread; what it raises ends the calibration
-Ctrl-C ends it, too. Other Python threads run meanwhile. ValueError for an unknown method or motions that cannot be used.
+progress  is called as progress(what, share), share from 0 to 1, from this thread; what it raises
+          ends the calibration
+Ctrl-C ends it, too. Other Python threads run meanwhile. ValueError for an unknown method or
+motions that cannot be used.
 )";
 
 constexpr int kMostHorizon = 1000;

@@ -15,8 +15,8 @@ namespace {
 constexpr const char* kHelp =
     R"(Which simulators a robot may be: a mixture of Gaussians over the parameters' coordinates.
 
-Coordinates are those in which a parameter is normal (Parameter.coordinate); all else is in physical units. Made by
-prior, load_posterior and Calibration.distribution. Immutable.
+Coordinates are those in which a parameter is normal (Parameter.coordinate); all else is in
+physical units. Made by prior, load_posterior and Calibration.distribution. Immutable.
 
 >>> prior = plumbline.prior(plumbline.load_robot("robots/pendulum"))
 >>> prior.names
@@ -28,8 +28,8 @@ prior, load_posterior and Calibration.distribution. Immutable.
 constexpr const char* kSampleHelp =
     R"(Draws parameters of the mixture: shape (count, parameters), physical units.
 
-Row i depends on the seed and on i alone. A linear parameter's row may be one of which there is no simulator, a negative
-mass: set_parameters says so.
+Row i depends on the seed and on i alone. A linear parameter's row may be one of which there is no
+simulator, a negative mass: set_parameters says so.
 )";
 
 constexpr uint32_t kSampleStream = 0x53414d50;  // "SAMP", second word of the random streams

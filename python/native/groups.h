@@ -12,7 +12,7 @@ class Groups {
   /// @param workers must outlive it.
   Groups(int count, int lanes, Workers& workers) : count_(count), workers_(&workers) {
     const int share = count / (kGroupsPerThread * workers.size()) / lanes * lanes;
-    together_ = std::clamp(share, lanes, kMostTogether);
+    together_ = std::clamp(share, kLeastTogether, kMostTogether);
   }
 
   /// work(first, last, worker) for all of the batch.
@@ -26,7 +26,8 @@ class Groups {
  private:
   // So many even out what one of the threads loses to others on the machine.
   static constexpr int kGroupsPerThread = 4;
-  static constexpr int kMostTogether = 64;  // what a group needs stays in the nearest cache
+  static constexpr int kLeastTogether = 32;  // fewer are done before another thread has woken up
+  static constexpr int kMostTogether = 64;   // what a group needs stays in the nearest cache
 
   int count_, together_;
   Workers* workers_;

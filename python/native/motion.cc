@@ -27,17 +27,18 @@ step, duration         number of the control step; [s]
 )";
 
 constexpr const char* kMotionHelp =
-    R"(A robot's motion from arrays, a row for each control step: as a table of `plumb calibrate --csv` (README.md).
+    R"(A robot's motion from arrays, a row for each control step: as a table of `plumb calibrate
+--csv` (README.md).
 
 t               shape (N,) [s]; begins anew, or goes on, with every episode
 q, v            shapes (N, num_positions) [rad or m], (N, num_velocities) [rad/s or m/s]: the state
-u               shape (N, actions): effort in the task's unit, Nm or N, or the effort limit in `hopper` and `walk`; acts from
-                the row's time on, simulation.latency late
+u               shape (N, actions): effort in the task's unit, Nm or N, or the effort limit in
+                `hopper` and `walk`; acts from the row's time on, simulation.latency late
 next_q, next_v  the state that it led to; default: the next row's state
 terminated, truncated   shape (N,) of bool: true where an episode ends with this row
 name            what messages and posterior.json call it
-nan stands for what is not known. The same numbers give the same bits as from a file. ValueError names the argument that is
-wrong; RuntimeError says why no transition can be used.
+nan stands for what is not known. The same numbers give the same bits as from a file. ValueError
+names the argument that is wrong; RuntimeError says why no transition can be used.
 )";
 
 using Given = std::optional<py::object>;

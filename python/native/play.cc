@@ -12,7 +12,8 @@ namespace plumb::python {
 namespace {
 
 constexpr const char* kHelp =
-    R"(Plays episodes as `plumb sim` does, with the same bits: a dict of arrays for each, a row for each control step.
+    R"(Plays episodes as `plumb sim` does, with the same bits: a dict of arrays for each, a row for
+each control step.
 
 policy       whose mean actions are taken; random=True: random actions; default: no effort
 seed         of all random numbers; episode i depends on it and on i alone
@@ -20,7 +21,8 @@ parameters   shape (parameters,), physical units; default: the prior's means
 threads      0 = as many as the machine has cores; the result does not depend on it
 
 t            [s] since the episode began, shape (N,)
-q, v         the state before the step, shapes (N, num_positions) [rad or m], (N, num_velocities) [rad/s or m/s]
+q, v         the state before the step, shapes (N, num_positions) [rad or m], (N, num_velocities)
+             [rad/s or m/s]
 u            the action as the task counts it, shape (N, actions)
 reward, terminated, truncated   of the step, shape (N,)
 

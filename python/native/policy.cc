@@ -19,21 +19,25 @@ namespace {
 constexpr const char* kHelp =
     R"(A policy that `plumb train` or a run has trained: a Gaussian around a network's mean action.
 
-Made by load_policy. Called with observations, shape (count, observations) or (observations,), as the task gives them, it
-returns the mean actions, shape (count, actions) or (actions,), float32 in policy units: 1 is the joint's effort limit, and
-what lies beyond [-1, 1] is clipped where it becomes an effort. The same bits as in `plumb sim --policy`. Immutable.
+Made by load_policy. Called with observations, shape (count, observations) or (observations,), as
+the task gives them, it returns the mean actions, shape (count, actions) or (actions,), float32 in
+policy units: 1 is the joint's effort limit, and what lies beyond [-1, 1] is clipped where it
+becomes an effort. The same bits as in `plumb sim --policy`. Immutable.
 )";
 
 constexpr const char* kSampleHelp =
-    R"(Draws actions around the mean ones; the shapes are those of a call. Row i depends on the seed and on i alone.)";
+    R"(Draws actions around the mean ones; the shapes are those of a call. Row i depends on the
+seed and on i alone.)";
 
 constexpr const char* kEvaluateHelp =
-    R"(Returns of episodes without exploration in simulators drawn one for each, by all cores: shape (episodes,).
+    R"(Returns of episodes without exploration in simulators drawn one for each, by all cores:
+shape (episodes,).
 
 distribution  of the simulators; default: the robot's prior
 threads       0 = as many as the machine has cores; the result does not depend on it
-nan stands for an episode that was not finite, or had parameters of which there is no simulator. The simulators are those
-on which `plumb train --seed` has evaluated the policy after training: the same returns.
+nan stands for an episode that was not finite, or had parameters of which there is no simulator.
+The simulators are those on which `plumb train --seed` has evaluated the policy after training: the
+same returns.
 )";
 
 constexpr uint32_t kActionStream = 0x41435450;  // "ACTP", second word of the random streams

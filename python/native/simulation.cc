@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <limits>
+#include <memory>
 #include <mutex>
 #include <numeric>
 #include <optional>
@@ -16,12 +17,13 @@ namespace {
 
 constexpr const char* kHelp = R"(A robot's task, simulated many times side by side by all cores.
 
-Simulation(robot, count, threads=0): `count` environments in the zero state, with the prior's means as parameters;
-`threads` 0 takes as many as the machine has cores. Each environment has the same bits as alone, and as in `plumb sim`,
-for any number of threads. While one works other Python threads run; of one Simulation one thread may make use at a time.
+Simulation(robot, count, threads=0): `count` environments in the zero state, with the prior's means
+as parameters; `threads` 0 takes as many as the machine has cores. Each environment has the same
+bits as alone, and as in `plumb sim`, for any number of threads. While one works other Python
+threads run; of one Simulation one thread may make use at a time.
 
-`observations`, `q`, `v`, `rewards` and `terminated` are read-only views of its own memory: no copy is made, and the
-next call writes over them. Keep them with .copy().
+`observations`, `q`, `v`, `rewards` and `terminated` are read-only views of its own memory: no copy
+is made, and the next call writes over them. Keep them with .copy().
 
 >>> simulation = plumbline.Simulation(plumbline.load_robot("robots/pendulum"), count=1000)
 >>> observations = simulation.reset(seed=1)
@@ -36,19 +38,20 @@ constexpr const char* kResetHelp =
     R"(Begins episodes: draws states of the task's initial distribution.
 
 seed      of all random numbers
-numbers   of the episodes, shape (count,); default 0, 1, 2, ...: equal seeds and numbers begin equally, as episode
-          `number` of `plumb sim --seed` does
+numbers   of the episodes, shape (count,); default 0, 1, 2, ...: equal seeds and numbers begin
+          equally, as episode `number` of `plumb sim --seed` does
 where     shape (count,) of bool: those that begin; default all
 Returns observations, shape (count, observations), float32.
 )";
 
 constexpr const char* kStepHelp = R"(One control period of all environments.
 
-actions   shape (count, actions), policy units: 1 is the joint's effort limit, what lies beyond [-1, 1] is clipped.
-          float32 in C order is read where it is, everything else is converted
-Returns (observations, rewards, terminated): shape (count, observations) float32, (count,) float64, (count,) bool.
-terminated says that the task is over, or that the simulation has blown up: its reward is nan then. The time limit,
-robot.steps, is the caller's to count, and episodes begin anew with reset alone.
+actions   shape (count, actions), policy units: 1 is the joint's effort limit, what lies beyond
+          [-1, 1] is clipped. float32 in C order is read where it is, everything else is converted
+Returns (observations, rewards, terminated): shape (count, observations) float32, (count,) float64,
+(count,) bool. terminated says that the task is over, or that the simulation has blown up: its
+reward is nan then. The time limit, robot.steps, is the caller's to count, and episodes begin anew
+with reset alone.
 )";
 
 constexpr int kMostEnvironments = 10'000'000;
@@ -57,47 +60,63 @@ constexpr uint32_t kMostNumber = std::numeric_limits<uint32_t>::max();
 class Simulation {
  public:
   Simulation(const Robot& robot, int count, int threads)
-      : batch_(robot.model, InRange("count", count, 1, kMostEnvironments), Threads(threads)) {}
+      : batch_(std::make_shared<EnvironmentBatch>(
+            robot.model, InRange("count", count, 1, kMostEnvironments), Threads(threads))) {
+    // What it has lent outlives it.
+    const py::capsule owner(new std::shared_ptr<EnvironmentBatch>(batch_), [](void* batch) {
+      delete static_cast<std::shared_ptr<EnvironmentBatch>*>(batch);
+    });
+    observations_ = View(batch_->observations(), owner);
+    q_ = View(batch_->q(), owner), v_ = View(batch_->v(), owner);
+    rewards_ = View(batch_->rewards(), owner);
+    terminated_ = View(batch_->terminated(), owner);
+    of_a_step_ = py::make_tuple(observations_, rewards_, terminated_);
+  }
 
-  int count() const { return batch_.count(); }
-  int threads() const { return batch_.threads(); }
+  int count() const { return batch_->count(); }
+  int threads() const { return batch_->threads(); }
+  const py::array& observations() const { return observations_; }
+  const py::array& q() const { return q_; }
+  const py::array& v() const { return v_; }
+  const py::array& rewards() const { return rewards_; }
+  const py::array& terminated() const { return terminated_; }
 
   void SetParameters(const py::object& parameters) {
-    const py::ssize_t size = batch_.model().parameters().size();
+    const py::ssize_t size = batch_->model().parameters().size();
     const auto numbers = Numbers<double>("parameters", parameters, {{size}, {count(), size}});
     const AtWork at_work(mutex_, "Simulation");
     if (numbers.ndim() == 2) {
-      batch_.SetParameters(AsMatrix(numbers));
+      batch_->SetParameters(AsMatrix(numbers));
     } else {
-      batch_.SetParameters(
+      batch_->SetParameters(
           Eigen::Map<const Eigen::RowVectorXd>(numbers.data(), size).replicate(count(), 1));
     }
   }
 
-  void Reset(uint64_t seed, const py::object& numbers, const py::object& where) {
+  const py::array& Reset(uint64_t seed, const py::object& numbers, const py::object& where) {
     const std::vector<uint32_t> episodes = EpisodeNumbers(numbers);
     std::optional<Array<bool>> mask;
     if (!where.is_none()) mask = Numbers<bool>("where", where, {{count()}});
-    const AtWork at_work(mutex_, "Simulation");
     std::span<const bool> begins;
     if (mask) begins = {mask->data(), static_cast<size_t>(count())};
-    batch_.Reset(seed, episodes, begins);
+    const AtWork at_work(mutex_, "Simulation");
+    batch_->Reset(seed, episodes, begins);
+    return observations_;
   }
 
   void SetState(const py::object& q, const py::object& v) {
-    const auto positions = Numbers<double>("q", q, {{count(), batch_.q().cols()}});
-    const auto velocities = Numbers<double>("v", v, {{count(), batch_.v().cols()}});
+    const auto positions = Numbers<double>("q", q, {{count(), batch_->q().cols()}});
+    const auto velocities = Numbers<double>("v", v, {{count(), batch_->v().cols()}});
     const AtWork at_work(mutex_, "Simulation");
-    batch_.SetState(AsMatrix(positions), AsMatrix(velocities));
+    batch_->SetState(AsMatrix(positions), AsMatrix(velocities));
   }
 
-  void Step(const py::object& actions) {
-    const auto numbers = Numbers<float>("actions", actions, {{count(), batch_.action_size()}});
+  const py::tuple& Step(const py::object& actions) {
+    const auto numbers = Numbers<float>("actions", actions, {{count(), batch_->action_size()}});
     const AtWork at_work(mutex_, "Simulation");
-    batch_.Step(numbers.data());
+    batch_->Step(numbers.data());
+    return of_a_step_;
   }
-
-  const EnvironmentBatch& batch() const { return batch_; }
 
  private:
   std::vector<uint32_t> EpisodeNumbers(const py::object& numbers) const {
@@ -116,13 +135,12 @@ class Simulation {
     return episodes;
   }
 
-  EnvironmentBatch batch_;
+  std::shared_ptr<EnvironmentBatch> batch_;
   std::mutex mutex_;
+  // Made once: to make them costs as much as a small batch's step.
+  py::array observations_, q_, v_, rewards_, terminated_;
+  py::tuple of_a_step_;
 };
-
-const EnvironmentBatch& BatchOf(const py::object& self) {
-  return self.cast<const Simulation&>().batch();
-}
 
 }  // namespace
 
@@ -137,38 +155,21 @@ void BindSimulation(py::module_& module) {
            "Gives all the same parameters, shape (parameters,), or each its own, shape (count, "
            "parameters); physical units, in the order of robot.parameters. ValueError for what is "
            "not physical.")
-      .def(
-          "reset",
-          [](const py::object& self, uint64_t seed, const py::object& numbers,
-             const py::object& where) {
-            self.cast<Simulation&>().Reset(seed, numbers, where);
-            return View(BatchOf(self).observations(), self);
-          },
-          py::arg("seed"), py::arg("numbers") = py::none(), py::arg("where") = py::none(),
-          kResetHelp)
+      .def("reset", &Simulation::Reset, py::arg("seed"), py::arg("numbers") = py::none(),
+           py::arg("where") = py::none(), kResetHelp)
       .def("set_state", &Simulation::SetState, py::arg("q"), py::arg("v"),
            "Puts all into states: q, shape (count, num_positions) [rad or m], and v, shape (count, "
            "num_velocities) [rad/s or m/s]. No effort has been applied yet.")
-      .def(
-          "step",
-          [](const py::object& self, const py::object& actions) {
-            self.cast<Simulation&>().Step(actions);
-            const EnvironmentBatch& batch = BatchOf(self);
-            return py::make_tuple(View(batch.observations(), self), View(batch.rewards(), self),
-                                  View(batch.terminated(), self));
-          },
-          py::arg("actions"), kStepHelp);
-  const auto view = [&](const char* name, auto member, const char* help) {
-    simulation.def_property_readonly(
-        name, [member](const py::object& self) { return View((BatchOf(self).*member)(), self); },
-        help);
-  };
-  using Batch = EnvironmentBatch;
-  view("observations", &Batch::observations, "Shape (count, observations), float32.");
-  view("q", &Batch::q, "Positions, shape (count, num_positions) [rad or m].");
-  view("v", &Batch::v, "Velocities, shape (count, num_velocities) [rad/s or m/s].");
-  view("rewards", &Batch::rewards, "Of the latest step, shape (count,).");
-  view("terminated", &Batch::terminated, "Of the latest step, shape (count,) of bool.");
+      .def("step", &Simulation::Step, py::arg("actions"), kStepHelp)
+      .def_property_readonly("observations", &Simulation::observations,
+                             "Shape (count, observations), float32.")
+      .def_property_readonly("q", &Simulation::q,
+                             "Positions, shape (count, num_positions) [rad or m].")
+      .def_property_readonly("v", &Simulation::v,
+                             "Velocities, shape (count, num_velocities) [rad/s or m/s].")
+      .def_property_readonly("rewards", &Simulation::rewards, "Of the latest step, shape (count,).")
+      .def_property_readonly("terminated", &Simulation::terminated,
+                             "Of the latest step, shape (count,) of bool.");
 }
 
 }  // namespace plumb::python

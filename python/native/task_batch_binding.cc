@@ -10,9 +10,11 @@ namespace plumb::python {
 namespace {
 
 constexpr const char* kHelp =
-    R"(Episodes of a task as `plumb train` sees them, in many simulations: what VectorEnv is made of.
+    R"(Episodes of a task as `plumb train` sees them, in many simulations: what VectorEnv is made
+of.
 
-TaskBatch(robot, count, distribution=None, threads=0). Arrays are read-only views, which the next call writes over.
+TaskBatch(robot, count, distribution=None, threads=0). Arrays are read-only views, which the next
+call writes over.
 )";
 
 constexpr int kMostSimulations = 10'000'000;

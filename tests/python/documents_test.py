@@ -75,6 +75,13 @@ class DocumentsTest(unittest.TestCase):
             self.assertEqual(runner.run(test).failed, 0, name)
         self.assertGreater(examples, 12)
 
+    def test_examples_of_the_page_are_true(self):
+        os.chdir(SOURCE)
+        text = re.sub(r"^```.*$", "", (SOURCE / "docs/python.md").read_text(), flags=re.M)  # an example ends with a blank line
+        test = doctest.DocTestParser().get_doctest(text, {}, "docs/python.md", None, None)
+        self.assertGreater(len(test.examples), 15)
+        self.assertEqual(doctest.DocTestRunner().run(test).failed, 0)
+
     def test_stubs_have_what_the_module_has(self):
         self.assertEqual(stubs(), compiled())
 
