@@ -1,5 +1,5 @@
-// The host's side of a moteus against the virtual motor, in virtual time: silence, faults, restarts,
-// lost frames, and motors that are set up otherwise.
+// The host's side of a moteus against the virtual motor, in virtual time: silence, faults,
+// restarts, lost frames, and motors that are set up otherwise.
 
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,6 +1,7 @@
 // The bytes of mjbots' protocol: what we send, written by hand, and what the virtual motor makes of
-// frames that mjbots have published: docs/protocol/can.md, docs/integration/can-fd.md, and
-// lib/cpp/mjbots/moteus/test/moteus_protocol_test.cc at commit db1a7623 of github.com/mjbots/moteus.
+// frames that mjbots have published, at commit db1a7623 of github.com/mjbots/moteus:
+// docs/protocol/can.md, docs/integration/can-fd.md, and
+// lib/cpp/mjbots/moteus/test/moteus_protocol_test.cc.
 
 #include "drivers/protocols/moteus.h"
 
