@@ -20,6 +20,7 @@ struct Witness {
   void OnFrame(const Frame& frame) {
     if (frame.id == CommandId(1)) {
       CHECK((frame.fd && frame.bit_rate_switch && frame.extended));
+      ++frames_to;
       if (HasShape(kCommand, frame)) {
         told = frame.receive_ns / 1000;
         asked = (*DecodePayload(kCommand.layout, frame))[3];
@@ -27,6 +28,7 @@ struct Witness {
     }
     if (frame.id != AnswerId(1) || !HasShape(kAnswer, frame)) return;
     CHECK((frame.fd && frame.bit_rate_switch && !frame.extended));
+    ++answers;
     const FieldValues values = *DecodePayload(kAnswer.layout, frame);
     mode = static_cast<int>(values[0]);
     given = values[3];
@@ -36,6 +38,7 @@ struct Witness {
   double asked = 0, given = 0;  ///< [Nm]
   int64_t told = 0;             ///< time of the last command
   int mode = -1;                ///< of the last answer
+  int frames_to = 0, answers = 0;
 };
 
 /// Up to an episode with a torque.
@@ -52,15 +55,15 @@ TEST_CASE("a pendulum on a moteus: a command and an answer in every cycle") {
   Witness witness(stage);
   Subscriber<joint_state_t> joints(stage.messenger, "JOINT_STATE");
   Run(stage, witness);
-  stage.frames_by_id.clear();
+  witness.frames_to = witness.answers = 0;
   const int64_t before = joints.received();
   stage.Listen(2);
   INFO(stage.drivers.newest().reason);
   CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
   CHECK(witness.mode == kPositionMode);
   CHECK(std::abs(joints.received() - before - 400) <= 1);
-  CHECK(std::abs(stage.frames_by_id[0x8001] - 400) <= 1);
-  CHECK(std::abs(stage.frames_by_id[0x100] - 400) <= 1);
+  CHECK(std::abs(witness.frames_to - 400) <= 1);
+  CHECK(std::abs(witness.answers - 400) <= 1);
   CHECK(std::abs(witness.asked) <= 2 + 1e-6);
   const driver_status_t& status = stage.drivers.newest();
   CHECK(status.bus_voltage[0] == 24);
