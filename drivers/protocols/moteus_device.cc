@@ -1,9 +1,7 @@
 #include "drivers/protocols/moteus_device.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -22,84 +20,10 @@ constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
 constexpr uint32_t kFirmware = 0x000107;  // made up
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// [unit of a register] of one step of an integer; 1 of what is counted. docs/protocol/registers.md
-struct Scale {
-  double of_int8, of_int16, of_int32;
-};
-Scale ScaleOf(uint32_t number) {
-  switch (number) {
-    case kPosition:
-    case kCommandPosition:
-      return {0.01, 0.0001, 0.00001};
-    case kVelocity:
-    case kCommandVelocity:
-      return {0.1, 0.00025, 0.00001};
-    case kTorque:
-    case kCommandTorque:
-    case kMaxTorque:
-      return {0.5, 0.01, 0.001};
-    case kKpScale:
-    case kKdScale:
-    case kIntegralScale:
-      return {1. / 127, 1. / 32767, 1. / 2147483647};
-    case kTimeout:
-      return {0.01, 0.001, 0.000001};
-    case kVoltage:
-      return {0.5, 0.1, 0.001};
-    case kTemperature:
-    case kMotorTemperature:
-      return {1, 0.1, 0.001};
-    default:
-      return {1, 1, 1};
-  }
-}
-double StepOf(uint32_t number, int format) {
-  const Scale scale = ScaleOf(number);
-  return format == kInt8 ? scale.of_int8 : format == kInt16 ? scale.of_int16 : scale.of_int32;
-}
-int BytesOf(int format) { return format == kInt8 ? 1 : format == kInt16 ? 2 : 4; }
-
-bool IsCounted(uint32_t number) { return ScaleOf(number).of_int8 == 1 && number != kTemperature; }
-
 // Of position mode, those that are of no use here included.
 bool IsWritable(uint32_t number) {
   return number == kMode || (number >= kCommandPosition && number <= 0x02D);
 }
-
-/// Bytes of an answer, up to a frame's.
-struct Writer {
-  void Byte(uint32_t byte) {
-    if (size < bytes.size()) bytes[size++] = static_cast<uint8_t>(byte);
-  }
-  void Number(uint32_t number) {
-    for (; number > 0x7F; number >>= 7) Byte((number & 0x7F) | 0x80);
-    Byte(number);
-  }
-  void Refuse(Subframe error, uint32_t number) {
-    Byte(error);
-    Number(number);
-    Number(1);
-  }
-  void Value(uint32_t number, int format, double value) {
-    uint32_t raw = 0;
-    const int count = BytesOf(format);
-    const double most = std::ldexp(1, 8 * count - 1) - 1;
-    if (format == kFloat) {
-      raw = std::bit_cast<uint32_t>(static_cast<float>(value));
-    } else if (IsCounted(number)) {
-      raw = static_cast<uint32_t>(static_cast<int64_t>(value));
-    } else if (!std::isfinite(value)) {
-      raw = static_cast<uint32_t>(static_cast<int64_t>(-most - 1));
-    } else {
-      raw = static_cast<uint32_t>(
-          static_cast<int64_t>(std::clamp(value / StepOf(number, format), -most, most)));
-    }
-    for (int byte = 0; byte < count; ++byte) Byte(raw >> 8 * byte & 0xFF);
-  }
-
-  std::array<uint8_t, 64> bytes{};
-  size_t size = 0;
-};
 
 class Drive : public MotorDevice {
  public:
@@ -137,53 +61,6 @@ class Drive : public MotorDevice {
 
 }  // namespace
 
-class MoteusDevice::Reader {
- public:
-  explicit Reader(const Frame& frame) : bytes_(frame.payload()) {}
-
-  bool empty() const { return at_ == bytes_.size(); }
-  std::optional<uint32_t> Byte() {
-    if (empty()) return {};
-    return bytes_[at_++];
-  }
-  /// Seven bits a byte, the least first; the highest bit says that there are more.
-  std::optional<uint32_t> Number() {
-    uint32_t number = 0;
-    for (int shift = 0; shift < 35; shift += 7) {
-      const auto byte = Byte();
-      if (!byte) return {};
-      number |= (*byte & 0x7F) << std::min(shift, 31);
-      if ((*byte & 0x80) == 0) return number;
-    }
-    return {};
-  }
-  /// A register's value in its unit; not-a-number for the most negative integer.
-  std::optional<double> Value(uint32_t number, int format) {
-    uint32_t raw = 0;
-    const int count = BytesOf(format);
-    for (int byte = 0; byte < count; ++byte) {
-      const auto next = Byte();
-      if (!next) return {};
-      raw |= *next << 8 * byte;
-    }
-    if (format == kFloat) return std::bit_cast<float>(raw);
-    const int unused = 32 - 8 * count;
-    const int32_t value = static_cast<int32_t>(raw << unused) >> unused;
-    if (value == std::numeric_limits<int32_t>::min() >> unused && number != kMode) return kNan;
-    return value * StepOf(number, format);
-  }
-  std::optional<std::string_view> Text(size_t size) {
-    if (bytes_.size() - at_ < size) return {};
-    const std::string_view text(reinterpret_cast<const char*>(bytes_.data() + at_), size);
-    at_ += size;
-    return text;
-  }
-
- private:
-  std::span<const uint8_t> bytes_;
-  size_t at_ = 0;
-};
-
 MoteusDevice::MoteusDevice(const Settings& settings) : settings_(settings) {
   const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
   if (settings.node < 1 || settings.node > kMaxNode || !positive(settings.most_torque) ||
@@ -211,7 +88,7 @@ bool MoteusDevice::OnFrame(const Frame& frame, int64_t now) noexcept {
   if (!Concerns(frame)) return false;
   CheckTime(now);
   wish_ = -1;
-  Reader reader(frame);
+  SubframeReader reader(frame);
   if (!Obey(reader)) ++rejected_;
   if (wish_ >= 0) Begin(now);
   const bool asked = (frame.id & 0x8000) != 0;
@@ -223,14 +100,14 @@ bool MoteusDevice::OnFrame(const Frame& frame, int64_t now) noexcept {
 }
 
 // What is written. @return whether it was understood to its end.
-bool MoteusDevice::Obey(Reader& reader) noexcept {
+bool MoteusDevice::Obey(SubframeReader& reader) noexcept {
   while (!reader.empty()) {
     const uint32_t subframe = *reader.Byte();
-    const int kind = subframe & 0xF0, format = subframe & 0x0C;
+    const int kind = subframe & 0xF0;
     if (subframe == kNothing) continue;
     if (subframe == kToMotor || subframe == kAskText) {
-      const auto channel = reader.Number(), size = reader.Number();
-      if (!channel || !size || *channel != 1) return false;
+      const auto size = reader.TextSize();
+      if (!size) return false;
       if (subframe == kAskText) continue;
       const auto text = reader.Text(*size);
       if (!text) return false;
@@ -239,15 +116,13 @@ bool MoteusDevice::Obey(Reader& reader) noexcept {
       continue;
     }
     if (kind != kWrite && kind != kRead) return false;
-    const auto count =
-                   (subframe & 3) != 0 ? std::optional<uint32_t>(subframe & 3) : reader.Number(),
-               first = count ? reader.Number() : count;
-    if (!first) return false;
+    const auto registers = reader.RegistersOf(subframe);
+    if (!registers) return false;
     if (kind == kRead) continue;
-    for (uint32_t i = 0; i < *count; ++i) {
-      const auto value = reader.Value(*first + i, format);
+    for (uint32_t i = 0; i < registers->count; ++i) {
+      const auto value = reader.Value(registers->first + i, registers->format);
       if (!value) return false;
-      Write(*first + i, *value);
+      Write(registers->first + i, *value);
     }
   }
   return true;
@@ -383,67 +258,76 @@ std::optional<double> MoteusDevice::Read(uint32_t source, const Sample& sample,
   }
 }
 
+// As much of its console's text as there is and may come.
+void MoteusDevice::Say(size_t most, SubframeWriter& writer) noexcept {
+  const size_t size = std::min(text_.size(), most);
+  writer.Byte(kFromMotor);
+  writer.Number(1);
+  writer.Number(static_cast<uint32_t>(size));
+  for (size_t i = 0; i < size; ++i) writer.Byte(static_cast<uint8_t>(text_[i]));
+  text_.erase(0, size);
+}
+
+// The registers, or which is the first of them that it does not know, and then nothing more.
+bool MoteusDevice::Reply(uint32_t subframe, const SubframeReader::Registers& registers,
+                         const Sample& sample, int64_t now, SubframeWriter& writer) const noexcept {
+  const auto [count, first, format] = registers;
+  std::array<double, 64> values{};
+  uint32_t known = 0;
+  for (; known < std::min<uint32_t>(count, 64); ++known) {
+    const auto value = Read(first + known, sample, now);
+    if (!value) break;
+    values[known] = *value;
+  }
+  if (known < count) {
+    writer.Refuse(kReadError, first + known);
+    return false;
+  }
+  writer.Byte((subframe & 0x0F) | kReply);
+  if ((subframe & 3) == 0) writer.Number(count);
+  writer.Number(first);
+  for (uint32_t i = 0; i < known; ++i) writer.Value(first + i, format, values[i]);
+  return true;
+}
+
 // What was asked for, in the order in which it was.
-Frame MoteusDevice::Answer(const Sample& sample, int64_t now) noexcept {
-  Writer writer;
-  const auto say = [&](size_t most) {
-    const size_t size = std::min(text_.size(), most);
-    writer.Byte(kFromMotor);
-    writer.Number(1);
-    writer.Number(static_cast<uint32_t>(size));
-    for (size_t i = 0; i < size; ++i) writer.Byte(static_cast<uint8_t>(text_[i]));
-    text_.erase(0, size);
-  };
-  Reader reader(question_);
+void MoteusDevice::ReplyToAll(const Sample& sample, int64_t now, SubframeWriter& writer) noexcept {
+  constexpr size_t kText = 32;
+  SubframeReader reader(question_);
   while (!reader.empty()) {
     const uint32_t subframe = *reader.Byte();
-    const int format = subframe & 0x0C;
     if (subframe == kNothing) continue;
     if (subframe == kToMotor || subframe == kAskText) {
-      const auto channel = reader.Number(), size = reader.Number();
-      if (!channel || !size || *channel != 1) break;
-      say(subframe == kAskText ? std::min<size_t>(*size, 32) : 32);
-      if (subframe == kToMotor && !reader.Text(*size)) break;
+      const auto size = reader.TextSize();
+      if (!size) return;
+      Say(subframe == kAskText ? std::min<size_t>(*size, kText) : kText, writer);
+      if (subframe == kToMotor && !reader.Text(*size)) return;
       continue;
     }
-    if ((subframe & 0xF0) > kRead) break;
-    const auto count =
-                   (subframe & 3) != 0 ? std::optional<uint32_t>(subframe & 3) : reader.Number(),
-               first = count ? reader.Number() : count;
-    if (!first) break;
-    if ((subframe & 0xF0) == kWrite) {
-      bool more = true;
-      for (uint32_t i = 0; i < *count && more; ++i) {
-        more = reader.Value(*first + i, format).has_value();
-        if (more && !IsWritable(*first + i)) writer.Refuse(kWriteError, *first + i);
-      }
-      if (!more) break;
+    if ((subframe & 0xF0) > kRead) return;
+    const auto registers = reader.RegistersOf(subframe);
+    if (!registers) return;
+    if ((subframe & 0xF0) == kRead) {
+      if (!Reply(subframe, *registers, sample, now, writer)) return;
       continue;
     }
-    std::array<double, 64> values{};
-    uint32_t known = 0;
-    for (; known < std::min<uint32_t>(*count, 64); ++known) {
-      const auto value = Read(*first + known, sample, now);
-      if (!value) break;
-      values[known] = *value;
+    for (uint32_t i = 0; i < registers->count; ++i) {
+      if (!reader.Value(registers->first + i, registers->format)) return;
+      if (!IsWritable(registers->first + i)) writer.Refuse(kWriteError, registers->first + i);
     }
-    if (known < *count) {  // it says which it does not know, and nothing more
-      writer.Refuse(kReadError, *first + known);
-      break;
-    }
-    writer.Byte((subframe & 0x0F) | kReply);
-    if ((subframe & 3) == 0) writer.Number(*count);
-    writer.Number(*first);
-    for (uint32_t i = 0; i < known; ++i) writer.Value(*first + i, format, values[i]);
   }
+}
+
+Frame MoteusDevice::Answer(const Sample& sample, int64_t now) noexcept {
+  SubframeWriter writer;
+  ReplyToAll(sample, now, writer);
   // Commands of the console end with a line.
   for (size_t end = 0; (end = heard_.find('\n')) != std::string::npos; heard_.erase(0, end + 1)) {
     text_ = heard_.substr(0, end + 1) == kAskTimeoutMode
                 ? std::to_string(settings_.timeout_mode) + "\r\n"
                 : "ERR unknown command\r\n";
   }
-  Frame frame = MakeFrame(AnswerId(settings_.node) | (question_.id >> 8 & 0x7F),
-                          {std::span(writer.bytes).first(writer.size)});
+  Frame frame = MakeFrame(AnswerId(settings_.node) | (question_.id >> 8 & 0x7F), {writer.bytes()});
   frame.fd = question_.fd || frame.length > 8;
   frame.bit_rate_switch = frame.fd && question_.bit_rate_switch;
   return frame;

@@ -8,6 +8,7 @@
 
 #include "drivers/can/transport.h"
 #include "drivers/protocols/moteus.h"
+#include "drivers/protocols/moteus_subframes.h"
 #include "drivers/protocols/motor_device.h"
 #include "robot/description.h"
 
@@ -69,15 +70,16 @@ class MoteusDevice {
   void Reboot(int64_t now, double position) noexcept;
 
  private:
-  /// Numbers from a frame, as long as there are any.
-  class Reader;
-
   bool Concerns(const Frame& frame) const noexcept;
-  bool Obey(Reader& reader) noexcept;
+  bool Obey(moteus::SubframeReader& reader) noexcept;
   void Write(uint32_t target, double value) noexcept;
   std::optional<double> Read(uint32_t source, const Sample& sample, int64_t now) const noexcept;
   void Begin(int64_t now) noexcept;
   void CheckTime(int64_t now) noexcept;
+  void Say(size_t most, moteus::SubframeWriter& writer) noexcept;
+  bool Reply(uint32_t subframe, const moteus::SubframeReader::Registers& registers,
+             const Sample& sample, int64_t now, moteus::SubframeWriter& writer) const noexcept;
+  void ReplyToAll(const Sample& sample, int64_t now, moteus::SubframeWriter& writer) noexcept;
   Frame Answer(const Sample& sample, int64_t now) noexcept;
 
   Settings settings_;

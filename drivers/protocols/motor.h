@@ -37,7 +37,7 @@ struct MotorReadings {
 
 /// A motor's verdict on a frame.
 enum class FrameUse {
-  kNotMine,   ///< another id, or not a frame a drive sends: remote, extended, FD, error
+  kNotMine,   ///< another id, or of a kind that this drive does not send: remote, error, FD ...
   kRejected,  ///< its id, but too short, not finite or of an unknown kind
   kConsumed,
   kEstimate,  ///< carried a new MotorEstimate

@@ -26,7 +26,7 @@ constexpr const char* kRobotHelp = R"(A robot: what robot.urdf and robot.toml sa
 constexpr const char* kLoadHelp =
     R"(Reads a robot from its folder, or from a TOML file.
 
-A relative path that is not there is one of the robots that are installed with Plumbline.
+A relative path that does not exist is looked up among the robots installed with Plumbline.
 RuntimeError names file, line and field of what is missing, unknown or out of range; ValueError what
 cannot be simulated.
 )";
