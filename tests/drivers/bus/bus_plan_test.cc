@@ -6,106 +6,13 @@
 #include <cstdlib>
 #include <map>
 
-#include "drivers/protocols/cansimple.h"
-#include "drivers/protocols/cia406.h"
 #include "drivers/protocols/registry.h"
-#include "drivers/protocols/xsens.h"
+#include "tests/drivers/bus/bus_devices.h"
 
 namespace plumb {
 namespace {
 
 using Catch::Contains;
-using Direction = BusMessage::Direction;
-
-BusMessage Message(const Layout& layout, uint32_t id, int64_t period, uint8_t length,
-                   int64_t jitter = 0) {
-  BusMessage message;
-  message.layout = layout;
-  message.layout.length = length;
-  message.id = id;
-  message.period = period;
-  message.jitter = jitter;
-  if (jitter > 0) message.direction = Direction::kToDevice;
-  return message;
-}
-
-/// An ODrive with torque setpoints of 4 bytes and without telemetry but its current.
-BusDevice Drive(int node, int64_t period) {
-  using namespace cansimple;
-  const auto id = [&](const Layout& layout) {
-    return static_cast<uint32_t>(node) << 5 | layout.command;
-  };
-  return {"drive" + std::to_string(node),
-          "cansimple",
-          {Message(kHeartbeat, id(kHeartbeat), 100'000, 8),
-           Message(kGetEncoderEstimates, id(kGetEncoderEstimates), period, 8),
-           Message(kSetInputTorque, id(kSetInputTorque), period, 4, BusMessage::kHostJitter),
-           Message(kGetIq, id(kGetIq), 10'000, 8)},
-          {}};
-}
-BusDevice Encoder(int node, int64_t period) {
-  return {"encoder" + std::to_string(node),
-          "cia406",
-          {Message(cia406::kPosition, 0x180 + static_cast<uint32_t>(node), period, 4)},
-          {}};
-}
-BusDevice Imu(uint32_t base, int64_t period) {
-  using namespace xsens;
-  return {
-      "imu",
-      "xsens",
-      {Message(kSampleTime, base + 0x05, period, 4), Message(kQuaternion, base + 0x21, period, 8),
-       Message(kRateOfTurn, base + 0x32, period, 6),
-       Message(kAcceleration, base + 0x34, period, 6)},
-      {}};
-}
-std::vector<BusDevice> Leg(int64_t motors, int64_t encoders, int64_t imu, uint32_t base = 0x380) {
-  return {Drive(1, motors),     Drive(2, motors),     Drive(3, motors),
-          Encoder(1, encoders), Encoder(2, encoders), Imu(base, imu)};
-}
-
-double Response(const BusPlan& plan, uint32_t id) {
-  for (const BusPlan::Row& row : plan.rows) {
-    if (row.message.id == id) return row.response;
-  }
-  return -1;
-}
-
-MotorDescription MitMotor(int node, int master) {
-  MotorDescription motor;
-  motor.protocol = "mit";
-  motor.node = node;
-  motor.mit = MitDescription{master, {.velocity = 50, .torque = 18}, "a test"};
-  return motor;
-}
-
-MotorDescription RmdMotor(int node) {
-  MotorDescription motor;
-  motor.protocol = "rmd";
-  motor.node = node;
-  motor.rmd = RmdDescription{.torque_constant = 1, .current = 10, .source = "a test"};
-  return motor;
-}
-
-MotorDescription Moteus(int node) {
-  MotorDescription motor;
-  motor.protocol = "moteus";
-  motor.node = node;
-  motor.moteus = MoteusDescription{.torque = 10};
-  return motor;
-}
-
-std::vector<BusDevice> Motors(std::vector<MotorDescription> motors, double cycle = 0.001) {
-  std::vector<BusDevice> devices;
-  DriverSettings driver{};
-  driver.cycle = driver.measurement = cycle;
-  driver.heartbeat_timeout = 0.5;
-  for (const MotorDescription& motor : motors) {
-    devices.push_back(MotorBusDevice(motor, driver));
-    devices.back().name = "motor" + std::to_string(motor.node);
-  }
-  return devices;
-}
 
 TEST_CASE("bits of a frame") {
   // DLC, standard nominal and worst, extended nominal and worst.
@@ -117,58 +24,6 @@ TEST_CASE("bits of a frame") {
     CHECK(NominalBits(true, length) == extended);
     CHECK(WorstCaseBits(true, length) == extended_worst);
   }
-}
-
-TEST_CASE("bits of a frame of CAN FD, at either rate") {
-  // By hand. Slow: start, id, RRS, IDE, FDF, res, BRS (extended: SRR and 18 of the id, too); CRC
-  // delimiter, acknowledgement 2, end 7, interframe space 3. Fast: ESI, length 4, data, stuff count
-  // 4, CRC 17 or 21, its stuff bits 6 or 7. At worst a stuff bit after each 4 up to the data's end.
-  struct Row {
-    bool extended;
-    int length, slow, fast, worst_slow, worst_fast;
-  };
-  for (const Row& row : {Row{false, 0, 30, 32, 34, 33}, Row{false, 8, 30, 96, 34, 113},
-                         Row{false, 16, 30, 160, 34, 193}, Row{false, 20, 30, 197, 34, 238},
-                         Row{false, 32, 30, 293, 34, 358}, Row{false, 64, 30, 549, 34, 678},
-                         Row{true, 48, 49, 421, 57, 519}}) {
-    INFO(row.extended << " " << row.length);
-    CHECK(NominalFdBits(row.extended, row.length).slow == row.slow);
-    CHECK(NominalFdBits(row.extended, row.length).fast == row.fast);
-    CHECK(WorstCaseFdBits(row.extended, row.length).slow == row.worst_slow);
-    CHECK(WorstCaseFdBits(row.extended, row.length).fast == row.worst_fast);
-  }
-}
-
-TEST_CASE("moteus on a bus of CAN FD: a command and an answer in every cycle") {
-  // 49 + 421 / 5 us and 30 + 293 / 5; at worst 57 + 519 / 5 and 34 + 358 / 5.
-  const double command = 160.8, answer = 105.6;
-  const BusPlan plan = PlanBus(Motors({Moteus(1), Moteus(2), Moteus(3)}, 0.002), 1e6, 5e6);
-  CHECK(plan.errors.empty());
-  CHECK(plan.warnings.empty());
-  CHECK(plan.nominal_load == Approx(3 * (133.2 + 88.6) / 2000));
-  CHECK(plan.worst_load == Approx(3 * (command + answer) / 2000));
-  // Commands go first, as their ids begin with zeros; the longest that may have begun is one of
-  // those that come now and then, text of 64 bytes.
-  const double text = 34 + 678 / 5.;
-  CHECK(Response(plan, 0x8001) == Approx(200 + text + command));
-  CHECK(Response(plan, 0x8003) == Approx(200 + text + 3 * command));
-  CHECK_THAT(ToText(plan), Contains("0x00008001") && Contains("data of FD frames at 5e+06 bit/s") &&
-                               Contains("470-576") && Contains("all deadlines are met"));
-  CHECK(PlanBus(Motors({Moteus(1), Moteus(2), Moteus(3)}, 0.001), 1e6, 5e6).worst_load ==
-        Approx(0.7992));
-  CHECK(PlanBus(Motors({Moteus(1)}, 0.005), 5e5, 2e6).errors.empty());
-}
-
-TEST_CASE("CAN FD on a bus that carries none, and beside those who cannot stand it") {
-  CHECK_THAT(PlanBus(Motors({Moteus(1)}), 1e6).errors.front(),
-             Contains("'motor1' speaks CAN FD, which the bus does not carry"));
-  auto devices = Motors({Moteus(1)}, 0.002);
-  devices.push_back(Encoder(5, 2'000));
-  const BusPlan plan = PlanBus(devices, 1e6, 5e6);
-  CHECK(plan.errors.empty());
-  REQUIRE(plan.warnings.size() == 1);
-  CHECK_THAT(plan.warnings[0],
-             Contains("'motor1' speaks CAN FD and 'encoder5' does not: a controller that cannot"));
 }
 
 TEST_CASE("a leg at 500 Hz fits: loads and response times as computed by hand") {
