@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <utility>
 
 #include "common/time_units.h"
+#include "drivers/protocols/answering_motor.h"
 #include "drivers/protocols/moteus.h"
 #include "drivers/protocols/moteus_reports.h"
 
@@ -14,8 +14,6 @@ namespace {
 
 using namespace moteus;
 
-constexpr int64_t kRetry = 20'000;  // [us] between questions to one that is silent
-constexpr int kStops = 2;           // the first answer may be one to an earlier command
 constexpr int kAnswersToArm = 2;
 
 // Behind "stop", while arming, in turn.
@@ -28,13 +26,15 @@ constexpr std::array<uint8_t, 3> kTextQuestion = {kAskText, 1, 48};
 constexpr std::span<const uint8_t> kArmingQuestions[] = {kQuestion, kVersionQuestion,
                                                          kSettingQuestion, kTextQuestion};
 
-class MoteusMotor : public Motor {
+enum class Step { kRest, kSettle, kAwait, kArmed, kDisarming };
+
+class MoteusMotor : public AnsweringMotor<Step> {
  public:
   MoteusMotor(int node, const MoteusDescription& settings, const MotorTiming& timing)
-      : node_(node),
+      : AnsweringMotor(timing),
+        node_(node),
         most_(settings.torque),
-        watchdog_(Microseconds(settings.watchdog)),
-        timing_(timing) {}
+        watchdog_(Microseconds(settings.watchdog)) {}
 
   Filter filter() const override {
     const uint32_t id = AnswerId(node_);
@@ -54,9 +54,8 @@ class MoteusMotor : public Motor {
       ++misfits_;
       return use;
     }
-    if (step_ == Step::kArmed && now - answered_ >= watchdog_) FailSilent(now);
-    heard_ = present_ = true;
-    answered_ = now;
+    if (step() == Step::kArmed && now - answered() >= watchdog_) FailSilent(now);
+    Hear(now);
     if (reports_.answers() != answers) OnMode(now);
     return use;
   }
@@ -65,24 +64,6 @@ class MoteusMotor : public Motor {
   double torque_estimate() const noexcept override { return reports_.torque_estimate(); }
   MotorReadings readings() const noexcept override { return reports_.readings(); }
   std::string_view identity() const noexcept override { return reports_.identity(); }
-  int64_t saturations() const noexcept override { return saturations_; }
-
-  void Arm(int64_t now) noexcept override {
-    if (step_ == Step::kArmed) return;
-    fault_ = false;
-    reason_.Clear();
-    misfits_ = 0;
-    reports_.ForgetSettings();
-    Enter(Step::kSettle, now);
-  }
-
-  void Disarm(int64_t now) noexcept override { Enter(Step::kDisarming, now); }
-
-  // The protocol has no emergency stop but this.
-  void Estop(int64_t now) noexcept override {
-    Fail(now, "emergency stop requested");
-    Disarm(now);
-  }
 
   bool IsEstop(const Frame& frame) const noexcept override {
     const uint32_t to = frame.id & 0xFF;
@@ -93,36 +74,23 @@ class MoteusMotor : public Motor {
   }
 
   void Tick(int64_t now, bool, FrameBatch& out) noexcept override {
-    present_ = heard_ && now - answered_ <= timing_.heartbeat_timeout;
     // Text and numbers take it no longer than a setpoint does.
-    const int64_t silence = step_ == Step::kArmed ? watchdog_ : timing_.heartbeat_timeout;
-    if (Active() && heard_ && now - answered_ >= silence) FailSilent(now);
-    if (Active() && step_ != Step::kArmed && now - entered_ >= timing_.heartbeat_timeout)
-      GiveUpArming(now);
-    given_ = false;
-    if (Active() || (!present_ && !Retry(now))) return;
-    out.Push(step_ == Step::kRest ? MakeFrame(CommandId(node_), {kQuestion}) : MakeStop(node_));
-    given_ = true;
-  }
-
-  void Transmitted(bool all, int64_t now) noexcept override {
-    if (!std::exchange(given_, false)) return;
-    if (!all) {
-      retry_ = now;
-      return;
-    }
-    ++sent_;
-    if (sent_ <= kStops) stopped_ = 0;
+    Watch(now, step() == Step::kArmed ? watchdog_ : heartbeat_timeout());
+    if (Active() && step() != Step::kArmed && Late(now)) GiveUpArming(now);
+    const bool speak = !Active() && (present() || Retry(now));
+    Give(speak);
+    if (!speak) return;
+    out.Push(step() == Step::kRest ? MakeFrame(CommandId(node_), {kQuestion}) : MakeStop(node_));
   }
 
   Frame Torque(double torque) noexcept override {
-    if (step_ != Step::kArmed) torque = 0;
-    if (!(std::abs(torque) <= most_)) ++saturations_;
+    if (step() != Step::kArmed) torque = 0;
+    if (!(std::abs(torque) <= most_)) CountSaturation();
     if (!std::isfinite(torque)) torque = 0;
-    switch (step_) {
+    switch (step()) {
       case Step::kAwait:
       case Step::kArmed:
-        may_run_ = true;
+        MayRun();
         return MakeCommand(node_, {.torque = std::clamp(torque, -most_, most_),
                                    .max_torque = most_,
                                    .timeout = watchdog_ / 1000});
@@ -136,57 +104,18 @@ class MoteusMotor : public Motor {
     return MakeStop(node_);
   }
 
-  bool lost_place() const noexcept override { return lost_place_; }
-  void Homed() noexcept override { lost_place_ = false; }
-  void Displaced() noexcept override { lost_place_ = false; }
-
-  DriveState state() const noexcept override {
-    if (!present_) return DriveState::kAbsent;
-    if (fault_) return DriveState::kFault;
-    if (step_ == Step::kArmed) return DriveState::kArmed;
-    return Active() ? DriveState::kArming : DriveState::kIdle;
-  }
-  std::string_view reason() const noexcept override {
-    if (reason_.text().empty() && !present_) return heard_ ? "no answer any more" : "no answer yet";
-    return reason_.text();
-  }
-  bool confirmed_idle() const noexcept override {
-    return step_ == Step::kRest || (!present_ && !may_run_);
-  }
-
  private:
-  enum class Step { kRest, kSettle, kAwait, kArmed, kDisarming };
-
-  /// The driver asks for setpoints, be they zero.
-  bool Active() const noexcept { return step_ != Step::kRest && step_ != Step::kDisarming; }
-
-  void Enter(Step step, int64_t now) noexcept {
-    step_ = step;
-    entered_ = retry_ = now;
-    sent_ = stopped_ = running_ = 0;
+  void BeginArming(int64_t now) noexcept override {
+    misfits_ = 0;
+    reports_.ForgetSettings();
+    Enter(Step::kSettle, now);
   }
 
-  bool Retry(int64_t now) noexcept {
-    if (now < retry_) return false;
-    retry_ = now + kRetry;
-    return true;
-  }
-
-  template <class... Args>
-  void Fail(int64_t now, fmt::format_string<Args...> format, Args&&... args) noexcept {
-    reason_.Set(format, std::forward<Args>(args)...);
-    fault_ = true;
-    // To begin anew with every fault would never come to an end where faults keep coming.
-    if (Active()) Disarm(now);
-  }
-
-  void FailSilent(int64_t now) noexcept {
-    Fail(now, "no answer for {} ms", (now - answered_) / 1000);
-  }
+  void ForgetAnswers() noexcept override { stopped_ = running_ = 0; }
 
   void GiveUpArming(int64_t now) noexcept {
     const int mode = reports_.mode();
-    if (step_ == Step::kAwait) {
+    if (step() == Step::kAwait) {
       Fail(now, "it does not start: mode {} ({}), {}", mode, DescribeMode(mode),
            DescribeFault(reports_.fault()));
     } else if (misfits_ > 0) {
@@ -206,13 +135,13 @@ class MoteusMotor : public Motor {
   // What the motor is doing, from its latest answer.
   void OnMode(int64_t now) noexcept {
     if (const auto uptime = reports_.TakeRestart()) {
-      lost_place_ = true;
+      LosePlace();
       if (Active()) Fail(now, "it has restarted {} ms ago", *uptime);
     }
     const int mode = reports_.mode();
     stopped_ = mode == kStopped ? stopped_ + 1 : 0;
     running_ = mode == kPositionMode ? running_ + 1 : 0;
-    switch (step_) {
+    switch (step()) {
       case Step::kRest:
         // It is of no use to clear a fault before somebody has seen it.
         if (mode != kStopped && mode != kFaulted) Disarm(now);
@@ -235,10 +164,7 @@ class MoteusMotor : public Motor {
           Fail(now, "it left position mode for mode {} ({})", mode, DescribeMode(mode));
         return;
       case Step::kDisarming:
-        if (sent_ >= kStops && stopped_ > 0) {
-          may_run_ = false;
-          Enter(Step::kRest, now);
-        }
+        if (Stopped(stopped_)) Rest(now);
         return;
     }
   }
@@ -264,25 +190,11 @@ class MoteusMotor : public Motor {
   const int node_;
   const double most_;       // [Nm]
   const int64_t watchdog_;  // [us]
-  const MotorTiming timing_;
 
   MoteusReports reports_;
-  bool heard_ = false, present_ = false;  // ever, lately
-  int64_t answered_ = 0;                  // time of the last answer
-  int64_t misfits_ = 0;                   // since Arm: frames that were none of its answers
-  int64_t saturations_ = 0;
-  size_t question_ = 0;  // of the arming ones, the latest
-
-  // Whoever was here before us may have left it running.
-  Step step_ = Step::kDisarming;
-  int64_t entered_ = 0, retry_ = std::numeric_limits<int64_t>::min();
-  int sent_ = 0;                   // in this step: frames of Tick's accepted
+  int64_t misfits_ = 0;            // since Arm: frames that were none of its answers
+  size_t question_ = 0;            // of the arming ones, the latest
   int stopped_ = 0, running_ = 0;  // in this step: answers in a row that say so
-  bool given_ = false;             // the last Tick gave a frame
-  bool may_run_ = false;           // may have had setpoints, and is not known to have stopped
-  bool fault_ = false;
-  bool lost_place_ = false;
-  Reason reason_;
 };
 
 }  // namespace

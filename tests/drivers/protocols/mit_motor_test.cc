@@ -4,42 +4,22 @@
 #include <cmath>
 #include <limits>
 
-#include "drivers/protocols/mit_device.h"
-#include "drivers/protocols/mit_host.h"
 #include "drivers/protocols/registry.h"
-#include "tests/drivers/protocols/motor_bench.h"
+#include "tests/drivers/protocols/mit_motor_bench.h"
 
 namespace plumb {
 namespace {
 
 using Catch::Contains;
 
-constexpr MitRanges kAk80{.position = 12.5, .velocity = 50, .torque = 18, .kp = 500, .kd = 5};
-
-MotorDescription Describe(int node = 0x11, int master = 0x10) {
-  MotorDescription description;
-  description.protocol = "mit";
-  description.node = node;
-  description.mit = MitDescription{master, kAk80, "a test"};
-  return description;
-}
-
-Frame Special(mit::Special special) { return mit::MakeSpecial(0x11, special); }
-
-struct Bench : MotorBench<MitDevice> {
-  explicit Bench(uint8_t reply_length = mit::kWithTemperature)
-      : MotorBench(MakeMitMotor(Describe(), {200'000}),
-                   {.node = 0x11, .master = 0x10, .ranges = kAk80, .reply_length = reply_length}) {
-    Start(60);
-  }
-};
+using Bench = MitMotorBench;
 
 TEST_CASE("a MIT motor at rest is heard, told to exit, and polled with zeros") {
   Bench bench;
   CHECK(bench.motor->state() == DriveState::kIdle);
   CHECK(bench.motor->confirmed_idle());
-  CHECK(bench.Count(Special(mit::kExit)) >= 2);
-  CHECK(bench.Count(Special(mit::kEnter)) == 0);
+  CHECK(bench.Count(Bench::Special(mit::kExit)) >= 2);
+  CHECK(bench.Count(Bench::Special(mit::kEnter)) == 0);
   CHECK(bench.motor->estimate().position == Approx(1).margin(1e-3));
   bench.sent.clear();
   bench.Run(5);
@@ -68,10 +48,10 @@ TEST_CASE("arming: zeros, enter, an answer, and only then torque") {
   bench.sent.clear();
   CHECK(bench.Arm());
   CHECK(bench.device.armed());
-  CHECK(bench.Count(Special(mit::kEnter)) == 2);
+  CHECK(bench.Count(Bench::Special(mit::kEnter)) == 2);
   int zeros = 0;
   for (const Frame& frame : bench.sent) {
-    if (SameOnWire(frame, Special(mit::kEnter))) break;
+    if (SameOnWire(frame, Bench::Special(mit::kEnter))) break;
     CHECK(ToText(frame) == "011#7FFF7FF0000007FF");
     ++zeros;
   }
@@ -84,7 +64,7 @@ TEST_CASE("arming: zeros, enter, an answer, and only then torque") {
   CHECK(bench.motor->state() == DriveState::kIdle);
   CHECK(bench.motor->confirmed_idle());
   CHECK(bench.device.zeroed() == 0);
-  CHECK(bench.Count(Special(mit::kZero)) == 0);
+  CHECK(bench.Count(Bench::Special(mit::kZero)) == 0);
 }
 
 TEST_CASE("no kick: what a motor was told before it was switched on is not obeyed") {
@@ -100,7 +80,7 @@ TEST_CASE("no kick: what a motor was told before it was switched on is not obeye
 
   MitDevice other({.node = 0x11, .master = 0x10, .ranges = kAk80});
   other.OnFrame(mit::MakeCommand(mit::CommandLayout(kAk80), 0x11, {.position = 5, .kp = 500}), 0);
-  other.OnFrame(Special(mit::kEnter), 0);
+  other.OnFrame(Bench::Special(mit::kEnter), 0);
   CHECK(other.Torque({}) == 18);  // the trap is there
 }
 
@@ -116,27 +96,12 @@ TEST_CASE("the motor's watchdog takes the torque away and leaves it switched on"
   CHECK(bench.device.Torque(bench.sample) == 0);
   CHECK(bench.device.armed());
   FrameBatch out;
-  bench.device.OnFrame(Special(mit::kEnter), bench.now);  // not a command: no food
+  bench.device.OnFrame(Bench::Special(mit::kEnter), bench.now);  // not a command: no food
   CHECK(bench.device.Torque(bench.sample) == 0);
   // Without torque frames there are no replies: the motor counts as absent, and "exit" is tried on.
   bench.Run(300);
   CHECK_FALSE(bench.device.armed());
-  CHECK_THAT(std::string(bench.motor->reason()), Contains("no reply for"));
-}
-
-TEST_CASE("silence is a fault; the motor is told to exit when it is back") {
-  Bench bench;
-  CHECK(bench.Arm());
-  bench.to_host = [](const Frame&) { return false; };
-  bench.Run(250);
-  CHECK(bench.motor->state() == DriveState::kAbsent);
-  CHECK_THAT(std::string(bench.motor->reason()), Contains("no reply for 20"));
-  bench.to_host = nullptr;
-  bench.Run(80);
-  CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK_FALSE(bench.device.armed());
-  CHECK(bench.motor->confirmed_idle());
-  CHECK(bench.Arm());
+  CHECK_THAT(std::string(bench.motor->reason()), Contains("no answer for"));
 }
 
 TEST_CASE("an error in a reply is a fault, and keeps the motor from being armed") {
@@ -148,7 +113,7 @@ TEST_CASE("an error in a reply is a fault, and keeps the motor from being armed"
   CHECK(bench.motor->reason() == "the motor reports over-temperature (error 1)");
   CHECK_FALSE(bench.Arm());
   CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK(bench.Count(Special(mit::kEnter)) == 2);  // those of the first time
+  CHECK(bench.Count(Bench::Special(mit::kEnter)) == 2);  // those of the first time
 }
 
 TEST_CASE("an error that a stranger reports does not stay") {
@@ -203,7 +168,7 @@ TEST_CASE("one lost frame of any kind does not spoil arming; a bus that takes no
     Bench bench;
     int seen = 0;
     bench.to_device = [&](const Frame& frame) {
-      return !SameOnWire(frame, Special(mit::kEnter)) || ++seen > 1;
+      return !SameOnWire(frame, Bench::Special(mit::kEnter)) || ++seen > 1;
     };
     CHECK(bench.Arm());
     CHECK(bench.device.armed());
@@ -227,7 +192,7 @@ TEST_CASE(
   CHECK(bench.Arm());
   int seen = 0;
   bench.to_device = [&](const Frame& frame) {
-    return !SameOnWire(frame, Special(mit::kExit)) || ++seen > 1;
+    return !SameOnWire(frame, Bench::Special(mit::kExit)) || ++seen > 1;
   };
   bench.motor->Disarm(bench.now);
   bench.Step();
@@ -244,9 +209,9 @@ TEST_CASE("a motor whose position keeps jumping is told to exit, and believed") 
   CHECK_FALSE(bench.device.armed());
   CHECK(bench.motor->confirmed_idle());
   bench.motor->Estop(bench.now);
-  const int exits = bench.Count(Special(mit::kExit));
+  const int exits = bench.Count(Bench::Special(mit::kExit));
   bench.Run(100);
-  CHECK(bench.Count(Special(mit::kExit)) >= exits + 2);
+  CHECK(bench.Count(Bench::Special(mit::kExit)) >= exits + 2);
   CHECK(bench.motor->confirmed_idle());
 }
 
@@ -277,15 +242,15 @@ TEST_CASE("frames of other motors and other kinds are not mine, others are rejec
 }
 
 TEST_CASE("motors that cannot be") {
-  CHECK_THROWS_AS(MakeMitMotor(Describe(0), {1}), std::invalid_argument);
-  CHECK_THROWS_AS(MakeMitMotor(Describe(0x100), {1}), std::invalid_argument);
-  CHECK_THROWS_AS(MakeMitMotor(Describe(1, 1), {1}), std::invalid_argument);
-  MotorDescription description = Describe();
+  CHECK_THROWS_AS(MakeMitMotor(Bench::Describe(0), {1}), std::invalid_argument);
+  CHECK_THROWS_AS(MakeMitMotor(Bench::Describe(0x100), {1}), std::invalid_argument);
+  CHECK_THROWS_AS(MakeMitMotor(Bench::Describe(1, 1), {1}), std::invalid_argument);
+  MotorDescription description = Bench::Describe();
   description.mit->ranges.torque = 0;
   CHECK_THROWS_AS(MakeMitMotor(description, {1}), std::invalid_argument);
   description.mit.reset();
   CHECK_THROWS_AS(MakeMitMotor(description, {1}), std::invalid_argument);
-  CHECK(MakeMotor(Describe(), {1}) != nullptr);
+  CHECK(MakeMotor(Bench::Describe(), {1}) != nullptr);
   MitDevice::Settings settings;
   CHECK_THROWS_AS(MitDevice(settings), std::invalid_argument);  // no ranges
 }

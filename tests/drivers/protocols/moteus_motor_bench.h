@@ -9,6 +9,8 @@ namespace plumb {
 /// A moteus that has just been switched on, and heard.
 struct MoteusMotorBench : MotorBench<MoteusDevice> {
   static constexpr int kNode = 0x11;
+  static constexpr int kSilence = 100;  ///< [ms] that an armed one may not reach
+  static constexpr int kStopFrames = 1;
   static constexpr double kMostTorque = 20;
 
   explicit MoteusMotorBench(MoteusDevice::Settings settings = {})
@@ -30,6 +32,7 @@ struct MoteusMotorBench : MotorBench<MoteusDevice> {
     return description;
   }
   static bool IsCommand(const Frame& frame) { return HasShape(moteus::kCommand, frame); }
+  static bool IsStop(const Frame& frame) { return SameOnWire(frame, moteus::MakeStop(kNode)); }
 };
 
 }  // namespace plumb

@@ -55,24 +55,6 @@ TEST_CASE("commands that do not get there: its mode says that its watchdog has e
   CHECK(Reason(bench) == "its watchdog has expired: no command for 100 ms");
 }
 
-TEST_CASE("silence of an armed moteus is a fault; it is told to stop when it is back") {
-  Bench bench;
-  REQUIRE(bench.Arm());
-  bench.powered = false;
-  bench.Run(101);
-  CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK(Reason(bench) == "no answer for 100 ms");
-  bench.Run(150);
-  CHECK(bench.motor->state() == DriveState::kAbsent);
-  CHECK_FALSE(bench.motor->confirmed_idle());  // it may run
-  bench.powered = true;
-  bench.Run(100);
-  CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK_FALSE(bench.device.armed());
-  CHECK(bench.motor->confirmed_idle());
-  CHECK(bench.Arm());
-}
-
 TEST_CASE("a fault of a moteus has a name, in the cycle in which it says so") {
   Bench bench;
   bench.torque = 1;
@@ -199,28 +181,6 @@ TEST_CASE("a moteus that does not do its part is not armed, and the reason says 
   CHECK(bench.motor->state() == (silent == 0x21 ? DriveState::kAbsent : DriveState::kFault));
   CHECK_FALSE(bench.device.armed());
   CHECK(Reason(bench) == reason);
-}
-
-TEST_CASE("a bus that takes no frames ends the arming of a moteus") {
-  Bench bench;
-  bench.bus_full = true;
-  bench.motor->Arm(bench.now);
-  bench.Run(260);
-  CHECK(bench.motor->state() == DriveState::kAbsent);
-  bench.bus_full = false;
-  bench.Run(100);
-  CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK(bench.Arm());
-}
-
-TEST_CASE("the first stop may be lost: only an answer to the second counts") {
-  Bench bench;
-  REQUIRE(bench.Arm());
-  int seen = 0;
-  bench.to_device = [&](const Frame&) { return ++seen > 1; };
-  bench.motor->Disarm(bench.now);
-  bench.Step();
-  CheckIdleOnlyOnceStopped(bench);
 }
 
 }  // namespace

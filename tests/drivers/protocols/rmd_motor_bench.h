@@ -13,6 +13,8 @@ inline constexpr double kDegree = std::numbers::pi / 180;  ///< [rad]
 /// An RMD motor that has just been switched on, and heard.
 struct RmdMotorBench : MotorBench<RmdDevice> {
   static constexpr int kNode = 0x11;
+  static constexpr int kSilence = 100;  ///< [ms] that an armed one may not reach
+  static constexpr int kStopFrames = 2;
   static constexpr double kTorqueConstant = 0.9, kMostCurrent = 20;
 
   explicit RmdMotorBench(int64_t stored_watchdog = 0)
@@ -33,6 +35,9 @@ struct RmdMotorBench : MotorBench<RmdDevice> {
     return description;
   }
   static Frame Command(rmd::Code code) { return rmd::MakeCommand(code, kNode); }
+  static bool IsStop(const Frame& frame) {
+    return frame.data[0] == rmd::kShutdown || frame.data[0] == rmd::kLockBrake;
+  }
 };
 
 }  // namespace plumb

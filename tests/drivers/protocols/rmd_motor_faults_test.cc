@@ -57,24 +57,6 @@ TEST_CASE("what a motor echoes after a silence is never an estimate") {
   CHECK(bench.device.rejected() == 0);
 }
 
-TEST_CASE("silence of an armed RMD motor is a fault; it is told to stop when it is back") {
-  RmdMotorBench bench;
-  REQUIRE(bench.Arm());
-  bench.powered = false;
-  bench.Run(101);
-  CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK_THAT(std::string(bench.motor->reason()), Contains("no answer for 100 ms"));
-  bench.Run(150);
-  CHECK(bench.motor->state() == DriveState::kAbsent);
-  CHECK_FALSE(bench.motor->confirmed_idle());  // it may run
-  bench.powered = true;
-  bench.Run(100);
-  CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK_FALSE(bench.device.armed());
-  CHECK(bench.motor->confirmed_idle());
-  CHECK(bench.Arm());
-}
-
 TEST_CASE("errors of an RMD motor are a fault with a name, and keep it from being armed") {
   RmdMotorBench bench;
   bench.torque = 1;
@@ -155,31 +137,6 @@ TEST_CASE("an RMD motor that does not do its part is not armed, and the reason s
   CHECK(bench.motor->state() == DriveState::kFault);
   CHECK(bench.motor->reason() == reason);
   CHECK_FALSE(bench.device.armed());
-}
-
-TEST_CASE("a bus that takes no frames ends the arming of an RMD motor") {
-  RmdMotorBench bench;
-  bench.bus_full = true;
-  bench.motor->Arm(bench.now);
-  bench.Run(260);
-  CHECK(bench.motor->state() == DriveState::kAbsent);
-  CHECK_FALSE(bench.motor->confirmed_idle());
-  bench.bus_full = false;
-  bench.Run(100);
-  CHECK(bench.motor->state() == DriveState::kFault);
-  CHECK(bench.Arm());
-}
-
-TEST_CASE("the first shutdown may be lost: only an answer to the second counts") {
-  RmdMotorBench bench;
-  REQUIRE(bench.Arm());
-  int seen = 0;
-  bench.to_device = [&](const Frame& frame) {
-    return (frame.data[0] != rmd::kShutdown && frame.data[0] != rmd::kLockBrake) || ++seen > 2;
-  };
-  bench.motor->Disarm(bench.now);
-  bench.Step();
-  CheckIdleOnlyOnceStopped(bench);
 }
 
 TEST_CASE("an answer to an earlier shutdown does not count") {
