@@ -28,6 +28,9 @@ const struct {
      {"plumb train robots/pendulum --output policy.onnx",
       "plumb train robots/hopper --distribution posterior.json --steps 1e6 --report "
       "training.html"}},
+    {{"export-model"},
+     {"plumb export-model robots/hopper --posterior posterior.json --mjcf hopper.xml",
+      "plumb export-model robots/hopper --randomisation table.json --samples 1000 --seed 2"}},
     {{"doctor"}, {"plumb doctor --bus socketcan:can0 --key robot.key"}},
     {{"can"}, {"plumb can plan robots/hopper"}},
     {{"can", "plan"}, {"plumb can plan robots/hopper"}},

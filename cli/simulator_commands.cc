@@ -1,6 +1,7 @@
 #include "cli/calibrate.h"
 #include "cli/command.h"
 #include "cli/excite.h"
+#include "cli/export_model.h"
 #include "cli/sim.h"
 #include "cli/train.h"
 
@@ -169,6 +170,26 @@ void AddTrain(CLI::App& app, const std::string& line, Action& action) {
   SetAction(*train, action, [flags](Process& process) { return Train(process, *flags); });
 }
 
+void AddExportModel(CLI::App& app, Action& action) {
+  const auto flags = std::make_shared<ExportModelFlags>();
+  CLI::App* export_model = AddCommand(
+      app, "export-model", "write what is known of the robot's parameters for other simulators");
+  export_model->add_option("robot", flags->robot, "robot folder or TOML file")->required();
+  export_model->add_option("--posterior", flags->posterior,
+                           "a posterior.json; default: what robot.toml says, the prior");
+  export_model->add_option("--urdf", flags->urdf, "the robot's URDF with the parameters' means");
+  export_model->add_option("--mjcf", flags->mjcf, "the same robot as MuJoCo's XML");
+  export_model->add_option("--randomisation", flags->randomisation,
+                           "mean, covariance and samples of the parameters (JSON)");
+  export_model->add_option("--samples", flags->samples, "of the parameters")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  export_model->add_option("--seed", flags->seed, "of all random numbers")
+      ->check(SeedRange())
+      ->capture_default_str();
+  SetAction(*export_model, action, [flags](Process&) { return ExportModel(*flags); });
+}
+
 }  // namespace
 
 void AddSimulatorCommands(CLI::App& app, const std::string& line, Action& action) {
@@ -176,6 +197,7 @@ void AddSimulatorCommands(CLI::App& app, const std::string& line, Action& action
   AddCalibrate(app, line, action);
   AddExcite(app, action);
   AddTrain(app, line, action);
+  AddExportModel(app, action);
 }
 
 }  // namespace plumb

@@ -1,27 +1,33 @@
-#include "sim/virtual/mjcf.h"
+#include "sim/mjcf.h"
 
 #include <fmt/format.h>
+#include <tinyxml.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <vector>
 
 #include "common/decompositions.h"
-#include "sim/virtual/physics_backend.h"
 
 namespace plumb {
 namespace {
 
 using Type = JointDescription::Type;
 
-std::string Words(const Eigen::Vector3d& v) {
-  return fmt::format("{:.17g} {:.17g} {:.17g}", v[0], v[1], v[2]);
-}
+constexpr double kPoint = 1e-6;  // [m] radius of a box's corner: MuJoCo knows no points
+
+std::string Words(const Eigen::Vector3d& v) { return fmt::format("{} {} {}", v[0], v[1], v[2]); }
 
 std::string Turn(const Eigen::Matrix3d& rotation) {
   const Eigen::Quaterniond q(rotation);
-  return fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}", q.w(), q.x(), q.y(), q.z());
+  return fmt::format("{} {} {} {}", q.w(), q.x(), q.y(), q.z());
+}
+
+std::string Name(const std::string& name) {
+  std::string escaped;
+  TiXmlBase::EncodeString(name, &escaped);
+  return escaped;
 }
 
 /// MuJoCo knows no rods that are infinitely thin.
@@ -45,19 +51,21 @@ class Writer {
 
   std::string Write() {
     text_ = fmt::format(
-        "<mujoco><compiler angle=\"radian\"/>"
-        "<option timestep=\"0.002\" integrator=\"RK4\" gravity=\"{}\"/><worldbody>\n",
-        Words(robot_.simulation.gravity * robot_.virtual_robot.ground.Down()));
+        "<mujoco model=\"{}\"><compiler angle=\"radian\"/>\n"
+        "<option timestep=\"0.002\" integrator=\"RK4\" gravity=\"{}\"/>\n<worldbody>\n",
+        Name(robot_.name), Words(robot_.simulation.gravity * robot_.virtual_robot.ground.Down()));
     if (const auto& contact = robot_.simulation.contact) {
       surface_ = fmt::format(
-          "condim=\"3\" friction=\"{:.17g} 0.005 0.0001\" margin=\"0.001\" solref=\"{:.17g} 1\" "
+          "condim=\"3\" friction=\"{} 0.005 0.0001\" margin=\"0.001\" solref=\"{} 1\" "
           "solimp=\"0.8 0.8 0.01\"",
           contact->friction, ContactTime(robot_));
       text_ += "<geom type=\"plane\" size=\"0 0 1\" contype=\"0\" conaffinity=\"1\" " + surface_ +
                "/>\n";
     }
     WriteChildren(0);
-    return text_ + "</worldbody></mujoco>\n";
+    text_ += "</worldbody>\n<actuator>\n";
+    for (const int i : robot_.driven()) WriteMotor(joint(static_cast<size_t>(i)));
+    return text_ + "</actuator>\n</mujoco>\n";
   }
 
  private:
@@ -80,14 +88,14 @@ class Writer {
       placed.push_back({last, frame});
       if (!Weightless(last)) break;
     }
-    text_ += fmt::format("<body pos=\"{}\" quat=\"{}\">\n", Words(frame.translation()),
-                         Turn(frame.linear()));
-    for (const Placed& p : placed) WriteJoint(p.joint, frame.inverse() * p.frame);
     const LinkDescription& link = robot_.links[last + 1];
+    text_ += fmt::format("<body name=\"{}\" pos=\"{}\" quat=\"{}\">\n", Name(link.name),
+                         Words(frame.translation()), Turn(frame.linear()));
+    for (const Placed& p : placed) WriteJoint(p.joint, frame.inverse() * p.frame);
     const Eigen::Matrix3d inertia = Solid(link.inertia);
     text_ += fmt::format(
-        "<inertial pos=\"{}\" mass=\"{:.17g}\" "
-        "fullinertia=\"{:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\"/>\n",
+        "<inertial pos=\"{}\" mass=\"{}\" "
+        "fullinertia=\"{} {} {} {} {} {}\"/>\n",
         Words(link.center_of_mass), link.mass, inertia(0, 0), inertia(1, 1), inertia(2, 2),
         inertia(0, 1), inertia(0, 2), inertia(1, 2));
     if (robot_.simulation.contact) {
@@ -108,30 +116,36 @@ class Writer {
   void WriteJoint(size_t index, const Eigen::Isometry3d& in_body) {
     const JointDescription& j = joint(index);
     if (j.type == Type::kSpherical) {
-      text_ += fmt::format("<joint name=\"{}\" type=\"ball\" pos=\"{}\"/>\n", MjcfJoint(index),
+      text_ += fmt::format("<joint name=\"{}\" type=\"ball\" pos=\"{}\"/>\n", Name(j.name),
                            Words(in_body.translation()));
       return;
     }
     const bool limited = robot_.simulation.stop && std::isfinite(j.upper);
     text_ += fmt::format(
-        "<joint name=\"{}\" type=\"{}\" pos=\"{}\" axis=\"{}\" armature=\"{:.17g}\" "
-        "damping=\"{:.17g}\" frictionloss=\"{:.17g}\" stiffness=\"{:.17g}\" springref=\"{:.17g}\"",
-        MjcfJoint(index), j.type == Type::kPrismatic ? "slide" : "hinge",
-        Words(in_body.translation()), Words(in_body.linear() * j.axis), j.dynamics.armature,
-        j.dynamics.damping, j.dynamics.friction, j.dynamics.stiffness, j.dynamics.rest);
-    if (limited)
-      text_ += fmt::format(" limited=\"true\" range=\"{:.17g} {:.17g}\"", j.lower, j.upper);
+        "<joint name=\"{}\" type=\"{}\" pos=\"{}\" axis=\"{}\" armature=\"{}\" "
+        "damping=\"{}\" frictionloss=\"{}\" stiffness=\"{}\" springref=\"{}\"",
+        Name(j.name), j.type == Type::kPrismatic ? "slide" : "hinge", Words(in_body.translation()),
+        Words(in_body.linear() * j.axis), j.dynamics.armature, j.dynamics.damping,
+        j.dynamics.friction, j.dynamics.stiffness, j.dynamics.rest);
+    if (limited) text_ += fmt::format(" limited=\"true\" range=\"{} {}\"", j.lower, j.upper);
     text_ += "/>\n";
+  }
+
+  void WriteMotor(const JointDescription& j) {
+    text_ += fmt::format(
+        "<motor name=\"{0}\" joint=\"{0}\" gear=\"{1}\" ctrllimited=\"true\" "
+        "ctrlrange=\"{2} {3}\"/>\n",
+        Name(j.name), j.dynamics.motor_gain, -j.effort_limit, j.effort_limit);
   }
 
   void WriteShape(const Shape& shape) {
     std::string type, size;
     switch (shape.type) {
       case Shape::Type::kSphere:
-        type = "sphere", size = fmt::format("{:.17g}", shape.size[0]);
+        type = "sphere", size = fmt::format("{}", std::max(shape.size[0], kPoint));
         break;
       case Shape::Type::kCapsule:
-        type = "capsule", size = fmt::format("{:.17g} {:.17g}", shape.size[0], shape.size[1] / 2);
+        type = "capsule", size = fmt::format("{} {}", shape.size[0], shape.size[1] / 2);
         break;
       case Shape::Type::kBox:
         type = "box", size = Words(shape.size / 2);
@@ -151,15 +165,10 @@ class Writer {
 
 }  // namespace
 
-std::string MjcfJoint(size_t index) { return fmt::format("joint{}", index); }
-
 double ContactTime(const RobotDescription& robot) {
   return 0.02 / std::sqrt(robot.virtual_robot.ground.stiffness_factor);
 }
 
-std::string Mjcf(const RobotDescription& robot) {
-  RequireKnownJoints(robot);
-  return Writer(robot).Write();
-}
+std::string Mjcf(const RobotDescription& robot) { return Writer(robot).Write(); }
 
 }  // namespace plumb

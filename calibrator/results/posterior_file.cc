@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "calibrator/results/json_lines.h"
 #include "calibrator/results/summary.h"
 #include "common/atomic_file.h"
 #include "common/process.h"
@@ -160,21 +161,6 @@ json Interval(const Summary& summary) {
   return interval;
 }
 
-std::string Dump(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
-
-// A field a line, and a line for each row of what has rows: a file that people and diff can read.
-std::string Print(const json& j, const std::string& indent) {
-  const bool rows = j.is_array() && !j.empty() && j.front().is_structured();
-  if (!rows && (!j.is_object() || j.empty())) return Dump(j);
-  std::string text;
-  const std::string deeper = indent + " ";
-  for (const auto& [key, value] : j.items()) {
-    text += fmt::format("{}\n{}{}", text.empty() ? "" : ",", deeper,
-                        rows ? Dump(value) : Dump(key) + ": " + Print(value, deeper));
-  }
-  return fmt::format("{}{}\n{}{}", rows ? "[" : "{", text, indent, rows ? "]" : "}");
-}
-
 }  // namespace
 
 Provenance ProvenanceOf(std::span<const Log> logs, const CalibrationOptions& options,
@@ -261,7 +247,7 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
     j["run"] = {
         {"seconds", findings.seconds}, {"date", provenance.date}, {"command", provenance.command}};
   }
-  return Print(j, "") + "\n";
+  return JsonLines(j);
 }
 
 void WritePosterior(const std::filesystem::path& file, const Findings& findings,

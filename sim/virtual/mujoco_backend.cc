@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/virtual/mjcf.h"
+#include "sim/mjcf.h"
 
 namespace plumb {
 namespace {
@@ -56,6 +56,7 @@ mjModel* Load(const std::string& xml) {
 class MujocoBackend : public PhysicsBackend {
  public:
   explicit MujocoBackend(const RobotDescription& robot) {
+    RequireKnownJoints(robot);
     InstallHandlers();
     model_.reset(Load(Mjcf(robot)));
     data_.reset(mj_makeData(model_.get()));
@@ -66,7 +67,7 @@ class MujocoBackend : public PhysicsBackend {
     gain_ = v_;
     for (size_t i = 0; i < robot.joints.size(); ++i) {
       const JointDescription& joint = robot.joints[i];
-      const int theirs = mj_name2id(model_.get(), mjOBJ_JOINT, MjcfJoint(i).c_str());
+      const int theirs = mj_name2id(model_.get(), mjOBJ_JOINT, joint.name.c_str());
       if (joint.num_positions() == 4) q_[static_cast<Eigen::Index>(q_address_.size())] = 1;
       gain_.segment(static_cast<Eigen::Index>(v_address_.size()), joint.num_velocities())
           .setConstant(joint.dynamics.motor_gain);

@@ -1,0 +1,115 @@
+#include "calibrator/results/randomisation.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <vector>
+
+#include "calibrator/results/json_lines.h"
+#include "common/random.h"
+#include "robot/physics_fingerprint.h"
+#include "robot/posterior_format.h"
+#include "sim/model.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kForCorrelations = 10000;  // draws: they are right to 0.01
+constexpr int kTriesPerDraw = 100;       // until a distribution is taken for no robot's
+
+std::vector<double> Numbers(const Eigen::VectorXd& x) { return {x.begin(), x.end()}; }
+
+std::vector<std::vector<double>> Rows(const Eigen::MatrixXd& matrix) {
+  std::vector<std::vector<double>> rows;
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) rows.push_back(Numbers(matrix.row(i)));
+  return rows;
+}
+
+/// Draws robots. Not thread-safe.
+class Draws {
+ public:
+  Draws(const ParameterDistribution& distribution, const RobotDescription& robot)
+      : distribution_(distribution), model_(robot), physics_(model_.parameters().Nominal()) {}
+
+  /// One for each row.
+  Eigen::MatrixXd Take(int count, Random random) {
+    Eigen::MatrixXd rows(count, distribution_.size());
+    int64_t tries = 0;
+    for (int i = 0; i < count; tries += 1) {
+      if (tries >= int64_t{kTriesPerDraw} * count) {
+        throw std::invalid_argument("less than one draw in a hundred is a robot: " + why_ +
+                                    "; give the parameter coordinate = \"log\" in robot.toml");
+      }
+      rows.row(i) = distribution_.Sample(random);
+      i += IsRobot(rows.row(i)) ? 1 : 0;
+    }
+    return rows;
+  }
+
+ private:
+  bool IsRobot(const Eigen::VectorXd& physical) {
+    try {
+      model_.parameters().Apply(physical, &physics_);
+      return true;
+    } catch (const std::invalid_argument& error) {
+      why_ = error.what();
+      return false;
+    }
+  }
+
+  const ParameterDistribution& distribution_;
+  const Model model_;
+  Physics<double> physics_;
+  std::string why_;  // the last one was none
+};
+
+Eigen::MatrixXd Covariance(const Eigen::VectorXd& sd, const Eigen::MatrixXd& draws) {
+  const Eigen::MatrixXd centred = draws.rowwise() - draws.colwise().mean();
+  const Eigen::MatrixXd products = centred.transpose() * centred;
+  Eigen::MatrixXd covariance = sd.cwiseAbs2().asDiagonal();
+  for (Eigen::Index i = 0; i < sd.size(); ++i) {
+    for (Eigen::Index j = 0; j < sd.size(); ++j) {
+      const double spread = std::sqrt(products(i, i) * products(j, j));
+      if (i != j && spread > 0) covariance(i, j) = sd(i) * sd(j) * products(i, j) / spread;
+    }
+  }
+  return covariance;
+}
+
+}  // namespace
+
+std::string RandomisationJson(const ParameterDistribution& distribution,
+                              const RobotDescription& robot, const RandomisationOptions& options) {
+  if (options.samples < 1) throw std::invalid_argument("at least one sample is needed");
+  if (robot.parameters.empty())
+    throw std::invalid_argument(robot.name +
+                                " has no uncertain parameters: there is nothing to "
+                                "randomise");
+  if (distribution.parameters.size() != robot.parameters.size())
+    throw std::invalid_argument("the distribution is another robot's");
+  std::vector<std::string> names, units;
+  for (const ParameterDescription& p : robot.parameters)
+    names.push_back(p.name), units.push_back(p.unit);
+  Draws draws(distribution, robot);
+  const Eigen::VectorXd sd = distribution.Sd();
+  const Eigen::MatrixXd covariance =
+      Covariance(sd, draws.Take(kForCorrelations, Random(options.seed, {1})));
+  return JsonLines({
+      {"format", "plumbline randomisation"},
+      {"version", 1},
+      {"robot", robot.name},
+      {"physics", Hexadecimal(PhysicsFingerprint(robot))},
+      {"source", options.source},
+      {"residual", distribution.residual != nullptr},
+      {"seed", options.seed},
+      {"names", names},
+      {"units", units},
+      {"mean", Numbers(distribution.Mean())},
+      {"sd", Numbers(sd)},
+      {"covariance", Rows(covariance)},
+      {"samples", Rows(draws.Take(options.samples, Random(options.seed, {0})))},
+  });
+}
+
+}  // namespace plumb
