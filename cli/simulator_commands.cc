@@ -49,7 +49,7 @@ void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
       ->allow_extra_args(false);
   calibrate
       ->add_option("--csv", flags->tables,
-                   "table of transitions, columns as in README.md; may be given several times")
+                   "table of transitions, columns: docs/commands.md; may be given several times")
       ->allow_extra_args(false);
   calibrate->add_option("--method", flags->options.method, "of inference")
       ->check(CLI::IsMember(CalibrationMethods()))

@@ -28,7 +28,7 @@ step, duration         number of the control step; [s]
 
 constexpr const char* kMotionHelp =
     R"(A robot's motion from arrays, a row for each control step: as a table of `plumb calibrate
---csv` (README.md).
+--csv` (docs/commands.md).
 
 t               shape (N,) [s]; begins anew, or goes on, with every episode
 q, v            shapes (N, num_positions) [rad or m], (N, num_velocities) [rad/s or m/s]: the state
