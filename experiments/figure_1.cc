@@ -18,9 +18,9 @@
 #include "calibrator/inference/reps_search.h"
 #include "common/atomic_file.h"
 #include "common/examples.h"
+#include "experiments/jobs.h"
 #include "experiments/options.h"
 #include "experiments/population_weights.h"
-#include "experiments/results.h"
 #include "plot/svg.h"
 
 namespace plumb {
@@ -247,8 +247,9 @@ std::string Percent(double light, double heavy) {
 int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t seed, bool quick) {
   const std::vector<ToyTransition> transitions = Record(quick ? 20 : 400, seed);
   const VectorXd grid = VectorXd::LinSpaced(321, -2, 2);
+  const Ranks ranks;
   Results results(output / "figure_1.csv", fmt::format("seed {}{}", seed, quick ? ", quick" : ""),
-                  {"method"}, {"xi", "density", "near_light", "near_heavy", "mean", "sd"});
+                  {"method"}, {"xi", "density", "near_light", "near_heavy", "mean", "sd"}, ranks);
   const std::vector<Job> jobs = {
       {"squared_error", 1,
        [&](const auto&) { return Tabulate(grid, BySquaredError(transitions, seed)); }},
@@ -257,7 +258,7 @@ int MakeFigure(Process& process, const std::filesystem::path& output, uint64_t s
       {"mixture", 100, [&](const auto& progress) {
          return Tabulate(grid, ByConditionalMixture(transitions, seed, progress));
        }}};
-  if (!RunJobs(process, jobs, results)) return 130;
+  if (const auto status = RunJobs(process, jobs, results)) return *status;
 
   std::vector<Shown> curves = {{"squared error, Gaussian search", "squared", {}, grid},
                                {"energy distance, population", "population", {}, grid},

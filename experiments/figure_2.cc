@@ -18,10 +18,10 @@
 #include "common/atomic_file.h"
 #include "common/examples.h"
 #include "experiments/budget.h"
+#include "experiments/jobs.h"
 #include "experiments/n_step_error.h"
 #include "experiments/options.h"
 #include "experiments/recording.h"
-#include "experiments/results.h"
 #include "plot/curves.h"
 
 namespace plumb {
@@ -162,8 +162,9 @@ std::string SettingsOf(const Options& options) {
 
 int MakeFigure(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
+  const Ranks ranks;
   Results results(folder / "figure_2.csv", SettingsOf(options), {"task", "method", "run"},
-                  {"n", "error", "simulated_steps"});
+                  {"n", "error", "simulated_steps"}, ranks);
   std::vector<Job> jobs;
   Remembered remembered;
   for (const PaperTask& task : kPaperTasks) {
@@ -177,7 +178,7 @@ int MakeFigure(Process& process, const Options& options) {
       }
     }
   }
-  if (!RunJobs(process, jobs, results)) return 130;
+  if (const auto status = RunJobs(process, jobs, results)) return *status;
   std::vector<Panel> panels;
   for (const PaperTask& task : kPaperTasks) {
     panels.push_back(Draw(options, task, results));

@@ -17,9 +17,9 @@
 
 #include "common/atomic_file.h"
 #include "common/examples.h"
+#include "experiments/jobs.h"
 #include "experiments/options.h"
 #include "experiments/recording.h"
-#include "experiments/results.h"
 #include "experiments/simulated_system.h"
 #include "plot/curves.h"
 
@@ -157,9 +157,11 @@ std::string SettingsOf(const ExperimentOptions& options) {
 
 int MakeFigure(Process& process, const ExperimentOptions& options) {
   const std::filesystem::path folder = options.output;
+  const Ranks ranks;
   Results results(folder / "figure_3.csv", SettingsOf(options), {"task", "way", "run"},
                   {"iteration", "robot_return", "simulated_return", "discrepancy", "transitions",
-                   "robot_seconds", "parameter_error"});
+                   "robot_seconds", "parameter_error"},
+                  ranks);
   std::vector<Job> jobs;
   Remembered remembered;
   for (const PaperTask& task : kPaperTasks) {
@@ -175,7 +177,7 @@ int MakeFigure(Process& process, const ExperimentOptions& options) {
       }
     }
   }
-  if (!RunJobs(process, jobs, results)) return 130;
+  if (const auto status = RunJobs(process, jobs, results)) return *status;
   std::vector<Panel> panels;
   for (const PaperTask& task : kPaperTasks) {
     panels.push_back(Draw(options, task, results));

@@ -17,10 +17,10 @@
 #include "common/examples.h"
 #include "experiments/bus_robot.h"
 #include "experiments/bus_simulation.h"
+#include "experiments/jobs.h"
 #include "experiments/loop.h"
 #include "experiments/options.h"
 #include "experiments/oracle.h"
-#include "experiments/results.h"
 #include "plot/curves.h"
 #include "sim/parameters.h"
 
@@ -244,12 +244,14 @@ std::string Table(const Options& options, const Gap& gap, const Results& results
 
 int Compare(Process& process, const Options& options) {
   const std::filesystem::path folder = options.output;
+  const Ranks ranks;
   Results results(
       folder / "reality_gap.csv",
       fmt::format("iterations {}{}", options.iterations, options.quick ? ", quick" : ""),
       {"gap", "method", "run"},
       {"iteration", "robot_return", "worst_episode", "newest_return", "deployed",
-       "simulated_return", "discrepancy", "residual", "transitions", "robot_seconds"});
+       "simulated_return", "discrepancy", "residual", "transitions", "robot_seconds"},
+      ranks);
   const std::vector<Gap> gaps = Chosen(kGaps, options.gaps);
   std::vector<Job> jobs;
   Remembered remembered;
@@ -264,7 +266,7 @@ int Compare(Process& process, const Options& options) {
       }
     }
   }
-  if (!RunJobs(process, jobs, results)) return 130;
+  if (const auto status = RunJobs(process, jobs, results)) return *status;
   std::vector<Panel> panels;
   for (const Gap& gap : gaps) {
     panels.push_back(Draw(options, gap, results));

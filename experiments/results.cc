@@ -3,38 +3,48 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <fstream>
-#include <iostream>
+#include <iterator>
+#include <span>
+#include <sstream>
 #include <stdexcept>
 
 #include "common/atomic_file.h"
-#include "common/progress_line.h"
 
 namespace plumb {
 namespace {
 
-struct Stopped {};
-
-std::string Duration(double seconds) {
-  const auto whole = static_cast<int>(seconds + 0.5);
-  return whole < 60 ? fmt::format("{} s", whole)
-                    : fmt::format("{}:{:02} min", whole / 60, whole % 60);
+// What rank 0 has in a file, for all of them; nothing if there is none.
+std::optional<std::string> Read(const std::filesystem::path& file, const Ranks& ranks) {
+  std::string text;
+  int64_t size = -1;
+  if (std::ifstream stream(file); ranks.rank() == 0 && stream) {
+    text.assign(std::istreambuf_iterator<char>(stream), {});
+    size = static_cast<int64_t>(text.size());
+  }
+  ranks.Broadcast(std::as_writable_bytes(std::span(&size, 1)));
+  if (size < 0) return {};
+  text.resize(static_cast<size_t>(size));
+  ranks.Broadcast(std::as_writable_bytes(std::span(text)));
+  return text;
 }
 
 }  // namespace
 
 Results::Results(std::filesystem::path file, const std::string& settings,
-                 std::vector<std::string> keys, std::vector<std::string> values)
-    : file_(std::move(file)),
-      lock_("results " + std::filesystem::weakly_canonical(file_).string(),
-            file_.string() + ": another process is at work on it: give another --output") {
+                 std::vector<std::string> keys, std::vector<std::string> values, const Ranks& ranks)
+    : file_(std::move(file)), ranks_(ranks), values_(values.size()) {
+  if (ranks.rank() == 0) {
+    lock_.emplace("results " + std::filesystem::weakly_canonical(file_).string(),
+                  file_.string() + ": another process is at work on it: give another --output");
+    if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path());
+  }
   const std::string columns = fmt::format("{},{}", fmt::join(keys, ","), fmt::join(values, ","));
   header_ = "# " + settings + "\n" + columns;
-  if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path());
-  std::ifstream stream(file_);
-  if (!stream) return;
+  const std::optional<std::string> text = Read(file_, ranks);
+  if (!text) return;
+  std::istringstream stream(*text);
   const std::runtime_error foreign(
       file_.string() + ": not a table of this experiment: delete it, or give another --output");
   std::string line;
@@ -59,7 +69,7 @@ Results::Results(std::filesystem::path file, const std::string& settings,
       if (after == next + 1) throw foreign;
       next = after;
     }
-    if (*next != '\0' || row.size() != values.size()) throw foreign;
+    if (*next != '\0' || row.size() != values_) throw foreign;
     const std::string key = line.substr(0, end);
     if (!Has(key)) {
       index_[key] = groups_.size();
@@ -73,48 +83,13 @@ void Results::Add(const std::string& key, Rows rows) {
   if (Has(key)) throw std::invalid_argument("the table has '" + key + "' already");
   index_[key] = groups_.size();
   groups_.emplace_back(key, std::move(rows));
+  if (ranks_.rank() != 0) return;
   std::string text = header_ + "\n";
   for (const auto& [name, group] : groups_) {
     for (const std::vector<double>& row : group)
       text += fmt::format("{},{:.8g}\n", name, fmt::join(row, ","));
   }
   WriteAtomically(file_, text);
-}
-
-bool RunJobs(Process& process, const std::vector<Job>& jobs, Results& results) {
-  double left = 0, done = 0;
-  for (const Job& job : jobs) left += results.Has(job.key) ? 0 : job.weight;
-  ProgressLine line;
-  const auto start = std::chrono::steady_clock::now();
-  for (size_t i = 0; i < jobs.size(); ++i) {
-    const Job& job = jobs[i];
-    if (results.Has(job.key)) continue;
-    const auto progress = [&](double share) {
-      if (process.stopping()) throw Stopped();
-      const double seconds =
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      const double now = done + share * job.weight;
-      if (!line.shown()) return;
-      const std::string rest = now > 0 ? Duration(seconds * (left - now) / now) + " left" : "";
-      line.Show(fmt::format("{} of {}: {}  {:.0f} %  {}", i + 1, jobs.size(), job.key, 100 * share,
-                            rest));
-    };
-    try {
-      progress(0);
-      results.Add(job.key, job.run(progress));
-    } catch (const Stopped&) {
-      line.Clear();
-      std::cerr << "stopped; the same command goes on from here\n";
-      return false;
-    }
-    done += job.weight;
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (!line.shown())
-      std::cerr << fmt::format("{} of {}: {} done, {} left\n", i + 1, jobs.size(), job.key,
-                               Duration(seconds * (left - done) / done));
-  }
-  return true;
 }
 
 }  // namespace plumb

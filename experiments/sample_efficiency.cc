@@ -21,10 +21,10 @@
 #include "common/atomic_file.h"
 #include "common/examples.h"
 #include "experiments/budget.h"
+#include "experiments/jobs.h"
 #include "experiments/n_step_error.h"
 #include "experiments/options.h"
 #include "experiments/recording.h"
-#include "experiments/results.h"
 #include "experiments/simulated_system.h"
 #include "plot/curves.h"
 
@@ -244,10 +244,11 @@ std::vector<double> Shares(const ExperimentOptions& options, const PaperTask& ta
 
 int Measure(Process& process, const ExperimentOptions& options) {
   const std::filesystem::path folder = options.output;
+  const Ranks ranks;
   Results robot(folder / "sample_efficiency_robot.csv", SettingsOf(options), {"task", "way", "run"},
-                {"transitions", "robot_return"});
+                {"transitions", "robot_return"}, ranks);
   Results simulator(folder / "sample_efficiency_simulator.csv", SettingsOf(options),
-                    {"task", "way", "run"}, {"simulated_steps", "error"});
+                    {"task", "way", "run"}, {"simulated_steps", "error"}, ranks);
   Experiment experiment(options);
   std::vector<Job> robot_jobs, simulator_jobs;
   for (const PaperTask& task : kPaperTasks) {
@@ -272,8 +273,9 @@ int Measure(Process& process, const ExperimentOptions& options) {
       }
     }
   }
-  if (!RunJobs(process, simulator_jobs, simulator) || !RunJobs(process, robot_jobs, robot))
-    return 130;
+  const auto stopped = RunJobs(process, simulator_jobs, simulator);
+  if (stopped && *stopped != 0) return *stopped;
+  if (const auto status = RunJobs(process, robot_jobs, robot)) return *status;
 
   std::vector<Panel> panels;
   for (const PaperTask& task : kPaperTasks) {
