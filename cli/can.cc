@@ -1,6 +1,10 @@
 #include "cli/can.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <iostream>
+#include <stdexcept>
 
 #include "cli/outputs.h"
 #include "common/atomic_file.h"
@@ -10,19 +14,37 @@
 
 namespace plumb {
 
-int PrintBusPlan(const std::string& robot) {
-  const RobotDescription description = LoadRobot(robot);
-  const BusPlan plan =
-      PlanBus(BusDevices(description), description.bus_bit_rate, description.bus_data_bit_rate);
-  std::cout << description.name << " on " << description.bus_url << "\n"
-            << ToText(plan) << std::flush;
-  return plan.errors.empty() ? 0 : 1;
+namespace {
+
+size_t BusNamed(const std::vector<BusDescription>& buses, const std::string& name) {
+  if (name.empty() && buses.size() == 1) return 0;
+  const auto bus = std::ranges::find(buses, name, &BusDescription::name);
+  if (bus != buses.end()) return static_cast<size_t>(bus - buses.begin());
+  throw std::invalid_argument(
+      fmt::format("--bus \"{}\" is none of the robot's: {}", name, InOneLine(buses)));
 }
 
-int WriteDbc(const std::string& robot, const std::string& output) {
+}  // namespace
+
+int PrintBusPlan(const std::string& robot) {
+  const RobotDescription description = LoadRobot(robot);
+  bool works = true;
+  for (size_t i = 0; i < description.buses.size(); ++i) {
+    const BusDescription& bus = description.buses[i];
+    const BusPlan plan = PlanBus(description, i);
+    std::cout << (i == 0 ? "" : "\n") << description.name
+              << (bus.name.empty() ? "" : ", " + bus.Label() + ",") << " on " << bus.url << "\n"
+              << ToText(plan);
+    works = works && plan.errors.empty();
+  }
+  std::cout << std::flush;
+  return works ? 0 : 1;
+}
+
+int WriteDbc(const std::string& robot, const std::string& bus, const std::string& output) {
   const RobotDescription description = LoadRobot(robot);
   RequireOutputs({output}, FilesOf(description));
-  const std::string text = ToDbc(BusDevices(description));
+  const std::string text = ToDbc(BusDevices(description, BusNamed(description.buses, bus)));
   if (output.empty()) {
     std::cout << text << std::flush;
   } else {

@@ -187,19 +187,24 @@ std::vector<Finding> Packages() {
 
 }  // namespace
 
-std::vector<Finding> Examine(const std::string& lcm_url, const std::string& bus,
+std::vector<Finding> Examine(const std::string& lcm_url, const std::vector<std::string>& buses,
                              const std::string& key) {
   std::vector<Finding> findings = Lcm(lcm_url, key);
-  findings.push_back(UdpBuffers());
-  for (const auto& group : {Can(), Bus(bus), RealTime(), Packages()}) {
+  const auto add = [&](const std::vector<Finding>& group) {
     findings.insert(findings.end(), group.begin(), group.end());
-  }
+  };
+  add({UdpBuffers()});
+  add(Can());
+  for (const std::string& bus : buses) add(Bus(bus));
+  add(RealTime());
+  add(Packages());
   return findings;
 }
 
-int Doctor(const std::string& lcm_url, const std::string& bus, const std::string& key) {
+int Doctor(const std::string& lcm_url, const std::vector<std::string>& buses,
+           const std::string& key) {
   int status = 0;
-  for (const Finding& finding : Examine(lcm_url, bus, key)) {
+  for (const Finding& finding : Examine(lcm_url, buses, key)) {
     const char* mark = finding.level == Level::kGood     ? "good  "
                        : finding.level == Level::kAdvice ? "advice"
                                                          : "BAD   ";

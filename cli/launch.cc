@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <functional>
 #include <iostream>
@@ -62,7 +63,7 @@ class ClosedLoop {
         trainings_(process.messenger(), "TRAINING_STATUS",
                    [&](const training_status_t& m) { progress_.OnTraining(m); }),
         processes_(flags,
-                   {setting.bus, process.lcm_url(),
+                   {UrlsOf(robot_.buses), process.lcm_url(),
                     setting.coordinator() ? setting.coordinator()->clock() : clock_.ToString(),
                     process.key_file(), setting.run, setting.output},
                    setting.coordinator()) {
@@ -72,8 +73,8 @@ class ClosedLoop {
   }
 
   int Run() {
-    std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << setting_.bus << ", seed "
-              << flags_.seed << ", logs in " << setting_.output.string() << std::endl;
+    std::cout << VersionLine("plumb") << ", " << robot_.name << " on " << InOneLine(robot_.buses)
+              << ", seed " << flags_.seed << ", logs in " << setting_.output.string() << std::endl;
     if (setting_.virtual_run && !setting_.virtual_run->mirror_failure().empty()) {
       std::cout << "nobody else can listen: " << setting_.virtual_run->mirror_failure()
                 << std::endl;
@@ -157,12 +158,12 @@ class ClosedLoop {
     // the driver refuses any earlier wish
     until([] { return false; }, robot_.driver.start_guard + 0.1);
     std::cout
-        << "The motors of " << robot_.name << " on " << setting_.bus
+        << "The motors of " << robot_.name << " on " << InOneLine(robot_.buses)
         << " will be switched on.\nStand clear, keep the emergency stop at hand, and type 'arm': "
         << std::flush;
     std::string answer;
     while (answer.empty() || answer.back() != '\n') {
-      if (!process_.Wait(1'000'000, STDIN_FILENO)) return 130;
+      if (!process_.Wait(1'000'000, std::array{STDIN_FILENO})) return 130;
       pollfd input{STDIN_FILENO, POLLIN, 0};
       char c = 0;
       while (poll(&input, 1, 0) > 0 && answer.find('\n') == std::string::npos) {
@@ -244,7 +245,7 @@ class ClosedLoop {
     summary["seed"] = flags_.seed;
     summary["time"] = setting_.virtual_run ? "virtual" : "real";
     if (!setting_.virtual_run) summary["speed"] = clock_.scale();
-    summary["bus"] = setting_.bus;
+    summary["bus"] = InOneLine(robot_.buses);
     summary["rearms"] = rearms_;
     summary["version"] = VersionLine("plumb");
     if (!flags_.summary.empty()) {

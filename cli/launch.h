@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "common/process.h"
 
@@ -13,7 +14,7 @@ struct LaunchFlags {
   uint64_t seed = 1;
   int iterations = 8;
   int evaluation_episodes = 10;
-  std::string bus;         ///< empty = the robot's own
+  std::vector<std::string> buses;  ///< see SetUrls; empty = the robot's own
   bool real_time = false;  ///< a virtual robot in real time; otherwise it runs in virtual time
   /// in real time scaled seconds per second, 0 = 1; in virtual time the most, 0 = no limit
   double speed = 0;

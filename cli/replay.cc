@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <iostream>
@@ -116,7 +117,7 @@ class Replayer {
   bool Rest() {
     const int64_t due = std::clamp<int64_t>(player_.Remaining(Now()), 0, kLook);
     const int64_t rest = std::exchange(full_, false) ? std::max(due, Pacing::kNap) : due;
-    return process_.Wait(rest, keyboard_.fd());
+    return process_.Wait(rest, std::array{keyboard_.fd()});
   }
 
   /// @return false if the keys say so.

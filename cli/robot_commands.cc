@@ -20,26 +20,32 @@ namespace {
 constexpr char kRobot[] = "robot folder or TOML file";
 
 void AddDoctor(CLI::App& app, Action& action) {
-  const auto bus = std::make_shared<std::string>("udp:239.74.163.2:43113");
+  const auto buses = std::make_shared<std::vector<std::string>>(
+      std::vector<std::string>{"udp:239.74.163.2:43113"});
   CLI::App* doctor = AddCommand(app, "doctor", "check that this machine is ready for a run");
-  doctor->add_option("--bus", *bus, "CAN bus that is going to be used")->capture_default_str();
-  SetAction(*doctor, action, [bus](Process& process) {
-    return Doctor(process.lcm_url(), *bus, process.key_file());
+  doctor->add_option("--bus", *buses, "CAN bus that is going to be used, may be repeated")
+      ->allow_extra_args(false)
+      ->capture_default_str();
+  SetAction(*doctor, action, [buses](Process& process) {
+    return Doctor(process.lcm_url(), *buses, process.key_file());
   });
 }
 
 void AddCan(CLI::App& app, Action& action) {
-  CLI::App* can = AddCommand(app, "can", "the plan of the robot's CAN bus");
+  CLI::App* can = AddCommand(app, "can", "the plan of the robot's CAN buses");
   can->require_subcommand(1);
-  const auto robot = std::make_shared<std::string>(), output = std::make_shared<std::string>();
+  const auto robot = std::make_shared<std::string>(), bus = std::make_shared<std::string>(),
+             output = std::make_shared<std::string>();
   CLI::App* plan =
       AddCommand(*can, "plan", "ids, load and response times; exit status 1 if it cannot work");
   plan->add_option("robot", *robot, kRobot)->required();
   SetAction(*plan, action, [robot](Process&) { return PrintBusPlan(*robot); });
-  CLI::App* dbc = AddCommand(*can, "dbc", "all messages as a DBC file, for other tools");
+  CLI::App* dbc = AddCommand(*can, "dbc", "all messages of a bus as a DBC file, for other tools");
   dbc->add_option("robot", *robot, kRobot)->required();
+  dbc->add_option("--bus", *bus, "name of the bus; default: the only one");
   dbc->add_option("--output", *output, "file; default: print it");
-  SetAction(*dbc, action, [robot, output](Process&) { return WriteDbc(*robot, *output); });
+  SetAction(*dbc, action,
+            [robot, bus, output](Process&) { return WriteDbc(*robot, *bus, *output); });
 }
 
 void AddEstimate(CLI::App& app, Action& action) {
@@ -152,7 +158,10 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
                    "roll-outs of the final policy")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  launch->add_option("--bus", flags->bus, "CAN bus, e.g. socketcan:can0; default: the robot's own");
+  launch
+      ->add_option("--bus", flags->buses,
+                   "CAN bus, e.g. socketcan:can0, of several NAME=URL; default: the robot's own")
+      ->allow_extra_args(false);
   auto* real_time = launch->add_flag(
       "--real-time", flags->real_time,
       "a virtual robot by this machine's clock, as a real one; default: in virtual time");

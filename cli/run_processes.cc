@@ -69,10 +69,14 @@ void RunProcesses::Start() {
   if (!flags_.log.empty() && !coordinator_) {
     Start(kRecorder, {"record", flags_.log, "--robot", flags_.robot, "--note", flags_.command});
   }
-  if (!flags_.real)
-    Start(kRobot, with_priority({flags_.robot, "--bus", where_.bus, "--seed", seed}, 5));
-  std::vector<std::string> driver{flags_.robot, "--bus", where_.bus, "--flight-recorder",
+  std::vector<std::string> virtual_robot{flags_.robot, "--seed", seed};
+  std::vector<std::string> driver{flags_.robot, "--flight-recorder",
                                   (where_.output / "faults").string()};
+  for (const std::string& bus : where_.buses) {
+    for (auto* arguments : {&virtual_robot, &driver})
+      arguments->insert(arguments->end(), {"--bus", bus});
+  }
+  if (!flags_.real) Start(kRobot, with_priority(virtual_robot, 5));
   if (!flags_.real) driver.push_back("--virtual");
   if (flags_.allow_unsigned) driver.push_back("--unsigned");
   std::vector<std::string> controller{flags_.robot, "--seed", seed};

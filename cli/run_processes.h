@@ -16,7 +16,8 @@ namespace plumb {
 class RunProcesses {
  public:
   struct Where {
-    std::string bus, lcm_url;
+    std::vector<std::string> buses;  ///< values of their option --bus
+    std::string lcm_url;
     std::string clock;             ///< value of their option --clock
     std::string key_file;          ///< empty = none
     int64_t run;                   ///< value of their option --run

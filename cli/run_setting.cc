@@ -62,17 +62,18 @@ void RunSetting::Lock(const std::string& lcm_url) {
     messages_lock.emplace("messages " + lcm_url, "another run is under way on " + lcm_url +
                                                      ": stop it, or give --lcm-url");
   }
-  const std::string innermost = InnermostBus(bus);
-  if (!innermost.starts_with("loop:")) {
-    bus_lock.emplace("bus " + innermost, "another run is under way on " + innermost +
-                                             ": stop it, or give another --bus");
+  for (const BusDescription& bus : robot.buses) {
+    const std::string innermost = InnermostBus(bus.url);
+    if (innermost.starts_with("loop:")) continue;
+    bus_locks.emplace_back("bus " + innermost, "another run is under way on " + innermost +
+                                                   ": stop it, or give another --bus");
   }
 }
 
 RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
     : robot(LoadRobot(flags.robot)),
-      bus(flags.bus.empty() ? robot.bus_url : flags.bus),
       run(flags.real || flags.real_time ? ProcessNumber(getpid()) : 0) {
+  SetUrls(robot.buses, flags.buses);
   for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
   if (!flags.dashboard.empty()) ListenAddress::Parse(flags.dashboard);
   RequireDrivable(robot);
@@ -83,7 +84,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   if (!flags.real) truth = HiddenParameters(robot, flags.seed);
   RequireFiles(process, flags, robot);
   Lock(process.lcm_url());
-  RequireFree(process.lcm_url(), bus, flags.real);
+  RequireFree(process.lcm_url(), robot.buses, flags.real);
   output = MakeFolder(flags.output);
   lock.emplace(output);
   for (const std::string& file : {flags.summary, flags.report}) {
@@ -92,7 +93,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   if (flags.real || flags.real_time) return;
   const RecordFolder::About about{VersionLine("plumb"), flags.command, "", "virtual", flags.robot};
   virtual_run.emplace(output, process.lcm_url(),
-                      VirtualRun::Records{flags.log, about, flags.can_log});
+                      VirtualRun::Records{flags.log, about, flags.can_log, robot.buses});
   virtual_run->coordinator().max_speed = flags.speed;
 }
 

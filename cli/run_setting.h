@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -25,13 +26,13 @@ struct RunSetting {
   /// Null in real time.
   Coordinator* coordinator() { return virtual_run ? &virtual_run->coordinator() : nullptr; }
 
-  RobotDescription robot;
-  std::string bus;
+  RobotDescription robot;  ///< with the buses' URLs as the flags have them
   int64_t run;  ///< its number among all runs, see Identity; 0 in virtual time, which is alone
   Eigen::VectorXd truth;         ///< hidden parameters, physical; empty: nobody knows them
   std::filesystem::path output;  ///< the run's folder
   std::optional<FolderLock> lock;
-  std::optional<NameLock> messages_lock, bus_lock;
+  std::optional<NameLock> messages_lock;
+  std::deque<NameLock> bus_locks;
   std::optional<VirtualRun> virtual_run;  ///< none in real time
 
  private:

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
@@ -10,10 +11,12 @@
 namespace plumb {
 namespace {
 
-/// The interface's name, as candump would print it.
-std::string_view Interface(std::string_view bus_url) {
+/// The interface's name, as candump would print it; of what is no interface, the bus's.
+std::string_view Interface(std::string_view url, const std::vector<BusDescription>& buses) {
   constexpr std::string_view kSocketCan = "socketcan:";
-  return bus_url.starts_with(kSocketCan) ? bus_url.substr(kSocketCan.size()) : "can0";
+  if (url.starts_with(kSocketCan)) return url.substr(kSocketCan.size());
+  const auto bus = std::ranges::find(buses, url, &BusDescription::url);
+  return bus == buses.end() || bus->name.empty() ? "can0" : std::string_view(bus->name);
 }
 
 }  // namespace
@@ -34,6 +37,7 @@ VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& l
   }
   if (!records.frames.empty()) {
     frames_file_ = records.frames;
+    buses_ = records.buses;
     frames_.open(frames_file_);
     RequireFrames();
   }
@@ -55,7 +59,7 @@ void VirtualRun::Record(const lockstep_post_t& post) {
   if (post.topic.kind == lockstep_topic_t::FRAME) {
     if (!frames_.is_open()) return;
     frames_ << fmt::format("({}.{:06}) {} ", post.arrival / 1'000'000, post.arrival % 1'000'000,
-                           Interface(post.topic.name));
+                           Interface(post.topic.name, buses_));
     frames_.write(reinterpret_cast<const char*>(post.data.data()), post.size);
     frames_ << '\n';
     RequireFrames();

@@ -11,6 +11,7 @@
 #include "common/lockstep/coordinator.h"
 #include "common/lockstep/lcm_mirror.h"
 #include "records/record_folder.h"
+#include "robot/buses.h"
 
 namespace plumb {
 
@@ -21,8 +22,9 @@ class VirtualRun {
   struct Records {
     /// LCM log to write, in lcm-logger's format, with the run's times; empty: none
     std::string messages;
-    RecordFolder::About about = {};  ///< what is to be said beside that log
-    std::string frames = {};         ///< CAN log to write, as candump -l does; empty: none
+    RecordFolder::About about = {};          ///< what is to be said beside that log
+    std::string frames = {};                 ///< CAN log to write, as candump -l does; empty: none
+    std::vector<BusDescription> buses = {};  ///< whose frames are in it
   };
 
   /// @param folder of the run, which no other has. @param lcm_url where its messages are mirrored;
@@ -57,6 +59,7 @@ class VirtualRun {
   std::optional<LcmLogWriter> messages_;
   std::optional<RecordFolder> beside_messages_;
   std::string frames_file_;
+  std::vector<BusDescription> buses_;
   std::ofstream frames_;
   std::exception_ptr failure_;
 };

@@ -145,16 +145,17 @@ bool Process::stopping() {
   return stopping_ || (participant_ && participant_->stopping());
 }
 
-void Process::Doze(int64_t timeout, int fd) {
+void Process::Doze(int64_t timeout, std::span<const int> fds) {
   if (participant_) {
     return participant_->Wait(participant_->now() + timeout, Participant::Wake::kWhenHeard,
                               stop_fd_);
   }
-  std::array<pollfd, 3> polled{
-      {{stop_fd_, POLLIN, 0}, {messenger().fd(), POLLIN, 0}, {fd, POLLIN, 0}}};
+  polled_.clear();
+  for (const int fd : {stop_fd_, messenger().fd()}) polled_.push_back({fd, POLLIN, 0});
+  for (const int fd : fds) polled_.push_back({fd, POLLIN, 0});
   const timespec real = clock_.RealDuration(timeout);
   Notice().Alive();
-  ppoll(polled.data(), fd < 0 ? 2 : 3, &real, nullptr);
+  ppoll(polled_.data(), polled_.size(), &real, nullptr);
 }
 
 /// In real time all that has arrived by now, or whoever computes for long between two turns would
@@ -171,8 +172,8 @@ void Process::Hear() {
   }
 }
 
-bool Process::Wait(int64_t timeout, int fd) {
-  Doze(timeout, fd);
+bool Process::Wait(int64_t timeout, std::span<const int> fds) {
+  Doze(timeout, fds);
   Hear();
   return !stopping();
 }

@@ -3,12 +3,16 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "common/clock.h"
 #include "common/lockstep/participant.h"
 #include "common/messenger.h"
 #include "common/signature.h"
+
+struct pollfd;
 
 namespace CLI {
 class App;
@@ -56,12 +60,13 @@ class Process {
   int stop_fd() const { return stop_fd_; }
   /// True once the process has been asked to stop. Never blocks.
   bool stopping();
-  /// Sleeps until LCM has messages, `fd` (if not -1) is readable, the process is asked to stop, or
-  /// `timeout` scaled microseconds have passed. Then drains LCM. @return false when the process is
-  /// asked to stop. In virtual time `fd` is a transport's, whose frames the participant hears.
-  bool Wait(int64_t timeout, int fd = -1);
+  /// Sleeps until LCM has messages, one of `fds` (which may be -1) is readable, the process is
+  /// asked to stop, or `timeout` scaled microseconds have passed. Then drains LCM. @return false
+  /// when the process is asked to stop. In virtual time `fds` are transports', whose frames the
+  /// participant hears.
+  bool Wait(int64_t timeout, std::span<const int> fds = {});
   /// The same, and leaves LCM's messages for messenger().Drain().
-  void Doze(int64_t timeout, int fd = -1);
+  void Doze(int64_t timeout, std::span<const int> fds = {});
   /// Sleeps for `timeout` scaled microseconds or until the process is asked to stop, whatever comes
   /// meanwhile. Then drains LCM. For those who are in no hurry. @param meanwhile work to do in that
   /// time, which sends and reads no message; in virtual time the others need not wait for it.
@@ -88,6 +93,7 @@ class Process {
   Participant* participant_;
   Clock clock_;
   std::unique_ptr<Messenger> messenger_;
+  std::vector<pollfd> polled_;  // keeps its memory from call to call
 };
 
 /// "plumb-driver 0.1.0 (3f2a9c1, clean)"

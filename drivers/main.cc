@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <deque>
 #include <stdexcept>
+#include <vector>
 
 #include "common/examples.h"
 #include "common/lcm_url.h"
@@ -28,8 +30,9 @@ constexpr int64_t kReopenPeriod = 100'000;  // [us]
 constexpr double kDisarmTimeout = 0.3;
 // of frames per wake: a flood must not keep us from our deadlines
 constexpr int kBursts = 8;
-constexpr int64_t kFlight = 2'000'000;    // [us] before a fault whose frames are kept
-constexpr size_t kFlightFrames = 40'000;  // more than two buses of 1 Mbit/s carry in that time
+constexpr int64_t kFlight = 2'000'000;  // [us] before a fault whose frames are kept
+// of a bus: more than two of 1 Mbit/s carry in that time
+constexpr size_t kFlightFrames = 40'000;
 
 void WriteState(int8_t state, std::string_view reason) {
   constexpr std::array names = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
@@ -44,15 +47,51 @@ void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {
     return spdlog::warn("takes unsigned commands of anybody on the network");
 }
 
+void ReportFlight(const std::string& file, const std::string& error) {
+  if (error.empty())
+    spdlog::warn("the frames of the last 2 s are in {}", file);
+  else
+    spdlog::error("the frames before the fault are lost: {}", error);
+}
+
+/// One of the robot's buses: its end here, and its latest frames.
+struct Bus {
+  Bus(const BusDescription& bus, std::unique_ptr<Transport> end, const std::string& folder)
+      : transport(std::move(end)), recorder(folder, bus, kFlightFrames, ReportFlight) {}
+
+  std::unique_ptr<Transport> transport;
+  FlightRecorder recorder;
+};
+
+void RequireFd(const BusDescription& bus, const Transport& transport, const std::string& robot) {
+  if (bus.data_bit_rate == 0 || transport.carries_fd()) return;
+  throw std::runtime_error(fmt::format(
+      "{}: the interface is not set up for CAN FD, which {} needs; cure: ip link set CAN type "
+      "can bitrate {:.0f} dbitrate {:.0f} fd on, or of a vcan: mtu 72",
+      bus.url, robot, bus.bit_rate, bus.data_bit_rate));
+}
+
+std::deque<Bus> OpenBuses(Process& process, const RobotDescription& robot, const Driver& driver,
+                          const std::string& flight_recorder) {
+  std::deque<Bus> buses;
+  for (const BusDescription& bus : robot.buses) {
+    auto transport =
+        OpenTransport(bus.url, driver.filters(buses.size()),
+                      {process.participant(), Microseconds(robot.driver.effort_delay)});
+    RequireFd(bus, *transport, robot.name);
+    buses.emplace_back(bus, std::move(transport), flight_recorder);
+  }
+  return buses;
+}
+
 class DriverProcess {
  public:
-  DriverProcess(Process& process, const RobotDescription& robot, const std::string& bus,
-                const std::string& flight_recorder, bool is_virtual)
+  DriverProcess(Process& process, const RobotDescription& robot, const std::string& flight_recorder,
+                bool is_virtual)
       : process_(process),
         clock_(process.clock()),
         driver_(robot, clock_.Now(), clock_.Utime()),
-        transport_(OpenTransport(bus, driver_.filters(),
-                                 {process.participant(), Microseconds(robot.driver.effort_delay)})),
+        buses_(OpenBuses(process, robot, driver_, flight_recorder)),
         cycle_(driver_.cycle(), clock_.Now()),
         states_(process.messenger(), "JOINT_STATE"),
         imus_(process.messenger(), "IMU"),
@@ -66,30 +105,22 @@ class DriverProcess {
             [this](const driver_request_t& request) { OnRequest(request); }, Speakers::kSeveral,
             [this](const driver_request_t& request, std::string_view why) {
               OnForgedRequest(request, why);
-            }),
-        recorder_(flight_recorder, bus, kFlightFrames,
-                  [](const std::string& file, const std::string& error) {
-                    if (error.empty())
-                      spdlog::warn("the frames of the last 2 s are in {}", file);
-                    else
-                      spdlog::error("the frames before the fault are lost: {}", error);
-                  }) {
-    if (robot.bus_data_bit_rate > 0 && !transport_->carries_fd()) {
-      throw std::runtime_error(fmt::format(
-          "{}: the interface is not set up for CAN FD, which {} needs; cure: ip link set CAN type "
-          "can bitrate {:.0f} dbitrate {:.0f} fd on, or of a vcan: mtu 72",
-          bus, robot.name, robot.bus_bit_rate, robot.bus_data_bit_rate));
-    }
-    driver_.set_bus(bus);
+            }) {
+    for (const Bus& bus : buses_) fds_.push_back(bus.transport->fd());
+    accepted_.resize(buses_.size());
+    stats_.resize(buses_.size());
     driver_.set_virtual(is_virtual);
     const bool commands_signed = !process.key_file().empty();
     driver_.set_commands_signed(commands_signed);
     LogCommandPolicy(process.lcm_url(), commands_signed);
-    process.messenger().Lead(robot.name, bus);
-    driver_.set_replay(transport_->is_replay());
-    for (const std::string& warning : transport_->warnings()) spdlog::warn("{}", warning);
-    spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, bus, robot.num_joints(),
-                 robot.num_joints() == 1 ? "" : "s", driver_.cycle());
+    process.messenger().Lead(robot.name, InOneLine(robot.buses));
+    driver_.set_replay(
+        std::ranges::any_of(buses_, [](const Bus& bus) { return bus.transport->is_replay(); }));
+    for (const Bus& bus : buses_) {
+      for (const std::string& warning : bus.transport->warnings()) spdlog::warn("{}", warning);
+    }
+    spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, InOneLine(robot.buses),
+                 robot.num_joints(), robot.num_joints() == 1 ? "" : "s", driver_.cycle());
   }
 
   int Run() {
@@ -107,8 +138,9 @@ class DriverProcess {
   /// Waits for input or the cycle's deadline, and deals with what there is.
   void Step() {
     const int64_t now = clock_.Now();
-    const int64_t next = std::max(transport_->NextEvent(), now) - now;
-    process_.Doze(std::min(cycle_.Remaining(now), next), transport_->fd());
+    int64_t next = Transport::kNever;
+    for (const Bus& bus : buses_) next = std::min(next, bus.transport->NextEvent());
+    process_.Doze(std::min(cycle_.Remaining(now), std::max(next, now) - now), fds_);
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
     // A wake-up with nothing to do is not timed.
     phases_.Mark();
@@ -141,20 +173,26 @@ class DriverProcess {
   /// @return whether there were any.
   bool ReceiveFrames() {
     bool any = false;
-    transport_->SetTime(clock_.Now());
+    for (size_t i = 0; i < buses_.size(); ++i) any = ReceiveFrames(i) || any;
+    return any;
+  }
+  bool ReceiveFrames(size_t index) {
+    Bus& bus = buses_[index];
+    bool any = false;
+    bus.transport->SetTime(clock_.Now());
     for (int burst = 0; burst < kBursts; ++burst) {
-      const int count = transport_->Receive(received_);
+      const int count = bus.transport->Receive(received_);
       if (count <= 0) break;
       any = true;
       const int64_t now = clock_.Now();
       for (const Frame& frame : std::span(received_).first(static_cast<size_t>(count))) {
         const int64_t utime =
             frame.receive_ns != 0 ? clock_.UtimeFromRealtimeNs(frame.receive_ns) : clock_.Utime();
-        recorder_.Record(frame, false, utime);
-        driver_.OnFrame(frame, now, utime);
+        bus.recorder.Record(frame, false, utime);
+        driver_.OnFrame(index, frame, now, utime);
       }
     }
-    driver_.OnLink(transport_->link());
+    driver_.OnLink(index, bus.transport->link());
     return any;
   }
 
@@ -170,32 +208,45 @@ class DriverProcess {
     const int64_t now = clock_.Now();
     const int64_t lateness = cycle_.Advance(now);
     phases_.Mark();
-    const std::span<const Frame> frames = driver_.Tick(now, clock_.Utime(), lateness);
+    driver_.Tick(now, clock_.Utime(), lateness);
     phases_.End(PhaseTimes::kControl);
-    transport_->SetTime(now);
-    const int accepted = frames.empty() ? 0 : transport_->Send(frames);
+    for (size_t i = 0; i < buses_.size(); ++i) {
+      const std::span<const Frame> frames = driver_.frames(i);
+      buses_[i].transport->SetTime(now);
+      accepted_[i] = frames.empty() ? 0 : buses_[i].transport->Send(frames);
+    }
     phases_.End(PhaseTimes::kSend);
     const int64_t sent = clock_.Utime();
-    driver_.Transmitted(accepted, sent);
-    for (const Frame& frame : frames.first(static_cast<size_t>(std::max(accepted, 0))))
-      recorder_.Record(frame, true, sent);
+    driver_.Transmitted(accepted_, sent);
     const bool fault = driver_.state() == DriveState::kFault;
-    if (fault && !faulty_) recorder_.Dump(sent - kFlight, sent, driver_.reason());
-    faulty_ = fault;
-
-    if (transport_->link() != LinkState::kUp && now >= next_reopen_) {
-      next_reopen_ = now + kReopenPeriod;
-      driver_.OnLink(transport_->Reopen());
+    for (size_t i = 0; i < buses_.size(); ++i) {
+      FlightRecorder& recorder = buses_[i].recorder;
+      const auto accepted = static_cast<size_t>(std::max(accepted_[i], 0));
+      for (const Frame& frame : driver_.frames(i).first(accepted))
+        recorder.Record(frame, true, sent);
+      if (fault && !faulty_) recorder.Dump(sent - kFlight, sent, driver_.reason());
     }
+    faulty_ = fault;
+    if (now >= next_reopen_) Reopen(now);
     if (driver_.revision() == revision_ && now < next_status_) return;
     PublishStatus();
     revision_ = driver_.revision();
     next_status_ = now + kStatusPeriod;
   }
 
+  /// Tries to bring back what is down.
+  void Reopen(int64_t now) {
+    for (size_t i = 0; i < buses_.size(); ++i) {
+      if (buses_[i].transport->link() == LinkState::kUp) continue;
+      next_reopen_ = now + kReopenPeriod;
+      driver_.OnLink(i, buses_[i].transport->Reopen());
+    }
+  }
+
   void PublishStatus() {
-    driver_status_t& status = driver_.Status(clock_.Utime(), transport_->stats(),
-                                             commands_.rejected() + requests_.rejected());
+    for (size_t i = 0; i < buses_.size(); ++i) stats_[i] = buses_[i].transport->stats();
+    driver_status_t& status =
+        driver_.Status(clock_.Utime(), stats_, commands_.rejected() + requests_.rejected());
     phases_.Fill(status);
     statuses_.Publish(status);
     log_.Note(status.state, status.reason);
@@ -232,7 +283,9 @@ class DriverProcess {
   Process& process_;
   const Clock& clock_;
   Driver driver_;
-  std::unique_ptr<Transport> transport_;
+  std::deque<Bus> buses_;              // in the robot's order
+  std::vector<int> fds_, accepted_;    // of each bus; frames accepted in this cycle
+  std::vector<TransportStats> stats_;  // of each bus
   Periodic cycle_;
   Publisher<joint_state_t> states_;
   Publisher<imu_t> imus_;
@@ -240,7 +293,6 @@ class DriverProcess {
   Subscriber<joint_command_t> commands_;
   Subscriber<driver_request_t> requests_;
   std::array<Frame, 64> received_;
-  FlightRecorder recorder_;
   PhaseTimes phases_{!clock_.is_virtual()};
   bool faulty_ = false;
   bool deaf_ = false;  // whom to believe on LCM cannot be told any more
@@ -254,17 +306,20 @@ class DriverProcess {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  std::string robot_path, bus, flight_recorder;
+  std::string robot_path, flight_recorder;
+  std::vector<std::string> buses;
   bool allow_unsigned = false;
   int priority = 0;
   bool is_virtual = false;
   return plumb::Run(
-      "plumb-driver", "Drives a robot's motors on a CAN bus: JOINT_COMMAND in, JOINT_STATE out.",
-      argc, argv,
+      "plumb-driver",
+      "Drives a robot's motors on its CAN buses: JOINT_COMMAND in, JOINT_STATE out.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder, or its TOML file")->required();
-        app.add_option("--bus", bus,
-                       "socketcan:can0, udp:239.74.163.2:43113; default: as the robot says");
+        app.add_option("--bus", buses,
+                       "socketcan:can0, udp:239.74.163.2:43113, of several NAME=URL; default: as "
+                       "the robot says")
+            ->allow_extra_args(false);
         app.add_option("--flight-recorder", flight_recorder,
                        "folder: on every fault the frames of the last 2 s are written there");
         app.add_flag("--virtual", is_virtual,
@@ -276,12 +331,12 @@ int main(int argc, char** argv) {
                                  "--realtime-priority 80 --key robot.key"});
       },
       [&](plumb::Process& process) {
-        const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
+        plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
+        plumb::SetUrls(robot.buses, buses);
         plumb::RequireKey(process.lcm_url(), !process.key_file().empty(), allow_unsigned);
         // LCM's thread comes right behind the cycle: what it brings is part of it.
         process.BecomeFast(std::max(priority - 1, 0));
-        plumb::DriverProcess driver(process, robot, bus.empty() ? robot.bus_url : bus,
-                                    flight_recorder, is_virtual);
+        plumb::DriverProcess driver(process, robot, flight_recorder, is_virtual);
         process.BecomeFast(priority);
         return driver.Run();
       });

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "common/config.h"
@@ -71,6 +72,19 @@ fs::path Installed(const fs::path& robot) {
   return robot.is_relative() ? FileOf(programs.parent_path() / "share/plumbline" / robot) : robot;
 }
 
+// A bus with nothing on it is a mistake: its joints are on another.
+void RequireUse(Config& root, const RobotDescription& robot) {
+  for (size_t i = 0; i < robot.buses.size(); ++i) {
+    const bool used =
+        std::ranges::any_of(robot.joints,
+                            [&](const auto& j) { return !j.passive && j.motor.bus == i; }) ||
+        std::ranges::any_of(robot.sensors, [&](const auto& sensor) { return sensor.bus == i; });
+    if (!used)
+      FailAtBus(root, i, "name",
+                fmt::format("= \"{}\" has no joint and no sensor on it", robot.buses[i].name));
+  }
+}
+
 }  // namespace
 
 RobotDescription LoadRobot(const std::string& folder_or_file) {
@@ -100,23 +114,20 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   robot.fingerprint = kEmptyHash;
   for (const std::string& part : files) robot.fingerprint = Hash(ReadFile(part), robot.fingerprint);
   if (urdf.joints.empty()) root.Fail("robot", "has no moving joint in " + urdf_file);
-  robot.joints = ReadJoints(root, urdf);
+  robot.buses = ReadBuses(root);
+  robot.joints = ReadJoints(root, urdf, robot.buses);
   robot.links = std::move(urdf.links);
 
-  Config bus = root.Table("bus");
-  robot.bus_url = bus.String("url");
-  robot.bus_bit_rate = bus.Number("bit_rate", {1e4, 1e6}, robot.bus_bit_rate);
-  if (bus.Has("data_bit_rate"))
-    robot.bus_data_bit_rate = bus.Number("data_bit_rate", {robot.bus_bit_rate, 8e6});
   for (const JointDescription& joint : robot.joints) {
-    if (!joint.passive && NeedsFd(joint.motor) && robot.bus_data_bit_rate == 0) {
-      bus.Fail("data_bit_rate",
-               fmt::format("is missing: joint \"{}\" speaks {}, which needs a bus of CAN FD",
-                           joint.name, joint.motor.protocol));
+    const MotorDescription& motor = joint.motor;
+    if (!joint.passive && NeedsFd(motor) && robot.buses[motor.bus].data_bit_rate == 0) {
+      FailAtBus(root, motor.bus, "data_bit_rate",
+                fmt::format("is missing: joint \"{}\" speaks {}, which needs a bus of CAN FD",
+                            joint.name, motor.protocol));
     }
   }
-  bus.Finish();
   robot.sensors = ReadSensors(root, robot);
+  RequireUse(root, robot);
   robot.driver = ReadDriver(root.Table("driver"), robot.joints);
   robot.task = ReadTask(root.Table("task"), robot.joints);
   robot.simulation = ReadSimulation(root.Table("simulation"), robot.task.period);

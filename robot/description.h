@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "robot/buses.h"
 #include "robot/joints.h"
 #include "robot/parameters.h"
 #include "robot/sensors.h"
@@ -31,9 +32,7 @@ struct RobotDescription {
   std::string name;
   std::vector<LinkDescription> links;
   std::vector<JointDescription> joints;
-  std::string bus_url;
-  double bus_bit_rate = 1e6;     ///< [bit/s]
-  double bus_data_bit_rate = 0;  ///< [bit/s] of the data of CAN FD frames; 0 = it carries none
+  std::vector<BusDescription> buses = std::vector<BusDescription>(1);  ///< one or more
   std::vector<SensorDescription> sensors;
   DriverSettings driver;
   EstimatorSettings estimator;

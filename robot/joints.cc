@@ -25,9 +25,10 @@ constexpr MotorTable kMotorTables[] = {
     {"rmd", &ReadRmd, &CheckRmd},
 };
 
-MotorDescription ReadMotor(Config& config) {
+MotorDescription ReadMotor(Config& config, const std::vector<BusDescription>& buses) {
   MotorDescription motor;
   motor.protocol = config.String("protocol");
+  motor.bus = ReadBusOf(config, buses);
   motor.node = config.Integer("node", {0, 0x3fffffff});
   motor.gear = config.Number("gear", {1e-9, 1e9}, 1);
   motor.sign = config.Integer("sign", {-1, 1}, 1);
@@ -153,7 +154,8 @@ std::vector<JointDescription> JointsOf(const UrdfModel& urdf) {
   return joints;
 }
 
-std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf) {
+std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf,
+                                         const std::vector<BusDescription>& buses) {
   std::vector<JointDescription> joints = JointsOf(urdf);
   std::vector<bool> seen(joints.size());
   for (Config& config : root.Tables("joint")) {
@@ -169,7 +171,7 @@ std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf) {
       const auto refuse = [&](const char* key) {
         if (config.Has(key)) config.Fail(key, "is of a motor, but the joint is passive");
       };
-      for (const char* key : {"protocol", "node", "gear", "sign", "offset"}) refuse(key);
+      for (const char* key : {"protocol", "bus", "node", "gear", "sign", "offset"}) refuse(key);
       for (const MotorTable& table : kMotorTables) refuse(table.protocol);
       refuse("limits");
     } else {
@@ -179,18 +181,18 @@ std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf) {
             fmt::format("= \"{}\" is a spherical joint, which no motor drives: passive = true",
                         name));
       }
-      joint->motor = ReadMotor(config);
+      joint->motor = ReadMotor(config, buses);
       CheckMotor(urdf, index);
       joint->limits = ReadLimits(config.Table("limits", false), *joint);
       for (const MotorTable& table : kMotorTables) {
         if (joint->motor.protocol == table.protocol) table.check(config, *joint);
       }
       for (size_t other = 0; other < joints.size(); ++other) {
-        if (seen[other] && !joints[other].passive &&
-            joints[other].motor.protocol == joint->motor.protocol &&
-            joints[other].motor.node == joint->motor.node) {
-          config.Fail("node", fmt::format("= {} is also joint {}'s", joint->motor.node,
-                                          joints[other].name));
+        const MotorDescription &own = joint->motor, &others = joints[other].motor;
+        if (seen[other] && !joints[other].passive && others.bus == own.bus &&
+            others.protocol == own.protocol && others.node == own.node) {
+          config.Fail("node", fmt::format("= {} is also joint {}'s, on {}", own.node,
+                                          joints[other].name, buses[own.bus].Label()));
         }
       }
     }

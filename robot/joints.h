@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/config.h"
+#include "robot/buses.h"
 #include "robot/mit.h"
 #include "robot/moteus.h"
 #include "robot/parameter_kinds.h"
@@ -18,11 +19,12 @@ namespace plumb {
 /// Address, gear and zero of a joint's motor.
 struct MotorDescription {
   std::string protocol;  ///< file name in drivers/protocols/, e.g. "cansimple"
-  int node = 0;          ///< CAN node id of the protocol
+  int node = 0;          ///< CAN node id of the protocol, on its bus no other motor's
   /// motor turns per joint turn (or per metre / 2 pi for a prismatic joint), > 0
   double gear = 1;
   int sign = 1;                            ///< +1 or -1
   double offset = 0;                       ///< [rad] or [m] joint position at motor position 0
+  size_t bus = 0;                          ///< index into the robot's buses
   std::optional<MitDescription> mit = {};  ///< of protocol "mit" and no other
   std::optional<RmdDescription> rmd = {};  ///< of protocol "rmd" and no other
   std::optional<MoteusDescription> moteus = {};  ///< of protocol "moteus" and no other
@@ -57,6 +59,7 @@ std::vector<JointDescription> JointsOf(const UrdfModel& urdf);
 
 /// The URDF's joints with what the [[joint]] tables say of them: motors and dynamics. Every joint
 /// is passive or has a motor, and moves some inertia. Thread-safe. @throws ConfigError
-std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf);
+std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf,
+                                         const std::vector<BusDescription>& buses);
 
 }  // namespace plumb

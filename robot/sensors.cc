@@ -123,6 +123,7 @@ std::vector<SensorDescription> ReadSensors(Config& root, const RobotDescription&
     for (const SensorKind& kind : kSensorKinds) protocols.emplace_back(kind.protocol);
     const SensorKind& kind = kSensorKinds[config.Choice("protocol", protocols)];
     s.protocol = kind.protocol;
+    s.bus = ReadBusOf(config, robot.buses);
     s.period = config.Number("period", {1e-4, 1});
     kind.read(config, robot, s);
     if (config.Has("delay")) s.noise.delay = config.Number("delay", {0, 0.1});

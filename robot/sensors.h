@@ -12,11 +12,12 @@ namespace plumb {
 
 struct RobotDescription;
 
-/// A sensor on the bus: an encoder of a joint, or an IMU on a link.
+/// A sensor on a bus: an encoder of a joint, or an IMU on a link.
 struct SensorDescription {
   std::string name;
   /// file name in drivers/protocols/: "cia406", an encoder, or "xsens", an IMU
   std::string protocol;
+  size_t bus = 0;     ///< index into the robot's buses
   double period = 0;  ///< [s] > 0 of its readings
 
   // Of an encoder. It measures a joint: position = sign * radius * angle + offset.
@@ -49,7 +50,7 @@ struct SensorDescription {
 };
 
 /// The [[sensor]] tables. Thread-safe.
-/// @param robot with links and joints. @throws ConfigError
+/// @param robot with links, joints and buses. @throws ConfigError
 std::vector<SensorDescription> ReadSensors(Config& root, const RobotDescription& robot);
 
 }  // namespace plumb

@@ -68,15 +68,41 @@ void Stand(const RobotDescription& description, uint64_t seed, VirtualRobot& rob
   robot.Place(0, q, v);
 }
 
+constexpr int64_t kReopenPeriod = 200'000;  // [us]
+
+/// The robot's end of one of its buses.
+struct Bus {
+  /// Tries to bring it back while it is down, and says when that changes.
+  void Watch(int64_t now) {
+    if (transport->link() != LinkState::kUp && now >= next_reopen) {
+      transport->Reopen();
+      next_reopen = now + kReopenPeriod;
+    }
+    if (transport->link() == link) return;
+    link = transport->link();
+    spdlog::info("{} is {}", url, link == LinkState::kUp ? "up again" : "down");
+  }
+
+  std::string url;
+  std::unique_ptr<Transport> transport;
+  LinkState link = LinkState::kUp;
+  int64_t next_reopen = 0;
+};
+
 int Serve(Process& process, const RobotDescription& description, const Eigen::VectorXd& physical,
-          uint64_t seed, const std::string& bus_url) {
-  constexpr int64_t kReopenPeriod = 200'000;  // [us]
+          uint64_t seed) {
   constexpr int kBursts = 16;  // of frames per wake, so that a flood cannot stop time
   const Clock& clock = process.clock();
   VirtualRobot robot(description, physical, clock.Utime());
   Stand(description, seed, robot);
-  const std::unique_ptr<Transport> transport = OpenTransport(
-      bus_url, robot.filters(), {process.participant(), Microseconds(description.estimator.delay)});
+  std::vector<Bus> buses;
+  std::vector<int> fds;
+  for (const BusDescription& bus : description.buses) {
+    buses.push_back({bus.url, OpenTransport(bus.url, robot.filters(buses.size()),
+                                            {process.participant(),
+                                             Microseconds(description.estimator.delay)})});
+    fds.push_back(buses.back().transport->fd());
+  }
   process.messenger().Follow(description.name);
   Subscriber<place_robot_t> places(
       process.messenger(), "PLACE_ROBOT", [&](const place_robot_t& wish) {
@@ -87,46 +113,47 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
         if (!robot.Place(wish.utime, q, v))
           spdlog::debug("PLACE_ROBOT asks for a state that this robot cannot have");
       });
-  for (const std::string& warning : transport->warnings()) spdlog::warn("{}", warning);
-  spdlog::info("{} is on {}", description.name, bus_url);
+  for (const Bus& bus : buses) {
+    for (const std::string& warning : bus.transport->warnings()) spdlog::warn("{}", warning);
+  }
+  spdlog::info("{} is on {}", description.name, InOneLine(description.buses));
 
   std::array<Frame, 32> frames;
-  FrameBatch answers;
-  LinkState link = LinkState::kUp;
-  int64_t next_reopen = 0;
+  std::vector<FrameBatch> answers(buses.size());
   int64_t now = clock.Utime();
   const auto until_frame = [&] {
-    return std::max(transport->NextEvent(), clock.Now()) - clock.Now();
+    int64_t next = Transport::kNever;
+    for (const Bus& bus : buses) next = std::min(next, bus.transport->NextEvent());
+    return std::max(next, clock.Now()) - clock.Now();
   };
-  while (process.Wait(std::min({robot.NextEvent() - now, kReopenPeriod, until_frame()}),
-                      transport->fd())) {
+  const auto send = [&] {
+    for (size_t i = 0; i < buses.size(); ++i) {
+      buses[i].transport->Send(answers[i].frames());
+      answers[i].Clear();
+    }
+  };
+  while (process.Wait(std::min({robot.NextEvent() - now, kReopenPeriod, until_frame()}), fds)) {
     // First the time, then the frames: what arrives in between must not find the robot already past
     // it.
     now = clock.Utime();
-    transport->SetTime(clock.Now());
-    for (int burst = 0; burst < kBursts; ++burst) {
-      const int count = transport->Receive(frames);
-      if (count == 0) break;
-      answers.Clear();
-      for (int i = 0; i < count; ++i) {
-        const Frame& frame = frames[static_cast<size_t>(i)];
-        const int64_t arrival =
-            frame.receive_ns == 0 ? now : clock.UtimeFromRealtimeNs(frame.receive_ns);
-        robot.Receive(frame, std::min(arrival, now), answers);
+    for (size_t bus = 0; bus < buses.size(); ++bus) {
+      Transport& transport = *buses[bus].transport;
+      transport.SetTime(clock.Now());
+      for (int burst = 0; burst < kBursts; ++burst) {
+        const int count = transport.Receive(frames);
+        if (count == 0) break;
+        for (int i = 0; i < count; ++i) {
+          const Frame& frame = frames[static_cast<size_t>(i)];
+          const int64_t arrival =
+              frame.receive_ns == 0 ? now : clock.UtimeFromRealtimeNs(frame.receive_ns);
+          robot.Receive(bus, frame, std::min(arrival, now), answers);
+        }
+        send();
       }
-      transport->Send(answers.frames());
     }
-    answers.Clear();
     robot.Advance(now, answers);
-    transport->Send(answers.frames());
-    if (transport->link() != LinkState::kUp && now >= next_reopen) {
-      transport->Reopen();
-      next_reopen = now + kReopenPeriod;
-    }
-    if (transport->link() != link) {
-      link = transport->link();
-      spdlog::info("{} is {}", bus_url, link == LinkState::kUp ? "up again" : "down");
-    }
+    send();
+    for (Bus& bus : buses) bus.Watch(now);
     now = clock.Utime();
   }
   return 0;
@@ -136,7 +163,8 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
 }  // namespace plumb
 
 int main(int argc, char** argv) {
-  std::string robot_path, bus_url;
+  std::string robot_path;
+  std::vector<std::string> buses;
   uint64_t seed = 1;
   int priority = 0;
   std::vector<std::string> assignments;
@@ -144,7 +172,8 @@ int main(int argc, char** argv) {
       "plumb-robot", "The virtual robot: hidden parameters, drives on a CAN bus", argc, argv,
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "folder or TOML file of the robot")->required();
-        app.add_option("--bus", bus_url, "CAN bus; default: the robot's");
+        app.add_option("--bus", buses, "CAN bus, of several NAME=URL; default: the robot's")
+            ->allow_extra_args(false);
         plumb::AddRealtimeFlag(app, priority);
         app.add_option("--seed", seed, "draws the hidden parameters")
             ->check(
@@ -156,12 +185,12 @@ int main(int argc, char** argv) {
       },
       [&](plumb::Process& process) {
         process.BecomeFast(priority);
-        const plumb::RobotDescription description = plumb::LoadRobot(robot_path);
+        plumb::RobotDescription description = plumb::LoadRobot(robot_path);
+        plumb::SetUrls(description.buses, buses);
         Eigen::VectorXd physical = plumb::HiddenParameters(description, seed);
         for (const std::string& assignment : assignments)
           plumb::Set(assignment, description, physical);
         plumb::LogTruth(description, physical, seed);
-        return plumb::Serve(process, description, physical, seed,
-                            bus_url.empty() ? description.bus_url : bus_url);
+        return plumb::Serve(process, description, physical, seed);
       });
 }

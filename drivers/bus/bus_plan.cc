@@ -287,15 +287,22 @@ BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate, double d
   return plan;
 }
 
-std::vector<BusDevice> BusDevices(const RobotDescription& robot) {
+std::vector<BusDevice> BusDevices(const RobotDescription& robot, size_t bus) {
   std::vector<BusDevice> devices;
   for (const JointDescription& joint : robot.joints) {
-    if (joint.passive) continue;
+    if (joint.passive || joint.motor.bus != bus) continue;
     devices.push_back(MotorBusDevice(joint.motor, robot.driver));
     devices.back().name = joint.name;
   }
-  for (const SensorDescription& sensor : robot.sensors) devices.push_back(SensorBusDevice(sensor));
+  for (const SensorDescription& sensor : robot.sensors) {
+    if (sensor.bus == bus) devices.push_back(SensorBusDevice(sensor));
+  }
   return devices;
+}
+
+BusPlan PlanBus(const RobotDescription& robot, size_t bus) {
+  const BusDescription& description = robot.buses[bus];
+  return PlanBus(BusDevices(robot, bus), description.bit_rate, description.data_bit_rate);
 }
 
 std::string ToText(const BusPlan& plan) {

@@ -63,9 +63,10 @@ struct BusPlan {
 /// @param data_bit_rate [bit/s] of the data of CAN FD frames; 0 = the bus carries none.
 BusPlan PlanBus(const std::vector<BusDevice>& devices, double bit_rate, double data_bit_rate = 0);
 
-/// All of a robot's motors and sensors, each under its joint's or its own name.
-/// @throws std::invalid_argument for an unknown protocol.
-std::vector<BusDevice> BusDevices(const RobotDescription& robot);
+/// The motors and sensors on one of a robot's buses, each under its joint's or its own name.
+/// @param bus index into the robot's buses. @throws std::invalid_argument for an unknown protocol.
+std::vector<BusDevice> BusDevices(const RobotDescription& robot, size_t bus);
+BusPlan PlanBus(const RobotDescription& robot, size_t bus);  ///< of these
 
 /// A table for people: messages, loads, response times, errors and warnings.
 std::string ToText(const BusPlan& plan);

@@ -49,45 +49,55 @@ void Driver::SetTime(int64_t now, int64_t utime) noexcept {
   utime_ = utime;
 }
 
-void Driver::OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept {
+void Driver::OnFrame(size_t bus_index, const Frame& frame, int64_t now, int64_t utime) noexcept {
+  Bus& bus = buses_[bus_index];
   now_ = now;
-  ++status_.frames_received;
+  ++bus.received;
   switch (DecodeErrorFrame(frame)) {
     case BusEvent::kBusOff:
-      bus_off_ = true;
-      if (Active()) Fault("the CAN controller went bus-off");
+      bus.off = true;
+      if (Active()) Fault("{}the CAN controller went bus-off", bus.prefix);
       return;
     case BusEvent::kRestarted:
-      bus_off_ = false;
+      bus.off = false;
       return;
     case BusEvent::kNoAck:
-      if (++unacknowledged_ > kUnacknowledged && Active())
-        Fault("nobody on the bus acknowledges frames");
+      if (++bus.unacknowledged > kUnacknowledged && Active())
+        Fault("{}nobody on the bus acknowledges frames", bus.prefix);
       return;
     case BusEvent::kNone:
       break;
   }
   if (frame.error) return;
   if (frame.foreign) {
-    foreign_at_ = now;
-    // A button on the bus is obeyed by all drives, whomever it was for.
-    if (std::ranges::any_of(joints_,
-                            [&](const Joint& joint) { return joint.motor->IsEstop(frame); })) {
-      return Estop("emergency stop from the bus");
+    bus.foreign_at = now;
+    // A button on a bus is obeyed by all drives, whomever it was for.
+    if (std::ranges::any_of(joints_, [&](const Joint& joint) {
+          return joint.bus == bus_index && joint.motor->IsEstop(frame);
+        })) {
+      Reason why;
+      why.Set("{}emergency stop from the bus", bus.prefix);
+      return Estop(why.text());
     }
-    if (Active()) Fault("second master: somebody else sends frame {:#05x} to the drives", frame.id);
+    if (Active()) {
+      Fault("{}second master: somebody else sends frame {:#05x} to the drives", bus.prefix,
+            frame.id);
+    }
     return;
   }
-  bus_off_ = false;
-  unacknowledged_ = 0;
+  bus.off = false;
+  bus.unacknowledged = 0;
   if (MayBeDisplaced()) Displaced();
-  if (!DispatchToMotors(frame, now, utime) && !DispatchToSensors(frame, now, utime))
-    ++frames_rejected_;
+  if (!DispatchToMotors(bus_index, frame, now, utime) &&
+      !DispatchToSensors(bus_index, frame, now, utime)) {
+    ++bus.rejected;
+  }
 }
 
-bool Driver::DispatchToMotors(const Frame& frame, int64_t now, int64_t utime) noexcept {
+bool Driver::DispatchToMotors(size_t bus, const Frame& frame, int64_t now, int64_t utime) noexcept {
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
+    if (joint.bus != bus) continue;
     switch (joint.motor->OnFrame(frame, now)) {
       case FrameUse::kNotMine:
         continue;
@@ -112,8 +122,10 @@ bool Driver::DispatchToMotors(const Frame& frame, int64_t now, int64_t utime) no
   return false;
 }
 
-bool Driver::DispatchToSensors(const Frame& frame, int64_t now, int64_t utime) noexcept {
+bool Driver::DispatchToSensors(size_t bus, const Frame& frame, int64_t now,
+                               int64_t utime) noexcept {
   for (JointSensor& sensor : sensors_) {
+    if (sensor.bus() != bus) continue;
     if (!Active()) sensor.ForgetTurns();
     const SensorUse use = sensor.OnFrame(frame, now, utime);
     if (use != SensorUse::kNotMine) return use != SensorUse::kRejected;
@@ -121,40 +133,47 @@ bool Driver::DispatchToSensors(const Frame& frame, int64_t now, int64_t utime) n
   return false;
 }
 
-void Driver::OnLink(LinkState link) noexcept {
-  link_ = link;
+void Driver::OnLink(size_t bus, LinkState link) noexcept {
+  buses_[bus].link = link;
   if (link != LinkState::kUp && Active()) {
-    Fault("{}",
+    Fault("{}{}", buses_[bus].prefix,
           link == LinkState::kDown ? "the CAN interface is down" : "the CAN interface is gone");
   }
 }
 
-std::span<const Frame> Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
+void Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
   SetTime(now, utime);
   StampStopTime();
   NoteLateness(lateness);
-  housekeeping_.Clear();
-  frames_.Clear();
+  for (Bus& bus : buses_) {
+    bus.housekeeping.Clear();
+    bus.frames.Clear();
+  }
   CheckHealth();
   CheckCommand();
   StampStopTime();
   CommandTorques();
   // After the checks, so that a fault is answered in this cycle. The joints take turns to be the
   // first.
-  size_t arming = std::max(kMaxFrames - std::min(kMaxFrames, torque_frames_), kMaxArmingFrames);
+  for (Bus& bus : buses_) {
+    bus.arming_room =
+        std::max(kMaxFrames - std::min(kMaxFrames, bus.torque_frames), kMaxArmingFrames);
+  }
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[(turn_ + i) % joints_.size()];
-    const size_t before = housekeeping_.size();
-    joint.motor->Tick(now, arming >= kMaxArmingFrames, housekeeping_);
-    arming -= std::min(arming, housekeeping_.size() - before);
-    joint.frames_end = torque_frames_ + housekeeping_.size();
+    Bus& bus = buses_[joint.bus];
+    const size_t before = bus.housekeeping.size();
+    joint.motor->Tick(now, bus.arming_room >= kMaxArmingFrames, bus.housekeeping);
+    bus.arming_room -= std::min(bus.arming_room, bus.housekeeping.size() - before);
+    joint.frames_end = bus.torque_frames + bus.housekeeping.size();
   }
   turn_ = (turn_ + 1) % joints_.size();
   Poll();
-  for (JointSensor& sensor : sensors_) sensor.device().Tick(now, housekeeping_);
-  for (const Frame& frame : housekeeping_.frames()) frames_.Push(frame);
+  for (JointSensor& sensor : sensors_) sensor.device().Tick(now, buses_[sensor.bus()].housekeeping);
+  for (Bus& bus : buses_) {
+    for (const Frame& frame : bus.housekeeping.frames()) bus.frames.Push(frame);
+  }
   NoteChanges();
-  return frames_.frames();
 }
 
 void Driver::CommandTorques() noexcept {
@@ -178,37 +197,49 @@ void Driver::CommandTorques() noexcept {
             .value_or(0);
     if (fresh) joint.commanded = joint.effort;
     limited = limited || (fresh && joint.effort != wish);
-    frames_.Push(joint.motor->Torque(joint.map.MotorTorque(joint.effort)));
+    FrameBatch& frames = buses_[joint.bus].frames;
+    joint.torque_at = frames.size();
+    frames.Push(joint.motor->Torque(joint.map.MotorTorque(joint.effort)));
   }
   if (limited) ++status_.commands_limited;
-  torque_frames_ = frames_.size();
+  for (Bus& bus : buses_) bus.torque_frames = bus.frames.size();
 }
 
-void Driver::Transmitted(int accepted, int64_t utime) noexcept {
-  const auto taken = static_cast<size_t>(std::max(accepted, 0));
+void Driver::Transmitted(std::span<const int> accepted, int64_t utime) noexcept {
+  const auto taken = [&](size_t bus) { return static_cast<size_t>(std::max(accepted[bus], 0)); };
   // A torque that was not accepted leaves the drive with the one before.
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    double& sent = effort_sent_[joints_[i].index];
-    if (torque_frames_ == 0) sent = 0;
-    if (i < torque_frames_ && i < taken) sent = joints_[i].effort;
+  for (const Joint& joint : joints_) {
+    const size_t torques = buses_[joint.bus].torque_frames;
+    double& sent = effort_sent_[joint.index];
+    if (torques == 0) sent = 0;
+    if (joint.torque_at < std::min(torques, taken(joint.bus))) sent = joint.effort;
   }
   history_.Record(utime + effort_delay_, effort_sent_);
-  for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken, now_);
-  refused_cycles_ = taken < frames_.size() ? refused_cycles_ + 1 : 0;
-  if (refused_cycles_ >= kRefusedCycles && Active()) {
-    Fault("the bus has not accepted frames in {} cycles", refused_cycles_);
+  for (Joint& joint : joints_) joint.motor->Transmitted(joint.frames_end <= taken(joint.bus), now_);
+  for (size_t i = 0; i < buses_.size(); ++i) {
+    Bus& bus = buses_[i];
+    bus.refused_cycles = taken(i) < bus.frames.size() ? bus.refused_cycles + 1 : 0;
+    if (bus.refused_cycles >= kRefusedCycles && Active()) {
+      Fault("{}the bus has not accepted frames in {} cycles", bus.prefix, bus.refused_cycles);
+    }
   }
 }
 
 void Driver::Poll() noexcept {
-  if (now_ < next_poll_ || mode_ == Mode::kArming) return;  // arming has need of all room there is
-  next_poll_ = now_ + poll_period_;
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    Motor& motor = *joints_[(poll_turn_ + i) % joints_.size()].motor;
-    if (motor.num_polled() == 0 || motor.state() == DriveState::kAbsent) continue;
-    motor.Poll(housekeeping_);
-    poll_turn_ = (poll_turn_ + i + 1) % joints_.size();
-    return;
+  if (mode_ == Mode::kArming) return;  // arming has need of all room there is
+  for (size_t b = 0; b < buses_.size(); ++b) {
+    Bus& bus = buses_[b];
+    if (now_ < bus.next_poll) continue;
+    bus.next_poll = now_ + bus.poll_period;
+    for (size_t i = 0; i < joints_.size(); ++i) {
+      const Joint& joint = joints_[(bus.poll_turn + i) % joints_.size()];
+      Motor& motor = *joint.motor;
+      if (joint.bus != b || motor.num_polled() == 0 || motor.state() == DriveState::kAbsent)
+        continue;
+      motor.Poll(bus.housekeeping);
+      bus.poll_turn = (bus.poll_turn + i + 1) % joints_.size();
+      break;
+    }
   }
 }
 

@@ -28,19 +28,23 @@ namespace plumb {
 /// The driver without sockets and clock: frames and messages go in, frames and messages come out.
 /// One cycle:
 ///
-///     for (received frame) driver.OnFrame(frame, now, utime of its arrival);
+///     for (frame received on bus) driver.OnFrame(bus, frame, now, utime of its arrival);
 ///     while (const joint_state_t* state = driver.NextState()) publish(*state);
 ///     while (const imu_t* imu = driver.NextImu()) publish(*imu);
 ///     driver.OnLink(...); driver.OnRequest(...); driver.OnCommand(...);   // what came since
-///     frames = driver.Tick(now, utime, lateness);                         // once per cycle
-///     driver.Transmitted(transport.Send(frames), utime right after it);
+///     driver.Tick(now, utime, lateness);                                  // once per cycle
+///     for (bus) accepted[bus] = transport[bus].Send(driver.frames(bus));
+///     driver.Transmitted(accepted, utime right after it);
 ///     // after every Tick: what was not accepted is given again
+///
+/// A robot may have several buses, by their indices in RobotDescription::buses; they have one cycle
+/// and one state: what is wrong on one of them stops the joints on all.
 ///
 /// It arms only on a request, made after its start and after whatever stopped it last. Armed, it
 /// transmits a torque in every cycle, within the joint's limits: zero when the command has expired,
 /// or what DriverSettings::stop says. It disarms and remembers why (FAULT) when commands stay away,
 /// a measurement or heartbeat is missing or cannot be true, a drive or sensor reports an error, a
-/// drive falls idle, is too hot or has a bad supply, the bus fails, or somebody else sends what
+/// drive falls idle, is too hot or has a bad supply, a bus fails, or somebody else sends what
 /// only it may send; only a new ARM leads out of FAULT.
 ///
 /// `now` is scaled monotonic, `utime` scaled real time, both in microseconds. No method but the
@@ -52,17 +56,18 @@ class Driver {
   /// that cannot work: ids in common, more than it carries (see BusPlan).
   Driver(const RobotDescription& robot, int64_t now, int64_t utime);
 
-  /// Filters that let in what drives and sensors send, and what only we may send, should another do
-  /// so.
-  std::vector<Filter> filters() const;
+  size_t num_buses() const { return buses_.size(); }
+  /// Filters that let in what a bus's drives and sensors send, and what only we may send, should
+  /// another do so.
+  std::vector<Filter> filters(size_t bus) const;
   int64_t cycle() const { return cycle_; }  ///< [us] period in which Tick wants to be called
 
-  void OnFrame(const Frame& frame, int64_t now, int64_t utime) noexcept;
+  void OnFrame(size_t bus, const Frame& frame, int64_t now, int64_t utime) noexcept;
   /// The next JOINT_STATE, null if there is none; valid until the next call.
   const joint_state_t* NextState() noexcept;
   /// The next IMU reading, null if there is none; valid until the next call.
   const imu_t* NextImu() noexcept;
-  void OnLink(LinkState link) noexcept;
+  void OnLink(size_t bus, LinkState link) noexcept;
   void OnRequest(const driver_request_t& request, int64_t now, int64_t utime) noexcept;
   void OnCommand(const joint_command_t& command, int64_t now, int64_t utime) noexcept;
   /// Instead of the two above, what is not to be obeyed because of who said it. @param why
@@ -70,10 +75,11 @@ class Driver {
   void OnForgedArm(std::string_view why) noexcept;
   void OnForgedCommand(std::string_view why) noexcept;
   /// @param lateness [us] after the cycle's deadline.
-  /// @return what to send now, torques first; valid until the next call.
-  std::span<const Frame> Tick(int64_t now, int64_t utime, int64_t lateness) noexcept;
-  /// @param accepted how many of Tick's frames the transport took. @param utime when.
-  void Transmitted(int accepted, int64_t utime) noexcept;
+  void Tick(int64_t now, int64_t utime, int64_t lateness) noexcept;
+  /// What to send on a bus after a Tick, torques first; valid until the next one.
+  std::span<const Frame> frames(size_t bus) const noexcept { return buses_[bus].frames.frames(); }
+  /// @param accepted how many of its frames each bus's transport took. @param utime when.
+  void Transmitted(std::span<const int> accepted, int64_t utime) noexcept;
 
   DriveState state() const noexcept;
   /// Why it is not armed; empty when it is.
@@ -84,15 +90,16 @@ class Driver {
   uint64_t revision() const noexcept { return revision_; }
   /// The message to publish, to which the caller may add what only it knows; valid until the next
   /// call.
+  /// @param stats of each bus's transport; empty: there are none.
   /// @param messages_rejected LCM messages that did not decode.
-  driver_status_t& Status(int64_t utime, const TransportStats& stats, int64_t messages_rejected);
-  void set_bus(const std::string& url) { status_.bus = url; }
+  driver_status_t& Status(int64_t utime, std::span<const TransportStats> stats,
+                          int64_t messages_rejected);
   /// Whether signatures are looked at before OnRequest and OnCommand are called.
   void set_commands_signed(bool commands_signed) { status_.commands_signed = commands_signed; }
   /// The robot is a virtual one, which may be put elsewhere at once (PLACE_ROBOT) between episodes,
   /// while no effort is sent: every check of its motion then begins anew, as after switching on.
   void set_virtual(bool is_virtual) { virtual_ = is_virtual; }
-  /// The bus is a recording: the driver refuses to arm.
+  /// A bus is a recording: the driver refuses to arm.
   void set_replay(bool replay) { replay_ = replay; }
 
  private:
@@ -111,9 +118,29 @@ class Driver {
     bool measured = false;
     int64_t measured_at = 0;  // `now` of the last estimate
     JointMeasurement latest;
+    size_t bus;
     double effort = 0;      // in the torque frame of this cycle
     double commanded = 0;   // the same when the command was fresh last
+    size_t torque_at = 0;   // that frame's place among the bus's frames
     size_t frames_end = 0;  // the motor's own frames of this cycle are before this one
+  };
+  struct Bus {
+    std::string prefix;  // of reasons: "bus left: "; empty where it has no name
+    bool usable() const noexcept { return link == LinkState::kUp && !off; }
+
+    LinkState link = LinkState::kUp;
+    bool off = false;        // its controller is bus-off
+    int64_t foreign_at;      // `now` of the last frame that only we may send, and another has sent
+    int unacknowledged = 0;  // error frames in a row that say so
+    int refused_cycles = 0;
+    int64_t received = 0, rejected = 0;  // frames
+    std::vector<Filter> own;             // of the frames that only we may send
+
+    FrameBatch frames, housekeeping;  // of this cycle: all; those that are no torques
+    size_t torque_frames = 0;
+    size_t arming_room = 0;          // frames that arming may still take in this cycle
+    int64_t poll_period, next_poll;  // [us] one question to one drive
+    size_t poll_turn = 0;
   };
 
   template <class... Args>
@@ -125,11 +152,13 @@ class Driver {
     mode_ = Mode::kFault;
   }
   static std::vector<Joint> DrivenJoints(const RobotDescription& robot);
+  /// @throws std::invalid_argument if one cannot work.
+  std::vector<Bus> Buses(const RobotDescription& robot) const;
   /// Of the joints without a motor. @throws std::invalid_argument if nothing measures one.
   void FindMeasuring(const RobotDescription& robot);
   void FindSecondEncoders(const RobotDescription& robot);
-  bool DispatchToMotors(const Frame& frame, int64_t now, int64_t utime) noexcept;
-  bool DispatchToSensors(const Frame& frame, int64_t now, int64_t utime) noexcept;
+  bool DispatchToMotors(size_t bus, const Frame& frame, int64_t now, int64_t utime) noexcept;
+  bool DispatchToSensors(size_t bus, const Frame& frame, int64_t now, int64_t utime) noexcept;
   void Refuse(std::string_view why) noexcept;
   void Disarm() noexcept;
   void Answer(const driver_request_t& request) noexcept;
@@ -161,6 +190,7 @@ class Driver {
   std::vector<std::string> names_;
   std::vector<Joint> joints_;  // with a motor
   std::vector<JointSensor> sensors_;
+  std::vector<Bus> buses_;
   /// Which sensor measures a joint without a motor.
   struct Measuring {
     size_t joint, sensor;
@@ -193,28 +223,17 @@ class Driver {
   // of a literal: what was wrong with a command since the last genuine one
   std::string_view forgery_;
   bool expiry_counted_ = false;
-  LinkState link_ = LinkState::kUp;
-  bool bus_off_ = false;
   bool replay_ = false;
   bool virtual_ = false;
   int64_t displaced_at_ = std::numeric_limits<int64_t>::min();  // `now` of the last Displaced()
-  int64_t foreign_at_;  // `now` of the last frame that only we may send, and another has sent
-  std::vector<Filter> own_;
-  int unacknowledged_ = 0;
-  int refused_cycles_ = 0;
-
-  FrameBatch frames_, housekeeping_;
-  size_t torque_frames_ = 0;
-  size_t turn_ = 0;                  // whose own frames come first
-  int64_t poll_period_, next_poll_;  // [us] one question to one drive
-  size_t poll_turn_ = 0;
+  size_t turn_ = 0;                                             // whose own frames come first
   std::vector<double> effort_sent_;
   std::vector<JointMeasurement> scratch_;
   joint_state_t state_message_;
   int64_t previous_utime_ = 0;
   bool has_previous_ = false;
   driver_status_t status_;
-  int64_t frames_rejected_ = 0, requests_rejected_ = 0;
+  int64_t requests_rejected_ = 0;
   uint64_t revision_ = 0;
   uint64_t signature_ = 0;
 };

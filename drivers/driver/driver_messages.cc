@@ -22,8 +22,6 @@ void Driver::PrepareMessages() {
   state_message_.valid.resize(size);
   state_message_.measured.resize(size);
 
-  status_.frames_received = status_.frames_sent = status_.frames_rejected = status_.frames_dropped =
-      0;
   status_.commands_accepted = status_.commands_rejected = status_.commands_expired = 0;
   status_.messages_rejected = status_.cycles = status_.overruns = status_.measurements_lost = 0;
   status_.stopped_by_request = false;
@@ -50,7 +48,7 @@ void Driver::PrepareMessages() {
   status_.sensor_state.resize(sensors_.size());
   status_.sensor_reason.resize(sensors_.size());
   status_.num_phases = 0;
-  status_.frames_foreign = status_.commands_limited = status_.commands_forged = 0;
+  status_.commands_limited = status_.commands_forged = 0;
   status_.commands_signed = false;
   status_.num_bins = PhaseTimes::kBins;
   status_.lateness.assign(PhaseTimes::kBins, 0);
@@ -107,7 +105,7 @@ void Driver::NoteChanges() noexcept {
   const auto mix = [&](uint64_t value) { signature = (signature ^ value) * 0x9E3779B97F4A7C15; };
   mix(hash(reason()));
   mix(status_.stopped_by_request);
-  mix(link_ == LinkState::kUp && !bus_off_);
+  for (const Bus& bus : buses_) mix(bus.usable());
   for (const Joint& joint : joints_) {
     mix(static_cast<uint64_t>(joint.motor->state()));
     mix(hash(joint.motor->reason()));
@@ -121,12 +119,21 @@ void Driver::NoteChanges() noexcept {
   signature_ = signature;
 }
 
-driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats,
+driver_status_t& Driver::Status(int64_t utime, std::span<const TransportStats> stats,
                                 int64_t messages_rejected) {
   status_.utime = utime;
   status_.state = static_cast<int8_t>(state());
   status_.reason = reason();
-  status_.bus_up = link_ == LinkState::kUp && !bus_off_;
+  for (size_t i = 0; i < buses_.size(); ++i) {
+    const TransportStats counted = i < stats.size() ? stats[i] : TransportStats{};
+    bus_status_t& bus = status_.buses[i];
+    bus.up = buses_[i].usable();
+    bus.frames_received = buses_[i].received;
+    bus.frames_sent = counted.sent;
+    bus.frames_rejected = buses_[i].rejected + counted.malformed;
+    bus.frames_dropped = counted.refused + counted.lost;
+    bus.frames_foreign = counted.foreign;
+  }
   for (size_t k = joints_.size(); k-- > 0;) {
     const Motor& motor = *joints_[k].motor;
     const size_t i = joints_[k].index;
@@ -154,10 +161,6 @@ driver_status_t& Driver::Status(int64_t utime, const TransportStats& stats,
     status_.joint_state[passive.joint] = fresh ? driver_status_t::IDLE : driver_status_t::ABSENT;
     status_.joint_reason[passive.joint] = status_.sensor_reason[passive.sensor];
   }
-  status_.frames_rejected = frames_rejected_ + stats.malformed;
-  status_.frames_sent = stats.sent;
-  status_.frames_dropped = stats.refused + stats.lost;
-  status_.frames_foreign = stats.foreign;
   status_.measurements_lost = measurements_.lost();
   for (const JointSensor& sensor : sensors_) status_.measurements_lost += sensor.lost();
   status_.messages_rejected = requests_rejected_ + messages_rejected;

@@ -78,10 +78,18 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
         "commands arrived when the driver started: stop the controller of an earlier run");
   }
   if (replay_) return Refuse("the bus is a recording: nobody hears us");
-  if (now - foreign_at_ < start_guard_)
-    return Refuse("somebody else commands the drives: there is a second master on the bus");
-  if (link_ != LinkState::kUp) return Refuse("the CAN interface is not up");
-  if (bus_off_) return Refuse("the CAN controller is bus-off");
+  for (const Bus& bus : buses_) {
+    const std::string_view wrong =
+        now - bus.foreign_at < start_guard_
+            ? "somebody else commands the drives: there is a second master on the bus"
+        : bus.link != LinkState::kUp ? "the CAN interface is not up"
+        : bus.off                    ? "the CAN controller is bus-off"
+                                     : "";
+    if (wrong.empty()) continue;
+    Reason why;
+    why.Set("{}{}", bus.prefix, wrong);
+    return Refuse(why.text());
+  }
   for (Joint& joint : joints_) {
     Reason why;
     if (joint.motor->state() == DriveState::kAbsent) {
@@ -115,7 +123,7 @@ void Driver::RequestArm(int64_t made, bool homed) noexcept {
   arms_refused_ = 0;
   stray_controller_ = false;
   status_.stopped_by_request = false;
-  refused_cycles_ = 0;
+  for (Bus& bus : buses_) bus.refused_cycles = 0;
   inbox_.Clear();
   forgery_ = {};
   cause_.Clear();

@@ -1,4 +1,4 @@
-// Of driver.h: its construction: joints with motors, sensors, the bus that they share.
+// Of driver.h: its construction: joints with motors, sensors, the buses that they share.
 
 #include <fmt/ranges.h>
 
@@ -33,7 +33,8 @@ Driver::Joint::Joint(size_t number, const JointDescription& joint, const DriverS
       limits(LimitsOf(joint)),
       damping(joint.limits.damping),
       turns(joint.type != JointDescription::Type::kPrismatic),
-      watch(PlausibilityOf(joint, settings)) {}
+      watch(PlausibilityOf(joint, settings)),
+      bus(joint.motor.bus) {}
 
 Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
     : settings_(robot.driver),
@@ -54,25 +55,24 @@ Driver::Driver(const RobotDescription& robot, int64_t now, int64_t utime)
       clock_offset_(utime - now),
       start_utime_(utime),
       stopped_utime_(utime - 1),
-      armed_by_(utime - 1),
-      foreign_at_(now - start_guard_ - 1) {
+      armed_by_(utime - 1) {
   for (const JointDescription& joint : robot.joints) names_.push_back(joint.name);
   for (const SensorDescription& sensor : robot.sensors)
     sensors_.emplace_back(robot, sensor, stale_after_);
+  buses_ = Buses(robot);
   FindMeasuring(robot);
   FindSecondEncoders(robot);
-  const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate, robot.bus_data_bit_rate);
-  if (!plan.errors.empty())
-    throw std::invalid_argument(
-        fmt::format("the bus cannot work: {}", fmt::join(plan.errors, "; ")));
-  int polled = 0;
-  for (const Joint& joint : joints_) polled += joint.motor->num_polled();
-  poll_period_ = std::max(cycle_, Microseconds(robot.driver.telemetry) / std::max(1, polled));
-  next_poll_ = now;
   effort_sent_.assign(num_joints_, 0);
   scratch_.resize(joints_.size());
   PrepareMessages();
   status_.robot = robot.name;
+  status_.bus = InOneLine(robot.buses);
+  status_.num_buses = static_cast<int32_t>(buses_.size());
+  status_.buses.resize(buses_.size());
+  for (size_t i = 0; i < buses_.size(); ++i) {
+    status_.buses[i].name = robot.buses[i].name;
+    status_.buses[i].url = robot.buses[i].url;
+  }
   reason_.Set("waiting for ARM");
 }
 
@@ -85,6 +85,27 @@ std::vector<Driver::Joint> Driver::DrivenJoints(const RobotDescription& robot) {
   return joints;
 }
 
+std::vector<Driver::Bus> Driver::Buses(const RobotDescription& robot) const {
+  std::vector<Bus> buses;
+  for (size_t i = 0; i < robot.buses.size(); ++i) {
+    const BusDescription& description = robot.buses[i];
+    const BusPlan plan = PlanBus(robot, i);
+    if (!plan.errors.empty()) {
+      throw std::invalid_argument(
+          fmt::format("{} cannot work: {}", description.Label(), fmt::join(plan.errors, "; ")));
+    }
+    int polled = 0;
+    for (const Joint& joint : joints_) polled += joint.bus == i ? joint.motor->num_polled() : 0;
+    Bus bus;
+    if (!description.name.empty()) bus.prefix = description.Label() + ": ";
+    bus.foreign_at = start_now_ - start_guard_ - 1;
+    bus.poll_period = std::max(cycle_, Microseconds(settings_.telemetry) / std::max(1, polled));
+    bus.next_poll = start_now_;
+    buses.push_back(bus);
+  }
+  return buses;
+}
+
 void Driver::FindMeasuring(const RobotDescription& robot) {
   std::optional<FloatingBase> base;
   if (robot.estimator.base == EstimatorSettings::Base::kLegs) base = FloatingBaseOf(robot);
@@ -93,10 +114,11 @@ void Driver::FindMeasuring(const RobotDescription& robot) {
     if (!joint.passive) {
       for (const BusMessage& message : MotorBusDevice(joint.motor, robot.driver).messages) {
         if (message.direction != BusMessage::Direction::kToDevice || message.remote) continue;
-        own_.push_back({.id = message.id,
-                        .mask = message.extended ? Filter::kAllExtended : 0x7FF,
-                        .own = true,
-                        .extended = message.extended});
+        buses_[joint.motor.bus].own.push_back(
+            {.id = message.id,
+             .mask = message.extended ? Filter::kAllExtended : 0x7FF,
+             .own = true,
+             .extended = message.extended});
       }
       continue;
     }
@@ -122,12 +144,16 @@ void Driver::FindSecondEncoders(const RobotDescription& robot) {
   }
 }
 
-std::vector<Filter> Driver::filters() const {
+std::vector<Filter> Driver::filters(size_t bus) const {
   std::vector<Filter> filters;
-  for (const Joint& joint : joints_) filters.push_back(joint.motor->filter());
-  for (const JointSensor& sensor : sensors_)
-    std::ranges::copy(sensor.device().filters(), std::back_inserter(filters));
-  filters.insert(filters.end(), own_.begin(), own_.end());
+  for (const Joint& joint : joints_) {
+    if (joint.bus == bus) filters.push_back(joint.motor->filter());
+  }
+  for (const JointSensor& sensor : sensors_) {
+    if (sensor.bus() == bus)
+      std::ranges::copy(sensor.device().filters(), std::back_inserter(filters));
+  }
+  std::ranges::copy(buses_[bus].own, std::back_inserter(filters));
   return filters;
 }
 

@@ -11,9 +11,9 @@
 
 namespace plumb {
 
-FlightRecorder::FlightRecorder(const std::filesystem::path& folder, const std::string& bus,
+FlightRecorder::FlightRecorder(const std::filesystem::path& folder, const BusDescription& bus,
                                size_t frames, Report report)
-    : folder_(folder), bus_(bus), report_(std::move(report)) {
+    : folder_(folder), name_(bus.name), bus_(bus.url), report_(std::move(report)) {
   if (folder_.empty()) return;
   std::filesystem::create_directories(folder_);
   std::replace(bus_.begin(), bus_.end(), ' ', '_');
@@ -64,7 +64,8 @@ void FlightRecorder::Serve() {
 }
 
 void FlightRecorder::Write(const Tape& tape) const {
-  const std::filesystem::path file = folder_ / fmt::format("fault_{}.log", utime_);
+  const std::filesystem::path file =
+      folder_ / fmt::format("fault_{}{}{}.log", utime_, name_.empty() ? "" : "_", name_);
   std::string text = fmt::format("# {}\n", reason_.text());
   for (size_t i = 0; i < tape.count; ++i) {
     const Entry& entry =

@@ -19,6 +19,7 @@ Eigen::Map<const Eigen::Vector3d> Vector(const std::array<double, 3>& values) {
 JointSensor::JointSensor(const RobotDescription& robot, const SensorDescription& sensor,
                          int64_t stale_after)
     : name_(sensor.name),
+      bus_(sensor.bus),
       stale_after_(std::max(stale_after, 3 * Microseconds(sensor.period))),
       joint_(sensor.joint),
       scale_(sensor.sign * sensor.radius),

@@ -33,6 +33,7 @@ class JointSensor {
   JointSensor(const RobotDescription& robot, const SensorDescription& sensor, int64_t stale_after);
 
   const std::string& name() const { return name_; }
+  size_t bus() const { return bus_; }  ///< index into the robot's buses
   /// Index of the joint that it measures, -1: none.
   int joint() const { return joint_; }
   Sensor& device() { return *device_; }
@@ -70,6 +71,7 @@ class JointSensor {
   JointMeasurement OfImu(const ImuSample& sample) noexcept;
 
   std::string name_;
+  size_t bus_;
   std::unique_ptr<Sensor> device_;
   int64_t stale_after_;
   int joint_ = -1;

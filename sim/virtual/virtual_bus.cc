@@ -19,7 +19,7 @@ void VirtualBus::Advance(int64_t until) {
       if (!flights->empty()) next = std::min(next, flights->front().arrival);
     }
     now_ = std::max(now_, next);
-    FrameBatch out;
+    std::vector<FrameBatch> out(driver_.num_buses());
     robot_.Advance(utime(), out);
     FromRobot(out);
     Deliver();
@@ -31,44 +31,52 @@ void VirtualBus::Advance(int64_t until) {
 
 void VirtualBus::Deliver() {
   for (; !to_robot_.empty() && to_robot_.front().arrival <= now_; to_robot_.pop_front()) {
-    ToRobot(to_robot_.front().frame);
+    ToRobot(to_robot_.front().bus, to_robot_.front().frame);
   }
   for (; !to_driver_.empty() && to_driver_.front().arrival <= now_; to_driver_.pop_front()) {
-    ToDriver(to_driver_.front().frame);
+    ToDriver(to_driver_.front().bus, to_driver_.front().frame);
   }
 }
 
 void VirtualBus::Cycle() {
   next_cycle_ += driver_.cycle();
   on_cycle();
-  const auto frames = driver_.Tick(now_, utime(), 0);
-  const std::vector<Frame> sent(frames.begin(), frames.end());
-  driver_.Transmitted(static_cast<int>(sent.size()), utime());
-  for (const Frame& frame : sent) {
-    on_frame(frame);
-    if (wire_.to_robot == 0) {
-      ToRobot(frame);
-    } else {
-      to_robot_.push_back({now_ + wire_.to_robot, frame});
+  driver_.Tick(now_, utime(), 0);
+  std::vector<int> accepted;
+  for (size_t bus = 0; bus < driver_.num_buses(); ++bus)
+    accepted.push_back(static_cast<int>(driver_.frames(bus).size()));
+  driver_.Transmitted(accepted, utime());
+  for (size_t bus = 0; bus < driver_.num_buses(); ++bus) {
+    for (const Frame& frame : driver_.frames(bus)) {
+      on_frame(frame);
+      if (wire_.to_robot == 0) {
+        ToRobot(bus, frame);
+      } else {
+        to_robot_.push_back({now_ + wire_.to_robot, bus, frame});
+      }
     }
   }
 }
 
-void VirtualBus::ToRobot(const Frame& frame) {
-  FrameBatch answers;
-  robot_.Receive(frame, utime(), answers);
+void VirtualBus::ToRobot(size_t bus, const Frame& frame) {
+  std::vector<FrameBatch> answers(driver_.num_buses());
+  robot_.Receive(bus, frame, utime(), answers);
   FromRobot(answers);
 }
 
-void VirtualBus::ToDriver(const Frame& frame) { driver_.OnFrame(frame, now_, utime()); }
+void VirtualBus::ToDriver(size_t bus, const Frame& frame) {
+  driver_.OnFrame(bus, frame, now_, utime());
+}
 
-void VirtualBus::FromRobot(const FrameBatch& batch) {
-  for (const Frame& frame : batch.frames()) {
-    on_frame(frame);
-    if (wire_.to_driver == 0) {
-      ToDriver(frame);
-    } else {
-      to_driver_.push_back({now_ + wire_.to_driver, frame});
+void VirtualBus::FromRobot(std::span<const FrameBatch> batches) {
+  for (size_t bus = 0; bus < batches.size(); ++bus) {
+    for (const Frame& frame : batches[bus].frames()) {
+      on_frame(frame);
+      if (wire_.to_driver == 0) {
+        ToDriver(bus, frame);
+      } else {
+        to_driver_.push_back({now_ + wire_.to_driver, bus, frame});
+      }
     }
   }
 }

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <span>
+#include <vector>
 
 #include "drivers/driver/driver.h"
 #include "plumb/imu_t.hpp"
@@ -13,7 +15,7 @@
 
 namespace plumb {
 
-/// A virtual robot and its driver on one bus, on a clock that nobody waits for: from event to
+/// A virtual robot and its driver on their buses, on a clock that nobody waits for: from event to
 /// event, to the microsecond. Equal calls give equal bits. Not thread-safe.
 class VirtualBus {
  public:
@@ -41,19 +43,20 @@ class VirtualBus {
   std::function<void(const imu_t&)> on_imu = [](const imu_t&) {};
   /// Called before each of the driver's cycles: what is commanded here is sent in it.
   std::function<void()> on_cycle = [] {};
-  /// Called with every frame when it is put on the bus.
+  /// Called with every frame when it is put on its bus.
   std::function<void(const Frame&)> on_frame = [](const Frame&) {};
 
  private:
   struct Flight {
     int64_t arrival;  // `now`
+    size_t bus;
     Frame frame;
   };
   void Cycle();
   void Deliver();
-  void FromRobot(const FrameBatch& batch);
-  void ToRobot(const Frame& frame);
-  void ToDriver(const Frame& frame);
+  void FromRobot(std::span<const FrameBatch> batches);
+  void ToRobot(size_t bus, const Frame& frame);
+  void ToDriver(size_t bus, const Frame& frame);
 
   const int64_t start_;
   const Wire wire_;

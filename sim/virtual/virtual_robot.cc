@@ -20,7 +20,11 @@ VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::Vec
                            int64_t now)
     : plant_(TrueRobot(description, physical)),
       devices_(VirtualDevices(description)),
-      efforts_(description) {
+      efforts_(description),
+      unsent_(description.buses.size()) {
+  for (const int joint : description.driven())
+    bus_.push_back(description.joints[static_cast<size_t>(joint)].motor.bus);
+  for (const SensorDescription& sensor : description.sensors) bus_.push_back(sensor.bus);
   std::vector<Eigen::Index> first;  // of the joints in v
   Eigen::Index next = 0;
   for (const JointDescription& joint : description.joints) {
@@ -39,18 +43,22 @@ void VirtualRobot::Boot(int64_t now) {
   for (const auto& device : devices_) device->Boot(Motion());
 }
 
-std::vector<Filter> VirtualRobot::filters() const {
+std::vector<Filter> VirtualRobot::filters(size_t bus) const {
   std::vector<Filter> all;
-  for (const auto& device : devices_) {
-    for (const Filter& filter : device->filters()) all.push_back(filter);
+  for (size_t i = 0; i < devices_.size(); ++i) {
+    if (bus_[i] != bus) continue;
+    for (const Filter& filter : devices_[i]->filters()) all.push_back(filter);
   }
   return all;
 }
 
-void VirtualRobot::Receive(const Frame& frame, int64_t arrival, FrameBatch& out) {
+void VirtualRobot::Receive(size_t bus, const Frame& frame, int64_t arrival,
+                           std::span<FrameBatch> out) {
   Advance(arrival, out);
   bool matters = false;
-  for (const auto& device : devices_) matters = device->OnFrame(frame, latest_) || matters;
+  for (size_t i = 0; i < devices_.size(); ++i) {
+    if (bus_[i] == bus) matters = devices_[i]->OnFrame(frame, latest_) || matters;
+  }
   if (!matters) return;
   MoveTo(latest_);
   Tick(out);
@@ -62,19 +70,19 @@ int64_t VirtualRobot::NextEvent() const {
   return next;
 }
 
-void VirtualRobot::Advance(int64_t now, FrameBatch& out) {
+void VirtualRobot::Advance(int64_t now, std::span<FrameBatch> out) {
   if (std::abs(now - latest_) > kLongestGap) Boot(now);
   latest_ = std::max(latest_, now);
   for (int64_t next = NextEvent(); next <= latest_; next = NextEvent()) {
     MoveTo(next);
-    unsent_.Clear();
+    for (FrameBatch& unsent : unsent_) unsent.Clear();
     Tick(latest_ - next > kLatest ? unsent_ : out);
   }
 }
 
-void VirtualRobot::Tick(FrameBatch& out) {
+void VirtualRobot::Tick(std::span<FrameBatch> out) {
   for (size_t i = 0; i < devices_.size(); ++i) {
-    devices_[i]->Tick(Motion(), out);
+    devices_[i]->Tick(Motion(), out[bus_[i]]);
     if (effort_index_[i] >= 0) efforts_.Make(effort_index_[i], devices_[i]->Effort(), time_);
   }
 }

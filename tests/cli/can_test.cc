@@ -31,6 +31,30 @@ TEST_CASE("can plan: the hopper's bus, and one that cannot work") {
       Catch::Contains("error: CAN id 0x021: 'thigh' sends Heartbeat and 'imu' sends Quaternion"));
 }
 
+TEST_CASE("of a robot with two buses each has its plan and its DBC file") {
+  const std::string robot = Robot("hopper/two_buses.toml");
+  const Outcome plan = Shell(Plumb() + "can plan " + robot);
+  INFO(plan.text);
+  CHECK(plan.status == 0);
+  const size_t boom = plan.text.find("\nhopper, bus boom, on udp:239.74.163.2:43114\n");
+  REQUIRE(boom != std::string::npos);
+  const std::string first = plan.text.substr(0, boom), second = plan.text.substr(boom);
+  CHECK_THAT(first, Catch::StartsWith("hopper, bus leg, on udp:239.74.163.2:43113\n") &&
+                        Catch::Contains("Set_Input_Torque") && !Catch::Contains("TPDO1") &&
+                        Catch::Contains("all deadlines are met"));
+  CHECK_THAT(second, Catch::Contains("TPDO1") && !Catch::Contains("Set_Input_Torque") &&
+                         Catch::Contains("all deadlines are met"));
+
+  const Outcome dbc = Shell(Plumb() + "can dbc " + robot + " --bus boom");
+  CHECK(dbc.status == 0);
+  CHECK_THAT(dbc.text, Catch::Contains("boom_yaw_TPDO1") && !Catch::Contains("thigh"));
+  for (const char* bus : {"", " --bus lge"}) {
+    const Outcome refused = Shell(Plumb() + "can dbc " + robot + bus);
+    CHECK(refused.status == 1);
+    CHECK_THAT(refused.text, Catch::Contains("is none of the robot's: leg=udp:"));
+  }
+}
+
 TEST_CASE("can dbc: to the screen or a file, the same") {
   const TemporaryFolder folder;
   const Outcome printed = Shell(Plumb() + "can dbc " + Robot("hopper"));

@@ -13,7 +13,8 @@ namespace plumb {
 namespace {
 
 TEST_CASE("what is bad comes with its cure, and a bus that cannot be opened is bad") {
-  const auto findings = Examine("udpm://239.255.76.67:17655?ttl=0", "socketcan:can77");
+  const auto findings =
+      Examine("udpm://239.255.76.67:17655?ttl=0", {"loop:doctor_test", "socketcan:can77"});
   CHECK(findings.size() >= 8);
   const auto bad = std::find_if(findings.begin(), findings.end(), [](const Finding& f) {
     return f.level == Finding::Level::kBad && (f.what + f.cure).find("can77") != std::string::npos;
@@ -30,7 +31,7 @@ TEST_CASE("what is bad comes with its cure, and a bus that cannot be opened is b
 }
 
 TEST_CASE("an LCM address that cannot be opened is bad") {
-  const auto findings = Examine("nonsense://", "loop:doctor_test");
+  const auto findings = Examine("nonsense://", {"loop:doctor_test"});
   CHECK(findings[0].level == Finding::Level::kBad);
   CHECK_THAT(findings[0].what, Catch::Contains("nonsense://"));
   CHECK(std::any_of(findings.begin(), findings.end(), [](const Finding& f) {
@@ -39,7 +40,7 @@ TEST_CASE("an LCM address that cannot be opened is bad") {
 }
 
 Finding Signatures(const std::string& lcm_url, const std::string& key = {}) {
-  for (const Finding& finding : Examine(lcm_url, "loop:doctor_signatures", key)) {
+  for (const Finding& finding : Examine(lcm_url, {"loop:doctor_signatures"}, key)) {
     if ((finding.what + finding.cure).find("sign") != std::string::npos ||
         finding.what.find("key") != std::string::npos)
       return finding;

@@ -224,7 +224,7 @@ TEST_CASE("who does not read misses the oldest states, none of the rest, and hol
   CHECK(dropped > 0);
   stand.looker.Take();
   CHECK(stand.looker.heard.size() == static_cast<size_t>(messages + 1 - dropped));
-  CHECK(stand.looker.heard[0].json.contains("bus_up"));  // the driver's status is still there
+  CHECK(stand.looker.heard[0].json.contains("num_buses"));  // the driver's status is still there
   CHECK(stand.looker.heard.back().json["sequence"] == messages - 1);
 }
 

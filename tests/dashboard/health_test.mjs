@@ -13,7 +13,6 @@ const rows = (page, selector) => page.locator(selector).evaluateAll((all) => all
 const agesOf = async (page, processes) => ages(await Promise.all(processes.map((name) => page.locator(`[data-process=${name}] .age`).innerText())));
 
 test("of every channel all that was counted is shown", visit({}, {}, async ({ page, mock }) => {
-  await page.locator("[data-channel]").first().waitFor();
   const shown = await rows(page, "[data-channel]");
   const said = mock.saidOfChannels.find((all) => all[0].count === shown[0][2]);
   assert.deepEqual(shown.map((row) => row.slice(0, 8)), said.map((one) => [one.channel, one.type, one.count, one.rate, one.jitter_ms, one.bytes_per_second, one.undecodable, one.refused]));
@@ -26,7 +25,6 @@ test("of every channel all that was counted is shown", visit({}, {}, async ({ pa
 
 const OLD = { driver: 2, estimator: 150, controller: 1000, calibrator: 7200, trainer: 400 }; // [s]
 test("how old each process's last word is, the gateway says", visit({ silent: true, ages: Object.fromEntries(Object.entries(OLD).map(([name, old]) => [STATUS[name], 1000 * old])) }, {}, async ({ page, mock, story }) => {
-  await page.locator("[data-channel]").first().waitFor();
   const asked = Date.now(), shown = await agesOf(page, Object.keys(OLD));
   const passed = (Date.now() - mock.begun) / 1000;
   Object.entries(OLD).forEach(([name, old], i) => {
@@ -42,7 +40,6 @@ test("how old each process's last word is, the gateway says", visit({ silent: tr
 }));
 
 test("a process that falls silent grows old", visit({}, {}, async ({ page, story }) => {
-  await page.locator("[data-channel]").first().waitFor();
   await page.waitForFunction(() => /^(now|[\d.]+ ms)$/.test(document.querySelector("[data-process=driver] .age").textContent));
   const before = Date.now();
   story.silent = true;
@@ -53,7 +50,6 @@ test("a process that falls silent grows old", visit({}, {}, async ({ page, story
 }));
 
 test("of every process is shown what it says, how regularly it works and what it has counted", visit({}, {}, async ({ page, mock }) => {
-  await page.locator("[data-channel]").first().waitFor();
   const words = await page.locator("#processes tr[data-process]").evaluateAll((all) => all.map((row) => [row.dataset.process, row.cells[2].textContent, row.cells[3].textContent]));
   assert.deepEqual(words, [["driver", "idle", "12.5"], ["estimator", "the state is valid", "10"], ["controller", "running", "8.33"], ["calibrator", "iteration 6", "7.14"], ["trainer", "policy 6, complete", "6.25"], ["gateway", "1 browser, 0 messages left out for slow ones", "–"]]);
   const shown = await numbers(page, "processes");
@@ -76,13 +72,22 @@ test("of every process is shown what it says, how regularly it works and what it
   assert.deepEqual(await page.locator("#counted .bad dd").evaluateAll((all) => all.map((one) => one.dataset.counter)), ["refused", "outages", "episodes_aborted", "dropped_not_finite"]);
 }));
 
-test("a bus that is down says why, and who may command", visit({ driver: { state: 4, reason: "the CAN controller went bus-off", bus_up: false, commands_signed: true, frames_foreign: 6 } }, {}, async ({ page }) => {
+const BUS = { name: "", url: "socketcan:can0", up: true, frames_received: 700, frames_sent: 350, frames_rejected: 0, frames_dropped: 0, frames_foreign: 0 };
+test("a bus that is down says why, and who may command", visit({ driver: { state: 4, reason: "the CAN controller went bus-off", buses: [{ ...BUS, up: false, frames_foreign: 6 }], commands_signed: true } }, {}, async ({ page }) => {
   const line = page.locator("#bus p.line").first();
   await line.filter({ hasText: "down" }).waitFor();
   assert.equal(await line.innerText(), "socketcan:can0 is down: the CAN controller went bus-off");
   assert.equal(await page.locator("#bus .lamp.bad").count(), 1);
   await page.locator("#bus").getByText("Only commands that are signed with its key are obeyed.").waitFor();
-  assert.deepEqual(await page.locator("#bus .counters .bad dd").evaluateAll((all) => all.map((one) => one.dataset.counter)), ["overruns", "frames_foreign", "measurements_lost"]);
+  assert.deepEqual(await page.locator("#bus .counters .bad dd").evaluateAll((all) => all.map((one) => one.dataset.counter)), ["frames_foreign", "overruns", "measurements_lost"]);
   await page.locator("#events").getByText("fault: the CAN controller went bus-off").waitFor();
   await page.locator("#events").getByText("the bus is down").waitFor();
+}));
+
+const TWO = ["left", "right"].map((name, i) => ({ ...BUS, name, url: `socketcan:can${i}`, up: name === "left", frames_sent: 350 + i }));
+test("of several buses each has its line and its counts", visit({ driver: { state: 4, reason: "bus right: the CAN interface is down", num_buses: 2, buses: TWO } }, {}, async ({ page }) => {
+  await page.locator("#bus p.line").filter({ hasText: "down" }).waitFor();
+  assert.deepEqual(await page.locator("#bus [data-bus] p.line").allInnerTexts(), ["left: socketcan:can0 is up", "right: socketcan:can1 is down: bus right: the CAN interface is down"]);
+  assert.deepEqual(await Promise.all(TWO.map(({ url }) => value(page.locator(`[data-bus="${url}"] [data-counter=frames_sent]`)))), [350, 351]);
+  await page.locator("#events").getByText("bus right is down").waitFor();
 }));

@@ -3,9 +3,11 @@
 // time. Whatever happens: no torque unless the robot is armed, the command and the measurements are
 // fresh, and limits are kept; and once nothing is wrong any more it can be armed again.
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "drivers/driver/driver.h"
@@ -76,7 +78,7 @@ class DriverGame {
         break;
       case 8:
         link_ = bytes_.Pick(std::array{LinkState::kUp, LinkState::kDown, LinkState::kGone});
-        driver_.OnLink(link_);
+        driver_.OnLink(0, link_);
         break;
       case 9:
         accepted_ = bytes_.Byte() % 16;
@@ -151,12 +153,12 @@ class DriverGame {
       q_[i] = map.JointPosition((*values)[0] * kTurn);
       v_[i] = map.JointVelocity((*values)[1] * kTurn);
     }
-    driver_.OnFrame(frame, now_, utime());
+    driver_.OnFrame(0, frame, now_, utime());
   }
 
   void Tick() {
-    const auto given = driver_.Tick(now_, utime(), 0);
-    const std::vector<Frame> frames(given.begin(), given.end());
+    driver_.Tick(now_, utime(), 0);
+    const std::span<const Frame> frames = driver_.frames(0);
     for (const Frame& frame : frames) {
       Require(IsWellFormed(frame) && !frame.foreign && !frame.error && !frame.extended);
       for (size_t i = 0; i < kMotors; ++i) {
@@ -167,7 +169,7 @@ class DriverGame {
       }
     }
     const size_t taken = std::min(accepted_, frames.size());
-    driver_.Transmitted(static_cast<int>(taken), utime());
+    driver_.Transmitted(std::array{static_cast<int>(taken)}, utime());
     for (size_t k = 0; k < taken; ++k) {
       wire_.Carry(frames[k], [this](const Frame& frame) {
         for (CanSimpleDevice& drive : drives_) drive.OnFrame(frame, now_);
@@ -270,7 +272,7 @@ class DriverGame {
   void ComeToRest() {
     wire_.Mend();
     accepted_ = FrameBatch::kCapacity;
-    driver_.OnLink(link_ = LinkState::kUp);
+    driver_.OnLink(0, link_ = LinkState::kUp);
     ToDriver({.id = 0x100, .error = true, .length = 8});  // the controller has been restarted
     position_ = velocity_ = {};
     effort_ = 0;

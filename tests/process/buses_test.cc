@@ -70,7 +70,7 @@ TEST_CASE("with a recording for a bus the driver plays it and refuses to arm") {
   REQUIRE(stage.WaitUntil([&] { return stage.drivers.received() > 5; }, 10));
   CHECK_FALSE(stage.Arm(2));
   CHECK_THAT(stage.drivers.newest().reason, Contains("ARM refused") && Contains("recording"));
-  CHECK(stage.drivers.newest().frames_received > 100);
+  CHECK(stage.drivers.newest().buses[0].frames_received > 100);
   CHECK(stage.drivers.newest().state != driver_status_t::ARMED);
 }
 

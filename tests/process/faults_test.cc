@@ -138,7 +138,7 @@ TEST_CASE("garbage on the bus") {
   Stage stage(6);
   stage.RunWithTorque();
   Random random(1);
-  const int64_t rejected = stage.drivers.newest().frames_rejected;
+  const int64_t rejected = stage.drivers.newest().buses[0].frames_rejected;
   const auto send = [&](const Frame& frame) { stage.bus->Send({&frame, 1}); };
   // Short and not-a-number encoder frames of the very drive, and random frames; not what is
   // well-formed and means something (a real heartbeat of the drive's own id would be a second
@@ -162,7 +162,7 @@ TEST_CASE("garbage on the bus") {
   }
   stage.Listen(0.5);
   CHECK(stage.drivers.newest().state == driver_status_t::ARMED);
-  CHECK(stage.drivers.newest().frames_rejected >= rejected + 100);
+  CHECK(stage.drivers.newest().buses[0].frames_rejected >= rejected + 100);
   CHECK(stage.children.at("plumb-driver")->running());
   CHECK(stage.children.at("plumb-robot")->running());
   CHECK(std::isfinite(stage.states.newest().q[0]));

@@ -76,7 +76,7 @@ TEST_CASE("a bus that is taken down: fault with a reason, and back only by armin
   REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
   INFO(stage.drivers.newest().reason);
   CHECK_THAT(stage.drivers.newest().reason, Catch::Contains("interface is down"));
-  CHECK_FALSE(stage.drivers.newest().bus_up);
+  CHECK_FALSE(stage.drivers.newest().buses[0].up);
   REQUIRE(std::system("ip link set vcan0 up") == 0);
   // The drive's watchdog has disarmed it meanwhile; nothing that was queued comes out now.
   stage.torque = 0;

@@ -194,7 +194,17 @@ void Stage::RunWithTorque() {
   REQUIRE(moving);
 }
 
+void Stage::Hear(const std::string& url, std::function<void(const Frame&)> frame) {
+  ears_.push_back({OpenTransport(url, {}, {coordinator ? &coordinator->participant() : nullptr, 0}),
+                   std::move(frame)});
+}
+
 void Stage::Witness() {
+  for (const Ear& ear : ears_) {
+    std::array<Frame, 64> heard;
+    for (int n; (n = ear.bus->Receive(heard)) > 0;)
+      std::ranges::for_each(std::span(heard).first(static_cast<size_t>(n)), ear.on_frame);
+  }
   // Independent of the driver's own tables: node 1's Set_Input_Torque is 0x02E, its Heartbeat
   // 0x021.
   std::array<Frame, 64> frames_now;

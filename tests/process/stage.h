@@ -101,6 +101,8 @@ class Stage {
   std::map<uint32_t, int64_t> frames_by_id;  ///< standard data frames
   /// Called with every frame.
   std::function<void(const Frame&)> on_frame = [](const Frame&) {};
+  /// Another bus, to whose frames the witness listens, too: calls `frame` with every one.
+  void Hear(const std::string& url, std::function<void(const Frame&)> frame);
 
   std::string lcm_url, bus_url, robot_folder;
   RobotDescription robot;
@@ -126,6 +128,12 @@ class Stage {
  private:
   void Witness();
 
+  struct Ear {
+    std::unique_ptr<Transport> bus;
+    std::function<void(const Frame&)> on_frame;
+  };
+
+  std::vector<Ear> ears_;
   std::vector<std::string> key_arguments_;
   Publisher<driver_request_t> requests_;
   Publisher<policy_t> policies_;

@@ -111,8 +111,8 @@ TEST_CASE("a foreign witness sees every frame of a run") {
   std::vector<std::string> frames = seen();
   CHECK(frames.size() == said.size());
   CHECK(frames == said);
-  CHECK(static_cast<int64_t>(sent_by_driver.size()) == stage.drivers.newest().frames_sent);
-  CHECK(stage.drivers.newest().frames_dropped == 0);
+  CHECK(static_cast<int64_t>(sent_by_driver.size()) == stage.drivers.newest().buses[0].frames_sent);
+  CHECK(stage.drivers.newest().buses[0].frames_dropped == 0);
   size_t recorded = 0;
   for (const auto& file : fs::directory_iterator(stage.folder / "faults")) {
     const std::vector<std::string> record =

@@ -23,14 +23,15 @@ std::string Robots() { return std::string(std::getenv("PLUMBLINE_SOURCE")) + "/r
 TEST_CASE("a log's folder has the robot, whatever its file extends, to the last number") {
   const TemporaryFolder folder;
   const std::string log = folder / "run.lcmlog";
-  const std::string file = GENERATE("pendulum", "pendulum/worn_weak.toml", "hopper",
-                                    "hopper/mit.toml", "cartpole/balance.toml");
+  const std::string file =
+      GENERATE("pendulum", "pendulum/worn_weak.toml", "hopper", "hopper/mit.toml",
+               "hopper/two_buses.toml", "cartpole/balance.toml");
   INFO(file);
   const RecordFolder record(log, {"plumb 1", "plumb record", "", "real", Robots() + file});
   const RobotDescription was = LoadRobot(Robots() + file), is = LoadRobot(log + ".d");
   CHECK(is.name == was.name);
   CHECK(PhysicsFingerprint(is) == PhysicsFingerprint(was));
-  CHECK(is.bus_url == was.bus_url);
+  CHECK(UrlsOf(is.buses) == UrlsOf(was.buses));
   CHECK(is.warnings.size() == was.warnings.size());
   const Gaussian prior_is = PriorGaussian(is), prior_was = PriorGaussian(was);
   CHECK(prior_is.mean == prior_was.mean);

@@ -226,7 +226,7 @@ TEST_CASE("moteus: a greatest torque, and a bus that carries CAN FD") {
   CHECK(motor.moteus->watchdog == 0.1);
   CHECK(NeedsFd(motor));
   CHECK_FALSE(NeedsFd(robot.joints[9].motor));
-  CHECK(robot.bus_data_bit_rate == 5e6);
+  CHECK(robot.buses[0].data_bit_rate == 5e6);
   CHECK(load(moteus + "watchdog = 0.05\n").joints[3].motor.moteus->watchdog == 0.05);
 
   const auto refused = [&](const std::string& from, const std::string& to,
@@ -280,10 +280,11 @@ TEST_CASE("an encoder on a joint with a motor may differ from it by a tolerance"
 }
 
 TEST_CASE("the bus has a bit rate, and drives a telemetry period") {
-  CHECK(Load(kZooToml).bus_bit_rate == 1e6);
+  CHECK(Load(kZooToml).buses[0].bit_rate == 1e6);
   CHECK(Load(kZooToml).driver.telemetry == 0.1);
   CHECK(Load(Replaced(kZooToml, "[driver]", "bit_rate = 500000\n[driver]\ntelemetry = 0.02"))
-            .bus_bit_rate == 5e5);
+            .buses[0]
+            .bit_rate == 5e5);
   CHECK_THROWS_WITH(Load(Replaced(kZooToml, "[driver]", "bit_rate = 2e6\n[driver]")),
                     Contains("bit_rate"));
 }

@@ -23,7 +23,10 @@ function driver(now: driver_status_t, before: driver_status_t | null): Said[] {
     const weight = now.state === driver_status_t.FAULT ? "bad" : now.state === driver_status_t.ARMED ? "good" : "note";
     said.push([`${DRIVER_STATES[now.state] ?? now.state}${because(now.reason)}`, weight]);
   }
-  if (before && now.bus_up !== before.bus_up) said.push(now.bus_up ? ["the bus is up", "good"] : ["the bus is down", "bad"]);
+  now.buses.forEach(({ name, up }, i) => {
+    const was = before?.buses[i];
+    if (was && up !== was.up) said.push([`${name ? `bus ${name}` : "the bus"} is ${up ? "up" : "down"}`, up ? "good" : "bad"]);
+  });
   now.sensor_name.forEach((name, i) => {
     if (before && now.sensor_state[i] !== before.sensor_state[i] && now.sensor_reason[i]) said.push([`${name}: ${now.sensor_reason[i]}`, "bad"]);
   });

@@ -1,5 +1,16 @@
 // Made by tools/messages.mjs from lcmtypes/: units and meanings are in docs/messages.md.
 
+export interface bus_status_t {
+  name: string;
+  url: string;
+  up: boolean;
+  frames_received: number;
+  frames_sent: number;
+  frames_rejected: number;
+  frames_dropped: number;
+  frames_foreign: number;
+}
+
 export interface calibration_status_t {
   utime: number;
   iteration: number;
@@ -75,7 +86,8 @@ export interface driver_status_t {
   answered: number;
   robot: string;
   bus: string;
-  bus_up: boolean;
+  num_buses: number;
+  buses: bus_status_t[];
   num_joints: number;
   joint_name: string[];
   joint_state: number[];
@@ -87,11 +99,6 @@ export interface driver_status_t {
   sensor_name: string[];
   sensor_state: number[];
   sensor_reason: string[];
-  frames_received: number;
-  frames_sent: number;
-  frames_rejected: number;
-  frames_dropped: number;
-  frames_foreign: number;
   measurements_lost: number;
   commands_accepted: number;
   commands_rejected: number;

@@ -218,14 +218,16 @@ TEST_CASE("slower buses are fuller") {
 TEST_CASE("the robots we ship fit their buses") {
   const char* source = std::getenv("PLUMBLINE_SOURCE");
   for (const char* name : {"pendulum", "pendulum/moteus.toml", "pendulum/rmd.toml",
-                           "double_pendulum", "cartpole", "hopper"}) {
+                           "double_pendulum", "cartpole", "hopper", "hopper/two_buses.toml"}) {
     INFO(name);
     const RobotDescription robot =
         LoadRobot(std::string(source ? source : ".") + "/robots/" + name);
-    const BusPlan plan = PlanBus(BusDevices(robot), robot.bus_bit_rate, robot.bus_data_bit_rate);
-    INFO(ToText(plan));
-    CHECK(plan.errors.empty());
-    CHECK(plan.warnings.empty());
+    for (size_t bus = 0; bus < robot.buses.size(); ++bus) {
+      const BusPlan plan = PlanBus(robot, bus);
+      INFO(ToText(plan));
+      CHECK(plan.errors.empty());
+      CHECK(plan.warnings.empty());
+    }
   }
   CHECK_THROWS_AS(MotorBusDevice(MotorDescription{"nonsense"}, DriverSettings{}),
                   std::invalid_argument);

@@ -59,7 +59,7 @@ std::vector<BusDevice> Menagerie() {
   sensor("yaw", "cia406");
   sensor("pitch", "cia406");
   sensor("imu", "xsens");
-  return BusDevices(robot);
+  return BusDevices(robot, 0);
 }
 
 struct Sent {
@@ -156,7 +156,7 @@ TEST_CASE("canmatrix decodes every message of every protocol as we do") {
 }
 
 TEST_CASE("canmatrix decodes every message of the hopper as we do") {
-  CheckDecodes(BusDevices(LoadRobot(Source() + "/robots/hopper")));
+  CheckDecodes(BusDevices(LoadRobot(Source() + "/robots/hopper"), 0));
 }
 
 TEST_CASE("messages of one device and one id are told apart by their first field") {

@@ -110,7 +110,7 @@ TEST_CASE("many joints arm with few frames in each cycle") {
     return static_cast<int>(std::min(frames.size(), most));
   };
   bool wrong = false;
-  rig.robot.bus_bit_rate = 1e7;  // more than one bus of 1 Mbit/s carries
+  rig.robot.buses[0].bit_rate = 1e7;  // more than one bus of 1 Mbit/s carries
   rig.Start();
   Watch(rig, wrong);
   CHECK(rig.Arm(1));

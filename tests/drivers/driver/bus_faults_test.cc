@@ -82,16 +82,16 @@ TEST_CASE("fault 7: the transmit queue is full", "[fault]") {
 TEST_CASE("fault 7: the transmit queue is full now and then", "[fault]") {
   ExpectToRunOn({.number = "7",
                  .name = "the transmit queue is full now and then",
-                 .detection = "DRIVER_STATUS.frames_dropped: what was refused is never sent later",
+                 .detection = "bus_status_t.frames_dropped: what was refused is never sent later",
                  .happens = [](BusRig& rig) { rig.Connect("tx.full=0.1"); },
-                 .is_over = [](BusRig& rig) { CHECK(rig.Status().frames_dropped > 0); },
+                 .is_over = [](BusRig& rig) { CHECK(rig.Status().buses[0].frames_dropped > 0); },
                  .within = 50});
 }
 
 TEST_CASE("fault 8: frames come faster than they are read", "[fault]") {
   ExpectToRunOn({.number = "8",
                  .name = "frames are lost as they were not read in time",
-                 .detection = "DRIVER_STATUS.frames_dropped, measurements_lost",
+                 .detection = "bus_status_t.frames_dropped, DRIVER_STATUS.measurements_lost",
                  .happens =
                      [](BusRig& rig) {
                        rig.driver_stopped = true;
@@ -101,7 +101,7 @@ TEST_CASE("fault 8: frames come faster than they are read", "[fault]") {
                        }
                        rig.driver_stopped = false;
                      },
-                 .is_over = [](BusRig& rig) { CHECK(rig.Status().frames_dropped > 1000); },
+                 .is_over = [](BusRig& rig) { CHECK(rig.Status().buses[0].frames_dropped > 1000); },
                  .within = 40});
 }
 
@@ -145,7 +145,7 @@ TEST_CASE("fault 10: frames that are not what they look like", "[fault]") {
   ExpectToRunOn(
       {.number = "10",
        .name = "frames too short, not a number, remote, 29-bit, FD, unknown, of other nodes",
-       .detection = "DRIVER_STATUS.frames_rejected",
+       .detection = "bus_status_t.frames_rejected",
        .happens =
            [](BusRig& rig) {
              rig.each_millisecond.push_back([&rig] {
@@ -161,7 +161,7 @@ TEST_CASE("fault 10: frames that are not what they look like", "[fault]") {
                if (rig.now % 20'000 == 0) rig.StrangerSends("029#R8");
              });
            },
-       .is_over = [](BusRig& rig) { CHECK(rig.Status().frames_rejected > 1000); },
+       .is_over = [](BusRig& rig) { CHECK(rig.Status().buses[0].frames_rejected > 1000); },
        .within = 5});
 }
 

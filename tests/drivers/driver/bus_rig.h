@@ -52,7 +52,7 @@ struct BusRig : Rig {
   /// From now on the driver has the bus with these faults (see faulty.h); "": with none.
   void Connect(const std::string& faults) {
     const std::string url = faults.empty() ? kBus : fmt::format("faulty:{}:{}", faults, kBus);
-    drivers_end_ = OpenTransport(url, driver->filters());
+    drivers_end_ = OpenTransport(url, driver->filters(0));
     drivers_end_->SetTime(now);
   }
   /// The driver's process stands still.
@@ -68,7 +68,7 @@ struct BusRig : Rig {
   }
   /// The driver's own controller says something: an error frame, which is on nobody's bus.
   void ControllerSays(const std::string& text) {
-    driver->OnFrame(FrameFromText(text).value(), now, utime());
+    driver->OnFrame(0, FrameFromText(text).value(), now, utime());
   }
   const driver_status_t& Status() {
     stats = drivers_end_->stats();
@@ -93,10 +93,11 @@ struct BusRig : Rig {
     std::array<Frame, 64> frames;
     for (int burst = 0; burst < kBursts && !cut_off; ++burst) {
       const int count = drivers_end_->Receive(frames);
-      for (int i = 0; i < count; ++i) driver->OnFrame(frames[static_cast<size_t>(i)], now, utime());
+      for (int i = 0; i < count; ++i)
+        driver->OnFrame(0, frames[static_cast<size_t>(i)], now, utime());
       if (count <= 0) break;
     }
-    driver->OnLink(link);
+    driver->OnLink(0, link);
   }
 
   void DeliverToDrives() {

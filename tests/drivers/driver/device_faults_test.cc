@@ -80,8 +80,8 @@ TEST_CASE(
   rig.Run(10);
   rig.driver_stopped = false;
   SECTION("the link") {
-    rig.driver->OnLink(LinkState::kDown);
-    rig.driver->OnLink(LinkState::kUp);
+    rig.driver->OnLink(0, LinkState::kDown);
+    rig.driver->OnLink(0, LinkState::kUp);
   }
   SECTION("the controller") {
     rig.ControllerSays("20000040#0000000000000000");

@@ -76,15 +76,16 @@ TEST_CASE("a thousand cycles with commands, faults and re-arming allocate nothin
     const long before = allocations;
     while (const int count = driver_end->Receive(frames)) {
       for (int i = 0; i < count; ++i)
-        rig.driver->OnFrame(frames[static_cast<size_t>(i)], rig.now, rig.utime());
+        rig.driver->OnFrame(0, frames[static_cast<size_t>(i)], rig.now, rig.utime());
     }
-    if (cycle % 100 == 50) rig.driver->OnFrame(event, rig.now, rig.utime());
+    if (cycle % 100 == 50) rig.driver->OnFrame(0, event, rig.now, rig.utime());
     while (rig.driver->NextState()) ++states;
-    rig.driver->OnLink(driver_end->link());
+    rig.driver->OnLink(0, driver_end->link());
     rig.driver->OnCommand(command, rig.now, rig.utime());
     if (cycle % 100 == 80) rig.driver->OnRequest(arm, rig.now, rig.utime());
-    const auto out = rig.driver->Tick(rig.now, rig.utime(), 10);
-    rig.driver->Transmitted(driver_end->Send(out), rig.utime());
+    rig.driver->Tick(rig.now, rig.utime(), 10);
+    const int accepted = driver_end->Send(rig.driver->frames(0));
+    rig.driver->Transmitted({&accepted, 1}, rig.utime());
     counted += allocations - before;
 
     faults += rig.driver->state() == DriveState::kFault;

@@ -70,7 +70,7 @@ TEST_CASE("an encoder that cannot be right stops the robot") {
       FrameBatch batch;
       second.Tick(rig.now, rig.samples[1], batch);
       for (const Frame& frame : batch.frames()) {
-        if (frame.id == 0x49) rig.driver->OnFrame(frame, rig.now, rig.utime());
+        if (frame.id == 0x49) rig.driver->OnFrame(0, frame, rig.now, rig.utime());
       }
     };
     CheckStops(rig, 1000, "knee1: 151 encoder estimates in 37");
@@ -191,7 +191,7 @@ TEST_CASE("two encoders of one joint must agree") {
     rig.samples[0].position += 0.5e-3 / kTurn;
     FrameBatch batch;
     encoder.Tick(rig.now, rig.samples[0].position * kTurn + slip, batch);
-    for (const Frame& frame : batch.frames()) rig.driver->OnFrame(frame, rig.now, rig.utime());
+    for (const Frame& frame : batch.frames()) rig.driver->OnFrame(0, frame, rig.now, rig.utime());
   };
   rig.to_drive = [&](Frame& frame) {
     encoder.OnFrame(frame, rig.now);

@@ -195,11 +195,11 @@ TEST_CASE("the bus fails and comes back, the robot does not by itself") {
   rig.Run(20);
   const char* expected = "";
   SECTION("link down") {
-    rig.driver->OnLink(LinkState::kDown);
+    rig.driver->OnLink(0, LinkState::kDown);
     expected = "the CAN interface is down";
   }
   SECTION("interface removed") {
-    rig.driver->OnLink(LinkState::kGone);
+    rig.driver->OnLink(0, LinkState::kGone);
     expected = "the CAN interface is gone";
   }
   SECTION("bus-off") {
@@ -210,10 +210,10 @@ TEST_CASE("the bus fails and comes back, the robot does not by itself") {
   CHECK(rig.Reason() == expected);
   rig.Run(5);
   CHECK(rig.Sent() == std::vector<std::string>{"02E#00000000", "027#0100000000000000"});
-  rig.driver->OnLink(LinkState::kUp);
+  rig.driver->OnLink(0, LinkState::kUp);
   rig.Inject("20000100#0000000000000000");
   rig.Run(500);
-  CHECK(rig.Status().bus_up);
+  CHECK(rig.Status().buses[0].up);
   CHECK(rig.driver->state() == DriveState::kFault);
   CHECK(rig.drives[0].Torque() == 0);
   CHECK(rig.Arm());
@@ -256,7 +256,7 @@ TEST_CASE("frames that only look like ours are not") {
   REQUIRE(rig.Arm(1));
   rig.Run(20);
   const size_t states = rig.states.size();
-  const int64_t rejected = rig.Status().frames_rejected;
+  const int64_t rejected = rig.Status().buses[0].frames_rejected;
   for (const char* text : {"029#R8", "00000029#0000803F0000803F", "029##00000803F0000803F",
                            "20000001#0000000001000000", "021#R", "00000021#0000000001000000",
                            "021##00000000001000000"}) {
@@ -264,13 +264,13 @@ TEST_CASE("frames that only look like ours are not") {
   }
   while (rig.driver->NextState()) FAIL("a state from frames that are not ours");
   CHECK(rig.driver->state() == DriveState::kArmed);
-  CHECK(rig.Status().frames_rejected == rejected + 6);  // error frames are no frames
+  CHECK(rig.Status().buses[0].frames_rejected == rejected + 6);  // error frames are no frames
   for (const char* text : {"029#000080BE", "029#0000C07F00006040", "029#00008040000080FF",
                            "021#000000000800", "03F#", "029#"}) {
     rig.Inject(text);
   }
   while (rig.driver->NextState()) FAIL("a state from malformed frames");
-  CHECK(rig.Status().frames_rejected == rejected + 12);
+  CHECK(rig.Status().buses[0].frames_rejected == rejected + 12);
   rig.Run(100);
   CHECK(rig.driver->state() == DriveState::kArmed);
   CHECK(rig.states.size() == states + 20);

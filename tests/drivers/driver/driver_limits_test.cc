@@ -98,7 +98,7 @@ TEST_CASE("without a command") {
     }
     SECTION("a request and a fault end it at once") {
       SECTION("request") { rig.Request(driver_request_t::DISARM); }
-      SECTION("fault") { rig.driver->OnLink(LinkState::kDown); }
+      SECTION("fault") { rig.driver->OnLink(0, LinkState::kDown); }
       rig.Run(5);
       CHECK(rig.drives[0].Torque() == 0);
       CHECK_FALSE(rig.drives[0].armed());

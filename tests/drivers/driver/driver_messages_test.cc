@@ -167,10 +167,10 @@ TEST_CASE("the status message counts") {
   const driver_status_t& status = rig.Status();
   CHECK(status.state == driver_status_t::IDLE);
   CHECK(status.joint_name == std::vector<std::string>{"pivot"});
-  CHECK(status.frames_sent == 70);
-  CHECK(status.frames_dropped == 8);
-  CHECK(status.frames_rejected == 4);
-  CHECK(status.frames_received == 11 + 2);  // estimates, heartbeats
+  CHECK(status.buses[0].frames_sent == 70);
+  CHECK(status.buses[0].frames_dropped == 8);
+  CHECK(status.buses[0].frames_rejected == 4);
+  CHECK(status.buses[0].frames_received == 11 + 2);  // estimates, heartbeats
   CHECK(status.cycles == 11);
   CHECK(status.overruns == 1);
   CHECK(status.num_bins == static_cast<int32_t>(status.lateness.size()));

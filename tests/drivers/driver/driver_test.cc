@@ -238,11 +238,11 @@ TEST_CASE("ARM is refused while something is missing, and says what") {
   rig.Request(driver_request_t::ARM);
   CHECK_THAT(rig.Reason(), Equals("ARM refused (2 times): knee1: no encoder estimates"));
   encoder = true;
-  rig.driver->OnLink(LinkState::kDown);
+  rig.driver->OnLink(0, LinkState::kDown);
   rig.Run(10);
   rig.Request(driver_request_t::ARM);
   CHECK_THAT(rig.Reason(), Contains("interface is not up"));
-  rig.driver->OnLink(LinkState::kUp);
+  rig.driver->OnLink(0, LinkState::kUp);
   CHECK(rig.Arm());
   CHECK(rig.drives[1].armed());
 }

@@ -25,7 +25,7 @@ TEST_CASE("what was on the bus before a fault is written as candump writes, olde
   std::string written, error;
   {
     FlightRecorder recorder(
-        folder.path() / "new", "udp:239.74.163.2:43113", 4,
+        folder.path() / "new", {.url = "udp:239.74.163.2:43113"}, 4,
         [&](const std::string& file, const std::string& what) { written = file, error = what; });
     for (int i = 0; i < 6; ++i) recorder.Record(Text("02E#0000C03F00000000"), true, 1'000'000 + i);
     recorder.Record(Text("029#R8"), false, 1'500'000);
@@ -44,7 +44,7 @@ TEST_CASE("each dump begins anew, and one at a time") {
   const TemporaryFolder folder;
   int reports = 0, dumps = 0;
   {
-    FlightRecorder recorder(folder.path(), "can0", 20000,
+    FlightRecorder recorder(folder.path(), {.url = "can0"}, 20000,
                             [&](const std::string&, const std::string&) { ++reports; });
     for (int round = 0; round < 20; ++round) {
       for (int i = 0; i < 5000; ++i)
@@ -64,16 +64,16 @@ TEST_CASE("each dump begins anew, and one at a time") {
 }
 
 TEST_CASE("without a folder nothing is recorded, and one that cannot be is an error") {
-  FlightRecorder recorder({}, "can0", 100, {});
+  FlightRecorder recorder({}, {.url = "can0"}, 100, {});
   recorder.Record(Text("181#40E20100"), false, 1);
   CHECK_FALSE(recorder.Dump(0, 2, "reason"));
   const TemporaryFolder folder;
   std::ofstream(folder.path() / "file") << "x";
-  CHECK_THROWS_AS(FlightRecorder(folder.path() / "file" / "below", "can0", 100, {}),
+  CHECK_THROWS_AS(FlightRecorder(folder.path() / "file" / "below", {.url = "can0"}, 100, {}),
                   std::runtime_error);
   std::string error;
   {
-    FlightRecorder gone(folder.path() / "gone", "can0", 100,
+    FlightRecorder gone(folder.path() / "gone", {.url = "can0"}, 100,
                         [&](const std::string&, const std::string& what) { error = what; });
     gone.Record(Text("181#40E20100"), false, 1);
     fs::remove_all(folder.path() / "gone");

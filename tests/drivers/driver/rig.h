@@ -59,7 +59,7 @@ struct Rig {
       FrameBatch batch;
       drives[i].Tick(now, samples[i], batch);
       for (Frame frame : batch.frames()) {
-        if (!to_driver || to_driver(frame)) driver->OnFrame(frame, now, utime());
+        if (!to_driver || to_driver(frame)) driver->OnFrame(0, frame, now, utime());
       }
     }
     if (driver_stopped) return;
@@ -67,9 +67,10 @@ struct Rig {
     if (now % 5000 != cycle_phase) return;
     if (commanding) Command(effort);
     sent.clear();
-    for (const Frame& frame : driver->Tick(now, utime(), lateness)) sent.push_back(frame);
+    driver->Tick(now, utime(), lateness);
+    for (const Frame& frame : driver->frames(0)) sent.push_back(frame);
     const int accepted = bus_full ? 0 : accept ? accept(sent) : static_cast<int>(sent.size());
-    driver->Transmitted(accepted, utime());
+    driver->Transmitted({&accepted, 1}, utime());
     for (int i = 0; i < accepted; ++i) {
       Frame frame = sent[static_cast<size_t>(i)];
       if (to_drive && !to_drive(frame)) continue;
@@ -88,7 +89,7 @@ struct Rig {
     return -1;
   }
 
-  void Inject(const std::string& text) { driver->OnFrame(*FrameFromText(text), now, utime()); }
+  void Inject(const std::string& text) { driver->OnFrame(0, *FrameFromText(text), now, utime()); }
 
   joint_command_t MakeCommand(double value) {
     joint_command_t command{};
@@ -125,7 +126,7 @@ struct Rig {
   }
 
   std::string Reason() const { return std::string(driver->reason()); }
-  const driver_status_t& Status() { return driver->Status(utime(), stats, 0); }
+  const driver_status_t& Status() { return driver->Status(utime(), {&stats, 1}, 0); }
   /// Texts of the frames sent in the last cycle.
   std::vector<std::string> Sent() const {
     std::vector<std::string> texts;

@@ -24,7 +24,7 @@ TEST_CASE(
   SECTION("armed") {
     REQUIRE(rig.Arm(1));
     rig.Run(50);
-    rig.driver->OnFrame(Foreign(obeyed), rig.now, rig.utime());
+    rig.driver->OnFrame(0, Foreign(obeyed), rig.now, rig.utime());
     CHECK(rig.driver->state() == DriveState::kFault);
     CHECK_THAT(rig.Reason(), Contains("second master") &&
                                  Contains(fmt::format("{:#05x}", FrameFromText(obeyed)->id)));
@@ -35,7 +35,7 @@ TEST_CASE(
   }
   SECTION("before") {
     rig.Run(300);
-    rig.driver->OnFrame(Foreign(obeyed), rig.now, rig.utime());
+    rig.driver->OnFrame(0, Foreign(obeyed), rig.now, rig.utime());
     rig.Request(driver_request_t::ARM);
     CHECK(rig.driver->state() != DriveState::kArming);
     CHECK_THAT(rig.Reason(), Contains("second master"));
@@ -51,7 +51,7 @@ TEST_CASE("an emergency stop that somebody sends on the bus is everybody's, and 
   REQUIRE(rig.Arm(1));
   rig.Run(50);
   const auto frame = GENERATE("022#", "042#", "7E2#");  // to one drive, to the other, to all
-  rig.driver->OnFrame(Foreign(frame), rig.now, rig.utime());
+  rig.driver->OnFrame(0, Foreign(frame), rig.now, rig.utime());
   CHECK(rig.driver->state() == DriveState::kFault);
   CHECK(rig.Reason() == "emergency stop from the bus");
   CHECK(rig.Status().stopped_by_request);
@@ -68,7 +68,7 @@ TEST_CASE("an emergency stop that somebody sends on the bus is everybody's, and 
 TEST_CASE("the transport is asked to tell another's commands from ours, for every drive") {
   Rig rig(2);
   rig.Start();
-  const auto driver_end = OpenTransport("loop:second_master", rig.driver->filters()),
+  const auto driver_end = OpenTransport("loop:second_master", rig.driver->filters(0)),
              other = OpenTransport("loop:second_master");
   const Frame sent[] = {FrameFromText("02E#0000C03F").value(),
                         FrameFromText("047#0800000000000000").value(),

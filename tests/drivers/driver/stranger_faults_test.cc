@@ -133,7 +133,7 @@ TEST_CASE("fault 17: a recording instead of a bus", "[fault]") {
   }
   Rig rig;
   rig.Start();
-  const auto recording = OpenTransport("replay:" + log, rig.driver->filters());
+  const auto recording = OpenTransport("replay:" + log, rig.driver->filters(0));
   rig.driver->set_replay(recording->is_replay());
   rig.to_driver = [](Frame&) { return false; };
   rig.on_step = [&] {
@@ -141,7 +141,7 @@ TEST_CASE("fault 17: a recording instead of a bus", "[fault]") {
     std::array<Frame, 8> frames;
     const int count = recording->Receive(frames);
     for (int i = 0; i < count; ++i)
-      rig.driver->OnFrame(frames[static_cast<size_t>(i)], rig.now, rig.utime());
+      rig.driver->OnFrame(0, frames[static_cast<size_t>(i)], rig.now, rig.utime());
   };
   CHECK_FALSE(rig.Arm(1));
   CHECK(rig.states.size() > 50);  // it plays

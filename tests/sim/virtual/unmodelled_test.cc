@@ -48,13 +48,15 @@ struct Bench {
     Send(Make(cansimple::kSetAxisState, 1, {cansimple::kClosedLoopControl}), 0);
     REQUIRE(virtual_robot.devices()[0]->armed());
   }
-  void Send(const Frame& frame, int64_t at) { virtual_robot.Receive(frame, kStart + at, out); }
+  void Send(const Frame& frame, int64_t at) {
+    virtual_robot.Receive(0, frame, kStart + at, {&out, 1});
+  }
   void Torque(double torque, int64_t at) {
     Send(Make(cansimple::kSetInputTorque, 1, {torque}), at);
   }
   /// The position at the latest event until then [rad], and how long that was ago.
   double At(int64_t time) {
-    virtual_robot.Advance(kStart + time, out);
+    virtual_robot.Advance(kStart + time, {&out, 1});
     REQUIRE(virtual_robot.time() == kStart + time);
     return virtual_robot.q()[0];
   }

@@ -123,7 +123,7 @@ TEST_CASE("a sensor that goes silent stops the robot") {
   bus.Run(100);
   // An emergency message of the boom's first encoder: hardware error.
   const Frame emergency = *FrameFromText("081#0050010000000000");
-  bus.driver.OnFrame(emergency, bus.now(), kStart + bus.now());
+  bus.driver.OnFrame(0, emergency, bus.now(), kStart + bus.now());
   Wiggle(bus);
   bus.Run(10);
   CHECK(bus.driver.state() == DriveState::kFault);

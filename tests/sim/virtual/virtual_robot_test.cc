@@ -34,8 +34,8 @@ struct Bench {
   explicit Bench(const RobotDescription& description = Pendulum())
       : truth(HiddenParameters(description, 1)), robot(description, truth, kStart) {}
 
-  void Send(const Frame& frame, int64_t at) { robot.Receive(frame, kStart + at, out); }
-  void Advance(int64_t to) { robot.Advance(kStart + to, out); }
+  void Send(const Frame& frame, int64_t at) { robot.Receive(0, frame, kStart + at, {&out, 1}); }
+  void Advance(int64_t to) { robot.Advance(kStart + to, {&out, 1}); }
   void Arm(int64_t at) {
     Send(Make(cansimple::kClearErrors, kNode), at);
     Send(Make(cansimple::kSetControllerMode, kNode,

@@ -1,25 +1,33 @@
 import { DRIVER_STATES } from "../events";
-import type { driver_status_t } from "../messages";
+import type { bus_status_t, driver_status_t } from "../messages";
 import { Counters, type Names } from "../parts/counters";
 import { type Cell, Panel, Table } from "../parts/panel";
 import { driver, estimator } from "../run";
 
 const COUNTERS: Names<driver_status_t> = [
-  ["cycles", "cycles"], ["missed deadlines", "overruns", "bad"], ["frames received", "frames_received"], ["frames sent", "frames_sent"], ["frames rejected", "frames_rejected", "bad"],
-  ["frames dropped", "frames_dropped", "bad"], ["frames of a stranger", "frames_foreign", "bad"], ["measurements lost", "measurements_lost", "bad"], ["commands accepted", "commands_accepted"],
+  ["cycles", "cycles"], ["missed deadlines", "overruns", "bad"], ["measurements lost", "measurements_lost", "bad"], ["commands accepted", "commands_accepted"],
   ["commands rejected", "commands_rejected", "bad"], ["commands expired", "commands_expired"], ["commands limited", "commands_limited"], ["commands forged", "commands_forged", "bad"],
   ["messages rejected", "messages_rejected", "bad"],
+];
+
+const FRAMES: Names<bus_status_t> = [
+  ["frames received", "frames_received"], ["frames sent", "frames_sent"], ["frames rejected", "frames_rejected", "bad"], ["frames dropped", "frames_dropped", "bad"], ["frames of a stranger", "frames_foreign", "bad"],
 ];
 
 export function BusPanel() {
   const d = driver.value, e = estimator.value;
   const trusted = (i: number): Cell[] => [e?.position_nis[i], e?.velocity_nis[i], e?.acceleration_nis[i]];
   return (
-    <Panel id="bus" size="full" title="Bus, drives and sensors" empty={!d && "The driver has said nothing yet."}
-      what="The state of the CAN bus and of each drive, what they report of themselves, everything that was counted since the driver's start, and how far the observer trusts each joint (1 on average if noise is as described).">
+    <Panel id="bus" size="full" title="Buses, drives and sensors" empty={!d && "The driver has said nothing yet."}
+      what="The state of each CAN bus and drive, what they report of themselves, everything that was counted since the driver's start, and how far the observer trusts each joint (1 on average if noise is as described).">
       {d && (
         <>
-          <p class="line"><i class={`lamp ${d.bus_up ? "good" : "bad"}`} /><b>{d.bus}</b> is {d.bus_up ? "up" : `down${d.reason && `: ${d.reason}`}`}</p>
+          {d.buses.map((bus) => (
+            <div key={bus.url} data-bus={bus.url}>
+              <p class="line"><i class={`lamp ${bus.up ? "good" : "bad"}`} />{bus.name && `${bus.name}: `}<b>{bus.url}</b> is {bus.up ? "up" : `down${d.reason && `: ${d.reason}`}`}</p>
+              <Counters channel="bus" message={bus} names={FRAMES} />
+            </div>
+          ))}
           {d.commands_signed && <p class="line">Only commands that are signed with its key are obeyed.</p>}
           <Counters channel="DRIVER_STATUS" message={d} names={COUNTERS} />
           <Table shown caption="Drives" columns={["joint", "drive", "motor [°C]", "power stage [°C]", "supply [V]", "says"]}

@@ -151,14 +151,14 @@ TEST_CASE("a bus-off error frame stops the driver") {
   FreshVcan();
   Rig rig;
   rig.Start();
-  const auto bus = OpenTransport("socketcan:vcan0", rig.driver->filters());
+  const auto bus = OpenTransport("socketcan:vcan0", rig.driver->filters(0));
   REQUIRE(rig.Arm(1));
   Shell("cansend vcan0 20000040#0000000000000000");
   REQUIRE(Readable(*bus));
   std::array<Frame, 4> frames;
   REQUIRE(bus->Receive(frames) == 1);
   CHECK(DecodeErrorFrame(frames[0]) == BusEvent::kBusOff);
-  rig.driver->OnFrame(frames[0], rig.now, rig.utime());
+  rig.driver->OnFrame(0, frames[0], rig.now, rig.utime());
   CHECK(rig.driver->state() == DriveState::kFault);
   CHECK_THAT(rig.Reason(), Contains("bus-off"));
 }
