@@ -160,12 +160,13 @@ export async function serve(folder, port = 0, story = {}) {
       tell("PLUMB_SCENE", { deletions: [], entities: [{ id: "robot", ...solids(angle, 1) }, { id: "prediction", ...solids(angle + 0.09, 0.4) }, { id: "ground" }] });
       tell("ROBOT_STATE", { sequence: tick, num_joints: 1, q: [angle], v: [3.4 * Math.cos(1.3 * t)], q_sd: [1.2e-4], v_sd: [0.02], effort: [0.3], contact: [], valid: true });
       if (tick % 5 === 0 && !story.silent) tell("DRIVER_STATUS", { ...driver(state, state === 4 ? "emergency stop by request" : "", tick + 1000), ...story.driver }), tell("CONTROLLER_STATUS", controller(6, story.placing ? 1 : 2, Number(story.judged ?? false))), tell("ESTIMATOR_STATUS", estimator);
+      // Channels last: who sees them has been told all that there is.
       if (tick % 25 === 0) {
+        tell("PLUMB_GATEWAY", { clock: story.clock ?? "real", speed: story.clock ? 14 : 1, clients: clients.size, dropped: 0 });
+        if (story.placing) tell("PLACE_ROBOT", { q: [-0.773], v: [0.812] });
         saidOfChannels.push(topics.slice(5).concat("JOINT_STATE", "JOINT_COMMAND", "IMU").map((channel, k) => counted(channel, k, tick, age(channel))));
         tell("PLUMB_CHANNELS", { channels: saidOfChannels.at(-1) });
       }
-      if (tick % 25 === 0 && story.placing) tell("PLACE_ROBOT", { q: [-0.773], v: [0.812] });
-      if (tick % 50 === 0) tell("PLUMB_GATEWAY", { clock: story.clock ?? "real", speed: story.clock ? 14 : 1, clients: clients.size, dropped: 0 });
     }
   }, 20);
   await new Promise((resolve) => http.listen(port, "127.0.0.1", resolve));
