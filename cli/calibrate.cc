@@ -11,12 +11,11 @@
 #include <thread>
 
 #include "calibrator/diagnostics/robot_sbc.h"
-#include "calibrator/motion/csv_log.h"
-#include "calibrator/motion/lcm_log.h"
 #include "calibrator/report/report.h"
 #include "calibrator/results/identified_urdf.h"
 #include "calibrator/results/posterior_file.h"
 #include "calibrator/results/summary.h"
+#include "cli/logs.h"
 #include "cli/outputs.h"
 #include "common/hash.h"
 #include "common/name_lock.h"
@@ -27,26 +26,6 @@ namespace plumb {
 namespace {
 
 struct Interrupted {};
-
-std::vector<Log> ReadLogs(const CalibrateFlags& flags, const RobotDescription& robot) {
-  std::vector<Log> logs;
-  for (const std::string& file : flags.logs) logs.push_back(ReadLcmLog(file, robot));
-  for (const std::string& file : flags.tables) logs.push_back(ReadCsvLog(file, robot));
-  return logs;
-}
-
-void PrintLogs(const std::vector<Log>& logs) {
-  for (const Log& log : logs) {
-    std::cout << fmt::format("{}: {} transitions in {} roll-out{}", log.name,
-                             CountTransitions(log.rollouts), log.rollouts.size(),
-                             log.rollouts.size() == 1 ? "" : "s");
-    if (log.drops.total() > 0) {
-      std::cout << "; dropped: " << log.drops.summary();
-    }
-    std::cout << "\n";
-    for (const std::string& warning : log.warnings) std::cout << "  " << warning << "\n";
-  }
-}
 
 // Errors of one step, each transition predicted by the others.
 void PrintGap(const Gap& gap, const RobotDescription& robot) {
@@ -159,8 +138,6 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const bool speaks = ranks.rank() == 0;
   if (!speaks) spdlog::set_level(spdlog::level::err);
   const RobotDescription robot = LoadRobot(flags.robot);
-  if (flags.logs.empty() && flags.tables.empty())
-    throw std::invalid_argument("there is nothing to calibrate with: give a --log or a --csv");
   if (speaks) {
     std::vector<std::string> inputs = FilesOf(robot);
     inputs.insert(inputs.end(), flags.logs.begin(), flags.logs.end());
@@ -168,7 +145,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
     RequireOutputs({flags.output, flags.report, flags.urdf}, inputs);
   }
   flags.options.residual = flags.options.residual && robot.calibration.residual;
-  const std::vector<Log> logs = ReadLogs(flags, robot);
+  const std::vector<Log> logs = ReadLogs(flags.logs, flags.tables, robot);
   if (speaks) PrintLogs(logs);
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   flags.options.execution.threads =

@@ -18,7 +18,7 @@ using Action = std::function<int(Process&)>;
 // the app's parsing. `line` is the whole command line, which results record. Not thread-safe.
 
 void AddLaunch(CLI::App& app, const std::string& line, Action& action);
-/// sim, calibrate, excite, train, export-model: what needs no robot.
+/// sim, calibrate, excite, train, export-model, serve-model: what needs no robot.
 void AddSimulatorCommands(CLI::App& app, const std::string& line, Action& action);
 /// doctor, can, estimate, arm, disarm, estop, record, replay, export, meldis, key.
 void AddRobotCommands(CLI::App& app, const std::string& line, Action& action);

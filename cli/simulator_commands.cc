@@ -2,6 +2,7 @@
 #include "cli/command.h"
 #include "cli/excite.h"
 #include "cli/export_model.h"
+#include "cli/serve_model.h"
 #include "cli/sim.h"
 #include "cli/train.h"
 
@@ -190,6 +191,28 @@ void AddExportModel(CLI::App& app, Action& action) {
   SetAction(*export_model, action, [flags](Process&) { return ExportModel(*flags); });
 }
 
+void AddServeModel(CLI::App& app, Action& action) {
+  const auto flags = std::make_shared<ServeModelFlags>();
+  CLI::App* serve = AddCommand(
+      app, "serve-model",
+      "serve what logs say of the robot's parameters to UM-Bridge's clients, until Ctrl-C");
+  serve->add_option("robot", flags->robot, "robot folder or TOML file")->required();
+  serve->add_option("--log", flags->logs, "LCM log; may be given several times")
+      ->allow_extra_args(false);
+  serve
+      ->add_option("--csv", flags->tables,
+                   "table of transitions, columns as in README.md; may be given several times")
+      ->allow_extra_args(false);
+  serve->add_option("--address", flags->address, "where to listen, ADDRESS:PORT; port 0 = any")
+      ->capture_default_str();
+  serve
+      ->add_option("--threads", flags->threads,
+                   "0 = one per core; the result does not depend on it")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  SetAction(*serve, action, [flags](Process& process) { return ServeModel(process, *flags); });
+}
+
 }  // namespace
 
 void AddSimulatorCommands(CLI::App& app, const std::string& line, Action& action) {
@@ -198,6 +221,7 @@ void AddSimulatorCommands(CLI::App& app, const std::string& line, Action& action
   AddExcite(app, action);
   AddTrain(app, line, action);
   AddExportModel(app, action);
+  AddServeModel(app, action);
 }
 
 }  // namespace plumb

@@ -1,37 +1,18 @@
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
-#include <chrono>
 #include <list>
 #include <memory>
-#include <string_view>
 
 #include "dashboard/server.h"
 
-// What the server and its two kinds of connection share. All of it on the context's thread.
+// What requests and WebSockets share. All of it on the context's thread.
 namespace plumb {
 
-namespace asio = boost::asio;
-namespace beast = boost::beast;
-namespace http = beast::http;
-using asio::ip::tcp;
-using boost::system::error_code;
-
-using Request = http::request<http::empty_body>;
-using Response = http::response<http::string_body>;
-
-inline constexpr auto kRequestTime =
-    std::chrono::seconds(10);  ///< for a request, from its first wait on
-
-inline std::string_view View(boost::string_view text) { return {text.data(), text.size()}; }
-
+/// A WebSocket.
 struct Connection {
   virtual ~Connection() = default;
   virtual void Close() = 0;
-  virtual bool sending() const { return false; }
+  virtual bool sending() const = 0;
   asio::ip::address address;  // of the other side
 };
 
@@ -42,9 +23,7 @@ struct Server::Parts {
         robot(description),
         gateway(to),
         setting(std::move(with)),
-        page(setting.page),
-        acceptor(context),
-        again(context) {}
+        page(setting.page) {}
 
   using Places = std::list<std::weak_ptr<Connection>>;
 
@@ -59,13 +38,11 @@ struct Server::Parts {
   Gateway& gateway;
   const Setting setting;
   const Page page;
-  tcp::acceptor acceptor;
-  asio::steady_timer again;
-  Places requests, viewers;  // connections of each kind, the oldest first
+  Places viewers;  // the oldest first
   bool ended = false;
 };
 
-/// A place in one of the lists, for as long as it lives.
+/// A place among the viewers, for as long as it lives.
 class Place {
  public:
   Place(Server::Parts::Places& places, const std::shared_ptr<Connection>& who)

@@ -1,15 +1,12 @@
 #include "dashboard/server.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <map>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "dashboard/connection.h"
-#include "dashboard/request_connection.h"
+#include "dashboard/request_answers.h"
 
 namespace plumb {
 
@@ -38,58 +35,33 @@ namespace {
 
 using Parts = Server::Parts;
 
-constexpr auto kAcceptAgain = std::chrono::milliseconds(100);
 constexpr int kSendBuffer =
     256 << 10;  // [bytes] of the kernel: what is older, a slow client misses
 
-void Accept(const std::shared_ptr<Parts>& parts) {
-  parts->acceptor.async_accept([parts](error_code error, tcp::socket socket) {
-    if (parts->ended) return;
-    if (error) {  // no descriptors left, say
-      parts->again.expires_after(kAcceptAgain);
-      parts->again.async_wait([parts](error_code) {
-        if (!parts->ended) Accept(parts);
-      });
-      return;
-    }
-    if (parts->requests.size() >= Server::kMaxConnections) {
-      if (const auto oldest = parts->requests.front().lock()) oldest->Close();
-    }
-    error_code ignored;
-    socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
-    BeginRequests(parts, std::move(socket));
-    Accept(parts);
-  });
+HttpServer::Setting Serve(const std::shared_ptr<Parts>& parts) {
+  return {parts->setting.listen, 0,
+          [parts](const Request& request, const HttpServer::Reply& reply) {
+            reply(AnswerRequest(*parts, request));
+          },
+          &RefuseRequest,
+          [parts](const Request& request, beast::tcp_stream& stream) {
+            error_code ignored;
+            stream.socket().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
+            return UpgradeRequest(parts, request, stream);
+          }};
 }
 
 }  // namespace
 
 Server::Server(asio::io_context& context, const RobotDescription& robot, Gateway& gateway,
                Setting setting)
-    : parts_(std::make_shared<Parts>(context, robot, gateway, std::move(setting))) {
-  const ListenAddress& listen = parts_->setting.listen;
-  try {
-    const tcp::endpoint endpoint(asio::ip::make_address(listen.address), listen.port);
-    parts_->acceptor.open(endpoint.protocol());
-    parts_->acceptor.set_option(asio::socket_base::reuse_address(true));
-    parts_->acceptor.bind(endpoint);
-    parts_->acceptor.listen();
-  } catch (const boost::system::system_error& error) {
-    throw std::runtime_error(fmt::format("cannot listen on {}:{}: {}", listen.address, listen.port,
-                                         error.code().message()));
-  }
-  Accept(parts_);
-}
+    : parts_(std::make_shared<Parts>(context, robot, gateway, std::move(setting))),
+      http_(context, Serve(parts_)) {}
 
 Server::~Server() {
   parts_->ended = true;
-  error_code ignored;
-  parts_->acceptor.close(ignored);
-  parts_->again.cancel(ignored);
-  for (const auto* places : {&parts_->requests, &parts_->viewers}) {
-    for (const auto& connection : Parts::Places(*places)) {
-      if (const auto open = connection.lock()) open->Close();
-    }
+  for (const auto& connection : Parts::Places(parts_->viewers)) {
+    if (const auto open = connection.lock()) open->Close();
   }
 }
 
@@ -99,7 +71,5 @@ bool Server::sending() const {
     return open && open->sending();
   });
 }
-
-uint16_t Server::port() const { return parts_->acceptor.local_endpoint().port(); }
 
 }  // namespace plumb

@@ -10,17 +10,17 @@
 #include "dashboard/access.h"
 #include "dashboard/gateway.h"
 #include "dashboard/page.h"
+#include "http/server.h"
 
 namespace plumb {
 
 /// HTTP and WebSocket, on one thread, that of the context: the page, /robot.json, and what
-/// Foxglove's protocol has. Everything that comes in has a bound: requests 8 kB and 10 s, messages
-/// kMaxClientMessage, kMaxConnections that are no WebSockets, of which the one that has waited
-/// longest makes room for a new one, and kMaxViewers that are, of which the oldest of the address
-/// that has most does. Not thread-safe.
+/// Foxglove's protocol has. Everything that comes in has a bound: requests those of HttpServer,
+/// without bodies; messages kMaxClientMessage, and kMaxViewers that are WebSockets, of which the
+/// oldest of the address that has most makes room for a new one. Not thread-safe.
 class Server {
  public:
-  static constexpr size_t kMaxConnections = 128, kMaxViewers = 64;
+  static constexpr size_t kMaxViewers = 64;
 
   struct Setting {
     ListenAddress listen;
@@ -34,7 +34,7 @@ class Server {
          Setting setting);
   ~Server();  ///< closes all connections
 
-  uint16_t port() const;
+  uint16_t port() const { return http_.port(); }
   /// Whether somebody who looks on has not been sent everything yet.
   bool sending() const;
 
@@ -42,6 +42,7 @@ class Server {
 
  private:
   std::shared_ptr<Parts> parts_;
+  HttpServer http_;
 };
 
 }  // namespace plumb

@@ -41,7 +41,7 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
     beast::get_lowest_layer(socket_).expires_never();
     error_code ignored;
     beast::get_lowest_layer(socket_).socket().set_option(tcp::no_delay(true), ignored);
-    websocket::stream_base::timeout timeout{kRequestTime, kSilence, true};
+    websocket::stream_base::timeout timeout{HttpServer::kRequestTime, kSilence, true};
     socket_.set_option(timeout);
     socket_.read_message_max(kMaxClientMessage);
     socket_.auto_fragment(false);

@@ -2,7 +2,7 @@
 """Dependencies point down only: which folder may include which. Exit status 1 names every line that does not.
 
 Also: SimTK headers only in sim/*.cc and what two of these share, sim/virtual/simbody_tree.h, MuJoCo's only in sim/virtual/mujoco_backend.cc, ODE's only in sim/virtual/ode_*,
-MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in main.cc files, common/ and drivers/can/, Boost's network in the dashboard's server (tests aside).
+MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in main.cc files, common/ and drivers/can/, Boost's network in http/ and the servers that stand on it (tests aside).
 """
 import pathlib
 import re
@@ -40,8 +40,10 @@ STANDS_ON = {
     "calibrator/live": {"calibrator/results"},
     "calibrator": {"calibrator/report", "calibrator/live"},
     "trainer": {"sim", "controller"},
-    "cli": {"records", "plot", "drivers", "sim/virtual", "sim/view", "estimator", "controller", "calibrator", "trainer"},
-    "dashboard": {"sim/view"},
+    "cli": {"records", "umbridge", "plot", "drivers", "sim/virtual", "sim/view", "estimator", "controller", "calibrator", "trainer"},
+    "http": {"common"},
+    "umbridge": {"http", "calibrator"},
+    "dashboard": {"http", "sim/view"},
     "chaos": {"cli"},
     "python": {"calibrator", "trainer"},
     "experiments": {"drivers", "sim/virtual", "estimator", "controller", "calibrator", "trainer"},
@@ -71,8 +73,8 @@ SYSTEM = {
     r"onnx/|google/protobuf/": lambda p: p.startswith("trainer/onnx_") and p.endswith(".cc"),
     r"lcm/": lambda p: p.startswith(("common/", "drivers/can/")) or p.endswith("main.cc"),
     r"mpi\.h": lambda p: p == "common/ranks.cc",
-    r"boost/(asio|beast)": lambda p: p in ("dashboard/server.h", "dashboard/server.cc", "dashboard/connection.h", "dashboard/request_connection.cc",
-                                       "dashboard/viewer_connection.cc", "dashboard/main.cc"),
+    r"boost/(asio|beast)": lambda p: p.startswith("http/") or p in (
+        "umbridge/server.cc",         "dashboard/server.h", "dashboard/request_answers.cc", "dashboard/viewer_connection.cc", "dashboard/main.cc"),
     r"sys/socket\.h|netinet/|linux/can": lambda p: p.startswith(("common/", "drivers/can/", "cli/doctor"))
     or p.endswith("main.cc"),
 }

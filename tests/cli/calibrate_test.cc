@@ -195,7 +195,7 @@ TEST_CASE("what cannot be calibrated with is refused in one clear line") {
     std::ofstream(folder / name) << text;
     return folder / name;
   };
-  refused(Robot("pendulum"), "there is nothing to calibrate with");
+  refused(Robot("pendulum"), "there is no motion");
   refused(Robot("pendulum") + " --csv " + (folder / "missing.csv"), "missing.csv");
   refused(Robot("pendulum") + " --log " + (folder / "missing.lcmlog"), "missing.lcmlog");
   refused(Robot("pendulum") + " --csv " + write("empty.csv", ""), "empty.csv");

@@ -1,0 +1,40 @@
+#include "cli/serve_model.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <iostream>
+#include <thread>
+
+#include "cli/logs.h"
+#include "common/listen_address.h"
+#include "umbridge/robot_models.h"
+#include "umbridge/server.h"
+
+namespace plumb {
+
+int ServeModel(Process& process, const ServeModelFlags& flags) {
+  const ListenAddress listen = ListenAddress::Parse(flags.address);
+  const RobotDescription robot = LoadRobot(flags.robot);
+  for (const std::string& warning : robot.warnings) spdlog::warn(warning);
+  const std::vector<Log> logs = ReadLogs(flags.logs, flags.tables, robot);
+  PrintLogs(logs);
+  const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  RobotModels models(robot, logs, ExecutionOptions(flags.threads > 0 ? flags.threads : cores));
+  UmbridgeServer server(listen, models.Models());
+  std::cout << "parameters, in this order and unit:";
+  for (const ParameterDescription& p : robot.parameters)
+    std::cout << fmt::format(" {} [{}]", p.name, p.unit);
+  std::cout << "\n";
+  for (const ServedModel& model : models.Models())
+    std::cout << fmt::format("{}: {} -> {}\n", model.name, model.inputs, model.outputs);
+  const bool six = listen.address.find(':') != std::string::npos;
+  std::cout << fmt::format("http://{}:{}", six ? "[" + listen.address + "]" : listen.address,
+                           server.port())
+            << std::endl;
+  server.Run(process.stop_fd(), [&] { return process.stopping(); });
+  return 0;
+}
+
+}  // namespace plumb

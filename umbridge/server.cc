@@ -1,0 +1,76 @@
+#include "umbridge/server.h"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <string>
+#include <utility>
+
+#include "http/server.h"
+
+namespace plumb {
+namespace {
+
+Response Json(int status, std::string body) {
+  return MakeResponse(static_cast<http::status>(status), "application/json", std::move(body));
+}
+
+}  // namespace
+
+struct UmbridgeServer::Parts {
+  Parts(const ListenAddress& listen, std::vector<ServedModel> models)
+      : service(std::move(models)),
+        server(context, {listen, service.longest_request(),
+                         [this](const Request& request, HttpServer::Reply reply) {
+                           Answer(request, std::move(reply));
+                         },
+                         [](const std::string& why) {
+                           return Json(400, UmbridgeError("InvalidInput", why));
+                         }}),
+        stop(context) {}
+  ~Parts() { stop.release(); }
+
+  void Answer(const Request& request, HttpServer::Reply reply) {
+    if (!request[http::field::origin].empty())
+      return reply(Json(403, UmbridgeError("InvalidInput", "a page in a browser may not ask")));
+    asio::post(worker, [this, method = std::string(View(request.method_string())),
+                        path = std::string(View(request.target())), body = request.body(),
+                        reply = std::move(reply)]() mutable {
+      ServiceAnswer answer = service.Respond(method, path, body);
+      asio::post(context, [answer = std::move(answer), reply = std::move(reply)]() mutable {
+        reply(Json(answer.status, std::move(answer.body)));
+      });
+    });
+  }
+
+  void AwaitStop(const std::function<bool()>& stopping) {
+    stop.async_wait(asio::posix::stream_descriptor::wait_read, [this, &stopping](error_code) {
+      if (!stopping()) return AwaitStop(stopping);
+      context.stop();
+    });
+  }
+
+  UmbridgeService service;
+  asio::io_context context{1};
+  HttpServer server;
+  asio::posix::stream_descriptor stop;
+  asio::thread_pool worker{1};  // the first to go: what it does knows all the others
+};
+
+UmbridgeServer::UmbridgeServer(const ListenAddress& listen, std::vector<ServedModel> models)
+    : parts_(std::make_unique<Parts>(listen, std::move(models))) {}
+
+UmbridgeServer::~UmbridgeServer() = default;
+
+uint16_t UmbridgeServer::port() const { return parts_->server.port(); }
+
+void UmbridgeServer::Run(int stop_fd, const std::function<bool()>& stopping) {
+  parts_->stop.assign(stop_fd);
+  parts_->AwaitStop(stopping);
+  parts_->context.run();
+  parts_->worker.stop();  // what nobody has begun, nobody waits for
+  parts_->worker.join();
+}
+
+}  // namespace plumb

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "common/listen_address.h"
+#include "umbridge/service.h"
+
+namespace plumb {
+
+/// Models for UM-Bridge's clients, over HTTP with the bounds of HttpServer. Models are evaluated
+/// one request after the other, on a thread of their own, while others are heard. Browsers' pages
+/// are refused (they say where they come from). Not thread-safe.
+class UmbridgeServer {
+ public:
+  /// Listens. @throws std::runtime_error naming the address, if it cannot.
+  UmbridgeServer(const ListenAddress& listen, std::vector<ServedModel> models);
+  ~UmbridgeServer();
+
+  uint16_t port() const;
+  /// Serves until `stop_fd` is readable and `stopping` says so; what is being evaluated then is
+  /// waited for.
+  void Run(int stop_fd, const std::function<bool()>& stopping);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace plumb
