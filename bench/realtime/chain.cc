@@ -1,5 +1,6 @@
 #include "bench/realtime/chain.h"
 
+#include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
 #include <unistd.h>
@@ -28,6 +29,8 @@
 #include "plumb/joint_command_t.hpp"
 #include "plumb/joint_state_t.hpp"
 #include "robot/description.h"
+#include "sim/tasks/task.h"
+#include "tests/legs_on_stand.h"
 
 namespace plumb {
 namespace {
@@ -37,6 +40,10 @@ namespace fs = std::filesystem;
 constexpr double kPatience = 60;             // [s] until there must be a torque
 constexpr int64_t kLongest = 1'000'000'000;  // [ns] in which an answer is looked for
 constexpr int kAhead = 1000;                 // encoder frames in which the next state is looked for
+
+constexpr int kObservedPort = 23190;  // of the bus with the first joint's drive, where we listen
+
+std::string BusUrl(int port) { return fmt::format("udp:239.74.163.2:{}", port); }
 
 /// robots/pendulum with a millisecond for everything but control, and positions that do not repeat.
 fs::path QuickPendulum(const fs::path& source, const fs::path& folder) {
@@ -55,17 +62,38 @@ fs::path QuickPendulum(const fs::path& source, const fs::path& folder) {
     toml = std::regex_replace(toml, std::regex("(^|\n)" + std::string(key) + " = [0-9.]+"),
                               "$1" + std::string(key) + " = " + value);
   }
+  toml = std::regex_replace(toml, std::regex("udp:[0-9.:]+"), BusUrl(kObservedPort));
   std::ofstream(folder / "robot.toml") << toml;
   return folder;
 }
 
-/// Effort as a smooth function of the angle: no two commands of a swing are the same.
+/// The robot's folder.
+fs::path Prepare(ChainRobot robot, const fs::path& source, const fs::path& folder) {
+  if (robot == ChainRobot::kPendulum) return QuickPendulum(source, folder);
+  LegsOnStand::Write(source / "robots", folder,
+                     {BusUrl(kObservedPort), BusUrl(kObservedPort + 1), BusUrl(kObservedPort + 2),
+                      BusUrl(kObservedPort + 3)});
+  return folder;
+}
+
+/// The first joint's effort as a smooth function of how it moves: no two commands of a swing are
+/// the same.
 policy_t Policy(const RobotDescription& robot) {
-  GaussianPolicy policy(PolicyShape{3, {4}, 1});
-  policy.parameters(0) = 0.5f;   // cos q -> first neuron
-  policy.parameters(4) = 1.f;    // sin q -> first neuron
-  policy.parameters(16) = 0.5f;  // first neuron -> effort
-  policy.action_scale.setConstant(static_cast<float>(robot.joints[0].effort_limit));
+  constexpr int kNeurons = 4;
+  const int observations = MakeTask(robot)->observation_size(),
+            actions = static_cast<int>(robot.driven().size());
+  GaussianPolicy policy(PolicyShape{observations, {kNeurons}, actions});
+  const Eigen::Index effort = (observations + 1) * kNeurons;  // first neuron -> first joint's
+  if (actions == 1) {
+    policy.parameters(0) = 0.5f;        // cos q -> first neuron
+    policy.parameters(kNeurons) = 1.f;  // sin q -> first neuron
+    policy.parameters(effort) = 0.5f;
+  } else {
+    // Pushed the way that it goes, it never comes to rest.
+    policy.parameters(actions * kNeurons) = 0.3f;  // first v -> first neuron
+    policy.parameters(effort) = 0.05f;
+  }
+  policy.action_scale = robot.effort_limits().cast<float>();
   policy_t message = policy.ToMessage();
   message.purpose = policy_t::EVALUATE;
   message.episodes = 1000;
@@ -74,12 +102,12 @@ policy_t Policy(const RobotDescription& robot) {
 
 class Chain {
  public:
-  Chain(const std::string& source, const std::string& binaries, int priority)
+  Chain(const std::string& source, const std::string& binaries, ChainRobot robot, int priority)
       : folder_(fs::temp_directory_path() / ("plumbline_realtime_" + std::to_string(getpid()))),
-        robot_(QuickPendulum(source, folder_ / "pendulum")),
+        robot_(Prepare(robot, source, folder_ / "robot")),
         binaries_(binaries),
         messenger_(lcm_url_),
-        bus_(OpenTransport(bus_url_)),
+        bus_(OpenTransport(BusUrl(kObservedPort))),
         statuses_(messenger_, "DRIVER_STATUS"),
         states_(messenger_, "JOINT_STATE",
                 [this](const joint_state_t& s) {
@@ -96,9 +124,8 @@ class Chain {
     // All of them before the rest of the machine, and the driver before the others.
     const std::vector<std::string> behind{"--realtime-priority",
                                           std::to_string(std::max(priority - 5, 0))};
-    Start("plumb-robot", {"--bus", bus_url_, "--seed", "1", behind[0], behind[1]});
-    Start("plumb-driver",
-          {"--bus", bus_url_, "--virtual", "--realtime-priority", std::to_string(priority)});
+    Start("plumb-robot", {"--seed", "1", behind[0], behind[1]});
+    Start("plumb-driver", {"--virtual", "--realtime-priority", std::to_string(priority)});
     Start("plumb-estimator", behind);
     Start("plumb-controller", behind);
   }
@@ -249,7 +276,6 @@ class Chain {
   static constexpr double kTurn = 2 * std::numbers::pi;
 
   const std::string lcm_url_ = "udpm://239.255.76.67:17690?ttl=0&recv_buf_size=2097152";
-  const std::string bus_url_ = "udp:239.74.163.2:23190";
   const Clock clock_;
   const fs::path folder_, robot_;
   const std::string binaries_;
@@ -273,11 +299,11 @@ class Chain {
 
 }  // namespace
 
-ChainTimes MeasureChain(const std::string& source, const std::string& binaries, double seconds,
-                        int priority, int load) {
+ChainTimes MeasureChain(const std::string& source, const std::string& binaries, ChainRobot robot,
+                        double seconds, int priority, int load) {
   // Before there are threads.
   const Load burning(load);
-  Chain chain(source, binaries, priority);
+  Chain chain(source, binaries, robot, priority);
   chain.WaitForTorque();
   return chain.Measure(seconds);
 }

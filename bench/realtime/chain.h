@@ -26,13 +26,18 @@ struct ChainTimes {
   std::string reason;  ///< of the last one
 };
 
-/// Runs plumb-robot, plumb-driver, plumb-estimator and plumb-controller on the udp: bus with
-/// robots/pendulum at 1 kHz (control every 10 ms), and listens for `seconds` from the first torque
-/// on. Not thread-safe.
+enum class ChainRobot {
+  kPendulum,  ///< robots/pendulum at 1 kHz, one drive
+  kLegs,      ///< LegsOnStand: twelve drives on four buses at 500 Hz
+};
+
+/// Runs plumb-robot, plumb-driver, plumb-estimator and plumb-controller on udp: buses (control
+/// every 10 ms), and listens for `seconds` from the first torque on. Of several buses it listens to
+/// the first one. Not thread-safe.
 /// @param priority the driver's --realtime-priority.
 /// @param load processes that keep the cores busy meanwhile.
 /// @throws std::runtime_error if no torque is seen within a minute.
-ChainTimes MeasureChain(const std::string& source, const std::string& binaries, double seconds,
-                        int priority, int load);
+ChainTimes MeasureChain(const std::string& source, const std::string& binaries, ChainRobot robot,
+                        double seconds, int priority, int load);
 
 }  // namespace plumb
