@@ -98,7 +98,7 @@ function counted(channel, k, tick, age_ms) {
 
 /** Starts it. @returns its address, what it has said of all channels, what was asked of it, and how to end it. `story` is changed as the test likes. */
 export async function serve(folder, port = 0, story = {}) {
-  const asked = [], saidOfChannels = [], spoken = new Map(), begun = Date.now(), clients = new Set(), topics = ["PLUMB_CHANNELS", "PLUMB_GATEWAY", "PLUMB_PREDICTION", "PLUMB_SCENE", "PLUMB_POSTERIOR", "ROBOT_STATE", "PLACE_ROBOT", "PARAMETER_DISTRIBUTION", "DRIVER_STATUS", "ESTIMATOR_STATUS", "CONTROLLER_STATUS", "CALIBRATION_STATUS", "TRAINING_STATUS"];
+  const asked = [], saidOfChannels = [], spoken = new Map(), begun = Date.now(), clients = new Set(), topics = ["PLUMB_GATEWAY", "PLUMB_PREDICTION", "PLUMB_SCENE", "PLUMB_POSTERIOR", "ROBOT_STATE", "PLACE_ROBOT", "PARAMETER_DISTRIBUTION", "DRIVER_STATUS", "ESTIMATOR_STATUS", "CONTROLLER_STATUS", "CALIBRATION_STATUS", "TRAINING_STATUS", "PLUMB_CHANNELS"];
   let state = 1;
   const http = createServer((request, response) => {
     const name = request.url === "/" ? "index.html" : request.url.slice(1);
@@ -160,11 +160,11 @@ export async function serve(folder, port = 0, story = {}) {
       tell("PLUMB_SCENE", { deletions: [], entities: [{ id: "robot", ...solids(angle, 1) }, { id: "prediction", ...solids(angle + 0.09, 0.4) }, { id: "ground" }] });
       tell("ROBOT_STATE", { sequence: tick, num_joints: 1, q: [angle], v: [3.4 * Math.cos(1.3 * t)], q_sd: [1.2e-4], v_sd: [0.02], effort: [0.3], contact: [], valid: true });
       if (tick % 5 === 0 && !story.silent) tell("DRIVER_STATUS", { ...driver(state, state === 4 ? "emergency stop by request" : "", tick + 1000), ...story.driver }), tell("CONTROLLER_STATUS", controller(6, story.placing ? 1 : 2, Number(story.judged ?? false))), tell("ESTIMATOR_STATUS", estimator);
-      // Channels last: who sees them has been told all that there is.
+      // Channels last, and asked for last: who sees them has been told all that there is.
       if (tick % 25 === 0) {
         tell("PLUMB_GATEWAY", { clock: story.clock ?? "real", speed: story.clock ? 14 : 1, clients: clients.size, dropped: 0 });
         if (story.placing) tell("PLACE_ROBOT", { q: [-0.773], v: [0.812] });
-        saidOfChannels.push(topics.slice(5).concat("JOINT_STATE", "JOINT_COMMAND", "IMU").map((channel, k) => counted(channel, k, tick, age(channel))));
+        saidOfChannels.push(topics.slice(4, -1).concat("JOINT_STATE", "JOINT_COMMAND", "IMU").map((channel, k) => counted(channel, k, tick, age(channel))));
         tell("PLUMB_CHANNELS", { channels: saidOfChannels.at(-1) });
       }
     }

@@ -24,8 +24,8 @@ function driver(now: driver_status_t, before: driver_status_t | null): Said[] {
     said.push([`${DRIVER_STATES[now.state] ?? now.state}${because(now.reason)}`, weight]);
   }
   now.buses.forEach(({ name, up }, i) => {
-    const was = before?.buses[i];
-    if (was && up !== was.up) said.push([`${name ? `bus ${name}` : "the bus"} is ${up ? "up" : "down"}`, up ? "good" : "bad"]);
+    const was = before?.buses[i]?.up ?? true;
+    if (up !== was) said.push([`${name ? `bus ${name}` : "the bus"} is ${up ? "up" : "down"}`, up ? "good" : "bad"]);
   });
   now.sensor_name.forEach((name, i) => {
     if (before && now.sensor_state[i] !== before.sensor_state[i] && now.sensor_reason[i]) said.push([`${name}: ${now.sensor_reason[i]}`, "bad"]);
