@@ -21,6 +21,7 @@
 #include "common/name_lock.h"
 #include "common/progress_line.h"
 #include "common/rank_batch_runner.h"
+#include "umbridge/remote_calibration.h"
 
 namespace plumb {
 namespace {
@@ -124,6 +125,31 @@ int Sbc(const CalibrateFlags& flags, const RobotDescription& robot, const std::v
   return 0;
 }
 
+// What judges a model needs simulations of ours.
+void RequireForRemote(const CalibrateFlags& flags, int ranks) {
+  if (flags.options.method != "auto" && flags.options.method != "laplace")
+    throw std::invalid_argument("--model is calibrated by laplace: no other --method");
+  if (!flags.report.empty() || flags.strict || flags.sbc > 0)
+    throw std::invalid_argument("--model excludes --report, --strict and --sbc: nothing judges it");
+  if (ranks > 1) throw std::invalid_argument("--model is for one rank");
+}
+
+int CalibrateForeign(const CalibrateFlags& flags, const RobotDescription& robot,
+                     const std::vector<Log>& logs, const std::string& command) {
+  RemoteModel model(flags.model, flags.model_name,
+                    static_cast<Eigen::Index>(robot.parameters.size()),
+                    NextStatesSize(robot, logs));
+  const Findings findings = CalibrateRemote(robot, logs, model, flags.options);
+  PrintFindings(findings, robot);
+  WritePosterior(flags.output, findings, robot,
+                 ProvenanceOf(logs, flags.options, command, std::time(nullptr)));
+  const Summary summary = Summarise(findings, robot);
+  if (!flags.urdf.empty()) WriteIdentifiedUrdf(flags.urdf, robot, summary.mean, summary.sd);
+  std::cout << "wrote " << flags.output << (flags.urdf.empty() ? "" : ", " + flags.urdf)
+            << std::endl;
+  return 0;
+}
+
 }  // namespace
 
 std::string MethodHelp() {
@@ -144,6 +170,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
     inputs.insert(inputs.end(), flags.tables.begin(), flags.tables.end());
     RequireOutputs({flags.output, flags.report, flags.urdf}, inputs);
   }
+  if (!flags.model.empty()) RequireForRemote(flags, ranks.size());
   flags.options.residual = flags.options.residual && robot.calibration.residual;
   const std::vector<Log> logs = ReadLogs(flags.logs, flags.tables, robot);
   if (speaks) PrintLogs(logs);
@@ -156,6 +183,12 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   };
   const std::string journal_file = flags.output + ".journal";
   try {
+    if (!flags.model.empty()) {
+      flags.options.progress = [&](const std::string& what, double share) {
+        look(), line.Show(what, share);
+      };
+      return CalibrateForeign(flags, robot, logs, command);
+    }
     if (flags.sbc > 0) return Sbc(flags, robot, logs, line, look);
     std::optional<NameLock> lock;
     std::optional<Journal> journal;
@@ -190,7 +223,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
         findings.holdout.better && !findings.misspecification.alarm && findings.agreement.agree;
     return flags.strict && !trustworthy ? 3 : 0;
   } catch (const Interrupted&) {
-    if (speaks && flags.sbc == 0)
+    if (speaks && flags.sbc == 0 && flags.model.empty())
       std::cerr << "\ninterrupted; the same command goes on from " << journal_file << std::endl;
     return 130;
   }

@@ -19,6 +19,8 @@ struct CalibrateFlags {
   std::string report, urdf;  ///< files; empty = none
   int sbc = 0;               ///< runs of simulation-based calibration instead; 0 = none
   bool strict = false;       ///< exit status 3 if the findings should not be trusted
+  std::string model;         ///< address of somebody else's simulator; empty = ours
+  std::string model_name = "next_states";
 };
 
 /// The methods' part of --help: a line for each. Thread-safe.
@@ -30,6 +32,7 @@ std::string MethodHelp();
 /// exit status: 0, 130 if it was interrupted; with `strict` 3 if the posterior predicts no better
 /// than the prior, the model cannot explain the logs, or they do not agree.
 /// @throws std::invalid_argument or std::runtime_error, one line for people: robot, logs, files.
+/// With a `model` it is that simulator's parameters that are inferred: CalibrateRemote.
 /// Has threads of its own; call it from one.
 int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& command);
 

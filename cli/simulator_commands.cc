@@ -90,6 +90,14 @@ void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
       ->capture_default_str();
   calibrate->add_flag("!--no-residual", flags->options.residual,
                       "do not learn what the model lacks where it cannot explain the robot");
+  auto* model = calibrate->add_option(
+      "--model", flags->model,
+      "instead of our simulator: one that an UM-Bridge server has, http://HOST:PORT");
+  calibrate
+      ->add_option("--model-name", flags->model_name,
+                   "of that server's: parameters -> q, v at each transition's end")
+      ->needs(model)
+      ->capture_default_str();
   calibrate->add_flag("--strict", flags->strict,
                       "exit status 3 if the findings should not be trusted");
   SetAction(*calibrate, action,

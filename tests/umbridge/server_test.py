@@ -94,6 +94,16 @@ class Served(unittest.TestCase):
             self.assertAlmostEqual(float(mean), float(their_mean), delta=0.5 * float(their_sd), msg=printed)
             self.assertAlmostEqual(float(sd) / float(their_sd), 1, delta=0.4, msg=printed)
 
+    def test_our_own_simulator_behind_a_server_is_calibrated_as_here(self):
+        folder = pathlib.Path(self.folder.name)
+        calibrate = [PLUMB, "calibrate", ROBOT, "--csv", self.table, "--method", "laplace", "--horizons", "1"]
+        subprocess.run([*calibrate, "--output", folder / "here.json"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([*calibrate, "--output", folder / "there.json", "--model", self.url], check=True, stdout=subprocess.DEVNULL)
+        here, there = (json.loads((folder / name).read_text()) for name in ("here.json", "there.json"))
+        for mean, other, sd, other_sd in zip(here["mean"], there["mean"], here["sd"], there["sd"]):
+            self.assertAlmostEqual(mean, other, delta=0.2 * sd)
+            self.assertAlmostEqual(other_sd / sd, 1, delta=0.1)
+
     def test_what_is_wrong_is_an_error_object(self):
         for path, request, status, kind in (
                 ("/Evaluate", {"name": "errors", "input": [[1, 2]]}, 400, "InvalidInput"),

@@ -1,0 +1,151 @@
+// Somebody else's simulator, behind a real connection: a linear one, whose posterior is known.
+#include "umbridge/remote_calibration.h"
+
+#include <unistd.h>
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <thread>
+
+#include "http/client.h"
+#include "umbridge/server.h"
+
+namespace plumb {
+namespace {
+
+using Eigen::VectorXd;
+
+constexpr int kSteps = 300;
+constexpr double kNoise = 0.01;
+
+/// A server in this process, on a port of its own.
+class Serving {
+ public:
+  explicit Serving(std::vector<ServedModel> models) : server_({"127.0.0.1", 0}, std::move(models)) {
+    REQUIRE(pipe(pipe_) == 0);
+    url_ = "http://127.0.0.1:" + std::to_string(server_.port());
+    thread_ = std::thread([this] { server_.Run(pipe_[0], [] { return true; }); });
+  }
+  ~Serving() {
+    REQUIRE(write(pipe_[1], "x", 1) == 1);
+    thread_.join();
+    close(pipe_[1]);
+  }
+  const std::string& url() const { return url_; }
+
+ private:
+  UmbridgeServer server_;
+  int pipe_[2];
+  std::string url_;
+  std::thread thread_;
+};
+
+RobotDescription Cartpole() {
+  RobotDescription robot =
+      LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/cartpole");
+  robot.parameters = {{"mass/cart", "kg", ParameterDescription::Coordinate::kLinear, 1, 1},
+                      {"mass/pole", "kg", ParameterDescription::Coordinate::kLinear, 1, 1}};
+  robot.virtual_robot.hidden.clear();
+  return robot;
+}
+
+/// Next states of a step are whatever this says, whatever the state.
+VectorXd Linear(int step, const VectorXd& p) {
+  return Eigen::Vector4d(p(0), p(1) * std::sin(step), p(0) * std::cos(2 * step), 0.3 * p(1));
+}
+
+/// Every beginning is exact, and the noise of the end known or not.
+Log Record(const VectorXd& truth, bool noise_known) {
+  Random random(5);
+  Log log;
+  log.rollouts.resize(1);
+  const VectorXd zero = VectorXd::Zero(2), sd = VectorXd::Constant(2, noise_known ? kNoise : NAN);
+  for (int step = 0; step < kSteps; ++step) {
+    VectorXd next = Linear(step, truth);
+    for (double& entry : next) entry += kNoise * random.Normal();
+    log.rollouts[0].transitions.push_back(
+        {2 * step, zero, zero, next.head(2), next.tail(2), zero, zero, sd, sd, {{0.02, zero}}});
+  }
+  return log;
+}
+
+ServedModel NextStates(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>& spoil =
+                           [](const Eigen::MatrixXd& m) { return m; }) {
+  return {"next_states", 2, 4 * kSteps, [=](const Eigen::MatrixXd& parameters) {
+            Eigen::MatrixXd outputs(4 * kSteps, parameters.cols());
+            for (Eigen::Index j = 0; j < parameters.cols(); ++j)
+              for (int step = 0; step < kSteps; ++step)
+                outputs.col(j).segment(4 * step, 4) = Linear(step, parameters.col(j));
+            return spoil(outputs);
+          }};
+}
+
+}  // namespace
+
+TEST_CASE("somebody else's linear model has the posterior of linear regression") {
+  const bool known = GENERATE(true, false);
+  INFO(known);
+  const RobotDescription robot = Cartpole();
+  const Eigen::Vector2d truth(1.7, 0.6);
+  const std::vector<Log> logs{Record(truth, known)};
+  const Serving serving({NextStates()});
+  RemoteModel model(serving.url(), "next_states", 2, NextStatesSize(robot, logs));
+  const Findings found = CalibrateRemote(robot, logs, model, {});
+
+  // Normal equations, the prior among them.
+  Eigen::Matrix2d precision = Eigen::Matrix2d::Identity();
+  Eigen::Vector2d weighted = Eigen::Vector2d::Ones();
+  for (int step = 0; step < kSteps; ++step) {
+    const Transition& t = logs[0].rollouts[0].transitions[static_cast<size_t>(step)];
+    Eigen::Matrix<double, 4, 2> rows;
+    rows << Linear(step, Eigen::Vector2d(1, 0)), Linear(step, Eigen::Vector2d(0, 1));
+    VectorXd end(4);
+    end << t.next_q, t.next_v;
+    precision += rows.transpose() * rows / (kNoise * kNoise);
+    weighted += rows.transpose() * end / (kNoise * kNoise);
+  }
+  const Eigen::Vector2d mean = precision.llt().solve(weighted);
+  const Eigen::Matrix2d covariance = precision.inverse();
+  REQUIRE(found.posterior.components.size() == 1);
+  const Gaussian& posterior = found.posterior.components[0];
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    const double sd = std::sqrt(covariance(i, i));
+    // The noise's scale is estimated, of each coordinate on its own where it is not known.
+    CHECK(std::abs(posterior.mean(i) - mean(i)) < 0.3 * sd);
+    CHECK(std::sqrt(posterior.covariance(i, i)) == Approx(sd).epsilon(0.15));
+  }
+  CHECK(found.identifiability.summary == "every parameter is determined by this motion");
+  CHECK(found.transitions == kSteps);
+  CHECK_THAT(found.misspecification.summary, Catch::Contains("not judged"));
+}
+
+TEST_CASE("a model that is not what it should be is refused in a line") {
+  const RobotDescription robot = Cartpole();
+  const std::vector<Log> logs{Record(Eigen::Vector2d(1, 1), true)};
+  const Eigen::Index size = NextStatesSize(robot, logs);
+  REQUIRE(size == 4 * kSteps);
+  using Catch::Contains;
+  {
+    const Serving serving({NextStates()});
+    CHECK_THROWS_WITH(RemoteModel(serving.url(), "forward", 2, size), Contains("next_states"));
+    CHECK_THROWS_WITH(RemoteModel(serving.url(), "next_states", 3, size),
+                      Contains("inputSizes of next_states is [2], and not [3]"));
+    CHECK_THROWS_WITH(RemoteModel(serving.url(), "next_states", 2, size + 4),
+                      Contains("outputSizes"));
+    CHECK_THROWS_WITH(PostHttp(serving.url(), "/InputSizes", R"({"name": "next_states"})", 3),
+                      Contains("limit"));
+  }
+  {
+    const Serving failing(
+        {NextStates([](const Eigen::MatrixXd& m) -> Eigen::MatrixXd { return m * NAN; })});
+    RemoteModel model(failing.url(), "next_states", 2, size);
+    CHECK_THROWS_WITH(CalibrateRemote(robot, logs, model, {}), Contains("no finite numbers"));
+  }
+  for (const char* url : {"https://127.0.0.1:1", "127.0.0.1:1", "http://", "http://a:b",
+                          "http://:1", "http://a/b", "http://a b:1"})
+    CHECK_THROWS_WITH(RemoteModel(url, "next_states", 2, size), Contains("http://HOST:PORT"));
+  // Port 1 of this machine: nobody is there.
+  CHECK_THROWS_WITH(RemoteModel("http://127.0.0.1:1", "next_states", 2, size),
+                    Contains("http://127.0.0.1:1/InputSizes: Connection refused"));
+}
+
+}  // namespace plumb

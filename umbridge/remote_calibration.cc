@@ -1,0 +1,208 @@
+#include "umbridge/remote_calibration.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include "calibrator/diagnostics/identifiability.h"
+#include "calibrator/fit/one_step.h"
+#include "calibrator/fit/recorded_window.h"
+#include "calibrator/fit/robot_least_squares.h"
+#include "calibrator/fit/whitening.h"
+#include "calibrator/fit/window_errors.h"
+#include "calibrator/inference/laplace.h"
+#include "robot/parameter_distribution.h"
+#include "sim/model.h"
+
+namespace plumb {
+namespace {
+
+constexpr int kNoiseRounds = 4;    // until the noise of beginnings and ends agrees
+constexpr double kSettled = 0.05;  // of the noise's scale
+constexpr Eigen::Index kSamples = 1000;
+
+/// Errors of the model's next states, in the rows of WindowErrors.
+class RemoteErrors {
+ public:
+  RemoteErrors(const RobotDescription& robot, const std::vector<Rollout>& rollouts,
+               RemoteModel& model, const std::function<void(const std::string&, double)>& progress)
+      : robot_(robot),
+        rollouts_(rollouts),
+        model_(model),
+        progress_(progress),
+        own_(std::make_shared<Model>(robot), rollouts, 1, ExecutionOptions()),
+        steps_(std::make_shared<Model>(robot), rollouts, 1),
+        noise_sd_(own_.noise_sd()) {
+    Eigen::Index first = 0;
+    for (const Rollout& rollout : rollouts) {
+      first_.push_back(first);
+      first += static_cast<Eigen::Index>(rollout.transitions.size());
+    }
+  }
+
+  LeastSquares Problem() {
+    LeastSquares problem = ProblemOf(robot_, own_);
+    problem.errors = [this](const Eigen::MatrixXd& coordinates) {
+      Eigen::MatrixXd errors = Raw(coordinates);
+      Whiten(&errors);
+      return errors;
+    };
+    return problem;
+  }
+
+  /// Takes from our own simulator with these parameters how a step carries the noise of the state
+  /// that it begins with along; where that fails, from free motion.
+  void Linearise(const Eigen::VectorXd& coordinates) {
+    const Eigen::VectorXd physical = robot_.ToPhysical(coordinates);
+    const Eigen::MatrixXd starts = steps_.Starts(), ends = steps_.Predict(physical, starts);
+    const Eigen::VectorXd differences = StartDifferences(noise_sd_);
+    sensitivity_.assign(steps_.steps().size(), Eigen::MatrixXd(starts.rows(), starts.rows()));
+    for (Eigen::Index c = 0; c < starts.rows(); ++c) {
+      Eigen::MatrixXd moved = starts;
+      moved.row(c).array() += differences(c);
+      const Eigen::MatrixXd slopes = (steps_.Predict(physical, moved) - ends) / differences(c);
+      for (size_t i = 0; i < sensitivity_.size(); ++i)
+        sensitivity_[i].col(c) = slopes.col(static_cast<Eigen::Index>(i));
+    }
+    for (size_t i = 0; i < sensitivity_.size(); ++i) {
+      if (!sensitivity_[i].allFinite())
+        sensitivity_[i] = FreeMotion(own_.num_velocities(), steps_.steps()[i].recorded->duration());
+    }
+  }
+
+  bool noise_known() const { return own_.noise_known(); }
+  const std::vector<WindowErrors::Row>& rows() const { return own_.rows(); }
+  const Eigen::VectorXd& noise_sd() const { return noise_sd_; }
+  void Scale(const Eigen::VectorXd& scale) {
+    for (Eigen::Index c = 0; c < std::min(scale.size(), noise_sd_.size()); ++c)
+      noise_sd_(c) *= std::max(scale(c), 1e-150);
+  }
+  int64_t evaluations() const { return evaluations_; }
+
+ private:
+  const Transition& TransitionOf(const WindowErrors::Row& row) const {
+    return rollouts_[static_cast<size_t>(row.rollout)]
+        .transitions[static_cast<size_t>(row.transition)];
+  }
+
+  // Among the transitions of all roll-outs.
+  Eigen::Index IndexOf(const WindowErrors::Row& row) const {
+    return first_[static_cast<size_t>(row.rollout)] + row.transition;
+  }
+
+  Eigen::MatrixXd Raw(const Eigen::MatrixXd& coordinates) {
+    const Eigen::Index size = 2 * own_.num_velocities();
+    Eigen::MatrixXd errors(static_cast<Eigen::Index>(rows().size()), coordinates.cols());
+    for (Eigen::Index j = 0; j < coordinates.cols(); ++j) {
+      progress_(fmt::format("{} evaluations of {}", ++evaluations_, model_.name()), 0.5);
+      const Eigen::VectorXd next = model_.Evaluate(robot_.ToPhysical(coordinates.col(j)));
+      for (size_t i = 0; i < rows().size(); ++i) {
+        const WindowErrors::Row& row = rows()[i];
+        errors(static_cast<Eigen::Index>(i), j) = next(size * IndexOf(row) + row.coordinate) -
+                                                  EndReading(TransitionOf(row), row.coordinate);
+      }
+      if (!errors.col(j).allFinite()) errors.col(j).setConstant(NAN);
+    }
+    return errors;
+  }
+
+  void Whiten(Eigen::MatrixXd* errors) const {
+    for (size_t begin = 0, end = 0; begin < rows().size(); begin = end) {
+      const Transition& t = TransitionOf(rows()[begin]);
+      const Eigen::MatrixXd& slopes = sensitivity_[static_cast<size_t>(IndexOf(rows()[begin]))];
+      std::vector<Eigen::Index> coordinates;
+      for (; end < rows().size() && rows()[end].window == rows()[begin].window; ++end)
+        coordinates.push_back(rows()[end].coordinate);
+      const auto count = static_cast<Eigen::Index>(end - begin);
+      Eigen::VectorXd end_sd(count);
+      for (Eigen::Index i = 0; i < count; ++i) {
+        const Eigen::Index c = coordinates[static_cast<size_t>(i)];
+        const double known = EndSd(t, c);
+        end_sd(i) = known > 0 ? known : noise_sd_(c);
+      }
+      Eigen::VectorXd start_sd = StartSd(t);
+      start_sd = start_sd.array().isNaN().select(noise_sd_, start_sd);
+      WhitenWindow(std::vector<Eigen::Index>{0, count}, start_sd, slopes(coordinates, Eigen::all),
+                   end_sd, errors->middleRows(static_cast<Eigen::Index>(begin), count));
+    }
+  }
+
+  const RobotDescription& robot_;
+  const std::vector<Rollout>& rollouts_;
+  RemoteModel& model_;
+  const std::function<void(const std::string&, double)>& progress_;
+  WindowErrors own_;  // its rows, and nothing that it simulates
+  OneStep steps_;
+  std::vector<Eigen::MatrixXd> sensitivity_;  // of each transition
+  std::vector<Eigen::Index> first_;           // transition of each roll-out
+  Eigen::VectorXd noise_sd_;
+  int64_t evaluations_ = 0;
+};
+
+LaplaceFit Fit(RemoteErrors& errors, const Prior& prior, const RemoteModel& model) {
+  Eigen::VectorXd mode = prior.FromStandard(Eigen::VectorXd::Zero(prior.size()));
+  for (int round = 1;; ++round) {
+    LaplaceFit fit;
+    errors.Linearise(mode);
+    try {
+      fit = FitLaplace(errors.Problem(), mode);
+    } catch (const std::invalid_argument& error) {
+      const std::string theirs = model.last_error();
+      throw std::invalid_argument(model.name() + ": " + error.what() +
+                                  (theirs.empty() ? "" : "; it has said: " + theirs));
+    }
+    mode = fit.mode;
+    const bool settled = errors.noise_known() || (fit.scale.array().log().abs() < kSettled).all();
+    if (settled || round == kNoiseRounds) return fit;
+    errors.Scale(fit.scale);
+  }
+}
+
+}  // namespace
+
+Eigen::Index NextStatesSize(const RobotDescription& robot, std::span<const Log> logs) {
+  size_t transitions = 0;
+  for (const Log& log : logs) transitions += CountTransitions(log.rollouts);
+  return 2 * robot.num_velocities() * static_cast<Eigen::Index>(transitions);
+}
+
+Findings CalibrateRemote(const RobotDescription& robot, std::span<const Log> logs,
+                         RemoteModel& model, const CalibrationOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<Rollout> rollouts;
+  for (const Log& log : logs)
+    rollouts.insert(rollouts.end(), log.rollouts.begin(), log.rollouts.end());
+  const Prior prior = PriorOf(robot);
+  RemoteErrors errors(robot, rollouts, model, options.progress);
+  const LaplaceFit fit = Fit(errors, prior, model);
+
+  Findings findings;
+  findings.method = options.method, findings.used = "laplace", findings.seed = options.seed;
+  findings.prior = PriorGaussian(robot);
+  findings.posterior = {{1}, {fit.posterior}};
+  Random random(options.seed);
+  const Eigen::MatrixXd samples = Draw(fit, prior, kSamples, random);
+  findings.samples.resizeLike(samples);
+  for (Eigen::Index i = 0; i < samples.cols(); ++i)
+    findings.samples.col(i) = robot.ToPhysical(samples.col(i));
+  findings.transitions = static_cast<int64_t>(CountTransitions(rollouts));
+  findings.simulated_steps = errors.evaluations() * findings.transitions;
+  findings.noise_sd = errors.noise_sd();
+  findings.errors = fit.errors, findings.rows = errors.rows();
+  findings.discrepancy = fit.errors.cwiseAbs2().mean();
+  findings.identifiability = FindIdentifiability(
+      robot, fit.information, findings.prior.covariance.diagonal().cwiseSqrt(), fit.posterior);
+  findings.cramer_rao = findings.identifiability.cramer_rao;
+  findings.misspecification.summary = "not judged: the model is not ours";
+  findings.holdout.summary = "nothing was held out: the model is not ours";
+  findings.agreement.summary = "the logs were not compared: the model is not ours";
+  findings.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return findings;
+}
+
+}  // namespace plumb
