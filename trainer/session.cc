@@ -144,10 +144,9 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
 }
 
 bool TrainingSession::Replace(const ParameterDistribution& distribution) {
-  if (!training() || distribution.iteration != iteration_ ||
-      distribution.mixture == distribution_.mixture)
-    return false;
+  if (!training() || distribution.iteration != iteration_) return false;
   if (distribution.residual) RequireResidualOf(description_, *distribution.residual);
+  if (distribution.mixture == distribution_.mixture) return false;
   RequireSimulable(distribution);
   distribution_ = distribution;
   trainer_.ForgetBest();

@@ -37,7 +37,6 @@ std::vector<Forgery> Forgeries(const RobotDescription& robot) {
   forgeries[2].message.covariance[n + 1] = std::exp(150.);
   forgeries[3].message.start = {0, 1e38f}, forgeries[3].message.num_starts = 2;
   forgeries[4].message.draw[0] = std::exp(150.);
-  forgeries[5].message.mean[0] += 0.01;  // or it is taken for a repetition of the right one
   return forgeries;
 }
 
