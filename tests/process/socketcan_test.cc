@@ -89,5 +89,38 @@ TEST_CASE("a bus that is taken down: fault with a reason, and back only by armin
   CHECK(stage.BeginEpisode());
 }
 
+TEST_CASE("one of two interfaces is taken down: the drives on the other stop, too") {
+  const auto ip = [](const std::string& what) {
+    return std::system(("ip link " + what).c_str()) == 0;
+  };
+  REQUIRE(ip("add dev vcanboom type vcan"));
+  REQUIRE(ip("set vcanboom up"));
+  {
+    Stage stage(43, "hopper/two_buses.toml");
+    const std::vector<std::string> buses{"--bus", "leg=" + stage.bus_url, "--bus",
+                                         "boom=socketcan:vcanboom"};
+    std::vector<std::string> driver = buses;
+    driver.push_back("--virtual");
+    stage.Start("plumb-robot", buses);
+    stage.Start("plumb-driver", driver);
+    stage.Start("plumb-estimator");
+    stage.Start("plumb-controller");
+    REQUIRE(stage.Arm(20));
+    REQUIRE(stage.WaitUntil([&] { return stage.axis_state == 8; }, 1));
+    REQUIRE(ip("set vcanboom down"));
+    REQUIRE(stage.WaitForDriver(driver_status_t::FAULT, 5));
+    CHECK(stage.drivers.newest().reason == "bus boom: the CAN interface is down");
+    CHECK(stage.WaitUntil([&] { return stage.axis_state == 1; }, 1));
+    CHECK(stage.drivers.newest().buses[0].up);
+    CHECK_FALSE(stage.drivers.newest().buses[1].up);
+    REQUIRE(ip("set vcanboom up"));
+    CHECK(stage.WaitUntil([&] { return stage.drivers.newest().buses[1].up; }, 5));
+    stage.Listen(1);
+    CHECK(stage.drivers.newest().state == driver_status_t::FAULT);
+    CHECK(stage.Arm(20));
+  }
+  CHECK(ip("del vcanboom"));
+}
+
 }  // namespace
 }  // namespace plumb
