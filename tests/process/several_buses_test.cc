@@ -30,8 +30,9 @@ std::set<uint32_t> Ids(const Counts& counts) {
 
 /// The hopper's processes, its boom's bus at the driver's end with faults.
 struct Hopper {
-  explicit Hopper(int number, const std::string& faults = "")
-      : stage(number, "hopper/two_buses.toml") {
+  explicit Hopper(int number, const std::string& faults = "",
+                  const std::string& file = "hopper/two_buses.toml")
+      : stage(number, file) {
     stage.Hear(Url(number, 1), [this](const Frame& frame) { ++boom[frame.id]; });
     const std::string leg = "leg=" + stage.bus_url, url = Url(number, 1);
     stage.Start("plumb-robot", {"--bus", leg, "--bus", "boom=" + url, "--seed", "1"});
@@ -46,8 +47,9 @@ struct Hopper {
   Counts boom;  ///< of its bus
 };
 
-TEST_CASE("the hopper on two buses: drives on one, boom and IMU on the other, one state of all") {
-  Hopper hopper(125);
+/// @param ids of the drives' torques and answers.
+void Stand(int number, const std::string& file, const std::vector<uint32_t>& ids) {
+  Hopper hopper(number, "", file);
   Stage& stage = hopper.stage;
   Subscriber<joint_state_t> joints(stage.messenger, "JOINT_STATE");
   Subscriber<imu_t> imus(stage.messenger, "IMU");
@@ -61,7 +63,7 @@ TEST_CASE("the hopper on two buses: drives on one, boom and IMU on the other, on
   CHECK(std::abs(imus.received() - readings - 200) <= 1);
   for (size_t i = 0; i < 6; ++i) CHECK(joints.newest().valid[i]);
   // Torques and estimates of nodes 1 to 3 on the leg's bus, encoders and IMU on the boom's.
-  for (const uint32_t id : {0x02Eu, 0x04Eu, 0x06Eu, 0x029u, 0x049u, 0x069u}) {
+  for (const uint32_t id : ids) {
     INFO(id);
     CHECK(std::abs(stage.frames_by_id[id] - 500) <= 1);
     CHECK(hopper.boom.count(id) == 0);
@@ -73,16 +75,24 @@ TEST_CASE("the hopper on two buses: drives on one, boom and IMU on the other, on
   }
   const driver_status_t& status = stage.drivers.newest();
   REQUIRE(status.num_buses == 2);
-  CHECK(status.bus == "leg=" + stage.bus_url + " boom=" + Url(125, 1));
+  CHECK(status.bus == "leg=" + stage.bus_url + " boom=" + Url(number, 1));
   for (const bus_status_t& bus : status.buses) {
     CHECK(bus.up);
     CHECK(bus.frames_rejected == 0);
     CHECK(bus.frames_dropped == 0);
   }
   CHECK(status.buses[0].name == "leg");
-  CHECK(status.buses[1].url == Url(125, 1));
+  CHECK(status.buses[1].url == Url(number, 1));
   CHECK(status.buses[0].frames_sent > status.buses[1].frames_sent);
   CHECK(status.buses[1].frames_received > 1000);
+}
+
+TEST_CASE("the hopper on two buses: drives on one, boom and IMU on the other, one state of all") {
+  Stand(125, "hopper/two_buses.toml", {0x02E, 0x04E, 0x06E, 0x029, 0x049, 0x069});
+}
+
+TEST_CASE("the hopper on three moteus: a bus that carries CAN FD beside one that does not") {
+  Stand(130, "hopper/moteus.toml", {0x8001, 0x8002, 0x8003, 0x100, 0x200, 0x300});
 }
 
 TEST_CASE("a bus that fails stops the drives on the other, and each bus has its recording") {

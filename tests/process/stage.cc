@@ -212,8 +212,9 @@ void Stage::Witness() {
     for (const Frame& frame : std::span(frames_now).first(static_cast<size_t>(n))) {
       on_frame(frame);
       ++frames;
-      if (frame.remote || frame.error || frame.extended) continue;
+      if (frame.remote || frame.error) continue;
       ++frames_by_id[frame.id];
+      if (frame.extended) continue;
       if (frame.id == 0x02E && frame.length >= 4) {
         std::memcpy(&torque, frame.data.data(), 4);
         if (torque == 0) continue;

@@ -98,7 +98,7 @@ class Stage {
   /// that a torque was asked for after the last command had been made
   int64_t longest_alone = 0;
   int64_t frames = 0;
-  std::map<uint32_t, int64_t> frames_by_id;  ///< standard data frames
+  std::map<uint32_t, int64_t> frames_by_id;  ///< data frames, ids of 11 and of 29 bits
   /// Called with every frame.
   std::function<void(const Frame&)> on_frame = [](const Frame&) {};
   /// Another bus, to whose frames the witness listens, too: calls `frame` with every one.

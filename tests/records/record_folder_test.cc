@@ -25,7 +25,7 @@ TEST_CASE("a log's folder has the robot, whatever its file extends, to the last 
   const std::string log = folder / "run.lcmlog";
   const std::string file =
       GENERATE("pendulum", "pendulum/worn_weak.toml", "hopper", "hopper/mit.toml",
-               "hopper/two_buses.toml", "cartpole/balance.toml");
+               "hopper/moteus.toml", "cartpole/balance.toml");
   INFO(file);
   const RecordFolder record(log, {"plumb 1", "plumb record", "", "real", Robots() + file});
   const RobotDescription was = LoadRobot(Robots() + file), is = LoadRobot(log + ".d");

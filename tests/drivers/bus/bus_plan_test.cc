@@ -217,8 +217,9 @@ TEST_CASE("slower buses are fuller") {
 
 TEST_CASE("the robots we ship fit their buses") {
   const char* source = std::getenv("PLUMBLINE_SOURCE");
-  for (const char* name : {"pendulum", "pendulum/moteus.toml", "pendulum/rmd.toml",
-                           "double_pendulum", "cartpole", "hopper", "hopper/two_buses.toml"}) {
+  for (const char* name :
+       {"pendulum", "pendulum/moteus.toml", "pendulum/rmd.toml", "double_pendulum", "cartpole",
+        "hopper", "hopper/two_buses.toml", "hopper/moteus.toml"}) {
     INFO(name);
     const RobotDescription robot =
         LoadRobot(std::string(source ? source : ".") + "/robots/" + name);
