@@ -163,40 +163,14 @@ TEST_CASE("nothing but finite torques within the range is sent, and the others a
   CHECK(bench.motor->saturations() == 4);
 }
 
-TEST_CASE("one lost frame of any kind does not spoil arming; a bus that takes none ends it") {
-  SECTION("the first enter is lost") {
-    Bench bench;
-    int seen = 0;
-    bench.to_device = [&](const Frame& frame) {
-      return !SameOnWire(frame, Bench::Special(mit::kEnter)) || ++seen > 1;
-    };
-    CHECK(bench.Arm());
-    CHECK(bench.device.armed());
-  }
-  SECTION("the bus is full") {
-    Bench bench;
-    bench.bus_full = true;
-    bench.motor->Arm(bench.now);
-    bench.Run(260);
-    CHECK(bench.motor->state() == DriveState::kAbsent);
-    bench.bus_full = false;
-    bench.Run(100);
-    CHECK(bench.motor->state() == DriveState::kFault);
-    CHECK(bench.Arm());
-  }
-}
-
-TEST_CASE(
-    "the first exit may be lost: the motor does not count as idle before the second is answered") {
+TEST_CASE("a lost enter does not spoil arming") {
   Bench bench;
-  CHECK(bench.Arm());
   int seen = 0;
   bench.to_device = [&](const Frame& frame) {
-    return !SameOnWire(frame, Bench::Special(mit::kExit)) || ++seen > 1;
+    return !SameOnWire(frame, Bench::Special(mit::kEnter)) || ++seen > 1;
   };
-  bench.motor->Disarm(bench.now);
-  bench.Step();
-  CheckIdleOnlyOnceStopped(bench);
+  CHECK(bench.Arm());
+  CHECK(bench.device.armed());
 }
 
 TEST_CASE("a motor whose position keeps jumping is told to exit, and believed") {
@@ -213,15 +187,6 @@ TEST_CASE("a motor whose position keeps jumping is told to exit, and believed") 
   bench.Run(100);
   CHECK(bench.Count(Bench::Special(mit::kExit)) >= exits + 2);
   CHECK(bench.motor->confirmed_idle());
-}
-
-TEST_CASE("an emergency stop exits and says so") {
-  Bench bench;
-  CHECK(bench.Arm());
-  bench.motor->Estop(bench.now);
-  bench.Step();
-  CHECK_FALSE(bench.device.armed());
-  CHECK(bench.motor->reason() == "emergency stop requested");
 }
 
 TEST_CASE("frames of other motors and other kinds are not mine, others are rejected") {
