@@ -1,5 +1,7 @@
 #pragma once
 
+#include <poll.h>
+
 #include <functional>
 #include <memory>
 #include <optional>
@@ -11,8 +13,6 @@
 #include "common/lockstep/participant.h"
 #include "common/messenger.h"
 #include "common/signature.h"
-
-struct pollfd;
 
 namespace CLI {
 class App;

@@ -1,8 +1,6 @@
 // Jobs of an experiment, by one process and by several ranks.
 #include "experiments/jobs.h"
 
-#include <poll.h>
-
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
