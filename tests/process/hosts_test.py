@@ -6,6 +6,7 @@ a network, or without OpenMPI.
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -20,16 +21,23 @@ def run(command, **options):
     return subprocess.run(command, check=True, **options)
 
 
+def skip_for(said, cause, words):
+    """Ends: as skipped if that is the cause, and as failed for any other."""
+    if not re.search(cause, said):
+        sys.exit(said)
+    print(f"skipped: {words}")
+    sys.exit(77)
+
+
 def second_host():
     """@return a process whose network and name are the second host's; ours is the first one."""
     host = subprocess.Popen(["unshare", "--net", "--uts", "sh", "-c", "hostname second; echo; exec sleep 600"], stdout=subprocess.PIPE)
     host.stdout.readline()
     there = ["nsenter", "-t", str(host.pid), "-n", "-u"]
-    wire = subprocess.run(["ip", "link", "add", "name", "first0", "type", "veth", "peer", "name", "second0", "netns", str(host.pid)])
+    wire = subprocess.run(["ip", "link", "add", "name", "first0", "type", "veth", "peer", "name", "second0", "netns", str(host.pid)], stderr=subprocess.PIPE, text=True)
     if wire.returncode:
         host.kill()
-        print("skipped: the kernel has no veth interfaces")
-        sys.exit(77)
+        skip_for(wire.stderr, r"Unknown device type|Operation not supported", "the kernel has no veth interfaces")
     for prefix, interface, address in (([], "first0", HOSTS[0]), (there, "second0", HOSTS[1])):
         run([*prefix, "ip", "link", "set", "lo", "up"])
         run([*prefix, "ip", "addr", "add", f"{address}/24", "dev", interface])
@@ -134,9 +142,9 @@ def main():
         if not shutil.which("mpirun"):
             print("skipped: OpenMPI (openmpi-bin) is not installed")
             sys.exit(77)
-        if subprocess.run(["unshare", "--net", "--uts", "true"], stderr=subprocess.DEVNULL).returncode:
-            print("skipped: this user may not make a network")
-            sys.exit(77)
+        network = subprocess.run(["unshare", "--net", "--uts", "true"], stderr=subprocess.PIPE, text=True)
+        if network.returncode:
+            skip_for(network.stderr, r"Operation not permitted", "this user may not make a network")
         os.environ.update({"PLUMBLINE_HOSTS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"})
         os.execvp("unshare", ["unshare", "--net", "--uts", sys.executable, *sys.argv])
     plumb, figure, robots = sys.argv[1:]
