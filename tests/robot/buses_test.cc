@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "robot/description.h"
+#include "tests/replaced.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {
@@ -12,12 +13,6 @@ namespace {
 
 using Catch::Contains;
 using Catch::StartsWith;
-
-std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  return text.replace(at, from.size(), to);
-}
 
 const std::string kOne = "[bus]\nurl = \"udp:239.74.163.2:43113\"\n", kTwo = R"([[bus]]
 name = "left"

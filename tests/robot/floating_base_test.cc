@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <fstream>
 
+#include "tests/replaced.h"
 #include "tests/robot/zoo.h"
 #include "tests/sim/robots.h"
 
@@ -16,12 +17,6 @@ using Catch::Contains;
 std::string Text(const std::string& file) {
   std::ifstream in(SourceFile("robots/hopper/" + file));
   return {std::istreambuf_iterator<char>(in), {}};
-}
-
-std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  return text.replace(at, from.size(), to);
 }
 
 RobotDescription Load(const std::string& toml, const std::string& urdf = Text("robot.urdf")) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "robot/description.h"
+#include "tests/replaced.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {
@@ -14,12 +15,6 @@ using Catch::Contains;
 
 RobotDescription Load(const std::string& toml, const std::string& urdf = kZooUrdf) {
   return LoadRobot(RobotFolder(urdf, toml).path());
-}
-
-std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  return text.replace(at, from.size(), to);
 }
 
 void Refused(const std::string& from, const std::string& to, const std::string& what) {

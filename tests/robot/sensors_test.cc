@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "robot/description.h"
+#include "tests/replaced.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {
@@ -49,12 +50,6 @@ velocity = 75.0
 torque = 18.0
 source = "the label"
 )";
-
-std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  return text.replace(at, from.size(), to);
-}
 
 RobotDescription Load(const std::string& toml) {
   return LoadRobot(RobotFolder(kZooUrdf, toml).path());

@@ -3,6 +3,7 @@
 
 #include "common/config.h"
 #include "robot/description.h"
+#include "tests/replaced.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {
@@ -25,12 +26,6 @@ std::string Error(const std::string& urdf, const std::string& toml = kZooToml) {
     return error.what();
   }
   return "no error";
-}
-
-std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  return text.replace(at, from.size(), to);
 }
 
 // The zoo with one text replaced: the error is at that line, or at that of `blamed`.
