@@ -126,12 +126,15 @@ class DriverProcess {
   int Run() {
     try {
       while (!process_.stopping()) Step();
+      return DisarmAndStop();
     } catch (const std::exception&) {  // whatever it is, the motors come first
       deaf_ = true;
-      DisarmAndStop();
+      try {
+        DisarmAndStop();
+      } catch (const std::exception&) {  // the first one says why
+      }
       throw;
     }
-    return DisarmAndStop();
   }
 
  private:
@@ -145,7 +148,7 @@ class DriverProcess {
     // A wake-up with nothing to do is not timed.
     phases_.Mark();
     if (ReceiveFrames()) phases_.End(PhaseTimes::kReceive);
-    if (Publish()) phases_.End(PhaseTimes::kPublish);
+    if (!deaf_ && Publish()) phases_.End(PhaseTimes::kPublish);
     phases_.Mark();
     if (!deaf_ && process_.messenger().Drain() > 0) phases_.End(PhaseTimes::kCommand);
     if (cycle_.Due(clock_.Now())) {
@@ -262,7 +265,13 @@ class DriverProcess {
     const auto patience = Microseconds(kDisarmTimeout * clock_.scale());
     const int64_t begin = clock_.Now();
     do {
-      Step();
+      try {
+        Step();
+      } catch (const std::exception&) {
+        // After the first one drives are still to confirm. A run in virtual time that is over
+        // stands still: no time passes.
+        if (!deaf_ || clock_.is_virtual()) throw;
+      }
     } while (!driver_.confirmed_idle() && clock_.Now() - begin < patience);
     PublishStatus();  // the last word: nothing is sent after it
     log_.Drain();
@@ -295,7 +304,8 @@ class DriverProcess {
   std::array<Frame, 64> received_;
   PhaseTimes phases_{!clock_.is_virtual()};
   bool faulty_ = false;
-  bool deaf_ = false;  // whom to believe on LCM cannot be told any more
+  // something has failed: nobody on LCM is heard or told any more, the drives come first
+  bool deaf_ = false;
   int64_t next_reopen_ = 0;
   int64_t next_status_ = 0;
   uint64_t revision_ = 0;

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -118,7 +119,13 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
   }
   spdlog::info("{} is on {}", description.name, InOneLine(description.buses));
 
+  struct Arrival {
+    int64_t utime;
+    size_t bus;
+    Frame frame;
+  };
   std::array<Frame, 32> frames;
+  std::vector<Arrival> arrivals;
   std::vector<FrameBatch> answers(buses.size());
   int64_t now = clock.Utime();
   const auto until_frame = [&] {
@@ -128,7 +135,7 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
   };
   const auto send = [&] {
     for (size_t i = 0; i < buses.size(); ++i) {
-      buses[i].transport->Send(answers[i].frames());
+      if (answers[i].size() > 0) buses[i].transport->Send(answers[i].frames());
       answers[i].Clear();
     }
   };
@@ -136,20 +143,28 @@ int Serve(Process& process, const RobotDescription& description, const Eigen::Ve
     // First the time, then the frames: what arrives in between must not find the robot already past
     // it.
     now = clock.Utime();
+    arrivals.clear();
     for (size_t bus = 0; bus < buses.size(); ++bus) {
       Transport& transport = *buses[bus].transport;
       transport.SetTime(clock.Now());
       for (int burst = 0; burst < kBursts; ++burst) {
         const int count = transport.Receive(frames);
         if (count == 0) break;
-        for (int i = 0; i < count; ++i) {
-          const Frame& frame = frames[static_cast<size_t>(i)];
-          const int64_t arrival =
+        for (const Frame& frame : std::span(frames).first(static_cast<size_t>(count))) {
+          const int64_t at =
               frame.receive_ns == 0 ? now : clock.UtimeFromRealtimeNs(frame.receive_ns);
-          robot.Receive(bus, frame, std::min(arrival, now), answers);
+          // Of one bus in the order in which it gives them, whatever clocks and faults do.
+          const bool first = arrivals.empty() || arrivals.back().bus != bus;
+          const int64_t before = first ? at : arrivals.back().utime;
+          arrivals.push_back({std::min(std::max(before, at), now), bus, frame});
         }
-        send();
       }
+    }
+    // The robot's time goes on with each: one bus must not be ahead of another.
+    std::ranges::stable_sort(arrivals, {}, &Arrival::utime);
+    for (const Arrival& arrival : arrivals) {
+      robot.Receive(arrival.bus, arrival.frame, arrival.utime, answers);
+      send();
     }
     robot.Advance(now, answers);
     send();

@@ -88,8 +88,7 @@ class SocketCan : public DatagramTransport {
       case ENODEV:
         Fail(
             fmt::format("no such interface; cure: ip link add {0} type vcan && ip link set {0} up "
-                        "for a virtual "
-                        "one, or use udp:239.74.163.2:43113",
+                        "for a virtual one, or use udp:239.74.163.2:43113",
                         interface_));
       case EPROTOTYPE:
         Fail("not a CAN interface");

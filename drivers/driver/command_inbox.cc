@@ -41,11 +41,11 @@ std::string_view CommandInbox::Judge(const joint_command_t& command, int64_t uti
   if (std::ranges::any_of(command.kp, negative) || std::ranges::any_of(command.kd, negative)) {
     return "a gain is negative";
   }
+  if (command.expiry < 0) return "their expiry is negative";
   // Not as a difference: a hostile utime must not overflow.
-  if (command.utime < utime - expiry_) return "they were computed too long ago";
+  if (command.utime < utime - Life(command)) return "they were computed too long ago";
   if (command.utime > utime + expiry_)
     return "they are dated in the future: are the clocks the same?";
-  if (command.expiry < 0) return "their expiry is negative";
   if (command.sequence < 0 || command.sequence > kGreatestSequence)
     return "no sequence is numbered like this";
   if (empty_) return {};
@@ -61,12 +61,13 @@ bool CommandInbox::Offer(const joint_command_t& command, int64_t now, int64_t ut
   if (!refusal_.empty()) return false;
   command_ = command;
   arrival_ = now;
+  expires_ = now + Life(command) - std::max(int64_t{0}, utime - command.utime);
   empty_ = false;
   return true;
 }
 
-int64_t CommandInbox::expires() const noexcept {
-  return arrival_ + (command_.expiry > 0 ? std::min(command_.expiry, expiry_) : expiry_);
+int64_t CommandInbox::Life(const joint_command_t& command) const noexcept {
+  return command.expiry > 0 ? std::min(command.expiry, expiry_) : expiry_;
 }
 
 double CommandInbox::Effort(int joint, double position, double velocity) const noexcept {

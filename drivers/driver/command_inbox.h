@@ -12,7 +12,8 @@ namespace plumb {
 /// [us].
 class CommandInbox {
  public:
-  /// @param expiry [us] after arrival a command is void; a command may shorten but not lengthen it.
+  /// @param expiry [us] after it was computed a command is void, or after it was taken where its
+  /// date is ahead; a command may shorten but not lengthen it.
   CommandInbox(int num_joints, int64_t expiry);
 
   /// Forgets everything: the next command may have any plausible sequence number (a new
@@ -32,7 +33,7 @@ class CommandInbox {
   /// `now` of the last command taken. Meaningless while empty.
   int64_t arrival() const noexcept { return arrival_; }
   /// `now` until which the last command taken holds. Meaningless while empty.
-  int64_t expires() const noexcept;
+  int64_t expires() const noexcept { return expires_; }
   /// Whether the last command taken is part of an episode.
   bool in_episode() const noexcept { return !empty_ && command_.episode >= 0; }
   bool Expired(int64_t now) const noexcept { return empty_ || now > expires(); }
@@ -43,13 +44,15 @@ class CommandInbox {
   double Effort(int joint, double position, double velocity) const noexcept;
 
  private:
+  /// [us] for which a command may be obeyed.
+  int64_t Life(const joint_command_t& command) const noexcept;
   /// Empty if the command may be taken.
   std::string_view Judge(const joint_command_t& command, int64_t utime) const noexcept;
 
   int num_joints_;
   int64_t expiry_;
   bool empty_ = true;
-  int64_t arrival_ = 0;
+  int64_t arrival_ = 0, expires_ = 0;
   std::string_view refusal_;  ///< of a literal
   joint_command_t command_;
 };

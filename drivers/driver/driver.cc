@@ -179,6 +179,8 @@ void Driver::Tick(int64_t now, int64_t utime, int64_t lateness) noexcept {
 void Driver::CommandTorques() noexcept {
   const bool commanded = mode_ == Mode::kArmed && !inbox_.empty(),
              fresh = commanded && !inbox_.Expired(now_);
+  // A newer command that was never obeyed ends the older one, and does not begin a ramp anew.
+  if (commanded) fresh_until_ = fresh ? inbox_.expires() : std::min(fresh_until_, inbox_.expires());
   bool limited = false;
   for (Joint& joint : joints_) {
     joint.effort = 0;
@@ -189,7 +191,7 @@ void Driver::CommandTorques() noexcept {
       wish = inbox_.Effort(static_cast<int>(joint.index), position, velocity);
     } else if (commanded) {
       wish = StoppingEffort(settings_, joint.damping, joint.commanded,
-                            InSeconds(now_ - inbox_.expires()), velocity);
+                            InSeconds(now_ - fresh_until_), velocity);
     }
     joint.effort =
         LimitEffort(wish, {position, velocity, effort_sent_[joint.index], InSeconds(cycle_)},

@@ -120,7 +120,7 @@ class Driver {
     JointMeasurement latest;
     size_t bus;
     double effort = 0;      // in the torque frame of this cycle
-    double commanded = 0;   // the same when the command was fresh last
+    double commanded = 0;   // the same when the command was fresh last, until fresh_until_
     size_t torque_at = 0;   // that frame's place among the bus's frames
     size_t frames_end = 0;  // the motor's own frames of this cycle are before this one
   };
@@ -223,6 +223,7 @@ class Driver {
   // of a literal: what was wrong with a command since the last genuine one
   std::string_view forgery_;
   bool expiry_counted_ = false;
+  int64_t fresh_until_ = 0;  // [us] since when there is no command to obey
   bool replay_ = false;
   bool virtual_ = false;
   int64_t displaced_at_ = std::numeric_limits<int64_t>::min();  // `now` of the last Displaced()

@@ -116,7 +116,7 @@ void Driver::FindMeasuring(const RobotDescription& robot) {
         if (message.direction != BusMessage::Direction::kToDevice || message.remote) continue;
         buses_[joint.motor.bus].own.push_back(
             {.id = message.id,
-             .mask = message.extended ? Filter::kAllExtended : 0x7FF,
+             .mask = (message.extended ? Filter::kAllExtended : 0x7FF) & ~message.sender_bits,
              .own = true,
              .extended = message.extended});
       }

@@ -64,17 +64,17 @@ void FlightRecorder::Serve() {
 }
 
 void FlightRecorder::Write(const Tape& tape) const {
-  const std::filesystem::path file =
-      folder_ / fmt::format("fault_{}{}{}.log", utime_, name_.empty() ? "" : "_", name_);
-  std::string text = fmt::format("# {}\n", reason_.text());
-  for (size_t i = 0; i < tape.count; ++i) {
-    const Entry& entry =
-        tape.entries[(tape.next + tape.entries.size() - tape.count + i) % tape.entries.size()];
-    if (entry.utime < since_) continue;
-    text += fmt::format("({}.{:06}) {} {} {}\n", entry.utime / 1'000'000, entry.utime % 1'000'000,
-                        bus_, ToText(entry.frame), entry.sent ? 'T' : 'R');
-  }
   try {
+    const std::filesystem::path file =
+        folder_ / fmt::format("fault_{}{}{}.log", utime_, name_.empty() ? "" : "_", name_);
+    std::string text = fmt::format("# {}\n", reason_.text());
+    for (size_t i = 0; i < tape.count; ++i) {
+      const Entry& entry =
+          tape.entries[(tape.next + tape.entries.size() - tape.count + i) % tape.entries.size()];
+      if (entry.utime < since_) continue;
+      text += fmt::format("({}.{:06}) {} {} {}\n", entry.utime / 1'000'000, entry.utime % 1'000'000,
+                          bus_, ToText(entry.frame), entry.sent ? 'T' : 'R');
+    }
     WriteAtomically(file, text);
     if (report_) report_(file.string(), {});
   } catch (const std::exception& error) {

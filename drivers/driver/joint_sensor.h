@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/bus/timed_samples.h"
 #include "drivers/driver/measurements.h"
+#include "drivers/driver/timed_samples.h"
 #include "drivers/protocols/sensor.h"
 #include "plumb/imu_t.hpp"
 #include "robot/description.h"

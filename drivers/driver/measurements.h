@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "drivers/bus/timed_samples.h"
+#include "drivers/driver/timed_samples.h"
 
 namespace plumb {
 

@@ -71,8 +71,7 @@ void Plausibility::CountDevices(int64_t time) noexcept {
     crowded_ = true;
     Complain(
         "{} encoder estimates in {} ms, where one device sends {}: two devices with one id, or "
-        "somebody asks "
-        "for them?",
+        "somebody asks for them?",
         count_, since / 1000, since / settings_.period + 1);
   }
 }

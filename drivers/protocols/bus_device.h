@@ -15,8 +15,9 @@ struct BusMessage {
   /// [us] assumed of what a program on Linux sends once per period.
   static constexpr int64_t kHostJitter = 200;
 
-  Layout layout;    ///< name, fields, and bytes on the wire
-  uint32_t id = 0;  ///< 11 bits, or 29 if extended
+  Layout layout;             ///< name, fields, and bytes on the wire
+  uint32_t id = 0;           ///< 11 bits, or 29 if extended
+  uint32_t sender_bits = 0;  ///< of the id: other masters have other ones, and are obeyed, too
   bool extended = false;
   bool remote = false;  ///< a request: no data
   bool fd = false;      ///< a frame of CAN FD, its data at the faster rate

@@ -229,6 +229,7 @@ class CanSimpleMotor : public Motor {
   void Fail(int64_t now, fmt::format_string<Args...> format, Args&&... args) noexcept {
     reason_.Set(format, std::forward<Args>(args)...);
     fault_ = true;
+    // Even one that says it has stopped: it may be another with its node id that has spoken.
     Disarm(now);
   }
 
@@ -261,9 +262,7 @@ class CanSimpleMotor : public Motor {
     if (step_ == Step::kArmed && !running) {
       Fail(now, "the drive went to {}: {} ({})", DescribeAxisState(axis_state_), Words(axis_error_),
            DescribeProcedureResult(procedure_result_));
-      ask_error_ =
-          // and tell it to stop nevertheless: it may be another with its node id that has spoken
-          true;
+      ask_error_ = true;
     }
     return FrameUse::kConsumed;
   }

@@ -170,6 +170,9 @@ constexpr uint8_t FdLength(size_t size) {
   return 64;
 }
 
+/// Of the id of a frame to a motor: whether it is to answer, and the number of who sends it, ours
+/// being 0.
+inline constexpr uint32_t kSourceBits = 0xFF00;
 /// Of the frames to a motor that it answers. Without the highest bit of the 16 it obeys without a
 /// word, which we never ask for. Extended, as 11 bits do not hold it.
 constexpr uint32_t CommandId(int node) { return 0x8000 | static_cast<uint32_t>(node); }

@@ -19,6 +19,7 @@ BusDevice MoteusBusDevice(const MotorDescription& motor, const DriverSettings& d
     message.extended = id > 0x7FF;
     message.fd = true;
     message.direction = direction;
+    if (direction == Direction::kToDevice) message.sender_bits = kSourceBits;
     return message;
   };
   BusMessage& command = add(kCommand.layout, CommandId(motor.node), Direction::kToDevice);

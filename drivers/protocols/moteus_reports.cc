@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace plumb {
 namespace {
@@ -13,11 +12,7 @@ namespace {
 using namespace moteus;
 
 constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
-// By how much its clock may be away from ours, frames that waited for us included, and by which
-// part of the time between two answers.
-constexpr int64_t kUptimeSlack = 1'000'000;  // [us]
-constexpr int64_t kDrift = 100;
-constexpr double kNotANumber = -128;  // of an int8 register
+constexpr double kNotANumber = -128;            // of an int8 register
 
 double Reading(double value, double scale = 1) {
   return value == kNotANumber * scale ? std::numeric_limits<double>::quiet_NaN() : value;
@@ -52,7 +47,7 @@ FrameUse MoteusReports::OnAnswer(const FieldValues& values, int64_t now) noexcep
   readings_.drive_temperature = Reading(temperature);
   readings_.bus_voltage = Reading(voltage, kAnswer.layout.fields[7].scale);
   if (!std::isnan(readings_.drive_temperature)) readings_.temperatures_at = now;
-  OnUptime(static_cast<uint32_t>(static_cast<int64_t>(uptime)), now);
+  uptime_.OnUptime(static_cast<uint32_t>(static_cast<int64_t>(uptime)), now);
   // Whether it runs one must know of a motor without an encoder, too.
   if (!std::isfinite(position) || !std::isfinite(velocity)) return FrameUse::kConsumed;
   estimate_ = {position * kTurn, velocity * kTurn};
@@ -76,24 +71,9 @@ FrameUse MoteusReports::OnText(const Frame& frame) noexcept {
   return FrameUse::kConsumed;
 }
 
-void MoteusReports::OnUptime(uint32_t uptime, int64_t now) noexcept {
-  if (uptime_) {
-    const int64_t passed = now - uptime_->at;
-    // It goes round after 50 days, and so does the difference.
-    const auto expected = uptime_->milliseconds + static_cast<uint32_t>(passed / 1000);
-    const int64_t behind = int64_t{static_cast<int32_t>(expected - uptime)} * 1000;
-    if (behind > kUptimeSlack + passed / kDrift) restart_ = uptime;
-  }
-  uptime_ = {uptime, now};
-}
-
 void MoteusReports::ForgetSettings() noexcept {
   register_map_.reset();
   timeout_mode_.reset();
-}
-
-std::optional<uint32_t> MoteusReports::TakeRestart() noexcept {
-  return std::exchange(restart_, std::nullopt);
 }
 
 }  // namespace plumb

@@ -6,6 +6,7 @@
 
 #include "drivers/protocols/moteus.h"
 #include "drivers/protocols/motor.h"
+#include "drivers/protocols/uptime_watch.h"
 
 namespace plumb {
 
@@ -35,12 +36,11 @@ class MoteusReports {
   /// else than a number.
   std::optional<int> timeout_mode() const noexcept { return timeout_mode_; }
   /// [ms] for which it has its power, if that began anew since the answer before. Told once.
-  std::optional<uint32_t> TakeRestart() noexcept;
+  std::optional<uint32_t> TakeRestart() noexcept { return uptime_.TakeRestart(); }
 
  private:
   FrameUse OnAnswer(const FieldValues& values, int64_t now) noexcept;
   FrameUse OnText(const Frame& frame) noexcept;
-  void OnUptime(uint32_t uptime, int64_t now) noexcept;
 
   MotorEstimate estimate_;
   double torque_estimate_ = std::numeric_limits<double>::quiet_NaN();
@@ -49,12 +49,7 @@ class MoteusReports {
   int mode_ = moteus::kStopped, fault_ = 0;
   std::optional<int> register_map_, timeout_mode_;
   Reason identity_;
-  struct Uptime {
-    uint32_t milliseconds;
-    int64_t at;
-  };
-  std::optional<Uptime> uptime_;
-  std::optional<uint32_t> restart_;
+  UptimeWatch uptime_{1'000'000};  // [us]
 };
 
 }  // namespace plumb

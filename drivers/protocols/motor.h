@@ -18,7 +18,7 @@ namespace plumb {
 /// How a drive is. The numbers are those of driver_status_t.
 enum class DriveState : int8_t { kAbsent = 0, kIdle = 1, kArming = 2, kArmed = 3, kFault = 4 };
 
-/// Latest measurement, at the motor's shaft.
+/// Latest measurement, at the shaft that the drive reports and commands.
 struct MotorEstimate {
   double position = 0;  ///< [rad]
   double velocity = 0;  ///< [rad/s]
@@ -48,8 +48,8 @@ inline constexpr size_t kMaxArmingFrames = 2;
 
 /// The host's side of one drive: what a protocol must offer. Pure logic: no sockets, no clock. All
 /// methods but the constructor are free of exceptions and allocation; times are scaled monotonic
-/// microseconds. Frames to send go into a batch. Units are SI at the motor's shaft; drives' own
-/// units end here. Not thread-safe.
+/// microseconds. Frames to send go into a batch. Units are SI at the shaft that the drive reports
+/// and commands; drives' own units end here. Not thread-safe.
 class Motor {
  public:
   virtual ~Motor() = default;
@@ -113,9 +113,8 @@ class Motor {
 
 /// The driver's settings that concern a motor.
 struct MotorTiming {
-  int64_t
-      /// [us] silence after which a drive counts as absent; also for each arming step
-      heartbeat_timeout;
+  /// [us] silence after which a drive counts as absent; also for each arming step
+  int64_t heartbeat_timeout;
 };
 
 }  // namespace plumb

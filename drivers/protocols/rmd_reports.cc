@@ -12,9 +12,6 @@ using namespace rmd;
 
 constexpr double kDegree = std::numbers::pi / 180;  // [rad]
 constexpr int64_t kTogether = 20'000;               // [us] between a speed and its angle, at most
-// By how much its clock may be behind ours, and by which part of the time between two answers.
-constexpr int64_t kUptimeSlack = 500'000;  // [us]
-constexpr int64_t kDrift = 100;
 
 }  // namespace
 
@@ -35,7 +32,7 @@ FrameUse RmdReports::OnAnswer(const Frame& frame, int64_t now) noexcept {
       OnStatus(*DecodePayload(kStatus, frame), now);
       break;
     case kAskUptime:
-      OnUptime(static_cast<uint32_t>((*DecodePayload(kUptime, frame))[1]), now);
+      uptime_.OnUptime(static_cast<uint32_t>((*DecodePayload(kUptime, frame))[1]), now);
       break;
     case kAskVersion:
       version_ = static_cast<uint32_t>((*DecodePayload(kVersion, frame))[1]);
@@ -73,21 +70,6 @@ void RmdReports::OnStatus(const FieldValues& values, int64_t now) noexcept {
   readings_.temperatures_at = now;
   readings_.bus_voltage = values[3];
   errors_ = static_cast<uint32_t>(values[4]);
-}
-
-void RmdReports::OnUptime(uint32_t uptime, int64_t now) noexcept {
-  if (uptime_) {
-    const int64_t passed = now - uptime_->at;
-    // It goes round after 50 days, and so does the difference.
-    const auto expected = uptime_->milliseconds + static_cast<uint32_t>(passed / 1000);
-    const int64_t behind = int64_t{static_cast<int32_t>(expected - uptime)} * 1000;
-    if (behind > kUptimeSlack + passed / kDrift) restart_ = uptime;
-  }
-  uptime_ = {uptime, now};
-}
-
-std::optional<uint32_t> RmdReports::TakeRestart() noexcept {
-  return std::exchange(restart_, std::nullopt);
 }
 
 }  // namespace plumb

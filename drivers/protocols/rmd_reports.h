@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "drivers/protocols/motor.h"
+#include "drivers/protocols/uptime_watch.h"
 
 namespace plumb {
 
@@ -27,13 +28,12 @@ class RmdReports {
   uint32_t errors() const noexcept { return errors_; }
   /// [ms] for which it has been up, if that began anew since its uptime before: it has lost its
   /// power, and maybe its place. Told once.
-  std::optional<uint32_t> TakeRestart() noexcept;
+  std::optional<uint32_t> TakeRestart() noexcept { return uptime_.TakeRestart(); }
 
  private:
   void Identify() noexcept;
   void OnMotion(const FieldValues& values, int64_t now) noexcept;
   void OnStatus(const FieldValues& values, int64_t now) noexcept;
-  void OnUptime(uint32_t uptime, int64_t now) noexcept;
 
   const double torque_constant_;
   MotorEstimate estimate_;
@@ -45,12 +45,7 @@ class RmdReports {
   uint32_t version_ = 0;
   std::array<char, 7> model_{};
   Reason identity_;
-  struct Uptime {
-    uint32_t milliseconds;
-    int64_t at;
-  };
-  std::optional<Uptime> uptime_;
-  std::optional<uint32_t> restart_;
+  UptimeWatch uptime_{500'000};  // [us]
 };
 
 }  // namespace plumb

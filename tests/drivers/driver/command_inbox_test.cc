@@ -103,6 +103,21 @@ TEST_CASE("a command expires, sooner if it wants to") {
   CHECK(inbox.Expired(101'001));
 }
 
+TEST_CASE("a command that has waited lasts no longer for it") {
+  CommandInbox inbox(2, 100'000);
+  const int64_t waited = 90'000;
+  REQUIRE(inbox.Offer(Command(1, 1), 1000, kUtime + waited));
+  CHECK_FALSE(inbox.Expired(11'000));
+  CHECK(inbox.Expired(11'001));
+  joint_command_t brief = Command(2, 1);
+  brief.expiry = 10'000;
+  CHECK_FALSE(inbox.Offer(brief, 1000, kUtime + waited));
+  CHECK(inbox.refusal() == "they were computed too long ago");
+  // Its clock may be ahead of ours: its life begins when it is taken.
+  REQUIRE(inbox.Offer(brief, 1000, kUtime - waited));
+  CHECK(inbox.Expired(11'001));
+}
+
 TEST_CASE("gains pull towards their targets") {
   CommandInbox inbox(2, 100'000);
   joint_command_t command = Command(1, 0.5);

@@ -91,6 +91,29 @@ TEST_CASE("without a command") {
       CHECK(rig.RunUntil(DriveState::kFault, 55) >= 0);
       CHECK(rig.Reason() == "no command for 255 ms");
     }
+    SECTION("to its end, whatever comes that has expired before it could be obeyed") {
+      for (int i = 0; i < 12; ++i) {
+        rig.Run(2);
+        joint_command_t late = rig.MakeCommand(1);
+        late.expiry = 1000;
+        rig.driver->OnCommand(late, rig.now, rig.utime());
+        rig.Run(3);
+      }
+      CHECK(rig.drives[0].Torque() == 0);
+    }
+    SECTION("from a newer command's expiry, though it was never obeyed") {
+      rig.commanding = true;
+      rig.Run(20);
+      rig.commanding = false;
+      rig.Run(2);
+      joint_command_t late = rig.MakeCommand(1);
+      late.expiry = 1000;
+      rig.driver->OnCommand(late, rig.now, rig.utime());
+      rig.Run(8);
+      CHECK(rig.drives[0].Torque() < 1);
+      rig.Run(100);
+      CHECK(rig.drives[0].Torque() == 0);
+    }
     SECTION("a command ends it") {
       rig.commanding = true;
       rig.Run(5);

@@ -1,6 +1,8 @@
 // Somebody else who sends what only the driver may send, and a bus that is none.
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cstdlib>
 
 #include "tests/drivers/driver/rig.h"
 
@@ -13,6 +15,22 @@ Frame Foreign(const char* text) {
   Frame frame = FrameFromText(text).value();
   frame.foreign = true;
   return frame;
+}
+
+TEST_CASE("a second master of moteus drives is heard, whatever number it has") {
+  const char* source = std::getenv("PLUMBLINE_SOURCE");
+  const Driver driver(
+      LoadRobot(std::string(source ? source : ".") + "/robots/pendulum/moteus.toml"), 0,
+      Rig::kEpoch);
+  const std::vector<Filter> filters = driver.filters(0);
+  const auto own = [&](uint32_t id) {
+    return std::ranges::any_of(filters, [&](const Filter& filter) {
+      return filter.own && filter.extended && (id & filter.mask) == (filter.id & filter.mask);
+    });
+  };
+  for (const uint32_t id : {0x8001, 0x8101, 0xFF01, 0x0101, 0x807F, 0x817F}) CHECK(own(id));
+  CHECK_FALSE(own(0x0100));  // the drive's answer
+  CHECK_FALSE(own(0x8102));  // to a drive that is not ours
 }
 
 TEST_CASE(

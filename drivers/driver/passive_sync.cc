@@ -1,4 +1,4 @@
-#include "drivers/bus/passive_sync.h"
+#include "drivers/driver/passive_sync.h"
 
 #include <algorithm>
 #include <cmath>

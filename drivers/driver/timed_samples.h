@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "drivers/bus/passive_sync.h"
+#include "drivers/driver/passive_sync.h"
 
 namespace plumb {
 
