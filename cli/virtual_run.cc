@@ -15,7 +15,8 @@ namespace {
 std::string_view Interface(std::string_view url, const std::vector<BusDescription>& buses) {
   constexpr std::string_view kSocketCan = "socketcan:";
   if (url.starts_with(kSocketCan)) return url.substr(kSocketCan.size());
-  const auto bus = std::ranges::find(buses, url, &BusDescription::url);
+  const auto bus = std::ranges::find_if(
+      buses, [&](const BusDescription& one) { return InnermostBus(one.url) == url; });
   return bus == buses.end() || bus->name.empty() ? "can0" : std::string_view(bus->name);
 }
 

@@ -76,6 +76,7 @@ Gaussian ReadComponent(const Field& mean, const Field& covariance, size_t n) {
 
 ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& robot) {
   const size_t count = mixture["weights"].size(), n = robot.parameters.size();
+  mixture.Require(n > 0, fmt::format("robot '{}' has no parameters", robot.name));
   mixture["weights"].Require(count >= 1 && count <= kMaxComponents,
                              fmt::format("has {} entries", count));
   const std::vector<Field> weights = mixture["weights"].Entries(count),

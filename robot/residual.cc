@@ -71,6 +71,9 @@ void RequirePlausible(const Residual& residual) {
   const auto small = [](const auto& x) {
     return (x.array().abs() <= ResidualFunction::kMostChange).all();  // NaN is not
   };
+  const auto near = [](const auto& x) {
+    return (x.array().abs() <= ResidualFunction::kFarthest).all();
+  };
   require(residual.margin >= 0 && std::isfinite(residual.margin), "margin is not a distance");
   for (const Eigen::VectorXd& draw : residual.coordinates)
     require(draw.allFinite(), "a draw is not finite");
@@ -79,9 +82,9 @@ void RequirePlausible(const Residual& residual) {
     const ResidualFunction& f = *(residual.*part.function);
     require(f.mean.allFinite(), "mean is not finite");
     require(f.scale.allFinite() && f.scale.minCoeff() > 0, "scale is not positive");
-    require(f.low.allFinite() && f.high.allFinite(), "low or high is not finite");
+    require(near(f.low) && near(f.high), "low or high is not finite, or too far away");
     require((f.low.array() <= f.high.array()).all(), "low is above high");
-    require(f.centres.allFinite(), "a centre is not finite");
+    require(near(f.centres), "a centre is not finite, or too far away");
     for (const Eigen::MatrixXd& weights : f.weights)
       require(weights.allFinite(), "weights are not finite");
     require(small(f.noise), "noise is larger than what a simulator can lack");

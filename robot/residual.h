@@ -74,6 +74,9 @@ struct ResidualFunction {
   static constexpr double kNugget = 1e-3;
   /// More would be no residual but an attack: their kernel is factorised.
   static constexpr int kMostCentres = 2000;
+  /// In units of z: what is beyond was never recorded, and its square is infinite in single
+  /// precision.
+  static constexpr double kFarthest = 1e6;
   /// [rad, m, rad/s, m/s] what no simulator lacks in a step: bound, noise and unknown are less.
   static constexpr double kMostChange = 1000;
 };

@@ -57,6 +57,11 @@ void RequireSmall(const JsonField& list, size_t size) {
   }
 }
 
+void RequireNear(const JsonField& list, const Eigen::MatrixXd& numbers) {
+  list.Require((numbers.array().abs() <= ResidualFunction::kFarthest).all(),
+               "is farther away than anything that was recorded");
+}
+
 ResidualFunction ReadFunction(const JsonField& field, size_t draws, size_t outputs) {
   const size_t inputs = Count(field["mean"]),
                centres = Count(field["centres"], ResidualFunction::kMostCentres);
@@ -65,8 +70,11 @@ ResidualFunction ReadFunction(const JsonField& field, size_t draws, size_t outpu
   function.scale = Positive(field["scale"], inputs);
   function.low = field["low"].SingleVector(inputs);
   function.high = field["high"].SingleVector(inputs);
+  RequireNear(field["low"], function.low);
+  RequireNear(field["high"], function.high);
   field["low"].Require((function.low.array() <= function.high.array()).all(), "is above high");
   function.centres = field["centres"].SingleMatrix(centres, inputs);
+  RequireNear(field["centres"], function.centres);
   for (const JsonField& weights : field["weights"].Entries(draws))
     function.weights.push_back(weights.SingleMatrix(outputs, 1 + inputs + centres));
   for (const JsonField& row : field["noise"].Entries(outputs)) RequireSmall(row, outputs);

@@ -153,7 +153,8 @@ std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy,
   int tasks = (own + kMaxTogether - 1) / kMaxTogether;
   tasks = std::min(own, (tasks + threads - 1) / threads * threads);
   workers_->Run(tasks, [&](int task, int worker) {
-    const int begin = own * task / tasks, end = own * (task + 1) / tasks;
+    const auto bound = [&](int t) { return static_cast<int>(int64_t{own} * t / tasks); };
+    const int begin = bound(task), end = bound(task + 1);
     state_[static_cast<size_t>(worker)]->Play(
         policy, network_, end - begin, explore, [&](int i, Player& player) {
           const int episode = begin + i;

@@ -8,6 +8,11 @@
 namespace plumb {
 namespace {
 
+// The first of the tasks that are worker w's own, of so many.
+int FirstTask(int tasks, int w, int workers) {
+  return static_cast<int>(int64_t{tasks} * w / workers);
+}
+
 // Jobs follow each other within microseconds: falling asleep in between would cost more. Some 10
 // us; for longer, a spinning thread would only be in the way of other processes.
 constexpr int kSpins = 600;
@@ -64,7 +69,7 @@ void Workers::Run(int tasks, const std::function<void(int, int)>& work) {
   job.unfinished = tasks;
   ++job.number;
   for (int w = 0; w < size(); ++w) {
-    const int share = tasks * (w + 1) / size() - tasks * w / size();
+    const int share = FirstTask(tasks, w + 1, size()) - FirstTask(tasks, w, size());
     job.claims[static_cast<size_t>(w)].ticket.store(
         uint64_t{job.number} << 32 | static_cast<uint32_t>(share), std::memory_order_release);
   }
@@ -139,7 +144,7 @@ bool Workers::DoTask(Job& job, int worker) {
     }
     if (!claimed) continue;
     const int task =
-        job.tasks * from / size() + static_cast<int>(static_cast<uint32_t>(ticket)) - 1;
+        FirstTask(job.tasks, from, size()) + static_cast<int>(static_cast<uint32_t>(ticket)) - 1;
     try {
       (*job.work)(task, worker);
     } catch (...) {

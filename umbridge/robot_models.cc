@@ -16,8 +16,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kImpossible = -1e300;  // JSON knows no infinity
-
 std::vector<Rollout> All(std::span<const Log> logs) {
   std::vector<Rollout> rollouts;
   for (const Log& log : logs)

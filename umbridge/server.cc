@@ -34,11 +34,15 @@ struct UmbridgeServer::Parts {
   void Answer(const Request& request, HttpServer::Reply reply) {
     if (!request[http::field::origin].empty())
       return reply(Json(403, UmbridgeError("InvalidInput", "a page in a browser may not ask")));
+    if (pending == HttpServer::kMaxConnections)
+      return reply(Json(503, UmbridgeError("Busy", "too many requests wait already")));
+    ++pending;
     asio::post(worker, [this, method = std::string(View(request.method_string())),
                         path = std::string(View(request.target())), body = request.body(),
                         reply = std::move(reply)]() mutable {
       ServiceAnswer answer = service.Respond(method, path, body);
-      asio::post(context, [answer = std::move(answer), reply = std::move(reply)]() mutable {
+      asio::post(context, [this, answer = std::move(answer), reply = std::move(reply)]() mutable {
+        --pending;
         reply(Json(answer.status, std::move(answer.body)));
       });
     });
@@ -52,6 +56,7 @@ struct UmbridgeServer::Parts {
   }
 
   UmbridgeService service;
+  size_t pending = 0;  // those of clients that have gone, too
   asio::io_context context{1};
   HttpServer server;
   asio::posix::stream_descriptor stop;

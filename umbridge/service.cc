@@ -81,6 +81,12 @@ Eigen::VectorXd Input(const ServedModel& model, const json& request) {
   return Numbers(vectors[0], "the input", model.inputs);
 }
 
+[[noreturn]] void RefuseOutput(const std::string& why) { throw Refusal{500, "InvalidOutput", why}; }
+
+void RequireFinite(const Eigen::MatrixXd& outputs) {
+  if (!outputs.allFinite()) RefuseOutput("with these inputs the model comes to no finite numbers");
+}
+
 Eigen::MatrixXd EvaluateAll(const ServedModel& model, const Eigen::MatrixXd& inputs) {
   Eigen::MatrixXd outputs;
   try {
@@ -88,8 +94,7 @@ Eigen::MatrixXd EvaluateAll(const ServedModel& model, const Eigen::MatrixXd& inp
   } catch (const std::invalid_argument& error) {
     RefuseInput(error.what());
   }
-  if (!outputs.allFinite())
-    throw Refusal{500, "InvalidOutput", "with these inputs the model comes to no finite numbers"};
+  RequireFinite(outputs);
   return outputs;
 }
 
@@ -101,9 +106,16 @@ Eigen::MatrixXd Jacobian(const ServedModel& model, const Eigen::VectorXd& input)
     moved(i, n + i) -= model.differences(i);
   }
   const Eigen::MatrixXd outputs = EvaluateAll(model, moved);
+  if (outputs.minCoeff() <= kImpossible)
+    RefuseOutput("beside these inputs the model is impossible");
   // What was really stepped, rounded as it is.
   const Eigen::VectorXd steps = moved.leftCols(n).diagonal() - moved.rightCols(n).diagonal();
   return (outputs.leftCols(n) - outputs.rightCols(n)) * steps.cwiseInverse().asDiagonal();
+}
+
+json FiniteList(const Eigen::VectorXd& numbers) {
+  RequireFinite(numbers);
+  return List(numbers);
 }
 
 json ModelInfo(const ServedModel& model) {
@@ -131,10 +143,10 @@ json Answer(const std::vector<ServedModel>& models, std::string_view path, const
   const Eigen::VectorXd input = Input(model, request);
   if (gradient) {
     const Eigen::VectorXd sens = Numbers(Field(request, "sens"), "sens", model.outputs);
-    return {{"output", List(Jacobian(model, input).transpose() * sens)}};
+    return {{"output", FiniteList(Jacobian(model, input).transpose() * sens)}};
   }
   const Eigen::VectorXd vec = Numbers(Field(request, "vec"), "vec", model.inputs);
-  return {{"output", List(Jacobian(model, input) * vec)}};
+  return {{"output", FiniteList(Jacobian(model, input) * vec)}};
 }
 
 json Info(const std::vector<ServedModel>& models) {

@@ -9,6 +9,9 @@
 
 namespace plumb {
 
+/// An output that stands for -infinity, which JSON does not know: there are no slopes beside it.
+inline constexpr double kImpossible = -1e300;
+
 /// A function that is served: a vector of numbers in, a vector of numbers out.
 struct ServedModel {
   std::string name;
@@ -32,7 +35,8 @@ struct ServiceAnswer {
 ///
 /// A request that is wrong is answered with {"error": {"type": ..., "message": ...}}: InvalidInput,
 /// ModelNotFound or UnsupportedFeature with status 400, and InvalidOutput with status 500 if the
-/// model came to numbers that are not finite. Nothing throws. One thread at a time, as the models.
+/// model, or a derivative, came to numbers that are not finite, or to none. Nothing throws. One
+/// thread at a time, as the models.
 class UmbridgeService {
  public:
   /// @param models with names of their own.

@@ -66,7 +66,9 @@ std::string IdentifiedMjcf(const RobotDescription& robot, const Eigen::VectorXd&
                            const Eigen::VectorXd& sd, bool residual) {
   if (sd.size() != mean.size())
     throw std::invalid_argument("as many standard deviations as means are needed");
-  XmlEdits file(Mjcf(Model(robot).Describe(mean)));
+  RobotDescription identified = Model(robot).Describe(mean);
+  identified.virtual_robot.ground = {};  // that of a virtual robot is hidden from who calibrates it
+  XmlEdits file(Mjcf(identified));
   file.AddComment(Comment(robot, mean, sd, residual));
   return file.Print();
 }

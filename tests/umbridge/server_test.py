@@ -56,6 +56,14 @@ class Served(unittest.TestCase):
     def evaluate(self, name, parameters):
         return self.ask("/Evaluate", {"name": name, "input": [parameters], "config": {}})["output"][0]
 
+    def busy(self):
+        try:
+            urllib.request.urlopen(self.url + "/Info", timeout=PATIENCE).close()
+            return False
+        except urllib.error.HTTPError as error:
+            with error:
+                return error.code == 503
+
     def works(self):
         self.assertEqual(self.ask("/Info")["protocolVersion"], 1.0)
         self.assertIsNone(self.server.poll())
@@ -118,6 +126,16 @@ class Served(unittest.TestCase):
             self.assertEqual(answer["error"]["type"], kind)
         self.assertEqual(self.ask("/Info", headers={"Origin": "https://example.org"}, status=403)["error"]["type"], "InvalidInput")
         self.assertEqual(self.evaluate("log_likelihood", [-1, 2, 3, 4]), [-1e300])
+        self.works()
+
+    def test_who_asks_and_goes_away_does_not_stand_in_others_way(self):
+        body = json.dumps({"name": "errors", "input": [TRUTH], "inWrt": 0, "outWrt": 0, "vec": [1, 0, 0, 0]}).encode()
+        request = b"POST /ApplyJacobian HTTP/1.1\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)
+        for _ in range(1000):
+            with socket.create_connection(self.address, PATIENCE) as connection:
+                connection.sendall(request)
+        while self.busy():
+            pass
         self.works()
 
     def test_requests_that_are_none_end_their_own_connection(self):

@@ -21,8 +21,14 @@ Eigen::MatrixXd Products(const Eigen::MatrixXd& inputs) {
   return outputs;
 }
 
+/// x, and impossible below zero.
+Eigen::MatrixXd Edge(const Eigen::MatrixXd& inputs) {
+  return (inputs.array() < 0).select(kImpossible, inputs);
+}
+
 UmbridgeService Service() {
   return UmbridgeService({{"products", 2, 3, &Products, Eigen::Vector2d(1e-4, 1e-4)},
+                          {"edge", 1, 1, &Edge, Eigen::VectorXd::Constant(1, 1e-4)},
                           {"root", 1, 1, [](const Eigen::MatrixXd& inputs) -> Eigen::MatrixXd {
                              return inputs.cwiseSqrt();
                            }}});
@@ -48,7 +54,7 @@ void CheckRefused(const std::string& path, const std::string& body, const std::s
 
 TEST_CASE("um-bridge: a client is told what models there are") {
   CHECK(json::parse(Service().Respond("GET", "/Info", "").body) ==
-        json{{"protocolVersion", 1.0}, {"models", {"products", "root"}}});
+        json{{"protocolVersion", 1.0}, {"models", {"products", "edge", "root"}}});
   CHECK(Ask("/InputSizes", R"({"name": "products"})") == json{{"inputSizes", {2}}});
   CHECK(Ask("/OutputSizes", R"({"name": "products", "config": {}})") == json{{"outputSizes", {3}}});
   const json support = Ask("/ModelInfo", R"({"name": "products"})")["support"];
@@ -74,11 +80,27 @@ TEST_CASE("um-bridge: values and derivatives are the function's") {
   CHECK(moved["output"][2].get<double>() == 0);
 }
 
+TEST_CASE("um-bridge: there is no slope beside what is impossible, and none that is not finite") {
+  const auto gradient = [](const std::string& x, const std::string& sens) {
+    return R"({"name": "edge", "input": [[)" + x + R"(]], "inWrt": 0, "outWrt": 0, "sens": [)" +
+           sens + "]}";
+  };
+  CHECK(Ask("/Gradient", gradient("1", "2"))["output"][0].get<double>() == Approx(2));
+  CheckRefused("/Gradient", gradient("0", "1"), "InvalidOutput", "impossible", 500);
+  CheckRefused("/ApplyJacobian",
+               R"({"name": "edge", "input": [[0]], "inWrt": 0, "outWrt": 0, "vec": [1]})",
+               "InvalidOutput", "impossible", 500);
+  CheckRefused(
+      "/ApplyJacobian",
+      R"({"name": "products", "input": [[1e10, 1]], "inWrt": 0, "outWrt": 0, "vec": [1e308, 0]})",
+      "InvalidOutput", "finite", 500);
+}
+
 TEST_CASE("um-bridge: what is wrong is answered with an error, and nothing else happens") {
   const std::string products = R"({"name": "products", "input": )", wrong = "InvalidInput";
-  CheckRefused("/Evaluate", R"({"name": "other"})", "ModelNotFound", "products, root");
-  CheckRefused("/Evaluate", R"({"name": 7})", "ModelNotFound", "products, root");
-  CheckRefused("/ModelInfo", "{}", "ModelNotFound", "products, root");
+  CheckRefused("/Evaluate", R"({"name": "other"})", "ModelNotFound", "products, edge, root");
+  CheckRefused("/Evaluate", R"({"name": 7})", "ModelNotFound", "products, edge, root");
+  CheckRefused("/ModelInfo", "{}", "ModelNotFound", "products, edge, root");
   CheckRefused("/Evaluate", "", wrong, "no JSON");
   CheckRefused("/Evaluate", "[1]", wrong, "no JSON object");
   CheckRefused("/Evaluate", std::string(100'000, '['), wrong, "no JSON");
