@@ -219,7 +219,7 @@ int main(int argc, char** argv) {
         app.add_option("--threads", flags.threads,
                        "0 = one per core; the result does not depend on it")
             ->capture_default_str();
-        plumb::AddExamples(app, {"plumb-calibrator robots/pendulum --output run"});
+        plumb::AddExamples(app, {"plumb-calibrator robots/pendulum --checkpoint run"});
       },
       [&](plumb::Process& process) {
         const plumb::RobotDescription robot = plumb::LoadRobot(flags.robot);

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "common/outside_text.h"
-#include "controller/acceptance.h"
+#include "controller/trial.h"
 #include "plumb/policy_t.hpp"
 
 namespace plumb {

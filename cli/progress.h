@@ -38,7 +38,6 @@ class Progress {
   std::string StatusLine(double seconds) const;
   /// True when the final policy's evaluation roll-outs are done.
   bool finished() const { return finished_; }
-  const std::vector<double>& evaluation_returns() const { return evaluation_; }
 
   /// "learned beside the hidden truth", for people. @param truth physical; empty if nobody knows.
   std::string Conclusion(const Eigen::VectorXd& truth) const;

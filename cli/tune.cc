@@ -41,7 +41,7 @@ int TuneEstimator(const std::string& robot_path, const std::string& log) {
   std::vector<std::variant<joint_state_t, imu_t>> messages;
   int64_t undecodable = 0;
   const auto keep = [&](auto message, const void* data, int size) {
-    if (message.decode(data, 0, size) == size)
+    if (Decodes(data, size, message))
       messages.push_back(std::move(message));
     else
       ++undecodable;

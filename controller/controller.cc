@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "common/time_units.h"
+#include "controller/policy_fit.h"
 
 namespace plumb {
 namespace {
@@ -63,16 +64,7 @@ void Controller::OnPolicy(const policy_t& message) {
     return;
   }
   auto policy = std::make_unique<GaussianPolicy>(GaussianPolicy::FromMessage(message));
-  if (policy->shape().observations != task_->observation_size() ||
-      policy->shape().actions != task_->action_size()) {
-    throw std::invalid_argument(
-        "the policy is for another robot: it has other numbers of observations or actions");
-  }
-  const Eigen::ArrayXf limits = robot_.effort_limits().cast<float>();
-  if (((policy->action_scale.array() - limits).abs() > 1e-4f * limits).any()) {
-    throw std::invalid_argument(
-        "the policy is for other effort limits: an action of 1 would be another effort");
-  }
+  RequireFit(*policy, robot_, *task_);
   next_policy_ = std::move(policy);
   next_header_ = message;
   next_header_.weight.clear();

@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "controller/acceptance.h"
 #include "controller/policy.h"
+#include "controller/trial.h"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/driver_status_t.hpp"
 #include "plumb/joint_command_t.hpp"

@@ -42,8 +42,6 @@ class BaseObserver {
   /// rad, 0.5 m/s.
   bool valid(int64_t utime) const;
 
-  const LegOdometry& odometry() const { return odometry_; }
-
  private:
   void LookAtLegs();
   double Angle() const;

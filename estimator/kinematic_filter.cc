@@ -7,9 +7,10 @@
 namespace plumb {
 namespace {
 
-// Nothing is known of the acceleration at a restart [rad/s^2]; any robot joint is well below it.
+// Nothing is known of the acceleration at a restart [rad/s^2 or m/s^2]; any robot joint is well
+// below it.
 constexpr double kInitialAccelerationSd = 100;
-// Nor of the velocity where it is not measured [rad/s].
+// Nor of the velocity where it is not measured [rad/s or m/s].
 constexpr double kInitialVelocitySd = 10;
 
 // Of a KinematicState: what every joint has, then what a joint with an inertial sensor has, then
@@ -192,8 +193,8 @@ void KinematicFilter::FindGain() {
   KinematicCovariance& gain = At(pending_ - 1).gain;
   gain = shared_;
   Eigen::Matrix<double, N, N> l;
-  Eigen::Matrix<double, N, 1>
-      inverse;  // of L's diagonal; 0 where there is no uncertainty left, and nothing to be learnt
+  // of L's diagonal; 0 where there is no uncertainty left, and nothing to be learnt
+  Eigen::Matrix<double, N, 1> inverse;
   for (int j = 0; j < N; ++j) {
     for (int i = j; i < N; ++i) {
       l(i, j) = predicted_covariance_(i, j);

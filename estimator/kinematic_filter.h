@@ -45,12 +45,12 @@ class KinematicFilter {
 
   explicit KinematicFilter(const EstimatorSettings& settings);
 
-  /// Starts anew at a measured position [rad] and velocity [rad/s]; NaN: it was not measured. Of
-  /// the bias it keeps what it knows.
+  /// Starts anew at a measured position [rad or m] and velocity [rad/s or m/s]; NaN: it was not
+  /// measured. Of the bias it keeps what it knows.
   void Restart(double position, double velocity);
   /// @param dt [s] since the last call, > 0.
-  /// @param effort_step [Nm] of the applied effort. @param step_after share of dt after which it
-  /// steps, 0 to 1.
+  /// @param effort_step [Nm] or [N] of the applied effort. @param step_after share of dt after
+  /// which it steps, 0 to 1.
   /// @param impact that there may be meanwhile.
   void Predict(double dt, double effort_step, const ImpactSpeeds& impact = {},
                double step_after = 0);

@@ -85,7 +85,7 @@ int main(int argc, char** argv) {
           imus.Rethrow();
         }
         spdlog::info("{} measurements, {} refused, {} undecodable, {} restarts",
-                     subscriber.received(), observer.refused(), subscriber.rejected(),
+                     subscriber.received(), observer.unused(), subscriber.rejected(),
                      observer.restarts());
         if (model_observer)
           spdlog::info("filter on the simulator's dynamics: {} restarts",

@@ -69,7 +69,6 @@ StateObserver::StateObserver(const RobotDescription& robot)
                 .acceleration_watch = AgreementWatch(AccelerationWatch(settings))};
     joint.of_base = base_ && base_->base().Has(i);
     joint.gyro = gyro;
-    joint.accelerometer = settings.acceleration_sd > 0;
     joints_.push_back(std::move(joint));
   }
   const auto n = joints_.size();

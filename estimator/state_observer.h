@@ -67,7 +67,7 @@ class StateObserver {
   int64_t readings(int joint) const { return joints_[static_cast<size_t>(joint)].readings; }
   /// Whether the joint is of a base that nothing holds: its noise is that of the IMU and the legs.
   bool of_base(int joint) const { return joints_[static_cast<size_t>(joint)].of_base; }
-  int64_t refused() const { return refused_ + duplicates_ + reordered_; }
+  int64_t unused() const { return refused_ + duplicates_ + reordered_; }
   int64_t restarts() const { return restarts_; }
 
  private:
@@ -76,15 +76,14 @@ class StateObserver {
     EstimatorSettings settings;
     double lower, upper;  // its stops
     KinematicFilter filter;
-    bool of_base = false;  // its state is base_'s: no filter of its own
-    bool gyro = false;     // its velocity is an IMU's rate
-    bool accelerometer = false;
+    bool of_base = false;    // its state is base_'s: no filter of its own
+    bool gyro = false;       // its velocity is an IMU's rate
     int64_t measured = -1;   // utime of its newest reading
     int64_t used = -1;       // of the newest that was valid and counted; -1 = none since the start
     bool out = false;        // silent for longer than an outage
-    double effort = 0;       // [Nm] that acts at the end of the latest interval
-    double effort_step = 0;  // [Nm] in it
-    double stop = 0;         // [rad/s] at which it may meet its stop in this one
+    double effort = 0;       // [Nm] or [N] that acts at the end of the latest interval
+    double effort_step = 0;  // [Nm] or [N] in it
+    double stop = 0;         // [rad/s] or [m/s] at which it may meet its stop in this one
     NisAverage position_nis = {}, velocity_nis = {}, acceleration_nis = {};
     AgreementWatch velocity_watch, acceleration_watch;
     AgreementWatch::Finding velocity_found = AgreementWatch::Finding::kNone,
@@ -123,8 +122,8 @@ class StateObserver {
   std::vector<Joint> joints_;
   std::vector<Imu> imus_;
   std::optional<BaseObserver> base_;
-  double greatest_effort_;  // [Nm] that a motor may have
-  // [Nm] assumed change of an effort that is not known: from full one way to full the other
+  double greatest_effort_;  // [Nm] or [N] that a motor may have
+  // [Nm] or [N] assumed change of an effort that is not known: from full one way to full the other
   double unknown_step_;
   GroundContact contact_;
   double ground_ = 0;  // [m/s] at which a point may meet the ground

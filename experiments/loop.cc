@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "experiments/random_forces.h"
+#include "trainer/acceptance.h"
 #include "trainer/robot_simulation.h"
 
 namespace plumb {

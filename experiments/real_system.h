@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "calibrator/motion/transitions.h"
-#include "controller/acceptance.h"
 #include "controller/policy.h"
+#include "controller/trial.h"
 
 namespace plumb {
 

@@ -18,8 +18,8 @@
 #include "common/program_version.h"
 #include "common/seal.h"
 #include "plumb/robot_state_t.hpp"
-#include "records/csv_table.h"
 #include "records/mcap_writer.h"
+#include "records/message_table.h"
 #include "sim/view/scene_update.h"
 
 namespace plumb {
@@ -170,7 +170,7 @@ ExportCounts ExportMcap(const std::string& log, const std::filesystem::path& fil
 
 ExportCounts ExportCsv(const std::string& log, const std::filesystem::path& folder) {
   ExportCounts counts;
-  std::map<Key, CsvTable> tables;
+  std::map<Key, MessageTable> tables;
   size_t columns = 0;  // of all
   const int64_t events = ReadEvents(log, counts, INT64_MAX, [&](const Event& event) {
     auto table = tables.find({event.channel, &event.type});
@@ -196,7 +196,8 @@ ExportCounts ExportCsv(const std::string& log, const std::filesystem::path& fold
     const std::string name = FileName(channel) + (channel == before ? "." + type->name : "");
     before = channel;
     if (table.too_wide()) {
-      counts.left_out[fmt::format("{}: more than {} columns", channel, CsvTable::kMostColumns)] +=
+      counts
+          .left_out[fmt::format("{}: more than {} columns", channel, MessageTable::kMostColumns)] +=
           table.rows();
     } else if (table.rows() > 0) {
       const std::filesystem::path file = folder / (name + ".csv");

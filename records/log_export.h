@@ -33,8 +33,8 @@ ExportCounts ExportMcap(const std::string& log, const std::filesystem::path& fil
                         const RobotDescription* robot,
                         const std::map<std::string, std::string>& notes);
 
-/// As tables (CsvTable), FOLDER/CHANNEL.csv each; what is no letter, digit, - or _ in a channel's
-/// name is %XX there.
+/// As tables (MessageTable), FOLDER/CHANNEL.csv each; what is no letter, digit, - or _ in a
+/// channel's name is %XX there.
 /// @throws std::runtime_error as ExportMcap.
 ExportCounts ExportCsv(const std::string& log, const std::filesystem::path& folder);
 

@@ -3,6 +3,8 @@
 
 Also: SimTK headers only in sim/*.cc and what two of these share, sim/virtual/simbody_tree.h, MuJoCo's only in sim/virtual/mujoco_backend.cc, ODE's only in sim/virtual/ode_*,
 MPI's only in common/ranks.cc, ONNX and protobuf only in trainer/onnx_*.cc, LCM and sockets only in main.cc files, common/ and drivers/can/, Boost's network in http/ and the servers that stand on it (tests aside).
+
+And no two headers define a class of one name: a program that has both would have one's functions for the other's objects.
 """
 import pathlib
 import re
@@ -86,12 +88,31 @@ def folder(path):
     return nested[0] if nested else path.split("/")[0]
 
 
+def classes(text):
+    """Those of a header, with their namespaces."""
+    inside = []
+    for line in text.splitlines():
+        opened = re.match(r"namespace ([\w:]*) ?\{", line)
+        defined = re.match(r"(?:class|struct|enum class) ([\w:]+)[^;(]*\{", line)
+        if opened:
+            if opened[1].split("::")[0] == "plumb":
+                inside.clear()  # what was opened to declare another library's names
+            inside.append(opened[1])
+        elif line.startswith("}  // namespace"):
+            inside.pop()
+        elif defined:
+            yield "::".join((*inside, defined[1]))
+
+
 def main():
-    wrong = []
+    wrong, homes = [], {}
     files = [f for room in {r.split("/")[0] for r in BELOW} for f in (ROOT / room).rglob("*") if f.suffix in (".h", ".cc")]
     for file in sorted(files):
         path = file.relative_to(ROOT).as_posix()
         here = folder(path)
+        for name in classes(file.read_text()) if file.suffix == ".h" else ():
+            if homes.setdefault(name, path) != path:
+                wrong.append(f"{path}: {name} is the name of a class in {homes[name]}, too")
         for number, line in enumerate(file.read_text().splitlines(), 1):
             quoted = re.match(r'#include "([^"]+)"', line)
             if quoted:

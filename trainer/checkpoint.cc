@@ -14,14 +14,14 @@
 #include <vector>
 
 #include "common/atomic_file.h"
-#include "common/sealed.h"
+#include "common/checked_file.h"
 
 namespace plumb {
 namespace {
 
 // Numbers as this machine has them: a checkpoint stays where it was written. Version 3: without
 // trials on the robot, 4 to 6: with other residuals, 7: without the updates' statuses.
-constexpr Seal kSeal{"PLUMBTRN", 8, "a trainer's checkpoint"};
+constexpr FileKind kKind{"PLUMBTRN", 8, "a trainer's checkpoint"};
 
 class Writer {
  public:
@@ -213,18 +213,18 @@ void SetTrainerState(const TrainerState& state, Checkpoint& checkpoint) {
 std::string EncodeCheckpoint(const Checkpoint& checkpoint) {
   Writer body;
   Transfer(body, checkpoint);
-  return Sealed(kSeal, {body.bytes().data(), body.bytes().size()});
+  return WithChecksum(kKind, {body.bytes().data(), body.bytes().size()});
 }
 
 Checkpoint DecodeCheckpoint(std::string_view bytes) {
   try {
-    const std::string_view content = Unsealed(kSeal, bytes);
+    const std::string_view content = CheckedContent(kKind, bytes);
     Reader body(content.data(), content.size());
     Checkpoint checkpoint;
     Transfer(body, checkpoint);
     if (body.left() != 0) throw CheckpointError("is too long");
     return checkpoint;
-  } catch (const SealError& error) {
+  } catch (const DamagedFile& error) {
     throw CheckpointError(error.what());
   }
 }
@@ -240,7 +240,7 @@ void SaveCheckpoint(const std::string& file, const Checkpoint& checkpoint) {
   }
 }
 
-bool IsCheckpoint(std::string_view bytes) { return bytes.starts_with(kSeal.magic); }
+bool IsCheckpoint(std::string_view bytes) { return bytes.starts_with(kKind.magic); }
 
 std::optional<Checkpoint> LoadCheckpoint(const std::string& file) {
   std::error_code ignored;  // whatever is wrong, opening the file tells

@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "controller/acceptance.h"
 #include "plumb/parameter_distribution_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "plumb/training_status_t.hpp"
+#include "trainer/acceptance.h"
 #include "trainer/critic.h"
 #include "trainer/evaluation.h"
 #include "trainer/trainer.h"

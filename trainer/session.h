@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <optional>
 
-#include "controller/acceptance.h"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "plumb/training_status_t.hpp"
 #include "robot/parameter_distribution.h"
+#include "trainer/acceptance.h"
 #include "trainer/checkpoint.h"
 #include "trainer/trainer.h"
 

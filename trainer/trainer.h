@@ -56,8 +56,8 @@ struct UpdateReport {
 /// and ranks, and for a run that was interrupted and resumed. Not thread-safe itself.
 class Trainer {
  public:
-  /// @param make makes simulations; called once per thread. @param action_scale effort of action 1,
-  /// per action.
+  /// @param make makes simulations: some for each thread, and one to ask for sizes.
+  /// @param action_scale effort of action 1, per action.
   /// @param threads 0 = as many as the machine has.
   /// @param ranks must outlive this. All of them make the same trainer and call the same methods,
   /// in the same order.

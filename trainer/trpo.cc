@@ -123,7 +123,6 @@ Trpo::Step Trpo::Improve(GaussianPolicy& policy, const PolicySamples& samples) {
         fv = FisherProduct(v.cast<float>()).cast<double>() + settings_.damping * v;
       },
       gradient, settings_.cg_iterations, kCgTolerance);
-  step.cg_iterations = natural.iterations;
   if (!natural.failure.empty()) {
     step.failure = "conjugate gradient: " + natural.failure;
     return step;

@@ -30,9 +30,8 @@ class Trpo {
   /// The outcome of one step.
   struct Step {
     bool accepted = false;
-    std::string failure;  ///< why not; the policy is then what it was, bit by bit
-    int tries = 0;        ///< of the line search
-    int cg_iterations = 0;
+    std::string failure;        ///< why not; the policy is then what it was, bit by bit
+    int tries = 0;              ///< of the line search
     double kl = 0;              ///< mean KL(old || new) over the samples [nat]
     double surrogate_gain = 0;  ///< mean of (ratio - 1) * advantage
   };

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Gaussian filter over rows (time) with reflected ends.
+// Gaussian filter over rows (time), reflected at both ends, the last row included.
 Eigen::MatrixXd SmoothOverTime(const Eigen::MatrixXd& x, double sigma_rows) {
   const int n = static_cast<int>(x.rows()), reach = static_cast<int>(std::ceil(4 * sigma_rows));
   if (reach == 0 || n < 2) return x;
@@ -27,7 +27,7 @@ Eigen::MatrixXd SmoothOverTime(const Eigen::MatrixXd& x, double sigma_rows) {
     const double weight = std::exp(-0.5 * offset * offset / (sigma_rows * sigma_rows));
     total += weight;
     for (int i = 0; i < n; ++i) {
-      int from = std::abs(i + offset) % (2 * n);
+      int from = ((i + offset) % (2 * n) + 2 * n) % (2 * n);
       if (from >= n) from = 2 * n - 1 - from;
       smooth.row(i) += weight * x.row(from);
     }

@@ -159,8 +159,7 @@ std::vector<Method> LikelihoodMethods() {
   return {
       {"auto",
        "`laplace`, whose Gaussian is checked two standard deviations from the mode along each "
-       "axis; "
-       "`mixture` where it fails, or where there are several modes",
+       "axis; `mixture` where it fails, or where there are several modes",
        Auto},
       {"laplace",
        "mode by Levenberg and Marquardt's method from several first guesses, noise scale and tails "

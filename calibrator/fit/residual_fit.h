@@ -15,9 +15,9 @@ namespace plumb {
 
 struct ResidualFitOptions {
   bool free = true, touching = true;  ///< where the simulator is to be corrected
-  /// what becomes of contacts' own errors in touching steps: nothing; they have functions of their
+  /// what becomes of contacts' own errors in touching steps: they have functions of their
   /// own (FitContacts); or they are taken away, and what is left is looked at
-  enum class Contacts { kIgnored, kLearnt, kSetAside } contacts = Contacts::kLearnt;
+  enum class Contacts { kLearnt, kSetAside } contacts = Contacts::kLearnt;
   int centres = 256;         ///< of its functions of free steps, or of touching ones without those
   int contact_centres = 96;  ///< of the functions of contacts
   int rest_centres = 128;    ///< of the function of what those leave

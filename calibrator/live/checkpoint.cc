@@ -12,7 +12,7 @@
 #include <stdexcept>
 
 #include "common/atomic_file.h"
-#include "common/sealed.h"
+#include "common/checked_file.h"
 #include "robot/json_text.h"
 #include "robot/parameter_distribution.h"
 #include "robot/physical.h"
@@ -23,8 +23,8 @@ namespace {
 using nlohmann::json;
 
 // Version 2: without the method used, its warnings and a search's samples; 3: without a residual; 4
-// to 6: with another; 7: without a seal
-constexpr Seal kSeal{"PLUMBCAL", 8, "a calibrator's checkpoint"};
+// to 6: with another; 7: without a checksum
+constexpr FileKind kKind{"PLUMBCAL", 8, "a calibrator's checkpoint"};
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -174,11 +174,11 @@ json ReadJson(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw std::runtime_error("cannot be opened");
   const std::string bytes(std::istreambuf_iterator<char>(stream), {});
-  return ParseJson(Unsealed(kSeal, bytes));
+  return ParseJson(CheckedContent(kKind, bytes));
 }
 
 void WriteJson(const std::filesystem::path& file, const json& j) {
-  WriteAtomically(file, Sealed(kSeal, j.dump()));
+  WriteAtomically(file, WithChecksum(kKind, j.dump()));
 }
 
 constexpr char kStateFile[] = "calibration.checkpoint";

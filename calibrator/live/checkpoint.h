@@ -8,8 +8,8 @@
 namespace plumb {
 
 /// Keeps a SimOpt state in a folder: `calibration.checkpoint` (small, after every update) and one
-/// `rollout_<n>.checkpoint` each, sealed JSON (common/sealed.h). Files are replaced atomically;
-/// numbers are written so that they read back to the same bits.
+/// `rollout_<n>.checkpoint` each, JSON with a checksum (common/checked_file.h). Files are replaced
+/// atomically; numbers are written so that they read back to the same bits.
 /// Not thread-safe, and a folder belongs to one process at a time.
 class CalibrationCheckpoint {
  public:

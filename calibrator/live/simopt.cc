@@ -198,8 +198,8 @@ GapFit SimOpt::RunFromWhereItIs() const {
     try {
       const MethodInput input{model_, state_.rollouts, options, state_.before.components[0].mean};
       return Fit(input);
-      // perhaps it cannot be simulated where the new roll-outs went
     } catch (const std::invalid_argument&) {
+      // perhaps it cannot be simulated where the new roll-outs went
     }
   }
   const MethodInput input{model_, state_.rollouts, options};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <string>
 
@@ -19,5 +20,16 @@ namespace plumb {
 int64_t ReadLog(const std::string& file,
                 const std::function<bool(const std::string& channel, const void* data, int size,
                                          int64_t utime)>& on_event);
+
+/// Whether it is a message of this type. A hostile one may ask for more memory than there is: then
+/// it is none.
+template <class Message>
+bool Decodes(const void* data, int size, Message& message) noexcept {
+  try {
+    return message.decode(data, 0, size) == size;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
 
 }  // namespace plumb

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "calibrator/motion/csv_table.h"
+#include "calibrator/motion/csv_reader.h"
 #include "common/nearest_name.h"
 #include "robot/physical.h"
 #include "sim/tasks/task.h"
@@ -51,7 +51,7 @@ struct Columns {
   bool has_next() const { return !next_q.empty(); }
 };
 
-std::vector<int> FindAll(const CsvTable& table, const std::vector<std::string>& names) {
+std::vector<int> FindAll(const CsvReader& table, const std::vector<std::string>& names) {
   std::vector<int> columns;
   for (const std::string& name : names) {
     columns.push_back(table.Find(name));
@@ -65,7 +65,7 @@ std::vector<int> FindAll(const CsvTable& table, const std::vector<std::string>& 
 
 // A column that looks like a joint's but is of none of this robot's is of another robot, or
 // misspelt: its values would be ignored in silence.
-void RefuseForeign(const CsvTable& table, const std::vector<std::string>& known,
+void RefuseForeign(const CsvReader& table, const std::vector<std::string>& known,
                    const std::string& robot) {
   constexpr const char* kPrefixes[] = {"q/", "v/", "u/", "next_q/", "next_v/"};
   for (const std::string& name : table.names()) {
@@ -80,7 +80,7 @@ void RefuseForeign(const CsvTable& table, const std::vector<std::string>& known,
   }
 }
 
-Columns FindColumns(const CsvTable& table, const Names& names, const std::string& robot) {
+Columns FindColumns(const CsvReader& table, const Names& names, const std::string& robot) {
   const std::vector<std::string> next_q = Prefixed(names.q), next_v = Prefixed(names.v);
   std::vector<std::string> known;
   for (const auto* some : {&names.q, &names.v, &names.u, &next_q, &next_v}) {
@@ -104,7 +104,7 @@ Columns FindColumns(const CsvTable& table, const Names& names, const std::string
   return columns;
 }
 
-double Number(const CsvTable& table, int column, double greatest = kGreatestQuantity) {
+double Number(const CsvReader& table, int column, double greatest = kGreatestQuantity) {
   const double number = table.Number(column);
   if (std::abs(number) > greatest) {
     table.Fail(fmt::format("{} is {}: beyond {} nothing is a robot's",
@@ -113,14 +113,14 @@ double Number(const CsvTable& table, int column, double greatest = kGreatestQuan
   return number;
 }
 
-Eigen::VectorXd Numbers(const CsvTable& table, const std::vector<int>& columns) {
+Eigen::VectorXd Numbers(const CsvReader& table, const std::vector<int>& columns) {
   Eigen::VectorXd numbers(columns.size());
   std::transform(columns.begin(), columns.end(), numbers.begin(),
                  [&](int column) { return Number(table, column); });
   return numbers;
 }
 
-bool Flag(const CsvTable& table, int column) {
+bool Flag(const CsvReader& table, int column) {
   if (column < 0) return false;
   const std::string_view text = table.Text(column);
   if (text == "True" || text == "true") return true;
@@ -156,7 +156,7 @@ class Efforts {
   int64_t clipped_ = 0;
 };
 
-std::vector<MotionRow> ReadRows(CsvTable& table, const Columns& columns, Efforts& efforts) {
+std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns, Efforts& efforts) {
   std::vector<MotionRow> rows;
   while (table.Next()) {
     MotionRow row{Number(table, columns.t, kLatest),
@@ -231,7 +231,7 @@ class CheckedColumns {
 }  // namespace
 
 MotionTable ReadMotionTable(const std::string& file, const RobotDescription& robot) {
-  CsvTable table(file);
+  CsvReader table(file);
   const Names names(robot);
   const Columns columns = FindColumns(table, names, robot.name);
   Efforts efforts(robot);

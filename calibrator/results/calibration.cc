@@ -23,10 +23,8 @@ namespace {
 constexpr double kDisagreement = 1e-3;
 constexpr char kCure[] =
     "; train on posterior and residual together (plumb train --distribution), and, as a residual "
-    "is "
-    "right only near what it was learnt from, record the trained policy's motion and calibrate "
-    "with "
-    "all logs";
+    "is right only near what it was learnt from, record the trained policy's motion and calibrate "
+    "with all logs";
 
 Eigen::MatrixXd ToPhysical(const RobotDescription& robot, const Eigen::MatrixXd& coordinates) {
   Eigen::MatrixXd physical(coordinates.rows(), coordinates.cols());

@@ -31,17 +31,23 @@ def names(lines):
     return [line.split()[0] for line in lines if re.match(r"  \S", line)]
 
 
+def told(text):
+    """Without the examples: what only they have is no option."""
+    return text.split("\nExamples:")[0]
+
+
 def judge(example):
     """Why that is no command; None if it is one."""
     words = shlex.split(example)
     if not (folder / words[0]).exists():
         return "no such program"
     command, rest = words[:1], words[1:]
-    text = known = help_of(command)
+    text = help_of(command)
+    known = told(text)
     while rest and rest[0] in names(section(text, "Subcommands")):
         command.append(rest.pop(0))
         text = help_of(command)
-        known += text
+        known += told(text)
     options = dict(re.findall(r"(--[a-z][a-z-]*)(?:,--[a-z-]+)?(=?[^\s,]*(?: [A-Z:]+)?)", known))
     required = [line for line in section(text, "Positionals") if "REQUIRED" in line]
     given = 0

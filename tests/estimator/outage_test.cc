@@ -145,7 +145,7 @@ TEST_CASE("duplicates and late messages are counted and change nothing") {
   CHECK(status.duplicates == 1);
   CHECK(status.reordered == 1);
   CHECK(status.restarts == 0);
-  CHECK(motion.observer.refused() == 2);
+  CHECK(motion.observer.unused() == 2);
 }
 
 TEST_CASE("noise as assumed: innovations are normal, and nobody lies") {

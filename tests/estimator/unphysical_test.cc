@@ -65,7 +65,7 @@ TEST_CASE(
       CHECK(observer.state().valid);
       CHECK_FALSE(observer.state().restarted);
       CHECK(std::abs(observer.state().q[0]) < 1e-3);
-      CHECK(observer.refused() == 1);
+      CHECK(observer.unused() == 1);
     }
   }
 }

@@ -14,8 +14,8 @@
 #include "calibrator/live/checkpoint.h"
 #include "calibrator/live/simopt.h"
 #include "calibrator/results/posterior_file.h"
+#include "common/checked_file.h"
 #include "common/config.h"
-#include "common/sealed.h"
 #include "robot/parameter_distribution.h"
 #include "robot/posterior_reader.h"
 #include "tests/calibrator/live/known_pendulum.h"
@@ -253,13 +253,13 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
   CHECK(told(*loaded) == told(state));
   CHECK(told(*loaded) != told(simopt.state()));
 
-  const Seal seal{"PLUMBCAL", 8, "a calibrator's checkpoint"};
+  const FileKind kind{"PLUMBCAL", 8, "a calibrator's checkpoint"};
   const std::string bytes = ReadFile(folder / "calibration.checkpoint");
-  const std::string text(Unsealed(seal, bytes));
+  const std::string text(CheckedContent(kind, bytes));
   const size_t at = text.find("\"residual\":\"") + 12;
   for (const std::string& spoilt : {text.substr(0, at) + text.substr(at + 2),
                                     text.substr(0, at) + "zz" + text.substr(at + 2)}) {
-    std::ofstream(folder / "calibration.checkpoint") << Sealed(seal, spoilt);
+    std::ofstream(folder / "calibration.checkpoint") << WithChecksum(kind, spoilt);
     CHECK_THROWS_WITH(checkpoint.Load(),
                       Catch::Contains("calibration.checkpoint: the residual is none"));
   }

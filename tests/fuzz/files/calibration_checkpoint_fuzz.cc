@@ -3,8 +3,8 @@
 
 #include "calibrator/live/checkpoint.h"
 
+#include "tests/fuzz/files/file_kind.h"
 #include "tests/fuzz/files/input_file.h"
-#include "tests/fuzz/files/sealed_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace plumb;
@@ -16,8 +16,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }();
   const std::string_view text = Text(data, size);
   const size_t line = std::min(text.find('\n'), size);
-  state.Write(Sealed(SealOf(example), text.substr(0, line)));
-  rollout.Write(Sealed(SealOf(example), text.substr(std::min(line + 1, size))));
+  state.Write(WithChecksum(KindOf(example), text.substr(0, line)));
+  rollout.Write(WithChecksum(KindOf(example), text.substr(std::min(line + 1, size))));
   ReadOrRefuse<std::runtime_error>([&] { checkpoint.Load(); });
   return 0;
 }

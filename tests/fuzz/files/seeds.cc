@@ -19,8 +19,8 @@
 #include "plumb/joint_command_t.hpp"
 #include "plumb/robot_state_t.hpp"
 #include "tests/calibrator/sample_findings.h"
+#include "tests/fuzz/files/file_kind.h"
 #include "tests/fuzz/files/input_file.h"
-#include "tests/fuzz/files/sealed_file.h"
 #include "trainer/checkpoint.h"
 
 namespace plumb {
@@ -39,9 +39,9 @@ std::vector<uint8_t> Bytes(const Message& message) {
   return bytes;
 }
 
-// Without its seal, which the fuzzer makes anew.
-std::string Content(std::string_view sealed) {
-  return std::string(Unsealed(SealOf(sealed), sealed));
+// Without its head, which the fuzzer makes anew.
+std::string Content(std::string_view file) {
+  return std::string(CheckedContent(KindOf(file), file));
 }
 std::string ContentOfFile(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);

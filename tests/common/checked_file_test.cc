@@ -1,22 +1,22 @@
-#include "common/sealed.h"
+#include "common/checked_file.h"
 
 #include <catch2/catch.hpp>
 
 namespace plumb {
 namespace {
 
-constexpr Seal kSeal{"PLUMBABC", 3, "a thing"};
+constexpr FileKind kKind{"PLUMBABC", 3, "a thing"};
 
 std::string WhatIsWrong(std::string_view bytes) {
   try {
-    return "content: " + std::string(Unsealed(kSeal, bytes));
-  } catch (const SealError& error) {
+    return "content: " + std::string(CheckedContent(kKind, bytes));
+  } catch (const DamagedFile& error) {
     return error.what();
   }
 }
 
-TEST_CASE("what was sealed is read again, and every changed bit is told") {
-  const std::string bytes = Sealed(kSeal, "123456789");
+TEST_CASE("what has a checksum is read again, and every changed bit is told") {
+  const std::string bytes = WithChecksum(kKind, "123456789");
   CHECK(WhatIsWrong(bytes) == "content: 123456789");
   CHECK(bytes.substr(12, 4) == "\x26\x39\xf4\xcb");  // CRC-32's check value, 0xcbf43926
   for (size_t bit = 0; bit < 8 * bytes.size(); ++bit) {

@@ -1,4 +1,4 @@
-#include "records/csv_table.h"
+#include "records/message_table.h"
 
 #include <fmt/format.h>
 
@@ -36,7 +36,7 @@ std::string Cell(const Scalar& scalar) {
 }  // namespace
 
 /// A column that an earlier message did not have comes behind the one before it in this message.
-bool CsvTable::Measure(std::span<const uint8_t> message) {
+bool MessageTable::Measure(std::span<const uint8_t> message) {
   if (!Decodes(type_, message)) return false;
   ++rows_;
   auto next = columns_.begin();
@@ -53,7 +53,7 @@ bool CsvTable::Measure(std::span<const uint8_t> message) {
   return true;
 }
 
-void CsvTable::Open(const std::filesystem::path& file) {
+void MessageTable::Open(const std::filesystem::path& file) {
   file_.emplace(file);
   file_->Write("received");
   for (const std::string& column : columns_) {
@@ -64,7 +64,7 @@ void CsvTable::Open(const std::filesystem::path& file) {
   cells_.resize(numbers_.size());
 }
 
-void CsvTable::Write(int64_t received, std::span<const uint8_t> message) {
+void MessageTable::Write(int64_t received, std::span<const uint8_t> message) {
   for (std::string& cell : cells_) cell.clear();
   const auto fill = [&](const std::string& path, const Scalar& scalar) {
     const auto number = numbers_.find(path);
@@ -79,6 +79,6 @@ void CsvTable::Write(int64_t received, std::span<const uint8_t> message) {
   file_->Write("\n");
 }
 
-void CsvTable::Finish() { file_->Commit(); }
+void MessageTable::Finish() { file_->Commit(); }
 
 }  // namespace plumb

@@ -1,4 +1,4 @@
-#include "common/sealed.h"
+#include "common/checked_file.h"
 
 #include <fmt/format.h>
 
@@ -18,24 +18,24 @@ uint32_t Crc(std::string_view content) {
 
 }  // namespace
 
-std::string Sealed(const Seal& seal, std::string_view content) {
-  std::string bytes(seal.magic);
+std::string WithChecksum(const FileKind& kind, std::string_view content) {
+  std::string bytes(kind.magic);
   const uint32_t crc = Crc(content);
-  bytes.append(reinterpret_cast<const char*>(&seal.version), sizeof seal.version);
+  bytes.append(reinterpret_cast<const char*>(&kind.version), sizeof kind.version);
   bytes.append(reinterpret_cast<const char*>(&crc), sizeof crc);
   return bytes.append(content);
 }
 
-std::string_view Unsealed(const Seal& seal, std::string_view bytes) {
-  if (bytes.size() < kHead || !bytes.starts_with(seal.magic))
-    throw SealError(fmt::format("is not {}", seal.what));
+std::string_view CheckedContent(const FileKind& kind, std::string_view bytes) {
+  if (bytes.size() < kHead || !bytes.starts_with(kind.magic))
+    throw DamagedFile(fmt::format("is not {}", kind.what));
   uint32_t version = 0, crc = 0;
   std::memcpy(&version, bytes.data() + kMagic, sizeof version);
   std::memcpy(&crc, bytes.data() + kMagic + sizeof version, sizeof crc);
-  if (version != seal.version)
-    throw SealError(fmt::format("has version {}, not {}", version, seal.version));
+  if (version != kind.version)
+    throw DamagedFile(fmt::format("has version {}, not {}", version, kind.version));
   const std::string_view content = bytes.substr(kHead);
-  if (crc != Crc(content)) throw SealError("is damaged");
+  if (crc != Crc(content)) throw DamagedFile("is damaged");
   return content;
 }
 

@@ -1,4 +1,4 @@
-#include "controller/acceptance.h"
+#include "trainer/acceptance.h"
 
 #include <fmt/format.h>
 
@@ -18,17 +18,6 @@ double ExpectedSteps(int falls, double rate, double m) {
 }
 
 }  // namespace
-
-void Trial::Add(double reward, int planned) {
-  sum_of_rewards += reward;
-  ++steps;
-  const int late = steps - planned / 2;
-  if (late > 0) late_rate += (reward - late_rate) / late;
-}
-
-double Trial::WholeReturn(int episode_steps) const {
-  return sum_of_rewards + (fell ? 0 : late_rate * (episode_steps - steps));
-}
 
 void Acceptance::Add(int iteration, const Trial& trial) {
   trials_[iteration].push_back(trial);

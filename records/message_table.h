@@ -18,12 +18,12 @@ namespace plumb {
 /// `received`, then a column for each number and text, "q[0]", "residual[1].scale[2]". Arrays that
 /// are shorter than the longest leave the rest empty. Numbers read back to the same bits, NaN and
 /// infinities as nan, inf and -inf. Measure all messages, then write all of them. Not thread-safe.
-class CsvTable {
+class MessageTable {
  public:
   /// More columns than anything reads, or a hostile log asks for.
   static constexpr size_t kMostColumns = 50'000;
 
-  explicit CsvTable(const MessageType& type) : type_(type) {}
+  explicit MessageTable(const MessageType& type) : type_(type) {}
 
   /// @return whether it decodes.
   bool Measure(std::span<const uint8_t> message);

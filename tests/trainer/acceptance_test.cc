@@ -1,4 +1,4 @@
-#include "controller/acceptance.h"
+#include "trainer/acceptance.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>

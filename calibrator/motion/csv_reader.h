@@ -12,15 +12,15 @@ namespace plumb {
 /// a field holds no line break; a UTF-8 mark, blank lines and lines that begin with # are skipped.
 /// Memory is that of one line. Not thread-safe. All errors are std::runtime_errors that begin with
 /// "file:line: ", or "file: " where there is no line.
-class CsvTable {
+class CsvReader {
  public:
   static constexpr size_t kLongestLine = size_t{1} << 20;
 
   /// Reads the head. @throws std::runtime_error if the file cannot be opened, is no text, or has no
   /// head with at least two names, each of them once.
-  explicit CsvTable(const std::string& file);
-  CsvTable(const CsvTable&) = delete;
-  CsvTable& operator=(const CsvTable&) = delete;
+  explicit CsvReader(const std::string& file);
+  CsvReader(const CsvReader&) = delete;
+  CsvReader& operator=(const CsvReader&) = delete;
 
   const std::vector<std::string>& names() const { return names_; }
   /// Column of that name, -1 if there is none.

@@ -12,18 +12,19 @@ namespace plumb {
 // machine has them. Functions here are thread-safe.
 
 /// "is damaged", "has version 3, not 7", "is not a trainer's checkpoint".
-struct SealError : std::runtime_error {
+struct DamagedFile : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-struct Seal {
+struct FileKind {
   std::string_view magic;  ///< eight characters
   uint32_t version;
   const char* what;  ///< "a trainer's checkpoint"
 };
 
-std::string Sealed(const Seal& seal, std::string_view content);
-/// The content, which lives as long as the bytes. @throws SealError if it is not what was sealed.
-std::string_view Unsealed(const Seal& seal, std::string_view bytes);
+std::string WithChecksum(const FileKind& kind, std::string_view content);
+/// The content, which lives as long as the bytes. @throws DamagedFile if it is of another kind or
+/// version, or damaged.
+std::string_view CheckedContent(const FileKind& kind, std::string_view bytes);
 
 }  // namespace plumb

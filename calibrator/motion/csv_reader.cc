@@ -1,4 +1,4 @@
-#include "calibrator/motion/csv_table.h"
+#include "calibrator/motion/csv_reader.h"
 
 #include <fmt/format.h>
 
@@ -32,7 +32,7 @@ std::string Quoted(std::string_view text) {
   return quoted + (text.size() > kLongestQuotation ? "...'" : "'");
 }
 
-CsvTable::CsvTable(const std::string& file) : file_(file) {
+CsvReader::CsvReader(const std::string& file) : file_(file) {
   std::error_code error;
   if (std::filesystem::is_directory(file, error)) throw std::runtime_error(file + ": is a folder");
   stream_.open(file, std::ios::binary);
@@ -52,12 +52,12 @@ CsvTable::CsvTable(const std::string& file) : file_(file) {
   }
 }
 
-int CsvTable::Find(std::string_view name) const {
+int CsvReader::Find(std::string_view name) const {
   const auto found = std::find(names_.begin(), names_.end(), name);
   return found == names_.end() ? -1 : static_cast<int>(found - names_.begin());
 }
 
-bool CsvTable::Next() {
+bool CsvReader::Next() {
   if (!ReadLine()) return false;
   Split();
   if (fields_.size() != names_.size()) {
@@ -67,7 +67,7 @@ bool CsvTable::Next() {
   return true;
 }
 
-double CsvTable::Number(int column) const {
+double CsvReader::Number(int column) const {
   const std::string_view text = Text(column);
   if (text.empty()) return std::numeric_limits<double>::quiet_NaN();
   const auto fail = [&](const char* why) {
@@ -86,13 +86,13 @@ double CsvTable::Number(int column) const {
   return value;
 }
 
-void CsvTable::Fail(const std::string& what) const {
+void CsvReader::Fail(const std::string& what) const {
   throw std::runtime_error(fmt::format("{}:{}: {}", file_, line_number_, what));
 }
 
 // The next line that says something, without its end. A file that is no text may have no line ends:
 // it is not swallowed whole.
-bool CsvTable::ReadLine() {
+bool CsvReader::ReadLine() {
   std::streambuf& bytes = *stream_.rdbuf();
   constexpr int kEnd = std::char_traits<char>::eof();
   for (int c = 0; c != kEnd;) {
@@ -112,7 +112,7 @@ bool CsvTable::ReadLine() {
 }
 
 // Fields point into the line; a quoted one's doubled quotes are made single in place.
-void CsvTable::Split() {
+void CsvReader::Split() {
   fields_.clear();
   for (size_t at = 0;;) {
     while (at < line_.size() && IsBlank(line_[at])) ++at;
