@@ -208,8 +208,9 @@ void AddServeModel(CLI::App& app, Action& action) {
   serve->add_option("--log", flags->logs, "LCM log; may be given several times")
       ->allow_extra_args(false);
   serve
-      ->add_option("--csv", flags->tables,
-                   "table of transitions, columns as in README.md; may be given several times")
+      ->add_option(
+          "--csv", flags->tables,
+          "table of transitions, columns as in docs/commands.md; may be given several times")
       ->allow_extra_args(false);
   serve->add_option("--address", flags->address, "where to listen, ADDRESS:PORT; port 0 = any")
       ->capture_default_str();

@@ -24,7 +24,7 @@ const mean = (of: Episode[]): Value => {
   return given.length ? given.reduce((sum, value) => sum + value, 0) / given.length : null;
 };
 
-/** Its episodes. A trial that time has cut off counts on at its late rate, as where policies are compared (controller/acceptance.h). */
+/** Its episodes. A trial that time has cut off counts on at its late rate, as where policies are compared (controller/trial.h). */
 function episodes({ returns, steps, late_rate, fell }: controller_status_t): Episode[] {
   const longest = robot.value?.task?.steps;
   return returns.map((said, i) => {
