@@ -50,10 +50,6 @@ Real Max(const Real& a, const Real& b) {
   return a > b ? a : b;
 }
 template <class Real>
-Real Min(const Real& a, const Real& b) {
-  return a < b ? a : b;
-}
-template <class Real>
 Real Abs(const Real& x) {
   return x < 0 ? -x : x;
 }
