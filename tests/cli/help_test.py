@@ -48,7 +48,7 @@ def judge(example):
         command.append(rest.pop(0))
         text = help_of(command)
         known += told(text)
-    options = dict(re.findall(r"(--[a-z][a-z-]*)(?:,--[a-z-]+)?(=?[^\s,]*(?: [A-Z:]+)?)", known))
+    options = set(re.findall(r"--[a-z][a-z-]*", known))
     required = [line for line in section(text, "Positionals") if "REQUIRED" in line]
     given = 0
     while rest:
