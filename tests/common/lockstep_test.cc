@@ -3,6 +3,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <filesystem>
@@ -278,6 +279,7 @@ TEST_CASE("who does not belong is refused with one line") {
   run.Pass(10);
   const auto refusal = [&](const std::function<void()>& join) {
     std::string line;
+    std::atomic<bool> done = false;
     std::thread stranger([&] {
       try {
         join();
@@ -285,9 +287,10 @@ TEST_CASE("who does not belong is refused with one line") {
         line = error.what();
       }
       line += " ";
+      done = true;
     });
     // The coordinator hears it when the owner waits.
-    for (int i = 0; i < 10'000 && line.empty(); ++i) run.Pass(10);
+    for (int i = 0; i < 10'000 && !done; ++i) run.Pass(10);
     stranger.join();
     return line;
   };
