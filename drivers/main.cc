@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
@@ -16,9 +15,9 @@
 #include "common/realtime.h"
 #include "common/time_units.h"
 #include "drivers/driver/driver.h"
-#include "drivers/driver/flight_recorder.h"
 #include "drivers/driver/phase_times.h"
 #include "drivers/driver/state_log.h"
+#include "drivers/robot_bus.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -31,8 +30,6 @@ constexpr double kDisarmTimeout = 0.3;
 // of frames per wake: a flood must not keep us from our deadlines
 constexpr int kBursts = 8;
 constexpr int64_t kFlight = 2'000'000;  // [us] before a fault whose frames are kept
-// of a bus: more than two of 1 Mbit/s carry in that time
-constexpr size_t kFlightFrames = 40'000;
 
 void WriteState(int8_t state, std::string_view reason) {
   constexpr std::array names = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
@@ -45,43 +42,6 @@ void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {
   if (commands_signed) return spdlog::info("takes signed commands only");
   if (!StaysOnMachine(lcm_url))
     return spdlog::warn("takes unsigned commands of anybody on the network");
-}
-
-void ReportFlight(const std::string& file, const std::string& error) {
-  if (error.empty())
-    spdlog::warn("the frames of the last 2 s are in {}", file);
-  else
-    spdlog::error("the frames before the fault are lost: {}", error);
-}
-
-/// One of the robot's buses: its end here, and its latest frames.
-struct Bus {
-  Bus(const BusDescription& bus, std::unique_ptr<Transport> end, const std::string& folder)
-      : transport(std::move(end)), recorder(folder, bus, kFlightFrames, ReportFlight) {}
-
-  std::unique_ptr<Transport> transport;
-  FlightRecorder recorder;
-};
-
-void RequireFd(const BusDescription& bus, const Transport& transport, const std::string& robot) {
-  if (bus.data_bit_rate == 0 || transport.carries_fd()) return;
-  throw std::runtime_error(fmt::format(
-      "{}: the interface is not set up for CAN FD, which {} needs; cure: ip link set CAN type "
-      "can bitrate {:.0f} dbitrate {:.0f} fd on, or of a vcan: mtu 72",
-      bus.url, robot, bus.bit_rate, bus.data_bit_rate));
-}
-
-std::deque<Bus> OpenBuses(Process& process, const RobotDescription& robot, const Driver& driver,
-                          const std::string& flight_recorder) {
-  std::deque<Bus> buses;
-  for (const BusDescription& bus : robot.buses) {
-    auto transport =
-        OpenTransport(bus.url, driver.filters(buses.size()),
-                      {process.participant(), Microseconds(robot.driver.effort_delay)});
-    RequireFd(bus, *transport, robot.name);
-    buses.emplace_back(bus, std::move(transport), flight_recorder);
-  }
-  return buses;
 }
 
 class DriverProcess {
@@ -106,7 +66,7 @@ class DriverProcess {
             [this](const driver_request_t& request, std::string_view why) {
               OnForgedRequest(request, why);
             }) {
-    for (const Bus& bus : buses_) fds_.push_back(bus.transport->fd());
+    for (const RobotBus& bus : buses_) fds_.push_back(bus.transport->fd());
     accepted_.resize(buses_.size());
     stats_.resize(buses_.size());
     driver_.set_virtual(is_virtual);
@@ -114,9 +74,9 @@ class DriverProcess {
     driver_.set_commands_signed(commands_signed);
     LogCommandPolicy(process.lcm_url(), commands_signed);
     process.messenger().Lead(robot.name, InOneLine(robot.buses));
-    driver_.set_replay(
-        std::ranges::any_of(buses_, [](const Bus& bus) { return bus.transport->is_replay(); }));
-    for (const Bus& bus : buses_) {
+    driver_.set_replay(std::ranges::any_of(
+        buses_, [](const RobotBus& bus) { return bus.transport->is_replay(); }));
+    for (const RobotBus& bus : buses_) {
       for (const std::string& warning : bus.transport->warnings()) spdlog::warn("{}", warning);
     }
     spdlog::info("{} on {}: {} joint{}, cycle {} us", robot.name, InOneLine(robot.buses),
@@ -142,7 +102,7 @@ class DriverProcess {
   void Step() {
     const int64_t now = clock_.Now();
     int64_t next = Transport::kNever;
-    for (const Bus& bus : buses_) next = std::min(next, bus.transport->NextEvent());
+    for (const RobotBus& bus : buses_) next = std::min(next, bus.transport->NextEvent());
     process_.Doze(std::min(cycle_.Remaining(now), std::max(next, now) - now), fds_);
     process_.stopping();  // reads the second signal, too: while one waits, ppoll does not
     // A wake-up with nothing to do is not timed.
@@ -180,7 +140,7 @@ class DriverProcess {
     return any;
   }
   bool ReceiveFrames(size_t index) {
-    Bus& bus = buses_[index];
+    RobotBus& bus = buses_[index];
     bool any = false;
     bus.transport->SetTime(clock_.Now());
     for (int burst = 0; burst < kBursts; ++burst) {
@@ -292,7 +252,7 @@ class DriverProcess {
   Process& process_;
   const Clock& clock_;
   Driver driver_;
-  std::deque<Bus> buses_;              // in the robot's order
+  std::deque<RobotBus> buses_;         // in the robot's order
   std::vector<int> fds_, accepted_;    // of each bus; frames accepted in this cycle
   std::vector<TransportStats> stats_;  // of each bus
   Periodic cycle_;

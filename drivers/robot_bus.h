@@ -1,0 +1,29 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <string>
+
+#include "common/process.h"
+#include "drivers/can/transport.h"
+#include "drivers/driver/driver.h"
+#include "drivers/driver/flight_recorder.h"
+#include "robot/description.h"
+
+namespace plumb {
+
+/// One of the robot's buses: its end here, and its latest frames.
+struct RobotBus {
+  RobotBus(const BusDescription& bus, std::unique_ptr<Transport> end, const std::string& folder);
+
+  std::unique_ptr<Transport> transport;
+  FlightRecorder recorder;
+};
+
+/// Opens them, in the robot's order, for the frames that the driver listens to. @param
+/// flight_recorder folder of the frames before a fault; empty = they are not kept.
+/// @throws std::runtime_error naming the bus that cannot be opened, or lacks the CAN FD it needs.
+std::deque<RobotBus> OpenBuses(Process& process, const RobotDescription& robot,
+                               const Driver& driver, const std::string& flight_recorder);
+
+}  // namespace plumb
