@@ -13,6 +13,8 @@
 #include <mpi.h>
 #endif
 
+#include "common/shares.h"
+
 namespace plumb {
 namespace {
 
@@ -35,7 +37,7 @@ const Ranks& Ranks::Alone() {
 
 std::vector<int> Ranks::Bounds(int count) const {
   std::vector<int> bounds;
-  for (int r = 0; r <= size_; ++r) bounds.push_back(static_cast<int>(int64_t{count} * r / size_));
+  for (int r = 0; r <= size_; ++r) bounds.push_back(ShareBegin(count, r, size_));
   return bounds;
 }
 

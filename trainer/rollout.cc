@@ -8,6 +8,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "common/shares.h"
+
 namespace plumb {
 namespace {
 
@@ -153,8 +155,7 @@ std::vector<EpisodeRecord> RolloutSampler::Run(const GaussianPolicy& policy,
   int tasks = (own + kMaxTogether - 1) / kMaxTogether;
   tasks = std::min(own, (tasks + threads - 1) / threads * threads);
   workers_->Run(tasks, [&](int task, int worker) {
-    const auto bound = [&](int t) { return static_cast<int>(int64_t{own} * t / tasks); };
-    const int begin = bound(task), end = bound(task + 1);
+    const int begin = ShareBegin(own, task, tasks), end = ShareBegin(own, task + 1, tasks);
     state_[static_cast<size_t>(worker)]->Play(
         policy, network_, end - begin, explore, [&](int i, Player& player) {
           const int episode = begin + i;

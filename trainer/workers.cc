@@ -5,13 +5,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/shares.h"
+
 namespace plumb {
 namespace {
-
-// The first of the tasks that are worker w's own, of so many.
-int FirstTask(int tasks, int w, int workers) {
-  return static_cast<int>(int64_t{tasks} * w / workers);
-}
 
 // Jobs follow each other within microseconds: falling asleep in between would cost more. Some 10
 // us; for longer, a spinning thread would only be in the way of other processes.
@@ -69,7 +66,7 @@ void Workers::Run(int tasks, const std::function<void(int, int)>& work) {
   job.unfinished = tasks;
   ++job.number;
   for (int w = 0; w < size(); ++w) {
-    const int share = FirstTask(tasks, w + 1, size()) - FirstTask(tasks, w, size());
+    const int share = ShareBegin(tasks, w + 1, size()) - ShareBegin(tasks, w, size());
     job.claims[static_cast<size_t>(w)].ticket.store(
         uint64_t{job.number} << 32 | static_cast<uint32_t>(share), std::memory_order_release);
   }
@@ -144,7 +141,7 @@ bool Workers::DoTask(Job& job, int worker) {
     }
     if (!claimed) continue;
     const int task =
-        FirstTask(job.tasks, from, size()) + static_cast<int>(static_cast<uint32_t>(ticket)) - 1;
+        ShareBegin(job.tasks, from, size()) + static_cast<int>(static_cast<uint32_t>(ticket)) - 1;
     try {
       (*job.work)(task, worker);
     } catch (...) {
