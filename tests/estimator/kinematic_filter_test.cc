@@ -100,7 +100,7 @@ TEST_CASE("the smoother equals batch least squares") {
     vector(b) += position[static_cast<size_t>(i)] / 0.01;
     vector(b + 1) += velocity[static_cast<size_t>(i)] / 0.16;
   }
-  const Eigen::MatrixXd covariance = information.inverse();
+  const Eigen::MatrixXd covariance = Inverse(information);
   const Eigen::VectorXd mean = covariance * vector;
   for (int i = 0; i < kSteps; ++i) {
     // The oldest of a window whose last state has seen everything: take them one by one.

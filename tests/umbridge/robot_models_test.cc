@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "calibrator/fit/curriculum.h"
+#include "common/decompositions.h"
 #include "common/random.h"
 #include "sim/simulator.h"
 
@@ -107,7 +108,7 @@ TEST_CASE("served models: errors are noise at the truth, where the likelihood is
   };
   for (Eigen::Index i = 0; i < 2; ++i) {
     const VectorXd step = 3 * sd(i) * VectorXd::Unit(2, i);
-    const double drop = 0.5 * 9 * sd(i) * sd(i) * fit.posterior.covariance.inverse()(i, i);
+    const double drop = 0.5 * 9 * sd(i) * sd(i) * Inverse(fit.posterior.covariance)(i, i);
     CHECK(value(fit.mode) - value(fit.mode + step) == Approx(drop).epsilon(0.2));
     CHECK(value(fit.mode) - value(fit.mode - step) == Approx(drop).epsilon(0.2));
   }

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
 
+#include "common/decompositions.h"
 #include "tests/calibrator/hopper.h"
 
 namespace plumb {
@@ -23,7 +24,7 @@ Contact RandomContact(bool ground, Eigen::Index k, const Eigen::MatrixXd& invers
   contact.x = normal(4, 1);
   contact.jacobian = normal(k, inverse_mass.rows());
   contact.mobility = contact.jacobian * inverse_mass * contact.jacobian.transpose();
-  contact.response = inverse_mass * contact.jacobian.transpose() * contact.mobility.inverse();
+  contact.response = inverse_mass * contact.jacobian.transpose() * Inverse(contact.mobility);
   return contact;
 }
 

@@ -52,7 +52,7 @@ Eigen::VectorXd Bound(const std::shared_ptr<const Model>& model,
         ((ends[static_cast<size_t>(2 * k)] - ends[static_cast<size_t>(2 * k + 1)]) / (2 * kStep))
             .reshaped();
   }
-  return (slopes.transpose() * slopes / kNoise).inverse().diagonal().cwiseSqrt();
+  return Inverse(slopes.transpose() * slopes / kNoise).diagonal().cwiseSqrt();
 }
 
 Eigen::VectorXd StartNear(const RobotDescription& robot, uint32_t stream) {

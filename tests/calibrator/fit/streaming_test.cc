@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/decompositions.h"
 #include "robot/parameter_distribution.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/synthetic.h"
@@ -134,7 +135,7 @@ TEST_CASE(
     const Gaussian found = stream.posterior();
     const Eigen::Vector3d null = Eigen::Vector3d(1, -2, 1).normalized();
     const Eigen::Vector3d precision = PriorGaussian(robot).covariance.diagonal().cwiseInverse();
-    CHECK(null.dot(found.covariance.inverse() * null) ==
+    CHECK(null.dot(Inverse(found.covariance) * null) ==
           Approx(null.dot(precision.asDiagonal() * null)).epsilon(1e-3));
   }
 }

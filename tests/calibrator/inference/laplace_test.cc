@@ -25,8 +25,8 @@ Gaussian Conjugate(const Prior& prior, const Eigen::MatrixXd& a, const Eigen::Ve
   }
   const Eigen::MatrixXd posterior =
       a.transpose() * a / (s * s) + Eigen::MatrixXd(precision.asDiagonal());
-  return {posterior.inverse() * (a.transpose() * y / (s * s) + precision.cwiseProduct(mean)),
-          posterior.inverse()};
+  return {Inverse(posterior) * (a.transpose() * y / (s * s) + precision.cwiseProduct(mean)),
+          Inverse(posterior)};
 }
 
 TEST_CASE("a line with normal noise has the posterior of the textbook") {

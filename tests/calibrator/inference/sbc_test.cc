@@ -23,7 +23,7 @@ struct LinearGaussian {
     const Eigen::VectorXd y = a * truth + noise * StandardNormals(3, 1, random);
     const Eigen::MatrixXd precision =
         Eigen::MatrixXd::Identity(2, 2) / 4 + a.transpose() * a / (noise * noise);
-    const Eigen::MatrixXd covariance = precision.inverse();
+    const Eigen::MatrixXd covariance = Inverse(precision);
     return {covariance * (Eigen::Vector2d(1, -3) / 4 + a.transpose() * y / (noise * noise)),
             covariance};
   }

@@ -70,7 +70,7 @@ TEST_CASE("a pendulum's calibration finds what the motion tells, and names what 
   REQUIRE(f.identifiability.combinations.size() == 2);
   CHECK(f.cramer_rao.array().isInf().all());
   // Along the null direction, relative to the prior's metric, samples are the prior's.
-  const Eigen::Vector3d across = f.prior.covariance.inverse() * null;
+  const Eigen::Vector3d across = Inverse(f.prior.covariance) * null;
   const Eigen::VectorXd along = (f.samples.array().log().matrix().transpose() * across).eval();
   CHECK(f.samples.cols() == 1000);
   CHECK(KolmogorovSmirnov(along, across.dot(f.prior.mean),
