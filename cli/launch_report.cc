@@ -84,7 +84,7 @@ class Report {
       html += alarm.empty() ? Verdict("good", "The model explains the robot",
                                       "The alarm does not speak of the last iteration's motion.")
                             : Verdict("bad", "The model does not explain the robot", alarm);
-      if (!gap.empty()) html += Verdict("", "What it lacks is learnt", gap);
+      if (!gap.empty()) html += Verdict("", "What it lacks", gap);
       html += Verdict("", "What can be known", Text("identifiability"));
     }
     const auto dropped = summary_.at("dropped_episodes").get<int64_t>();

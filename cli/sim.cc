@@ -184,7 +184,7 @@ int Simulate(Process& process, const SimFlags& flags) {
     const auto see = [&](SimulatedStep step) {
       if (noise.any()) noise.Add(robot, readings, step.q, step.v);
       if (!flags.csv.empty()) AppendCsv(step, csv);
-      if (number == 0) film.push_back({step.time, step.q});
+      if (number == 0) film.push_back({step.time, step.true_q});
     };
     episodes.push_back(PlayEpisode(environment, robot, actor, flags.seed,
                                    static_cast<uint32_t>(number), see, stop));
@@ -193,11 +193,8 @@ int Simulate(Process& process, const SimFlags& flags) {
                              Describe(episode.end))
               << std::endl;
     if (episode.end == EpisodeSummary::End::kInterrupted) return 130;
-    if (number == 0 && environment.q().allFinite()) {
-      Eigen::VectorXd q = environment.q(), v = environment.v();
-      if (noise.any()) noise.Add(robot, readings, q, v);
-      film.push_back({static_cast<double>(episode.steps) * robot.task.period, q});
-    }
+    if (number == 0 && environment.q().allFinite())
+      film.push_back({static_cast<double>(episode.steps) * robot.task.period, environment.q()});
   }
   const double seconds =
       std::max(Seconds(process.clock().Now() - begin) / process.clock().scale(), 1e-6);

@@ -108,6 +108,7 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
   const ParameterSampler sample = [&](Random& random) { return distribution.Draw(random); };
   LoopResult result;
   Acceptance acceptance(model_.task.steps);
+  std::optional<GaussianPolicy> incumbent;
   int deployed_iteration = 0;
   int64_t transitions = 0;
   double seconds = 0, discrepancy = std::numeric_limits<double>::quiet_NaN();
@@ -143,10 +144,17 @@ LoopResult Loop::Run(RealSystem& real, const LoopSettings& settings,
       if (settings.accept) {
         const bool right = simopt && model_.calibration.residual && !simopt->state().residual;
         const double scatter = trainer->ScatterOfStarts(distribution.Mean());
+        if (!incumbent) incumbent = trainer->policy();
+        const auto simulated = [&](const GaussianPolicy& policy) {
+          return trainer->EvaluateHeldOut(policy, sample, Acceptance::kSimulators).mean;
+        };
         const Acceptance::Decision decision =
-            right ? acceptance.Trust(iteration, scatter) : acceptance.Decide(iteration, scatter);
+            right ? acceptance.Trust(iteration, scatter)
+                  : acceptance.Decide(iteration, scatter,
+                                      {simulated(trainer->policy()), simulated(*incumbent)});
         result.decisions.push_back(Summary(decision));
-        if (acceptance.incumbent() == iteration) deployed_iteration = iteration;
+        if (acceptance.incumbent() == iteration)
+          deployed_iteration = iteration, incumbent = trainer->policy();
       }
     }
     Train(*trainer, sample, settings.next_updates,

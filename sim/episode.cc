@@ -43,8 +43,9 @@ EpisodeSummary PlayEpisode(Environment& environment, const RobotDescription& rob
     const Eigen::VectorXf action = actor(observation, random);
     if (!action.allFinite()) throw std::runtime_error("the policy's action is not finite");
     step.time = static_cast<double>(episode.steps) * robot.task.period;
-    step.q = environment.q();
-    step.v = environment.v();
+    step.q = environment.reading_q();
+    step.v = environment.reading_v();
+    step.true_q = environment.q();
     const StepResult result = environment.Step(action);
     for (int i = 0; i < environment.action_size(); ++i) {
       step.action[i] =

@@ -20,8 +20,9 @@ Actor RandomActions(int action_size);
 
 /// One control step: the state before it and what was done in it.
 struct SimulatedStep {
-  double time;  ///< [s] since the episode began
-  Eigen::VectorXd q, v;
+  double time;           ///< [s] since the episode began
+  Eigen::VectorXd q, v;  ///< as the sensors read them, which may be late or biased: JointDynamics
+  Eigen::VectorXd true_q;
   Eigen::VectorXd action;  ///< of the driven joints, in the task's own units
   double reward;
   bool terminated, truncated;

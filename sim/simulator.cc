@@ -71,6 +71,20 @@ void Simulator::SetReading(const Vector& q, const Vector& v, const Vector& effor
   Take();
 }
 
+void Simulator::SetReading(const Vector& q, const Vector& v, std::span<const EffortSegment> before,
+                           const Vector& effort) {
+  RequireSize(effort.size());
+  SetState(q, v);
+  Recall(before);
+  for (size_t k = 0; k < arriving_.size(); ++k) {
+    const double delay = physics_.axes[k].delay;
+    arriving_[k] = delay > 0 ? track_.At(k, 0, delay) : effort[static_cast<Eigen::Index>(k)];
+  }
+  if (!model_->parameters().sensor_errors()) return;
+  engine_->FromReading(arriving_.data());
+  Take();
+}
+
 void Simulator::Recall(std::span<const EffortSegment> before) {
   for (const EffortSegment& segment : before) RequireSize(segment.effort.size());
   for (const EffortSegment& segment : before)

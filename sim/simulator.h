@@ -49,6 +49,11 @@ class Simulator {
   /// JointDynamics.
   /// @param effort that acts at that time.
   void SetReading(const Vector& q, const Vector& v, const Vector& effort);
+  /// The same where it is to be worked out what acts at that time.
+  /// @param before as of Recall. @param effort that is commanded then: it acts where nothing is
+  /// delayed.
+  void SetReading(const Vector& q, const Vector& v, std::span<const EffortSegment> before,
+                  const Vector& effort);
   /// The efforts commanded before the present, in order of time: where an effort is delayed, it
   /// is still to come.
   void Recall(std::span<const EffortSegment> before);

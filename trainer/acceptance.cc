@@ -62,15 +62,18 @@ double Acceptance::Better(int challenger, double scatter) const {
   return std::erfc(-difference / sd / std::sqrt(2.0)) / 2;
 }
 
-Acceptance::Decision Acceptance::Decide(int challenger, double scatter) {
-  Decision decision{challenger,
-                    incumbent_,
-                    false,
-                    false,
-                    Better(challenger, scatter),
-                    MeanReturn(challenger),
-                    MeanReturn(incumbent_)};
-  decision.accepted = challenger != incumbent_ && decision.probability >= kSure;
+Acceptance::Decision Acceptance::Decide(int challenger, double scatter,
+                                        const Simulated& simulated) {
+  Decision decision;
+  decision.challenger = challenger, decision.incumbent = incumbent_;
+  decision.probability = Better(challenger, scatter);
+  decision.challenger_return = MeanReturn(challenger);
+  decision.incumbent_return = MeanReturn(incumbent_);
+  const bool better = challenger != incumbent_ && decision.probability >= kSure;
+  decision.less_simulated =
+      better &&
+      simulated.challenger < simulated.incumbent - kLessSimulated * std::abs(simulated.incumbent);
+  decision.accepted = better && !decision.less_simulated;
   if (decision.accepted) incumbent_ = challenger;
   return decision;
 }
@@ -78,7 +81,10 @@ Acceptance::Decision Acceptance::Decide(int challenger, double scatter) {
 Acceptance::Decision Acceptance::Trust(int challenger, double scatter) {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const auto tried = [&](int iteration) { return trials_.contains(iteration); };
-  Decision decision{challenger, incumbent_, true, true, kUnknown, kUnknown, kUnknown};
+  Decision decision;
+  decision.challenger = challenger, decision.incumbent = incumbent_;
+  decision.accepted = decision.trusted = true;
+  decision.probability = decision.challenger_return = decision.incumbent_return = kUnknown;
   if (tried(challenger)) decision.challenger_return = MeanReturn(challenger);
   if (tried(incumbent_)) decision.incumbent_return = MeanReturn(incumbent_);
   if (tried(challenger) && tried(incumbent_)) decision.probability = Better(challenger, scatter);
@@ -90,7 +96,7 @@ std::string Summary(const Acceptance::Decision& d) {
   const bool first = d.incumbent < 0 || d.challenger == d.incumbent;
   std::string text = fmt::format("policy {} {}", d.challenger,
                                  first        ? "is the first"
-                                 : d.trusted  ? "trusted: the model explains the robot"
+                                 : d.trusted  ? "trusted: trained without a residual"
                                  : d.accepted ? "accepted"
                                               : "not accepted");
   if (!std::isfinite(d.challenger_return)) return text;
@@ -100,6 +106,7 @@ std::string Summary(const Acceptance::Decision& d) {
         d.incumbent == 0 ? fmt::format(" less {:.0f} %", 100 * Acceptance::kUnseen) : "";
     text += fmt::format("; incumbent {}: {:.4g}{}; better with {:.0f} %", d.incumbent,
                         d.incumbent_return, less, 100 * d.probability);
+    if (d.less_simulated) text += ", but not in the simulator that was learnt since";
   }
   return text + ")";
 }

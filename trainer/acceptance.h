@@ -10,8 +10,10 @@
 namespace plumb {
 
 /// Which of several policies a robot is to be run with: the incumbent, and challengers one after
-/// the other, judged by what they return on the robot itself. A return in a simulator that is not
-/// the robot tells nothing of a policy: those that exploit the simulator look best there.
+/// the other, judged by what they return on the robot itself. A return in the simulator that a
+/// policy was trained in tells nothing: those that exploit it look best there. One that was learnt
+/// since, from the policy's own motion among other, knows of falls that a trial is too short for,
+/// and can speak against a challenger (kLessSimulated), never for it.
 ///
 /// What a trial of s steps would have returned over an episode of T steps is its sum and, unless it
 /// fell,
@@ -46,14 +48,20 @@ class Acceptance {
   struct Decision {
     int challenger = -1, incumbent = -1;  ///< iterations; the incumbent of before
     bool accepted = false, trusted = false;
-    double probability = 0;  ///< that the challenger's expected return is more
+    double probability = 0;       ///< that the challenger's expected return is more
+    bool less_simulated = false;  ///< refused for what it returns in simulation
     /// of an episode, means; with the probability NaN where there has been no trial
     double challenger_return = 0, incumbent_return = 0;
   };
-  /// Makes the challenger the incumbent if its expected return is more with probability kSure.
+  /// What both return in simulators that were learnt since, means; NaN = they cannot say.
+  struct Simulated {
+    double challenger = 0, incumbent = 0;
+  };
+  /// Makes the challenger the incumbent if its expected return is more with probability kSure, and
+  /// in simulation not less by more than kLessSimulated of the incumbent's.
   /// @param scatter of a trial's return by where it begins, sd, >= 0
   /// @throws std::invalid_argument if it has had no trial.
-  Decision Decide(int challenger, double scatter);
+  Decision Decide(int challenger, double scatter, const Simulated& simulated);
   /// Makes it the incumbent whatever the trials say: where the model explains the robot, training
   /// on it is the better judge. It need not have had a trial. @param scatter as above
   Decision Trust(int challenger, double scatter);
@@ -67,6 +75,8 @@ class Acceptance {
   static constexpr double kSure = 0.75;
   static constexpr double kScatter = 0.008;
   static constexpr double kUnseen = 0.05;
+  static constexpr double kLessSimulated = 0.05;
+  static constexpr int kSimulators = 60;  ///< that Simulated is to be of
 
  private:
   double Better(int challenger, double scatter) const;

@@ -20,8 +20,9 @@ namespace plumb {
 namespace {
 
 // Numbers as this machine has them: a checkpoint stays where it was written. Version 3: without
-// trials on the robot, 4 to 6: with other residuals, 7: without the updates' statuses.
-constexpr FileKind kKind{"PLUMBTRN", 8, "a trainer's checkpoint"};
+// trials on the robot, 4 to 6: with other residuals, 7: without the updates' statuses, 8: without
+// what a decision owes to simulation.
+constexpr FileKind kKind{"PLUMBTRN", 9, "a trainer's checkpoint"};
 
 class Writer {
  public:
@@ -132,6 +133,7 @@ void Transfer(Archive& archive, C& decision) {
   archive(decision.accepted);
   archive(decision.trusted);
   archive(decision.probability);
+  archive(decision.less_simulated);
   archive(decision.challenger_return);
   archive(decision.incumbent_return);
 }

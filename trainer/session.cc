@@ -130,8 +130,14 @@ bool TrainingSession::Begin(const ParameterDistribution& distribution) {
   RequireSimulable(distribution);
   if (complete_ && trial_steps() > 0) {
     const double scatter = trainer_.ScatterOfStarts(distribution.Mean());
-    Choose(distribution.residual ? acceptance_.Decide(iteration_, scatter)
-                                 : acceptance_.Trust(iteration_, scatter),
+    const auto simulated = [&](const GaussianPolicy& policy) {
+      const ParameterSampler sample = [&](Random& random) { return distribution.Draw(random); };
+      return trainer_.EvaluateHeldOut(policy, sample, Acceptance::kSimulators).mean;
+    };
+    Choose(distribution.residual
+               ? acceptance_.Decide(iteration_, scatter,
+                                    {simulated(trainer_.policy()), simulated(*incumbent_policy_)})
+               : acceptance_.Trust(iteration_, scatter),
            distribution.iteration);
   }
   distribution_ = distribution;

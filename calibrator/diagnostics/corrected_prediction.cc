@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/step_errors.h"
 #include "sim/correction.h"
 #include "sim/tasks/task.h"
@@ -24,10 +25,11 @@ std::shared_ptr<const Residual> MeanOf(const Residual& residual) {
 }
 
 // Mean over the entries that were observed, in standard units.
-double SquaredError(const Simulator& simulator, const Transition& t, const Eigen::VectorXd& scale) {
+double SquaredError(const Simulator::State& reading, const Transition& t,
+                    const Eigen::VectorXd& scale) {
   Eigen::ArrayXd error(scale.size()), recorded(scale.size());
   recorded << t.next_q, t.next_v;
-  error << simulator.q() - t.next_q, simulator.v() - t.next_v;
+  error << reading.q - t.next_q, reading.v - t.next_v;
   const auto observed = recorded.isFinite();
   const double mean = observed.select((error / scale.array()).square(), 0.0).sum() /
                       static_cast<double>(observed.count());
@@ -55,8 +57,7 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
       return i > 0 && transitions[i - 1].step + 1 == transitions[i].step;
     };
     for (size_t start = 0; start < transitions.size(); ++start) {
-      simulator.SetState(transitions[start].q, transitions[start].v);
-      if (follows(start)) simulator.Recall(transitions[start - 1].efforts);
+      BeginTransition(rollout, start, &simulator);
       const size_t end = std::min(transitions.size(), start + longest);
       for (size_t i = start; i < end && (i == start || follows(i)); ++i) {
         const Transition& t = transitions[i];
@@ -69,7 +70,7 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
                                         static_cast<int>(i - start + 1));
         if (horizon == horizons.data() + horizons.size()) continue;
         if (!t.next_q.array().isFinite().any() && !t.next_v.array().isFinite().any()) continue;
-        squares[horizon - horizons.data()] += SquaredError(simulator, t, scale);
+        squares[horizon - horizons.data()] += SquaredError(simulator.Reading(), t, scale);
         ++windows[horizon - horizons.data()];
       }
     }

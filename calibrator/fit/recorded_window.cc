@@ -26,6 +26,13 @@ Window RecordedWindow(const Model& model, const Rollout& rollout, size_t first, 
   return window;
 }
 
+void BeginTransition(const Rollout& rollout, size_t i, Simulator* simulator) {
+  const Window window = RecordedWindow(simulator->model(), rollout, i, 1);
+  std::vector<EffortSegment> before;
+  for (const auto& step : window.before) before.insert(before.end(), step.begin(), step.end());
+  simulator->SetReading(window.q, window.v, before, window.steps.front().front().effort);
+}
+
 double EndReading(const Transition& t, Eigen::Index c) {
   return c < t.next_q.size() ? t.next_q(c) : t.next_v(c - t.next_q.size());
 }

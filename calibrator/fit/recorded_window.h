@@ -6,6 +6,7 @@
 
 #include "calibrator/motion/transitions.h"
 #include "sim/model.h"
+#include "sim/simulator.h"
 #include "sim/windows.h"
 
 namespace plumb {
@@ -22,6 +23,10 @@ size_t StretchLength(const Rollout& rollout, size_t first);
 /// far back as there is no gap.
 /// @param rollout whose efforts the window refers to: they must outlive it.
 Window RecordedWindow(const Model& model, const Rollout& rollout, size_t first, size_t length);
+
+/// The simulator as sensors read it when transition i began, the efforts commanded before on their
+/// way as far as RecordedWindow knows them.
+void BeginTransition(const Rollout& rollout, size_t i, Simulator* simulator);
 
 /// Entry c of (q, v) at a transition's end, physical units, NaN = not observed; and its standard
 /// deviation, NaN = not known.

@@ -1,5 +1,6 @@
 #include "calibrator/fit/step_errors.h"
 
+#include "calibrator/fit/recorded_window.h"
 #include "sim/residual_inputs.h"
 #include "sim/simulator.h"
 
@@ -12,11 +13,11 @@ Eigen::VectorXd Stack(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   return both;
 }
 
-void Add(const ResidualInputs& inputs, const Transition& t, const Simulator& simulator,
+void Add(const ResidualInputs& inputs, const Transition& t, const Simulator::State& reading,
          StepErrors::Place place, StepErrors* to) {
   to->places.push_back(place);
   to->inputs.push_back(inputs.x());
-  to->errors.push_back(Stack(t.next_q - simulator.q(), t.next_v - simulator.v()));
+  to->errors.push_back(Stack(t.next_q - reading.q, t.next_v - reading.v));
   to->variances.push_back(Stack(t.next_q_sd.cwiseAbs2() + t.q_sd.cwiseAbs2(),
                                 t.next_v_sd.cwiseAbs2() + t.v_sd.cwiseAbs2()));
   std::vector<StepContacts::Contact>& contacts = to->contacts.emplace_back();
@@ -46,13 +47,13 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
       const bool follows = last && last->step + 1 == t.step;
       const Eigen::VectorXd effort = MeanEffort(t), before = follows ? MeanEffort(*last) : effort;
       if (t.next_q.allFinite() && t.next_v.allFinite()) {
-        simulator.SetState(t.q, t.v);
-        if (follows) simulator.Recall(last->efforts);
+        BeginTransition(rollouts[r], i, &simulator);
         inputs.Begin(simulator);
         simulator.Step(t.efforts);
         inputs.End(simulator, effort, before, t.duration());
         if (simulator.finite())
-          Add(inputs, t, simulator, {r, i}, inputs.touching() ? &errors.touching : &errors.free);
+          Add(inputs, t, simulator.Reading(), {r, i},
+              inputs.touching() ? &errors.touching : &errors.free);
       }
       last = &t;
     }

@@ -51,6 +51,8 @@ bool Matters(const MethodInput& input, const MethodResult& result,
   return Worth(fit.free, units) || Worth(fit.touching, units);
 }
 
+constexpr char kNotLearnt[] = "what the model lacks is not learnt: ";
+
 // Why nothing is learnt of what the model lacks; empty = it is.
 std::string Obstacle(const MethodInput& input) {
   if (!input.options.residual) return "residuals are switched off";
@@ -225,14 +227,16 @@ GapFit CloseGap(const MethodInput& input, MethodResult all) {
   fit.information = fit.view.information;
   fit.result = std::move(all);
   if (!fit.alarm.alarm) return fit;
-  fit.gap.obstacle = Obstacle(input);
-  if (!fit.gap.obstacle.empty()) return fit;
+  if (const std::string obstacle = Obstacle(input); !obstacle.empty()) {
+    fit.gap.summary = kNotLearnt + obstacle;
+    return fit;
+  }
   if (!Matters(input, fit.result)) {
-    fit.gap.obstacle = fmt::format(
-        "a residual would explain less than {:.0f} % of the velocities' squared errors, or too "
+    fit.gap.summary = fmt::format(
+        "{}a residual would explain less than {:.0f} % of the velocities' squared errors, or too "
         "little to matter; the parameters are as unsure as what may be wrong with the model makes "
         "them",
-        100 * kLeastExplained);
+        kNotLearnt, 100 * kLeastExplained);
     Take(input, test.considered, &fit);
     return fit;
   }

@@ -34,9 +34,8 @@ struct Gap {
   /// learnt from all transitions; null where there is no alarm, or too little to learn from
   std::shared_ptr<const Residual> residual;
   ResidualQuality free, touching;  ///< of the residual's functions
-  std::string summary;             ///< in words, for people; empty = nothing is lacking
-  /// why nothing is learnt although the alarm speaks, in words; empty = it is, or there is none
-  std::string obstacle;
+  /// in words, for people: what is learnt, or why nothing is; empty = no alarm
+  std::string summary;
 };
 
 /// A posterior, and what its simulators lack.

@@ -173,12 +173,7 @@ void SimOpt::Infer() {
   }
 }
 
-GapFit SimOpt::Fit(const MethodInput& input) const {
-  if (robot_.calibration.residual) return CloseGap(input, RunMethod(input));
-  GapFit alone;
-  alone.result = RunMethod(input);
-  return alone;
-}
+GapFit SimOpt::Fit(const MethodInput& input) const { return CloseGap(input, RunMethod(input)); }
 
 // One mode leads to the next iteration's. Of several none may be given up, and in the beginning
 // there is none: the search is then one from many places, the prior's mean first.
@@ -193,6 +188,7 @@ GapFit SimOpt::RunFromWhereItIs() const {
                          options.horizons.end());
   options.seed = seed_;
   options.execution = threads_;
+  options.residual = robot_.calibration.residual;
   const bool one_mode = state_.iteration > 0 && state_.before.components.size() == 1;
   if (one_mode) {
     try {

@@ -74,8 +74,7 @@ class Report {
                 ? Verdict("", "The model was not tested",
                           "Whether it can explain the robot is not known.")
                 : Verdict("good", "The model explains the robot", model.summary);
-    if (findings_.gap.residual)
-      html += Verdict("", "What it lacks is learnt", findings_.gap.summary);
+    if (!findings_.gap.summary.empty()) html += Verdict("", "What it lacks", findings_.gap.summary);
     const bool tried = std::any_of(findings_.holdout.errors.begin(), findings_.holdout.errors.end(),
                                    [](const HorizonError& e) { return e.windows > 0; });
     html +=

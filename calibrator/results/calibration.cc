@@ -67,8 +67,6 @@ class Calibration {
     findings_.misspecification = fit.alarm;
     findings_.gap = fit.gap;
     if (fit.gap.residual) findings_.gap.summary += kCure;
-    if (!fit.gap.obstacle.empty())
-      findings_.gap.summary = "what the model lacks is not learnt: " + fit.gap.obstacle;
     findings_.diagnostic_steps = fit.simulated_steps;
     mean_ = Moments(result.posterior).mean;
     if (result.curriculum) findings_.stages = result.curriculum->stages;

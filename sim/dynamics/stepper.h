@@ -134,10 +134,12 @@ class Stepper {
   /// q, v are readings of sensors (JointDynamics): makes them the state that these are of, to
   /// second order in the delay, and back.
   void FromReading(const Real* effort) {
+    ForEachReading(
+        [&](Real& position, Real&, const auto& axis, size_t) { position -= axis.sensor_bias; });
     const Real* acceleration = Felt(effort);
     ForEachReading([&](Real& position, Real& velocity, const auto& axis, size_t i) {
       const Real t = axis.sensor_delay;
-      position += -axis.sensor_bias + t * velocity + 0.5 * t * t * acceleration[i];
+      position += t * velocity + 0.5 * t * t * acceleration[i];
       velocity += t * acceleration[i];
     });
   }
