@@ -47,16 +47,14 @@ double Acceptance::MeanReturn(int iteration) const {
   return sum / static_cast<double>(found->second.size());
 }
 
-double Acceptance::Better(int challenger, double scatter) const {
+double Acceptance::Better(int challenger, double scatter, const Simulated& simulated) const {
   const auto variance = [&](int iteration) {
     const double sd = std::max(scatter, kScatter * std::abs(MeanReturn(iteration)));
     return sd * sd / static_cast<double>(trials_.at(iteration).size());
   };
-  const auto value = [&](int iteration) {
-    const double mean = MeanReturn(iteration);
-    return iteration == 0 ? mean - kUnseen * std::abs(mean) : mean;
-  };
-  const double difference = value(challenger) - value(incumbent_),
+  const double in_simulation = simulated.challenger - simulated.incumbent;
+  const double difference = MeanReturn(challenger) - MeanReturn(incumbent_) +
+                            (std::isfinite(in_simulation) ? kSimulated * in_simulation : 0),
                sd = std::sqrt(variance(challenger) + variance(incumbent_));
   if (sd == 0) return difference > 0 ? 1 : difference < 0 ? 0 : 0.5;
   return std::erfc(-difference / sd / std::sqrt(2.0)) / 2;
@@ -66,14 +64,11 @@ Acceptance::Decision Acceptance::Decide(int challenger, double scatter,
                                         const Simulated& simulated) {
   Decision decision;
   decision.challenger = challenger, decision.incumbent = incumbent_;
-  decision.probability = Better(challenger, scatter);
+  decision.probability = Better(challenger, scatter, simulated);
   decision.challenger_return = MeanReturn(challenger);
   decision.incumbent_return = MeanReturn(incumbent_);
-  const bool better = challenger != incumbent_ && decision.probability >= kSure;
-  decision.less_simulated =
-      better &&
-      simulated.challenger < simulated.incumbent - kLessSimulated * std::abs(simulated.incumbent);
-  decision.accepted = better && !decision.less_simulated;
+  decision.simulated = simulated;
+  decision.accepted = challenger != incumbent_ && decision.probability >= kSure;
   if (decision.accepted) incumbent_ = challenger;
   return decision;
 }
@@ -85,9 +80,11 @@ Acceptance::Decision Acceptance::Trust(int challenger, double scatter) {
   decision.challenger = challenger, decision.incumbent = incumbent_;
   decision.accepted = decision.trusted = true;
   decision.probability = decision.challenger_return = decision.incumbent_return = kUnknown;
+  decision.simulated = {kUnknown, kUnknown};
   if (tried(challenger)) decision.challenger_return = MeanReturn(challenger);
   if (tried(incumbent_)) decision.incumbent_return = MeanReturn(incumbent_);
-  if (tried(challenger) && tried(incumbent_)) decision.probability = Better(challenger, scatter);
+  if (tried(challenger) && tried(incumbent_))
+    decision.probability = Better(challenger, scatter, decision.simulated);
   incumbent_ = challenger;
   return decision;
 }
@@ -102,11 +99,11 @@ std::string Summary(const Acceptance::Decision& d) {
   if (!std::isfinite(d.challenger_return)) return text;
   text += fmt::format(" ({:.4g}", d.challenger_return);
   if (!first && std::isfinite(d.incumbent_return)) {
-    const std::string less =
-        d.incumbent == 0 ? fmt::format(" less {:.0f} %", 100 * Acceptance::kUnseen) : "";
-    text += fmt::format("; incumbent {}: {:.4g}{}; better with {:.0f} %", d.incumbent,
-                        d.incumbent_return, less, 100 * d.probability);
-    if (d.less_simulated) text += ", but not in the simulator that was learnt since";
+    text += fmt::format("; incumbent {}: {:.4g}", d.incumbent, d.incumbent_return);
+    if (std::isfinite(d.simulated.challenger - d.simulated.incumbent))
+      text +=
+          fmt::format("; simulated {:.4g}, {:.4g}", d.simulated.challenger, d.simulated.incumbent);
+    text += fmt::format("; better with {:.0f} %", 100 * d.probability);
   }
   return text + ")";
 }

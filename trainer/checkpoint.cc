@@ -133,9 +133,10 @@ void Transfer(Archive& archive, C& decision) {
   archive(decision.accepted);
   archive(decision.trusted);
   archive(decision.probability);
-  archive(decision.less_simulated);
   archive(decision.challenger_return);
   archive(decision.incumbent_return);
+  archive(decision.simulated.challenger);
+  archive(decision.simulated.incumbent);
 }
 
 /// The one list of what is in the file, for writing and reading.

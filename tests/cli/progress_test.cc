@@ -152,15 +152,15 @@ TEST_CASE_METHOD(Fixture, "which policy runs, since when, and why") {
   CHECK_THAT(progress.StatusLine(3), Catch::Contains("; policy 0 runs"));
 
   t.challenger = 1, t.probability = 0.25, t.challenger_return = -700;
-  t.decision = "policy 1 not accepted (-700; incumbent 0: -500 less 5 %; better with 25 %)";
+  t.decision = "policy 1 not accepted (-700; incumbent 0: -500; better with 25 %)";
   progress.OnTraining(t);
   rows = progress.TakeRows();
   REQUIRE(rows.size() == 1);
   CHECK_THAT(rows[0], Catch::Contains(t.decision));
-  CHECK_THAT(progress.Conclusion({}),
-             Catch::Contains(
-                 "policy 0 runs since iteration 0: policy 0 is the first (-500); "
-                 "policy 1 not accepted (-700; incumbent 0: -500 less 5 %; better with 25 %)\n"));
+  CHECK_THAT(
+      progress.Conclusion({}),
+      Catch::Contains("policy 0 runs since iteration 0: policy 0 is the first (-500); "
+                      "policy 1 not accepted (-700; incumbent 0: -500; better with 25 %)\n"));
   const nlohmann::json summary = progress.Summary({});
   CHECK(summary["iterations"][0]["robot_return"] == -500);
   CHECK(summary["policy"]["iteration"] == 0);
