@@ -86,6 +86,19 @@ Residuals ResidualsOf(const Findings& findings, const RobotDescription& robot) {
   return residuals;
 }
 
+// All of it: simulations of other data are not taken up.
+uint64_t HashOf(const Transition& t, uint64_t identity) {
+  identity = Hash(&t.step, sizeof t.step, identity);
+  for (const Eigen::VectorXd* x :
+       {&t.q, &t.v, &t.next_q, &t.next_v, &t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
+    identity = Hash(Eigen::MatrixXd(*x), identity);
+  for (const EffortSegment& segment : t.efforts) {
+    identity = Hash(&segment.duration, sizeof segment.duration, identity);
+    identity = Hash(Eigen::MatrixXd(segment.effort), identity);
+  }
+  return Hash(t.disturbance, identity);
+}
+
 uint64_t IdentityOf(const RobotDescription& robot, const CalibrateFlags& flags,
                     const std::vector<Log>& logs) {
   uint64_t identity = Hash(VersionLine("plumb") + flags.options.method + flags.options.discrepancy,
@@ -97,12 +110,9 @@ uint64_t IdentityOf(const RobotDescription& robot, const CalibrateFlags& flags,
       Hash(flags.options.horizons.data(), flags.options.horizons.size() * sizeof(int), identity);
   for (const Log& log : logs) {
     for (const Rollout& rollout : log.rollouts) {
-      for (const Transition& t : rollout.transitions) {
-        for (const Eigen::VectorXd* x : {&t.q, &t.v, &t.next_q, &t.next_v})
-          identity = Hash(Eigen::MatrixXd(*x), identity);
-        for (const EffortSegment& segment : t.efforts)
-          identity = Hash(Eigen::MatrixXd(segment.effort), identity);
-      }
+      const size_t count = rollout.transitions.size();
+      identity = Hash(&count, sizeof count, identity);
+      for (const Transition& t : rollout.transitions) identity = HashOf(t, identity);
     }
   }
   return identity;

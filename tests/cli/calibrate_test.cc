@@ -90,6 +90,26 @@ TEST_CASE(
   CHECK(Posterior(folder / "ended.json") == whole);
 }
 
+TEST_CASE("a journal is not taken up for a table that has been corrected since") {
+  const TemporaryFolder folder;
+  const std::string table = HopperTable(folder, 4);
+  const auto calibrate = [&](const std::string& output) {
+    return Plumb() + "calibrate " + Robot("hopper") + " --csv " + table +
+           " --method reps --budget 20000 --output " + (folder / output);
+  };
+  REQUIRE(Shell("ulimit -f 900; exec " + calibrate("p.json")).status == 1);
+  // Its clock had been slow by a hundredth, which a step's duration alone tells.
+  REQUIRE(Shell("awk -F , -v OFS=, 'NR > 1 { $1 = sprintf(\"%.9f\", 1.01 * $1) } 1' " + table +
+                " >" + table + ".new && mv " + table + ".new " + table)
+              .status == 0);
+  const Outcome corrected = Shell(calibrate("p.json"));
+  INFO(corrected.text);
+  REQUIRE(corrected.status == 0);
+  CHECK(corrected.text.find("went on from") == std::string::npos);
+  REQUIRE(Shell(calibrate("fresh.json")).status == 0);
+  CHECK(Posterior(folder / "p.json") == Posterior(folder / "fresh.json"));
+}
+
 TEST_CASE("ranks that share the work come to the same bits") {
   if (Shell("command -v mpirun").status != 0) {
     WARN("skipped: mpirun (openmpi-bin) is not installed");
