@@ -10,9 +10,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <limits>
 #include <map>
@@ -23,6 +21,7 @@
 #include "common/process.h"
 #include "common/progress_line.h"
 #include "experiments/options.h"
+#include "experiments/results.h"
 #include "plot/svg.h"
 #include "robot/parameter_distribution.h"
 #include "trainer/robot_simulation.h"
@@ -36,7 +35,6 @@ using Eigen::Vector2d;
 constexpr int kEvaluationEpisodes = 100;  // of the final policy
 constexpr int kSmoothed = 5;              // batches
 constexpr int kLastBatches = 10;
-constexpr char kHeader[] = "seed,steps,mean_return,evaluation_return,seconds";
 
 struct Options {
   std::string robot, output = ".", distribution = "nominal";
@@ -81,38 +79,26 @@ struct Curve {
   }
 };
 
-std::map<int, Curve> ReadTable(const std::filesystem::path& file) {
-  std::map<int, Curve> curves;
-  std::ifstream stream(file);
-  std::string line;
-  std::getline(stream, line);
-  while (std::getline(stream, line)) {
-    std::vector<double> fields;
-    const char* next = line.c_str();
-    for (char* end; fields.size() < 5; next = *end == ',' ? end + 1 : end) {
-      fields.push_back(std::strtod(next, &end));
-      if (end == next)
-        throw std::runtime_error(file.string() +
-                                 ": not a table of mine: delete it, or give another --output");
-    }
-    Curve& curve = curves[static_cast<int>(fields[0])];
-    curve.steps.push_back(fields[1]), curve.returns.push_back(fields[2]);
-    curve.evaluation = fields[3], curve.seconds = fields[4];
+using Curves = std::map<int, Curve>;  // by seed
+
+Results::Rows RowsOf(const Curve& curve) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  Results::Rows rows;
+  for (size_t i = 0; i < curve.steps.size(); ++i) {
+    const bool last = i + 1 == curve.steps.size();
+    rows.push_back({curve.steps[i], curve.returns[i], last ? curve.evaluation : kNone,
+                    last ? curve.seconds : kNone});
   }
-  return curves;
+  return rows;
 }
 
-std::string Print(const std::map<int, Curve>& curves) {
-  std::string text = std::string(kHeader) + "\n";
-  for (const auto& [seed, curve] : curves) {
-    for (size_t i = 0; i < curve.steps.size(); ++i) {
-      const bool last = i + 1 == curve.steps.size();
-      text += fmt::format("{},{:.0f},{:.6g},{},{}\n", seed, curve.steps[i], curve.returns[i],
-                          last ? fmt::format("{:.6g}", curve.evaluation) : "nan",
-                          last ? fmt::format("{:.2f}", curve.seconds) : "nan");
-    }
+Curve CurveOf(const Results::Rows& rows) {
+  Curve curve;
+  for (const std::vector<double>& row : rows) {
+    curve.steps.push_back(row[0]), curve.returns.push_back(row[1]);
+    curve.evaluation = row[2], curve.seconds = row[3];
   }
-  return text;
+  return curve;
 }
 
 /// @return an incomplete curve if the process was asked to stop.
@@ -147,11 +133,12 @@ text.tick { font-size: 11px; fill: #5b6676; } text.muted { fill: #5b6676; }
 .grid { fill: none; stroke: #e8ecf1; }
 .band { fill: #1f5fbf; fill-opacity: 0.14; stroke: none; }
 .seed { fill: none; stroke: #1f5fbf; stroke-opacity: 0.35; }
+.dot { fill: #1f5fbf; }
 .mean { fill: none; stroke: #1f5fbf; stroke-width: 2.2; }
 </style>
 )";
 
-std::string Draw(const std::map<int, Curve>& curves, double steps, const std::string& title) {
+std::string Draw(const Curves& curves, double steps, const std::string& title) {
   constexpr double kWidth = 640, kHeight = 360, kLeft = 70, kRight = 626, kTop = 34, kBottom = 312;
   constexpr int kPoints = 200;
   std::vector<double> grid, low, high, mean;
@@ -166,7 +153,14 @@ std::string Draw(const std::map<int, Curve>& curves, double steps, const std::st
     grid.push_back(at), low.push_back(least), high.push_back(most),
         mean.push_back(sum / static_cast<double>(curves.size()));
   }
-  if (grid.empty()) return {};
+  const bool one_batch = grid.empty();
+  if (one_batch) {  // of each seed, which is a point and no curve
+    for (const auto& [seed, curve] : curves) {
+      for (auto* list : {&low, &high, &mean}) list->push_back(curve.last());
+      grid.push_back(curve.steps.back());
+      steps = std::max(steps, grid.back());
+    }
+  }
   Svg svg(kWidth, kHeight, title);
   svg.Rectangle(0, 0, kWidth, kHeight, "paper");
   svg.Text(kLeft, 20, title, "label", Svg::Anchor::kStart);
@@ -174,7 +168,10 @@ std::string Draw(const std::map<int, Curve>& curves, double steps, const std::st
       y(std::min(0., *std::min_element(low.begin(), low.end())),
         std::max(0., *std::max_element(high.begin(), high.end())), kBottom, kTop);
   svg.Frame(x, y, "simulated steps", "return", 6, 6);
+  for (size_t i = 0; one_batch && i < grid.size(); ++i)
+    svg.Circle(x.Pixel(grid[i]), y.Pixel(mean[i]), 3, "dot");
   std::vector<Vector2d> band, line;
+  if (one_batch) grid.clear();
   for (size_t i = 0; i < grid.size(); ++i) band.emplace_back(x.Pixel(grid[i]), y.Pixel(high[i]));
   for (size_t i = grid.size(); i-- > 0;) band.emplace_back(x.Pixel(grid[i]), y.Pixel(low[i]));
   svg.Path(band, "band", true);
@@ -190,7 +187,7 @@ std::string Draw(const std::map<int, Curve>& curves, double steps, const std::st
 }
 
 template <class F>
-std::string Each(const std::map<int, Curve>& curves, const std::string& format, F&& value) {
+std::string Each(const Curves& curves, const std::string& format, F&& value) {
   std::string text;
   for (const auto& [seed, curve] : curves)
     text += (text.empty() ? "" : " ") + fmt::format(fmt::runtime(format), value(curve));
@@ -205,15 +202,21 @@ int RunSeeds(Process& process, const Options& options) {
   const auto steps = options.steps > 0 ? static_cast<int64_t>(options.steps)
                                        : int64_t{robot.training.updates} * robot.training.batch;
 
-  const std::filesystem::path folder = options.output, table = folder / "learning_curves.csv";
-  std::filesystem::create_directories(folder);
-  std::map<int, Curve> curves = ReadTable(table);
+  const std::filesystem::path folder = options.output;
+  const std::string settings =
+      fmt::format("{} {:016x}, {} steps, {} simulators{}", robot.name, robot.fingerprint, steps,
+                  options.distribution, options.paper ? ", the paper's settings" : "");
+  Results results(folder / "learning_curves.csv", settings, {"seed"},
+                  {"steps", "mean_return", "evaluation_return", "seconds"});
+  Curves curves;
   for (int seed = 1; seed <= options.seeds; ++seed) {
-    if (curves.count(seed) > 0) continue;
-    Curve curve = Train(robot, distribution, steps, seed, options.threads, process);
-    if (process.stopping()) return 130;
-    curves[seed] = std::move(curve);
-    WriteAtomically(table, Print(curves));
+    const std::string key = std::to_string(seed);
+    if (!results.Has(key)) {
+      const Curve curve = Train(robot, distribution, steps, seed, options.threads, process);
+      if (process.stopping()) return 130;
+      results.Add(key, RowsOf(curve));
+    }
+    curves[seed] = CurveOf(results.Of(key));
   }
   const std::string title = fmt::format(
       "{}, {} simulators, {} seeds{}: mean return of a batch, band from the worst to the best seed",
