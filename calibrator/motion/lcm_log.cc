@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <deque>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -43,13 +42,18 @@ class EpisodeJoiner {
     }
     joiner_.OnState(state);
     while (!episodes_.empty() && IsComplete(episodes_.front())) JoinFirst();
-    const int64_t needed =
-        episodes_.empty() ? std::numeric_limits<int64_t>::max() : episodes_.front().first_state;
-    joiner_.Forget(std::min(needed, joiner_.newest_state() - kPatience));
+    int64_t needed = joiner_.newest_state() - kPatience;
+    for (const Episode& episode : episodes_) needed = std::min(needed, episode.first_state);
+    joiner_.Forget(needed);
   }
 
   void OnCommand(const joint_command_t& command) {
     if (!Fits(command.num_joints)) return;
+    // It would make of its episode one that is never over, which those behind it wait for.
+    if (!MayCome(command.state_sequence)) {
+      ++implausible_;
+      return;
+    }
     // Whatever command comes next answers the state that the one before led to.
     for (Episode& episode : episodes_) {
       if (!episode.next_state && episode.id != command.episode)
@@ -72,7 +76,8 @@ class EpisodeJoiner {
   void OnControllerStatus(const controller_status_t& status) {
     for (size_t i = 0; i < status.episode.size(); ++i) {
       for (Episode& episode : episodes_) {
-        if (episode.id == status.episode[i]) episode.named_state = status.last_state_sequence[i];
+        if (episode.id == status.episode[i] && MayCome(status.last_state_sequence[i]))
+          episode.named_state = status.last_state_sequence[i];
       }
     }
   }
@@ -92,6 +97,8 @@ class EpisodeJoiner {
   int foreign_joints() const { return foreign_joints_; }
   /// Episodes that were not over when too many others were under way.
   int64_t cut_off() const { return cut_off_; }
+  /// Commands that answer a state which no robot has been in.
+  int64_t implausible() const { return implausible_; }
 
  private:
   struct Episode {
@@ -106,6 +113,12 @@ class EpisodeJoiner {
     ++foreign_;
     foreign_joints_ = joints;
     return false;
+  }
+
+  // Whether a state is there, or may still come. Nothing is known of a log's first ones.
+  bool MayCome(int64_t state) const {
+    const int64_t newest = joiner_.newest_state();
+    return state >= 0 && state <= (newest < 0 ? kLargest : newest + kPatience);
   }
 
   // A restarted driver counts its states from 0 again. What is under way gets no further.
@@ -148,7 +161,7 @@ class EpisodeJoiner {
   DropCounts drops_of_earlier_runs_;
   int64_t fitting_ = 0, foreign_ = 0;
   int foreign_joints_ = 0;
-  int64_t cut_off_ = 0;
+  int64_t cut_off_ = 0, implausible_ = 0;
 };
 
 }  // namespace
@@ -165,6 +178,10 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
   if (joiner.cut_off() > 0) {
     log.warnings.push_back(fmt::format("{} episodes never end: more than {} are under way at once",
                                        joiner.cut_off(), kMostEpisodes));
+  }
+  if (joiner.implausible() > 0) {
+    log.warnings.push_back(
+        fmt::format("{} commands answer states that the robot was never in", joiner.implausible()));
   }
   if (joiner.foreign() > 0) {
     log.warnings.push_back(fmt::format("{} messages are of a robot with {} joints, '{}' has {}",

@@ -327,12 +327,41 @@ TEST_CASE("whatever happens to a log, it is refused or read as finite transition
   }
 }
 
+TEST_CASE("a command that answers a state which no robot has been in costs no episode") {
+  constexpr int64_t kPeriod = 240;  // states from an episode to the next
+  const auto record = [](int64_t state, int64_t of) {
+    Recording r;
+    for (int64_t i = 0; i < 60; ++i) {
+      const int64_t first = 30 + kPeriod * i;
+      if (i == 20) r.Command(state, of < 0 ? 100 + i : of, 20);
+      r.Episode(100 + i, first, 20);
+      r.States(first + 181, first + kPeriod - 21);
+    }
+    return Read(r.bytes);
+  };
+  const Log without = record(-1, 0);
+  REQUIRE(CountTransitions(without.rollouts) == 1200);
+  for (const int64_t state : {int64_t{1} << 62, int64_t{1} << 52, int64_t{1'000'000}}) {
+    for (const int64_t of : {int64_t{-1}, int64_t{9'999}}) {  // that episode's, or its own
+      INFO(state << " of " << of);
+      const Log with = record(state, of);
+      REQUIRE(with.rollouts.size() == without.rollouts.size());
+      for (size_t i = 0; i < with.rollouts.size(); ++i) {
+        CHECK(with.rollouts[i].episode == without.rollouts[i].episode);
+        CHECK(with.rollouts[i].transitions.size() == 20);
+      }
+      REQUIRE(with.warnings.size() == 1);
+      CHECK(with.warnings[0] == "1 commands answer states that the robot was never in");
+    }
+  }
+}
+
 // Each stays until it is over: 200 000 would be looked through for each of 200 000 commands.
 TEST_CASE("episodes that never end are cut off, and counted") {
   Recording recording;
   recording.Episode(7, 0, 20);
   recording.States(181, 210);
-  for (int i = 0; i < 200'000; ++i) recording.Command(100'000, 1'000 + i, 0);
+  for (int i = 0; i < 200'000; ++i) recording.Command(4'000, 1'000 + i, 0);
   const Log log = Read(recording.bytes);
   CHECK(CountTransitions(log.rollouts) == 20);
   REQUIRE(log.warnings.size() == 1);
