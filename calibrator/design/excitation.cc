@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "calibrator/fit/discrepancy.h"
+#include "calibrator/fit/robot_draws.h"
 #include "calibrator/motion/state_noise.h"
 #include "common/decompositions.h"
 #include "common/random.h"
@@ -62,10 +63,8 @@ class Rater {
         noise_(SmoothedNoise(robot)),
         root_(belief.covariance.llt().matrixL()) {
     std::tie(q_, v_) = ExcitationStart(robot, settings.seed);
-    Random random(settings.seed, {kDrawStream});
     draws_.resize(belief.mean.size(), settings.draws + 1);
-    draws_ << belief.mean,
-        Transform(belief, StandardNormals(belief.mean.size(), settings.draws, random));
+    draws_ << belief.mean, Draws();
   }
 
   std::optional<RatedExcitation> Rate(Excitation excitation) {
@@ -85,6 +84,19 @@ class Rater {
   }
 
  private:
+  Eigen::MatrixXd Draws() const {
+    Random random(settings_.seed, {kDrawStream});
+    const auto draw = [&](Eigen::Index count) {
+      return Transform(belief_, StandardNormals(belief_.mean.size(), count, random));
+    };
+    const Eigen::MatrixXd first = draw(settings_.draws);
+    Eigen::Index used = 0;
+    return DrawRobots(Model(robot_), settings_.draws, [&]() -> Eigen::VectorXd {
+      if (used < first.cols()) return first.col(used++);
+      return draw(1);
+    });
+  }
+
   Motion Move(const Eigen::MatrixXd& action, const Eigen::VectorXd& coordinates) {
     const Eigen::Index n = robot_.num_velocities(), steps = action.rows();
     const double period = robot_.task.period,

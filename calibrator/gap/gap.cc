@@ -8,6 +8,7 @@
 
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
+#include "calibrator/fit/robot_draws.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/gap/disturbances.h"
 #include "robot/parameter_distribution.h"
@@ -80,11 +81,11 @@ MethodResult PriorAlone(const MethodInput& input, MethodResult all) {
 // Columns: the mean, then draws.
 Eigen::MatrixXd Draws(const MethodInput& input, const GaussianMixture& posterior) {
   const ParameterDistribution distribution{0, input.model->description().parameters, posterior};
-  Eigen::MatrixXd draws(distribution.size(), kResidualDraws);
-  draws.col(0) = Moments(posterior).mean;
   Random random(input.options.seed, {kDrawStream});
-  for (Eigen::Index k = 1; k < draws.cols(); ++k)
-    draws.col(k) = distribution.SampleCoordinates(random);
+  Eigen::MatrixXd draws(distribution.size(), kResidualDraws);
+  draws << Moments(posterior).mean, DrawRobots(*input.model, kResidualDraws - 1, [&] {
+    return distribution.SampleCoordinates(random);
+  });
   return draws;
 }
 

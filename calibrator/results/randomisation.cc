@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "calibrator/fit/robot_draws.h"
 #include "calibrator/results/json_lines.h"
 #include "common/random.h"
 #include "robot/physics_fingerprint.h"
@@ -16,7 +17,6 @@ namespace plumb {
 namespace {
 
 constexpr int kForCorrelations = 10000;  // draws: they are right to 0.01
-constexpr int kTriesPerDraw = 100;       // until a distribution is taken for no robot's
 
 std::vector<double> Numbers(const Eigen::VectorXd& x) { return {x.begin(), x.end()}; }
 
@@ -26,43 +26,16 @@ std::vector<std::vector<double>> Rows(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
-/// Draws robots. Not thread-safe.
-class Draws {
- public:
-  Draws(const ParameterDistribution& distribution, const RobotDescription& robot)
-      : distribution_(distribution), model_(robot), physics_(model_.parameters().Nominal()) {}
-
-  /// One for each row.
-  Eigen::MatrixXd Take(int count, Random random) {
-    Eigen::MatrixXd rows(count, distribution_.size());
-    int64_t tries = 0;
-    for (int i = 0; i < count; tries += 1) {
-      if (tries >= int64_t{kTriesPerDraw} * count) {
-        throw std::invalid_argument("less than one draw in a hundred is a robot: " + why_ +
-                                    "; give the parameter coordinate = \"log\" in robot.toml");
-      }
-      rows.row(i) = distribution_.Sample(random);
-      i += IsRobot(rows.row(i)) ? 1 : 0;
-    }
-    return rows;
-  }
-
- private:
-  bool IsRobot(const Eigen::VectorXd& physical) {
-    try {
-      model_.parameters().Apply(physical, &physics_);
-      return true;
-    } catch (const std::invalid_argument& error) {
-      why_ = error.what();
-      return false;
-    }
-  }
-
-  const ParameterDistribution& distribution_;
-  const Model model_;
-  Physics<double> physics_;
-  std::string why_;  // the last one was none
-};
+// Robots, a row for each, physical units.
+Eigen::MatrixXd Draws(const ParameterDistribution& distribution, const Model& model, int count,
+                      Random random) {
+  const Eigen::MatrixXd draws =
+      DrawRobots(model, count, [&] { return distribution.SampleCoordinates(random); });
+  Eigen::MatrixXd rows(count, draws.rows());
+  for (Eigen::Index i = 0; i < rows.rows(); ++i)
+    rows.row(i) = distribution.ToPhysical(draws.col(i));
+  return rows;
+}
 
 Eigen::MatrixXd Covariance(const Eigen::VectorXd& sd, const Eigen::MatrixXd& draws) {
   const Eigen::MatrixXd centred = draws.rowwise() - draws.colwise().mean();
@@ -91,10 +64,10 @@ std::string RandomisationJson(const ParameterDistribution& distribution,
   std::vector<std::string> names, units;
   for (const ParameterDescription& p : robot.parameters)
     names.push_back(p.name), units.push_back(p.unit);
-  Draws draws(distribution, robot);
+  const Model model(robot);
   const Eigen::VectorXd sd = distribution.Sd();
   const Eigen::MatrixXd covariance =
-      Covariance(sd, draws.Take(kForCorrelations, Random(options.seed, {1})));
+      Covariance(sd, Draws(distribution, model, kForCorrelations, Random(options.seed, {1})));
   return JsonLines({
       {"format", "plumbline randomisation"},
       {"version", 1},
@@ -108,7 +81,7 @@ std::string RandomisationJson(const ParameterDistribution& distribution,
       {"mean", Numbers(distribution.Mean())},
       {"sd", Numbers(sd)},
       {"covariance", Rows(covariance)},
-      {"samples", Rows(draws.Take(options.samples, Random(options.seed, {0})))},
+      {"samples", Rows(Draws(distribution, model, options.samples, Random(options.seed, {0})))},
   });
 }
 

@@ -123,6 +123,21 @@ TEST_CASE("limits are kept by every simulator of the prior, or the excitation is
   CHECK(RateExcitations(robot, prior, settings).empty());
 }
 
+// The prior is a Gaussian of what cannot be below zero.
+TEST_CASE("a belief that reaches beyond what a robot can be is drawn from where robots are") {
+  RobotDescription robot = Robot("pendulum");
+  robot.parameters = {
+      {"damping/pivot", "Nm s/rad", ParameterDescription::Coordinate::kLinear, 0.02, 0.0004}};
+  robot.virtual_robot.hidden.clear();
+  for (const uint64_t seed : {1, 2, 3, 4, 5}) {
+    ExcitationSettings settings = Few(4, 1);
+    settings.seed = seed;
+    const auto rated = RateExcitations(robot, PriorGaussian(robot), settings);
+    REQUIRE(!rated.empty());
+    CHECK(std::isfinite(rated[0].gain));
+  }
+}
+
 TEST_CASE("of a robot that falls only what comes before counts") {
   const RobotDescription robot = Robot("hopper");
   const auto rated = RateExcitations(robot, PriorGaussian(robot), Few(6, 4));

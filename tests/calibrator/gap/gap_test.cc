@@ -162,6 +162,18 @@ TEST_CASE("friction in free motion: the prior stays, and the residual goes with 
   CHECK(gap.gap.summary.find("nothing informs its parameters") != std::string::npos);
 }
 
+TEST_CASE("a residual's draws of the prior are robots, where the prior reaches beyond them, too") {
+  RobotDescription robot = Robot("pendulum/gym.toml");
+  robot.parameters.push_back(
+      {"damping/pivot", "Nm s/rad", ParameterDescription::Coordinate::kLinear, 0.02, 0.0004});
+  const auto log = RandomLog(robot, {{{"friction/pivot", 0.5}}, 0, 1e-3}, 600, 3);
+  const GapFit gap = Close(robot, log).fit;
+  REQUIRE(gap.gap.informed == Informed::kNone);
+  REQUIRE(gap.gap.residual);
+  for (const Eigen::VectorXd& coordinates : gap.gap.residual->coordinates)
+    CHECK(robot.ToPhysical(coordinates)(robot.FindParameter("damping/pivot")) >= 0);
+}
+
 TEST_CASE(
     "where no residual is worth it, parameters are as unsure as what is wrong may make them") {
   const RobotDescription robot = Robot("double_pendulum");
