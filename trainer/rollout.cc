@@ -15,6 +15,8 @@ namespace {
 
 // Episodes side by side: the kernels gain little from more columns, simulators nothing.
 constexpr int kMaxTogether = 8;
+// Episodes after which a batch may be given up, as nearly all of them were dropped.
+constexpr int kFewestJudged = 40;
 
 }  // namespace
 
@@ -193,7 +195,9 @@ Batch RolloutSampler::Collect(const GaussianPolicy& policy, const ParameterSampl
       records.push_back(std::move(record));
     }
     batch.played += wanted;
-    if (2 * batch.dropped > batch.played && batch.played >= 10) {
+    // A session has let in distributions of which half of a sample can be simulated: of a few
+    // episodes most may break, and nothing that was let in is to end a trainer.
+    if (10 * batch.dropped > 9 * batch.played && batch.played >= kFewestJudged) {
       throw std::runtime_error(
           fmt::format("{} of {} simulated episodes were not finite or had impossible parameters: "
                       "nothing to learn from",

@@ -162,7 +162,20 @@ TEST_CASE("What is not finite is dropped with its episode and counted") {
   }
 }
 
-TEST_CASE("A simulation that mostly breaks is an error, not an endless loop") {
+TEST_CASE("Where most simulations break the others are learned from") {
+  Workers workers(2);
+  RolloutSampler rollout([] { return std::make_unique<Fragile>(Fragile::Break::kReward); }, kShape,
+                         workers);
+  const ParameterSampler mostly = [](Random& random) -> Eigen::VectorXd {
+    return Eigen::VectorXd::Constant(1, 0.5 * random.Uniform());  // three in five
+  };
+  for (uint32_t number = 0; number < 20; ++number) {
+    const Batch batch = rollout.Collect(SomePolicy(), mostly, 150, 1, 7, 1, number);
+    CHECK(batch.size() >= 150);
+  }
+}
+
+TEST_CASE("A simulation that always breaks is an error, not an endless loop") {
   Workers workers(2);
   RolloutSampler rollout([] { return std::make_unique<Fragile>(Fragile::Break::kReward); }, kShape,
                          workers);
