@@ -15,6 +15,8 @@ namespace {
 constexpr int64_t kLetGo = 30'000;
 // [us] a robot not placed by then is asked to be placed anew
 constexpr int64_t kPlaceAgain = 1'000'000;
+// [us] No clock gets there; beyond it, differences overflow.
+constexpr int64_t kLatest = int64_t{1} << 53;
 constexpr int64_t kDriverTimeout = 1'000'000;  // [us] DRIVER_STATUS comes ten times a second
 // place_tolerance [rad] times this is the tolerance of speed [rad/s]
 constexpr double kPlaceSpeedFactor = 10;
@@ -187,6 +189,7 @@ bool Controller::Placed(const robot_state_t& state) const {
 std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, int64_t now,
                                                    int64_t utime) {
   if (state.num_joints != robot_.num_joints()) return {};
+  if (state.utime < -kLatest || state.utime > kLatest) return {};
   const bool finite = Map(state.q).allFinite() && Map(state.v).allFinite();
   // A backlog brings states in quick succession that are all old: their own time tells.
   const bool late = std::abs(utime - state.utime) > Microseconds(robot_.controller.state_timeout);

@@ -17,6 +17,7 @@ constexpr size_t kMaxStates = 200'000;  // a quarter of an hour at 200 Hz
 constexpr size_t kMaxEpisodes = 64;
 constexpr size_t kMaxCommands = 200'000;
 constexpr int kMaxSteps = 1'000'000;
+constexpr int64_t kLatest = int64_t{1} << 53;  // [us] no clock gets there; differences overflow
 
 Eigen::VectorXd ToEigen(const std::vector<double>& values) {
   return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
@@ -101,7 +102,7 @@ const robot_state_t* TransitionJoiner::FindState(int64_t sequence) const {
 }
 
 void TransitionJoiner::OnState(const robot_state_t& smoothed) {
-  if (smoothed.num_joints != n_) return;
+  if (smoothed.num_joints != n_ || smoothed.utime < -kLatest || smoothed.utime > kLatest) return;
   // A restarted driver counts from 0 again, at a later time; what was before cannot be joined with
   // it.
   if (!states_.empty() && smoothed.sequence <= newest_state() &&

@@ -216,6 +216,21 @@ TEST_CASE_METHOD(Surroundings, "a policy that does not fit is refused and the ol
   CHECK(controller.status().policy_iteration == 0);
 }
 
+TEST_CASE_METHOD(Surroundings, "a state at a time that no clock shows is none") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 1, 0.5f));
+  for (const int8_t phase : {S::PLACING, S::RUNNING}) {
+    StepUntil(phase);
+    for (const int64_t mad : {INT64_MIN, INT64_MAX, -(int64_t{1} << 54), int64_t{1} << 54}) {
+      robot_state_t state = robot_state;
+      state.utime = mad;
+      CHECK_FALSE(controller.OnState(state, now, utime));
+      CHECK(controller.phase() == phase);
+    }
+  }
+  StepUntil(S::COMPLETE);
+}
+
 TEST_CASE_METHOD(Surroundings,
                  "doubtful states halt it: zero effort, silence, and only a re-arming leads out") {
   Driver(driver_status_t::ARMED);

@@ -49,6 +49,18 @@ struct Fixture {
   }
 };
 
+TEST_CASE_METHOD(Fixture, "a state at a time that no clock shows is not there") {
+  for (int64_t i = 90; i <= 310; ++i) {
+    robot_state_t state = State(i);
+    if (i == 135) state.utime = INT64_MIN;
+    if (i == 250) state.utime = INT64_MAX;  // the end of one step and the beginning of another
+    joiner.OnState(state);
+  }
+  Commands();
+  CHECK(joiner.Join(42, 300).transitions.size() == 17);
+  CHECK(joiner.drops().gap == 3);
+}
+
 TEST_CASE_METHOD(Fixture, "a transition carries the effort applied, cycle by cycle") {
   States();
   Commands();
