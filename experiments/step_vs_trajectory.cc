@@ -9,13 +9,14 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <fstream>
 #include <iostream>
 
 #include "calibrator/live/checkpoint.h"
 #include "calibrator/live/simopt.h"
+#include "common/atomic_file.h"
 #include "common/examples.h"
 #include "common/process.h"
+#include "experiments/options.h"
 
 namespace plumb {
 namespace {
@@ -67,15 +68,14 @@ Judgement Judge(const RobotDescription& robot, const std::vector<Rollout>& rollo
 int Compare(const std::string& robot_path, const std::vector<std::string>& folders, int seeds,
             const std::string& csv) {
   const RobotDescription robot = LoadRobot(robot_path);
-  std::ofstream table;
-  if (!csv.empty()) table.open(csv);
-  table << "method,run,seed,transitions";
+  if (!csv.empty()) RequireWritable(csv);
+  std::string table = "method,run,seed,transitions";
   std::cout << fmt::format("{:<34}", "root mean square error, held out");
   for (const int n : robot.calibration.horizons) {
-    table << ",error_" << n;
+    table += fmt::format(",error_{}", n);
     std::cout << fmt::format("{:>12}", fmt::format("{}-step", n));
   }
-  table << "\n";
+  table += "\n";
   std::cout << fmt::format("{:>24}", "transitions simulated") << std::endl;
   for (const Method& method : kMethods) {
     Eigen::VectorXd squared =
@@ -92,15 +92,16 @@ int Compare(const std::string& robot_path, const std::vector<std::string>& folde
         squared += judgement.errors.cwiseAbs2();
         transitions += judgement.transitions;
         ++count;
-        table << method.name << "," << folder << "," << seed << "," << judgement.transitions;
-        for (const double error : judgement.errors) table << "," << error;
-        table << "\n";
+        table += fmt::format("{},{},{},{}", method.name, folder, seed, judgement.transitions);
+        for (const double error : judgement.errors) table += fmt::format(",{:g}", error);
+        table += "\n";
       }
     }
     std::cout << fmt::format("{:<34}", method.name);
     for (const double x : squared) std::cout << fmt::format("{:12.5f}", std::sqrt(x / count));
     std::cout << fmt::format("{:24}", transitions / static_cast<size_t>(count)) << std::endl;
   }
+  if (!csv.empty()) WriteAtomically(csv, table);
   return 0;
 }
 
@@ -117,7 +118,7 @@ int main(int argc, char** argv) {
       [&](CLI::App& app) {
         app.add_option("robot", robot, "robot folder or TOML file")->required();
         app.add_option("runs", folders, "output folders of plumb launch")->required();
-        app.add_option("--seeds", seeds, "of the calibration, per run")->capture_default_str();
+        plumb::AddCountFlag(app, "--seeds", seeds, "of the calibration, per run");
         app.add_option("--csv", csv, "write every single result here");
         plumb::AddExamples(app, {"plumb-step-vs-trajectory robots/pendulum runs/1 runs/2"});
       },
