@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "calibrator/fit/discrepancy.h"
 #include "calibrator/fit/robot_least_squares.h"
@@ -38,9 +39,9 @@ MethodResult Reps(const MethodInput& input) {
       PriorOf(input.model->description())
           .FromStandard(Eigen::VectorXd::Zero(errors.parameter_count()))));
   const LeastSquares problem = ProblemOf(input.model->description(), errors);
-  const int affordable = static_cast<int>(input.options.budget /
-                                          std::max<int64_t>(1, options.samples * errors.steps()));
-  const int updates = std::max(1, std::min(affordable, 4 * kFewestUpdates));
+  const int64_t affordable =
+      input.options.budget / std::max<int64_t>(1, options.samples * errors.steps());
+  const auto updates = static_cast<int>(std::clamp<int64_t>(affordable, 1, 4 * kFewestUpdates));
   const RepsState run = SearchByReps(
       problem.prior, [&](const Eigen::MatrixXd& x) { return LogLikelihood(problem, x); }, options,
       updates,
@@ -64,8 +65,10 @@ MethodResult Simopt(const MethodInput& input) {
   options.min_temperature = 0.01;
   options.seed = input.options.seed;
   const auto transitions = static_cast<int64_t>(CountTransitions(input.rollouts));
-  const auto updates = static_cast<int>(std::max<int64_t>(
-      1, input.options.budget / (options.samples * std::max<int64_t>(1, transitions))));
+  const int64_t affordable =
+      input.options.budget / (options.samples * std::max<int64_t>(1, transitions));
+  const auto updates =
+      static_cast<int>(std::clamp<int64_t>(affordable, 1, std::numeric_limits<int>::max()));
   const RobotDescription& robot = input.model->description();
   Discrepancy discrepancy(robot, input.options.execution);
   const RepsState run = SearchByReps(

@@ -6,6 +6,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "tests/calibrator/fitted_log.h"
+
 namespace plumb {
 namespace {
 
@@ -22,6 +24,24 @@ TEST_CASE("a method that is none is refused, naming the nearest") {
   CHECK_NOTHROW(RequireMethod("abc-smc"));
   CHECK_THROWS_WITH(RequireMethod("lapalce"),
                     "there is no method 'lapalce'; did you mean 'laplace'?");
+}
+
+TEST_CASE("a budget beyond 32 bits is one") {
+  struct Searching {};
+  const RobotDescription robot = Robot("pendulum");
+  const auto model = std::make_shared<Model>(robot);
+  const auto log = RandomLog(robot, {}, 20, 3);
+  for (const char* method : {"simopt", "reps"}) {
+    for (int bits = 40; bits <= 50; ++bits) {
+      CAPTURE(method, bits);
+      CalibrationOptions options;
+      options.method = method, options.budget = int64_t{1} << bits;
+      options.progress = [](const std::string&, double share) {
+        if (share > 0 && share < 1) throw Searching();
+      };
+      CHECK_THROWS_AS(RunMethod({model, log, options}), Searching);
+    }
+  }
 }
 
 }  // namespace
