@@ -78,7 +78,8 @@ int Run(const Flags& flags) {
             << std::flush;
   int played = 0, violated = 0;
   int64_t pranks = 0;
-  for (uint64_t seed = seeds.first; seed <= seeds.last; ++seed) {
+  bool more = true;  // the last of them may be the greatest number there is
+  for (uint64_t seed = seeds.first; more; more = seed++ != seeds.last) {
     const Folder folder;
     TrialSetting setting = flags.setting;
     setting.seed = seed;
