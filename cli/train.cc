@@ -137,9 +137,7 @@ class Training {
       }
     }
     // A longer run goes on from here, as if it had never ended.
-    const TrainerState last = trainer_.state();
-    Conclude(sample);
-    Save(last, true);
+    Conclude(sample, trainer_.state());
     return 0;
   }
 
@@ -219,7 +217,7 @@ class Training {
                                report.dropped_episodes));
   }
 
-  void Conclude(const ParameterSampler& sample) {
+  void Conclude(const ParameterSampler& sample, const TrainerState& last) {
     const int64_t from = flags_.paper ? trainer_.updates() : trainer_.ReturnToBest(sample);
     const Evaluation own = trainer_.EvaluateHeldOut(sample, flags_.held_out);
     const ParameterDistribution prior = ParameterDistribution::Prior(robot_);
@@ -227,6 +225,7 @@ class Training {
         [&](Random& random) { return prior.Sample(random); }, flags_.held_out);
     if (!speaks()) return;
     WritePolicy(own);
+    Save(last, true);
     std::cout << fmt::format(
         "{} steps, {} updates, {:.1f} s; policy of update {}\n"
         "return without exploration, {} simulators held out:\n",

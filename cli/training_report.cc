@@ -81,6 +81,12 @@ std::string Verdicts(const TrainingOutcome& outcome, const std::vector<TrainingR
 }
 
 std::string Curves(const RobotDescription& robot, const std::vector<TrainingRow>& rows) {
+  if (rows.empty()) {
+    return "<h2>Updates</h2>\n" +
+           Paragraph(
+               "There are no curves: the table of the updates was not kept while they were made. "
+               "--report or --csv, given from the beginning, keeps it.");
+  }
   struct {
     std::string drawing, caption;
   } const figures[] = {
@@ -182,7 +188,6 @@ std::vector<TrainingRow> ReadTrainingRows(const std::string& file) {
 
 std::string TrainingReport(const RobotDescription& robot, const ParameterDistribution& distribution,
                            const TrainingOutcome& outcome, const std::vector<TrainingRow>& rows) {
-  if (rows.empty()) throw std::runtime_error("no update was made: there is nothing to report");
   const std::string title = "Training of " + robot.name;
   return Page(title, "<h1>" + Escape(title) + "</h1>\n<p class=\"sub\">" +
                          Escape(fmt::format("task {}, {} updates, {} simulated steps",

@@ -102,6 +102,37 @@ TEST_CASE("a report has the table's curves and the run's numbers, and loads noth
   CHECK(std::distance(std::sregex_iterator(page.begin(), page.end(), dot), {}) == 2);
 }
 
+TEST_CASE("a training that has ended is reported without its curves, if its table was not kept") {
+  const TemporaryFolder folder;
+  const std::string command = Plumb() + "train " + Robot("pendulum") +
+                              " --held-out 5 --steps 3200 --output " + folder / "policy.onnx",
+                    report = folder / "training.html";
+  REQUIRE(Shell(command).status == 0);
+  const std::string policy = Read(folder / "policy.onnx");
+  const Outcome outcome = Shell(command + " --report " + report);
+  INFO(outcome.text);
+  CHECK(outcome.status == 0);
+  CHECK(Read(folder / "policy.onnx") == policy);
+  const std::string page = Read(report);
+  CHECK(page.find("2 updates, 3200 simulated steps") != std::string::npos);
+  CHECK(page.find("There are no curves") != std::string::npos);
+  CHECK(page.find("<svg") == std::string::npos);
+}
+
+TEST_CASE("the paper's way is another training, also of a robot with the paper's settings") {
+  const TemporaryFolder folder;
+  const std::string robot = folder / "pendulum/paper.toml";
+  REQUIRE(Shell("cp -r " + Robot("pendulum") + " " + folder.path().string()).status == 0);
+  std::ofstream(robot)
+      << "extends = \"robot.toml\"\n[training]\nnormalise_values = false\nfisher_fraction = 1.0\n"
+      << "batch = 3000\ngamma = 0.995\nlambda = 0.97\nkl = 0.01\n"
+      << "critic_epochs = 20\n";
+  const std::string command =
+      Plumb() + "train " + robot + " --held-out 5 --steps 6000 --output " + folder / "policy.onnx";
+  REQUIRE(Shell(command + " --paper").status == 0);
+  CHECK_THAT(Shell(command).text, Catch::Contains("is of another run, which has ended"));
+}
+
 TEST_CASE("an interrupted training goes on to the same bits, with any number of threads") {
   const TemporaryFolder folder;
   REQUIRE(Shell(Train(folder, "straight", "--steps 24000 --threads 1")).status == 0);
