@@ -56,9 +56,10 @@ uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
                     const std::optional<GaussianPolicy>& start) {
   const TrainingSettings& s = robot.training;
   std::ostringstream text;
-  text << VersionLine("plumb") << robot.fingerprint << s.normalise_values << s.fisher_fraction
-       << ' ' << s.worst_share << ' ' << s.worst_after << ' ' << flags.seed;
   text.precision(17);
+  // The robot's file and --paper tell all of its settings but those that other flags give.
+  text << VersionLine("plumb") << ' ' << robot.fingerprint << ' ' << flags.paper << ' '
+       << s.worst_share << ' ' << s.worst_after << ' ' << flags.seed << ' ';
   for (size_t i = 0; i < distribution.mixture.components.size(); ++i) {
     const Gaussian& component = distribution.mixture.components[i];
     text << distribution.mixture.weights[i] << component.mean << component.covariance;
