@@ -174,11 +174,13 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const bool speaks = ranks.rank() == 0;
   if (!speaks) spdlog::set_level(spdlog::level::err);
   const RobotDescription robot = LoadRobot(flags.robot);
+  const std::string journal_file = flags.output + ".journal";
   if (speaks) {
     std::vector<std::string> inputs = FilesOf(robot);
     inputs.insert(inputs.end(), flags.logs.begin(), flags.logs.end());
     inputs.insert(inputs.end(), flags.tables.begin(), flags.tables.end());
     RequireOutputs({flags.output, flags.report, flags.urdf}, inputs);
+    RequireApart({journal_file, flags.report, flags.urdf});
   }
   if (!flags.model.empty()) RequireForRemote(flags, ranks.size());
   flags.options.residual = flags.options.residual && robot.calibration.residual;
@@ -191,7 +193,6 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
   const auto look = [&] {
     if (process.stopping()) throw Interrupted();
   };
-  const std::string journal_file = flags.output + ".journal";
   try {
     if (!flags.model.empty()) {
       flags.options.progress = [&](const std::string& what, double share) {

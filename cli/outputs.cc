@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <stdexcept>
 #include <system_error>
 
@@ -22,9 +23,19 @@ void RequireNotRead(const std::vector<std::string>& outputs,
   }
 }
 
+void RequireApart(const std::vector<std::string>& outputs) {
+  std::set<std::filesystem::path> taken;
+  for (const std::string& output : outputs) {
+    if (output.empty()) continue;
+    if (!taken.insert(std::filesystem::weakly_canonical(std::filesystem::absolute(output))).second)
+      throw std::invalid_argument(output + ": would be written twice: give a file for each output");
+  }
+}
+
 void RequireOutputs(const std::vector<std::string>& outputs,
                     const std::vector<std::string>& inputs) {
   RequireNotRead(outputs, inputs);
+  RequireApart(outputs);
   for (const std::string& output : outputs) {
     if (!output.empty()) RequireWritable(output);
   }

@@ -14,7 +14,11 @@ namespace plumb {
 void RequireNotRead(const std::vector<std::string>& outputs,
                     const std::vector<std::string>& inputs);
 
-/// Every output can be written (RequireWritable), too. Thread-safe.
+/// No two outputs are one file, whatever names it goes by. Thread-safe.
+/// @throws std::invalid_argument naming the file.
+void RequireApart(const std::vector<std::string>& outputs);
+
+/// Both, and every output can be written (RequireWritable). Thread-safe.
 /// @throws std::runtime_error or std::invalid_argument naming the file.
 void RequireOutputs(const std::vector<std::string>& outputs,
                     const std::vector<std::string>& inputs);

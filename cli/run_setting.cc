@@ -46,7 +46,9 @@ fs::path MakeFolder(const std::string& wanted) {
 void RequireFiles(const Process& process, const LaunchFlags& flags, const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
   inputs.push_back(process.key_file());
-  RequireNotRead({flags.log, flags.can_log, flags.summary, flags.report}, inputs);
+  const std::vector<std::string> outputs{flags.log, flags.can_log, flags.summary, flags.report};
+  RequireNotRead(outputs, inputs);
+  RequireApart(outputs);
   RequireSameKind(flags.log, "\xed\xa1\xda\x01", "an LCM log");
   RequireSameKind(flags.can_log, "(", "a log of candump's");
   RequireSameKind(flags.summary, "{", "a summary");

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <utility>
@@ -29,16 +28,6 @@ constexpr uint32_t kReadingStream = 0x52454144;  // "READ", second word of the r
 
 /// Before a long simulation rather than after it.
 void RequireFiles(const SimFlags& flags, const RobotDescription& robot) {
-  namespace fs = std::filesystem;
-  std::vector<fs::path> taken;
-  for (const std::string& file : {flags.csv, flags.png, flags.gif}) {
-    if (file.empty()) continue;
-    const fs::path path = fs::weakly_canonical(fs::absolute(file));
-    if (std::find(taken.begin(), taken.end(), path) != taken.end()) {
-      throw std::invalid_argument(file + ": --csv, --png and --gif need a file each");
-    }
-    taken.push_back(path);
-  }
   std::vector<std::string> inputs = FilesOf(robot);
   inputs.insert(inputs.end(), {flags.policy, flags.posterior});
   RequireOutputs({flags.csv, flags.png, flags.gif}, inputs);
