@@ -29,6 +29,17 @@ Eigen::Map<const Eigen::VectorXd> Map(const std::vector<double>& values) {
   return {values.data(), static_cast<Eigen::Index>(values.size())};
 }
 
+// All but the time at which it was said. @param header of the policy, as it was received.
+bool SameContents(const policy_t& message, const policy_t& header, const GaussianPolicy& policy) {
+  return message.iteration == header.iteration && message.trained_in == header.trained_in &&
+         message.purpose == header.purpose && message.episodes == header.episodes &&
+         message.trial_steps == header.trial_steps && message.size == header.size &&
+         message.observation_mean == header.observation_mean &&
+         message.observation_scale == header.observation_scale &&
+         message.action_scale == header.action_scale &&
+         std::ranges::equal(message.weight, policy.parameters);
+}
+
 }  // namespace
 
 Controller::Controller(const RobotDescription& robot, uint64_t seed, double rest)
@@ -60,11 +71,7 @@ void Controller::OnPolicy(const policy_t& message) {
   // Policies are repeated for those who come late; the same contents are the same policy.
   const GaussianPolicy* known = next_policy_ ? next_policy_.get() : policy_.get();
   const policy_t& header = next_policy_ ? next_header_ : policy_header_;
-  if (known && message.iteration == header.iteration && message.purpose == header.purpose &&
-      std::equal(message.weight.begin(), message.weight.end(), known->parameters.begin(),
-                 known->parameters.end())) {
-    return;
-  }
+  if (known && SameContents(message, header, *known)) return;
   auto policy = std::make_unique<GaussianPolicy>(GaussianPolicy::FromMessage(message));
   RequireFit(*policy, robot_, *task_);
   next_policy_ = std::move(policy);

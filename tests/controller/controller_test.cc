@@ -196,7 +196,16 @@ TEST_CASE_METHOD(Surroundings, "a policy that is repeated is not run again") {
   policy.utime += 1'000'000;
   controller.OnPolicy(policy);
   CHECK(controller.phase() == S::COMPLETE);
-  controller.OnPolicy(Policy(1));
+  SECTION("another one is") { controller.OnPolicy(Policy(1)); }
+  SECTION("one with another normaliser is not a repeat") {
+    policy.observation_mean[0] += 1;
+    controller.OnPolicy(policy);
+  }
+  SECTION("nor one of which more episodes are wanted") {
+    policy.episodes += 1;
+    controller.OnPolicy(policy);
+    CHECK(controller.status().episodes_wanted == 2);
+  }
   CHECK(controller.phase() == S::WAITING);
 }
 
