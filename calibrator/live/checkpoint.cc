@@ -9,6 +9,7 @@
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <stdexcept>
 
 #include "common/atomic_file.h"
@@ -183,6 +184,13 @@ void WriteJson(const std::filesystem::path& file, const json& j) {
 
 constexpr char kStateFile[] = "calibration.checkpoint";
 
+// Of all iterations.
+size_t Count(const std::vector<int>& rollouts_per_iteration) {
+  return std::accumulate(
+      rollouts_per_iteration.begin(), rollouts_per_iteration.end(), size_t{0},
+      [](size_t sum, int rollouts) { return sum + static_cast<size_t>(rollouts); });
+}
+
 std::string RolloutFile(size_t index) { return fmt::format("rollout_{}.checkpoint", index); }
 
 // As the message that carries it, in hexadecimal digits; null if there is none.
@@ -216,14 +224,18 @@ std::shared_ptr<const Residual> ResidualFrom(const json& j, const RobotDescripti
 
 std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
   std::vector<Rollout> rollouts;
-  for (;;) {
-    const std::filesystem::path file = folder / RolloutFile(rollouts.size());
-    if (!std::filesystem::exists(file)) return rollouts;
-    try {
+  std::filesystem::path file = folder / kStateFile;
+  if (!std::filesystem::exists(file)) return rollouts;
+  try {
+    // An earlier, longer run may have left more of them.
+    const size_t count = Count(ReadJson(file).at("rollouts_per_iteration").get<std::vector<int>>());
+    while (rollouts.size() < count) {
+      file = folder / RolloutFile(rollouts.size());
       rollouts.push_back(RolloutFrom(ReadJson(file)));
-    } catch (const std::exception& error) {
-      throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
     }
+    return rollouts;
+  } catch (const std::exception& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
   }
 }
 
@@ -293,8 +305,7 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     state.alarm = j.at("alarm"), state.gap = j.at("gap");
     state.informed = InformedFrom(j.at("informed"));
     state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
-    size_t count = 0;
-    for (const int rollouts : state.rollouts_per_iteration) count += static_cast<size_t>(rollouts);
+    const size_t count = Count(state.rollouts_per_iteration);
     for (size_t i = 0; i < count; ++i) {
       file = folder_ / RolloutFile(i);
       state.rollouts.push_back(RolloutFrom(ReadJson(file)));

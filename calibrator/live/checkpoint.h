@@ -29,8 +29,8 @@ class CalibrationCheckpoint {
   size_t saved_rollouts_ = 0;
 };
 
-/// The roll-outs a checkpoint folder holds, in order. @throws std::runtime_error naming the file if
-/// one is damaged.
+/// The roll-outs of a checkpoint folder's calibration, in order; none if there is no checkpoint.
+/// @throws std::runtime_error naming the file if one is damaged or missing.
 std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder);
 
 }  // namespace plumb

@@ -67,6 +67,12 @@ TEST_CASE("any number of threads and any interruption give the same bits") {
   CHECK(resumed->iteration == 2);
   CHECK(SameBits(straight.state().distribution, resumed->distribution));
 
+  SECTION("the roll-outs are those of this calibration, whatever a longer one has left") {
+    std::filesystem::copy_file(folder.path() / "rollout_1.checkpoint",
+                               folder.path() / "rollout_2.checkpoint");
+    CHECK(LoadRollouts(folder.path()).size() == 2);
+    CHECK(LoadRollouts(folder.path() / "none").empty());
+  }
   SECTION("another description's checkpoint is refused") {
     RobotDescription edited = robot;
     edited.fingerprint ^= 1;
