@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <iostream>
 #include <thread>
 
@@ -14,6 +15,7 @@
 #include "calibrator/results/posterior_file.h"
 #include "common/examples.h"
 #include "common/process.h"
+#include "common/seed_range.h"
 #include "common/time_units.h"
 
 namespace plumb {
@@ -36,8 +38,9 @@ class Session {
         clock_(clock),
         folder_(flags.checkpoint),
         simopt_(robot, flags.seed,
-                flags.threads > 0 ? flags.threads
-                                  : static_cast<int>(std::thread::hardware_concurrency()),
+                flags.threads > 0
+                    ? flags.threads
+                    : static_cast<int>(std::max(1u, std::thread::hardware_concurrency())),
                 flags.method.empty() ? robot.calibration.method : flags.method),
         calibrator(robot, simopt_),
         checkpoint_(flags.checkpoint, robot, flags.seed) {
@@ -212,12 +215,15 @@ int main(int argc, char** argv) {
         app.add_option(
             "--method", flags.method,
             "auto, laplace, mixture, reps or simopt; without it the one that robot.toml says");
-        app.add_option("--seed", flags.seed, "of the random numbers")->capture_default_str();
+        app.add_option("--seed", flags.seed, "of the random numbers")
+            ->check(plumb::SeedRange())
+            ->capture_default_str();
         app.add_option("--checkpoint", flags.checkpoint,
                        "folder for checkpoints and posterior_<iteration>.json")
             ->capture_default_str();
         app.add_option("--threads", flags.threads,
                        "0 = one per core; the result does not depend on it")
+            ->check(CLI::Range(0, 1024))
             ->capture_default_str();
         plumb::AddExamples(app, {"plumb-calibrator robots/pendulum --checkpoint run"});
       },

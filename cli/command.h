@@ -19,7 +19,4 @@ inline void SetAction(CLI::App& command, Action& action, Action does) {
   command.final_callback([&action, does = std::move(does)] { action = does; });
 }
 
-/// Of what --seed takes: else -1 would be the greatest of them.
-inline CLI::Range SeedRange() { return {0.0, 18446744073709551615.0}; }
-
 }  // namespace plumb

@@ -11,6 +11,7 @@
 #include "cli/request.h"
 #include "cli/tune.h"
 #include "common/realtime.h"
+#include "common/seed_range.h"
 #include "common/signature.h"
 #include "plumb/driver_request_t.hpp"
 

@@ -5,6 +5,7 @@
 #include "cli/serve_model.h"
 #include "cli/sim.h"
 #include "cli/train.h"
+#include "common/seed_range.h"
 
 namespace plumb {
 namespace {

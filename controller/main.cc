@@ -9,6 +9,7 @@
 #include "common/examples.h"
 #include "common/process.h"
 #include "common/realtime.h"
+#include "common/seed_range.h"
 #include "controller/controller.h"
 
 int main(int argc, char** argv) {
@@ -21,7 +22,9 @@ int main(int argc, char** argv) {
       [&](CLI::App& app) {
         app.add_option("robot", robot_path, "robot folder or TOML file")->required();
         plumb::AddRealtimeFlag(app, priority);
-        app.add_option("--seed", seed, "of initial states and exploration")->capture_default_str();
+        app.add_option("--seed", seed, "of initial states and exploration")
+            ->check(plumb::SeedRange())
+            ->capture_default_str();
         app.add_option(
             "--rest", rest,
             "[s] do not have the robot placed: let it rest that long, then begin where it is");

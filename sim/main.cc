@@ -15,6 +15,7 @@
 #include "common/process.h"
 #include "common/random.h"
 #include "common/realtime.h"
+#include "common/seed_range.h"
 #include "common/time_units.h"
 #include "drivers/can/transport.h"
 #include "plumb/place_robot_t.hpp"
@@ -191,8 +192,7 @@ int main(int argc, char** argv) {
             ->allow_extra_args(false);
         plumb::AddRealtimeFlag(app, priority);
         app.add_option("--seed", seed, "draws the hidden parameters")
-            ->check(
-                CLI::Range(0.0, 18446744073709551615.0))  // else -1 would be the greatest of them
+            ->check(plumb::SeedRange())
             ->capture_default_str();
         app.add_option("--set", assignments,
                        "NAME=VALUE: this parameter is not drawn, may be repeated");

@@ -10,6 +10,7 @@
 #include "common/examples.h"
 #include "common/hash.h"
 #include "common/process.h"
+#include "common/seed_range.h"
 #include "common/time_units.h"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/parameter_distribution_t.hpp"
@@ -230,7 +231,9 @@ int main(int argc, char** argv) {
                        "calibrations; the policy after the last is evaluated")
             ->check(CLI::Range(0, 10000))
             ->capture_default_str();
-        app.add_option("--seed", options.seed, "of all random numbers")->capture_default_str();
+        app.add_option("--seed", options.seed, "of all random numbers")
+            ->check(plumb::SeedRange())
+            ->capture_default_str();
         app.add_option("--checkpoint", options.checkpoint,
                        "folder to checkpoint in and to resume from");
         app.add_option("--threads", options.threads, "0 = all processors")

@@ -176,6 +176,15 @@ TEST_CASE("sim: a seed is a number from 0") {
   CHECK(Sim(Robot("pendulum") + " --seed 100000000000000000000").status == 2);
   CHECK(Sim(Robot("pendulum") + " --seed 0").status == 0);
   CHECK(Sim(Robot("pendulum") + " --seed 18446744073709551615").status == 0);
+  for (const char* flag : {"robot --seed", "controller --seed", "calibrator --seed",
+                           "trainer --seed", "calibrator --threads", "trainer --threads"}) {
+    const std::string command = std::string(std::getenv("PLUMBLINE_BUILD")) + "/bin/plumb-" + flag +
+                                " -1 " + Robot("pendulum");
+    INFO(command);
+    const Outcome refused = Shell(command);
+    CHECK(refused.status == 2);
+    CHECK_THAT(refused.text, Catch::Contains("--"));
+  }
 }
 
 TEST_CASE("sim: says which parameters are in use") {
