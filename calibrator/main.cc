@@ -191,6 +191,7 @@ int RunLog(Process& process, Session& session, const RobotDescription& robot,
     }
     return !process.stopping();
   });
+  if (process.stopping()) return 130;
   const calibration_status_t found = session.Status();
   spdlog::info("{} events, {} undecodable; dropped transitions: {}", counts.events,
                counts.undecodable, session.calibrator.drops().summary());

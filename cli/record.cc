@@ -33,9 +33,9 @@ int Record(Process& process, const RecordFlags& flags) {
         }
       });
   spdlog::info("recording to {}", flags.log);
-  while (process.Wait(1'000'000)) {
-    if (failure) std::rethrow_exception(failure);
+  while (process.Wait(1'000'000) && !failure) {
   }
+  if (failure) std::rethrow_exception(failure);
   log.Flush();
   spdlog::info("{} messages in {}", messages, flags.log);
   return 0;
