@@ -145,10 +145,10 @@ class Replayer {
           player_.Seek(0, now);
           break;
         case Key::kFaster:
-          player_.SetSpeed(std::min(2 * speed, kFastest), now);
+          player_.SetSpeed(Faster(speed), now);
           break;
         case Key::kSlower:
-          player_.SetSpeed(speed == 0 ? kFastest : std::max(speed / 2, kSlowest), now);
+          player_.SetSpeed(Slower(speed), now);
           break;
         case Key::kQuit:
           return false;
@@ -205,6 +205,12 @@ class Replayer {
 };
 
 }  // namespace
+
+double Faster(double speed) { return std::max(speed, std::min(2 * speed, kFastest)); }
+
+double Slower(double speed) {
+  return speed == 0 ? kFastest : std::min(speed, std::max(speed / 2, kSlowest));
+}
 
 int Replay(Process& process, const ReplayFlags& flags) {
   if (process.participant())

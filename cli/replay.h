@@ -23,4 +23,9 @@ struct ReplayFlags {
 /// read or is damaged; LCM that is in use by a run.
 int Replay(Process& process, const ReplayFlags& flags);
 
+/// Speeds that the keys + and - lead to: twice and half of what it is, between 1/64 and 64, and
+/// never the other way where --speed was beyond these. 0 = as fast as possible. Thread-safe.
+double Faster(double speed);
+double Slower(double speed);
+
 }  // namespace plumb
