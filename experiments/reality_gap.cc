@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <iostream>
 #include <limits>
+#include <map>
 
 #include "common/atomic_file.h"
 #include "common/examples.h"
@@ -66,7 +67,7 @@ struct Method {
   double forces = 0, tempering = 1;
   bool oracle = false;
 };
-// Those with the same model are neighbours: its first policy is trained once for all of them.
+// The first policy of a model is trained once for all that have it, with residuals or without.
 const std::array<Method, 10> kMethods{
     {{"default", "Plumbline: residual and acceptance", CalibrationStrategy::kDefault, true, true},
      {"residual", "residual without acceptance", CalibrationStrategy::kDefault, true, false},
@@ -114,9 +115,10 @@ std::filesystem::path DecisionsFile(const Options& options, const Gap& gap, cons
          fmt::format("decisions_{}_{}_{}.txt", gap.key, method.key, run);
 }
 
+// The loops of a run, by model, which remember their first policies: gaps and methods share them.
 struct Remembered {
-  std::string of;
-  std::unique_ptr<Loop> loop;
+  int run = 0;
+  std::map<std::string, std::unique_ptr<Loop>> loops;
 };
 
 // The same policy in each iteration: it has no share in the loop.
@@ -149,10 +151,9 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   if (options.quick) model.task.steps = std::min(model.task.steps, 40);
   const auto seed = static_cast<uint64_t>(run);
   const Eigen::VectorXd hidden = HiddenParameters(truth, seed);
-  if (const std::string of = fmt::format("{} {} {}", model_file, method.residual, run);
-      remembered.of != of) {
-    remembered = {of, std::make_unique<Loop>(model, hidden)};
-  }
+  if (remembered.run != run) remembered = {run, {}};
+  std::unique_ptr<Loop>& loop = remembered.loops[fmt::format("{} {}", model_file, method.residual)];
+  if (!loop) loop = std::make_unique<Loop>(model, hidden);
   BusRobot real(truth, model, hidden, seed);
   if (method.oracle) return RunOracle(options, truth, model, hidden, seed, real, progress);
   LoopSettings settings;
@@ -168,7 +169,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   settings.forces = method.forces, settings.tempering = method.tempering;
   settings.seed = seed;
   settings.threads = options.threads;
-  const LoopResult result = remembered.loop->Run(real, settings, progress);
+  const LoopResult result = loop->Run(real, settings, progress);
   if (method.accept) {
     std::string text;
     for (const std::string& decision : result.decisions) text += decision + "\n";
