@@ -230,9 +230,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
     journal->Finish();
     std::cout << "wrote " << flags.output << (flags.report.empty() ? "" : ", " + flags.report)
               << (flags.urdf.empty() ? "" : ", " + flags.urdf) << std::endl;
-    const bool trustworthy =
-        findings.holdout.better && !findings.misspecification.alarm && findings.agreement.agree;
-    return flags.strict && !trustworthy ? 3 : 0;
+    return flags.strict && !Trustworthy(findings) ? 3 : 0;
   } catch (const Interrupted&) {
     if (speaks && flags.sbc == 0 && flags.model.empty())
       std::cerr << "\ninterrupted; the same command goes on from " << journal_file << std::endl;

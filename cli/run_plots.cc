@@ -4,14 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "plot/curves.h"
 #include "plot/svg.h"
 
 namespace plumb {
 namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
-
-constexpr double kNormal95 = 1.959963984540054;
 
 struct Extent {
   double low = std::numeric_limits<double>::infinity(), high = -low;

@@ -19,6 +19,7 @@
 #include "common/examples.h"
 #include "experiments/jobs.h"
 #include "experiments/options.h"
+#include "experiments/oracle.h"
 #include "experiments/recording.h"
 #include "experiments/simulated_system.h"
 #include "plot/curves.h"
@@ -85,12 +86,6 @@ Panel Draw(const ExperimentOptions& options, const PaperTask& task, const Result
     panel.curves.push_back(std::move(curve));
   }
   return panel;
-}
-
-// After k iterations, of all runs; a return below zero is a cost, of which the oracle's is the
-// least.
-double ShareOfOracle(double value, double oracle) {
-  return oracle > 0 ? value / oracle : oracle / value;
 }
 
 // One column of the table after k iterations, of all runs, ascending.

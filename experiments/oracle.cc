@@ -20,4 +20,8 @@ Oracle TrainOracle(const RobotDescription& model, const SimulationFactory& reali
   return {trainer.policy(), updates, trainer.steps()};
 }
 
+double ShareOfOracle(double value, double oracle) {
+  return oracle > 0 ? value / oracle : oracle / value;
+}
+
 }  // namespace plumb

@@ -22,6 +22,10 @@ struct Oracle {
 Oracle TrainOracle(const RobotDescription& model, const SimulationFactory& reality, uint64_t seed,
                    int threads, const std::function<void(double)>& progress);
 
+/// Which share of the oracle's return a return is. One below zero is a cost, of which the oracle's
+/// is the least.
+double ShareOfOracle(double value, double oracle);
+
 inline constexpr int kBetween = 20, kPatience = 160, kMostUpdates = 1200;
 
 }  // namespace plumb

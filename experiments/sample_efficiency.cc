@@ -24,6 +24,7 @@
 #include "experiments/jobs.h"
 #include "experiments/n_step_error.h"
 #include "experiments/options.h"
+#include "experiments/oracle.h"
 #include "experiments/recording.h"
 #include "experiments/simulated_system.h"
 #include "plot/curves.h"
@@ -213,10 +214,6 @@ std::string Needed(const std::vector<double>& x, const std::vector<double>& y,
   size_t i = x.size();
   while (i > 0 && good(y[i - 1])) --i;
   return i == x.size() ? "never" : fmt::format("{:.0f}", x[i]);
-}
-
-double ShareOfOracle(double value, double oracle) {
-  return oracle > 0 ? value / oracle : oracle / value;
 }
 
 std::string SettingsOf(const ExperimentOptions& options) {

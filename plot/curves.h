@@ -24,6 +24,9 @@ struct Panel {
 /// by those who see fewer, too (Okabe, Ito, "Color Universal Design", 2008).
 std::string DrawCurves(const std::string& title, const std::vector<Panel>& panels);
 
+/// Standard deviations from the mean between which 95 % of a normal distribution are.
+inline constexpr double kNormal95 = 1.959963984540054;
+
 /// Of several runs: the mean and the 95 % confidence interval of the mean by Student's t; of their
 /// logarithms if asked for, as numbers that span orders of magnitude want. One run has no interval:
 /// it is NaN.

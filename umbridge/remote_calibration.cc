@@ -10,6 +10,7 @@
 
 #include "calibrator/diagnostics/identifiability.h"
 #include "calibrator/fit/one_step.h"
+#include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/whitening.h"
@@ -186,9 +187,7 @@ Findings CalibrateRemote(const RobotDescription& robot, std::span<const Log> log
   findings.posterior = {{1}, {fit.posterior}};
   Random random(options.seed);
   const Eigen::MatrixXd samples = Draw(fit, prior, kSamples, random);
-  findings.samples.resizeLike(samples);
-  for (Eigen::Index i = 0; i < samples.cols(); ++i)
-    findings.samples.col(i) = robot.ToPhysical(samples.col(i));
+  findings.samples = PhysicalColumns(robot, samples);
   findings.transitions = static_cast<int64_t>(CountTransitions(rollouts));
   findings.simulated_steps = errors.evaluations() * findings.transitions;
   findings.noise_sd = errors.noise_sd();

@@ -35,12 +35,6 @@ const std::string& FullName(const RobotDescription& robot, Eigen::Index index) {
   return robot.parameters[static_cast<size_t>(index)].name;
 }
 
-std::string Join(const std::vector<std::string>& parts, const std::string& by) {
-  std::string all;
-  for (const std::string& part : parts) all += (all.empty() ? "" : by) + part;
-  return all;
-}
-
 // "gravity / length and mass length^2", of many parameters on their own only how many.
 std::string Known(const std::vector<Combination>& combinations) {
   std::vector<std::string> names;
@@ -50,7 +44,7 @@ std::string Known(const std::vector<Combination>& combinations) {
   for (const Combination& combination : combinations) {
     if (alone <= kMaxNames || Single(combination.power) < 0) names.push_back(combination.name);
   }
-  return names.empty() ? "nothing" : "only " + Join(names, " and ");
+  return names.empty() ? "nothing" : "only " + fmt::format("{}", fmt::join(names, " and "));
 }
 
 // Directions of several parameters that change nothing.
@@ -65,7 +59,8 @@ std::string Coupled(const RobotDescription& robot, const Eigen::VectorXd& mean,
     if (involved) names.push_back(ShortName(robot, i));
   }
   if (names.empty()) return "";
-  std::string summary = "; " + Join(names, ", ") + " are not identifiable separately:";
+  std::string summary =
+      "; " + fmt::format("{}", fmt::join(names, ", ")) + " are not identifiable separately:";
   for (const Eigen::VectorXd& direction : found.null) {
     if (Single(direction) < 0)
       summary += " (" + DirectionName(robot, mean, direction) + ") changes nothing";
@@ -80,7 +75,7 @@ std::string WithoutEffect(const RobotDescription& robot, const Identifiability& 
     if (Single(direction) >= 0) names.push_back(FullName(robot, Single(direction)));
   }
   if (names.empty()) return "";
-  return "; " + Join(names, ", ") + (names.size() == 1 ? " has" : " have") +
+  return "; " + fmt::format("{}", fmt::join(names, ", ")) + (names.size() == 1 ? " has" : " have") +
          " no effect on this motion";
 }
 
@@ -147,7 +142,7 @@ std::string DirectionName(const RobotDescription& robot, const Eigen::VectorXd& 
                                 step * slope * direction(i), parameter.unit.empty() ? "" : " ",
                                 parameter.unit));
   }
-  return Join(moves, ", ");
+  return fmt::format("{}", fmt::join(moves, ", "));
 }
 
 std::string IdentifiabilitySummary(const RobotDescription& robot, const Eigen::VectorXd& mean,

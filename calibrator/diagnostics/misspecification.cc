@@ -151,12 +151,6 @@ Explained Explain(const ProjectedErrors& errors, const std::vector<bool>& noise_
   return {share, fmt::format("{:.0f} % of {}", 100 * share, of_it ? "it" : "the errors' variance")};
 }
 
-std::string Join(const std::vector<std::string>& parts, const std::string& by) {
-  std::string all;
-  for (const std::string& part : parts) all += (all.empty() ? "" : by) + part;
-  return all;
-}
-
 }  // namespace
 
 Misspecification FindMisspecification(const RobotDescription& robot,
@@ -197,7 +191,8 @@ Misspecification FindMisspecification(const RobotDescription& robot,
       if (&other == &*best || other.score.gain < kNearlyAsGood * best->score.gain) continue;
       if (alternatives.size() < kMaxAlternatives) alternatives.push_back(other.misfit.what);
     }
-    if (!alternatives.empty()) line += " (nearly as well: " + Join(alternatives, "; ") + ")";
+    if (!alternatives.empty())
+      line += " (nearly as well: " + fmt::format("{}", fmt::join(alternatives, "; ")) + ")";
     words.push_back((round == 0 ? "" : "of what is left ") + line);
     found.misfits.push_back(best->misfit);
     errors.Explain(best->column);
@@ -229,13 +224,15 @@ Misspecification FindMisspecification(const RobotDescription& robot,
   if (!found.alarm) {
     found.summary = fmt::format("nothing speaks against the model ({} tests of {} errors)", count,
                                 errors.r.size());
-    if (!rest.empty()) found.summary += ", but look at " + Join(rest, "; ");
+    if (!rest.empty()) found.summary += ", but look at " + fmt::format("{}", fmt::join(rest, "; "));
     return found;
   }
-  found.summary = "the model cannot explain this log: " + Join(distinct, "; ");
+  found.summary =
+      "the model cannot explain this log: " + fmt::format("{}", fmt::join(distinct, "; "));
   for (const std::string& line : words) found.summary += "; " + line;
   if (!rest.empty())
-    found.summary += (words.empty() ? "; " : "; not explained by that: ") + Join(rest, "; ");
+    found.summary += (words.empty() ? "; " : "; not explained by that: ") +
+                     fmt::format("{}", fmt::join(rest, "; "));
   return found;
 }
 

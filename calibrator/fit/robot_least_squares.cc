@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "calibrator/fit/physical_columns.h"
+
 namespace plumb {
 namespace {
 
@@ -22,10 +24,7 @@ Prior PriorOf(const RobotDescription& robot) {
 LeastSquares ProblemOf(const RobotDescription& robot, WindowErrors& errors) {
   LeastSquares problem{PriorOf(robot),
                        [&](const Eigen::MatrixXd& coordinates) {
-                         Eigen::MatrixXd physical(coordinates.rows(), coordinates.cols());
-                         for (Eigen::Index j = 0; j < coordinates.cols(); ++j)
-                           physical.col(j) = robot.ToPhysical(coordinates.col(j));
-                         return errors.Whitened(physical);
+                         return errors.Whitened(PhysicalColumns(robot, coordinates));
                        },
                        {},
                        {},

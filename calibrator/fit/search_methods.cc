@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "calibrator/fit/discrepancy.h"
+#include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/reps_search.h"
 
@@ -74,9 +75,7 @@ MethodResult Simopt(const MethodInput& input) {
   const RepsState run = SearchByReps(
       PriorOf(robot),
       [&](const Eigen::MatrixXd& x) {
-        Eigen::MatrixXd physical(x.rows(), x.cols());
-        for (Eigen::Index i = 0; i < x.cols(); ++i) physical.col(i) = robot.ToPhysical(x.col(i));
-        return discrepancy.TrajectoryError(physical, input.rollouts);
+        return discrepancy.TrajectoryError(PhysicalColumns(robot, x), input.rollouts);
       },
       options, updates,
       [&](int update) { input.options.progress("simopt", update / static_cast<double>(updates)); });

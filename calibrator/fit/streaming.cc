@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/fit/whitening.h"
@@ -129,10 +130,8 @@ const Transition& StreamingLaplace::TransitionOf(const Piece& piece) const {
 // States at the windows' ends, 2 n rows for each window; NaN where the simulation fails.
 Eigen::MatrixXd StreamingLaplace::Predict(const Eigen::MatrixXd& standard,
                                           const std::vector<Window>& windows) {
-  const Eigen::MatrixXd coordinates = prior_.FromStandard(standard);
-  Eigen::MatrixXd physical(p_, standard.cols());
-  for (Eigen::Index j = 0; j < physical.cols(); ++j)
-    physical.col(j) = model_->description().ToPhysical(coordinates.col(j));
+  const Eigen::MatrixXd physical =
+      PhysicalColumns(model_->description(), prior_.FromStandard(standard));
   Eigen::MatrixXd ends(2 * n_ * static_cast<Eigen::Index>(windows.size()), physical.cols());
   windows_.Predict(physical, windows,
                    [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {

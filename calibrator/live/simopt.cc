@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "calibrator/fit/physical_columns.h"
 #include "robot/parameter_distribution.h"
 
 namespace plumb {
@@ -139,9 +140,7 @@ RepsOptions SimOpt::SearchOptions() const {
 Eigen::VectorXd SimOpt::Evaluate(const Eigen::MatrixXd& samples) {
   // Without data the samples' own scatter must not move anything.
   if (CountTransitions(state_.rollouts) == 0) return Eigen::VectorXd::Constant(samples.cols(), NAN);
-  Eigen::MatrixXd physical(samples.rows(), samples.cols());
-  for (Eigen::Index i = 0; i < samples.cols(); ++i)
-    physical.col(i) = robot_.ToPhysical(samples.col(i));
+  const Eigen::MatrixXd physical = PhysicalColumns(robot_, samples);
   switch (*objective_) {
     case Objective::kPosterior:
       return discrepancy_.LogLikelihood(physical, state_.rollouts);

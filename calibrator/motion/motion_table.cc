@@ -178,12 +178,6 @@ std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns, Effort
   return rows;
 }
 
-std::string Join(const std::vector<std::string>& names) {
-  std::string joined;
-  for (const std::string& name : names) joined += (joined.empty() ? "" : ", ") + name;
-  return joined;
-}
-
 std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Names& names,
                                   int64_t clipped) {
   if (rows.empty()) return {};
@@ -195,8 +189,10 @@ std::vector<std::string> Warnings(const std::vector<MotionRow>& rows, const Name
     if (std::isnan(s)) missing.push_back(states[i]);
     if (s == 0 && rows.size() > 1) still.push_back(states[i]);
   }
-  if (!missing.empty()) warnings.push_back("never observed: " + Join(missing));
-  if (!still.empty()) warnings.push_back("the same in all rows: " + Join(still));
+  if (!missing.empty())
+    warnings.push_back(fmt::format("never observed: {}", fmt::join(missing, ", ")));
+  if (!still.empty())
+    warnings.push_back(fmt::format("the same in all rows: {}", fmt::join(still, ", ")));
   if (clipped > 0) {
     warnings.push_back(
         fmt::format("{} actions go beyond the effort limits: clipped, as the task does", clipped));

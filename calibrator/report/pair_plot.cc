@@ -13,8 +13,6 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-double Density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * M_PI); }
-
 // What is shown of a prior: most of it.
 std::pair<double, double> PriorSpan(const Findings& findings, const ParameterDescription& p,
                                     Eigen::Index i) {
@@ -147,7 +145,7 @@ class Pairs {
       const double step = 1e-4 * sd;
       const double slope =
           (p.ToPhysical(mean + z * sd + step) - p.ToPhysical(mean + z * sd - step)) / (2 * step);
-      prior.emplace_back(p.ToPhysical(mean + z * sd), Density(z) / sd / slope);
+      prior.emplace_back(p.ToPhysical(mean + z * sd), NormalDensity(z) / sd / slope);
     }
     double highest = *std::max_element(bins.begin(), bins.end());
     for (const auto& point : prior) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "plot/curves.h"
 #include "plot/svg.h"
 
 namespace plumb {
@@ -14,14 +15,12 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-constexpr double kNormal95 = 1.959963984540054;
-
-double Density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * M_PI); }
-
 // The small plots: where they are drawn.
 constexpr double kWidth = 304, kHeight = 210, kLeft = 66, kRight = 294, kTop = 10, kBottom = 166;
 
 }  // namespace
+
+double NormalDensity(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * M_PI); }
 
 std::string ErrorPlot(const std::vector<HorizonError>& errors) {
   double low = INFINITY, high = 0, first = INFINITY, last = 0;
@@ -89,8 +88,8 @@ std::string ResidualHistogram(const std::vector<double>& residuals) {
   for (double& bin : bins) bin /= kBin * std::max<double>(1, static_cast<double>(residuals.size()));
   Svg svg(kWidth, kHeight, "histogram of residuals");
   const Axis x(-kEnd, kEnd, kLeft, kRight);
-  const Axis y(0, 1.1 * std::max(Density(0), *std::max_element(bins.begin(), bins.end())), kBottom,
-               kTop);
+  const Axis y(0, 1.1 * std::max(NormalDensity(0), *std::max_element(bins.begin(), bins.end())),
+               kBottom, kTop);
   svg.Frame(x, y, "residual [sd]", "density", 6, 4);
   for (int k = 0; k < kBins; ++k) {
     const double from = x.Pixel(-kEnd + k * kBin), top = y.Pixel(bins[static_cast<size_t>(k)]);
@@ -99,7 +98,7 @@ std::string ResidualHistogram(const std::vector<double>& residuals) {
   }
   Points normal;
   for (double z = -kEnd; z <= kEnd + 1e-9; z += 0.1)
-    normal.emplace_back(x.Pixel(z), y.Pixel(Density(z)));
+    normal.emplace_back(x.Pixel(z), y.Pixel(NormalDensity(z)));
   svg.Path(normal, "reference line");
   return svg.Print();
 }

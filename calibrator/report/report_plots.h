@@ -49,4 +49,7 @@ std::string ErrorsLeftPlot(const ResidualQuality& quality, const RobotDescriptio
 std::string AgreementPlot(const std::vector<LogAgreement>& logs, const Summary& summary,
                           const RobotDescription& robot, Eigen::Index parameter);
 
+/// Of the standard normal distribution.
+double NormalDensity(double z);
+
 }  // namespace plumb

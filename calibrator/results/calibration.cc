@@ -10,6 +10,7 @@
 #include "calibrator/design/excitation.h"
 #include "calibrator/diagnostics/holdout.h"
 #include "calibrator/fit/methods.h"
+#include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/gap/gap.h"
 #include "calibrator/inference/chi_squared.h"
@@ -25,13 +26,6 @@ constexpr char kCure[] =
     "; train on posterior and residual together (plumb train --distribution), and, as a residual "
     "is right only near what it was learnt from, record the trained policy's motion and calibrate "
     "with all logs";
-
-Eigen::MatrixXd ToPhysical(const RobotDescription& robot, const Eigen::MatrixXd& coordinates) {
-  Eigen::MatrixXd physical(coordinates.rows(), coordinates.cols());
-  for (Eigen::Index i = 0; i < coordinates.cols(); ++i)
-    physical.col(i) = robot.ToPhysical(coordinates.col(i));
-  return physical;
-}
 
 class Calibration {
  public:
@@ -58,7 +52,7 @@ class Calibration {
     findings_.prior = {prior_.FromStandard(Eigen::VectorXd::Zero(prior_.size())),
                        PriorCovariance()};
     findings_.posterior = result.posterior;
-    findings_.samples = ToPhysical(robot_, result.samples);
+    findings_.samples = PhysicalColumns(robot_, result.samples);
     findings_.transitions = static_cast<int64_t>(CountTransitions(rollouts_));
     findings_.simulated_steps = result.simulated_steps;
     findings_.failures = result.failures;

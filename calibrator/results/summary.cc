@@ -59,6 +59,10 @@ Eigen::MatrixXd Draw(const Findings& findings, const RobotDescription& robot) {
 
 }  // namespace
 
+bool Trustworthy(const Findings& findings) {
+  return findings.holdout.better && !findings.misspecification.alarm && findings.agreement.agree;
+}
+
 double Quantile(const std::vector<double>& sorted, double share) {
   if (sorted.empty()) return std::numeric_limits<double>::quiet_NaN();
   const double at = share * static_cast<double>(sorted.size() - 1);

@@ -29,6 +29,10 @@ struct Summary {
 /// written as if they were some. Thread-safe.
 Summary Summarise(const Findings& findings, const RobotDescription& robot);
 
+/// Whether findings are to be relied on, as plumb calibrate --strict asks: better than the prior on
+/// motion not seen, no alarm, and the logs agree. Thread-safe.
+bool Trustworthy(const Findings& findings);
+
 /// Quantile of sorted values, linear between them (type 7 of Hyndman and Fan, The American
 /// Statistician 50, 1996).
 /// @param share 0 to 1. @return NaN of no values.

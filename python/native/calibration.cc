@@ -168,10 +168,7 @@ void BindCalibration(py::module_& module) {
       "alarm", [](const Findings& f) { return f.misspecification.alarm; },
       "Whether the model cannot explain the robot.");
   finding(
-      "trustworthy",
-      [](const Findings& f) {
-        return f.holdout.better && !f.misspecification.alarm && f.agreement.agree;
-      },
+      "trustworthy", [](const Findings& f) { return Trustworthy(f); },
       "What plumb calibrate --strict asks for: better than the prior on motion not seen, no "
       "alarm, and the motions agree.");
   finding("findings", &Words, "In words, those that the command prints.");
