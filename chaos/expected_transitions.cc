@@ -20,6 +20,7 @@ constexpr int64_t kOldest = 10'000'000, kAhead = 1'000'000;  // [us] of a counte
 ExpectedTransitions::ExpectedTransitions(const RobotDescription& robot, const std::string& bus,
                                          const SigningKey& key, int64_t beginning)
     : robot_(robot),
+      space_(robot),
       bus_(bus),
       key_(key),
       beginning_(beginning),
@@ -66,7 +67,9 @@ void ExpectedTransitions::Hear(const lockstep_post_t& post) {
 }
 
 void ExpectedTransitions::OnState(const robot_state_t& state) {
-  if (static_cast<size_t>(state.num_joints) != joints_) return;
+  if (state.num_positions != space_.num_positions() ||
+      state.num_velocities != space_.num_velocities())
+    return;
   // A driver that was started again counts anew.
   if (!states_.empty() && state.sequence <= states_.rbegin()->first &&
       state.utime > states_.rbegin()->second.utime) {
@@ -137,6 +140,8 @@ std::optional<ExpectedTransitions::Step> ExpectedTransitions::JoinOne(int step, 
 bool ExpectedTransitions::IsPlausible(const robot_state_t& state) const {
   const auto tame = [](double x) { return std::abs(x) <= kGreatest; };
   const auto sd = [](double x) { return x == 0 || (x >= kLeastSd && x <= kGreatest); };
+  const auto size = static_cast<Eigen::Index>(state.q.size());
+  if (!space_.Has(Eigen::VectorXd::Map(state.q.data(), size))) return false;
   return std::ranges::all_of(state.q, tame) && std::ranges::all_of(state.v, tame) &&
          std::ranges::all_of(state.q_sd, sd) && std::ranges::all_of(state.v_sd, sd);
 }

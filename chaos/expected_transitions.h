@@ -12,6 +12,7 @@
 #include "plumb/joint_command_t.hpp"
 #include "plumb/lockstep_post_t.hpp"
 #include "plumb/robot_state_t.hpp"
+#include "robot/configuration_space.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -51,6 +52,7 @@ class ExpectedTransitions {
   bool IsPlausible(const robot_state_t& state) const;
 
   const RobotDescription& robot_;
+  const ConfigurationSpace space_;
   const std::string bus_;
   const SigningKey key_;
   const int64_t beginning_;

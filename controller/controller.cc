@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <stdexcept>
 
 #include "common/time_units.h"
 #include "controller/policy_fit.h"
@@ -44,6 +43,8 @@ bool SameContents(const policy_t& message, const policy_t& header, const Gaussia
 
 Controller::Controller(const RobotDescription& robot, uint64_t seed, double rest)
     : robot_(robot),
+      space_(robot_),
+      placement_(robot_),
       task_(MakeTask(robot_)),
       seed_(seed),
       rest_(rest),
@@ -51,10 +52,6 @@ Controller::Controller(const RobotDescription& robot, uint64_t seed, double rest
       step_v_(Eigen::VectorXd::Zero(robot.num_velocities())),
       effort_(step_v_),
       observation_(task_->observation_size()) {
-  if (robot.num_positions() != robot.num_joints()) {
-    throw std::invalid_argument("robot '" + robot.name +
-                                "' has a spherical joint: it can only be simulated");
-  }
   status_.policy_iteration = -1;
   Enter(controller_status_t::WAITING, "no policy yet");
 }
@@ -163,7 +160,8 @@ std::optional<joint_command_t> Controller::Tick(int64_t now, int64_t utime) {
 void Controller::BeginPlacing(int64_t now, int64_t utime) {
   place_robot_t place{};
   place.utime = utime;
-  place.num_joints = robot_.num_joints();
+  place.num_positions = robot_.num_positions();
+  place.num_velocities = robot_.num_velocities();
   Eigen::VectorXd q(robot_.num_positions()), v(robot_.num_velocities());
   Random random(seed_, {static_cast<uint32_t>(status_.policy_iteration),
                         static_cast<uint32_t>(attempt_++), kPlacementStream});
@@ -186,27 +184,28 @@ bool Controller::ReadyToRun(const robot_state_t& state, int64_t now) const {
 bool Controller::Placed(const robot_state_t& state) const {
   const double tolerance = robot_.controller.place_tolerance;
   if (state.utime <= place_->utime) return false;
-  for (size_t i = 0; i < state.q.size(); ++i) {
-    if (std::abs(state.q[i] - place_->q[i]) > tolerance) return false;
-    if (std::abs(state.v[i] - place_->v[i]) > kPlaceSpeedFactor * tolerance) return false;
-  }
-  return true;
+  return placement_.Distance(Map(state.q), Map(place_->q)).cwiseAbs().maxCoeff() <= tolerance &&
+         (Map(state.v) - Map(place_->v)).cwiseAbs().maxCoeff() <= kPlaceSpeedFactor * tolerance;
 }
 
 std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, int64_t now,
                                                    int64_t utime) {
-  if (state.num_joints != robot_.num_joints()) return {};
-  if (state.utime < -kLatest || state.utime > kLatest) return {};
+  if (state.num_positions != space_.num_positions() ||
+      state.num_velocities != space_.num_velocities())
+    return {};
+  if (state.utime < -kLatest || state.utime > kLatest) return;
   const bool finite = Map(state.q).allFinite() && Map(state.v).allFinite();
+  const bool rotates = space_.Has(Map(state.q));
   // A backlog brings states in quick succession that are all old: their own time tells.
   const bool late = std::abs(utime - state.utime) > Microseconds(robot_.controller.state_timeout);
   last_state_sequence_ = state.sequence;
-  if (finite && state.valid && !late) state_heard_ = now;
+  if (finite && rotates && state.valid && !late) state_heard_ = now;
   const bool talking = driver_state_ == driver_status_t::ARMING || Armed();
   if (!talking || phase() == controller_status_t::HALTED) return {};
 
   if (phase() == controller_status_t::RUNNING) {
     if (!finite) return Halt("the state is not finite", utime);
+    if (!rotates) return Halt("the state's q " + space_.Fault(Map(state.q)), utime);
     if (late) return Halt("the state is late", utime);
     if (!state.valid)
       return Halt(
@@ -214,7 +213,7 @@ std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, i
           utime);
     return Act(state, utime);
   }
-  const bool good = finite && state.valid && !late;
+  const bool good = finite && rotates && state.valid && !late;
   if (phase() == controller_status_t::PLACING && good && ReadyToRun(state, now)) {
     Enter(controller_status_t::RUNNING);
     episode_ = state.utime;

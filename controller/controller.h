@@ -15,7 +15,9 @@
 #include "plumb/place_robot_t.hpp"
 #include "plumb/policy_t.hpp"
 #include "plumb/robot_state_t.hpp"
+#include "robot/configuration_space.h"
 #include "robot/description.h"
+#include "robot/placement.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
@@ -26,9 +28,9 @@ namespace plumb {
 /// - A policy is exchanged only between episodes.
 /// - Between episodes it commands zero effort, which keeps an armed driver from disarming.
 /// - It is silent unless the driver is arming or armed, and after a halt: silence disarms.
-/// - A late (by arrival or by its own time), invalid or non-finite state or action halts it: one
-///   command of zero effort, then silence until the driver has been seen disarmed and armed anew,
-///   which takes a person.
+/// - A late (by arrival or by its own time), invalid or non-finite state, one with a quaternion
+///   that is no unit one, or a non-finite action halts it: one command of zero effort, then silence
+///   until the driver has been seen disarmed and armed anew, which takes a person.
 class Controller {
  public:
   /// @param rest [s] negative: each episode begins in a state of the task's choice, where
@@ -74,6 +76,8 @@ class Controller {
   std::optional<joint_command_t> Act(const robot_state_t& state, int64_t utime);
 
   const RobotDescription robot_;
+  ConfigurationSpace space_;
+  Placement placement_;
   std::unique_ptr<Task> task_;
   uint64_t seed_;
   double rest_;

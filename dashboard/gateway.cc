@@ -88,6 +88,7 @@ std::optional<Message> Decode(std::span<const uint8_t> bytes) {
 
 Gateway::Gateway(const RobotDescription& robot, Setting setting, Wishes::Request request)
     : robot_(robot),
+      placement_(robot_),
       setting_(std::move(setting)),
       time_(setting_.kind),
       derived_(robot, topics_),
@@ -276,14 +277,24 @@ DriverWish::Answer Gateway::Placed() const {
   if (controller_->phase != controller_status_t::PLACING)
     return {false, "the controller does not ask for the robot to be placed" +
                        (controller_->reason.empty() ? "" : ": " + controller_->reason)};
-  if (!place_ || !state_ || place_->q.size() != state_->q.size() ||
-      state_->q.size() != robot_.joints.size())
+  const auto size = static_cast<size_t>(robot_.num_positions());
+  if (!place_ || !state_ || place_->q.size() != size || state_->q.size() != size)
     return {false, "the controller begins by itself when the robot has rested"};
-  for (size_t i = 0; i < state_->q.size(); ++i) {
-    if (!(std::abs(state_->q[i] - place_->q[i]) <= robot_.controller.place_tolerance))
-      return {false, fmt::format("{} is at {:.3f}, and is to be at {:.3f}, within {:.3f}",
-                                 robot_.joints[i].name, state_->q[i], place_->q[i],
-                                 robot_.controller.place_tolerance)};
+  const auto map = [](const std::vector<double>& q) {
+    return Eigen::VectorXd::Map(q.data(), static_cast<Eigen::Index>(q.size()));
+  };
+  const double tolerance = robot_.controller.place_tolerance;
+  const Eigen::VectorXd distance = placement_.Distance(map(state_->q), map(place_->q));
+  for (Eigen::Index i = 0; i < distance.size(); ++i) {
+    if (std::abs(distance[i]) <= tolerance) continue;
+    if (placement_.flat()) {
+      const auto joint = static_cast<size_t>(i);
+      return {false,
+              fmt::format("{} is at {:.3f}, and is to be at {:.3f}, within {:.3f}",
+                          placement_.name(i), state_->q[joint], place_->q[joint], tolerance)};
+    }
+    return {false, fmt::format("{} is {:.3f} from where it is to be, within {:.3f}",
+                               placement_.name(i), std::abs(distance[i]), tolerance)};
   }
   return {true, "the robot is where it is to be"};
 }

@@ -17,6 +17,7 @@
 #include "dashboard/wishes.h"
 #include "plumb/controller_status_t.hpp"
 #include "plumb/place_robot_t.hpp"
+#include "robot/placement.h"
 
 namespace plumb {
 
@@ -76,6 +77,7 @@ class Gateway {
   int64_t Utime(const Moment& moment) const;
 
   const RobotDescription robot_;
+  const Placement placement_;
   const Setting setting_;
   Topics topics_;
   ChannelStatistics statistics_;

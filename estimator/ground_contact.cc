@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "estimator/impact.h"
 
@@ -31,12 +30,7 @@ GroundContact::GroundContact(const RobotDescription& robot)
       tests_(points_.size()),
       motions_(points_.size()),
       kinematics_(robot),
-      jacobian_(3, robot.num_velocities()) {
-  if (!points_.empty() && robot.num_positions() != robot.num_joints()) {
-    throw std::invalid_argument("robot '" + robot.name +
-                                "' has a spherical joint: it can only be simulated");
-  }
-}
+      jacobian_(3, robot.num_velocities()) {}
 
 void GroundContact::Judge(robot_state_t& state) {
   if (points_.empty()) return;
@@ -47,8 +41,9 @@ void GroundContact::Judge(robot_state_t& state) {
     return;
   }
   using Values = Eigen::Map<const Eigen::VectorXd>;
-  const auto n = static_cast<Eigen::Index>(state.q.size());
-  kinematics_.Update(Values(state.q.data(), n), Values(state.v.data(), n));
+  const auto n = static_cast<Eigen::Index>(state.v.size());
+  kinematics_.Update(Values(state.q.data(), static_cast<Eigen::Index>(state.q.size())),
+                     Values(state.v.data(), n));
   const Values q_sd(state.q_sd.data(), n), v_sd(state.v_sd.data(), n);
   for (size_t i = 0; i < points_.size(); ++i) {
     const ContactPoint& point = points_[i];

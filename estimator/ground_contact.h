@@ -42,14 +42,12 @@ class ContactTest {
 /// Does not allocate after construction. Not thread-safe.
 class GroundContact {
  public:
-  /// @throws std::invalid_argument if points can touch the ground and a joint is spherical:
-  /// ROBOT_STATE has one coordinate a joint.
   explicit GroundContact(const RobotDescription& robot);
 
   int32_t num_points() const { return static_cast<int32_t>(points_.size()); }
   /// Fills in state.contact from the rest of it, one each: -1 = not known, because the state is not
-  /// valid. The joints' errors are taken as independent; how the errors of positions turn into ones
-  /// of the vertical velocity is neglected.
+  /// valid. The coordinates' errors are taken as independent; how the errors of positions turn into
+  /// ones of the vertical velocity is neglected.
   void Judge(robot_state_t& state);
   /// [m/s] at which a point may meet the ground, or moves in it, within `ahead` [s] from the last
   /// state: the fastest one's. 0 if that state was not valid.

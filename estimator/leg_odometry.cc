@@ -1,4 +1,5 @@
 #include "estimator/leg_odometry.h"
+#include "estimator/leg_smoother.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -36,13 +37,13 @@ Matrix3d Cross(const Vector3d& a) {
   return m;
 }
 
-Eigen::Quaterniond Turn(const Vector3d& by) {
+}  // namespace
+
+Eigen::Quaterniond LegOdometry::Turn(const Vector3d& by) {
   const double angle = by.norm();
   if (angle < 1e-12) return Eigen::Quaterniond(1, by.x() / 2, by.y() / 2, by.z() / 2).normalized();
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, by / angle));
 }
-
-}  // namespace
 
 LegOdometry::LegOdometry(const Settings& settings, size_t num_feet)
     : s_(settings),
@@ -119,6 +120,7 @@ void LegOdometry::Predict(double dt, const Vector3d& rate, const Vector3d& force
   // F P F': each row of the transition is used before what it refers to changes.
   const Matrix3d by_angle = -dt * Cross(felt), by_acceleration_bias = -dt * half,
                  by_rate_bias = -dt * half;
+  if (smoother_) smoother_->Predicted(dt, by_angle, half);
   auto& p = covariance_;
   p.middleRows<3>(kPosition) +=
       dt * p.middleRows<3>(kVelocity) + dt / 2 * (by_angle * p.middleRows<3>(kAngle)) +
@@ -180,7 +182,25 @@ ContactTest::Motion LegOdometry::MotionOf(const Foot& foot) const {
           .rise_sd = std::sqrt(std::max(0.0, rise))};
 }
 
-void LegOdometry::Judge(size_t index, const Foot& foot) {
+// Of two points the higher cannot rest on level ground, however high both of them may be.
+void LegOdometry::CompareWithLowest(const Foot& foot, std::span<const Foot> feet,
+                                    ContactTest::Motion* motion) const {
+  const Vector3d arm = orientation_ * foot.centre;
+  double above = 0, variance = 0;
+  for (const Foot& other : feet) {
+    const Vector3d between = arm - orientation_ * other.centre;
+    const double by = between.z() - foot.radius + other.radius;
+    if (by <= above) continue;
+    above = by;
+    const Vector3d by_angle = between.cross(Vector3d::UnitZ());
+    variance = by_angle.dot(covariance_.block<3, 3>(kAngle, kAngle) * by_angle);
+  }
+  motion->height = above;
+  motion->height_sd = std::sqrt(std::max(0.0, variance) + 2 * Square(s_.ground_sd));
+}
+
+void LegOdometry::Judge(size_t index, std::span<const Foot> feet) {
+  const Foot& foot = feet[index];
   ContactTest::Motion motion = MotionOf(foot);
   const bool rested = rests(index);
   if (!rested && motion.height_sd > kHeightKnown) {
@@ -188,6 +208,8 @@ void LegOdometry::Judge(size_t index, const Foot& foot) {
     // freely rests on nothing.
     if (borne_ < s_.gravity / 2) return;
     motion.height = 0;
+    // In a plane what touches is one foot's: as good as level.
+    if (!s_.normal) CompareWithLowest(foot, feet, &motion);
   }
   if (motion.height < -kAstray * motion.height_sd) astray_ = true;
   const bool rests = feet_[index].test.Judge(motion);
@@ -196,6 +218,7 @@ void LegOdometry::Judge(size_t index, const Foot& foot) {
 }
 
 void LegOdometry::Forget(Eigen::Index block) {
+  if (smoother_) smoother_->Forgot(block);
   covariance_.middleRows<3>(block).setZero();
   covariance_.middleCols<3>(block).setZero();
 }
@@ -221,6 +244,7 @@ void LegOdometry::Wander(size_t index, const Foot& foot) {
   place += dt_ * foot.radius * (allowed_ * rate.cross(Vector3d::UnitZ()));
   const double keeps = std::exp(-dt_ / kSettlesIn);
   place.z() = foot.radius + keeps * (place.z() - foot.radius);
+  if (smoother_) smoother_->Scaled(at + 2, keeps);
   covariance_.row(at + 2) *= keeps;
   covariance_.col(at + 2) *= keeps;
   const Vector3d up = Vector3d::UnitZ();
@@ -232,7 +256,7 @@ void LegOdometry::Correct(std::span<const Foot> feet) {
   for (size_t i = 0; i < feet.size(); ++i) {
     const bool rested = rests(i);
     if (rested) Wander(i, feet[i]);
-    Judge(i, feet[i]);
+    Judge(i, feet);
     if (!rests(i)) continue;
     const bool fits = CorrectBy(i, feet[i]);
     if (!fits && !rested && lift_ < flight_ * s_.gravity / 2) {
@@ -273,6 +297,7 @@ bool LegOdometry::CorrectBy(size_t index, const Foot& foot) {
   const Matrix3d inverse = spread.inverse();
   if (innovation.dot(inverse * innovation) > kSlipped) return false;
   gain_.noalias() = seen_.transpose() * inverse;
+  if (smoother_) smoother_->Corrected(at, by_angle, innovation, inverse, gain_);
   error_.noalias() = gain_ * innovation;
   covariance_.noalias() -= gain_ * seen_;
   // Rounding must not make it unsymmetric.

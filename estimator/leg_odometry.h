@@ -11,6 +11,8 @@
 
 namespace plumb {
 
+class LegSmoother;
+
 /// Where a body is that carries an IMU and stands on feet: a contact-aided error-state Kalman
 /// filter after M. Bloesch et al., "State Estimation for Legged Robots - Consistent Fusion of Leg
 /// Kinematics and IMU", RSS 2012.
@@ -105,10 +107,20 @@ class LegOdometry {
   double rate_change() const { return rate_change_; }
   double acceleration_change() const { return acceleration_change_; }
 
- private:
+  /// Where in the error things are: three entries each; from kFeet on the places of the feet.
   static constexpr Eigen::Index kPosition = 0, kVelocity = 3, kAngle = 6, kRateBias = 9,
                                 kAccelerationBias = 12, kFeet = 15;
   static constexpr int kMax = kFeet + 3 * FloatingBase::kMaxPoints;
+  using Covariance =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMax, kMax>;
+  /// Of the whole error.
+  const Covariance& whole_covariance() const { return covariance_; }
+  /// The rotation by a vector.
+  static Eigen::Quaterniond Turn(const Eigen::Vector3d& by);
+  /// From now on it is told what is done with each reading. It must outlive this.
+  void Tell(LegSmoother& smoother) { smoother_ = &smoother; }
+
+ private:
   struct Rest {
     Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of the centre, if it rests
     ContactTest test;
@@ -117,7 +129,9 @@ class LegOdometry {
 
   double Sd(Eigen::Index block, const Eigen::Vector3d& direction) const;
   ContactTest::Motion MotionOf(const Foot& foot) const;
-  void Judge(size_t index, const Foot& foot);
+  void Judge(size_t index, std::span<const Foot> feet);
+  void CompareWithLowest(const Foot& foot, std::span<const Foot> feet,
+                         ContactTest::Motion* motion) const;
   void SetDown(size_t index, const Foot& foot);
   void Forget(Eigen::Index block);
   void Wander(size_t index, const Foot& foot);
@@ -140,7 +154,7 @@ class LegOdometry {
   std::vector<Rest> feet_;
   // Of bounded size, so that what is computed with them needs no memory but the stack.
   // of the error
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMax, kMax> covariance_;
+  Covariance covariance_;
   // what a correction finds
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMax, 1> error_;
   // covariance of what is seen with the error
@@ -148,6 +162,7 @@ class LegOdometry {
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, kMax, 3> gain_;
   int64_t slips_ = 0;
   bool astray_ = false;
+  LegSmoother* smoother_ = nullptr;
 };
 
 }  // namespace plumb

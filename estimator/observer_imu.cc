@@ -32,7 +32,8 @@ void StateObserver::OnImu(const imu_t& message) {
   ++imu_refused_;
 }
 
-void StateObserver::UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay) {
+// @return whether somebody has moved the robot.
+bool StateObserver::UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay) {
   BaseObserver::Legs& legs = base_->legs();
   const int64_t measured = reading.utime - delay;
   const double age = Seconds(utime - measured);
@@ -44,21 +45,24 @@ void StateObserver::UseForBase(const ImuInbox::Reading& reading, int64_t utime, 
     legs.q_variance[at] = joints_[i].filter.covariance()(0, 0);
     legs.v_variance[at] = joints_[i].filter.covariance()(1, 1);
   }
+  if (base_->Moved(reading)) return true;
   base_->Read(measured, reading);
+  return false;
 }
 
-void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading,
+// @return whether somebody has moved the robot.
+bool StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading,
                            const joint_state_t& measured) {
   const int64_t late = measured.utime - reading.utime;
   if (late > ImuInbox::kLatest) {
     ++imu_refused_;
-    return;
+    return false;
   }
   ++imu_readings_;
   const double age = Seconds(late) + imu.delay;
   const double elapsed = imu.used < 0 ? 0 : Seconds(reading.utime - imu.used);
   imu.used = std::max(imu.used, reading.utime);
-  if (reading.clipped) return;
+  if (reading.clipped) return false;
   if (imu.of_base) return UseForBase(reading, measured.utime, Microseconds(imu.delay));
   if (imu.mounting.turned >= 0) {
     // JOINT_STATE has the last reading of each of its periods; those in between, only we have.
@@ -71,7 +75,7 @@ void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading,
               imu.mounting.axis.dot(Eigen::Map<const Eigen::Vector3d>(reading.rate.data())), age);
     }
   }
-  if (imu.mounting.slides.empty() || !reading.orientation_valid) return;
+  if (imu.mounting.slides.empty() || !reading.orientation_valid) return false;
   const auto& [w, x, y, z] = reading.orientation;
   // As the joints have it: neither a wrong heading nor a boom's roll matter.
   const Eigen::Quaterniond turn =
@@ -101,6 +105,7 @@ void StateObserver::UseImu(Imu& imu, const ImuInbox::Reading& reading,
       ++reasons_changed_;
     }
   }
+  return false;
 }
 
 }  // namespace plumb

@@ -61,7 +61,7 @@ estimator_status_t StateObserver::Status() const {
   estimator_status_t status{};
   status.utime = state_.utime;
   status.valid = state_.valid;
-  status.num_joints = state_.num_joints;
+  status.num_joints = static_cast<int32_t>(joints_.size());
   for (const Joint& joint : joints_) {
     status.joint_name.push_back(joint.name);
     status.age.push_back(joint.used < 0 ? kNone : Seconds(state_.utime - joint.used));

@@ -42,7 +42,8 @@ AgreementWatch::Settings AccelerationWatch(const EstimatorSettings& s) {
 }  // namespace
 
 StateObserver::StateObserver(const RobotDescription& robot)
-    : lag_(robot.estimator.lag),
+    : space_(robot),
+      lag_(robot.estimator.lag),
       gravity_(robot.simulation.gravity),
       greatest_effort_(GreatestEffort(robot)),
       unknown_step_(2 * robot.effort_limits().maxCoeff()),
@@ -56,6 +57,7 @@ StateObserver::StateObserver(const RobotDescription& robot)
         {sensor.name, MountingOf(robot, sensor.link), sensor.period, delay, {}, -1, false});
     imus_.back().of_base = base_ && sensor.name == robot.sensors[base_->base().imu].name;
   }
+  size_t position = 0, velocity = 0;
   for (int i = 0; i < robot.num_joints(); ++i) {
     const EstimatorSettings settings = EstimatorOf(robot, i);
     const auto turns = [&](const Imu& imu) { return imu.mounting.turned == i; };
@@ -65,16 +67,21 @@ StateObserver::StateObserver(const RobotDescription& robot)
                 .lower = robot.joints[static_cast<size_t>(i)].lower,
                 .upper = robot.joints[static_cast<size_t>(i)].upper,
                 .filter = KinematicFilter(settings),
+                .position = position,
+                .velocity = velocity,
                 .velocity_watch = AgreementWatch(VelocityWatch(settings, gyro)),
                 .acceleration_watch = AgreementWatch(AccelerationWatch(settings))};
     joint.of_base = base_ && base_->base().Has(i);
     joint.gyro = gyro;
     joints_.push_back(std::move(joint));
+    position += static_cast<size_t>(robot.joints[static_cast<size_t>(i)].num_positions());
+    velocity += static_cast<size_t>(robot.joints[static_cast<size_t>(i)].num_velocities());
   }
-  const auto n = joints_.size();
-  state_.num_joints = static_cast<int32_t>(n);
-  for (auto* values : {&state_.q, &state_.v, &state_.q_sd, &state_.v_sd, &state_.effort})
-    values->resize(n, 0);
+  state_.num_positions = static_cast<int32_t>(position);
+  state_.num_velocities = static_cast<int32_t>(velocity);
+  state_.q.resize(position, 0);
+  for (auto* values : {&state_.v, &state_.q_sd, &state_.v_sd, &state_.effort})
+    values->resize(velocity, 0);
   state_.num_contacts = contact_.num_points();
   state_.contact.assign(static_cast<size_t>(state_.num_contacts), -1);
   waiting_.assign(static_cast<size_t>(lag_) + 2, state_);
@@ -92,7 +99,7 @@ bool StateObserver::IsNew(const joint_state_t& measured, size_t joint) const {
 
 StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
   // Times of this epoch only, so that differences cannot overflow.
-  if (measured.num_joints != state_.num_joints || measured.utime < 0 ||
+  if (static_cast<size_t>(measured.num_joints) != joints_.size() || measured.utime < 0 ||
       measured.utime >= kEndOfTime)
     return Use::kRefuse;
   for (size_t i = 0; i < joints_.size(); ++i) {
@@ -185,8 +192,10 @@ void StateObserver::Predict(const joint_state_t& measured, double elapsed) {
   double efforts = 0, stops = 0;                          // sums of squares
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
-    const double stop =
-        joint.of_base ? 0 : StopSpeed(joint.lower, joint.upper, state_.q[i], state_.v[i], elapsed);
+    const double stop = joint.of_base
+                            ? 0
+                            : StopSpeed(joint.lower, joint.upper, state_.q[joint.position],
+                                        state_.v[joint.velocity], elapsed);
     joint.stop = std::max(joint.stop * left, stop);
     efforts += Square(joint.effort_step);
     stops += Square(joint.stop);
@@ -278,13 +287,14 @@ bool StateObserver::OnJointState(const joint_state_t& measured) {
       if (IsNew(measured, i)) UseReading(measured, i);
     }
   }
+  bool moved = false;
   for (Imu& imu : imus_) {
     while (const ImuInbox::Reading* reading = imu.inbox.Take(measured.utime)) {
-      if (!restarted) UseImu(imu, *reading, measured);
+      if (!restarted) moved = UseImu(imu, *reading, measured) || moved;
     }
   }
   const auto sound = [](const Joint& joint) { return joint.filter.sound(); };
-  if (!restarted && !std::all_of(joints_.begin(), joints_.end(), sound)) {
+  if (!restarted && (moved || !std::all_of(joints_.begin(), joints_.end(), sound))) {
     Restart(measured);
     restarted = true;
   }
@@ -306,16 +316,20 @@ void StateObserver::FillState(const joint_state_t& measured, bool restarted) {
   state_.valid = since_restart_ >= kSettled;
   for (size_t i = 0; i < joints_.size(); ++i) {
     Joint& joint = joints_[i];
-    state_.q[i] = joint.filter.mean()(0);
-    state_.v[i] = joint.filter.mean()(1);
-    state_.q_sd[i] = std::sqrt(joint.filter.covariance()(0, 0));
-    state_.v_sd[i] = std::sqrt(joint.filter.covariance()(1, 1));
-    state_.effort[i] = measured.effort_applied[i];
+    state_.q[joint.position] = joint.filter.mean()(0);
+    state_.v[joint.velocity] = joint.filter.mean()(1);
+    state_.q_sd[joint.velocity] = std::sqrt(joint.filter.covariance()(0, 0));
+    state_.v_sd[joint.velocity] = std::sqrt(joint.filter.covariance()(1, 1));
+    const size_t end = i + 1 < joints_.size() ? joints_[i + 1].velocity : state_.effort.size();
+    std::fill(&state_.effort[joint.velocity], state_.effort.data() + end,
+              measured.effort_applied[i]);
     if (joint.out) state_.valid = false;
   }
   if (base_) base_->Fill(measured.utime, state_);
   for (const auto* values : {&state_.q, &state_.v, &state_.q_sd, &state_.v_sd})
     state_.valid = state_.valid && AllFinite(*values);
+  const auto positions = static_cast<Eigen::Index>(state_.q.size());
+  state_.valid = state_.valid && space_.Has(Eigen::VectorXd::Map(state_.q.data(), positions));
   if (state_.valid != was_valid) ++reasons_changed_;
   contact_.Judge(state_);
   const auto room = static_cast<int>(waiting_.size());
@@ -332,11 +346,13 @@ void StateObserver::EmitSmoothed() {
     const KinematicFilter::Smoothed smoothed = joints_[i].filter.TakeOldest();
     const bool finite = smoothed.mean.allFinite() && smoothed.covariance.allFinite();
     if (joints_[i].of_base || !finite) continue;  // causal as it was
-    state.q[i] = smoothed.mean(0);
-    state.v[i] = smoothed.mean(1);
-    state.q_sd[i] = std::sqrt(std::max(0.0, smoothed.covariance(0, 0)));
-    state.v_sd[i] = std::sqrt(std::max(0.0, smoothed.covariance(1, 1)));
+    const size_t position = joints_[i].position, velocity = joints_[i].velocity;
+    state.q[position] = smoothed.mean(0);
+    state.v[velocity] = smoothed.mean(1);
+    state.q_sd[velocity] = std::sqrt(std::max(0.0, smoothed.covariance(0, 0)));
+    state.v_sd[velocity] = std::sqrt(std::max(0.0, smoothed.covariance(1, 1)));
   }
+  if (base_) base_->Smooth(state.utime, state);
 }
 
 }  // namespace plumb

@@ -18,6 +18,7 @@
 #include "plumb/imu_t.hpp"
 #include "plumb/joint_state_t.hpp"
 #include "plumb/robot_state_t.hpp"
+#include "robot/configuration_space.h"
 #include "robot/description.h"
 #include "robot/imu_mounting.h"
 
@@ -35,8 +36,8 @@ namespace plumb {
 /// The filter restarts after a jump of time (backwards, or more than a second forwards), when a
 /// joint comes back after an outage, and when the robot has evidently been moved by hand
 /// (innovation above reset_after and all uncertainty); such a state says `restarted`. It is `valid`
-/// when all joints are, the filter has settled and all of its numbers are finite. A filter that is
-/// not finite restarts.
+/// when all joints are, the filter has settled, all of its numbers are finite and quaternions are
+/// of unit length. A filter that is not finite restarts.
 ///
 /// OnJointState and OnImu do not allocate after construction, but for strings in what they are
 /// given.
@@ -76,9 +77,10 @@ class StateObserver {
     EstimatorSettings settings;
     double lower, upper;  // its stops
     KinematicFilter filter;
-    bool of_base = false;    // its state is base_'s: no filter of its own
-    bool gyro = false;       // its velocity is an IMU's rate
-    int64_t measured = -1;   // utime of its newest reading
+    size_t position, velocity;  // its first entries of q and v
+    bool of_base = false;       // its state is base_'s: no filter of its own
+    bool gyro = false;          // its velocity is an IMU's rate
+    int64_t measured = -1;      // utime of its newest reading
     int64_t used = -1;       // of the newest that was valid and counted; -1 = none since the start
     bool out = false;        // silent for longer than an outage
     double effort = 0;       // [Nm] or [N] that acts at the end of the latest interval
@@ -109,14 +111,15 @@ class StateObserver {
   double FindEffortSteps(const joint_state_t& measured);
   void Predict(const joint_state_t& measured, double elapsed);
   void UseReading(const joint_state_t& measured, size_t joint);
-  void UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay);
-  void UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured);
+  bool UseForBase(const ImuInbox::Reading& reading, int64_t utime, int64_t delay);
+  bool UseImu(Imu& imu, const ImuInbox::Reading& reading, const joint_state_t& measured);
   KinematicFilter::Innovation Correct(Joint& joint, Quantity quantity, double value, double age);
   void JudgeOutages(int64_t utime);
   void FillState(const joint_state_t& measured, bool restarted);
   void EmitSmoothed();
   std::string SensorReason(const Joint& joint) const;
 
+  ConfigurationSpace space_;
   int lag_;
   double gravity_;
   std::vector<Joint> joints_;

@@ -28,6 +28,18 @@ bool AtRightAngles(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::abs(a.dot(b)) < kParallel;
 }
 
+bool IsFree(const FloatingBase& base) {
+  if (base.turned < 0 || base.slides.size() != (base.spatial ? 3 : 2)) return false;
+  std::vector<Eigen::Vector3d> directions;
+  for (const ImuMounting::Slide& slide : base.slides) directions.push_back(slide.direction);
+  if (!base.spatial) {
+    directions.push_back(base.normal());
+    if (std::abs(directions.back().z()) >= kParallel) return false;
+  }
+  return AtRightAngles(directions[0], directions[1]) &&
+         AtRightAngles(directions[0], directions[2]) && AtRightAngles(directions[1], directions[2]);
+}
+
 void Refuse(const std::string& why) { throw std::invalid_argument(why); }
 
 }  // namespace
@@ -46,6 +58,7 @@ FloatingBase FloatingBaseOf(const RobotDescription& robot) {
                     .link = imu->link,
                     .slides = {},
                     .turned = -1,
+                    .spatial = false,
                     .axis = Eigen::Vector3d::UnitY(),
                     .zero = {}};
   for (const int index : ChainTo(robot, imu->link)) {
@@ -64,23 +77,14 @@ FloatingBase FloatingBaseOf(const RobotDescription& robot) {
       base.slides.push_back({index, base.zero.rotation * joint.axis});
       continue;
     }
-    if (joint.type == Type::kSpherical) {
-      Refuse(fmt::format("joint \"{}\" is spherical, and the state has one coordinate a joint",
-                         joint.name));
-    }
     base.turned = index;
+    base.spatial = joint.type == Type::kSpherical;
     base.axis = joint.axis;
   }
-  const Eigen::Vector3d normal = base.normal();
-  const bool in_plane = base.turned >= 0 && base.slides.size() == 2 &&
-                        std::abs(normal.z()) < kParallel &&
-                        AtRightAngles(base.slides[0].direction, base.slides[1].direction) &&
-                        AtRightAngles(base.slides[0].direction, normal) &&
-                        AtRightAngles(base.slides[1].direction, normal);
-  if (!in_plane) {
+  if (!IsFree(base)) {
     Refuse(
         fmt::format("\"{}\" does not slide along two axes at right angles in an upright plane and "
-                    "then turn about its normal",
+                    "then turn about its normal, nor along three and then turn freely",
                     link));
   }
   const std::vector<ContactPoint> points = ContactPoints(robot);

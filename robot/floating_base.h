@@ -9,9 +9,10 @@
 
 namespace plumb {
 
-/// The free base of a robot that moves in an upright plane: between the world and the link that
-/// carries its IMU are joints with neither motor nor encoder, two that slide at right angles and a
-/// last one that turns about the plane's normal. Plain data.
+/// The free base of a robot: between the world and the link that carries its IMU are joints with
+/// neither motor nor encoder. In an upright plane they are two that slide at right angles and a
+/// last one that turns about the plane's normal; in space three that slide at right angles and a
+/// last one that is spherical. Plain data.
 struct FloatingBase {
   static constexpr int kMaxPoints = 32;  ///< that can touch the ground
 
@@ -19,12 +20,14 @@ struct FloatingBase {
   int link;                                ///< index into links: what carries the IMU
   std::vector<ImuMounting::Slide> slides;  ///< with their directions in the world
   int turned;                              ///< index into joints of the last one
-  Eigen::Vector3d axis;                    ///< that it turns about, in the link's axes
-  Pose zero;                               ///< of the link where all these joints are at zero
+  bool spatial;                            ///< that one is spherical
+  /// that it turns about, in the link's axes; of no meaning in space
+  Eigen::Vector3d axis;
+  Pose zero;  ///< of the link where all these joints are at zero
 
   /// Whether a joint is one of them.
   bool Has(int joint) const;
-  /// Of the plane, in the world.
+  /// Of the plane, in the world; not in space.
   Eigen::Vector3d normal() const { return zero.rotation * axis; }
 };
 

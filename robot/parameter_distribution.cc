@@ -97,10 +97,8 @@ SimulatorDraw ParameterDistribution::Draw(Random& random) const {
     draw.parameters = ToPhysical(residual->coordinates[draw.draw]);
     draw.residual = residual;
   }
-  if (!starts.empty() && random.Uniform() < kRecordedStarts) {
-    const Eigen::VectorXd& start = starts[choose(starts.size())];
-    draw.q = start.head(start.size() / 2), draw.v = start.tail(start.size() / 2);
-  }
+  if (!starts.empty() && random.Uniform() < kRecordedStarts)
+    draw.start = starts[choose(starts.size())];
   return draw;
 }
 

@@ -29,8 +29,8 @@ struct SimulatorDraw {
   /// that the simulator lacks, and which draw of it; null = nothing
   std::shared_ptr<const Residual> residual = nullptr;
   size_t draw = 0;
-  /// the state that an episode begins with; empty = one of the task's
-  Eigen::VectorXd q = {}, v = {};
+  /// the state (q, v) that an episode begins with; empty = one of the task's
+  Eigen::VectorXd start = {};
 };
 
 /// Which simulators could have produced a robot's motion: a mixture of Gaussians over the
@@ -45,7 +45,8 @@ struct ParameterDistribution {
   /// that all of these simulators lack; null = nothing
   std::shared_ptr<const Residual> residual = nullptr;
 
-  /// States (q, v), 2 num_velocities entries, in which episodes have begun on the robot.
+  /// States (q, v), num_positions + num_velocities entries, in which episodes have begun on the
+  /// robot.
   std::vector<Eigen::VectorXd> starts = {};
 
   /// The description's prior: one component with a diagonal covariance.

@@ -9,6 +9,7 @@
 
 #include "common/decompositions.h"
 #include "common/outside_text.h"
+#include "robot/configuration_space.h"
 #include "robot/parameter_distribution.h"
 #include "robot/physical.h"
 #include "robot/residual_message.h"
@@ -157,6 +158,7 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
     for (const Eigen::VectorXd& draw : result.residual->coordinates)
       RequireNear(draw, "residual's draw", description);
   }
+  const ConfigurationSpace space(description);
   const auto state =
       static_cast<size_t>(description.num_positions() + description.num_velocities());
   if (message.start.size() % std::max<size_t>(1, state) != 0) Reject("start of the wrong size");
@@ -166,6 +168,8 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
             .cast<double>());
     if (!std::ranges::all_of(result.starts.back(), IsPhysical))
       Reject(fmt::format("a start is beyond {:g}, or not finite", kGreatestQuantity));
+    const std::string fault = space.Fault(result.starts.back().head(description.num_positions()));
+    if (!fault.empty()) Reject("start: q " + fault);
   }
   return result;
 }

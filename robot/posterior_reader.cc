@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "robot/configuration_space.h"
 #include "robot/json_field.h"
 #include "robot/json_text.h"
 #include "robot/physics_fingerprint.h"
@@ -109,8 +110,12 @@ void ReadGap(const Field& root, const RobotDescription& robot, ParameterDistribu
     for (const Eigen::VectorXd& draw : to->residual->coordinates)
       residual["draws"].Require(to->ToPhysical(draw).allFinite(), "is too wide: it overflows");
   }
-  for (const Field& start : starts.Entries(starts.size()))
+  const ConfigurationSpace space(robot);
+  for (const Field& start : starts.Entries(starts.size())) {
     to->starts.push_back(start.SingleVector(state));
+    const std::string fault = space.Fault(to->starts.back().head(robot.num_positions()));
+    start.Require(fault.empty(), "q " + fault);
+  }
 }
 
 }  // namespace

@@ -2,9 +2,9 @@
 
 #include <memory>
 #include <span>
-#include <stdexcept>
 #include <vector>
 
+#include "robot/configuration_space.h"
 #include "sim/environment.h"
 #include "sim/simulator_lanes.h"
 
@@ -18,8 +18,10 @@ class RobotSimulation : public Simulation {
         environment_(model),
         position_noise_(model->description().training.position_noise),
         velocity_noise_(model->description().training.velocity_noise),
+        space_(model->description()),
         q_(environment_.q()),
-        v_(environment_.v()) {
+        v_(environment_.v()),
+        position_step_(v_.size()) {
     if (model->description().simulation.latency > 0) environment_.SendThroughDriver();
   }
 
@@ -30,7 +32,8 @@ class RobotSimulation : public Simulation {
     environment_.SetParameters(simulator.parameters);
     environment_.SetResidual(simulator.residual, simulator.draw);
     environment_.Reset(random);
-    if (simulator.q.size() > 0) environment_.SetState(simulator.q, simulator.v);
+    if (const Eigen::VectorXd& start = simulator.start; start.size() > 0)
+      environment_.SetState(start.head(q_.size()), start.tail(v_.size()));
     if (noisy()) noise_ = Random(uint64_t{random.Bits()} << 32 | random.Bits());
     Read();
   }
@@ -62,7 +65,9 @@ class RobotSimulation : public Simulation {
   void Read() {
     q_ = environment_.reading_q(), v_ = environment_.reading_v();
     if (!noisy()) return;
-    for (double& q : q_) q += position_noise_ * noise_.Normal();
+    Eigen::VectorXd& step = position_step_;
+    for (double& entry : step) entry = position_noise_ * noise_.Normal();
+    q_ = space_.Move(q_, step);
     for (double& v : v_) v += velocity_noise_ * noise_.Normal();
   }
 
@@ -70,7 +75,9 @@ class RobotSimulation : public Simulation {
   Environment environment_;
   double position_noise_, velocity_noise_;
   Random noise_{0};
-  Eigen::VectorXd q_, v_;  // what the policy is told
+  ConfigurationSpace space_;
+  Eigen::VectorXd q_, v_;          // what the policy is told
+  Eigen::VectorXd position_step_;  // that its q is off
   // of the one that steps others with itself
   std::unique_ptr<SimulatorLanes> lanes_;
   std::vector<Environment::Move> moves_;
@@ -79,12 +86,6 @@ class RobotSimulation : public Simulation {
 }  // namespace
 
 SimulationFactory SimulateRobot(const RobotDescription& description) {
-  const bool noisy = description.training.position_noise > 0;
-  if (noisy && description.num_positions() != description.num_velocities()) {
-    throw std::invalid_argument(
-        "position_noise: not for robots with spherical joints, whose positions are no numbers to "
-        "add to");
-  }
   return [model = std::make_shared<const Model>(description)] {
     return std::make_unique<RobotSimulation>(model);
   };

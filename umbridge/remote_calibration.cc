@@ -18,6 +18,7 @@
 #include "calibrator/inference/laplace.h"
 #include "robot/parameter_distribution.h"
 #include "sim/model.h"
+#include "umbridge/robot_models.h"
 
 namespace plumb {
 namespace {
@@ -38,6 +39,7 @@ class RemoteErrors {
         own_(std::make_shared<Model>(robot), rollouts, 1, ExecutionOptions()),
         steps_(std::make_shared<Model>(robot), rollouts, 1),
         noise_sd_(own_.noise_sd()) {
+    RequireNumbers(robot);
     Eigen::Index first = 0;
     for (const Rollout& rollout : rollouts) {
       first_.push_back(first);
@@ -103,8 +105,10 @@ class RemoteErrors {
       const Eigen::VectorXd next = model_.Evaluate(robot_.ToPhysical(coordinates.col(j)));
       for (size_t i = 0; i < rows().size(); ++i) {
         const WindowErrors::Row& row = rows()[i];
-        errors(static_cast<Eigen::Index>(i), j) = next(size * IndexOf(row) + row.coordinate) -
-                                                  EndReading(TransitionOf(row), row.coordinate);
+        const Transition& t = TransitionOf(row);
+        const Eigen::Index c = row.coordinate, n = own_.num_velocities();
+        errors(static_cast<Eigen::Index>(i), j) =
+            next(size * IndexOf(row) + c) - (c < n ? t.next_q(c) : t.next_v(c - n));
       }
       if (!errors.col(j).allFinite()) errors.col(j).setConstant(NAN);
     }

@@ -92,10 +92,18 @@ struct RobotModels::Parts {
   LeastSquares problem;
 };
 
+void RequireNumbers(const RobotDescription& robot) {
+  if (robot.num_positions() != robot.num_velocities())
+    throw std::invalid_argument(robot.name +
+                                " has a spherical joint, whose orientation is no list of numbers "
+                                "to learn from: next states have none");
+}
+
 RobotModels::RobotModels(const RobotDescription& robot, std::span<const Log> logs,
                          ExecutionOptions execution) {
   if (robot.parameters.empty())
     throw std::invalid_argument(robot.name + " has no uncertain parameters: there is no model");
+  RequireNumbers(robot);
   parts_ = std::make_unique<Parts>(robot, logs, execution);
 }
 

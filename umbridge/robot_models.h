@@ -13,6 +13,10 @@
 
 namespace plumb {
 
+/// Next states are lists of numbers.
+/// @throws std::invalid_argument for robots with spherical joints.
+void RequireNumbers(const RobotDescription& robot);
+
 /// What a robot's log says of its parameters, as functions of them. Each takes the n parameters in
 /// physical units, in the order of robot.parameters; T transitions, v velocities and as many
 /// positions:
@@ -26,8 +30,8 @@ namespace plumb {
 /// The noise is what a first fit finds, and so is the linearisation that whitens.
 class RobotModels {
  public:
-  /// Fits once: seconds. @throws std::invalid_argument if there is no uncertain parameter, or the
-  /// logs cannot be used (FitCurriculum).
+  /// Fits once: seconds. @throws std::invalid_argument if there is no uncertain parameter, a
+  /// spherical joint, or the logs cannot be used (FitCurriculum).
   RobotModels(const RobotDescription& robot, std::span<const Log> logs, ExecutionOptions execution);
   ~RobotModels();
 

@@ -25,11 +25,11 @@ std::shared_ptr<const Residual> MeanOf(const Residual& residual) {
 }
 
 // Mean over the entries that were observed, in standard units.
-double SquaredError(const Simulator::State& reading, const Transition& t,
-                    const Eigen::VectorXd& scale) {
+double SquaredError(const ConfigurationSpace& space, const Simulator::State& reading,
+                    const Transition& t, const Eigen::VectorXd& scale) {
   Eigen::ArrayXd error(scale.size()), recorded(scale.size());
-  recorded << t.next_q, t.next_v;
-  error << reading.q - t.next_q, reading.v - t.next_v;
+  recorded << space.Difference(t.next_q, t.next_q), t.next_v;
+  error << space.Difference(reading.q, t.next_q), reading.v - t.next_v;
   const auto observed = recorded.isFinite();
   const double mean = observed.select((error / scale.array()).square(), 0.0).sum() /
                       static_cast<double>(observed.count());
@@ -42,6 +42,7 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
                                           const Eigen::VectorXd& physical, const Residual& residual,
                                           std::span<const Rollout> rollouts,
                                           std::span<const int> horizons) {
+  const ConfigurationSpace space(model->description());
   const Eigen::VectorXd scale = MakeTask(model->description())->state_scale();
   const auto longest = static_cast<size_t>(*std::max_element(horizons.begin(), horizons.end()));
   Simulator simulator(model);
@@ -70,7 +71,7 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
                                         static_cast<int>(i - start + 1));
         if (horizon == horizons.data() + horizons.size()) continue;
         if (!t.next_q.array().isFinite().any() && !t.next_v.array().isFinite().any()) continue;
-        squares[horizon - horizons.data()] += SquaredError(simulator.Reading(), t, scale);
+        squares[horizon - horizons.data()] += SquaredError(space, simulator.Reading(), t, scale);
         ++windows[horizon - horizons.data()];
       }
     }

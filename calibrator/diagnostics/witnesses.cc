@@ -162,13 +162,14 @@ Eigen::MatrixXd PredictRows(OneStep& step, std::span<const WindowErrors::Row> ro
 std::vector<Whereabouts> FindWhereabouts(OneStep& step, std::span<const WindowErrors::Row> rows,
                                          const Eigen::VectorXd& physical,
                                          const Eigen::MatrixXd& starts) {
-  const Eigen::Index n = step.num_velocities();
   const Eigen::MatrixXd ends = step.Predict(physical, starts);
   const Index index = IndexOf(step);
   std::vector<Whereabouts> all;
   for (const auto& [first, last] : BlocksOf(rows)) {
     const Eigen::Index k = index.at({rows[first].rollout, rows[first].transition});
-    all.push_back({starts.col(k).head(n), starts.col(k).tail(n), ends.col(k).head(n)});
+    const auto at = static_cast<size_t>(k);
+    all.push_back({step.StartPositions(at, starts.col(k)),
+                   starts.col(k).tail(step.num_velocities()), step.EndPositions(at, ends.col(k))});
   }
   return all;
 }

@@ -48,13 +48,10 @@ Eigen::VectorXd ColumnSums(const Eigen::MatrixXd& values) {
 
 Discrepancy::Discrepancy(const RobotDescription& robot, ExecutionOptions execution)
     : n_(robot.num_velocities()),
+      space_(robot),
       windows_(std::make_shared<Model>(robot), execution.threads),
       scale_(MakeTask(robot)->state_scale()),
-      batches_(execution.batches) {
-  if (robot.num_positions() != robot.num_velocities()) {
-    throw std::invalid_argument("calibration does not know spherical joints yet");
-  }
-}
+      batches_(execution.batches) {}
 
 void Discrepancy::OneStep(std::span<const Rollout> rollouts, std::vector<Window>* windows,
                           Ends* ends) const {
@@ -97,9 +94,10 @@ Eigen::MatrixXd Discrepancy::Residuals(const Eigen::MatrixXd& parameters,
           [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
             auto errors =
                 residuals.col(sample).segment(static_cast<Eigen::Index>(window) * size, size);
+            const Eigen::VectorXd off = space_.Difference(q, ends[window]->next_q);
             for (Eigen::Index i = 0; i < n_; ++i) {
               errors(2 * i) = v(i) - ends[window]->next_v(i);
-              errors(2 * i + 1) = q(i) - ends[window]->next_q(i);
+              errors(2 * i + 1) = off(i);
             }
           });
   const std::array<Eigen::Index, 2> step{0, size};
@@ -200,11 +198,10 @@ Eigen::VectorXd Discrepancy::TrajectoryErrorHere(const Eigen::MatrixXd& paramete
     const Transition& transition = first[window][step];
     auto row =
         errors[static_cast<size_t>(sample)].row(rows[window] + static_cast<Eigen::Index>(step));
-    row << (q - transition.next_q).transpose(), (v - transition.next_v).transpose();
+    row << space_.Difference(q, transition.next_q).transpose(), (v - transition.next_v).transpose();
     row.array() /= scale_.transpose().array();
-    for (Eigen::Index i = 0; i < n_; ++i) {  // what was not observed is not compared
-      if (std::isnan(transition.next_q(i))) row(i) = 0;
-      if (std::isnan(transition.next_v(i))) row(n_ + i) = 0;
+    for (Eigen::Index i = 0; i < 2 * n_; ++i) {  // what was not observed is not compared
+      if (!IsObserved(space_, transition, i)) row(i) = 0;
     }
   };
   Predict(parameters, windows, visit, /*last_only=*/false);
@@ -245,10 +242,11 @@ Eigen::VectorXd Discrepancy::PredictionErrorHere(const Eigen::MatrixXd& paramete
   Predict(
       parameters, windows,
       [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
+        const Transition& end = *ends[window];
         Eigen::VectorXd error(2 * n_);
-        error << q - ends[window]->next_q, v - ends[window]->next_v;
-        const Eigen::ArrayXd recorded =
-            (Eigen::ArrayXd(2 * n_) << ends[window]->next_q, ends[window]->next_v).finished();
+        error << space_.Difference(q, end.next_q), v - end.next_v;
+        Eigen::ArrayXd recorded(2 * n_);  // NaN where it is not
+        recorded << space_.Difference(end.next_q, end.next_q), end.next_v;
         const auto observed = recorded.isFinite();
         const double mean = observed.select((error.array() / scale_.array()).square(), 0.0).sum() /
                             static_cast<double>(observed.count());

@@ -6,6 +6,7 @@
 
 #include "calibrator/motion/transitions.h"
 #include "common/batch_runner.h"
+#include "robot/configuration_space.h"
 #include "sim/tasks/task.h"
 #include "sim/windows.h"
 
@@ -19,8 +20,7 @@ class Discrepancy {
  public:
   static constexpr double kDegreesOfFreedom = 4;
 
-  /// @throws std::invalid_argument if there is no simulator of the robot, or it has spherical
-  /// joints.
+  /// @throws std::invalid_argument if there is no simulator of the robot.
   explicit Discrepancy(const RobotDescription& robot, ExecutionOptions execution = {});
 
   /// Step-based (Cui & Hensel): reset to s, apply what was applied, compare with s'. The squared
@@ -76,6 +76,7 @@ class Discrepancy {
                                     std::span<const Rollout> rollouts);
 
   Eigen::Index n_;
+  ConfigurationSpace space_;
   Windows windows_;
   Eigen::VectorXd scale_;
   Windows::Failures failures_;

@@ -1,5 +1,7 @@
 #include "calibrator/fit/recorded_window.h"
 
+#include <cmath>
+
 namespace plumb {
 
 size_t StretchLength(const Rollout& rollout, size_t first) {
@@ -33,12 +35,27 @@ void BeginTransition(const Rollout& rollout, size_t i, Simulator* simulator) {
   simulator->SetReading(window.q, window.v, before, window.steps.front().front().effort);
 }
 
-double EndReading(const Transition& t, Eigen::Index c) {
-  return c < t.next_q.size() ? t.next_q(c) : t.next_v(c - t.next_q.size());
+double EndError(const ConfigurationSpace& space, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                const Transition& t, Eigen::Index c) {
+  const Eigen::Index n = t.next_v.size();
+  return c < n ? space.Difference(q, t.next_q, c) : v(c - n) - t.next_v(c - n);
 }
 
 double EndSd(const Transition& t, Eigen::Index c) {
-  return c < t.next_q.size() ? t.next_q_sd(c) : t.next_v_sd(c - t.next_q.size());
+  return c < t.next_q_sd.size() ? t.next_q_sd(c) : t.next_v_sd(c - t.next_q_sd.size());
+}
+
+bool IsObserved(const ConfigurationSpace& space, const Transition& t, Eigen::Index c) {
+  const Eigen::Index n = t.next_v.size();
+  return std::isfinite(c < n ? space.Difference(t.next_q, t.next_q, c) : t.next_v(c - n));
+}
+
+void MoveStart(const ConfigurationSpace& space, Eigen::Index c, double by, Window* window) {
+  const Eigen::Index n = window->v.size();
+  if (c < n)
+    space.Move(c, by, window->q);
+  else
+    window->v(c - n) += by;
 }
 
 Eigen::VectorXd StartSd(const Transition& t) {

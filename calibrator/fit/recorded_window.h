@@ -5,14 +5,15 @@
 #include <span>
 
 #include "calibrator/motion/transitions.h"
+#include "robot/configuration_space.h"
 #include "sim/model.h"
 #include "sim/simulator.h"
 #include "sim/windows.h"
 
 namespace plumb {
 
-// Recorded motion as simulators' windows begin and end with it. (q, v) has 2 n entries: n
-// positions, n velocities. All of these are thread-safe.
+// Recorded motion as simulators' windows begin and end with it. Errors of (q, v) have 2 n entries:
+// n of positions (ConfigurationSpace::Difference), n of velocities. All of these are thread-safe.
 
 /// How many transitions of a roll-out from `first` on follow each other without a gap, at least 1.
 /// What has disturbed one of them is not simulated: it is a stretch of its own.
@@ -28,10 +29,15 @@ Window RecordedWindow(const Model& model, const Rollout& rollout, size_t first, 
 /// way as far as RecordedWindow knows them.
 void BeginTransition(const Rollout& rollout, size_t i, Simulator* simulator);
 
-/// Entry c of (q, v) at a transition's end, physical units, NaN = not observed; and its standard
-/// deviation, NaN = not known.
-double EndReading(const Transition& transition, Eigen::Index c);
+/// Entry c of the error of (q, v) at a transition's end: predicted minus recorded, physical units,
+/// NaN = not observed; and the record's standard deviation, NaN = not known.
+double EndError(const ConfigurationSpace& space, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                const Transition& transition, Eigen::Index c);
 double EndSd(const Transition& transition, Eigen::Index c);
+/// Whether that entry was observed at all: of a quaternion all or nothing.
+bool IsObserved(const ConfigurationSpace& space, const Transition& transition, Eigen::Index c);
+/// The state with which a window begins, moved by so much in entry c.
+void MoveStart(const ConfigurationSpace& space, Eigen::Index c, double by, Window* window);
 
 /// Standard deviations of (q, v) at a transition's beginning: 0 = exact, NaN = not known.
 Eigen::VectorXd StartSd(const Transition& transition);

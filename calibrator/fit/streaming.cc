@@ -33,6 +33,7 @@ StreamingLaplace::StreamingLaplace(std::shared_ptr<const Model> model)
     : model_(std::move(model)),
       prior_(PriorOf(model_->description())),
       windows_(model_, 1),
+      space_(model_->description()),
       n_(model_->num_velocities()),
       p_(prior_.size()),
       mode_(Eigen::VectorXd::Zero(p_)),
@@ -40,10 +41,7 @@ StreamingLaplace::StreamingLaplace(std::shared_ptr<const Model> model)
       noise_sd_(GuessedNoise(model_->description())),
       scale_(Eigen::VectorXd::Ones(2 * n_)),
       sums_(static_cast<int>(2 * n_), mode_),
-      next_sums_(sums_) {
-  if (model_->num_positions() != n_)
-    throw std::invalid_argument("calibration does not know spherical joints yet");
-}
+      next_sums_(sums_) {}
 
 bool StreamingLaplace::Add(const Transition& transition, int64_t episode) {
   std::vector<size_t> turns = NextInTurn();
@@ -60,7 +58,7 @@ bool StreamingLaplace::Add(const Transition& transition, int64_t episode) {
               {}};
   int unknown = 0;
   for (int c = 0; c < static_cast<int>(2 * n_); ++c) {
-    if (!std::isfinite(EndReading(transition, c))) continue;
+    if (!IsObserved(space_, transition, c)) continue;
     piece.coordinates.push_back(c);
     unknown += !(EndSd(transition, c) > 0);
   }
@@ -127,16 +125,26 @@ const Transition& StreamingLaplace::TransitionOf(const Piece& piece) const {
   return rollouts_[piece.rollout].transitions[piece.transition];
 }
 
+// About which rotations at the end of a transition are counted.
+const Eigen::VectorXd& StreamingLaplace::AboutOf(const Piece& piece) const {
+  const Transition& t = TransitionOf(piece);
+  return t.next_q.allFinite() ? t.next_q : t.q;
+}
+
 // States at the windows' ends, 2 n rows for each window; NaN where the simulation fails.
+// @param indices of the pieces that they are, each of so many windows one after the other.
 Eigen::MatrixXd StreamingLaplace::Predict(const Eigen::MatrixXd& standard,
-                                          const std::vector<Window>& windows) {
+                                          const std::vector<Window>& windows,
+                                          const std::vector<size_t>& indices) {
+  const size_t each = windows.size() / std::max<size_t>(1, indices.size());
   const Eigen::MatrixXd physical =
       PhysicalColumns(model_->description(), prior_.FromStandard(standard));
   Eigen::MatrixXd ends(2 * n_ * static_cast<Eigen::Index>(windows.size()), physical.cols());
   windows_.Predict(physical, windows,
                    [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
                      const Eigen::Index first = 2 * n_ * static_cast<Eigen::Index>(window);
-                     ends.col(sample).segment(first, n_) = q;
+                     ends.col(sample).segment(first, n_) =
+                         space_.Coordinates(q, AboutOf(pieces_[indices[window / each]]));
                      ends.col(sample).segment(first + n_, n_) = v;
                    });
   simulated_steps_ += static_cast<int64_t>(windows.size()) * physical.cols();
@@ -152,24 +160,27 @@ void StreamingLaplace::Linearise(const std::vector<size_t>& indices) {
   }
   Eigen::MatrixXd at = mode_.replicate(1, 1 + p_);
   at.rightCols(p_).diagonal().array() += kSlopeDifference;
-  const Eigen::MatrixXd ends = Predict(at, windows);
+  const Eigen::MatrixXd ends = Predict(at, windows, indices);
   const auto sensitivities = StartSensitivities(indices, windows, ends.col(0));
   for (size_t k = 0; k < indices.size(); ++k) {
     Piece& piece = pieces_[indices[k]];
     const Eigen::Index first = 2 * n_ * static_cast<Eigen::Index>(k);
     if (piece.coordinates.empty() || !ends.col(0).segment(first, 2 * n_).allFinite()) continue;
     Eigen::MatrixXd raw(static_cast<Eigen::Index>(piece.coordinates.size()), 1 + p_);
+    const Transition& transition = TransitionOf(piece);
+    Eigen::VectorXd reading(2 * n_);
+    reading << space_.Coordinates(transition.next_q, AboutOf(piece)), transition.next_v;
     for (Eigen::Index i = 0; i < raw.rows(); ++i) {
       const int c = piece.coordinates[static_cast<size_t>(i)];
       raw.row(i) = ends.row(first + c);
       raw.row(i).tail(p_).array() -= raw(i, 0);
-      raw(i, 0) -= EndReading(TransitionOf(piece), c);
+      raw(i, 0) -= reading(c);
     }
     for (Eigen::Index j = 1; j <= p_; ++j) {
       if (raw.col(j).allFinite()) continue;
       // Where one step forward is no simulator, one backward has to do.
-      const Eigen::MatrixXd back =
-          Predict(mode_ - kSlopeDifference * Eigen::VectorXd::Unit(p_, j - 1), {windows[k]});
+      const Eigen::MatrixXd back = Predict(
+          mode_ - kSlopeDifference * Eigen::VectorXd::Unit(p_, j - 1), {windows[k]}, {indices[k]});
       for (Eigen::Index i = 0; i < raw.rows(); ++i) {
         const int c = piece.coordinates[static_cast<size_t>(i)];
         raw(i, j) = ends(first + c, 0) - back(c, 0);
@@ -188,18 +199,19 @@ std::vector<Eigen::MatrixXd> StreamingLaplace::StartSensitivities(
     const Eigen::VectorXd& middle) {
   const Eigen::VectorXd differences = StartDifferences(noise_sd_);
   std::vector<Window> moved;
-  std::vector<size_t> uncertain;
+  std::vector<size_t> uncertain, moved_of;
   for (size_t k = 0; k < indices.size(); ++k) {
     if (!pieces_[indices[k]].start_uncertain) continue;
     uncertain.push_back(k);
+    moved_of.push_back(indices[k]);
     for (Eigen::Index c = 0; c < 2 * n_; ++c) {
       moved.push_back(windows[k]);
-      (c < n_ ? moved.back().q(c) : moved.back().v(c - n_)) += differences(c);
+      MoveStart(space_, c, differences(c), &moved.back());
     }
   }
   std::vector<Eigen::MatrixXd> sensitivities(indices.size());
   if (moved.empty()) return sensitivities;
-  const Eigen::MatrixXd ends = Predict(mode_, moved);
+  const Eigen::MatrixXd ends = Predict(mode_, moved, moved_of);
   for (size_t u = 0; u < uncertain.size(); ++u) {
     const size_t k = uncertain[u];
     Eigen::MatrixXd sensitivity = Eigen::MatrixXd::Map(

@@ -10,6 +10,7 @@
 #include "calibrator/inference/prior.h"
 #include "calibrator/motion/transitions.h"
 #include "common/gaussian.h"
+#include "robot/configuration_space.h"
 #include "sim/windows.h"
 
 namespace plumb {
@@ -33,7 +34,6 @@ namespace plumb {
 /// transitions in the same order. Not thread-safe; works in the caller's thread.
 class StreamingLaplace {
  public:
-  /// @throws std::invalid_argument if the robot has spherical joints.
   explicit StreamingLaplace(std::shared_ptr<const Model> model);
 
   /// Takes one more transition. @param episode that it is of: efforts of the one before it, if it
@@ -78,7 +78,9 @@ class StreamingLaplace {
   double DistanceFrom(const Eigen::VectorXd& at) const;
   std::vector<size_t> NextInTurn();
   void Linearise(const std::vector<size_t>& indices);
-  Eigen::MatrixXd Predict(const Eigen::MatrixXd& standard, const std::vector<Window>& windows);
+  const Eigen::VectorXd& AboutOf(const Piece& piece) const;
+  Eigen::MatrixXd Predict(const Eigen::MatrixXd& standard, const std::vector<Window>& windows,
+                          const std::vector<size_t>& indices);
   std::vector<Eigen::MatrixXd> StartSensitivities(const std::vector<size_t>& indices,
                                                   const std::vector<Window>& windows,
                                                   const Eigen::VectorXd& middle);
@@ -91,6 +93,7 @@ class StreamingLaplace {
   std::shared_ptr<const Model> model_;
   Prior prior_;
   Windows windows_;
+  ConfigurationSpace space_;
   Eigen::Index n_, p_;
   std::vector<Rollout> rollouts_;  // what came, one for each episode without another in between
   std::deque<Piece> pieces_;       // of each transition, in order

@@ -37,9 +37,8 @@ WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const R
     : n_(model->num_velocities()),
       rollouts_(rollouts),
       simulate_(std::move(model), execution.threads),
+      space_(simulate_.model().description()),
       batches_(execution.batches) {
-  if (simulate_.model().num_positions() != n_)
-    throw std::invalid_argument("calibration does not know spherical joints yet");
   scale_ = MakeTask(simulate_.model().description())->state_scale();
   noise_sd_ = GuessedNoise(simulate_.model().description());
   const auto longest = static_cast<size_t>(std::max(1, horizon));
@@ -68,7 +67,7 @@ void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
     step_rows.push_back(static_cast<Eigen::Index>(rows_.size()));
     const Transition& t = transitions[i];
     for (Eigen::Index c = 0; c < 2 * n_; ++c) {
-      if (!std::isfinite(EndReading(t, c))) continue;
+      if (!IsObserved(space_, t, c)) continue;
       rows_.push_back({static_cast<int>(windows_.size()), static_cast<int>(rollout),
                        static_cast<int>(i), static_cast<int>(c)});
     }
@@ -126,9 +125,7 @@ Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical,
         const auto& step_rows = step_rows_[window];
         for (Eigen::Index i = step_rows[step]; i < step_rows[step + 1]; ++i) {
           const Row& row = rows_[static_cast<size_t>(i)];
-          const Transition& t = TransitionOf(row);
-          const Eigen::Index c = row.coordinate;
-          errors(i, sample) = (c < n_ ? q(c) : v(c - n_)) - EndReading(t, c);
+          errors(i, sample) = EndError(space_, q, v, TransitionOf(row), row.coordinate);
         }
       },
       /*last_only=*/false);
@@ -169,7 +166,7 @@ bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
   for (Eigen::Index c = 0; c < 2 * n_; ++c) {
     std::vector<Window> moved = windows_;
     const double h = differences(c);
-    for (Window& window : moved) (c < n_ ? window.q(c) : window.v(c - n_)) += h;
+    for (Window& window : moved) MoveStart(space_, c, h, &window);
     sensitivity.col(c) = (Predict(physical, moved, static_cast<uint64_t>(c) + 1) - middle) / h;
   }
   const bool good = sensitivity.allFinite();

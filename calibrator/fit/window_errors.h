@@ -8,13 +8,14 @@
 
 #include "calibrator/motion/transitions.h"
 #include "common/batch_runner.h"
+#include "robot/configuration_space.h"
 #include "sim/windows.h"
 
 namespace plumb {
 
-/// A guess of the sensors' noise where nobody says, for each entry of (q, v), physical units:
-/// a thousandth of the task's units of the state. Only a beginning: the scale of the errors is
-/// estimated.
+/// A guess of the sensors' noise where nobody says, for each entry of (q, v)'s errors, physical
+/// units: a thousandth of the task's units of the state. Only a beginning: the scale of the errors
+/// is estimated.
 Eigen::VectorXd GuessedNoise(const RobotDescription& robot);
 
 /// The step of each entry of (q, v) in finite differences with respect to the initial state: large
@@ -40,12 +41,11 @@ class WindowErrors {
   struct Row {
     int window;
     int rollout, transition;  ///< at whose end
-    int coordinate;           ///< 0 ... n - 1: q, n ... 2 n - 1: v
+    int coordinate;           ///< 0 ... n - 1: of q's differences, n ... 2 n - 1: of v
   };
 
   /// @param rollouts must outlive this. @param every k: only each k-th window is kept; >= 1.
-  /// @throws std::invalid_argument if the robot has spherical joints or there is no transition with
-  /// an observed end.
+  /// @throws std::invalid_argument if there is no transition with an observed end.
   WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
                ExecutionOptions execution, int every = 1);
 
@@ -104,6 +104,7 @@ class WindowErrors {
   Eigen::Index n_;
   std::span<const Rollout> rollouts_;
   Windows simulate_;
+  ConfigurationSpace space_;
   std::vector<Window> windows_;
   std::vector<Start> starts_;
   std::vector<Row> rows_;

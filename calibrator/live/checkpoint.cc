@@ -14,6 +14,7 @@
 
 #include "common/atomic_file.h"
 #include "common/checked_file.h"
+#include "robot/configuration_space.h"
 #include "robot/json_text.h"
 #include "robot/parameter_distribution.h"
 #include "robot/physical.h"
@@ -156,13 +157,17 @@ void RequireTransitions(const Rollout& rollout, const RobotDescription& robot) {
     if (x.size() != size || !std::all_of(x.begin(), x.end(), good))
       throw std::runtime_error("a transition has the wrong size or is not physical");
   };
+  const ConfigurationSpace space(robot);
   const int positions = robot.num_positions(), velocities = robot.num_velocities();
   for (const Transition& t : rollout.transitions) {
     for (const Eigen::VectorXd* q : {&t.q, &t.next_q}) require(*q, positions, IsPhysical);
     for (const Eigen::VectorXd* v : {&t.v, &t.next_v}) require(*v, velocities, IsPhysical);
-    for (const Eigen::VectorXd* sd : {&t.q_sd, &t.next_q_sd}) require(*sd, positions, IsPhysicalSd);
-    for (const Eigen::VectorXd* sd : {&t.v_sd, &t.next_v_sd})
+    for (const Eigen::VectorXd* sd : {&t.q_sd, &t.next_q_sd, &t.v_sd, &t.next_v_sd})
       require(*sd, velocities, IsPhysicalSd);
+    for (const Eigen::VectorXd* q : {&t.q, &t.next_q}) {
+      if (const std::string fault = space.Fault(*q); !fault.empty())
+        throw std::runtime_error("a transition's q " + fault);
+    }
     for (const EffortSegment& segment : t.efforts) {
       require(segment.effort, velocities, IsPhysical);
       if (!(segment.duration > 0)) throw std::runtime_error("an effort lasts no time");

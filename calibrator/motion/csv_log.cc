@@ -187,9 +187,9 @@ class Assembly {
       return false;
     }
     const bool read = (before.linked && before.shared) || (after.linked && after.shared);
-    t.q_sd.setConstant(t.q.size(), read ? kNaN : 0);
+    t.q_sd.setConstant(t.v.size(), read ? kNaN : 0);
     t.v_sd.setConstant(t.v.size(), read ? kNaN : 0);
-    t.next_q_sd.setConstant(t.q.size(), kNaN);
+    t.next_q_sd.setConstant(t.v.size(), kNaN);
     t.next_v_sd.setConstant(t.v.size(), kNaN);
     return true;
   }

@@ -12,7 +12,8 @@ namespace plumb {
 /// ignored:
 ///   t   [s]; begins anew, or goes on, with every episode
 ///   q/<joint>, v/<joint>   [rad or m], [rad/s or m/s]: the state s. Where it is not known in full,
-///       no transition begins. A spherical joint has /w, /x, /y, /z in q and /x, /y, /z in v
+///       no transition begins. A spherical joint has /w, /x, /y, /z in q, a unit quaternion within
+///       a thousandth, and /x, /y, /z in v
 ///   u/<joint>   of each driven joint: effort / Task::action_unit, held for one control period. As
 ///       in the simulator, it is clipped to the effort limits and acts simulation.latency late, the
 ///       one before until then; before an episode there was none

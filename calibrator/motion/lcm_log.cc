@@ -33,7 +33,10 @@ class EpisodeJoiner {
       : robot_(robot), rollouts_(*rollouts), joiner_(TransitionJoiner::Unbounded(robot)) {}
 
   void OnState(const robot_state_t& state) {
-    if (!Fits(state.num_joints) || state.sequence < 0 || state.sequence > kLargest) return;
+    if (!Fits(state.num_positions, robot_.num_positions(), "coordinates") ||
+        !Fits(state.num_velocities, robot_.num_velocities(), "velocities") || state.sequence < 0 ||
+        state.sequence > kLargest)
+      return;
     if (state.utime < -kLargest || state.utime > kLargest) return;
     const robot_state_t* newest = joiner_.FindState(joiner_.newest_state());
     if (newest && (state.sequence < newest->sequence - kReordered ||
@@ -48,7 +51,7 @@ class EpisodeJoiner {
   }
 
   void OnCommand(const joint_command_t& command) {
-    if (!Fits(command.num_joints)) return;
+    if (!Fits(command.num_joints, robot_.num_joints(), "joints")) return;
     // It would make of its episode one that is never over, which those behind it wait for.
     if (!MayCome(command.state_sequence)) {
       ++implausible_;
@@ -92,9 +95,14 @@ class EpisodeJoiner {
     return sum += joiner_.drops();
   }
   int64_t fitting() const { return fitting_; }
-  /// Messages of a robot with another number of joints, and the newest such number.
+  /// Messages of a robot with another number of joints, coordinates or velocities; of the newest
+  /// its number and ours.
   int64_t foreign() const { return foreign_; }
-  int foreign_joints() const { return foreign_joints_; }
+  struct Numbers {
+    int its, ours;
+    const char* of_what;
+  };
+  const Numbers& foreign_numbers() const { return foreign_numbers_; }
   /// Episodes that were not over when too many others were under way.
   int64_t cut_off() const { return cut_off_; }
   /// Commands that answer a state which no robot has been in.
@@ -108,10 +116,10 @@ class EpisodeJoiner {
     std::optional<int64_t> named_state;  // that ended it, says CONTROLLER_STATUS
   };
 
-  bool Fits(int joints) {
-    if (joints == robot_.num_joints()) return ++fitting_, true;
+  bool Fits(int entries, int ours, const char* of_what) {
+    if (entries == ours) return ++fitting_, true;
     ++foreign_;
-    foreign_joints_ = joints;
+    foreign_numbers_ = {entries, ours, of_what};
     return false;
   }
 
@@ -160,7 +168,7 @@ class EpisodeJoiner {
   std::deque<Episode> episodes_;  // not joined yet, in the order in which they began
   DropCounts drops_of_earlier_runs_;
   int64_t fitting_ = 0, foreign_ = 0;
-  int foreign_joints_ = 0;
+  Numbers foreign_numbers_{};
   int64_t cut_off_ = 0, implausible_ = 0;
 };
 
@@ -184,9 +192,9 @@ Log ReadLcmLog(const std::string& file, const RobotDescription& robot) {
         fmt::format("{} commands answer states that the robot was never in", joiner.implausible()));
   }
   if (joiner.foreign() > 0) {
-    log.warnings.push_back(fmt::format("{} messages are of a robot with {} joints, '{}' has {}",
-                                       joiner.foreign(), joiner.foreign_joints(), robot.name,
-                                       robot.num_joints()));
+    const auto& [its, ours, of_what] = joiner.foreign_numbers();
+    log.warnings.push_back(fmt::format("{} messages are of a robot with {} {}, '{}' has {}",
+                                       joiner.foreign(), its, of_what, robot.name, ours));
   }
   if (!log.rollouts.empty()) return log;
   if (log.drops.model_based > 0) {

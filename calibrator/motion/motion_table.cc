@@ -11,6 +11,7 @@
 
 #include "calibrator/motion/csv_reader.h"
 #include "common/nearest_name.h"
+#include "robot/configuration_space.h"
 #include "robot/physical.h"
 #include "sim/tasks/task.h"
 
@@ -156,7 +157,20 @@ class Efforts {
   int64_t clipped_ = 0;
 };
 
-std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns, Efforts& efforts) {
+/// Quaternions of unit length, each the continuation of the row's before.
+/// @return what is wrong with one that is none; empty if there is none such.
+std::string Normalise(const ConfigurationSpace& space, const std::vector<MotionRow>& rows,
+                      MotionRow* row) {
+  if (space.flat()) return {};
+  Transition& t = row->transition;
+  std::string fault = space.Normalise(rows.empty() ? t.q : rows.back().transition.q, t.q);
+  if (!fault.empty()) return "q " + fault;
+  if (t.next_q.size() > 0) fault = space.Normalise(t.q, t.next_q);
+  return fault.empty() ? fault : "next_q " + fault;
+}
+
+std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns, Efforts& efforts,
+                                const ConfigurationSpace& space) {
   std::vector<MotionRow> rows;
   while (table.Next()) {
     MotionRow row{Number(table, columns.t, kLatest),
@@ -173,6 +187,7 @@ std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns, Effort
       row.transition.next_q = Numbers(table, columns.next_q);
       row.transition.next_v = Numbers(table, columns.next_v);
     }
+    if (const std::string fault = Normalise(space, rows, &row); !fault.empty()) table.Fail(fault);
     rows.push_back(std::move(row));
   }
   return rows;
@@ -231,7 +246,8 @@ MotionTable ReadMotionTable(const std::string& file, const RobotDescription& rob
   const Names names(robot);
   const Columns columns = FindColumns(table, names, robot.name);
   Efforts efforts(robot);
-  MotionTable motion{ReadRows(table, columns, efforts), columns.has_next(), {}};
+  MotionTable motion{
+      ReadRows(table, columns, efforts, ConfigurationSpace(robot)), columns.has_next(), {}};
   motion.warnings = Warnings(motion.rows, names, efforts.clipped());
   return motion;
 }
@@ -248,6 +264,7 @@ MotionTable MakeMotionTable(const MotionColumns& columns, const RobotDescription
   if (!columns.ends.empty() && columns.ends.size() != static_cast<size_t>(rows))
     throw std::invalid_argument("terminated, truncated: one entry for each row");
   Efforts efforts(robot);
+  const ConfigurationSpace space(robot);
   MotionTable motion{{}, has_next, {}};
   for (Eigen::Index i = 0; i < rows; ++i) {
     MotionRow row{columns.t(i),
@@ -262,6 +279,8 @@ MotionTable MakeMotionTable(const MotionColumns& columns, const RobotDescription
     row.transition.q = columns.q.row(i), row.transition.v = columns.v.row(i);
     if (has_next)
       row.transition.next_q = columns.next_q.row(i), row.transition.next_v = columns.next_v.row(i);
+    if (const std::string fault = Normalise(space, motion.rows, &row); !fault.empty())
+      throw std::invalid_argument(fmt::format("{}, in row {}", fault, i));
     motion.rows.push_back(std::move(row));
   }
   motion.warnings = Warnings(motion.rows, Names(robot), efforts.clipped());

@@ -82,7 +82,8 @@ DropCounts& DropCounts::operator+=(const DropCounts& other) {
 }
 
 TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
-    : n_(robot.num_joints()),
+    : num_joints_(robot.num_joints()),
+      space_(robot),
       period_(robot.task.period),
       greatest_effort_(GreatestEffort(robot)),
       max_states_(kMaxStates),
@@ -102,7 +103,10 @@ const robot_state_t* TransitionJoiner::FindState(int64_t sequence) const {
 }
 
 void TransitionJoiner::OnState(const robot_state_t& smoothed) {
-  if (smoothed.num_joints != n_ || smoothed.utime < -kLatest || smoothed.utime > kLatest) return;
+  if (smoothed.num_positions != space_.num_positions() ||
+      smoothed.num_velocities != space_.num_velocities())
+    return;
+  if (smoothed.utime < -kLatest || smoothed.utime > kLatest) return;
   // A restarted driver counts from 0 again, at a later time; what was before cannot be joined with
   // it.
   if (!states_.empty() && smoothed.sequence <= newest_state() &&
@@ -121,7 +125,7 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
 }
 
 void TransitionJoiner::OnCommand(const joint_command_t& command) {
-  if (command.num_joints != n_ || command.episode < 0 || command.step < 0 ||
+  if (command.num_joints != num_joints_ || command.episode < 0 || command.step < 0 ||
       command.step >= kMaxSteps)
     return;
   const bool is_new =
@@ -228,6 +232,7 @@ bool TransitionJoiner::JoinOne(int64_t from, int64_t to, Transition* transition,
   for (const Eigen::VectorXd* x :
        {&transition->q, &transition->v, &transition->next_q, &transition->next_v})
     physical = physical && std::all_of(x->begin(), x->end(), IsPhysical);
+  physical = physical && space_.Has(transition->q) && space_.Has(transition->next_q);
   for (const Eigen::VectorXd* sd :
        {&transition->q_sd, &transition->v_sd, &transition->next_q_sd, &transition->next_v_sd})
     physical = physical && std::all_of(sd->begin(), sd->end(), IsPhysicalSd);

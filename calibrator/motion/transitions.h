@@ -10,6 +10,7 @@
 
 #include "plumb/joint_command_t.hpp"
 #include "plumb/robot_state_t.hpp"
+#include "robot/configuration_space.h"
 #include "robot/description.h"
 #include "sim/simulator.h"
 
@@ -22,7 +23,8 @@ struct Transition {
   int step;                        ///< in the episode
   Eigen::VectorXd q, v;            ///< smoothed state, finite
   Eigen::VectorXd next_q, next_v;  ///< smoothed state; NaN = not observed
-  /// Their standard deviations. 0 = exact; NaN = not known, to be estimated from the errors.
+  /// Their standard deviations, num_velocities entries each, q's as ConfigurationSpace has its
+  /// differences. 0 = exact; NaN = not known, to be estimated from the errors.
   Eigen::VectorXd q_sd, v_sd, next_q_sd, next_v_sd;
   std::vector<EffortSegment> efforts;  ///< from s to s', gapless
   /// Directions, columns of 2 n entries (positions, velocities), each a standard deviation long, in
@@ -43,10 +45,11 @@ size_t CountTransitions(std::span<const Rollout> rollouts);
 
 /// Why transitions were left out, counted since the start. Nothing is ever guessed.
 struct DropCounts {
-  int64_t gap = 0;         ///< a state or a command is missing
-  int64_t late = 0;        ///< the interval is not one control period (within 20 %)
-  int64_t not_finite = 0;  ///< or not physical (robot/physical.h), or an effort is unknown
-  int64_t restart = 0;     ///< the estimator's filter restarted within the interval
+  int64_t gap = 0;   ///< a state or a command is missing
+  int64_t late = 0;  ///< the interval is not one control period (within 20 %)
+  /// or not physical (robot/physical.h), or an effort is unknown, or a quaternion is no unit one
+  int64_t not_finite = 0;
+  int64_t restart = 0;  ///< the estimator's filter restarted within the interval
   /// the simulator's dynamics are in a state: what it tells of parameters is what was put in
   int64_t model_based = 0;
   int64_t total() const { return gap + late + not_finite + restart + model_based; }
@@ -111,7 +114,8 @@ class TransitionJoiner {
   using Commands = std::map<int64_t, std::map<int, Answer>>;  // by episode, by step
   void ForgetEpisode(Commands::iterator episode);
 
-  int n_;
+  int num_joints_;
+  ConfigurationSpace space_;
   double period_, greatest_effort_;
   size_t max_states_, max_episodes_, max_commands_;
   std::map<int64_t, robot_state_t> states_;  // by sequence

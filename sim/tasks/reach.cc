@@ -40,13 +40,13 @@ std::vector<std::string> ObservationNames(const RobotDescription& description) {
 }
 
 Eigen::VectorXd StateScale(const RobotDescription& description) {
-  Eigen::VectorXd scale(description.num_positions() + description.num_velocities());
-  Eigen::Index q = 0, v = description.num_positions();
+  const Eigen::Index n = description.num_velocities();
+  Eigen::VectorXd scale(2 * n);
+  Eigen::Index at = 0;
   for (const JointDescription& joint : description.joints) {
-    scale.segment(q, joint.num_positions()).setConstant(Scale(joint));
-    scale.segment(v, joint.num_velocities()).setConstant(kSpeedScale * Scale(joint));
-    q += joint.num_positions();
-    v += joint.num_velocities();
+    scale.segment(at, joint.num_velocities()).setConstant(Scale(joint));
+    scale.segment(n + at, joint.num_velocities()).setConstant(kSpeedScale * Scale(joint));
+    at += joint.num_velocities();
   }
   return scale;
 }

@@ -51,7 +51,7 @@ class Task {
                             Eigen::Ref<Eigen::VectorXd> v) const = 0;
 
   /// Units in which errors of predicted states are measured, so that angles and velocities can be
-  /// added: (scale of q, scale of v), entries > 0.
+  /// added: (scale of q's differences, scale of v), 2 num_velocities entries > 0.
   const Eigen::VectorXd& state_scale() const { return state_scale_; }
 
   /// Policy units to effort: clips to [-1, 1] and multiplies by the joints' effort limits. A NaN

@@ -52,12 +52,12 @@ std::vector<std::string> ObservationNames(const RobotDescription& description) {
 /// Of what a step of walking makes of each: 0.1 m and 0.1 rad of the trunk, 0.5 rad of the legs;
 /// half a metre and a radian a second, 5 rad/s.
 Eigen::VectorXd StateScale(const RobotDescription& description) {
-  const Eigen::Index nq = description.num_positions(), nv = description.num_velocities();
-  Eigen::VectorXd scale = Eigen::VectorXd::Constant(nq + nv, 5);
-  scale.head(nq).setConstant(0.5);
-  scale.head(std::min<Eigen::Index>(nq, kBaseQ)).setConstant(0.1);
-  scale.segment(nq, std::min<Eigen::Index>(nv, 3)).setConstant(0.5);
-  if (nv >= kBaseV) scale.segment(nq + 3, 3).setConstant(1);
+  const Eigen::Index n = description.num_velocities();
+  Eigen::VectorXd scale = Eigen::VectorXd::Constant(2 * n, 5);
+  scale.head(n).setConstant(0.5);
+  scale.head(std::min<Eigen::Index>(n, kBaseV)).setConstant(0.1);
+  scale.segment(n, std::min<Eigen::Index>(n, 3)).setConstant(0.5);
+  if (n >= kBaseV) scale.segment(n + 3, 3).setConstant(1);
   return scale;
 }
 

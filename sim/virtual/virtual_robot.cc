@@ -18,7 +18,8 @@ RobotDescription TrueRobot(const RobotDescription& description, const Eigen::Vec
 
 VirtualRobot::VirtualRobot(const RobotDescription& description, const Eigen::VectorXd& physical,
                            int64_t now)
-    : plant_(TrueRobot(description, physical)),
+    : space_(description),
+      plant_(TrueRobot(description, physical)),
       devices_(VirtualDevices(description)),
       efforts_(description),
       unsent_(description.buses.size()) {
@@ -111,7 +112,7 @@ bool VirtualRobot::Place(int64_t utime, const Eigen::Ref<const Eigen::VectorXd>&
                                const Eigen::VectorXd& now) {
     return x.size() == now.size() && (x.array().abs() <= kFarthest).all();  // NaN is not
   };
-  if (!within_reach(wish_q, q()) || !within_reach(wish_v, v())) return false;
+  if (!within_reach(wish_q, q()) || !within_reach(wish_v, v()) || !space_.Has(wish_q)) return false;
   if (utime == placed_) return true;
   placed_ = utime;
   MoveTo(latest_);

@@ -9,6 +9,7 @@
 
 #include "drivers/can/frame.h"
 #include "drivers/can/transport.h"
+#include "robot/configuration_space.h"
 #include "robot/description.h"
 #include "sim/virtual/effort_delay.h"
 #include "sim/virtual/virtual_devices.h"
@@ -66,6 +67,7 @@ class VirtualRobot {
   void Tick(std::span<FrameBatch> out);
   RobotMotion Motion() const { return {time_, q(), v(), plant_.motor_q(), plant_.motor_v()}; }
 
+  ConfigurationSpace space_;
   VirtualPlant plant_;
   std::vector<std::unique_ptr<VirtualDevice>> devices_;
   std::vector<size_t> bus_;                 // of each device

@@ -34,7 +34,7 @@ struct Told {
     witness.OnStart(driver.beginning() - 1);
     Hear("DRIVER_STATUS", driver_status_t{});
     robot_state_t state{};
-    state.num_joints = 1;
+    state.num_positions = state.num_velocities = 1;
     state.q = state.v = state.q_sd = state.v_sd = state.effort = {0};
     Hear("ROBOT_STATE_SMOOTHED", state);
     controller_status_t status{};

@@ -185,7 +185,7 @@ TEST_CASE("what is valid is finite, and iterations do not count down") {
   Chronicle chronicle;
   MessageWitness witness(chronicle);
   robot_state_t state{};
-  state.num_joints = 1;
+  state.num_positions = state.num_velocities = 1;
   state.q = state.v = state.q_sd = state.v_sd = state.effort = {0};
   state.q = {NAN};
   policy_t policy{};

@@ -111,7 +111,7 @@ TEST_CASE("a message's scalars one by one are the JSON's leaves, with their path
 TEST_CASE("a message's scalars have their values") {
   robot_state_t state{};
   state.sequence = 7;
-  state.num_joints = 1;
+  state.num_positions = state.num_velocities = 1;
   state.q = {0.25};
   state.v = state.q_sd = state.v_sd = state.effort = {0};
   state.num_contacts = 2;
@@ -138,7 +138,7 @@ TEST_CASE(
       CHECK(Decodes(other, sample.bytes) == (&other == sample.type));
   }
   Bytes huge = Encode(robot_state_t{});
-  // the number of joints, behind fingerprint, utime and sequence
+  // the number of positions, behind fingerprint, utime and sequence
   for (const std::vector<uint8_t>& count :
        {Bytes{0x7f, 0xff, 0xff, 0xff}, Bytes{0xff, 0xff, 0xff, 0xff}, Bytes{0, 0, 0, 100}}) {
     std::ranges::copy(count, huge.begin() + 24);

@@ -16,7 +16,7 @@ class Surroundings {
   Surroundings()
       : robot(LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum")),
         controller(robot, 1) {
-    robot_state.num_joints = 1;
+    robot_state.num_positions = robot_state.num_velocities = 1;
     robot_state.q = robot_state.v = robot_state.q_sd = robot_state.v_sd = robot_state.effort = {0};
     robot_state.valid = 1;
   }

@@ -23,7 +23,7 @@ robot_state_t StateOf(const Simulator& simulator, int64_t sequence, double perio
   robot_state_t state{};
   state.sequence = sequence;
   state.utime = 1'700'000'000'000'000 + static_cast<int64_t>(1e6 * period * sequence);
-  state.num_joints = static_cast<int32_t>(simulator.q().size());
+  state.num_positions = state.num_velocities = static_cast<int32_t>(simulator.q().size());
   state.q.assign(simulator.q().begin(), simulator.q().end());
   state.v.assign(simulator.v().begin(), simulator.v().end());
   state.effort = {effort};

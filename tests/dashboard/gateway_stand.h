@@ -71,7 +71,7 @@ inline robot_state_t State(int64_t sequence, double q = 0.1) {
   robot_state_t state{};
   state.utime = kUtime + 5000 * sequence;
   state.sequence = sequence;
-  state.num_joints = 1;
+  state.num_positions = state.num_velocities = 1;
   state.q = {q};
   state.v = {0};
   state.q_sd = state.v_sd = {0.001};

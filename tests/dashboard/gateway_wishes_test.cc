@@ -59,7 +59,7 @@ TEST_CASE("a person who places the robot is told what is missing") {
   controller.phase = controller_status_t::PLACING;
   stand.Hear("CONTROLLER_STATUS", controller);
   place_robot_t place{};
-  place.num_joints = 1;
+  place.num_positions = place.num_velocities = 1;
   place.q = {3.0};
   place.v = {0};
   stand.Hear("PLACE_ROBOT", place);

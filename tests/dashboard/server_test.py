@@ -33,7 +33,7 @@ PATIENCE = 60  # [s]; who is as late as that hangs
 def state(sequence, q=0.25):
     message = plumb.robot_state_t()
     message.utime = 1_700_000_000_000_000 + 2000 * sequence
-    message.sequence, message.num_joints, message.valid = sequence, 1, True
+    message.sequence, message.num_positions, message.num_velocities, message.valid = sequence, 1, 1, True
     message.q, message.v, message.q_sd, message.v_sd, message.effort = [q], [0.5], [0.01], [0.1], [0.0]
     return message
 

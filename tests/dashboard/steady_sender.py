@@ -14,7 +14,7 @@ lcm = lcm_sender.Sender()
 print(lcm.url, flush=True)
 sys.stdin.readline()
 message = plumb.robot_state_t()
-message.num_joints, message.valid = 1, True
+message.num_positions, message.num_velocities, message.valid = 1, 1, True
 message.q, message.v, message.q_sd, message.v_sd, message.effort = [0.25], [0.5], [0.01], [0.1], [0.0]
 due = time.monotonic()
 while True:

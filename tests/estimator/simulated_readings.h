@@ -12,7 +12,9 @@
 #include "common/random.h"
 #include "plumb/imu_t.hpp"
 #include "plumb/joint_state_t.hpp"
+#include "robot/configuration_space.h"
 #include "robot/imu_mounting.h"
+#include "robot/kinematics.h"
 #include "sim/model.h"
 #include "sim/virtual/encoder.h"
 #include "sim/virtual/virtual_plant.h"
@@ -24,7 +26,8 @@ namespace plumb {
 ///
 /// Drives have an encoder and its tracking loop (sim/virtual/encoder.h) plus white noise on the
 /// velocity; joints with an encoder of their own are quantised by its counts; an IMU has white
-/// noise, a constant bias, and forces averaged over its period. All messages are labelled with the
+/// noise, a constant bias, and forces averaged over its period; one on a link that turns freely has
+/// a bias about each axis. All messages are labelled with the
 /// time of their arrival, kDelay after the measurement, as a driver would that cannot know the
 /// constant part of the delay.
 class SimulatedReadings {
@@ -49,11 +52,21 @@ class SimulatedReadings {
   SimulatedReadings(const RobotDescription& robot, uint32_t seed, const Eigen::VectorXd& truth = {})
       : robot_(robot),
         random_(seed, {41}),
+        space_(robot),
+        kinematics_(robot),
         mechanism_(Model(robot).Describe(truth.size() > 0 ? truth : PriorMean(robot))) {
-    for (int i = 0; i < robot.num_joints(); ++i)
+    Eigen::Index position = 0, velocity = 0;
+    for (const JointDescription& joint : robot.joints) {
       encoders_.emplace_back(robot.virtual_robot.encoder_bits);
+      position_.push_back(position), velocity_.push_back(velocity);
+      position += joint.num_positions(), velocity += joint.num_velocities();
+    }
     bias_ = kForceBias * Eigen::Vector3d(random_.Normal(), random_.Normal(), random_.Normal());
     rate_bias_ = kRateBias * random_.Normal();
+    if (!space_.flat()) {
+      rate_biases_ =
+          kRateBias * Eigen::Vector3d(random_.Normal(), random_.Normal(), random_.Normal());
+    }
     for (const SensorDescription& sensor : robot.sensors) {
       if (sensor.link < 0) continue;
       imu_ = &sensor;
@@ -68,7 +81,7 @@ class SimulatedReadings {
                           const std::function<Eigen::VectorXd(double, const Eigen::VectorXd&,
                                                               const Eigen::VectorXd&)>& effort) {
     mechanism_.SetState(q, v);
-    for (size_t i = 0; i < encoders_.size(); ++i) encoders_[i].Reset(Turns(q, i), Turns(v, i));
+    for (size_t i = 0; i < encoders_.size(); ++i) encoders_[i].Reset(Angle(q, i), Rate(v, i));
     Eigen::VectorXd applied = Eigen::VectorXd::Zero(robot_.num_velocities()), impulse = applied;
     std::vector<Sample> samples;
     joint_state_t reading{};
@@ -77,12 +90,13 @@ class SimulatedReadings {
     for (int64_t t = 0; t <= std::llround(duration * 1e6); t += kStep) {
       if (t % kPeriod == kDelay % kPeriod && t > kDelay) {  // the reading of kDelay ago arrives
         for (size_t i = 0; i < encoders_.size(); ++i) {
-          reading.effort_applied[i] = impulse[static_cast<Eigen::Index>(i)] / (1e-6 * kPeriod);
-          reading.effort_sent[i] = applied[static_cast<Eigen::Index>(i)];
+          reading.effort_applied[i] = impulse[velocity_[i]] / (1e-6 * kPeriod);
+          reading.effort_sent[i] = applied[velocity_[i]];
         }
         // The state is of the time that the message names, which is off a little.
         const double off = 1e-6 * static_cast<double>(reading.utime - kStart - t);
-        samples.push_back({reading, imus, mechanism_.q() + off * mechanism_.v(), mechanism_.v()});
+        samples.push_back(
+            {reading, imus, space_.Move(mechanism_.q(), off * mechanism_.v()), mechanism_.v()});
         imus.clear();
         impulse.setZero();
       }
@@ -94,15 +108,15 @@ class SimulatedReadings {
         Eigen::Index k = 0;
         for (const int i : robot_.driven()) {
           const double limit = robot_.joints[static_cast<size_t>(i)].effort_limit;
-          applied[i] = std::clamp(wish[k++], -limit, limit);
+          applied[velocity_[static_cast<size_t>(i)]] = std::clamp(wish[k++], -limit, limit);
         }
       }
       const Eigen::VectorXd q0 = mechanism_.q(), v0 = mechanism_.v();
       mechanism_.Advance(applied, 1e-6 * kStep);
       impulse += applied * (1e-6 * kStep);
       for (size_t i = 0; i < encoders_.size(); ++i) {
-        encoders_[i].Track({t, t + kStep, Turns(q0, i), Turns(mechanism_.q(), i), Turns(v0, i),
-                            Turns(mechanism_.v(), i)});
+        encoders_[i].Track({t, t + kStep, Angle(q0, i), Angle(mechanism_.q(), i), Rate(v0, i),
+                            Rate(mechanism_.v(), i)});
       }
     }
     return samples;
@@ -115,8 +129,12 @@ class SimulatedReadings {
       mean[static_cast<Eigen::Index>(i)] = robot.parameters[i].coordinate_mean();
     return robot.ToPhysical(mean);
   }
-  static double Turns(const Eigen::VectorXd& x, size_t i) {
-    return x[static_cast<Eigen::Index>(i)] / (2 * std::numbers::pi);
+  // In turns, of joint i.
+  double Angle(const Eigen::VectorXd& q, size_t i) const {
+    return q[position_[i]] / (2 * std::numbers::pi);
+  }
+  double Rate(const Eigen::VectorXd& v, size_t i) const {
+    return v[velocity_[i]] / (2 * std::numbers::pi);
   }
 
   joint_state_t Read(int64_t t) {
@@ -131,7 +149,7 @@ class SimulatedReadings {
     m.effort_measured = m.effort_sent = m.effort_applied = std::vector<double>(n, 0.0);
     m.valid.assign(n, 1);
     for (size_t i = 0; i < n; ++i) {
-      m.position[i] = encoders_[i].Quantise(Turns(mechanism_.q(), i)) * 2 * std::numbers::pi;
+      m.position[i] = encoders_[i].Quantise(Angle(mechanism_.q(), i)) * 2 * std::numbers::pi;
       m.velocity[i] =
           encoders_[i].velocity() * 2 * std::numbers::pi + kVelocityNoise * random_.Normal();
     }
@@ -142,6 +160,9 @@ class SimulatedReadings {
       m.position[i] = std::round(mechanism_.q()[sensor.joint] / quantum) * quantum;
       m.velocity[i] = std::numeric_limits<double>::quiet_NaN();
     }
+    for (size_t i = 0; i < n; ++i) {
+      if (robot_.joints[i].passive && !space_.flat()) m.valid[i] = 0;
+    }
     if (imu_ && mounting_.turned >= 0) {
       const auto i = static_cast<size_t>(mounting_.turned);
       m.measured[i] = angle_utime_;
@@ -151,7 +172,38 @@ class SimulatedReadings {
     return m;
   }
 
+  // On a link that turns freely.
+  void ReadFreeImu(int64_t t, std::vector<imu_t>& out) {
+    kinematics_.Update(mechanism_.q(), mechanism_.v());
+    const LinkMotion& link = kinematics_.link(imu_->link);
+    const auto noise = [&](double sd) -> Eigen::Vector3d {
+      return sd * Eigen::Vector3d(random_.Normal(), random_.Normal(), random_.Normal());
+    };
+    const Eigen::Vector3d acceleration = (link.velocity - last_velocity_) / imu_->period;
+    last_velocity_ = link.velocity;
+    const Eigen::Vector3d up = robot_.simulation.gravity * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d rate =
+        link.rotation.transpose() * link.rate + rate_biases_ + noise(kRateNoise);
+    const Eigen::Vector3d force =
+        link.rotation.transpose() * (acceleration + up) + bias_ + noise(kForceNoise);
+    const Eigen::Vector3d off = noise(kAngleNoise);
+    const Eigen::Quaterniond told =
+        Eigen::Quaterniond(link.rotation) *
+        Eigen::Quaterniond(1, off.x() / 2, off.y() / 2, off.z() / 2).normalized();
+    imu_t imu{};
+    imu.utime = kStart + t + kDelay;
+    imu.name = imu_->name;
+    imu.link = robot_.links[static_cast<size_t>(imu_->link)].name;
+    std::copy_n(force.data(), 3, std::begin(imu.force));
+    std::copy_n(rate.data(), 3, std::begin(imu.rate));
+    imu.orientation[0] = told.w(), imu.orientation[1] = told.x(), imu.orientation[2] = told.y(),
+    imu.orientation[3] = told.z();
+    imu.orientation_valid = true;
+    if (t > 0) out.push_back(imu);
+  }
+
   void ReadImu(int64_t t, Eigen::VectorXd& last_v, std::vector<imu_t>& out) {
+    if (!space_.flat()) return ReadFreeImu(t, out);
     angle_utime_ = kStart + t + kDelay;
     angle_ = mechanism_.q()[mounting_.turned] + kAngleNoise * random_.Normal();
     rate_ = mechanism_.v()[mounting_.turned] + rate_bias_ + kRateNoise * random_.Normal();
@@ -184,11 +236,15 @@ class SimulatedReadings {
 
   RobotDescription robot_;
   Random random_;
+  ConfigurationSpace space_;
+  Kinematics kinematics_;
   VirtualPlant mechanism_;
   std::vector<Encoder> encoders_;
+  std::vector<Eigen::Index> position_, velocity_;  // of the joints' first entries
   const SensorDescription* imu_ = nullptr;
   ImuMounting mounting_;
-  Eigen::Vector3d bias_;
+  Eigen::Vector3d bias_, rate_biases_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();  // of a link that turns freely
   double rate_bias_ = 0, angle_ = 0, rate_ = 0;
   int64_t angle_utime_ = kStart, sequence_ = 0;
 };

@@ -32,7 +32,7 @@ std::vector<std::vector<uint8_t>> OneOfEach(const Stage& stage, bool with_key) {
   measured.effort_measured = measured.effort_sent = measured.effort_applied = {0};
   measured.valid = {1};
   robot_state_t state{};
-  state.utime = stage.Now(), state.num_joints = 1, state.valid = 1;
+  state.utime = stage.Now(), state.num_positions = state.num_velocities = 1, state.valid = 1;
   state.q = state.v = state.effort = {0};
   state.q_sd = state.v_sd = {1e-3};
   joint_command_t command{};
@@ -41,7 +41,7 @@ std::vector<std::vector<uint8_t>> OneOfEach(const Stage& stage, bool with_key) {
   command.position = command.velocity = command.kp = command.kd = {NAN};
   policy_t policy = GaussianPolicy(PolicyShape{3, {4}, 1}).ToMessage();
   place_robot_t place{};
-  place.num_joints = 1, place.q = place.v = {0};
+  place.num_positions = place.num_velocities = 1, place.q = place.v = {0};
   driver_request_t request{};
   request.utime = stage.Now();
   request.request = with_key ? driver_request_t::ARM : int8_t{77};

@@ -44,7 +44,7 @@ std::vector<uint8_t> Large(const std::string& channel) {
   const std::string words(40'000, 'x');
   if (channel == "ROBOT_STATE_SMOOTHED") {
     robot_state_t state{};
-    state.num_joints = kJoints;
+    state.num_positions = state.num_velocities = kJoints;
     state.q = state.v = state.effort = state.q_sd = state.v_sd = numbers;
     return Said(channel, state);
   }
@@ -172,7 +172,7 @@ TEST_CASE("what the calibrator remembers of messages has a bound") {
   Publisher<robot_state_t> states(stage.messenger, "ROBOT_STATE_SMOOTHED");
   Publisher<joint_command_t> commands(stage.messenger, "JOINT_COMMAND");
   robot_state_t state{};
-  state.num_joints = 1, state.valid = 1;
+  state.num_positions = state.num_velocities = 1, state.valid = 1;
   state.q = state.v = state.effort = {0};
   state.q_sd = state.v_sd = {1e-3};
   joint_command_t command{};

@@ -179,9 +179,9 @@ TEST_CASE("Drake's viewer is told of the robot that is heard, and of no other") 
   Child meldis = Plumb(stage, "meldis", {stage.robot_folder});
   Publisher<robot_state_t> states(stage.messenger, "ROBOT_STATE");
   robot_state_t state{}, foreign{};
-  state.num_joints = 1;
+  state.num_positions = state.num_velocities = 1;
   state.q = state.v = state.q_sd = state.v_sd = state.effort = {0.5};
-  foreign.num_joints = 2;
+  foreign.num_positions = foreign.num_velocities = 2;
   foreign.q = foreign.v = foreign.q_sd = foreign.v_sd = foreign.effort = {1, NAN};
   REQUIRE(stage.WaitUntil(
       [&] {

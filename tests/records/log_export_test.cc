@@ -35,7 +35,7 @@ robot_state_t State(int i) {
   robot_state_t state{};
   state.utime = kBegin + 10'000 * i - 1500;
   state.sequence = i;
-  state.num_joints = 1;
+  state.num_positions = state.num_velocities = 1;
   state.q = {0.1 * i};
   state.v = {std::nextafter(1.0 / 3, i)};
   state.q_sd = {NAN};
@@ -167,9 +167,10 @@ TEST_CASE_METHOD(Recorded,
   // Of the two types on one channel the first in the alphabet has the plain name.
   REQUIRE(rows.size() == 2);
   REQUIRE(other.size() == 501);
-  CHECK(other[0] == std::vector<std::string>{"received", "utime", "sequence", "num_joints", "q[0]",
-                                             "v[0]", "q_sd[0]", "v_sd[0]", "effort[0]",
-                                             "num_contacts", "model_based", "valid", "restarted"});
+  CHECK(other[0] == std::vector<std::string>{"received", "utime", "sequence", "num_positions",
+                                             "q[0]", "num_velocities", "v[0]", "q_sd[0]", "v_sd[0]",
+                                             "effort[0]", "num_contacts", "model_based", "valid",
+                                             "restarted"});
   for (int i = 0; i < 500; ++i) {
     const auto& row = other[static_cast<size_t>(i) + 1];
     const robot_state_t state = State(i);
@@ -177,11 +178,11 @@ TEST_CASE_METHOD(Recorded,
     CHECK(row[0] == std::to_string(kBegin + 10'000 * i));
     CHECK(row[1] == std::to_string(state.utime));
     CHECK(std::stod(row[4]) == state.q[0]);
-    CHECK(std::stod(row[5]) == state.v[0]);
-    CHECK(row[6] == "nan");
-    CHECK(row[7] == "-inf");
-    CHECK(std::strtod(row[8].c_str(), nullptr) == 1e-300);
-    CHECK(row[11] == "1");
+    CHECK(std::stod(row[6]) == state.v[0]);
+    CHECK(row[7] == "nan");
+    CHECK(row[8] == "-inf");
+    CHECK(std::strtod(row[9].c_str(), nullptr) == 1e-300);
+    CHECK(row[12] == "1");
   }
 }
 

@@ -19,7 +19,7 @@ BEGIN = 1_700_000_000_000_000
 
 def state(i):
     message = plumb.robot_state_t()
-    message.utime, message.sequence, message.num_joints = BEGIN + 1000 * i - 300, i, 2
+    message.utime, message.sequence, message.num_positions, message.num_velocities = BEGIN + 1000 * i - 300, i, 2, 2
     message.q, message.v = [i / 3, -i / 7], [math.nan, 1e-300]
     message.q_sd = message.v_sd = message.effort = [0.0, 0.0]
     return message

@@ -41,7 +41,7 @@ def require(so, what):
 
 def state(i):
     message = plumb.robot_state_t()
-    message.utime, message.sequence, message.num_joints = BEGIN + 1000 * i - 300, i, 1
+    message.utime, message.sequence, message.num_positions, message.num_velocities = BEGIN + 1000 * i - 300, i, 1, 1
     message.q, message.v, message.q_sd, message.v_sd, message.effort = [i / 3000], [-i / 7], [math.nan], [1e-300], [0.0]
     return message
 
@@ -137,7 +137,7 @@ def main(folder):
 
 def meant_state(message):
     """What JSON says of `state`."""
-    names = ["utime", "sequence", "num_joints", "q", "v", "q_sd", "v_sd", "effort", "num_contacts", "contact", "model_based", "valid", "restarted"]
+    names = ["utime", "sequence", "num_positions", "q", "num_velocities", "v", "q_sd", "v_sd", "effort", "num_contacts", "contact", "model_based", "valid", "restarted"]
     said = {name: getattr(message, name) for name in names}
     return {**said, "q_sd": [None], "contact": [], "model_based": False, "valid": False, "restarted": False}
 

@@ -68,7 +68,7 @@ TEST_CASE("floating base: who cannot do without a boom is told why, and where") 
 
   RobotDescription robot = Load(toml);
   robot.joints[2].type = JointDescription::Type::kSpherical;
-  CHECK_THROWS_WITH(FloatingBaseOf(robot), Contains("rooty") && Contains("spherical"));
+  CHECK_THROWS_WITH(FloatingBaseOf(robot), Contains("along three"));
   robot = Load(toml);
   robot.joints[1].passive = false;
   CHECK_THROWS_WITH(FloatingBaseOf(robot), Contains("motor of \"rootz\""));

@@ -175,10 +175,10 @@ TEST_CASE("four of five simulators have the residual, half of the episodes a rec
     const SimulatorDraw draw = distribution.Draw(random);
     with += draw.residual != nullptr;
     if (draw.residual) CHECK(draw.parameters[0] == 9 - static_cast<double>(draw.draw));
-    if (draw.q.size() == 0) continue;
+    if (draw.start.size() == 0) continue;
     ++started;
-    CHECK(draw.v[0] == draw.q[0] + 1);
-    first += draw.q[0] == 1;
+    CHECK(draw.start[1] == draw.start[0] + 1);
+    first += draw.start[0] == 1;
   }
   const double sd = std::sqrt(kCount) / 2;
   CHECK(std::abs(with - 0.8 * kCount) < 4 * sd);

@@ -211,8 +211,9 @@ export const parameter_distribution_t = { LINEAR: 0, LOG: 1, LOGIT: 2 } as const
 
 export interface place_robot_t {
   utime: number;
-  num_joints: number;
+  num_positions: number;
   q: (number | null)[];
+  num_velocities: number;
   v: (number | null)[];
 }
 
@@ -258,8 +259,9 @@ export const residual_function_t = { FREE: 0, TOUCHING: 1, GROUND: 2, STOP: 3 } 
 export interface robot_state_t {
   utime: number;
   sequence: number;
-  num_joints: number;
+  num_positions: number;
   q: (number | null)[];
+  num_velocities: number;
   v: (number | null)[];
   q_sd: (number | null)[];
   v_sd: (number | null)[];

@@ -159,9 +159,18 @@ TEST_CASE("a joint without a motor has no action, and a spherical one a quaterni
   robot.task.target = {0, 1, 0, 0, 0};
   const Log log = ReadTable(
       "t,q/pivot,q/ball/w,q/ball/x,q/ball/y,q/ball/z,v/pivot,v/ball/x,v/ball/y,v/ball/z,u/pivot\n"
-      "0,1,2,3,4,5,6,7,8,9,1\n0.05,0,1,0,0,0,0,0,0,0,0\n",
+      "0,1,0.5,-0.5,0.5,0.5,6,7,8,9,1\n0.05,0,-0.5,0.5,-0.5,-0.5001,0,0,0,0,0\n",
       robot);
-  CHECK(log.rollouts[0].transitions[0].q == (Eigen::VectorXd(5) << 1, 2, 3, 4, 5).finished());
+  CHECK(log.rollouts[0].transitions[0].q ==
+        (Eigen::VectorXd(5) << 1, 0.5, -0.5, 0.5, 0.5).finished());
+  // The other quaternion of nearly the same rotation, with few digits.
+  const Eigen::VectorXd next = log.rollouts[0].transitions[0].next_q;
+  CHECK((next - log.rollouts[0].transitions[0].q + Eigen::VectorXd::Unit(5, 0)).norm() < 2e-4);
+  CHECK(std::abs(next.tail<4>().norm() - 1) < 1e-15);
+  CHECK(log.rollouts[0].transitions[0].q_sd.size() == 4);
+  CHECK(Refusal("t,q/pivot,q/ball/w,q/ball/x,q/ball/y,q/ball/z,v/pivot,v/ball/x,v/ball/y,v/ball/z,"
+                "u/pivot\n0,1,1,0,0,0,0,0,0,0,1\n0.05,0,0.5,0.5,0,0,0,0,0,0,0\n",
+                robot) == ":3: q of ball (0.5, 0.5, 0, 0) is no unit quaternion");
   CHECK(log.rollouts[0].transitions[0].v == Eigen::Vector4d(6, 7, 8, 9));
   CHECK(log.rollouts[0].transitions[0].efforts[0].effort == Eigen::Vector4d(1, 0, 0, 0));
 }

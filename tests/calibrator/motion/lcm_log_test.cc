@@ -34,7 +34,7 @@ class Recording {
     robot_state_t s{};
     s.sequence = sequence;
     s.utime = start + 5000 * (sequence % 1'000'000);
-    s.num_joints = joints;
+    s.num_positions = s.num_velocities = joints;
     const auto n = static_cast<size_t>(joints);
     s.q.assign(n, 1e-3 * static_cast<double>(sequence));
     s.v.assign(n, 0.2);
@@ -219,7 +219,7 @@ TEST_CASE("what does not decode, or is of another robot, is left out with a warn
   CHECK(log.rollouts[0].transitions.size() == 20);
   REQUIRE(log.warnings.size() == 2);
   CHECK(log.warnings[0] == "2 messages do not decode");
-  CHECK(log.warnings[1] == "1 messages are of a robot with 2 joints, 'pendulum' has 1");
+  CHECK(log.warnings[1] == "1 messages are of a robot with 2 coordinates, 'pendulum' has 1");
 }
 
 TEST_CASE("hostile numbers in messages do no harm") {
@@ -279,7 +279,7 @@ TEST_CASE("a log that is of no use is refused with the reason") {
       {"no command", states.bytes, none + "it holds no command of an episode"},
       {"no state", commands.bytes, none + "2 gaps, 0 late, 0 not finite, 0 across restarts"},
       {"wrong robot", foreign.bytes,
-       none + "10 messages are of a robot with 3 joints, 'pendulum' has 1"},
+       none + "10 messages are of a robot with 3 coordinates, 'pendulum' has 1"},
       {"another rate", late.bytes, none + "0 gaps, 5 late, 0 not finite, 0 across restarts"},
       {"a state from the simulator's dynamics", assumed.bytes,
        ": its states are model-based: calibration would find the parameters that the estimator "

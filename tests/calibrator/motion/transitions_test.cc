@@ -16,7 +16,7 @@ robot_state_t State(int64_t sequence) {
   robot_state_t s{};
   s.sequence = sequence;
   s.utime = 7'000'000 + 5000 * sequence;
-  s.num_joints = 1;
+  s.num_positions = s.num_velocities = 1;
   s.q = {0.001 * static_cast<double>(sequence)};
   s.v = {0.2};
   s.q_sd = {1e-4};
@@ -201,7 +201,7 @@ TEST_CASE_METHOD(Fixture, "gaps, lateness, restarts and rubbish are dropped and 
   SECTION("messages of another robot, and hostile ones") {
     States();
     robot_state_t other = State(155);
-    other.num_joints = 2;
+    other.num_positions = other.num_velocities = 2;
     joiner.OnState(other);
     joint_command_t command = Command(3);
     command.step = 2'000'000'000;

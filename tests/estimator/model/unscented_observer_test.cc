@@ -53,7 +53,7 @@ robot_state_t Kinematic(const joint_state_t& measured, double q = 0.1, double v 
   robot_state_t s{};
   s.utime = measured.utime;
   s.sequence = measured.sequence;
-  s.num_joints = 1;
+  s.num_positions = s.num_velocities = 1;
   s.q = {q};
   s.v = {v};
   s.q_sd = {1e-3};

@@ -143,7 +143,7 @@ void WriteLog(const RobotDescription& robot, const fs::path& file) {
     const int64_t time = kEpisode + i * period;
     robot_state_t state{};
     state.utime = time, state.sequence = i;
-    state.num_joints = joints;
+    state.num_positions = state.num_velocities = joints;
     state.q.assign(n, 0.001 * i), state.v.assign(n, 0.2), state.effort.assign(n, 0.5);
     state.q_sd.assign(n, 1e-4), state.v_sd.assign(n, 1e-2);
     state.valid = true;

@@ -113,7 +113,7 @@ TEST_CASE(
   REQUIRE(task->observation_size() == 3 + 3 + 2 + 7);
   CHECK(task->action_indices() == std::vector<int>{6});
   CHECK(task->state_scale() ==
-        (Eigen::VectorXd(15) << 1, 1, 1, 1, 1, 1, 1, 1, 8, 8, 8, 8, 8, 8, 8).finished());
+        (Eigen::VectorXd(14) << 1, 1, 1, 1, 1, 1, 1, 8, 8, 8, 8, 8, 8, 8).finished());
 
   const Eigen::VectorXd still = Eigen::VectorXd::Zero(7);
   Eigen::VectorXd q(8), v = still;

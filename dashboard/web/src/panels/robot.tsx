@@ -62,7 +62,9 @@ function Coordinates() {
   const now = robotState.value;
   const last = predictions.value[predictions.value.length - 1];
   const { coordinates = [], velocities = [] } = robot.value ?? {};
-  const n = now?.num_joints ?? coordinates.length;
+  const n = now?.num_positions ?? coordinates.length;
+  // A quaternion has four entries, the rate and the standard deviations about the axes three.
+  const named = new Map(velocities.map(({ name }, i) => [name, i]));
   return (
     <div class="scroll" tabIndex={0} role="region" aria-label="State">
       <table class="state">
@@ -72,12 +74,15 @@ function Coordinates() {
           {Array.from({ length: n }, (_, i) => {
             const q = last?.q[i], measured = last?.q_measured[i];
             const off = q == null || measured == null ? null : q - measured;
+            const at = coordinates[i] ? named.get(coordinates[i].name) : i;
+            const v = at == null ? null : now?.v[at];
+            const turns = coordinates[i]?.unit === "1";
             return (
               <tr key={i}>
                 <th scope="row">{withUnit(coordinates[i]?.name ?? `q[${i}]`, coordinates[i]?.unit)}</th>
-                <td class="n" data-value={now?.q[i] ?? "null"}>{now ? plusMinus(now.q[i], now.q_sd[i]) : DASH}</td>
+                <td class="n" data-value={now?.q[i] ?? "null"}>{!now ? DASH : turns || at == null ? number(now.q[i]) : plusMinus(now.q[i], now.q_sd[at])}</td>
                 <td class="n" data-value={off ?? "null"}>{number(off, 2)}</td>
-                <td class="n" data-value={now?.v[i] ?? "null"} title={velocities[i]?.unit ?? ""}>{now ? plusMinus(now.v[i], now.v_sd[i]) : DASH}</td>
+                <td class="n" data-value={v ?? "null"} title={at == null ? "" : velocities[at]?.unit ?? ""}>{now && at != null ? plusMinus(now.v[at], now.v_sd[at]) : DASH}</td>
               </tr>
             );
           })}
