@@ -28,7 +28,7 @@ void RequireApart(const std::vector<std::string>& outputs) {
   for (const std::string& output : outputs) {
     if (output.empty()) continue;
     if (!taken.insert(std::filesystem::weakly_canonical(std::filesystem::absolute(output))).second)
-      throw std::invalid_argument(output + ": would be written twice: give a file for each output");
+      throw std::invalid_argument(output + ": would be written twice: outputs need a file each");
   }
 }
 
