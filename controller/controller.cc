@@ -193,7 +193,7 @@ std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, i
   if (state.num_positions != space_.num_positions() ||
       state.num_velocities != space_.num_velocities())
     return {};
-  if (state.utime < -kLatest || state.utime > kLatest) return;
+  if (state.utime < -kLatest || state.utime > kLatest) return {};
   const bool finite = Map(state.q).allFinite() && Map(state.v).allFinite();
   const bool rotates = space_.Has(Map(state.q));
   // A backlog brings states in quick succession that are all old: their own time tells.
