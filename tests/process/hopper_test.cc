@@ -97,7 +97,7 @@ void Stand(const std::string& robot, int number, const std::vector<uint32_t>& fr
   CHECK(about(imus.received() - imus_before, 400));
 
   const joint_state_t& state = joints.newest();
-  REQUIRE(state.num_velocities == 6);
+  REQUIRE(state.num_joints == 6);
   for (size_t i = 0; i < 6; ++i) {
     CHECK(state.valid[i]);
     CHECK(std::isfinite(state.position[i]));
