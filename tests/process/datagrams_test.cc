@@ -120,8 +120,9 @@ TEST_CASE("a run and its record go on under a flood") {
     const Flood flood(stage.lcm_url, Malformed(), 10'000);
     Child launch = Launch(stage, {"--real-time", "--log", log});
     REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 60));
-    stage.Listen(1);
     INFO(launch.Tail(20));
+    CHECK(stage.WaitUntil([&] { return stage.states.received() > 0; }, 60));
+    stage.Listen(1);
     REQUIRE(launch.running());
     launch.Signal(SIGINT);
     CHECK(stage.WaitUntil([&] { return !launch.running(); }, 60));
@@ -132,8 +133,10 @@ TEST_CASE("a run and its record go on under a flood") {
     ++messages[channel];
     return true;
   });
-  for (const char* channel : {"JOINT_STATE", "ROBOT_STATE", "DRIVER_STATUS", "DRIVER_REQUEST"})
+  for (const char* channel : {"JOINT_STATE", "ROBOT_STATE", "DRIVER_STATUS", "DRIVER_REQUEST"}) {
+    INFO(channel);
     CHECK(messages[channel] > 0);
+  }
 }
 
 TEST_CASE("messages that are refused again and again do not fill the log") {
