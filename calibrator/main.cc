@@ -78,10 +78,8 @@ class Session {
       spdlog::warn("{} simulations failed in this iteration: they count as infinitely far", failed);
     for (const std::string& warning : report->warnings)
       spdlog::warn("iteration {}: {}", report->iteration, warning);
-    if (!report->gap.empty()) {
-      spdlog::warn("iteration {}: {}", report->iteration, report->alarm);
-      spdlog::warn("iteration {}: {}", report->iteration, report->gap);
-    }
+    for (const std::string& text : {report->alarm, report->gap})
+      if (!text.empty()) spdlog::warn("iteration {}: {}", report->iteration, text);
     report_ = std::move(report);
     seconds_ = Seconds(clock_.Now() - start_) / clock_.scale();
     WriteFindings();

@@ -80,8 +80,13 @@ void PrintFindings(const Findings& findings, const RobotDescription& robot) {
 Residuals ResidualsOf(const Findings& findings, const RobotDescription& robot) {
   Residuals residuals{findings.errors, findings.rows, {}};
   for (const char* kind : {"q ", "v "}) {
-    for (const JointDescription& joint : robot.joints)
-      residuals.coordinates.push_back(kind + joint.name);
+    for (const JointDescription& joint : robot.joints) {
+      const std::vector<std::string> axes = joint.num_velocities() == 1
+                                                ? std::vector<std::string>{""}
+                                                : std::vector<std::string>{"/x", "/y", "/z"};
+      for (const std::string& axis : axes)
+        residuals.coordinates.push_back(kind + joint.name + axis);
+    }
   }
   return residuals;
 }

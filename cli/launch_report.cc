@@ -81,10 +81,11 @@ class Report {
     if (!iterations_.empty()) {
       const auto alarm = iterations_.back().at("alarm").get<std::string>(),
                  gap = iterations_.back().at("gap").get<std::string>();
-      html += alarm.empty() ? Verdict("good", "The model explains the robot",
-                                      "The alarm does not speak of the last iteration's motion.")
-                            : Verdict("bad", "The model does not explain the robot", alarm);
-      if (!gap.empty()) html += Verdict("", "What it lacks", gap);
+      html += !alarm.empty() ? Verdict("bad", "The model does not explain the robot", alarm)
+              : gap.empty()  ? Verdict("good", "The model explains the robot",
+                                       "The alarm does not speak of the last iteration's motion.")
+                            : Verdict("", "Whether the model explains the robot is not known", gap);
+      if (!alarm.empty() && !gap.empty()) html += Verdict("", "What it lacks", gap);
       html += Verdict("", "What can be known", Text("identifiability"));
     }
     const auto dropped = summary_.at("dropped_episodes").get<int64_t>();

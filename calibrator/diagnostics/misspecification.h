@@ -39,6 +39,7 @@ struct Misspecification {
   std::vector<Misfit> misfits;  ///< those that count, worst first
   std::string summary;
   std::vector<CandidateChange> changes{};  ///< of all candidates that can be tested, best first
+  bool judged = true;                      ///< else nobody can tell, and the summary says why
 };
 
 /// A state, and the positions at a transition's end.

@@ -99,6 +99,7 @@ class Test {
         witnesses.count(), step_.steps().size());
     Misspecification found;
     if (witnesses.count() < kFewestWitnesses) {
+      found.judged = false;
       found.summary = "nobody can tell whether the model explains this log: only " + share;
       return found;
     }

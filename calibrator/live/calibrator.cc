@@ -153,7 +153,7 @@ calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::
   m.sd.assign(sd.begin(), sd.end());
   m.num_parameters = static_cast<int32_t>(m.mean.size());
   m.seconds = seconds;
-  if (report && !report->gap.empty()) m.alarm = report->alarm, m.gap = report->gap;
+  if (report) m.alarm = report->alarm, m.gap = report->gap;
   if (stream && stream->determined()) {
     const ParameterDistribution streamed{
         state.iteration, robot.parameters, {{1}, {stream->posterior()}}};

@@ -159,7 +159,8 @@ void SimOpt::Infer() {
     const GapFit fit = RunFromWhereItIs();
     const MethodResult& result = fit.result;
     state_.residual = fit.gap.residual, state_.informed = fit.gap.informed;
-    state_.alarm = fit.alarm.summary, state_.gap = fit.gap.summary;
+    state_.alarm = fit.alarm.alarm ? fit.alarm.summary : "";
+    state_.gap = fit.alarm.judged ? fit.gap.summary : fit.alarm.summary;
     state_.kl = KlDivergence(Moments(result.posterior), Moments(state_.before));
     state_.ess = result.ess;
     state_.temperature = 1;

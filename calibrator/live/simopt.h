@@ -85,8 +85,8 @@ class SimOpt {
     /// that its simulators lack; null = nothing, or nothing is known of it
     std::shared_ptr<const Residual> residual;
     Informed informed = Informed::kAll;  ///< which steps the parameters are learnt from
-    /// whether the model explains what was recorded; and what was done about it, or why nothing
-    /// was: empty where the alarm does not speak
+    /// what the model does not explain of what was recorded, empty = no alarm; and what was done
+    /// about it, or why nothing was, or that nobody can tell: empty where the model explains it
     std::string alarm, gap;
     GaussianMixture before;  ///< distribution at the beginning of the running iteration
     /// of the running iteration, else of the last one; without a search its update counts all the

@@ -40,11 +40,11 @@ export function GapPanel() {
       }]}>
       <div class="split">
       <div>
-      <p class={`verdict ${newest?.alarm ? "bad" : "good"}`} data-alarm>
-        <b>{newest?.alarm ? "Alarm" : all.length ? "No alarm" : "Nothing to judge yet"}</b>
-        {newest?.alarm || (all.length ? "The model explains what was recorded." : "No roll-out has been recorded.")}
+      <p class={`verdict ${newest?.alarm ? "bad" : newest?.gap ? "" : "good"}`} data-alarm>
+        <b>{newest?.alarm ? "Alarm" : newest?.gap ? "Not known" : all.length ? "No alarm" : "Nothing to judge yet"}</b>
+        {newest?.alarm || newest?.gap || (all.length ? "The model explains what was recorded." : "No roll-out has been recorded.")}
       </p>
-      {newest?.gap && <p class="line">{newest.gap}</p>}
+      {newest?.alarm && newest.gap && <p class="line">{newest.gap}</p>}
       {newest?.identifiability && <p class="line">{newest.identifiability}.</p>}
       {!!newest?.num_combinations && (
         <Table shown caption="What the motion determines" columns={["combination", "mean", "sd"]} rows={newest.combination.map((name, i) => [name, newest.combination_mean[i], newest.combination_sd[i]])} />
