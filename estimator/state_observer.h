@@ -101,6 +101,8 @@ class StateObserver {
     int64_t used = -1;     // utime of the newest reading that counted
     bool of_base = false;  // base_ has its readings
   };
+  // measurements after a restart until velocity can be trusted
+  static constexpr int kSettled = 5;
   enum class Use { kUse, kRefuse, kDuplicate, kReordered };
 
   Use Judge(const joint_state_t& measured) const;
