@@ -5,8 +5,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "tests/estimator/allocations_of.h"
 #include "tests/estimator/observer_errors.h"
-#include "tests/sim/allocations.h"
 #include "tests/sim/robots.h"
 
 namespace plumb {
@@ -217,14 +217,7 @@ TEST_CASE("a step without a boom allocates nothing") {
   const RobotDescription robot = Free();
   const auto recording = HopUpright(robot, 9);
   StateObserver observer(robot);
-  int64_t counted = 0;
-  for (const SimulatedReadings::Sample& sample : recording) {
-    const int64_t before = Allocations();
-    for (const imu_t& imu : sample.imus) observer.OnImu(imu);
-    observer.OnJointState(sample.joints);
-    counted += Allocations() - before;
-  }
-  CHECK(counted == 0);
+  CHECK(AllocationsOf(recording, observer) == 0);
   CHECK(observer.state().valid);
 }
 

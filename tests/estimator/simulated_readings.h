@@ -172,6 +172,20 @@ class SimulatedReadings {
     return m;
   }
 
+  imu_t Reading(int64_t t, const Eigen::Vector3d& force, const Eigen::Vector3d& rate,
+                const Eigen::Quaterniond& orientation) const {
+    imu_t imu{};
+    imu.utime = kStart + t + kDelay;
+    imu.name = imu_->name;
+    imu.link = robot_.links[static_cast<size_t>(imu_->link)].name;
+    std::copy_n(force.data(), 3, std::begin(imu.force));
+    std::copy_n(rate.data(), 3, std::begin(imu.rate));
+    imu.orientation[0] = orientation.w(), imu.orientation[1] = orientation.x(),
+    imu.orientation[2] = orientation.y(), imu.orientation[3] = orientation.z();
+    imu.orientation_valid = true;
+    return imu;
+  }
+
   // On a link that turns freely.
   void ReadFreeImu(int64_t t, std::vector<imu_t>& out) {
     kinematics_.Update(mechanism_.q(), mechanism_.v());
@@ -190,16 +204,7 @@ class SimulatedReadings {
     const Eigen::Quaterniond told =
         Eigen::Quaterniond(link.rotation) *
         Eigen::Quaterniond(1, off.x() / 2, off.y() / 2, off.z() / 2).normalized();
-    imu_t imu{};
-    imu.utime = kStart + t + kDelay;
-    imu.name = imu_->name;
-    imu.link = robot_.links[static_cast<size_t>(imu_->link)].name;
-    std::copy_n(force.data(), 3, std::begin(imu.force));
-    std::copy_n(rate.data(), 3, std::begin(imu.rate));
-    imu.orientation[0] = told.w(), imu.orientation[1] = told.x(), imu.orientation[2] = told.y(),
-    imu.orientation[3] = told.z();
-    imu.orientation_valid = true;
-    if (t > 0) out.push_back(imu);
+    if (t > 0) out.push_back(Reading(t, force, rate, told));
   }
 
   void ReadImu(int64_t t, Eigen::VectorXd& last_v, std::vector<imu_t>& out) {
@@ -207,10 +212,6 @@ class SimulatedReadings {
     angle_utime_ = kStart + t + kDelay;
     angle_ = mechanism_.q()[mounting_.turned] + kAngleNoise * random_.Normal();
     rate_ = mechanism_.v()[mounting_.turned] + rate_bias_ + kRateNoise * random_.Normal();
-    imu_t imu{};
-    imu.utime = angle_utime_;
-    imu.name = imu_->name;
-    imu.link = robot_.links[static_cast<size_t>(imu_->link)].name;
     Eigen::Vector3d acceleration = robot_.simulation.gravity * Eigen::Vector3d::UnitZ();
     for (const auto& slide : mounting_.slides) {
       acceleration +=
@@ -226,12 +227,7 @@ class SimulatedReadings {
         truth.conjugate() * acceleration + bias_ +
         kForceNoise * Eigen::Vector3d(random_.Normal(), random_.Normal(), random_.Normal());
     const Eigen::Vector3d rate = mounting_.axis * rate_;
-    std::copy_n(force.data(), 3, std::begin(imu.force));
-    std::copy_n(rate.data(), 3, std::begin(imu.rate));
-    imu.orientation[0] = told.w(), imu.orientation[1] = told.x(), imu.orientation[2] = told.y(),
-    imu.orientation[3] = told.z();
-    imu.orientation_valid = true;
-    if (t > 0) out.push_back(imu);
+    if (t > 0) out.push_back(Reading(t, force, rate, told));
   }
 
   RobotDescription robot_;
