@@ -6,6 +6,7 @@
 
 #include "common/time_units.h"
 #include "controller/policy_fit.h"
+#include "robot/physical.h"
 
 namespace plumb {
 namespace {
@@ -14,8 +15,6 @@ namespace {
 constexpr int64_t kLetGo = 30'000;
 // [us] a robot not placed by then is asked to be placed anew
 constexpr int64_t kPlaceAgain = 1'000'000;
-// [us] No clock gets there; beyond it, differences overflow.
-constexpr int64_t kLatest = int64_t{1} << 53;
 constexpr int64_t kDriverTimeout = 1'000'000;  // [us] DRIVER_STATUS comes ten times a second
 // place_tolerance [rad] times this is the tolerance of speed [rad/s]
 constexpr double kPlaceSpeedFactor = 10;
@@ -193,7 +192,7 @@ std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, i
   if (state.num_positions != space_.num_positions() ||
       state.num_velocities != space_.num_velocities())
     return {};
-  if (state.utime < -kLatest || state.utime > kLatest) return {};
+  if (!IsTime(state.utime)) return {};
   const bool finite = Map(state.q).allFinite() && Map(state.v).allFinite();
   const bool rotates = space_.Has(Map(state.q));
   // A backlog brings states in quick succession that are all old: their own time tells.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "robot/description.h"
 
@@ -20,6 +21,11 @@ inline constexpr double kLeastSd = 1e-12;
 /// recorded when limits were higher.
 inline constexpr double kOverload = 10;
 
+/// [us] No clock gets there; beyond it, differences overflow.
+inline constexpr int64_t kLatestTime = int64_t{1} << 53;
+
+/// Of a utime [us].
+inline bool IsTime(int64_t utime) { return utime >= -kLatestTime && utime <= kLatestTime; }
 /// False of what is not finite.
 inline bool IsPhysical(double x) { return std::abs(x) <= kGreatestQuantity; }
 /// 0 = exact.

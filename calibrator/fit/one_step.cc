@@ -29,8 +29,7 @@ Eigen::MatrixXd OneStep::Starts() const {
 
 const Eigen::VectorXd& OneStep::EndAbout(size_t k) const {
   if (k + 1 < steps_.size() && steps_[k + 1].goes_on) return steps_[k + 1].recorded->q;
-  const Transition& t = *steps_[k].recorded;
-  return t.next_q.allFinite() ? t.next_q : t.q;
+  return NearEnd(*steps_[k].recorded);
 }
 
 Eigen::VectorXd OneStep::StartPositions(size_t k, const Eigen::VectorXd& state) const {

@@ -45,6 +45,10 @@ double EndSd(const Transition& t, Eigen::Index c) {
   return c < t.next_q_sd.size() ? t.next_q_sd(c) : t.next_v_sd(c - t.next_q_sd.size());
 }
 
+const Eigen::VectorXd& NearEnd(const Transition& t) {
+  return t.next_q.allFinite() ? t.next_q : t.q;
+}
+
 bool IsObserved(const ConfigurationSpace& space, const Transition& t, Eigen::Index c) {
   const Eigen::Index n = t.next_v.size();
   return std::isfinite(c < n ? space.Difference(t.next_q, t.next_q, c) : t.next_v(c - n));

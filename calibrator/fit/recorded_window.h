@@ -34,6 +34,8 @@ void BeginTransition(const Rollout& rollout, size_t i, Simulator* simulator);
 double EndError(const ConfigurationSpace& space, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                 const Transition& transition, Eigen::Index c);
 double EndSd(const Transition& transition, Eigen::Index c);
+/// The recorded positions nearest to a transition's end: rotations there are counted about these.
+const Eigen::VectorXd& NearEnd(const Transition& transition);
 /// Whether that entry was observed at all: of a quaternion all or nothing.
 bool IsObserved(const ConfigurationSpace& space, const Transition& transition, Eigen::Index c);
 /// The state with which a window begins, moved by so much in entry c.

@@ -125,12 +125,6 @@ const Transition& StreamingLaplace::TransitionOf(const Piece& piece) const {
   return rollouts_[piece.rollout].transitions[piece.transition];
 }
 
-// About which rotations at the end of a transition are counted.
-const Eigen::VectorXd& StreamingLaplace::AboutOf(const Piece& piece) const {
-  const Transition& t = TransitionOf(piece);
-  return t.next_q.allFinite() ? t.next_q : t.q;
-}
-
 // States at the windows' ends, 2 n rows for each window; NaN where the simulation fails.
 // @param indices of the pieces that they are, each of so many windows one after the other.
 Eigen::MatrixXd StreamingLaplace::Predict(const Eigen::MatrixXd& standard,
@@ -143,8 +137,8 @@ Eigen::MatrixXd StreamingLaplace::Predict(const Eigen::MatrixXd& standard,
   windows_.Predict(physical, windows,
                    [&](Eigen::Index sample, size_t window, size_t, const auto& q, const auto& v) {
                      const Eigen::Index first = 2 * n_ * static_cast<Eigen::Index>(window);
-                     ends.col(sample).segment(first, n_) =
-                         space_.Coordinates(q, AboutOf(pieces_[indices[window / each]]));
+                     ends.col(sample).segment(first, n_) = space_.Coordinates(
+                         q, NearEnd(TransitionOf(pieces_[indices[window / each]])));
                      ends.col(sample).segment(first + n_, n_) = v;
                    });
   simulated_steps_ += static_cast<int64_t>(windows.size()) * physical.cols();
@@ -169,7 +163,7 @@ void StreamingLaplace::Linearise(const std::vector<size_t>& indices) {
     Eigen::MatrixXd raw(static_cast<Eigen::Index>(piece.coordinates.size()), 1 + p_);
     const Transition& transition = TransitionOf(piece);
     Eigen::VectorXd reading(2 * n_);
-    reading << space_.Coordinates(transition.next_q, AboutOf(piece)), transition.next_v;
+    reading << space_.Coordinates(transition.next_q, NearEnd(transition)), transition.next_v;
     for (Eigen::Index i = 0; i < raw.rows(); ++i) {
       const int c = piece.coordinates[static_cast<size_t>(i)];
       raw.row(i) = ends.row(first + c);

@@ -78,7 +78,6 @@ class StreamingLaplace {
   double DistanceFrom(const Eigen::VectorXd& at) const;
   std::vector<size_t> NextInTurn();
   void Linearise(const std::vector<size_t>& indices);
-  const Eigen::VectorXd& AboutOf(const Piece& piece) const;
   Eigen::MatrixXd Predict(const Eigen::MatrixXd& standard, const std::vector<Window>& windows,
                           const std::vector<size_t>& indices);
   std::vector<Eigen::MatrixXd> StartSensitivities(const std::vector<size_t>& indices,

@@ -173,8 +173,6 @@ void SimOpt::Infer() {
   }
 }
 
-GapFit SimOpt::Fit(const MethodInput& input) const { return CloseGap(input, RunMethod(input)); }
-
 // One mode leads to the next iteration's. Of several none may be given up, and in the beginning
 // there is none: the search is then one from many places, the prior's mean first.
 GapFit SimOpt::RunFromWhereItIs() const {
@@ -193,13 +191,13 @@ GapFit SimOpt::RunFromWhereItIs() const {
   if (one_mode) {
     try {
       const MethodInput input{model_, state_.rollouts, options, state_.before.components[0].mean};
-      return Fit(input);
+      return CloseGap(input, RunMethod(input));
     } catch (const std::invalid_argument&) {
       // perhaps it cannot be simulated where the new roll-outs went
     }
   }
   const MethodInput input{model_, state_.rollouts, options};
-  return Fit(input);
+  return CloseGap(input, RunMethod(input));
 }
 
 std::optional<CalibrationReport> SimOpt::Report() {

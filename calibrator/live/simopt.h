@@ -127,7 +127,6 @@ class SimOpt {
   RepsOptions SearchOptions() const;
   Eigen::VectorXd Evaluate(const Eigen::MatrixXd& samples);
   void Infer();
-  GapFit Fit(const MethodInput& input) const;
   GapFit RunFromWhereItIs() const;
   std::span<const Rollout> Newest() const;
 

@@ -10,6 +10,7 @@
 
 #include "calibrator/motion/motion_log.h"
 #include "common/time_units.h"
+#include "robot/physical.h"
 
 namespace plumb {
 namespace {
@@ -22,7 +23,7 @@ constexpr int64_t kPatience = 5000;
 constexpr int64_t kReordered = 1000;
 // Episodes under way at once: in a robot's log an episode has a state of its own at least.
 constexpr size_t kMostEpisodes = kPatience;
-// No counter and no clock gets there; beyond it, sums and differences overflow.
+// No counter gets there; beyond it, sums and differences overflow.
 constexpr int64_t kLargest = int64_t{1} << 53;
 
 /// Joins the episodes of a log one after the other as soon as each is complete, so that no more
@@ -35,9 +36,8 @@ class EpisodeJoiner {
   void OnState(const robot_state_t& state) {
     if (!Fits(state.num_positions, robot_.num_positions(), "coordinates") ||
         !Fits(state.num_velocities, robot_.num_velocities(), "velocities") || state.sequence < 0 ||
-        state.sequence > kLargest)
+        state.sequence > kLargest || !IsTime(state.utime))
       return;
-    if (state.utime < -kLargest || state.utime > kLargest) return;
     const robot_state_t* newest = joiner_.FindState(joiner_.newest_state());
     if (newest && (state.sequence < newest->sequence - kReordered ||
                    (state.sequence <= newest->sequence && state.utime > newest->utime))) {

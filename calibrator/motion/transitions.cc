@@ -17,7 +17,6 @@ constexpr size_t kMaxStates = 200'000;  // a quarter of an hour at 200 Hz
 constexpr size_t kMaxEpisodes = 64;
 constexpr size_t kMaxCommands = 200'000;
 constexpr int kMaxSteps = 1'000'000;
-constexpr int64_t kLatest = int64_t{1} << 53;  // [us] no clock gets there; differences overflow
 
 Eigen::VectorXd ToEigen(const std::vector<double>& values) {
   return Eigen::VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
@@ -106,7 +105,7 @@ void TransitionJoiner::OnState(const robot_state_t& smoothed) {
   if (smoothed.num_positions != space_.num_positions() ||
       smoothed.num_velocities != space_.num_velocities())
     return;
-  if (smoothed.utime < -kLatest || smoothed.utime > kLatest) return;
+  if (!IsTime(smoothed.utime)) return;
   // A restarted driver counts from 0 again, at a later time; what was before cannot be joined with
   // it.
   if (!states_.empty() && smoothed.sequence <= newest_state() &&

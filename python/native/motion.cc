@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "calibrator/fit/step_errors.h"
 #include "calibrator/motion/csv_log.h"
 #include "calibrator/motion/lcm_log.h"
 #include "python/native/arrays.h"
@@ -74,13 +75,6 @@ Motion MotionOf(std::shared_ptr<Robot> robot, const py::object& t, const py::obj
   columns.ends = Ends(terminated, truncated, columns.t.size());
   Log log = JoinMotion(name, MakeMotionTable(columns, description), description);
   return {std::move(robot), std::move(log)};
-}
-
-Eigen::VectorXd MeanEffort(const Transition& transition) {
-  Eigen::VectorXd effort = Eigen::VectorXd::Zero(transition.v.size());
-  for (const EffortSegment& segment : transition.efforts)
-    effort += segment.duration / transition.duration() * segment.effort;
-  return effort;
 }
 
 template <class Get>
