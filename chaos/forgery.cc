@@ -4,12 +4,12 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "chaos/mad_numbers.h"
 #include "common/lockstep/participant.h"
 #include "common/seal.h"
+#include "common/special_numbers.h"
 #include "drivers/can/frame.h"
 #include "drivers/protocols/cansimple.h"
 #include "plumb/driver_request_t.hpp"
@@ -18,10 +18,6 @@ namespace plumb {
 namespace {
 
 constexpr size_t kMostRemembered = 200;  // messages of a channel
-
-size_t Below(Random& random, size_t bound) {
-  return static_cast<size_t>(random.Uniform() * static_cast<double>(bound));
-}
 
 std::vector<uint8_t> RandomBytes(Random& random, size_t size) {
   std::vector<uint8_t> bytes(size);
@@ -39,8 +35,8 @@ std::vector<int> NodesOf(const RobotDescription& robot) {
 Frame RandomFrame(Random& random) {
   Frame frame;
   frame.id = random.Bits() & 0x7FF;
-  frame.remote = Below(random, 8) == 0;
-  frame.length = static_cast<uint8_t>(Below(random, 9));
+  frame.remote = random.Below(8) == 0;
+  frame.length = static_cast<uint8_t>(random.Below(9));
   if (frame.remote) return frame;
   for (size_t i = 0; i < frame.length; ++i) frame.data[i] = static_cast<uint8_t>(random.Bits());
   return frame;
@@ -48,8 +44,7 @@ Frame RandomFrame(Random& random) {
 
 std::string ForgedFrame(const std::vector<int>& nodes, Random& random) {
   using namespace cansimple;
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  const int node = nodes[Below(random, nodes.size())];
+  const int node = nodes[random.Below(nodes.size())];
   const std::array frames{Make(kSetInputTorque, node, {1.25}),
                           Make(kSetInputTorqueShort, node, {-0.75}),
                           Make(kEstop, node),
@@ -62,7 +57,7 @@ std::string ForgedFrame(const std::vector<int>& nodes, Random& random) {
                           Make(kGetEncoderEstimates, node, {1e9, 0}),
                           Make(kGetEncoderEstimates, node, {0, 0}),
                           Make(kGetTemperature, node, {200, 200})};
-  return ToText(frames[Below(random, frames.size())]);
+  return ToText(frames[random.Below(frames.size())]);
 }
 
 lockstep_post_t Post(lockstep_topic_t topic, std::vector<uint8_t> data) {
@@ -103,11 +98,11 @@ std::optional<lockstep_post_t> Forgery::Make(const Prank& prank, Random& random)
   }
   const lockstep_topic_t channel = ChannelTopic(prank.topic);
   if (prank.what == Mischief::kGarbage)
-    return Post(channel, RandomBytes(random, Below(random, 300)));
+    return Post(channel, RandomBytes(random, random.Below(300)));
   const auto heard = heard_.find(prank.topic);
   if (heard == heard_.end()) return std::nullopt;
   if (prank.what == Mischief::kReplay)
-    return Post(channel, heard->second[Below(random, heard->second.size())]);
+    return Post(channel, heard->second[random.Below(heard->second.size())]);
   return Post(channel, Forged(prank.topic, random));
 }
 
@@ -117,10 +112,10 @@ std::vector<uint8_t> Forgery::Forged(const std::string& channel, Random& random)
   const std::span<const uint8_t> message = Unsealed(model);
   std::vector<uint8_t> bytes = WithMadNumbers(channel, message, random)
                                    .value_or(std::vector<uint8_t>(message.begin(), message.end()));
-  const size_t way = Below(random, 4);
+  const size_t way = random.Below(4);
   if (way == 0) return bytes;  // as another program says it
   bytes.resize(bytes.size() + kSealSize);
-  seal.counter += 1 + static_cast<int64_t>(Below(random, 1000));
+  seal.counter += 1 + static_cast<int64_t>(random.Below(1000));
   if (way == 1) seal.sender ^= 2;  // else it pretends to be the one whom it imitates
   const bool copied = way == 2;    // with a signature that is another message's
   WriteSeal(seal, copied ? nullptr : &wrong_key_, robot_, bus_, channel, bytes);

@@ -45,10 +45,9 @@ int64_t MadInteger(int64_t sane, Random& random) {
 /// One number of one of the lists.
 template <class Number>
 void MaddenOne(std::initializer_list<std::vector<Number>*> lists, Random& random) {
-  std::vector<Number>& list =
-      **(lists.begin() + static_cast<long>(random.Uniform() * static_cast<double>(lists.size())));
+  std::vector<Number>& list = **(lists.begin() + static_cast<long>(random.Below(lists.size())));
   if (list.empty()) return;
-  Number& number = list[static_cast<size_t>(random.Uniform() * static_cast<double>(list.size()))];
+  Number& number = list[random.Below(list.size())];
   number = Mad(number, random);
 }
 

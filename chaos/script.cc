@@ -56,10 +56,6 @@ constexpr std::array kKinds{
 };
 static_assert(kKinds.size() == kMischiefs);
 
-uint32_t Below(Random& random, size_t bound) {
-  return static_cast<uint32_t>(random.Uniform() * static_cast<double>(bound));
-}
-
 double LogUniform(Random& random, double lower, double upper) {
   return std::exp(random.Uniform(std::log(lower), std::log(upper)));
 }
@@ -67,7 +63,7 @@ double LogUniform(Random& random, double lower, double upper) {
 const Kind& PickKind(Random& random) {
   int all = 0;
   for (const Kind& kind : kKinds) all += kind.weight;
-  int left = static_cast<int>(Below(random, static_cast<size_t>(all)));
+  int left = static_cast<int>(random.Below(static_cast<size_t>(all)));
   return *std::ranges::find_if(kKinds, [&](const Kind& kind) { return (left -= kind.weight) < 0; });
 }
 
@@ -78,7 +74,7 @@ void PickVictim(Random& random, Prank& prank) {
     case Mischief::kDelay:
     case Mischief::kDouble:
     case Mischief::kCorrupt: {
-      const Hearing& hearing = kHearings[Below(random, kHearings.size())];
+      const Hearing& hearing = kHearings[random.Below(kHearings.size())];
       prank.whom = hearing.who;
       prank.topic = hearing.topic;
       return;
@@ -90,7 +86,7 @@ void PickVictim(Random& random, Prank& prank) {
                                                   {"plumb-controller", "ROBOT_STATE"},
                                                   {"plumb-controller", "POLICY"},
                                                   {"plumb-calibrator", "ROBOT_STATE_SMOOTHED"}}};
-      const Hearing& hearing = kTrusting[Below(random, kTrusting.size())];
+      const Hearing& hearing = kTrusting[random.Below(kTrusting.size())];
       prank.whom = hearing.who;
       prank.topic = hearing.topic;
       return;
@@ -98,7 +94,7 @@ void PickVictim(Random& random, Prank& prank) {
     case Mischief::kReplay:
     case Mischief::kForge:
     case Mischief::kGarbage: {
-      const Hearing& hearing = kHearings[Below(random, kHearings.size())];
+      const Hearing& hearing = kHearings[random.Below(kHearings.size())];
       prank.topic = prank.what == Mischief::kGarbage || hearing.topic != std::string(kBus)
                         ? hearing.topic
                         : "DRIVER_REQUEST";
@@ -114,13 +110,13 @@ void PickVictim(Random& random, Prank& prank) {
     case Mischief::kDiskFull: {  // those who write
       constexpr std::array kWriters{"plumb-driver", "plumb-calibrator", "plumb-calibrator",
                                     "plumb-trainer"};
-      prank.whom = kWriters[Below(random, kWriters.size())];
+      prank.whom = kWriters[random.Below(kWriters.size())];
       return;
     }
     case Mischief::kKill:
     case Mischief::kStall:
     case Mischief::kSetClock:
-      prank.whom = names[Below(random, names.size())];
+      prank.whom = names[random.Below(names.size())];
       return;
   }
 }

@@ -12,17 +12,14 @@ constexpr uint32_t kWireStream = 0x57697265;  // "Wire"
 bool IsFrame(const lockstep_post_t& post) { return post.topic.kind == lockstep_topic_t::FRAME; }
 
 void FlipBit(lockstep_post_t& post, Random& random) {
-  const auto below = [&](size_t bound) {
-    return static_cast<size_t>(random.Uniform() * static_cast<double>(bound));
-  };
   if (!IsFrame(post)) {
     if (!post.data.empty())
-      post.data[below(post.data.size())] ^= static_cast<uint8_t>(1u << below(8));
+      post.data[random.Below(post.data.size())] ^= static_cast<uint8_t>(1u << random.Below(8));
     return;
   }
   auto frame = FrameFromText({reinterpret_cast<const char*>(post.data.data()), post.data.size()});
   if (!frame || frame->length == 0) return;
-  frame->data[below(frame->length)] ^= static_cast<uint8_t>(1u << below(8));
+  frame->data[random.Below(frame->length)] ^= static_cast<uint8_t>(1u << random.Below(8));
   const std::string text = ToText(*frame);
   post.data.assign(text.begin(), text.end());
   post.size = static_cast<int32_t>(post.data.size());

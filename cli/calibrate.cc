@@ -104,8 +104,8 @@ uint64_t HashOf(const Transition& t, uint64_t identity) {
   return Hash(t.disturbance, identity);
 }
 
-uint64_t IdentityOf(const RobotDescription& robot, const CalibrateFlags& flags,
-                    const std::vector<Log>& logs) {
+uint64_t CalibrationIdentity(const RobotDescription& robot, const CalibrateFlags& flags,
+                             const std::vector<Log>& logs) {
   uint64_t identity = Hash(VersionLine("plumb") + flags.options.method + flags.options.discrepancy,
                            robot.fingerprint);
   identity = Hash(&flags.options.seed, sizeof flags.options.seed, identity);
@@ -212,7 +212,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
       lock.emplace("journal " + std::filesystem::weakly_canonical(journal_file).string(),
                    journal_file + ": another process is at work on it: give another --output");
     }
-    if (speaks) journal.emplace(journal_file, IdentityOf(robot, flags, logs));
+    if (speaks) journal.emplace(journal_file, CalibrationIdentity(robot, flags, logs));
     RankBatchRunner batches(ranks, journal ? &*journal : nullptr);
     flags.options.execution.batches = &batches;
     flags.options.progress = [&](const std::string& what, double share) {

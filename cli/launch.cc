@@ -32,13 +32,9 @@ using SteadyClock = std::chrono::steady_clock;
 // of a virtual robot; a real one is armed by a person, every time
 constexpr int kMaxRearms = 20;
 constexpr int64_t kArmAgain = 500'000;      // [us]
-constexpr int64_t kLook = 50'000;           // [us]
+constexpr int64_t kLookAround = 50'000;     // [us]
 constexpr int64_t kDoubt = 300'000;         // [us]; three statuses of the controller
 constexpr size_t kMaxStrangeChannels = 10;  // that are named: strangers choose how many there are
-
-double SecondsSince(SteadyClock::time_point start) {
-  return std::chrono::duration<double>(SteadyClock::now() - start).count();
-}
 
 /// One run: its processes and what they say.
 class ClosedLoop {
@@ -91,7 +87,7 @@ class ClosedLoop {
     const int64_t doubt = setting_.virtual_run ? 0 : kDoubt;
     int64_t finished = 0;
     while (!progress_.finished() || clock_.Now() < finished + doubt) {
-      if (!process_.Wait(kLook)) {
+      if (!process_.Wait(kLookAround)) {
         line_.Clear();
         processes_.Hurry();
         std::cout << "interrupted" << std::endl;
@@ -145,7 +141,7 @@ class ClosedLoop {
     const auto until = [&](const std::function<bool()>& so, double seconds) {
       const auto start = SteadyClock::now();
       while (!so() && SecondsSince(start) < seconds && AllRunning()) {
-        if (!process_.Wait(kLook)) return false;
+        if (!process_.Wait(kLookAround)) return false;
       }
       return so();
     };

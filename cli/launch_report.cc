@@ -36,9 +36,9 @@ std::string Digits(double value) {
   return std::isfinite(value) ? fmt::format("{:.3g}", value) : "\xe2\x80\x93";
 }
 
-class Report {
+class LaunchPage {
  public:
-  Report(const RobotDescription& robot, const json& summary, const std::string& command)
+  LaunchPage(const RobotDescription& robot, const json& summary, const std::string& command)
       : robot_(robot),
         summary_(summary),
         command_(command),
@@ -244,7 +244,7 @@ class Report {
 
 std::string LaunchReport(const RobotDescription& robot, const json& summary,
                          const std::string& command) {
-  return Report(robot, summary, command).Print();
+  return LaunchPage(robot, summary, command).Print();
 }
 
 }  // namespace plumb

@@ -7,17 +7,16 @@
 #include <algorithm>
 #include <chrono>
 
+#include "common/time_units.h"
+
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr char kRobot[] = "plumb-robot", kDriver[] = "plumb-driver", kRecorder[] = "plumb-record";
-
-double SecondsSince(SteadyClock::time_point start) {
-  return std::chrono::duration<double>(SteadyClock::now() - start).count();
-}
+constexpr char kRobotProcess[] = "plumb-robot", kDriver[] = "plumb-driver",
+               kRecorder[] = "plumb-record";
 
 }  // namespace
 
@@ -76,7 +75,7 @@ void RunProcesses::Start() {
     for (auto* arguments : {&virtual_robot, &driver})
       arguments->insert(arguments->end(), {"--bus", bus});
   }
-  if (!flags_.real) Start(kRobot, with_priority(virtual_robot, 5));
+  if (!flags_.real) Start(kRobotProcess, with_priority(virtual_robot, 5));
   if (!flags_.real) driver.push_back("--virtual");
   if (flags_.allow_unsigned) driver.push_back("--unsigned");
   std::vector<std::string> controller{flags_.robot, "--seed", seed};
@@ -146,13 +145,13 @@ void RunProcesses::StopInVirtualTime(bool hurry) {
       coordinator_->participant().Wait(coordinator_->now() + kSlice, Participant::Wake::kOnTime);
     }
   };
-  stop([](const Child& child) { return child.name() != kRobot; });
+  stop([](const Child& child) { return child.name() != kRobotProcess; });
   stop([](const Child&) { return true; });
 }
 
 void RunProcesses::StopInRealTime() {
   for (Child& child : children_) {
-    if (child.name() != kRobot && child.name() != kRecorder) child.Signal(SIGTERM);
+    if (child.name() != kRobotProcess && child.name() != kRecorder) child.Signal(SIGTERM);
   }
   for (Child& child : children_) {
     if (child.name() == kDriver) child.WaitFor(0.5);

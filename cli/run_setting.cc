@@ -43,7 +43,8 @@ fs::path MakeFolder(const std::string& wanted) {
 }
 
 // LCM's log begins with the sync word of its first event.
-void RequireFiles(const Process& process, const LaunchFlags& flags, const RobotDescription& robot) {
+void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
+                         const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
   inputs.push_back(process.key_file());
   const std::vector<std::string> outputs{flags.log, flags.can_log, flags.summary, flags.report};
@@ -84,7 +85,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   if (flags.real && flags.speed != 0)
     throw std::invalid_argument("a real robot runs at its own speed, without --speed");
   if (!flags.real) truth = HiddenParameters(robot, flags.seed);
-  RequireFiles(process, flags, robot);
+  RequireProcessFiles(process, flags, robot);
   Lock(process.lcm_url());
   RequireFree(process.lcm_url(), robot.buses, flags.real);
   output = MakeFolder(flags.output);

@@ -51,9 +51,9 @@ ParameterDistribution ReadDistribution(const std::string& name, const RobotDescr
 
 /// A fingerprint of all that the result depends on, but for the number of steps: a longer run may
 /// go on from a shorter one.
-uint64_t IdentityOf(const TrainFlags& flags, const RobotDescription& robot,
-                    const ParameterDistribution& distribution,
-                    const std::optional<GaussianPolicy>& start) {
+uint64_t TrainingIdentity(const TrainFlags& flags, const RobotDescription& robot,
+                          const ParameterDistribution& distribution,
+                          const std::optional<GaussianPolicy>& start) {
   const TrainingSettings& s = robot.training;
   std::ostringstream text;
   text.precision(17);
@@ -98,7 +98,7 @@ class Training {
       start = LoadPolicy(flags_.from, robot_, *MakeTask(robot_));
       trainer_.Start(*start);
     }
-    identity_ = IdentityOf(flags_, robot_, distribution_, start);
+    identity_ = TrainingIdentity(flags_, robot_, distribution_, start);
     Resume();
   }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/progress_line.h"
+#include "common/time_units.h"
 #include "trainer/trainer.h"
 
 // How a training goes, for people and their tables. Not thread-safe.
@@ -14,9 +15,7 @@ namespace plumb {
 /// Real time since it was made.
 class Stopwatch {
  public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
+  double seconds() const { return SecondsSince(start_); }
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

@@ -12,12 +12,22 @@ set(plumb_precompiled <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem
   <memory> <numeric> <optional> <set> <span> <sstream> <stdexcept> <string> <string_view> <utility> <vector>
   <Eigen/Dense> <fmt/format.h>)
 
-# plumb_library(<folder> SOURCES a.cc ... LINKS other ...) -> static library plumb_<folder>
+# Several files compiled as one take two thirds of the time. So names in a folder's unnamed namespaces differ from each other;
+# APART is for folders whose files have the same names for the same things, as each protocol has its Step.
+option(PLUMBLINE_UNITY "compile several files as one" ON)
+function(plumb_unity target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${PLUMBLINE_UNITY} UNITY_BUILD_BATCH_SIZE 5)
+endfunction()
+
+# plumb_library(<folder> [APART] SOURCES a.cc ... LINKS other ...) -> static library plumb_<folder>
 function(plumb_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "APART" "" "SOURCES;LINKS" ${ARGN})
   add_library(plumb_${name} STATIC ${ARG_SOURCES})
   target_include_directories(plumb_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
   target_link_libraries(plumb_${name} PUBLIC ${ARG_LINKS} PRIVATE $<BUILD_INTERFACE:plumb_warnings>)
+  if(NOT ARG_APART)
+    plumb_unity(plumb_${name})
+  endif()
   if(name STREQUAL common)
     target_precompile_headers(plumb_common PRIVATE ${plumb_precompiled})
   else()
@@ -34,10 +44,10 @@ function(plumb_process name)
   target_precompile_headers(plumb-${name} REUSE_FROM plumb_common)
 endfunction()
 
-# plumb_test(<name> [FOLDERS folder ...] LINKS ...) -> one Catch2 binary of tests/<folder>/*.cc, one CTest entry.
+# plumb_test(<name> [APART] [FOLDERS folder ...] LINKS ...) -> one Catch2 binary of tests/<folder>/*.cc, one CTest entry.
 # Without FOLDERS the folder has the name.
 function(plumb_test name)
-  cmake_parse_arguments(ARG "" "" "FOLDERS;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "APART" "" "FOLDERS;LINKS" ${ARGN})
   if(NOT ARG_FOLDERS)
     set(ARG_FOLDERS ${name})
   endif()
@@ -47,6 +57,9 @@ function(plumb_test name)
     return()
   endif()
   add_executable(${name}_test ${sources})
+  if(NOT ARG_APART)
+    plumb_unity(${name}_test)
+  endif()
   target_link_libraries(${name}_test PRIVATE plumb_test_main ${ARG_LINKS} plumb_warnings)
   target_precompile_headers(${name}_test REUSE_FROM plumb_test_main)
   add_test(NAME ${name} COMMAND ${name}_test)

@@ -13,7 +13,7 @@
 namespace plumb {
 namespace {
 
-constexpr uint64_t kMagic = 0x504c554d424a3031;  // "PLUMBJ01"
+constexpr uint64_t kJournalMagic = 0x504c554d424a3031;  // "PLUMBJ01"
 
 // In front of each batch; its check covers these numbers and the batch.
 struct Header {
@@ -34,9 +34,9 @@ class Opened {
       : fd_(open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0644)) {
     if (fd_ < 0 && errno == ELOOP) Fail(file, "is a link: a journal is not written through one");
     if (fd_ < 0) Fail(file, std::string("cannot be written: ") + std::strerror(errno));
-    std::array<char, sizeof kMagic> begin{};
+    std::array<char, sizeof kJournalMagic> begin{};
     const ssize_t size = pread(fd_, begin.data(), begin.size(), 0);
-    if (size < 0 || std::memcmp(begin.data(), &kMagic, static_cast<size_t>(size)) != 0)
+    if (size < 0 || std::memcmp(begin.data(), &kJournalMagic, static_cast<size_t>(size)) != 0)
       Fail(file, "is in the way and no journal: it is not written over");
   }
   ~Opened() {
@@ -71,12 +71,12 @@ Journal::Journal(std::filesystem::path file, uint64_t identity) : file_(std::mov
   std::array<uint64_t, 2> head{};
   stream_.open(opened.name(), std::ios::in | std::ios::out | std::ios::binary);
   const bool same = stream_ && stream_.read(reinterpret_cast<char*>(head.data()), sizeof head) &&
-                    head[0] == kMagic && head[1] == identity;
+                    head[0] == kJournalMagic && head[1] == identity;
   if (same) return;
   reading_ = false;
   stream_ = std::fstream(opened.name(),
                          std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
-  head = {kMagic, identity};
+  head = {kJournalMagic, identity};
   stream_.write(reinterpret_cast<const char*>(head.data()), sizeof head);
   stream_.flush();
   RequireWritten();

@@ -8,7 +8,7 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kMagic = 8, kHead = kMagic + 2 * sizeof(uint32_t);
+constexpr size_t kMagicSize = 8, kCheckedHead = kMagicSize + 2 * sizeof(uint32_t);
 
 uint32_t Crc(std::string_view content) {
   boost::crc_32_type crc;
@@ -27,14 +27,14 @@ std::string WithChecksum(const FileKind& kind, std::string_view content) {
 }
 
 std::string_view CheckedContent(const FileKind& kind, std::string_view bytes) {
-  if (bytes.size() < kHead || !bytes.starts_with(kind.magic))
+  if (bytes.size() < kCheckedHead || !bytes.starts_with(kind.magic))
     throw DamagedFile(fmt::format("is not {}", kind.what));
   uint32_t version = 0, crc = 0;
-  std::memcpy(&version, bytes.data() + kMagic, sizeof version);
-  std::memcpy(&crc, bytes.data() + kMagic + sizeof version, sizeof crc);
+  std::memcpy(&version, bytes.data() + kMagicSize, sizeof version);
+  std::memcpy(&crc, bytes.data() + kMagicSize + sizeof version, sizeof crc);
   if (version != kind.version)
     throw DamagedFile(fmt::format("has version {}, not {}", version, kind.version));
-  const std::string_view content = bytes.substr(kHead);
+  const std::string_view content = bytes.substr(kCheckedHead);
   if (crc != Crc(content)) throw DamagedFile("is damaged");
   return content;
 }

@@ -16,8 +16,6 @@
 namespace plumb {
 namespace {
 
-constexpr char kDriverChannel[] = "DRIVER_STATUS";
-
 /// A number that nobody can guess, but in virtual time, where all is the same in each run.
 int64_t SenderNumber(const std::string& name, const Clock& clock) {
   uint64_t number = 0;

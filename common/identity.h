@@ -12,6 +12,9 @@
 
 namespace plumb {
 
+/// On which a driver says who it is.
+inline constexpr char kDriverChannel[] = "DRIVER_STATUS";
+
 /// Who a process is on LCM: it seals what the process says, and knows whom the process is to
 /// believe. Not thread-safe.
 ///

@@ -23,13 +23,13 @@ constexpr int kBurst = 64;  // datagrams between two looks at whether to stop
 // Of a message in a queue, beyond its bytes: what the containers take.
 constexpr size_t kOverhead = 128;
 
-[[noreturn]] void Fail(const char* what) {
+[[noreturn]] void FailWithErrno(const char* what) {
   throw std::system_error(errno, std::generic_category(), what);
 }
 
 template <class Value>
 void SetOption(int fd, int level, int option, const Value& value, const char* what) {
-  if (setsockopt(fd, level, option, &value, sizeof value) != 0) Fail(what);
+  if (setsockopt(fd, level, option, &value, sizeof value) != 0) FailWithErrno(what);
 }
 
 /// The descriptor is not readable any more.
@@ -86,7 +86,8 @@ LcmReceiver::LcmReceiver(const MulticastAddress& address)
       waiting_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
       stop_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
       datagrams_([this](std::string_view channel) { return Wanted(channel); }) {
-  if (!socket_.valid() || !waiting_fd_.valid() || !stop_fd_.valid()) Fail("cannot open a socket");
+  if (!socket_.valid() || !waiting_fd_.valid() || !stop_fd_.valid())
+    FailWithErrno("cannot open a socket");
   Open(address);
   thread_ = std::thread([this] { Work(); });
 }
@@ -111,7 +112,7 @@ void LcmReceiver::Open(const MulticastAddress& address) {
   group.sin_port = htons(address.port);
   inet_pton(AF_INET, address.group.c_str(), &group.sin_addr);
   if (bind(fd, reinterpret_cast<const sockaddr*>(&group), sizeof group) != 0)
-    Fail("cannot bind LCM's port");
+    FailWithErrno("cannot bind LCM's port");
   ip_mreqn membership{};
   membership.imr_multiaddr = group.sin_addr;  // by the interface that the routes choose
   SetOption(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, membership, "cannot join LCM's group");

@@ -17,8 +17,8 @@ namespace {
 
 constexpr char kUdpm[] = "udpm://";
 
-int Number(const std::string& url, std::string_view what, std::string_view text, int least,
-           int greatest) {
+int NumberIn(const std::string& url, std::string_view what, std::string_view text, int least,
+             int greatest) {
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < least ||
@@ -49,7 +49,7 @@ MulticastAddress ParseUdpm(const std::string& url) {
   if (!network.empty()) address.group = network.substr(0, colon);
   if (colon != std::string_view::npos) {
     address.port = static_cast<uint16_t>(
-        Number(url, "port", network.substr(colon + 1), 1, std::numeric_limits<uint16_t>::max()));
+        NumberIn(url, "port", network.substr(colon + 1), 1, std::numeric_limits<uint16_t>::max()));
   }
   in_addr group{};
   if (inet_pton(AF_INET, address.group.c_str(), &group) != 1 || !IN_MULTICAST(ntohl(group.s_addr)))
@@ -65,10 +65,10 @@ MulticastAddress ParseUdpm(const std::string& url) {
     if (!seen.insert(key).second)
       throw std::invalid_argument(fmt::format("{}: '{}' is given twice", url, key));
     if (key == "ttl")
-      address.ttl = Number(url, "ttl", value, 0, 255);
+      address.ttl = NumberIn(url, "ttl", value, 0, 255);
     else if (key == "recv_buf_size")
       address.receive_buffer =
-          Number(url, "recv_buf_size", value, 0, std::numeric_limits<int>::max());
+          NumberIn(url, "recv_buf_size", value, 0, std::numeric_limits<int>::max());
     else
       throw std::invalid_argument(
           fmt::format("{}: '{}' is no option of udpm: ttl and recv_buf_size are", url, key));

@@ -10,6 +10,9 @@ namespace plumb {
 /// LCM by multicast on this machine only (TTL 0), with a receive buffer large enough for a policy.
 inline constexpr char kDefaultLcmUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
 
+/// The channel on which liblcm says something to itself when it starts.
+inline constexpr char kSelfTest[] = "LCM_SELF_TEST";
+
 /// The URL itself; for an empty one $LCM_DEFAULT_URL or, without that, kDefaultLcmUrl.
 std::string ResolvedLcmUrl(const std::string& url);
 

@@ -14,9 +14,8 @@
 namespace plumb {
 namespace {
 
-constexpr char kSelfTest[] = "LCM_SELF_TEST";  // the channel that liblcm has for it
-constexpr int64_t kPatience = 10'000'000;      // [us], as liblcm has it
-constexpr int kAgain = 100;                    // [ms]
+constexpr int64_t kPatience = 10'000'000;  // [us], as liblcm has it
+constexpr int kAgain = 100;                // [ms]
 
 bool IsMulticast(const std::string& url) { return url.starts_with("udpm:"); }
 
@@ -38,8 +37,6 @@ std::runtime_error CannotOpen(const std::string& url, const std::string& reason 
                          "ip route add 224.0.0.0/4 dev lo"
                        : ""));
 }
-
-constexpr char kDriverChannel[] = "DRIVER_STATUS";
 
 /// The first, the 10th, the 100th ...: whoever floods us is not to fill the disk.
 void WarnNowAndThen(std::string_view channel, std::string_view why, int64_t count) noexcept {

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <utility>
+#include <vector>
 
 namespace plumb {
 
@@ -21,6 +24,8 @@ class Random {
   double Uniform();
   /// Uniform in [lower, upper).
   double Uniform(double lower, double upper) { return lower + (upper - lower) * Uniform(); }
+  /// One of 0, 1, ... bound - 1, bound > 0.
+  size_t Below(size_t bound) { return static_cast<size_t>(Uniform() * static_cast<double>(bound)); }
   /// Standard normal (Box-Muller).
   double Normal();
 
@@ -32,5 +37,11 @@ class Random {
   double spare_ = 0;
   bool has_spare_ = false;
 };
+
+/// Every order equally likely (Fisher and Yates).
+template <class T>
+void Shuffle(std::vector<T>& items, Random& random) {
+  for (size_t i = items.size(); i > 1; --i) std::swap(items[i - 1], items[random.Below(i)]);
+}
 
 }  // namespace plumb

@@ -9,11 +9,11 @@
 namespace plumb {
 namespace {
 
-constexpr std::string_view kMagic = "PLUMSEAL";
+constexpr std::string_view kSealMagic = "PLUMSEAL";
 
 bool HasSeal(std::span<const uint8_t> bytes) noexcept {
-  return bytes.size() >= kSealSize &&
-         std::memcmp(bytes.data() + bytes.size() - kSealSize, kMagic.data(), kMagic.size()) == 0;
+  return bytes.size() >= kSealSize && std::memcmp(bytes.data() + bytes.size() - kSealSize,
+                                                  kSealMagic.data(), kSealMagic.size()) == 0;
 }
 
 Signature SignatureOf(const SigningKey& key, std::string_view robot, std::string_view bus,
@@ -26,7 +26,7 @@ Signature SignatureOf(const SigningKey& key, std::string_view robot, std::string
 std::optional<Seal> FindSeal(std::span<const uint8_t> bytes) noexcept {
   if (!HasSeal(bytes)) return std::nullopt;
   std::array<uint64_t, 4> numbers;
-  const uint8_t* at = bytes.data() + bytes.size() - kSealSize + kMagic.size();
+  const uint8_t* at = bytes.data() + bytes.size() - kSealSize + kSealMagic.size();
   std::memcpy(numbers.data(), at, sizeof numbers);
   for (uint64_t& number : numbers) number = be64toh(number);
   Seal seal{static_cast<int64_t>(numbers[0]),
@@ -45,8 +45,8 @@ std::span<const uint8_t> Unsealed(std::span<const uint8_t> bytes) noexcept {
 void WriteSeal(Seal seal, const SigningKey* key, std::string_view robot, std::string_view bus,
                std::string_view channel, std::span<uint8_t> message) noexcept {
   uint8_t* at = message.data() + message.size() - kSealSize;
-  std::memcpy(at, kMagic.data(), kMagic.size());
-  at += kMagic.size();
+  std::memcpy(at, kSealMagic.data(), kSealMagic.size());
+  at += kSealMagic.size();
   for (const int64_t number : {seal.run, seal.sender, seal.process, seal.counter}) {
     const uint64_t network = htobe64(static_cast<uint64_t>(number));
     std::memcpy(at, &network, sizeof network);

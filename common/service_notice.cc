@@ -18,7 +18,7 @@ int64_t Nanoseconds() {
 }
 
 /// A whole number > 0 of the environment; 0 = there is none.
-int64_t Number(const char* name) {
+int64_t FromEnvironment(const char* name) {
   const char* const text = std::getenv(name);
   int64_t number = 0;
   if (!text) return 0;
@@ -47,8 +47,8 @@ ServiceNotice::ServiceNotice() {
   const char* const name = std::getenv("NOTIFY_SOCKET");
   if (!name) return;
   socket_ = Connect(name);
-  const int64_t pid = Number("WATCHDOG_PID");
-  if (pid == 0 || pid == getpid()) period_ = Number("WATCHDOG_USEC") * 1000 / 2;
+  const int64_t pid = FromEnvironment("WATCHDOG_PID");
+  if (pid == 0 || pid == getpid()) period_ = FromEnvironment("WATCHDOG_USEC") * 1000 / 2;
 }
 
 void ServiceNotice::Stopping() {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kDigits = 64;
 
-[[noreturn]] void Fail(const std::filesystem::path& file, const std::string& why) {
+[[noreturn]] void RefuseKey(const std::filesystem::path& file, const std::string& why) {
   throw std::runtime_error(file.string() + ": " + why);
 }
 
@@ -34,27 +34,28 @@ void ReadKeyText(const std::filesystem::path& file, KeyText& key) {
   // Without waiting, should it be a pipe.
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0)
-    Fail(file, fmt::format("the key cannot be read: {}; cure: plumb key {}", std::strerror(errno),
-                           file.string()));
+    RefuseKey(file, fmt::format("the key cannot be read: {}; cure: plumb key {}",
+                                std::strerror(errno), file.string()));
   struct stat status {};
   const bool known = fstat(fd, &status) == 0;
   const ssize_t size =
       known && S_ISREG(status.st_mode) ? read(fd, key.text.data(), key.text.size()) : -1;
   close(fd);
-  if (known && !S_ISREG(status.st_mode)) Fail(file, "not a file that could hold a key");
+  if (known && !S_ISREG(status.st_mode)) RefuseKey(file, "not a file that could hold a key");
   if ((status.st_mode & 077) != 0) {
-    Fail(file,
-         fmt::format("the key is open to others (mode {:04o}); cure: chmod 600 {}, or a new one if "
-                     "somebody has read it",
-                     status.st_mode & 07777, file.string()));
+    RefuseKey(
+        file,
+        fmt::format("the key is open to others (mode {:04o}); cure: chmod 600 {}, or a new one if "
+                    "somebody has read it",
+                    status.st_mode & 07777, file.string()));
   }
   if (status.st_uid != geteuid()) {
-    Fail(file,
-         fmt::format("the key belongs to another user ({}), who may know or change it; cure: a "
-                     "copy of one\'s own, made by install -m 600",
-                     status.st_uid));
+    RefuseKey(file, fmt::format(
+                        "the key belongs to another user ({}), who may know or change it; cure: a "
+                        "copy of one\'s own, made by install -m 600",
+                        status.st_uid));
   }
-  if (size < 0) Fail(file, "the key cannot be read");
+  if (size < 0) RefuseKey(file, "the key cannot be read");
   key.size = static_cast<size_t>(size);
   if (key.size > 0 && key.text[key.size - 1] == '\n') --key.size;
 }
@@ -71,10 +72,11 @@ SigningKey::SigningKey(const std::filesystem::path& file) {
                                           nullptr, &length, &end) == 0 &&
                            end == key.text.data() + key.size;
   if (!hexadecimal || length != key_.size()) {
-    Fail(file,
-         fmt::format(
-             "not a key: one line of {} hexadecimal digits is expected; cure: plumb key NEW-FILE",
-             kDigits));
+    RefuseKey(
+        file,
+        fmt::format(
+            "not a key: one line of {} hexadecimal digits is expected; cure: plumb key NEW-FILE",
+            kDigits));
   }
 }
 
@@ -106,14 +108,14 @@ void MakeKeyFile(const std::filesystem::path& file) {
   sodium_memzero(key.data(), key.size());
   text.text[kDigits] = '\n';
   const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  if (fd < 0 && errno == EEXIST) Fail(file, "exists already; a key is never replaced");
-  if (fd < 0) Fail(file, fmt::format("cannot be written: {}", std::strerror(errno)));
+  if (fd < 0 && errno == EEXIST) RefuseKey(file, "exists already; a key is never replaced");
+  if (fd < 0) RefuseKey(file, fmt::format("cannot be written: {}", std::strerror(errno)));
   const bool written = write(fd, text.text.data(), kDigits + 1) == kDigits + 1 && fsync(fd) == 0;
   const int error = errno;
   close(fd);
   if (written) return;
   unlink(file.c_str());
-  Fail(file, fmt::format("cannot be written: {}", std::strerror(error)));
+  RefuseKey(file, fmt::format("cannot be written: {}", std::strerror(error)));
 }
 
 }  // namespace plumb

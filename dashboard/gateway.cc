@@ -12,6 +12,7 @@
 #include "common/message_walk.h"
 #include "dashboard/channels.h"
 #include "plumb/driver_status_t.hpp"
+#include "robot/physical.h"
 
 namespace plumb {
 namespace {
@@ -141,7 +142,7 @@ void Gateway::OnMessage(const std::string& name, std::span<const uint8_t> messag
                             : Verdict::kUndecodable);
   if (!believed && name == "DRIVER_STATUS") wishes_.OnUnbelieved();
   if (!good) return;
-  if (channel->tells_time && IsTime(numbers.utime())) {
+  if (channel->tells_time && numbers.utime() >= 0 && IsTime(numbers.utime())) {
     // One speaker's words come in order. A time of 0 is none.
     if (numbers.utime() > 0 && numbers.utime() < channel->utime)
       Rewind(numbers.utime(), moment.now);

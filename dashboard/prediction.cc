@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 
 #include "common/message_json.h"
 #include "common/time_units.h"
-#include "dashboard/run_time.h"
+#include "robot/physical.h"
 
 namespace plumb {
 namespace {
@@ -44,7 +45,8 @@ OneStepPrediction::OneStepPrediction(const RobotDescription& robot)
 void OneStepPrediction::OnState(const robot_state_t& state) {
   State next{state.utime,      state.sequence,        ToEigen(state.q),
              ToEigen(state.v), ToEigen(state.effort), state.restarted != 0};
-  const bool ours = IsTime(next.utime) && IsTime(next.sequence) &&
+  const bool ours = IsTime(next.utime) && next.sequence >= 0 &&
+                    next.sequence < std::numeric_limits<int64_t>::max() &&
                     next.q.size() == simulator_.num_positions() &&
                     next.v.size() == simulator_.num_velocities() && next.q.allFinite() &&
                     next.v.allFinite() && next.effort.size() == next.v.size();

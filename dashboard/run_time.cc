@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "robot/physical.h"
+
 namespace plumb {
 namespace {
 
@@ -10,7 +12,7 @@ constexpr int64_t kOld = 10'000'000;  // [us], as ChannelJudge has it
 }  // namespace
 
 void RunTime::OnMessage(int64_t utime, const std::optional<Seal>& seal, int64_t date, int64_t now) {
-  if (!IsTime(utime)) return;
+  if (utime < 0 || !IsTime(utime)) return;
   utime_ = std::max(utime_, utime);  // processes' words come a little out of order
   if (seal) {
     heard_ = seal->process == 0            ? Kind::kVirtual

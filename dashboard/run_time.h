@@ -9,9 +9,6 @@
 
 namespace plumb {
 
-/// Times that a message may have [us]: with others, differences would overflow. Up to 2255.
-inline bool IsTime(int64_t utime) { return utime >= 0 && utime <= int64_t{1} << 53; }
-
 /// What time it is in the run that is heard, how fast it goes, and of what kind it is: as its
 /// messages say. Not thread-safe.
 class RunTime {

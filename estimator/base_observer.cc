@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
 
+#include "common/special_numbers.h"
 #include "common/time_units.h"
 
 namespace plumb {
@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kLate = 1e-6 * ImuInbox::kLatest;                            // [s]
-constexpr double kSurely = 5;                                                 // standard deviations
+constexpr double kSurelyApart = 5;                                            // standard deviations
 constexpr double kHeightKnown = 0.1, kTiltKnown = 0.1, kVelocityKnown = 0.5;  // [m], [rad], [m/s]
 
 LegOdometry::Settings SettingsOf(const RobotDescription& robot, const FloatingBase& base) {
@@ -118,7 +118,7 @@ bool BaseObserver::Moved(const ImuInbox::Reading& reading) const {
                  measured =
                      Eigen::Quaterniond(w, x, y, z).normalized().conjugate() * Vector3d::UnitZ();
   const double apart = std::atan2(up.cross(measured).norm(), up.dot(measured));
-  return apart > std::max(reset_after_, kSurely * std::hypot(TiltSd(), measured_angle_sd_));
+  return apart > std::max(reset_after_, kSurelyApart * std::hypot(TiltSd(), measured_angle_sd_));
 }
 
 void BaseObserver::Read(int64_t utime, const ImuInbox::Reading& reading) {
@@ -180,7 +180,6 @@ void BaseObserver::SetTurn(const Eigen::Quaterniond& orientation, const Vector3d
 
 void BaseObserver::Fill(int64_t utime, robot_state_t& state) const {
   if (!started_) {
-    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     for (const ImuMounting::Slide& slide : base_.slides)
       Set(slide.joint, kNaN, kNaN, kNaN, kNaN, state);
     const Vector3d none = Vector3d::Constant(kNaN);

@@ -4,13 +4,12 @@
 #include <cmath>
 
 #include "estimator/impact.h"
+#include "estimator/square.h"
 
 namespace plumb {
 namespace {
 
 constexpr double kSurelyBelow = 2;  // standard deviations
-
-double Square(double x) { return x * x; }
 
 }  // namespace
 

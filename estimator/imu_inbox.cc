@@ -8,10 +8,8 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
-
 bool Sane(const imu_t& imu) {
-  if (imu.utime < 0 || imu.utime >= kEndOfTime) return false;
+  if (imu.utime < 0 || !IsTime(imu.utime)) return false;
   if (!std::ranges::all_of(imu.rate, IsPhysical) || !std::ranges::all_of(imu.force, IsPhysical))
     return false;
   double norm = 0;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/square.h"
+
 namespace plumb {
 namespace {
 
@@ -20,8 +22,6 @@ enum Entry { kPosition, kVelocity, kAcceleration, kStep, kBias, kMark };
 int SizeOf(const EstimatorSettings& settings) {
   return settings.acceleration_sd > 0 ? kMark + 1 : settings.bias_sd > 0 ? kBias + 1 : kStep + 1;
 }
-
-constexpr double Square(double x) { return x * x; }
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 #include "estimator/leg_odometry.h"
 #include "estimator/leg_smoother.h"
+#include "estimator/square.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -22,14 +23,12 @@ constexpr double kFootSd = 1e-3;   // [m] play and elasticity of a leg
 constexpr double kAnywhereSd = 1;  // [m] of a foot that has just been set down, horizontally
 constexpr double kSlipped = 16.3;  // chi-square with three degrees of freedom: 99.9 %
 // [m] sd below which the filter itself can tell whether a foot rests
-constexpr double kHeightKnown = 0.03;
+constexpr double kRestHeightKnown = 0.03;
 // [s] over which the force on the body is averaged before that
 constexpr double kBorneFor = 0.1;
 // [s] after which the force on a body in flight is zero on average
 constexpr double kLongFlight = 0.5;
 constexpr double kAstray = 8;  // standard deviations below the ground
-
-double Square(double x) { return x * x; }
 
 Matrix3d Cross(const Vector3d& a) {
   Matrix3d m;
@@ -203,7 +202,7 @@ void LegOdometry::Judge(size_t index, std::span<const Foot> feet) {
   const Foot& foot = feet[index];
   ContactTest::Motion motion = MotionOf(foot);
   const bool rested = rests(index);
-  if (!rested && motion.height_sd > kHeightKnown) {
+  if (!rested && motion.height_sd > kRestHeightKnown) {
     // A height that is as good as unknown excludes nothing and excuses nothing; but what falls
     // freely rests on nothing.
     if (borne_ < s_.gravity / 2) return;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/impact.h"
+#include "estimator/square.h"
 #include "robot/motion_noise.h"
 #include "robot/physical.h"
 
@@ -12,15 +13,12 @@ namespace {
 
 // [us]; beyond it nothing is known of the motion in between
 constexpr int64_t kLongestGap = 1'000'000;
-constexpr int64_t kMaxAhead = 10'000;             // [us] of a joint's reading before the others
-constexpr int64_t kEndOfTime = int64_t{1} << 60;  // [us]; in 36 000 years
-constexpr double kSurely = 5;                     // standard deviations
+constexpr int64_t kMaxAhead = 10'000;  // [us] of a joint's reading before the others
+constexpr double kSurely = 5;          // standard deviations
 // [s] of a drive's velocity estimate: twice that of an ODrive as it comes
 constexpr double kVelocityLag = 4e-3;
 constexpr double kBiasesInOrder = 5;     // times its sd
 constexpr double kRoundedEffort = 1e-9;  // [Nm] or [N]: what rounding makes of a mean
-
-double Square(double x) { return x * x; }
 
 AgreementWatch::Settings VelocityWatch(const EstimatorSettings& s, bool gyro) {
   return {s.position_sd, s.velocity_sd, gyro ? kBiasesInOrder * s.bias_sd : 0,
@@ -94,7 +92,7 @@ bool StateObserver::IsNew(const joint_state_t& measured, size_t joint) const {
 StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
   // Times of this epoch only, so that differences cannot overflow.
   if (static_cast<size_t>(measured.num_joints) != joints_.size() || measured.utime < 0 ||
-      measured.utime >= kEndOfTime)
+      !IsTime(measured.utime))
     return Use::kRefuse;
   for (size_t i = 0; i < joints_.size(); ++i) {
     const auto within = [](double x, double greatest) { return !(std::abs(x) > greatest); };
@@ -105,8 +103,8 @@ StateObserver::Use StateObserver::Judge(const joint_state_t& measured) const {
       return Use::kRefuse;
     if (!measured.valid[i]) continue;
     const int64_t t = measured.measured[i];
-    const bool of_that_time = t >= 0 && t < kEndOfTime && t - measured.utime <= kMaxAhead &&
-                              measured.utime - t <= kLongestGap;
+    const bool of_that_time =
+        t >= 0 && IsTime(t) && t - measured.utime <= kMaxAhead && measured.utime - t <= kLongestGap;
     if (!of_that_time || !IsPhysical(measured.position[i])) return Use::kRefuse;
   }
   if (!started_) return Use::kUse;

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "common/progress_line.h"
+#include "common/time_units.h"
 
 namespace plumb {
 namespace {
@@ -70,8 +71,7 @@ class Progress {
 
  private:
   std::string Left(double share) const {
-    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start_;
-    return Duration(passed.count() * (1 - share) / share);
+    return Duration(SecondsSince(start_) * (1 - share) / share);
   }
 
   const bool speaks_;

@@ -20,6 +20,7 @@
 #include "common/examples.h"
 #include "common/process.h"
 #include "common/progress_line.h"
+#include "common/time_units.h"
 #include "experiments/options.h"
 #include "experiments/results.h"
 #include "plot/svg.h"
@@ -121,7 +122,7 @@ Curve Train(const RobotDescription& robot, const ParameterDistribution& distribu
     }
   }
   line.Clear();
-  curve.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  curve.seconds = SecondsSince(start);
   curve.evaluation = trainer.EvaluateHeldOut(sample, kEvaluationEpisodes).mean;
   return curve;
 }

@@ -12,7 +12,6 @@
 namespace plumb {
 namespace {
 
-class Connection;
 constexpr size_t kMaxHeader = 8 << 10;  // [bytes]
 constexpr auto kAcceptAgain = std::chrono::milliseconds(100);
 
@@ -20,6 +19,7 @@ constexpr auto kAcceptAgain = std::chrono::milliseconds(100);
 
 /// What all connections share. They hold it, and it knows them.
 struct HttpServer::Parts {
+  class Connection;
   Parts(asio::io_context& context, Setting with)
       : setting(std::move(with)), acceptor(context), again(context) {}
 
@@ -30,12 +30,8 @@ struct HttpServer::Parts {
   bool ended = false;
 };
 
-namespace {
-
-using Parts = HttpServer::Parts;
-
 /// A client that asks, one request after the other, until it goes or becomes a WebSocket.
-class Connection : public std::enable_shared_from_this<Connection> {
+class HttpServer::Parts::Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(std::shared_ptr<Parts> parts, tcp::socket&& socket)
       : parts_(std::move(parts)), stream_(std::move(socket)) {}
@@ -111,7 +107,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::optional<std::list<std::weak_ptr<Connection>>::iterator> place_;
 };
 
-void Accept(const std::shared_ptr<Parts>& parts) {
+namespace {
+
+void Accept(const std::shared_ptr<HttpServer::Parts>& parts) {
   parts->acceptor.async_accept([parts](error_code error, tcp::socket socket) {
     if (parts->ended) return;
     if (error) {  // no descriptors left, say
@@ -124,7 +122,7 @@ void Accept(const std::shared_ptr<Parts>& parts) {
     if (parts->connections.size() >= HttpServer::kMaxConnections) {
       if (const auto oldest = parts->connections.front().lock()) oldest->Close();
     }
-    std::make_shared<Connection>(parts, std::move(socket))->Begin();
+    std::make_shared<HttpServer::Parts::Connection>(parts, std::move(socket))->Begin();
     Accept(parts);
   });
 }

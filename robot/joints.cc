@@ -9,7 +9,7 @@
 namespace plumb {
 namespace {
 
-constexpr Range kSane{-1e9, 1e9}, kSaneNotNegative{0, 1e9};
+constexpr Range kAnyNumber{-1e9, 1e9}, kNotNegative{0, 1e9};
 
 /// [joint.PROTOCOL] of the motor protocols that have keys of their own.
 struct MotorTable {
@@ -33,7 +33,7 @@ MotorDescription ReadMotor(Config& config, const std::vector<BusDescription>& bu
   motor.gear = config.Number("gear", {1e-9, 1e9}, 1);
   motor.sign = config.Integer("sign", {-1, 1}, 1);
   if (motor.sign == 0) config.Fail("sign", "must be 1 or -1");
-  motor.offset = config.Number("offset", kSane, 0);
+  motor.offset = config.Number("offset", kAnyNumber, 0);
   for (const MotorTable& table : kMotorTables) {
     if (motor.protocol == table.protocol) {
       table.read(config, motor);
@@ -62,7 +62,7 @@ JointDynamics ReadDynamics(Config config, const JointDescription& joint) {
 
 JointLimitSettings ReadLimits(Config config, const JointDescription& joint) {
   JointLimitSettings limits;
-  limits.position_margin = config.Number("position_margin", kSaneNotNegative, 0);
+  limits.position_margin = config.Number("position_margin", kNotNegative, 0);
   // One margin for each limit, and none of the other's.
   if (limits.position_margin > 0 && !(2 * limits.position_margin <= joint.upper - joint.lower)) {
     config.Fail("position_margin",
@@ -73,7 +73,7 @@ JointLimitSettings ReadLimits(Config config, const JointDescription& joint) {
     config.Fail("position_margin", "is of position limits, and the joint has none");
   }
   limits.effort_rate = config.Number("effort_rate", {1e-9, HUGE_VAL}, limits.effort_rate);
-  limits.damping = config.Number("damping", kSaneNotNegative, 0);
+  limits.damping = config.Number("damping", kNotNegative, 0);
   config.Finish();
   return limits;
 }

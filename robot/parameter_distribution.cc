@@ -86,19 +86,16 @@ Eigen::VectorXd ParameterDistribution::SampleCoordinates(Random& random) const {
 }
 
 SimulatorDraw ParameterDistribution::Draw(Random& random) const {
-  const auto choose = [&](size_t count) {
-    return static_cast<size_t>(random.Uniform() * static_cast<double>(count));
-  };
   SimulatorDraw draw{Eigen::VectorXd()};
   if (!residual || random.Uniform() < kPlainShare) {
     draw.parameters = Sample(random);
   } else {
-    draw.draw = choose(residual->coordinates.size());
+    draw.draw = random.Below(residual->coordinates.size());
     draw.parameters = ToPhysical(residual->coordinates[draw.draw]);
     draw.residual = residual;
   }
   if (!starts.empty() && random.Uniform() < kRecordedStarts)
-    draw.start = starts[choose(starts.size())];
+    draw.start = starts[random.Below(starts.size())];
   return draw;
 }
 

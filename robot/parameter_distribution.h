@@ -37,6 +37,12 @@ struct SimulatorDraw {
 /// *coordinates* of the uncertain parameters (see ParameterDescription::coordinate), in the order
 /// of RobotDescription::parameters. Immutable use is thread-safe.
 struct ParameterDistribution {
+  /// More is no distribution but an attack.
+  static constexpr int kMaxComponents = 1000;
+  /// A covariance that has been through arithmetic: eigenvalues this far below zero, relative to
+  /// the largest, are zero.
+  static constexpr double kRounding = 1e-9;
+
   int iteration = 0;                             ///< of SimOpt; 0 = the prior
   std::vector<ParameterDescription> parameters;  ///< P
   /// of P coordinates; covariances may be singular: of a parameter that is known exactly, or

@@ -19,11 +19,6 @@ namespace {
 
 using Coordinate = ParameterDescription::Coordinate;
 
-constexpr int kMaxComponents = 1000;
-// A covariance that has been through arithmetic: eigenvalues this far below zero, relative to the
-// largest, are zero.
-constexpr double kRounding = 1e-9;
-
 int8_t ToCode(Coordinate coordinate) {
   switch (coordinate) {
     case Coordinate::kLog:
@@ -67,8 +62,8 @@ constexpr double kFarthest = 1000, kWidest = 100;
 constexpr double kGreatest = 1e12;  // in any unit
 
 // In coordinates, of each parameter apart, so that it and the field can be named.
-void RequireNear(const Eigen::VectorXd& coordinates, const char* field,
-                 const RobotDescription& robot) {
+void RequireNearPrior(const Eigen::VectorXd& coordinates, const char* field,
+                      const RobotDescription& robot) {
   const Gaussian prior = PriorGaussian(robot);
   for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
     const double sds = std::abs(coordinates[i] - prior.mean[i]) / std::sqrt(prior.covariance(i, i));
@@ -91,7 +86,7 @@ void RequireNarrow(const Eigen::MatrixXd& covariance, const RobotDescription& ro
 // As they are, and as simulators have them.
 void RequirePlausible(const ParameterDistribution& distribution, const RobotDescription& robot) {
   for (const Gaussian& component : distribution.mixture.components) {
-    RequireNear(component.mean, "mean", robot);
+    RequireNearPrior(component.mean, "mean", robot);
     RequireNarrow(component.covariance, robot);
   }
   const Eigen::VectorXd means = distribution.Mean(), sds = distribution.Sd();
@@ -104,11 +99,13 @@ void RequirePlausible(const ParameterDistribution& distribution, const RobotDesc
 
 void RequireCovariance(const Eigen::MatrixXd& covariance) {
   const double scale = covariance.cwiseAbs().maxCoeff();
-  if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > kRounding * scale) {
+  if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() >
+      ParameterDistribution::kRounding * scale) {
     Reject("covariance is not symmetric");
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance, Eigen::EigenvaluesOnly);
-  if (eigen.info() != Eigen::Success || eigen.eigenvalues().minCoeff() < -kRounding * scale) {
+  if (eigen.info() != Eigen::Success ||
+      eigen.eigenvalues().minCoeff() < -ParameterDistribution::kRounding * scale) {
     Reject("covariance is not positive semidefinite");
   }
 }
@@ -156,7 +153,7 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
   }
   if (result.residual) {
     for (const Eigen::VectorXd& draw : result.residual->coordinates)
-      RequireNear(draw, "residual's draw", description);
+      RequireNearPrior(draw, "residual's draw", description);
   }
   const ConfigurationSpace space(description);
   const auto state =

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kLevel = 1e-9;  // of a direction's rise
 
-Eigen::Quaterniond QuaternionAt(const Placement::Vector& q, Eigen::Index i) {
+Eigen::Quaterniond UnitQuaternionAt(const Placement::Vector& q, Eigen::Index i) {
   return Eigen::Quaterniond(q[i], q[i + 1], q[i + 2], q[i + 3]).normalized();
 }
 
@@ -42,8 +42,8 @@ Eigen::VectorXd Placement::Distance(const Vector& q, const Vector& wanted) const
   for (const Eigen::Index entry : unknown_) distance[entry] = 0;
   if (rotation_ < 0) return distance;
   // The turn that takes up, as the link is to have it, to where it has it.
-  const Eigen::Vector3d has = QuaternionAt(q, quaternion_).conjugate() * up_,
-                        wants = QuaternionAt(wanted, quaternion_).conjugate() * up_;
+  const Eigen::Vector3d has = UnitQuaternionAt(q, quaternion_).conjugate() * up_,
+                        wants = UnitQuaternionAt(wanted, quaternion_).conjugate() * up_;
   const Eigen::AngleAxisd lean(Eigen::Quaterniond::FromTwoVectors(has, wants));
   distance.segment<3>(rotation_) = lean.angle() * lean.axis();
   return distance;

@@ -22,8 +22,6 @@ using nlohmann::json;
 using Field = JsonField;
 
 constexpr std::uintmax_t kMaxBytes = 256 << 20;
-constexpr size_t kMaxComponents = 1000;
-constexpr double kRounding = 1e-9;
 
 std::string ReadText(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file)) throw std::runtime_error("there is no such file");
@@ -67,9 +65,9 @@ void RequireRobot(const Field& root, const RobotDescription& robot) {
 Gaussian ReadComponent(const Field& mean, const Field& covariance, size_t n) {
   Gaussian component{mean.Vector(n), covariance.Matrix(n)};
   const Eigen::MatrixXd& c = component.covariance;
-  covariance.Require(
-      (c - c.transpose()).cwiseAbs().maxCoeff() <= kRounding * c.cwiseAbs().maxCoeff(),
-      "is not symmetric");
+  covariance.Require((c - c.transpose()).cwiseAbs().maxCoeff() <=
+                         ParameterDistribution::kRounding * c.cwiseAbs().maxCoeff(),
+                     "is not symmetric");
   covariance.Require(Eigen::LLT<Eigen::MatrixXd>(c).info() == Eigen::Success,
                      "is not positive definite");
   return component;
@@ -78,7 +76,7 @@ Gaussian ReadComponent(const Field& mean, const Field& covariance, size_t n) {
 ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& robot) {
   const size_t count = mixture["weights"].size(), n = robot.parameters.size();
   mixture.Require(n > 0, fmt::format("robot '{}' has no parameters", robot.name));
-  mixture["weights"].Require(count >= 1 && count <= kMaxComponents,
+  mixture["weights"].Require(count >= 1 && count <= ParameterDistribution::kMaxComponents,
                              fmt::format("has {} entries", count));
   const std::vector<Field> weights = mixture["weights"].Entries(count),
                            means = mixture["means"].Entries(count),
@@ -92,7 +90,7 @@ ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& 
     distribution.mixture.components.push_back(ReadComponent(means[i], covariances[i], n));
     total += weight;
   }
-  mixture["weights"].Require(std::abs(total - 1) <= kRounding,
+  mixture["weights"].Require(std::abs(total - 1) <= ParameterDistribution::kRounding,
                              fmt::format("sum to {}, not to 1", total));
   mixture.Require(distribution.Mean().allFinite() && distribution.Sd().allFinite(),
                   "is too wide: its moments overflow");

@@ -74,6 +74,7 @@ struct ResidualFunction {
   static constexpr double kNugget = 1e-3;
   /// More would be no residual but an attack: their kernel is factorised.
   static constexpr int kMostCentres = 2000;
+  static constexpr int kMostChannels = 10'000;  ///< inputs, outputs
   /// In units of z: what is beyond was never recorded, and its square is infinite in single
   /// precision.
   static constexpr double kFarthest = 1e6;

@@ -10,7 +10,6 @@ namespace {
 using json = nlohmann::ordered_json;
 
 // More would be no residual but an attack on the memory.
-constexpr size_t kMost = 10'000;
 // Displacement and velocity in space.
 constexpr size_t kMostOfContact = 6;
 
@@ -38,7 +37,7 @@ json ToJson(const std::optional<ResidualFunction>& function) {
           {"unknown", Singles(function->unknown)}};
 }
 
-size_t Count(const JsonField& list, size_t most = kMost) {
+size_t Count(const JsonField& list, size_t most = ResidualFunction::kMostChannels) {
   const size_t count = list.size();
   list.Require(count >= 1 && count <= most, fmt::format("has {} entries", count));
   return count;
@@ -57,7 +56,7 @@ void RequireSmall(const JsonField& list, size_t size) {
   }
 }
 
-void RequireNear(const JsonField& list, const Eigen::MatrixXd& numbers) {
+void RequireNearRecorded(const JsonField& list, const Eigen::MatrixXd& numbers) {
   list.Require((numbers.array().abs() <= ResidualFunction::kFarthest).all(),
                "is farther away than anything that was recorded");
 }
@@ -70,11 +69,11 @@ ResidualFunction ReadFunction(const JsonField& field, size_t draws, size_t outpu
   function.scale = Positive(field["scale"], inputs);
   function.low = field["low"].SingleVector(inputs);
   function.high = field["high"].SingleVector(inputs);
-  RequireNear(field["low"], function.low);
-  RequireNear(field["high"], function.high);
+  RequireNearRecorded(field["low"], function.low);
+  RequireNearRecorded(field["high"], function.high);
   field["low"].Require((function.low.array() <= function.high.array()).all(), "is above high");
   function.centres = field["centres"].SingleMatrix(centres, inputs);
-  RequireNear(field["centres"], function.centres);
+  RequireNearRecorded(field["centres"], function.centres);
   for (const JsonField& weights : field["weights"].Entries(draws))
     function.weights.push_back(weights.SingleMatrix(outputs, 1 + inputs + centres));
   for (const JsonField& row : field["noise"].Entries(outputs)) RequireSmall(row, outputs);

@@ -15,7 +15,6 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using RowMajorFloat = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // More would be no residual but an attack on the memory.
-constexpr int kMost = 10'000;
 // In the order of Residual::kParts.
 constexpr int8_t kConditions[] = {Message::FREE, Message::TOUCHING, Message::GROUND, Message::STOP};
 static_assert(std::size(kConditions) == Residual::kParts.size());
@@ -58,8 +57,8 @@ ResidualFunction FromMessage(const Message& m, size_t draws) {
   const auto require = [](bool good, const char* field) {
     if (!good) throw std::invalid_argument(fmt::format("residual: {} of the wrong size", field));
   };
-  require(m.num_inputs > 0 && m.num_inputs <= kMost, "num_inputs");
-  require(m.num_outputs > 0 && m.num_outputs <= kMost, "num_outputs");
+  require(m.num_inputs > 0 && m.num_inputs <= ResidualFunction::kMostChannels, "num_inputs");
+  require(m.num_outputs > 0 && m.num_outputs <= ResidualFunction::kMostChannels, "num_outputs");
   require(m.num_centres > 0 && m.num_centres <= ResidualFunction::kMostCentres, "num_centres");
   const auto d = static_cast<size_t>(m.num_inputs), n = static_cast<size_t>(m.num_outputs),
              w = static_cast<size_t>(m.num_centres), each = n * (1 + d + w);

@@ -16,7 +16,7 @@ namespace {
 constexpr size_t kLargestBlock = 16;
 
 // Of a window: 80 MB of efforts for six joints.
-constexpr double kMaxSubsteps = 1e5;
+constexpr double kMaxWindowSubsteps = 1e5;
 
 double Duration(std::span<const EffortSegment> step) {
   return std::accumulate(step.begin(), step.end(), 0.0,
@@ -45,7 +45,7 @@ void Require(const Window& window, const Model& model) {
     throw std::invalid_argument(
         "a window needs a finite state, and steps of some duration with efforts for all joints");
   }
-  if (!(substeps <= kMaxSubsteps))
+  if (!(substeps <= kMaxWindowSubsteps))
     throw std::invalid_argument("a window is too long to be simulated");
 }
 

@@ -24,7 +24,7 @@ namespace {
 // what a decision owes to simulation.
 constexpr FileKind kKind{"PLUMBTRN", 9, "a trainer's checkpoint"};
 
-class Writer {
+class CheckpointWriter {
  public:
   template <class T>
   void operator()(const T& value) {
@@ -57,9 +57,9 @@ class Writer {
   std::vector<char> bytes_;
 };
 
-class Reader {
+class CheckpointReader {
  public:
-  Reader(const char* data, size_t size) : next_(data), left_(size) {}
+  CheckpointReader(const char* data, size_t size) : next_(data), left_(size) {}
 
   template <class T>
   void operator()(T& value) {
@@ -214,7 +214,7 @@ void SetTrainerState(const TrainerState& state, Checkpoint& checkpoint) {
 }
 
 std::string EncodeCheckpoint(const Checkpoint& checkpoint) {
-  Writer body;
+  CheckpointWriter body;
   Transfer(body, checkpoint);
   return WithChecksum(kKind, {body.bytes().data(), body.bytes().size()});
 }
@@ -222,7 +222,7 @@ std::string EncodeCheckpoint(const Checkpoint& checkpoint) {
 Checkpoint DecodeCheckpoint(std::string_view bytes) {
   try {
     const std::string_view content = CheckedContent(kKind, bytes);
-    Reader body(content.data(), content.size());
+    CheckpointReader body(content.data(), content.size());
     Checkpoint checkpoint;
     Transfer(body, checkpoint);
     if (body.left() != 0) throw CheckpointError("is too long");

@@ -22,12 +22,6 @@ std::vector<int> Sizes(const TrainingSettings& settings, int observations) {
 // in order. More would be too small to be worth handing to another thread.
 constexpr int kShares = 2;
 
-void Shuffle(std::vector<int>& order, Random& random) {
-  for (size_t i = order.size(); i > 1; --i) {
-    std::swap(order[i - 1], order[static_cast<size_t>(random.Uniform() * static_cast<double>(i))]);
-  }
-}
-
 }  // namespace
 
 Critic::Critic(const TrainingSettings& settings, int observations, Random random, Workers& workers,

@@ -24,7 +24,7 @@ void ForFields(Fields& fields, Record& record) {
 }
 
 /// Between ranks of one run: bytes as they lie in memory, arrays with their length before them.
-struct Writer {
+struct EpisodeWriter {
   std::vector<std::byte> bytes;
 
   void Append(const void* data, size_t size) {
@@ -42,7 +42,7 @@ struct Writer {
   }
 };
 
-struct Reader {
+struct EpisodeReader {
   std::span<const std::byte> rest;
 
   void Take(void* data, size_t size) {
@@ -67,11 +67,11 @@ struct Reader {
 
 std::vector<EpisodeRecord> Gather(const Ranks& ranks, std::vector<EpisodeRecord> mine) {
   if (ranks.size() == 1) return mine;
-  Writer writer;
+  EpisodeWriter writer;
   for (const EpisodeRecord& record : mine) ForFields(writer, record);
   const std::vector<std::byte> bytes = ranks.Concatenate(writer.bytes);
   std::vector<EpisodeRecord> all;
-  for (Reader reader{bytes}; !reader.rest.empty();) ForFields(reader, all.emplace_back());
+  for (EpisodeReader reader{bytes}; !reader.rest.empty();) ForFields(reader, all.emplace_back());
   return all;
 }
 

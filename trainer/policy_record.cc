@@ -38,9 +38,10 @@ std::string Excerpt(const json& value) {
 }
 
 /// Reads properties, naming the one that is at fault.
-class Reader {
+class RecordReader {
  public:
-  explicit Reader(const std::map<std::string, std::string>& properties) : properties_(properties) {}
+  explicit RecordReader(const std::map<std::string, std::string>& properties)
+      : properties_(properties) {}
 
   void operator()(const char* name, std::string& text) const { text = Find(name); }
   template <class Number>
@@ -89,7 +90,7 @@ class Reader {
   const std::map<std::string, std::string>& properties_;
 };
 
-class Writer {
+class RecordWriter {
  public:
   void operator()(const char* name, const std::string& text) { properties[name] = text; }
   void operator()(const char* name, const std::vector<std::string>& list) {
@@ -110,7 +111,7 @@ class Writer {
 
 /// The one list of what is in the file, for writing and reading.
 template <class Archive, class Record>
-void Transfer(Archive& archive, Record& record) {
+void TransferRecord(Archive& archive, Record& record) {
   archive("robot", record.robot);
   archive("task", record.task);
   archive("observations", record.observation_names);
@@ -156,17 +157,17 @@ void RequireSameTask(const PolicyRecord& record, const RobotDescription& robot, 
 }
 
 std::map<std::string, std::string> ToProperties(const PolicyRecord& record) {
-  Writer writer;
-  Transfer(writer, record);
+  RecordWriter writer;
+  TransferRecord(writer, record);
   return writer.properties;
 }
 
 PolicyRecord FromProperties(const std::map<std::string, std::string>& properties) {
   PolicyRecord record;
-  const Reader reader(properties);
-  Transfer(reader, record);
-  if (record.period <= 0) Reader::Fail("period", "is not positive");
-  if (record.steps < 0) Reader::Fail("steps", "is negative");
+  const RecordReader reader(properties);
+  TransferRecord(reader, record);
+  if (record.period <= 0) RecordReader::Fail("period", "is not positive");
+  if (record.steps < 0) RecordReader::Fail("steps", "is negative");
   return record;
 }
 

@@ -16,6 +16,7 @@
 #include "calibrator/fit/whitening.h"
 #include "calibrator/fit/window_errors.h"
 #include "calibrator/inference/laplace.h"
+#include "common/time_units.h"
 #include "robot/parameter_distribution.h"
 #include "sim/model.h"
 #include "umbridge/robot_models.h"
@@ -203,8 +204,7 @@ Findings CalibrateRemote(const RobotDescription& robot, std::span<const Log> log
   findings.misspecification.summary = "not judged: the model is not ours";
   findings.holdout.summary = "nothing was held out: the model is not ours";
   findings.agreement.summary = "the logs were not compared: the model is not ours";
-  findings.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  findings.seconds = SecondsSince(start);
   return findings;
 }
 

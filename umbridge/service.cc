@@ -16,8 +16,8 @@ namespace {
 using nlohmann::json;
 
 constexpr double kProtocolVersion = 1.0;
-constexpr size_t kLongestNumber = 32;       // [bytes], with what stands around it
-constexpr size_t kBesideNumbers = 4 << 10;  // [bytes] of a request
+constexpr size_t kLongestInput = 32;               // [bytes], with what stands around it
+constexpr size_t kRequestBesideNumbers = 4 << 10;  // [bytes] of a request
 
 struct Refusal {
   int status;
@@ -176,7 +176,7 @@ size_t UmbridgeService::longest_request() const {
   size_t most = 0;
   for (const ServedModel& model : models_)
     most = std::max(most, static_cast<size_t>(2 * model.inputs + model.outputs));
-  return kBesideNumbers + kLongestNumber * most;
+  return kRequestBesideNumbers + kLongestInput * most;
 }
 
 ServiceAnswer UmbridgeService::Respond(std::string_view method, std::string_view path,

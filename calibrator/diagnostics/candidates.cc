@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Differences are taken over this share of a likely surprise: the errors of what is not smooth
 // (contact, friction, delays) are asked for what such a change does to them, not for an
 // infinitesimal one.

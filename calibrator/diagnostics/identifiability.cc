@@ -9,11 +9,11 @@
 #include "calibrator/diagnostics/identifiability_summary.h"
 #include "calibrator/diagnostics/sparse_basis.h"
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNull = 1e-6;             // of the largest information, in units of the prior
 constexpr double kNullInformation = 1e-2;  // and of the prior's
 constexpr double kWeakInformation = 1;     // of the prior's

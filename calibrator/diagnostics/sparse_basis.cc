@@ -32,9 +32,7 @@ Eigen::Index First(const Eigen::VectorXd& x) {
 std::vector<Eigen::Index> IndependentRows(const Eigen::MatrixXd& space, Random& random) {
   std::vector<Eigen::Index> order(static_cast<size_t>(space.rows())), chosen;
   std::iota(order.begin(), order.end(), 0);
-  for (size_t i = order.size(); i > 1; --i) {
-    std::swap(order[i - 1], order[static_cast<size_t>(random.Uniform() * static_cast<double>(i))]);
-  }
+  Shuffle(order, random);
   Eigen::MatrixXd basis(space.cols(), 0);
   for (const Eigen::Index row : order) {
     const Eigen::VectorXd entries = space.row(row).transpose();

@@ -11,11 +11,10 @@
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/whitening.h"
 #include "common/hash.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Gaussian filter over rows (time), reflected at both ends, the last row included.
 Eigen::MatrixXd SmoothOverTime(const Eigen::MatrixXd& x, double sigma_rows) {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kLengths[] = {2, 3, 4, 6, 8};  // in units of the inputs' sd
 constexpr double kBoundOfSeen = 2;
-constexpr double kStill = 1e-9;  // an error that is none
+constexpr double kNoError = 1e-9;  // an error that is none
 
 template <class Matrix>
 void RoundEntries(Matrix* matrix) {
@@ -29,7 +29,7 @@ FunctionFit::FunctionFit(std::vector<Examples> draws, const FunctionFitOptions& 
   }
   const Eigen::MatrixXd& outputs = draws_.front().outputs;
   function_.noise = Eigen::MatrixXd::Zero(outputs.rows(), outputs.rows());
-  function_.bound = kBoundOfSeen * outputs.cwiseAbs().rowwise().maxCoeff().array().max(kStill);
+  function_.bound = kBoundOfSeen * outputs.cwiseAbs().rowwise().maxCoeff().array().max(kNoError);
   function_.unknown = options.unknown * (first.variance.array() / first.ratio.array()).sqrt();
 }
 

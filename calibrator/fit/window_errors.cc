@@ -2,19 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/whitening.h"
 #include "common/decompositions.h"
 #include "common/hash.h"
+#include "common/special_numbers.h"
 #include "sim/tasks/task.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Relative to the units of the state; large against the rounding of a simulation, small against its
 // curvature.

@@ -6,9 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "calibrator/inference/abc_posterior.h"
 #include "calibrator/inference/distances.h"
-#include "calibrator/inference/gaussian_mixture.h"
-#include "calibrator/inference/kernel_density.h"
 #include "calibrator/inference/regression_adjustment.h"
 
 namespace plumb {
@@ -16,8 +15,7 @@ namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
-constexpr uint32_t kParameters = 1, kSamples = 2;  // first stream words
-constexpr int kMaxKernels = 2'000, kMaxFitted = 2'000, kMaxComponents = 16;
+constexpr uint32_t kParameterStream = 1, kPosteriorStream = 2;  // first stream words
 
 }  // namespace
 
@@ -28,9 +26,8 @@ Posterior InferByRejection(const Problem& problem, const RejectionOptions& optio
     throw std::invalid_argument(
         "rejection needs simulations, samples, a fraction in (0, 1] and an observation");
   }
-  Posterior posterior;
   const Index n = problem.prior.size(), total = options.simulations;
-  Random draws(seed, {kParameters});
+  Random draws(seed, {kParameterStream});
   const MatrixXd u = StandardNormals(n, total, draws);
   MatrixXd outcomes(problem.observed.size(), total);
   for (Index first = 0; first < total; first += options.batch) {
@@ -49,22 +46,15 @@ Posterior InferByRejection(const Problem& problem, const RejectionOptions& optio
   while (!order.empty() && !std::isfinite(distances(order.back()))) order.pop_back();
   const VectorXd equal = VectorXd::Ones(static_cast<Index>(order.size()));
 
-  Random random(seed, {kSamples});
-  if (order.empty()) {
-    posterior.samples = problem.prior.Sample(options.samples, random);
-  } else {
-    AdjustedSamples kept{u(Eigen::all, order), equal};
-    if (options.adjust) {
-      kept = AdjustByRegression(kept.samples, outcomes(Eigen::all, order), problem.observed,
-                                distances(order), equal);
-    }
-    const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMaxKernels, random);
-    posterior.samples = problem.prior.FromStandard(Sample(density, options.samples, random));
+  std::optional<AdjustedSamples> kept;
+  if (!order.empty() && options.adjust) {
+    kept = AdjustByRegression(u(Eigen::all, order), outcomes(Eigen::all, order), problem.observed,
+                              distances(order), equal);
+  } else if (!order.empty()) {
+    kept = {u(Eigen::all, order), equal};
   }
-  const Index some = std::min<Index>(options.samples, kMaxFitted);
-  posterior.mixture =
-      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMaxComponents, random)
-          .mixture;
+  Random random(seed, {kPosteriorStream});
+  Posterior posterior = AbcPosterior(problem.prior, kept, options.samples, random);
   posterior.simulations = total;
   for (const auto column : outcomes.colwise()) posterior.failures += !column.allFinite();
   if (diagnostics) {

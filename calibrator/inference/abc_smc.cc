@@ -7,6 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "calibrator/inference/abc_posterior.h"
 #include "calibrator/inference/distances.h"
 #include "calibrator/inference/gaussian_mixture.h"
 #include "calibrator/inference/kernel_density.h"
@@ -17,8 +18,7 @@ namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
-constexpr uint32_t kProposals = 1, kSamples = 2;  // first stream words
-constexpr int kMaxKernels = 2'000, kMaxFitted = 2'000, kMaxComponents = 16;
+constexpr uint32_t kSmcProposals = 1, kSmcPosteriorStream = 2;  // first stream words
 
 struct Population {
   MatrixXd u, outcomes;
@@ -91,7 +91,7 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
   }
   const Index n = problem.prior.size();
   const VectorXd& observed = problem.observed;
-  Posterior posterior;
+  int64_t simulations = 0, failures = 0;
   SmcDiagnostics report;
   Population population;
   GaussianMixture kernels;
@@ -99,17 +99,15 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
   // The first generation accepts everything that did not fail.
   double epsilon = std::numeric_limits<double>::max();
 
-  for (uint32_t t = 0; posterior.simulations < options.simulations; ++t) {
+  for (uint32_t t = 0; simulations < options.simulations; ++t) {
     Generation generation{MatrixXd(n, 0), MatrixXd(observed.size(), 0), {}};
-    Random random(seed, {kProposals, t});
+    Random random(seed, {kSmcProposals, t});
     while (static_cast<int>(generation.accepted.size()) < options.population &&
-           posterior.simulations < options.simulations) {
-      const Index batch =
-          std::min<Index>(options.population, options.simulations - posterior.simulations);
+           simulations < options.simulations) {
+      const Index batch = std::min<Index>(options.population, options.simulations - simulations);
       const MatrixXd u =
           t == 0 ? StandardNormals(n, batch, random) : Sample(kernels, batch, random);
-      const MatrixXd outcomes =
-          problem.simulate(problem.prior.FromStandard(u), posterior.simulations);
+      const MatrixXd outcomes = problem.simulate(problem.prior.FromStandard(u), simulations);
       const Index before = generation.u.cols();
       generation.u.conservativeResize(Eigen::NoChange, before + batch);
       generation.outcomes.conservativeResize(Eigen::NoChange, before + batch);
@@ -118,12 +116,12 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
       const VectorXd d = Distances(options.distance, outcomes, observed,
                                    t == 0 ? VectorXd::Ones(observed.size()) : scale);
       for (Index j = 0; j < batch; ++j) {
-        posterior.failures += !outcomes.col(j).allFinite();
+        failures += !outcomes.col(j).allFinite();
         if (d(j) <= epsilon && static_cast<int>(generation.accepted.size()) < options.population) {
           generation.accepted.push_back(before + j);
         }
       }
-      posterior.simulations += batch;
+      simulations += batch;
     }
     const auto accepted = static_cast<int>(generation.accepted.size());
     // Half a generation is still one, and the only one there may ever be.
@@ -149,22 +147,17 @@ Posterior InferBySmc(const Problem& problem, const SmcOptions& options, uint64_t
     kernels = Kernels(population, options.local_kernels);
   }
 
-  Random random(seed, {kSamples});
-  if (population.u.cols() == 0) {
-    posterior.samples = problem.prior.Sample(options.samples, random);
-  } else {
-    AdjustedSamples kept{population.u, population.weights};
-    if (options.adjust) {
-      kept = AdjustByRegression(population.u, population.outcomes, observed, distances,
-                                population.weights);
-    }
-    const GaussianMixture density = KernelDensity(kept.samples, kept.weights, kMaxKernels, random);
-    posterior.samples = problem.prior.FromStandard(Sample(density, options.samples, random));
+  std::optional<AdjustedSamples> kept;
+  if (population.u.cols() > 0 && options.adjust) {
+    kept = AdjustByRegression(population.u, population.outcomes, observed, distances,
+                              population.weights);
+  } else if (population.u.cols() > 0) {
+    kept = {population.u, population.weights};
   }
-  const Index some = std::min<Index>(options.samples, kMaxFitted);
-  posterior.mixture =
-      SelectMixture(posterior.samples.leftCols(some), VectorXd::Ones(some), kMaxComponents, random)
-          .mixture;
+  Random random(seed, {kSmcPosteriorStream});
+  Posterior posterior = AbcPosterior(problem.prior, kept, options.samples, random);
+  posterior.simulations = simulations;
+  posterior.failures = failures;
   if (diagnostics) *diagnostics = std::move(report);
   return posterior;
 }

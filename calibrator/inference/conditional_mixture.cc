@@ -21,7 +21,7 @@ constexpr uint32_t kParameters = 1, kEstimate = 2, kFinal = 3, kSamples = 4;
 // Simulations of less than this of the nearest one's weight are left out.
 constexpr double kNegligible = 1e-3;
 // More would cost time and hardly change a mixture.
-constexpr Index kMaxFitted = 20'000;
+constexpr Index kMaxOutcomes = 20'000;
 
 // Simulations that succeeded with parameters in the region.
 struct Simulations {
@@ -56,7 +56,7 @@ MatrixXd RobustCovariance(MatrixXd outcomes) {
 
 // Gaussian kernel of the width that gives an effective number of `target`, or equal weights if that
 // cannot be.
-VectorXd KernelWeights(const VectorXd& squared, double target) {
+VectorXd GaussianKernelWeights(const VectorXd& squared, double target) {
   if (target >= static_cast<double>(squared.size())) return VectorXd::Ones(squared.size());
   const double nearest = squared.minCoeff();
   const auto weights = [&](double width) -> VectorXd {
@@ -76,10 +76,10 @@ std::vector<Index> Weighty(const VectorXd& weights) {
   for (Index j = 0; j < weights.size(); ++j) {
     if (weights(j) > kNegligible * weights.maxCoeff()) columns.push_back(j);
   }
-  if (static_cast<Index>(columns.size()) > kMaxFitted) {
+  if (static_cast<Index>(columns.size()) > kMaxOutcomes) {
     std::stable_sort(columns.begin(), columns.end(),
                      [&](Index a, Index b) { return weights(a) > weights(b); });
-    columns.resize(kMaxFitted);
+    columns.resize(kMaxOutcomes);
   }
   return columns;
 }
@@ -172,7 +172,8 @@ class Inference {
     ConditionalMixtureDiagnostics::Round report{made_, inside.joint.cols(), 0, 0,
                                                 region_.has_value()};
     if (static_cast<double>(inside.joint.cols()) < Fewest()) return report;
-    const VectorXd weights = KernelWeights(inside.squared, Effective(inside, options_.local_share));
+    const VectorXd weights =
+        GaussianKernelWeights(inside.squared, Effective(inside, options_.local_share));
     report.effective = EffectiveNumber(weights);
     const std::vector<Index> columns = Weighty(weights);
     Random random(seed_, {kEstimate, static_cast<uint32_t>(round)});
@@ -199,12 +200,12 @@ class Inference {
     const std::vector<double> shares = {1, 0.5, 0.25, 0.125, 0.0625};
     // Simulations that judge have weight in all kernels, or widths would be judged by different
     // ones.
-    VectorXd judged = KernelWeights(inside.squared, Effective(inside, shares.back()));
+    VectorXd judged = GaussianKernelWeights(inside.squared, Effective(inside, shares.back()));
     judged = (judged.array() > kNegligible * judged.maxCoeff()).select(judged, 0).eval();
     std::vector<GaussianMixture> estimates;
     double last_effective = 0;
     for (size_t i = 0; i < shares.size(); ++i) {
-      const VectorXd weights = KernelWeights(inside.squared, Effective(inside, shares[i]));
+      const VectorXd weights = GaussianKernelWeights(inside.squared, Effective(inside, shares[i]));
       const double effective = EffectiveNumber(weights);
       if (effective == last_effective) break;  // no more can be left out
       last_effective = effective;

@@ -2,19 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
 #include "common/decompositions.h"
 #include "common/gaussian.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Sum over all pairs of columns of f(squared distance).
 template <typename F>

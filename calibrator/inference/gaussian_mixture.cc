@@ -5,11 +5,10 @@
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // ln N(x; p) of every column.
 Eigen::VectorXd ComponentLogDensities(const Gaussian& p, const Eigen::MatrixXd& points) {

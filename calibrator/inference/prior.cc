@@ -2,15 +2,13 @@
 
 #include <boost/math/special_functions/erf.hpp>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "common/gaussian.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Phi and its inverse, accurate in both tails.
 double NormalCdf(double u) { return 0.5 * std::erfc(-u * M_SQRT1_2); }

@@ -13,7 +13,7 @@ using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
 // Epanechnikov's kernel times the given weights; its width reaches just beyond the farthest finite
 // distance.
-VectorXd KernelWeights(const VectorXd& distances, const VectorXd& weights) {
+VectorXd EpanechnikovWeights(const VectorXd& distances, const VectorXd& weights) {
   double farthest = 0;
   for (Index i = 0; i < distances.size(); ++i) {
     if (weights(i) > 0 && std::isfinite(distances(i))) farthest = std::max(farthest, distances(i));
@@ -52,7 +52,7 @@ AdjustedSamples AdjustByRegression(const MatrixXd& parameters, const MatrixXd& o
       outcomes.rows() != observed.size()) {
     throw std::invalid_argument("regression adjustment: sizes do not match");
   }
-  AdjustedSamples result{parameters, KernelWeights(distances, weights)};
+  AdjustedSamples result{parameters, EpanechnikovWeights(distances, weights)};
   const VectorXd& w = result.weights;
   std::vector<Index> compared, used;
   for (Index i = 0; i < observed.size(); ++i) {

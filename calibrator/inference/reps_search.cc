@@ -8,11 +8,10 @@
 #include "calibrator/inference/reps.h"
 #include "common/decompositions.h"
 #include "common/random.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Features of a quadratic: 1, x_i, x_i x_j with i <= j.
 Eigen::Index FeatureCount(Eigen::Index n) { return (n + 1) * (n + 2) / 2; }

@@ -4,20 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "calibrator/inference/chi_squared.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMaxBins = 20;
 // expected; fewer, and the statistic is not chi-squared distributed
 constexpr int kFewestPerBin = 5;
-constexpr int kMaxPoints = 100;        // at which distribution functions are compared
-constexpr double kNegligible = 1e-20;  // a probability
+constexpr int kMaxPoints = 100;                   // at which distribution functions are compared
+constexpr double kNegligibleProbability = 1e-20;  // a probability
 constexpr double kSignificant = 0.01;
 constexpr uint32_t kTieStream = 0x54494553;  // "TIES"
 
@@ -164,7 +163,7 @@ double UniformityByEcdf(const std::vector<int>& ranks, int draws) {
       if (here == 0) continue;
       for (int to = from; to <= n; ++to) {
         const double p = pmf(to - from, n - from, step);
-        if (p < kNegligible && to - from > (n - from) * step) break;
+        if (p < kNegligibleProbability && to - from > (n - from) * step) break;
         // The observed path is an excursion itself, whatever the rounding.
         if (tail[static_cast<size_t>(to)] > least * (1 + 1e-9))
           next[static_cast<size_t>(to)] += here * p;

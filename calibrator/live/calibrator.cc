@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 
+#include "common/special_numbers.h"
 #include "plumb/policy_t.hpp"
 #include "robot/parameter_distribution.h"
 
@@ -113,7 +113,6 @@ Findings IterationFindings(const RobotDescription& robot, const SimOpt& simopt,
 calibration_status_t StatusMessage(const RobotDescription& robot, const SimOpt::State& state,
                                    const DropCounts& drops, const CalibrationReport* report,
                                    double seconds, const StreamingLaplace* stream) {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   calibration_status_t m{};
   m.utime = Time(state);
   m.iteration = state.iteration;

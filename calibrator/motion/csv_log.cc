@@ -4,17 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
 #include "calibrator/motion/differences.h"
 #include "calibrator/motion/motion_table.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPeriodTolerance = 0.2;  // as TransitionJoiner's
 // decimal fractions in binary: the period itself was meant
 constexpr double kSamePeriod = 1e-6;

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <utility>
 
 #include "calibrator/motion/csv_reader.h"
 #include "common/nearest_name.h"
+#include "common/special_numbers.h"
 #include "robot/configuration_space.h"
 #include "robot/physical.h"
 #include "sim/tasks/task.h"
@@ -18,8 +18,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kLatest = 1e12;  // [s]; Unix time in nanoseconds is none
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kLatest = 1e12;           // [s]; Unix time in nanoseconds is none
 constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit is not just rounded
 
 /// The columns' names, in the order of q, v and the actions.

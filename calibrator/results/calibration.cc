@@ -16,6 +16,7 @@
 #include "calibrator/inference/chi_squared.h"
 #include "calibrator/motion/differences.h"
 #include "common/decompositions.h"
+#include "common/time_units.h"
 
 namespace plumb {
 namespace {
@@ -68,8 +69,7 @@ class Calibration {
     FindWhatIsKnown(fit.information);
     CrossValidate(result);
     CompareLogs();
-    findings_.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    findings_.seconds = SecondsSince(start);
     return std::move(findings_);
   }
 

@@ -112,8 +112,8 @@ std::string Quoted(const std::string& text) {
   return '"' + quoted + '"';
 }
 
-std::string Comment(const RobotDescription& robot, const std::vector<Value>& values,
-                    bool residual) {
+std::string WhatChanged(const RobotDescription& robot, const std::vector<Value>& values,
+                        bool residual) {
   std::string here, elsewhere;
   for (const Value& v : values) {
     const std::string unit = v.unit.empty() ? "" : " " + v.unit;
@@ -166,7 +166,7 @@ std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd&
     if (v.in_urdf && attribute)
       writer.WriteDynamics(v.name.substr(v.name.find('/') + 1), attribute, v.mean);
   }
-  writer.AddComment(Comment(robot, values, residual));
+  writer.AddComment(WhatChanged(robot, values, residual));
   return writer.Print();
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 // Numbers this close, relative to the largest of their kind, differ by rounding only: the text's
 // stays.
-constexpr double kRounding = 1e-14;
+constexpr double kRelativeRounding = 1e-14;
 
 std::vector<double> Numbers(const TiXmlElement* element, const char* attribute, size_t count) {
   std::vector<double> numbers(count, 0);
@@ -66,9 +66,9 @@ void UrdfNumbers::WriteLink(size_t index, double stretch) {
   Collect({link, Vector3d::Zero(), Matrix3d::Identity()});
   if (stretch != 1) Stretch(stretch);
   const auto same = [](const auto& a, const auto& b) {
-    return (a - b).cwiseAbs().maxCoeff() <= kRounding * b.cwiseAbs().maxCoeff();
+    return (a - b).cwiseAbs().maxCoeff() <= kRelativeRounding * b.cwiseAbs().maxCoeff();
   };
-  if (std::abs(was.mass - is.mass) > kRounding * was.mass ||
+  if (std::abs(was.mass - is.mass) > kRelativeRounding * was.mass ||
       !same(is.center_of_mass, was.center_of_mass) || !same(is.inertia, was.inertia)) {
     WriteInertials(is, stretch);
   }
@@ -119,7 +119,7 @@ void UrdfNumbers::Set(const TiXmlElement& element, const char* attribute,
   std::vector<double> numbers = Numbers(&element, attribute, values.size());
   bool changed = false;
   for (size_t i = 0; i < values.size(); ++i) {
-    if (std::abs(values[i] - numbers[i]) <= kRounding * scale) continue;
+    if (std::abs(values[i] - numbers[i]) <= kRelativeRounding * scale) continue;
     numbers[i] = values[i];
     changed = true;
   }

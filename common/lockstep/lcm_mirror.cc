@@ -15,7 +15,6 @@ constexpr int kNap = 2;           // [ms] of real time for which there was nothi
 constexpr int kMaxRead = 10'000;  // messages in one go
 constexpr size_t kMaxMessages = 400, kMaxBytes = 500'000;  // on their way
 constexpr size_t kMaxBehind = 20'000;                      // messages
-constexpr char kSelfTest[] = "LCM_SELF_TEST";  // which liblcm says to itself when it starts
 
 size_t Hash(std::span<const uint8_t> message) {
   return std::hash<std::string_view>{}(

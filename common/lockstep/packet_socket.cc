@@ -18,7 +18,7 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kHead = sizeof(uint32_t);
+constexpr size_t kLengthSize = sizeof(uint32_t);
 constexpr size_t kChunk = size_t{1} << 16;  // [bytes] sent in one go
 constexpr timeval kSoon{0, 100'000};        // for which a Read waits, at most
 
@@ -110,9 +110,9 @@ PacketSocket PacketSocket::Accept() const {
 
 bool PacketSocket::Send(std::span<const uint8_t> packet, const std::function<bool()>& waiting) {
   const auto length = static_cast<uint32_t>(packet.size());
-  out_.resize(kHead + packet.size());
-  std::memcpy(out_.data(), &length, kHead);
-  if (!packet.empty()) std::memcpy(out_.data() + kHead, packet.data(), packet.size());
+  out_.resize(kLengthSize + packet.size());
+  std::memcpy(out_.data(), &length, kLengthSize);
+  if (!packet.empty()) std::memcpy(out_.data() + kLengthSize, packet.data(), packet.size());
   for (size_t sent = 0; sent < out_.size();) {
     const size_t size = std::min(kChunk, out_.size() - sent);
     const ssize_t n = send(fd_, out_.data() + sent, size, MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -137,7 +137,7 @@ bool PacketSocket::Read(When when) {
     if (n == 0) return false;
     end_ += static_cast<size_t>(n);
     const size_t length = Length();
-    if (length == 0 || length > kLongest) return end_ - begin_ < kHead;
+    if (length == 0 || length > kLongest) return end_ - begin_ < kLengthSize;
     more = static_cast<size_t>(n) == kChunk;
     when = When::kNow;
   }
@@ -146,15 +146,15 @@ bool PacketSocket::Read(When when) {
 
 size_t PacketSocket::Length() const {
   uint32_t length = 0;
-  if (end_ - begin_ >= kHead) std::memcpy(&length, in_.data() + begin_, kHead);
+  if (end_ - begin_ >= kLengthSize) std::memcpy(&length, in_.data() + begin_, kLengthSize);
   return length;
 }
 
 std::span<const uint8_t> PacketSocket::Next() {
   const size_t length = Length();
-  if (length == 0 || end_ - begin_ - kHead < length) return {};
-  const std::span<const uint8_t> packet = std::span(in_).subspan(begin_ + kHead, length);
-  begin_ += kHead + length;
+  if (length == 0 || end_ - begin_ - kLengthSize < length) return {};
+  const std::span<const uint8_t> packet = std::span(in_).subspan(begin_ + kLengthSize, length);
+  begin_ += kLengthSize + length;
   return packet;
 }
 

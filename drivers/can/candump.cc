@@ -24,7 +24,7 @@ bool ParseDigits(std::string_view digits, int64_t& number) {
 }
 
 /// "(seconds.decimals)" in nanoseconds.
-bool ParseTime(std::string_view text, int64_t& time) {
+bool ParseTimestamp(std::string_view text, int64_t& time) {
   if (!text.starts_with('(') || !text.ends_with(')') || text.size() < 2) return false;
   text = text.substr(1, text.size() - 2);
   const size_t point = text.find('.');
@@ -46,7 +46,7 @@ bool ParseTime(std::string_view text, int64_t& time) {
 
 std::optional<LoggedFrame> ParseCandump(std::string_view line) noexcept {
   LoggedFrame logged;
-  if (!ParseTime(Word(line), logged.time_ns)) return {};
+  if (!ParseTimestamp(Word(line), logged.time_ns)) return {};
   logged.interface = Word(line);
   const auto frame = FrameFromText(Word(line));
   if (!frame) return {};

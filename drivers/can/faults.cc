@@ -23,7 +23,7 @@ bool ParseProbability(std::string_view text, double& probability) {
 }
 
 /// "500us", "2ms", "1.5s".
-bool ParseTime(std::string_view text, int64_t& time) {
+bool ParseDuration(std::string_view text, int64_t& time) {
   double unit = 1e6;
   if (text.ends_with("us")) {
     unit = 1;
@@ -52,7 +52,7 @@ Outcome SetSide(Faults::Side& side, std::string_view name, std::string_view valu
                                                    : nullptr;
   if (probability == nullptr && time == nullptr) return Outcome::kUnknown;
   const bool good =
-      probability ? ParseProbability(value, side.*probability) : ParseTime(value, side.*time);
+      probability ? ParseProbability(value, side.*probability) : ParseDuration(value, side.*time);
   return good ? Outcome::kSet : Outcome::kBadValue;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "common/special_numbers.h"
 #include "common/time_units.h"
 
 namespace plumb {
@@ -16,7 +17,6 @@ using namespace moteus;
 constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
 constexpr int64_t kPreparation = 15'000;  // [us] made up: it measures its current sensors' zeros
 constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 class Drive : public MotorDevice {
  public:
@@ -126,7 +126,7 @@ void MoteusDevice::Write(uint32_t target, double value) noexcept {
     case kMode:
       if (!(value >= 0 && value <= kLastMode)) return;
       wish_ = static_cast<int>(value);
-      command_ = {.position = 0, .kp = 1, .kd = 1, .max_torque = kNan, .timeout = 0};
+      command_ = {.position = 0, .kp = 1, .kd = 1, .max_torque = kNaN, .timeout = 0};
       return;
     case kCommandPosition:
       command_.position = value;

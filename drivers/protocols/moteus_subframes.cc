@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "common/special_numbers.h"
+
 namespace plumb::moteus {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// [unit of a register] of one step of an integer; 1 of what is counted. docs/protocol/registers.md
 struct Scale {
@@ -85,7 +85,7 @@ std::optional<double> SubframeReader::Value(uint32_t number, int format) {
   if (format == kFloat) return std::bit_cast<float>(raw);
   const int unused = 32 - 8 * count;
   const int32_t value = static_cast<int32_t>(raw << unused) >> unused;
-  if (value == std::numeric_limits<int32_t>::min() >> unused && number != kMode) return kNan;
+  if (value == std::numeric_limits<int32_t>::min() >> unused && number != kMode) return kNaN;
   return value * StepOf(number, format);
 }
 

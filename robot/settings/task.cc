@@ -10,7 +10,7 @@
 namespace plumb {
 namespace {
 
-constexpr Range kSane{-1e9, 1e9}, kLengthOrAngle{0, 1e9};
+constexpr Range kAnyTarget{-1e9, 1e9}, kLengthOrAngle{0, 1e9};
 
 // A table of joints: `read` is told the key and the joint, and where its coordinates begin.
 template <typename Read>
@@ -25,7 +25,7 @@ void ReadByJoint(Config config, const std::vector<JointDescription>& joints, con
 
 void ReadTarget(Config& config, const JointDescription& joint, double* target) {
   if (joint.type != JointDescription::Type::kSpherical) {
-    *target = config.Number(joint.name, kSane);
+    *target = config.Number(joint.name, kAnyTarget);
     if (*target < joint.lower || *target > joint.upper) {
       config.Fail(joint.name, fmt::format("= {} is beyond the joint's limits [{}, {}]", *target,
                                           joint.lower, joint.upper));

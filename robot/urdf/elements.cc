@@ -32,9 +32,9 @@ Eigen::Matrix3d FromRollPitchYaw(const Eigen::Vector3d& rpy) {
   return Eigen::Quaterniond(w / norm, x / norm, y / norm, z / norm).normalized().toRotationMatrix();
 }
 
-class Reader {
+class ElementReader {
  public:
-  Reader(const std::string& text, const std::string& file) : xml_(text, file) {}
+  ElementReader(const std::string& text, const std::string& file) : xml_(text, file) {}
 
   UrdfElements Read() {
     const TiXmlElement& robot = xml_.root();
@@ -269,7 +269,7 @@ class Reader {
 }  // namespace
 
 UrdfElements ReadUrdfElements(const std::string& text, const std::string& file) {
-  return Reader(text, file).Read();
+  return ElementReader(text, file).Read();
 }
 
 }  // namespace plumb

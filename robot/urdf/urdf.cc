@@ -3,24 +3,24 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <limits>
 #include <utility>
 
 #include "common/config.h"
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 #include "robot/urdf/elements.h"
 
 namespace plumb {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr size_t kMaxJoints = 500;  // as many as are still a robot
 
 using Pose = UrdfElements::Pose;
 
-class Reader {
+class ModelReader {
  public:
-  explicit Reader(const std::string& file) : elements_(ReadUrdfElements(ReadFile(file), file)) {
+  explicit ModelReader(const std::string& file)
+      : elements_(ReadUrdfElements(ReadFile(file), file)) {
     model_.file = file;
   }
 
@@ -203,6 +203,6 @@ void UrdfModel::Fail(int line, const std::string& what) const {
   throw ConfigError(fmt::format("{}:{}: {}", file, line, what));
 }
 
-UrdfModel LoadUrdf(const std::string& file) { return Reader(file).Read(); }
+UrdfModel LoadUrdf(const std::string& file) { return ModelReader(file).Read(); }
 
 }  // namespace plumb

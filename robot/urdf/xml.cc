@@ -16,8 +16,6 @@ bool IsControl(char c) { return static_cast<unsigned char>(c) < ' '; }
 
 bool IsAscii(char c) { return static_cast<unsigned char>(c) < 127; }
 
-bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
-
 bool IsName(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || !IsAscii(c);
 }
@@ -31,7 +29,7 @@ int LineOf(const std::string& text, size_t place) {
 // many bytes as the first of a character promises, beyond the end of the text as well.
 size_t FindOdd(const std::string& text) {
   size_t at = 0;
-  while (at < text.size() && (!IsControl(text[at]) || IsSpace(text[at]))) {
+  while (at < text.size() && (!IsControl(text[at]) || IsXmlSpace(text[at]))) {
     const size_t length = CharacterLength(text, at);
     if (length == 0) break;
     at += length;
@@ -143,12 +141,12 @@ std::vector<double> Xml::Numbers(const TiXmlElement& element, const char* attrib
   };
   std::vector<double> numbers;
   for (const char *at = text.data(), *end = at + text.size();;) {
-    while (at != end && IsSpace(*at)) ++at;
+    while (at != end && IsXmlSpace(*at)) ++at;
     if (at == end) break;
     if (*at == '+' && at + 1 != end && at[1] != '-') ++at;
     double number = 0;
     const auto [after, error] = std::from_chars(at, end, number);
-    if (error != std::errc() || (after != end && !IsSpace(*after)) || numbers.size() == count)
+    if (error != std::errc() || (after != end && !IsXmlSpace(*after)) || numbers.size() == count)
       fail();
     if (!(std::abs(number) <= magnitude)) {
       Fail(element, fmt::format("{}=\"{}\" of <{}> is not finite or beyond {:g}", attribute,

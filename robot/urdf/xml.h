@@ -8,6 +8,9 @@
 
 namespace plumb {
 
+/// What XML takes for space.
+inline bool IsXmlSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
 /// An XML text, all of whose errors name their line. Immutable, hence thread-safe.
 class Xml {
  public:

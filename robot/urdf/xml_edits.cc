@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "robot/urdf/xml.h"
+
 namespace plumb {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-
-bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
 bool ContinuesCharacter(char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; }
 
@@ -63,7 +63,7 @@ void XmlEdits::SetAttribute(const TiXmlElement& element, const char* attribute,
     if (text_.compare(name, a->NameTStr().size(), attribute) != 0)
       throw std::logic_error("an attribute is elsewhere");
     size_t from = text_.find('=', name) + 1;
-    while (IsSpace(text_[from])) ++from;
+    while (IsXmlSpace(text_[from])) ++from;
     const char quote = text_[from];
     if (quote == '"' || quote == '\'') {
       edits_[from + 1] = {text_.find(quote, from + 1) - from - 1, value};

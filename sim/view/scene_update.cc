@@ -11,7 +11,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kGround = 20;         // [m] edge
+constexpr double kGroundEdge = 20;     // [m] edge
 constexpr double kThickness = 0.001;   // [m]
 constexpr double kTranslucent = 0.35;  // of a prediction
 constexpr Color kGroundColor{0.93, 0.92, 0.90};
@@ -103,7 +103,7 @@ std::string SceneUpdate::Json(int64_t utime, const Eigen::VectorXd& q,
   Shape plate;
   plate.type = Shape::Type::kBox;
   plate.position.z() = -kThickness / 2;
-  plate.size = {kGround, kGround, kThickness};
+  plate.size = {kGroundEdge, kGroundEdge, kThickness};
   ground.Add({}, plate, kGroundColor);
   std::string deletions;
   if (!prediction) {

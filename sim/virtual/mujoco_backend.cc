@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kLongestStep = 0.002;  // [s]
 
-struct Delete {
+struct DeleteMujoco {
   void operator()(mjModel* model) const { mj_deleteModel(model); }
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
@@ -122,8 +122,8 @@ class MujocoBackend : public PhysicsBackend {
   int AddressOfQ(Eigen::Index i) const { return q_address_[static_cast<size_t>(i)]; }
   int AddressOfV(Eigen::Index i) const { return v_address_[static_cast<size_t>(i)]; }
 
-  std::unique_ptr<mjModel, Delete> model_;
-  std::unique_ptr<mjData, Delete> data_;
+  std::unique_ptr<mjModel, DeleteMujoco> model_;
+  std::unique_ptr<mjData, DeleteMujoco> data_;
   double longest_step_;  // [s]
   // Of our positions and velocities in MuJoCo's, which are depth first.
   std::vector<int> q_address_, v_address_;

@@ -22,7 +22,7 @@ constexpr double kGyration = 0.1;   // [m] of a link that has no mass
 constexpr double kThinnest = 1e-6;  // of its inertia's trace: ODE knows no rods that are thinner
 constexpr double kMost = 1e9;       // [rad/s, m/s, Nm, N] beyond which it is not asked to go
 
-struct Delete {
+struct DeleteOde {
   void operator()(dxWorld* world) const { dWorldDestroy(world); }
   void operator()(dxJointGroup* group) const { dJointGroupDestroy(group); }
 };
@@ -170,9 +170,9 @@ class OdeBackend : public PhysicsBackend {
   Cushion ground_{};
   double friction_ = 0;
   double drift_ = 0;  // [1/s] at which joints take back what they have drifted apart
-  std::unique_ptr<dxWorld, Delete> world_;
-  std::unique_ptr<dxJointGroup, Delete> touching_;  // the contacts of a step
-  std::vector<dBodyID> bodies_;                     // of each link, null of the base
+  std::unique_ptr<dxWorld, DeleteOde> world_;
+  std::unique_ptr<dxJointGroup, DeleteOde> touching_;  // the contacts of a step
+  std::vector<dBodyID> bodies_;                        // of each link, null of the base
   std::vector<OdeJoint> joints_;
   VectorXd q_, v_;
 };

@@ -8,7 +8,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kGyration = 1e-3;  // [m] no engine takes a point
+constexpr double kPointGyration = 1e-3;  // [m] no engine takes a point
 
 Eigen::VectorXd ZeroPose(const RobotDescription& robot) {
   Eigen::VectorXd q = Eigen::VectorXd::Zero(robot.num_positions());
@@ -48,7 +48,7 @@ RobotDescription WithSprungMasses(RobotDescription robot) {
     LinkDescription link;
     link.name = sprung.name;
     link.mass = sprung.mass;
-    link.inertia = sprung.mass * kGyration * kGyration * Eigen::Matrix3d::Identity();
+    link.inertia = sprung.mass * kPointGyration * kPointGyration * Eigen::Matrix3d::Identity();
     robot.links.push_back(link);
   }
   return robot;

@@ -17,7 +17,7 @@
 namespace plumb {
 namespace {
 
-using Engine = VirtualRobotSettings::Engine;
+using PlantEngine = VirtualRobotSettings::Engine;
 
 /// Simbody where it can simulate all of the robot, else the simulator.
 std::unique_ptr<PhysicsBackend> MakeByNeed(const RobotDescription& robot) {
@@ -27,15 +27,15 @@ std::unique_ptr<PhysicsBackend> MakeByNeed(const RobotDescription& robot) {
 
 /// By `engine` in [virtual_robot]. A new one is its own files and a line here.
 struct Backend {
-  Engine engine;
+  PlantEngine engine;
   std::string_view name;
   std::unique_ptr<PhysicsBackend> (*make)(const RobotDescription&);
 };
 constexpr Backend kBackends[] = {
-    {Engine::kAuto, "auto", &MakeByNeed},
-    {Engine::kMujoco, "mujoco", &MakeMujocoBackend},
-    {Engine::kSimbody, "simbody", &MakeSimbodyBackend},
-    {Engine::kOde, "ode", &MakeOdeBackend},
+    {PlantEngine::kAuto, "auto", &MakeByNeed},
+    {PlantEngine::kMujoco, "mujoco", &MakeMujocoBackend},
+    {PlantEngine::kSimbody, "simbody", &MakeSimbodyBackend},
+    {PlantEngine::kOde, "ode", &MakeOdeBackend},
 };
 
 std::unique_ptr<PhysicsBackend> MakeBackend(const RobotDescription& robot) {
@@ -48,7 +48,7 @@ std::unique_ptr<PhysicsBackend> MakeBackend(const RobotDescription& robot) {
   }
   const VirtualRobotSettings& wanted = robot.virtual_robot;
   const Backend& backend = *std::ranges::find(kBackends, wanted.engine, &Backend::engine);
-  if (backend.engine == Engine::kAuto) return backend.make(robot);
+  if (backend.engine == PlantEngine::kAuto) return backend.make(robot);
   try {
     return backend.make(robot);
   } catch (const std::invalid_argument& error) {

@@ -6,15 +6,12 @@
 
 #include "robot/urdf/xml.h"
 #include "tests/cli/sample_summary.h"
+#include "tests/sim/robots.h"
 
 namespace plumb {
 namespace {
 
 using Catch::Contains;
-
-RobotDescription Pendulum() {
-  return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum");
-}
 
 size_t Count(const std::string& text, const std::string& what) {
   size_t count = 0;
@@ -23,7 +20,8 @@ size_t Count(const std::string& text, const std::string& what) {
 }
 
 TEST_CASE("a run's report says which policy runs and why, and what was learnt") {
-  const std::string page = LaunchReport(Pendulum(), SampleSummary(), "plumb launch --seed 7");
+  const std::string page =
+      LaunchReport(LoadPendulum("robot.toml"), SampleSummary(), "plumb launch --seed 7");
   CHECK_NOTHROW(Xml(page, "page"));
   for (const char* words :
        {"Run of pendulum", "2 iterations on loop:, in virtual time, seed 7",
@@ -49,7 +47,7 @@ TEST_CASE("in a run's report, what is not known is left out or a dash") {
   summary["iterations"][0]["simulated_return"] = nullptr;
   summary["iterations"][1]["alarm"] = summary["iterations"][1]["gap"] = "";
   summary["dropped_episodes"] = 5, summary["rearms"] = 2;
-  const std::string page = LaunchReport(Pendulum(), summary, "");
+  const std::string page = LaunchReport(LoadPendulum("robot.toml"), summary, "");
   CHECK_NOTHROW(Xml(page, "page"));
   CHECK_THAT(page, !Contains("nan"));
   CHECK_THAT(page, Contains("The model explains the robot"));
@@ -59,7 +57,7 @@ TEST_CASE("in a run's report, what is not known is left out or a dash") {
 
   summary["iterations"] = nlohmann::json::array();
   summary["decisions"] = nlohmann::json::array();
-  CHECK_NOTHROW(Xml(LaunchReport(Pendulum(), summary, ""), "page"));
+  CHECK_NOTHROW(Xml(LaunchReport(LoadPendulum("robot.toml"), summary, ""), "page"));
 }
 
 }  // namespace

@@ -7,13 +7,10 @@
 #include <cstdlib>
 
 #include "plumb/policy_t.hpp"
+#include "tests/sim/robots.h"
 
 namespace plumb {
 namespace {
-
-RobotDescription Pendulum() {
-  return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum");
-}
 
 calibration_status_t Calibration(int iteration) {
   calibration_status_t c{};
@@ -34,7 +31,7 @@ calibration_status_t Calibration(int iteration) {
 }
 
 struct Fixture {
-  RobotDescription robot = Pendulum();
+  RobotDescription robot = LoadPendulum("robot.toml");
   Progress progress{robot, 2};
 
   void Rollout(int iteration, int8_t purpose, std::vector<double> returns) {

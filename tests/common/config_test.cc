@@ -79,7 +79,7 @@ TEST_CASE("what is no file of text is refused, however long") {
   CHECK_THROWS_WITH(ReadFile(file), Equals(file + ": is longer than 16 MB"));
 }
 
-struct Folder : TemporaryFolder {
+struct ConfigFolder : TemporaryFolder {
   void Write(const std::string& name, const std::string& text) const {
     std::ofstream(*this / name) << text;
   }
@@ -87,7 +87,7 @@ struct Folder : TemporaryFolder {
 
 TEST_CASE(
     "a file that extends another stands in its place, key by key, table by table, name by name") {
-  const Folder folder;
+  const ConfigFolder folder;
   folder.Write("base.toml",
                "a = 1\nb = 2\nlist = [1, 2]\n[t]\nx = 1\ny = 2\n[t.deep]\nz = 3\n"
                "[[j]]\nname = \"hip\"\nm = 1\nn = 2\n[[j]]\nname = \"knee\"\nm = 3\n");
@@ -119,7 +119,7 @@ TEST_CASE(
 }
 
 TEST_CASE("mistakes in files that extend each other are named in the file where they are") {
-  const Folder folder;
+  const ConfigFolder folder;
   folder.Write("base.toml", "a = \"x\"\n[t]\nb = 1\n[[j]]\nname = \"hip\"\n");
   folder.Write("own.toml",
                "extends = \"base.toml\"\n[t]\nc = -1\nd = 1\n[[j]]\nname = \"hip\"\nm = "
@@ -185,7 +185,7 @@ TEST_CASE("what would keep the reader busy for minutes, or end it, is one line")
 }
 
 TEST_CASE("a file that is extended is as modest as one that is read, and names its own line") {
-  const Folder folder;
+  const ConfigFolder folder;
   folder.Write("own.toml", "extends = \"base.toml\"\na = 1\n");
   const auto refused = [&](const std::string& base, const std::string& why) {
     folder.Write("base.toml", base);
@@ -203,7 +203,7 @@ TEST_CASE("a file that is extended is as modest as one that is read, and names i
 }
 
 TEST_CASE("two files of as many names as may be are merged") {
-  const Folder folder;
+  const ConfigFolder folder;
   std::string tables;
   for (int i = 0; i < 10'000; ++i)
     tables += "[[joint]]\nname = \"a" + std::to_string(i) + "\"\nm = 1\n";

@@ -21,7 +21,7 @@ DriverWish Wish(int8_t request, bool has_key = false) {
   return DriverWish(request, kIdentity, kUtime, 0, has_key);
 }
 
-std::string Text(const DriverWish& wish, int64_t now = 0, bool unbelieved = false) {
+std::string WishText(const DriverWish& wish, int64_t now = 0, bool unbelieved = false) {
   const auto answer = wish.FindAnswer(now, unbelieved, kWhere);
   return answer ? (answer->granted ? "yes: " : "no: ") + answer->text : "none yet";
 }
@@ -35,11 +35,11 @@ TEST_CASE("a wish to stop goes out at once, and again until the driver has answe
   CHECK(first->utime == kUtime);
   wish.OnStatus(Status(driver_status_t::ARMED));
   CHECK(wish.Tick()->utime == kUtime + 6);  // by the driver's clock
-  CHECK(Text(wish) == "none yet");
+  CHECK(WishText(wish) == "none yet");
   wish.OnStatus(Status(driver_status_t::IDLE, kIdentity + 1, "stopped by another"));
-  CHECK(Text(wish) == "none yet");
+  CHECK(WishText(wish) == "none yet");
   wish.OnStatus(Status(driver_status_t::FAULT, kIdentity, "emergency stop"));
-  CHECK(Text(wish) == "yes: not armed: emergency stop");
+  CHECK(WishText(wish) == "yes: not armed: emergency stop");
 }
 
 TEST_CASE("a wish to arm goes out once, when the driver has been heard") {
@@ -49,21 +49,21 @@ TEST_CASE("a wish to arm goes out once, when the driver has been heard") {
   CHECK(wish.Tick());
   CHECK_FALSE(wish.Tick());
   wish.OnStatus(Status(driver_status_t::ARMING, kIdentity));
-  CHECK(Text(wish) == "none yet");
+  CHECK(WishText(wish) == "none yet");
   wish.OnStatus(Status(driver_status_t::ARMED, kIdentity));
-  CHECK(Text(wish) == "yes: armed");
+  CHECK(WishText(wish) == "yes: armed");
 }
 
 TEST_CASE("a wish to arm that is refused, or cannot be granted, says why") {
   DriverWish refused = Wish(driver_request_t::ARM);
   refused.OnStatus(Status(driver_status_t::FAULT, kIdentity, "pivot: overheated"));
-  CHECK(Text(refused) == "no: not armed: pivot: overheated");
+  CHECK(WishText(refused) == "no: not armed: pivot: overheated");
   DriverWish without_key = Wish(driver_request_t::ARM);
   driver_status_t wants_key = Status(driver_status_t::IDLE);
   wants_key.commands_signed = true;
   without_key.OnStatus(wants_key);
   CHECK_FALSE(without_key.Tick());
-  CHECK(Text(without_key).starts_with("no: the driver obeys signed requests only"));
+  CHECK(WishText(without_key).starts_with("no: the driver obeys signed requests only"));
   DriverWish with_key = Wish(driver_request_t::ARM, true);
   with_key.OnStatus(wants_key);
   CHECK(with_key.Tick());
@@ -71,14 +71,14 @@ TEST_CASE("a wish to arm that is refused, or cannot be granted, says why") {
 
 TEST_CASE("a wish that nobody answers says after three seconds what was heard meanwhile") {
   DriverWish wish = Wish(driver_request_t::DISARM);
-  CHECK(Text(wish, DriverWish::kPatience - 1) == "none yet");
-  CHECK(Text(wish, DriverWish::kPatience) == std::string("no: no driver answers on ") + kWhere);
-  CHECK(Text(wish, DriverWish::kPatience, true).ends_with("is not signed with this key"));
+  CHECK(WishText(wish, DriverWish::kPatience - 1) == "none yet");
+  CHECK(WishText(wish, DriverWish::kPatience) == std::string("no: no driver answers on ") + kWhere);
+  CHECK(WishText(wish, DriverWish::kPatience, true).ends_with("is not signed with this key"));
   wish.OnStatus(Status(driver_status_t::ARMED));
-  CHECK(Text(wish, DriverWish::kPatience).find("has not answered this request") !=
+  CHECK(WishText(wish, DriverWish::kPatience).find("has not answered this request") !=
         std::string::npos);
   wish.OnStatus(Status(driver_status_t::ARMED, kIdentity, "busy"));
-  CHECK(Text(wish, DriverWish::kPatience) == "no: the driver did not obey: busy");
+  CHECK(WishText(wish, DriverWish::kPatience) == "no: the driver did not obey: busy");
 }
 
 }  // namespace

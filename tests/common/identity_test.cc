@@ -20,7 +20,7 @@ using Reach = Identity::Reach;
 
 constexpr char kForeign[] = "not signed with the driver's key, for its robot and its bus";
 
-std::string Hex(const Bytes& bytes) {
+std::string HexText(const Bytes& bytes) {
   std::string text(bytes.size() * 2 + 1, '\0');
   sodium_bin2hex(text.data(), text.size(), bytes.data(), bytes.size());
   text.pop_back();
@@ -182,13 +182,13 @@ TEST_CASE_METHOD(Signed, "Python signs what we accept") {
   const char* source = std::getenv("PLUMBLINE_SOURCE");
   const std::string call = "timeout 60 /usr/bin/python3 " + std::string(source ? source : ".") +
                            "/tests/common/sign.py " + folder / "key" + " pendulum socketcan:can0 " +
-                           kChannel + " " + Hex(unsigned_one);
+                           kChannel + " " + HexText(unsigned_one);
   FILE* pipe = popen(call.c_str(), "r");
   REQUIRE(pipe);
   std::string theirs(ours.size() * 2, '\0');
   REQUIRE(fread(theirs.data(), 1, theirs.size(), pipe) == theirs.size());
   CHECK(pclose(pipe) == 0);
-  CHECK(theirs == Hex(ours));
+  CHECK(theirs == HexText(ours));
 }
 
 }  // namespace

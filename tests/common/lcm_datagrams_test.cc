@@ -9,7 +9,7 @@
 namespace plumb {
 namespace {
 
-std::string Text(const LcmDatagrams::Message& message) {
+std::string DatagramText(const LcmDatagrams::Message& message) {
   return {message.data.begin(), message.data.end()};
 }
 
@@ -23,7 +23,7 @@ TEST_CASE("a message in one datagram") {
   const auto message = datagrams.Take(1, datagram);
   REQUIRE(message);
   CHECK(message->channel == "POLICY");
-  CHECK(Text(*message) == "weights");
+  CHECK(DatagramText(*message) == "weights");
   const std::vector<uint8_t> good = Whole("POLICY", "");
   CHECK(datagrams.Take(1, good)->data.empty());
   CHECK(datagrams.Take(1, Whole(std::string(63, 'x'), "y")));
@@ -41,7 +41,7 @@ TEST_CASE("messages in fragments, those of several senders side by side") {
     const auto second = datagrams.Take(2, Fragment("B", other, 4, n, 3));
     CHECK(first.has_value() == (n == 2));
     REQUIRE(second.has_value() == (n == 2));
-    if (second) CHECK(Text(*second) == other);
+    if (second) CHECK(DatagramText(*second) == other);
   }
   CHECK(datagrams.pending() == 0);
   // One that lacks a fragment is lost, and the next one is not.
@@ -52,7 +52,7 @@ TEST_CASE("messages in fragments, those of several senders side by side") {
   const auto whole = datagrams.Take(1, Fragment("A", long_one, 6, 1, 2));
   REQUIRE(whole);
   CHECK(whole->channel == "A");
-  CHECK(Text(*whole) == long_one);
+  CHECK(DatagramText(*whole) == long_one);
 }
 
 // liblcm 1.3.1 writes 4 GB out of bounds for a single one of these.

@@ -17,7 +17,7 @@ std::string Url() {
          "?ttl=0&recv_buf_size=2097152";
 }
 
-std::span<const uint8_t> Bytes(const std::string& text) {
+std::span<const uint8_t> View(const std::string& text) {
   return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
 }
 
@@ -32,9 +32,9 @@ TEST_CASE("others hear all of it, and are heard apart from it") {
           heard.push_back(channel + " " + std::string(message.begin(), message.end()));
       });
   for (int i = 0; i < 2000; ++i) {
-    mirror.Publish(i % 2 == 0 ? "JOINT_STATE" : "ROBOT_STATE", Bytes(std::to_string(i)));
+    mirror.Publish(i % 2 == 0 ? "JOINT_STATE" : "ROBOT_STATE", View(std::to_string(i)));
   }
-  other.Publish("JOINT_COMMAND", Bytes("mine"));
+  other.Publish("JOINT_COMMAND", View("mine"));
   mirror.Flush();
   for (int i = 0; i < 1000 && strangers.empty(); ++i)
     usleep(10'000), strangers = mirror.TakeStrangers();
@@ -52,9 +52,9 @@ TEST_CASE("of strangers 8 MB are remembered, the first, until they are taken") {
   // No more in one go than fits into the socket's buffer.
   constexpr size_t kSize = 50'000, kFit = LcmMirror::kMaxStrangers / kSize;
   const auto say = [&](const std::string& text) {
-    other.Publish("JOINT_COMMAND", Bytes(text));
+    other.Publish("JOINT_COMMAND", View(text));
     // What comes back afterwards has been behind it.
-    mirror.Publish("JOINT_STATE", Bytes("behind " + text.substr(0, 10)));
+    mirror.Publish("JOINT_STATE", View("behind " + text.substr(0, 10)));
     mirror.Flush();
   };
   for (size_t i = 0; i < 3 * kFit; ++i) say(std::to_string(i) + std::string(kSize, ' '));
@@ -73,13 +73,13 @@ TEST_CASE("of strangers 8 MB are remembered, the first, until they are taken") {
 
 TEST_CASE("a message that does not come back has been lost: an error with channel and number") {
   LcmMirror mirror(Url(), 5);
-  mirror.Publish("POLICY", Bytes("first"));
+  mirror.Publish("POLICY", View("first"));
   mirror.Flush();
   // Larger than what the guard of LCM's socket lets in.
   const std::string huge(size_t{5} << 20, 'x');
   CHECK_THROWS_WITH(
       [&] {
-        mirror.Publish("POLICY", Bytes(huge));
+        mirror.Publish("POLICY", View(huge));
         mirror.Flush();
       }(),
       Contains("lost on LCM: POLICY, number 2 on its channel"));

@@ -27,7 +27,7 @@ using Wake = Participant::Wake;
 
 constexpr int64_t kStart = Coordinator::kBeginning;
 
-std::vector<uint8_t> Bytes(const std::string& text) { return {text.begin(), text.end()}; }
+std::vector<uint8_t> ToBytes(const std::string& text) { return {text.begin(), text.end()}; }
 std::string Text(const lockstep_post_t& post) { return {post.data.begin(), post.data.end()}; }
 
 /// A run, its transcript, and threads that take part in it.
@@ -78,7 +78,7 @@ Run::Body Ticker(const std::string& channel, int64_t period) {
   return [=](Participant& run) {
     for (int64_t next = run.now() + period; !run.stopping(); next += period) {
       while (run.now() < next && !run.stopping()) run.Wait(next, Wake::kWhenHeard);
-      if (!run.stopping()) run.Say(ChannelTopic(channel), Bytes("tick"));
+      if (!run.stopping()) run.Say(ChannelTopic(channel), ToBytes("tick"));
     }
   };
 }
@@ -90,7 +90,7 @@ Run::Body Answerer(const std::string& from, const std::string& to, Wake wake = W
     while (!run.stopping()) {
       run.Wait(run.now() + 25, wake);
       for (; !run.messages().empty(); run.messages().pop_front()) {
-        run.Say(ChannelTopic(to), Bytes("to " + Text(run.messages().front())));
+        run.Say(ChannelTopic(to), ToBytes("to " + Text(run.messages().front())));
       }
     }
   };
@@ -130,9 +130,9 @@ TEST_CASE("what is on its way arrives when it is said to, in order of arrival") 
   std::vector<std::string> heard;
   run.coordinator->participant().Listen(BusTopic("loop:x"));
   run.Start("a", [](Participant& self) {
-    self.Say(BusTopic("loop:x"), Bytes("slow"), 100);
-    self.Say(BusTopic("loop:x"), Bytes("fast"), 30);
-    self.Say(BusTopic("loop:y"), Bytes("elsewhere"), 0);
+    self.Say(BusTopic("loop:x"), ToBytes("slow"), 100);
+    self.Say(BusTopic("loop:x"), ToBytes("fast"), 30);
+    self.Say(BusTopic("loop:y"), ToBytes("elsewhere"), 0);
     self.Listen(BusTopic("loop:x"));  // and hears nothing of its own
     self.Wait(kStart + 1000, Wake::kWhenHeard);
     self.Fail(self.now() == kStart + 1000 ? "it has slept" : "it has heard itself");
@@ -157,7 +157,7 @@ TEST_CASE("one's own messages come back, as LCM's do") {
   Run run;
   Participant& owner = run.coordinator->participant();
   owner.Listen(ChannelTopic("X"));
-  owner.Say(ChannelTopic("X"), Bytes("hello"));
+  owner.Say(ChannelTopic("X"), ToBytes("hello"));
   owner.Wait(kStart + 10, Wake::kWhenHeard);
   CHECK(owner.now() == kStart);
   REQUIRE(owner.messages().size() == 1);
@@ -194,7 +194,7 @@ TEST_CASE("on the way to a listener things get lost, late, doubled and altered")
         heard[0].arrival += 15;
         break;
       case 3:
-        heard[0].data = Bytes("TICK");
+        heard[0].data = ToBytes("TICK");
         heard[0].size = 4;
         heard.push_back(post);
         break;
@@ -214,7 +214,7 @@ TEST_CASE("who has the wrong date has it until it is set right, and sleeps as lo
     const Clock clock(self.time());
     for (int i = 1; !self.stopping(); ++i) {
       while (self.now() < kStart + 10 * i) self.Wait(kStart + 10 * i, Wake::kOnTime);
-      self.Say(ChannelTopic("A"), Bytes(std::to_string(clock.Utime() - clock.Now())));
+      self.Say(ChannelTopic("A"), ToBytes(std::to_string(clock.Utime() - clock.Now())));
     }
   });
   run.Pass(15);
@@ -234,7 +234,7 @@ TEST_CASE(
       self.Listen(ChannelTopic("A"));
       while (self.now() < kStart + moment)
         self.Wait(kStart + moment, Wake::kWhenHeard), self.messages().clear();
-      self.Say(ChannelTopic("C"), Bytes("last words"));
+      self.Say(ChannelTopic("C"), ToBytes("last words"));
     };
   };
   run.Start("c", die_at(20));

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using Bytes = std::vector<uint8_t>;
 
-struct Folder : TemporaryFolder {
+struct KeyFolder : TemporaryFolder {
   fs::path Write(const std::string& name, const std::string& text, mode_t mode = 0600) const {
     const fs::path file = path() / name;
     std::ofstream(file) << text;
@@ -44,7 +44,7 @@ std::string Hex(std::span<const uint8_t> bytes) {
   return text;
 }
 
-std::string WhatIsWrong(const fs::path& file) {
+std::string WhatIsWrongWithKey(const fs::path& file) {
   try {
     const SigningKey key(file);
     return "nothing";
@@ -99,7 +99,7 @@ TEST_CASE("the hash is the reference implementation's") {
 // By python3's hashlib: blake2b(b"CHANNEL\0" + bytes(range(100)), key=bytes(range(32)),
 // digest_size=32), and the same with b"ROBOT\0BUS\0CHANNEL\0".
 TEST_CASE("a signature is the keyed hash of words, a zero byte behind each, and the message") {
-  const Folder folder;
+  const KeyFolder folder;
   Bytes body(100);
   std::iota(body.begin(), body.end(), uint8_t{0});
   CHECK(Hex(folder.Key().Sign({"CHANNEL"}, body)) ==
@@ -109,7 +109,7 @@ TEST_CASE("a signature is the keyed hash of words, a zero byte behind each, and 
 }
 
 TEST_CASE("a new key file is its owner's alone, random, and never replaces another") {
-  const Folder folder;
+  const KeyFolder folder;
   const fs::path file = folder.path() / "new", other = folder.path() / "other";
   const mode_t mask = umask(0);
   MakeKeyFile(file);
@@ -131,36 +131,36 @@ TEST_CASE("a new key file is its owner's alone, random, and never replaces anoth
 
 TEST_CASE("a key that belongs to another user is refused") {
   if (geteuid() != 0) return;  // to nobody else can one give a file
-  const Folder folder;
+  const KeyFolder folder;
   const fs::path file = folder.Write("key", std::string(64, 'a'));
   REQUIRE(chown(file.c_str(), 12345, 12345) == 0);
-  CHECK_THAT(WhatIsWrong(file), Catch::Contains(file.string()) &&
-                                    Catch::Contains("belongs to another user (12345)") &&
-                                    Catch::Contains("cure: "));
+  CHECK_THAT(WhatIsWrongWithKey(file), Catch::Contains(file.string()) &&
+                                           Catch::Contains("belongs to another user (12345)") &&
+                                           Catch::Contains("cure: "));
 }
 
 TEST_CASE("a key that others may read, or that is none, is refused with the cure") {
-  const Folder folder;
+  const KeyFolder folder;
   const std::string digits(64, 'a');
   for (const mode_t mode : {0640, 0604, 0620, 0602, 0644, 0601}) {
     const fs::path file = folder.Write("open", digits, mode);
-    CHECK_THAT(WhatIsWrong(file), Catch::Contains(file.string()) &&
-                                      Catch::Contains("cure: chmod 600 " + file.string()));
+    CHECK_THAT(WhatIsWrongWithKey(file), Catch::Contains(file.string()) &&
+                                             Catch::Contains("cure: chmod 600 " + file.string()));
   }
-  CHECK(WhatIsWrong(folder.Write("good", digits)) == "nothing");
-  CHECK(WhatIsWrong(folder.Write("line", digits + "\n", 0400)) == "nothing");
+  CHECK(WhatIsWrongWithKey(folder.Write("good", digits)) == "nothing");
+  CHECK(WhatIsWrongWithKey(folder.Write("line", digits + "\n", 0400)) == "nothing");
   for (const std::string& text :
        {std::string(), std::string("\n"), digits.substr(1), digits + "a", digits + "\n\n",
         digits + " \n", " " + digits.substr(1), digits.substr(1) + "g", digits.substr(2) + "0x",
         std::string(64, '\0'), digits + digits, std::string(1 << 20, 'a')}) {
-    CHECK_THAT(WhatIsWrong(folder.Write("bad", text)),
+    CHECK_THAT(WhatIsWrongWithKey(folder.Write("bad", text)),
                Catch::Contains("64 hexadecimal digits") && Catch::Contains("plumb key"));
   }
-  CHECK_THAT(WhatIsWrong(folder.path() / "absent"),
+  CHECK_THAT(WhatIsWrongWithKey(folder.path() / "absent"),
              Catch::Contains("No such file") && Catch::Contains("plumb key"));
-  CHECK_THAT(WhatIsWrong(folder.path()), Catch::Contains("not a file"));
+  CHECK_THAT(WhatIsWrongWithKey(folder.path()), Catch::Contains("not a file"));
   REQUIRE(mkfifo((folder.path() / "pipe").c_str(), 0600) == 0);
-  CHECK_THAT(WhatIsWrong(folder.path() / "pipe"), Catch::Contains("not a file"));
+  CHECK_THAT(WhatIsWrongWithKey(folder.path() / "pipe"), Catch::Contains("not a file"));
 }
 
 }  // namespace

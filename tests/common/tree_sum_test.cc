@@ -12,7 +12,7 @@ constexpr size_t kSize = 37;
 using Vectors = std::vector<std::vector<float>>;
 
 /// Terms of very different sizes: the order of additions shows.
-Vectors RandomTerms(int count) {
+Vectors RandomVectors(int count) {
   Random random(3, {static_cast<uint32_t>(count)});
   Vectors terms(static_cast<size_t>(count), std::vector<float>(kSize));
   for (auto& term : terms) {
@@ -24,7 +24,7 @@ Vectors RandomTerms(int count) {
 
 /// The sum when each of `owners` adds up its branches and one adds up those, in pieces of `slice`
 /// elements.
-std::vector<float> Sum(Vectors terms, int owners, size_t slice) {
+std::vector<float> SumOf(Vectors terms, int owners, size_t slice) {
   const int count = static_cast<int>(terms.size());
   std::vector<float> sum;
   for (size_t first = 0; first < kSize; first += slice) {
@@ -49,16 +49,16 @@ std::vector<float> Sum(Vectors terms, int owners, size_t slice) {
 
 TEST_CASE("a sum has the same bits whoever has the terms, and however it is sliced") {
   for (const int terms : {1, 2, 3, 7, 8, 20, 64, 100}) {
-    const std::vector<float> sum = Sum(RandomTerms(terms), 1, kSize);
+    const std::vector<float> sum = SumOf(RandomVectors(terms), 1, kSize);
     for (int owners = 2; owners <= 9; ++owners)
-      CHECK(Sum(RandomTerms(terms), owners, kSize) == sum);
-    CHECK(Sum(RandomTerms(terms), 3, 10) == sum);
+      CHECK(SumOf(RandomVectors(terms), owners, kSize) == sum);
+    CHECK(SumOf(RandomVectors(terms), 3, 10) == sum);
   }
 }
 
 TEST_CASE("the sum is the sum") {
-  const Vectors terms = RandomTerms(20);
-  const std::vector<float> sum = Sum(terms, 1, kSize);
+  const Vectors terms = RandomVectors(20);
+  const std::vector<float> sum = SumOf(terms, 1, kSize);
   for (size_t i = 0; i < kSize; ++i) {
     double exact = 0, size = 0;
     for (const auto& term : terms) exact += double{term[i]}, size += std::abs(double{term[i]});

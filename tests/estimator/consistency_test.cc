@@ -34,9 +34,10 @@ double Nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
 
 // Position, velocity and acceleration under white jerk (section 6.2.3) and steps of the
 // acceleration.
-class Motion {
+class DriftingMotion {
  public:
-  Motion(const EstimatorSettings& settings, Random& random) : settings_(settings), random_(random) {
+  DriftingMotion(const EstimatorSettings& settings, Random& random)
+      : settings_(settings), random_(random) {
     Eigen::Matrix3d q;
     q << std::pow(kDt, 5) / 20, std::pow(kDt, 4) / 8, std::pow(kDt, 3) / 6,  //
         std::pow(kDt, 4) / 8, std::pow(kDt, 3) / 3, std::pow(kDt, 2) / 2,    //
@@ -67,7 +68,7 @@ TEST_CASE(
   double causal = 0, smoothed = 0;
   for (uint32_t run = 0; run < kRuns; ++run) {
     Random random(5, {run, accelerometer});
-    Motion motion(settings, random);
+    DriftingMotion motion(settings, random);
     KinematicFilter filter(settings);
     const double bias = settings.bias_sd * random.Normal();
     std::vector<Eigen::Vector3d> truth{motion.state()};

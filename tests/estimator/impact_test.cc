@@ -18,10 +18,10 @@ namespace plumb {
 namespace {
 
 constexpr double kPositionSd = 1e-4, kVelocitySd = 0.1, kStopImpact = 100;
-constexpr int64_t kPeriod = 2000, kSubstep = 20;  // [us]
+constexpr int64_t kImpactPeriod = 2000, kSubstep = 20;  // [us]
 
 /// Falls onto its stop at zero, again and again.
-RobotDescription Robot() {
+RobotDescription Hammer() {
   RobotDescription robot;
   robot.joints.resize(1);
   robot.joints[0].name = "pivot";
@@ -55,7 +55,7 @@ Bounce Bouncing(uint32_t seed) {
   Bounce bounce;
   int64_t last = -1'000'000;  // [us] when an impact began
   for (int64_t t = 0; t < 1'000'000 && (last < 0 || t - last < 200'000); t += kSubstep) {
-    if (t % kPeriod == 0) {
+    if (t % kImpactPeriod == 0) {
       const auto k = static_cast<int64_t>(bounce.truth.size());
       joint_state_t m{};
       m.utime = 1'000'000 + t;
@@ -83,10 +83,10 @@ Bounce Bouncing(uint32_t seed) {
 }
 
 /// Average normalised squared error of smoothed velocities, at impacts and elsewhere.
-struct Nees {
+struct NeesNearImpacts {
   double impact = 0, free = 0;
 };
-Nees NeesOf(const RobotDescription& robot) {
+NeesNearImpacts NeesOf(const RobotDescription& robot) {
   double sum[2] = {0, 0}, count[2] = {0, 0};
   for (uint32_t seed = 1; seed <= 40; ++seed) {
     const Bounce bounce = Bouncing(seed);
@@ -108,10 +108,10 @@ Nees NeesOf(const RobotDescription& robot) {
 TEST_CASE(
     "where a joint meets its stop the velocity's error is as large as it says, with the impact "
     "left open") {
-  RobotDescription robot = Robot();
-  const Nees without = NeesOf(robot);
+  RobotDescription robot = Hammer();
+  const NeesNearImpacts without = NeesOf(robot);
   robot.estimator.stop_impact = kStopImpact;
-  const Nees with = NeesOf(robot);
+  const NeesNearImpacts with = NeesOf(robot);
   INFO("at impacts " << without.impact << " and " << with.impact << ", elsewhere " << without.free
                      << " and " << with.free);
   CHECK(without.impact > 20);
@@ -121,7 +121,7 @@ TEST_CASE(
 }
 
 TEST_CASE("how hard stops are is learnt, and that there are none") {
-  RobotDescription robot = Robot();
+  RobotDescription robot = Hammer();
   robot.estimator.jerk = 300;
   std::vector<joint_state_t> readings;
   for (uint32_t seed = 101; seed <= 112; ++seed) {

@@ -10,7 +10,7 @@
 namespace plumb {
 namespace {
 
-EstimatorSettings Settings() {
+EstimatorSettings FilterSettings() {
   return {.position_sd = 1.2e-4,
           .velocity_sd = 0.5,
           .jerk = 100,
@@ -27,7 +27,7 @@ void Update(KinematicFilter& filter, double position, double velocity) {
 }
 
 TEST_CASE("noiseless constant acceleration is followed exactly") {
-  EstimatorSettings settings = Settings();
+  EstimatorSettings settings = FilterSettings();
   KinematicFilter filter(settings);
   const auto q = [](double t) { return 0.3 + 0.7 * t + 2.0 * t * t; };
   const auto v = [](double t) { return 0.7 + 4.0 * t; };
@@ -42,7 +42,7 @@ TEST_CASE("noiseless constant acceleration is followed exactly") {
 }
 
 TEST_CASE("what is late, sometimes missing and of the position alone is followed exactly, too") {
-  KinematicFilter filter(Settings());
+  KinematicFilter filter(FilterSettings());
   const auto q = [](double t) { return 0.3 + 0.7 * t + 2.0 * t * t; };
   filter.Restart(q(0), NAN);
   for (int i = 1; i <= 800; ++i) {
@@ -60,7 +60,7 @@ TEST_CASE("what is late, sometimes missing and of the position alone is followed
 // Independent truth: the batch weighted least-squares solution of the same linear-Gaussian model,
 // which a Kalman filter with a Rauch-Tung-Striebel smoother must reproduce.
 TEST_CASE("the smoother equals batch least squares") {
-  EstimatorSettings settings = Settings();
+  EstimatorSettings settings = FilterSettings();
   settings.position_sd = 0.1;
   settings.velocity_sd = 0.4;
   settings.jerk = 2;
@@ -117,7 +117,7 @@ TEST_CASE("the smoother equals batch least squares") {
 TEST_CASE("effort steps do not bias the smoothed velocity") {
   const double dt = 0.005;
   for (const bool allow : {true, false}) {
-    EstimatorSettings settings = Settings();
+    EstimatorSettings settings = FilterSettings();
     settings.jerk = 30;
     if (!allow) settings.effort_step = 0;
     KinematicFilter filter(settings);

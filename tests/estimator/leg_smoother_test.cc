@@ -50,7 +50,7 @@ struct Smoothed {
   std::deque<Error> errors;  // of the filter, the newest first
 };
 
-double Nees(const Error& e, const Eigen::Matrix<double, 9, 9>& covariance) {
+double SmootherNees(const Error& e, const Eigen::Matrix<double, 9, 9>& covariance) {
   return e.dot(covariance.ldlt().solve(e)) / 9;
 }
 
@@ -66,7 +66,7 @@ TEST_CASE("what came later tells of a body's motion, and how well it is known th
       const LegSmoother::Motion* motion = s.smoother.At(s.utime - kLag * kStep);
       REQUIRE(motion);
       const Error e = s.ErrorAt(*motion), before = s.errors.back();
-      nees += Nees(e, motion->covariance.topLeftCorner<9, 9>());
+      nees += SmootherNees(e, motion->covariance.topLeftCorner<9, 9>());
       velocity += e.segment<3>(3).squaredNorm(), lean += e.segment<2>(6).squaredNorm();
       causal_velocity += before.segment<3>(3).squaredNorm();
       causal_lean += before.segment<2>(6).squaredNorm();
@@ -128,7 +128,7 @@ TEST_CASE("through a foot's being lifted and set down elsewhere it stays honest"
       for (int i = 0; i < 8; ++i) s.Step();
       const LegSmoother::Motion* motion = s.smoother.At(s.utime - kLag * kStep);
       REQUIRE(motion);
-      nees += Nees(s.ErrorAt(*motion), motion->covariance.topLeftCorner<9, 9>());
+      nees += SmootherNees(s.ErrorAt(*motion), motion->covariance.topLeftCorner<9, 9>());
       ++count;
     }
   }

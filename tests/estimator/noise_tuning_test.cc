@@ -8,7 +8,7 @@
 namespace plumb {
 namespace {
 
-RobotDescription Robot() {
+RobotDescription TunedRobot() {
   RobotDescription robot;
   robot.joints.resize(1);
   robot.joints[0].name = "pivot";
@@ -49,8 +49,8 @@ void Play(StateObserver& observer, double position_sd, double velocity_sd, doubl
 }
 
 TEST_CASE("known noise is found, far from where the search begins") {
-  const TunedNoise tuned =
-      TuneNoise(Robot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 6000); });
+  const TunedNoise tuned = TuneNoise(
+      TunedRobot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 6000); });
   CHECK(tuned.joints[0].position_sd == Approx(1e-3).epsilon(0.15));
   CHECK(tuned.joints[0].velocity_sd == Approx(0.05).epsilon(0.15));
   CHECK(tuned.joints[0].jerk == Approx(40).epsilon(0.3));
@@ -60,7 +60,7 @@ TEST_CASE("known noise is found, far from where the search begins") {
 
 TEST_CASE("too little to learn from is refused by name") {
   CHECK_THROWS_WITH(
-      TuneNoise(Robot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 50); }),
+      TuneNoise(TunedRobot(), [](StateObserver& observer) { Play(observer, 1e-3, 0.05, 40, 50); }),
       Catch::Contains("joint pivot") && Catch::Contains("too few"));
 }
 

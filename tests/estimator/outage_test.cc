@@ -12,7 +12,7 @@ namespace {
 
 constexpr int64_t kPeriod = 5000;  // [us]
 
-RobotDescription Robot(int joints) {
+RobotDescription RobotOf(int joints) {
   RobotDescription robot;
   robot.joints.resize(static_cast<size_t>(joints));
   for (JointDescription& joint : robot.joints) joint.effort_limit = 2;
@@ -31,8 +31,8 @@ double Position(double t) { return std::sin(3 * t); }
 double Velocity(double t) { return 3 * std::cos(3 * t); }
 
 /// Joints that all move like this, with noise as assumed.
-struct Motion {
-  explicit Motion(int joints) : observer(Robot(joints)), n(static_cast<size_t>(joints)) {}
+struct SteadyMotion {
+  explicit SteadyMotion(int joints) : observer(RobotOf(joints)), n(static_cast<size_t>(joints)) {}
 
   joint_state_t Next() {
     joint_state_t m{};
@@ -63,7 +63,7 @@ struct Motion {
 TEST_CASE(
     "a silent joint is predicted with growing uncertainty, then the state is invalid, then it is "
     "back") {
-  Motion motion(2);
+  SteadyMotion motion(2);
   motion.Run(100);
   CHECK(motion.observer.state().valid);
   const bool flagged = GENERATE(true, false);  // or its reading is only not new
@@ -98,7 +98,7 @@ TEST_CASE(
 }
 
 TEST_CASE("a short silence ends without a restart") {
-  Motion motion(1);
+  SteadyMotion motion(1);
   motion.Run(100);
   for (int i = 0; i < 8; ++i) {
     joint_state_t m = motion.Next();
@@ -112,7 +112,7 @@ TEST_CASE("a short silence ends without a restart") {
 }
 
 TEST_CASE("silent for longer than a second, and from the very start") {
-  Motion motion(2);
+  SteadyMotion motion(2);
   for (int i = 0; i < 300; ++i) {
     joint_state_t m = motion.Next();
     m.measured[0] = 0;
@@ -128,7 +128,7 @@ TEST_CASE("silent for longer than a second, and from the very start") {
 }
 
 TEST_CASE("duplicates and late messages are counted and change nothing") {
-  Motion motion(1), undisturbed(1);
+  SteadyMotion motion(1), undisturbed(1);
   motion.Run(10);
   undisturbed.Run(10);
   const joint_state_t older = motion.Next(), newer = motion.Next();
@@ -149,7 +149,7 @@ TEST_CASE("duplicates and late messages are counted and change nothing") {
 }
 
 TEST_CASE("noise as assumed: innovations are normal, and nobody lies") {
-  Motion motion(1);
+  SteadyMotion motion(1);
   motion.Run(2000);
   const estimator_status_t status = motion.observer.Status();
   CHECK(status.position_nis[0] == Approx(1).margin(0.5));
@@ -160,7 +160,7 @@ TEST_CASE("noise as assumed: innovations are normal, and nobody lies") {
 }
 
 TEST_CASE("a lying sensor is named") {
-  Motion motion(1);
+  SteadyMotion motion(1);
   motion.Run(200);
   const int64_t before = motion.observer.reasons_changed();
   std::string expected;

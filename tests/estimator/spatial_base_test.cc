@@ -56,7 +56,8 @@ struct TrunkErrors {
   int64_t restarts = 0;
 };
 
-TrunkErrors ErrorsOf(const RobotDescription& robot, const Recordings& recordings, bool smoothed) {
+TrunkErrors TrunkErrorsOf(const RobotDescription& robot, const Recordings& recordings,
+                          bool smoothed) {
   TrunkErrors errors;
   for (const auto& recording : recordings) {
     StateObserver observer(robot);
@@ -93,7 +94,7 @@ TrunkErrors ErrorsOf(const RobotDescription& robot, const Recordings& recordings
   return errors;
 }
 
-std::string Describe(const TrunkErrors& e) {
+std::string DescribeTrunk(const TrunkErrors& e) {
   return "height " + std::to_string(e.height.q()) + " NEES " + std::to_string(e.height.nees_q()) +
          ", lean " + std::to_string(e.lean.q()) + " NEES " + std::to_string(e.lean.nees_q()) +
          ", velocity " + std::to_string(e.velocity.v()) + " NEES " +
@@ -107,8 +108,8 @@ TEST_CASE("a quadruped knows its height, lean and velocities") {
   Recordings recordings;
   for (uint32_t seed = 1; seed <= 4; ++seed) recordings.push_back(Trot(robot, seed));
   for (const bool smoothed : {false, true}) {
-    const TrunkErrors e = ErrorsOf(robot, recordings, smoothed);
-    INFO((smoothed ? "smoothed: " : "causal: ") << Describe(e));
+    const TrunkErrors e = TrunkErrorsOf(robot, recordings, smoothed);
+    INFO((smoothed ? "smoothed: " : "causal: ") << DescribeTrunk(e));
     CHECK(e.restarts == 0);
     CHECK(e.valid > 0.95 * e.count);
     CHECK(e.height.q() < 0.01);

@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 
 #include "common/random.h"
+#include "common/special_numbers.h"
 #include "estimator/state_observer.h"
 #include "tests/sim/robots.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool Finite(const robot_state_t& state) {
   bool finite = true;

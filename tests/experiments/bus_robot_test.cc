@@ -18,7 +18,7 @@
 namespace plumb {
 namespace {
 
-RobotDescription Robot(const std::string& name) {
+RobotDescription RobotNamed(const std::string& name) {
   return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name);
 }
 
@@ -53,7 +53,7 @@ double Sum(const Rollout& rollout) {
 
 TEST_CASE("an episode is a function of seed and number, to the bit") {
   const std::string name = GENERATE("pendulum", "hopper");
-  const RobotDescription robot = Robot(name);
+  const RobotDescription robot = RobotNamed(name);
   const Eigen::VectorXd hidden = HiddenParameters(robot, 1);
   const GaussianPolicy policy = Wanderer(robot, 0.5f);
   BusRobot one(robot, robot, hidden, 7), other(robot, robot, hidden, 7);
@@ -95,7 +95,7 @@ Findings Found(const RobotDescription& model, std::vector<Rollout> rollouts) {
 TEST_CASE("what a robot without a gap does behind its bus calibrates to its hidden parameters") {
   const std::string name = GENERATE("pendulum", "hopper");
   CAPTURE(name);
-  const RobotDescription robot = Robot(name);
+  const RobotDescription robot = RobotNamed(name);
   const Eigen::VectorXd hidden = HiddenParameters(robot, 2);
   BusRobot system(robot, robot, hidden, 1);
   const bool hopper = name == "hopper";
@@ -113,12 +113,12 @@ TEST_CASE("what a robot without a gap does behind its bus calibrates to its hidd
 }
 
 TEST_CASE("friction and delay that no model knows are found where the model may have them") {
-  RobotDescription truth = Robot("pendulum/worn.toml");
+  RobotDescription truth = RobotNamed("pendulum/worn.toml");
   truth.virtual_robot.joints[0].backlash = 0;
-  const RobotDescription model = Robot("pendulum/worn_fitted.toml");
+  const RobotDescription model = RobotNamed("pendulum/worn_fitted.toml");
   BusRobot system(truth, model, HiddenParameters(truth, 2), 1);
   const std::vector<Rollout> rollouts = Trials(system, Wanderer(model, 0.5f), 3);
-  const Findings blind = Found(Robot("pendulum"), rollouts), found = Found(model, rollouts);
+  const Findings blind = Found(RobotNamed("pendulum"), rollouts), found = Found(model, rollouts);
   CHECK(blind.misspecification.alarm);
   CHECK_FALSE(found.misspecification.alarm);
   const Gaussian posterior = Moments(found.posterior);
@@ -132,8 +132,8 @@ TEST_CASE("friction and delay that no model knows are found where the model may 
 }
 
 TEST_CASE("backlash is a gap that the pendulum's parameters do not close") {
-  const RobotDescription truth = Robot("pendulum/worn.toml"),
-                         model = Robot("pendulum/worn_fitted.toml");
+  const RobotDescription truth = RobotNamed("pendulum/worn.toml"),
+                         model = RobotNamed("pendulum/worn_fitted.toml");
   BusRobot system(truth, model, HiddenParameters(truth, 2), 1);
   CHECK(Found(model, Trials(system, Wanderer(model, 0.5f), 1)).misspecification.alarm);
 }
@@ -144,7 +144,8 @@ TEST_CASE("a hopper that another program moves is driven through its bus as any 
     bool here;
   };
   const auto other = GENERATE(Other{"mujoco", HasMujoco()}, Other{"ode", HasOde()});
-  const RobotDescription truth = Robot("hopper/" + other.name + ".toml"), model = Robot("hopper");
+  const RobotDescription truth = RobotNamed("hopper/" + other.name + ".toml"),
+                         model = RobotNamed("hopper");
   const Eigen::VectorXd hidden = HiddenParameters(truth, 2);
   BusRobot other_world(truth, model, hidden, 1), own_world(model, model, hidden, 1);
   if (!other.here) {

@@ -12,7 +12,7 @@
 namespace plumb {
 namespace {
 
-RobotDescription Robot(const std::string& name) {
+RobotDescription RobotToml(const std::string& name) {
   return LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/" + name +
                    "/robot.toml");
 }
@@ -30,7 +30,7 @@ GaussianPolicy SomePolicy(const RobotDescription& robot) {
 
 TEST_CASE("a policy returns as much in the robot's simulation as on the robot") {
   const std::string name = GENERATE("pendulum", "hopper");
-  RobotDescription robot = Robot(name);
+  RobotDescription robot = RobotToml(name);
   robot.task.steps = 60;
   const Eigen::VectorXd hidden = HiddenParameters(robot, 1);
   const GaussianPolicy policy = SomePolicy(robot);
@@ -56,7 +56,7 @@ TEST_CASE("a policy returns as much in the robot's simulation as on the robot") 
 }
 
 TEST_CASE("an episode on the robot may be left at any time") {
-  const RobotDescription robot = Robot("pendulum");
+  const RobotDescription robot = RobotToml("pendulum");
   const auto simulation = SimulateBusRobot(robot, robot, HiddenParameters(robot, 1), 7)();
   Random random(3);
   for (int steps : {0, 3, 0}) {

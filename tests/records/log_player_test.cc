@@ -11,24 +11,24 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kBegin = 1'700'000'000'000'000;
+constexpr int64_t kFirst = 1'700'000'000'000'000;
 
 int Next(const LogPlayer& player) {
   return std::stoi(std::string(player.next().data.begin(), player.next().data.end()));
 }
 
 /// Ten messages a second for ten seconds.
-struct Recorded {
-  Recorded() {
+struct TenSeconds {
+  TenSeconds() {
     std::vector<int64_t> times(101);
-    for (size_t i = 0; i < times.size(); ++i) times[i] = kBegin + 100'000 * static_cast<int64_t>(i);
+    for (size_t i = 0; i < times.size(); ++i) times[i] = kFirst + 100'000 * static_cast<int64_t>(i);
     WriteLog(file, times);
   }
   TemporaryFolder folder;
   const std::string file = folder / "a.lcmlog";
 };
 
-TEST_CASE_METHOD(Recorded, "each message is due at its time, at any speed") {
+TEST_CASE_METHOD(TenSeconds, "each message is due at its time, at any speed") {
   LogPlayer player(file, {}, 2, 1000);
   CHECK(player.duration() == Approx(10));
   CHECK(Next(player) == 0);
@@ -46,7 +46,7 @@ TEST_CASE_METHOD(Recorded, "each message is due at its time, at any speed") {
   CHECK(player.Position(1000 + 40'000) == Approx(10));
 }
 
-TEST_CASE_METHOD(Recorded, "a pause lasts until it ends, and nothing is skipped by it") {
+TEST_CASE_METHOD(TenSeconds, "a pause lasts until it ends, and nothing is skipped by it") {
   LogPlayer player(file, {}, 1, 0);
   player.Advance(0);
   player.Pause(true, 30'000);
@@ -57,7 +57,7 @@ TEST_CASE_METHOD(Recorded, "a pause lasts until it ends, and nothing is skipped 
   CHECK(Next(player) == 1);
 }
 
-TEST_CASE_METHOD(Recorded, "seeking finds the message of that time, back and forth") {
+TEST_CASE_METHOD(TenSeconds, "seeking finds the message of that time, back and forth") {
   LogPlayer player(file, {}, 1, 0);
   for (const double position : {7.25, 0.0, 10.0, 3.0, 2.999, -4.0, 99.0}) {
     player.Seek(position, 500);
@@ -67,7 +67,7 @@ TEST_CASE_METHOD(Recorded, "seeking finds the message of that time, back and for
   }
 }
 
-TEST_CASE_METHOD(Recorded, "a part is played from its beginning to its end, once or again") {
+TEST_CASE_METHOD(TenSeconds, "a part is played from its beginning to its end, once or again") {
   LogPlayer once(file, {2, 2.3}, 1, 0);
   std::vector<int> played;
   for (; !once.over(); once.Advance(0)) played.push_back(Next(once));
@@ -87,7 +87,7 @@ TEST_CASE("of a long log any moment is found, though some messages are late") {
   const std::string file = folder / "a.lcmlog";
   std::vector<int64_t> times(10'000);
   for (size_t i = 0; i < times.size(); ++i)
-    times[i] = kBegin + 1000 * static_cast<int64_t>(i) - (i % 7 == 3 ? 2500 : 0);
+    times[i] = kFirst + 1000 * static_cast<int64_t>(i) - (i % 7 == 3 ? 2500 : 0);
   WriteLog(file, times);
   LcmLogReader log(file);
   const LogIndex index(log);
@@ -95,14 +95,14 @@ TEST_CASE("of a long log any moment is found, though some messages are late") {
   LcmLogEvent event;
   for (const size_t i :
        {size_t{0}, size_t{1}, size_t{999}, size_t{1000}, size_t{5555}, size_t{9998}}) {
-    const int64_t wanted = kBegin + 1000 * static_cast<int64_t>(i);
+    const int64_t wanted = kFirst + 1000 * static_cast<int64_t>(i);
     index.Seek(log, wanted);
     REQUIRE(log.Read(event));
     const auto first = std::ranges::find_if(times, [&](int64_t t) { return t >= wanted; });
     CHECK(std::string(event.data.begin(), event.data.end()) ==
           std::to_string(first - times.begin()));
   }
-  index.Seek(log, kBegin + 10'000'000);
+  index.Seek(log, kFirst + 10'000'000);
   CHECK_FALSE(log.Read(event));
 }
 

@@ -42,34 +42,35 @@ std::string TwoBuses() {
   return Replaced(toml, "node = 2\n", "node = 2\nbus = \"right\"\n") + kEncoder;
 }
 
-RobotDescription Load(const std::string& toml) {
+RobotDescription LoadZoo(const std::string& toml) {
   return LoadRobot(RobotFolder(kZooUrdf, toml).path());
 }
 
-void Refused(const std::string& from, const std::string& to, const std::string& what) {
+void RefusedOfTwoBuses(const std::string& from, const std::string& to, const std::string& what) {
   INFO(from << " -> " << to);
-  CHECK_THROWS_WITH(Load(Replaced(TwoBuses(), from, to)), Contains("robot.toml:" + what));
+  CHECK_THROWS_WITH(LoadZoo(Replaced(TwoBuses(), from, to)), Contains("robot.toml:" + what));
 }
 
 TEST_CASE("one bus needs no name, and nobody needs to name it") {
-  const RobotDescription robot = Load(kZooToml);
+  const RobotDescription robot = LoadZoo(kZooToml);
   REQUIRE(robot.buses.size() == 1);
   CHECK(robot.buses[0].name.empty());
   CHECK(robot.buses[0].Label() == "the bus");
   CHECK(UrlsOf(robot.buses) == std::vector<std::string>{"udp:239.74.163.2:43113"});
   CHECK(robot.joints[3].motor.bus == 0);
-  CHECK_THROWS_WITH(Load(Replaced(kZooToml, "gear = 6.0\n", "gear = 6.0\nbus = \"left\"\n")),
+  CHECK_THROWS_WITH(LoadZoo(Replaced(kZooToml, "gear = 6.0\n", "gear = 6.0\nbus = \"left\"\n")),
                     Contains("but the robot has one bus, without a name"));
   // It may have one.
   const std::string named = Replaced(kZooToml, "[bus]\n", "[bus]\nname = \"left\"\n");
-  CHECK(Load(named).buses[0].name == "left");
-  CHECK(Load(Replaced(named, "[bus]", "[[bus]]")).buses[0].name == "left");
-  CHECK(Load(Replaced(named, "gear = 6.0\n", "gear = 6.0\nbus = \"left\"\n")).joints[3].motor.bus ==
-        0);
+  CHECK(LoadZoo(named).buses[0].name == "left");
+  CHECK(LoadZoo(Replaced(named, "[bus]", "[[bus]]")).buses[0].name == "left");
+  CHECK(LoadZoo(Replaced(named, "gear = 6.0\n", "gear = 6.0\nbus = \"left\"\n"))
+            .joints[3]
+            .motor.bus == 0);
 }
 
 TEST_CASE("of several buses each has its rates, and joints and sensors say which is theirs") {
-  const RobotDescription robot = Load(TwoBuses());
+  const RobotDescription robot = LoadZoo(TwoBuses());
   REQUIRE(robot.buses.size() == 2);
   CHECK(robot.buses[0].name == "left");
   CHECK(robot.buses[0].bit_rate == 1e6);
@@ -86,44 +87,48 @@ TEST_CASE("of several buses each has its rates, and joints and sensors say which
 
 TEST_CASE("one id on two buses is two drives, on one bus it is a mistake") {
   const std::string same = Replaced(TwoBuses(), "node = 2\n", "node = 1\n");
-  CHECK(Load(same).joints[9].motor.node == 1);
-  CHECK_THROWS_WITH(Load(Replaced(same, "bus = \"right\"", "bus = \"left\"")),
+  CHECK(LoadZoo(same).joints[9].motor.node == 1);
+  CHECK_THROWS_WITH(LoadZoo(Replaced(same, "bus = \"right\"", "bus = \"left\"")),
                     Contains("joint[2].node = 1 is also joint hip's, on bus left"));
 }
 
 TEST_CASE("mistakes about buses are at their lines") {
-  Refused("bus = \"left\"\n[joint", "[joint",
-          "20:1: joint[0].bus is missing: the robot has several, left, right");
-  Refused("bus = \"right\"\n", "bus = \"rigth\"\n",
-          "45:7: joint[2].bus = \"rigth\" is none of the buses left, right");
-  Refused("bus = \"left\"\nnode", "node", "127:1: sensor[0].bus is missing");
-  Refused("bus = \"left\"\nnode", "bus = \"\"\nnode", "130:7: sensor[0].bus = \"\" is none");
-  Refused("name = \"right\"\n", "name = \"left\"\n", "8:8: bus[1].name = \"left\" occurs twice");
-  Refused("name = \"right\"\n", "", "7:1: bus[1].name is missing");
-  Refused("name = \"right\"", "name = \"the right\"", "8:8: bus[1].name = \"the right\" is not of");
-  Refused("socketcan:can1", "socketcan:can0",
-          "9:7: bus[1].url = \"socketcan:can0\" is also bus left's");
-  Refused("socketcan:can1", "faulty:loss=0.1:socketcan:can0", "9:7: bus[1].url");
-  Refused("bit_rate = 5e5", "bitrate = 5e5", "10:11: bus[1].bitrate is not a known key");
-  Refused("passive = true\n", "passive = true\nbus = \"left\"\n",
-          "39:7: joint[1].bus is of a motor, but the joint is passive");
+  RefusedOfTwoBuses("bus = \"left\"\n[joint", "[joint",
+                    "20:1: joint[0].bus is missing: the robot has several, left, right");
+  RefusedOfTwoBuses("bus = \"right\"\n", "bus = \"rigth\"\n",
+                    "45:7: joint[2].bus = \"rigth\" is none of the buses left, right");
+  RefusedOfTwoBuses("bus = \"left\"\nnode", "node", "127:1: sensor[0].bus is missing");
+  RefusedOfTwoBuses("bus = \"left\"\nnode", "bus = \"\"\nnode",
+                    "130:7: sensor[0].bus = \"\" is none");
+  RefusedOfTwoBuses("name = \"right\"\n", "name = \"left\"\n",
+                    "8:8: bus[1].name = \"left\" occurs twice");
+  RefusedOfTwoBuses("name = \"right\"\n", "", "7:1: bus[1].name is missing");
+  RefusedOfTwoBuses("name = \"right\"", "name = \"the right\"",
+                    "8:8: bus[1].name = \"the right\" is not of");
+  RefusedOfTwoBuses("socketcan:can1", "socketcan:can0",
+                    "9:7: bus[1].url = \"socketcan:can0\" is also bus left's");
+  RefusedOfTwoBuses("socketcan:can1", "faulty:loss=0.1:socketcan:can0", "9:7: bus[1].url");
+  RefusedOfTwoBuses("bit_rate = 5e5", "bitrate = 5e5", "10:11: bus[1].bitrate is not a known key");
+  RefusedOfTwoBuses("passive = true\n", "passive = true\nbus = \"left\"\n",
+                    "39:7: joint[1].bus is of a motor, but the joint is passive");
   // Nothing is on it.
-  Refused("[driver]", "[[bus]]\nname = \"spare\"\nurl = \"socketcan:can2\"\n[driver]",
-          "13:8: bus[2].name = \"spare\" has no joint and no sensor on it");
+  RefusedOfTwoBuses("[driver]", "[[bus]]\nname = \"spare\"\nurl = \"socketcan:can2\"\n[driver]",
+                    "13:8: bus[2].name = \"spare\" has no joint and no sensor on it");
   std::string many;
   for (int i = 0; i < 15; ++i)
     many += "[[bus]]\nname = \"b" + std::to_string(i) + "\"\nurl = \"loop:" + std::to_string(i) +
             "\"\n";
-  Refused("[driver]", many + "[driver]", "55:8: bus[16].name is one too many: 16 buses at most");
+  RefusedOfTwoBuses("[driver]", many + "[driver]",
+                    "55:8: bus[16].name is one too many: 16 buses at most");
 }
 
 TEST_CASE("CAN FD is needed of the bus that its drive is on") {
   const std::string moteus =
       "protocol = \"moteus\"\nnode = 7\nbus = \"right\"\n[joint.moteus]\ntorque = 30.0\n";
   const std::string disc = "protocol = \"cansimple\"\nnode = 2\nbus = \"right\"\n";
-  CHECK(Load(Replaced(TwoBuses(), disc, moteus)).joints[9].motor.moteus);
+  CHECK(LoadZoo(Replaced(TwoBuses(), disc, moteus)).joints[9].motor.moteus);
   CHECK_THROWS_WITH(
-      Load(Replaced(TwoBuses(), disc, Replaced(moteus, "bus = \"right\"", "bus = \"left\""))),
+      LoadZoo(Replaced(TwoBuses(), disc, Replaced(moteus, "bus = \"right\"", "bus = \"left\""))),
       Contains("robot.toml:4:1: bus[0].data_bit_rate is missing: joint \"disc\" speaks moteus"));
 }
 

@@ -14,17 +14,18 @@ namespace {
 
 using Catch::Contains;
 
-std::string Text(const std::string& file) {
+std::string HopperFile(const std::string& file) {
   std::ifstream in(SourceFile("robots/hopper/" + file));
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-RobotDescription Load(const std::string& toml, const std::string& urdf = Text("robot.urdf")) {
+RobotDescription LoadHopper(const std::string& toml,
+                            const std::string& urdf = HopperFile("robot.urdf")) {
   return LoadRobot(RobotFolder(urdf, toml).path());
 }
 
 TEST_CASE("floating base: the hopper's torso without its boom") {
-  const RobotDescription robot = Load(Text("free.toml"));
+  const RobotDescription robot = LoadHopper(HopperFile("free.toml"));
   CHECK(robot.estimator.base == EstimatorSettings::Base::kLegs);
   CHECK(robot.estimator.ground_sd == 0.018);
   CHECK(robot.estimator.slip == 0.05);
@@ -42,11 +43,12 @@ TEST_CASE("floating base: the hopper's torso without its boom") {
 }
 
 TEST_CASE("floating base: who cannot do without a boom is told why, and where") {
-  const std::string toml = Text("free.toml"), urdf = Text("robot.urdf");
+  const std::string toml = HopperFile("free.toml"), urdf = HopperFile("robot.urdf");
   const auto refused = [&](const std::string& other_toml, const std::string& other_urdf,
                            const std::string& what) {
     INFO(what);
-    CHECK_THROWS_WITH(Load(other_toml, other_urdf), Contains("robot.toml:") && Contains(what));
+    CHECK_THROWS_WITH(LoadHopper(other_toml, other_urdf),
+                      Contains("robot.toml:") && Contains(what));
   };
   const auto without = [](const std::string& text, const std::string& from, const std::string& to) {
     const size_t at = text.find(from), end = text.find(to, at);
@@ -66,17 +68,17 @@ TEST_CASE("floating base: who cannot do without a boom is told why, and where") 
   refused(Replaced(toml, "ground_sd = 0.018", "ground_sd = 0"), urdf, "ground_sd");
   refused(Replaced(toml, "base = \"legs\"", "base = \"sensors\""), urdf, "ground_sd");
 
-  RobotDescription robot = Load(toml);
+  RobotDescription robot = LoadHopper(toml);
   robot.joints[2].type = JointDescription::Type::kSpherical;
   CHECK_THROWS_WITH(FloatingBaseOf(robot), Contains("along three"));
-  robot = Load(toml);
+  robot = LoadHopper(toml);
   robot.joints[1].passive = false;
   CHECK_THROWS_WITH(FloatingBaseOf(robot), Contains("motor of \"rootz\""));
-  robot = Load(toml);
+  robot = LoadHopper(toml);
   Shape sphere;
   robot.links[1].collisions.push_back(sphere);
   CHECK_THROWS_WITH(FloatingBaseOf(robot), Contains("does not hang"));
-  robot = Load(toml);
+  robot = LoadHopper(toml);
   for (int i = 0; i < 40; ++i) robot.links.back().collisions.push_back(sphere);
   CHECK_THROWS_WITH(FloatingBaseOf(robot), Contains("more than 32"));
 }

@@ -1,13 +1,11 @@
 #include "robot/limit_effort.h"
 
 #include <catch2/catch.hpp>
-#include <limits>
+
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity(),
-                 kNan = std::numeric_limits<double>::quiet_NaN();
 
 double Limited(double wish, double position, double velocity, const JointLimits& limits,
                double sent = 0) {
@@ -38,12 +36,13 @@ TEST_CASE("effort, position and velocity limits") {
     INFO(c.effort << " at " << c.position << ", " << c.velocity);
     CHECK(Limited(c.effort, c.position, c.velocity, limits) == c.expected);
   }
-  for (const double bad : {kNan, kInf, -kInf}) {
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
     CHECK_FALSE(LimitEffort(bad, {0, 0, 0, 0.01}, limits));
     CHECK_FALSE(LimitEffort(0, {bad, 0, 0, 0.01}, limits));
     CHECK_FALSE(LimitEffort(0, {0, bad, 0, 0.01}, limits));
   }
-  const JointLimits continuous{.lower = -kInf, .upper = kInf, .velocity = kInf, .effort = 3};
+  const JointLimits continuous{
+      .lower = -kInfinity, .upper = kInfinity, .velocity = kInfinity, .effort = 3};
   CHECK(Limited(3, 1e6, 1e6, continuous) == 3);
 }
 
@@ -93,8 +92,11 @@ TEST_CASE("efforts that make a joint faster fade before its velocity limit") {
 }
 
 TEST_CASE("an effort grows at its rate and falls at once") {
-  const JointLimits limits{
-      .lower = -kInf, .upper = kInf, .velocity = kInf, .effort = 3, .effort_rate = 50};
+  const JointLimits limits{.lower = -kInfinity,
+                           .upper = kInfinity,
+                           .velocity = kInfinity,
+                           .effort = 3,
+                           .effort_rate = 50};
   struct Case {
     double wish, sent, expected;
   };

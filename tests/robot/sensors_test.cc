@@ -51,7 +51,7 @@ torque = 18.0
 source = "the label"
 )";
 
-RobotDescription Load(const std::string& toml) {
+RobotDescription LoadWithSensors(const std::string& toml) {
   return LoadRobot(RobotFolder(kZooUrdf, toml).path());
 }
 
@@ -61,7 +61,7 @@ std::string WithMotor(const std::string& motor) {
 }
 
 TEST_CASE("sensors: encoders and an IMU") {
-  const RobotDescription robot = Load(kZooToml + kSensors);
+  const RobotDescription robot = LoadWithSensors(kZooToml + kSensors);
   REQUIRE(robot.sensors.size() == 3);
   const SensorDescription& boom = robot.sensors[0];
   CHECK(boom.name == "boom");
@@ -82,13 +82,13 @@ TEST_CASE("sensors: encoders and an IMU") {
   CHECK(imu.tick == 1e-4);
   CHECK(robot.links[static_cast<size_t>(imu.link)].name == "carriage");
   CHECK((imu.rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm() < 1e-12);
-  CHECK(Load(kZooToml).sensors.empty());
+  CHECK(LoadWithSensors(kZooToml).sensors.empty());
 }
 
 TEST_CASE("sensors: what is refused") {
   const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
     INFO(from << " -> " << to);
-    CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, from, to)),
+    CHECK_THROWS_WITH(LoadWithSensors(kZooToml + Replaced(kSensors, from, to)),
                       Contains("robot.toml:") && Contains(what));
   };
   refused("name = \"hip_encoder\"", "name = \"boom\"", "occurs twice");
@@ -115,7 +115,7 @@ TEST_CASE("sensors: what is refused") {
 }
 
 TEST_CASE("noise: of a count, of an IMU, of a joint") {
-  const RobotDescription robot = Load(kZooToml + kSensors);
+  const RobotDescription robot = LoadWithSensors(kZooToml + kSensors);
   CHECK(robot.sensors[0].noise.position_sd == Approx(1.5 * 2 * M_PI / 65536 / std::sqrt(12.)));
   CHECK(robot.sensors[1].noise.position_sd == Approx(2 * M_PI / 4096 / std::sqrt(12.)));
   CHECK(std::isnan(robot.sensors[0].noise.velocity_sd));
@@ -124,19 +124,19 @@ TEST_CASE("noise: of a count, of an IMU, of a joint") {
   CHECK(robot.estimator.delay == 0);
   CHECK(robot.estimator.outage == 0.05);
   CHECK(robot.estimator.model_acceleration == 0.2);
-  CHECK(Load(Replaced(kZooToml, "reset_after = 0.2",
-                      "reset_after = 0.2\nmodel = {acceleration = 3.0}"))
+  CHECK(LoadWithSensors(Replaced(kZooToml, "reset_after = 0.2",
+                                 "reset_after = 0.2\nmodel = {acceleration = 3.0}"))
             .estimator.model_acceleration == 3);
   const std::string imu =
       Replaced(kSensors, "base = 0x380",
                "base = 0x380\nangle_sd = 0.003\nrate_bias_sd = 0.2\ndelay = 0.001");
-  const RobotDescription told = Load(kZooToml + imu);
+  const RobotDescription told = LoadWithSensors(kZooToml + imu);
   CHECK(told.sensors[2].noise.position_sd == 0.003);
   CHECK(told.sensors[2].rate_bias_sd == 0.2);
   CHECK(told.sensors[2].noise.delay == 0.001);
   const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
     INFO(from << " -> " << to);
-    CHECK_THROWS_WITH(Load(Replaced(kZooToml + kSensors, from, to)),
+    CHECK_THROWS_WITH(LoadWithSensors(Replaced(kZooToml + kSensors, from, to)),
                       Contains("robot.toml:") && Contains(what));
   };
   refused("base = 0x380", "base = 0x380\nangle_sd = 0", "angle_sd");
@@ -149,7 +149,7 @@ TEST_CASE("noise: of a count, of an IMU, of a joint") {
   refused("reset_after = 0.2", "reset_after = 0.2\nmodel = {jerk = 1.0}", "estimator.model.jerk");
   refused("name = \"disc\"\n", "name = \"disc\"\nestimator = {jerk = -1.0}\n", "jerk");
   refused("name = \"disc\"\n", "name = \"disc\"\nestimator = {lag = 3}\n", "lag");
-  const RobotDescription joint = Load(Replaced(
+  const RobotDescription joint = LoadWithSensors(Replaced(
       kZooToml, "name = \"disc\"\n", "name = \"disc\"\nestimator = {jerk = 5.0, delay = 0.002}\n"));
   const auto disc = std::find_if(joint.joints.begin(), joint.joints.end(),
                                  [](const auto& j) { return j.name == "disc"; });
@@ -160,7 +160,7 @@ TEST_CASE("noise: of a count, of an IMU, of a joint") {
 }
 
 TEST_CASE("MIT motors: ranges with their source") {
-  const RobotDescription robot = Load(WithMotor(kMit));
+  const RobotDescription robot = LoadWithSensors(WithMotor(kMit));
   const MotorDescription& motor = robot.joints[3].motor;
   CHECK(motor.protocol == "mit");
   CHECK(motor.node == 0x11);
@@ -179,7 +179,7 @@ TEST_CASE("RMD motors: a torque constant with its source") {
   const std::string rmd =
       "protocol = \"rmd\"\nnode = 7\n[joint.rmd]\ntorque_constant = 0.5\ncurrent = 8.0\nsource = "
       "\"the data sheet\"\n";
-  const RobotDescription robot = Load(WithMotor(rmd));
+  const RobotDescription robot = LoadWithSensors(WithMotor(rmd));
   const MotorDescription& motor = robot.joints[3].motor;
   REQUIRE(motor.rmd);
   CHECK(motor.node == 7);
@@ -188,12 +188,13 @@ TEST_CASE("RMD motors: a torque constant with its source") {
   CHECK(motor.rmd->watchdog == 0.1);
   CHECK(motor.rmd->source == "the data sheet");
   CHECK_FALSE(motor.mit);
-  CHECK(Load(WithMotor(rmd + "watchdog = 0.05\n")).joints[3].motor.rmd->watchdog == 0.05);
+  CHECK(LoadWithSensors(WithMotor(rmd + "watchdog = 0.05\n")).joints[3].motor.rmd->watchdog ==
+        0.05);
 
   const auto refused = [&](const std::string& from, const std::string& to,
                            const std::string& what) {
     INFO(from << " -> " << to);
-    CHECK_THROWS_WITH(Load(WithMotor(Replaced(rmd, from, to))),
+    CHECK_THROWS_WITH(LoadWithSensors(WithMotor(Replaced(rmd, from, to))),
                       Contains("robot.toml:") && Contains(what));
   };
   refused(rmd.substr(rmd.find("[joint.rmd]")), "", "rmd");
@@ -211,7 +212,7 @@ TEST_CASE("moteus: a greatest torque, and a bus that carries CAN FD") {
   const std::string moteus = "protocol = \"moteus\"\nnode = 7\n[joint.moteus]\ntorque = 8.0\n",
                     fd = "data_bit_rate = 5e6\n[driver]";
   const auto load = [&](const std::string& motor) {
-    return Load(Replaced(WithMotor(motor), "[driver]", fd));
+    return LoadWithSensors(Replaced(WithMotor(motor), "[driver]", fd));
   };
   const RobotDescription robot = load(moteus);
   const MotorDescription& motor = robot.joints[3].motor;
@@ -238,17 +239,18 @@ TEST_CASE("moteus: a greatest torque, and a bus that carries CAN FD") {
   refused("torque = 8.0", "torque = 8.0\nwatchdog = 0", "watchdog");
   refused("torque = 8.0", "torque = 8.0\ntorqe = 8", "did you mean torque?");
   // On a bus that has no FD: the table's line.
-  CHECK_THROWS_WITH(Load(WithMotor(moteus)),
+  CHECK_THROWS_WITH(LoadWithSensors(WithMotor(moteus)),
                     Contains("robot.toml:4:") && Contains("bus.data_bit_rate is missing") &&
                         Contains("speaks moteus, which needs a bus of CAN FD"));
-  CHECK_THROWS_WITH(Load(Replaced(WithMotor(moteus), "[driver]", "data_bit_rate = 5e5\n[driver]")),
-                    Contains("robot.toml:") && Contains("data_bit_rate"));
+  CHECK_THROWS_WITH(
+      LoadWithSensors(Replaced(WithMotor(moteus), "[driver]", "data_bit_rate = 5e5\n[driver]")),
+      Contains("robot.toml:") && Contains("data_bit_rate"));
 }
 
 TEST_CASE("MIT motors: what is refused") {
   const auto refused = [](const std::string& from, const std::string& to, const std::string& what) {
     INFO(from << " -> " << to);
-    CHECK_THROWS_WITH(Load(WithMotor(Replaced(kMit, from, to))),
+    CHECK_THROWS_WITH(LoadWithSensors(WithMotor(Replaced(kMit, from, to))),
                       Contains("robot.toml:") && Contains(what));
   };
   refused(kMit.substr(kMit.find("[joint.mit]")), "", "mit");
@@ -265,22 +267,25 @@ TEST_CASE("MIT motors: what is refused") {
 
 TEST_CASE("an encoder on a joint with a motor may differ from it by a tolerance") {
   const std::string hip = "node = 2\nperiod = 0.002\n", boom = "node = 1\nperiod = 0.002\n";
-  CHECK(std::isinf(Load(kZooToml + kSensors).sensors[1].tolerance));
-  CHECK(Load(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0.05\n")).sensors[1].tolerance ==
-        0.05);
-  CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0\n")),
+  CHECK(std::isinf(LoadWithSensors(kZooToml + kSensors).sensors[1].tolerance));
+  CHECK(LoadWithSensors(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0.05\n"))
+            .sensors[1]
+            .tolerance == 0.05);
+  CHECK_THROWS_WITH(LoadWithSensors(kZooToml + Replaced(kSensors, hip, hip + "tolerance = 0\n")),
                     Contains("tolerance"));
-  CHECK_THROWS_WITH(Load(kZooToml + Replaced(kSensors, boom, boom + "tolerance = 0.05\n")),
-                    Contains("\"rail/x\" has no motor"));
+  CHECK_THROWS_WITH(
+      LoadWithSensors(kZooToml + Replaced(kSensors, boom, boom + "tolerance = 0.05\n")),
+      Contains("\"rail/x\" has no motor"));
 }
 
 TEST_CASE("the bus has a bit rate, and drives a telemetry period") {
-  CHECK(Load(kZooToml).buses[0].bit_rate == 1e6);
-  CHECK(Load(kZooToml).driver.telemetry == 0.1);
-  CHECK(Load(Replaced(kZooToml, "[driver]", "bit_rate = 500000\n[driver]\ntelemetry = 0.02"))
+  CHECK(LoadWithSensors(kZooToml).buses[0].bit_rate == 1e6);
+  CHECK(LoadWithSensors(kZooToml).driver.telemetry == 0.1);
+  CHECK(LoadWithSensors(
+            Replaced(kZooToml, "[driver]", "bit_rate = 500000\n[driver]\ntelemetry = 0.02"))
             .buses[0]
             .bit_rate == 5e5);
-  CHECK_THROWS_WITH(Load(Replaced(kZooToml, "[driver]", "bit_rate = 2e6\n[driver]")),
+  CHECK_THROWS_WITH(LoadWithSensors(Replaced(kZooToml, "[driver]", "bit_rate = 2e6\n[driver]")),
                     Contains("bit_rate"));
 }
 

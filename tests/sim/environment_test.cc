@@ -8,6 +8,7 @@
 
 #include "tests/sim/allocations.h"
 #include "tests/sim/robots.h"
+#include "tests/sim/scalar.h"
 
 namespace plumb {
 namespace {
@@ -15,7 +16,6 @@ namespace {
 using Eigen::VectorXd;
 using Eigen::VectorXf;
 
-VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
 VectorXf Action(float x) { return VectorXf::Constant(1, x); }
 
 }  // namespace

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 
+#include "common/special_numbers.h"
 #include "sim/simulator.h"
 #include "tests/sim/allocations.h"
 #include "tests/sim/trees.h"
@@ -13,9 +13,6 @@ namespace plumb {
 namespace {
 
 using Eigen::VectorXd;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // On the ground, with everything that can act; and once through space.
 std::vector<RobotDescription> Robots() {

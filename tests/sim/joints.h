@@ -1,9 +1,9 @@
 #pragma once
 
-#include <limits>
 #include <numbers>
 #include <string>
 
+#include "common/special_numbers.h"
 #include "tests/sim/robots.h"
 
 /// Robots as far as tasks know them: joints without bodies.
@@ -11,7 +11,6 @@ namespace plumb {
 
 using Type = JointDescription::Type;
 inline constexpr double kPi = std::numbers::pi;
-inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 inline JointDescription Joint(const std::string& name, JointDescription::Type type, double lower,
                               double upper, double effort_limit) {

@@ -9,6 +9,7 @@
 #include "common/random.h"
 #include "tests/sim/allocations.h"
 #include "tests/sim/robots.h"
+#include "tests/sim/scalar.h"
 
 namespace plumb {
 namespace {
@@ -16,10 +17,8 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
-
 /// gym's Pendulum, from its published formula.
-struct Gym {
+struct GymHopper {
   double g, m, l;
   bool move_before_clip;
 
@@ -55,7 +54,7 @@ TEST_CASE("gym.toml steps as gym does, with either order of clip and move") {
       const double u = random.Uniform(-2, 2);
       simulator.SetState(Scalar(q), Scalar(v));
       simulator.Step(Scalar(u), 0.05);
-      Gym{physical[0], physical[1], physical[2], move_before_clip}.Step(q, v, u);
+      GymHopper{physical[0], physical[1], physical[2], move_before_clip}.Step(q, v, u);
       worst = std::max({worst, std::abs(simulator.q()[0] - q), std::abs(simulator.v()[0] - v)});
       clipped += std::abs(v) == 8;
     }
@@ -72,7 +71,8 @@ TEST_CASE("mass and length act as in gym's formula") {
     const double q = random.Uniform(-4, 4), v = random.Uniform(-20, 20), u = random.Uniform(-2, 2);
     simulator.SetParameters(physical);
     simulator.SetState(Scalar(q), Scalar(v));
-    const double expected = Gym{physical[0], physical[1], physical[2], false}.Acceleration(q, u);
+    const double expected =
+        GymHopper{physical[0], physical[1], physical[2], false}.Acceleration(q, u);
     REQUIRE(std::abs(simulator.Acceleration(Scalar(u))[0] - expected) <
             1e-11 * (1 + std::abs(expected)));
   }

@@ -10,7 +10,7 @@
 namespace plumb {
 namespace {
 
-Eigen::VectorXf Action(const Environment& environment, Random& random) {
+Eigen::VectorXf RandomAction(const Environment& environment, Random& random) {
   Eigen::VectorXf action(environment.action_size());
   for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
   return action;
@@ -28,7 +28,7 @@ TEST_CASE("a residual of nothing changes nothing") {
   b.Bits(), b.Bits();  // for the noise
   corrected.Reset(a), plain.Reset(b);
   for (int i = 0; i < 50; ++i) {
-    const Eigen::VectorXf action = Action(plain, c);
+    const Eigen::VectorXf action = RandomAction(plain, c);
     CHECK(corrected.Step(action).reward == plain.Step(action).reward);
     CHECK(corrected.q() == plain.q());
     CHECK(corrected.v() == plain.v());

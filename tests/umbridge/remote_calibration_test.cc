@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr int kSteps = 300;
-constexpr double kNoise = 0.01;
+constexpr int kOutcomes = 300;
+constexpr double kOutcomeNoise = 0.01;
 
 /// A server in this process, on a port of its own.
 class Serving {
@@ -39,7 +39,7 @@ class Serving {
   std::thread thread_;
 };
 
-RobotDescription Cartpole() {
+RobotDescription TwoMasses() {
   RobotDescription robot =
       LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/cartpole");
   robot.parameters = {{"mass/cart", "kg", ParameterDescription::Coordinate::kLinear, 1, 1},
@@ -58,10 +58,11 @@ Log Record(const VectorXd& truth, bool noise_known) {
   Random random(5);
   Log log;
   log.rollouts.resize(1);
-  const VectorXd zero = VectorXd::Zero(2), sd = VectorXd::Constant(2, noise_known ? kNoise : NAN);
-  for (int step = 0; step < kSteps; ++step) {
+  const VectorXd zero = VectorXd::Zero(2),
+                 sd = VectorXd::Constant(2, noise_known ? kOutcomeNoise : NAN);
+  for (int step = 0; step < kOutcomes; ++step) {
     VectorXd next = Linear(step, truth);
-    for (double& entry : next) entry += kNoise * random.Normal();
+    for (double& entry : next) entry += kOutcomeNoise * random.Normal();
     log.rollouts[0].transitions.push_back(
         {2 * step, zero, zero, next.head(2), next.tail(2), zero, zero, sd, sd, {{0.02, zero}}});
   }
@@ -70,10 +71,10 @@ Log Record(const VectorXd& truth, bool noise_known) {
 
 ServedModel NextStates(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>& spoil =
                            [](const Eigen::MatrixXd& m) { return m; }) {
-  return {"next_states", 2, 4 * kSteps, [=](const Eigen::MatrixXd& parameters) {
-            Eigen::MatrixXd outputs(4 * kSteps, parameters.cols());
+  return {"next_states", 2, 4 * kOutcomes, [=](const Eigen::MatrixXd& parameters) {
+            Eigen::MatrixXd outputs(4 * kOutcomes, parameters.cols());
             for (Eigen::Index j = 0; j < parameters.cols(); ++j)
-              for (int step = 0; step < kSteps; ++step)
+              for (int step = 0; step < kOutcomes; ++step)
                 outputs.col(j).segment(4 * step, 4) = Linear(step, parameters.col(j));
             return spoil(outputs);
           }};
@@ -84,7 +85,7 @@ ServedModel NextStates(const std::function<Eigen::MatrixXd(const Eigen::MatrixXd
 TEST_CASE("somebody else's linear model has the posterior of linear regression") {
   const bool known = GENERATE(true, false);
   INFO(known);
-  const RobotDescription robot = Cartpole();
+  const RobotDescription robot = TwoMasses();
   const Eigen::Vector2d truth(1.7, 0.6);
   const std::vector<Log> logs{Record(truth, known)};
   const Serving serving({NextStates()});
@@ -94,14 +95,14 @@ TEST_CASE("somebody else's linear model has the posterior of linear regression")
   // Normal equations, the prior among them.
   Eigen::Matrix2d precision = Eigen::Matrix2d::Identity();
   Eigen::Vector2d weighted = Eigen::Vector2d::Ones();
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kOutcomes; ++step) {
     const Transition& t = logs[0].rollouts[0].transitions[static_cast<size_t>(step)];
     Eigen::Matrix<double, 4, 2> rows;
     rows << Linear(step, Eigen::Vector2d(1, 0)), Linear(step, Eigen::Vector2d(0, 1));
     VectorXd end(4);
     end << t.next_q, t.next_v;
-    precision += rows.transpose() * rows / (kNoise * kNoise);
-    weighted += rows.transpose() * end / (kNoise * kNoise);
+    precision += rows.transpose() * rows / (kOutcomeNoise * kOutcomeNoise);
+    weighted += rows.transpose() * end / (kOutcomeNoise * kOutcomeNoise);
   }
   const Eigen::Vector2d mean = precision.llt().solve(weighted);
   const Eigen::Matrix2d covariance = precision.inverse();
@@ -114,15 +115,15 @@ TEST_CASE("somebody else's linear model has the posterior of linear regression")
     CHECK(std::sqrt(posterior.covariance(i, i)) == Approx(sd).epsilon(0.15));
   }
   CHECK(found.identifiability.summary == "every parameter is determined by this motion");
-  CHECK(found.transitions == kSteps);
+  CHECK(found.transitions == kOutcomes);
   CHECK_THAT(found.misspecification.summary, Catch::Contains("not judged"));
 }
 
 TEST_CASE("a model that is not what it should be is refused in a line") {
-  const RobotDescription robot = Cartpole();
+  const RobotDescription robot = TwoMasses();
   const std::vector<Log> logs{Record(Eigen::Vector2d(1, 1), true)};
   const Eigen::Index size = NextStatesSize(robot, logs);
-  REQUIRE(size == 4 * kSteps);
+  REQUIRE(size == 4 * kOutcomes);
   using Catch::Contains;
   {
     const Serving serving({NextStates()});

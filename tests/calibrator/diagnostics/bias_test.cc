@@ -16,7 +16,7 @@
 namespace plumb {
 namespace {
 
-const Eigen::Vector3d kTruth(9.3, 0.93, 1.07);
+const Eigen::Vector3d kBiasedTruth(9.3, 0.93, 1.07);
 constexpr int64_t kMeasurement = 5000, kPeriod = 50'000, kLatency = 7000;  // [us]
 
 struct Recording {
@@ -25,7 +25,7 @@ struct Recording {
 };
 
 Recording Record(const RobotDescription& robot, uint32_t episode) {
-  SimbodyPlant plant(Model(robot).Describe(kTruth));
+  SimbodyPlant plant(Model(robot).Describe(kBiasedTruth));
   Encoder encoder(robot.virtual_robot.encoder_bits);
   StateObserver observer(robot);
   Random random(23, {episode});
@@ -125,7 +125,7 @@ struct Errors {
 };
 
 Errors Calibrate(const RobotDescription& robot, const std::vector<Rollout>& rollouts) {
-  const Eigen::Vector3d truth = kTruth.array().log();
+  const Eigen::Vector3d truth = kBiasedTruth.array().log();
   const Gaussian posterior = LaplacePosterior(robot, rollouts, truth);
   const Eigen::Vector3d a(1, 0, -1), b(0, 1, 2);
   return {a.dot(posterior.mean - truth), b.dot(posterior.mean - truth),
@@ -148,7 +148,7 @@ TEST_CASE(
 TEST_CASE("what the live calibrator claims to know of smoothed states is true") {
   const RobotDescription robot = Pendulum();
   SimOpt simopt(robot, 1, 2, "auto");
-  const Eigen::Vector3d truth = kTruth.array().log();
+  const Eigen::Vector3d truth = kBiasedTruth.array().log();
   for (Rollout& rollout : Rollouts(robot, Recordings())) {
     simopt.Begin({std::move(rollout)});
     const auto report = simopt.Update();

@@ -13,7 +13,7 @@ namespace plumb {
 namespace {
 
 // What the environment does under random actions, recorded without noise.
-Rollout Record(Environment& environment, const RobotDescription& robot, int steps) {
+Rollout RecordRollout(Environment& environment, const RobotDescription& robot, int steps) {
   Rollout rollout;
   Random random(3);
   environment.Reset(random);
@@ -43,7 +43,7 @@ TEST_CASE("a robot that is simulator and residual is predicted by both, however 
   residual->touching = Constant(robot, Eigen::VectorXd::Constant(6, -0.0625));
   Environment environment(model);
   environment.SetResidual(residual);
-  const std::vector<Rollout> rollouts{Record(environment, robot, 40)};
+  const std::vector<Rollout> rollouts{RecordRollout(environment, robot, 40)};
   REQUIRE(rollouts[0].transitions.size() > 10);
 
   // Noise, and what is unknown, are not predicted.
@@ -71,7 +71,7 @@ TEST_CASE("a residual's predictions stand beside those without it") {
   residual->free = residual->touching = Constant(robot, Eigen::VectorXd::Constant(6, 0.125));
   Environment environment(model);
   environment.SetResidual(residual);
-  const std::vector<Rollout> rollouts{Record(environment, robot, 40)};
+  const std::vector<Rollout> rollouts{RecordRollout(environment, robot, 40)};
   const Split split{{}, rollouts};
   Discrepancy discrepancy(robot);
   const Eigen::VectorXd physical = model->parameters().means();

@@ -28,7 +28,7 @@ Identifiability Find(const ParameterDescription& extra, const Eigen::VectorXd& t
 
 /// A robot of n parameters a0, a1, ... with logarithmic coordinates: only their description
 /// matters.
-RobotDescription WithParameters(int n) {
+RobotDescription WithSomeParameters(int n) {
   RobotDescription robot;
   for (int i = 0; i < n; ++i)
     robot.parameters.push_back({"a" + std::to_string(i), "", Coordinate::kLog, 1, 0.01});
@@ -73,7 +73,7 @@ TEST_CASE("of forty parameters those coupled are found, and nothing else is said
   }
   Eigen::MatrixXd combinations(static_cast<Eigen::Index>(rows.size()), n);
   for (size_t i = 0; i < rows.size(); ++i) combinations.row(static_cast<Eigen::Index>(i)) = rows[i];
-  const Identifiability found = FindFrom(WithParameters(40), InformationOf(combinations, 100));
+  const Identifiability found = FindFrom(WithSomeParameters(40), InformationOf(combinations, 100));
   INFO(found.summary);
   REQUIRE(found.null.size() == 3);
   CHECK(Has(found.null, Powers(n, {{3, 1}})));
@@ -115,7 +115,7 @@ TEST_CASE("two null directions of eight parameters come with as few entries as t
 }
 
 TEST_CASE("what is hardly determined is told, with what is left of the prior's sd") {
-  RobotDescription robot = WithParameters(3);
+  RobotDescription robot = WithSomeParameters(3);
   const double variance = robot.parameters[0].coordinate_variance();
   Eigen::Vector3d information(1e4, 1e4, 0.16);  // in units of the prior
   SECTION("a parameter") {
@@ -158,16 +158,16 @@ TEST_CASE("what is hardly determined is told, with what is left of the prior's s
 }
 
 TEST_CASE("a little information is no null direction for being small beside much") {
-  const double variance = WithParameters(2).parameters[0].coordinate_variance();
+  const double variance = WithSomeParameters(2).parameters[0].coordinate_variance();
   const Identifiability found = FindFrom(
       // 50 times the prior's
-      WithParameters(2), (Eigen::Vector2d(1e9, 50) / variance).asDiagonal());
+      WithSomeParameters(2), (Eigen::Vector2d(1e9, 50) / variance).asDiagonal());
   CHECK(found.null.empty());
   CHECK(found.weak.empty());
 }
 
 TEST_CASE("linear parameters move in their unit") {
-  RobotDescription robot = WithParameters(1);
+  RobotDescription robot = WithSomeParameters(1);
   robot.parameters.push_back({"com/leg/x", "m", Coordinate::kLinear, 0.1, 0.01});
   Eigen::MatrixXd combination(1, 2);
   combination << 0.5, 1;  // ln a0 / 2 + x

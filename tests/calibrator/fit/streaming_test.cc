@@ -3,17 +3,15 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 #include "robot/parameter_distribution.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/synthetic.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // FitLaplace of windows of one step, as exactly as it can: again from its own mode until slopes are
 // those at the mode.

@@ -2,10 +2,10 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/inference/statistics.h"
 #include "tests/calibrator/synthetic.h"
@@ -13,10 +13,9 @@
 namespace plumb {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 /// The same motion, read anew with noise at both ends of each transition, every reading on its own.
-std::vector<Rollout> Read(std::vector<Rollout> exact, double q_sd, double v_sd, uint32_t stream) {
+std::vector<Rollout> WithReadingNoise(std::vector<Rollout> exact, double q_sd, double v_sd,
+                                      uint32_t stream) {
   Random random(7, {stream});
   for (Rollout& rollout : exact) {
     for (Transition& t : rollout.transitions) {
@@ -84,7 +83,7 @@ TEST_CASE("whitened errors of the right simulator are white, with noise at both 
   SECTION("pendulum") {
     const RobotDescription robot = Pendulum();
     const Eigen::VectorXd truth = Eigen::Vector3d(10, 1.1, 0.9);
-    const std::vector<Rollout> rollouts = Read(Swings(20, 100, truth), 1e-3, 5e-3, 1);
+    const std::vector<Rollout> rollouts = WithReadingNoise(Swings(20, 100, truth), 1e-3, 5e-3, 1);
     WindowErrors errors(std::make_shared<Model>(robot), rollouts, horizon, 1);
     CHECK(errors.noise_known());
     CHECK_FALSE(errors.starts_known());
@@ -98,7 +97,7 @@ TEST_CASE("whitened errors of the right simulator are white, with noise at both 
     const RobotDescription robot = Hopper();
     const Eigen::VectorXd truth = RandomMasses(robot, 3);
     const std::vector<Rollout> rollouts =
-        Read(RandomRollouts(robot, truth, 1000, 0, 3), 1e-6, 1e-5, 2);
+        WithReadingNoise(RandomRollouts(robot, truth, 1000, 0, 3), 1e-6, 1e-5, 2);
     WindowErrors errors(std::make_shared<Model>(robot), rollouts, horizon, 1);
     CHECK(errors.Linearise(truth));
     CheckWhite(FullWindows(errors, truth, 12 * horizon));
@@ -107,7 +106,7 @@ TEST_CASE("whitened errors of the right simulator are white, with noise at both 
 
 TEST_CASE("where the noise is not known it is what was set") {
   const Eigen::VectorXd truth = Eigen::Vector3d(10, 1.1, 0.9);
-  std::vector<Rollout> rollouts = Read(Swings(10, 60, truth), 1e-3, 5e-3, 4);
+  std::vector<Rollout> rollouts = WithReadingNoise(Swings(10, 60, truth), 1e-3, 5e-3, 4);
   for (Rollout& rollout : rollouts) {
     for (Transition& t : rollout.transitions) {
       for (Eigen::VectorXd* sd : {&t.q_sd, &t.v_sd, &t.next_q_sd, &t.next_v_sd})
@@ -242,7 +241,7 @@ TEST_CASE(
 
 TEST_CASE("with entries missing, what is left is white as well") {
   const Eigen::VectorXd truth = Eigen::Vector3d(10, 1.1, 0.9);
-  std::vector<Rollout> rollouts = Read(Swings(20, 100, truth), 1e-3, 5e-3, 6);
+  std::vector<Rollout> rollouts = WithReadingNoise(Swings(20, 100, truth), 1e-3, 5e-3, 6);
   for (Rollout& rollout : rollouts) {
     for (size_t i = 0; i < rollout.transitions.size(); ++i) {
       if (i % 5 == 1) rollout.transitions[i].next_q(0) = kNaN;
@@ -279,7 +278,7 @@ TEST_CASE("simulators that fail are counted and have no errors at all") {
 
 TEST_CASE("without a simulator to linearise, motion is taken to be free") {
   const Eigen::VectorXd truth = Eigen::Vector3d(10, 1.1, 0.9);
-  const std::vector<Rollout> rollouts = Read(Swings(3, 20, truth), 1e-3, 5e-3, 8);
+  const std::vector<Rollout> rollouts = WithReadingNoise(Swings(3, 20, truth), 1e-3, 5e-3, 8);
   WindowErrors errors(std::make_shared<Model>(Pendulum()), rollouts, 1, 1);
   CHECK_FALSE(errors.Linearise(Eigen::Vector3d(10, -1, 1)));
   const Eigen::VectorXd raw = errors.Raw(truth), whitened = errors.Whitened(truth);

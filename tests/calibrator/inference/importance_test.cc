@@ -2,10 +2,10 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
@@ -99,8 +99,6 @@ TEST_CASE("a guess of one mode too many loses it") {
 }
 
 TEST_CASE("what is not finite has no density, and nothing anywhere is an error") {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(),
-                   kInfinity = std::numeric_limits<double>::infinity();
   const Gaussian one{Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Identity(1, 1)};
   // A standard normal's positive half; +infinity, too, is a failure, not a certainty.
   const ImportanceFit fit = FitByImportance(

@@ -4,13 +4,11 @@
 
 #include "calibrator/inference/laplace.h"
 #include "calibrator/inference/sandwich.h"
+#include "common/special_numbers.h"
 #include "tests/calibrator/inference/least_squares_problem.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST_CASE("outliers do little harm, and normal errors are taken as such") {
   const Prior prior = SomePrior();

@@ -2,17 +2,15 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 #include "tests/calibrator/inference/least_squares_problem.h"
 #include "tests/calibrator/inference/statistics.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Of a normal prior and a normal likelihood with that noise.
 Gaussian Conjugate(const Prior& prior, const Eigen::MatrixXd& a, const Eigen::VectorXd& y,

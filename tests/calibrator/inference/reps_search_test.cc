@@ -2,14 +2,12 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 
 namespace plumb {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // A normal likelihood of three parameters that says nothing of the last.
 struct Linear {

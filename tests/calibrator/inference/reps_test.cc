@@ -86,14 +86,14 @@ TEST_CASE("hard cases of the dual") {
   }
 }
 
-Gaussian Example() {
+Gaussian ExampleGaussian() {
   Eigen::MatrixXd covariance(2, 2);
   covariance << 2, 0.5, 0.5, 1;
   return {Eigen::Vector2d(1, -2), covariance};
 }
 
 TEST_CASE("Kullback-Leibler divergence and density against a sum over a fine grid") {
-  const Gaussian p = Example();
+  const Gaussian p = ExampleGaussian();
   Gaussian q{Eigen::Vector2d(0.5, -1), 1.5 * Eigen::Matrix2d::Identity()};
   double kl = 0, mass = 0;
   const double h = 0.02;
@@ -111,7 +111,7 @@ TEST_CASE("Kullback-Leibler divergence and density against a sum over a fine gri
 }
 
 TEST_CASE("samples have the moments asked for, and fitting them gives the Gaussian back") {
-  const Gaussian p = Example();
+  const Gaussian p = ExampleGaussian();
   Random random(11);
   Eigen::MatrixXd normals(2, 20000);
   for (Eigen::Index j = 0; j < normals.cols(); ++j)
@@ -124,7 +124,7 @@ TEST_CASE("samples have the moments asked for, and fitting them gives the Gaussi
 }
 
 TEST_CASE("few samples leave the covariance near the prior's, and unbiased on average") {
-  const Gaussian p = Example();
+  const Gaussian p = ExampleGaussian();
   Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
   constexpr int kTrials = 4000;
   for (uint32_t trial = 0; trial < kTrials; ++trial) {
@@ -139,7 +139,7 @@ TEST_CASE("few samples leave the covariance near the prior's, and unbiased on av
 }
 
 TEST_CASE("the KL bound holds for the distribution itself") {
-  const Gaussian old = Example();
+  const Gaussian old = ExampleGaussian();
   Gaussian target{Eigen::Vector2d(4, 1), 0.01 * Eigen::Matrix2d::Identity()};
   const Gaussian limited = LimitKl(old, target, 0.1);
   CHECK(KlDivergence(limited, old) == Approx(0.1).epsilon(1e-6));

@@ -11,7 +11,7 @@
 namespace plumb {
 namespace {
 
-Log Read(const std::string& bytes, const RobotDescription& robot = Pendulum()) {
+Log ReadLog(const std::string& bytes, const RobotDescription& robot = Pendulum()) {
   return ReadLcmLog(TemporaryFile(bytes, ".lcmlog").path(), robot);
 }
 
@@ -35,7 +35,7 @@ TEST_CASE("all episodes of a log are joined, named by a status or not") {
   SECTION("without a status the command after it tells where an episode ended") {}
   SECTION("with one") { r.Status(200, 440); }
   r.States(421, 460);
-  const Log log = Read(r.bytes);
+  const Log log = ReadLog(r.bytes);
   CHECK(log.warnings.empty());
   CHECK(log.drops.total() == 0);
   REQUIRE(log.rollouts.size() == 2);
@@ -55,7 +55,7 @@ TEST_CASE("an episode whose end nobody tells ends a control period after its las
   r.Command(0, 5, 0);
   r.Command(10, 5, 1);
   r.States(0, 200);
-  const Log log = Read(r.bytes);
+  const Log log = ReadLog(r.bytes);
   REQUIRE(log.rollouts.size() == 1);
   REQUIRE(log.rollouts[0].transitions.size() == 2);
   CHECK(log.rollouts[0].transitions[1].next_q(0) == Approx(0.02));
@@ -70,7 +70,7 @@ TEST_CASE("a log cut off anywhere counts as far as it goes") {
   r.Episode(200, 240, 20);
   size_t most = 0;
   for (size_t size = first_whole; size < r.bytes.size(); size += 997) {
-    const Log log = Read(r.bytes.substr(0, size));
+    const Log log = ReadLog(r.bytes.substr(0, size));
     CHECK(log.rollouts[0].transitions.size() == 20);
     size_t transitions = 0;
     for (const Rollout& rollout : log.rollouts) transitions += rollout.transitions.size();
@@ -85,7 +85,7 @@ TEST_CASE("a log of one transition") {
   Recording r;
   r.Command(0, 5, 0);
   r.States(0, 10);
-  CHECK(Read(r.bytes).rollouts[0].transitions.size() == 1);
+  CHECK(ReadLog(r.bytes).rollouts[0].transitions.size() == 1);
 }
 
 TEST_CASE("however many episodes a log has, and however long they are, none is lost") {
@@ -94,7 +94,7 @@ TEST_CASE("however many episodes a log has, and however long they are, none is l
     constexpr int kEpisodes = 150;
     for (int i = 0; i < kEpisodes; ++i) r.Episode(1000 + i, 30 + 20 * i, 2);
     r.States(20 * kEpisodes + 30 - 20, 20 * kEpisodes + 60);
-    const Log log = Read(r.bytes);
+    const Log log = ReadLog(r.bytes);
     REQUIRE(log.rollouts.size() == kEpisodes);
     for (const Rollout& rollout : log.rollouts) CHECK(rollout.transitions.size() == 2);
   }
@@ -102,7 +102,7 @@ TEST_CASE("however many episodes a log has, and however long they are, none is l
     Recording r;
     r.Episode(100, 30, 21'000);  // 210,000 states
     r.States(210'011, 230'000);
-    const Log log = Read(r.bytes);
+    const Log log = ReadLog(r.bytes);
     REQUIRE(log.rollouts.size() == 1);
     CHECK(log.rollouts[0].transitions.size() == 21'000);
     CHECK(log.drops.total() == 0);
@@ -118,7 +118,7 @@ TEST_CASE("a driver that was restarted, and a second run in the same log, begin 
   r.States(0, 9);
   r.Episode(300, 30, 20);
   r.States(211, 240);
-  const Log log = Read(r.bytes);
+  const Log log = ReadLog(r.bytes);
   REQUIRE(log.rollouts.size() == 2);
   CHECK(log.rollouts[0].transitions.size() == 20);
   CHECK(log.rollouts[1].transitions.size() == 20);
@@ -133,7 +133,7 @@ TEST_CASE("what does not decode, or is of another robot, is left out with a warn
   r.State(300, 2);
   r.AddBytes("CAMERA", "anything");
   r.States(211, 240);
-  const Log log = Read(r.bytes);
+  const Log log = ReadLog(r.bytes);
   CHECK(log.rollouts[0].transitions.size() == 20);
   REQUIRE(log.warnings.size() == 2);
   CHECK(log.warnings[0] == "2 messages do not decode");
@@ -154,7 +154,7 @@ TEST_CASE("hostile numbers in messages do no harm") {
     r.States(61, 240);
     INFO(huge);
     try {
-      for (const Rollout& rollout : Read(r.bytes).rollouts) {
+      for (const Rollout& rollout : ReadLog(r.bytes).rollouts) {
         for (const Transition& t : rollout.transitions)
           CHECK(t.duration() == Approx(0.05).epsilon(0.21));
       }
@@ -255,7 +255,7 @@ TEST_CASE("a command that answers a state which no robot has been in costs no ep
       r.Episode(100 + i, first, 20);
       r.States(first + 181, first + kPeriod - 21);
     }
-    return Read(r.bytes);
+    return ReadLog(r.bytes);
   };
   const Log without = record(-1, 0);
   REQUIRE(CountTransitions(without.rollouts) == 1200);
@@ -280,7 +280,7 @@ TEST_CASE("episodes that never end are cut off, and counted") {
   recording.Episode(7, 0, 20);
   recording.States(181, 210);
   for (int i = 0; i < 200'000; ++i) recording.Command(4'000, 1'000 + i, 0);
-  const Log log = Read(recording.bytes);
+  const Log log = ReadLog(recording.bytes);
   CHECK(CountTransitions(log.rollouts) == 20);
   REQUIRE(log.warnings.size() == 1);
   CHECK(log.warnings[0] == "195001 episodes never end: more than 5000 are under way at once");

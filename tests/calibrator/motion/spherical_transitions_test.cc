@@ -22,7 +22,7 @@ constexpr int kQ = 19, kV = 18;
 
 RobotDescription Quadruped() { return LoadRobot(SourceFile("robots/quadruped")); }
 
-robot_state_t State(int64_t sequence) {
+robot_state_t QuadrupedState(int64_t sequence) {
   robot_state_t s{};
   s.sequence = sequence;
   s.utime = 7'000'000 + 5000 * sequence;
@@ -37,7 +37,7 @@ robot_state_t State(int64_t sequence) {
   return s;
 }
 
-joint_command_t Command(int step) {
+joint_command_t QuadrupedCommand(int step) {
   joint_command_t c{};
   c.state_sequence = 100 + 4 * step;
   c.episode = 42;
@@ -49,12 +49,12 @@ joint_command_t Command(int step) {
 TEST_CASE("a transition has the sizes of q and v; a quaternion that is none is dropped") {
   TransitionJoiner joiner(Quadruped());
   for (int64_t i = 90; i <= 150; ++i) {
-    robot_state_t state = State(i);
+    robot_state_t state = QuadrupedState(i);
     if (i == 104) state.q[3] += 3e-6;  // the end of one transition, the beginning of the next
     joiner.OnState(state);
   }
-  for (int step = 0; step < 10; ++step) joiner.OnCommand(Command(step));
-  robot_state_t flat = State(120);
+  for (int step = 0; step < 10; ++step) joiner.OnCommand(QuadrupedCommand(step));
+  robot_state_t flat = QuadrupedState(120);
   flat.num_positions = kV, flat.q.resize(kV);
   joiner.OnState(flat);
   const Rollout rollout = joiner.Join(42, 140);
@@ -88,8 +88,8 @@ TEST_CASE("starts go through their message whole, and one with a forged quaterni
 }
 
 // Steps of 20 ms from states with noise of known size, which turn any way.
-std::vector<Rollout> Rollouts(const RobotDescription& robot, double mass, int steps, double q_sd,
-                              double v_sd) {
+std::vector<Rollout> QuadrupedRollouts(const RobotDescription& robot, double mass, int steps,
+                                       double q_sd, double v_sd) {
   const ConfigurationSpace space(robot);
   Simulator simulator(robot);
   simulator.SetParameters(Eigen::VectorXd::Constant(1, mass));
@@ -128,13 +128,13 @@ std::vector<Rollout> Rollouts(const RobotDescription& robot, double mass, int st
 TEST_CASE("errors of the right simulator are zero, or what noise makes of them") {
   const RobotDescription robot = Quadruped();
   const Eigen::VectorXd mass = Eigen::VectorXd::Constant(1, 7.3);
-  const auto exact = Rollouts(robot, 7.3, 10, 0, 0);
+  const auto exact = QuadrupedRollouts(robot, 7.3, 10, 0, 0);
   WindowErrors errors(std::make_shared<Model>(robot), exact, 1, 1);
   CHECK(errors.rows().size() == 10 * 2 * kV);
   CHECK(errors.Raw(mass).cwiseAbs().maxCoeff() < 1e-12);
   CHECK(Discrepancy(robot).PredictionError(mass, exact, 1)(0) < 1e-12);
 
-  const auto noisy = Rollouts(robot, 7.3, 60, 1e-3, 1e-2);
+  const auto noisy = QuadrupedRollouts(robot, 7.3, 60, 1e-3, 1e-2);
   WindowErrors whitened(std::make_shared<Model>(robot), noisy, 1, 1);
   REQUIRE(whitened.Linearise(mass));
   const Eigen::VectorXd w = whitened.Whitened(mass);
@@ -153,7 +153,7 @@ TEST_CASE("errors of the right simulator are zero, or what noise makes of them")
 
 TEST_CASE("a trunk's mass is found where all states are noisy") {
   const RobotDescription robot = Quadruped();
-  const auto rollouts = Rollouts(robot, 7.9, 120, 1e-4, 1e-3);
+  const auto rollouts = QuadrupedRollouts(robot, 7.9, 120, 1e-4, 1e-3);
   StreamingLaplace stream(std::make_shared<Model>(robot));
   for (const Transition& t : rollouts[0].transitions) stream.Add(t);
   CHECK(stream.Settle());

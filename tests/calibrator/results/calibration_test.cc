@@ -2,11 +2,11 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "calibrator/diagnostics/holdout.h"
 #include "common/decompositions.h"
+#include "common/special_numbers.h"
 #include "tests/calibrator/fitted_log.h"
 #include "tests/calibrator/hopper.h"
 #include "tests/calibrator/inference/statistics.h"
@@ -15,7 +15,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 const Eigen::Vector3d kTruth(9.5, 1.1, 0.95);
 
 Log Swinging(const std::string& name, const Eigen::VectorXd& truth, int rollouts, uint32_t stream,

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "common/special_numbers.h"
+
 namespace plumb {
 namespace {
 
 constexpr int64_t kUtime = 1'700'000'000'000'000;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 joint_command_t Command(int64_t sequence, double effort, int joints = 2) {
   joint_command_t command{};
@@ -19,7 +20,7 @@ joint_command_t Command(int64_t sequence, double effort, int joints = 2) {
   command.expiry = 0;
   command.effort.assign(size, effort);
   for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd})
-    values->assign(size, kNan);
+    values->assign(size, kNaN);
   return command;
 }
 
@@ -61,7 +62,7 @@ TEST_CASE("what is no command") {
     return !inbox.Offer(command, 0, kUtime) && inbox.empty();
   };
   CHECK(rejects(Command(1, 0, 1)));
-  CHECK(rejects(Command(1, kNan)));
+  CHECK(rejects(Command(1, kNaN)));
   CHECK(rejects(Command(1, INFINITY)));
   for (const auto member :
        {&joint_command_t::effort, &joint_command_t::position, &joint_command_t::velocity,

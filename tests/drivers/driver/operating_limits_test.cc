@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "common/special_numbers.h"
+
 namespace plumb {
 namespace {
 
@@ -21,10 +23,9 @@ TEST_CASE("temperatures and supply have limits") {
     CHECK_FALSE(WithinOperatingLimits(readings, settings, why));
     return std::string(why.text());
   };
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   CHECK_THAT(complaint(90.5, 20, 24),
              Equals("the motor has 90.5 degC, more than max_motor_temperature = 90"));
-  CHECK_THAT(complaint(kNan, 91, 24),
+  CHECK_THAT(complaint(kNaN, 91, 24),
              Equals("the drive has 91.0 degC, more than max_drive_temperature = 90"));
   settings.min_bus_voltage = 20;
   settings.max_bus_voltage = 28.5;
@@ -32,7 +33,7 @@ TEST_CASE("temperatures and supply have limits") {
              Equals("its supply has 19.9 V, less than min_bus_voltage = 20"));
   CHECK_THAT(complaint(20, 20, 30),
              Equals("its supply has 30.0 V, more than max_bus_voltage = 28.5"));
-  readings.bus_voltage = kNan;
+  readings.bus_voltage = kNaN;
   CHECK(WithinOperatingLimits(readings, settings, why));
 }
 

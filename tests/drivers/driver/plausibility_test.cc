@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "common/special_numbers.h"
 #include "tests/drivers/driver/plausibility_rig.h"
 
 namespace plumb {
@@ -12,8 +13,6 @@ using Catch::Matchers::Equals;
 using Catch::Matchers::StartsWith;
 using Sample = CanSimpleDevice::Sample;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
-                 kInf = std::numeric_limits<double>::infinity();
 constexpr const char* kBadBus = "faulty:loss=0.3,jitter=10ms,duplicate=0.05:";
 
 TEST_CASE("a healthy joint on any bus gives no cause for complaint") {
@@ -39,7 +38,7 @@ struct EncoderFault {
 };
 
 TEST_CASE("what an encoder does wrong is found") {
-  const auto freeze = [frozen = Sample{kNan, 0}](Sample& sample) mutable {
+  const auto freeze = [frozen = Sample{kNaN, 0}](Sample& sample) mutable {
     if (std::isnan(frozen.position)) frozen = sample;
     sample = frozen;
   };
@@ -132,18 +131,18 @@ TEST_CASE("a jump is what the velocity limit does not allow") {
     CHECK_THAT(joint.Add(1.02, 4, 0, 0), StartsWith("the position jumped by -0.3 in 0 ms"));
   }
   SECTION("no velocity") {
-    joint.Add(1, kNan);
-    CHECK(joint.Add(1 + 20 * 0.060, kNan) == "");
-    CHECK_THAT(joint.Add(1 + 20 * 0.121, kNan), StartsWith("the position jumped"));
+    joint.Add(1, kNaN);
+    CHECK(joint.Add(1 + 20 * 0.060, kNaN) == "");
+    CHECK_THAT(joint.Add(1 + 20 * 0.121, kNaN), StartsWith("the position jumped"));
   }
 }
 
 TEST_CASE("no velocity limit, no jump") {
   PlausibilitySettings settings = kSettings;
-  settings.velocity_limit = kInf;
+  settings.velocity_limit = kInfinity;
   Given joint(settings);
-  joint.Add(0, kNan);
-  CHECK(joint.Add(1e6, kNan) == "");
+  joint.Add(0, kNaN);
+  CHECK(joint.Add(1e6, kNaN) == "");
 }
 
 TEST_CASE("a complaint stays until it is taken back, and the first one counts") {
@@ -188,7 +187,7 @@ TEST_CASE("the same bits under an effort are a stuck encoder") {
   const auto half = [](int) { return 0.5; };
   const auto zero = [](int) { return 0.0; };
   CHECK(after(0.2, half, zero) == 20);
-  CHECK(after(-2, half, [](int) { return kNan; }) == 20);
+  CHECK(after(-2, half, [](int) { return kNaN; }) == 20);
   CHECK(after(0.19, half, zero) == -1);
   CHECK(after(
             2, [](int i) { return i % 20 == 0 ? std::nextafter(0.5, 1) : 0.5; }, zero) == -1);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/special_numbers.h"
 #include "drivers/driver/driver.h"
 #include "drivers/protocols/cansimple_device.h"
 
@@ -94,7 +95,6 @@ struct Rig {
   joint_command_t MakeCommand(double value) {
     joint_command_t command{};
     const size_t size = drives.size();
-    constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
     command.utime = utime();
     command.sequence = ++sequence;
     command.state_sequence = 0;
@@ -105,7 +105,7 @@ struct Rig {
     command.expiry = 0;
     command.effort.assign(size, value);
     for (auto* values : {&command.position, &command.velocity, &command.kp, &command.kd})
-      values->assign(size, kNan);
+      values->assign(size, kNaN);
     return command;
   }
   void Command(double value) { driver->OnCommand(MakeCommand(value), now, utime()); }

@@ -5,13 +5,13 @@
 #include <limits>
 #include <string>
 
+#include "common/special_numbers.h"
+
 namespace plumb {
 namespace {
 
 using Kind = Field::Kind;
 using Order = Field::Order;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 std::string Text(const Layout& layout, std::initializer_list<double> values) {
   Frame frame;
@@ -93,8 +93,8 @@ TEST_CASE("every code of a range survives decoding and encoding") {
         CHECK(field.Encode(2 * most) == field.Encode(most));
         CHECK(field.Encode(least - 1) == field.Encode(least));
         // Nonsense is not the least of the range, which would be a great torque backwards.
-        CHECK(field.Encode(kNan) == field.Encode(0));
-        CHECK(std::abs(field.Decode(field.Encode(kNan))) <= 0.5001 * field.scale);
+        CHECK(field.Encode(kNaN) == field.Encode(0));
+        CHECK(std::abs(field.Decode(field.Encode(kNaN))) <= 0.5001 * field.scale);
       }
     }
   }
@@ -106,11 +106,11 @@ TEST_CASE("what a field holds") {
   CHECK_FALSE(i16.Holds(-32.77));
   CHECK(i16.Holds(32.767));
   CHECK_FALSE(i16.Holds(32.768));
-  CHECK_FALSE(i16.Holds(kNan));
+  CHECK_FALSE(i16.Holds(kNaN));
   constexpr Field f{"x", 0, 32, Kind::kFloat};
   CHECK(f.Holds(-3e38));
   CHECK_FALSE(f.Holds(std::numeric_limits<double>::infinity()));
-  CHECK_FALSE(f.Holds(kNan));
+  CHECK_FALSE(f.Holds(kNaN));
 }
 
 TEST_CASE("scale and offset, signed and float, too") {

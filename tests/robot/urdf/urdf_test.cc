@@ -3,9 +3,9 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 
 #include "common/config.h"
+#include "common/special_numbers.h"
 #include "tests/robot/zoo.h"
 
 namespace plumb {
@@ -14,8 +14,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Type = JointGeometry::Type;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 UrdfModel Load(const std::string& urdf) { return LoadUrdf(RobotFolder(urdf, "").urdf()); }
 

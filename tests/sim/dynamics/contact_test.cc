@@ -7,6 +7,7 @@
 #include "sim/dynamics/constraints.h"
 #include "sim/dynamics/planar_tree.h"
 #include "sim/simulator.h"
+#include "tests/sim/scalar.h"
 #include "tests/sim/trees.h"
 
 namespace plumb {
@@ -64,8 +65,6 @@ VectorXd BallState(double height) {
   q[3] = 1;
   return q;
 }
-
-VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
 
 }  // namespace
 

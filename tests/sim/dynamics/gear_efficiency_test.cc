@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kPeriod = 0.01;
+constexpr double kStep = 0.01;
 
 // Where nothing but the motor acts.
 RobotDescription Wheel(double efficiency) {
@@ -27,7 +27,7 @@ VectorXd One(double value) { return VectorXd::Constant(1, value); }
 double ChangeOfSpeed(const RobotDescription& robot, double speed, double effort) {
   Simulator simulator(robot);
   simulator.SetState(One(0), One(speed));
-  simulator.Step(One(effort), kPeriod);
+  simulator.Step(One(effort), kStep);
   return simulator.v()[0] - speed;
 }
 
@@ -52,13 +52,13 @@ TEST_CASE("a joint holds still under a load that its motor can hold but not lift
   const double load = simulator.Bias()[0];
   for (const double share : {1.05, 1.3, 1.6}) {  // of the load; 1 / 0.6 would lift it
     simulator.SetState(q, One(0));
-    for (int i = 0; i < 100; ++i) simulator.Step(One(share * load), kPeriod);
+    for (int i = 0; i < 100; ++i) simulator.Step(One(share * load), kStep);
     CHECK(std::abs(simulator.v()[0]) < 0.02);
     CHECK(std::abs(simulator.q()[0] - q[0]) < 0.02);
   }
   for (const double share : {0.8, 2.0}) {
     simulator.SetState(q, One(0));
-    for (int i = 0; i < 20; ++i) simulator.Step(One(share * load), kPeriod);
+    for (int i = 0; i < 20; ++i) simulator.Step(One(share * load), kStep);
     CHECK(simulator.v()[0] * (share - 1) * load > 0);
     CHECK(std::abs(simulator.q()[0] - q[0]) > 0.02);
   }
@@ -73,7 +73,7 @@ TEST_CASE("a gear without losses is none, uncertain or not") {
   for (Simulator* simulator : {&one, &other})
     simulator->SetState(Eigen::Vector2d(0.5, -1), Eigen::Vector2d(2, 1));
   for (int i = 0; i < 50; ++i) {
-    for (Simulator* simulator : {&one, &other}) simulator->Step(Eigen::Vector2d(3, -1), kPeriod);
+    for (Simulator* simulator : {&one, &other}) simulator->Step(Eigen::Vector2d(3, -1), kStep);
   }
   CHECK((one.q() - other.q()).norm() < 1e-12);
   CHECK((one.v() - other.v()).norm() < 1e-12);
@@ -92,7 +92,7 @@ TEST_CASE("it is told from the motor's gain and from friction") {
     simulator.SetState(One(0), One(2));
     VectorXd speeds(60);
     for (int i = 0; i < 60; ++i) {
-      simulator.Step(One((i < 30 ? 1 : 0.3) * std::sin(0.3 * i)), kPeriod);
+      simulator.Step(One((i < 30 ? 1 : 0.3) * std::sin(0.3 * i)), kStep);
       speeds[i] = simulator.v()[0];
     }
     return speeds;

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-bool SameBits(double a, double b) {
+bool SameBitPattern(double a, double b) {
   return (std::isnan(a) && std::isnan(b)) ||
          std::bit_cast<uint64_t>(a) == std::bit_cast<uint64_t>(b);
 }
@@ -105,7 +105,7 @@ void CompareLanes(const RobotDescription& robot, Trouble trouble, Random& random
     for (size_t lane = 0; lane < lanes; ++lane) {
       const double* expected = other(*alone[lane], lane);
       for (size_t i = 0; i < count; ++i) {
-        if (!SameBits(one[i * lanes + lane], expected[i])) {
+        if (!SameBitPattern(one[i * lanes + lane], expected[i])) {
           FAIL("step " << step << " lane " << lane << " entry " << i << ": "
                        << one[i * lanes + lane] << " for " << expected[i]);
         }

@@ -1,4 +1,4 @@
-// Our Hopper against MuJoCo's, where the two solve the same equations: in free flight.
+// Our HopperInTheAir against MuJoCo's, where the two solve the same equations: in free flight.
 #include <catch2/catch.hpp>
 
 #include "sim/simulator.h"
@@ -8,9 +8,9 @@
 namespace plumb {
 namespace {
 
-using State = MujocoHopper::State;
+using MujocoState = MujocoHopper::State;
 
-RobotDescription Hopper() {
+RobotDescription HopperInTheAir() {
   RobotDescription hopper = LoadExample("hopper/gym.toml");
   for (JointDescription& joint : hopper.joints) joint.dynamics.delay = 0;
   return hopper;
@@ -20,7 +20,7 @@ RobotDescription Hopper() {
 
 TEST_CASE("mujoco: the hopper's bodies weigh what MuJoCo makes of their shapes") {
   const MujocoHopper theirs;
-  const RobotDescription ours = Hopper();
+  const RobotDescription ours = HopperInTheAir();
   for (int i = 0; i < 4; ++i) {
     const LinkDescription& link = ours.links[static_cast<size_t>(i) + 3];
     INFO(link.name);
@@ -35,7 +35,7 @@ TEST_CASE("mujoco: the hopper's bodies weigh what MuJoCo makes of their shapes")
 
 TEST_CASE("mujoco: in flight a time step is MuJoCo's own") {
   MujocoHopper theirs(MujocoHopper::Integrator::kEuler);
-  RobotDescription description = Hopper();
+  RobotDescription description = HopperInTheAir();
   REQUIRE(description.simulation.integrator == SimulationSettings::Integrator::kSemiImplicit);
   description.simulation.substep = MujocoHopper::kTimeStep;
   REQUIRE(description.parameters.size() == 4);  // torso, thigh, leg, foot
@@ -47,7 +47,7 @@ TEST_CASE("mujoco: in flight a time step is MuJoCo's own") {
     REQUIRE(tries < 100'000);
     Eigen::Vector4d masses;
     for (double& mass : masses) mass = random.Uniform(1, 9);
-    State q = State::Zero(), v;
+    MujocoState q = MujocoState::Zero(), v;
     q << random.Uniform(-5, 5), random.Uniform(5, 9), random.Uniform(-3, 3),
         random.Uniform(-2.5, -0.1), random.Uniform(-2.5, -0.1), random.Uniform(-0.7, 0.7);
     for (double& speed : v) speed = random.Uniform(-10, 10);
@@ -71,11 +71,11 @@ TEST_CASE("mujoco: in flight a time step is MuJoCo's own") {
 
 TEST_CASE("mujoco: a flight of a second is MuJoCo's") {
   MujocoHopper theirs(MujocoHopper::Integrator::kEuler);
-  RobotDescription description = Hopper();
+  RobotDescription description = HopperInTheAir();
   description.simulation.substep = MujocoHopper::kTimeStep;
   Simulator ours(description);
   ours.SetParameters(theirs.published_masses());
-  State q, v;
+  MujocoState q, v;
   q << 0, 20, 0.3, -1, -1, 0.1;
   v << 1, 5, -2, 0.5, -0.5, 1;
   theirs.SetState(q, v);
@@ -99,14 +99,14 @@ TEST_CASE("mujoco: a flight of a second is MuJoCo's") {
 
 TEST_CASE("mujoco: a hopper at rest on the ground is held by it") {
   MujocoHopper theirs;
-  State q, v = State::Zero();
+  MujocoState q, v = MujocoState::Zero();
   q << 0, 1.2, 0, 0, 0, 0;  // 1 cm deep
   theirs.SetState(q, v);
   theirs.Step(Eigen::Vector3d::Zero());
   CHECK(theirs.active_constraints() > 0);
   CHECK(theirs.contacts() == 2);  // both ends of the foot
   CHECK_FALSE(theirs.reset_itself());
-  theirs.SetState(State::Constant(1e300), v);
+  theirs.SetState(MujocoState::Constant(1e300), v);
   theirs.Step(Eigen::Vector3d::Zero());
   CHECK(theirs.reset_itself());
 }
@@ -130,13 +130,13 @@ struct Gaps {
 // or after 100 steps.
 Gaps MeasureGaps(double amplitude, bool end_with_fall) {
   MujocoHopper theirs;
-  RobotDescription description = Hopper();
+  RobotDescription description = HopperInTheAir();
   description.parameters.clear();
   Simulator ours(description);
   Random random(5);
   Gaps gaps;
   for (int episode = 0; episode < 40; ++episode) {
-    State q = State::Zero(), v;
+    MujocoState q = MujocoState::Zero(), v;
     q[1] = 1.25;
     for (int i = 0; i < 6; ++i)
       q[i] += random.Uniform(-.005, .005), v[i] = random.Uniform(-.005, .005);

@@ -6,11 +6,10 @@
 
 #include "sim/environment.h"
 #include "tests/sim/joints.h"
+#include "tests/sim/scalar.h"
 
 namespace plumb {
 namespace {
-
-Eigen::VectorXd Scalar(double x) { return Eigen::VectorXd::Constant(1, x); }
 
 // Wherever the step leads: gym's Pendulum is paid for where it was.
 double PendulumReward(const Task& task, double q, double v, double u) {

@@ -10,13 +10,13 @@
 namespace plumb {
 namespace {
 
-struct State {
+struct WalkState {
   Eigen::VectorXd q = Eigen::VectorXd::Zero(19), v = Eigen::VectorXd::Zero(18);
 };
 
 /// With its legs at rest, level, headed by `heading`, moving in that heading.
-State Going(const RobotDescription& robot, double heading, double forward, double left) {
-  State state;
+WalkState Going(const RobotDescription& robot, double heading, double forward, double left) {
+  WalkState state;
   state.q.head<7>() << 3, -2, 0.33, std::cos(heading / 2), 0, 0, std::sin(heading / 2);
   for (Eigen::Index i = 0; i < 12; ++i)
     state.q[7 + i] = robot.joints[static_cast<size_t>(4 + i)].dynamics.rest;
@@ -32,12 +32,12 @@ TEST_CASE("walk: who goes as commanded earns one and a half, in whatever heading
   const auto task = MakeTask(robot);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(18);
   for (const double heading : {0.0, 1.0, -2.5}) {
-    const State right = Going(robot, heading, 0.5, 0);
+    const WalkState right = Going(robot, heading, 0.5, 0);
     CHECK(task->Reward(right.q, right.v, none, right.q, right.v) == Approx(1.5).epsilon(1e-12));
-    const State off = Going(robot, heading, 0.2, -0.4);  // by half a metre a second
+    const WalkState off = Going(robot, heading, 0.2, -0.4);  // by half a metre a second
     CHECK(task->Reward(off.q, off.v, none, off.q, off.v) ==
           Approx(std::exp(-1) + 0.5).epsilon(1e-12));
-    State turning = right;
+    WalkState turning = right;
     turning.v[5] = 0.5;
     CHECK(task->Reward(right.q, turning.v, none, right.q, turning.v) ==
           Approx(1 + 0.5 * std::exp(-1)).epsilon(1e-12));
@@ -47,8 +47,8 @@ TEST_CASE("walk: who goes as commanded earns one and a half, in whatever heading
 TEST_CASE("walk: a drive's torque is the effort and its spring's") {
   const RobotDescription robot = LoadRobot(SourceFile("robots/quadruped"));
   const auto task = MakeTask(robot);
-  const State going = Going(robot, 0, 0.5, 0);
-  State bent = going;
+  const WalkState going = Going(robot, 0, 0.5, 0);
+  WalkState bent = going;
   bent.q[7 + 4] += 0.2;
   Eigen::VectorXd effort = Eigen::VectorXd::Zero(18);
   effort[6 + 4] = robot.joints[8].dynamics.stiffness * 0.2;  // which holds it there: no torque
@@ -63,7 +63,7 @@ TEST_CASE("walk: what is seen does not depend on place and heading") {
   const auto task = MakeTask(robot);
   const auto seen = [&](double heading) {
     std::vector<float> observation(static_cast<size_t>(task->observation_size()));
-    const State state = Going(robot, heading, 0.5, 0.1);
+    const WalkState state = Going(robot, heading, 0.5, 0.1);
     task->Observe(state.q, state.v, observation);
     return observation;
   };
@@ -79,7 +79,7 @@ TEST_CASE("walk: an episode begins on the feet, and ends with a fall") {
   const RobotDescription robot = LoadRobot(SourceFile("robots/quadruped"));
   const auto task = MakeTask(robot);
   Random random(3);
-  State start;
+  WalkState start;
   double lowest = 0;
   const int times = 200;
   for (int i = 0; i < times; ++i) {
@@ -93,11 +93,11 @@ TEST_CASE("walk: an episode begins on the feet, and ends with a fall") {
     }
   }
   CHECK(lowest == Approx(0).margin(0.01));
-  State lying = Going(robot, 0, 0, 0);
+  WalkState lying = Going(robot, 0, 0, 0);
   lying.q[2] = 0.1;
   CHECK(task->Terminated(lying.q, lying.v));
   CHECK(task->Reward(lying.q, lying.v, Eigen::VectorXd::Zero(18), lying.q, lying.v) == 0);
-  State leaning = Going(robot, 0, 0, 0);
+  WalkState leaning = Going(robot, 0, 0, 0);
   leaning.q.segment<4>(3) << std::cos(0.55), std::sin(0.55), 0, 0;  // 63 degrees
   CHECK(task->Terminated(leaning.q, leaning.v));
   leaning.q.segment<4>(3) << std::cos(0.5), std::sin(0.5), 0, 0;

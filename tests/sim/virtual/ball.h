@@ -22,4 +22,10 @@ inline RobotDescription Ball() {
   return ball;
 }
 
+inline UnmodelledGround Slope(double slope) {
+  UnmodelledGround ground;
+  ground.slope = slope;
+  return ground;
+}
+
 }  // namespace plumb

@@ -8,13 +8,12 @@
 #include "sim/model.h"
 #include "sim/virtual/virtual_plant.h"
 #include "tests/sim/robots.h"
+#include "tests/sim/scalar.h"
 
 namespace plumb {
 namespace {
 
 using Eigen::VectorXd;
-
-VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
 
 constexpr double kGap = 0.01, kRotor = 0.02;  // [rad], [kg m^2]
 

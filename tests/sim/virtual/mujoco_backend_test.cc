@@ -8,6 +8,7 @@
 #include "sim/virtual/simbody_plant.h"
 #include "sim/virtual/virtual_plant.h"
 #include "tests/sim/mujoco_hopper.h"
+#include "tests/sim/virtual/advance.h"
 #include "tests/sim/virtual/ball.h"
 
 namespace plumb {
@@ -15,14 +16,6 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::VectorXd;
-
-/// By steps that have nothing in common with any period.
-bool Advance(PhysicsBackend& engine, const VectorXd& effort, double duration) {
-  for (double t = 0; t < duration; t += 0.0037) {
-    if (!engine.Advance(effort, std::min(0.0037, duration - t))) return false;
-  }
-  return true;
-}
 
 }  // namespace
 

@@ -21,13 +21,13 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using Engine = VirtualRobotSettings::Engine;
+using PlantEngine = VirtualRobotSettings::Engine;
 
 /// How far it ends from where another engine does, of positions and of velocities.
-struct Distance {
-  Distance(const RobotDescription& robot, const VectorXd& q, const VectorXd& v,
-           const VectorXd& effort, double duration, double step, const VectorXd& true_q,
-           const VectorXd& true_v) {
+struct BackendDistance {
+  BackendDistance(const RobotDescription& robot, const VectorXd& q, const VectorXd& v,
+                  const VectorXd& effort, double duration, double step, const VectorXd& true_q,
+                  const VectorXd& true_v) {
     const auto engine = MakeOdeBackend(robot);
     engine->SetState(q, v);
     REQUIRE(Advance(*engine, effort, duration, step));
@@ -66,10 +66,11 @@ TEST_CASE("ode's engine: where nothing touches, robots move as the simulator's")
     simulator.SetState(c.q, c.v);
     simulator.Step(c.effort, c.duration);
     const auto distance = [&](double step) {
-      return Distance(robot, c.q, c.v, c.effort, c.duration, step, simulator.q(), simulator.v());
+      return BackendDistance(robot, c.q, c.v, c.effort, c.duration, step, simulator.q(),
+                             simulator.v());
     };
     INFO(c.robot);
-    const Distance usual = distance(0.0037), fine = distance(kOdeStep / 10);
+    const BackendDistance usual = distance(0.0037), fine = distance(kOdeStep / 10);
     CHECK(usual.positions < c.positions);
     CHECK(usual.velocities < c.velocities);
     CHECK(fine.positions < 0.13 * usual.positions);
@@ -89,9 +90,9 @@ TEST_CASE("ode's engine: a tree in space moves as Simbody's") {
   plant.SetState(q, v);
   REQUIRE(plant.Advance(effort, 0.5));
   const auto distance = [&](double step) {
-    return Distance(tree, q, v, effort, 0.5, step, plant.q(), plant.v());
+    return BackendDistance(tree, q, v, effort, 0.5, step, plant.q(), plant.v());
   };
-  const Distance usual = distance(0.0037), fine = distance(kOdeStep / 10);
+  const BackendDistance usual = distance(0.0037), fine = distance(kOdeStep / 10);
   CHECK(usual.positions < 2e-3);
   CHECK(usual.velocities < 2e-2);
   CHECK(fine.positions < 0.12 * usual.positions);
@@ -145,7 +146,7 @@ TEST_CASE("ode's engine: friction in a joint holds, and stops what moves") {
 
 TEST_CASE("ode's engine: a sprung mass swings against the link that carries it") {
   constexpr double kForce = 10 * SprungCarrier::kBoth;
-  RobotDescription carrier = SprungCarrier::Robot(Engine::kOde);
+  RobotDescription carrier = SprungCarrier::Robot(PlantEngine::kOde);
   carrier.simulation.gravity = 0;
   VirtualPlant plant(carrier);
   plant.SetState(Vector2d(0, 3), Vector2d::Zero());
@@ -169,7 +170,7 @@ TEST_CASE("ode's engine: a slide on a link that turns has the simulator's speed"
                                         .centre = {0.1, 0.1, 0.2},
                                         .travel = std::numeric_limits<double>::infinity()}};
   std::vector<VectorXd> ends;
-  for (const Engine engine : {Engine::kAuto, Engine::kOde}) {
+  for (const PlantEngine engine : {PlantEngine::kAuto, PlantEngine::kOde}) {
     robot.virtual_robot.engine = engine;
     VirtualPlant plant(robot);
     plant.SetState(Vector2d(0.4, -0.8), Vector2d(2, 8));
@@ -226,7 +227,7 @@ TEST_CASE("ode's engine: numbers that are none, and what it cannot be told") {
   CHECK_THROWS_AS(engine->SetState(VectorXd::Ones(3), v), std::invalid_argument);
 
   RobotDescription hopper = Known("hopper");
-  hopper.virtual_robot.engine = Engine::kOde;
+  hopper.virtual_robot.engine = PlantEngine::kOde;
   hopper.virtual_robot.engine_source = "robot.toml:7:1: ";
   CHECK_NOTHROW(VirtualPlant(hopper));
   const auto refused = [&](const std::string& why) {

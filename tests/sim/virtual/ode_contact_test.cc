@@ -14,12 +14,12 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::VectorXd;
-using Engine = VirtualRobotSettings::Engine;
+using PlantEngine = VirtualRobotSettings::Engine;
 
 /// The ball on a ground of its own, moved by ODE.
 VirtualPlant BallOn(const UnmodelledGround& ground) {
   RobotDescription ball = Ball();
-  ball.virtual_robot.engine = Engine::kOde;
+  ball.virtual_robot.engine = PlantEngine::kOde;
   ball.virtual_robot.ground = ground;
   return VirtualPlant(ball);
 }
@@ -29,12 +29,6 @@ Vector2d After(VirtualPlant plant, const Vector2d& q, const Vector2d& v, double 
   for (double t = 0; t < duration; t += 0.0037)
     REQUIRE(plant.Advance(Vector2d::Zero(), std::min(0.0037, duration - t)));
   return plant.q();
-}
-
-UnmodelledGround Slope(double slope) {
-  UnmodelledGround ground;
-  ground.slope = slope;
-  return ground;
 }
 
 TEST_CASE("ode's engine: the ground bears what rests on it, and holds it by its friction") {

@@ -8,6 +8,7 @@
 #include "common/random.h"
 #include "sim/simulator.h"
 #include "sim/virtual/virtual_plant.h"
+#include "tests/sim/virtual/advance.h"
 #include "tests/sim/virtual/ball.h"
 
 namespace plumb {
@@ -17,14 +18,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-/// By steps that have nothing in common with any period.
-bool Advance(PhysicsBackend& engine, const VectorXd& effort, double duration) {
-  for (double t = 0; t < duration; t += 0.0037) {
-    if (!engine.Advance(effort, std::min(0.0037, duration - t))) return false;
-  }
-  return true;
-}
-
 VectorXd Draw(Random& random, const VectorXd& lower, const VectorXd& upper) {
   VectorXd result(lower.size());
   for (Eigen::Index i = 0; i < result.size(); ++i) result[i] = random.Uniform(lower[i], upper[i]);
@@ -32,8 +25,8 @@ VectorXd Draw(Random& random, const VectorXd& lower, const VectorXd& upper) {
 }
 
 /// Of the hopper, its foot in the ground or a little above.
-struct Pose {
-  explicit Pose(Random& random) : q(6), v(6), effort(VectorXd::Zero(6)) {
+struct HopperPose {
+  explicit HopperPose(Random& random) : q(6), v(6), effort(VectorXd::Zero(6)) {
     const VectorXd one = VectorXd::Ones(6);
     q << random.Uniform(-3, 3), 1.25, random.Uniform(-0.2, 0.2), random.Uniform(-0.2, 0),
         random.Uniform(-0.2, 0), random.Uniform(-0.3, 0.3);
@@ -61,7 +54,7 @@ TEST_CASE("simbody's engine: in flight a hopper has the simulator's acceleration
   Simulator simulator(hopper);
   Random random(7);
   for (int i = 0; i < 200; ++i) {
-    const Pose pose(random);
+    const HopperPose pose(random);
     const VectorXd q = pose.q + Eigen::Matrix<double, 6, 1>::Unit(1) * 5;
     engine.SetState(q, pose.v);
     simulator.SetState(q, pose.v);
@@ -79,7 +72,7 @@ TEST_CASE("simbody's engine: what moves a hopper besides its weight is the groun
   Random random(8);
   double largest = 0;
   for (int i = 0; i < 200; ++i) {
-    const Pose pose(random);
+    const HopperPose pose(random);
     engine.SetState(pose.q, pose.v);
     simulator.SetState(pose.q, pose.v);
     const VectorXd total =

@@ -8,15 +8,14 @@
 #include "common/random.h"
 #include "sim/simulator.h"
 #include "tests/sim/robots.h"
+#include "tests/sim/scalar.h"
 
 namespace plumb {
 namespace {
 
 using Eigen::VectorXd;
 
-VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
-
-VectorXd Draw(Random& random, int size, double bound) {
+VectorXd DrawBelow(Random& random, int size, double bound) {
   VectorXd result(size);
   for (double& x : result) x = random.Uniform(-bound, bound);
   return result;
@@ -35,7 +34,8 @@ TEST_CASE("plant and simulator have the same accelerations by different equation
   Simulator simulator(description);
   Random random(11);
   for (int i = 0; i < 300; ++i) {
-    const VectorXd q = Draw(random, 4, 3), v = Draw(random, 4, 6), effort = Draw(random, 4, 5);
+    const VectorXd q = DrawBelow(random, 4, 3), v = DrawBelow(random, 4, 6),
+                   effort = DrawBelow(random, 4, 5);
     plant.SetState(q, v);
     simulator.SetState(q, v);
     const VectorXd expected = plant.Acceleration(effort);

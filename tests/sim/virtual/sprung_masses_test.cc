@@ -15,17 +15,18 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using Engine = VirtualRobotSettings::Engine;
+using PlantEngine = VirtualRobotSettings::Engine;
 
 constexpr double kMass = SprungCarrier::kMass, kCarrier = SprungCarrier::kCarrier,
                  kFrequency = SprungCarrier::kFrequency,
                  kDampingRatio = SprungCarrier::kDampingRatio;
 
-RobotDescription Carrier(Engine engine) { return SprungCarrier::Robot(engine); }
+RobotDescription Carrier(PlantEngine engine) { return SprungCarrier::Robot(engine); }
 
 TEST_CASE("a sprung mass swings against the link that carries it") {
   constexpr double kForce = 10 * SprungCarrier::kBoth;
-  for (const Engine engine : {Engine::kAuto, Engine::kMujoco, Engine::kSimbody}) {
+  for (const PlantEngine engine :
+       {PlantEngine::kAuto, PlantEngine::kMujoco, PlantEngine::kSimbody}) {
     RobotDescription carrier = Carrier(engine);
     carrier.simulation.gravity = 0;
     VirtualPlant plant(carrier);
@@ -40,7 +41,8 @@ TEST_CASE("a sprung mass swings against the link that carries it") {
 }
 
 TEST_CASE("a sprung mass rests where it is said to be, and weighs") {
-  for (const Engine engine : {Engine::kAuto, Engine::kMujoco, Engine::kSimbody}) {
+  for (const PlantEngine engine :
+       {PlantEngine::kAuto, PlantEngine::kMujoco, PlantEngine::kSimbody}) {
     VirtualPlant plant(Carrier(engine));
     plant.SetState(Vector2d(0, 3), Vector2d::Zero());
     REQUIRE(plant.Advance(Vector2d(0, 9.81 * (kMass + kCarrier)), 0.5));
@@ -51,7 +53,7 @@ TEST_CASE("a sprung mass rests where it is said to be, and weighs") {
 
 TEST_CASE("a sprung mass ends at its stops") {
   // Its carrier is pushed as hard as if it could not move: its own joint is looked at.
-  RobotDescription carrier = Carrier(Engine::kAuto);
+  RobotDescription carrier = Carrier(PlantEngine::kAuto);
   carrier.virtual_robot.sprung_masses[0].travel = 0.02;
   const RobotDescription real = WithSprungMasses(carrier);
   REQUIRE(real.joints.size() == 3);
@@ -84,7 +86,8 @@ TEST_CASE("a sprung mass may be on any link, in any order that an engine has") {
   const VectorXd q = Eigen::Vector4d(0.1, -0.5, 0.7, 1.2), v = Eigen::Vector4d(0.3, 1, -1, 2),
                  effort = Eigen::Vector4d(5, 1, -0.5, 0.3);
   std::vector<VectorXd> ends;
-  for (const Engine engine : {Engine::kAuto, Engine::kMujoco, Engine::kSimbody}) {
+  for (const PlantEngine engine :
+       {PlantEngine::kAuto, PlantEngine::kMujoco, PlantEngine::kSimbody}) {
     tree.virtual_robot.engine = engine;
     VirtualPlant plant(tree);
     plant.SetState(q, v);

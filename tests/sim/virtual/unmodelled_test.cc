@@ -9,6 +9,7 @@
 #include "sim/virtual/virtual_plant.h"
 #include "sim/virtual/virtual_robot.h"
 #include "tests/sim/robots.h"
+#include "tests/sim/scalar.h"
 
 namespace plumb {
 namespace {
@@ -16,11 +17,9 @@ namespace {
 using cansimple::Make;
 using Eigen::VectorXd;
 
-constexpr int64_t kStart = 1'700'000'000'000'000;
+constexpr int64_t kBegin = 1'700'000'000'000'000;
 
-VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
-
-RobotDescription Pendulum(UnmodelledJoint unmodelled) {
+RobotDescription UnmodelledPendulum(UnmodelledJoint unmodelled) {
   RobotDescription robot = LoadPendulum("robot.toml");
   robot.simulation.gravity = 0;
   std::erase_if(robot.parameters,
@@ -37,9 +36,9 @@ double Inertia(const RobotDescription& robot) {
 }
 
 /// Armed at 0.
-struct Bench {
-  explicit Bench(const RobotDescription& robot)
-      : virtual_robot(robot, Model(robot).parameters().means(), kStart) {
+struct UnmodelledBench {
+  explicit UnmodelledBench(const RobotDescription& robot)
+      : virtual_robot(robot, Model(robot).parameters().means(), kBegin) {
     Send(Make(cansimple::kClearErrors, 1), 0);
     Send(Make(cansimple::kSetControllerMode, 1,
               {cansimple::kTorqueControl, cansimple::kPassthrough}),
@@ -49,15 +48,15 @@ struct Bench {
     REQUIRE(virtual_robot.devices()[0]->armed());
   }
   void Send(const Frame& frame, int64_t at) {
-    virtual_robot.Receive(0, frame, kStart + at, {&out, 1});
+    virtual_robot.Receive(0, frame, kBegin + at, {&out, 1});
   }
   void Torque(double torque, int64_t at) {
     Send(Make(cansimple::kSetInputTorque, 1, {torque}), at);
   }
   /// The position at the latest event until then [rad], and how long that was ago.
   double At(int64_t time) {
-    virtual_robot.Advance(kStart + time, {&out, 1});
-    REQUIRE(virtual_robot.time() == kStart + time);
+    virtual_robot.Advance(kBegin + time, {&out, 1});
+    REQUIRE(virtual_robot.time() == kBegin + time);
     return virtual_robot.q()[0];
   }
 
@@ -66,7 +65,7 @@ struct Bench {
 };
 
 TEST_CASE("friction that no model knows stops a swing where its work has used up the energy") {
-  const RobotDescription robot = Pendulum({.friction = 0.1});
+  const RobotDescription robot = UnmodelledPendulum({.friction = 0.1});
   VirtualPlant mechanism(Model(robot).Describe(Model(robot).parameters().means()));
   mechanism.SetState(Scalar(0), Scalar(2));
   REQUIRE(mechanism.Advance(Scalar(0), 20));
@@ -75,9 +74,9 @@ TEST_CASE("friction that no model knows stops a swing where its work has used up
 }
 
 TEST_CASE("a delay that no model knows shifts an effort by itself, to the microsecond") {
-  const double inertia = Inertia(Pendulum({}));
+  const double inertia = Inertia(UnmodelledPendulum({}));
   for (const double delay : {0.0, 0.004, 0.012345, 0.1}) {
-    Bench bench(Pendulum({.delay = delay}));
+    UnmodelledBench bench(UnmodelledPendulum({.delay = delay}));
     bench.Torque(1.5, 10'007);
     bench.Torque(0, 20'011);  // overtakes nothing
     bench.Torque(0, 60'000);
@@ -91,7 +90,7 @@ TEST_CASE("a delay that no model knows shifts an effort by itself, to the micros
 }
 
 TEST_CASE("efforts on their way are forgotten when the power goes") {
-  EffortDelay delay(Pendulum({.delay = 0.004}));
+  EffortDelay delay(UnmodelledPendulum({.delay = 0.004}));
   delay.Make(0, 1, 1000);
   delay.Make(0, 1, 1500);  // no change
   delay.Make(0, 2, 2000);
@@ -108,7 +107,7 @@ TEST_CASE("efforts on their way are forgotten when the power goes") {
 
 TEST_CASE("with backlash a drive's encoder reads the rotor, and its torque moves that first") {
   const double rotor = 0.01, gap = 0.02;
-  Bench bench(Pendulum({.backlash = gap, .rotor = rotor}));
+  UnmodelledBench bench(UnmodelledPendulum({.backlash = gap, .rotor = rotor}));
   bench.Torque(0.05, 10'000);
   bench.At(50'000);
   const double expected = 0.05 / rotor * 0.04 * 0.04 / 2;  // less than half the gap

@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr int64_t kStart = HopperBus::kStart;
+constexpr int64_t kHopperStart = HopperBus::kStart;
 
 RobotDescription Hopper(const std::string& file) {
   return LoadRobot(SourceFile("robots/hopper/" + file));
@@ -94,7 +94,7 @@ TEST_CASE("without a boom the driver leaves the base's slides to the estimator, 
     CHECK(state.valid[i] == (i >= 2));
     CHECK(std::isfinite(state.position[i]) == (i >= 2));
   }
-  const driver_status_t& status = bus.driver.Status(kStart, {}, 0);
+  const driver_status_t& status = bus.driver.Status(kHopperStart, {}, 0);
   CHECK(status.joint_state[0] == driver_status_t::IDLE);
   CHECK_THAT(status.joint_reason[1], Catch::Contains("estimator"));
 }
@@ -123,7 +123,7 @@ TEST_CASE("a sensor that goes silent stops the robot") {
   bus.Run(100);
   // An emergency message of the boom's first encoder: hardware error.
   const Frame emergency = *FrameFromText("081#0050010000000000");
-  bus.driver.OnFrame(0, emergency, bus.now(), kStart + bus.now());
+  bus.driver.OnFrame(0, emergency, bus.now(), kHopperStart + bus.now());
   Wiggle(bus);
   bus.Run(10);
   CHECK(bus.driver.state() == DriveState::kFault);
@@ -140,7 +140,7 @@ TEST_CASE("a joint that nothing measures is refused by its name") {
   RobotDescription description = Hopper("robot.toml");
   std::erase_if(description.sensors,
                 [](const SensorDescription& sensor) { return sensor.name == "imu"; });
-  CHECK_THROWS_WITH(Driver(description, 0, kStart),
+  CHECK_THROWS_WITH(Driver(description, 0, kHopperStart),
                     Catch::Contains("'rooty' has no motor, and no sensor measures it"));
 }
 

@@ -7,18 +7,11 @@
 #include "sim/simulator.h"
 #include "sim/virtual/simbody_plant.h"
 #include "tests/sim/trees.h"
+#include "tests/sim/virtual/ball.h"
 
 namespace plumb {
-namespace {
 
 using Eigen::VectorXd;
-
-RobotDescription Known(const std::string& name) {
-  const Model model(LoadExample(name));
-  return model.Describe(model.parameters().means());
-}
-
-}  // namespace
 
 TEST_CASE("a mechanism is Simbody's where that knows all the robot has") {
   const RobotDescription robot = Known("pendulum");

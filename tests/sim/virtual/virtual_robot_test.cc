@@ -13,6 +13,7 @@
 #include "sim/simulator.h"
 #include "sim/virtual/simbody_plant.h"
 #include "tests/sim/robots.h"
+#include "tests/sim/scalar.h"
 
 namespace plumb {
 namespace {
@@ -24,8 +25,6 @@ constexpr double kTurn = 2 * std::numbers::pi;
 // a utime, [us]; a multiple of the measurement period
 constexpr int64_t kStart = 1'700'000'000'000'000;
 constexpr int kNode = 1;
-
-VectorXd Scalar(double x) { return VectorXd::Constant(1, x); }
 
 RobotDescription Pendulum() { return LoadPendulum("robot.toml"); }
 
