@@ -230,25 +230,22 @@ void Run(const Case& one, uint64_t seed, Outcome* outcome) {
   const auto parameters = static_cast<int>(robot.parameters.size());
   outcome->held += Held(robot, Moments(result.posterior), seed);
   outcome->intervals += parameters;
-  Misspecification found;
-  if (log.differenced.empty()) {
-    const GapFit gap = CloseGap(input, std::move(result));
-    found = gap.alarm;
-    ++outcome->judged;
-    outcome->beside += gap.gap.informed == Informed::kBesideContacts;
-    outcome->free += gap.gap.informed == Informed::kFree;
-    outcome->nothing += gap.gap.informed == Informed::kNone;
-    if (gap.gap.informed != Informed::kNone) {
-      outcome->left += parameters;
-      outcome->left_held += Held(robot, Moments(gap.result.posterior), seed);
-    }
+  const GapFit gap = log.differenced.empty() ? CloseGap(input, std::move(result))
+                                             : LeaveUnjudged(input, std::move(result), "");
+  outcome->judged += log.differenced.empty();
+  outcome->beside += gap.gap.informed == Informed::kBesideContacts;
+  outcome->free += gap.gap.informed == Informed::kFree;
+  outcome->nothing += gap.gap.informed == Informed::kNone;
+  if (gap.gap.informed != Informed::kNone) {
+    outcome->left += parameters;
+    outcome->left_held += Held(robot, Moments(gap.result.posterior), seed);
   }
   const std::chrono::duration<double> fit = fitted - begin,
                                       test = std::chrono::steady_clock::now() - fitted;
   outcome->fit += fit.count(), outcome->test += test.count();
-  ++outcome->logs, outcome->alarms += found.alarm;
-  fmt::print(stderr, "{}, seed {}: {} {}\n", one.name, seed, found.alarm ? "ALARM" : "quiet",
-             found.summary);
+  ++outcome->logs, outcome->alarms += gap.alarm.alarm;
+  fmt::print(stderr, "{}, seed {}: {} {}\n", one.name, seed, gap.alarm.alarm ? "ALARM" : "quiet",
+             gap.alarm.summary);
 }
 
 }  // namespace

@@ -38,9 +38,11 @@ class Test {
 
   ModelTest Run() {
     const FitResiduals residuals = OfAll();
-    Misspecification found = FindMisspecification(Known(), residuals);
-    if (found.alarm && !errors_.starts_known()) found = AskWitnesses();
-    Gaussian considered = Consider(residuals, found);
+    Misspecification all = FindMisspecification(Known(), residuals);
+    if (!all.alarm || errors_.starts_known()) return {all, Consider(residuals, all)};
+    Misspecification found = AskWitnesses();
+    // Where nobody can tell, what all errors say may be so.
+    Gaussian considered = Consider(residuals, found.judged ? found : all);
     return {std::move(found), std::move(considered)};
   }
 

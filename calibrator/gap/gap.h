@@ -52,7 +52,8 @@ struct GapFit {
 /// Statist. Soc. B 63, 2001) with a likelihood that is cut (Plummer, Stat. Comput. 25, 2015), so
 /// that parameters are not bent to explain what they are not the cause of.
 ///
-///   1. No alarm: the result stays as it is, to the bit, and there is no residual.
+///   1. No alarm: the result stays as it is, to the bit, and there is no residual. If nobody can
+///      tell whether there should be one, the posterior is ModelTest's considered one.
 ///   2. If a residual would not be worth it (kLeastExplained, kLeastEffect), there is none, and the
 ///      posterior is ModelTest's considered one: as wide as what may be wrong makes it.
 ///   3. Else steps that touch the ground or a stop are left out, if there are any, and the method
@@ -72,6 +73,11 @@ struct GapFit {
 /// @param all the method's result for input.rollouts.
 /// @throws std::invalid_argument as FitResidual.
 GapFit CloseGap(const MethodInput& input, MethodResult all);
+
+/// Where errors cannot judge a model, for a reason that is known beforehand: the posterior is
+/// ModelTest's considered one, of methods that know the likelihood of steps, and nothing is learnt.
+/// @param why the alarm's summary.
+GapFit LeaveUnjudged(const MethodInput& input, MethodResult all, std::string why);
 
 /// The steps of roll-outs that begin and end away from the ground and from stops. Thread-safe.
 std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Rollout> rollouts);

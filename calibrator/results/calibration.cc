@@ -86,14 +86,8 @@ class Calibration {
     const MethodInput input{model_, rollouts_, options_};
     MethodResult result = RunMethod(input);
     const std::string why = NotJudged();
-    if (why.empty()) return CloseGap(input, std::move(result));
-    GapFit alone;
-    alone.view = ViewOneStep(input, result);
-    alone.information = alone.view.information;
-    alone.simulated_steps = alone.view.simulated_steps;
-    alone.alarm.summary = why;
-    alone.result = std::move(result);
-    return alone;
+    return why.empty() ? CloseGap(input, std::move(result))
+                       : LeaveUnjudged(input, std::move(result), why);
   }
 
   // At the mean that all transitions have informed, whatever method has found it.

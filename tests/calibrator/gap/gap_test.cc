@@ -214,6 +214,36 @@ TEST_CASE("where residuals are switched off an alarm changes nothing, and it is 
   CHECK(fit.gap.summary == "what the model lacks is not learnt: residuals are switched off");
 }
 
+TEST_CASE("of differences for velocities the posterior is as wide as what may be wrong makes it") {
+  const RobotDescription robot = Robot("double_pendulum/robot.toml");
+  std::vector<Rollout> log = RandomLog(robot, {}, 300, 3);
+  for (Rollout& rollout : log) {
+    for (size_t i = rollout.transitions.size(); i-- > 0;) {
+      Transition& t = rollout.transitions[i];
+      t.next_v = (t.next_q - t.q) / t.duration();
+      if (i > 0) t.v = (t.q - rollout.transitions[i - 1].q) / rollout.transitions[i - 1].duration();
+    }
+  }
+  CalibrationOptions options;
+  options.method = "laplace", options.horizons = {1};
+  const MethodInput input{std::make_shared<Model>(robot), log, options};
+  const MethodResult alone = RunMethod(input);
+  const GapFit fit = LeaveUnjudged(input, alone, "why");
+  CHECK_FALSE(fit.alarm.alarm);
+  CHECK_FALSE(fit.alarm.judged);
+  CHECK(fit.alarm.summary == "why");
+  CHECK_FALSE(fit.gap.residual);
+  // Off by so many standard deviations at most; the truth is the prior's mean.
+  const auto off = [&](const Gaussian& posterior) {
+    return ((posterior.mean - PriorGaussian(robot).mean).array() /
+            posterior.covariance.diagonal().array().sqrt())
+        .abs()
+        .maxCoeff();
+  };
+  CHECK(off(Moments(alone.posterior)) > 10);
+  CHECK(off(Moments(fit.result.posterior)) < 2.5);
+}
+
 TEST_CASE("of too few steps nothing is learnt, and there is nothing that it explains") {
   const RobotDescription robot = Hopper();
   const std::vector<Rollout> log = RandomLog(robot, {}, kFewestForResidual - 1, 3);
