@@ -230,8 +230,8 @@ void Run(const Case& one, uint64_t seed, Outcome* outcome) {
   const auto parameters = static_cast<int>(robot.parameters.size());
   outcome->held += Held(robot, Moments(result.posterior), seed);
   outcome->intervals += parameters;
-  const GapFit gap = log.differenced.empty() ? CloseGap(input, std::move(result))
-                                             : LeaveUnjudged(input, std::move(result), "");
+  const GapFit gap =
+      CloseGap(input, std::move(result), log.differenced.empty() ? "" : "differences");
   outcome->judged += log.differenced.empty();
   outcome->beside += gap.gap.informed == Informed::kBesideContacts;
   outcome->free += gap.gap.informed == Informed::kFree;

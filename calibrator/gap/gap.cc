@@ -219,25 +219,15 @@ Eigen::VectorXd Explained(const ResidualQuality& quality) {
   return (1 - after / before.max(1e-300)).max(0);
 }
 
-GapFit LeaveUnjudged(const MethodInput& input, MethodResult all, std::string why) {
-  GapFit fit;
-  fit.view = ViewOneStep(input, all);
-  fit.simulated_steps += fit.view.simulated_steps;
-  fit.information = fit.view.information;
-  const ModelTest test = TestModel(input, all, fit.view, &fit.simulated_steps);
-  fit.result = std::move(all);
-  if (KnowsLikelihood(input.options.method)) Take(input, test.considered, &fit);
-  fit.alarm.judged = false;
-  fit.alarm.summary = std::move(why);
-  return fit;
-}
-
-GapFit CloseGap(const MethodInput& input, MethodResult all) {
+GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& not_judged) {
   GapFit fit;
   fit.view = ViewOneStep(input, all);
   fit.simulated_steps += fit.view.simulated_steps;
   ModelTest test = TestModel(input, all, fit.view, &fit.simulated_steps);
-  fit.alarm = std::move(test.found);
+  if (not_judged.empty())
+    fit.alarm = std::move(test.found);
+  else
+    fit.alarm.judged = false, fit.alarm.summary = not_judged;
   fit.information = fit.view.information;
   fit.result = std::move(all);
   if (!fit.alarm.judged && KnowsLikelihood(input.options.method))

@@ -71,13 +71,10 @@ struct GapFit {
 /// Uses the threads that input.options says, and shares nothing. The same bits for any number of
 /// them.
 /// @param all the method's result for input.rollouts.
+/// @param not_judged why errors cannot judge the model, if that is known beforehand: it is the
+/// alarm's summary. Empty = they can.
 /// @throws std::invalid_argument as FitResidual.
-GapFit CloseGap(const MethodInput& input, MethodResult all);
-
-/// Where errors cannot judge a model, for a reason that is known beforehand: the posterior is
-/// ModelTest's considered one, of methods that know the likelihood of steps, and nothing is learnt.
-/// @param why the alarm's summary.
-GapFit LeaveUnjudged(const MethodInput& input, MethodResult all, std::string why);
+GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& not_judged = {});
 
 /// The steps of roll-outs that begin and end away from the ground and from stops. Thread-safe.
 std::vector<Rollout> FreeSteps(const RobotDescription& robot, std::span<const Rollout> rollouts);

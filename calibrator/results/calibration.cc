@@ -85,9 +85,7 @@ class Calibration {
   GapFit Fit() const {
     const MethodInput input{model_, rollouts_, options_};
     MethodResult result = RunMethod(input);
-    const std::string why = NotJudged();
-    return why.empty() ? CloseGap(input, std::move(result))
-                       : LeaveUnjudged(input, std::move(result), why);
+    return CloseGap(input, std::move(result), NotJudged());
   }
 
   // At the mean that all transitions have informed, whatever method has found it.

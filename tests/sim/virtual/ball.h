@@ -22,6 +22,7 @@ inline RobotDescription Ball() {
   return ball;
 }
 
+/// A ground that rises by so much along x [rad].
 inline UnmodelledGround Slope(double slope) {
   UnmodelledGround ground;
   ground.slope = slope;
