@@ -25,7 +25,7 @@ using Level = Finding::Level;
 
 constexpr int kCanHardwareType = 280;     // ARPHRD_CAN, linux/if_arp.h
 constexpr long kReceiveBuffer = 2097152;  // of the default LCM URL
-constexpr int kListenMs = 300;            // [ms]; a driver's status comes ten times a second
+constexpr int kAwaitStatus = 300;         // [ms]; a driver's status comes ten times a second
 
 /// The fault in "FAULT; cure: CURE" and its cure, or `fallback` where it has none.
 Finding Split(Level level, const std::string& text, const std::string& fallback) {
@@ -60,7 +60,7 @@ Finding Signatures(const std::string& lcm_url, const std::string& key) {
 /// Findings about a driver that is running, from its own status; none if there is no driver.
 std::vector<Finding> RunningDriver(Messenger& messenger, const std::string& lcm_url) {
   const Subscriber<driver_status_t> drivers(messenger, "DRIVER_STATUS");
-  messenger.Await(kListenMs);
+  messenger.Await(kAwaitStatus);
   messenger.Drain();
   if (drivers.received() == 0) return {};
   const driver_status_t& driver = drivers.newest();

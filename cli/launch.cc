@@ -32,7 +32,7 @@ using SteadyClock = std::chrono::steady_clock;
 // of a virtual robot; a real one is armed by a person, every time
 constexpr int kMaxRearms = 20;
 constexpr int64_t kArmAgain = 500'000;      // [us]
-constexpr int64_t kLookAround = 50'000;     // [us]
+constexpr int64_t kPoll = 50'000;           // [us]
 constexpr int64_t kDoubt = 300'000;         // [us]; three statuses of the controller
 constexpr size_t kMaxStrangeChannels = 10;  // that are named: strangers choose how many there are
 
@@ -87,7 +87,7 @@ class ClosedLoop {
     const int64_t doubt = setting_.virtual_run ? 0 : kDoubt;
     int64_t finished = 0;
     while (!progress_.finished() || clock_.Now() < finished + doubt) {
-      if (!process_.Wait(kLookAround)) {
+      if (!process_.Wait(kPoll)) {
         line_.Clear();
         processes_.Hurry();
         std::cout << "interrupted" << std::endl;
@@ -141,7 +141,7 @@ class ClosedLoop {
     const auto until = [&](const std::function<bool()>& so, double seconds) {
       const auto start = SteadyClock::now();
       while (!so() && SecondsSince(start) < seconds && AllRunning()) {
-        if (!process_.Wait(kLookAround)) return false;
+        if (!process_.Wait(kPoll)) return false;
       }
       return so();
     };

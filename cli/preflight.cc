@@ -16,7 +16,7 @@ namespace plumb {
 namespace {
 
 // [us]; statuses come ten times a second, heartbeats at least as often
-constexpr int64_t kListenFor = 500'000;
+constexpr int64_t kListenFirst = 500'000;
 
 bool IsVirtual(const std::string& url) {
   return url.starts_with("udp:") || url.starts_with("socketcan:vcan") || url.starts_with("loop:");
@@ -40,7 +40,7 @@ void RequireFree(const std::string& lcm_url, const std::vector<BusDescription>& 
   for (const auto& end : ends) polled.push_back({end->fd(), POLLIN, 0});
   std::array<Frame, 64> frames;
   const Clock clock;
-  for (const int64_t deadline = clock.Now() + kListenFor; clock.Now() < deadline;) {
+  for (const int64_t deadline = clock.Now() + kListenFirst; clock.Now() < deadline;) {
     poll(polled.data(), polled.size(), 10);
     messenger.Drain();
     if (drivers.received() > 0 || policies.received() > 0) {

@@ -19,9 +19,9 @@ namespace {
 // With each new transition. More would follow the mode sooner, and in virtual time the robot waits
 // for it; looking costs little.
 constexpr size_t kLinearisedAgain = 3, kLookedAt = 128;
-constexpr double kWhereItWas = 0.01;  // [sd] of the posterior: a mode so near is where it was
-constexpr double kSettled = 1e-6;     // [sd]
-constexpr int kRounds = 30;           // until it has settled
+constexpr double kUnmoved = 0.01;  // [sd] of the posterior: a mode so near is where it was
+constexpr double kSettled = 1e-6;  // [sd]
+constexpr int kRounds = 30;        // until it has settled
 constexpr size_t kSettledAtOnce = 64;
 // of the mode, in standard coordinates: slopes are not to be trusted further away
 constexpr double kLongestStep = 2;
@@ -107,7 +107,7 @@ std::vector<size_t> StreamingLaplace::NextInTurn() {
     const Piece& piece = pieces_[next_];
     if (piece.coordinates.empty()) continue;
     const bool stale = piece.at.size() == 0 || piece.noise_version != noise_version_;
-    if (stale || DistanceFrom(piece.at) > kWhereItWas)
+    if (stale || DistanceFrom(piece.at) > kUnmoved)
       turns.push_back(next_);
     else
       next_sums_.Add(piece.coordinates, piece.errors, piece.at);
@@ -301,7 +301,7 @@ bool StreamingLaplace::Settle() {
     const double step = DistanceFrom(before);
     // A short step that is no shorter than the last one is rounding, in a direction that next to
     // nothing is known of.
-    const bool rests = step <= kSettled || (step <= kWhereItWas && step > last_step / 2);
+    const bool rests = step <= kSettled || (step <= kUnmoved && step > last_step / 2);
     last_step = step;
     if (!AdaptNoise() && rests) return true;
   }

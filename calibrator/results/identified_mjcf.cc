@@ -26,8 +26,8 @@ bool InMjcf(std::string_view name) {
                       [&](std::string_view kind) { return name.starts_with(kind); });
 }
 
-std::string WhatItIs(const RobotDescription& robot, const Eigen::VectorXd& mean,
-                     const Eigen::VectorXd& sd, bool residual) {
+std::string ModelComment(const RobotDescription& robot, const Eigen::VectorXd& mean,
+                         const Eigen::VectorXd& sd, bool residual) {
   std::string here, elsewhere;
   for (size_t i = 0; i < robot.parameters.size(); ++i) {
     const ParameterDescription& p = robot.parameters[i];
@@ -69,7 +69,7 @@ std::string IdentifiedMjcf(const RobotDescription& robot, const Eigen::VectorXd&
   RobotDescription identified = Model(robot).Describe(mean);
   identified.virtual_robot.ground = {};  // that of a virtual robot is hidden from who calibrates it
   XmlEdits file(Mjcf(identified));
-  file.AddComment(WhatItIs(robot, mean, sd, residual));
+  file.AddComment(ModelComment(robot, mean, sd, residual));
   return file.Print();
 }
 

@@ -112,7 +112,7 @@ std::string Quoted(const std::string& text) {
   return '"' + quoted + '"';
 }
 
-std::string WhatChanged(const RobotDescription& robot, const std::vector<Value>& values,
+std::string UrdfComment(const RobotDescription& robot, const std::vector<Value>& values,
                         bool residual) {
   std::string here, elsewhere;
   for (const Value& v : values) {
@@ -166,7 +166,7 @@ std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd&
     if (v.in_urdf && attribute)
       writer.WriteDynamics(v.name.substr(v.name.find('/') + 1), attribute, v.mean);
   }
-  writer.AddComment(WhatChanged(robot, values, residual));
+  writer.AddComment(UrdfComment(robot, values, residual));
   return writer.Print();
 }
 

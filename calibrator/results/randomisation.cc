@@ -18,11 +18,11 @@ namespace {
 
 constexpr int kForCorrelations = 10000;  // draws: they are right to 0.01
 
-std::vector<double> ToList(const Eigen::VectorXd& x) { return {x.begin(), x.end()}; }
+std::vector<double> Entries(const Eigen::VectorXd& x) { return {x.begin(), x.end()}; }
 
 std::vector<std::vector<double>> Rows(const Eigen::MatrixXd& matrix) {
   std::vector<std::vector<double>> rows;
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) rows.push_back(ToList(matrix.row(i)));
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) rows.push_back(Entries(matrix.row(i)));
   return rows;
 }
 
@@ -78,8 +78,8 @@ std::string RandomisationJson(const ParameterDistribution& distribution,
       {"seed", options.seed},
       {"names", names},
       {"units", units},
-      {"mean", ToList(distribution.Mean())},
-      {"sd", ToList(sd)},
+      {"mean", Entries(distribution.Mean())},
+      {"sd", Entries(sd)},
       {"covariance", Rows(covariance)},
       {"samples", Rows(Draws(distribution, model, options.samples, Random(options.seed, {0})))},
   });
