@@ -47,6 +47,13 @@ void PrintGap(const Gap& gap, const RobotDescription& robot) {
   if (gap.residual->touching) rows("touching", gap.touching);
 }
 
+void PrintReplay(const Replay& replay) {
+  std::cout << fmt::format(
+      "- open-loop replay of what was held out, up to {:.3g} s from its first state: sum over "
+      "joints of the mean squared position error {:.3g}, of the prior {:.3g}\n",
+      replay.seconds, replay.posterior, replay.prior);
+}
+
 void PrintFindings(const Findings& findings, const RobotDescription& robot) {
   const Summary summary = Summarise(findings, robot);
   std::cout << fmt::format("{:24} {:>22} {:>24} {:>25}\n", "", "prior", "posterior", "95 %");
@@ -224,6 +231,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
       std::cout << fmt::format("went on from {}: {} batches of simulations were there\n",
                                journal_file, journal->resumed());
     PrintFindings(findings, robot);
+    if (flags.options.replay) PrintReplay(findings.holdout.replay);
     const Provenance provenance = ProvenanceOf(logs, flags.options, command, std::time(nullptr));
     WritePosterior(flags.output, findings, robot, provenance);
     const Summary summary = Summarise(findings, robot);

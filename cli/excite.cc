@@ -92,6 +92,7 @@ int Excite(Process& process, const ExciteFlags& flags) {
   settings.candidates = flags.candidates;
   settings.seconds = flags.seconds;
   settings.seed = flags.seed;
+  settings.one_by_one = flags.one_by_one;
   const Gaussian prior = flags.posterior.empty()
                              ? PriorGaussian(robot)
                              : Moments(ReadSimulators(flags.posterior, robot).mixture);

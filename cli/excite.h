@@ -13,9 +13,10 @@ struct ExciteFlags {
   std::string output = "excitation.csv";
   uint64_t seed = 1;
   int candidates = 61;
-  double seconds = 10;    ///< of robot time
-  std::string posterior;  ///< posterior.json with what is known already; empty = the prior
-  std::string png;        ///< file; empty = none
+  double seconds = 10;      ///< of robot time
+  bool one_by_one = false;  ///< joints
+  std::string posterior;    ///< posterior.json with what is known already; empty = the prior
+  std::string png;          ///< file; empty = none
 };
 
 /// `plumb excite`: looks for the efforts that would tell most of the robot's parameters and stay

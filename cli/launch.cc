@@ -48,7 +48,7 @@ class ClosedLoop {
                    ? process.clock()
                    : Clock(flags.speed > 0 ? flags.speed : 1, process.clock().Utime())),
         start_(clock_.Now()),
-        progress_(robot_, flags.iterations),
+        progress_(robot_, flags.efforts.empty() ? flags.iterations : 1, !flags.efforts.empty()),
         requests_(process.messenger(), "DRIVER_REQUEST"),
         drivers_(process.messenger(), "DRIVER_STATUS",
                  [&](const driver_status_t& m) { progress_.OnDriver(m); }),

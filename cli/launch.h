@@ -14,6 +14,8 @@ struct LaunchFlags {
   uint64_t seed = 1;
   int iterations = 8;
   int evaluation_episodes = 10;
+  /// table of efforts to play once and calibrate with, without any policy; empty = the whole loop
+  std::string efforts;
   std::vector<std::string> buses;  ///< see SetUrls; empty = the robot's own
   bool real_time = false;  ///< a virtual robot in real time; otherwise it runs in virtual time
   /// in real time scaled seconds per second, 0 = 1; in virtual time the most, 0 = no limit

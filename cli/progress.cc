@@ -126,6 +126,7 @@ void Progress::OnCalibration(const calibration_status_t& status) {
   done_.push_back({std::move(printable), or_nan(simulated_return_, status.iteration - 1),
                    or_nan(robot_return_, status.iteration - 1), spent_.accounted - last_row_});
   last_row_ = spent_.accounted;
+  finished_ = finished_ || (calibrates_only_ && status.iteration == iterations_);
 }
 
 double& Progress::Spent::Doing(const controller_status_t& c, const training_status_t& t) {

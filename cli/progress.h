@@ -18,7 +18,10 @@ namespace plumb {
 /// summary. Time is an argument. Not thread-safe.
 class Progress {
  public:
-  Progress(const RobotDescription& robot, int iterations) : robot_(robot), iterations_(iterations) {
+  /// @param calibrates_only the run ends with the last calibration; else with the final policy's
+  /// evaluation.
+  Progress(const RobotDescription& robot, int iterations, bool calibrates_only = false)
+      : robot_(robot), iterations_(iterations), calibrates_only_(calibrates_only) {
     training_.incumbent = training_.incumbent_since = training_.challenger = -1;
   }
 
@@ -36,7 +39,7 @@ class Progress {
   std::vector<std::string> TakeRows();
   std::string Header() const;
   std::string StatusLine(double seconds) const;
-  /// True when the final policy's evaluation roll-outs are done.
+  /// True when the final policy's evaluation roll-outs, or the last calibration, are done.
   bool finished() const { return finished_; }
 
   /// "learned beside the hidden truth", for people. @param truth physical; empty if nobody knows.
@@ -63,6 +66,7 @@ class Progress {
 
   const RobotDescription& robot_;
   int iterations_;
+  bool calibrates_only_;
   driver_status_t driver_{};
   controller_status_t controller_{};
   training_status_t training_{};

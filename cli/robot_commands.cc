@@ -159,6 +159,8 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
                    "roll-outs of the final policy")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  launch->add_option("--efforts", flags->efforts,
+                     "instead of the loop: play this table of `plumb excite` once, calibrate");
   launch
       ->add_option("--bus", flags->buses,
                    "CAN bus, e.g. socketcan:can0, of several NAME=URL; default: the robot's own")

@@ -81,6 +81,7 @@ void RunProcesses::Start() {
   std::vector<std::string> controller{flags_.robot, "--seed", seed};
   // a real robot cannot be placed: it rests, then its episode begins where it is
   if (flags_.real) controller.insert(controller.end(), {"--rest", "5"});
+  if (!flags_.efforts.empty()) controller.insert(controller.end(), {"--efforts", flags_.efforts});
   Start(kDriver, with_priority(driver, 0));
   Start("plumb-estimator", with_priority({flags_.robot}, 5));
   Start("plumb-controller", with_priority(controller, 5));
@@ -101,7 +102,7 @@ void RunProcesses::Start() {
       arguments->insert(arguments->end(), {"--nice", "10"});
   }
   Start("plumb-calibrator", calibrator);
-  Start("plumb-trainer", trainer);
+  if (flags_.efforts.empty()) Start("plumb-trainer", trainer);
 }
 
 Child* RunProcesses::Ended() {

@@ -16,6 +16,7 @@
 #include "common/atomic_file.h"
 #include "common/time_units.h"
 #include "sim/simulators.h"
+#include "sim/tasks/effort_table.h"
 #include "sim/view/picture.h"
 #include "trainer/policy_file.h"
 
@@ -29,7 +30,7 @@ constexpr uint32_t kReadingStream = 0x52454144;  // "READ", second word of the r
 /// Before a long simulation rather than after it.
 void RequireFiles(const SimFlags& flags, const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
-  inputs.insert(inputs.end(), {flags.policy, flags.posterior});
+  inputs.insert(inputs.end(), {flags.policy, flags.posterior, flags.efforts});
   RequireOutputs({flags.csv, flags.png, flags.gif}, inputs);
 }
 
@@ -84,11 +85,18 @@ Eigen::VectorXd Means(const RobotDescription& robot) {
 }
 
 Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task& task) {
+  if (!flags.efforts.empty()) return PlayActions(ReadEffortTable(flags.efforts, robot, task));
   if (!flags.policy.empty()) {
     return [policy = LoadPolicy(flags.policy, robot, task)](
                const Eigen::VectorXf& observation, Random&) { return policy.Mean(observation); };
   }
   return flags.random ? RandomActions(task.action_size()) : NoAction(task.action_size());
+}
+
+std::string DescribeActions(const SimFlags& flags) {
+  if (!flags.efforts.empty()) return "the efforts of " + flags.efforts;
+  if (flags.random) return "random actions";
+  return flags.policy.empty() ? "no action" : flags.policy;
 }
 
 const char* Describe(EpisodeSummary::End end) {
@@ -132,8 +140,8 @@ std::string Describe(const ReadingNoise& noise) {
 }  // namespace
 
 int Simulate(Process& process, const SimFlags& flags) {
-  if (flags.random && !flags.policy.empty())
-    throw std::invalid_argument("--policy and --random exclude each other");
+  if (flags.random + !flags.policy.empty() + !flags.efforts.empty() > 1)
+    throw std::invalid_argument("--policy, --efforts and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
   std::shared_ptr<const Residual> residual;
@@ -143,16 +151,16 @@ int Simulate(Process& process, const SimFlags& flags) {
   const ReadingNoise noise = ParseReadingNoise(flags.noise);
   RequireFiles(flags, robot);
   const Eigen::VectorXd means = Means(robot);
+  if (!flags.efforts.empty()) {
+    robot.task.steps =
+        static_cast<int>(ReadEffortTable(flags.efforts, robot, *MakeTask(robot)).rows());
+  }
   Environment environment(robot);
   environment.SetParameters(means);
   if (residual) environment.SetResidual(First(*residual, means));
-  const Actor actor = MakeActor(flags, robot, environment.task());
 
   std::cout << fmt::format("{}, task {}, {}, seed {}\n", robot.name, robot.task.name,
-                           flags.random           ? "random actions"
-                           : flags.policy.empty() ? "no action"
-                                                  : flags.policy,
-                           flags.seed)
+                           DescribeActions(flags), flags.seed)
             << DescribeParameters(robot)
             << (residual ? "residual: what " + flags.posterior + " has learnt that these lack\n"
                          : "")
@@ -175,8 +183,8 @@ int Simulate(Process& process, const SimFlags& flags) {
       if (!flags.csv.empty()) AppendCsv(step, csv);
       if (number == 0) film.push_back({step.time, step.true_q});
     };
-    episodes.push_back(PlayEpisode(environment, robot, actor, flags.seed,
-                                   static_cast<uint32_t>(number), see, stop));
+    episodes.push_back(PlayEpisode(environment, robot, MakeActor(flags, robot, environment.task()),
+                                   flags.seed, static_cast<uint32_t>(number), see, stop));
     const EpisodeSummary& episode = episodes.back();
     std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum,
                              Describe(episode.end))

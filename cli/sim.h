@@ -11,7 +11,8 @@ namespace plumb {
 /// The flags of `plumb sim`.
 struct SimFlags {
   std::string robot;
-  std::string policy;  ///< file; empty = none
+  std::string policy;   ///< file; empty = none
+  std::string efforts;  ///< table of efforts to play; empty = none
   bool random = false;
   uint64_t seed = 1;
   int episodes = 1;
@@ -23,7 +24,7 @@ struct SimFlags {
   bool urdf = false;             ///< forget the uncertain parameters' prior means
 };
 
-/// `plumb sim`: rolls a policy, random actions or no action out in the simulator, without messages
+/// `plumb sim`: rolls a policy, a table of efforts, random actions or no action out in the simulator, without messages
 /// or buses, and says how it went. @return exit status: 0, or 130 if it was interrupted; then it
 /// writes no files. Runs in one thread.
 /// @throws std::invalid_argument or std::runtime_error, one line for people: robot, policy, files.

@@ -18,7 +18,13 @@ void AddSim(CLI::App& app, Action& action) {
   auto* policy = sim->add_option("--policy", flags->policy,
                                  "a trainer's checkpoint or an ONNX model that Plumbline has "
                                  "written; its mean action is taken");
-  sim->add_flag("--random", flags->random, "random actions; default: none")->excludes(policy);
+  auto* efforts = sim->add_option("--efforts", flags->efforts,
+                                  "a table of efforts to play one after the other, as `plumb "
+                                  "excite` writes it")
+                      ->excludes(policy);
+  sim->add_flag("--random", flags->random, "random actions; default: none")
+      ->excludes(policy)
+      ->excludes(efforts);
   sim->add_option("--seed", flags->seed, "of all random numbers")
       ->check(SeedRange())
       ->capture_default_str();
@@ -99,6 +105,8 @@ void AddCalibrate(CLI::App& app, const std::string& line, Action& action) {
                    "of that server's: parameters -> q, v at each transition's end")
       ->needs(model)
       ->capture_default_str();
+  calibrate->add_flag("--replay", flags->options.replay,
+                      "say how far motion that was held out is from its open-loop replay");
   calibrate->add_flag("--strict", flags->strict,
                       "exit status 3 if the findings should not be trusted");
   SetAction(*calibrate, action,
@@ -121,6 +129,8 @@ void AddExcite(CLI::App& app, Action& action) {
   excite->add_option("--seconds", flags->seconds, "of each")
       ->check(CLI::Range(0.01, 600.0))
       ->capture_default_str();
+  excite->add_flag("--one-by-one", flags->one_by_one,
+                   "move one joint after the other, the others without effort");
   excite->add_option("--posterior", flags->posterior,
                      "a posterior.json to start from, without its residual; default: the prior");
   excite->add_option("--png", flags->png, "draw the best one as a strip of snapshots");

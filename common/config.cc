@@ -210,6 +210,23 @@ std::vector<int> Config::Integers(const std::string& key, Range range,
   return values;
 }
 
+std::vector<std::string> Config::Strings(const std::string& key,
+                                         std::optional<std::vector<std::string>> fallback) {
+  if (!Has(key)) {
+    if (fallback) return *fallback;
+    FailMissing(key);
+  }
+  const toml::array* array = table().get(key)->as_array();
+  std::vector<std::string> values;
+  if (array) {
+    for (const toml::node& node : *array) {
+      if (const auto text = node.value_exact<std::string>()) values.push_back(*text);
+    }
+  }
+  if (!array || values.size() != array->size()) Fail(key, "is not an array of texts");
+  return values;
+}
+
 Config Config::Table(const std::string& key, bool required) {
   static const toml::table kEmpty;
   const std::string path = path_.empty() ? key : path_ + "." + key;

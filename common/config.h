@@ -43,7 +43,8 @@ class Config {
  public:
   /// Reads a file, and the one that its key `extends` names, relative to its folder: what the file
   /// says stands in place of what that one says; tables are merged, and of arrays of tables those
-  /// with the same `name`.
+  /// with the same `name`. Its key `without` lists what it has not of the other one: keys of
+  /// tables and named tables of arrays, ["task/velocity", "sensor/imu"].
   /// @throws ConfigError if one cannot be opened or parsed, or they extend each other.
   /// @param files if not null, those that were read are appended to it, this one first.
   static Config Load(const std::string& file, std::vector<std::string>* files = nullptr);
@@ -73,6 +74,9 @@ class Config {
                               std::optional<std::vector<double>> fallback = {});
   std::vector<int> Integers(const std::string& key, Range range,
                             std::optional<std::vector<int>> fallback = {});
+  /// Array of texts.
+  std::vector<std::string> Strings(const std::string& key,
+                                   std::optional<std::vector<std::string>> fallback = {});
 
   /// A sub-table `[key]`; empty if absent and not required.
   Config Table(const std::string& key, bool required = true);

@@ -136,6 +136,41 @@ void MergeByName(toml::array& base, toml::array& own) {
   }
 }
 
+bool EraseByName(toml::array& tables, const std::string& name) {
+  const size_t before = tables.size();
+  for (auto table = tables.begin(); table != tables.end();)
+    table = NameOf(*table) == name ? tables.erase(table) : std::next(table);
+  return tables.size() < before;
+}
+
+// "task/velocity" of tables, "parameter/mass/trunk" of arrays of tables with names.
+bool Erase(toml::table& from, const std::string& path) {
+  if (from.erase(path) > 0) return true;
+  const size_t slash = path.find('/');
+  const std::string key = path.substr(0, slash);
+  toml::node* const node = from.get(key);
+  if (!node || slash == std::string::npos) return false;
+  const std::string rest = path.substr(slash + 1);
+  if (node->is_table()) return Erase(*node->as_table(), rest);
+  if (!IsTables(*node) || !EraseByName(*node->as_array(), rest)) return false;
+  if (node->as_array()->empty()) from.erase(key);
+  return true;
+}
+
+// What the extending file says it is without.
+void TakeAway(const toml::node& without, const std::string& file, toml::table& base) {
+  const auto fail = [&](const toml::node& where, const std::string& what) {
+    throw ConfigError(TomlPlace(file, where.source()) + what);
+  };
+  if (!without.is_array()) fail(without, "without is not an array of texts");
+  for (const toml::node& entry : *without.as_array()) {
+    const auto path = entry.value_exact<std::string>();
+    if (!path) fail(entry, "without is not an array of texts");
+    if (!Erase(base, *path))
+      fail(entry, fmt::format("without \"{}\": the file that is extended has none", *path));
+  }
+}
+
 }  // namespace
 
 std::string TomlPlace(const std::string& file, const toml::source_region& source) {
@@ -175,7 +210,8 @@ toml::table LoadTomlChain(const std::string& file, std::vector<std::string>& fil
                                   *extends->value<std::string>()));
   }
   toml::table base = LoadTomlChain(base_file.string(), files);
-  own.erase("extends");
+  if (const toml::node* without = own.get("without")) TakeAway(*without, file, base);
+  own.erase("extends"), own.erase("without");
   Merge(base, own);
   return base;
 }

@@ -47,6 +47,7 @@ Controller::Controller(const RobotDescription& robot, uint64_t seed, double rest
       task_(MakeTask(robot_)),
       seed_(seed),
       rest_(rest),
+      most_steps_(robot.task.steps),
       step_q_(Eigen::VectorXd::Zero(robot.num_positions())),
       step_v_(Eigen::VectorXd::Zero(robot.num_velocities())),
       effort_(step_v_),
@@ -63,7 +64,19 @@ void Controller::Enter(int8_t phase, const std::string& reason) {
   if (phase != controller_status_t::RUNNING) episode_ = -1;
 }
 
+void Controller::Play(Eigen::MatrixXf actions) {
+  plays_ = true;
+  most_steps_ = static_cast<int>(actions.rows());
+  decide_ = [actions = std::move(actions)](const Eigen::VectorXf&, const Trial& so_far) {
+    return actions.row(so_far.steps).transpose().eval();
+  };
+  next_header_.purpose = policy_t::CALIBRATE;
+  next_header_.episodes = 1;
+  TakePolicy();
+}
+
 void Controller::OnPolicy(const policy_t& message) {
+  if (plays_) return;
   // Policies are repeated for those who come late; the same contents are the same policy.
   const GaussianPolicy* known = next_policy_ ? next_policy_.get() : policy_.get();
   const policy_t& header = next_policy_ ? next_header_ : policy_header_;
@@ -101,7 +114,7 @@ void Controller::OnDriverStatus(const driver_status_t& status, int64_t now) {
   driver_heard_ = now;
   if (Armed() == was_armed) return;
   if (Armed()) {
-    Enter(controller_status_t::WAITING, policy_ ? "" : "no policy yet");
+    Enter(controller_status_t::WAITING, policy_ || plays_ ? "" : "no policy yet");
     state_heard_ = -1;
   } else if (phase() != controller_status_t::COMPLETE) {
     if (phase() == controller_status_t::RUNNING) ++status_.episodes_aborted;
@@ -220,7 +233,7 @@ std::optional<joint_command_t> Controller::OnState(const robot_state_t& state, i
     next_decision_ = state.utime;
     return Act(state, utime);
   }
-  if (phase() == controller_status_t::WAITING && Armed() && policy_ && good) {
+  if (phase() == controller_status_t::WAITING && Armed() && (policy_ || plays_) && good) {
     const bool more = status_.num_episodes < status_.episodes_wanted;
     if (more)
       BeginPlacing(now, utime);
@@ -288,7 +301,7 @@ bool Controller::Trying() const {
 }
 
 int Controller::StepLimit() const {
-  const int all = robot_.task.steps;
+  const int all = most_steps_;
   if (policy_header_.purpose != policy_t::CALIBRATE || policy_header_.trial_steps <= 0) return all;
   const int trial = std::min(policy_header_.trial_steps, all);
   return Trying() ? trial : std::max(1, all - trial);

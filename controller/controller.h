@@ -45,6 +45,10 @@ class Controller {
   /// From now on this decides, not the policy: a robot that is trained on itself.
   void SetDecision(Decide decide) { decide_ = std::move(decide); }
 
+  /// From now on no policy is needed: one episode has these actions one after the other, policy
+  /// units, and is to calibrate with. @param actions control steps x driven joints.
+  void Play(Eigen::MatrixXf actions);
+
   /// A new policy. @throws std::invalid_argument if it does not fit the robot or is damaged.
   void OnPolicy(const policy_t& message);
   void OnDriverStatus(const driver_status_t& status, int64_t now);
@@ -81,7 +85,9 @@ class Controller {
   std::unique_ptr<Task> task_;
   uint64_t seed_;
   double rest_;
-  Decide decide_;  // empty: the policy does
+  Decide decide_;       // empty: the policy does
+  bool plays_ = false;  // what is decided needs no policy
+  int most_steps_;      // of an episode
   std::unique_ptr<GaussianPolicy> policy_, next_policy_;
   policy_t policy_header_{}, next_header_{};  // without weights
   controller_status_t status_{};

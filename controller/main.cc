@@ -11,11 +11,13 @@
 #include "common/realtime.h"
 #include "common/seed_range.h"
 #include "controller/controller.h"
+#include "sim/tasks/effort_table.h"
 
 int main(int argc, char** argv) {
   std::string robot_path;
   uint64_t seed = 1;
   double rest = -1;
+  std::string efforts;
   int priority = 0;
   return plumb::Run(
       "plumb-controller", "Runs a policy on the robot, episode by episode.", argc, argv,
@@ -28,6 +30,8 @@ int main(int argc, char** argv) {
         app.add_option(
             "--rest", rest,
             "[s] do not have the robot placed: let it rest that long, then begin where it is");
+        app.add_option("--efforts", efforts,
+                       "play this table of `plumb excite` in one episode, and no policy");
         plumb::AddExamples(app, {"plumb-controller robots/pendulum --rest 2"});
       },
       [&](plumb::Process& process) {
@@ -35,6 +39,8 @@ int main(int argc, char** argv) {
         const plumb::RobotDescription robot = plumb::LoadRobot(robot_path);
         const plumb::Clock& clock = process.clock();
         plumb::Controller controller(robot, seed, rest);
+        if (!efforts.empty())
+          controller.Play(plumb::ReadEffortTable(efforts, robot, *plumb::MakeTask(robot)));
         plumb::Messenger& messenger = process.messenger();
         messenger.Follow(robot.name);
         plumb::Publisher<plumb::joint_command_t> commands(messenger, "JOINT_COMMAND");

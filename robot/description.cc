@@ -72,6 +72,14 @@ fs::path Installed(const fs::path& robot) {
   return robot.is_relative() ? FileOf(programs.parent_path() / "share/plumbline" / robot) : robot;
 }
 
+UrdfModel ReadUrdf(Config& header, const std::string& file, const std::vector<std::string>& fixed) {
+  try {
+    return LoadUrdf(file, fixed);
+  } catch (const std::invalid_argument& error) {
+    header.Fail("fixed", std::string("= ") + error.what());
+  }
+}
+
 // A bus with nothing on it is a mistake: its joints are on another.
 void RequireUse(Config& root, const RobotDescription& robot) {
   for (size_t i = 0; i < robot.buses.size(); ++i) {
@@ -108,8 +116,9 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   const std::string urdf_path = (file.parent_path() / urdf_file).string();
   if (!fs::exists(urdf_path, error))
     header.Fail("urdf", fmt::format("= \"{}\": there is no such file", urdf_file));
+  const std::vector<std::string> fixed = header.Strings("fixed", {{}});
   header.Finish();
-  UrdfModel urdf = LoadUrdf(urdf_path);
+  UrdfModel urdf = ReadUrdf(header, urdf_path, fixed);
   files.push_back(urdf_path);
   robot.fingerprint = kEmptyHash;
   for (const std::string& part : files) robot.fingerprint = Hash(ReadFile(part), robot.fingerprint);

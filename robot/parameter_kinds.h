@@ -23,11 +23,13 @@ template <class Real>
 struct JointDynamicsOf {
   static constexpr double kLongestDelay = 0.5;  ///< [s]
 
-  Real armature{};               ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
-  Real damping{};                ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
-  Real friction{};               ///< [Nm] or [N] >= 0: Coulomb friction
-  Real stiffness{};              ///< [Nm/rad] or [N/m] >= 0 of a spring
-  Real rest{};                   ///< [rad] or [m] where the spring is relaxed
+  Real armature{};   ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
+  Real damping{};    ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
+  Real friction{};   ///< [Nm] or [N] >= 0: Coulomb friction
+  Real stiffness{};  ///< [Nm/rad] or [N/m] >= 0 of a spring
+  Real rest{};       ///< [rad] or [m] where the spring is relaxed, and the drive's loop
+  Real kp{};         ///< [Nm/rad] or [N/m] >= 0 of the drive's own position loop, see DriveEffort
+  Real kd{};         ///< [Nm s/rad] or [N s/m] >= 0 of it
   Real motor_gain = Real{} + 1;  ///< effort at the joint per effort commanded, >= 0
   /// [s] 0 to kLongestDelay between an effort's command and its effect, beyond what was recorded
   Real delay{};
@@ -84,6 +86,12 @@ inline constexpr JointParameterKind kJointParameterKinds[] = {
      {0, 1e9}, kAboveZero, {0.05, true}},
     {"rest", "rest", &JointDynamics::rest, JointGroup::kOneCoordinate, "rad", "m", "the spring",
      {-1e9, 1e9}, kFinite, {}},
+    {"kp", "kp", &JointDynamics::kp, JointGroup::kDriven,
+     "Nm/rad", "N/m", "the drive's own loop",
+     {0, 1e9}, kNotNegative, {}},
+    {"kd", "kd", &JointDynamics::kd, JointGroup::kDriven,
+     "Nm s/rad", "N s/m", "the drive's own loop",
+     {0, 1e9}, kNotNegative, {}},
     {"gain", "motor_gain", &JointDynamics::motor_gain, JointGroup::kDriven,
      "", "", "the motor's gain",
      {0, 1e9}, kNotNegative, {0.1}},

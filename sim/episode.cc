@@ -1,6 +1,7 @@
 #include "sim/episode.h"
 
 #include <stdexcept>
+#include <utility>
 
 namespace plumb {
 namespace {
@@ -21,6 +22,14 @@ Actor RandomActions(int action_size) {
     Eigen::VectorXf action(action_size);
     for (float& a : action) a = static_cast<float>(random.Uniform(-1, 1));
     return action;
+  };
+}
+
+Actor PlayActions(Eigen::MatrixXf actions) {
+  return [actions = std::move(actions), step = Eigen::Index{0}](const Eigen::VectorXf&,
+                                                                Random&) mutable {
+    if (step == actions.rows()) return Eigen::VectorXf::Zero(actions.cols()).eval();
+    return actions.row(step++).transpose().eval();
   };
 }
 

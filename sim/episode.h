@@ -17,6 +17,9 @@ using Actor = std::function<Eigen::VectorXf(const Eigen::VectorXf& observation, 
 Actor NoAction(int action_size);
 /// Each action uniform in [-1, 1), every time another.
 Actor RandomActions(int action_size);
+/// One after the other, of one episode. @param actions a row for each control step; after the last
+/// there is no effort.
+Actor PlayActions(Eigen::MatrixXf actions);
 
 /// One control step: the state before it and what was done in it.
 struct SimulatedStep {

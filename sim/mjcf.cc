@@ -132,6 +132,16 @@ class Writer {
   }
 
   void WriteMotor(const JointDescription& j) {
+    const JointDynamics& d = j.dynamics;
+    if ((d.kp > 0 || d.kd > 0) && d.motor_gain > 0) {
+      // Lengths and speeds of an actuator are the joint's times its gear, too.
+      text_ += fmt::format(
+          "<general name=\"{0}\" joint=\"{0}\" gear=\"{1}\" gainprm=\"1\" biastype=\"affine\" "
+          "biasprm=\"{2} {3} {4}\" forcelimited=\"true\" forcerange=\"{5} {6}\"/>\n",
+          Name(j.name), d.motor_gain, d.kp * d.rest, -d.kp / d.motor_gain, -d.kd / d.motor_gain,
+          -j.effort_limit, j.effort_limit);
+      return;
+    }
     text_ += fmt::format(
         "<motor name=\"{0}\" joint=\"{0}\" gear=\"{1}\" ctrllimited=\"true\" "
         "ctrlrange=\"{2} {3}\"/>\n",

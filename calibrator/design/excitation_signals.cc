@@ -94,13 +94,21 @@ std::vector<Excitation> MakeExcitations(const RobotDescription& robot,
   const int steps =
       std::max(1, static_cast<int>(std::lround(settings.seconds / robot.task.period)));
   const auto joints = static_cast<Eigen::Index>(robot.driven().size());
+  // The part of the time in which a joint moves.
+  const auto begin = [&](Eigen::Index i) { return settings.one_by_one ? i * steps / joints : 0; };
+  const auto count = [&](Eigen::Index i) {
+    return settings.one_by_one ? begin(i + 1) - begin(i) : steps;
+  };
   std::vector<Excitation> excitations;
   for (int c = 0; c < settings.candidates; ++c) {
     Random random(settings.seed, {static_cast<uint32_t>(c), kStream});
-    Eigen::MatrixXd action(steps, joints);
+    Eigen::MatrixXd action = Eigen::MatrixXd::Zero(steps, joints);
     if (c == 0) {
       for (Eigen::Index k = 0; k < steps; ++k) {
-        for (Eigen::Index i = 0; i < joints; ++i) action(k, i) = random.Uniform(-1, 1);
+        for (Eigen::Index i = 0; i < joints; ++i) {
+          const double drawn = random.Uniform(-1, 1);
+          if (k >= begin(i) && k < begin(i) + count(i)) action(k, i) = drawn;
+        }
       }
       excitations.push_back({"the task's random actions", action});
       continue;
@@ -114,7 +122,8 @@ std::vector<Excitation> MakeExcitations(const RobotDescription& robot,
       // Joints that all did the same could not be told apart.
       const double own_amplitude = i == 0 ? amplitude : amplitude * random.Uniform(0.5, 1);
       const double own_bandwidth = i == 0 ? bandwidth : bandwidth * random.Uniform(0.5, 1);
-      action.col(i) = own_amplitude * Make(shape, steps, own_bandwidth, random);
+      action.col(i).segment(begin(i), count(i)) =
+          own_amplitude * Make(shape, static_cast<int>(count(i)), own_bandwidth, random);
     }
     excitations.push_back(
         {fmt::format("{} up to {:.2g} Hz, {:.0f} % effort", kNames[static_cast<size_t>(shape)],

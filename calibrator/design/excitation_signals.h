@@ -18,17 +18,18 @@ struct Excitation {
 };
 
 struct ExcitationSettings {
-  int candidates = 61;  ///< at least 1
-  double seconds = 10;  ///< > 0, of each
-  int draws = 3;        ///< simulators of the belief beside its mean
+  int candidates = 61;      ///< at least 1
+  double seconds = 10;      ///< > 0, of each
+  bool one_by_one = false;  ///< each joint moves in its own part of the time, the others do not
+  int draws = 3;            ///< simulators of the belief beside its mean
   /// share of a joint's range, and of its velocity limit, to keep away from its ends
   double margin = 0.05;
   uint64_t seed = 1;
 };
 
 /// The task's own random actions, then random steps, bang-bang, multisines, chirps and impulses, in
-/// turn at several amplitudes and bandwidths, of all driven joints at once but differently. Equal
-/// seeds give equal excitations.
+/// turn at several amplitudes and bandwidths, of all driven joints at once but differently, or one
+/// by one. Equal seeds give equal excitations.
 std::vector<Excitation> MakeExcitations(const RobotDescription& robot,
                                         const ExcitationSettings& settings);
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "calibrator/diagnostics/corrected_prediction.h"
+#include "calibrator/fit/recorded_window.h"
 
 namespace plumb {
 namespace {
@@ -40,6 +41,21 @@ double ObservedEntries(std::span<const Rollout> rollouts) {
   return std::max(1.0, entries / std::max(1.0, transitions));
 }
 
+// [s]
+double LongestStretch(std::span<const Rollout> rollouts) {
+  double longest = 0;
+  for (const Rollout& rollout : rollouts) {
+    const auto& t = rollout.transitions;
+    for (size_t begin = 0, length = 0; begin < t.size(); begin += length) {
+      length = StretchLength(rollout, begin);
+      double seconds = 0;
+      for (size_t i = begin; i < begin + length; ++i) seconds += t[i].duration();
+      longest = std::max(longest, seconds);
+    }
+  }
+  return longest;
+}
+
 }  // namespace
 
 Split HoldOut(std::span<const Rollout> rollouts) {
@@ -65,13 +81,17 @@ Split HoldOut(std::span<const Rollout> rollouts) {
 }
 
 Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorXd& posterior,
-              const Eigen::VectorXd& prior) {
+              const Eigen::VectorXd& prior, bool replay) {
   Holdout result;
   result.fitted = static_cast<int64_t>(CountTransitions(split.fitted));
   result.held_out = static_cast<int64_t>(CountTransitions(split.held_out));
   const double entries = split.held_out.empty() ? 1 : ObservedEntries(split.held_out);
   Eigen::MatrixXd both(posterior.size(), 2);
   both << posterior, prior;
+  if (replay && result.held_out > 0) {
+    const Eigen::VectorXd replayed = discrepancy.ReplayError(both, split.held_out);
+    result.replay = {replayed(0), replayed(1), LongestStretch(split.held_out)};
+  }
   int tried = 0, better = 0;
   std::string worse, alike;
   for (const int horizon : kHorizons) {

@@ -28,9 +28,17 @@ struct HorizonError {
   double corrected = std::numeric_limits<double>::quiet_NaN();
 };
 
+/// Discrepancy::ReplayError of the motion held out, of the posterior's and of the prior's mean.
+struct Replay {
+  double posterior = std::numeric_limits<double>::quiet_NaN();
+  double prior = std::numeric_limits<double>::quiet_NaN();
+  double seconds = 0;  ///< of the longest stretch
+};
+
 struct Holdout {
   int64_t fitted = 0, held_out = 0;  ///< transitions
   std::vector<HorizonError> errors;
+  Replay replay;  ///< where it was asked for
   /// the posterior predicts better than the prior at some horizons, and at none worse, chance apart
   bool better = false;
   std::string summary;
@@ -46,9 +54,9 @@ struct Split {
 Split HoldOut(std::span<const Rollout> rollouts);
 
 /// Errors of predicting 1, 2, 5, 10, 20 and 50 steps ahead. @param posterior, prior means, physical
-/// units.
+/// units. @param replay play the motion open-loop, too.
 Holdout Judge(Discrepancy& discrepancy, const Split& split, const Eigen::VectorXd& posterior,
-              const Eigen::VectorXd& prior);
+              const Eigen::VectorXd& prior, bool replay = false);
 /// Predicts with a residual, too, and says so. @param residual of split.fitted, for the posterior's
 /// mean. @throws std::invalid_argument as CorrectedPredictionErrors.
 void JudgeResidual(const std::shared_ptr<const Model>& model, const Residual& residual,

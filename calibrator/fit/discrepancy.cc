@@ -7,6 +7,7 @@
 #include <memory>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/whitening.h"
@@ -15,6 +16,8 @@
 
 namespace plumb {
 namespace {
+
+constexpr uint64_t kReplay = ~uint64_t{0};  // of a batch; 0 trajectories, others horizons
 
 // Gaussian filter over rows (time), reflected at both ends, the last row included.
 Eigen::MatrixXd SmoothOverTime(const Eigen::MatrixXd& x, double sigma_rows) {
@@ -168,27 +171,65 @@ Eigen::VectorXd Discrepancy::PredictionError(const Eigen::MatrixXd& parameters,
   });
 }
 
+Discrepancy::Stretches Discrepancy::WholeStretches(std::span<const Rollout> rollouts) const {
+  Stretches all;
+  for (const Rollout& rollout : rollouts) {
+    const auto& transitions = rollout.transitions;
+    for (size_t begin = 0, length = 0; begin < transitions.size(); begin += length) {
+      length = StretchLength(rollout, begin);
+      all.windows.push_back(RecordedWindow(windows_.model(), rollout, begin, length));
+      all.first.push_back(&transitions[begin]);
+    }
+  }
+  return all;
+}
+
+Eigen::VectorXd Discrepancy::ReplayError(const Eigen::MatrixXd& parameters,
+                                         std::span<const Rollout> rollouts) {
+  return Batch(kReplay, parameters,
+               [&](const Eigen::MatrixXd& columns) { return ReplayErrorHere(columns, rollouts); });
+}
+
+Eigen::VectorXd Discrepancy::ReplayErrorHere(const Eigen::MatrixXd& parameters,
+                                             std::span<const Rollout> rollouts) {
+  const auto [windows, first] = WholeStretches(rollouts);
+  // Of each window, as several threads are visited at once.
+  std::vector<Eigen::MatrixXd> squares(windows.size(),
+                                       Eigen::MatrixXd::Zero(parameters.cols(), n_)),
+      counts = squares;
+  Predict(
+      parameters, windows,
+      [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto&) {
+        const Transition& transition = first[window][step];
+        const Eigen::VectorXd error = space_.Difference(q, transition.next_q);
+        for (Eigen::Index i = 0; i < n_; ++i) {
+          if (!IsObserved(space_, transition, i)) continue;
+          squares[window](sample, i) += std::isfinite(error(i)) ? error(i) * error(i) : kInfinity;
+          ++counts[window](sample, i);
+        }
+      },
+      /*last_only=*/false);
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(parameters.cols(), n_), count = sum;
+  for (size_t w = 0; w < windows.size(); ++w) sum += squares[w], count += counts[w];
+  if (!(count.array() > 0).any()) return Eigen::VectorXd::Constant(parameters.cols(), kNaN);
+  return (count.array() > 0).select(sum.array() / count.array(), 0).rowwise().sum();
+}
+
 Eigen::VectorXd Discrepancy::TrajectoryErrorHere(const Eigen::MatrixXd& parameters,
                                                  std::span<const Rollout> rollouts,
                                                  double smoothing) {
   // Over a gap nothing is known of the efforts: the simulation sets off again where the record
   // does.
-  std::vector<Window> windows;
-  std::vector<const Transition*> first;  // of each window
+  const auto [windows, first] = WholeStretches(rollouts);
   // where each window's errors go, and where each roll-out's begin
   std::vector<Eigen::Index> rows, begins;
   Eigen::Index steps = 0;
-  for (const Rollout& rollout : rollouts) {
-    const auto& transitions = rollout.transitions;
-    begins.push_back(steps);
-    for (size_t begin = 0, length = 0; begin < transitions.size(); begin += length) {
-      length = StretchLength(rollout, begin);
-      windows.push_back(RecordedWindow(windows_.model(), rollout, begin, length));
-      first.push_back(&transitions[begin]);
-      rows.push_back(steps + static_cast<Eigen::Index>(begin));
-    }
-    steps += static_cast<Eigen::Index>(transitions.size());
-  }
+  for (const Window& window : windows)
+    rows.push_back(std::exchange(steps, steps + static_cast<Eigen::Index>(window.steps.size())));
+  steps = 0;
+  for (const Rollout& rollout : rollouts)
+    begins.push_back(
+        std::exchange(steps, steps + static_cast<Eigen::Index>(rollout.transitions.size())));
   begins.push_back(steps);
   std::vector<Eigen::MatrixXd> errors(static_cast<size_t>(parameters.cols()),
                                       Eigen::MatrixXd(steps, 2 * n_));

@@ -57,11 +57,24 @@ class Discrepancy {
   Eigen::VectorXd PredictionError(const Eigen::MatrixXd& parameters,
                                   std::span<const Rollout> rollouts, int horizon);
 
+  /// Open-loop replay error [rad^2 or m^2, by joint], as the identification of legged robots'
+  /// drives is judged by: each gapless stretch simulated from its first state to its end, with the
+  /// recorded efforts; the sum over the joints of the mean squared error of their positions. NaN if
+  /// nothing was observed.
+  Eigen::VectorXd ReplayError(const Eigen::MatrixXd& parameters, std::span<const Rollout> rollouts);
+
   /// Simulations of all calls that have failed.
   const Windows::Failures& failures() const { return failures_; }
 
  private:
   using Ends = std::vector<const Transition*>;
+  struct Stretches {
+    std::vector<Window> windows;
+    Ends first;  // transition of each
+  };
+  Stretches WholeStretches(std::span<const Rollout> rollouts) const;
+  Eigen::VectorXd ReplayErrorHere(const Eigen::MatrixXd& parameters,
+                                  std::span<const Rollout> rollouts);
   void OneStep(std::span<const Rollout> rollouts, std::vector<Window>* windows, Ends* ends) const;
   void Predict(const Eigen::MatrixXd& parameters, std::span<const Window> windows,
                const Windows::Visit& visit, bool last_only = true);

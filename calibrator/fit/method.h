@@ -23,6 +23,7 @@ struct CalibrationOptions {
   int64_t budget = 100'000;
   uint64_t seed = 1;
   bool residual = true;  ///< where the alarm speaks, learn what the model lacks (CloseGap)
+  bool replay = false;   ///< play held-out motion open-loop, too
   ExecutionOptions execution;
   std::function<void(const std::string& what, double share)> progress = [](const std::string&,
                                                                            double) {};

@@ -14,7 +14,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kPeriodTolerance = 0.2;  // as TransitionJoiner's
 // decimal fractions in binary: the period itself was meant
 constexpr double kSamePeriod = 1e-6;
 // of the spread of s: no further from what the row before led to

@@ -17,6 +17,8 @@ namespace plumb {
 ///   u/<joint>   of each driven joint: effort / Task::action_unit, held for one control period. As
 ///       in the simulator, it is clipped to the effort limits and acts simulation.latency late, the
 ///       one before until then; before an episode there was none
+///   target_q/<joint>   instead, or besides: where the joint's drive, which runs a position loop of
+///       its own, was told to go; kp/<joint>, kd/<joint> must then be robot.toml's (DriveTargets)
 ///   next_q/<joint>, next_v/<joint>   the state s' that it led to. Without these columns, as
 ///       `plumb sim --csv` writes the table, s' is the next row's state
 ///   terminated, truncated   optional: other than 0 where an episode ends with this row

@@ -77,4 +77,18 @@ std::string DifferencesWarning(std::span<const std::string> joints) {
          "which smooths positions read several times in a control step";
 }
 
+void DifferencePositions(const ConfigurationSpace& space, double period,
+                         std::vector<MotionRow>* rows) {
+  const auto follows = [&](size_t k) {  // row k + 1 row k
+    const double interval = (*rows)[k + 1].t - (*rows)[k].t;
+    return !(*rows)[k].ends && std::abs(interval - period) <= kPeriodTolerance * period;
+  };
+  for (size_t k = 1; k + 1 < rows->size(); ++k) {
+    if (!follows(k - 1) || !follows(k)) continue;
+    const MotionRow &before = (*rows)[k - 1], &after = (*rows)[k + 1];
+    (*rows)[k].transition.v =
+        space.Difference(after.transition.q, before.transition.q) / (after.t - before.t);
+  }
+}
+
 }  // namespace plumb

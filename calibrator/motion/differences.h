@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "calibrator/motion/motion_table.h"
 #include "calibrator/motion/transitions.h"
+#include "robot/configuration_space.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -31,5 +33,11 @@ std::vector<std::string> DifferencedJoints(const RobotDescription& robot,
 std::string DifferencesWarning(std::span<const std::string> joints);
 
 inline constexpr double kSameDifference = 0.05;
+
+/// Gives each row of a table without velocities the central difference of its neighbours'
+/// positions. Where it has not both, a control period away within a fifth, they stay unknown.
+/// Thread-safe.
+void DifferencePositions(const ConfigurationSpace& space, double period,
+                         std::vector<MotionRow>* rows);
 
 }  // namespace plumb

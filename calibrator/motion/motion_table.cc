@@ -8,7 +8,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "calibrator/motion/csv_reader.h"
+#include "calibrator/motion/differences.h"
+#include "calibrator/motion/drive_targets.h"
+#include "common/csv_reader.h"
 #include "common/nearest_name.h"
 #include "common/special_numbers.h"
 #include "robot/configuration_space.h"
@@ -23,7 +25,7 @@ constexpr double kBeyondLimit = 1 + 1e-9;  // an effort so far beyond its limit 
 
 /// The columns' names, in the order of q, v and the actions.
 struct Names {
-  std::vector<std::string> q, v, u;
+  std::vector<std::string> q, v, u, target, kp, kd;
 
   explicit Names(const RobotDescription& robot) {
     for (const JointDescription& joint : robot.joints) {
@@ -34,7 +36,9 @@ struct Names {
         q.push_back("q/" + joint.name);
         v.push_back("v/" + joint.name);
       }
-      if (!joint.passive) u.push_back("u/" + joint.name);
+      if (joint.passive) continue;
+      u.push_back("u/" + joint.name), target.push_back("target_q/" + joint.name);
+      kp.push_back("kp/" + joint.name), kd.push_back("kd/" + joint.name);
     }
   }
 };
@@ -44,10 +48,13 @@ std::vector<std::string> Prefixed(std::vector<std::string> names) {
   return names;
 }
 
-/// Where things are in a table.
+/// Where things are in a table; -1 if there is no such column.
 struct Columns {
-  int t, terminated, truncated;  // the latter two -1 if there is none
-  std::vector<int> q, v, u, next_q, next_v;
+  int t, terminated, truncated;
+  std::vector<int> q, v;
+  std::vector<int> u, target, kp, kd;  // of each driven joint
+  std::vector<int> next_q, next_v;
+  bool has_velocities() const { return !v.empty(); }
   bool has_next() const { return !next_q.empty(); }
 };
 
@@ -63,27 +70,43 @@ std::vector<int> FindAll(const CsvReader& table, const std::vector<std::string>&
   return columns;
 }
 
+bool OfMotor(const std::string& column) {
+  return !column.starts_with("q/") && !column.starts_with("v/") && !column.starts_with("next_");
+}
+
 // A column that looks like a joint's but is of none of this robot's is of another robot, or
 // misspelt: its values would be ignored in silence.
 void RefuseForeign(const CsvReader& table, const std::vector<std::string>& known,
                    const std::string& robot) {
-  constexpr const char* kPrefixes[] = {"q/", "v/", "u/", "next_q/", "next_v/"};
+  constexpr const char* kPrefixes[] = {"q/",  "v/",  "u/",      "next_q/",
+                                       "kp/", "kd/", "next_v/", "target_q/"};
   for (const std::string& name : table.names()) {
     const bool of_a_joint =
         std::any_of(std::begin(kPrefixes), std::end(kPrefixes),
                     [&](const char* prefix) { return name.starts_with(prefix); });
     if (of_a_joint && std::find(known.begin(), known.end(), name) == known.end()) {
       table.Fail(fmt::format("column {} is of no joint{} of robot '{}'; the nearest is '{}'",
-                             Quoted(name), name.starts_with("u/") ? " with a motor" : "", robot,
+                             Quoted(name), OfMotor(name) ? " with a motor" : "", robot,
                              NearestName(name, known)));
     }
   }
 }
 
+std::vector<int> FindAny(const CsvReader& table, const std::vector<std::string>& names) {
+  std::vector<int> columns;
+  for (const std::string& name : names) columns.push_back(table.Find(name));
+  return columns;
+}
+
+bool HasAny(const CsvReader& table, const std::vector<std::string>& names) {
+  return std::ranges::any_of(FindAny(table, names), [](int column) { return column >= 0; });
+}
+
 Columns FindColumns(const CsvReader& table, const Names& names, const std::string& robot) {
   const std::vector<std::string> next_q = Prefixed(names.q), next_v = Prefixed(names.v);
   std::vector<std::string> known;
-  for (const auto* some : {&names.q, &names.v, &names.u, &next_q, &next_v}) {
+  for (const auto* some :
+       {&names.q, &names.v, &names.u, &names.target, &names.kp, &names.kd, &next_q, &next_v}) {
     known.insert(known.end(), some->begin(), some->end());
   }
   RefuseForeign(table, known, robot);
@@ -91,13 +114,19 @@ Columns FindColumns(const CsvReader& table, const Names& names, const std::strin
                   table.Find("terminated"),
                   table.Find("truncated"),
                   FindAll(table, names.q),
-                  FindAll(table, names.v),
-                  FindAll(table, names.u),
+                  {},
+                  FindAny(table, names.u),
+                  FindAny(table, names.target),
+                  FindAny(table, names.kp),
+                  FindAny(table, names.kd),
                   {},
                   {}};
-  const auto is_there = [&](const std::string& name) { return table.Find(name) >= 0; };
-  if (std::any_of(next_q.begin(), next_q.end(), is_there) ||
-      std::any_of(next_v.begin(), next_v.end(), is_there)) {
+  for (size_t i = 0; i < columns.u.size(); ++i) {
+    if (columns.u[i] < 0 && columns.target[i] < 0) FindAll(table, {names.u[i]});  // says what lacks
+  }
+  const bool has_next = HasAny(table, next_q) || HasAny(table, next_v);
+  if (has_next || HasAny(table, names.v)) columns.v = FindAll(table, names.v);
+  if (has_next) {
     columns.next_q = FindAll(table, next_q);
     columns.next_v = FindAll(table, next_v);
   }
@@ -118,6 +147,14 @@ Eigen::VectorXd Numbers(const CsvReader& table, const std::vector<int>& columns)
   std::transform(columns.begin(), columns.end(), numbers.begin(),
                  [&](int column) { return Number(table, column); });
   return numbers;
+}
+
+// A joint with a target only has no effort besides.
+Eigen::VectorXd Actions(const CsvReader& table, const std::vector<int>& columns) {
+  Eigen::VectorXd actions(columns.size());
+  std::transform(columns.begin(), columns.end(), actions.begin(),
+                 [&](int column) { return column < 0 ? 0 : Number(table, column); });
+  return actions;
 }
 
 bool Flag(const CsvReader& table, int column) {
@@ -168,20 +205,23 @@ std::string Normalise(const ConfigurationSpace& space, const std::vector<MotionR
   return fault.empty() ? fault : "next_q " + fault;
 }
 
-std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns, Efforts& efforts,
-                                const ConfigurationSpace& space) {
+std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns,
+                                const RobotDescription& robot, Efforts& efforts) {
+  const ConfigurationSpace space(robot);
+  const DriveTargets targets(table, robot, columns.target, columns.kp, columns.kd);
+  const Eigen::VectorXd no_velocity = Eigen::VectorXd::Constant(space.num_velocities(), kNaN);
   std::vector<MotionRow> rows;
   while (table.Next()) {
     MotionRow row{Number(table, columns.t, kLatest),
                   Flag(table, columns.terminated) || Flag(table, columns.truncated),
-                  efforts(Numbers(table, columns.u)),
+                  efforts(Actions(table, columns.u)) + targets.Effort(),
                   {}};
     if (std::isnan(row.t)) table.Fail("t must be known");
     if (!rows.empty() && !rows.back().ends && rows.back().t == row.t) {
       table.Fail(fmt::format("t is {}, as in the row before", row.t));
     }
     row.transition.q = Numbers(table, columns.q);
-    row.transition.v = Numbers(table, columns.v);
+    row.transition.v = columns.has_velocities() ? Numbers(table, columns.v) : no_velocity;
     if (columns.has_next()) {
       row.transition.next_q = Numbers(table, columns.next_q);
       row.transition.next_v = Numbers(table, columns.next_v);
@@ -189,6 +229,7 @@ std::vector<MotionRow> ReadRows(CsvReader& table, const Columns& columns, Effort
     if (const std::string fault = Normalise(space, rows, &row); !fault.empty()) table.Fail(fault);
     rows.push_back(std::move(row));
   }
+  if (!columns.has_velocities()) DifferencePositions(space, robot.task.period, &rows);
   return rows;
 }
 
@@ -245,8 +286,7 @@ MotionTable ReadMotionTable(const std::string& file, const RobotDescription& rob
   const Names names(robot);
   const Columns columns = FindColumns(table, names, robot.name);
   Efforts efforts(robot);
-  MotionTable motion{
-      ReadRows(table, columns, efforts, ConfigurationSpace(robot)), columns.has_next(), {}};
+  MotionTable motion{ReadRows(table, columns, robot, efforts), columns.has_next(), {}};
   motion.warnings = Warnings(motion.rows, names, efforts.clipped());
   return motion;
 }

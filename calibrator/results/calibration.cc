@@ -148,8 +148,9 @@ class Calibration {
         split = {rollouts_, {}};
       }
     }
-    findings_.holdout =
-        Judge(discrepancy, split, robot_.ToPhysical(mean), robot_.ToPhysical(findings_.prior.mean));
+    findings_.holdout = Judge(discrepancy, split, robot_.ToPhysical(mean),
+                              robot_.ToPhysical(findings_.prior.mean), options_.replay);
+    if (options_.replay) findings_.diagnostic_steps += 2 * findings_.holdout.held_out;
     for (const HorizonError& error : findings_.holdout.errors)
       findings_.diagnostic_steps += 2 * error.windows * error.horizon;
     if (!informed())

@@ -19,14 +19,16 @@ namespace {
 /// The settings of robot.toml that matter here.
 struct Toml {
   std::string urdf;                // path
+  std::vector<std::string> fixed;  // joints
   std::set<std::string> dynamics;  // paths of what is in [joint.dynamics]
 };
 
 Toml ReadToml(const RobotDescription& robot) {
   Config root = Config::Load(robot.file);
   Toml toml;
-  toml.urdf = (std::filesystem::path(robot.file).parent_path() / root.Table("robot").String("urdf"))
-                  .string();
+  Config header = root.Table("robot");
+  toml.urdf = (std::filesystem::path(robot.file).parent_path() / header.String("urdf")).string();
+  toml.fixed = header.Strings("fixed", {{}});
   for (Config& joint : root.Tables("joint")) {
     const std::string name = joint.String("name");
     const Config dynamics = joint.Table("dynamics", false);
@@ -157,7 +159,7 @@ std::string IdentifiedUrdf(const RobotDescription& robot, const Eigen::VectorXd&
     throw ConfigError(robot.file + ": it or its URDF has changed since the robot was read");
   }
   const Toml toml = ReadToml(robot);
-  const UrdfModel file = LoadUrdf(toml.urdf);
+  const UrdfModel file = LoadUrdf(toml.urdf, toml.fixed);
   const std::vector<Value> values = AllValues(robot, mean, sd, Placement(toml, file));
   UrdfNumbers writer(ReadFile(toml.urdf), file, now);
   for (size_t i = 1; i < file.links.size(); ++i) writer.WriteLink(i, StretchOf(file, i, values));

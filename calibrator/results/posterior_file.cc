@@ -112,17 +112,21 @@ json ToJson(const Identifiability& found, const Eigen::VectorXd& cramer_rao,
 }
 
 json ToJson(const Holdout& holdout) {
-  return {{"words", holdout.summary},
-          {"better", holdout.better},
-          {"fitted", holdout.fitted},
-          {"held_out", holdout.held_out},
-          {"errors", List(holdout.errors, [](const HorizonError& e) {
-             return json{{"horizon", e.horizon},
-                         {"windows", e.windows},
-                         {"posterior", e.posterior},
-                         {"prior", e.prior},
-                         {"corrected", e.corrected}};
-           })}};
+  json found = {{"words", holdout.summary},
+                {"better", holdout.better},
+                {"fitted", holdout.fitted},
+                {"held_out", holdout.held_out},
+                {"errors", List(holdout.errors, [](const HorizonError& e) {
+                   return json{{"horizon", e.horizon},
+                               {"windows", e.windows},
+                               {"posterior", e.posterior},
+                               {"prior", e.prior},
+                               {"corrected", e.corrected}};
+                 })}};
+  if (const Replay& replay = holdout.replay; replay.seconds > 0)
+    found["replay"] = {
+        {"posterior", replay.posterior}, {"prior", replay.prior}, {"seconds", replay.seconds}};
+  return found;
 }
 
 json ToJson(const Agreement& agreement) {

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <stdexcept>
 #include <utility>
 
 #include "common/config.h"
 #include "common/decompositions.h"
+#include "common/nearest_name.h"
 #include "common/special_numbers.h"
 #include "robot/urdf/elements.h"
 
@@ -19,9 +21,10 @@ using Pose = UrdfElements::Pose;
 
 class ModelReader {
  public:
-  explicit ModelReader(const std::string& file)
+  ModelReader(const std::string& file, const std::vector<std::string>& fixed)
       : elements_(ReadUrdfElements(ReadFile(file), file)) {
     model_.file = file;
+    for (const std::string& name : fixed) Fix(name);
   }
 
   UrdfModel Read() {
@@ -34,6 +37,21 @@ class ModelReader {
   }
 
  private:
+  void Fix(const std::string& name) {
+    const auto joint = elements_.joints.find(name);
+    if (joint != elements_.joints.end() && joint->second.type != "fixed") {
+      joint->second.type = "fixed";
+      return;
+    }
+    std::vector<std::string> moving;
+    for (const auto& [other, element] : elements_.joints) {
+      if (element.type != "fixed") moving.push_back(other);
+    }
+    throw std::invalid_argument(
+        fmt::format("\"{}\" is not a moving joint of the URDF{}", name,
+                    moving.empty() ? "" : "; did you mean " + NearestName(name, moving) + "?"));
+  }
+
   void AddLink(const std::string& name, int line) {
     model_.links.push_back({name});
     model_.link_lines.push_back(line);
@@ -203,6 +221,8 @@ void UrdfModel::Fail(int line, const std::string& what) const {
   throw ConfigError(fmt::format("{}:{}: {}", file, line, what));
 }
 
-UrdfModel LoadUrdf(const std::string& file) { return ModelReader(file).Read(); }
+UrdfModel LoadUrdf(const std::string& file, const std::vector<std::string>& fixed) {
+  return ModelReader(file, fixed).Read();
+}
 
 }  // namespace plumb

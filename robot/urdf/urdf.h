@@ -39,6 +39,8 @@ struct UrdfModel {
 /// Does not know motors: effort limits may be 0, and links may have no mass.
 /// @throws ConfigError "file:line: ..." for anything missing, unsupported or impossible (an inertia
 /// no body can have, a cycle of joints, a joint without limits). Thread-safe but for the file.
-UrdfModel LoadUrdf(const std::string& file);
+/// @param fixed names of moving joints that hold still at zero, as fixed ones do.
+/// @throws std::invalid_argument if one of them is no moving joint of the file, naming the nearest.
+UrdfModel LoadUrdf(const std::string& file, const std::vector<std::string>& fixed = {});
 
 }  // namespace plumb

@@ -28,6 +28,7 @@ class Stepper {
       : topology_(topology),
         settings_(settings),
         springs_(terms.Has(&JointDynamics::stiffness)),
+        loops_(terms.Has(&JointDynamics::kp) || terms.Has(&JointDynamics::kd)),
         speed_limits_(terms.Has(&JointDynamics::no_load_speed)),
         gears_lose_(terms.Has(&JointDynamics::gear_efficiency)),
         rubs_(terms.Has(&JointDynamics::friction) || gears_lose_),
@@ -157,7 +158,7 @@ class Stepper {
 
   const Topology& topology_;
   SimulationSettings settings_;
-  bool springs_, speed_limits_, gears_lose_, rubs_;  // whether any joint may have them
+  bool springs_, loops_, speed_limits_, gears_lose_, rubs_;  // whether any joint may have them
   bool leapfrog_;
   size_t n_;
   Tree<Real> tree_;
@@ -186,6 +187,22 @@ class Stepper {
     return Clamp(effort, Real(-backwards), forwards);
   }
 
+  // DriveEffort at the substep's beginning. Where the motor can make it, the loop's springing and
+  // damping go on to its end as a spring's do; at the effort limit nothing of them is left.
+  Real CloseLoop(const Real& h, const Topology::Joint& joint, const Real& effort) {
+    const auto i = static_cast<size_t>(joint.velocity);
+    const auto& axis = physics.axes[i];
+    const Real asked =
+        effort + axis.kp * (axis.rest - q[static_cast<size_t>(joint.position)]) - axis.kd * v[i];
+    const Truth follows = Abs(asked) < joint.effort_limit;
+    const Real spring = follows ? Real(axis.motor_gain * axis.kp) : Real{},
+               damper = follows ? Real(axis.motor_gain * axis.kd) : Real{};
+    smooth_[i * n_ + i] += leapfrog_ ? Real(0.25 * h * h * spring + 0.5 * h * damper)
+                                     : Real(h * (h * spring + damper));
+    if (!leapfrog_) drive_[i] -= h * spring * v[i];
+    return Clamp(asked, Real{} - joint.effort_limit, Real{} + joint.effort_limit);
+  }
+
   // An effort f that drives arrives as e f, one that brakes as f (efficiency that depends on the
   // direction: Wang, Kim, ICRA 2015). That is f - l with Coulomb friction of |l| against the
   // motion, l = (1 - e)/2 f: so the jump where the motion turns is settled with friction,
@@ -206,7 +223,7 @@ class Stepper {
       smooth_[i * n_ + i] += axis.armature + share * h * axis.damping;
       if (rubs_) friction_[i] = axis.friction;
     }
-    if (speed_limits_ || gears_lose_ || springs_) AssembleJoints(h, effort);
+    if (loops_ || speed_limits_ || gears_lose_ || springs_) AssembleJoints(h, effort);
   }
 
   void AssembleJoints(const Real& h, const Real* effort) {
@@ -214,12 +231,13 @@ class Stepper {
       if (joint.type == JointDescription::Type::kSpherical) continue;
       const auto i = static_cast<size_t>(joint.velocity);
       const auto& axis = physics.axes[i];
-      if (speed_limits_ && joint.effort_limit > 0) {
-        drive_[i] += axis.motor_gain * (Slowed(i, effort[i], v[i], joint.effort_limit) - effort[i]);
+      Real acting = effort[i];
+      if (joint.effort_limit > 0) {
+        if (loops_) acting = CloseLoop(h, joint, acting);
+        if (speed_limits_) acting = Slowed(i, acting, v[i], joint.effort_limit);
+        if (loops_ || speed_limits_) drive_[i] += axis.motor_gain * (acting - effort[i]);
       }
       if (gears_lose_) {
-        const bool slows = speed_limits_ && joint.effort_limit > 0;
-        const Real acting = slows ? Slowed(i, effort[i], v[i], joint.effort_limit) : effort[i];
         const Real loss = GearLoss(i, axis.motor_gain * acting);
         drive_[i] -= loss;
         friction_[i] += Abs(loss);

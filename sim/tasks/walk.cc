@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "robot/contact_points.h"
+#include "robot/drive_effort.h"
 #include "robot/kinematics.h"
 
 namespace plumb {
@@ -79,13 +80,11 @@ WalkTask::WalkTask(const RobotDescription& description)
         description.name + "' has others");
   }
   const auto driven = static_cast<Eigen::Index>(action_size());
-  rest_.resize(driven), stiffness_.resize(driven), damping_.resize(driven);
+  rest_.resize(driven), drives_.reserve(static_cast<size_t>(driven));
   for (Eigen::Index i = 0; i < driven; ++i) {
-    const JointDynamics& dynamics =
-        description.joints[static_cast<size_t>(kBaseJoints + i)].dynamics;
-    rest_[i] = dynamics.rest;
-    stiffness_[i] = dynamics.stiffness;
-    damping_[i] = dynamics.damping;
+    const JointDescription& joint = description.joints[static_cast<size_t>(kBaseJoints + i)];
+    rest_[i] = joint.dynamics.rest;
+    drives_.push_back({joint.dynamics, joint.effort_limit});
   }
   Eigen::VectorXd q(description.num_positions());
   q << 0, 0, 0, 1, 0, 0, 0, rest_;
@@ -119,9 +118,13 @@ double WalkTask::Reward(const State&, const State& v, const State& effort, const
   const auto angle = next_q.tail(rest_.size()), speed = next_v.tail(rest_.size());
   const double off = (velocity.head<2>() - command_.head<2>()).squaredNorm();
   const double off_turn = rate.z() - command_.z();
-  const double torques = (effort.tail(rest_.size()) + stiffness_.cwiseProduct(rest_ - angle) -
-                          damping_.cwiseProduct(speed))
-                             .squaredNorm();
+  double torques = 0;
+  for (Eigen::Index i = 0; i < rest_.size(); ++i) {
+    const auto& [dynamics, limit] = drives_[static_cast<size_t>(i)];
+    const double torque =
+        DriveEffort(dynamics, limit, effort.tail(rest_.size())[i], angle[i], speed[i]);
+    torques += torque * torque;
+  }
   const double accelerations = (speed - v.tail(rest_.size())).squaredNorm() / (period_ * period_);
   return std::exp(-off / kTracking) + 0.5 * std::exp(-off_turn * off_turn / kTracking) -
          2 * velocity.z() * velocity.z() - 0.05 * rate.head<2>().squaredNorm() -

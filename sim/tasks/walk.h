@@ -17,8 +17,7 @@ namespace plumb {
 ///                  exp(-|e_xy|^2 / 0.25) + 0.5 exp(-e_turn^2 / 0.25)
 ///                  - 2 u_z^2 - 0.05 (w_x^2 + w_y^2) - 5 (g_x^2 + g_y^2)
 ///                  - 2e-4 sum torque^2 - 2.5e-7 sum acceleration^2 - 0.1 mean (angle - rest)^2
-///                torque what the drive makes: effort + stiffness (rest - angle) - damping speed,
-///                with the joint's own as the drive's
+///                torque what the drive makes (DriveEffort)
 ///   start        at rest, legs at their joints' rest, the feet on the ground; angles and speeds
 ///                of the joints +- 0.1, heading any
 /// Terminates with a fall: the trunk leans by more than 60 degrees or is lower than half of where
@@ -39,8 +38,13 @@ class WalkTask : public Task {
  private:
   Eigen::Vector3d command_;
   double period_;
-  double height_;  ///< [m] of the trunk, its feet on the ground and its joints at rest
-  Eigen::VectorXd rest_, stiffness_, damping_;  ///< of the driven joints
+  double height_;         ///< [m] of the trunk, its feet on the ground and its joints at rest
+  Eigen::VectorXd rest_;  ///< of the driven joints
+  struct Drive {
+    JointDynamics dynamics;
+    double effort_limit;
+  };
+  std::vector<Drive> drives_;  ///< likewise
 };
 
 }  // namespace plumb

@@ -71,6 +71,11 @@ class MujocoBackend : public PhysicsBackend {
       if (joint.num_positions() == 4) q_[static_cast<Eigen::Index>(q_address_.size())] = 1;
       gain_.segment(static_cast<Eigen::Index>(v_address_.size()), joint.num_velocities())
           .setConstant(joint.dynamics.motor_gain);
+      if (!joint.passive && (joint.dynamics.kp > 0 || joint.dynamics.kd > 0)) {
+        const auto velocity = static_cast<Eigen::Index>(v_address_.size());
+        loops_.push_back({mj_name2id(model_.get(), mjOBJ_ACTUATOR, joint.name.c_str()), velocity});
+        gain_[velocity] = 0;  // its actuator makes all of it
+      }
       for (int k = 0; k < joint.num_positions(); ++k)
         q_address_.push_back(model_->jnt_qposadr[theirs] + k);
       for (int k = 0; k < joint.num_velocities(); ++k)
@@ -92,6 +97,7 @@ class MujocoBackend : public PhysicsBackend {
     model_->opt.timestep = duration / count;
     for (Eigen::Index i = 0; i < effort.size(); ++i)
       data_->qfrc_applied[AddressOfV(i)] = gain_[i] * effort[i];
+    for (const Loop& loop : loops_) data_->ctrl[loop.actuator] = effort[loop.velocity];
     for (int i = 0; i < count && !GivenUp(); ++i) mj_step(model_.get(), data_.get());
     const auto q = Eigen::VectorXd::Map(data_->qpos, q_.size()),
                v = Eigen::VectorXd::Map(data_->qvel, v_.size());
@@ -128,6 +134,11 @@ class MujocoBackend : public PhysicsBackend {
   // Of our positions and velocities in MuJoCo's, which are depth first.
   std::vector<int> q_address_, v_address_;
   Eigen::VectorXd q_, v_, gain_;
+  struct Loop {
+    int actuator;
+    Eigen::Index velocity;
+  };
+  std::vector<Loop> loops_;  // of drives that run one of their own
 };
 
 }  // namespace

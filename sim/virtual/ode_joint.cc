@@ -4,6 +4,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "robot/drive_effort.h"
+
 namespace plumb {
 namespace {
 
@@ -30,6 +32,7 @@ OdeJoint::OdeJoint(const JointDescription& joint, dWorldID world, const Pose& ze
     : slides_(joint.type == JointDescription::Type::kPrismatic),
       stops_(stops && std::isfinite(joint.upper)),
       dynamics_(joint.dynamics),
+      effort_limit_(joint.effort_limit),
       link_(link),
       parent_(parent),
       guide_(slides_ ? dJointCreateSlider(world, nullptr) : dJointCreateHinge(world, nullptr)) {
@@ -59,7 +62,7 @@ OdeJoint::OdeJoint(const JointDescription& joint, dWorldID world, const Pose& ze
 }
 
 void OdeJoint::Prepare(double effort, double q, double v, double step) const {
-  const double acting = dynamics_.motor_gain * effort;
+  const double acting = dynamics_.motor_gain * DriveEffort(dynamics_, effort_limit_, effort, q, v);
   slides_ ? dJointAddSliderForce(guide_, acting) : dJointAddHingeTorque(guide_, acting);
   if (stops_) {
     const OdeSoftness softness(kOdeStop, step);

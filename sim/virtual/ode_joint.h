@@ -42,6 +42,7 @@ class OdeJoint {
 
   bool slides_, stops_;
   JointDynamics dynamics_;
+  double effort_limit_;
   dBodyID link_, parent_;
   dJointID guide_;               // hinge or slider, and its stops
   dJointID yielding_ = nullptr;  // armature, damping and spring, if there are any

@@ -17,7 +17,8 @@ void RequireKnownJoints(const RobotDescription& robot) {
     const std::string of = " of joint '" + joint.name + "'";
     const JointParameterKind* unknown =
         FirstNotAmong({&JointDynamics::armature, &JointDynamics::damping, &JointDynamics::friction,
-                       &JointDynamics::stiffness, &JointDynamics::rest, &JointDynamics::motor_gain},
+                       &JointDynamics::stiffness, &JointDynamics::rest, &JointDynamics::kp,
+                       &JointDynamics::kd, &JointDynamics::motor_gain},
                       joint.dynamics);
     if (unknown) throw std::invalid_argument(unknown->noun + of);
   }

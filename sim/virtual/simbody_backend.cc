@@ -9,6 +9,7 @@
 
 #include "common/decompositions.h"
 #include "robot/contact_points.h"
+#include "robot/drive_effort.h"
 #include "sim/virtual/simbody_tree.h"
 
 namespace plumb {
@@ -67,8 +68,10 @@ class SimbodyBackend::Impl {
   VectorXd Acceleration(const VectorXd& q, const VectorXd& v, const VectorXd& effort) const {
     Write(q, v);
     for (int i = 0; i < applied_.size(); ++i) {
-      const JointDynamics& d = joints_[static_cast<size_t>(i)].dynamics;
-      applied_[i] = d.motor_gain * effort[i] - d.damping * v[i] - d.stiffness * (q[i] - d.rest) -
+      const JointDescription& joint = joints_[static_cast<size_t>(i)];
+      const JointDynamics& d = joint.dynamics;
+      applied_[i] = d.motor_gain * DriveEffort(d, joint.effort_limit, effort[i], q[i], v[i]) -
+                    d.damping * v[i] - d.stiffness * (q[i] - d.rest) -
                     d.friction * v[i] / std::max(std::abs(v[i]), kStickSpeed);
     }
     tree_.efforts.setAllMobilityForces(state_, applied_);

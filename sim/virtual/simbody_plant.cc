@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "robot/drive_effort.h"
 #include "sim/virtual/simbody_tree.h"
 
 namespace plumb {
@@ -144,8 +145,9 @@ class SimbodyPlant::Impl {
       const JointDynamics& d = joint.dynamics;
       if (joint.type != Type::kSpherical) {
         const double speed = v[velocity];
-        all[velocity] = d.motor_gain * effort[velocity] - d.damping * speed -
-                        d.stiffness * (q[position] - d.rest) -
+        all[velocity] = d.motor_gain * DriveEffort(d, joint.effort_limit, effort[velocity],
+                                                   q[position], speed) -
+                        d.damping * speed - d.stiffness * (q[position] - d.rest) -
                         d.friction * speed / std::max(std::abs(speed), kStickSpeed);
       }
       position += joint.num_positions();
@@ -175,10 +177,10 @@ std::string SimbodyPlant::Lacks(const RobotDescription& robot) {
     const std::string of = " of joint '" + joint.name + "'";
     if (joint.type == Type::kSpherical) return "the free rotation" + of;
     if (robot.simulation.stop && std::isfinite(joint.upper)) return "the stops" + of;
-    const JointParameterKind* lacking =
-        FirstNotAmong({&JointDynamics::damping, &JointDynamics::friction, &JointDynamics::stiffness,
-                       &JointDynamics::rest, &JointDynamics::motor_gain},
-                      joint.dynamics);
+    const JointParameterKind* lacking = FirstNotAmong(
+        {&JointDynamics::damping, &JointDynamics::friction, &JointDynamics::stiffness,
+         &JointDynamics::rest, &JointDynamics::kp, &JointDynamics::kd, &JointDynamics::motor_gain},
+        joint.dynamics);
     if (lacking) return lacking->noun + of;
   }
   return "";

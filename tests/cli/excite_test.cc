@@ -52,6 +52,27 @@ TEST_CASE(
   CHECK(Read(folder / "a.csv") != Read(folder / "b.csv"));
 }
 
+TEST_CASE("excite: one joint after the other moves if it is to be so") {
+  const TemporaryFolder folder;
+  const Outcome outcome = Excite(
+      "double_pendulum", "--one-by-one --candidates 6 --seconds 4 --output " + folder / "a.csv");
+  INFO(outcome.text);
+  REQUIRE(outcome.status == 0);
+  std::istringstream csv(Read(folder / "a.csv"));
+  std::string line;
+  std::getline(csv, line);
+  CHECK(line == "t,u/shoulder,u/elbow");
+  double moved[2]{};
+  while (std::getline(csv, line)) {
+    double t, u[2];
+    REQUIRE(std::sscanf(line.c_str(), "%lf,%lf,%lf", &t, &u[0], &u[1]) == 3);
+    CHECK((t < 2 ? u[1] : u[0]) == 0);
+    for (int i = 0; i < 2; ++i) moved[i] = std::max(moved[i], std::abs(u[i]));
+  }
+  CHECK(moved[0] > 0.01);
+  CHECK(moved[1] > 0.01);
+}
+
 TEST_CASE("excite: of the falling hopper only what comes before the fall, in gym's units") {
   const TemporaryFolder folder;
   const Outcome outcome =

@@ -23,6 +23,41 @@ namespace plumb {
 
 namespace fs = std::filesystem;
 
+TEST_CASE("sim: a table of efforts is played, row by row") {
+  const TemporaryFolder folder;
+  const auto write = [&](const std::string& text) {
+    std::ofstream(folder / "efforts.csv") << text;
+    return folder / "efforts.csv";
+  };
+  std::string csv = "t,u/pivot,q/pivot\n";
+  for (int k = 0; k < 30; ++k) csv += fmt::format("{},{},0\n", 0.05 * k, 0.0625 * (k - 15));
+  const Outcome good = Sim(Robot("pendulum") + " --episodes 2 --efforts " + write(csv) + " --csv " +
+                           folder / "a.csv");
+  INFO(good.text);
+  REQUIRE(good.status == 0);
+  CHECK_THAT(good.text, Catch::Contains("the efforts of " + folder / "efforts.csv"));
+  const SimTable table = ReadSimTable(folder / "a.csv");
+  REQUIRE(table.rows.size() == 60);
+  for (size_t k = 0; k < 60; ++k)
+    CHECK(table.at(k, "u/pivot") == 0.0625 * (static_cast<double>(k % 30) - 15));
+  CHECK(table.at(29, "truncated") == 1);
+
+  const auto refused = [&](const std::string& text, const std::string& why) {
+    const Outcome outcome = Sim(Robot("pendulum") + " --efforts " + write(text));
+    INFO(outcome.text);
+    CHECK(outcome.status == 1);
+    CHECK_THAT(outcome.text, Catch::Contains("efforts.csv:" + why));
+  };
+  refused("t,u/pivott\n0,0\n", "1: has no column 'u/pivot'; the nearest is 'u/pivott'");
+  refused("t,u/pivot\n0,0\n0.05,nan\n", "3: u/pivot is nan: beyond the joint's effort limit");
+  refused("t,u/pivot\n0,0\n0.05,2.1\n", "3: u/pivot is 2.1: beyond");
+  refused("t,u/pivot\n0,0\n0.06,1\n", "3: t is 0.06, 0.06 s after the row before, but");
+  refused("t,u/pivot\n0,0\n,1\n", "3: t must be known");
+  refused("t,u/pivot\n", " has a head but no rows");
+  CHECK(Sim(Robot("pendulum") + " --efforts none.csv").status == 1);
+  CHECK(Sim(Robot("pendulum") + " --random --efforts " + folder / "efforts.csv").status != 0);
+}
+
 TEST_CASE("sim: a trainer's policy, and whatever is not one") {
   const TemporaryFolder folder;
   GaussianPolicy policy(PolicyShape{3, {4}, 1});

@@ -118,6 +118,41 @@ TEST_CASE(
   config.Finish();
 }
 
+TEST_CASE("a file is without what it says of the file that it extends") {
+  const ConfigFolder folder;
+  folder.Write("base.toml",
+               "a = 1\n[t]\nx = 1\ny = 2\n[t.deep]\n\"mass/leg\" = 3\nw = 4\n"
+               "[[j]]\nname = \"hip\"\n[[j]]\nname = \"mass/knee\"\n[[k]]\nname = \"one\"\n");
+  folder.Write("own.toml",
+               "extends = \"base.toml\"\nwithout = [\"a\", \"t/x\", \"t/deep/mass/leg\", "
+               "\"j/mass/knee\", \"k/one\"]\n[[j]]\nname = \"mass/knee\"\nm = 7\n");
+  Config config = Config::Load(folder / "own.toml");
+  CHECK_FALSE(config.Has("a"));
+  CHECK_FALSE(config.Has("k"));
+  CHECK_FALSE(config.Has("without"));
+  Config t = config.Table("t");
+  CHECK(t.Keys() == std::vector<std::string>{"y", "deep"});
+  CHECK(t.Table("deep").Keys() == std::vector<std::string>{"w"});
+  std::vector<Config> joints = config.Tables("j");
+  REQUIRE(joints.size() == 2);
+  CHECK(joints[0].String("name") == "hip");
+  CHECK(joints[1].Number("m") == 7);  // what it says itself it has
+
+  const auto refused = [&](const std::string& without, const std::string& why) {
+    folder.Write("bad.toml", "extends = \"base.toml\"\nwithout = " + without + "\n");
+    CHECK_THROWS_WITH(Config::Load(folder / "bad.toml"),
+                      Catch::Contains((folder / "bad.toml") + why));
+  };
+  refused("3", ":2:11: without is not an array of texts");
+  refused("[\"a\", 3]", ":2:17: without is not an array of texts");
+  for (const char* none : {"b", "t/z", "t/deep/v", "j/toe", "a/b", ""}) {
+    refused("[\"" + std::string(none) + "\"]",
+            ":2:12: without \"" + std::string(none) + "\": the file that is extended has none");
+  }
+  CHECK_THROWS_WITH(Read("without = []\n").Finish(),
+                    Catch::Contains("without is not a known key"));
+}
+
 TEST_CASE("mistakes in files that extend each other are named in the file where they are") {
   const ConfigFolder folder;
   folder.Write("base.toml", "a = \"x\"\n[t]\nb = 1\n[[j]]\nname = \"hip\"\n");

@@ -68,6 +68,30 @@ class Surroundings {
 
 using S = controller_status_t;
 
+TEST_CASE_METHOD(Surroundings, "a table of efforts is played once, without any policy") {
+  Eigen::MatrixXf actions(7, 1);
+  actions << 0.5, -1, 0.25, 0, 1, -0.5, 0.125;
+  controller.Play(actions);
+  CHECK_NOTHROW(controller.OnPolicy(Policy(1)));  // nobody asks for one
+  Driver(driver_state);
+  std::vector<double> efforts;
+  for (int i = 0; i < 1000 && controller.phase() != S::COMPLETE; ++i) {
+    const auto command = Step();
+    if (command && command->step >= 0) efforts.push_back(command->effort[0]);
+  }
+  REQUIRE(controller.phase() == S::COMPLETE);
+  REQUIRE(efforts.size() == 7);
+  for (Eigen::Index i = 0; i < 7; ++i)
+    CHECK(efforts[static_cast<size_t>(i)] == 2. * static_cast<double>(actions(i, 0)));  // [Nm]
+  CHECK(controller.status().purpose == policy_t::CALIBRATE);
+  CHECK(controller.status().num_episodes == 1);
+  CHECK(controller.status().steps == std::vector<int>{7});
+  for (int i = 0; i < 100; ++i) {  // and not again
+    const auto command = Step();
+    if (command) CHECK(command->effort[0] == 0);
+  }
+}
+
 TEST_CASE_METHOD(Surroundings, "it is silent until the driver is armed, then commands zero") {
   for (int i = 0; i < 50; ++i) {
     driver_state = driver_status_t::IDLE;

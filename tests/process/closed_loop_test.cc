@@ -25,6 +25,36 @@ std::string Finish(Stage& stage, Child& launch) {
   return launch.Tail(100);
 }
 
+TEST_CASE("an excitation is played on the robot and calibrated with, without any policy") {
+  Stage stage(122, "pendulum", Stage::Time::kReal);
+  const fs::path table = stage.folder / "efforts.csv", summary_file = stage.folder / "summary.json";
+  const RobotDescription robot = LoadRobot(stage.robot_folder);
+  std::string csv = "t,u/pivot\n";
+  for (int k = 0; k < 100; ++k)
+    csv += fmt::format("{},{}\n", k * robot.task.period, 1.8 * std::sin(0.3 * k));
+  std::ofstream(table) << csv;
+  Child launch = Launch(stage, {"--efforts", table, "--seed", "3", "--summary", summary_file});
+  const std::string said = Finish(stage, launch);
+  CHECK(Left(stage) == 0);
+  CHECK_FALSE(fs::exists(stage.folder / "run" / "plumb-trainer.log"));
+  const auto summary = nlohmann::json::parse(Read(summary_file));
+  REQUIRE(summary.at("iterations").size() == 1);
+  const auto& found = summary.at("iterations")[0];
+  CHECK(found.at("transitions") >= 90);
+  // What a pendulum's motion tells of is gravity / length.
+  const auto& combination = found.at("combinations")[0];
+  const double mean = combination.at("mean"), sd = combination.at("sd"),
+               hidden = combination.at("hidden");
+  CHECK(std::abs(mean / hidden - 1) < 0.02);
+  CHECK(sd < 0.05 * mean);
+
+  std::ofstream(table) << "t,u/pivot\n0,3\n";  // more than the motor has
+  Child refused = Launch(stage, {"--efforts", table}, "refused");
+  stage.WaitUntil([&] { return !refused.running(); }, kLong);
+  CHECK(refused.failed());
+  CHECK_THAT(refused.Tail(20), Contains("efforts.csv:2: u/pivot is 3: beyond the joint's effort"));
+}
+
 TEST_CASE("the loop closes, and its log gives the same distributions bit by bit") {
   Stage stage(30, "pendulum", Stage::Time::kReal);
   LearnLittle(stage);

@@ -57,6 +57,38 @@ TEST_CASE("impacts and coupling of the estimator are read and checked") {
   }
 }
 
+TEST_CASE("a joint that robot.toml holds must be one of the URDF's") {
+  const auto with = [](const std::string& fixed) {
+    return Edited("robot.toml", "urdf = ", "fixed = " + fixed + "\nurdf = ");
+  };
+  CHECK_THROWS_WITH(LoadRobot(with("[\"pivott\"]").path()),
+                    Contains("robot.toml:") && Contains("fixed = \"pivott\" is not a moving joint "
+                                                        "of the URDF; did you mean pivot?"));
+  CHECK_THROWS_WITH(LoadRobot(with("[\"pivot\"]").path()), Contains("has no moving joint"));
+  CHECK_THROWS_WITH(LoadRobot(with("3").path()), Contains("fixed is not an array of texts"));
+  CHECK_THROWS_WITH(LoadRobot(with("[3]").path()), Contains("fixed is not an array of texts"));
+  CHECK(LoadRobot(with("[]").path()).num_joints() == 1);
+}
+
+TEST_CASE("the hung quadruped is its legs alone") {
+  const fs::path folder = fs::path(kPendulum).parent_path() / "quadruped";
+  const RobotDescription whole = LoadRobot(folder), hung = LoadRobot(folder / "hung.toml");
+  CHECK(hung.num_joints() == 12);
+  CHECK(hung.num_positions() == 12);
+  CHECK(whole.num_positions() == 19);
+  REQUIRE(hung.parameters.size() == 48);
+  CHECK(hung.virtual_robot.hidden.size() == 48);
+  CHECK_FALSE(hung.simulation.contact);
+  for (size_t i = 0; i < 12; ++i) {
+    const JointDescription &own = hung.joints[i], &joint = whole.joints[i + 4];
+    CHECK(own.name == joint.name);
+    CHECK(own.dynamics.kp == 25);
+    CHECK(own.dynamics.rest == joint.dynamics.rest);
+    CHECK(hung.task.target[i] == joint.dynamics.rest);
+    CHECK(hung.links[i + 1].mass == whole.links[i + 5].mass);
+  }
+}
+
 TEST_CASE("the pendulum is read whole") {
   const RobotDescription robot = LoadRobot(kPendulum);
   CHECK(robot.name == "pendulum");

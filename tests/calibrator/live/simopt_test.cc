@@ -6,7 +6,9 @@
 #include <stdexcept>
 #include <vector>
 
+#include "common/special_numbers.h"
 #include "robot/parameter_distribution.h"
+#include "sim/simulator.h"
 #include "tests/calibrator/live/known_pendulum.h"
 #include "tests/calibrator/synthetic.h"
 
@@ -46,6 +48,28 @@ TEST_CASE(
   rollouts[0].transitions.erase(rollouts[0].transitions.begin() + 30);
   CHECK(std::isnan(discrepancy.PredictionError(wrong, rollouts, 31)(0)));
   CHECK(discrepancy.TrajectoryError(kTruth, rollouts)(0) < 1e-9);
+}
+
+TEST_CASE("a replay goes from each stretch's first state to its end, with what was applied") {
+  const RobotDescription robot = Pendulum();
+  Discrepancy discrepancy(robot);
+  std::vector<Rollout> rollouts{SyntheticRollout(robot, kTruth, 60, 0, 0, 1)};
+  CHECK(discrepancy.ReplayError(kTruth, rollouts)(0) < 1e-12);
+  auto& transitions = rollouts[0].transitions;
+  transitions.erase(transitions.begin() + 25);
+  transitions[40].next_q[0] = kNaN;
+  const Eigen::Vector3d wrong(10, 1, 1);
+  Simulator simulator(robot);
+  simulator.SetParameters(wrong);
+  double squares = 0;
+  for (size_t i = 0; i < transitions.size(); ++i) {
+    if (i == 0 || i == 25) simulator.SetState(transitions[i].q, transitions[i].v);
+    simulator.Step(transitions[i].efforts);
+    if (i != 40) squares += std::pow(simulator.q()[0] - transitions[i].next_q[0], 2);
+  }
+  CHECK(squares > 1e-3);
+  CHECK(discrepancy.ReplayError(wrong, rollouts)(0) == Approx(squares / 58));
+  CHECK(std::isnan(discrepancy.ReplayError(wrong, std::span<const Rollout>())(0)));
 }
 
 TEST_CASE(

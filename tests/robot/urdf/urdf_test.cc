@@ -23,6 +23,24 @@ UrdfModel LoadJoint(const std::string& type, const std::string& inside) {
               type + "'><parent link='base'/><child link='body'/>" + inside + "</joint></robot>");
 }
 
+TEST_CASE("joints that are held are no joints: what they carry belongs to their parents") {
+  const RobotFolder folder(kZooUrdf, "");
+  const UrdfModel free = LoadUrdf(folder.urdf()), held = LoadUrdf(folder.urdf(), {"free", "hip"});
+  std::vector<std::string> names;
+  for (const UrdfJoint& joint : held.joints) names.push_back(joint.name);
+  CHECK(names ==
+        std::vector<std::string>{"rail/x", "rail/y", "rail/angle", "spring", "disc"});
+  double mass = 0, all = 0;
+  for (const LinkDescription& link : held.links) mass += link.mass;
+  for (const LinkDescription& link : free.links) all += link.mass;
+  CHECK(mass == Approx(all));
+  CHECK(held.links[0].mass == Approx(free.links[0].mass + free.links[9].mass));  // the ball's
+  CHECK(held.links[3].mass == Approx(free.links[3].mass + free.links[4].mass));  // the thigh's
+  CHECK_THROWS_WITH(LoadUrdf(folder.urdf(), {"hop"}),
+                    "\"hop\" is not a moving joint of the URDF; did you mean hip?");
+  CHECK_THROWS_WITH(LoadUrdf(folder.urdf(), {"hip", "hip"}), Catch::Contains("\"hip\" is not"));
+}
+
 TEST_CASE("every kind of joint is read, depth first, in the file's order") {
   const UrdfModel zoo = Load(kZooUrdf);
   struct Expected {
