@@ -24,9 +24,9 @@ struct SimFlags {
   bool urdf = false;             ///< forget the uncertain parameters' prior means
 };
 
-/// `plumb sim`: rolls a policy, a table of efforts, random actions or no action out in the simulator, without messages
-/// or buses, and says how it went. @return exit status: 0, or 130 if it was interrupted; then it
-/// writes no files. Runs in one thread.
+/// `plumb sim`: rolls a policy, a table of efforts, random actions or no action out in the
+/// simulator, without messages or buses, and says how it went. @return exit status: 0, or 130 if it
+/// was interrupted; then it writes no files. Runs in one thread.
 /// @throws std::invalid_argument or std::runtime_error, one line for people: robot, policy, files.
 int Simulate(Process& process, const SimFlags& flags);
 

@@ -10,6 +10,7 @@
 #include "calibrator/diagnostics/witnesses.h"
 #include "calibrator/fit/curriculum.h"
 #include "calibrator/fit/one_step.h"
+#include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "common/decompositions.h"
 #include "robot/parameter_distribution.h"
@@ -29,7 +30,7 @@ class Test {
         physical_(robot_.ToPhysical(fit.posterior.mean)),
         candidates_(FindCandidates(robot_)),
         extended_(std::make_shared<Model>(WithCandidates(robot_, candidates_))),
-        errors_(extended_, fit.rollouts, 1, execution),
+        errors_(extended_, fit.rollouts, ShortestWindow(fit.rollouts), execution),
         step_(extended_, fit.rollouts, execution.threads) {
     errors_.set_noise_sd(fit.noise_sd);
     nominal_ = extended_->parameters().means();
@@ -39,7 +40,9 @@ class Test {
   ModelTest Run() {
     const FitResiduals residuals = OfAll();
     Misspecification all = FindMisspecification(Known(), residuals);
-    if (!all.alarm || errors_.starts_known()) return {all, Consider(residuals, all)};
+    // Of windows nobody has more than what all errors say.
+    if (!all.alarm || errors_.starts_known() || ShortestWindow(fit_.rollouts) > 1)
+      return {all, Consider(residuals, all)};
     Misspecification found = AskWitnesses();
     // Where nobody can tell, what all errors say may be so.
     Gaussian considered = Consider(residuals, found.judged ? found : all);
@@ -208,7 +211,8 @@ OneStepView ViewOneStep(const MethodInput& input, const MethodResult& result) {
   }
   const RobotDescription& robot = input.model->description();
   const Eigen::VectorXd mean = Moments(result.posterior).mean;
-  WindowErrors errors(input.model, input.rollouts, 1, input.options.execution);
+  WindowErrors errors(input.model, input.rollouts, ShortestWindow(input.rollouts),
+                      input.options.execution);
   LaplaceOptions curvature_only;
   curvature_only.max_iterations = 0;
   errors.Linearise(robot.ToPhysical(mean));

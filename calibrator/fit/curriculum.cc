@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/noise.h"
 #include "common/decompositions.h"
@@ -15,8 +16,8 @@
 namespace plumb {
 namespace {
 
-constexpr int64_t kSearchSteps = 40;  // transitions that are enough to find a mode
-constexpr double kSameMode = 4;       // [sd] between two answers that count as one
+constexpr int64_t kSearchWindows = 40;  // the shortest, that are enough to find a mode
+constexpr double kSameMode = 4;         // [sd] between two answers that count as one
 // [nat] by which another mode may explain the transitions worse
 constexpr double kWorthless = 12;
 constexpr int kNoiseRounds = 4;        // until the noise of beginnings and ends agrees
@@ -31,10 +32,11 @@ class Curriculum {
         robot_(model_->description()),
         prior_(PriorOf(robot_)),
         rollouts_(rollouts),
-        options_(options) {}
+        options_(options),
+        shortest_(ShortestWindow(rollouts)) {}
 
   CurriculumFit Run(const Eigen::VectorXd& start) {
-    WindowErrors one_step(model_, rollouts_, 1, options_.execution);
+    WindowErrors one_step(model_, rollouts_, shortest_, options_.execution);
     result_.noise_known = one_step.noise_known();
     result_.rows = one_step.rows();
     std::vector<Eigen::VectorXd> guesses = Search(FirstGuesses(start), one_step);
@@ -63,14 +65,15 @@ class Curriculum {
     result_.fit = std::move(modes[0]);
     result_.one_step = result_.fit;
     first_errors_ = Whitened(one_step, result_.fit).cwiseProduct(one_step.EndNoise());
-    Record(one_step, result_.fit, 1);
+    Record(one_step, result_.fit, shortest_);
     // Where one step leaves nothing to explain, more can teach nothing.
     const bool exact = (result_.fit.scale.array() <= Noise::kLeastScale).all();
     for (const int horizon : options_.horizons) {
       if (exact) break;
-      if (horizon > 1 && !Lengthen(horizon)) break;
+      if (horizon > shortest_ && !Lengthen(horizon)) break;
     }
-    if (result_.horizon > 1 || modes.size() > 1) {  // how the one-step errors are at the final mode
+    if (result_.horizon > shortest_ ||
+        modes.size() > 1) {  // how the one-step errors are at the final mode
       one_step.Linearise(robot_.ToPhysical(result_.fit.mode));
       const Eigen::VectorXd errors = ProblemOf(robot_, one_step).errors(result_.fit.mode);
       result_.one_step.errors = errors.array() / RowScale(one_step, result_.one_step).array();
@@ -94,7 +97,7 @@ class Curriculum {
   // Modes that the guesses lead to on a part of the transitions; the best explanation first.
   std::vector<Eigen::VectorXd> Search(const std::vector<Eigen::VectorXd>& guesses,
                                       const WindowErrors& all) {
-    const auto every = static_cast<int>(std::max<int64_t>(1, all.steps() / kSearchSteps));
+    const auto every = static_cast<int>(std::max<int64_t>(1, all.windows() / kSearchWindows));
     LaplaceOptions quick;
     quick.sandwich = quick.robust = quick.jacobian_at_end = false;
     quick.tolerance = 0.3;
@@ -102,7 +105,7 @@ class Curriculum {
     int impossible = 0;
     std::string last_error = "no first guess can be simulated";
     for (const Eigen::VectorXd& guess : guesses) {
-      WindowErrors part(model_, rollouts_, 1, options_.execution, every);
+      WindowErrors part(model_, rollouts_, shortest_, options_.execution, every);
       try {
         part.Linearise(robot_.ToPhysical(guess));
         found.push_back(FitLaplace(ProblemOf(robot_, part), guess, quick));
@@ -291,6 +294,7 @@ class Curriculum {
   Prior prior_;
   std::span<const Rollout> rollouts_;
   const CurriculumOptions& options_;
+  const int shortest_;  // window, in control steps: "one step"
   CurriculumFit result_;
   // of one step, root mean square of each entry of (q, v), physical units
   Eigen::VectorXd first_errors_;

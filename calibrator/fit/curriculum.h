@@ -55,10 +55,10 @@ struct CurriculumFit {
   std::vector<std::string> warnings;
 };
 
-/// Laplace's approximation from windows of one step, where the mode is found from anywhere, then of
-/// more and more steps, each stage from the mode of the one before: the accuracy of long windows
-/// with the convergence of short ones. Several first guesses are tried on a part of the
-/// transitions.
+/// Laplace's approximation from windows of one step (or ShortestWindow), where the mode is found
+/// from anywhere, then of more and more steps, each stage from the mode of the one before: the
+/// accuracy of long windows with the convergence of short ones. Several first guesses are tried on
+/// a part of the transitions.
 ///
 /// A stage whose errors are larger than the noise of the first one by 15 %, or whose mode lies 3.5
 /// standard deviations from the one before, says that the model is not the robot over so many

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/inference/importance.h"
 #include "common/decompositions.h"
@@ -85,7 +86,7 @@ GaussianMixture Modes(const CurriculumFit& curriculum) {
 
 MethodResult MixtureFrom(const MethodInput& input, MethodResult laplace) {
   const CurriculumFit& curriculum = *laplace.curriculum;
-  WindowErrors errors = WindowsOf(input, curriculum, 1);
+  WindowErrors errors = WindowsOf(input, curriculum, ShortestWindow(input.rollouts));
   const LeastSquares problem = ProblemOf(input.model->description(), errors);
   ImportanceOptions options;
   options.seed = input.options.seed;
@@ -171,6 +172,11 @@ std::vector<Method> LikelihoodMethods() {
        "likelihood",
        Mixture},
   };
+}
+
+bool KnowsLikelihood(const std::string& method) {
+  return std::ranges::any_of(LikelihoodMethods(),
+                             [&](const Method& known) { return known.name == method; });
 }
 
 }  // namespace plumb

@@ -14,6 +14,15 @@ size_t StretchLength(const Rollout& rollout, size_t first) {
   return end - first;
 }
 
+int ShortestWindow(std::span<const Rollout> rollouts) {
+  for (const Rollout& rollout : rollouts) {
+    for (const Transition& t : rollout.transitions) {
+      if ((t.v_sd.array() > 0 && t.next_v.array().isNaN()).any()) return kUnreadVelocityWindow;
+    }
+  }
+  return 1;
+}
+
 Window RecordedWindow(const Model& model, const Rollout& rollout, size_t first, size_t length) {
   const auto& t = rollout.transitions;
   Window window{t[first].q, t[first].v, {}};

@@ -19,6 +19,12 @@ namespace plumb {
 /// What has disturbed one of them is not simulated: it is a stretch of its own.
 size_t StretchLength(const Rollout& rollout, size_t first);
 
+/// The fewest control steps from which errors tell something of the simulator: one where states are
+/// read in full. Where nobody has read a velocity (ForgetVelocities), a window begins with one that
+/// its own positions have to tell, and only what they tell besides is about the simulator.
+int ShortestWindow(std::span<const Rollout> rollouts);
+inline constexpr int kUnreadVelocityWindow = 6;
+
 /// `length` recorded steps from transition `first` on: the state that it begins with, and the
 /// applied efforts. Where the model delays efforts, the efforts commanded before are part of it, as
 /// far back as there is no gap.

@@ -8,6 +8,7 @@
 
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
+#include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_draws.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/gap/disturbances.h"
@@ -23,12 +24,6 @@ constexpr uint32_t kDrawStream = 0x4761'7044;  // of random numbers; "GapD"
 double MeanExplained(const ResidualQuality& quality) {
   const Eigen::VectorXd explained = Explained(quality);
   return explained.size() == 0 ? 0 : explained.mean();
-}
-
-bool KnowsLikelihood(const std::string& name) {
-  const std::vector<Method> methods = LikelihoodMethods();
-  return std::any_of(methods.begin(), methods.end(),
-                     [&](const Method& method) { return method.name == name; });
 }
 
 // Whether a residual makes errors much smaller, and makes them smaller by an amount that counts.
@@ -60,6 +55,7 @@ std::string Obstacle(const MethodInput& input) {
   if (!KnowsLikelihood(input.options.method))
     return fmt::format("{} does not know the likelihood of steps, as auto does",
                        input.options.method);
+  if (ShortestWindow(input.rollouts) > 1) return "nobody has read the velocities";
   if (input.model->num_positions() != input.model->num_velocities())
     return "a residual is not for robots with spherical joints";
   return "";
@@ -235,6 +231,7 @@ GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& n
   if (!fit.alarm.alarm) return fit;
   if (const std::string obstacle = Obstacle(input); !obstacle.empty()) {
     fit.gap.summary = kNotLearnt + obstacle;
+    if (ShortestWindow(input.rollouts) > 1) Take(input, test.considered, &fit);
     return fit;
   }
   if (!Matters(input, fit.result)) {

@@ -213,7 +213,11 @@ Log JoinMotion(const std::string& name, MotionTable table, const RobotDescriptio
   Assembly assembly(robot, table.has_next, &log);
   assembly.Take(table.rows, links);
   if (!log.rollouts.empty()) {
-    log.differenced = DifferencedJoints(robot, log.rollouts);
+    if (table.has_velocities) {
+      log.differenced = DifferencedJoints(robot, log.rollouts);
+    } else {
+      for (const JointDescription& joint : robot.joints) log.differenced.push_back(joint.name);
+    }
     if (!log.differenced.empty()) log.warnings.push_back(DifferencesWarning(log.differenced));
     return log;
   }

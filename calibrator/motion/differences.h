@@ -32,6 +32,17 @@ std::vector<std::string> DifferencedJoints(const RobotDescription& robot,
 /// What that means, and what to do about it: a sentence.
 std::string DifferencesWarning(std::span<const std::string> joints);
 
+/// Takes these joints' velocities for what they are: nobody has read them. Those at transitions'
+/// ends become NaN; those with which transitions begin become guesses, the central differences of
+/// the positions where both neighbours are known, kGuessSd times as unsure as velocities change
+/// from one control step to the next (root mean square). Thread-safe.
+void ForgetVelocities(const RobotDescription& robot, std::span<const std::string> joints,
+                      std::vector<Rollout>* rollouts);
+
+/// A difference's error is at most half of that change. A wide guess, as the positions that it is
+/// made of are compared with, too.
+inline constexpr double kGuessSd = 2;
+
 inline constexpr double kSameDifference = 0.05;
 
 /// Gives each row of a table without velocities the central difference of its neighbours'

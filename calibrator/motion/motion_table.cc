@@ -286,7 +286,8 @@ MotionTable ReadMotionTable(const std::string& file, const RobotDescription& rob
   const Names names(robot);
   const Columns columns = FindColumns(table, names, robot.name);
   Efforts efforts(robot);
-  MotionTable motion{ReadRows(table, columns, robot, efforts), columns.has_next(), {}};
+  MotionTable motion{
+      ReadRows(table, columns, robot, efforts), columns.has_next(), columns.has_velocities(), {}};
   motion.warnings = Warnings(motion.rows, names, efforts.clipped());
   return motion;
 }
@@ -304,7 +305,7 @@ MotionTable MakeMotionTable(const MotionColumns& columns, const RobotDescription
     throw std::invalid_argument("terminated, truncated: one entry for each row");
   Efforts efforts(robot);
   const ConfigurationSpace space(robot);
-  MotionTable motion{{}, has_next, {}};
+  MotionTable motion{{}, has_next, true, {}};
   for (Eigen::Index i = 0; i < rows; ++i) {
     MotionRow row{columns.t(i),
                   !columns.ends.empty() && columns.ends[static_cast<size_t>(i)],

@@ -28,7 +28,8 @@ struct MotionRow {
 struct MotionTable {
   /// in the file's order; t differs from row to row but where an episode ends
   std::vector<MotionRow> rows;
-  bool has_next = false;  ///< next_ columns are there
+  bool has_next = false;       ///< next_ columns are there
+  bool has_velocities = true;  ///< else they are differences of the positions
   std::vector<std::string> warnings;
 };
 

@@ -9,6 +9,7 @@
 
 #include "calibrator/design/excitation.h"
 #include "calibrator/diagnostics/holdout.h"
+#include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
 #include "calibrator/fit/physical_columns.h"
 #include "calibrator/fit/robot_least_squares.h"
@@ -37,8 +38,9 @@ class Calibration {
         logs_(logs),
         options_(options),
         prior_(PriorOf(robot)) {
-    for (const Log& log : logs)
-      rollouts_.insert(rollouts_.end(), log.rollouts.begin(), log.rollouts.end());
+    for (const Log& log : logs) own_.push_back(Motion(log));
+    for (const std::vector<Rollout>& own : own_)
+      rollouts_.insert(rollouts_.end(), own.begin(), own.end());
     if (CountTransitions(rollouts_) == 0)
       throw std::invalid_argument("there is no transition to calibrate with");
   }
@@ -74,6 +76,13 @@ class Calibration {
   }
 
  private:
+  // What a method can learn from.
+  std::vector<Rollout> Motion(const Log& log) const {
+    std::vector<Rollout> rollouts = log.rollouts;
+    if (KnowsLikelihood(options_.method)) ForgetVelocities(robot_, log.differenced, &rollouts);
+    return rollouts;
+  }
+
   Eigen::MatrixXd PriorCovariance() const {
     Eigen::VectorXd variance(prior_.size());
     for (Eigen::Index i = 0; i < variance.size(); ++i)
@@ -113,6 +122,7 @@ class Calibration {
 
   // Why errors tell nothing of the model, empty if they do.
   std::string NotJudged() const {
+    if (KnowsLikelihood(options_.method)) return {};
     for (const Log& log : logs_) {
       if (!log.differenced.empty())
         return "the model is not judged: " + DifferencesWarning(log.differenced);
@@ -183,12 +193,13 @@ class Calibration {
     }
     std::vector<LaplaceFit> fits;
     std::vector<std::string> names;
-    for (const Log& log : logs_) {
+    for (size_t i = 0; i < logs_.size(); ++i) {
+      const Log& log = logs_[i];
       try {
         CurriculumOptions options;
         options.horizons = options_.horizons, options.execution = options_.execution,
         options.starts = 1;
-        const CurriculumFit own = FitCurriculum(model_, Informing(log.rollouts), options, mean_);
+        const CurriculumFit own = FitCurriculum(model_, Informing(own_[i]), options, mean_);
         findings_.diagnostic_steps += own.simulated_steps;
         fits.push_back(own.fit);
         names.push_back(log.name);
@@ -301,6 +312,7 @@ class Calibration {
   const RobotDescription& robot_;
   std::shared_ptr<const Model> model_;
   std::span<const Log> logs_;
+  std::vector<std::vector<Rollout>> own_;  // of each log, as the method takes it
   const CalibrationOptions& options_;
   Prior prior_;
   std::vector<Rollout> rollouts_;

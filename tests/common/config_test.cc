@@ -149,8 +149,7 @@ TEST_CASE("a file is without what it says of the file that it extends") {
     refused("[\"" + std::string(none) + "\"]",
             ":2:12: without \"" + std::string(none) + "\": the file that is extended has none");
   }
-  CHECK_THROWS_WITH(Read("without = []\n").Finish(),
-                    Catch::Contains("without is not a known key"));
+  CHECK_THROWS_WITH(Read("without = []\n").Finish(), Catch::Contains("without is not a known key"));
 }
 
 TEST_CASE("mistakes in files that extend each other are named in the file where they are") {

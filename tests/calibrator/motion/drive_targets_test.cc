@@ -46,8 +46,8 @@ std::string Motion(const RobotDescription& robot, int rows, const std::string& c
 
 TEST_CASE("a target is an effort on top of the drive's loop: the table leads to the motion") {
   const RobotDescription robot = Held();
-  for (const char* columns : {"q/pivot,v/pivot,target_q/pivot",
-                              "q/pivot,v/pivot,target_q/pivot,kp/pivot,kd/pivot"}) {
+  for (const char* columns :
+       {"q/pivot,v/pivot,target_q/pivot", "q/pivot,v/pivot,target_q/pivot,kp/pivot,kd/pivot"}) {
     const Log log = ReadTable(Motion(robot, 50, columns), robot);
     REQUIRE(log.rollouts.size() == 1);
     REQUIRE(log.rollouts[0].transitions.size() == 49);
@@ -84,8 +84,7 @@ TEST_CASE("without velocities they are the central differences of the positions"
   REQUIRE(transitions.size() == 48);  // the first row has no row before it
   for (size_t i = 0; i + 1 < transitions.size(); ++i) {
     const Transition &at = transitions[i], &next = transitions[i + 1];
-    CHECK(next.v[0] ==
-          Approx((next.next_q[0] - at.q[0]) / (2 * robot.task.period)).epsilon(1e-9));
+    CHECK(next.v[0] == Approx((next.next_q[0] - at.q[0]) / (2 * robot.task.period)).epsilon(1e-9));
     CHECK(at.next_v[0] == next.v[0]);
   }
   CHECK(std::isnan(transitions.back().next_v[0]));
@@ -122,9 +121,9 @@ TEST_CASE("targets and gains that are not this robot's are refused, with the lin
       {"rest/pivot", "rad", ParameterDescription::Coordinate::kLinear, 0, 1});
   CHECK_THAT(Refusal("t,q/pivot,v/pivot,target_q/pivot" + row + "\n", unsure),
              Catch::Contains(":1: target_q/pivot: rest/pivot is an uncertain parameter"));
-  CHECK_THAT(Refusal("t,q/pivot,v/pivot,target_q/pivot,kp/pivot" + row + ",4\n0.05,0,0,1,5\n",
-                     robot),
-             Catch::Contains(":3: 'kp/pivot' is 5, but 4 in robot.toml's [joint.dynamics]"));
+  CHECK_THAT(
+      Refusal("t,q/pivot,v/pivot,target_q/pivot,kp/pivot" + row + ",4\n0.05,0,0,1,5\n", robot),
+      Catch::Contains(":3: 'kp/pivot' is 5, but 4 in robot.toml's [joint.dynamics]"));
   CHECK_THAT(Refusal("t,q/pivot,v/pivot,target_q/pivot" + row + "\n0.05,0,0,1e150\n", robot),
              Catch::Contains(":3: 'target_q/pivot' is 1e+150"));
   CHECK_THAT(Refusal("t,q/pivot,v/pivot,target_q/pivott" + row + "\n", robot),

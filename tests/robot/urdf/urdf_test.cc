@@ -28,8 +28,7 @@ TEST_CASE("joints that are held are no joints: what they carry belongs to their 
   const UrdfModel free = LoadUrdf(folder.urdf()), held = LoadUrdf(folder.urdf(), {"free", "hip"});
   std::vector<std::string> names;
   for (const UrdfJoint& joint : held.joints) names.push_back(joint.name);
-  CHECK(names ==
-        std::vector<std::string>{"rail/x", "rail/y", "rail/angle", "spring", "disc"});
+  CHECK(names == std::vector<std::string>{"rail/x", "rail/y", "rail/angle", "spring", "disc"});
   double mass = 0, all = 0;
   for (const LinkDescription& link : held.links) mass += link.mass;
   for (const LinkDescription& link : free.links) all += link.mass;

@@ -1,4 +1,4 @@
-// Drives that run a position loop of their own: against closed forms, Simbody and each other's lanes.
+// Drives that run a position loop of their own: against closed forms and Simbody.
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -60,7 +60,8 @@ TEST_CASE("a loop moves a wheel as a spring and a damper do, its command moves w
   }
 }
 
-TEST_CASE("at its effort limit a loop is a constant effort, and the motor's gain scales all of it") {
+TEST_CASE(
+    "at its effort limit a loop is a constant effort, and the motor's gain scales all of it") {
   RobotDescription robot = Wheel(1000, 0.01, 100, Integrator::kSemiImplicit);
   for (const double gain : {1.0, 0.5}) {
     robot.joints[0].dynamics.motor_gain = gain;
