@@ -14,10 +14,15 @@ size_t StretchLength(const Rollout& rollout, size_t first) {
   return end - first;
 }
 
+bool IsUnread(const Transition& t, Eigen::Index c) {
+  return t.v_sd(c) > 0 && std::isnan(t.next_v(c));
+}
+
 int ShortestWindow(std::span<const Rollout> rollouts) {
   for (const Rollout& rollout : rollouts) {
     for (const Transition& t : rollout.transitions) {
-      if ((t.v_sd.array() > 0 && t.next_v.array().isNaN()).any()) return kUnreadVelocityWindow;
+      for (Eigen::Index c = 0; c < t.v.size(); ++c)
+        if (IsUnread(t, c)) return kUnreadVelocityWindow;
     }
   }
   return 1;

@@ -23,6 +23,8 @@ size_t StretchLength(const Rollout& rollout, size_t first);
 /// read in full. Where nobody has read a velocity (ForgetVelocities), a window begins with one that
 /// its own positions have to tell, and only what they tell besides is about the simulator.
 int ShortestWindow(std::span<const Rollout> rollouts);
+/// Whether nobody has read entry c of the velocity that a transition begins with.
+bool IsUnread(const Transition& transition, Eigen::Index c);
 inline constexpr int kUnreadVelocityWindow = 6;
 
 /// `length` recorded steps from transition `first` on: the state that it begins with, and the

@@ -18,7 +18,8 @@ namespace {
 // curvature.
 constexpr double kDifference = 1e-6;
 
-constexpr double kGuess = 1e-3;  // relative to the units of the state
+constexpr double kGuess = 1e-3;   // relative to the units of the state
+constexpr double kExact = 1e-24;  // variance of what does not move, physical units
 
 }  // namespace
 
@@ -36,6 +37,7 @@ WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const R
       rollouts_(rollouts),
       simulate_(std::move(model), execution.threads),
       space_(simulate_.model().description()),
+      looks_for_starts_(ShortestWindow(rollouts) > 1),
       batches_(execution.batches) {
   scale_ = MakeTask(simulate_.model().description())->state_scale();
   noise_sd_ = GuessedNoise(simulate_.model().description());
@@ -52,30 +54,38 @@ WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const R
       }
     }
   }
-  first_row_.push_back(static_cast<Eigen::Index>(rows_.size()));
+  first_row_.push_back(static_cast<Eigen::Index>(readings_.size()));
   if (rows_.empty()) throw std::invalid_argument("there is no transition whose end was observed");
-  identity_ = Hash(rows_.data(), rows_.size() * sizeof(Row));
+  identity_ = Hash(readings_.data(), readings_.size() * sizeof(Row));
 }
 
 void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
   const auto& transitions = rollouts_[rollout].transitions;
-  const auto row_count = rows_.size();
+  const Transition& begins = transitions[first];
+  const size_t before = readings_.size(), told = told_.size();
   std::vector<Eigen::Index> step_rows;
   for (size_t i = first; i < first + length; ++i) {
-    step_rows.push_back(static_cast<Eigen::Index>(rows_.size()));
-    const Transition& t = transitions[i];
+    step_rows.push_back(static_cast<Eigen::Index>(readings_.size()));
     for (Eigen::Index c = 0; c < 2 * n_; ++c) {
-      if (!IsObserved(space_, t, c)) continue;
-      rows_.push_back({static_cast<int>(windows_.size()), static_cast<int>(rollout),
-                       static_cast<int>(i), static_cast<int>(c)});
+      if (!IsObserved(space_, transitions[i], c)) continue;
+      // It takes one position to tell with which velocity the window began.
+      const bool tells = i > first || c >= n_ || !IsUnread(begins, c);
+      if (tells) told_.push_back(static_cast<Eigen::Index>(readings_.size()));
+      readings_.push_back({static_cast<int>(windows_.size()), static_cast<int>(rollout),
+                           static_cast<int>(i), static_cast<int>(c)});
     }
   }
-  if (rows_.size() == row_count) return;  // nothing was observed
-  step_rows.push_back(static_cast<Eigen::Index>(rows_.size()));
+  if (told_.size() == told) {
+    readings_.resize(before);
+    return;
+  }
+  for (size_t k = told; k < told_.size(); ++k)
+    rows_.push_back(readings_[static_cast<size_t>(told_[k])]);
+  step_rows.push_back(static_cast<Eigen::Index>(readings_.size()));
   step_rows_.push_back(std::move(step_rows));
-  first_row_.push_back(static_cast<Eigen::Index>(row_count));
+  first_row_.push_back(static_cast<Eigen::Index>(before));
   windows_.push_back(RecordedWindow(simulate_.model(), rollouts_[rollout], first, length));
-  starts_.push_back({StartSd(transitions[first]), {}});
+  starts_.push_back({StartSd(begins), {}, {}});
   steps_ += static_cast<int64_t>(length);
 }
 
@@ -98,14 +108,14 @@ double WindowErrors::NoiseOf(const Row& row) const {
 
 Eigen::VectorXd WindowErrors::EndNoise() const {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * n_), count = squares;
-  for (const Row& row : rows_)
+  for (const Row& row : readings_)
     squares(row.coordinate) += std::pow(NoiseOf(row), 2), count(row.coordinate) += 1;
   return (count.array() > 0)
       .select((squares.array() / count.array().max(1)).sqrt(), noise_sd_.array());
 }
 
 bool WindowErrors::noise_known() const {
-  return std::all_of(rows_.begin(), rows_.end(),
+  return std::all_of(readings_.begin(), readings_.end(),
                      [&](const Row& row) { return EndSd(TransitionOf(row), row.coordinate) > 0; });
 }
 
@@ -116,13 +126,13 @@ bool WindowErrors::starts_known() const {
 
 Eigen::MatrixXd WindowErrors::Simulate(const Eigen::MatrixXd& physical,
                                        std::span<const Window> windows) {
-  Eigen::MatrixXd errors(static_cast<Eigen::Index>(rows_.size()), physical.cols());
+  Eigen::MatrixXd errors(static_cast<Eigen::Index>(readings_.size()), physical.cols());
   simulate_.Predict(
       physical, windows,
       [&](Eigen::Index sample, size_t window, size_t step, const auto& q, const auto& v) {
         const auto& step_rows = step_rows_[window];
         for (Eigen::Index i = step_rows[step]; i < step_rows[step + 1]; ++i) {
-          const Row& row = rows_[static_cast<size_t>(i)];
+          const Row& row = readings_[static_cast<size_t>(i)];
           errors(i, sample) = EndError(space_, q, v, TransitionOf(row), row.coordinate);
         }
       },
@@ -140,7 +150,7 @@ Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical,
   const Eigen::MatrixXd errors =
       (batches_ ? *batches_ : here)
           .Run(Hash(physical, Hash(&which, sizeof which, identity_)),
-               static_cast<Eigen::Index>(rows_.size()), physical.cols(), compute);
+               static_cast<Eigen::Index>(readings_.size()), physical.cols(), compute);
   simulated_steps_ += steps_ * physical.cols();
   for (Eigen::Index j = 0; j < errors.cols(); ++j) {
     if (errors.col(j).allFinite()) continue;
@@ -152,13 +162,30 @@ Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical,
   return errors;
 }
 
-Eigen::MatrixXd WindowErrors::Raw(const Eigen::MatrixXd& physical) {
-  return Predict(physical, windows_);
+Eigen::MatrixXd WindowErrors::FromRecord(const Eigen::MatrixXd& physical) {
+  Eigen::MatrixXd errors = Predict(physical, windows_);
+  for (size_t w = 0; w < windows_.size(); ++w) {
+    const Start& start = starts_[w];
+    if (start.offset.size() == 0) continue;
+    const Eigen::VectorXd moved = start.sensitivity * start.offset;
+    errors.middleRows(first_row_[w], moved.size()).colwise() -= moved;
+  }
+  return errors;
 }
 
-bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
-  if (starts_known()) return true;
-  const Eigen::MatrixXd middle = Predict(physical, windows_);
+Eigen::MatrixXd WindowErrors::Told(const Eigen::MatrixXd& errors) const {
+  if (told_.size() == readings_.size()) return errors;
+  return errors(told_, Eigen::all);
+}
+
+Eigen::MatrixXd WindowErrors::Raw(const Eigen::MatrixXd& physical) {
+  return Told(FromRecord(physical));
+}
+
+// Of all rows to the states that windows begin with.
+// @param middle their errors with these parameters.
+Eigen::MatrixXd WindowErrors::Sensitivity(const Eigen::VectorXd& physical,
+                                          const Eigen::MatrixXd& middle) {
   const Eigen::VectorXd differences = StartDifferences(noise_sd_);
   Eigen::MatrixXd sensitivity(middle.rows(), 2 * n_);
   for (Eigen::Index c = 0; c < 2 * n_; ++c) {
@@ -167,20 +194,61 @@ bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
     for (Window& window : moved) MoveStart(space_, c, h, &window);
     sensitivity.col(c) = (Predict(physical, moved, static_cast<uint64_t>(c) + 1) - middle) / h;
   }
-  const bool good = sensitivity.allFinite();
-  if (!good) sensitivity = FreeMotion();
+  return sensitivity;
+}
+
+// Each window's beginning to where its errors, and how far the record may be off, are smallest.
+// @param errors with which the windows leave the record now.
+void WindowErrors::MoveStarts(const Eigen::MatrixXd& errors) {
   for (size_t w = 0; w < windows_.size(); ++w) {
-    starts_[w].sensitivity =
-        sensitivity.middleRows(first_row_[w], first_row_[w + 1] - first_row_[w]);
+    Start& start = starts_[w];
+    const Eigen::Index first = first_row_[w], count = first_row_[w + 1] - first;
+    Eigen::VectorXd precision(count);
+    for (Eigen::Index i = 0; i < count; ++i)
+      precision(i) = 1 / std::pow(NoiseOf(readings_[static_cast<size_t>(first + i)]), 2);
+    const Eigen::VectorXd start_sd = StartSdOf(start);
+    const Eigen::VectorXd offset =
+        start.offset.size() > 0 ? start.offset : Eigen::VectorXd::Zero(2 * n_).eval();
+    const Eigen::MatrixXd weighted = precision.asDiagonal() * start.sensitivity;
+    Eigen::MatrixXd curvature = weighted.transpose() * start.sensitivity;
+    curvature.diagonal() += start_sd.cwiseAbs2().cwiseMax(kExact).cwiseInverse();
+    const Eigen::VectorXd best = curvature.llt().solve(
+        weighted.transpose() * (start.sensitivity * offset - errors.col(0).segment(first, count)));
+    if (!best.allFinite()) continue;
+    Window& window = windows_[w];
+    window.q = space_.Move(window.q, (best - offset).head(n_));
+    window.v += (best - offset).tail(n_);
+    start.offset = best;
+    identity_ = Hash(Eigen::MatrixXd(best), identity_);
+  }
+}
+
+Eigen::VectorXd WindowErrors::StartSdOf(const Start& start) const {
+  return start.sd.array().isNaN().select(noise_sd_, start.sd);
+}
+
+bool WindowErrors::Linearise(const Eigen::VectorXd& physical) {
+  if (starts_known()) return true;
+  bool good = true;
+  for (int round = 0; round < (looks_for_starts_ ? kRounds : 1); ++round) {
+    const Eigen::MatrixXd middle = Predict(physical, windows_);
+    Eigen::MatrixXd sensitivity = Sensitivity(physical, middle);
+    good = sensitivity.allFinite();
+    if (!good) sensitivity = FreeMotion();
+    for (size_t w = 0; w < windows_.size(); ++w) {
+      starts_[w].sensitivity =
+          sensitivity.middleRows(first_row_[w], first_row_[w + 1] - first_row_[w]);
+    }
+    if (looks_for_starts_ && good && round + 1 < kRounds) MoveStarts(middle);
   }
   return good;
 }
 
 Eigen::MatrixXd WindowErrors::FreeMotion() const {
   Eigen::MatrixXd sensitivity =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_.size()), 2 * n_);
-  for (size_t i = 0; i < rows_.size(); ++i) {
-    const Row& row = rows_[i];
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(readings_.size()), 2 * n_);
+  for (size_t i = 0; i < readings_.size(); ++i) {
+    const Row& row = readings_[i];
     const auto at = static_cast<Eigen::Index>(i);
     sensitivity(at, row.coordinate) = 1;
     if (row.coordinate >= n_) continue;
@@ -192,16 +260,16 @@ Eigen::MatrixXd WindowErrors::FreeMotion() const {
 }
 
 Eigen::MatrixXd WindowErrors::Whitened(const Eigen::MatrixXd& physical) {
-  Eigen::MatrixXd errors = Raw(physical);
+  Eigen::MatrixXd errors = FromRecord(physical);
   for (size_t w = 0; w < windows_.size(); ++w) WhitenWindow(w, &errors);
   for (Eigen::Index j = 0; j < errors.cols(); ++j) {
     if (!errors.col(j).allFinite()) errors.col(j).setConstant(kNaN);
   }
-  return errors;
+  return Told(errors);
 }
 
 double WindowErrors::LogSpread() const {
-  Eigen::MatrixXd none = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_.size()), 1);
+  Eigen::MatrixXd none = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(readings_.size()), 1);
   double sum = 0;
   for (size_t w = 0; w < windows_.size(); ++w) sum += WhitenWindow(w, &none);
   return sum;
@@ -215,12 +283,12 @@ double WindowErrors::WhitenWindow(size_t w, Eigen::MatrixXd* errors) const {
   Eigen::VectorXd end_sd(count);
   std::vector<int> coordinates;
   for (Eigen::Index i = 0; i < count; ++i) {
-    const Row& row = rows_[static_cast<size_t>(first + i)];
+    const Row& row = readings_[static_cast<size_t>(first + i)];
     end_sd(i) = NoiseOf(row);
     coordinates.push_back(row.coordinate);
   }
-  Eigen::VectorXd start_sd = start.sd.array().isNaN().select(noise_sd_, start.sd);
-  const Transition& begins = TransitionOf(rows_[static_cast<size_t>(first)]);
+  Eigen::VectorXd start_sd = StartSdOf(start);
+  const Transition& begins = TransitionOf(readings_[static_cast<size_t>(first)]);
   if (begins.disturbance.cols() == 0)
     return plumb::WhitenWindow(steps, start_sd, start.sensitivity, end_sd,
                                errors->middleRows(first, count));

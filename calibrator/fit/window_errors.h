@@ -49,6 +49,8 @@ class WindowErrors {
   WindowErrors(std::shared_ptr<const Model> model, std::span<const Rollout> rollouts, int horizon,
                ExecutionOptions execution, int every = 1);
 
+  /// Where nobody has read a velocity (ForgetVelocities), the first position of a window tells with
+  /// which one it began, and is none of them.
   const std::vector<Row>& rows() const { return rows_; }
   int windows() const { return static_cast<int>(windows_.size()); }
   int num_velocities() const { return static_cast<int>(n_); }
@@ -70,12 +72,16 @@ class WindowErrors {
   bool starts_known() const;
   /// Takes the sensitivity to the initial state, by finite differences, from the simulator with
   /// these parameters. It has to be called before Whitened if any initial state is uncertain, and
-  /// costs 2 n + 1 simulators then, nothing else.
+  /// costs 2 n + 1 simulators then, nothing else. Where nobody has read the velocities that windows
+  /// begin with, it is taken at the states that explain each window best, which are looked for
+  /// (Gauss-Newton; an iterated Kalman filter: Bell, Cathey, IEEE Trans. Autom. Control 38, 1993):
+  /// kRounds times that.
   /// @return false if that simulator fails: the sensitivity is then that of free motion, q + v t.
   bool Linearise(const Eigen::VectorXd& physical);
 
   /// Predicted minus recorded, physical units: a row of each, a column for each simulator. NaN from
-  /// where it has failed.
+  /// where it has failed. From the recorded beginnings; where Linearise has looked for better ones,
+  /// as the line there has it.
   Eigen::MatrixXd Raw(const Eigen::MatrixXd& physical);
   /// The same whitened. A simulator that fails anywhere has NaN all over.
   Eigen::MatrixXd Whitened(const Eigen::MatrixXd& physical);
@@ -91,12 +97,19 @@ class WindowErrors {
   struct Start {
     Eigen::VectorXd sd;           // of (q, v)
     Eigen::MatrixXd sensitivity;  // rows of the window x 2 n, physical units; empty until Linearise
+    Eigen::VectorXd offset;       // of where it was taken from the record, 2 n; empty = none
   };
+  static constexpr int kRounds = 4;  // of looking for beginnings
   void AddWindow(size_t rollout, size_t first, size_t length);
   Eigen::MatrixXd Predict(const Eigen::MatrixXd& physical, std::span<const Window> windows,
                           uint64_t which = 0);
   Eigen::MatrixXd Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows);
+  Eigen::MatrixXd FromRecord(const Eigen::MatrixXd& physical);
+  Eigen::MatrixXd Told(const Eigen::MatrixXd& errors) const;
   Eigen::MatrixXd FreeMotion() const;
+  Eigen::MatrixXd Sensitivity(const Eigen::VectorXd& physical, const Eigen::MatrixXd& middle);
+  void MoveStarts(const Eigen::MatrixXd& errors);
+  Eigen::VectorXd StartSdOf(const Start& start) const;
   double WhitenWindow(size_t window, Eigen::MatrixXd* errors) const;
   const Transition& TransitionOf(const Row& row) const;
   double NoiseOf(const Row& row) const;
@@ -105,10 +118,13 @@ class WindowErrors {
   std::span<const Rollout> rollouts_;
   Windows simulate_;
   ConfigurationSpace space_;
-  std::vector<Window> windows_;
+  std::vector<Window> windows_;  // from where the sensitivity is taken
+  bool looks_for_starts_;        // nobody has read the velocities with which windows begin
   std::vector<Start> starts_;
-  std::vector<Row> rows_;
-  std::vector<Eigen::Index> first_row_;  // of each window, and the end
+  std::vector<Row> readings_;            // all that are compared
+  std::vector<Row> rows_;                // those that tell
+  std::vector<Eigen::Index> told_;       // where these are among all
+  std::vector<Eigen::Index> first_row_;  // reading of each window, and the end
   // first of each step of each window, and the end
   std::vector<std::vector<Eigen::Index>> step_rows_;
   Eigen::VectorXd scale_, noise_sd_;
