@@ -8,7 +8,6 @@
 
 #include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/methods.h"
-#include "calibrator/fit/recorded_window.h"
 #include "calibrator/fit/robot_draws.h"
 #include "calibrator/fit/robot_least_squares.h"
 #include "calibrator/gap/disturbances.h"
@@ -55,7 +54,6 @@ std::string Obstacle(const MethodInput& input) {
   if (!KnowsLikelihood(input.options.method))
     return fmt::format("{} does not know the likelihood of steps, as auto does",
                        input.options.method);
-  if (ShortestWindow(input.rollouts) > 1) return "nobody has read the velocities";
   if (input.model->num_positions() != input.model->num_velocities())
     return "a residual is not for robots with spherical joints";
   return "";
@@ -231,7 +229,6 @@ GapFit CloseGap(const MethodInput& input, MethodResult all, const std::string& n
   if (!fit.alarm.alarm) return fit;
   if (const std::string obstacle = Obstacle(input); !obstacle.empty()) {
     fit.gap.summary = kNotLearnt + obstacle;
-    if (ShortestWindow(input.rollouts) > 1) Take(input, test.considered, &fit);
     return fit;
   }
   if (!Matters(input, fit.result)) {
