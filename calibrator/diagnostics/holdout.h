@@ -38,10 +38,10 @@ struct Replay {
 struct Holdout {
   int64_t fitted = 0, held_out = 0;  ///< transitions
   std::vector<HorizonError> errors;
-  Replay replay;  ///< where it was asked for
   /// the posterior predicts better than the prior at some horizons, and at none worse, chance apart
   bool better = false;
   std::string summary;
+  Replay replay = {};  ///< where it was asked for
 };
 
 /// Transitions to fit, and those kept back to judge the fit by.

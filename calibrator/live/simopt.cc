@@ -6,7 +6,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "calibrator/fit/likelihood_methods.h"
 #include "calibrator/fit/physical_columns.h"
+#include "calibrator/motion/differences.h"
 #include "robot/parameter_distribution.h"
 
 namespace plumb {
@@ -187,16 +189,18 @@ GapFit SimOpt::RunFromWhereItIs() const {
   options.seed = seed_;
   options.execution = threads_;
   options.residual = robot_.calibration.residual;
+  std::vector<Rollout> motion = state_.rollouts;
+  if (KnowsLikelihood(method_)) ForgetVelocities(robot_, UnreadJoints(robot_, {}), &motion);
   const bool one_mode = state_.iteration > 0 && state_.before.components.size() == 1;
   if (one_mode) {
     try {
-      const MethodInput input{model_, state_.rollouts, options, state_.before.components[0].mean};
+      const MethodInput input{model_, motion, options, state_.before.components[0].mean};
       return CloseGap(input, RunMethod(input));
     } catch (const std::invalid_argument&) {
       // perhaps it cannot be simulated where the new roll-outs went
     }
   }
-  const MethodInput input{model_, state_.rollouts, options};
+  const MethodInput input{model_, motion, options};
   return CloseGap(input, RunMethod(input));
 }
 

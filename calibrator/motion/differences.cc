@@ -79,8 +79,17 @@ std::string DifferencesWarning(std::span<const std::string> joints) {
          "and mixture do without; intervals of other methods will be too narrow";
 }
 
+std::vector<std::string> UnreadJoints(const RobotDescription& robot,
+                                      std::span<const std::string> differenced) {
+  if (robot.calibration.velocities) return {differenced.begin(), differenced.end()};
+  std::vector<std::string> joints;
+  for (const JointDescription& joint : robot.joints) joints.push_back(joint.name);
+  return joints;
+}
+
 void ForgetVelocities(const RobotDescription& robot, std::span<const std::string> joints,
                       std::vector<Rollout>* rollouts) {
+  if (joints.empty()) return;
   const ConfigurationSpace space(robot);
   std::vector<Eigen::Index> coordinates;
   Eigen::Index velocity = 0;

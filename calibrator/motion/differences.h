@@ -32,6 +32,11 @@ std::vector<std::string> DifferencedJoints(const RobotDescription& robot,
 /// What that means, and what to do about it: a sentence.
 std::string DifferencesWarning(std::span<const std::string> joints);
 
+/// The joints whose velocities a likelihood does without: `differenced`, or all where the robot's
+/// calibration is to use positions alone. Thread-safe.
+std::vector<std::string> UnreadJoints(const RobotDescription& robot,
+                                      std::span<const std::string> differenced);
+
 /// Takes these joints' velocities for what they are: nobody has read them. Those at transitions'
 /// ends become NaN; those with which transitions begin become guesses, the central differences of
 /// the positions where both neighbours are known, kGuessSd times as unsure as velocities change

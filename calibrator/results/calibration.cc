@@ -79,7 +79,8 @@ class Calibration {
   // What a method can learn from.
   std::vector<Rollout> Motion(const Log& log) const {
     std::vector<Rollout> rollouts = log.rollouts;
-    if (KnowsLikelihood(options_.method)) ForgetVelocities(robot_, log.differenced, &rollouts);
+    if (KnowsLikelihood(options_.method))
+      ForgetVelocities(robot_, UnreadJoints(robot_, log.differenced), &rollouts);
     return rollouts;
   }
 

@@ -19,6 +19,7 @@ CalibrationSettings ReadCalibration(Config config) {
   s.horizons = config.Integers("horizons", {1, 10000});
   if (s.horizons.empty()) config.Fail("horizons", "is empty");
   s.residual = config.Boolean("residual", true);
+  s.velocities = config.Boolean("velocities", true);
   s.duration = config.Number("duration", {0, 1e6}, 0);
   config.Finish();
   return s;

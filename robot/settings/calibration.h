@@ -15,6 +15,9 @@ struct CalibrationSettings {
   std::vector<int> horizons;
   /// What the simulator lacks is learnt where the alarm speaks: calibrator/gap/gap.h
   bool residual = true;
+  /// Else auto, laplace and mixture use positions alone, as if nobody had read velocities: a
+  /// smoother smears what dry friction and play do between two commands.
+  bool velocities = true;
   double duration = 0;  ///< [s] >= 0 that a calibration takes in virtual time
 };
 

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "sim/simulator.h"
 #include "tests/calibrator/motion/csv_tables.h"
@@ -37,8 +38,9 @@ std::string Motion(const RobotDescription& robot, int rows, const std::string& c
     add("target_q/pivot", Target(k)), add("kp/pivot", kKp), add("kd/pivot", kKd);
     csv += "\n";
     const Eigen::VectorXd effort = Eigen::VectorXd::Constant(1, kKp * (Target(k) - kRest));
-    simulator.Step(before, robot.simulation.latency);
-    simulator.Step(effort, robot.task.period - robot.simulation.latency);
+    const double latency = robot.simulation.latency;
+    simulator.Step(
+        std::vector<EffortSegment>{{latency, before}, {robot.task.period - latency, effort}});
     before = effort;
   }
   return csv;
