@@ -47,7 +47,7 @@ void PrintGap(const Gap& gap, const RobotDescription& robot) {
   if (gap.residual->touching) rows("touching", gap.touching);
 }
 
-void PrintReplay(const Replay& replay) {
+void PrintReplay(const ReplayErrors& replay) {
   std::cout << fmt::format(
       "- open-loop replay of what was held out, up to {:.3g} s from its first state: sum over "
       "joints of the mean squared position error {:.3g}, of the prior {:.3g}\n",

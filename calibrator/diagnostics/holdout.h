@@ -29,7 +29,7 @@ struct HorizonError {
 };
 
 /// Discrepancy::ReplayError of the motion held out, of the posterior's and of the prior's mean.
-struct Replay {
+struct ReplayErrors {
   double posterior = std::numeric_limits<double>::quiet_NaN();
   double prior = std::numeric_limits<double>::quiet_NaN();
   double seconds = 0;  ///< of the longest stretch
@@ -41,7 +41,7 @@ struct Holdout {
   /// the posterior predicts better than the prior at some horizons, and at none worse, chance apart
   bool better = false;
   std::string summary;
-  Replay replay = {};  ///< where it was asked for
+  ReplayErrors replay = {};  ///< where it was asked for
 };
 
 /// Transitions to fit, and those kept back to judge the fit by.

@@ -41,9 +41,9 @@ class Test {
   ModelTest Run() {
     const FitResiduals residuals = OfAll();
     Misspecification all = FindMisspecification(Known(), residuals);
+    if (ShortestWindow(fit_.rollouts) > 1) return {WithoutWitnesses(all), Consider(residuals, all)};
     if (!all.alarm || errors_.starts_known()) return {all, Consider(residuals, all)};
-    Misspecification found =
-        ShortestWindow(fit_.rollouts) > 1 ? WithoutWitnesses(all) : AskWitnesses();
+    Misspecification found = AskWitnesses();
     // Where nobody can tell, what all errors say may be so.
     Gaussian considered = Consider(residuals, found.judged ? found : all);
     return {std::move(found), std::move(considered)};
@@ -89,10 +89,13 @@ class Test {
   }
 
   // Errors of windows depend on their own readings, and where motion is not linear over the noise
-  // they are larger than whitened ones should be: an alarm may be either.
+  // they are larger than whitened ones should be: an alarm may be either. Of what is wrong with
+  // velocities alone they say little.
   static Misspecification WithoutWitnesses(const Misspecification& all) {
     Misspecification found;
     found.judged = false;
+    found.summary = all.summary + ", as far as positions tell: nobody has read the velocities";
+    if (!all.alarm) return found;
     found.summary =
         "nobody can tell whether the model explains this log: nobody has read its velocities, and "
         "errors of windows may depend on their own noise" +

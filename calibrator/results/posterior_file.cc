@@ -123,7 +123,7 @@ json ToJson(const Holdout& holdout) {
                                {"prior", e.prior},
                                {"corrected", e.corrected}};
                  })}};
-  if (const Replay& replay = holdout.replay; replay.seconds > 0)
+  if (const ReplayErrors& replay = holdout.replay; replay.seconds > 0)
     found["replay"] = {
         {"posterior", replay.posterior}, {"prior", replay.prior}, {"seconds", replay.seconds}};
   return found;

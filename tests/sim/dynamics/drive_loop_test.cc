@@ -6,6 +6,7 @@
 #include "sim/model.h"
 #include "sim/simulator.h"
 #include "sim/virtual/simbody_plant.h"
+#include "tests/sim/scalar.h"
 #include "tests/sim/trees.h"
 
 namespace plumb {
@@ -15,8 +16,6 @@ using Eigen::VectorXd;
 using Integrator = SimulationSettings::Integrator;
 
 constexpr double kLimit = 2;  // [Nm] of the pendulum's motor
-
-VectorXd One(double value) { return VectorXd::Constant(1, value); }
 
 // Where nothing but the motor acts.
 RobotDescription Wheel(double kp, double kd, double rest, Integrator integrator) {
@@ -48,8 +47,8 @@ TEST_CASE("a loop moves a wheel as a spring and a damper do, its command moves w
   for (const Integrator integrator : {Integrator::kSemiImplicit, Integrator::kLeapfrog}) {
     const RobotDescription robot = Wheel(kKp, kKd, kRest, integrator);
     Simulator simulator(robot);
-    simulator.SetState(One(kStart), One(0));
-    simulator.Step(One(kKp * (kTarget - kRest)), kTime);
+    simulator.SetState(Scalar(kStart), Scalar(0));
+    simulator.Step(Scalar(kKp * (kTarget - kRest)), kTime);
     // of an underdamped oscillator from rest
     const double inertia = Inertia(robot), decay = kKd / (2 * inertia),
                  rate = std::sqrt(kKp / inertia - decay * decay);
@@ -66,11 +65,11 @@ TEST_CASE(
   for (const double gain : {1.0, 0.5}) {
     robot.joints[0].dynamics.motor_gain = gain;
     Simulator simulator(robot);
-    simulator.SetState(One(0), One(0));
-    simulator.Step(One(0), 0.1);
+    simulator.SetState(Scalar(0), Scalar(0));
+    simulator.Step(Scalar(0), 0.1);
     CHECK(simulator.v()[0] == Approx(gain * kLimit / Inertia(robot) * 0.1));
-    simulator.SetState(One(0), One(0));
-    simulator.Step(One(-1e6), 0.1);
+    simulator.SetState(Scalar(0), Scalar(0));
+    simulator.Step(Scalar(-1e6), 0.1);
     CHECK(simulator.v()[0] == Approx(-gain * kLimit / Inertia(robot) * 0.1));
   }
 }
@@ -81,10 +80,10 @@ TEST_CASE("a stiff loop needs no short substeps") {
     robot.joints[0].effort_limit = 1e6;
     robot.simulation.substep = 0.05;
     Simulator simulator(robot);
-    simulator.SetState(One(1), One(0));
+    simulator.SetState(Scalar(1), Scalar(0));
     double largest = 0;
     for (int i = 0; i < 200; ++i) {
-      simulator.Step(One(0), 0.05);
+      simulator.Step(Scalar(0), 0.05);
       largest = std::max(largest, std::abs(simulator.q()[0]));
     }
     CHECK(largest <= 1);
