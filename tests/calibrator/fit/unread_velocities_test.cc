@@ -36,8 +36,8 @@ Rollout Line(const RobotDescription& robot, int steps, double noise) {
   Rollout rollout;
   for (int k = 0; k < steps; ++k) {
     const auto one = [](double x) { return Eigen::VectorXd::Constant(1, x).eval(); };
-    Transition t{k, one(readings(k)), one(9), one(readings(k + 1)), one(9),
-                 one(kNaN), one(kNaN), one(kNaN), one(kNaN), {{period, one(0)}}};
+    Transition t{k,         one(readings(k)), one(9),    one(readings(k + 1)), one(9), one(kNaN),
+                 one(kNaN), one(kNaN),        one(kNaN), {{period, one(0)}}};
     rollout.transitions.push_back(t);
   }
   return rollout;

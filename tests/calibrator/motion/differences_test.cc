@@ -64,7 +64,7 @@ TEST_CASE("gym's pendulum moves by differences: these are its velocities") {
 TEST_CASE("what velocities of differences mean is said") {
   const Names joints{"hip", "knee"};
   CHECK_THAT(DifferencesWarning(joints),
-             Catch::StartsWith("v/hip, v/knee are made of differences of the positions: "));
+             Catch::StartsWith("v/hip, v/knee are made of differences of the positions, and "));
 }
 
 }  // namespace plumb

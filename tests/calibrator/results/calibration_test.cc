@@ -46,7 +46,12 @@ TEST_CASE("a model is not judged by velocities that are differences of positions
   logs[0].differenced = {"pivot"};
   const Findings f = Of(logs, "laplace");
   CHECK_FALSE(f.misspecification.alarm);
-  CHECK_THAT(f.misspecification.summary,
+  CHECK_FALSE(f.misspecification.judged);
+  CHECK_THAT(f.misspecification.summary, Catch::Contains("nobody has read the velocities"));
+  // Whoever needs velocities takes them for read.
+  const Findings reps = Of(logs, "reps");
+  CHECK_FALSE(reps.misspecification.judged);
+  CHECK_THAT(reps.misspecification.summary,
              Catch::StartsWith("the model is not judged: v/pivot is made of differences"));
 }
 

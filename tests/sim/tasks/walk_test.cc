@@ -51,7 +51,7 @@ TEST_CASE("walk: a drive's torque is the effort and its spring's") {
   WalkState bent = going;
   bent.q[7 + 4] += 0.2;
   Eigen::VectorXd effort = Eigen::VectorXd::Zero(18);
-  effort[6 + 4] = robot.joints[8].dynamics.stiffness * 0.2;  // which holds it there: no torque
+  effort[6 + 4] = robot.joints[8].dynamics.kp * 0.2;  // which holds it there: no torque
   const double rest = 0.1 * 0.2 * 0.2 / 12;
   CHECK(task->Reward(bent.q, bent.v, Eigen::VectorXd::Zero(18), bent.q, bent.v) ==
         Approx(1.5 - rest - 2e-4 * 25).epsilon(1e-12));
