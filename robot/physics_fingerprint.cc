@@ -1,5 +1,8 @@
 #include "robot/physics_fingerprint.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "common/hash.h"
 
 namespace plumb {
