@@ -41,7 +41,14 @@ const char* DriverState(int8_t state) {
   }
 }
 
-std::string PlusMinus(double mean, double sd) { return fmt::format("{:.3f} ± {:.3f}", mean, sd); }
+// Three decimals; more where a standard deviation would be none of them.
+int Decimals(double sd) {
+  return sd > 0 && sd < 5e-4 ? std::min(12, static_cast<int>(std::ceil(1 - std::log10(sd)))) : 3;
+}
+
+std::string PlusMinus(double mean, double sd) {
+  return fmt::format("{0:.{2}f} ± {1:.{2}f}", mean, sd, Decimals(sd));
+}
 
 std::string OrDash(double value) {
   return std::isfinite(value) ? fmt::format("{:.0f}", value) : "-";
@@ -240,11 +247,14 @@ std::string Progress::Conclusion(const Eigen::VectorXd& truth) const {
   std::string text;
   if (!done_.empty()) {
     const calibration_status_t& c = done_.back().calibration;
-    text += fmt::format("{:<24}{:>22}{:>12}{:>10}\n", "", "learned", "hidden", "error");
+    size_t width = 24;
+    for (const ParameterDescription& p : robot_.parameters)
+      width = std::max(width, p.name.size() + 3);
+    text += fmt::format("{:<{}}{:>22}{:>12}{:>10}\n", "", width, "learned", "hidden", "error");
     const auto line = [&](const std::string& name, double mean, double sd, double real) {
-      text += fmt::format("{:<24}", name) + Pad(PlusMinus(mean, sd), 22);
+      text += fmt::format("{:<{}}", name, width) + Pad(PlusMinus(mean, sd), 22);
       if (std::isfinite(real))
-        text += fmt::format("{:12.3f}{:9.2f} %", real, 100 * (mean / real - 1));
+        text += fmt::format("{:12.{}f}{:9.2f} %", real, Decimals(sd), 100 * (mean / real - 1));
       text += "\n";
     };
     // Where every parameter is determined, each is a combination of its own, which need not be told
