@@ -23,13 +23,11 @@ template <class Real>
 struct JointDynamicsOf {
   static constexpr double kLongestDelay = 0.5;  ///< [s]
 
-  Real armature{};   ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
-  Real damping{};    ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
-  Real friction{};   ///< [Nm] or [N] >= 0: Coulomb friction
-  Real stiffness{};  ///< [Nm/rad] or [N/m] >= 0 of a spring
-  Real rest{};       ///< [rad] or [m] where the spring is relaxed, and the drive's loop
-  Real kp{};         ///< [Nm/rad] or [N/m] >= 0 of the drive's own position loop, see DriveEffort
-  Real kd{};         ///< [Nm s/rad] or [N s/m] >= 0 of it
+  Real armature{};               ///< [kg m^2] or [kg] >= 0: inertia of the rotor, seen at the joint
+  Real damping{};                ///< [Nm s/rad] or [N s/m] >= 0: viscous friction
+  Real friction{};               ///< [Nm] or [N] >= 0: Coulomb friction
+  Real stiffness{};              ///< [Nm/rad] or [N/m] >= 0 of a spring
+  Real rest{};                   ///< [rad] or [m] where the spring is relaxed, and the drive's loop
   Real motor_gain = Real{} + 1;  ///< effort at the joint per effort commanded, >= 0
   /// [s] 0 to kLongestDelay between an effort's command and its effect, beyond what was recorded
   Real delay{};
@@ -42,6 +40,8 @@ struct JointDynamicsOf {
   /// (0, 1]: the share of the motor's effort that its gear passes on while it drives the joint;
   /// driven by it, the motor brakes with all of its effort
   Real gear_efficiency = Real{} + 1;
+  Real kp{};  ///< [Nm/rad] or [N/m] >= 0 of the drive's own position loop, see DriveEffort
+  Real kd{};  ///< [Nm s/rad] or [N s/m] >= 0 of it
 };
 using JointDynamics = JointDynamicsOf<double>;
 
@@ -69,7 +69,8 @@ struct JointParameterKind {
   bool in_urdf = false;  ///< `key` is an attribute of URDF's <dynamics>, too
 };
 
-/// In the order of the members.
+/// In the order of the members. What comes later comes at the end: posteriors of before still fit
+/// their robots then (robot/physics_fingerprint.cc).
 // clang-format off
 inline constexpr JointParameterKind kJointParameterKinds[] = {
     // name, key, member, joints, units, noun, in file, values, surprise, in URDF
@@ -86,12 +87,6 @@ inline constexpr JointParameterKind kJointParameterKinds[] = {
      {0, 1e9}, kAboveZero, {0.05, true}},
     {"rest", "rest", &JointDynamics::rest, JointGroup::kOneCoordinate, "rad", "m", "the spring",
      {-1e9, 1e9}, kFinite, {}},
-    {"kp", "kp", &JointDynamics::kp, JointGroup::kDriven,
-     "Nm/rad", "N/m", "the drive's own loop",
-     {0, 1e9}, kNotNegative, {}},
-    {"kd", "kd", &JointDynamics::kd, JointGroup::kDriven,
-     "Nm s/rad", "N s/m", "the drive's own loop",
-     {0, 1e9}, kNotNegative, {}},
     {"gain", "motor_gain", &JointDynamics::motor_gain, JointGroup::kDriven,
      "", "", "the motor's gain",
      {0, 1e9}, kNotNegative, {0.1}},
@@ -111,6 +106,12 @@ inline constexpr JointParameterKind kJointParameterKinds[] = {
     {"gear_efficiency", "gear_efficiency", &JointDynamics::gear_efficiency, JointGroup::kDriven,
      "", "", "the gear's losses",
      {1e-9, 1}, {1e-9, 1}, {}},
+    {"kp", "kp", &JointDynamics::kp, JointGroup::kDriven,
+     "Nm/rad", "N/m", "the drive's own loop",
+     {0, 1e9}, kNotNegative, {}},
+    {"kd", "kd", &JointDynamics::kd, JointGroup::kDriven,
+     "Nm s/rad", "N s/m", "the drive's own loop",
+     {0, 1e9}, kNotNegative, {}},
 };
 // clang-format on
 static_assert(sizeof(JointDynamics) == std::size(kJointParameterKinds) * sizeof(double));

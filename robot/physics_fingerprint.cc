@@ -1,8 +1,5 @@
 #include "robot/physics_fingerprint.h"
 
-#include <algorithm>
-#include <iterator>
-
 #include "common/hash.h"
 
 namespace plumb {
@@ -31,12 +28,7 @@ class Fingerprint {
 };
 
 // Kinds that came later count where a joint has them: older posteriors still fit their robots.
-constexpr double JointDynamics::*kLaterKinds[] = {&JointDynamics::kp, &JointDynamics::kd,
-                                                  &JointDynamics::gear_efficiency};
-
-bool CameLater(const JointParameterKind& kind) {
-  return std::ranges::find(kLaterKinds, kind.member) != std::end(kLaterKinds);
-}
+constexpr size_t kFirstKinds = 10;
 
 void AddLink(const LinkDescription& link, Fingerprint* hash) {
   hash->Add(link.name), hash->Add(link.mass), hash->Add(link.center_of_mass),
@@ -55,10 +47,11 @@ void AddJoint(const JointDescription& joint, Fingerprint* hash) {
     hash->Add(number);
   }
   constexpr JointDynamics kDefault;
-  for (const JointParameterKind& kind : kJointParameterKinds) {
+  for (size_t i = 0; i < std::size(kJointParameterKinds); ++i) {
+    const JointParameterKind& kind = kJointParameterKinds[i];
     const double number = joint.dynamics.*kind.member;
-    if (CameLater(kind) && number == kDefault.*kind.member) continue;
-    if (CameLater(kind)) hash->Add(kind.name);
+    if (i >= kFirstKinds && number == kDefault.*kind.member) continue;
+    if (i >= kFirstKinds) hash->Add(kind.name);
     hash->Add(number);
   }
 }
