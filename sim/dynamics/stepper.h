@@ -4,7 +4,9 @@
 #include <limits>
 #include <vector>
 
+#include "robot/drive_effort.h"
 #include "sim/dynamics/constraints.h"
+#include "sim/dynamics/motor.h"
 #include "sim/dynamics/physics.h"
 #include "sim/dynamics/sparse_cholesky.h"
 #include "sim/dynamics/topology.h"
@@ -78,7 +80,7 @@ class Stepper {
     if (moment) {
       for (size_t i = 0; i < n_; ++i) {
         shift_[i] = physics.axes[i].motor_gain * moment[i];
-        if (gears_lose_) shift_[i] -= GearLoss(i, shift_[i]);
+        if (gears_lose_) shift_[i] -= GearLoss(physics.axes[i], shift_[i]);
       }
       cholesky_.Solve(topology_.ancestors, matrix_.data(), shift_.data());
     }
@@ -178,39 +180,6 @@ class Stepper {
   Constraints<Real, Tree> constraints_;
   std::vector<Real> heights_, jacobians_;  // of contact points, for ContactHeights
 
-  // A torque along the speed is limited by it: see JointDynamics::no_load_speed.
-  Real Slowed(size_t i, const Real& effort, const Real& speed, double limit) const {
-    const Real inverse_no_load_speed = 1 / physics.axes[i].no_load_speed;
-    const Real share = speed * inverse_no_load_speed;
-    const Real forwards = limit * Max(Real(1 - share), Real{}),
-               backwards = limit * Max(Real(1 + share), Real{});
-    return Clamp(effort, Real(-backwards), forwards);
-  }
-
-  // DriveEffort at the substep's beginning. Where the motor can make it, the loop's springing and
-  // damping go on to its end as a spring's do; at the effort limit nothing of them is left.
-  Real CloseLoop(const Real& h, const Topology::Joint& joint, const Real& effort) {
-    const auto i = static_cast<size_t>(joint.velocity);
-    const auto& axis = physics.axes[i];
-    const Real asked =
-        effort + axis.kp * (axis.rest - q[static_cast<size_t>(joint.position)]) - axis.kd * v[i];
-    const Truth follows = Abs(asked) < joint.effort_limit;
-    const Real spring = follows ? Real(axis.motor_gain * axis.kp) : Real{},
-               damper = follows ? Real(axis.motor_gain * axis.kd) : Real{};
-    smooth_[i * n_ + i] += leapfrog_ ? Real(0.25 * h * h * spring + 0.5 * h * damper)
-                                     : Real(h * (h * spring + damper));
-    if (!leapfrog_) drive_[i] -= h * spring * v[i];
-    return Clamp(asked, Real{} - joint.effort_limit, Real{} + joint.effort_limit);
-  }
-
-  // An effort f that drives arrives as e f, one that brakes as f (efficiency that depends on the
-  // direction: Wang, Kim, ICRA 2015). That is f - l with Coulomb friction of |l| against the
-  // motion, l = (1 - e)/2 f: so the jump where the motion turns is settled with friction,
-  // implicitly, and a joint may hold still under a load that its motor can hold but not lift.
-  Real GearLoss(size_t i, const Real& effort) const {
-    return 0.5 * (1 - physics.axes[i].gear_efficiency) * effort;
-  }
-
   void AssembleSmooth(const Real& h, const Real* effort) {
     tree_.MoveAt(v.data());
     tree_.MassMatrix(physics, smooth_.data());
@@ -232,13 +201,18 @@ class Stepper {
       const auto i = static_cast<size_t>(joint.velocity);
       const auto& axis = physics.axes[i];
       Real acting = effort[i];
-      if (joint.effort_limit > 0) {
-        if (loops_) acting = CloseLoop(h, joint, acting);
-        if (speed_limits_) acting = Slowed(i, acting, v[i], joint.effort_limit);
-        if (loops_ || speed_limits_) drive_[i] += axis.motor_gain * (acting - effort[i]);
+      if (joint.effort_limit > 0 && (loops_ || speed_limits_)) {
+        const Real position = q[static_cast<size_t>(joint.position)],
+                   asked = loops_ ? LoopEffort(axis, effort[i], position, v[i]) : effort[i];
+        acting = asked;
+        if (loops_)
+          acting = Clamp(acting, Real{} - joint.effort_limit, Real{} + joint.effort_limit);
+        if (speed_limits_) acting = SlowedEffort(axis, acting, v[i], joint.effort_limit);
+        drive_[i] += axis.motor_gain * (acting - effort[i]);
+        if (loops_) GoOn(h, i, Abs(Real(acting - asked)) > 0);
       }
       if (gears_lose_) {
-        const Real loss = GearLoss(i, axis.motor_gain * acting);
+        const Real loss = GearLoss(axis, Real(axis.motor_gain * acting));
         drive_[i] -= loss;
         friction_[i] += Abs(loss);
       }
@@ -249,6 +223,17 @@ class Stepper {
         smooth_[i * n_ + i] += (leapfrog_ ? 0.25 : 1.0) * h * h * axis.stiffness;
       }
     }
+  }
+
+  // A loop's springing and damping go on to the substep's end, as a spring's do; where the motor is
+  // at a limit nothing of them is left.
+  void GoOn(const Real& h, size_t i, const Truth& limited) {
+    const auto& axis = physics.axes[i];
+    const Real spring = limited ? Real{} : Real(axis.motor_gain * axis.kp),
+               damper = limited ? Real{} : Real(axis.motor_gain * axis.kd);
+    smooth_[i * n_ + i] += leapfrog_ ? Real(0.25 * h * h * spring + 0.5 * h * damper)
+                                     : Real(h * (h * spring + damper));
+    if (!leapfrog_) drive_[i] -= h * spring * v[i];
   }
 
   void Solve(const Real& h) {

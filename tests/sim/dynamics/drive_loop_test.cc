@@ -74,6 +74,21 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("a loop's motor has no more at a speed than any motor") {
+  constexpr double kNoLoad = 6, kTime = 0.4;  // [rad/s], [s]
+  for (const Integrator integrator : {Integrator::kSemiImplicit, Integrator::kLeapfrog}) {
+    RobotDescription robot = Wheel(50, 1, 1000, integrator);
+    robot.joints[0].dynamics.no_load_speed = kNoLoad;
+    Simulator simulator(robot);
+    simulator.SetState(Scalar(0), Scalar(0));
+    simulator.Step(Scalar(0), kTime);
+    // I v' = limit (1 - v / no-load speed)
+    const double rate = kLimit / (Inertia(robot) * kNoLoad);
+    CHECK(simulator.v()[0] == Approx(kNoLoad * (1 - std::exp(-rate * kTime))).epsilon(1e-3));
+    CHECK(simulator.v()[0] > 0.5);
+  }
+}
+
 TEST_CASE("a stiff loop needs no short substeps") {
   for (const Integrator integrator : {Integrator::kSemiImplicit, Integrator::kLeapfrog}) {
     RobotDescription robot = Wheel(500, 5, 0, integrator);
