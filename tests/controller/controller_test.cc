@@ -1,72 +1,13 @@
-#include "controller/controller.h"
-
-#include <catch2/catch.hpp>
+// Which episodes a controller runs, and what it does in them.
 #include <cmath>
-#include <cstdlib>
-#include <limits>
 #include <map>
 #include <set>
+#include <vector>
+
+#include "tests/controller/surroundings.h"
 
 namespace plumb {
 namespace {
-
-/// The world around a controller, in steps of one measurement (5 ms).
-class Surroundings {
- public:
-  Surroundings()
-      : robot(LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum")),
-        controller(robot, 1) {
-    robot_state.num_positions = robot_state.num_velocities = 1;
-    robot_state.q = robot_state.v = robot_state.q_sd = robot_state.v_sd = robot_state.effort = {0};
-    robot_state.valid = 1;
-  }
-
-  void Driver(int8_t state) {
-    driver_status_t status{};
-    status.state = state;
-    controller.OnDriverStatus(status, now);
-  }
-
-  policy_t Policy(int iteration, int episodes = 1, float bias = 0,
-                  int8_t purpose = policy_t::EVALUATE) {
-    GaussianPolicy policy(PolicyShape{3, {4}, 1});
-    policy.parameters(policy.parameters.size() - 2) = bias;  // of the output
-    policy.action_scale.setConstant(2);
-    policy_t message = policy.ToMessage();
-    message.utime = 1000 + iteration;
-    message.iteration = iteration;
-    message.episodes = episodes;
-    message.purpose = purpose;
-    return message;
-  }
-
-  /// One measurement; the robot is wherever it was last asked to be placed. @return the command, if
-  /// any.
-  std::optional<joint_command_t> Step() {
-    now += 5000, utime += 5000;
-    ++robot_state.sequence;
-    robot_state.utime = utime;
-    if (controller.place())
-      robot_state.q = controller.place()->q, robot_state.v = controller.place()->v;
-    auto command = controller.OnState(robot_state, now, utime + 300);
-    const auto halt = controller.Tick(now, utime);
-    if (halt) command = halt;
-    if (controller.phase() != 4 && now % 100'000 == 0) Driver(driver_state);
-    return command;
-  }
-  void StepUntil(int8_t phase, int most = 10000) {
-    for (int i = 0; i < most && controller.phase() != phase; ++i) Step();
-    REQUIRE(controller.phase() == phase);
-  }
-
-  RobotDescription robot;
-  Controller controller;
-  robot_state_t robot_state{};
-  int64_t now = 1'000'000, utime = 50'000'000;
-  int8_t driver_state = driver_status_t::ARMED;
-};
-
-using S = controller_status_t;
 
 TEST_CASE_METHOD(Surroundings, "a table of efforts is played once, without any policy") {
   Eigen::MatrixXf actions(7, 1);
@@ -90,24 +31,6 @@ TEST_CASE_METHOD(Surroundings, "a table of efforts is played once, without any p
     const auto command = Step();
     if (command) CHECK(command->effort[0] == 0);
   }
-}
-
-TEST_CASE_METHOD(Surroundings, "it is silent until the driver is armed, then commands zero") {
-  for (int i = 0; i < 50; ++i) {
-    driver_state = driver_status_t::IDLE;
-    CHECK_FALSE(Step());
-  }
-  Driver(driver_state = driver_status_t::ARMED);
-  int commands = 0;
-  for (int i = 0; i < 100; ++i) {
-    if (const auto command = Step()) {
-      ++commands;
-      CHECK(command->effort[0] == 0);
-      CHECK(command->episode == -1);
-    }
-  }
-  CHECK(commands >= 9);  // one per control period of ten measurements
-  CHECK(commands <= 11);
 }
 
 TEST_CASE_METHOD(Surroundings, "an episode has its number of steps, one control period apart") {
@@ -247,89 +170,6 @@ TEST_CASE_METHOD(Surroundings, "a policy that does not fit is refused and the ol
   stronger.action_scale = {3};
   CHECK_THROWS_AS(controller.OnPolicy(stronger), std::invalid_argument);
   CHECK(controller.status().policy_iteration == 0);
-}
-
-TEST_CASE_METHOD(Surroundings, "a state at a time that no clock shows is none") {
-  Driver(driver_status_t::ARMED);
-  controller.OnPolicy(Policy(0, 1, 0.5f));
-  for (const int8_t phase : {S::PLACING, S::RUNNING}) {
-    StepUntil(phase);
-    for (const int64_t mad : {INT64_MIN, INT64_MAX, -(int64_t{1} << 54), int64_t{1} << 54}) {
-      robot_state_t state = robot_state;
-      state.utime = mad;
-      CHECK_FALSE(controller.OnState(state, now, utime));
-      CHECK(controller.phase() == phase);
-    }
-  }
-  StepUntil(S::COMPLETE);
-}
-
-TEST_CASE_METHOD(Surroundings,
-                 "doubtful states halt it: zero effort, silence, and only a re-arming leads out") {
-  Driver(driver_status_t::ARMED);
-  controller.OnPolicy(Policy(0, 1, 0.5f));
-  StepUntil(S::RUNNING);
-  for (int i = 0; i < 33; ++i) Step();
-  std::optional<joint_command_t> command;
-  SECTION("late") {
-    now += 150'000, utime += 150'000;
-    command = controller.Tick(now, utime);
-  }
-  SECTION("old, in quick succession, as after a stop") {
-    utime += 150'000;  // the world has moved on, the states have not
-    robot_state.utime = utime - 150'000 + 5000;
-    ++robot_state.sequence;
-    command = controller.OnState(robot_state, now + 5000, utime);
-  }
-  SECTION("not finite") {
-    robot_state.q[0] = std::numeric_limits<double>::quiet_NaN();
-    command = Step();
-    robot_state.q[0] = 0;
-  }
-  SECTION("not valid") {
-    robot_state.valid = 0;
-    command = Step();
-    robot_state.valid = 1;
-  }
-  SECTION("half a control period late") {
-    now += 60'000, utime += 60'000;
-    robot_state.sequence += 12;
-    command = Step();
-  }
-  REQUIRE(controller.phase() == S::HALTED);
-  REQUIRE(command);
-  CHECK(command->effort[0] == 0);
-  CHECK_FALSE(controller.status().reason.empty());
-  CHECK(controller.status().episodes_aborted == 1);
-  for (int i = 0; i < 100; ++i) CHECK_FALSE(Step());
-  Driver(driver_status_t::ARMED);
-  CHECK(controller.phase() == S::HALTED);
-  Driver(driver_status_t::FAULT);
-  CHECK(controller.phase() == S::HALTED);
-  Driver(driver_status_t::ARMED);
-  StepUntil(S::COMPLETE);  // the episode is run anew
-  CHECK(controller.status().num_episodes == 1);
-}
-
-TEST_CASE_METHOD(Surroundings,
-                 "a driver that disarms ends the episode; a silent driver counts as absent") {
-  Driver(driver_status_t::ARMED);
-  controller.OnPolicy(Policy(0));
-  StepUntil(S::RUNNING);
-  SECTION("disarms") { Driver(driver_state = driver_status_t::FAULT); }
-  SECTION("falls silent") {
-    for (int i = 0; i < 300; ++i) {
-      now += 5000, utime += 5000;
-      ++robot_state.sequence;
-      robot_state.utime = utime;
-      controller.OnState(robot_state, now, utime);
-      controller.Tick(now, utime);
-    }
-    driver_state = driver_status_t::ABSENT;
-  }
-  CHECK(controller.phase() == S::WAITING);
-  CHECK(controller.status().episodes_aborted == 1);
-  CHECK_FALSE(Step());
 }
 
 TEST_CASE_METHOD(Surroundings, "a robot that nobody can place rests, and begins where it is") {

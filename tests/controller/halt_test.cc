@@ -1,0 +1,112 @@
+// When a controller is silent, and what ends an episode that it may not go on with.
+#include <cmath>
+#include <limits>
+
+#include "tests/controller/surroundings.h"
+
+namespace plumb {
+namespace {
+
+TEST_CASE_METHOD(Surroundings, "it is silent until the driver is armed, then commands zero") {
+  for (int i = 0; i < 50; ++i) {
+    driver_state = driver_status_t::IDLE;
+    CHECK_FALSE(Step());
+  }
+  Driver(driver_state = driver_status_t::ARMED);
+  int commands = 0;
+  for (int i = 0; i < 100; ++i) {
+    if (const auto command = Step()) {
+      ++commands;
+      CHECK(command->effort[0] == 0);
+      CHECK(command->episode == -1);
+    }
+  }
+  CHECK(commands >= 9);  // one per control period of ten measurements
+  CHECK(commands <= 11);
+}
+
+TEST_CASE_METHOD(Surroundings, "a state at a time that no clock shows is none") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 1, 0.5f));
+  for (const int8_t phase : {S::PLACING, S::RUNNING}) {
+    StepUntil(phase);
+    for (const int64_t mad : {INT64_MIN, INT64_MAX, -(int64_t{1} << 54), int64_t{1} << 54}) {
+      robot_state_t state = robot_state;
+      state.utime = mad;
+      CHECK_FALSE(controller.OnState(state, now, utime));
+      CHECK(controller.phase() == phase);
+    }
+  }
+  StepUntil(S::COMPLETE);
+}
+
+TEST_CASE_METHOD(Surroundings,
+                 "doubtful states halt it: zero effort, silence, and only a re-arming leads out") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0, 1, 0.5f));
+  StepUntil(S::RUNNING);
+  for (int i = 0; i < 33; ++i) Step();
+  std::optional<joint_command_t> command;
+  SECTION("late") {
+    now += 150'000, utime += 150'000;
+    command = controller.Tick(now, utime);
+  }
+  SECTION("old, in quick succession, as after a stop") {
+    utime += 150'000;  // the world has moved on, the states have not
+    robot_state.utime = utime - 150'000 + 5000;
+    ++robot_state.sequence;
+    command = controller.OnState(robot_state, now + 5000, utime);
+  }
+  SECTION("not finite") {
+    robot_state.q[0] = std::numeric_limits<double>::quiet_NaN();
+    command = Step();
+    robot_state.q[0] = 0;
+  }
+  SECTION("not valid") {
+    robot_state.valid = 0;
+    command = Step();
+    robot_state.valid = 1;
+  }
+  SECTION("half a control period late") {
+    now += 60'000, utime += 60'000;
+    robot_state.sequence += 12;
+    command = Step();
+  }
+  REQUIRE(controller.phase() == S::HALTED);
+  REQUIRE(command);
+  CHECK(command->effort[0] == 0);
+  CHECK_FALSE(controller.status().reason.empty());
+  CHECK(controller.status().episodes_aborted == 1);
+  for (int i = 0; i < 100; ++i) CHECK_FALSE(Step());
+  Driver(driver_status_t::ARMED);
+  CHECK(controller.phase() == S::HALTED);
+  Driver(driver_status_t::FAULT);
+  CHECK(controller.phase() == S::HALTED);
+  Driver(driver_status_t::ARMED);
+  StepUntil(S::COMPLETE);  // the episode is run anew
+  CHECK(controller.status().num_episodes == 1);
+}
+
+TEST_CASE_METHOD(Surroundings,
+                 "a driver that disarms ends the episode; a silent driver counts as absent") {
+  Driver(driver_status_t::ARMED);
+  controller.OnPolicy(Policy(0));
+  StepUntil(S::RUNNING);
+  SECTION("disarms") { Driver(driver_state = driver_status_t::FAULT); }
+  SECTION("falls silent") {
+    for (int i = 0; i < 300; ++i) {
+      now += 5000, utime += 5000;
+      ++robot_state.sequence;
+      robot_state.utime = utime;
+      controller.OnState(robot_state, now, utime);
+      controller.Tick(now, utime);
+    }
+    driver_state = driver_status_t::ABSENT;
+  }
+  CHECK(controller.phase() == S::WAITING);
+  CHECK(controller.status().episodes_aborted == 1);
+  CHECK_FALSE(Step());
+}
+
+}  // namespace
+}  // namespace plumb
