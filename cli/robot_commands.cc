@@ -151,16 +151,18 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
   launch->add_option("--seed", flags->seed, "of all random numbers and of the hidden robot")
       ->check(SeedRange())
       ->capture_default_str();
-  launch->add_option("--iterations", flags->iterations, "of calibration")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  auto* iterations = launch->add_option("--iterations", flags->iterations, "of calibration")
+                         ->check(CLI::Range(1, 1000))
+                         ->capture_default_str();
+  auto* episodes = launch
+                       ->add_option("--evaluation-episodes", flags->evaluation_episodes,
+                                    "roll-outs of the final policy")
+                       ->check(CLI::Range(1, 1000))
+                       ->capture_default_str();
   launch
-      ->add_option("--evaluation-episodes", flags->evaluation_episodes,
-                   "roll-outs of the final policy")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  launch->add_option("--efforts", flags->efforts,
-                     "instead of the loop: play this table of `plumb excite` once, calibrate");
+      ->add_option("--efforts", flags->efforts,
+                   "instead of the loop: play this table of `plumb excite` once, calibrate")
+      ->excludes(iterations, episodes);
   launch
       ->add_option("--bus", flags->buses,
                    "CAN bus, e.g. socketcan:can0, of several NAME=URL; default: the robot's own")

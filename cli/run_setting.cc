@@ -16,6 +16,7 @@
 #include "common/process_number.h"
 #include "drivers/driver/driver.h"
 #include "sim/parameters.h"
+#include "sim/tasks/effort_table.h"
 #include "trainer/session.h"
 
 namespace plumb {
@@ -46,7 +47,7 @@ fs::path MakeFolder(const std::string& wanted) {
 void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
                          const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
-  inputs.push_back(process.key_file());
+  inputs.insert(inputs.end(), {process.key_file(), flags.efforts});
   const std::vector<std::string> outputs{flags.log, flags.can_log, flags.summary, flags.report};
   RequireNotRead(outputs, inputs);
   RequireApart(outputs);
@@ -80,6 +81,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
   if (!flags.dashboard.empty()) ListenAddress::Parse(flags.dashboard);
   RequireDrivable(robot);
+  if (!flags.efforts.empty()) ReadEffortTable(flags.efforts, robot, *MakeTask(robot));
   RequireSendable(robot);
   RequireKey(process.lcm_url(), !process.key_file().empty(), flags.allow_unsigned);
   if (flags.real && flags.speed != 0)

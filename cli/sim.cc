@@ -84,8 +84,10 @@ Eigen::VectorXd Means(const RobotDescription& robot) {
   return means;
 }
 
-Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task& task) {
-  if (!flags.efforts.empty()) return PlayActions(ReadEffortTable(flags.efforts, robot, task));
+/// @param played what --efforts has; empty = nothing.
+Actor MakeActor(const SimFlags& flags, const RobotDescription& robot, const Task& task,
+                const Eigen::MatrixXf& played) {
+  if (played.rows() > 0) return PlayActions(played);
   if (!flags.policy.empty()) {
     return [policy = LoadPolicy(flags.policy, robot, task)](
                const Eigen::VectorXf& observation, Random&) { return policy.Mean(observation); };
@@ -151,9 +153,10 @@ int Simulate(Process& process, const SimFlags& flags) {
   const ReadingNoise noise = ParseReadingNoise(flags.noise);
   RequireFiles(flags, robot);
   const Eigen::VectorXd means = Means(robot);
+  Eigen::MatrixXf played;
   if (!flags.efforts.empty()) {
-    robot.task.steps =
-        static_cast<int>(ReadEffortTable(flags.efforts, robot, *MakeTask(robot)).rows());
+    played = ReadEffortTable(flags.efforts, robot, *MakeTask(robot));
+    robot.task.steps = static_cast<int>(played.rows());
   }
   Environment environment(robot);
   environment.SetParameters(means);
@@ -183,8 +186,9 @@ int Simulate(Process& process, const SimFlags& flags) {
       if (!flags.csv.empty()) AppendCsv(step, csv);
       if (number == 0) film.push_back({step.time, step.true_q});
     };
-    episodes.push_back(PlayEpisode(environment, robot, MakeActor(flags, robot, environment.task()),
-                                   flags.seed, static_cast<uint32_t>(number), see, stop));
+    episodes.push_back(PlayEpisode(environment, robot,
+                                   MakeActor(flags, robot, environment.task(), played), flags.seed,
+                                   static_cast<uint32_t>(number), see, stop));
     const EpisodeSummary& episode = episodes.back();
     std::cout << fmt::format("{:>7}  {:>6}  {:>10.1f}  {}", number + 1, episode.steps, episode.sum,
                              Describe(episode.end))
