@@ -232,7 +232,7 @@ void Run(const Case& one, uint64_t seed, Outcome* outcome) {
   const auto parameters = static_cast<int>(robot.parameters.size());
   outcome->held += Held(robot, Moments(result.posterior), seed);
   outcome->intervals += parameters;
-  const GapFit gap = CloseGap(input, std::move(result), "");
+  const GapFit gap = CloseGap(input, std::move(result));
   outcome->judged += gap.alarm.judged;
   outcome->beside += gap.gap.informed == Informed::kBesideContacts;
   outcome->free += gap.gap.informed == Informed::kFree;

@@ -116,7 +116,7 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   const std::string urdf_path = (file.parent_path() / urdf_file).string();
   if (!fs::exists(urdf_path, error))
     header.Fail("urdf", fmt::format("= \"{}\": there is no such file", urdf_file));
-  const std::vector<std::string> fixed = header.Strings("fixed", {{}});
+  const std::vector<std::string> fixed = header.Strings("fixed", std::vector<std::string>{});
   header.Finish();
   UrdfModel urdf = ReadUrdf(header, urdf_path, fixed);
   files.push_back(urdf_path);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -94,12 +93,12 @@ class Test {
   static Misspecification WithoutWitnesses(const Misspecification& all) {
     Misspecification found;
     found.judged = false;
-    found.summary = all.summary + ", as far as positions tell: nobody has read the velocities";
-    if (!all.alarm) return found;
     found.summary =
-        "nobody can tell whether the model explains this log: nobody has read its velocities, and "
-        "errors of windows may depend on their own noise" +
-        all.summary.substr(std::min(all.summary.size(), all.summary.find(": ")));
+        all.alarm ? "nobody can tell whether the model explains this log: nobody has read its "
+                    "velocities, and errors of windows may depend on their own noise; if they do "
+                    "not, " +
+                        all.summary
+                  : all.summary + ", as far as positions tell: nobody has read the velocities";
     return found;
   }
 

@@ -62,7 +62,7 @@ WindowErrors::WindowErrors(std::shared_ptr<const Model> model, std::span<const R
 void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
   const auto& transitions = rollouts_[rollout].transitions;
   const Transition& begins = transitions[first];
-  const size_t before = readings_.size(), told = told_.size();
+  const size_t before = readings_.size(), telling = telling_.size();
   std::vector<Eigen::Index> step_rows;
   for (size_t i = first; i < first + length; ++i) {
     step_rows.push_back(static_cast<Eigen::Index>(readings_.size()));
@@ -70,17 +70,17 @@ void WindowErrors::AddWindow(size_t rollout, size_t first, size_t length) {
       if (!IsObserved(space_, transitions[i], c)) continue;
       // It takes one position to tell with which velocity the window began.
       const bool tells = i > first || c >= n_ || !IsUnread(begins, c);
-      if (tells) told_.push_back(static_cast<Eigen::Index>(readings_.size()));
+      if (tells) telling_.push_back(static_cast<Eigen::Index>(readings_.size()));
       readings_.push_back({static_cast<int>(windows_.size()), static_cast<int>(rollout),
                            static_cast<int>(i), static_cast<int>(c)});
     }
   }
-  if (told_.size() == told) {
+  if (telling_.size() == telling) {
     readings_.resize(before);
     return;
   }
-  for (size_t k = told; k < told_.size(); ++k)
-    rows_.push_back(readings_[static_cast<size_t>(told_[k])]);
+  for (size_t k = telling; k < telling_.size(); ++k)
+    rows_.push_back(readings_[static_cast<size_t>(telling_[k])]);
   step_rows.push_back(static_cast<Eigen::Index>(readings_.size()));
   step_rows_.push_back(std::move(step_rows));
   first_row_.push_back(static_cast<Eigen::Index>(before));
@@ -173,13 +173,13 @@ Eigen::MatrixXd WindowErrors::FromRecord(const Eigen::MatrixXd& physical) {
   return errors;
 }
 
-Eigen::MatrixXd WindowErrors::Told(const Eigen::MatrixXd& errors) const {
-  if (told_.size() == readings_.size()) return errors;
-  return errors(told_, Eigen::all);
+Eigen::MatrixXd WindowErrors::Telling(const Eigen::MatrixXd& errors) const {
+  if (telling_.size() == readings_.size()) return errors;
+  return errors(telling_, Eigen::all);
 }
 
 Eigen::MatrixXd WindowErrors::Raw(const Eigen::MatrixXd& physical) {
-  return Told(FromRecord(physical));
+  return Telling(FromRecord(physical));
 }
 
 // Of all rows to the states that windows begin with.
@@ -265,7 +265,7 @@ Eigen::MatrixXd WindowErrors::Whitened(const Eigen::MatrixXd& physical) {
   for (Eigen::Index j = 0; j < errors.cols(); ++j) {
     if (!errors.col(j).allFinite()) errors.col(j).setConstant(kNaN);
   }
-  return Told(errors);
+  return Telling(errors);
 }
 
 double WindowErrors::LogSpread() const {

@@ -105,7 +105,7 @@ class WindowErrors {
                           uint64_t which = 0);
   Eigen::MatrixXd Simulate(const Eigen::MatrixXd& physical, std::span<const Window> windows);
   Eigen::MatrixXd FromRecord(const Eigen::MatrixXd& physical);
-  Eigen::MatrixXd Told(const Eigen::MatrixXd& errors) const;
+  Eigen::MatrixXd Telling(const Eigen::MatrixXd& errors) const;
   Eigen::MatrixXd FreeMotion() const;
   Eigen::MatrixXd Sensitivity(const Eigen::VectorXd& physical, const Eigen::MatrixXd& middle);
   void MoveStarts(const Eigen::MatrixXd& errors);
@@ -123,7 +123,7 @@ class WindowErrors {
   std::vector<Start> starts_;
   std::vector<Row> readings_;            // all that are compared
   std::vector<Row> rows_;                // those that tell
-  std::vector<Eigen::Index> told_;       // where these are among all
+  std::vector<Eigen::Index> telling_;    // where these are among all
   std::vector<Eigen::Index> first_row_;  // reading of each window, and the end
   // first of each step of each window, and the end
   std::vector<std::vector<Eigen::Index>> step_rows_;

@@ -28,7 +28,7 @@ Toml ReadToml(const RobotDescription& robot) {
   Toml toml;
   Config header = root.Table("robot");
   toml.urdf = (std::filesystem::path(robot.file).parent_path() / header.String("urdf")).string();
-  toml.fixed = header.Strings("fixed", {{}});
+  toml.fixed = header.Strings("fixed", std::vector<std::string>{});
   for (Config& joint : root.Tables("joint")) {
     const std::string name = joint.String("name");
     const Config dynamics = joint.Table("dynamics", false);
