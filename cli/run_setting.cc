@@ -81,7 +81,10 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   for (const std::string& warning : robot.warnings) spdlog::warn("{}", warning);
   if (!flags.dashboard.empty()) ListenAddress::Parse(flags.dashboard);
   RequireDrivable(robot);
-  if (!flags.efforts.empty()) ReadEffortTable(flags.efforts, robot, *MakeTask(robot));
+  if (!flags.efforts.empty()) {
+    const Eigen::MatrixXf played = ReadEffortTable(flags.efforts, robot, *MakeTask(robot));
+    robot.task.steps = static_cast<int>(played.rows());
+  }
   RequireSendable(robot);
   RequireKey(process.lcm_url(), !process.key_file().empty(), flags.allow_unsigned);
   if (flags.real && flags.speed != 0)

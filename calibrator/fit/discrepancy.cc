@@ -192,7 +192,9 @@ Eigen::VectorXd Discrepancy::ReplayError(const Eigen::MatrixXd& parameters,
 
 Eigen::VectorXd Discrepancy::ReplayErrorHere(const Eigen::MatrixXd& parameters,
                                              std::span<const Rollout> rollouts) {
-  const auto [windows, first] = WholeStretches(rollouts);
+  const Stretches stretches = WholeStretches(rollouts);
+  const std::vector<Window>& windows = stretches.windows;
+  const Ends& first = stretches.first;
   // Of each window, as several threads are visited at once.
   std::vector<Eigen::MatrixXd> squares(windows.size(),
                                        Eigen::MatrixXd::Zero(parameters.cols(), n_)),
@@ -220,7 +222,9 @@ Eigen::VectorXd Discrepancy::TrajectoryErrorHere(const Eigen::MatrixXd& paramete
                                                  double smoothing) {
   // Over a gap nothing is known of the efforts: the simulation sets off again where the record
   // does.
-  const auto [windows, first] = WholeStretches(rollouts);
+  const Stretches stretches = WholeStretches(rollouts);
+  const std::vector<Window>& windows = stretches.windows;
+  const Ends& first = stretches.first;
   // where each window's errors go, and where each roll-out's begin
   std::vector<Eigen::Index> rows, begins;
   Eigen::Index steps = 0;
