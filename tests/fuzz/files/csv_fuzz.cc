@@ -21,7 +21,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const InputFile file("log.csv");
   static const RobotDescription robot = HeldRobot();
   file.Write(Text(data, size));
-  ReadOrRefuse<std::runtime_error>(
-      [&] { RequireFinite(ReadCsvLog(file.path(), robot).rollouts); });
+  ReadOrRefuse<std::runtime_error>([&] { RequireFinite(ReadCsvLog(file.path(), robot).rollouts); });
   return 0;
 }
