@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <thread>
 
@@ -14,6 +15,7 @@
 #include "calibrator/motion/motion_log.h"
 #include "calibrator/results/posterior_file.h"
 #include "common/examples.h"
+#include "common/name_lock.h"
 #include "common/process.h"
 #include "common/seed_range.h"
 #include "common/time_units.h"
@@ -37,6 +39,9 @@ class Session {
       : robot_(robot),
         clock_(clock),
         folder_(flags.checkpoint),
+        lock_(
+            "calibration " + std::filesystem::weakly_canonical(flags.checkpoint).string(),
+            flags.checkpoint + ": another calibrator is at work there: give another --checkpoint"),
         simopt_(robot, flags.seed,
                 flags.threads > 0
                     ? flags.threads
@@ -123,6 +128,7 @@ class Session {
   const RobotDescription& robot_;
   const Clock& clock_;
   std::filesystem::path folder_;
+  const NameLock lock_;
   SimOpt simopt_;
 
  public:

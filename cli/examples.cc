@@ -34,7 +34,7 @@ const struct {
       "plumb export-model robots/hopper --randomisation table.json --samples 1000 --seed 2"}},
     {{"serve-model"},
      {"plumb serve-model robots/hopper --csv hop.csv",
-      "plumb serve-model robots/hopper --log hop.lcmlog --address 127.0.0.1:4243"}},
+      "plumb serve-model robots/hopper --log hop.lcmlog --address 0.0.0.0:4243 --host robot.lab"}},
     {{"doctor"}, {"plumb doctor --bus socketcan:can0 --key robot.key"}},
     {{"can"}, {"plumb can plan robots/hopper"}},
     {{"can", "plan"}, {"plumb can plan robots/hopper"}},

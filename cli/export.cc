@@ -15,6 +15,7 @@
 #include "records/log_export.h"
 #include "records/record_folder.h"
 #include "robot/description.h"
+#include "robot/json_text.h"
 
 namespace plumb {
 namespace {
@@ -27,7 +28,12 @@ std::map<std::string, std::string> NotesOf(const std::string& log) {
   const fs::path file = RecordFolder::Of(log) / "record.json";
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return notes;
-  const nlohmann::json record = nlohmann::json::parse(ReadFile(file.string()), nullptr, false);
+  nlohmann::json record;
+  try {
+    record = ParseJson(ReadFile(file.string()));
+  } catch (const std::exception&) {
+    return notes;
+  }
   if (!record.is_object()) return notes;
   for (const auto& [key, value] : record.items()) {
     if (value.is_string()) notes[key] = value.get<std::string>();

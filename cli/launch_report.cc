@@ -247,4 +247,6 @@ std::string LaunchReport(const RobotDescription& robot, const json& summary,
   return LaunchPage(robot, summary, command).Print();
 }
 
+std::string LaunchReportBegins() { return kPageBegins; }
+
 }  // namespace plumb

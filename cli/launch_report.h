@@ -13,4 +13,7 @@ namespace plumb {
 std::string LaunchReport(const RobotDescription& robot, const nlohmann::json& summary,
                          const std::string& command);
 
+/// What each report begins with. Thread-safe.
+std::string LaunchReportBegins();
+
 }  // namespace plumb

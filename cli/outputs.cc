@@ -60,4 +60,8 @@ void RequireSameKind(const std::string& file, const std::string& begins, const s
     throw std::invalid_argument(file + ": is there and not " + kind + ": it is not written over");
 }
 
+void RequireLcmLog(const std::string& file) {
+  RequireSameKind(file, "\xed\xa1\xda\x01", "an LCM log");
+}
+
 }  // namespace plumb

@@ -30,5 +30,7 @@ std::vector<std::string> FilesOf(const RobotDescription& robot);
 /// @param begins what files of that kind begin with. @param kind "an LCM log"
 /// @throws std::invalid_argument naming the file.
 void RequireSameKind(const std::string& file, const std::string& begins, const std::string& kind);
+/// The same of LCM's logs, which begin with the sync word of their first event.
+void RequireLcmLog(const std::string& file);
 
 }  // namespace plumb

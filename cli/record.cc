@@ -4,9 +4,13 @@
 
 #include <exception>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
+#include "cli/outputs.h"
 #include "common/lcm_log_writer.h"
 #include "records/record_folder.h"
+#include "robot/description.h"
 
 namespace plumb {
 
@@ -15,6 +19,12 @@ int Record(Process& process, const RecordFlags& flags) {
     throw std::invalid_argument(
         "a run in virtual time is recorded without loss by plumb launch --log");
   }
+  std::vector<std::string> inputs{process.key_file()};
+  if (!flags.robot.empty()) {
+    for (const std::string& file : FilesOf(LoadRobot(flags.robot))) inputs.push_back(file);
+  }
+  RequireNotRead({flags.log}, inputs);
+  RequireLcmLog(flags.log);
   Messenger& messenger = process.messenger();
   // First, for a robot that cannot be read: what an earlier log has is not lost for it.
   RecordFolder folder(flags.log,

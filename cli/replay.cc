@@ -218,7 +218,7 @@ int Replay(Process& process, const ReplayFlags& flags) {
   // Two speakers on a channel end whoever listens: one run or replay at a time.
   std::optional<NameLock> lock;
   if (const std::string& url = process.lcm_url(); !url.starts_with("memq:")) {
-    lock.emplace("messages " + url,
+    lock.emplace("messages " + LcmGroup(url),
                  "a run or a replay is under way on " + url + ": stop it, or give --lcm-url");
   }
   return Replayer(process, flags).Run();

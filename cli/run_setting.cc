@@ -8,6 +8,8 @@
 #include <ctime>
 #include <stdexcept>
 
+#include "calibrator/motion/longest_episode.h"
+#include "cli/launch_report.h"
 #include "cli/outputs.h"
 #include "cli/preflight.h"
 #include "common/atomic_file.h"
@@ -43,7 +45,6 @@ fs::path MakeFolder(const std::string& wanted) {
   return folder;
 }
 
-// LCM's log begins with the sync word of its first event.
 void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
                          const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
@@ -51,10 +52,10 @@ void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
   const std::vector<std::string> outputs{flags.log, flags.can_log, flags.summary, flags.report};
   RequireNotRead(outputs, inputs);
   RequireApart(outputs);
-  RequireSameKind(flags.log, "\xed\xa1\xda\x01", "an LCM log");
+  RequireLcmLog(flags.log);
   RequireSameKind(flags.can_log, "(", "a log of candump's");
-  RequireSameKind(flags.summary, "{", "a summary");
-  RequireSameKind(flags.report, "<!DOCTYPE html>", "a report");
+  RequireSameKind(flags.summary, "{\n \"bus\": ", "a run's summary");
+  RequireSameKind(flags.report, LaunchReportBegins(), "a report of ours");
 }
 
 }  // namespace
@@ -63,8 +64,9 @@ void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
 // within a process is nobody else's.
 void RunSetting::Lock(const std::string& lcm_url) {
   if (!lcm_url.starts_with("memq:")) {
-    messages_lock.emplace("messages " + lcm_url, "another run is under way on " + lcm_url +
-                                                     ": stop it, or give --lcm-url");
+    messages_lock.emplace(
+        "messages " + LcmGroup(lcm_url),
+        "another run is under way on " + lcm_url + ": stop it, or give --lcm-url");
   }
   for (const BusDescription& bus : robot.buses) {
     const std::string innermost = InnermostBus(bus.url);
@@ -84,6 +86,13 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   if (!flags.efforts.empty()) {
     const Eigen::MatrixXf played = ReadEffortTable(flags.efforts, robot, *MakeTask(robot));
     robot.task.steps = static_cast<int>(played.rows());
+    const double longest = static_cast<double>(kMostEpisodeStates) * robot.driver.cycle;
+    if (robot.task.steps * robot.task.period > longest) {
+      throw std::invalid_argument(
+          fmt::format("{}: lasts {:.6g} s; of one motion {:.6g} s are kept to learn from: play "
+                      "several shorter ones",
+                      flags.efforts, robot.task.steps * robot.task.period, longest));
+    }
   }
   RequireSendable(robot);
   RequireKey(process.lcm_url(), !process.key_file().empty(), flags.allow_unsigned);

@@ -22,7 +22,9 @@ int ServeModel(Process& process, const ServeModelFlags& flags) {
   PrintLogs(logs);
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   RobotModels models(robot, logs, ExecutionOptions(flags.threads > 0 ? flags.threads : cores));
-  UmbridgeServer server(listen, models.Models());
+  std::vector<std::string> names;
+  for (const std::string& name : flags.hosts) names.push_back(HostAndPort::Split(name).host);
+  UmbridgeServer server(listen, names, models.Models());
   std::cout << "parameters, in this order and unit:";
   for (const ParameterDescription& p : robot.parameters)
     std::cout << fmt::format(" {} [{}]", p.name, p.unit);

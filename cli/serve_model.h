@@ -12,7 +12,8 @@ struct ServeModelFlags {
   std::string robot;
   std::vector<std::string> logs, tables;  ///< LCM logs, CSV files
   std::string address = "127.0.0.1:4242";
-  int threads = 0;  ///< 0 = one per core
+  std::vector<std::string> hosts;  ///< further names by which clients may call this machine
+  int threads = 0;                 ///< 0 = one per core
 };
 
 /// `plumb serve-model`: what logs say of a robot's parameters (RobotModels), for UM-Bridge's

@@ -226,6 +226,10 @@ void AddServeModel(CLI::App& app, Action& action) {
   serve->add_option("--address", flags->address, "where to listen, ADDRESS:PORT; port 0 = any")
       ->capture_default_str();
   serve
+      ->add_option("--host", flags->hosts,
+                   "another name by which clients may call this machine; may be repeated")
+      ->allow_extra_args(false);
+  serve
       ->add_option("--threads", flags->threads,
                    "0 = one per core; the result does not depend on it")
       ->check(CLI::Range(0, 1024))

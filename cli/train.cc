@@ -81,7 +81,10 @@ class Training {
                  Threads(), ranks_) {
     if (!speaks()) spdlog::set_level(spdlog::level::err);
     if (flags_.checkpoint.empty()) flags_.checkpoint = flags_.output + ".checkpoint";
-    if (flags_.csv.empty() && !flags_.report.empty()) flags_.csv = flags_.report + ".csv";
+    if (flags_.csv.empty() && !flags_.report.empty()) {
+      flags_.csv = flags_.report + ".csv";  // which nobody has named
+      RequireSameKind(flags_.csv, "update,steps,mean_return,", "a table of a training");
+    }
     steps_ = flags_.steps > 0 ? static_cast<int64_t>(flags_.steps)
                               : int64_t{robot_.training.updates} * robot_.training.batch;
     if (speaks()) {

@@ -76,6 +76,14 @@ MulticastAddress ParseUdpm(const std::string& url) {
   return address;
 }
 
+std::string LcmGroup(const std::string& url) {
+  if (!url.starts_with(kUdpm)) return url;
+  const MulticastAddress address = ParseUdpm(url);
+  in_addr group{};
+  inet_pton(AF_INET, address.group.c_str(), &group);
+  return fmt::format("{:08x}:{}", ntohl(group.s_addr), address.port);
+}
+
 bool StaysOnMachine(const std::string& url) {
   const std::string resolved = ResolvedLcmUrl(url);
   if (resolved.starts_with("memq://") || resolved.starts_with("file://")) return true;

@@ -18,10 +18,10 @@ std::string ResolvedLcmUrl(const std::string& url);
 
 /// Where the messages of a udpm: URL go.
 struct MulticastAddress {
-  std::string group;       ///< IPv4, e.g. "239.255.76.67"
-  uint16_t port;           ///< 1 to 65535
-  int ttl = 0;             ///< 0 to 255; 0 = stays on this machine
-  int receive_buffer = 0;  ///< of the kernel [bytes]; 0 = its default
+  std::string group;             ///< IPv4, e.g. "239.255.76.67"
+  uint16_t port;                 ///< 1 to 65535
+  int ttl = 0;                   ///< 0 to 255; 0 = stays on this machine
+  int receive_buffer = 2 << 20;  ///< of the kernel [bytes]; 0 = its default
   bool operator==(const MulticastAddress&) const = default;
 };
 
@@ -29,6 +29,10 @@ struct MulticastAddress {
 /// out. Stricter than liblcm, which takes what it does not understand for 0.
 /// @throws std::invalid_argument naming what is wrong.
 MulticastAddress ParseUdpm(const std::string& url);
+
+/// Group and port of a udpm: URL, the same however that is spelt; any other URL itself.
+/// @throws as ParseUdpm.
+std::string LcmGroup(const std::string& url);
 
 /// True if what is sent to this LCM URL reaches no other machine: memq:, file:, or udpm: with a TTL
 /// of 0, which is liblcm's default. In udpm: both directions hold: with a TTL of

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace plumb {
 
@@ -27,5 +28,10 @@ struct HostAndPort {
   /// Whether the host is an address of IPv4, or in brackets one of IPv6.
   bool is_number() const;
 };
+
+/// Whether whoever asks calls a server by a number, which nobody can rebind, by "localhost" or by
+/// one of these names: a page under a name of its own that leads to this machine (DNS rebinding)
+/// must not get at it. @param header "Host" of an HTTP request. @param names in small letters.
+bool IsCalledRightly(std::string_view header, const std::vector<std::string>& names);
 
 }  // namespace plumb

@@ -20,6 +20,7 @@ constexpr int kLongestChain = 8;  // of files that extend each other
 // Far beyond any robot; what has more keeps the reader busy for minutes, or ends it by recursion.
 constexpr int kDeepestKey = 16;                              // parts of a.b.c
 constexpr size_t kMostEntries = 10'000;                      // of a table or an array
+constexpr size_t kMostTakenAway = 200;                       // by `without`, each looked for in all
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // which a file may begin with
 
 // What the reader must not be given. It makes a table of each part of a dotted key, and descends
@@ -36,6 +37,10 @@ void RequirePlainKeys(const std::string& text, const std::string& name) {
       if (escapes && text[at] == '\\') ++at;
     }
     at += end.size() - 1;
+    // Of four or five quotes that end a string of many lines the last three do.
+    for (int more = 0; end.size() == 3 && more < 2 && text.compare(at + 1, 1, end, 0, 1) == 0;
+         ++more)
+      ++at;
   };
   for (size_t at = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0; at < text.size();
        ++at) {
@@ -163,6 +168,8 @@ void TakeAway(const toml::node& without, const std::string& file, toml::table& b
     throw ConfigError(TomlPlace(file, where.source()) + what);
   };
   if (!without.is_array()) fail(without, "without is not an array of texts");
+  if (without.as_array()->size() > kMostTakenAway)
+    fail(without, fmt::format("without more than {} entries of a file", kMostTakenAway));
   for (const toml::node& entry : *without.as_array()) {
     const auto path = entry.value_exact<std::string>();
     if (!path) fail(entry, "without is not an array of texts");

@@ -10,13 +10,7 @@
 #include "common/listen_address.h"
 
 namespace plumb {
-bool Access::HostAllowed(std::string_view header) const {
-  const HostAndPort parts = HostAndPort::Split(header);
-  const bool port = std::ranges::all_of(parts.port, [](char c) { return c >= '0' && c <= '9'; });
-  if (!port) return false;
-  return parts.is_number() || parts.host == "localhost" ||
-         std::ranges::find(hosts, parts.host) != hosts.end();
-}
+bool Access::HostAllowed(std::string_view header) const { return IsCalledRightly(header, hosts); }
 
 bool Access::OriginAllowed(std::string_view origin, std::string_view host) const {
   if (origin.empty() || std::ranges::find(origins, origin) != origins.end()) return true;

@@ -10,7 +10,7 @@
 namespace plumb {
 
 std::string Page(const std::string& title, const std::string& body) {
-  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/>"
+  return std::string(kPageBegins) +
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>" +
          Escape(title) + "</title>\n<style>" + kPageStyle + "</style></head>\n<body><main>\n" +
          body + "</main></body>\n</html>\n";

@@ -10,6 +10,10 @@ namespace plumb {
 
 /// The page's style sheet: light and dark.
 extern const char kPageStyle[];
+/// How each page of ours begins.
+inline constexpr char kPageBegins[] =
+    "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/>"
+    "<meta name=\"generator\" content=\"Plumbline\"/>";
 /// A whole page. @param title text. @param body HTML.
 std::string Page(const std::string& title, const std::string& body);
 /// A card. @param css "good", "bad" or empty. @param title, words text.

@@ -41,7 +41,7 @@ struct Event {
 };
 
 void LeaveOut(ExportCounts& counts, const std::string& channel, const char* why) {
-  const std::string reason = channel + ": " + why;
+  const std::string reason = Printable(channel) + ": " + why;
   if (counts.left_out.size() < kMostReasons || counts.left_out.contains(reason))
     ++counts.left_out[reason];
 }
@@ -196,9 +196,8 @@ ExportCounts ExportCsv(const std::string& log, const std::filesystem::path& fold
     const std::string name = FileName(channel) + (channel == before ? "." + type->name : "");
     before = channel;
     if (table.too_wide()) {
-      counts
-          .left_out[fmt::format("{}: more than {} columns", channel, MessageTable::kMostColumns)] +=
-          table.rows();
+      counts.left_out[fmt::format("{}: more than {} columns", Printable(channel),
+                                  MessageTable::kMostColumns)] += table.rows();
     } else if (table.rows() > 0) {
       const std::filesystem::path file = folder / (name + ".csv");
       if (std::filesystem::equivalent(file, log, error))

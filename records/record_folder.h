@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/name_lock.h"
+
 namespace plumb {
 
 /// What somebody needs who comes upon a log later, in the folder LOG.d beside it:
@@ -33,7 +35,8 @@ class RecordFolder {
 
   /// Makes the folder, and writes all that is known at the beginning; what an earlier recording of
   /// that name has left is replaced or removed.
-  /// @throws std::runtime_error naming a file that cannot be written; ConfigError of a robot.
+  /// @throws std::runtime_error naming a file that cannot be written, or the folder if somebody has
+  /// something else in it, or writes it now; ConfigError of a robot.
   RecordFolder(const std::string& log, const About& about);
 
   /// A message that goes into the log. @throws std::runtime_error naming a file that cannot be
@@ -42,6 +45,7 @@ class RecordFolder {
 
  private:
   std::filesystem::path folder_;
+  NameLock lock_;
   std::vector<uint8_t> distribution_;  // the newest, as it came
 };
 

@@ -12,6 +12,7 @@
 #include "robot/configuration_space.h"
 #include "robot/parameter_distribution.h"
 #include "robot/physical.h"
+#include "robot/posterior_format.h"
 #include "robot/residual_message.h"
 
 namespace plumb {
@@ -59,7 +60,6 @@ void RequireSameParameters(const parameter_distribution_t& message,
 
 // Nobody's posterior is so far from the prior, or so wide: [sd] of the prior.
 constexpr double kFarthest = 1000, kWidest = 100;
-constexpr double kGreatest = 1e12;  // in any unit
 
 // In coordinates, of each parameter apart, so that it and the field can be named.
 void RequireNearPrior(const Eigen::VectorXd& coordinates, const char* field,
@@ -91,7 +91,7 @@ void RequirePlausible(const ParameterDistribution& distribution, const RobotDesc
   }
   const Eigen::VectorXd means = distribution.Mean(), sds = distribution.Sd();
   for (Eigen::Index i = 0; i < means.size(); ++i) {
-    if (!(std::abs(means[i]) <= kGreatest) || !(sds[i] <= kGreatest))
+    if (!(std::abs(means[i]) <= kGreatestParameter) || !(sds[i] <= kGreatestParameter))
       Reject(fmt::format("'{}' is {} with a standard deviation of {}",
                          robot.parameters[static_cast<size_t>(i)].name, means[i], sds[i]));
   }

@@ -92,8 +92,12 @@ ParameterDistribution ReadMixture(const Field& mixture, const RobotDescription& 
   }
   mixture["weights"].Require(std::abs(total - 1) <= ParameterDistribution::kRounding,
                              fmt::format("sum to {}, not to 1", total));
-  mixture.Require(distribution.Mean().allFinite() && distribution.Sd().allFinite(),
-                  "is too wide: its moments overflow");
+  const auto plausible = [](const Eigen::VectorXd& x) {
+    return x.allFinite() && x.cwiseAbs().maxCoeff() <= kGreatestParameter;
+  };
+  mixture.Require(
+      plausible(distribution.Mean()) && plausible(distribution.Sd()),
+      fmt::format("is too far, or too wide: its moments are beyond {:g}", kGreatestParameter));
   return distribution;
 }
 

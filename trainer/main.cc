@@ -1,6 +1,7 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "common/config.h"
 #include "common/examples.h"
 #include "common/hash.h"
+#include "common/name_lock.h"
 #include "common/process.h"
 #include "common/seed_range.h"
 #include "common/time_units.h"
@@ -83,6 +85,9 @@ class TrainerProcess {
   void Resume() {
     start_ = process_.clock().Now();
     if (checkpoint_file_.empty()) return;
+    lock_.emplace(
+        "training " + std::filesystem::weakly_canonical(options_.checkpoint).string(),
+        options_.checkpoint + ": another trainer is at work there: give another --checkpoint");
     RemoveLeftovers(options_.checkpoint);
     if (process_.participant()) past_.emplace(options_.checkpoint, FingerprintOf(robot_));
     if (process_.begins_virtual_run()) return;
@@ -209,6 +214,7 @@ class TrainerProcess {
   Subscriber<controller_status_t> controller_;
   Periodic repeat_;
   std::string checkpoint_file_;                // empty = none
+  std::optional<NameLock> lock_;               // of the checkpoints
   std::optional<PastTrainings> past_;          // in virtual time, if there are checkpoints
   std::optional<training_status_t> repeated_;  // of the last update, if it was made before
   int64_t start_ = 0;                          // of the iteration, monotonic

@@ -11,6 +11,7 @@
 
 #include "http/client.h"
 #include "robot/json_text.h"
+#include "robot/physical.h"
 
 namespace plumb {
 namespace {
@@ -89,6 +90,8 @@ Eigen::MatrixXd RemoteModel::Evaluate(const Eigen::MatrixXd& inputs) {
       const json& number = (*output)[0][static_cast<size_t>(i)];
       if (!number.is_number()) Fail(server_, "/Evaluate answers something that is no number");
       outputs(i, j) = number.get<double>();
+      if (!IsPhysical(outputs(i, j)))
+        Fail(server_, fmt::format("/Evaluate answers {:.3g}, which no output is", outputs(i, j)));
     }
   }
   return outputs;

@@ -19,8 +19,10 @@ Response Json(int status, std::string body) {
 }  // namespace
 
 struct UmbridgeServer::Parts {
-  Parts(const ListenAddress& listen, std::vector<ServedModel> models)
-      : service(std::move(models)),
+  Parts(const ListenAddress& listen, std::vector<std::string> our_names,
+        std::vector<ServedModel> models)
+      : names(std::move(our_names)),
+        service(std::move(models)),
         server(context, {listen, service.longest_request(),
                          [this](const Request& request, HttpServer::Reply reply) {
                            Answer(request, std::move(reply));
@@ -32,6 +34,11 @@ struct UmbridgeServer::Parts {
   ~Parts() { stop.release(); }
 
   void Answer(const Request& request, HttpServer::Reply reply) {
+    if (!IsCalledRightly(View(request[http::field::host]), names)) {
+      return reply(Json(403, UmbridgeError("InvalidInput",
+                                           "this is not a name of ours: ask by its number, or give "
+                                           "plumb serve-model --host")));
+    }
     if (!request[http::field::origin].empty())
       return reply(Json(403, UmbridgeError("InvalidInput", "a page in a browser may not ask")));
     if (pending == HttpServer::kMaxConnections)
@@ -55,6 +62,7 @@ struct UmbridgeServer::Parts {
     });
   }
 
+  const std::vector<std::string> names;
   UmbridgeService service;
   size_t pending = 0;  // those of clients that have gone, too
   asio::io_context context{1};
@@ -63,8 +71,9 @@ struct UmbridgeServer::Parts {
   asio::thread_pool worker{1};  // the first to go: what it does knows all the others
 };
 
-UmbridgeServer::UmbridgeServer(const ListenAddress& listen, std::vector<ServedModel> models)
-    : parts_(std::make_unique<Parts>(listen, std::move(models))) {}
+UmbridgeServer::UmbridgeServer(const ListenAddress& listen, std::vector<std::string> names,
+                               std::vector<ServedModel> models)
+    : parts_(std::make_unique<Parts>(listen, std::move(names), std::move(models))) {}
 
 UmbridgeServer::~UmbridgeServer() = default;
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "common/listen_address.h"
@@ -12,11 +13,14 @@ namespace plumb {
 
 /// Models for UM-Bridge's clients, over HTTP with the bounds of HttpServer. Models are evaluated
 /// one request after the other, on a thread of their own, while others are heard. Browsers' pages
-/// are refused (they say where they come from). Not thread-safe.
+/// are refused: they say where they come from, or call us by a name that is not ours. Not
+/// thread-safe.
 class UmbridgeServer {
  public:
-  /// Listens. @throws std::runtime_error naming the address, if it cannot.
-  UmbridgeServer(const ListenAddress& listen, std::vector<ServedModel> models);
+  /// Listens. @param names by which clients may call this machine, see IsCalledRightly.
+  /// @throws std::runtime_error naming the address, if it cannot.
+  UmbridgeServer(const ListenAddress& listen, std::vector<std::string> names,
+                 std::vector<ServedModel> models);
   ~UmbridgeServer();
 
   uint16_t port() const;

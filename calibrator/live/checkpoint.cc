@@ -82,6 +82,25 @@ GaussianMixture MixtureFrom(const json& j) {
   return mixture;
 }
 
+// A number with a fraction or a greater one would become one that nobody wrote.
+template <class Int>
+Int Whole(const json& j) {
+  const bool fits = j.is_number_unsigned()
+                        ? j.get<uint64_t>() <= uint64_t{std::numeric_limits<Int>::max()}
+                        : j.is_number_integer() &&
+                              j.get<int64_t>() >= std::numeric_limits<Int>::min() &&
+                              j.get<int64_t>() <= std::numeric_limits<Int>::max();
+  if (!fits)
+    throw std::runtime_error(fmt::format("{} is not a whole number, or too great", j.dump()));
+  return j.get<Int>();
+}
+
+std::vector<int> WholeNumbers(const json& j) {
+  std::vector<int> numbers;
+  for (const json& number : j) numbers.push_back(Whole<int>(number));
+  return numbers;
+}
+
 // JSON has no NaN.
 double NumberOrNaN(const json& j) {
   return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
@@ -139,11 +158,11 @@ json ToJson(const Rollout& rollout) {
 
 Rollout RolloutFrom(const json& j) {
   Rollout rollout;
-  rollout.episode = j.at("episode");
-  rollout.policy_iteration = j.at("policy_iteration");
+  rollout.episode = Whole<decltype(rollout.episode)>(j.at("episode"));
+  rollout.policy_iteration = Whole<decltype(rollout.policy_iteration)>(j.at("policy_iteration"));
   for (const json& entry : j.at("transitions")) {
     Transition t;
-    t.step = entry.at("step");
+    t.step = Whole<decltype(t.step)>(entry.at("step"));
     for (const auto& [name, member] : kVectors) t.*member = VectorFrom(entry.at(name));
     for (const json& e : entry.at("efforts"))
       t.efforts.push_back({e.at("duration"), VectorFrom(e.at("effort"))});
@@ -233,7 +252,7 @@ std::vector<Rollout> LoadRollouts(const std::filesystem::path& folder) {
   if (!std::filesystem::exists(file)) return rollouts;
   try {
     // An earlier, longer run may have left more of them.
-    const size_t count = Count(ReadJson(file).at("rollouts_per_iteration").get<std::vector<int>>());
+    const size_t count = Count(WholeNumbers(ReadJson(file).at("rollouts_per_iteration")));
     while (rollouts.size() < count) {
       file = folder / RolloutFile(rollouts.size());
       rollouts.push_back(RolloutFrom(ReadJson(file)));
@@ -293,13 +312,13 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
           "was made with another robot.toml or robot.urdf; choose another folder");
     }
     SimOpt::State state;
-    state.iteration = j.at("iteration");
+    state.iteration = Whole<int>(j.at("iteration"));
     state.distribution = MixtureFrom(j.at("distribution"));
     state.used = j.at("used");
     state.before = MixtureFrom(j.at("before"));
     state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
     state.temperature = j.at("temperature");
-    state.search = {.update = j.at("update"),
+    state.search = {.update = Whole<int>(j.at("update")),
                     .distribution = Moments(state.distribution),
                     .kl = state.kl,
                     .temperature = state.temperature,
@@ -309,7 +328,7 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     state.residual = ResidualFrom(j.at("residual"), robot_);
     state.alarm = j.at("alarm"), state.gap = j.at("gap");
     state.informed = InformedFrom(j.at("informed"));
-    state.rollouts_per_iteration = j.at("rollouts_per_iteration").get<std::vector<int>>();
+    state.rollouts_per_iteration = WholeNumbers(j.at("rollouts_per_iteration"));
     const size_t count = Count(state.rollouts_per_iteration);
     for (size_t i = 0; i < count; ++i) {
       file = folder_ / RolloutFile(i);

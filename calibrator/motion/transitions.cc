@@ -7,13 +7,13 @@
 #include <limits>
 #include <numeric>
 
+#include "calibrator/motion/longest_episode.h"
 #include "common/time_units.h"
 #include "robot/physical.h"
 
 namespace plumb {
 namespace {
 
-constexpr size_t kMaxStates = 200'000;  // a quarter of an hour at 200 Hz
 constexpr size_t kMaxEpisodes = 64;
 constexpr size_t kMaxCommands = 200'000;
 constexpr int kMaxSteps = 1'000'000;
@@ -85,7 +85,7 @@ TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
       space_(robot),
       period_(robot.task.period),
       greatest_effort_(GreatestEffort(robot)),
-      max_states_(kMaxStates),
+      max_states_(kMostEpisodeStates),
       max_episodes_(kMaxEpisodes),
       max_commands_(kMaxCommands) {}
 

@@ -12,6 +12,7 @@
 #include "calibrator/results/json_lines.h"
 #include "calibrator/results/summary.h"
 #include "common/atomic_file.h"
+#include "common/outside_text.h"
 #include "common/process.h"
 #include "robot/physics_fingerprint.h"
 #include "robot/posterior_format.h"
@@ -170,12 +171,12 @@ json Interval(const Summary& summary) {
 Provenance ProvenanceOf(std::span<const Log> logs, const CalibrationOptions& options,
                         std::string command, std::time_t now) {
   Provenance provenance;
-  for (const Log& log : logs) provenance.logs.push_back(log.name);
+  for (const Log& log : logs) provenance.logs.push_back(Printable(log.name));
   provenance.options = {{"horizons", fmt::format("{}", fmt::join(options.horizons, ", "))},
                         {"budget", std::to_string(options.budget)},
                         {"discrepancy", options.discrepancy},
                         {"residual", options.residual ? "yes" : "no"}};
-  provenance.command = std::move(command);
+  provenance.command = Printable(command);
   provenance.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
   return provenance;
 }

@@ -1,7 +1,7 @@
 #include "common/lockstep/lcm_mirror.h"
 
 #include <fmt/format.h>
-#include <poll.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -15,6 +15,8 @@ constexpr int kNap = 2;           // [ms] of real time for which there was nothi
 constexpr int kMaxRead = 10'000;  // messages in one go
 constexpr size_t kMaxMessages = 400, kMaxBytes = 500'000;  // on their way
 constexpr size_t kMaxBehind = 20'000;                      // messages
+constexpr size_t kMaxGivenUp = 4000;                       // remembered
+constexpr int kImpatient = 50;
 
 size_t Hash(std::span<const uint8_t> message) {
   return std::hash<std::string_view>{}(
@@ -39,8 +41,23 @@ void LcmMirror::Publish(const std::string& channel, std::span<const uint8_t> mes
   if (unfinished_ >= kMaxBehind) AwaitRoom(kMaxBehind / 2);
   const std::lock_guard lock(mutex_);
   if (failure_) std::rethrow_exception(failure_);
+  TellOfLosses();
   ++unfinished_;
   queue_.push_back({channel, {message.begin(), message.end()}});
+}
+
+void LcmMirror::Flush() {
+  AwaitRoom(0);
+  TellOfLosses();
+}
+
+/// At the first, the second, the fourth, ... time.
+void LcmMirror::TellOfLosses() {
+  const int64_t lost = lost_;
+  if (lost < std::max<int64_t>(1, 2 * told_)) return;
+  told_ = lost;
+  spdlog::warn("{} messages did not come back from LCM: who listens there has lost them, too",
+               lost);
 }
 
 std::vector<LcmMirror::Message> LcmMirror::TakeStrangers() {
@@ -83,13 +100,23 @@ void LcmMirror::Work() {
 }
 
 /// Naps are counted, and not the time: where this process stands still, so does what it waits for.
+/// So that they are naps under a flood as well, nobody wakes it.
 void LcmMirror::Nap() {
-  pollfd readable{messenger_.fd(), POLLIN, 0};
-  poll(&readable, 1, kNap);
-  if (said_.empty() || said_.front().naps++ < patience_ * (100 / kNap)) return;
-  throw std::runtime_error(
-      fmt::format("lost on LCM: {}, number {} on its channel, has not come back",
-                  said_.front().channel, said_.front().number));
+  std::this_thread::sleep_for(std::chrono::milliseconds(kNap));
+  if (said_.empty()) return;
+  const int naps = patience_ * (100 / kNap);
+  if (said_.front().naps++ >= (patient_ ? naps : naps / kImpatient)) GiveUp();
+}
+
+/// What was said since the lost one has had no better chance.
+void LcmMirror::GiveUp() {
+  lost_ += static_cast<int64_t>(said_.size());
+  unfinished_ -= said_.size();
+  said_bytes_ = 0;
+  patient_ = false;
+  given_up_.insert(given_up_.end(), said_.begin(), said_.end());
+  said_.clear();
+  while (given_up_.size() > kMaxGivenUp) given_up_.pop_front();
 }
 
 void LcmMirror::Say(const Message& message) {
@@ -110,13 +137,18 @@ void LcmMirror::Say(const Message& message) {
 
 void LcmMirror::OnMessage(const std::string& channel, std::span<const uint8_t> message) noexcept {
   const size_t hash = Hash(message);
-  const auto ours = std::ranges::find_if(said_, [&](const Said& said) {
-    return said.hash == hash && said.bytes == message.size() && said.channel == channel;
-  });
-  if (ours != said_.end()) {
+  const auto find = [&](std::deque<Said>& among) {
+    return std::ranges::find_if(among, [&](const Said& said) {
+      return said.hash == hash && said.bytes == message.size() && said.channel == channel;
+    });
+  };
+  if (const auto ours = find(said_); ours != said_.end()) {
     said_bytes_ -= ours->bytes;
     said_.erase(ours);
     --unfinished_;
+    patient_ = true;
+  } else if (const auto late = find(given_up_); late != given_up_.end()) {
+    given_up_.erase(late);
   } else if (channel != kSelfTest) {
     const std::lock_guard lock(mutex_);
     const size_t cost = message.size() + kStrangerOverhead;

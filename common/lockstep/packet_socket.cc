@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -82,6 +83,9 @@ void PacketSocket::Close() {
 }
 
 PacketSocket PacketSocket::Listen(const std::string& path) {
+  struct stat known {};
+  if (lstat(path.c_str(), &known) == 0 && !S_ISSOCK(known.st_mode))
+    throw std::runtime_error(path + ": is there and no socket of ours: it is not removed");
   unlink(path.c_str());  // of a run that was killed; a living one holds the folder's lock
   PacketSocket socket = MakeSocket(SOCK_NONBLOCK);
   const Address address(path);

@@ -28,7 +28,8 @@ sockaddr_in ParseAddress(const std::string& address) {
   if (colon != std::string::npos) {
     const char* end = address.data() + address.size();
     const auto parsed = std::from_chars(address.data() + colon + 1, end, port);
-    if (parsed.ec != std::errc{} || parsed.ptr != end) port = 0;
+    // One bus has one name, by which it is locked.
+    if (parsed.ec != std::errc{} || parsed.ptr != end || address[colon + 1] == '0') port = 0;
   }
   if (port == 0 || inet_pton(AF_INET, address.substr(0, colon).c_str(), &result.sin_addr) != 1 ||
       !IN_MULTICAST(ntohl(result.sin_addr.s_addr))) {

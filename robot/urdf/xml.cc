@@ -38,7 +38,9 @@ size_t FindOdd(const std::string& text) {
 }
 
 // TinyXML descends into elements by recursion, and looks through all attributes of an element for
-// each: how deep and how many is known before.
+// each: how deep and how many is known before. It is never deeper than the depth that is counted
+// here: what it does not know, an end outside all elements among it, is over with the next '>', and
+// so is a declaration at the earliest, which may have one within quotes.
 struct Excess {
   int line = 0;  // 0 = there is none
   std::string what = {};
@@ -47,15 +49,21 @@ struct Excess {
 Excess FindExcess(const std::string& text, int most_nested, int most_attributes) {
   int depth = 0;
   size_t at = 0;
+  const auto begins = [&](std::string_view with) {
+    return text.compare(at, with.size(), with) == 0;
+  };
+  const auto pass = [&](size_t begin, std::string_view end) {
+    const size_t found = text.find(end, at + begin);
+    at = found == std::string::npos ? text.size() : found + end.size();
+  };
   while ((at = text.find('<', at)) != std::string::npos) {
-    const auto skip_to = [&](const char* end) { at = std::min(text.find(end, at), text.size()); };
-    if (text.compare(at, 4, "<!--") == 0) {
-      skip_to("-->");
-    } else if (text.compare(at, 9, "<![CDATA[") == 0) {
-      skip_to("]]>");
-    } else if (text.compare(at, 2, "</") == 0) {
+    if (begins("<!--")) {
+      pass(4, "-->");
+    } else if (begins("<![CDATA[")) {
+      pass(9, "]]>");
+    } else if (depth > 0 && begins("</")) {
       --depth;
-      ++at;
+      at += 2;
     } else if (at + 1 < text.size() && IsName(text[at + 1])) {
       if (++depth > most_nested)
         return {LineOf(text, at), fmt::format("nests more than {} elements", most_nested)};
@@ -69,8 +77,10 @@ Excess FindExcess(const std::string& text, int most_nested, int most_attributes)
                   fmt::format("an element of more than {} attributes", most_attributes)};
       }
       if (at < text.size() && text[at - 1] == '/') --depth;
+    } else if (depth > 0 && begins("<?")) {
+      return {LineOf(text, at), "a declaration within an element"};
     } else {
-      ++at;
+      pass(1, ">");
     }
   }
   return {};

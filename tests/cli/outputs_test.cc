@@ -22,6 +22,49 @@ TEST_CASE("no two outputs are one file, whatever names it goes by") {
   }
 }
 
+TEST_CASE("what is read is not written, whatever name it goes by") {
+  const TemporaryFolder folder;
+  const std::string file = folder / "read";
+  std::ofstream(file) << "input";
+  fs::create_hard_link(file, folder / "hard");
+  fs::create_symlink(file, folder / "soft");
+  CHECK_NOTHROW(RequireNotRead({folder / "other", ""}, {file, ""}));
+  for (const char* other : {"read", "./read", "hard", "soft"})
+    CHECK_THROWS_WITH(RequireNotRead({folder / other}, {file}), Catch::Contains("is read, too"));
+}
+
+TEST_CASE("only what is of the kind that is to be written is written over") {
+  const TemporaryFolder folder;
+  const std::string efforts = folder / "efforts.csv", posterior = folder / "posterior.json",
+                    page = folder / "mine.html", pendulum = Robot("pendulum"),
+                    table = folder / "report.html.csv";
+  std::ofstream(efforts) << "t,u/pivot\n0,1\n";
+  std::ofstream(posterior) << "{\n \"format\": \"plumbline posterior\"}";
+  std::ofstream(page) << "<!DOCTYPE html>\n<html><head><title>Mine";
+  std::ofstream(table) << "name,marks\n";
+  const std::string endless = folder / "endless.csv";
+  {
+    std::ofstream rows(endless);
+    rows << "t,u/pivot\n";
+    for (int k = 0; k < 20'001; ++k) rows << 0.05 * k << ",0\n";
+  }
+  const std::string launch = "launch " + pendulum + " --bus loop: --output " + (folder / "run");
+  for (const auto& [command, words] : std::vector<std::pair<std::string, std::string>>{
+           {launch + " --summary " + posterior, "is there and not a run's summary"},
+           {launch + " --report " + page, "is there and not a report of ours"},
+           {launch + " --log " + page, "is there and not an LCM log"},
+           {launch + " --efforts " + efforts + " --summary " + efforts, "is read, too"},
+           {launch + " --efforts " + endless, "of one motion 1000 s are kept"},
+           {"train " + pendulum + " --output " + (folder / "p.onnx") + " --report " +
+                (folder / "report.html"),
+            "is there and not a table of a training"}}) {
+    const Outcome outcome = Shell(Plumb() + command);
+    INFO(command << "\n" << outcome.text);
+    CHECK(outcome.status == 1);
+    CHECK_THAT(outcome.text, Catch::Contains(words));
+  }
+}
+
 TEST_CASE("commands refuse to write two outputs into one file, before anything is computed") {
   const TemporaryFolder folder;
   const std::string file = folder / "same", again = folder / "./same", pendulum = Robot("pendulum");

@@ -207,6 +207,11 @@ TEST_CASE("what would keep the reader busy for minutes, or end it, is one line")
     for (int i = 0; i < 20; ++i) key += std::string(" . ") + quoted;
     CHECK_THROWS_WITH(Read("[" + key + "]\n"), Equals("robot.toml:1: a key of more than 16 parts"));
   }
+  // Of four or five quotes three end the text: what comes after them is read, too.
+  for (const char* text : {"\"\"\"y\"\"\"\"", "\"\"\"y\"\"\"\"\"", "'''y''''", "'''''''"}) {
+    CHECK_THROWS_WITH(Read(std::string("x = { b = ") + text + ", " + deep.substr(15) + "a = 1 }\n"),
+                      Equals("robot.toml:1: a key of more than 16 parts"));
+  }
   for (int i = 0; i < 60'000; ++i) names += "name" + std::to_string(i) + " = 1\n";
   for (int i = 0; i < 20'000; ++i) {
     entries += "\"base.toml\",";
@@ -216,6 +221,16 @@ TEST_CASE("what would keep the reader busy for minutes, or end it, is one line")
                     Equals("robot.toml:1:11: 20000 entries, more than 10000"));
   CHECK_THROWS_WITH(Read(names), Catch::Contains("60000 entries, more than 10000"));
   CHECK_THROWS_WITH(Read(tables), Catch::Contains("20000 entries, more than 10000"));
+}
+
+TEST_CASE("what is taken away from a file that is extended is little") {
+  const ConfigFolder folder;
+  folder.Write("base.toml", "a = 1\n");
+  std::string without;
+  for (int i = 0; i <= 200; ++i) without += "\"a\",";
+  folder.Write("own.toml", "extends = \"base.toml\"\nwithout = [" + without + "]\n");
+  CHECK_THROWS_WITH(Config::Load(folder / "own.toml"),
+                    Equals(folder / "own.toml:2:11: without more than 200 entries of a file"));
 }
 
 TEST_CASE("a file that is extended is as modest as one that is read, and names its own line") {

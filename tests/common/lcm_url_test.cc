@@ -53,8 +53,8 @@ TEST_CASE("an empty URL is $LCM_DEFAULT_URL, or else our default") {
 }
 
 TEST_CASE("where a udpm: URL leads") {
-  CHECK(ParseUdpm("udpm://") == MulticastAddress{"239.255.76.67", 7667, 0, 0});
-  CHECK(ParseUdpm("udpm://239.1.2.3") == MulticastAddress{"239.1.2.3", 7667, 0, 0});
+  CHECK(ParseUdpm("udpm://") == MulticastAddress{"239.255.76.67", 7667, 0, 2 << 20});
+  CHECK(ParseUdpm("udpm://239.1.2.3") == MulticastAddress{"239.1.2.3", 7667, 0, 2 << 20});
   CHECK(ParseUdpm("udpm://239.1.2.3:99?recv_buf_size=5&ttl=1") ==
         MulticastAddress{"239.1.2.3", 99, 1, 5});
   CHECK(ParseUdpm(kDefaultLcmUrl) == MulticastAddress{"239.255.76.67", 7667, 0, 2 << 20});

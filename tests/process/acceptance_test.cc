@@ -1,5 +1,5 @@
-// A robot that no simulator of ours contains, through the whole loop: what the model lacks is learnt
-// beside its parameters, and the robot runs what has done best on it, not what is newest.
+// A robot that no simulator of ours contains, through the whole loop: what the model lacks is
+// learnt beside its parameters, and the robot runs what has done best on it, not what is newest.
 
 #include <cmath>
 #include <map>

@@ -82,11 +82,81 @@ TEST_CASE("two launches on one bus, one LCM group or in one folder at the same m
     runs.push_back(launch(lcm, "loop:", "b", "b.log"));
     OneIsRefused(runs, "another run is under way on " + lcm);
   }
+  SECTION("the group, spelt otherwise") {
+    runs.push_back(launch(lcm, "loop:", "a", "a.log"));
+    runs.push_back(launch(lcm + "0", "loop:", "b", "b.log"));  // a larger buffer
+    OneIsRefused(runs, "another run is under way on " + lcm.substr(0, lcm.find('?')));
+  }
   SECTION("the folder") {
     runs.push_back(launch("memq://", "loop:", "a", "a.log"));
     runs.push_back(launch("memq://", "loop:", "a", "b.log"));
     OneIsRefused(runs, "in use by process");
   }
+}
+
+TEST_CASE("two that keep their checkpoints in one folder, two that write one log") {
+  Stage stage(132, "pendulum", Stage::Time::kReal);
+  std::string program, words;
+  std::vector<std::string> arguments{stage.robot_folder, "--lcm-url", "memq://"};
+  SECTION("calibrators") {
+    program = "plumb-calibrator", words = "another calibrator is at work there";
+    arguments.insert(arguments.end(), {"--checkpoint", stage.folder / "checkpoints"});
+  }
+  SECTION("trainers") {
+    program = "plumb-trainer", words = "another trainer is at work there";
+    fs::create_directory(stage.folder / "checkpoints");
+    arguments.insert(arguments.end(), {"--checkpoint", stage.folder / "checkpoints"});
+  }
+  SECTION("records") {
+    program = "plumb", words = "run.lcmlog: is being written already";
+    arguments = {"--lcm-url", "memq://", "record", stage.folder / "run.lcmlog"};
+  }
+  arguments.insert(arguments.begin(), Stage::Binary(program));
+  std::vector<Child> runs;
+  for (const char* log : {"a.log", "b.log"})
+    runs.emplace_back(program, arguments, stage.folder / log);
+  OneIsRefused(runs, words);
+}
+
+TEST_CASE("files of somebody else's are not written over by a record, nor by a run's own files") {
+  Stage stage(133, "pendulum", Stage::Time::kReal);
+  const fs::path own = stage.folder / "own";
+  fs::create_directory(own);
+  const auto write = [&](const fs::path& file) { std::ofstream(file) << "somebody's\n"; };
+  const auto refused = [&](std::vector<std::string> arguments, const std::string& words) {
+    arguments.insert(arguments.begin(), {Stage::Binary("plumb"), "--lcm-url", "memq://"});
+    Child child("plumb", arguments, stage.folder / "child.log");
+    REQUIRE(child.WaitFor(120));
+    INFO(child.Tail(5));
+    CHECK(child.ending() == "exit status 1");
+    CHECK_THAT(child.Tail(5), Contains(words));
+  };
+  fs::copy(stage.robot_folder, own / "robot");
+  const std::string toml = own / "robot" / "robot.toml", known = Read(toml);
+  refused({"record", toml, "--robot", own / "robot"}, "is read, too");
+  refused({"record", toml}, "is there and not an LCM log");
+  fs::create_symlink(toml, own / "link");
+  refused({"record", own / "link"}, "is there and not an LCM log");
+  fs::create_directory(own / "run.d");
+  write(own / "run.d" / "robot.toml");
+  refused({"record", own / "run"}, "run.d: is there and no log's");
+  CHECK(Read(own / "run.d" / "robot.toml") == "somebody's\n");
+  CHECK(Read(toml) == known);
+
+  const auto launch = [&](const fs::path& folder, const std::string& words) {
+    refused({"launch", stage.robot_folder, "--bus", "loop:", "--output", folder}, words);
+  };
+  fs::create_directories(own / "a"), fs::create_directories(own / "b");
+  fs::create_directories(own / "c");
+  write(own / "thesis.txt");
+  fs::create_symlink(own / "thesis.txt", own / "a" / "lock");
+  launch(own / "a", "lock: Too many levels of symbolic links");
+  write(own / "b" / "lock");
+  launch(own / "b", "lock: is there and no run's");
+  write(own / "c" / "clock");
+  launch(own / "c", "clock: is there and no socket of ours");
+  for (const char* file : {"thesis.txt", "b/lock", "c/clock"})
+    CHECK(Read(own / file) == "somebody's\n");
 }
 
 }  // namespace

@@ -220,6 +220,20 @@ TEST_CASE("a message of too many columns has no table, and is named") {
   CHECK(counts.left_out == std::map<std::string, int64_t>{{"POLICY: more than 50000 columns", 1}});
 }
 
+TEST_CASE("a channel's name makes no line of its own among what is told") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "a.lcmlog";
+  {
+    LcmLogWriter writer(log);
+    const std::vector<uint8_t> nothing(8, 0xEE);
+    writer.Write(1, "A\nwrote /etc/passwd", nothing);
+    writer.Flush();
+  }
+  const ExportCounts counts = ExportCsv(log, folder / "tables");
+  REQUIRE(counts.left_out.size() == 1);
+  CHECK(counts.left_out.begin()->first == "A wrote /etc/passwd: of no type of ours");
+}
+
 TEST_CASE("a damaged log leaves no file, and a channel's name is no path") {
   const TemporaryFolder folder;
   const std::string log = folder / "a.lcmlog";

@@ -106,9 +106,24 @@ TEST_CASE("a folder that cannot be made, and a robot that cannot be read, are na
   const std::string log = folder / "run.lcmlog";
   CHECK_THROWS_WITH(RecordFolder(log, {"", "", "", "", folder / "none"}),
                     folder / "none" + ": there is no such robot");
+  std::ofstream(folder / "file") << "a file";
+  CHECK_THROWS_WITH(RecordFolder(folder / "file/run", {}),
+                    Catch::StartsWith(folder / "file/run.d/lcmtypes: cannot be made: "));
+}
+
+TEST_CASE("what somebody else has where a log's folder is to be stays as it is") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "run", words = log + ".d: is there and no log's";
   std::ofstream(log + ".d") << "a file";
-  CHECK_THROWS_WITH(RecordFolder(log, {}),
-                    Catch::StartsWith(log + ".d/lcmtypes: cannot be made: "));
+  CHECK_THROWS_WITH(RecordFolder(log, {}), Catch::StartsWith(words));
+  fs::remove(log + ".d");
+  fs::create_directory(log + ".d");
+  std::ofstream(log + ".d/robot.toml") << "somebody's";
+  CHECK_THROWS_WITH(RecordFolder(log, {}), Catch::StartsWith(words));
+  CHECK(ReadFile(log + ".d/robot.toml") == "somebody's");
+  fs::remove(log + ".d/robot.toml");
+  const RecordFolder first(log, {});  // an empty folder may be anybody's
+  CHECK_THROWS_WITH(RecordFolder(log, {}), log + ": is being written already");
 }
 
 }  // namespace

@@ -20,7 +20,8 @@ constexpr double kOutcomeNoise = 0.01;
 /// A server in this process, on a port of its own.
 class Serving {
  public:
-  explicit Serving(std::vector<ServedModel> models) : server_({"127.0.0.1", 0}, std::move(models)) {
+  explicit Serving(std::vector<ServedModel> models)
+      : server_({"127.0.0.1", 0}, {}, std::move(models)) {
     REQUIRE(pipe(pipe_) == 0);
     url_ = "http://127.0.0.1:" + std::to_string(server_.port());
     thread_ = std::thread([this] { server_.Run(pipe_[0], [] { return true; }); });
@@ -140,6 +141,15 @@ TEST_CASE("a model that is not what it should be is refused in a line") {
         {NextStates([](const Eigen::MatrixXd& m) -> Eigen::MatrixXd { return m * NAN; })});
     RemoteModel model(failing.url(), "next_states", 2, size);
     CHECK_THROWS_WITH(CalibrateRemote(robot, logs, model, {}), Contains("no finite numbers"));
+  }
+  for (const double absurd : {1e150, -1e200}) {
+    const Serving mad({NextStates([=](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
+      return Eigen::MatrixXd::Constant(m.rows(), m.cols(), absurd);
+    })});
+    RemoteModel model(mad.url(), "next_states", 2, size);
+    CHECK_THROWS_WITH(
+        model.Evaluate(Eigen::MatrixXd::Ones(2, 1)),
+        Catch::StartsWith(mad.url() + ": /Evaluate answers") && Contains("which no output is"));
   }
   for (const char* url : {"https://127.0.0.1:1", "127.0.0.1:1", "http://", "http://a:b",
                           "http://:1", "http://a/b", "http://a b:1"})

@@ -26,7 +26,8 @@ class Served(unittest.TestCase):
         masses = [f"mass/{link}={mass}" for link, mass in zip(("torso", "thigh", "leg", "foot"), TRUTH)]
         subprocess.run([PLUMB, "sim", ROBOT, "--random", "--episodes", "20", "--seed", "3", "--noise", "0.003", "--csv", cls.table, "--set", *masses],
                        check=True, stdout=subprocess.DEVNULL)
-        cls.server = subprocess.Popen([PLUMB, "serve-model", ROBOT, "--csv", cls.table, "--address", "127.0.0.1:0"], stdout=subprocess.PIPE, text=True)
+        cls.server = subprocess.Popen([PLUMB, "serve-model", ROBOT, "--csv", cls.table, "--address", "127.0.0.1:0", "--host", "lab.example"],
+                                      stdout=subprocess.PIPE, text=True)
         cls.said = []
         for line in cls.server.stdout:
             cls.said.append(line)
@@ -125,6 +126,9 @@ class Served(unittest.TestCase):
             self.assertEqual(list(answer), ["error"])
             self.assertEqual(answer["error"]["type"], kind)
         self.assertEqual(self.ask("/Info", headers={"Origin": "https://example.org"}, status=403)["error"]["type"], "InvalidInput")
+        answer = self.ask("/Info", headers={"Host": "rebound.example:80"}, status=403)
+        self.assertIn("not a name of ours", answer["error"]["message"])
+        self.assertEqual(self.ask("/Info", headers={"Host": "Lab.Example:80"})["protocolVersion"], 1.0)
         self.assertEqual(self.evaluate("log_likelihood", [-1, 2, 3, 4]), [-1e300])
         self.works()
 

@@ -105,6 +105,8 @@ TEST_CASE("hostile posteriors are refused with file and field") {
   CHECK_THAT(spoilt("/names", "gravity"), Contains(": names: is not an array"));
   CHECK_THAT(spoilt("/names/0", 7), Contains(": names[0]: is not a string"));
   CHECK_THAT(spoilt("/mixture", 7), Contains(": mixture: is not an object"));
+  CHECK_THAT(spoilt("/mixture/means/0/0", 700),
+             Contains(": mixture: is too far, or too wide: its moments are beyond 1e+12"));
   CHECK_THAT(spoilt("/mixture/weights", json::array()),
              Contains(": mixture.weights: has 0 entries"));
   CHECK_THAT(spoilt("/mixture/weights", std::vector<double>(100000, 1e-5)),

@@ -207,6 +207,11 @@ TEST_CASE("diagnostics without numbers, and names that are not UTF-8, still make
   const json j = json::parse(PosteriorJson(findings, robot, {{"\xc3\x28.lcm"}, {}, "", ""}));
   CHECK(j["discrepancy"].is_null());
   CHECK(j["stages"] == json::array());
+  std::vector<Log> logs(1);
+  logs[0].name = "a\x1b[31m\nb.csv";
+  const Provenance provenance = ProvenanceOf(logs, {}, "plumb \x1b[2J", 0);
+  CHECK(provenance.logs[0] == "a\uFFFD[31m b.csv");
+  CHECK(provenance.command == "plumb \uFFFD[2J");
   CHECK(j["warnings"][0].get<std::string>().starts_with("quote \" backslash \\ newline \n and "));
 }
 

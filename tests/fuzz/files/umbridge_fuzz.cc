@@ -1,5 +1,5 @@
-// libFuzzer: what clients of served models say, the path in the first line and the body after it, is
-// answered with JSON, and never with a number that is not finite.
+// libFuzzer: what clients of served models say, the path in the first line and the body after it,
+// is answered with JSON, and never with a number that is not finite.
 
 #include <algorithm>
 #include <cmath>

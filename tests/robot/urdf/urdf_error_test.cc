@@ -163,6 +163,19 @@ TEST_CASE("absurd sizes are refused") {
   std::string nested;
   for (int i = 0; i < 200000; ++i) nested += "<a>\n";
   CHECK_THAT(Error(nested), Contains("robot.urdf:101: nests more than 100 elements"));
+  // Ends of elements that have not begun, and what is no element, take nothing off the depth.
+  std::string ends, hundred;
+  for (int i = 0; i < 200000; ++i) ends += "</a>";
+  for (int i = 0; i < 100; ++i) hundred += "<a>";
+  for (const std::string& before :
+       {ends, "<!x " + ends + ">", "<robot name='r'><!-->" + ends + "-->", "<?x " + ends + "?>",
+        hundred + "<!-->" + ends + "-->", hundred + "<1" + ends, hundred + "<!x '" + ends + "'>",
+        hundred + "<a b='" + ends + "'/>", hundred + "<![CDATA[" + ends + "]]>"}) {
+    CAPTURE(before.substr(0, 30));
+    CHECK_THAT(Error(before + nested), Contains("nests more than 100 elements"));
+  }
+  CHECK_THAT(Error(hundred + "<?xml version='" + ends + "'?>" + nested),
+             Contains("robot.urdf:1: a declaration within an element"));
   std::string attributes;
   for (int i = 0; i < 500'000; ++i) attributes += " a" + std::to_string(i) + "='<'";
   CHECK_THAT(Error("<robot name='r'>\n<link" + attributes + "/></robot>"),
