@@ -52,7 +52,7 @@ int Serve(plumb::Process& process, const Flags& flags) {
   const Eigen::Index outputs =
       2 * robot.num_velocities() * static_cast<Eigen::Index>(plumb::CountTransitions(log.rollouts));
   plumb::UmbridgeServer server(
-      listen,
+      listen, {},
       {{"next_states", static_cast<Eigen::Index>(robot.parameters.size()), outputs, evaluate}});
   std::cout << "http://" << listen.address << ":" << server.port() << std::endl;
   server.Run(process.stop_fd(), [&] { return process.stopping(); });
