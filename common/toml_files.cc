@@ -38,9 +38,8 @@ void RequirePlainKeys(const std::string& text, const std::string& name) {
     }
     at += end.size() - 1;
     // Of four or five quotes that end a string of many lines the last three do.
-    for (int more = 0; end.size() == 3 && more < 2 && text.compare(at + 1, 1, end, 0, 1) == 0;
-         ++more)
-      ++at;
+    const auto quote_follows = [&] { return at + 1 < text.size() && text[at + 1] == end[0]; };
+    for (int more = 0; end.size() == 3 && more < 2 && quote_follows(); ++more) ++at;
   };
   for (size_t at = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0; at < text.size();
        ++at) {

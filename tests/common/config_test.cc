@@ -212,6 +212,10 @@ TEST_CASE("what would keep the reader busy for minutes, or end it, is one line")
     CHECK_THROWS_WITH(Read(std::string("x = { b = ") + text + ", " + deep.substr(15) + "a = 1 }\n"),
                       Equals("robot.toml:1: a key of more than 16 parts"));
   }
+  for (const char* endless :
+       {"x = \"\"\"y", "x = \"\"\"", "x = '''y''", "x = \"y", "x = \"\"\"y\\"})
+    CHECK_THROWS_AS(Read(endless), ConfigError);
+  CHECK_NOTHROW(Read("x = \"\"\"y\"\"\"\""));
   for (int i = 0; i < 60'000; ++i) names += "name" + std::to_string(i) + " = 1\n";
   for (int i = 0; i < 20'000; ++i) {
     entries += "\"base.toml\",";
