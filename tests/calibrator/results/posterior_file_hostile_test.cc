@@ -120,7 +120,7 @@ TEST_CASE("hostile posteriors are refused with file and field") {
   CHECK_THAT(spoilt("/mixture/means/0", {1, 2}),
              Contains(": mixture.means[0]: has 2 entries, expected 3"));
   CHECK_THAT(spoilt("/mixture/means/0/1", "1"), Contains(": mixture.means[0][1]: is not a number"));
-  CHECK_THAT(spoilt("/mixture/means/0/0", 1e9), Contains(": mixture: is too wide"));
+  CHECK_THAT(spoilt("/mixture/means/0/0", 1e9), Contains(": mixture: is too far, or too wide"));
   CHECK_THAT(spoilt("/mixture/covariances", json::array()),
              Contains(": mixture.covariances: has 0 entries, expected 2"));
   CHECK_THAT(spoilt("/mixture/covariances/1/2", {1}),
