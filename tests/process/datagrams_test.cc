@@ -117,7 +117,9 @@ TEST_CASE("a run and its record go on under a flood") {
   Stage stage(94, "pendulum", Stage::Time::kReal);
   const std::filesystem::path log = stage.folder / "run.lcmlog";
   {
-    const Flood flood(stage.lcm_url, Malformed(), 10'000);
+    // No more than the record's socket holds while a busy machine lets it wait for a second or
+    // two: there is only one request to arm.
+    const Flood flood(stage.lcm_url, Malformed(), 2'000);
     Child launch = Launch(stage, {"--real-time", "--log", log});
     REQUIRE(stage.WaitForDriver(driver_status_t::ARMED, 60));
     INFO(launch.Tail(20));
