@@ -40,7 +40,7 @@ class Session {
         clock_(clock),
         folder_(flags.checkpoint),
         lock_(
-            "calibration " + std::filesystem::weakly_canonical(flags.checkpoint).string(),
+            "calibration " + NameOfFile(flags.checkpoint),
             flags.checkpoint + ": another calibrator is at work there: give another --checkpoint"),
         simopt_(robot, flags.seed,
                 flags.threads > 0

@@ -216,7 +216,7 @@ int CalibrateLogs(Process& process, CalibrateFlags flags, const std::string& com
     std::optional<NameLock> lock;
     std::optional<Journal> journal;
     if (speaks) {
-      lock.emplace("journal " + std::filesystem::weakly_canonical(journal_file).string(),
+      lock.emplace("journal " + NameOfFile(journal_file),
                    journal_file + ": another process is at work on it: give another --output");
     }
     if (speaks) journal.emplace(journal_file, CalibrationIdentity(robot, flags, logs));

@@ -31,6 +31,7 @@ FolderLock::FolderLock(const std::filesystem::path& folder) {
     throw std::runtime_error(
         fmt::format("{}: in use by process {}; give another --output", folder.string(), owner));
   }
+  // Of a run that has ended it holds a number, and of one that has just begun nothing.
   if (std::string known; std::getline(std::ifstream(file), known) && !IsNumber(known)) {
     close(fd_);
     throw std::runtime_error(file.string() + ": is there and no run's: it is not written over");

@@ -8,6 +8,7 @@
 
 #include "common/atomic_file.h"
 #include "common/config.h"
+#include "common/name_lock.h"
 
 namespace plumb {
 
@@ -24,10 +25,10 @@ void RequireNotRead(const std::vector<std::string>& outputs,
 }
 
 void RequireApart(const std::vector<std::string>& outputs) {
-  std::set<std::filesystem::path> taken;
+  std::set<std::string> taken;
   for (const std::string& output : outputs) {
     if (output.empty()) continue;
-    if (!taken.insert(std::filesystem::weakly_canonical(std::filesystem::absolute(output))).second)
+    if (!taken.insert(NameOfFile(output)).second)
       throw std::invalid_argument(output + ": would be written twice: outputs need a file each");
   }
 }

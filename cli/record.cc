@@ -26,7 +26,7 @@ int Record(Process& process, const RecordFlags& flags) {
   RequireNotRead({flags.log}, inputs);
   RequireLcmLog(flags.log);
   Messenger& messenger = process.messenger();
-  // First, for a robot that cannot be read: what an earlier log has is not lost for it.
+  // First, for what is refused: what an earlier log has is not lost for it.
   RecordFolder folder(flags.log,
                       {VersionLine("plumb"), flags.command, flags.note, "real", flags.robot});
   LcmLogWriter log(flags.log);

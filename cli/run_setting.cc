@@ -8,7 +8,7 @@
 #include <ctime>
 #include <stdexcept>
 
-#include "calibrator/motion/longest_episode.h"
+#include "calibrator/motion/transitions.h"
 #include "cli/launch_report.h"
 #include "cli/outputs.h"
 #include "cli/preflight.h"
@@ -33,6 +33,18 @@ void RequireDrivable(const RobotDescription& robot) {
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(fmt::format("{} cannot be launched (plumb sim simulates it): {}",
                                             robot.name, error.what()));
+  }
+}
+
+// The calibrator would forget the beginning.
+void RequireKept(const RobotDescription& robot, const std::string& efforts) {
+  const double lasts = robot.task.steps * robot.task.period,
+               kept = static_cast<double>(TransitionJoiner::kMaxStates) * robot.driver.cycle;
+  if (lasts > kept) {
+    throw std::invalid_argument(fmt::format(
+        "{}: lasts {:.6g} s; of one motion {:.6g} s are kept to learn from: play several shorter "
+        "ones",
+        efforts, lasts, kept));
   }
 }
 
@@ -86,13 +98,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   if (!flags.efforts.empty()) {
     const Eigen::MatrixXf played = ReadEffortTable(flags.efforts, robot, *MakeTask(robot));
     robot.task.steps = static_cast<int>(played.rows());
-    const double longest = static_cast<double>(kMostEpisodeStates) * robot.driver.cycle;
-    if (robot.task.steps * robot.task.period > longest) {
-      throw std::invalid_argument(
-          fmt::format("{}: lasts {:.6g} s; of one motion {:.6g} s are kept to learn from: play "
-                      "several shorter ones",
-                      flags.efforts, robot.task.steps * robot.task.period, longest));
-    }
+    RequireKept(robot, flags.efforts);
   }
   RequireSendable(robot);
   RequireKey(process.lcm_url(), !process.key_file().empty(), flags.allow_unsigned);

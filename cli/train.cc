@@ -91,7 +91,7 @@ class Training {
       std::vector<std::string> inputs = FilesOf(robot_);
       inputs.insert(inputs.end(), {flags_.distribution, flags_.from});
       RequireOutputs({flags_.output, flags_.checkpoint, flags_.csv, flags_.report}, inputs);
-      lock_.emplace("checkpoint " + std::filesystem::weakly_canonical(flags_.checkpoint).string(),
+      lock_.emplace("checkpoint " + NameOfFile(flags_.checkpoint),
                     flags_.checkpoint +
                         ": another process is at work on it: give another "
                         "--output or --checkpoint");

@@ -33,8 +33,9 @@ VirtualRun::VirtualRun(const std::filesystem::path& folder, const std::string& l
     }
   }
   if (!records.messages.empty()) {
-    messages_.emplace(records.messages);
+    // First, for what is refused: what an earlier log has is not lost for it.
     beside_messages_.emplace(records.messages, records.about);
+    messages_.emplace(records.messages);
   }
   if (!records.frames.empty()) {
     frames_file_ = records.frames;

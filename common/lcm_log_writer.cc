@@ -5,20 +5,14 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 #include <utility>
 
 namespace plumb {
 
-LcmLogWriter::LcmLogWriter(std::string file) : file_(std::move(file)) {
-  std::error_code none;
-  if (!std::filesystem::exists(file_, none) || std::filesystem::is_regular_file(file_, none)) {
-    lock_.emplace("log " + std::filesystem::weakly_canonical(file_, none).string(),
-                  file_ + ": is being written already");
-  }
-  log_ = std::make_unique<lcm::LogFile>(file_, "w");
+LcmLogWriter::LcmLogWriter(std::string file)
+    : file_(std::move(file)), log_(std::make_unique<lcm::LogFile>(file_, "w")) {
   if (!log_->good()) Fail();
 }
 

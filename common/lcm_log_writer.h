@@ -2,11 +2,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
-
-#include "common/name_lock.h"
 
 namespace lcm {
 class LogFile;
@@ -18,7 +15,7 @@ namespace plumb {
 /// Not thread-safe.
 class LcmLogWriter {
  public:
-  /// @throws std::runtime_error naming the file, if it cannot be written, or is being written.
+  /// @throws std::runtime_error naming the file, if it cannot be written.
   explicit LcmLogWriter(std::string file);
   ~LcmLogWriter();
 
@@ -32,7 +29,6 @@ class LcmLogWriter {
   [[noreturn]] void Fail() const;
 
   std::string file_;
-  std::optional<NameLock> lock_;  // of a file that is one: two may write to a pipe
   std::unique_ptr<lcm::LogFile> log_;
 };
 

@@ -50,7 +50,7 @@ ListenAddress ListenAddress::Parse(const std::string& text) {
 
 bool ListenAddress::local() const { return address.starts_with("127.") || address == "::1"; }
 
-bool IsCalledRightly(std::string_view header, const std::vector<std::string>& names) {
+bool HostAllowed(std::string_view header, const std::vector<std::string>& names) {
   const HostAndPort parts = HostAndPort::Split(header);
   const bool port = std::ranges::all_of(parts.port, [](char c) { return c >= '0' && c <= '9'; });
   if (!port) return false;

@@ -32,6 +32,6 @@ struct HostAndPort {
 /// Whether whoever asks calls a server by a number, which nobody can rebind, by "localhost" or by
 /// one of these names: a page under a name of its own that leads to this machine (DNS rebinding)
 /// must not get at it. @param header "Host" of an HTTP request. @param names in small letters.
-bool IsCalledRightly(std::string_view header, const std::vector<std::string>& names);
+bool HostAllowed(std::string_view header, const std::vector<std::string>& names);
 
 }  // namespace plumb

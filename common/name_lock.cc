@@ -33,4 +33,9 @@ NameLock::NameLock(const std::string& name, const std::string& otherwise)
 
 NameLock::~NameLock() { close(fd_); }
 
+// Of what is not there a path that is relative would stay so.
+std::string NameOfFile(const std::filesystem::path& file) {
+  return std::filesystem::weakly_canonical(std::filesystem::absolute(file)).string();
+}
+
 }  // namespace plumb

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 namespace plumb {
@@ -19,5 +20,9 @@ class NameLock {
  private:
   int fd_;
 };
+
+/// A file's or folder's name for a lock, whether it is there or not: the same from wherever, and
+/// however, its path is given. Thread-safe.
+std::string NameOfFile(const std::filesystem::path& file);
 
 }  // namespace plumb

@@ -10,7 +10,9 @@
 #include "common/listen_address.h"
 
 namespace plumb {
-bool Access::HostAllowed(std::string_view header) const { return IsCalledRightly(header, hosts); }
+bool Access::HostAllowed(std::string_view header) const {
+  return plumb::HostAllowed(header, hosts);
+}
 
 bool Access::OriginAllowed(std::string_view origin, std::string_view host) const {
   if (origin.empty() || std::ranges::find(origins, origin) != origins.end()) return true;

@@ -15,7 +15,7 @@ struct Access {
   std::vector<std::string> origins;  ///< of other pages that may talk to us, "https://example.org"
   std::string token;  ///< that whoever wants to arm must have; empty: nobody needs one
 
-  /// @param host the header "Host": see IsCalledRightly.
+  /// @param host the header "Host": see plumb::HostAllowed.
   bool HostAllowed(std::string_view host) const;
   /// @param origin the header "Origin", empty: it is no browser.
   bool OriginAllowed(std::string_view origin, std::string_view host) const;

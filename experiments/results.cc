@@ -36,7 +36,7 @@ Results::Results(std::filesystem::path file, const std::string& settings,
                  std::vector<std::string> keys, std::vector<std::string> values, const Ranks& ranks)
     : file_(std::move(file)), ranks_(ranks), values_(values.size()) {
   if (ranks.rank() == 0) {
-    lock_.emplace("results " + std::filesystem::weakly_canonical(file_).string(),
+    lock_.emplace("results " + NameOfFile(file_),
                   file_.string() + ": another process is at work on it: give another --output");
     if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path());
   }

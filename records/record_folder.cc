@@ -66,15 +66,13 @@ std::vector<std::string> RecordFolder::Files(const std::string& log) {
 }
 
 RecordFolder::RecordFolder(const std::string& log, const About& about)
-    : folder_(Of(log)),
-      lock_("record " + fs::weakly_canonical(folder_).string(),
-            log + ": is being written already") {
+    : folder_(Of(log)), lock_("record " + NameOfFile(folder_), log + ": is being written already") {
   // Read before anything is removed: it may be the folder of an earlier recording.
   std::optional<Robot> robot;
   if (!about.robot.empty()) robot = ReadRobot(about.robot);
   std::error_code error;
-  if (fs::exists(folder_, error) && !fs::is_regular_file(folder_ / kRecord, error) &&
-      !(fs::is_directory(folder_, error) && fs::is_empty(folder_, error))) {
+  if (fs::exists(folder_, error) && !fs::exists(folder_ / kRecord, error) &&
+      !fs::is_empty(folder_, error)) {
     throw std::runtime_error(
         fmt::format("{}: is there and no log's: its files are not written over", folder_.string()));
   }

@@ -12,7 +12,6 @@
 #include "robot/configuration_space.h"
 #include "robot/parameter_distribution.h"
 #include "robot/physical.h"
-#include "robot/posterior_format.h"
 #include "robot/residual_message.h"
 
 namespace plumb {

@@ -15,6 +15,8 @@ namespace plumb {
 
 /// Of positions, velocities, accelerations and efforts: [rad] or [m], per s, per s^2, [Nm] or [N].
 inline constexpr double kGreatestQuantity = 1e9;
+/// Of a parameter, its mean and its standard deviation, in any unit.
+inline constexpr double kGreatestParameter = 1e12;
 /// No reading is surer.
 inline constexpr double kLeastSd = 1e-12;
 /// An effort so many times the strongest motor's limit is none of this robot's; a log may have been

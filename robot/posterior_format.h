@@ -15,9 +15,6 @@ inline constexpr int kPosteriorVersion = 2;
 /// The version that had no residual: what is not in it is none.
 inline constexpr int kPosteriorBeforeResiduals = 1;
 
-/// Of a parameter's mean or standard deviation, in any unit: no robot's is greater.
-inline constexpr double kGreatestParameter = 1e12;
-
 /// As a string: a JSON number is a double to most readers, which has 53 bits.
 inline std::string Hexadecimal(uint64_t number) { return fmt::format("{:#018x}", number); }
 

@@ -11,6 +11,7 @@
 #include "robot/configuration_space.h"
 #include "robot/json_field.h"
 #include "robot/json_text.h"
+#include "robot/physical.h"
 #include "robot/physics_fingerprint.h"
 #include "robot/posterior_format.h"
 #include "robot/residual_json.h"

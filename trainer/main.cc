@@ -1,7 +1,6 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -86,7 +85,7 @@ class TrainerProcess {
     start_ = process_.clock().Now();
     if (checkpoint_file_.empty()) return;
     lock_.emplace(
-        "training " + std::filesystem::weakly_canonical(options_.checkpoint).string(),
+        "training " + NameOfFile(options_.checkpoint),
         options_.checkpoint + ": another trainer is at work there: give another --checkpoint");
     RemoveLeftovers(options_.checkpoint);
     if (process_.participant()) past_.emplace(options_.checkpoint, FingerprintOf(robot_));

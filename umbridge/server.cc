@@ -34,7 +34,7 @@ struct UmbridgeServer::Parts {
   ~Parts() { stop.release(); }
 
   void Answer(const Request& request, HttpServer::Reply reply) {
-    if (!IsCalledRightly(View(request[http::field::host]), names)) {
+    if (!HostAllowed(View(request[http::field::host]), names)) {
       return reply(Json(403, UmbridgeError("InvalidInput",
                                            "this is not a name of ours: ask by its number, or give "
                                            "plumb serve-model --host")));

@@ -17,7 +17,7 @@ namespace plumb {
 /// thread-safe.
 class UmbridgeServer {
  public:
-  /// Listens. @param names by which clients may call this machine, see IsCalledRightly.
+  /// Listens. @param names by which clients may call this machine, see HostAllowed.
   /// @throws std::runtime_error naming the address, if it cannot.
   UmbridgeServer(const ListenAddress& listen, std::vector<std::string> names,
                  std::vector<ServedModel> models);

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "common/atomic_file.h"
 #include "common/checked_file.h"
@@ -82,14 +83,12 @@ GaussianMixture MixtureFrom(const json& j) {
   return mixture;
 }
 
-// A number with a fraction or a greater one would become one that nobody wrote.
-template <class Int>
+// A number with a fraction, or a greater one, would become one that nobody wrote.
+template <class Int = int>
 Int Whole(const json& j) {
   const bool fits = j.is_number_unsigned()
-                        ? j.get<uint64_t>() <= uint64_t{std::numeric_limits<Int>::max()}
-                        : j.is_number_integer() &&
-                              j.get<int64_t>() >= std::numeric_limits<Int>::min() &&
-                              j.get<int64_t>() <= std::numeric_limits<Int>::max();
+                        ? std::in_range<Int>(j.get<uint64_t>())
+                        : j.is_number_integer() && std::in_range<Int>(j.get<int64_t>());
   if (!fits)
     throw std::runtime_error(fmt::format("{} is not a whole number, or too great", j.dump()));
   return j.get<Int>();
@@ -97,7 +96,7 @@ Int Whole(const json& j) {
 
 std::vector<int> WholeNumbers(const json& j) {
   std::vector<int> numbers;
-  for (const json& number : j) numbers.push_back(Whole<int>(number));
+  for (const json& number : j) numbers.push_back(Whole(number));
   return numbers;
 }
 
@@ -158,11 +157,11 @@ json ToJson(const Rollout& rollout) {
 
 Rollout RolloutFrom(const json& j) {
   Rollout rollout;
-  rollout.episode = Whole<decltype(rollout.episode)>(j.at("episode"));
-  rollout.policy_iteration = Whole<decltype(rollout.policy_iteration)>(j.at("policy_iteration"));
+  rollout.episode = Whole<int64_t>(j.at("episode"));
+  rollout.policy_iteration = Whole(j.at("policy_iteration"));
   for (const json& entry : j.at("transitions")) {
     Transition t;
-    t.step = Whole<decltype(t.step)>(entry.at("step"));
+    t.step = Whole(entry.at("step"));
     for (const auto& [name, member] : kVectors) t.*member = VectorFrom(entry.at(name));
     for (const json& e : entry.at("efforts"))
       t.efforts.push_back({e.at("duration"), VectorFrom(e.at("effort"))});
@@ -312,13 +311,13 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
           "was made with another robot.toml or robot.urdf; choose another folder");
     }
     SimOpt::State state;
-    state.iteration = Whole<int>(j.at("iteration"));
+    state.iteration = Whole(j.at("iteration"));
     state.distribution = MixtureFrom(j.at("distribution"));
     state.used = j.at("used");
     state.before = MixtureFrom(j.at("before"));
     state.kl = j.at("kl"), state.ess = NumberOrNaN(j.at("ess")),
     state.temperature = j.at("temperature");
-    state.search = {.update = Whole<int>(j.at("update")),
+    state.search = {.update = Whole(j.at("update")),
                     .distribution = Moments(state.distribution),
                     .kl = state.kl,
                     .temperature = state.temperature,

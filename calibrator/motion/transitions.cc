@@ -7,7 +7,6 @@
 #include <limits>
 #include <numeric>
 
-#include "calibrator/motion/longest_episode.h"
 #include "common/time_units.h"
 #include "robot/physical.h"
 
@@ -85,7 +84,7 @@ TransitionJoiner::TransitionJoiner(const RobotDescription& robot)
       space_(robot),
       period_(robot.task.period),
       greatest_effort_(GreatestEffort(robot)),
-      max_states_(kMostEpisodeStates),
+      max_states_(kMaxStates),
       max_episodes_(kMaxEpisodes),
       max_commands_(kMaxCommands) {}
 

@@ -64,9 +64,11 @@ struct DropCounts {
 /// interval: a step within one is put back to where the means say that it was. Not thread-safe.
 class TransitionJoiner {
  public:
+  static constexpr size_t kMaxStates = 200'000;  ///< 400 s of a driver at 500 Hz
+
   /// Memory is bounded: the oldest states, episodes and commands are forgotten, as a process that
-  /// runs for days must. At most 200 000 states of 350 bytes and 40 a joint, and 200 000 commands
-  /// of 64 bytes.
+  /// runs for days must. At most kMaxStates states of 350 bytes and 40 a joint, and 200 000
+  /// commands of 64 bytes.
   explicit TransitionJoiner(const RobotDescription& robot);
   /// Nothing is forgotten but by Forget.
   static TransitionJoiner Unbounded(const RobotDescription& robot);

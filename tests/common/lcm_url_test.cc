@@ -52,6 +52,15 @@ TEST_CASE("an empty URL is $LCM_DEFAULT_URL, or else our default") {
     unsetenv("LCM_DEFAULT_URL");
 }
 
+TEST_CASE("a group is one, however its URL is spelt") {
+  const std::string group = LcmGroup("udpm://239.255.76.67:7667?ttl=0");
+  for (const char* same : {"udpm://", "udpm://?ttl=1", "udpm://239.255.76.67:07667"})
+    CHECK(LcmGroup(same) == group);
+  CHECK(LcmGroup("udpm://239.255.76.67:7668") != group);
+  CHECK(LcmGroup("udpm://239.255.76.68") != group);
+  CHECK(LcmGroup("memq://") == "memq://");
+}
+
 TEST_CASE("where a udpm: URL leads") {
   CHECK(ParseUdpm("udpm://") == MulticastAddress{"239.255.76.67", 7667, 0, 2 << 20});
   CHECK(ParseUdpm("udpm://239.1.2.3") == MulticastAddress{"239.1.2.3", 7667, 0, 2 << 20});

@@ -4,7 +4,10 @@
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <memory>
+
+#include "tests/temporary_folder.h"
 
 namespace plumb {
 namespace {
@@ -30,6 +33,23 @@ TEST_CASE("a name is one process's at a time, and free when that has ended in wh
   waitpid(other, nullptr, 0);
   CHECK_NOTHROW(NameLock(name, "taken"));
   close(pipes[0]), close(pipes[1]);
+}
+
+TEST_CASE("a file has one name, and two files that are called alike have two") {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder.path() / "a");
+  std::filesystem::create_directory_symlink(folder.path() / "a", folder.path() / "b");
+  CHECK(NameOfFile(folder / "a/x") == NameOfFile(folder / "b/../a/./x"));
+  CHECK(NameOfFile(folder / "a/x") == NameOfFile(folder / "b/x"));
+  const std::filesystem::path here = std::filesystem::current_path();
+  const auto from = [&](const std::string& place) {
+    std::filesystem::current_path(place);
+    const std::string name = NameOfFile("not there");
+    std::filesystem::current_path(here);
+    return name;
+  };
+  CHECK(from(folder / "a") == NameOfFile(folder / "a/not there"));
+  CHECK(from(folder / "a") != from(folder.path()));
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "common/lcm_log_reader.h"
+#include "calibrator/motion/log_reader.h"
 #include "plumb/parameter_distribution_t.hpp"
 #include "tests/process/launch.h"
 
@@ -15,40 +15,28 @@ namespace {
 namespace fs = std::filesystem;
 using Catch::Contains;
 
-constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
 constexpr int kIterations = 3;
 
 /// What a log has of a channel, the message that was said first for each key.
 template <class Message, class Key>
-std::map<int, Message> FirstOf(const fs::path& log, const std::string& channel, Key key) {
-  LcmLogReader reader(log);
-  LcmLogEvent event;
+std::map<int, Message> FirstOf(const fs::path& log, const std::string& wanted, Key key) {
   std::map<int, Message> first;
-  while (reader.Read(event)) {
+  ReadLog(log, [&](const std::string& channel, const void* data, int size, int64_t) {
     Message message;
-    if (event.channel != channel) continue;
-    REQUIRE(message.decode(event.data.data(), 0, static_cast<int>(event.data.size())) > 0);
-    first.try_emplace(key(message), message);
-  }
+    if (channel == wanted && Decodes(data, size, message)) first.try_emplace(key(message), message);
+    return true;
+  });
   return first;
 }
 
 TEST_CASE("on a worn robot what is lacking is learnt, and what has done best there runs") {
   Stage stage(131, "pendulum", Stage::Time::kReal);
-  const fs::path file = stage.folder / "robot.toml";
-  std::ofstream(file) << fmt::format(
-      "extends = \"{0}/worn.toml\"\n[robot]\nurdf = \"{0}/robot.urdf\"\n[training]\nupdates = "
-      "20\nupdates_again = 5\n",
-      stage.robot_folder);
-  stage.robot_folder = file;
+  LearnLittle(stage, 20, 5, "worn.toml");
   const fs::path summary_file = stage.folder / "summary.json", log = stage.folder / "run.lcmlog";
   Child launch =
       Launch(stage, {"--iterations", std::to_string(kIterations), "--evaluation-episodes", "1",
                      "--seed", "3", "--log", log, "--summary", summary_file});
-  stage.WaitUntil([&] { return !launch.running(); }, kLong);
-  INFO(launch.Tail(30));
-  REQUIRE_FALSE(launch.running());
-  REQUIRE_FALSE(launch.failed());
+  Finish(stage, launch);
 
   // The alarm speaks; nothing that the model cannot explain informs its parameters.
   const auto summary = nlohmann::json::parse(Read(summary_file));

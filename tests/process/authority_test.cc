@@ -17,7 +17,6 @@ namespace fs = std::filesystem;
 using Catch::Contains;
 
 constexpr int kIdle = 1, kRunning = 8;  // CANSimple axis states
-constexpr double kLong = 1200;          // [s] of real time: whoever is as late as that hangs
 
 /// Says messages without a seal, as anybody can.
 struct Forger {

@@ -14,17 +14,6 @@ namespace fs = std::filesystem;
 using Catch::Contains;
 using Catch::StartsWith;
 
-constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
-
-/// Waits for a run's end. @return what it has printed.
-std::string Finish(Stage& stage, Child& launch) {
-  stage.WaitUntil([&] { return !launch.running(); }, kLong);
-  INFO(launch.Tail(30));
-  REQUIRE_FALSE(launch.running());
-  CHECK_FALSE(launch.failed());
-  return launch.Tail(100);
-}
-
 TEST_CASE("an excitation is played on the robot and calibrated with, without any policy") {
   Stage stage(122, "pendulum", Stage::Time::kReal);
   const fs::path table = stage.folder / "efforts.csv", summary_file = stage.folder / "summary.json";

@@ -17,8 +17,6 @@ namespace fs = std::filesystem;
 using Catch::Contains;
 using nlohmann::json;
 
-constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
-
 /// A command, and the folder that it leaves its files in.
 struct Command {
   Stage& stage;

@@ -9,8 +9,6 @@ namespace fs = std::filesystem;
 using Catch::Contains;
 using Catch::StartsWith;
 
-constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
-
 /// To the run's process of that name.
 void Signal(const Stage& stage, const std::string& process, int signal) {
   for (const auto& entry : fs::directory_iterator("/proc")) {

@@ -19,8 +19,6 @@ namespace {
 
 using Catch::Contains;
 
-constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
-
 /// One of each that the processes say to each other, plausible but for who says it. Without a key
 /// whoever speaks on DRIVER_STATUS beside the driver ends `plumb arm`, and the first request to arm
 /// is obeyed, whoever it comes from: neither is sent then.

@@ -12,8 +12,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
-
 struct Forgery {
   parameter_distribution_t message;
   std::string refusal;  // that the trainer is to write

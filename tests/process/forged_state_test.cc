@@ -13,8 +13,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr double kLong = 1200;  // [s]: whoever is as late as that hangs
-
 template <class Message>
 std::optional<Message> Decoded(const void* data, int size) {
   Message message;

@@ -22,13 +22,26 @@ inline Child Launch(Stage& stage, std::vector<std::string> flags,
   return Child("plumb", arguments, stage.folder / (output + ".log"));
 }
 
+inline constexpr double kLong = 1200;  // [s] of real time: whoever is as late as that hangs
+
+/// Waits for a run's end. @return what it has printed.
+inline std::string Finish(Stage& stage, Child& launch) {
+  stage.WaitUntil([&] { return !launch.running(); }, kLong);
+  INFO(launch.Tail(30));
+  REQUIRE_FALSE(launch.running());
+  CHECK_FALSE(launch.failed());
+  return launch.Tail(100);
+}
+
 /// The stage's robot becomes one that learns so little that a run takes seconds.
-inline void LearnLittle(Stage& stage, int updates = 3) {
+/// @param kind of it, a file in its folder.
+inline void LearnLittle(Stage& stage, int updates = 3, int updates_again = 1,
+                        const std::string& kind = "robot.toml") {
   const std::filesystem::path file = stage.folder / "robot.toml";
   std::ofstream(file) << fmt::format(
-      "extends = \"{0}/robot.toml\"\n[robot]\nurdf = \"{0}/robot.urdf\"\n[training]\nupdates = "
-      "{1}\nupdates_again = 1\n",
-      stage.robot_folder, updates);
+      "extends = \"{0}/{1}\"\n[robot]\nurdf = \"{0}/robot.urdf\"\n[training]\nupdates = {2}\n"
+      "updates_again = {3}\n",
+      stage.robot_folder, kind, updates, updates_again);
   stage.robot_folder = file;
 }
 

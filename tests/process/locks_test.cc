@@ -27,7 +27,7 @@ void OneIsRefused(std::vector<Child>& runs, const std::string& words) {
 
 TEST_CASE(
     "two calibrations with one journal, two trainings with one checkpoint, two experiments with "
-    "one table") {
+    "one table, two records in one log") {
   Stage stage(64);
   const std::string pendulum = stage.robot_folder;
   std::string program = "plumb", words = "another process is at work on it";
@@ -47,6 +47,18 @@ TEST_CASE(
   SECTION("train") {
     arguments = {"train", pendulum, "--steps", "1e9", "--output", stage.folder / "policy.onnx"};
     words = "policy.onnx.checkpoint: " + words;
+  }
+  SECTION("a calibrator by hand") {
+    program = "plumb-calibrator", words = "another calibrator is at work there";
+    arguments = {pendulum, "--lcm-url", "memq://", "--checkpoint", stage.folder / "checkpoints"};
+  }
+  SECTION("a trainer by hand") {
+    program = "plumb-trainer", words = "another trainer is at work there";
+    arguments = {pendulum, "--lcm-url", "memq://", "--checkpoint", stage.folder};
+  }
+  SECTION("a record") {
+    arguments = {"--lcm-url", "memq://", "record", stage.folder / "run.lcmlog"};
+    words = "run.lcmlog: is being written already";
   }
   SECTION("an experiment") {
     program = "plumb-reality-gap";
@@ -92,30 +104,6 @@ TEST_CASE("two launches on one bus, one LCM group or in one folder at the same m
     runs.push_back(launch("memq://", "loop:", "a", "b.log"));
     OneIsRefused(runs, "in use by process");
   }
-}
-
-TEST_CASE("two that keep their checkpoints in one folder, two that write one log") {
-  Stage stage(132, "pendulum", Stage::Time::kReal);
-  std::string program, words;
-  std::vector<std::string> arguments{stage.robot_folder, "--lcm-url", "memq://"};
-  SECTION("calibrators") {
-    program = "plumb-calibrator", words = "another calibrator is at work there";
-    arguments.insert(arguments.end(), {"--checkpoint", stage.folder / "checkpoints"});
-  }
-  SECTION("trainers") {
-    program = "plumb-trainer", words = "another trainer is at work there";
-    fs::create_directory(stage.folder / "checkpoints");
-    arguments.insert(arguments.end(), {"--checkpoint", stage.folder / "checkpoints"});
-  }
-  SECTION("records") {
-    program = "plumb", words = "run.lcmlog: is being written already";
-    arguments = {"--lcm-url", "memq://", "record", stage.folder / "run.lcmlog"};
-  }
-  arguments.insert(arguments.begin(), Stage::Binary(program));
-  std::vector<Child> runs;
-  for (const char* log : {"a.log", "b.log"})
-    runs.emplace_back(program, arguments, stage.folder / log);
-  OneIsRefused(runs, words);
 }
 
 TEST_CASE("files of somebody else's are not written over by a record, nor by a run's own files") {

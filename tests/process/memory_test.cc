@@ -15,7 +15,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kLong = 1200;      // [s] of real time: whoever is as late as that hangs
 constexpr int64_t kQueue = 32'768;  // [kB] of messages that wait on a channel
 
 /// For as long as it lives, the thread that main() runs in stands still, as if it computed, and all

@@ -256,6 +256,7 @@ TEST_CASE("a bus that cannot be opened says why") {
   CHECK_THAT(error("can0"), Contains("'can0' is not socketcan:INTERFACE"));
   CHECK_THAT(error("tcp:1.2.3.4:5"), Contains("udp:GROUP:PORT"));
   CHECK_THAT(error("udp:127.0.0.1:43113"), Contains("not an IPv4 multicast group"));
+  CHECK_THAT(error("udp:239.74.163.2:043113"), Contains("not an IPv4 multicast group"));
   CHECK_THAT(error("udp:239.74.163.2"), Contains("and a port"));
   CHECK_THAT(error("udp:239.74.163.2:0"), Contains("and a port"));
   CHECK_THAT(error("udp:239.74.163.2:70000"), Contains("and a port"));
