@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 
 #include "cli/outputs.h"
@@ -27,6 +28,7 @@
 #include "trainer/onnx_policy.h"
 #include "trainer/policy_file.h"
 #include "trainer/robot_simulation.h"
+#include "trainer/session.h"
 #include "trainer/trainer.h"
 
 namespace plumb {
@@ -80,6 +82,11 @@ class Training {
         trainer_(robot_.training, SimulateRobot(robot_), robot_.effort_limits(), flags_.seed,
                  Threads(), ranks_) {
     if (!speaks()) spdlog::set_level(spdlog::level::err);
+    try {
+      RequireSendable(robot_);
+    } catch (const std::invalid_argument& error) {
+      spdlog::warn("{}", error.what());  // a file has room for it all the same
+    }
     if (flags_.checkpoint.empty()) flags_.checkpoint = flags_.output + ".checkpoint";
     if (flags_.csv.empty() && !flags_.report.empty()) {
       flags_.csv = flags_.report + ".csv";  // which nobody has named

@@ -260,6 +260,13 @@ TEST_CASE("nonsense is refused with a line that says why") {
   refused("--steps 3000 --worst-share 0", "--worst-share");
   refused("--steps 3000 --from " + folder / "none.onnx", "none.onnx");
   refused("--steps 3000 --checkpoint /proc/no/such", "/proc/no/such");
+  const std::string large = folder / "large.toml";
+  std::ofstream(large) << "extends = \"" + Robot("pendulum") + "/robot.toml\"\n[robot]\nurdf = \"" +
+                              Robot("pendulum") +
+                              "/robot.urdf\"\n[training]\nhidden = [1100, 1000]\n";
+  const Outcome outcome = Shell(Plumb() + "train " + large + " --output /proc/no/such");
+  CHECK(outcome.status == 1);
+  CHECK(outcome.text.find("gets through to nobody") != std::string::npos);
   std::ofstream(folder / "text.json") << "{\"parameters\": 7}";
   refused("--steps 3000 --distribution " + folder / "text.json", "text.json");
   std::ofstream(folder / "policy.checkpoint") << "rubbish";
