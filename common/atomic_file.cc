@@ -8,8 +8,10 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <functional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -37,7 +39,6 @@ bool SyncFolder(const std::filesystem::path& file) {
 
 // Names nobody else gives: of this file, and of this process.
 constexpr char kPart[] = ".part-";
-std::string TemporaryPrefix(const std::filesystem::path& file) { return file.string() + kPart; }
 
 struct Temporary {
   int fd = -1;
@@ -49,7 +50,7 @@ Temporary MakeTemporary(const std::filesystem::path& file) {
   constexpr int kMostTries = 100;
   Temporary temporary;
   for (int i = 0; i < kMostTries; ++i) {
-    temporary.name = TemporaryPrefix(file) + std::to_string(getpid());
+    temporary.name = file.string() + kPart + std::to_string(getpid());
     if (i > 0) temporary.name += "-" + std::to_string(i);
     temporary.fd =
         open(temporary.name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
@@ -71,17 +72,17 @@ bool IsLeftover(const std::filesystem::path& file, std::string_view number) {
   return ours && kill(pid, 0) != 0 && errno == ESRCH;
 }
 
-// @param prefix of their names, up to the process's number; empty: of any file.
-void RemoveLeftovers(const std::filesystem::path& folder, const std::string& prefix) {
+// @param of whether they are of this file, by its name
+void RemoveLeftoversOf(const std::filesystem::path& folder,
+                       const std::function<bool(std::string_view file)>& of) {
   namespace fs = std::filesystem;
   std::error_code ignored;  // of what cannot be removed nobody is worse off
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
     const std::string name = entry.path().filename().string();
     const size_t part = name.rfind(kPart);
     if (part == std::string::npos) continue;
-    const size_t number = part + std::strlen(kPart);
-    if (!prefix.empty() && name.substr(0, number) != prefix) continue;
-    if (IsLeftover(entry.path(), std::string_view(name).substr(number)))
+    const std::string_view file(name.data(), part);
+    if (of(file) && IsLeftover(entry.path(), name.substr(part + std::strlen(kPart))))
       fs::remove(entry.path(), ignored);
   }
 }
@@ -143,14 +144,16 @@ void RequireWritable(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(status) || !file.has_filename()) fail("it is a folder");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     fail("it is not a regular file");
-  RemoveLeftovers(file.has_parent_path() ? file.parent_path() : ".",
-                  TemporaryPrefix(file.filename()));
+  RemoveLeftoversOf(file.has_parent_path() ? file.parent_path() : ".",
+                    [name = file.filename().string()](std::string_view of) { return of == name; });
   const Temporary temporary = MakeTemporary(file);
   if (temporary.fd < 0) fail(std::strerror(errno));
   close(temporary.fd);
   unlink(temporary.name.c_str());
 }
 
-void RemoveLeftovers(const std::filesystem::path& folder) { RemoveLeftovers(folder, ""); }
+void RemoveLeftovers(const std::filesystem::path& folder, const std::string& extension) {
+  RemoveLeftoversOf(folder, [&](std::string_view file) { return file.ends_with(extension); });
+}
 
 }  // namespace plumb

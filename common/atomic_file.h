@@ -43,8 +43,9 @@ class AtomicFile {
 /// @throws std::runtime_error naming the file and the cause.
 void RequireWritable(const std::filesystem::path& file);
 
-/// Removes the temporary files that killed processes have left in a folder, whatever files they
-/// were for: on a full disk they take the room of what replaces them. Thread-safe.
-void RemoveLeftovers(const std::filesystem::path& folder);
+/// Removes the temporary files that killed processes have left in a folder, of all files whose
+/// names end so: on a full disk they take the room of what replaces them. Thread-safe.
+/// @param extension ".checkpoint"
+void RemoveLeftovers(const std::filesystem::path& folder, const std::string& extension);
 
 }  // namespace plumb

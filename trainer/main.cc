@@ -87,7 +87,7 @@ class TrainerProcess {
     lock_.emplace(
         "training " + NameOfFile(options_.checkpoint),
         options_.checkpoint + ": another trainer is at work there: give another --checkpoint");
-    RemoveLeftovers(options_.checkpoint);
+    RemoveLeftovers(options_.checkpoint, ".checkpoint");
     if (process_.participant()) past_.emplace(options_.checkpoint, FingerprintOf(robot_));
     if (process_.begins_virtual_run()) return;
     const std::optional<Checkpoint> checkpoint = LoadCheckpoint(checkpoint_file_);

@@ -269,7 +269,7 @@ CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error) throw std::runtime_error(folder_.string() + ": " + error.message());
-  RemoveLeftovers(folder_);
+  RemoveLeftovers(folder_, ".checkpoint");
 }
 
 void CalibrationCheckpoint::Save(const SimOpt::State& state) {

@@ -41,13 +41,15 @@ TEST_CASE("what killed processes have left is removed, what others are writing i
                     other = file + ".part-" + std::to_string(getppid()),
                     name = file + ".part-of-speech";
   for (const std::string& there : {left, other, name}) std::ofstream(there) << "half";
-  const std::string of_another_file = folder / "y.part-" + std::to_string(gone);
-  std::ofstream(of_another_file) << "half";
+  const std::string of_another_file = folder / "y.checkpoint.part-" + std::to_string(gone),
+                    somebodys = folder / "notes.part-" + std::to_string(gone);
+  for (const std::string& there : {of_another_file, somebodys}) std::ofstream(there) << "half";
   RequireWritable(file);
   CHECK_FALSE(fs::exists(left));
   CHECK(fs::exists(of_another_file));
-  RemoveLeftovers(folder.path());
+  RemoveLeftovers(folder.path(), ".checkpoint");
   CHECK_FALSE(fs::exists(of_another_file));
+  CHECK(fs::exists(somebodys));
   CHECK(fs::exists(other));
   CHECK(fs::exists(name));
 }
