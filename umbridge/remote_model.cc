@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/outside_text.h"
 #include "http/client.h"
 #include "robot/json_text.h"
 #include "robot/physical.h"
@@ -38,6 +39,10 @@ json Ask(const std::string& server, const std::string& path, const json& request
   return said;
 }
 
+std::string Beginning(const std::string& words, size_t longest) {
+  return Printable(words.substr(0, longest));  // which may have cut a letter in two
+}
+
 /// What it says of itself as an error; empty = it is none.
 std::string ErrorIn(const json& answer) {
   const auto error = answer.find("error");
@@ -45,7 +50,7 @@ std::string ErrorIn(const json& answer) {
   const bool has_words =
       error->is_object() && error->contains("message") && (*error)["message"].is_string();
   const std::string words = has_words ? (*error)["message"].get<std::string>() : error->dump();
-  return words.empty() ? "an error without words" : words.substr(0, 200);
+  return words.empty() ? "an error without words" : Beginning(words, 200);
 }
 
 void RequireSize(const std::string& server, const std::string& name, const std::string& path,
@@ -55,7 +60,7 @@ void RequireSize(const std::string& server, const std::string& name, const std::
   const json expected = json::array({size});
   if (!answer.contains(field) || answer[field] != expected) {
     Fail(server, fmt::format("{} of {} is {}, and not {}", field, name,
-                             answer.value(field, json()).dump().substr(0, 100), expected.dump()));
+                             Beginning(answer.value(field, json()).dump(), 100), expected.dump()));
   }
 }
 

@@ -94,8 +94,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   server.Answer(text.substr(0, end), text.substr(std::min(end + 1, text.size())));
   ReadOrRefuse<std::runtime_error>([&] {
     RemoteModel model(server.url(), "sums", 2, 3);
-    const Eigen::MatrixXd outputs = model.Evaluate(Eigen::MatrixXd::Ones(2, 1));
-    Require(outputs.rows() == 3 && outputs.cols() == 1);
+    const Eigen::VectorXd outputs = model.Evaluate(Eigen::MatrixXd::Ones(2, 1));
+    Require(outputs.size() == 3);
     if (model.last_error().empty())
       Require(std::all_of(outputs.begin(), outputs.end(), IsPhysical));
     else
