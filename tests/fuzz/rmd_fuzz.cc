@@ -25,8 +25,8 @@ class Drive : public VirtualDrive {
     return {kCommands + kNode, kAnswers + kNode, kAllMotors};
   }
   void OnFrame(const Frame& frame, int64_t now) override {
-    const int64_t rejected = device_.rejected();
-    if (device_.OnFrame(frame, now) || device_.rejected() == rejected) fed_ = now;
+    device_.OnFrame(frame, now);
+    if (Feeds(frame)) fed_ = now;
   }
   void Tick(int64_t now, FrameBatch& out) override {
     const bool slept = device_.watchdog() > 0 && now - fed_ >= device_.watchdog();
@@ -94,6 +94,13 @@ class Drive : public VirtualDrive {
   }
 
  private:
+  // Whatever it commands, or if that is nothing a motor knows.
+  static bool Feeds(const Frame& frame) {
+    const bool ours = frame.id == kCommands + kNode || frame.id == kAllMotors;
+    return ours && !frame.extended && !frame.error && !frame.fd && !frame.remote &&
+           frame.length == 8;
+  }
+
   const RmdDevice::Settings settings_;
   RmdDevice device_;
   RmdDevice::Sample sample_;
