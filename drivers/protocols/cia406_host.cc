@@ -60,9 +60,11 @@ class Cia406Encoder : public Sensor {
   void Tick(int64_t now, FrameBatch& out) noexcept override {
     present_ = heard_ && now - heard_at_ <= timing_.timeout;
     if (state_ == SensorState::kRunning && now - position_at_ > timing_.timeout) {
-      // Its turns until then can still be counted, if it is not too long.
-      if (!present_) {
+      // Its turns until then can still be counted, if it is not too long. One that is there and
+      // has not agreed may have a longer period, and must be told again.
+      if (!present_ || !agreed_) {
         state_ = SensorState::kStarting;
+        if (present_) retry_ = now;
         agreed_ = false;
       } else {
         Fail("it is there, but has sent no position for {} ms", (now - position_at_) / 1000);

@@ -103,10 +103,12 @@ TEST_CASE("an encoder is told its period and to start, and then read") {
 }
 
 TEST_CASE("one that sends too seldom is told its period until it says that it has it") {
-  Bench bench;
-  // Somebody has given it 50 ms, and stopped it: it starts when it is told to, but does not hear
-  // its period before.
-  bench.device.OnFrame(*FrameFromText("601#2B00180532000000"), bench.now);
+  // Somebody has given it 50 ms, or so long that it seems to have fallen silent, and stopped it: it
+  // starts when it is told to, but does not hear its period before.
+  const auto [request, range] = GENERATE(table<const char*, double>(
+      {{"601#2B00180532000000", 65536}, {"601#2B0018052C010000", 4294967296.}}));
+  Bench bench({.range = range}, Describe(65536, range));
+  bench.device.OnFrame(*FrameFromText(request), bench.now);
   bench.device.OnFrame(*FrameFromText("000#0201"), bench.now);
   bench.tap = [](const Frame& frame) { return frame.id != 0x701 && frame.id != 0x581; };
   bench.Run(1);
