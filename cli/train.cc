@@ -93,7 +93,7 @@ class Training {
       RequireSameKind(flags_.csv, "update,steps,mean_return,", "a table of a training");
     }
     steps_ = flags_.steps > 0 ? static_cast<int64_t>(flags_.steps)
-                              : int64_t{robot_.training.updates} * robot_.training.batch;
+                              : int64_t{robot_.training.first_updates()} * robot_.training.batch;
     if (speaks()) {
       std::vector<std::string> inputs = FilesOf(robot_);
       inputs.insert(inputs.end(), {flags_.distribution, flags_.from});

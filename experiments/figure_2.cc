@@ -62,7 +62,7 @@ struct Remembered {
 Remembered RecordRun(const Options& options, const PaperTask& task, int run,
                      const std::function<void(double)>& progress) {
   const RobotDescription robot = LoadTask(options.robots, task, options.hidden);
-  const int updates = options.quick ? 40 : robot.training.updates;
+  const int updates = options.quick ? 40 : robot.training.first_updates();
   const RecordingSettings settings{updates,        options.iterations,         options.noise,
                                    options.hidden, static_cast<uint64_t>(run), options.threads};
   Remembered remembered{fmt::format("{} {}", task.name, run), Record(robot, settings, progress)};

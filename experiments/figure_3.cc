@@ -56,7 +56,7 @@ Results::Rows RunLoop(const ExperimentOptions& options, const PaperTask& task,
   settings.strategy = strategy;
   settings.iterations = options.iterations;
   settings.steps_per_iteration = static_cast<int>(kRobotSeconds / robot.task.period);
-  settings.first_updates = options.quick ? 2 : robot.training.updates;
+  settings.first_updates = options.quick ? 2 : robot.training.first_updates();
   settings.next_updates = options.quick ? 1 : robot.training.updates_again;
   settings.evaluation_episodes = options.quick ? 2 : 20;
   settings.seed = seed;
@@ -163,8 +163,9 @@ int MakeFigure(Process& process, const ExperimentOptions& options) {
     const TrainingSettings training = LoadTask(options.robots, task, options.hidden).training;
     for (int run = 1; run <= options.runs; ++run) {
       for (const CalibrationStrategy strategy : kStrategies) {
-        const double weight = training.batch * (training.updates * (Learns(strategy) ? 0.5 : 1.0) +
-                                                options.iterations * training.updates_again);
+        const double weight =
+            training.batch * (training.first_updates() * (Learns(strategy) ? 0.5 : 1.0) +
+                              options.iterations * training.updates_again);
         jobs.push_back(
             {KeyOf(task, strategy, run), weight, [&, run, strategy](const auto& progress) {
                return RunLoop(options, task, strategy, run, remembered, progress);

@@ -200,8 +200,9 @@ int RunSeeds(Process& process, const Options& options) {
   if (options.paper) robot.training = PaperSettings(robot.training);
   ParameterDistribution distribution = ParameterDistribution::Prior(robot);
   if (options.distribution == "nominal") distribution.mixture.components[0].covariance.setZero();
-  const auto steps = options.steps > 0 ? static_cast<int64_t>(options.steps)
-                                       : int64_t{robot.training.updates} * robot.training.batch;
+  const auto steps = options.steps > 0
+                         ? static_cast<int64_t>(options.steps)
+                         : int64_t{robot.training.first_updates()} * robot.training.batch;
 
   const std::filesystem::path folder = options.output;
   const std::string settings =

@@ -161,7 +161,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   settings.iterations = options.iterations;
   settings.steps_per_iteration =
       static_cast<int>((options.quick ? 1 : kRobotSeconds) / model.task.period);
-  settings.first_updates = options.quick ? 2 : model.training.updates;
+  settings.first_updates = options.quick ? 2 : model.training.first_updates();
   settings.next_updates = options.quick ? 1 : model.training.updates_again;
   settings.evaluation_episodes = options.quick ? 1 : kJudged;
   settings.trial_share = method.accept ? kTrialShare : 0;

@@ -124,7 +124,7 @@ class Experiment {
     const std::string of = fmt::format("{} {}", task.name, run);
     if (now_.of == of) return;
     const RobotDescription robot = LoadTask(options_.robots, task, options_.hidden);
-    const RecordingSettings settings{options_.quick ? 40 : robot.training.updates,
+    const RecordingSettings settings{options_.quick ? 40 : robot.training.first_updates(),
                                      Updates(options_),
                                      1,
                                      options_.hidden,
@@ -152,7 +152,7 @@ class Experiment {
     LoopSettings settings;
     settings.seed = static_cast<uint64_t>(run);
     settings.threads = options_.threads;
-    settings.first_updates = options_.quick ? 40 : robot.training.updates;
+    settings.first_updates = options_.quick ? 40 : robot.training.first_updates();
     const auto trainer = now_.recording.loop->TrainFirst(
         Key(CalibrationStrategy::kPrior), ParameterDistribution::Prior(robot), settings, progress);
     const int updates = options_.quick ? 1 : kIterations * robot.training.updates_again;

@@ -59,7 +59,8 @@ TrainingSession::TrainingSession(const RobotDescription& description, const Simu
 }
 
 int TrainingSession::updates() const {
-  return iteration_ == 0 ? description_.training.updates : description_.training.updates_again;
+  return iteration_ == 0 ? description_.training.first_updates()
+                         : description_.training.updates_again;
 }
 
 int TrainingSession::awaited() const {

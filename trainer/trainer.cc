@@ -19,15 +19,18 @@ namespace {
 constexpr int kJudgements = 16, kJudgementEpisodes = 30, kScatterEpisodes = 40;
 constexpr double kOutputGain = 0.01;  // of a fresh policy: every mean action is near 0
 
-GaussianPolicy FreshPolicy(const TrainingSettings& settings, const SimulationFactory& make,
-                           const Eigen::VectorXd& action_scale, uint64_t seed) {
+PolicyShape ShapeFor(const TrainingSettings& settings, const SimulationFactory& make,
+                     const Eigen::VectorXd& action_scale) {
   const std::unique_ptr<Simulation> simulation = make();
-  GaussianPolicy policy(
-      {simulation->observation_size(), settings.hidden, simulation->action_size()});
   if (action_scale.size() != simulation->action_size())
     throw std::invalid_argument("trainer: size of action scale");
-  policy.action_scale = action_scale.cast<float>();
-  Random random(seed, {kPolicyStream});
+  return {simulation->observation_size(), settings.hidden, simulation->action_size()};
+}
+
+GaussianPolicy FreshPolicy(const TrainingSettings& settings, const PolicyShape& shape,
+                           const Eigen::VectorXf& action_scale, Random random) {
+  GaussianPolicy policy(shape);
+  policy.action_scale = action_scale;
   const Eigen::VectorXf weights = OrthogonalParameters(policy.shape().sizes(), kOutputGain, random);
   policy.parameters.head(weights.size()) = weights;
   policy.parameters.tail(policy.shape().actions)
@@ -55,7 +58,8 @@ Trainer::Trainer(const TrainingSettings& settings, const SimulationFactory& make
       seed_(seed),
       ranks_(&ranks),
       workers_(threads),
-      policy_(FreshPolicy(settings, make, action_scale, seed)),
+      policy_(FreshPolicy(settings, ShapeFor(settings, make, action_scale),
+                          action_scale.cast<float>(), Random(seed, {kPolicyStream}))),
       rollout_(make, policy_.shape(), workers_, ranks),
       trpo_(settings, policy_.shape(), workers_, ranks),
       critic_(settings, policy_.shape().observations, Random(seed, {kCriticStream}), workers_,
@@ -88,16 +92,34 @@ void Trainer::Start(const GaussianPolicy& policy) {
   if (policy.shape() != policy_.shape())
     throw std::invalid_argument("trainer: the policy to begin with is another network");
   policy_ = policy;
+  settings_.starts = 1;
   if (!settings_.normalise_observations) return;
   observations_.count = static_cast<double>(settings_.updates) * settings_.batch;
   observations_.mean = policy.observation_mean.cast<double>();
   observations_.squares = observations_.count * policy.observation_scale.cast<double>().cwiseAbs2();
 }
 
+bool Trainer::starts_anew() const {
+  return updates_ > 0 && updates_ < settings_.first_updates() && updates_ % settings_.updates == 0;
+}
+
+void Trainer::StartAnew() {
+  const auto update = static_cast<uint32_t>(updates_);
+  policy_ = FreshPolicy(settings_, policy_.shape(), policy_.action_scale,
+                        Random(seed_, {kPolicyStream, update}));
+  critic_.Restore(Critic(settings_, policy_.shape().observations,
+                         Random(seed_, {kCriticStream, update}), workers_, *ranks_)
+                      .state());
+  observations_ = {};
+}
+
 UpdateReport Trainer::Update(const ParameterSampler& sample) {
+  if (starts_anew()) StartAnew();
   const auto update = static_cast<uint32_t>(updates_);
   // Who cannot yet do it at all learns nothing from the worst of its failures.
-  const double share = updates_ < settings_.worst_after ? 1 : settings_.worst_share;
+  const int64_t of_start =
+      updates_ < settings_.first_updates() ? updates_ % settings_.updates : updates_;
+  const double share = of_start < settings_.worst_after ? 1 : settings_.worst_share;
   const Batch batch =
       rollout_.Collect(policy_, sample, settings_.batch, share, seed_, kRolloutStream, update);
   const std::vector<double> values = critic_.Values(batch.observations);
@@ -153,7 +175,7 @@ void Trainer::CompareRanks() const {
 }
 
 bool Trainer::JudgementDue() const {
-  return !best_ || updates_ % std::max(1, settings_.updates / kJudgements) == 0;
+  return !best_ || starts_anew() || updates_ % std::max(1, settings_.updates / kJudgements) == 0;
 }
 
 void Trainer::Judge(const ParameterSampler& sample) {

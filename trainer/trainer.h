@@ -68,22 +68,23 @@ class Trainer {
   TrainerState state() const;
   /// @throws std::invalid_argument if it is another network's.
   void Restore(TrainerState state);
-  /// Begins with another policy, before the first update; its normaliser counts as much as all
-  /// batches of the settings. (As ten batches, what is seen moves it, and with it the policy, by
-  /// more than any step's KL bound: returns fell by half.) @throws std::invalid_argument if its
-  /// network is another's.
+  /// Begins with another policy, before the first update, the only start; its normaliser counts as
+  /// much as all batches of the settings. (As ten batches, what is seen moves it, and with it the
+  /// policy, by more than any step's KL bound: returns fell by half.) @throws std::invalid_argument
+  /// if its network is another's.
   void Start(const GaussianPolicy& policy);
   const GaussianPolicy& policy() const { return policy_; }
   int64_t updates() const { return updates_; }
   int64_t steps() const { return steps_; }
   int64_t dropped_episodes() const { return dropped_episodes_; }
 
-  /// One update of policy and critic. @throws std::runtime_error if the simulations cannot be used,
-  /// or if ranks have come to different results.
+  /// One update of policy and critic. Until the settings' `starts` are made, both are new after
+  /// each `updates` of them: no start learns from another. @throws std::runtime_error if the
+  /// simulations cannot be used, or if ranks have come to different results.
   UpdateReport Update(const ParameterSampler& sample);
 
   /// Whether the policy should be judged before the next update: at first, then 16 times in the
-  /// `updates` of the settings.
+  /// `updates` of the settings, and where the next update is of another start.
   bool JudgementDue() const;
   /// Plays the policy without exploration in 30 simulators, always the same and not those held out,
   /// and remembers it if it is the best so far: by the mean of all returns, or of the worst_share
@@ -110,6 +111,8 @@ class Trainer {
   double ScatterOfStarts(const SimulatorDraw& simulator);
 
  private:
+  bool starts_anew() const;
+  void StartAnew();
   void CompareRanks() const;
 
   TrainingSettings settings_;

@@ -5,15 +5,16 @@
 namespace plumb {
 namespace {
 
-constexpr Range kAtLeastOne{1, 1e9};
+constexpr Range kUpdates{1, 1e7};  // of each of up to 100 starts
 
 }  // namespace
 
 TrainingSettings ReadTraining(Config config) {
   TrainingSettings s;
   s.batch = config.Integer("batch", {10, 1e7});
-  s.updates = config.Integer("updates", kAtLeastOne);
+  s.updates = config.Integer("updates", kUpdates);
   s.updates_again = config.Integer("updates_again", {0, 1e9});
+  s.starts = config.Integer("starts", {1, 100}, 1);
   s.trial = config.Number("trial", {0, 0.9}, 0.5);
   s.hidden = config.Integers("hidden", {1, 4096});
   s.initial_sd = config.Number("initial_sd", {1e-3, 10}, 1);

@@ -9,6 +9,8 @@ namespace plumb {
 /// [training]: of the trainer, see docs/training.md.
 struct TrainingSettings {
   int batch, updates, updates_again;
+  /// trainings from nothing in the first iteration, of `updates` each; the best policy goes on
+  int starts = 1;
   /// of a roll-out's steps, the first so many try the policy, without exploration: what does worse
   /// on the robot is not deployed there. 0 = no trials, the newest policy is deployed
   double trial = 0.5;
@@ -28,6 +30,9 @@ struct TrainingSettings {
   double duration = 0;
   /// sd of what the policy is told [rad or m], [rad/s or m/s]
   double position_noise = 0, velocity_noise = 0;
+
+  /// Of all starts.
+  int first_updates() const { return starts * updates; }
 };
 
 /// Thread-safe. @throws ConfigError

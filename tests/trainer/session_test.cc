@@ -9,6 +9,19 @@
 namespace plumb {
 namespace {
 
+TEST_CASE("several starts are of the first iteration") {
+  RobotDescription robot = PendulumRobot();
+  robot.training.starts = 3;
+  TrainingSession session(robot, MakeGymPendulum, 1, 4, 1);
+  REQUIRE(session.Begin(Distribution(0)));
+  CHECK(session.updates() == 18);
+  TrainToTheEnd(session);
+  CHECK(session.Status().update == 18);
+  REQUIRE(session.AddTrial(Tried(0, -1)));
+  REQUIRE(session.Begin(Distribution(1)));
+  CHECK(session.updates() == 2);
+}
+
 TEST_CASE("Iterations follow one another, each for its own distribution") {
   TrainingSession session = NewSession();
   CHECK(session.awaited() == 0);

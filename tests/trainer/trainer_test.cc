@@ -41,6 +41,52 @@ TEST_CASE("Another seed is another run") {
   CHECK(a.policy().parameters != b.policy().parameters);
 }
 
+TEST_CASE("Of several starts none learns from another, and the best policy goes on") {
+  TrainingSettings settings = SmallSettings();
+  settings.updates = 3, settings.starts = 2;
+  settings.normalise_observations = true;
+  const auto make = [](const TrainingSettings& of) {
+    return Trainer(of, MakeGymPendulum, PendulumScale(), 5, 1);
+  };
+  Trainer trainer = make(settings), resumed = make(settings);
+  settings.starts = 1;
+  Trainer single = make(settings);
+  const auto update = [](Trainer& t) {
+    if (t.JudgementDue()) t.Judge(GymParameters);
+    t.Update(GymParameters);
+  };
+  for (int i = 0; i < 3; ++i) update(trainer), update(single);
+  CHECK(trainer.policy().parameters == single.policy().parameters);
+  CHECK(trainer.state().critic.parameters == single.state().critic.parameters);
+
+  resumed.Restore(trainer.state());
+  for (int i = 0; i < 3; ++i) {
+    update(trainer), update(resumed);
+    CHECK(trainer.state().observations.count == (i + 1) * settings.batch);
+  }
+  CHECK(resumed.policy().parameters == trainer.policy().parameters);
+  // As far from where both begin as three steps lead, and not as six do.
+  CHECK(trainer.state().critic.adam_steps == single.state().critic.adam_steps);
+
+  // The first start's policies count, too.
+  TrainerState worse = trainer.state();
+  worse.best->mean_return = 0, worse.best->updates = 3, worse.best->policy = single.policy();
+  resumed.Restore(worse);
+  CHECK(resumed.ReturnToBest(GymParameters) == 3);
+  CHECK(resumed.policy().parameters == single.policy().parameters);
+
+  // After them it goes on.
+  update(trainer);
+  CHECK(trainer.state().observations.count == 4 * settings.batch);
+  // A policy that it is given is its only start.
+  settings.starts = 2;
+  Trainer given = make(settings);
+  given.Start(single.policy());
+  for (int i = 0; i < 4; ++i) update(given);
+  CHECK((given.policy().parameters - single.policy().parameters).norm() <
+        (given.policy().parameters - make(settings).policy().parameters).norm());
+}
+
 TEST_CASE("The pendulum is learnt") {
   TrainingSettings settings = PendulumSettings();
   settings.hidden = {64, 64};
