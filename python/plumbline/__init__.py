@@ -14,8 +14,14 @@ names it; what is wrong with a file, a RuntimeError with the message that the co
 """
 from plumb_log import read_log
 
-from ._native import (Calibration, Distribution, Motion, Parameter, Policy, Robot, Simulation, __version__, calibrate, load_policy,
-                      load_posterior, load_robot, motion, play, prior, read_csv, read_lcm)
+try:
+    from ._native import (Calibration, Distribution, Motion, Parameter, Policy, Robot, Simulation, __version__, calibrate, load_policy,
+                          load_posterior, load_robot, motion, play, prior, read_csv, read_lcm)
+except ModuleNotFoundError as error:
+    if error.name != "plumbline._native":
+        raise
+    raise ImportError("plumbline._native is not built, or for another Python: scripts/setup && scripts/build plumbline_native, then "
+                      "PYTHONPATH=build/python /usr/bin/python3") from None
 from .vector_env import Box, VectorEnv
 
 __all__ = ["Box", "Calibration", "Distribution", "Motion", "Parameter", "Policy", "Robot", "Simulation", "VectorEnv", "calibrate",
