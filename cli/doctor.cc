@@ -146,7 +146,9 @@ std::vector<Finding> RealTime() {
   else
     findings.push_back({Level::kAdvice,
                         "real-time priorities are not allowed: --realtime-priority will be refused",
-                        "echo '@realtime - rtprio 90' >> /etc/security/limits.d/plumbline.conf"});
+                        "sudo groupadd -f realtime && sudo usermod -aG realtime $USER && echo "
+                        "'@realtime - rtprio 90' | sudo tee -a "
+                        "/etc/security/limits.d/plumbline.conf, and log in anew"});
   getrlimit(RLIMIT_MEMLOCK, &limit);
   if (geteuid() == 0 || limit.rlim_cur >= (64u << 20))
     findings.push_back({Level::kGood, "memory may be locked", ""});

@@ -4,42 +4,19 @@
 
 #include <filesystem>
 #include <iostream>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <system_error>
 
 #include "cli/outputs.h"
-#include "common/config.h"
 #include "records/log_export.h"
 #include "records/record_folder.h"
 #include "robot/description.h"
-#include "robot/json_text.h"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Of the folder beside the log: its record, as far as it can be read.
-std::map<std::string, std::string> NotesOf(const std::string& log) {
-  std::map<std::string, std::string> notes{{"log", fs::path(log).filename().string()}};
-  const fs::path file = RecordFolder::Of(log) / "record.json";
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) return notes;
-  nlohmann::json record;
-  try {
-    record = ParseJson(ReadFile(file.string()));
-  } catch (const std::exception&) {
-    return notes;
-  }
-  if (!record.is_object()) return notes;
-  for (const auto& [key, value] : record.items()) {
-    if (value.is_string()) notes[key] = value.get<std::string>();
-  }
-  return notes;
-}
 
 std::optional<RobotDescription> RobotOf(const ExportFlags& flags) {
   if (!flags.robot.empty()) return LoadRobot(flags.robot);
@@ -67,8 +44,8 @@ int Export(const ExportFlags& flags) {
     RequireOutputs({flags.mcap}, {flags.log});
     RequireSameKind(flags.mcap, "\x89MCAP", "an MCAP file");
     const std::optional<RobotDescription> robot = RobotOf(flags);
-    const ExportCounts counts =
-        ExportMcap(flags.log, flags.mcap, robot ? &*robot : nullptr, NotesOf(flags.log));
+    const ExportCounts counts = ExportMcap(flags.log, flags.mcap, robot ? &*robot : nullptr,
+                                           RecordFolder::Notes(flags.log));
     if (!robot)
       std::cout << "no robot.toml beside the log, and no --robot: the robot is not drawn\n";
     Report(counts, flags.log,

@@ -90,7 +90,9 @@ class ClosedLoop {
       if (!process_.Wait(kPoll)) {
         line_.Clear();
         processes_.Hurry();
-        std::cout << "interrupted" << std::endl;
+        std::cout << "interrupted; what was learnt is in " << setting_.output.string()
+                  << ": the same command goes on from there with --output "
+                  << setting_.output.string() << std::endl;
         return 130;
       }
       if (setting_.virtual_run) setting_.virtual_run->Rethrow();

@@ -24,10 +24,11 @@ struct LaunchFlags {
   bool allow_unsigned = false;  ///< although LCM leaves this machine
   /// SCHED_FIFO of the driver; robot, estimator and controller come right behind it. 0 = off
   int priority = 0;
-  std::string log;      ///< record all messages here; empty = do not
-  std::string can_log;  ///< record all frames here, in virtual time; empty = do not
-  std::string summary;  ///< JSON of the outcome; empty = do not
-  std::string report;   ///< the same as an HTML page; empty = do not
+  std::string log;         ///< record all messages here; empty = do not
+  bool overwrite = false;  ///< what the log holds that cannot be made again
+  std::string can_log;     ///< record all frames here, in virtual time; empty = do not
+  std::string summary;     ///< JSON of the outcome; empty = do not
+  std::string report;      ///< the same as an HTML page; empty = do not
   /// where a page shows the run, ADDRESS:PORT; empty: nowhere
   std::string dashboard;
   std::string command;  ///< that was given

@@ -1,7 +1,9 @@
 #include "cli/outputs.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <set>
 #include <stdexcept>
 #include <system_error>
@@ -9,6 +11,7 @@
 #include "common/atomic_file.h"
 #include "common/config.h"
 #include "common/name_lock.h"
+#include "records/record_folder.h"
 
 namespace plumb {
 
@@ -63,6 +66,19 @@ void RequireSameKind(const std::string& file, const std::string& begins, const s
 
 void RequireLcmLog(const std::string& file) {
   RequireSameKind(file, "\xed\xa1\xda\x01", "an LCM log");
+}
+
+void RequireOverwritable(const std::string& log, const std::string& robot) {
+  std::error_code not_there;
+  if (log.empty() || !std::filesystem::is_regular_file(log, not_there) ||
+      std::filesystem::file_size(log, not_there) == 0)
+    return;
+  const std::map<std::string, std::string> wanted{{"clock", "virtual"}, {"robot", robot}};
+  const std::map<std::string, std::string> notes = RecordFolder::Notes(log);
+  const bool again = !robot.empty() && std::ranges::includes(notes, wanted);
+  if (!again)
+    throw std::invalid_argument(
+        log + ": holds a recording that cannot be made again: give another name, or --overwrite");
 }
 
 }  // namespace plumb

@@ -27,10 +27,15 @@ void RequireOutputs(const std::vector<std::string>& outputs,
 std::vector<std::string> FilesOf(const RobotDescription& robot);
 
 /// A file that would be written over is of the kind that is going to be written, or empty.
-/// @param begins what files of that kind begin with. @param kind "an LCM log"
+/// @param begins what files of that kind begin with. @param kind "a report of ours"
 /// @throws std::invalid_argument naming the file.
 void RequireSameKind(const std::string& file, const std::string& begins, const std::string& kind);
 /// The same of LCM's logs, which begin with the sync word of their first event.
 void RequireLcmLog(const std::string& file);
+/// A log that would be written over is empty, or LOG.d beside it says that it is of a run in
+/// virtual time of this robot, which its command would make again.
+/// @param robot its name, if what writes is such a run; else empty
+/// @throws std::invalid_argument naming the file.
+void RequireOverwritable(const std::string& log, const std::string& robot);
 
 }  // namespace plumb

@@ -25,6 +25,7 @@ int Record(Process& process, const RecordFlags& flags) {
   }
   RequireNotRead({flags.log}, inputs);
   RequireLcmLog(flags.log);
+  if (!flags.overwrite) RequireOverwritable(flags.log, "");
   Messenger& messenger = process.messenger();
   // First, for what is refused: what an earlier log has is not lost for it.
   RecordFolder folder(flags.log,

@@ -9,9 +9,10 @@ namespace plumb {
 /// The flags of `plumb record`.
 struct RecordFlags {
   std::string log;
-  std::string robot;    ///< folder or TOML file, to be kept beside it; empty = not known
-  std::string note;     ///< what is recorded, for people
-  std::string command;  ///< that was given
+  bool overwrite = false;  ///< what the log holds, if it is an LCM log
+  std::string robot;       ///< folder or TOML file, to be kept beside it; empty = not known
+  std::string note;        ///< what is recorded, for people
+  std::string command;     ///< that was given
 };
 
 /// `plumb record`: writes every message on LCM, whatever its channel, to a log in lcm-logger's

@@ -81,6 +81,7 @@ void AddRecord(CLI::App& app, const std::string& line, Action& action) {
   flags->command = line;
   CLI::App* record = AddCommand(app, "record", "record all messages to an LCM log, until Ctrl-C");
   record->add_option("file", flags->log, "the log; lcm-logplayer and --log read it")->required();
+  record->add_flag("--overwrite", flags->overwrite, "what the log holds");
   record->add_option("--robot", flags->robot,
                      "robot folder or TOML file, of which a copy is kept beside the log");
   record->add_option("--note", flags->note, "what this is, kept beside the log");
@@ -185,6 +186,8 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
                  "let the driver obey anybody, although LCM leaves this machine")
       ->excludes(app.get_option("--key"));
   launch->add_option("--log", flags->log, "record all messages to this LCM log");
+  launch->add_flag("--overwrite", flags->overwrite,
+                   "write over a log that no run in virtual time of this robot would make again");
   launch->add_option("--can-log", flags->can_log,
                      "in virtual time: record all frames to this file, as candump -l does");
   launch

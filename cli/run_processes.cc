@@ -66,7 +66,8 @@ void RunProcesses::Start() {
     return arguments;
   };
   if (!flags_.log.empty() && !coordinator_) {
-    Start(kRecorder, {"record", flags_.log, "--robot", flags_.robot, "--note", flags_.command});
+    Start(kRecorder,
+          {"record", flags_.log, "--overwrite", "--robot", flags_.robot, "--note", flags_.command});
   }
   std::vector<std::string> virtual_robot{flags_.robot, "--seed", seed};
   std::vector<std::string> driver{flags_.robot, "--flight-recorder",

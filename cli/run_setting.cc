@@ -65,6 +65,8 @@ void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
   RequireNotRead(outputs, inputs);
   RequireApart(outputs);
   RequireLcmLog(flags.log);
+  if (!flags.overwrite)
+    RequireOverwritable(flags.log, flags.real || flags.real_time ? "" : robot.name);
   RequireSameKind(flags.can_log, "(", "a log of candump's");
   RequireSameKind(flags.summary, "{\n \"bus\": ", "a run's summary");
   RequireSameKind(flags.report, LaunchReportBegins(), "a report of ours");

@@ -50,7 +50,7 @@ std::optional<DriverWish::Answer> DriverWish::FindAnswer(int64_t now, bool unbel
     if (status_.state == driver_status_t::ARMED) return Answer{true, "armed"};
     if (!Moves(status_)) return Answer{false, "not armed: " + status_.reason};
   } else if (answered && !Moves(status_)) {
-    return Answer{true, "not armed: " + status_.reason};
+    return Answer{true, "stopped; not armed: " + status_.reason};
   }
   if (now < deadline_) return std::nullopt;
   if (!heard_) {

@@ -23,6 +23,7 @@
 
 #include "common/lcm_url.h"
 #include "common/log_limit.h"
+#include "common/nearest_name.h"
 #include "common/outside_text.h"
 #include "common/program_version.h"
 #include "common/realtime.h"
@@ -211,6 +212,21 @@ void Process::TakeVirtualTime(double seconds) {
 
 std::string VersionLine(const std::string& name) { return name + " " + ProgramVersion(); }
 
+namespace {
+
+// CLI11 says no more than that there must be one.
+void SuggestCommand(const CLI::App& app) {
+  const std::vector<std::string> unknown = app.remaining();
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  if (names.empty() || unknown.empty() || !app.get_subcommands().empty()) return;
+  std::cerr << fmt::format("{} has no command '{}'; the nearest is '{}'\n", app.get_name(),
+                           unknown.front(), NearestName(unknown.front(), names));
+}
+
+}  // namespace
+
 int Run(const std::string& name, const std::string& description, int argc, char** argv,
         const std::function<void(CLI::App&)>& add_flags, const std::function<int(Process&)>& body) {
   const PrintableStream out(std::cout), err(std::cerr);
@@ -241,6 +257,7 @@ int Run(const std::string& name, const std::string& description, int argc, char*
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const int status = app.exit(error);
+    if (status != 0) SuggestCommand(app);
     return status == 0 ? 0 : 2;
   }
   spdlog::set_default_logger(

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <system_error>
@@ -16,6 +17,7 @@
 #include "common/seal.h"
 #include "records/message_definitions.h"
 #include "robot/description.h"
+#include "robot/json_text.h"
 
 namespace plumb {
 namespace {
@@ -58,6 +60,24 @@ Robot ReadRobot(const std::string& folder_or_file) {
 
 }  // namespace
 
+std::map<std::string, std::string> RecordFolder::Notes(const std::string& log) {
+  std::map<std::string, std::string> notes{{"log", fs::path(log).filename().string()}};
+  const fs::path file = Of(log) / kRecord;
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return notes;
+  nlohmann::json record;
+  try {
+    record = ParseJson(ReadFile(file.string()));
+  } catch (const std::exception&) {
+    return notes;
+  }
+  if (!record.is_object()) return notes;
+  for (const auto& [key, value] : record.items()) {
+    if (value.is_string()) notes[key] = value.get<std::string>();
+  }
+  return notes;
+}
+
 std::vector<std::string> RecordFolder::Files(const std::string& log) {
   std::vector<std::string> files;
   for (const char* name : {kRecord, kToml, kUrdf, kDistribution})
@@ -76,14 +96,19 @@ RecordFolder::RecordFolder(const std::string& log, const About& about)
     throw std::runtime_error(
         fmt::format("{}: is there and no log's: its files are not written over", folder_.string()));
   }
-  fs::create_directories(folder_ / kTypes, error);
-  if (error)
-    throw std::runtime_error(
-        fmt::format("{}: cannot be made: {}", (folder_ / kTypes).string(), error.message()));
-  for (const std::string& file : Files(log)) fs::remove(file, error);
+  const auto make = [&](const fs::path& wanted) {
+    fs::create_directories(wanted, error);
+    if (error)
+      throw std::runtime_error(
+          fmt::format("{}: cannot be made: {}", wanted.string(), error.message()));
+  };
+  make(folder_);
+  // First, and never missing: it says whose folder this is, to whoever comes after a kill.
+  WriteAtomically(folder_ / kRecord, RecordJson(log, about, robot ? robot->name : ""));
+  for (const char* earlier : {kToml, kUrdf, kDistribution}) fs::remove(folder_ / earlier, error);
+  make(folder_ / kTypes);
   for (const MessageDefinition& definition : MessageDefinitions())
     WriteAtomically(folder_ / kTypes / definition.file, definition.text);
-  WriteAtomically(folder_ / kRecord, RecordJson(log, about, robot ? robot->name : ""));
   if (!robot) return;
   WriteAtomically(folder_ / kUrdf, robot->urdf);
   WriteAtomically(folder_ / kToml, robot->toml);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,6 +31,9 @@ class RecordFolder {
 
   /// The folder of a log.
   static std::filesystem::path Of(const std::string& log) { return log + ".d"; }
+  /// What record.json beside a log says, and the log's name ("log"); of what it does not say, or
+  /// cannot be read, nothing.
+  static std::map<std::string, std::string> Notes(const std::string& log);
   /// The files that are written for a log, whatever there is to be said.
   static std::vector<std::string> Files(const std::string& log);
 

@@ -7,6 +7,7 @@
 
 #include "common/config.h"
 #include "common/hash.h"
+#include "common/nearest_name.h"
 #include "robot/urdf/urdf.h"
 
 namespace plumb {
@@ -93,6 +94,20 @@ void RequireUse(Config& root, const RobotDescription& robot) {
   }
 }
 
+// "; did you mean robots/pendulum?", or from where a relative path was looked for.
+std::string Neighbour(const fs::path& path) {
+  std::error_code error;
+  const fs::path name = path.has_filename() ? path : path.parent_path();
+  std::vector<std::string> there;
+  for (const fs::directory_entry& entry : fs::directory_iterator(name.parent_path(), error)) {
+    const fs::path file = FileOf(entry.path());
+    if (file.extension() == ".toml" && fs::exists(file, error))
+      there.push_back(entry.path().string());
+  }
+  if (!there.empty()) return fmt::format("; did you mean {}?", NearestName(name.string(), there));
+  return path.is_relative() ? ", seen from " + fs::current_path(error).string() : "";
+}
+
 }  // namespace
 
 RobotDescription LoadRobot(const std::string& folder_or_file) {
@@ -102,9 +117,11 @@ RobotDescription LoadRobot(const std::string& folder_or_file) {
   if (!here) {
     const fs::path installed = Installed(folder_or_file);
     if (!fs::exists(installed, error))
-      throw ConfigError(file.string() + ": there is no such robot");
+      throw ConfigError(file.string() + ": there is no such robot" + Neighbour(folder_or_file));
     file = installed;
   }
+  if (file.extension() == ".urdf")
+    throw ConfigError(file.string() + ": is a URDF: give the folder or the TOML file of its robot");
   std::vector<std::string> files;
   Config root = Config::Load(file.string(), &files);
 

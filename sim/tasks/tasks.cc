@@ -36,7 +36,8 @@ std::unique_ptr<Task> MakeTask(const RobotDescription& description) {
   for (const auto& task : kTasks) {
     if (task.name == name) return task.make(description);
   }
-  throw std::invalid_argument("no task is named '" + name + "'; the nearest is '" +
+  const std::string where = description.file.empty() ? "" : description.file + ": [task] ";
+  throw std::invalid_argument(where + "no task is named '" + name + "'; the nearest is '" +
                               NearestName(name, TaskNames()) + "'");
 }
 

@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "common/config.h"
 #include "tests/cli/shell.h"
 #include "tests/temporary_folder.h"
 
@@ -63,6 +64,43 @@ TEST_CASE("only what is of the kind that is to be written is written over") {
     CHECK(outcome.status == 1);
     CHECK_THAT(outcome.text, Catch::Contains(words));
   }
+}
+
+TEST_CASE("a recording that cannot be made again is not written over unasked") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "run.lcmlog", recorded = "\xed\xa1\xda\x01 and so on";
+  const auto beside = [&](const std::string& json) {
+    fs::create_directories(log + ".d");
+    std::ofstream(log + ".d/record.json") << json;
+  };
+  CHECK_NOTHROW(RequireOverwritable("", "arm"));
+  CHECK_NOTHROW(RequireOverwritable(log, ""));  // there is none
+  std::ofstream{log};
+  CHECK_NOTHROW(RequireOverwritable(log, ""));
+  std::ofstream(log) << recorded;
+  const auto refused = [&](const std::string& robot) {
+    CHECK_THROWS_WITH(
+        RequireOverwritable(log, robot),
+        Catch::StartsWith(log + ": holds a recording") && Catch::Contains("--overwrite"));
+  };
+  refused(""), refused("arm");  // nobody knows what it is
+  beside(R"({"robot": "arm", "clock": "real"})");
+  refused(""), refused("arm");
+  beside(R"({"robot": "arm", "clock": "virtual"})");
+  refused(""), refused("hopper");
+  CHECK_NOTHROW(RequireOverwritable(log, "arm"));
+  beside("no JSON");
+  refused("arm");
+
+  const std::string command =
+      "launch " + Robot("pendulum") + " --bus loop: --output " + (folder / "run") + " --log " + log;
+  const Outcome outcome = Shell(Plumb() + command);
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.text, Catch::Contains("holds a recording"));
+  const Outcome recorder = Shell(Plumb() + "--lcm-url memq:// record " + log);
+  CHECK(recorder.status == 1);
+  CHECK_THAT(recorder.text, Catch::Contains("holds a recording"));
+  CHECK(ReadFile(log) == recorded);
 }
 
 TEST_CASE("commands refuse to write two outputs into one file, before anything is computed") {

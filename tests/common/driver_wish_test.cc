@@ -39,7 +39,7 @@ TEST_CASE("a wish to stop goes out at once, and again until the driver has answe
   wish.OnStatus(Status(driver_status_t::IDLE, kIdentity + 1, "stopped by another"));
   CHECK(WishText(wish) == "none yet");
   wish.OnStatus(Status(driver_status_t::FAULT, kIdentity, "emergency stop"));
-  CHECK(WishText(wish) == "yes: not armed: emergency stop");
+  CHECK(WishText(wish) == "yes: stopped; not armed: emergency stop");
 }
 
 TEST_CASE("a wish to arm goes out once, when the driver has been heard") {

@@ -22,7 +22,7 @@ TEST_CASE("an emergency stop goes to the driver at once, and is done when the dr
   CHECK(stand.Answer() == "none yet");
   stand.Hear("DRIVER_STATUS",
              Driver(driver_status_t::FAULT, stand.requests[0].identity, "emergency stop"));
-  CHECK(stand.Answer() == "yes: not armed: emergency stop");
+  CHECK(stand.Answer() == "yes: stopped; not armed: emergency stop");
   stand.Pass(100'000);
   CHECK(stand.requests.size() == 2);
 }

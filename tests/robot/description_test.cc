@@ -17,8 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using Catch::Contains;
+using Catch::EndsWith;
 
-const std::string kPendulum = std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum";
+const std::string kRobots = std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots",
+                  kPendulum = kRobots + "/pendulum";
 
 std::string Text(const std::string& file) {
   std::ifstream stream(file);
@@ -255,6 +257,12 @@ TEST_CASE("mistakes in robot.urdf name the file and the element") {
              Contains("joint pivot is not fixed"));
   CHECK_THAT(message("</robot>", ""), Contains("robot.urdf"));
   CHECK_THROWS_WITH(LoadRobot("/nowhere"), Contains("there is no such robot"));
+  CHECK_THROWS_WITH(LoadRobot(kRobots + "/pendulm"),
+                    EndsWith("; did you mean " + kRobots + "/pendulum?"));
+  CHECK_THROWS_WITH(LoadRobot(kRobots + "/hopper/mujco.toml"), EndsWith("/hopper/mujoco.toml?"));
+  CHECK_THROWS_WITH(LoadRobot("none/arm"),
+                    EndsWith("seen from " + std::filesystem::current_path().string()));
+  CHECK_THROWS_WITH(LoadRobot(kRobots + "/pendulum/robot.urdf"), Contains("is a URDF"));
 }
 
 // Two 1 kg points 2 m apart, the second behind a fixed joint turned by 90 degrees: their common
