@@ -111,7 +111,7 @@ TEST_CASE("a folder that cannot be made, and a robot that cannot be read, are na
                     folder / "none" + ": there is no such robot");
   std::ofstream(folder / "file") << "a file";
   CHECK_THROWS_WITH(RecordFolder(folder / "file/run", {}),
-                    Catch::StartsWith(folder / "file/run.d/lcmtypes: cannot be made: "));
+                    Catch::StartsWith(folder / "file/run.d: cannot be made: "));
 }
 
 TEST_CASE("what somebody else has where a log's folder is to be stays as it is") {
