@@ -137,6 +137,13 @@ std::vector<Finding> Bus(const std::string& url) {
   }
 }
 
+std::string CureOfLimit(const std::string& limit) {
+  return fmt::format(
+      "sudo groupadd -f realtime && sudo usermod -aG realtime $USER && echo '@realtime - {}' | "
+      "sudo tee -a /etc/security/limits.d/plumbline.conf, and log in anew",
+      limit);
+}
+
 std::vector<Finding> RealTime() {
   std::vector<Finding> findings;
   rlimit limit{};
@@ -146,16 +153,13 @@ std::vector<Finding> RealTime() {
   else
     findings.push_back({Level::kAdvice,
                         "real-time priorities are not allowed: --realtime-priority will be refused",
-                        "sudo groupadd -f realtime && sudo usermod -aG realtime $USER && echo "
-                        "'@realtime - rtprio 90' | sudo tee -a "
-                        "/etc/security/limits.d/plumbline.conf, and log in anew"});
+                        CureOfLimit("rtprio 90")});
   getrlimit(RLIMIT_MEMLOCK, &limit);
   if (geteuid() == 0 || limit.rlim_cur >= (64u << 20))
     findings.push_back({Level::kGood, "memory may be locked", ""});
   else
     findings.push_back(
-        {Level::kAdvice, "memory may not be locked",
-         "echo '@realtime - memlock unlimited' >> /etc/security/limits.d/plumbline.conf"});
+        {Level::kAdvice, "memory may not be locked", CureOfLimit("memlock unlimited")});
   return findings;
 }
 

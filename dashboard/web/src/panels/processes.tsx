@@ -23,7 +23,7 @@ function lives(): Life[] {
     { name: "driver", channel: "DRIVER_STATUS", result: "JOINT_STATE", old: 0.5, says: d ? `${DRIVER_STATES[d.state] ?? d.state}${d.reason ? `: ${d.reason}` : ""}` : "", well: d && d.state !== driver_status_t.FAULT },
     { name: "estimator", channel: "ESTIMATOR_STATUS", result: "ROBOT_STATE", old: 0.5, says: e ? (e.valid ? "the state is valid" : e.reason || "the state is not valid") : "", well: e && e.valid },
     { name: "controller", channel: "CONTROLLER_STATUS", result: "JOINT_COMMAND", old: 0.5, says: c ? `${PHASES[c.phase] ?? c.phase}${c.reason ? `: ${c.reason}` : ""}` : "", well: c && c.phase !== 4 },
-    { name: "calibrator", channel: "CALIBRATION_STATUS", result: null, old: 5, says: calibration ? `iteration ${calibration.iteration}${calibration.streamed_transitions ? `, ${calibration.streamed_transitions} transitions heard of the next` : ""}` : "", well: calibration ? !calibration.alarm : null },
+    { name: "calibrator", channel: "CALIBRATION_STATUS", result: null, old: 5, says: calibration ? `iteration ${calibration.iteration}${calibration.alarm ? ", the model does not explain the robot" : ""}${calibration.streamed_transitions ? `, ${calibration.streamed_transitions} transitions heard of the next` : ""}` : "", well: calibration ? !calibration.alarm : null },
     // While it computes it says nothing between updates.
     { name: "trainer", channel: "TRAINING_STATUS", result: null, old: Infinity, says: training ? `policy ${training.iteration}, ${training.complete ? "complete" : `update ${training.update} of ${training.updates}`}` : "", well: training ? true : null },
   ];
