@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/nearest_name.h"
 #include "robot/description.h"
 
 namespace plumb {
@@ -85,6 +86,15 @@ SprungMass ReadSprungMass(Config& config, const RobotDescription& robot,
   return s;
 }
 
+// Which of the two is misspelt is for the reader to see.
+std::string NoParameter(const std::string& name, const RobotDescription& robot) {
+  std::vector<std::string> names;
+  for (const ParameterDescription& parameter : robot.parameters) names.push_back(parameter.name);
+  std::string text = "is not one of the parameters";
+  if (!names.empty()) text += "; the nearest is '" + NearestName(name, names) + "'";
+  return text;
+}
+
 }  // namespace
 
 Eigen::Vector3d UnmodelledGround::Down() const {
@@ -103,7 +113,7 @@ VirtualRobotSettings ReadVirtualRobot(Config config, const RobotDescription& rob
   for (const std::string& name : hidden.Keys()) {
     const std::vector<double> bounds = hidden.Numbers(name, 2, {-1e12, 1e12});
     if (!(bounds[0] <= bounds[1])) hidden.Fail(name, "must be [lower, upper]");
-    if (robot.FindParameter(name) < 0) hidden.Fail(name, "is not one of the parameters");
+    if (robot.FindParameter(name) < 0) hidden.Fail(name, NoParameter(name, robot));
     s.hidden.push_back({name, bounds[0], bounds[1]});
   }
   for (Config& joint : config.Tables("joint"))

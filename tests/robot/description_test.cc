@@ -228,7 +228,7 @@ TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
   CHECK_THAT(message("coordinate = \"log\"", "coordinate = \"logg\""),
              Contains("is not one of linear, log"));
   CHECK_THAT(message("gravity = [9.0, 11.0]", "gravty = [9.0, 11.0]"),
-             Contains("gravty is not one of the parameters"));
+             Contains("gravty is not one of the parameters; the nearest is 'gravity'"));
   CHECK_THAT(message("[task]", "[tsk]"), Contains("tsk is not a known key; did you mean task?"));
   CHECK_THAT(message("substep = 0.005", "substep = nan"), Contains("simulation.substep"));
   CHECK_THAT(message("steps = 200", "steps = 1e99"), Contains("task.steps"));
