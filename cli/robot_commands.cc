@@ -81,7 +81,7 @@ void AddRecord(CLI::App& app, const std::string& line, Action& action) {
   flags->command = line;
   CLI::App* record = AddCommand(app, "record", "record all messages to an LCM log, until Ctrl-C");
   record->add_option("file", flags->log, "the log; lcm-logplayer and --log read it")->required();
-  record->add_flag("--overwrite", flags->overwrite, "what the log holds");
+  record->add_flag("--overwrite", flags->overwrite, "write over what the log holds");
   record->add_option("--robot", flags->robot,
                      "robot folder or TOML file, of which a copy is kept beside the log");
   record->add_option("--note", flags->note, "what this is, kept beside the log");
