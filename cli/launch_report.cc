@@ -47,8 +47,12 @@ class LaunchPage {
   std::string Print() const {
     const std::string title = "Run of " + robot_.name;
     return Page(title, "<h1>" + Escape(title) + "</h1>\n<p class=\"sub\">" + Escape(Subtitle()) +
-                           "</p>\n" + Verdicts() + PolicySection() + ParameterSection() +
-                           PredictionSection() + IterationSection() + Reproduce());
+                           "</p>\n" + Verdicts() + Group("Policies", PolicyPanel()) +
+                           (iterations_.empty()
+                                ? ""
+                                : Group("Learning", ParameterPanel() + KnownPanel() +
+                                                        PredictionPanel() + IterationPanel())) +
+                           Group("How it was found", Reproduce()));
   }
 
  private:
@@ -114,15 +118,13 @@ class LaunchPage {
     return returns;
   }
 
-  std::string PolicySection() const {
-    const std::string drawing = ReturnsPlot(Returns());
-    std::string html = "<h2>Policies</h2>\n";
-    if (!drawing.empty()) {
-      html += Figure(drawing,
-                     "<span class=\"key robot\"></span>on the robot &#160; <span class=\"key "
-                     "simulation\"></span>in simulators that it was trained for &#160; <span "
-                     "class=\"key reference\"></span>the policy that the robot was run with. Small "
-                     "dots: roll-outs of the one that runs in the end.");
+  std::string PolicyPanel() const {
+    std::string html = ReturnsPlot(Returns());
+    if (!html.empty()) {
+      html = Key({{"robot", "on the robot"},
+                  {"simulation", "in simulators that it was trained for"},
+                  {"reference", "the policy that the robot was run with"}}) +
+             html;
     }
     Table table({"policy", "accepted", "better with", "return", "of the one before", ""});
     for (const json& decision : summary_.at("decisions")) {
@@ -135,13 +137,16 @@ class LaunchPage {
                  Return(Real(decision.at("return"))), Return(Real(decision.at("incumbent_return"))),
                  Escape(decision.at("summary").get<std::string>())});
     }
-    return html + table.Print();
+    return Panel(
+        Width::kFull, "Return: robot and simulation",
+        "What each policy earns in an episode; small dots: roll-outs of the one that runs in "
+        "the end. Below: which were accepted, and why.",
+        html + table.Print());
   }
 
-  std::string ParameterSection() const {
-    if (iterations_.empty()) return "";
+  std::string ParameterPanel() const {
     const std::vector<double> hidden = Reals(summary_.at("hidden"));
-    std::string html = "<h2>Parameters</h2>\n<div class=\"panels\">\n";
+    std::string drawings;
     Table table({"parameter", "unit", "prior", "learnt", "hidden", "error"});
     for (size_t i = 0; i < robot_.parameters.size(); ++i) {
       const ParameterDescription& p = robot_.parameters[i];
@@ -151,29 +156,34 @@ class LaunchPage {
         sd.push_back(Real(iteration.at("sd").at(i)));
       }
       const double truth = i < hidden.size() ? hidden[i] : NAN, error = mean.back() / truth - 1;
-      html += LearnedPlot(p, mean, sd, truth);
+      drawings += LearnedPlot(p, mean, sd, truth);
       table.Add({Escape(p.name), Escape(p.unit), PlusMinus(p.mean, std::sqrt(p.variance)),
                  PlusMinus(mean.back(), sd.back()), Number(truth, sd.back()),
                  std::isfinite(error) ? fmt::format("{:.2f} %", 100 * error) : Digits(error)});
     }
-    html +=
-        "</div>\n<figcaption>Mean and 95 % after each iteration; iteration 0 is the prior, "
-        "which goes out of the picture where it is much wider. Black: hidden truth, where "
-        "there is one.</figcaption>\n" +
-        table.Print();
+    return Panel(
+        Width::kFull, "Parameters",
+        "Mean and 95 % after each iteration; iteration 0 is the prior, which goes out of the "
+        "picture where it is much wider. Black: hidden truth, where there is one.",
+        Row(drawings) + table.Print());
+  }
+
+  std::string KnownPanel() const {
     const json& combinations = iterations_.back().at("combinations");
-    if (combinations.size() >= robot_.parameters.size()) return html;  // as the table has it
+    if (combinations.size() >= robot_.parameters.size())
+      return "";  // as the parameters' table has it
     Table known({"what the motion determines", "learnt", "hidden"});
     for (const json& c : combinations) {
       const double c_sd = Real(c.at("sd"));
       known.Add({Escape(c.at("name").get<std::string>()), PlusMinus(Real(c.at("mean")), c_sd),
                  Number(Real(c.at("hidden")), c_sd)});
     }
-    return html + known.Print();
+    return Panel(Width::kHalf, "What the motion determines",
+                 "Combinations of parameters that it tells apart, where it does not tell each.",
+                 known.Print());
   }
 
-  std::string PredictionSection() const {
-    if (iterations_.empty()) return "";
+  std::string PredictionPanel() const {
     const json& last = iterations_.back();
     const std::vector<double> before = Reals(last.at("error_prior")),
                               after = Reals(last.at("error_after"));
@@ -186,13 +196,12 @@ class LaunchPage {
     }
     const std::string drawing = ErrorPlot(errors);
     if (drawing.empty()) return "";
-    return "<h2>Prediction</h2>\n" +
-           Figure(drawing, std::string(kPriorPosteriorKey) +
-                               "Error of predicting the newest roll-out so many steps ahead.");
+    return Panel(Width::kHalf, "Error after n steps",
+                 "Of predicting the newest roll-out so many steps ahead.",
+                 PriorPosteriorKey() + drawing);
   }
 
-  std::string IterationSection() const {
-    if (iterations_.empty()) return "";
+  std::string IterationPanel() const {
     std::vector<std::string> header{"iteration", "transitions", "discrepancy"};
     for (const json& horizon : iterations_.back().at("horizons"))
       header.push_back(fmt::format("{}-step", horizon.get<int>()));
@@ -211,11 +220,11 @@ class LaunchPage {
       cells.push_back(Escape(iteration.at("gap").get<std::string>()));
       table.Add(cells);
     }
-    return "<h2>Iterations</h2>\n" + table.Print() +
-           Paragraph(
-               "Discrepancy: mean squared error of one step in units of its uncertainty. "
-               "Errors of several steps: of the newest roll-out, before it was learnt from, "
-               "in standard units.");
+    return Panel(
+        Width::kFull, "Iterations",
+        "Discrepancy: mean squared error of one step in units of its uncertainty. Errors of "
+        "several steps: of the newest roll-out, before it was learnt from, in standard units.",
+        table.Print());
   }
 
   std::string Reproduce() const {
@@ -231,7 +240,9 @@ class LaunchPage {
                     Real(seconds.at("training")), Real(seconds.at("other"))));
     add("robot's files", fmt::format("{}, fingerprint {:#018x}", robot_.file, robot_.fingerprint));
     add("version", Text("version"));
-    return "<h2>How to do it again</h2>\n<pre>" + Escape(command_) + "</pre>\n" + table.Print();
+    return Panel(Width::kFull, "How to do it again",
+                 "The same files and the same seed give the same bits, in virtual time.",
+                 "<pre>" + Escape(command_) + "</pre>\n" + table.Print());
   }
 
   const RobotDescription& robot_;

@@ -82,31 +82,35 @@ std::string Verdicts(const TrainingOutcome& outcome, const std::vector<TrainingR
 
 std::string Curves(const RobotDescription& robot, const std::vector<TrainingRow>& rows) {
   if (rows.empty()) {
-    return "<h2>Updates</h2>\n" +
-           Paragraph(
-               "There are no curves: the table of the updates was not kept while they were made. "
-               "--report or --csv, given from the beginning, keeps it.");
+    return Panel(
+        Width::kFull, "Curves", "What each update has done.",
+        Paragraph("There are no curves: the table of the updates was not kept while they were "
+                  "made. --report or --csv, given from the beginning, keeps it."));
   }
   struct {
-    std::string drawing, caption;
-  } const figures[] = {
-      {Plot("return", rows, &TrainingRow::mean_return, NAN, &TrainingRow::evaluation_return),
-       "Mean return of each batch's episodes, with exploration. Dots: without (--evaluate-every)."},
-      {Plot("KL [nat]", rows, &TrainingRow::kl, robot.training.kl),
-       "Of the policy before to the one after an update; dotted: the bound, kl of [training]."},
-      {Plot("gain", rows, &TrainingRow::surrogate_gain),
-       "What the update is expected to gain, in standard deviations of the advantage."},
-      {Plot("explained", rows, &TrainingRow::explained_variance, 1),
-       "Share of the returns' variance that the critic explains, before it has seen them. Dotted: "
-       "all of it."},
-      {Plot("entropy [nat]", rows, &TrainingRow::entropy),
-       "Of the policy: how much it still tries."},
+    std::string title, what, drawing;
+  } const curves[] = {
+      {"Return",
+       "Mean return of each batch's episodes, with exploration. Dots: without (--evaluate-every).",
+       Plot("return", rows, &TrainingRow::mean_return, NAN, &TrainingRow::evaluation_return)},
+      {"Step",
+       "Divergence of the policy before from the one after an update; dotted: the bound, kl of "
+       "[training].",
+       Plot("KL [nat]", rows, &TrainingRow::kl, robot.training.kl)},
+      {"Gain", "What the update is expected to gain, in standard deviations of the advantage.",
+       Plot("gain", rows, &TrainingRow::surrogate_gain)},
+      {"Critic",
+       "Share of the returns' variance that it explains, before it has seen them. Dotted: all of "
+       "it.",
+       Plot("explained", rows, &TrainingRow::explained_variance, 1)},
+      {"Exploration", "Entropy of the policy: how much it still tries.",
+       Plot("entropy [nat]", rows, &TrainingRow::entropy)},
   };
-  std::string html = "<h2>Updates</h2>\n<div class=\"panels\">\n";
-  for (const auto& [drawing, caption] : figures) {
-    if (!drawing.empty()) html += Figure(drawing, Escape(caption));
+  std::string panels;
+  for (const auto& [title, what, drawing] : curves) {
+    if (!drawing.empty()) panels += Panel(Width::kHalf, title, what, drawing);
   }
-  return html + "</div>\n";
+  return panels;
 }
 
 std::string Simulators(const RobotDescription& robot, const ParameterDistribution& distribution) {
@@ -122,13 +126,14 @@ std::string Simulators(const RobotDescription& robot, const ParameterDistributio
     const ParameterDescription& parameter = robot.parameters[static_cast<size_t>(i)];
     table.Add({Escape(parameter.name), Escape(parameter.unit), PlusMinus(mean, sd)});
   }
-  return "<h2>Simulators</h2>\n" + table.Print() +
-         Paragraph(
-             distribution.residual
-                 ? fmt::format("{:.0f} % of the episodes are simulated with the residual that "
-                               "was learnt of what the model lacks.",
-                               100 * (1 - ParameterDistribution::kPlainShare))
-                 : "No residual: the model as it is.");
+  return Panel(
+      Width::kFull, "Simulators",
+      distribution.residual
+          ? fmt::format("{:.0f} % of the episodes are simulated with the residual that was "
+                        "learnt of what the model lacks.",
+                        100 * (1 - ParameterDistribution::kPlainShare))
+          : "No residual: the model as it is.",
+      table.Print());
 }
 
 std::string Reproduce(const RobotDescription& robot, const TrainingOutcome& outcome) {
@@ -147,8 +152,9 @@ std::string Reproduce(const RobotDescription& robot, const TrainingOutcome& outc
   add("wall time", fmt::format("{:.1f} s", outcome.seconds));
   add("robot's files", fmt::format("{}, fingerprint {:#018x}", robot.file, robot.fingerprint));
   add("version", VersionLine("plumb"));
-  return "<h2>How to do it again</h2>\n<pre>" + Escape(outcome.command) + "</pre>\n" +
-         table.Print();
+  return Panel(Width::kFull, "How to do it again",
+               "The same files and the same seed give the same bits.",
+               "<pre>" + Escape(outcome.command) + "</pre>\n" + table.Print());
 }
 
 }  // namespace
@@ -189,11 +195,13 @@ std::vector<TrainingRow> ReadTrainingRows(const std::string& file) {
 std::string TrainingReport(const RobotDescription& robot, const ParameterDistribution& distribution,
                            const TrainingOutcome& outcome, const std::vector<TrainingRow>& rows) {
   const std::string title = "Training of " + robot.name;
-  return Page(title, "<h1>" + Escape(title) + "</h1>\n<p class=\"sub\">" +
-                         Escape(fmt::format("task {}, {} updates, {} simulated steps",
-                                            robot.task.name, outcome.updates, outcome.steps)) +
-                         "</p>\n" + Verdicts(outcome, rows) + Curves(robot, rows) +
-                         Simulators(robot, distribution) + Reproduce(robot, outcome));
+  return Page(
+      title,
+      "<h1>" + Escape(title) + "</h1>\n<p class=\"sub\">" +
+          Escape(fmt::format("task {}, {} updates, {} simulated steps", robot.task.name,
+                             outcome.updates, outcome.steps)) +
+          "</p>\n" + Verdicts(outcome, rows) + Group("Updates", Curves(robot, rows)) +
+          Group("How it was trained", Simulators(robot, distribution) + Reproduce(robot, outcome)));
 }
 
 }  // namespace plumb

@@ -108,8 +108,8 @@ Results::Rows Measure(const Options& options, const Remembered& remembered, cons
   return rows;
 }
 
-Panel Draw(const Options& options, const PaperTask& task, const Results& results) {
-  Panel panel{task.name, "n, control steps", "error after n steps, standard units", true, {}};
+Chart Draw(const Options& options, const PaperTask& task, const Results& results) {
+  Chart chart{task.name, "n, control steps", "error after n steps, standard units", true, {}};
   for (const Method& method : kMethods) {
     Curve curve{method.label, {}, {}, {}, {}};
     for (size_t n = 0; n < kHorizon; ++n) {
@@ -120,23 +120,23 @@ Panel Draw(const Options& options, const PaperTask& task, const Results& results
       curve.x.push_back(static_cast<double>(n + 1)), curve.middle.push_back(band.middle),
           curve.low.push_back(band.low), curve.high.push_back(band.high);
     }
-    panel.curves.push_back(std::move(curve));
+    chart.curves.push_back(std::move(curve));
   }
-  return panel;
+  return chart;
 }
 
 // How many of n = 1 ... 20 have the first curve below the second, and its band below the other's.
-std::string Below(const Panel& panel, size_t first, size_t second) {
+std::string Below(const Chart& chart, size_t first, size_t second) {
   constexpr size_t kJudged = 20;
   int below = 0, apart = 0;
   for (size_t n = 0; n < kJudged; ++n) {
-    below += panel.curves[first].middle[n] < panel.curves[second].middle[n];
-    apart += panel.curves[first].high[n] < panel.curves[second].low[n];
+    below += chart.curves[first].middle[n] < chart.curves[second].middle[n];
+    apart += chart.curves[first].high[n] < chart.curves[second].low[n];
   }
   return fmt::format("at {} of n = 1 ... {}, bands apart at {}", below, kJudged, apart);
 }
 
-std::string Sentence(const Options& options, const PaperTask& task, const Panel& panel,
+std::string Sentence(const Options& options, const PaperTask& task, const Chart& chart,
                      const Results& results) {
   std::string text = fmt::format(
       "{}, {} runs, error after 1, 10, 20, 50 steps, simulated steps:", task.name, options.runs);
@@ -144,14 +144,14 @@ std::string Sentence(const Options& options, const PaperTask& task, const Panel&
     double simulated = 0;
     for (int run = 1; run <= options.runs; ++run)
       simulated += results.Of(KeyOf(task, kMethods[m], run))[0][2] / options.runs;
-    const auto& middle = panel.curves[m].middle;
+    const auto& middle = chart.curves[m].middle;
     text += fmt::format("\n  {:<42}{:10.2g}{:10.2g}{:10.2g}{:10.2g}{:12.0f}", kMethods[m].label,
                         middle[0], middle[9], middle[19], middle[49], simulated);
   }
   text += fmt::format(
       "\n  step-based below original {}; default with few below step-based {}, below "
       "original {}",
-      Below(panel, 1, 0), Below(panel, 3, 1), Below(panel, 3, 0));
+      Below(chart, 1, 0), Below(chart, 3, 1), Below(chart, 3, 0));
   return text;
 }
 
@@ -179,16 +179,16 @@ int MakeFigure(Process& process, const Options& options) {
     }
   }
   if (const auto status = RunJobs(process, jobs, results)) return *status;
-  std::vector<Panel> panels;
+  std::vector<Chart> charts;
   for (const PaperTask& task : kPaperTasks) {
-    panels.push_back(Draw(options, task, results));
-    std::cout << Sentence(options, task, panels.back(), results) << "\n";
+    charts.push_back(Draw(options, task, results));
+    std::cout << Sentence(options, task, charts.back(), results) << "\n";
   }
   WriteAtomically(
       folder / "figure_2.svg",
       DrawCurves(fmt::format("error of simulators after n steps, mean of {} runs and its 95 % band",
                              options.runs),
-                 panels));
+                 charts));
   return 0;
 }
 

@@ -70,8 +70,8 @@ Results::Rows RunLoop(const ExperimentOptions& options, const PaperTask& task,
   return rows;
 }
 
-Panel Draw(const ExperimentOptions& options, const PaperTask& task, const Results& results) {
-  Panel panel{
+Chart Draw(const ExperimentOptions& options, const PaperTask& task, const Results& results) {
+  Chart chart{
       task.name, "SimOpt iterations, 6 s of the robot each", "return on the robot", false, {}};
   for (const CalibrationStrategy strategy : kStrategies) {
     Curve curve{Label(strategy), {}, {}, {}, {}};
@@ -83,9 +83,9 @@ Panel Draw(const ExperimentOptions& options, const PaperTask& task, const Result
       curve.x.push_back(k), curve.middle.push_back(band.middle), curve.low.push_back(band.low),
           curve.high.push_back(band.high);
     }
-    panel.curves.push_back(std::move(curve));
+    chart.curves.push_back(std::move(curve));
   }
-  return panel;
+  return chart;
 }
 
 // One column of the table after k iterations, of all runs, ascending.
@@ -174,15 +174,15 @@ int MakeFigure(Process& process, const ExperimentOptions& options) {
     }
   }
   if (const auto status = RunJobs(process, jobs, results)) return *status;
-  std::vector<Panel> panels;
+  std::vector<Chart> charts;
   for (const PaperTask& task : kPaperTasks) {
-    panels.push_back(Draw(options, task, results));
+    charts.push_back(Draw(options, task, results));
     std::cout << Sentence(options, task, results) << "\n";
   }
   WriteAtomically(folder / "figure_3.svg",
                   DrawCurves(fmt::format("return on the robot, mean of {} runs and its 95 % band",
                                          options.runs),
-                             panels));
+                             charts));
   return 0;
 }
 

@@ -213,16 +213,16 @@ Curve CurveOf(const std::string& label, const Options& options, const Gap& gap,
   return curve;
 }
 
-Panel Draw(const Options& options, const Gap& gap, const Results& results) {
-  Panel panel{
+Chart Draw(const Options& options, const Gap& gap, const Results& results) {
+  Chart chart{
       gap.title, "iterations, 6 s of the robot each", "return of the deployed policy", false, {}};
   const std::vector<Method> methods = Chosen(kMethods, options.methods);
   for (const Method& method : methods)
-    panel.curves.push_back(CurveOf(method.label, options, gap, method, results, kReturn));
+    chart.curves.push_back(CurveOf(method.label, options, gap, method, results, kReturn));
   if (methods.size() == 1 && methods[0].accept)
-    panel.curves.push_back(
+    chart.curves.push_back(
         CurveOf("the newest policy", options, gap, methods[0], results, kNewest));
-  return panel;
+  return chart;
 }
 
 std::string Table(const Options& options, const Gap& gap, const Results& results) {
@@ -268,16 +268,16 @@ int Compare(Process& process, const Options& options) {
     }
   }
   if (const auto status = RunJobs(process, jobs, results)) return *status;
-  std::vector<Panel> panels;
+  std::vector<Chart> charts;
   for (const Gap& gap : gaps) {
-    panels.push_back(Draw(options, gap, results));
+    charts.push_back(Draw(options, gap, results));
     std::cout << Table(options, gap, results) << "\n";
   }
   WriteAtomically(folder / "reality_gap.svg",
                   DrawCurves(fmt::format("return on robots that no simulator is, median of {} "
                                          "runs, band from the worst to the best",
                                          options.runs),
-                             panels));
+                             charts));
   return 0;
 }
 

@@ -274,14 +274,14 @@ int Measure(Process& process, const ExperimentOptions& options) {
   if (stopped && *stopped != 0) return *stopped;
   if (const auto status = RunJobs(process, robot_jobs, robot)) return *status;
 
-  std::vector<Panel> panels;
+  std::vector<Chart> charts;
   for (const PaperTask& task : kPaperTasks) {
-    Panel errors{task.name,
+    Chart errors{task.name,
                  "simulated steps",
                  fmt::format("error after {} steps, standard units", kHorizon),
                  true,
                  {}};
-    Panel returns{task.name, "transitions of the robot", "return on the robot", false, {}};
+    Chart returns{task.name, "transitions of the robot", "return on the robot", false, {}};
     errors.logarithmic_x = returns.logarithmic_x = true;
     std::cout << fmt::format("{}, {} runs:\n  {:<40}{:>22}{:>22}{:>22}\n", task.name, options.runs,
                              "", "95 % of the oracle's",
@@ -310,14 +310,14 @@ int Measure(Process& process, const ExperimentOptions& options) {
       errors.curves.push_back({Label(strategy), {}, {}, {}, {}});
       std::cout << fmt::format("  {:<40}return {:.0f}\n", Label(strategy), band.middle);
     }
-    panels.push_back(std::move(returns));
-    panels.push_back(std::move(errors));
+    charts.push_back(std::move(returns));
+    charts.push_back(std::move(errors));
   }
   WriteAtomically(
       folder / "sample_efficiency.svg",
       DrawCurves(
           fmt::format("what calibration costs, mean of {} runs and its 95 % band", options.runs),
-          panels));
+          charts));
   return 0;
 }
 

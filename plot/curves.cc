@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-// of a panel
+// of a chart
 constexpr double kWidth = 380, kHeight = 300, kLeft = 62, kGap = 14, kTop = 30, kBelow = 46;
 constexpr size_t kAbreast = 2;
 constexpr double kLegendRow = 20, kLegendColumn = 300;
@@ -43,24 +43,24 @@ struct Range {
   }
 };
 
-void DrawPanel(const Panel& panel, double left, double top, Svg& svg) {
+void DrawChart(const Chart& chart, double left, double top, Svg& svg) {
   Range x_range, y_range;
-  for (const Curve& curve : panel.curves) {
-    for (const double x : curve.x) x_range.Take(x, panel.logarithmic_x);
+  for (const Curve& curve : chart.curves) {
+    for (const double x : curve.x) x_range.Take(x, chart.logarithmic_x);
     for (const auto* values : {&curve.middle, &curve.low, &curve.high}) {
-      for (const double y : *values) y_range.Take(y, panel.logarithmic);
+      for (const double y : *values) y_range.Take(y, chart.logarithmic);
     }
   }
-  svg.Text(left + kLeft, top + kTop - 10, panel.title, "name", Svg::Anchor::kStart);
+  svg.Text(left + kLeft, top + kTop - 10, chart.title, "name", Svg::Anchor::kStart);
   if (!(x_range.low <= x_range.high) || !(y_range.low <= y_range.high)) return;
   const double right = left + kWidth - kGap, bottom = top + kHeight - kBelow;
-  const double margin = panel.logarithmic ? 0 : 0.03 * (y_range.high - y_range.low);
-  const Axis x(x_range.low, x_range.high, left + kLeft, right, panel.logarithmic_x);
-  const Axis y(y_range.low - margin, y_range.high + margin, bottom, top + kTop, panel.logarithmic);
-  svg.Frame(x, y, panel.x_label, panel.y_label, 6, 6);
+  const double margin = chart.logarithmic ? 0 : 0.03 * (y_range.high - y_range.low);
+  const Axis x(x_range.low, x_range.high, left + kLeft, right, chart.logarithmic_x);
+  const Axis y(y_range.low - margin, y_range.high + margin, bottom, top + kTop, chart.logarithmic);
+  svg.Frame(x, y, chart.x_label, chart.y_label, 6, 6);
   svg.BeginClip(left + kLeft, top + kTop, right - left - kLeft, bottom - top - kTop);
-  for (size_t c = 0; c < panel.curves.size(); ++c) {
-    const Curve& curve = panel.curves[c];
+  for (size_t c = 0; c < chart.curves.size(); ++c) {
+    const Curve& curve = chart.curves[c];
     const auto pixel = [&](size_t i, double value) {
       return Vector2d(x.Pixel(curve.x[i]), y.Pixel(value));
     };
@@ -71,7 +71,7 @@ void DrawPanel(const Panel& panel, double left, double top, Svg& svg) {
     for (size_t i = curve.x.size(); i-- > 0;) {
       if (std::isfinite(curve.low[i]))
         band.push_back(
-            pixel(i, panel.logarithmic ? std::max(curve.low[i], y.lower()) : curve.low[i]));
+            pixel(i, chart.logarithmic ? std::max(curve.low[i], y.lower()) : curve.low[i]));
     }
     for (size_t i = 0; i < curve.x.size(); ++i) line.push_back(pixel(i, curve.middle[i]));
     const std::string colour = " c" + std::to_string(c);
@@ -83,12 +83,12 @@ void DrawPanel(const Panel& panel, double left, double top, Svg& svg) {
 
 }  // namespace
 
-std::string DrawCurves(const std::string& title, const std::vector<Panel>& panels) {
-  const size_t abreast = std::min(panels.size(), kAbreast);
+std::string DrawCurves(const std::string& title, const std::vector<Chart>& charts) {
+  const size_t abreast = std::min(charts.size(), kAbreast);
   const double width = kWidth * static_cast<double>(abreast),
-               height = kHeight * std::ceil(static_cast<double>(panels.size()) / kAbreast);
+               height = kHeight * std::ceil(static_cast<double>(charts.size()) / kAbreast);
   const auto columns = static_cast<size_t>(std::max(1.0, std::floor(width / kLegendColumn)));
-  const std::vector<Curve>& curves = panels.at(0).curves;
+  const std::vector<Curve>& curves = charts.at(0).curves;
   const double legend =
       kLegendRow * static_cast<double>((curves.size() + columns - 1) / columns) + 6;
   Svg svg(width, legend + height, title);
@@ -99,8 +99,8 @@ std::string DrawCurves(const std::string& title, const std::vector<Panel>& panel
     svg.Line(left, y - 4, left + 26, y - 4, "line c" + std::to_string(c));
     svg.Text(left + 33, y, curves[c].name, "label", Svg::Anchor::kStart);
   }
-  for (size_t p = 0; p < panels.size(); ++p) {
-    DrawPanel(panels[p], kWidth * static_cast<double>(p % kAbreast),
+  for (size_t p = 0; p < charts.size(); ++p) {
+    DrawChart(charts[p], kWidth * static_cast<double>(p % kAbreast),
               legend + kHeight * static_cast<double>(p / kAbreast), svg);
   }
   std::string text = svg.Print();

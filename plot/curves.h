@@ -13,16 +13,16 @@ struct Curve {
   std::vector<double> x, middle, low, high;
 };
 
-struct Panel {
+struct Chart {
   std::string title, x_label, y_label;
   bool logarithmic = false;   ///< the y axis; what is not positive is then left out
-  std::vector<Curve> curves;  ///< the same names in the same order as the first panel's
+  std::vector<Curve> curves;  ///< the same names in the same order as the first chart's
   bool logarithmic_x = false;
 };
 
-/// Panels, two abreast, with one legend above, as SVG. At most eight curves. Colours are told apart
+/// Charts, two abreast, with one legend above, as SVG. At most eight curves. Colours are told apart
 /// by those who see fewer, too (Okabe, Ito, "Color Universal Design", 2008).
-std::string DrawCurves(const std::string& title, const std::vector<Panel>& panels);
+std::string DrawCurves(const std::string& title, const std::vector<Chart>& charts);
 
 /// Standard deviations from the mean between which 95 % of a normal distribution are.
 inline constexpr double kNormal95 = 1.959963984540054;

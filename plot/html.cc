@@ -21,6 +21,30 @@ std::string Verdict(const std::string& css, const std::string& title, const std:
          "</div>\n";
 }
 
+std::string Group(const std::string& title, const std::string& panels) {
+  return "<section class=\"group\"><h2>" + Escape(title) + "</h2>\n<div class=\"panels\">\n" +
+         panels + "</div></section>\n";
+}
+
+std::string Panel(Width width, const std::string& title, const std::string& what,
+                  const std::string& content) {
+  constexpr const char* kWidths[] = {"third", "half", "full"};
+  return fmt::format("<section class=\"panel {}\"><header><h3>{}</h3></header>\n",
+                     kWidths[static_cast<int>(width)], Escape(title)) +
+         "<p class=\"what\">" + Escape(what) + "</p>\n" + content + "</section>\n";
+}
+
+std::string Key(const std::vector<std::pair<std::string, std::string>>& items) {
+  std::string html;
+  for (const auto& [kind, label] : items)
+    html += "<li><i class=\"" + kind + "\"></i>" + Escape(label) + "</li>";
+  return "<ul class=\"key\">" + html + "</ul>\n";
+}
+
+std::string PriorPosteriorKey() {
+  return Key({{"prior dash", "prior"}, {"posterior", "posterior"}});
+}
+
 std::string Number(double value, double sd) {
   if (std::isnan(value)) return "\xe2\x80\x93";  // en dash
   if (std::isinf(value)) return value > 0 ? "\xe2\x88\x9e" : "-\xe2\x88\x9e";
@@ -35,8 +59,7 @@ std::string PlusMinus(double value, double sd) {
 }
 
 Table::Table(const std::vector<std::string>& header) {
-  for (const std::string& cell : header) rows_ += "<th>" + cell + "</th>";
-  rows_ = "<tr>" + rows_ + "</tr>\n";
+  for (const std::string& cell : header) header_ += "<th scope=\"col\">" + cell + "</th>";
 }
 
 void Table::Add(const std::vector<std::string>& cells) {
@@ -49,15 +72,16 @@ void Table::Add(const std::vector<std::string>& cells) {
 }
 
 std::string Table::Print() const {
-  return "<div class=\"scroll\"><table>\n" + rows_ + "</table></div>\n";
+  return "<div class=\"scroll\"><table>\n<thead><tr>" + header_ + "</tr></thead>\n<tbody>\n" +
+         rows_ + "</tbody></table></div>\n";
 }
 
 std::string Paragraph(const std::string& text) {
   return text.empty() ? "" : "<p>" + Escape(text) + "</p>\n";
 }
 
-std::string Figure(const std::string& drawing, const std::string& caption) {
-  return "<figure>" + drawing + "<figcaption>" + caption + "</figcaption></figure>\n";
+std::string Row(const std::string& drawings) {
+  return "<div class=\"row\">" + drawings + "</div>\n";
 }
 
 std::string Scrolling(const std::string& drawing) {

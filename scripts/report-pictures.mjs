@@ -1,4 +1,4 @@
-// Makes the pictures of reports in the documents: `node scripts/report-pictures.mjs docs/images`. Wants scripts/setup --page.
+// Makes the pictures of reports in the documents: `node scripts/report-pictures.mjs docs/images`. Wants scripts/setup --page and --browser.
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -18,34 +18,22 @@ plumb("train", `${robots}/pendulum`, "--steps", "3e5", "--evaluate-every", "5", 
 plumb("launch", `${robots}/pendulum`, "--iterations", "4", "--report", "run.html");
 
 const browser = await launch();
-const desk = { viewport: { width: 1060, height: 900 } };
+const desk = { viewport: { width: 1140, height: 900 } };
 const phone = { viewport: { width: 390, height: 844 }, isMobile: true };
-const PICTURES = [ // file, page, how it is looked at, section by its heading; none: the beginning of the page
+const PICTURES = [ // file, page, how it is looked at, panel by its title; none: the beginning of the page
   ["report-pairs-pendulum", "pendulum", desk, "Prior and posterior"],
   ["report-pairs-hopper", "hopper", desk, "Prior and posterior"],
   ["report-fit-pendulum", "pendulum", desk, "Residuals"],
-  ["report-training", "training", { ...desk, viewport: { width: 1060, height: 1000 } }, ""],
-  ["report-run", "run", { ...desk, viewport: { width: 1060, height: 1000 } }, ""],
+  ["report-training", "training", { ...desk, viewport: { width: 1140, height: 1000 } }, ""],
+  ["report-run", "run", { ...desk, viewport: { width: 1140, height: 1000 } }, ""],
   ["report-phone", "hopper", { ...phone, colorScheme: "dark" }, ""],
 ];
 try {
   for (const [file, name, context, heading] of PICTURES) {
     const page = await (await browser.newContext({ colorScheme: "light", ...context })).newPage();
     await page.goto(`file://${folder}/${name}.html`);
-    const found = heading && (await page.evaluate((words) => {
-      const begin = [...document.querySelectorAll("h2")].find((one) => one.textContent === words);
-      if (!begin) return [...document.querySelectorAll("h2")].map((one) => one.textContent).join("; ");
-      const box = document.createElement("section");
-      const part = [begin];
-      for (let next = begin.nextElementSibling; next && next.tagName !== "H2"; next = next.nextElementSibling) part.push(next);
-      begin.before(box);
-      box.append(...part);
-      box.id = "picture";
-      return "";
-    }, heading));
-    if (found) throw new Error(`${name} has no "${heading}" but: ${found}`);
     const picture = { path: `${images}/${file}.png` };
-    if (heading) await page.locator("#picture").screenshot(picture);
+    if (heading) await page.locator("section.panel", { has: page.getByRole("heading", { name: heading, exact: true }) }).screenshot(picture);
     else await page.screenshot(picture);
   }
 } finally {

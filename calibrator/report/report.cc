@@ -42,11 +42,12 @@ class Report {
 
   std::string Print() const {
     return Page("Calibration of " + robot_.name,
-                Headline() + Parameters() + Pairs() + KnownAndUnknown() +
-                    PredictionSection(findings_.holdout) + MisfitSection(findings_) +
-                    GapSection(findings_.gap, robot_) + ResidualSection(residuals_) +
-                    AgreementSection(findings_.agreement, summary_, robot_, kMaxPairs) + Stages() +
-                    Reproduce());
+                Headline() + Group("What was learnt", Parameters() + Pairs() + KnownAndUnknown()) +
+                    Group("Does the model explain the robot?",
+                          PredictionPanel(findings_.holdout) + MisfitPanel(findings_) +
+                              GapPanel(findings_.gap, robot_) + ResidualPanel(residuals_) +
+                              AgreementPanel(findings_.agreement, summary_, robot_, kMaxPairs)) +
+                    Group("How it was found", Stages() + Reproduce()));
   }
 
  private:
@@ -87,10 +88,9 @@ class Report {
                   ? Verdict("good", "The logs agree", findings_.agreement.summary)
                   : Verdict("bad", "The logs disagree", findings_.agreement.summary);
     }
-    html += "</div>\n";
     for (const std::string& warning : findings_.warnings)
-      html += "<p><b>Warning:</b> " + Escape(warning) + "</p>\n";
-    return html;
+      html += Verdict("bad", "Warning", warning);
+    return html + "</div>\n";
   }
 
   std::string KnownSummary() const {
@@ -150,14 +150,12 @@ class Report {
                  Number(summary_.lower(i), sd) + " to " + Number(summary_.upper(i), sd),
                  Number(CramerRao(i), CramerRao(i)), Identifiable(i)});
     }
-    return "<h2>Parameters</h2>\n" + table.Print() +
-           "<p class=\"note\">Mean &#177; standard deviation. Cram&#233;r-Rao: the smallest sd "
-           "that an "
-           "unbiased estimate from these "
-           "data alone can have; &#8734; where they do not tell the parameter on its own. A "
-           "posterior may be "
-           "narrower, as it knows the "
-           "prior, too.</p>\n";
+    return Panel(
+        Width::kFull, "Parameters",
+        "Mean \xc2\xb1 standard deviation. Cram\xc3\xa9r-Rao: the smallest sd that an unbiased "
+        "estimate from these data alone can have; \xe2\x88\x9e where they do not tell the "
+        "parameter on its own. A posterior may be narrower, as it knows the prior, too.",
+        table.Print());
   }
 
   std::string Pairs() const {
@@ -173,24 +171,21 @@ class Report {
           fmt::format("Of {} parameters these are the {} that the data have told most about. ",
                       size(), kMaxPairs);
     }
-    return "<h2>Prior and posterior</h2>\n" +
-           Figure(Scrolling(PairPlot(findings_, summary_, robot_, shown)),
-                  selection + kPriorPosteriorKey +
-                      "Ellipses: 1 and 2 sigma, one pair for each component of the posterior; dots "
-                      "are its "
-                      "samples. Where the "
-                      "posterior is much narrower than the prior, only its surroundings are shown, "
-                      "and the "
-                      "rule above shows where in the prior they are, and how much narrower it is. "
-                      "Numbers: "
-                      "the posterior's "
-                      "correlation of the coordinates.") +
-           Paragraph(findings_.check);
+    return Panel(
+        Width::kFull, "Prior and posterior",
+        selection +
+            "Ellipses: 1 and 2 sigma, one pair for each component of the posterior; dots are "
+            "its samples. Where the posterior is much narrower than the prior, only its "
+            "surroundings are shown, and the rule above shows where in the prior they are, "
+            "and how much narrower it is. Numbers: the posterior's correlation of the "
+            "coordinates.",
+        PriorPosteriorKey() + Scrolling(PairPlot(findings_, summary_, robot_, shown)) +
+            Paragraph(findings_.check));
   }
 
   std::string KnownAndUnknown() const {
     const Identifiability& found = findings_.identifiability;
-    std::string html = "<h2>What can be known from this motion</h2>\n" + Paragraph(KnownSummary());
+    std::string html = Paragraph(KnownSummary());
     if (!found.combinations.empty()) {
       Table table({"what the motion determines", "value"});
       for (const Combination& c : found.combinations)
@@ -203,17 +198,19 @@ class Report {
         table.Add({std::to_string(k + 1), Direction(found.null[k])});
       html += table.Print();
     }
-    if (!findings_.advice.empty()) html += Paragraph(findings_.advice);
+    html += Paragraph(findings_.advice);
     const std::string scree = ScreePlot(InformationEigenvalues(), kNull);
+    const Width width = scree.empty() ? Width::kFull : Width::kHalf;
+    html = Panel(width, "What can be known from this motion",
+                 "The parameters, or combinations of them, that the motion tells apart.", html);
     if (scree.empty()) return html;
     return html +
-           Figure(
-               scree,
+           Panel(
+               width, "How much the motion tells",
                "Eigenvalues of the Fisher information in units of the prior, greatest first. Along "
-               "a direction with "
-               "1 (dashed) the data tell as much as the prior; what is below a millionth of the "
-               "greatest (dotted) cannot "
-               "be known from them.");
+               "a direction with 1 (dashed) the data tell as much as the prior; what is below a "
+               "millionth of the greatest (dotted) cannot be known from them.",
+               scree);
   }
 
   std::string Direction(const Eigen::VectorXd& direction) const {
@@ -248,7 +245,10 @@ class Report {
       table.Add({std::to_string(k + 1), std::to_string(s.horizon), std::to_string(s.windows),
                  std::to_string(s.simulated_steps), Number(s.discrepancy, 0.001)});
     }
-    return "<h2>Stages of the fit</h2>\n" + table.Print();
+    return Panel(Width::kFull, "Stages of the fit",
+                 "The fit begins with steps that are predicted on their own, and goes on to longer "
+                 "windows.",
+                 table.Print());
   }
 
   std::string Reproduce() const {
@@ -268,9 +268,10 @@ class Report {
         fmt::format("{} for the fit, {} for diagnostics; {} simulations failed",
                     findings_.simulated_steps, findings_.diagnostic_steps, findings_.failures));
     add("wall time", fmt::format("{:.1f} s", findings_.seconds));
-    return "<h2>How to do it again</h2>\n" +
-           (provenance_.command.empty() ? "" : "<pre>" + Escape(provenance_.command) + "</pre>\n") +
-           table.Print();
+    return Panel(
+        Width::kFull, "How to do it again", "The same files and the same seed give the same bits.",
+        (provenance_.command.empty() ? "" : "<pre>" + Escape(provenance_.command) + "</pre>\n") +
+            table.Print());
   }
 
   const Findings& findings_;

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "calibrator/report/report_plots.h"
+#include "plot/html.h"
 #include "plot/svg.h"
 
 namespace plumb {
@@ -73,9 +74,8 @@ std::vector<double> Autocorrelation(const Residuals& residuals, int coordinate, 
   return correlation;
 }
 
-std::string ResidualSection(const Residuals& residuals) {
+std::string ResidualPanel(const Residuals& residuals) {
   RequireFit(residuals);
-  std::string html = "<h2>Residuals</h2>\n";
   const std::vector<std::vector<double>> sorted = ByCoordinate(residuals);
   std::vector<size_t> shown;
   size_t total = 0;
@@ -83,15 +83,21 @@ std::string ResidualSection(const Residuals& residuals) {
     total += sorted[i].size();
     if (!sorted[i].empty()) shown.push_back(i);
   }
-  if (total == 0) return html + "<p>There are none.</p>\n";
-  html +=
-      "<p>Whitened one-step errors of the posterior's mean. Of a model that explains the robot "
-      "they are "
-      "independent, with the standard "
-      "normal distribution. ";
-  html += fmt::format("{} residuals", total);
+  const std::string title = "Residuals";
+  if (total == 0)
+    return Panel(Width::kFull, title, "Whitened one-step errors of the posterior's mean.",
+                 Paragraph("There are none."));
+  std::string what =
+      "Whitened one-step errors of the posterior's mean. Of a model that explains the robot they "
+      "are "
+      "independent, with the standard normal distribution. Over the record: their root mean "
+      "square; "
+      "dashed lines begin a roll-out. Below, left: histogram and the standard normal density; "
+      "middle: "
+      "quantiles; right: autocorrelation and the band of 95 % of white noise. ";
+  what += fmt::format("{} residuals", total);
   if (total < residuals.rows.size())
-    html += fmt::format(", and {} without a number", residuals.rows.size() - total);
+    what += fmt::format(", and {} without a number", residuals.rows.size() - total);
   if (shown.size() > kMaxCoordinates) {
     const size_t all = shown.size();
     std::stable_sort(shown.begin(), shown.end(), [&](size_t a, size_t b) {
@@ -99,30 +105,20 @@ std::string ResidualSection(const Residuals& residuals) {
     });
     shown.resize(kMaxCoordinates);
     std::sort(shown.begin(), shown.end());
-    html += fmt::format("; of {} coordinates the {} with the greatest", all, kMaxCoordinates);
+    what += fmt::format("; of {} coordinates the {} with the greatest", all, kMaxCoordinates);
   }
-  html += ".</p>\n<figure><div class=\"scroll\">" +
-          ResidualsOverTime(residuals.whitened, residuals.rows) +
-          "</div><figcaption>Root mean square over the record; dashed lines begin a "
-          "roll-out.</figcaption></figure>\n";
+  std::string html = Scrolling(ResidualsOverTime(residuals.whitened, residuals.rows));
   for (const size_t i : shown) {
-    html += fmt::format(
-        "<h3>{}</h3><p class=\"note\">root mean square {:.3g}, mean {:.2g}, {} residuals</p>\n<div "
-        "class=\"panels\">\n",
-        Escape(residuals.coordinates[i]), std::sqrt(MeanSquare(sorted[i])),
-        std::accumulate(sorted[i].begin(), sorted[i].end(), 0.) /
-            static_cast<double>(sorted[i].size()),
-        sorted[i].size());
-    html += ResidualHistogram(sorted[i]) + ResidualQuantiles(sorted[i]) +
-            ResidualCorrelation(Autocorrelation(residuals, static_cast<int>(i), kLags),
-                                sorted[i].size()) +
-            "</div>\n";
+    html += fmt::format("<h4>{}: root mean square {:.3g}, mean {:.2g}, {} residuals</h4>\n",
+                        Escape(residuals.coordinates[i]), std::sqrt(MeanSquare(sorted[i])),
+                        std::accumulate(sorted[i].begin(), sorted[i].end(), 0.) /
+                            static_cast<double>(sorted[i].size()),
+                        sorted[i].size());
+    html += Row(ResidualHistogram(sorted[i]) + ResidualQuantiles(sorted[i]) +
+                ResidualCorrelation(Autocorrelation(residuals, static_cast<int>(i), kLags),
+                                    sorted[i].size()));
   }
-  return html +
-         "<p class=\"note\">Left: histogram and the standard normal density. Middle: quantiles. "
-         "Right: "
-         "autocorrelation and the "
-         "band of 95 % of white noise.</p>\n";
+  return Panel(Width::kFull, title, what + ".", html);
 }
 
 }  // namespace plumb

@@ -9,9 +9,9 @@ namespace plumb {
 
 // The functions here share nothing: thread-safe.
 
-/// The report's section about residuals, HTML; says so where there are none.
+/// The report's panel about residuals, HTML; says so where there are none.
 /// @throws std::invalid_argument if residuals, rows and coordinates do not fit each other.
-std::string ResidualSection(const Residuals& residuals);
+std::string ResidualPanel(const Residuals& residuals);
 
 /// Autocorrelation of one coordinate's residuals at lags 1 to `lags`: of transitions of one
 /// roll-out that are so far apart, over their variance about their mean. NaN where there are none.

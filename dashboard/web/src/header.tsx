@@ -41,5 +41,7 @@ export function Warning() {
   const silent = now.value - lastHeard.value;
   if (state.value === "lost") return <p class="warning" role="alert">Not connected. What is shown is what was heard last; the page comes back by itself. The robot may be moving.</p>;
   if (state.value === "open" && silent > OLD_AFTER) return <p class="warning" role="alert">Nothing has come for {seconds(silent / 1000)}: what is shown is old.</p>;
+  const [here, there] = [robot.value?.name, driver.value?.robot];
+  if (here && there && here !== there) return <p class="warning" role="alert">The driver that is heard is of {there}, and this page of {here}: numbers may be of the wrong joints. plumb-dashboard wants the robot of the run.</p>;
   return null;
 }
