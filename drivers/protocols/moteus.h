@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <string_view>
 
@@ -22,6 +23,8 @@
 /// fw/fdcan.cc and fw/fdcan_micro_server.h (frames), and mjlib/multiplex/micro_server.cc of
 /// github.com/mjbots/mjlib (subframes).
 namespace plumb::moteus {
+
+inline constexpr double kTurn = 2 * std::numbers::pi;  ///< [rad]
 
 /// Numbers that a motor may have (fw/moteus.cc); kEverybody is heard by all. The driver's own is 0,
 /// as that of mjbots' tools is.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 
 #include "common/special_numbers.h"
@@ -14,7 +13,6 @@ namespace {
 
 using namespace moteus;
 
-constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
 constexpr int64_t kPreparation = 15'000;  // [us] made up: it measures its current sensors' zeros
 constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
 

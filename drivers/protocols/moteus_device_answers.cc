@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numbers>
 #include <optional>
 #include <string>
 
@@ -13,8 +12,7 @@ namespace {
 
 using namespace moteus;
 
-constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
-constexpr uint32_t kFirmware = 0x000107;        // made up
+constexpr uint32_t kFirmware = 0x000107;  // made up
 
 // Of position mode, those that are of no use here included.
 bool IsWritable(uint32_t number) {

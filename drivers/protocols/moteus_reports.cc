@@ -4,15 +4,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 
 namespace plumb {
 namespace {
 
 using namespace moteus;
 
-constexpr double kTurn = 2 * std::numbers::pi;  // [rad]
-constexpr double kNotANumber = -128;            // of an int8 register
+constexpr double kNotANumber = -128;  // of an int8 register
 
 double Reading(double value, double scale = 1) {
   return value == kNotANumber * scale ? std::numeric_limits<double>::quiet_NaN() : value;
