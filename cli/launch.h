@@ -8,6 +8,9 @@
 
 namespace plumb {
 
+/// In a run's folder: where calibrator and trainer keep their checkpoints.
+inline constexpr char kCalibrationFolder[] = "calibration", kTrainingFolder[] = "training";
+
 /// The flags of `plumb launch`.
 struct LaunchFlags {
   std::string robot = "robots/pendulum";
@@ -31,8 +34,9 @@ struct LaunchFlags {
   std::string report;      ///< the same as an HTML page; empty = do not
   /// where a page shows the run, ADDRESS:PORT; empty: nowhere
   std::string dashboard;
-  std::string command;  ///< that was given
-  std::string output;   ///< folder for logs and checkpoints; empty = a new one
+  std::vector<std::string> origins;  ///< of other pages that may talk to that one
+  std::string command;               ///< that was given
+  std::string output;                ///< folder for logs and checkpoints; empty = a new one
 };
 
 /// `plumb launch`: starts every process of a run, arms, shows progress, stops everything again

@@ -190,11 +190,18 @@ void AddLaunch(CLI::App& app, const std::string& line, Action& action) {
                    "write over a log that no run in virtual time of this robot would make again");
   launch->add_option("--can-log", flags->can_log,
                      "in virtual time: record all frames to this file, as candump -l does");
+  auto* dashboard =
+      launch
+          ->add_option("--dashboard", flags->dashboard,
+                       "show the run in browsers; where to listen, default: 127.0.0.1:8765")
+          ->expected(0, 1)
+          ->type_name("ADDRESS:PORT");
   launch
-      ->add_option("--dashboard", flags->dashboard,
-                   "show the run in browsers; where to listen, default: 127.0.0.1:8765")
-      ->expected(0, 1)
-      ->type_name("ADDRESS:PORT");
+      ->add_option("--origin", flags->origins,
+                   "of another page that may talk to the dashboard, as Foxglove's, "
+                   "https://app.foxglove.dev; may be repeated")
+      ->allow_extra_args(false)
+      ->needs(dashboard);
   launch->add_option("--summary", flags->summary, "write the outcome to this JSON file");
   launch->add_option("--report", flags->report, "how it went, for people: an HTML page");
   launch->add_option("--output", flags->output,

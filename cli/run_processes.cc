@@ -42,6 +42,8 @@ std::string RunProcesses::StartDashboard() {
   constexpr double kPatience = 10;  // [s]
   constexpr char kName[] = "plumb-dashboard", kSays[] = "dashboard: ";
   std::vector<std::string> arguments{flags_.robot, "--address", flags_.dashboard};
+  for (const std::string& origin : flags_.origins)
+    arguments.insert(arguments.end(), {"--origin", origin});
   if (coordinator_) arguments.push_back("--virtual");
   dashboard_.emplace(kName, Command(kName, arguments, coordinator_ ? "1" : where_.clock),
                      where_.output / (std::string(kName) + ".log"));
@@ -87,7 +89,7 @@ void RunProcesses::Start() {
   Start("plumb-estimator", with_priority({flags_.robot}, 5));
   Start("plumb-controller", with_priority(controller, 5));
   std::vector<std::string> calibrator{flags_.robot, "--seed", seed, "--checkpoint",
-                                      (where_.output / "calibration").string()};
+                                      (where_.output / kCalibrationFolder).string()};
   std::vector<std::string> trainer{flags_.robot,
                                    "--seed",
                                    seed,
@@ -96,7 +98,7 @@ void RunProcesses::Start() {
                                    "--evaluation-episodes",
                                    std::to_string(flags_.evaluation_episodes),
                                    "--checkpoint",
-                                   (where_.output / "training").string()};
+                                   (where_.output / kTrainingFolder).string()};
   // In real time the slow loop gives way to the fast one.
   if (!coordinator_) {
     for (auto* arguments : {&calibrator, &trainer})

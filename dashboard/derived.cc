@@ -23,6 +23,8 @@ std::string PredictionSchema() {
                                         numbers + R"(,"q_measured":)" + numbers);
 }
 
+// Without `samples` and `prior_samples`, which are lists of lists: neither Foxglove nor Lichtblick
+// takes a schema with such, and either would show nothing of the topic.
 std::string PosteriorSchema() {
   const std::string numbers = kNumbers;
   return Schema(
@@ -32,8 +34,7 @@ std::string PosteriorSchema() {
       R"("sd":{"type":"number"},"quantiles":)" +
           numbers +
           R"(,"prior_mean":{"type":"number"},"prior_sd":{"type":"number"},)"
-          R"("determined":{"type":"boolean"}}}},"samples":{"type":"array","items":)" +
-          numbers + R"(},"prior_samples":{"type":"array","items":)" + numbers + "}");
+          R"("determined":{"type":"boolean"}}}})");
 }
 
 }  // namespace
@@ -45,6 +46,8 @@ Derived::Derived(const RobotDescription& robot, Topics& topics)
       predictions_(topics.Add("PLUMB_PREDICTION", "plumb.prediction", PredictionSchema(),
                               Topics::Keep::kNewest)),
       scenes_(topics.Add("PLUMB_SCENE", "foxglove.SceneUpdate", SceneUpdate::Schema(),
+                         Topics::Keep::kNewest)),
+      frames_(topics.Add("PLUMB_FRAME", "foxglove.FrameTransform", SceneUpdate::FrameSchema(),
                          Topics::Keep::kNewest)),
       posteriors_(topics.Add("PLUMB_POSTERIOR", "plumb.posterior", PosteriorSchema(),
                              Topics::Keep::kHistory)),
@@ -63,7 +66,7 @@ void Derived::OnState(const robot_state_t& state, int64_t now) {
   if (q.size() != robot_.num_positions() || !q.allFinite()) return;
   utime_ = state.utime;
   q_ = q;
-  const bool sees = topics_.watched(scenes_) && now >= next_scene_;
+  const bool sees = (topics_.watched(scenes_) || topics_.watched(frames_)) && now >= next_scene_;
   const bool compares = topics_.watched(predictions_) && now >= next_prediction_;
   if (!sees && !compares) return;
   const auto predicted = prediction_ ? prediction_->Predict() : std::nullopt;
@@ -73,14 +76,18 @@ void Derived::OnState(const robot_state_t& state, int64_t now) {
   }
   if (sees) {
     next_scene_ = now + kScenePeriod;
-    topics_.Publish(scenes_, state.utime,
-                    scene_.Json(state.utime, q, predicted ? &predicted->q : nullptr));
+    if (topics_.watched(frames_))
+      topics_.Publish(frames_, state.utime, scene_.FrameJson(state.utime, q));
+    if (topics_.watched(scenes_))
+      topics_.Publish(scenes_, state.utime,
+                      scene_.Json(state.utime, q, predicted ? &predicted->q : nullptr));
   }
 }
 
-std::optional<Topics::Message> Derived::Scene() const {
-  if (q_.size() == 0) return std::nullopt;
-  return Topics::Message{utime_, scene_.Json(utime_, q_)};
+std::optional<Topics::Message> Derived::Newest(uint32_t topic) const {
+  if (q_.size() == 0 || (topic != scenes_ && topic != frames_)) return std::nullopt;
+  return Topics::Message{utime_,
+                         topic == scenes_ ? scene_.Json(utime_, q_) : scene_.FrameJson(utime_, q_)};
 }
 
 void Derived::OnDistribution(const parameter_distribution_t& message, int64_t utime) {

@@ -14,7 +14,8 @@
 
 namespace plumb {
 
-/// What is not said on LCM, but follows from it: PLUMB_PREDICTION, PLUMB_SCENE and PLUMB_POSTERIOR.
+/// What is not said on LCM, but follows from it: PLUMB_PREDICTION, PLUMB_SCENE,
+/// PLUMB_FRAME and PLUMB_POSTERIOR.
 /// Computed where somebody listens, and at most so often as eyes can follow. Not thread-safe.
 class Derived {
  public:
@@ -25,9 +26,8 @@ class Derived {
 
   /// @param now monotonic [us].
   void OnState(const robot_state_t& state, int64_t now);
-  /// The robot as it was last seen, without a prediction.
-  std::optional<Topics::Message> Scene() const;
-  uint32_t scenes() const { return scenes_; }
+  /// Of PLUMB_SCENE and PLUMB_FRAME: the robot as it was last seen, without a prediction.
+  std::optional<Topics::Message> Newest(uint32_t topic) const;
   /// What is no distribution of this robot's is passed over. @param utime [us] of the run.
   void OnDistribution(const parameter_distribution_t& message, int64_t utime);
 
@@ -37,7 +37,7 @@ class Derived {
   const RobotDescription robot_;
   const ParameterDistribution prior_;
   Topics& topics_;
-  const uint32_t predictions_, scenes_, posteriors_;
+  const uint32_t predictions_, scenes_, frames_, posteriors_;
   const SceneUpdate scene_;
   std::optional<OneStepPrediction> prediction_;
   int64_t utime_ = 0;  // of the newest state that is one of this robot's

@@ -14,8 +14,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr uint8_t kMessageData = 1, kServiceRequest = 2, kServiceResponse = 3;  // opcodes
-constexpr size_t kMaxEntries = 1000;                                            // of one message
+constexpr uint8_t kMessageData = 1, kTime = 2, kServiceRequest = 2,
+                  kServiceResponse = 3;  // opcodes
+constexpr size_t kMaxEntries = 1000;     // of one message
 
 json Parse(std::string_view text) {
   try {
@@ -63,10 +64,9 @@ const json& List(const json& message, const char* name) {
 }  // namespace
 
 std::string ServerInfoText(std::string_view name, std::string_view session) {
-  return fmt::format(
-      R"({{"op":"serverInfo","name":{},"capabilities":["services"],"supportedEncodings":["json"],)"
-      R"("metadata":{{}},"sessionId":{}}})",
-      Quoted(name), Quoted(session));
+  return fmt::format(R"({{"op":"serverInfo","name":{},"capabilities":["services","time"],)"
+                     R"("supportedEncodings":["json"],"metadata":{{}},"sessionId":{}}})",
+                     Quoted(name), Quoted(session));
 }
 
 std::string AdvertiseText(std::span<const FoxgloveTopic> topics) {
@@ -115,6 +115,12 @@ MessageHead MessageHeadOf(uint32_t subscription, int64_t utime) {
   PutNumber(subscription, 4, &head[1]);
   PutNumber(static_cast<uint64_t>(utime) * 1000, 8, &head[5]);
   return head;
+}
+
+std::string TimeFrame(int64_t utime) {
+  std::array<uint8_t, 9> frame{kTime};
+  PutNumber(static_cast<uint64_t>(utime) * 1000, 8, &frame[1]);
+  return {frame.begin(), frame.end()};
 }
 
 std::string ServiceResponse(uint32_t service, uint32_t call, std::string_view json_text) {

@@ -36,7 +36,8 @@ std::string ServiceFailureText(uint32_t service, uint32_t call, std::string_view
 /// What stands before a message's JSON in its binary frame. @param utime [us]
 using MessageHead = std::array<uint8_t, 13>;
 MessageHead MessageHeadOf(uint32_t subscription, int64_t utime);
-/// A whole binary frame.
+/// Whole binary frames.
+std::string TimeFrame(int64_t utime);  ///< what time it is in the run [us]
 std::string ServiceResponse(uint32_t service, uint32_t call, std::string_view json);
 
 /// What a client has said. Empty if it was something that asks for nothing.

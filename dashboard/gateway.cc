@@ -109,7 +109,7 @@ Gateway::Gateway(const RobotDescription& robot, Setting setting, Wishes::Request
 }
 
 std::optional<Topics::Message> Gateway::Newest(uint32_t topic) const {
-  if (topic == derived_.scenes()) return derived_.Scene();
+  if (auto derived = derived_.Newest(topic)) return derived;
   const auto found =
       std::ranges::find(channels_, topic, [](const auto& channel) { return channel.second.topic; });
   if (found == channels_.end() || found->second.last.empty()) return std::nullopt;
@@ -147,7 +147,9 @@ void Gateway::OnMessage(const std::string& name, std::span<const uint8_t> messag
     if (numbers.utime() > 0 && numbers.utime() < channel->utime)
       Rewind(numbers.utime(), moment.now);
     channel->utime = numbers.utime();
+    const bool first = time_.utime() == 0;
     time_.OnMessage(numbers.utime(), FindSeal(message), moment.date, moment.now);
+    if (first) topics_.SetTime(time_.utime());  // it may be earlier than what we said so far
   }
   const std::span<const uint8_t> content = Unsealed(message);
   const bool repeated = std::ranges::equal(content, channel->last);
@@ -215,6 +217,7 @@ void Gateway::Finish(const Moment& moment) {
 
 void Gateway::Join(Viewer& viewer) {
   viewer.Say(ServerInfoText("Plumbline: " + robot_.name, fmt::format("{:x}", setting_.identity)));
+  if (time_.utime() > 0) viewer.SetTime(time_.utime());
   topics_.Join(viewer);
   viewer.Say(AdvertiseServicesText(kServices));
 }

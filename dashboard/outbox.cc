@@ -8,7 +8,18 @@ namespace {
 
 constexpr size_t kOverhead = 64;  // of an item, beyond its payload
 
+Outbox::Item TimeOf(int64_t utime) {
+  return {Outbox::Kind::kControl,
+          true,
+          0,
+          {},
+          utime,
+          std::make_shared<const std::string>(TimeFrame(utime))};
+}
+
 }  // namespace
+
+void Outbox::SetTime(int64_t utime) { Push(TimeOf(utime)); }
 
 void Outbox::Push(Item item) {
   Account(item, true);
@@ -17,6 +28,13 @@ void Outbox::Push(Item item) {
 }
 
 Outbox::Item Outbox::Pop() {
+  const auto& [kind, binary, subscription, head, utime, payload] = items_.front();
+  const bool sets = kind == Kind::kControl && utime;
+  // History is of any time, also of the machine's, from before the run's was known.
+  if (sets || (utime && kind != Kind::kHistory && *utime - kTimeStep >= told_)) {
+    told_ = *utime;
+    if (!sets) return TimeOf(told_);
+  }
   Item item = std::move(items_.front());
   items_.pop_front();
   Account(item, false);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,11 +30,18 @@ class Outbox {
     bool binary = true;
     uint32_t subscription = 0;
     std::optional<MessageHead> head;             ///< before the payload
+    std::optional<int64_t> utime;                ///< of the run, at which it was said [us]
     std::shared_ptr<const std::string> payload;  ///< which other clients get, too
   };
 
+  static constexpr int64_t kTimeStep = 5'000;  ///< [us] by which the time that is told may be late
+
   void Push(Item item);
+  /// The run's time is this from here on [us], also where it was later before.
+  void SetTime(int64_t utime);
   bool empty() const { return items_.empty(); }
+  /// The next; before a message of a later time than was told, unless it is of history, that time
+  /// as a frame of its own: Foxglove stamps what it hears with the time that it was told last.
   Item Pop();
   /// Nothing more of a subscription that has ended.
   void Forget(uint32_t subscription);
@@ -49,6 +57,7 @@ class Outbox {
   std::deque<Item> items_;
   size_t bytes_ = 0, control_bytes_ = 0;
   int64_t dropped_ = 0;
+  int64_t told_ = std::numeric_limits<int64_t>::min();  // [us] the run's time
 };
 
 }  // namespace plumb

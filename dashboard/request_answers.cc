@@ -1,12 +1,15 @@
 #include "dashboard/request_answers.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <boost/beast/websocket/rfc6455.hpp>
+#include <mutex>
 #include <optional>
 #include <utility>
 
+#include "common/outside_text.h"
 #include "dashboard/foxglove.h"
 #include "dashboard/robot_json.h"
 #include "dashboard/viewer_connection.h"
@@ -73,8 +76,16 @@ Response Find(const Parts& parts, const Request& request) {
 /// Why a request does not become a WebSocket; none: it does.
 std::optional<Response> WhyNotUpgrade(const Access& access, const Request& request) {
   const std::string_view host = View(request[http::field::host]);
-  if (!access.OriginAllowed(View(request[http::field::origin]), host))
+  const std::string_view origin = View(request[http::field::origin]);
+  if (!access.OriginAllowed(origin, host)) {
+    // Viewers show their users no more than that it failed. Once: any page may ask on and on.
+    static std::once_flag said;
+    std::call_once(said, [&] {
+      spdlog::warn("a page of {0} was refused, as others will be: --origin {0} lets it in",
+                   Printable(origin));
+    });
     return Text(http::status::forbidden, "another page may not talk to us: --origin");
+  }
   auto offered = http::token_list(request[http::field::sec_websocket_protocol]);
   if (!offered.exists(kFoxgloveProtocol)) {
     return Text(http::status::bad_request, fmt::format("the subprotocol is {}", kFoxgloveProtocol));

@@ -48,6 +48,8 @@ class Topics {
 
   /// The run has been set back to this time: what was said from then on is forgotten.
   void Rewind(int64_t utime);
+  /// All viewers are told that the run's time is this.
+  void SetTime(int64_t utime);
 
   void Join(Viewer& viewer);
   void Leave(Viewer& viewer);

@@ -22,7 +22,14 @@ struct Viewer {
                  binary,
                  0,
                  {},
+                 {},
                  std::make_shared<const std::string>(std::move(text))});
+    wake();
+  }
+
+  /// @param utime of the run [us]
+  void SetTime(int64_t utime) {
+    outbox.SetTime(utime);
     wake();
   }
 

@@ -83,7 +83,10 @@ class Scenes {
         writer_(writer),
         channel_(writer.AddChannel(
             "PLUMB_SCENE",
-            writer.AddSchema("foxglove.SceneUpdate", "jsonschema", SceneUpdate::Schema()),
+            writer.AddSchema("foxglove.SceneUpdate", "jsonschema", SceneUpdate::Schema()), "json")),
+        frames_(writer.AddChannel(
+            "PLUMB_FRAME",
+            writer.AddSchema("foxglove.FrameTransform", "jsonschema", SceneUpdate::FrameSchema()),
             "json")) {}
 
   /// @return whether a scene was written.
@@ -98,6 +101,7 @@ class Scenes {
         state.q.data(), static_cast<Eigen::Index>(state.q.size()));
     if (q.size() != robot_.num_positions() || !q.allFinite()) return false;
     const uint64_t now = Nanoseconds(event.utime);
+    writer_.Write(frames_, now, now, update_.FrameJson(event.utime, q));
     writer_.Write(channel_, now, now, update_.Json(event.utime, q));
     last_ = event.utime;
     return any_ = true;
@@ -107,7 +111,7 @@ class Scenes {
   const RobotDescription& robot_;
   const SceneUpdate update_;
   McapWriter& writer_;
-  const uint16_t channel_;
+  const uint16_t channel_, frames_;
   bool any_ = false;
   int64_t last_ = 0;  // [us]
 };

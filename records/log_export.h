@@ -25,7 +25,8 @@ struct ExportCounts {
 };
 
 /// As MCAP: every message in JSON with its JSON Schema, by the time of its reception; and, if the
-/// robot is known, PLUMB_SCENE, a foxglove.SceneUpdate for ROBOT_STATE, 30 a second at most.
+/// robot is known, PLUMB_SCENE, a foxglove.SceneUpdate for ROBOT_STATE, 30 a second at most, each
+/// with PLUMB_FRAME, the frame that goes with it.
 /// @param robot null = unknown. @param notes that go into the file's metadata.
 /// @throws std::runtime_error naming the file: the log cannot be read or is damaged, the output
 /// cannot be written; what there is already then stays.

@@ -27,6 +27,24 @@ std::string Numbers(std::initializer_list<std::pair<char, double>> members) {
   return json + "}";
 }
 
+// Parts of JSON Schemas.
+std::string Object(const std::string& properties) {
+  return R"({"type":"object","properties":{)" + properties + "}}";
+}
+std::string NumbersSchema(const std::string& names) {
+  std::string properties;
+  for (const char name : names) {
+    if (!properties.empty()) properties += ',';
+    properties += fmt::format(R"("{}":{{"type":"number"}})", name);
+  }
+  return Object(properties);
+}
+std::string Time() { return Object(R"("sec":{"type":"integer"},"nsec":{"type":"integer"})"); }
+std::string Titled(const std::string& title, const std::string& properties) {
+  return R"({"$schema":"https://json-schema.org/draft/2020-12/schema","title":")" + title +
+         R"(","type":"object","properties":{)" + properties + "}}";
+}
+
 /// One entity's solids, by kind.
 class Entity {
  public:
@@ -89,6 +107,15 @@ SceneUpdate::SceneUpdate(const RobotDescription& robot) : robot_(robot), shapes_
     colors_.push_back(ColorOf(robot, static_cast<int>(link)));
 }
 
+// A ground that ends is not one: it goes with the robot.
+Eigen::Vector3d SceneUpdate::Place(const std::vector<Pose>& poses) const {
+  for (size_t link = 0; link < poses.size(); ++link) {
+    const Eigen::Vector3d& at = poses[link].position;
+    if (!shapes_[link].empty()) return {at.x(), at.y(), 0};
+  }
+  return Eigen::Vector3d::Zero();
+}
+
 std::string SceneUpdate::Json(int64_t utime, const Eigen::VectorXd& q,
                               const Eigen::VectorXd* prediction) const {
   const auto robot_at = [&](const char* id, const Eigen::VectorXd& at, double alpha) {
@@ -102,7 +129,7 @@ std::string SceneUpdate::Json(int64_t utime, const Eigen::VectorXd& q,
   Entity ground("ground", utime, 1);
   Shape plate;
   plate.type = Shape::Type::kBox;
-  plate.position.z() = -kThickness / 2;
+  plate.position = Place(LinkPoses(robot_, q)) - Eigen::Vector3d(0, 0, kThickness / 2);
   plate.size = {kGroundEdge, kGroundEdge, kThickness};
   ground.Add({}, plate, kGroundColor);
   std::string deletions;
@@ -115,42 +142,48 @@ std::string SceneUpdate::Json(int64_t utime, const Eigen::VectorXd& q,
   return fmt::format(R"({{"deletions":[{}],"entities":[{}]}})", deletions, entities);
 }
 
+std::string SceneUpdate::FrameJson(int64_t utime, const Eigen::VectorXd& q) const {
+  const Eigen::Vector3d at = Place(LinkPoses(robot_, q));
+  return fmt::format(
+      R"({{"timestamp":{{"sec":{},"nsec":{}}},"parent_frame_id":"world","child_frame_id":"robot",)"
+      R"("translation":{},"rotation":{}}})",
+      utime / 1'000'000, utime % 1'000'000 * 1000,
+      Numbers({{'x', at.x()}, {'y', at.y()}, {'z', at.z()}}),
+      Numbers({{'x', 0}, {'y', 0}, {'z', 0}, {'w', 1}}));
+}
+
+std::string SceneUpdate::FrameSchema() {
+  return Titled("foxglove.FrameTransform",
+                R"("timestamp":)" + Time() +
+                    R"(,"parent_frame_id":{"type":"string"},"child_frame_id":{"type":"string"},)"
+                    R"("translation":)" +
+                    NumbersSchema("xyz") + R"(,"rotation":)" + NumbersSchema("xyzw"));
+}
+
 std::string SceneUpdate::Schema() {
-  const auto object = [](const std::string& properties) {
-    return R"({"type":"object","properties":{)" + properties + "}}";
-  };
-  const auto numbers = [&](const std::string& names) {
-    std::string properties;
-    for (const char name : names) {
-      if (!properties.empty()) properties += ',';
-      properties += fmt::format(R"("{}":{{"type":"number"}})", name);
-    }
-    return object(properties);
-  };
   const auto array = [](const std::string& items) {
     return R"({"type":"array","items":)" + items + "}";
   };
-  const std::string time = object(R"("sec":{"type":"integer"},"nsec":{"type":"integer"})");
-  const std::string solid =
-      R"("pose":)" +
-      object(R"("position":)" + numbers("xyz") + R"(,"orientation":)" + numbers("xyzw")) +
-      R"(,"size":)" + numbers("xyz") + R"(,"color":)" + numbers("rgba");
+  const std::string time = Time();
+  const std::string solid = R"("pose":)" +
+                            Object(R"("position":)" + NumbersSchema("xyz") + R"(,"orientation":)" +
+                                   NumbersSchema("xyzw")) +
+                            R"(,"size":)" + NumbersSchema("xyz") + R"(,"color":)" +
+                            NumbersSchema("rgba");
   const std::string cylinder =
       solid + R"(,"bottom_scale":{"type":"number"},"top_scale":{"type":"number"})";
-  const std::string unused = array(object(""));
-  const std::string entity = object(
+  const std::string unused = array(Object(""));
+  const std::string entity = Object(
       R"("timestamp":)" + time +
       R"(,"frame_id":{"type":"string"},"id":{"type":"string"},"lifetime":)" + time +
       R"(,"frame_locked":{"type":"boolean"},"metadata":)" + unused + R"(,"arrows":)" + unused +
-      R"(,"cubes":)" + array(object(solid)) + R"(,"spheres":)" + array(object(solid)) +
-      R"(,"cylinders":)" + array(object(cylinder)) + R"(,"lines":)" + unused + R"(,"triangles":)" +
+      R"(,"cubes":)" + array(Object(solid)) + R"(,"spheres":)" + array(Object(solid)) +
+      R"(,"cylinders":)" + array(Object(cylinder)) + R"(,"lines":)" + unused + R"(,"triangles":)" +
       unused + R"(,"texts":)" + unused + R"(,"models":)" + unused);
   const std::string deletion =
-      object(R"("timestamp":)" + time + R"(,"type":{"type":"integer"},"id":{"type":"string"})");
-  return R"({"$schema":"https://json-schema.org/draft/2020-12/schema",)"
-         R"("title":"foxglove.SceneUpdate",)"
-         R"("type":"object","properties":{"deletions":)" +
-         array(deletion) + R"(,"entities":)" + array(entity) + "}}";
+      Object(R"("timestamp":)" + time + R"(,"type":{"type":"integer"},"id":{"type":"string"})");
+  return Titled("foxglove.SceneUpdate",
+                R"("deletions":)" + array(deletion) + R"(,"entities":)" + array(entity));
 }
 
 }  // namespace plumb

@@ -12,12 +12,12 @@ const CHROMIUM = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/go
 
 function skipUnless(there, reason) {
   if (there) return;
-  console.log(`skipped: ${reason} (scripts/setup --page)`);
+  console.log(`skipped: ${reason}`);
   process.exit(77);
 }
-skipUnless(CHROMIUM, "Chromium is not installed");
-skipUnless(existsSync(new URL("node_modules/playwright-core", web)), "the page's packages are not installed");
-skipUnless(existsSync(`${pageFolder}/page.js`), `there is no built page in ${pageFolder}`);
+skipUnless(CHROMIUM, "Chromium is not installed (scripts/setup --browser)");
+skipUnless(existsSync(new URL("node_modules/playwright-core", web)), "the page's packages are not installed (scripts/setup --page)");
+skipUnless(existsSync(`${pageFolder}/page.js`), `there is no built page in ${pageFolder} (scripts/build dashboard_page)`);
 
 const { chromium } = createRequire(new URL("package.json", web))("playwright-core");
 export const PATIENCE = 120_000; // [ms] for a busy machine: nothing here is about how fast it is

@@ -134,9 +134,10 @@ class Page(WebSocket):
         self.names = {}  # of subscriptions
         self.answers = {}  # of calls
         self.statuses = []
+        self.time = None  # [ns] of the run, as we were told it last
         self.next = 1
         while not self.services:
-            self._text(self.receive())
+            self.hear()
 
     def _text(self, message):
         if message["op"] == "advertise":
@@ -164,6 +165,9 @@ class Page(WebSocket):
         if message[0] == 1:
             subscription, nanoseconds = struct.unpack("<IQ", message[1:13])
             return self.names[subscription], nanoseconds, json.loads(message[13:])
+        if message[0] == 2:
+            self.time, = struct.unpack("<Q", message[1:])
+            return None
         assert message[0] == 3, message[:20]
         service, call, size = struct.unpack("<III", message[1:13])
         assert message[13:13 + size] == b"json"

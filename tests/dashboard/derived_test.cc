@@ -155,6 +155,28 @@ TEST_CASE("a picture has every solid where the robot's kinematics have it") {
   CHECK(json::parse(SceneUpdate::Schema())["title"] == "foxglove.SceneUpdate");
 }
 
+TEST_CASE(
+    "whoever looks from the frame \"robot\" goes with it along the ground, which never ends") {
+  const RobotDescription hopper = Robot("hopper"), pendulum = Robot("pendulum");
+  CHECK(json::parse(SceneUpdate::FrameSchema())["title"] == "foxglove.FrameTransform");
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(hopper.num_positions());
+  q[0] = 20.8, q[1] = 0.3, q[2] = 0.1;  // it has hopped away, is in the air, leans
+  const SceneUpdate scene(hopper);
+  const json frame = json::parse(scene.FrameJson(1'500'000, q));
+  CHECK(frame["parent_frame_id"] == "world");
+  CHECK(frame["child_frame_id"] == "robot");
+  CHECK(frame["timestamp"] == json{{"sec", 1}, {"nsec", 500'000'000}});
+  CHECK(frame["translation"]["x"].get<double>() == Approx(20.8).margin(0.5));
+  CHECK(frame["translation"]["z"] == 0);
+  CHECK(frame["rotation"] == json{{"x", 0}, {"y", 0}, {"z", 0}, {"w", 1}});
+  const json ground = json::parse(scene.Json(1'500'000, q))["entities"][0];
+  CHECK(ground["cubes"][0]["pose"]["position"]["x"] == frame["translation"]["x"]);
+  // What stays where it is has a frame that does.
+  const SceneUpdate swings(pendulum);
+  CHECK(json::parse(swings.FrameJson(0, Eigen::VectorXd::Constant(1, 0.3))) ==
+        json::parse(swings.FrameJson(0, Eigen::VectorXd::Constant(1, 2.3))));
+}
+
 TEST_CASE("the page is told of joints, coordinates, priors, and whether it may arm") {
   const RobotDescription robot = Robot("hopper");
   const json read = json::parse(RobotJson(robot, ""));

@@ -136,9 +136,64 @@ TEST_CASE("times that are none, and names that are ours, do no harm") {
   CHECK(stand.looker.topics.size() == topics);
 }
 
+/// Whether a schema has lists of lists anywhere.
+bool ListsLists(const json& schema, bool in_list = false) {
+  const bool list = schema.value("type", json()) == "array";
+  if (list && in_list) return true;
+  if (list) return ListsLists(schema["items"], true);
+  return std::ranges::any_of(schema.value("properties", json::object()),
+                             [](const json& property) { return ListsLists(property); });
+}
+
+TEST_CASE("no schema has lists of lists, which Foxglove and Lichtblick refuse with their topic") {
+  Stand stand;
+  stand.looker.Take();
+  REQUIRE(stand.looker.topics.size() > 15);
+  for (const auto& [name, topic] : stand.looker.topics) {
+    INFO(name);
+    CHECK_FALSE(ListsLists(json::parse(topic["schema"].get<std::string>())));
+  }
+  CHECK(ListsLists(json::parse(
+      R"({"type":"object","properties":{"a":{"type":"array","items":{"type":"array"}}}})")));
+}
+
+TEST_CASE("the run's time is told before what was said then, and again where it goes back") {
+  Stand stand;
+  stand.Listen("ROBOT_STATE");
+  for (int i = 0; i < 30; ++i) {
+    stand.moment.now += 2000;
+    robot_state_t state = State(i);
+    state.utime = kUtime + 2000 * i;
+    stand.Hear("ROBOT_STATE", state);
+  }
+  stand.looker.Take();
+  const size_t before = stand.looker.times.size();
+  CHECK(before == 10);  // every 6 ms: of each third
+  CHECK(std::ranges::is_sorted(stand.looker.times));
+  robot_state_t state = State(0);
+  state.utime = kUtime - 1'000'000;
+  stand.Hear("ROBOT_STATE", state);
+  stand.looker.Take();
+  REQUIRE(stand.looker.times.size() == before + 1);
+  CHECK(stand.looker.times.back() == state.utime);
+  Stand early;  // before there is a run there is the machine's time
+  early.Listen("PLUMB_GATEWAY");
+  early.Pass(1'000'000);
+  early.looker.Take();
+  CHECK(early.looker.times == std::vector<int64_t>{kUtime + 1'000'000});
+  early.Hear("ROBOT_STATE", State(0));
+  early.looker.Take();
+  CHECK(early.looker.times.back() == kUtime);
+  Looker late;
+  stand.gateway.Join(late.viewer);
+  late.Take();
+  CHECK(late.times == std::vector<int64_t>{state.utime});
+  stand.gateway.Leave(late.viewer);
+}
+
 TEST_CASE("what follows from messages: a picture, a prediction, a posterior beside its prior") {
   Stand stand;
-  for (const char* topic : {"PLUMB_SCENE", "PLUMB_PREDICTION", "PLUMB_POSTERIOR"})
+  for (const char* topic : {"PLUMB_SCENE", "PLUMB_FRAME", "PLUMB_PREDICTION", "PLUMB_POSTERIOR"})
     stand.Listen(topic);
   parameter_distribution_t prior = ParameterDistribution::Prior(Pendulum()).ToMessage();
   prior.iteration = 1;
@@ -160,6 +215,8 @@ TEST_CASE("what follows from messages: a picture, a prediction, a posterior besi
   CHECK(posterior["samples"] == posterior["prior_samples"]);
   // 150 ms of states: a picture every 33 ms, a prediction every 20, once 40 ms of them are there
   CHECK(of("PLUMB_SCENE").size() == 5);
+  CHECK(of("PLUMB_FRAME").size() == 5);
+  CHECK(of("PLUMB_FRAME").back()["child_frame_id"] == "robot");
   CHECK(of("PLUMB_PREDICTION").size() == 6);
   const json prediction = of("PLUMB_PREDICTION").back();
   CHECK(prediction["q_measured"] == json{0.1});

@@ -25,6 +25,8 @@ struct Looker {
         texts.push_back(nlohmann::json::parse(*item.payload));
         for (const auto& topic : texts.back().value("channels", nlohmann::json::array()))
           topics[topic["topic"]] = topic;
+      } else if (!item.head && item.utime) {
+        times.push_back(*item.utime);
       } else if (!item.head) {
         answers.push_back(nlohmann::json::parse(item.payload->substr(17)));
       } else {
@@ -49,6 +51,7 @@ struct Looker {
   std::vector<nlohmann::json> texts, answers;
   std::map<std::string, nlohmann::json> topics;
   std::vector<Heard> heard;
+  std::vector<int64_t> times;  // [us] that were told
 };
 
 }  // namespace plumb

@@ -112,6 +112,10 @@ test("a run that may only be looked at says why", visit({ robot: { may_control: 
   assert.deepEqual(mock.asked, ["emergency_stop"]);
 }));
 
+test("a page of another robot than the run's says so", visit({ robot: { name: "hopper" } }, {}, async ({ page }) => {
+  await page.getByRole("alert").filter({ hasText: "The driver that is heard is of pendulum, and this page of hopper" }).waitFor();
+}));
+
 test("a wish to place the robot is shown, and confirmed", visit({ placing: true }, {}, async ({ page, mock }) => {
   await page.getByText("Place the robot").waitFor();
   assert.match(await page.locator(".placing").innerText(), /pivot \[rad\] −0\.773, moving with pivot \[rad\/s\] 0\.812/);

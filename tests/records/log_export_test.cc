@@ -127,10 +127,14 @@ TEST_CASE_METHOD(Recorded, "the robot is drawn where it was, thirty times a seco
   for (const auto& entity : scene.at("entities")) drawn = drawn || entity.at("id") == "robot";
   CHECK(drawn);
   CHECK(scenes[1].logged == static_cast<uint64_t>(kBegin + 40'000) * 1000);
-  bool known = false;
+  const auto frames = file.Of("PLUMB_FRAME");
+  REQUIRE(frames.size() == scenes.size());
+  CHECK(frames[1].logged == scenes[1].logged);
+  CHECK(nlohmann::json::parse(frames[1].data).at("translation").at("z") == 0);
+  int known = 0;
   for (const auto& [id, schema] : file.schemas)
-    known = known || schema.name == "foxglove.SceneUpdate";
-  CHECK(known);
+    known += schema.name == "foxglove.SceneUpdate" || schema.name == "foxglove.FrameTransform";
+  CHECK(known == 2);
 }
 
 /// A table's cells, quotes resolved.
