@@ -20,6 +20,9 @@ namespace plumb {
 Child::Child(std::string name, const std::vector<std::string>& arguments,
              const std::filesystem::path& log)
     : name_(std::move(name)), log_(log) {
+  std::error_code none_yet;
+  const uintmax_t size = std::filesystem::file_size(log, none_yet);
+  begins_ = none_yet ? 0 : size;
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
@@ -50,6 +53,7 @@ Child::Child(std::string name, const std::vector<std::string>& arguments,
 Child::Child(Child&& other) noexcept
     : name_(std::move(other.name_)),
       log_(std::move(other.log_)),
+      begins_(other.begins_),
       pid_(std::exchange(other.pid_, -1)),
       status_(std::exchange(other.status_, {})) {}
 
@@ -87,6 +91,7 @@ bool Child::WaitFor(double seconds) {
 
 std::string Child::Tail(size_t lines) const {
   std::ifstream stream(log_);
+  stream.seekg(static_cast<std::streamoff>(begins_));
   std::deque<std::string> last;
   for (std::string line; std::getline(stream, line);) {
     last.push_back(line);

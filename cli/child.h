@@ -2,6 +2,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -32,12 +33,13 @@ class Child {
   void Signal(int signal);
   /// Waits until it has ended, at most `seconds`. @return true if it has.
   bool WaitFor(double seconds);
-  /// The last lines of its log.
+  /// The last lines that it has written to its log, which may have those of earlier runs.
   std::string Tail(size_t lines) const;
 
  private:
   std::string name_;
   std::filesystem::path log_;
+  uintmax_t begins_;  ///< in the log
   pid_t pid_ = -1;
   std::optional<int> status_;
 };

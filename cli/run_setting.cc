@@ -8,6 +8,7 @@
 #include <ctime>
 #include <stdexcept>
 
+#include "calibrator/live/checkpoint.h"
 #include "calibrator/motion/transitions.h"
 #include "cli/launch_report.h"
 #include "cli/outputs.h"
@@ -19,6 +20,7 @@
 #include "drivers/driver/driver.h"
 #include "sim/parameters.h"
 #include "sim/tasks/effort_table.h"
+#include "trainer/checkpoint.h"
 #include "trainer/session.h"
 
 namespace plumb {
@@ -72,21 +74,34 @@ void RequireProcessFiles(const Process& process, const LaunchFlags& flags,
   RequireSameKind(flags.report, LaunchReportBegins(), "a report of ours");
 }
 
+// A run goes on from what is in its folder; what is another's is refused before anything starts.
+void RequireOwn(const fs::path& folder, const RobotDescription& robot, const LaunchFlags& flags) {
+  CalibrationCheckpoint(folder / kCalibrationFolder, robot, flags.seed).Load();
+  const fs::path file = folder / kTrainingFolder / kTrainerCheckpoint;
+  const std::optional<Checkpoint> training = LoadCheckpoint(file);
+  if (!training) return;
+  try {
+    RequireContinues(*training, flags.seed, flags.iterations);
+  } catch (const CheckpointError& error) {
+    throw CheckpointError(file.string() + ": " + error.what() + ": give another --output");
+  }
+}
+
 }  // namespace
 
 // Listening, as RequireFree does, tells nothing of who has just begun to listen, too. What stays
 // within a process is nobody else's.
 void RunSetting::Lock(const std::string& lcm_url) {
   if (!lcm_url.starts_with("memq:")) {
-    messages_lock.emplace(
-        "messages " + LcmGroup(lcm_url),
-        "another run is under way on " + lcm_url + ": stop it, or give --lcm-url");
+    locks.emplace_back("messages " + LcmGroup(lcm_url),
+                       "another run is under way on " + lcm_url +
+                           ": stop it, or give --lcm-url and another --bus: each run has its own");
   }
   for (const BusDescription& bus : robot.buses) {
     const std::string innermost = InnermostBus(bus.url);
     if (innermost.starts_with("loop:")) continue;
-    bus_locks.emplace_back("bus " + innermost, "another run is under way on " + innermost +
-                                                   ": stop it, or give another --bus");
+    locks.emplace_back("bus " + innermost, "another run is under way on " + innermost +
+                                               ": stop it, or give another --bus");
   }
 }
 
@@ -112,6 +127,7 @@ RunSetting::RunSetting(const Process& process, const LaunchFlags& flags)
   RequireFree(process.lcm_url(), robot.buses, flags.real);
   output = MakeFolder(flags.output);
   lock.emplace(output);
+  RequireOwn(output, robot, flags);
   for (const std::string& file : {flags.summary, flags.report}) {
     if (!file.empty()) RequireWritable(file);  // perhaps in that folder
   }

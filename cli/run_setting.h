@@ -31,8 +31,7 @@ struct RunSetting {
   Eigen::VectorXd truth;         ///< hidden parameters, physical; empty: nobody knows them
   std::filesystem::path output;  ///< the run's folder
   std::optional<FolderLock> lock;
-  std::optional<NameLock> messages_lock;
-  std::deque<NameLock> bus_locks;
+  std::deque<NameLock> locks;             ///< messages and buses
   std::optional<VirtualRun> virtual_run;  ///< none in real time
 
  private:

@@ -108,15 +108,17 @@ void Config::Fail(const std::string& key, const std::string& what) const {
 }
 
 void Config::FailMissing(const std::string& key) const {
-  // A required key that is not there has usually been misspelt: then its line is the better place
-  // to point to.
+  FailMisspelt(key);
+  Fail(key, "is missing");
+}
+
+void Config::FailMisspelt(const std::string& key) const {
   for (const std::string& present : Keys()) {
     if (known_.count(present) == 0 &&
         EditDistance(present, key) <= std::min<size_t>(2, key.size() / 2)) {
       Fail(present, "is not a known key; did you mean " + key + "?");
     }
   }
-  Fail(key, "is missing");
 }
 
 double Config::Number(const std::string& key, Range range, std::optional<double> fallback) {
@@ -241,7 +243,10 @@ Config Config::Table(const std::string& key, bool required) {
 
 std::vector<Config> Config::Tables(const std::string& key) {
   std::vector<Config> tables;
-  if (!Has(key)) return tables;
+  if (!Has(key)) {
+    FailMisspelt(key);
+    return tables;
+  }
   const toml::array* array = table().get(key)->as_array();
   if (!array || !array->is_homogeneous<toml::table>())
     Fail(key, "is not an array of tables: write [[" + key + "]]");

@@ -97,6 +97,8 @@ class Config {
          std::string path);
   const toml::table& table() const { return *table_; }
   [[noreturn]] void FailMissing(const std::string& key) const;
+  /// What is not there has usually been misspelt: then its line is the place to point to.
+  void FailMisspelt(const std::string& key) const;
 
   std::shared_ptr<const toml::table> root_;
   const toml::table* table_;

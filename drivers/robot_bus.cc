@@ -43,7 +43,12 @@ std::deque<RobotBus> OpenBuses(Process& process, const RobotDescription& robot,
         OpenTransport(bus.url, driver.filters(buses.size()),
                       {process.participant(), Microseconds(robot.driver.effort_delay)});
     RequireFd(bus, *transport, robot.name);
-    buses.emplace_back(bus, std::move(transport), flight_recorder);
+    const bool shared = !process.participant() && !transport->is_replay();
+    RobotBus& opened = buses.emplace_back(bus, std::move(transport), flight_recorder);
+    if (!shared) continue;
+    const std::string innermost = InnermostBus(bus.url);
+    opened.lock.emplace("driver on " + innermost, "another driver is at work on " + innermost +
+                                                      ": end it, or give another --bus");
   }
   return buses;
 }

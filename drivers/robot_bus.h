@@ -2,8 +2,10 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "common/name_lock.h"
 #include "common/process.h"
 #include "drivers/can/transport.h"
 #include "drivers/driver/driver.h"
@@ -16,13 +18,16 @@ namespace plumb {
 struct RobotBus {
   RobotBus(const BusDescription& bus, std::unique_ptr<Transport> end, const std::string& folder);
 
+  std::optional<NameLock> lock;  ///< against a second driver on this machine; none in virtual time
+
   std::unique_ptr<Transport> transport;
   FlightRecorder recorder;
 };
 
 /// Opens them, in the robot's order, for the frames that the driver listens to. @param
 /// flight_recorder folder of the frames before a fault; empty = they are not kept.
-/// @throws std::runtime_error naming the bus that cannot be opened, or lacks the CAN FD it needs.
+/// @throws std::runtime_error naming the bus that cannot be opened, lacks the CAN FD it needs, or
+/// has another driver of this machine at work.
 std::deque<RobotBus> OpenBuses(Process& process, const RobotDescription& robot,
                                const Driver& driver, const std::string& flight_recorder);
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/nearest_name.h"
+
 namespace plumb {
 namespace {
 
@@ -162,8 +164,13 @@ std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf,
     const std::string name = config.String("name");
     const auto joint =
         std::find_if(joints.begin(), joints.end(), [&](const auto& j) { return j.name == name; });
-    if (joint == joints.end())
-      config.Fail("name", fmt::format("= \"{}\" is not a moving joint of the URDF", name));
+    if (joint == joints.end()) {
+      std::vector<std::string> moving;
+      for (const auto& j : joints) moving.push_back(j.name);
+      config.Fail("name",
+                  fmt::format("= \"{}\" is not a moving joint of the URDF; the nearest is '{}'",
+                              name, NearestName(name, moving)));
+    }
     const auto index = static_cast<size_t>(joint - joints.begin());
     if (seen[index]) config.Fail("name", fmt::format("= \"{}\" occurs twice", name));
     joint->passive = config.Boolean("passive", false);

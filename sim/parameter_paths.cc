@@ -62,7 +62,8 @@ std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
   return paths;
 }
 
-const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path) {
+const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path,
+                              const std::string& file) {
   std::vector<std::string> names;
   for (const ParameterPath& candidate : paths) {
     if (candidate.path == path) return candidate;
@@ -74,7 +75,8 @@ const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std
   if (path.starts_with("limit/")) why = " (stops need [simulation.limit])";
   if (path.starts_with("length/"))
     why = " (a link whose joints and centre of mass coincide has no length)";
-  throw std::invalid_argument("the simulator has no parameter '" + path + "'" + why +
+  const std::string where = file.empty() ? "" : file + ": [[parameter]]: ";
+  throw std::invalid_argument(where + "the simulator has no parameter '" + path + "'" + why +
                               "; the nearest is '" + NearestName(path, names) + "'");
 }
 

@@ -30,7 +30,9 @@ struct ParameterPath {
 std::vector<ParameterPath> ParameterPaths(const RobotDescription& description,
                                           const Physics<double>& physics);
 
-/// The one of that path. @throws std::invalid_argument naming the nearest if there is none.
-const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path);
+/// The one of that path. @throws std::invalid_argument naming the nearest if there is none, and, if
+/// it is known, the robot's file.
+const ParameterPath& FindPath(const std::vector<ParameterPath>& paths, const std::string& path,
+                              const std::string& file);
 
 }  // namespace plumb

@@ -89,12 +89,12 @@ Parameters::Parameters(const RobotDescription& description, const Topology& topo
   const std::vector<ParameterPath> all = ParameterPaths(description, base_);
   for (const ParameterDescription& parameter : description.parameters) {
     const auto index = static_cast<int>(paths_.size());
-    paths_.push_back(FindPath(all, parameter.name));
+    paths_.push_back(FindPath(all, parameter.name, description.file));
     means_[index] = parameter.mean;
     if (IsCholesky(paths_.back())) AddCholesky(paths_.back(), index, 0);
   }
   for (const FrozenParameter& parameter : description.frozen) {
-    const ParameterPath& path = FindPath(all, parameter.name);
+    const ParameterPath& path = FindPath(all, parameter.name, description.file);
     Check(path.path, path.values, parameter.value);
     Freeze(path, parameter.value);
   }

@@ -185,6 +185,17 @@ const policy_t& DeployedPolicy(const Checkpoint& checkpoint) {
   return checkpoint.incumbent >= 0 ? checkpoint.incumbent_policy : checkpoint.policy;
 }
 
+void RequireContinues(const Checkpoint& checkpoint, uint64_t seed, int iterations) {
+  if (checkpoint.seed != seed) {
+    throw CheckpointError(
+        fmt::format("the checkpoint is of a run with seed {}, not {}", checkpoint.seed, seed));
+  }
+  if (checkpoint.iteration < 0 || checkpoint.iteration > iterations) {
+    throw CheckpointError(fmt::format("the checkpoint stands at iteration {}, beyond {}",
+                                      checkpoint.iteration, iterations));
+  }
+}
+
 TrainerState TrainerStateOf(const Checkpoint& checkpoint) {
   TrainerState state{GaussianPolicy::FromMessage(checkpoint.policy),
                      checkpoint.critic,

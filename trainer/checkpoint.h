@@ -65,6 +65,12 @@ struct Checkpoint {
 /// The policy that the robot is to be run with: the incumbent's, else the newest. Thread-safe.
 const policy_t& DeployedPolicy(const Checkpoint& checkpoint);
 
+/// A trainer process' in the folder that it is given.
+inline constexpr char kTrainerCheckpoint[] = "trainer.checkpoint";
+/// @param iterations as TrainingSession has them.
+/// @throws CheckpointError if a session with these cannot go on from there.
+void RequireContinues(const Checkpoint& checkpoint, uint64_t seed, int iterations);
+
 /// What a checkpoint has of the trainer. @throws std::invalid_argument if a policy is none.
 TrainerState TrainerStateOf(const Checkpoint& checkpoint);
 void SetTrainerState(const TrainerState& state, Checkpoint& checkpoint);

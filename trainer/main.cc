@@ -61,7 +61,8 @@ class TrainerProcess {
                     [this](const controller_status_t& message) { OnController(message); }),
         repeat_(kRepeat, process.clock().Now()) {
     process.messenger().Follow(robot_.name);
-    if (!options.checkpoint.empty()) checkpoint_file_ = options.checkpoint + "/trainer.checkpoint";
+    if (!options.checkpoint.empty())
+      checkpoint_file_ = options.checkpoint + "/" + kTrainerCheckpoint;
   }
 
   int Run() {

@@ -241,14 +241,7 @@ Checkpoint TrainingSession::MakeCheckpoint() const {
 }
 
 void TrainingSession::Restore(const Checkpoint& checkpoint) {
-  if (checkpoint.seed != seed_) {
-    throw CheckpointError(
-        fmt::format("the checkpoint is of a run with seed {}, not {}", checkpoint.seed, seed_));
-  }
-  if (checkpoint.iteration < 0 || checkpoint.iteration > iterations_) {
-    throw CheckpointError(fmt::format("the checkpoint stands at iteration {}, beyond {}",
-                                      checkpoint.iteration, iterations_));
-  }
+  RequireContinues(checkpoint, seed_, iterations_);
   try {
     distribution_ = ParameterDistribution::FromMessage(checkpoint.distribution, description_);
     trainer_.Restore(TrainerStateOf(checkpoint));

@@ -244,6 +244,15 @@ TEST_CASE("the same run, every time: beside others, stopped now and then, withou
     Finish(stage, other);
     CHECK(Traces(stage, "other") != expected);
   }
+  {
+    INFO("what another run has left in the folder is refused before anything starts");
+    const auto said = fs::file_size(stage.folder / "first/plumb-driver.log");
+    Child other = Launch(stage, {"--iterations", "1", "--seed", "2"}, "first");
+    REQUIRE(other.WaitFor(kLong));
+    CHECK(other.ending() == "exit status 1");
+    CHECK_THAT(other.Tail(1), Contains("calibration.checkpoint") && Contains("has another seed"));
+    CHECK(fs::file_size(stage.folder / "first/plumb-driver.log") == said);
+  }
 }
 
 TEST_CASE("who speaks from outside is named once, and not heard") {

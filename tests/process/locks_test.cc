@@ -56,6 +56,10 @@ TEST_CASE(
     program = "plumb-trainer", words = "another trainer is at work there";
     arguments = {pendulum, "--lcm-url", "memq://", "--checkpoint", stage.folder};
   }
+  SECTION("a driver") {
+    program = "plumb-driver", words = "another driver is at work on " + stage.bus_url;
+    arguments = {pendulum, "--lcm-url", "memq://", "--bus", stage.bus_url};
+  }
   SECTION("a record") {
     arguments = {"--lcm-url", "memq://", "record", stage.folder / "run.lcmlog"};
     words = "run.lcmlog: is being written already";

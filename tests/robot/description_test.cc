@@ -221,7 +221,9 @@ TEST_CASE("mistakes in robot.toml are one line with file, line and field") {
              Contains("latencey is not a known key; did you mean latency?"));
   CHECK_THAT(message("node = 1", "node = \"1\""), Contains("joint[0].node is not an integer"));
   CHECK_THAT(message("name = \"pivot\"", "name = \"pivto\""),
-             Contains("\"pivto\" is not a moving joint of the URDF"));
+             Contains("\"pivto\" is not a moving joint of the URDF; the nearest is 'pivot'"));
+  CHECK_THAT(message("[[joint]]", "[[jonit]]"),
+             Contains("jonit is not a known key; did you mean joint?"));
   CHECK_THAT(message("variance = 0.33", "variance = -0.33"), Contains("parameter[0].variance"));
   CHECK_THAT(message("disarm_after = 0.25", "disarm_after = 0.05"),
              Contains("disarm_after must not be shorter"));
