@@ -37,6 +37,12 @@ def chosen(arguments, mistakes):
     return tree, [] if arguments.check else asked
 
 
+def build(tree, target, jobs):
+    done = run(["ninja", "-C", tree / "build", f"-j{jobs}", target])
+    if done.returncode != 0:
+        sys.exit(done.stdout[-4000:] + "\nthe copy does not build")
+
+
 @contextlib.contextmanager
 def made(tree, target, jobs, file, right, wrong):
     """While it lasts the mistake is there, and the target is built with it."""
@@ -44,9 +50,7 @@ def made(tree, target, jobs, file, right, wrong):
     text = source.read_text()
     try:
         source.write_text(text.replace(right, wrong))
-        done = run(["ninja", "-C", tree / "build", f"-j{jobs}", target])
-        if done.returncode != 0:
-            sys.exit(done.stdout[-4000:] + "\nthe copy does not build")
+        build(tree, target, jobs)
         yield
     finally:
         source.write_text(text)
