@@ -39,7 +39,7 @@ TEST_CASE("the divergence of one normal distribution from another, in closed for
   CHECK(KlDivergence(q, p) == Approx(-std::log(4) + (4 + 4.) / 0.5 - 0.5));
 }
 
-TEST_CASE("a precision is the covariance's inverse, and standard normals become the distribution's") {
+TEST_CASE("a precision is the covariance's inverse, and normals become the distribution's") {
   const Gaussian p = Correlated();
   CHECK((Precision(p) * p.covariance).isIdentity(1e-12));
   Random random(11);
