@@ -15,13 +15,13 @@ def run(command, **options):
 
 
 def parser(description):
-    made = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    where = made.add_mutually_exclusive_group(required=True)
+    options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    where = options.add_mutually_exclusive_group(required=True)
     where.add_argument("--tree", type=pathlib.Path, help="the copy, with its build folder in build/")
     where.add_argument("--check", action="store_true", help="only look whether each can still be made of this tree's source")
-    made.add_argument("--jobs", type=int, default=2)
-    made.add_argument("names", nargs="*", help="mistakes; default: all")
-    return made
+    options.add_argument("--jobs", type=int, default=2)
+    options.add_argument("names", nargs="*", help="mistakes; default: all")
+    return options
 
 
 def chosen(arguments, mistakes):

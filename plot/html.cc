@@ -28,9 +28,8 @@ std::string Group(const std::string& title, const std::string& panels) {
 
 std::string Panel(Width width, const std::string& title, const std::string& what,
                   const std::string& content) {
-  constexpr const char* kWidths[] = {"third", "half", "full"};
   return fmt::format("<section class=\"panel {}\"><header><h3>{}</h3></header>\n",
-                     kWidths[static_cast<int>(width)], Escape(title)) +
+                     width == Width::kHalf ? "half" : "full", Escape(title)) +
          "<p class=\"what\">" + Escape(what) + "</p>\n" + content + "</section>\n";
 }
 

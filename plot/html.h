@@ -27,7 +27,7 @@ std::string Verdict(const std::string& css, const std::string& title, const std:
 
 /// Panels under a heading. @param title text. @param panels HTML.
 std::string Group(const std::string& title, const std::string& panels);
-enum class Width { kThird, kHalf, kFull };  ///< of a wide screen
+enum class Width { kHalf, kFull };  ///< of a wide screen
 /// Title, what it shows in a sentence or two, and that. @param title, what text. @param content
 /// HTML.
 std::string Panel(Width width, const std::string& title, const std::string& what,

@@ -246,8 +246,7 @@ class Report {
                  std::to_string(s.simulated_steps), Number(s.discrepancy, 0.001)});
     }
     return Panel(Width::kFull, "Stages of the fit",
-                 "The fit begins with steps that are predicted on their own, and goes on to longer "
-                 "windows.",
+                 "So many steps are predicted as one window; the fit begins with the shortest.",
                  table.Print());
   }
 

@@ -20,7 +20,6 @@ const source = process.env.PLUMBLINE_SOURCE ?? new URL("../..", import.meta.url)
 const [pictures] = process.argv.slice(2);
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm", ".png": "image/png", ".ttf": "font/ttf" };
 const folder = mkdtempSync(`${tmpdir()}/studio-test.`);
-const port = () => 20000 + (process.pid % 20000);
 let browser, server, here;
 
 /** Studio's files, and ours: in parts, where a part is asked for. */
@@ -48,10 +47,10 @@ after(async () => {
   rmSync(folder, { recursive: true });
 });
 
-async function open(source_type, url) {
+async function open(kind, url) {
   const page = await (await browser.newContext({ viewport: { width: 1280, height: 800 } })).newPage();
   page.setDefaultTimeout(PATIENCE);
-  await page.goto(`${here}/?ds=${source_type}&ds.url=${encodeURIComponent(url)}`);
+  await page.goto(`${here}/?ds=${kind}&ds.url=${encodeURIComponent(url)}`);
   await page.getByText("plumb.robot_state_t").first().waitFor();
   return page;
 }
@@ -91,7 +90,7 @@ test("a record", { timeout: 4 * PATIENCE }, async () => {
 
 test("live, by the run's time", { timeout: 4 * PATIENCE }, async () => {
   const robot = pictures ? "hopper" : "pendulum";
-  const { loop, ended, address } = await startLoop(robot, ["--iterations", "1", "--evaluation-episodes", "60", "--seed", "3", "--speed", "1", "--origin", here], folder, port());
+  const { loop, ended, address } = await startLoop(robot, ["--iterations", "1", "--evaluation-episodes", "60", "--seed", "3", "--speed", "1", "--origin", here], folder, 20000 + (process.pid % 20000));
   try {
     const page = await open("foxglove-websocket", address.replace("http", "ws"));
     for (let look = 0; look < 3; look++) {
