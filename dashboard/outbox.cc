@@ -9,11 +9,7 @@ namespace {
 constexpr size_t kOverhead = 64;  // of an item, beyond its payload
 
 Outbox::Item TimeOf(int64_t utime) {
-  return {Outbox::Kind::kControl,
-          true,
-          0,
-          {},
-          utime,
+  return {Outbox::Kind::kControl, true, 0, utime,
           std::make_shared<const std::string>(TimeFrame(utime))};
 }
 
@@ -28,13 +24,12 @@ void Outbox::Push(Item item) {
 }
 
 Outbox::Item Outbox::Pop() {
-  const auto& [kind, binary, subscription, head, utime, payload] = items_.front();
-  const bool sets = kind == Kind::kControl && utime;
+  const Item& next = items_.front();
   // History is of any time, also of the machine's, from before the run's was known.
-  if (sets || (utime && kind != Kind::kHistory && *utime - kTimeStep >= told_)) {
-    told_ = *utime;
-    if (!sets) return TimeOf(told_);
-  }
+  const bool later =
+      next.is_message() && next.kind != Kind::kHistory && *next.utime - kTimeStep >= told_;
+  if (later || next.tells_time()) told_ = *next.utime;
+  if (later) return TimeOf(told_);
   Item item = std::move(items_.front());
   items_.pop_front();
   Account(item, false);
@@ -43,7 +38,7 @@ Outbox::Item Outbox::Pop() {
 
 void Outbox::Forget(uint32_t subscription) {
   std::erase_if(items_, [&](const Item& item) {
-    const bool gone = item.kind != Kind::kControl && item.subscription == subscription;
+    const bool gone = item.is_message() && item.subscription == subscription;
     if (gone) Account(item, false);
     return gone;
   });

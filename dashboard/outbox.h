@@ -29,9 +29,13 @@ class Outbox {
     Kind kind;
     bool binary = true;
     uint32_t subscription = 0;
-    std::optional<MessageHead> head;             ///< before the payload
-    std::optional<int64_t> utime;                ///< of the run, at which it was said [us]
-    std::shared_ptr<const std::string> payload;  ///< which other clients get, too
+    /// [us] of the run, at which a message was said; of what is control, the time that it tells
+    std::optional<int64_t> utime;
+    /// which other clients get, too; of a message without its MessageHead
+    std::shared_ptr<const std::string> payload;
+
+    bool is_message() const { return kind != Kind::kControl; }
+    bool tells_time() const { return !is_message() && utime; }
   };
 
   static constexpr int64_t kTimeStep = 5'000;  ///< [us] by which the time that is told may be late

@@ -26,8 +26,7 @@ void Topics::Publish(uint32_t id, int64_t utime, std::string json,
   const auto payload = std::make_shared<const std::string>(std::move(json));
   const auto kind = topic.keep == Keep::kHistory ? Outbox::Kind::kSlow : Outbox::Kind::kFast;
   for (const auto& [viewer, subscription] : topic.watchers) {
-    viewer->outbox.Push(
-        {kind, true, subscription, MessageHeadOf(subscription, utime), utime, payload});
+    viewer->outbox.Push({kind, true, subscription, utime, payload});
     viewer->wake();
   }
   if (topic.keep == Keep::kHistory) topic.history.Add({++said_, utime, step, words, payload});
@@ -82,15 +81,13 @@ void Topics::Subscribe(Viewer& viewer, std::span<const ClientMessage::Subscripti
     for (const History::Entry& entry : Of(topic).history.entries()) kept.push_back({&entry, id});
     if (Of(topic).keep != Keep::kNewest) continue;
     if (auto message = newest(topic)) {
-      viewer.outbox.Push({Outbox::Kind::kFast, true, id, MessageHeadOf(id, message->utime),
-                          message->utime,
+      viewer.outbox.Push({Outbox::Kind::kFast, true, id, message->utime,
                           std::make_shared<const std::string>(std::move(message->json))});
     }
   }
   std::ranges::sort(kept, {}, [](const auto& one) { return one.first->order; });
   for (const auto& [entry, id] : kept) {
-    viewer.outbox.Push({Outbox::Kind::kHistory, true, id, MessageHeadOf(id, entry->utime),
-                        entry->utime, entry->json});
+    viewer.outbox.Push({Outbox::Kind::kHistory, true, id, entry->utime, entry->json});
   }
   viewer.wake();
   if (!first_wrong.empty()) throw std::runtime_error(first_wrong);

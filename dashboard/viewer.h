@@ -22,7 +22,6 @@ struct Viewer {
                  binary,
                  0,
                  {},
-                 {},
                  std::make_shared<const std::string>(std::move(text))});
     wake();
   }

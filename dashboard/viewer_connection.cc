@@ -100,8 +100,9 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
     if (sending_ || viewer_.outbox.empty()) return;
     sending_ = viewer_.outbox.Pop();
     socket_.binary(sending_->binary);
+    if (sending_->is_message()) head_ = MessageHeadOf(sending_->subscription, *sending_->utime);
     const std::array<asio::const_buffer, 2> buffers{
-        sending_->head ? asio::buffer(*sending_->head) : asio::const_buffer(),
+        sending_->is_message() ? asio::buffer(head_) : asio::const_buffer(),
         asio::buffer(*sending_->payload)};
     socket_.async_write(buffers, [self = shared_from_this()](error_code error, size_t) {
       self->sending_.reset();
@@ -117,6 +118,7 @@ class ViewerConnection : public Connection, public std::enable_shared_from_this<
   Viewer viewer_;
   std::optional<Place> place_;
   std::optional<Outbox::Item> sending_;
+  MessageHead head_;  // of that, if it is a message
   bool joined_ = false;
 };
 

@@ -25,15 +25,12 @@ struct Looker {
         texts.push_back(nlohmann::json::parse(*item.payload));
         for (const auto& topic : texts.back().value("channels", nlohmann::json::array()))
           topics[topic["topic"]] = topic;
-      } else if (!item.head && item.utime) {
+      } else if (item.tells_time()) {
         times.push_back(*item.utime);
-      } else if (!item.head) {
+      } else if (!item.is_message()) {
         answers.push_back(nlohmann::json::parse(item.payload->substr(17)));
       } else {
-        int64_t nanoseconds = 0;
-        for (size_t i = 0; i < 8; ++i) nanoseconds |= int64_t{(*item.head)[5 + i]} << (8 * i);
-        heard.push_back(
-            {item.subscription, nanoseconds / 1000, nlohmann::json::parse(*item.payload)});
+        heard.push_back({item.subscription, *item.utime, nlohmann::json::parse(*item.payload)});
       }
     }
   }

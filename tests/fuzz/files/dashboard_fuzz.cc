@@ -19,8 +19,8 @@ bool IsJson(const std::string& payload, size_t from) {
 void TakeAll(Viewer& viewer) {
   while (!viewer.outbox.empty()) {
     const Outbox::Item item = viewer.outbox.Pop();
-    const bool is_time = item.utime && !item.head;
-    Require(is_time || IsJson(*item.payload, item.binary && !item.head ? 17 : 0));
+    const bool answers = item.binary && !item.is_message();
+    Require(item.tells_time() || IsJson(*item.payload, answers ? 17 : 0));
   }
 }
 
