@@ -43,10 +43,12 @@ std::deque<RobotBus> OpenBuses(Process& process, const RobotDescription& robot,
         OpenTransport(bus.url, driver.filters(buses.size()),
                       {process.participant(), Microseconds(robot.driver.effort_delay)});
     RequireFd(bus, *transport, robot.name);
-    const bool shared = !process.participant() && !transport->is_replay();
-    RobotBus& opened = buses.emplace_back(bus, std::move(transport), flight_recorder);
-    if (!shared) continue;
     const std::string innermost = InnermostBus(bus.url);
+    // Of virtual time, of a recording and within the process each has his own.
+    const bool own =
+        process.participant() || transport->is_replay() || innermost.starts_with("loop:");
+    RobotBus& opened = buses.emplace_back(bus, std::move(transport), flight_recorder);
+    if (own) continue;
     opened.lock.emplace("driver on " + innermost, "another driver is at work on " + innermost +
                                                       ": end it, or give another --bus");
   }
