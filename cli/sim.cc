@@ -8,6 +8,7 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 
 #include "cli/outputs.h"
@@ -15,6 +16,7 @@
 #include "cli/roll_out.h"
 #include "common/atomic_file.h"
 #include "common/time_units.h"
+#include "drivers/protocols/registry.h"
 #include "sim/simulators.h"
 #include "sim/tasks/effort_table.h"
 #include "sim/view/picture.h"
@@ -32,6 +34,19 @@ void RequireFiles(const SimFlags& flags, const RobotDescription& robot) {
   std::vector<std::string> inputs = FilesOf(robot);
   inputs.insert(inputs.end(), {flags.policy, flags.posterior, flags.efforts});
   RequireOutputs({flags.csv, flags.png, flags.gif}, inputs);
+}
+
+// A simulation needs no drives, but whoever has misspelt what they speak hears of it here, before
+// the first launch refuses it.
+void WarnOfProtocols(const RobotDescription& robot) {
+  for (const JointDescription& joint : robot.joints) {
+    if (joint.passive) continue;
+    try {
+      MotorBusDevice(joint.motor, robot.driver);
+    } catch (const std::invalid_argument& error) {
+      spdlog::warn("joint {}: {}: it cannot be driven", joint.name, error.what());
+    }
+  }
 }
 
 /// "mass/thigh=4": gives the parameter that value. One that is not among the uncertain ones joins
@@ -146,6 +161,7 @@ int Simulate(Process& process, const SimFlags& flags) {
     throw std::invalid_argument("--policy, --efforts and --random exclude each other");
   RobotDescription robot = LoadRobot(flags.robot);
   for (const std::string& warning : robot.warnings) spdlog::warn(warning);
+  WarnOfProtocols(robot);
   std::shared_ptr<const Residual> residual;
   if (!flags.posterior.empty()) residual = SetMeans(flags.posterior, robot);
   if (flags.urdf) robot.parameters.clear();

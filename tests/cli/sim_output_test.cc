@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "cli/reading_noise.h"
@@ -38,6 +39,21 @@ TEST_CASE("sim: the pendulum's table, number by number") {
     CHECK(table.at(row, "truncated") == (row % 200 == 199 ? 1 : 0));
   }
   CHECK(table.at(0, "q/pivot") != table.at(200, "q/pivot"));
+}
+
+TEST_CASE("sim: a motor's protocol that there is not is told, though nothing is driven") {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "robot.toml")
+      << "extends = \"" + Robot("pendulum") + "/robot.toml\"\n[robot]\nurdf = \"" +
+             Robot("pendulum") +
+             "/robot.urdf\"\n[[joint]]\nname = \"pivot\"\nprotocol = "
+             "\"cansimpel\"\n";
+  const Outcome outcome = Sim(folder / "robot.toml --random");
+  INFO(outcome.text);
+  CHECK(outcome.status == 0);
+  CHECK(outcome.text.find("joint pivot: unknown motor protocol 'cansimpel'; known: cansimple") !=
+        std::string::npos);
+  CHECK(Sim(Robot("hopper") + " --random").text.find("cannot be driven") == std::string::npos);
 }
 
 TEST_CASE("sim: the hopper's table") {
