@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 
 #include "trainer/trainer.h"
 
@@ -17,10 +18,14 @@ struct Oracle {
 /// Trains in simulations that are the reality (SimulateBusRobot) until the best policy so far is
 /// kPatience updates old, or for kMostUpdates. The policy is judged after every kBetween updates,
 /// in 30 episodes without exploration; the best one is the result.
+/// @param checkpoint the file where it is left after each judgement, and from which it goes on with
+/// the same bits; the caller removes it once the result is safe.
+/// @param identity of the reality and the model.
 /// @param progress told the share of kMostUpdates that is done; may throw to break off.
-/// @throws as Trainer.
+/// @throws as Trainer; CheckpointError, also if the checkpoint is of another identity or seed.
 Oracle TrainOracle(const RobotDescription& model, const SimulationFactory& reality, uint64_t seed,
-                   int threads, const std::function<void(double)>& progress);
+                   int threads, const std::string& checkpoint, uint64_t identity,
+                   const std::function<void(double)>& progress);
 
 /// Which share of the oracle's return a return is. One below zero is a cost, of which the oracle's
 /// is the least.

@@ -16,6 +16,7 @@
 
 #include "common/atomic_file.h"
 #include "common/examples.h"
+#include "common/hash.h"
 #include "experiments/bus_robot.h"
 #include "experiments/bus_simulation.h"
 #include "experiments/jobs.h"
@@ -122,12 +123,17 @@ struct Remembered {
 };
 
 // The same policy in each iteration: it has no share in the loop.
-Results::Rows RunOracle(const Options& options, const RobotDescription& truth,
+Results::Rows RunOracle(const Options& options, const Gap& gap, const RobotDescription& truth,
                         const RobotDescription& model, const Eigen::VectorXd& hidden, uint64_t seed,
                         BusRobot& real, const std::function<void(double)>& progress) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  const Oracle oracle = TrainOracle(model, SimulateBusRobot(truth, model, hidden, seed), seed,
-                                    options.threads, progress);
+  const std::filesystem::path checkpoint =
+      std::filesystem::path(options.output) / fmt::format("oracle_{}_{}.checkpoint", gap.key, seed);
+  const Oracle oracle = TrainOracle(
+      model, SimulateBusRobot(truth, model, hidden, seed), seed, options.threads,
+      checkpoint.string(),
+      Hash(fmt::format("{} {} {}", truth.fingerprint, model.fingerprint, model.task.steps)),
+      progress);
   const auto judged =
       Loop::Judge(real, oracle.policy, model.task.steps, options.quick ? 1 : kJudged);
   Results::Rows rows;
@@ -136,6 +142,7 @@ Results::Rows RunOracle(const Options& options, const RobotDescription& truth,
                     kNone, 0, static_cast<double>(oracle.steps),
                     static_cast<double>(oracle.steps) * model.task.period});
   }
+  std::filesystem::remove(checkpoint);
   return rows;
 }
 
@@ -155,7 +162,7 @@ Results::Rows RunLoop(const Options& options, const Gap& gap, const Method& meth
   std::unique_ptr<Loop>& loop = remembered.loops[fmt::format("{} {}", model_file, method.residual)];
   if (!loop) loop = std::make_unique<Loop>(model, hidden);
   BusRobot real(truth, model, hidden, seed);
-  if (method.oracle) return RunOracle(options, truth, model, hidden, seed, real, progress);
+  if (method.oracle) return RunOracle(options, gap, truth, model, hidden, seed, real, progress);
   LoopSettings settings;
   settings.strategy = method.strategy;
   settings.iterations = options.iterations;

@@ -42,13 +42,13 @@ struct Checkpoint {
   bool complete = false;
   Evaluation evaluation;       ///< of the policy, once it is complete
   double training_return = 0;  ///< of the last batch
-  policy_t policy;
-  parameter_distribution_t distribution;  ///< of the iteration
+  policy_t policy{};
+  parameter_distribution_t distribution{};  ///< of the iteration
   CriticState critic;
   ObservationMoments observations;  ///< as in TrainerState
   /// JudgedPolicy of TrainerState, if there is one
   bool judged = false;
-  policy_t best_policy;
+  policy_t best_policy{};
   CriticState best_critic;
   int64_t best_updates = 0;
   double best_return = 0;
@@ -57,7 +57,7 @@ struct Checkpoint {
   std::vector<TriedPolicy> trials;
   Acceptance::Decision decision;
   int32_t incumbent = -1, incumbent_since = -1;
-  policy_t incumbent_policy;
+  policy_t incumbent_policy{};
   /// of the iteration's updates, in virtual time; see PastTrainings
   std::vector<training_status_t> statuses;
 };
