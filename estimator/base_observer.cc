@@ -18,8 +18,16 @@ constexpr double kLate = 1e-6 * ImuInbox::kLatest;                            //
 constexpr double kSurelyApart = 5;                                            // standard deviations
 constexpr double kHeightKnown = 0.1, kTiltKnown = 0.1, kVelocityKnown = 0.5;  // [m], [rad], [m/s]
 
+// [kg] of all that the base carries, and of itself.
+double Mass(const RobotDescription& robot) {
+  double mass = 0;
+  for (const LinkDescription& link : robot.links) mass += link.mass;
+  return mass;
+}
+
 LegOdometry::Settings SettingsOf(const RobotDescription& robot, const FloatingBase& base) {
   const SensorDescription& imu = robot.sensors[base.imu];
+  const auto& contact = robot.simulation.contact;
   return {.rate_sd = imu.noise.velocity_sd,
           .rate_bias_sd = imu.rate_bias_sd,
           .acceleration_sd = imu.acceleration_sd,
@@ -29,7 +37,8 @@ LegOdometry::Settings SettingsOf(const RobotDescription& robot, const FloatingBa
           .ground_sd = robot.estimator.ground_sd,
           .slip = robot.estimator.slip,
           .gravity = robot.simulation.gravity,
-          .normal = base.spatial ? std::nullopt : std::optional(base.normal())};
+          .normal = base.spatial ? std::nullopt : std::optional(base.normal()),
+          .give = contact ? Mass(robot) / contact->stiffness : 0};
 }
 
 // That the smoother has to remember: of the lag, of what may come late, and those around it.

@@ -28,7 +28,11 @@ constexpr double kRestHeightKnown = 0.03;
 constexpr double kBorneFor = 0.1;
 // [s] after which the force on a body in flight is zero on average
 constexpr double kLongFlight = 0.5;
-constexpr double kAstray = 8;  // standard deviations below the ground
+constexpr double kAstray = 8;       // standard deviations below the ground
+constexpr double kSurelyAbove = 5;  // standard deviations above it
+// Share of its weight from which on a body that flies for long is held up. Legs that swing pull and
+// push it by half of that and more.
+constexpr double kHeldUp = 0.9;
 
 Matrix3d Cross(const Vector3d& a) {
   Matrix3d m;
@@ -202,9 +206,10 @@ void LegOdometry::Judge(size_t index, std::span<const Foot> feet) {
   const Foot& foot = feet[index];
   ContactTest::Motion motion = MotionOf(foot);
   const bool rested = rests(index);
-  if (!rested && motion.height_sd > kRestHeightKnown) {
-    // A height that is as good as unknown excludes nothing and excuses nothing; but what falls
-    // freely rests on nothing.
+  if (!rested && motion.height_sd > kRestHeightKnown &&
+      motion.height < kSurelyAbove * motion.height_sd) {
+    // A height that is as good as unknown excludes nothing and excuses nothing, unless it is surely
+    // one in the air; but what falls freely rests on nothing.
     if (borne_ < s_.gravity / 2) return;
     motion.height = 0;
     // In a plane what touches is one foot's: as good as level.
@@ -235,14 +240,22 @@ void LegOdometry::SetDown(size_t index, const Foot& foot) {
   covariance_(at + 2, at + 2) = Square(s_.ground_sd);
 }
 
+// [m] by which the ground gives way, once it has settled, under each foot that rests.
+double LegOdometry::Pressed() const {
+  const auto resting = std::count_if(feet_.begin(), feet_.end(),
+                                     [](const Rest& foot) { return foot.test.touching(); });
+  if (resting == 0 || !force_) return 0;
+  return s_.give * std::max(0.0, force_->z()) / static_cast<double>(resting);
+}
+
 // A sphere rolls, creeps, and sinks in or comes up again (an Ornstein-Uhlenbeck process).
 void LegOdometry::Wander(size_t index, const Foot& foot) {
   const Eigen::Index at = IndexOf(index);
   Vector3d& place = feet_[index].place;
   const Vector3d rate = orientation_ * (rate_ - rate_bias_ + foot.rate);
   place += dt_ * foot.radius * (allowed_ * rate.cross(Vector3d::UnitZ()));
-  const double keeps = std::exp(-dt_ / kSettlesIn);
-  place.z() = foot.radius + keeps * (place.z() - foot.radius);
+  const double keeps = std::exp(-dt_ / kSettlesIn), pressed = foot.radius - Pressed();
+  place.z() = pressed + keeps * (place.z() - pressed);
   if (smoother_) smoother_->Scaled(at + 2, keeps);
   covariance_.row(at + 2) *= keeps;
   covariance_.col(at + 2) *= keeps;
@@ -272,7 +285,7 @@ void LegOdometry::Correct(std::span<const Foot> feet) {
     if (!rested || !CorrectBy(i, feet[i])) astray_ = true;
   }
   // Legs may swing, but what flies for long is not held up.
-  if (flight_ > kLongFlight && lift_ > flight_ * s_.gravity / 2) astray_ = true;
+  if (flight_ > kLongFlight && lift_ > kHeldUp * flight_ * s_.gravity) astray_ = true;
 }
 
 // place - position - orientation * centre = 0, but for noise. False: that cannot be, and nothing is

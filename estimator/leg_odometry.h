@@ -20,9 +20,9 @@ class LegSmoother;
 /// State: position and velocity of the body's origin, its orientation, gyro and accelerometer
 /// biases, and the places of the feet that rest. An IMU's reading moves it on; where the legs'
 /// kinematics see a resting foot corrects it. Beyond the paper: the ground is the plane z = 0, soft
-/// and not quite even (the height of a foot that rests wanders about it); feet are spheres, which
-/// roll; and which of them rest is judged by ContactTest from the filter itself, since nothing
-/// feels it.
+/// and not quite even (the height of a foot that rests wanders about what the body's weight and
+/// acceleration press it in); feet are spheres, which roll; and which of them rest is judged by
+/// ContactTest from the filter itself, since nothing feels it.
 ///
 /// The orientation's error is a rotation in the world's axes, which keeps what feet and IMU cannot
 /// tell, the heading, to one direction; neither can they tell the horizontal position. Both count
@@ -36,13 +36,17 @@ class LegOdometry {
     double rate_sd, rate_bias_sd;  ///< [rad/s] of a gyro's reading
     /// [m/s^2] of an accelerometer's, averaged over a period
     double acceleration_sd, acceleration_bias_sd;
-    double period;     ///< [s] of the IMU
-    double angle_sd;   ///< [rad] of the orientation at the start
-    double ground_sd;  ///< [m] by which the ground is uneven and gives way
-    double slip;       ///< [m/sqrt(s)] by which a foot that rests creeps
-    double gravity;    ///< [m/s^2]
+    double period;    ///< [s] of the IMU
+    double angle_sd;  ///< [rad] of the orientation at the start
+    double
+        ground_sd;   ///< [m] by which the ground is uneven, and gives way otherwise than by `give`
+    double slip;     ///< [m/sqrt(s)] by which a foot that rests creeps
+    double gravity;  ///< [m/s^2]
     /// unit vector, in the world: the body stays in the plane across it
     std::optional<Eigen::Vector3d> normal = {};
+    /// [m / (m/s^2)] by which a single foot that carries the body is pressed in, for each unit of
+    /// the specific force upwards: mass / stiffness of the ground. Feet that rest share it.
+    double give = 0;
   };
   /// The legs' measurement of a sphere that can touch the ground, in the body's axes, relative to
   /// the body. Variances without those of the body.
@@ -134,6 +138,7 @@ class LegOdometry {
                          ContactTest::Motion* motion) const;
   void SetDown(size_t index, const Foot& foot);
   void Forget(Eigen::Index block);
+  double Pressed() const;
   void Wander(size_t index, const Foot& foot);
   bool CorrectBy(size_t index, const Foot& foot);
   void Shift();

@@ -104,17 +104,20 @@ Eigen::VectorXd ConfigurationSpace::At(const Vector& coordinates, const Vector& 
 }
 
 Eigen::VectorXd ConfigurationSpace::Move(const Vector& q, const Vector& step) const {
-  if (flat()) return q + step;
   Eigen::VectorXd moved = q;
+  MoveInPlace(step, moved);
+  return moved;
+}
+
+void ConfigurationSpace::MoveInPlace(const Vector& step, Eigen::Ref<Eigen::VectorXd> q) const {
   for (Eigen::Index c = 0; c < num_velocities_; ++c) {
     const Eigen::Index at = position_of_[static_cast<size_t>(c)];
-    if (at >= 0) moved[at] += step[c];
+    if (at >= 0) q[at] += step[c];
   }
   for (const Turn& turn : turns_) {
     Put((QuaternionAt(q, turn.position) * Exp(step.segment<3>(turn.velocity))).normalized(),
-        turn.position, moved);
+        turn.position, q);
   }
-  return moved;
 }
 
 void ConfigurationSpace::Move(Eigen::Index c, double by, Eigen::Ref<Eigen::VectorXd> q) const {

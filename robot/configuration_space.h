@@ -38,6 +38,8 @@ class ConfigurationSpace {
   /// Where one is after a step from q: Difference(Move(q, step), q) = step, if that turns no joint
   /// by more than pi. Quaternions are of unit length again.
   Eigen::VectorXd Move(const Vector& q, const Vector& step) const;
+  /// The same in place. Does not allocate.
+  void MoveInPlace(const Vector& step, Eigen::Ref<Eigen::VectorXd> q) const;
   /// The same for a step of `by` in entry c alone.
   void Move(Eigen::Index c, double by, Eigen::Ref<Eigen::VectorXd> q) const;
   /// Makes quaternions, which may have been written with few digits, unit ones, and of the two of a

@@ -17,7 +17,7 @@ Correction::Correction(const Model& model, std::shared_ptr<const Residual> resid
     : residual_(std::move(residual)),
       sample_(Checked(model, *residual_)),
       inputs_(model, residual_->margin),
-      dq_(model.num_positions()),
+      dq_(model.num_velocities()),
       dv_(model.num_velocities()) {}
 
 void Correction::EndStep(Simulator& simulator, const Eigen::Ref<const Eigen::VectorXd>& effort,

@@ -28,7 +28,10 @@ std::unique_ptr<Engine> WithPhysics(std::unique_ptr<Engine> engine,
 }  // namespace
 
 Model::Model(const RobotDescription& description)
-    : description_(description), topology_(description), parameters_(description, topology_) {
+    : description_(description),
+      space_(description),
+      topology_(description),
+      parameters_(description, topology_) {
   RequireInertia();
 }
 

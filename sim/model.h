@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <memory>
 
+#include "robot/configuration_space.h"
 #include "robot/description.h"
 #include "sim/dynamics/engine.h"
 #include "sim/dynamics/topology.h"
@@ -22,6 +23,7 @@ class Model {
   explicit Model(const RobotDescription& description);
 
   const RobotDescription& description() const { return description_; }
+  const ConfigurationSpace& space() const { return space_; }
   const Topology& topology() const { return topology_; }
   const Parameters& parameters() const { return parameters_; }
   int num_positions() const { return topology_.positions; }
@@ -41,6 +43,7 @@ class Model {
   void RequireInertia() const;
 
   RobotDescription description_;
+  ConfigurationSpace space_;
   Topology topology_;
   Parameters parameters_;
 };

@@ -39,8 +39,6 @@ ResidualInputs::ResidualInputs(const Model& model, double margin)
       acceleration_(v_.size()),
       constrained_(v_.size()),
       x_(ResidualInputCount(model.description())) {
-  if (model.num_positions() != model.num_velocities())
-    throw std::invalid_argument("a residual is not for robots with spherical joints");
   const Eigen::VectorXd all = model.description().effort_limits();
   for (Eigen::Index a = 0; a < limits_.size(); ++a) limits_[a] = all[a];
 }

@@ -27,7 +27,6 @@ void RequireResidualOf(const RobotDescription& robot, const Residual& residual);
 class ResidualInputs {
  public:
   /// @param margin see StepContacts.
-  /// @throws std::invalid_argument if the robot has spherical joints.
   ResidualInputs(const Model& model, double margin);
 
   int size() const { return static_cast<int>(x_.size()); }

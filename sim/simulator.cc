@@ -148,7 +148,7 @@ void Simulator::Run() {
 
 void Simulator::Correct(const Vector& dq, const Vector& dv) {
   if (!finite_) return;
-  for (Eigen::Index i = 0; i < q_.size(); ++i) engine_->q()[i] += dq[i];
+  model_->space().MoveInPlace(dq, Eigen::Map<Eigen::VectorXd>(engine_->q(), q_.size()));
   for (Eigen::Index i = 0; i < v_.size(); ++i) engine_->v()[i] += dv[i];
   Take();
 }

@@ -75,7 +75,8 @@ class Simulator {
   void Prepare(const Vector& effort, double duration);
   void Prepare(std::span<const EffortSegment> profile);
   void Run();
-  /// Adds to the state what a residual says that the step has left out; efforts on their way stay.
+  /// Moves the state by what a residual says that the step has left out; efforts on their way stay.
+  /// @param dq, dv num_velocities entries; see ConfigurationSpace.
   void Correct(const Vector& dq, const Vector& dv);
 
   const Eigen::VectorXd& q() const { return q_; }  ///< [rad or m]

@@ -61,7 +61,8 @@ StepContacts::StepContacts(const Model& model, double margin)
   for (size_t i = 0; i < robot.joints.size(); ++i) {
     const JointDescription& joint = robot.joints[i];
     if (HasStop(robot, joint))
-      stops_.push_back({model.topology().joints[i].velocity, joint.lower, joint.upper});
+      stops_.push_back({model.topology().joints[i].position, model.topology().joints[i].velocity,
+                        joint.lower, joint.upper});
   }
   joints_.assign(stops_.size(), stop);
   touching_.reserve(points_.size() + joints_.size());
@@ -99,16 +100,16 @@ void StepContacts::End(Simulator& simulator, const Eigen::Ref<const Eigen::Vecto
     touching_.push_back(&contact);
   }
   for (size_t s = 0; s < stops_.size(); ++s) {
-    const auto [joint, lower, upper] = stops_[s];
-    const double q = simulator.q()[joint];
+    const auto [position, velocity, lower, upper] = stops_[s];
+    const double q = simulator.q()[position];
     const bool low = q - lower < upper - q;
     const double stop = low ? lower : upper, away = low ? 1 : -1;
-    if (!(std::min(away * (q_[joint] - stop), away * (q - stop)) <= margin_)) continue;
+    if (!(std::min(away * (q_[position] - stop), away * (q - stop)) <= margin_)) continue;
     Contact& contact = joints_[s];
-    contact.jacobian(0, joint) = away;
+    contact.jacobian(0, velocity) = away;
     Respond(simulator, &contact);
-    contact.x << away * (q_[joint] - stop), away * v_[joint], away * (q - stop),
-        away * simulator.v()[joint], away * constrained[joint];
+    contact.x << away * (q_[position] - stop), away * v_[velocity], away * (q - stop),
+        away * simulator.v()[velocity], away * constrained[velocity];
     touching_.push_back(&contact);
   }
 }
@@ -141,7 +142,8 @@ void StepContacts::Nearness(Eigen::Ref<Eigen::VectorXd> nearness) const {
     i += 1 + directions_;
   }
   for (const Stop& stop : stops_)
-    nearness[i++] = distance(q_[stop.joint] - stop.lower) - distance(stop.upper - q_[stop.joint]);
+    nearness[i++] =
+        distance(q_[stop.position] - stop.lower) - distance(stop.upper - q_[stop.position]);
 }
 
 }  // namespace plumb

@@ -57,7 +57,7 @@ class StepContacts {
 
  private:
   struct Stop {
-    Eigen::Index joint;
+    Eigen::Index position, velocity;  // in q and v
     double lower, upper;
   };
   void Look(Simulator& simulator, Eigen::VectorXd* heights, Eigen::MatrixXd* velocities);

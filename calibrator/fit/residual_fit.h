@@ -54,7 +54,7 @@ struct ResidualFit {
 /// residual. Thread-safe; the same bits each time.
 /// @param coordinates of the simulators to be corrected, a column each, at least one; the first one
 /// decides the scales.
-/// @throws std::invalid_argument for robots with spherical joints, or parameters that are none.
+/// @throws std::invalid_argument for parameters that are none.
 ResidualFit FitResidual(const std::shared_ptr<const Model>& model,
                         const Eigen::MatrixXd& coordinates, std::span<const Rollout> rollouts,
                         const ResidualFitOptions& options);

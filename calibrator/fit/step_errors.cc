@@ -1,6 +1,7 @@
 #include "calibrator/fit/step_errors.h"
 
 #include "calibrator/fit/recorded_window.h"
+#include "robot/configuration_space.h"
 #include "sim/residual_inputs.h"
 #include "sim/simulator.h"
 
@@ -13,11 +14,11 @@ Eigen::VectorXd Stack(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   return both;
 }
 
-void Add(const ResidualInputs& inputs, const Transition& t, const Simulator::State& reading,
-         StepErrors::Place place, StepErrors* to) {
+void Add(const ConfigurationSpace& space, const ResidualInputs& inputs, const Transition& t,
+         const Simulator::State& reading, StepErrors::Place place, StepErrors* to) {
   to->places.push_back(place);
   to->inputs.push_back(inputs.x());
-  to->errors.push_back(Stack(t.next_q - reading.q, t.next_v - reading.v));
+  to->errors.push_back(Stack(space.Difference(t.next_q, reading.q), t.next_v - reading.v));
   to->variances.push_back(Stack(t.next_q_sd.cwiseAbs2() + t.q_sd.cwiseAbs2(),
                                 t.next_v_sd.cwiseAbs2() + t.v_sd.cwiseAbs2()));
   std::vector<StepContacts::Contact>& contacts = to->contacts.emplace_back();
@@ -37,6 +38,7 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
                            const Eigen::VectorXd& physical, std::span<const Rollout> rollouts,
                            double margin) {
   SortedErrors errors;
+  const ConfigurationSpace space(model->description());
   ResidualInputs inputs(*model, margin);
   Simulator simulator(model);
   simulator.SetParameters(physical);
@@ -52,7 +54,7 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
         simulator.Step(t.efforts);
         inputs.End(simulator, effort, before, t.duration());
         if (simulator.finite())
-          Add(inputs, t, simulator.Reading(), {r, i},
+          Add(space, inputs, t, simulator.Reading(), {r, i},
               inputs.touching() ? &errors.touching : &errors.free);
       }
       last = &t;

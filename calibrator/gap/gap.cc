@@ -54,8 +54,6 @@ std::string Obstacle(const MethodInput& input) {
   if (!KnowsLikelihood(input.options.method))
     return fmt::format("{} does not know the likelihood of steps, as auto does",
                        input.options.method);
-  if (input.model->num_positions() != input.model->num_velocities())
-    return "a residual is not for robots with spherical joints";
   return "";
 }
 

@@ -66,10 +66,9 @@ struct GapFit {
 ///      stays.
 ///   6. A residual for what was left out is learnt for draws of that posterior, from all steps.
 ///
-/// Only of methods that know the likelihood of steps (LikelihoodMethods), of robots without
-/// spherical joints, and where input.options.residual says so: else the result stays as it is.
-/// Uses the threads that input.options says, and shares nothing. The same bits for any number of
-/// them.
+/// Only of methods that know the likelihood of steps (LikelihoodMethods), and where
+/// input.options.residual says so: else the result stays as it is. Uses the threads that
+/// input.options says, and shares nothing. The same bits for any number of them.
 /// @param all the method's result for input.rollouts.
 /// @param not_judged why errors cannot judge the model, if that is known beforehand: it is the
 /// alarm's summary. Empty = they can.

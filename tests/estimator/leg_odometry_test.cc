@@ -14,11 +14,13 @@ using namespace walker;
 TEST_CASE("feet and IMU tell height, tilt and velocity of a body in space, and how well") {
   const double sway = GENERATE(0.0, 1.0);
   const int num_feet = GENERATE(2, 4);
-  INFO("sway " << sway << ", " << num_feet << " feet");
+  LegOdometry::Settings settings = Settings();
+  settings.give = GENERATE(0.0, 1e-3);  // 1 cm under a single foot
+  INFO("sway " << sway << ", " << num_feet << " feet, give " << settings.give);
   double nees = 0, height = 0, tilt = 0, velocity = 0;
   int count = 0;
   for (uint64_t seed = 1; seed <= 25; ++seed) {
-    Walker walker(seed, num_feet);
+    Walker walker(seed, num_feet, settings);
     walker.sway = sway;
     walker.Start();
     walker.Run(2);
@@ -120,6 +122,38 @@ TEST_CASE("who flies grows unsure, and who is held up without feet is astray") {
     walker.Step();
   }
   CHECK(walker.filter.astray());
+}
+
+TEST_CASE("legs that swing in flight do not hold the body up") {
+  Walker walker(9, 2);
+  walker.sway = 0;
+  walker.Start();
+  walker.Run(1);
+  for (Vector3d& place : walker.places) place.z() += 3;
+  for (int i = 0; i < 120; ++i) {
+    walker.filter.Predict(kPeriod, Vector3d::Zero(), 0.6 * kGravity * Vector3d::UnitZ());
+    walker.filter.Correct(walker.Feet());
+  }
+  CHECK_FALSE(walker.filter.astray());
+}
+
+TEST_CASE("on ground that gives way a lot a foot in the air does not rest all the same") {
+  LegOdometry::Settings s = Settings();
+  s.normal = Vector3d::UnitY();
+  s.ground_sd = 0.03;
+  Walker walker(12, 2, s);
+  walker.sway = 0;
+  walker.filter.Restart(LegOdometry::Beginning::kStands, Vector3d::Zero(), Quaterniond::Identity(),
+                        walker.Feet());
+  walker.Run(1);
+  REQUIRE(walker.filter.rests(0));
+  for (int i = 0; i < 40; ++i) {
+    walker.places[0].z() = 0.3;
+    walker.Step();
+  }
+  CHECK_FALSE(walker.filter.rests(0));
+  CHECK(walker.filter.rests(1));
+  CHECK_FALSE(walker.filter.astray());
 }
 
 TEST_CASE("in a plane nothing leaves it") {

@@ -123,6 +123,24 @@ TEST_CASE("a quadruped knows its height, lean and velocities") {
   }
 }
 
+TEST_CASE("a quadruped that stands is as high as the ground that its feet press in lets it be") {
+  const RobotDescription robot = Quadruped();
+  const auto recording = Trot(robot, 5, 0);
+  StateObserver observer(robot);
+  double error = 0;
+  int count = 0;
+  for (size_t k = 0; k < recording.size(); ++k) {
+    for (const imu_t& imu : recording[k].imus) observer.OnImu(imu);
+    observer.OnJointState(recording[k].joints);
+    if (k < recording.size() / 2) continue;
+    REQUIRE(observer.state().valid);
+    error += observer.state().q[2] - recording[k].q[2];
+    ++count;
+  }
+  INFO("mean error of the height: " << error / count << " m");
+  CHECK(std::abs(error / count) < 3e-4);  // it has sunk in by 1.5 mm
+}
+
 TEST_CASE("where it is along the ground and which way it heads grow unsure, no quaternion does") {
   const RobotDescription robot = Quadruped();
   const auto recording = Trot(robot, 7, 0.5);

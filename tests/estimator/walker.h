@@ -90,14 +90,15 @@ class Walker {
   void Step() {
     const double before = now;
     now += kPeriod;
-    const double keeps = std::exp(-kPeriod / 0.05);
-    for (Vector3d& place : places) {
-      place.head<2>() += s.slip * std::sqrt(kPeriod) * Normal().head<2>();
-      place.z() = kRadius + keeps * (place.z() - kRadius) +
-                  s.ground_sd * std::sqrt(1 - keeps * keeps) * random.Normal();
-    }
     const Vector3d acceleration =
         (Velocity(now) - Velocity(before)) / kPeriod + kGravity * Vector3d::UnitZ();
+    const double keeps = std::exp(-kPeriod / 0.05),
+                 pressed = kRadius - s.give * acceleration.z() / static_cast<double>(places.size());
+    for (Vector3d& place : places) {
+      place.head<2>() += s.slip * std::sqrt(kPeriod) * Normal().head<2>();
+      place.z() = pressed + keeps * (place.z() - pressed) +
+                  s.ground_sd * std::sqrt(1 - keeps * keeps) * random.Normal();
+    }
     filter.Predict(kPeriod, Rate(now) + rate_bias + s.rate_sd * Normal(),
                    Orientation((now + before) / 2).conjugate() * acceleration + acceleration_bias +
                        s.acceleration_sd * Normal());

@@ -14,8 +14,8 @@ namespace plumb {
 namespace {
 
 RobotDescription SmallTask() {
-  RobotDescription robot = LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) +
-                                     "/robots/pendulum/robot.toml");
+  RobotDescription robot =
+      LoadRobot(std::string(std::getenv("PLUMBLINE_SOURCE")) + "/robots/pendulum/robot.toml");
   robot.parameters.clear();
   robot.task.steps = 16;
   robot.training.batch = 64;
@@ -38,8 +38,11 @@ TEST_CASE("an oracle that was interrupted goes on from its last judgement, to th
 
   struct Stop {};
   int told = 0;
-  CHECK_THROWS_AS(train("parts", [&](double) {
-      if (++told > 50) throw Stop(); }), Stop);
+  CHECK_THROWS_AS(train("parts",
+                        [&](double) {
+                          if (++told > 50) throw Stop();
+                        }),
+                  Stop);
   CHECK(LoadCheckpoint(folder / "parts").value().updates == 40);
   int again = 0;
   const Oracle parts = train("parts", [&](double) { ++again; });
@@ -55,9 +58,9 @@ TEST_CASE("an oracle does not go on from another robot's or seed's checkpoint") 
   struct Stop {};
   const auto train = [&](uint64_t seed, uint64_t identity) {
     int told = 0;
-    TrainOracle(robot, SimulateRobot(robot), seed, 1, folder / "oracle", identity,
-                [&](double) {
-      if (++told > 20) throw Stop(); });
+    TrainOracle(robot, SimulateRobot(robot), seed, 1, folder / "oracle", identity, [&](double) {
+      if (++told > 20) throw Stop();
+    });
   };
   CHECK_THROWS_AS(train(3, 5), Stop);
   CHECK_THROWS_WITH(train(4, 5), Catch::Contains(folder / "oracle: of another robot or seed"));

@@ -54,6 +54,28 @@ TEST_CASE("a residual moves positions and velocities by what it says") {
   CHECK(corrected.v() == plain.v());
 }
 
+TEST_CASE("a residual turns a spherical joint about its link's axes, as its velocities do") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/quadruped/robot.toml"));
+  const ConfigurationSpace space(robot);
+  Environment plain(robot), corrected(robot);
+  const auto residual = Of(robot);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(36);
+  for (int i = 0; i < 36; ++i) change[i] = 0.03 * std::sin(1.0 + i);  // 18 of q, 18 of v
+  residual->free = Constant(robot, change);
+  corrected.SetResidual(residual);
+  Random random(1);
+  plain.Reset(random);
+  Eigen::VectorXd q = plain.q(), v = plain.v();
+  q[2] += 1;  // in the air
+  q.segment<4>(3) << 0.5, -0.5, 0.5, 0.5;
+  for (Environment* environment : {&plain, &corrected}) environment->SetState(q, v);
+  const Eigen::VectorXf action = RandomAction(plain, random);
+  plain.Step(action), corrected.Step(action);
+  CHECK((space.Difference(corrected.q(), plain.q()) - change.head(18)).norm() < 1e-8);
+  CHECK((corrected.v() - plain.v() - change.tail(18)).norm() < 1e-8);
+  CHECK(space.Fault(corrected.q()).empty());
+}
+
 TEST_CASE("free and touching steps have residuals of their own") {
   const RobotDescription robot = LoadRobot(SourceFile("robots/hopper/gym.toml"));
   const auto residual = Of(robot);

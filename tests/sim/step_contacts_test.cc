@@ -1,7 +1,9 @@
 #include "sim/step_contacts.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "robot/contact_points.h"
 #include "robot/kinematics.h"
@@ -137,6 +139,34 @@ TEST_CASE("a joint at a stop is a contact, away from whichever stop is nearer") 
   const JointDescription& knee = robot.joints[4];
   check(knee.upper - 0.002, 1, knee.upper, -1);
   check(knee.lower + 0.001, -1, knee.lower, 1);
+}
+
+TEST_CASE("a joint's stop is found behind a spherical joint, whose coordinates are one more") {
+  const RobotDescription robot = LoadRobot(SourceFile("robots/quadruped/robot.toml"));
+  const Model model(robot);
+  Simulator simulator(robot);
+  StepContacts contacts(model, 0.005);
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(19), v = Eigen::VectorXd::Zero(18);
+  q[2] = 2, q[3] = 1;  // in the air
+  for (size_t i = 0; i < robot.joints.size(); ++i) {
+    const JointDescription& joint = robot.joints[i];
+    if (std::isfinite(joint.upper))
+      q[model.topology().joints[i].position] = (joint.lower + joint.upper) / 2;
+  }
+  Make(simulator, &contacts, q, v);
+  CHECK(contacts.touching().empty());
+  const auto knee = std::find_if(robot.joints.begin(), robot.joints.end(),
+                                 [](const auto& joint) { return joint.name == "rear_right_knee"; });
+  const auto& place = model.topology().joints[static_cast<size_t>(knee - robot.joints.begin())];
+  q[place.position] = knee->lower + 0.001, v[place.velocity] = -0.1;
+  Make(simulator, &contacts, q, v);
+  REQUIRE(contacts.touching().size() == 1);
+  const StepContacts::Contact& stop = *contacts.touching()[0];
+  CHECK_FALSE(stop.ground);
+  CHECK(stop.x[0] == Approx(0.001));
+  CHECK(stop.x[1] == -0.1);
+  CHECK(stop.jacobian(0, place.velocity) == 1);
+  CHECK(stop.jacobian.cwiseAbs().sum() == 1);
 }
 
 }  // namespace plumb
