@@ -13,7 +13,8 @@ namespace plumb {
 
 /// Judges the hypothesis that a point rests on the ground by two residuals that should then be
 /// zero: its height and its vertical velocity, each over its standard deviation. No forces, hence
-/// no masses: what calibration learns from it is not what it put in. Not thread-safe.
+/// no masses, but in the height of a base that stands on soft ground (LegOdometry::Settings::give):
+/// what calibration learns from it is not what it put in. Not thread-safe.
 class ContactTest {
  public:
   /// Uncertainty of the ground rather than of the robot: it is not quite even, and gives way.

@@ -142,7 +142,6 @@ Results::Rows RunOracle(const Options& options, const Gap& gap, const RobotDescr
                     kNone, 0, static_cast<double>(oracle.steps),
                     static_cast<double>(oracle.steps) * model.task.period});
   }
-  std::filesystem::remove(checkpoint);
   return rows;
 }
 

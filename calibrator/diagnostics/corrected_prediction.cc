@@ -42,7 +42,6 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
                                           const Eigen::VectorXd& physical, const Residual& residual,
                                           std::span<const Rollout> rollouts,
                                           std::span<const int> horizons) {
-  const ConfigurationSpace space(model->description());
   const Eigen::VectorXd scale = MakeTask(model->description())->state_scale();
   const auto longest = static_cast<size_t>(*std::max_element(horizons.begin(), horizons.end()));
   Simulator simulator(model);
@@ -71,7 +70,8 @@ Eigen::VectorXd CorrectedPredictionErrors(const std::shared_ptr<const Model>& mo
                                         static_cast<int>(i - start + 1));
         if (horizon == horizons.data() + horizons.size()) continue;
         if (!t.next_q.array().isFinite().any() && !t.next_v.array().isFinite().any()) continue;
-        squares[horizon - horizons.data()] += SquaredError(space, simulator.Reading(), t, scale);
+        squares[horizon - horizons.data()] +=
+            SquaredError(model->space(), simulator.Reading(), t, scale);
         ++windows[horizon - horizons.data()];
       }
     }

@@ -1,7 +1,6 @@
 #include "calibrator/fit/step_errors.h"
 
 #include "calibrator/fit/recorded_window.h"
-#include "robot/configuration_space.h"
 #include "sim/residual_inputs.h"
 #include "sim/simulator.h"
 
@@ -38,7 +37,6 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
                            const Eigen::VectorXd& physical, std::span<const Rollout> rollouts,
                            double margin) {
   SortedErrors errors;
-  const ConfigurationSpace space(model->description());
   ResidualInputs inputs(*model, margin);
   Simulator simulator(model);
   simulator.SetParameters(physical);
@@ -54,7 +52,7 @@ SortedErrors CollectErrors(const std::shared_ptr<const Model>& model,
         simulator.Step(t.efforts);
         inputs.End(simulator, effort, before, t.duration());
         if (simulator.finite())
-          Add(space, inputs, t, simulator.Reading(), {r, i},
+          Add(model->space(), inputs, t, simulator.Reading(), {r, i},
               inputs.touching() ? &errors.touching : &errors.free);
       }
       last = &t;

@@ -2,8 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cstdlib>
-#include <filesystem>
-#include <stdexcept>
+#include <functional>
 #include <string>
 
 #include "tests/temporary_folder.h"
@@ -23,7 +22,13 @@ RobotDescription SmallTask() {
   return robot;
 }
 
-void Ignore(double) {}
+struct Stop {};
+// Breaks off after so many updates.
+std::function<void(double)> After(int updates) {
+  return [=](double) mutable {
+    if (--updates < 0) throw Stop();
+  };
+}
 
 }  // namespace
 
@@ -33,16 +38,9 @@ TEST_CASE("an oracle that was interrupted goes on from its last judgement, to th
   const auto train = [&](const std::string& file, const std::function<void(double)>& progress) {
     return TrainOracle(robot, SimulateRobot(robot), 3, 1, folder / file, 5, progress);
   };
-  const Oracle whole = train("whole", Ignore);
+  const Oracle whole = train("whole", [](double) {});
   CHECK(whole.updates >= kPatience);
-
-  struct Stop {};
-  int told = 0;
-  CHECK_THROWS_AS(train("parts",
-                        [&](double) {
-                          if (++told > 50) throw Stop();
-                        }),
-                  Stop);
+  CHECK_THROWS_AS(train("parts", After(50)), Stop);
   CHECK(LoadCheckpoint(folder / "parts").value().updates == 40);
   int again = 0;
   const Oracle parts = train("parts", [&](double) { ++again; });
@@ -55,12 +53,8 @@ TEST_CASE("an oracle that was interrupted goes on from its last judgement, to th
 TEST_CASE("an oracle does not go on from another robot's or seed's checkpoint") {
   const TemporaryFolder folder;
   const RobotDescription robot = SmallTask();
-  struct Stop {};
   const auto train = [&](uint64_t seed, uint64_t identity) {
-    int told = 0;
-    TrainOracle(robot, SimulateRobot(robot), seed, 1, folder / "oracle", identity, [&](double) {
-      if (++told > 20) throw Stop();
-    });
+    TrainOracle(robot, SimulateRobot(robot), seed, 1, folder / "oracle", identity, After(20));
   };
   CHECK_THROWS_AS(train(3, 5), Stop);
   CHECK_THROWS_WITH(train(4, 5), Catch::Contains(folder / "oracle: of another robot or seed"));
