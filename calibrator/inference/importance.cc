@@ -73,9 +73,12 @@ GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x,
     const Eigen::MatrixXd centred = x.colwise() - p.mean;
     const double ess = total * total / w.squaredNorm();
     const double d = static_cast<double>(n);
-    p.covariance =
-        (ess * (centred * (w / total).asDiagonal() * centred.transpose()) + d * old.covariance) /
-        (ess + d);
+    // Fewer samples have no covariance: a round that has found next to nothing would make the next
+    // ones, and the result, surer and surer of it.
+    p.covariance = ess < d + 1 ? old.covariance
+                               : (ess * (centred * (w / total).asDiagonal() * centred.transpose()) +
+                                  d * old.covariance) /
+                                     (ess + d);
     adapted.weights.push_back(total);
     adapted.components.push_back(std::move(p));
   }

@@ -28,7 +28,8 @@ struct ImportanceFit {
 /// mixture of Gaussians as proposal (Cappe et al., Statistics and Computing 18, 2008, eq. 11-13),
 /// its samples weighted by the deterministic mixture of all rounds' proposals (Cornuet et al.,
 /// Scand. J. Stat. 39, 2012: AMIS). The proposals have twice the components' variance for half of
-/// the draws, so that tails are seen, too; the first trusts the guess's weights by half only.
+/// the draws, so that tails are seen, too; the first trusts the guess's weights by half only. A
+/// component with fewer than n + 1 effective samples keeps its covariance.
 /// Everything that is not finite has density zero.
 /// @param log_density of n x N points.
 /// @throws std::invalid_argument if no sample has any density.

@@ -52,6 +52,18 @@ void CheckMoments(const ImportanceFit& fit) {
   CHECK((adapted.covariance - covariance).norm() < 0.08 * covariance.norm());
 }
 
+TEST_CASE("a guess of which one sample counts is not taken for ever surer") {
+  // Far narrower than the guess, and outside of it: nearest is all that a sample can be.
+  const auto needle = [](const Eigen::MatrixXd& points) -> Eigen::VectorXd {
+    return -0.5e8 * (points.array() - 40).square().transpose();
+  };
+  const Gaussian guess{Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Identity(1, 1)};
+  const ImportanceFit fit = FitByImportance(needle, {{1}, {guess}}, {.samples = 50});
+  CHECK(fit.ess < 1.1);
+  CHECK(fit.mixture.components[0].mean(0) > 1);
+  CHECK(fit.mixture.components[0].covariance(0, 0) == Approx(1));
+}
+
 TEST_CASE("two modes get the weights, the places and the widths that they have") {
   const ImportanceFit fit = FitByImportance(Bimodal, Guess(0.5));
   CHECK(fit.samples.cols() == 1600);
