@@ -3,6 +3,7 @@
 #include <lcm/lcm_coretypes.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cstring>
 #include <memory>
 #include <stdexcept>
@@ -160,6 +161,7 @@ size_t LeastSize(const MessageType::Field& field) {
     case Kind::kString:
       return 5;  // its length and a zero
     case Kind::kStruct:
+      assert(field.type);
       return field.type->least_size;
   }
   return 1;

@@ -83,7 +83,7 @@ class Walk {
   template <class T>
   bool Integer(int64_t* number) {
     return Take<std::make_unsigned_t<T>>([&](auto bits) {
-      *number = static_cast<T>(bits);
+      *number = static_cast<int64_t>(static_cast<T>(bits));
       visitor_.Integer(*number);
     });
   }

@@ -27,7 +27,7 @@ bool IsControl(uint32_t code) {
 class Filter : public std::streambuf {
  public:
   explicit Filter(std::streambuf& outlet) : outlet_(outlet) {}
-  ~Filter() override { sync(); }
+  ~Filter() override { Filter::sync(); }
 
  protected:
   int_type overflow(int_type c) override {

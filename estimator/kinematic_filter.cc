@@ -214,9 +214,9 @@ void KinematicFilter::FindGain() {
 }
 
 KinematicFilter::Smoothed KinematicFilter::TakeOldest() {
-  const Smoothed smoothed = size_ == 4   ? SmoothOldest<4>()
-                            : size_ == 5 ? SmoothOldest<5>()
-                                         : SmoothOldest<6>();
+  Smoothed smoothed = size_ == 4   ? SmoothOldest<4>()
+                      : size_ == 5 ? SmoothOldest<5>()
+                                   : SmoothOldest<6>();
   oldest_ = (oldest_ + 1) % static_cast<int>(window_.size());
   --pending_;
   return smoothed;

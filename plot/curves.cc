@@ -89,19 +89,21 @@ std::string DrawCurves(const std::string& title, const std::vector<Chart>& chart
                height = kHeight * std::ceil(static_cast<double>(charts.size()) / kAbreast);
   const auto columns = static_cast<size_t>(std::max(1.0, std::floor(width / kLegendColumn)));
   const std::vector<Curve>& curves = charts.at(0).curves;
-  const double legend =
-      kLegendRow * static_cast<double>((curves.size() + columns - 1) / columns) + 6;
+  const size_t rows = (curves.size() + columns - 1) / columns;
+  const double legend = kLegendRow * static_cast<double>(rows) + 6;
   Svg svg(width, legend + height, title);
   svg.Rectangle(0, 0, width, legend + height, "paper");
   for (size_t c = 0; c < curves.size(); ++c) {
+    const size_t row = c / columns;
     const double left = 14 + kLegendColumn * static_cast<double>(c % columns),
-                 y = 16 + kLegendRow * static_cast<double>(c / columns);
+                 y = 16 + kLegendRow * static_cast<double>(row);
     svg.Line(left, y - 4, left + 26, y - 4, "line c" + std::to_string(c));
     svg.Text(left + 33, y, curves[c].name, "label", Svg::Anchor::kStart);
   }
   for (size_t p = 0; p < charts.size(); ++p) {
+    const size_t row = p / kAbreast;
     DrawChart(charts[p], kWidth * static_cast<double>(p % kAbreast),
-              legend + kHeight * static_cast<double>(p / kAbreast), svg);
+              legend + kHeight * static_cast<double>(row), svg);
   }
   std::string text = svg.Print();
   return text.insert(text.find("</title>") + 9, kStyle);

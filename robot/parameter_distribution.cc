@@ -19,10 +19,11 @@ struct RawMoments {
 // converges exponentially, as the integrand is analytic and gone at the ends; beyond sd 8, where
 // all is at the bounds, slower.
 RawMoments LogitMoments(double mean, double sd, const ParameterDescription& parameter) {
-  constexpr double kEnd = 9, kSpacing = 1. / 16;
+  constexpr int kEnd = 9, kPointsPerSd = 16;
   RawMoments sum{0, 0};
   double total = 0;
-  for (double z = -kEnd; z <= kEnd; z += kSpacing) {
+  for (int i = -kEnd * kPointsPerSd; i <= kEnd * kPointsPerSd; ++i) {
+    const double z = static_cast<double>(i) / kPointsPerSd;
     const double weight = std::exp(-z * z / 2), value = parameter.ToPhysical(mean + sd * z);
     total += weight;
     sum.mean += weight * value;

@@ -155,8 +155,8 @@ ParameterDistribution ParameterDistribution::FromMessage(const parameter_distrib
       RequireNearPrior(draw, "residual's draw", description);
   }
   const ConfigurationSpace space(description);
-  const auto state =
-      static_cast<size_t>(description.num_positions() + description.num_velocities());
+  const size_t state = static_cast<size_t>(description.num_positions()) +
+                       static_cast<size_t>(description.num_velocities());
   if (message.start.size() % std::max<size_t>(1, state) != 0) Reject("start of the wrong size");
   for (size_t i = 0; state > 0 && i < message.start.size(); i += state) {
     result.starts.push_back(

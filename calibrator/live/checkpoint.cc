@@ -26,8 +26,8 @@ namespace {
 using nlohmann::json;
 
 // Version 2: without the method used, its warnings and a search's samples; 3: without a residual; 4
-// to 6: with another; 7: without a checksum
-constexpr FileKind kKind{"PLUMBCAL", 8, "a calibrator's checkpoint"};
+// to 6: with another; 7: without a checksum; 8: without the number of roll-outs that are forgotten
+constexpr FileKind kKind{"PLUMBCAL", 9, "a calibrator's checkpoint"};
 
 json ToJson(const Eigen::VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
 
@@ -273,8 +273,11 @@ CalibrationCheckpoint::CalibrationCheckpoint(std::filesystem::path folder,
 }
 
 void CalibrationCheckpoint::Save(const SimOpt::State& state) {
-  for (; saved_rollouts_ < state.rollouts.size(); ++saved_rollouts_) {
-    WriteJson(folder_ / RolloutFile(saved_rollouts_), ToJson(state.rollouts[saved_rollouts_]));
+  const auto forgotten = static_cast<size_t>(state.forgotten);
+  saved_rollouts_ = std::max(saved_rollouts_, forgotten);
+  for (; saved_rollouts_ < forgotten + state.rollouts.size(); ++saved_rollouts_) {
+    WriteJson(folder_ / RolloutFile(saved_rollouts_),
+              ToJson(state.rollouts[saved_rollouts_ - forgotten]));
   }
   const json j{{"robot", robot_.name},
                {"parameters", parameters_},
@@ -294,7 +297,8 @@ void CalibrationCheckpoint::Save(const SimOpt::State& state) {
                {"alarm", state.alarm},
                {"gap", state.gap},
                {"informed", Name(state.informed)},
-               {"rollouts_per_iteration", state.rollouts_per_iteration}};
+               {"rollouts_per_iteration", state.rollouts_per_iteration},
+               {"forgotten", state.forgotten}};
   WriteJson(folder_ / kStateFile, j);
 }
 
@@ -329,7 +333,9 @@ std::optional<SimOpt::State> CalibrationCheckpoint::Load() const {
     state.informed = InformedFrom(j.at("informed"));
     state.rollouts_per_iteration = WholeNumbers(j.at("rollouts_per_iteration"));
     const size_t count = Count(state.rollouts_per_iteration);
-    for (size_t i = 0; i < count; ++i) {
+    state.forgotten = Whole(j.at("forgotten"));
+    if (state.forgotten < 0) throw std::runtime_error("forgotten: less than none");
+    for (auto i = static_cast<size_t>(state.forgotten); i < count; ++i) {
       file = folder_ / RolloutFile(i);
       state.rollouts.push_back(RolloutFrom(ReadJson(file)));
       RequireTransitions(state.rollouts.back(), robot_);

@@ -93,12 +93,23 @@ bool SimOpt::running() const {
 void SimOpt::Begin(std::vector<Rollout> rollouts) {
   if (running()) throw std::invalid_argument("a calibration is running");
   state_.rollouts_per_iteration.push_back(static_cast<int>(rollouts.size()));
+  Forget(CountTransitions(rollouts));
   for (Rollout& rollout : rollouts) state_.rollouts.push_back(std::move(rollout));
   state_.before = state_.distribution;
   state_.kl = 0;
   state_.search = {.distribution = Moments(state_.distribution),
                    .temperature = state_.temperature,
                    .ess = state_.ess};
+}
+
+// The oldest roll-outs, for so many new transitions.
+void SimOpt::Forget(size_t fresh) {
+  size_t kept = fresh + CountTransitions(state_.rollouts);
+  auto oldest = state_.rollouts.begin();
+  for (; oldest != state_.rollouts.end() && kept > kMostTransitions; ++oldest)
+    kept -= oldest->transitions.size();
+  state_.forgotten += static_cast<int>(oldest - state_.rollouts.begin());
+  state_.rollouts.erase(state_.rollouts.begin(), oldest);
 }
 
 std::span<const Rollout> SimOpt::Newest() const {

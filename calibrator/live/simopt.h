@@ -76,6 +76,10 @@ inline constexpr size_t kStarts = 32;
 /// the same bits, with any number of threads. Not thread-safe; uses `threads` threads inside.
 class SimOpt {
  public:
+  /// An iteration's roll-outs and those before it that fit in so many: a run of days takes no more
+  /// memory, and no more time for an update, than one of minutes.
+  static constexpr size_t kMostTransitions = 20'000;
+
   /// Everything a resumed run needs, apart from the robot.
   struct State {
     int iteration = 0;  ///< completed iterations
@@ -94,8 +98,10 @@ class SimOpt {
     RepsState search;
     double kl = 0, ess = 0, temperature = 0;  ///< see CalibrationReport
     std::vector<std::string> warnings;        ///< of the last update
-    std::vector<Rollout> rollouts;  ///< all so far; an iteration's are added when it begins
-    std::vector<int> rollouts_per_iteration;
+    /// the newest, of kMostTransitions together; an iteration's are added when it begins
+    std::vector<Rollout> rollouts;
+    int forgotten = 0;  ///< roll-outs before those, of which nothing but the distribution is left
+    std::vector<int> rollouts_per_iteration;  ///< of all so far
   };
 
   /// By relative-entropy policy search.
@@ -123,6 +129,7 @@ class SimOpt {
   std::optional<CalibrationReport> Report();
 
  private:
+  void Forget(size_t fresh);
   void Search();
   RepsOptions SearchOptions() const;
   Eigen::VectorXd Evaluate(const Eigen::MatrixXd& samples);

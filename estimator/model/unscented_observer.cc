@@ -95,7 +95,7 @@ bool UnscentedObserver::Predict(double elapsed) {
   }
   acceleration_ = -filter_.mean().segment(n_, n_) / elapsed;
   const bool predicted = filter_.Predict(
-      [this, elapsed](Eigen::Ref<Eigen::VectorXd> x) { return Move(x, elapsed); }, noise_);
+      [this, elapsed](const Eigen::Ref<Eigen::VectorXd>& x) { return Move(x, elapsed); }, noise_);
   acceleration_ += filter_.mean().segment(n_, n_) / elapsed;
   return predicted;
 }

@@ -130,7 +130,7 @@ std::string Xml::Name(const TiXmlElement& element, const char* attribute) const 
   const char* value = element.Attribute(attribute);
   if (!value || !*value)
     Fail(element, fmt::format("<{}> has no {}=\"...\"", element.Value(), attribute));
-  const std::string name = value;
+  std::string name = value;
   if (name.size() > 200 ||
       std::any_of(name.begin(), name.end(), [](char c) { return IsControl(c) || !IsAscii(c); })) {
     Fail(element, fmt::format("{} of <{}> is longer than 200 bytes or not printable ASCII",

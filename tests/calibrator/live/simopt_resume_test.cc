@@ -201,7 +201,7 @@ TEST_CASE("all modes of a posterior are kept in checkpoints and told to the trai
   std::string bytes = ReadFile(folder / "calibration.checkpoint");
   bytes[8] = 7;  // the version
   std::ofstream(folder / "calibration.checkpoint") << bytes;
-  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("has version 7, not 8"));
+  CHECK_THROWS_WITH(checkpoint.Load(), Catch::Contains("has version 7, not 9"));
 }
 
 TEST_CASE("what is said of an iteration stays as it is while the next one is under way") {
@@ -259,7 +259,7 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
   CHECK(told(*loaded) == told(state));
   CHECK(told(*loaded) != told(simopt.state()));
 
-  const FileKind kind{"PLUMBCAL", 8, "a calibrator's checkpoint"};
+  const FileKind kind{"PLUMBCAL", 9, "a calibrator's checkpoint"};
   const std::string bytes = ReadFile(folder / "calibration.checkpoint");
   const std::string text(CheckedContent(kind, bytes));
   const size_t at = text.find("\"residual\":\"") + 12;
@@ -269,6 +269,42 @@ TEST_CASE("what the simulators lack is told to the trainer again after a resumpt
     CHECK_THROWS_WITH(checkpoint.Load(),
                       Catch::Contains("calibration.checkpoint: the residual is none"));
   }
+}
+
+TEST_CASE("a run of days takes no more memory: the oldest roll-outs are forgotten") {
+  RobotDescription robot = Pendulum();
+  robot.calibration.updates = 1, robot.calibration.samples = 5;
+  constexpr int kSteps = static_cast<int>(SimOpt::kMostTransitions / 4);
+  const auto iterate = [&](SimOpt& simopt, CalibrationCheckpoint& checkpoint, uint32_t i) {
+    simopt.Begin({SyntheticRollout(robot, kTruth, kSteps, 1e-4, 0.01, i)});
+    checkpoint.Save(simopt.state());
+    Finish(simopt);
+    checkpoint.Save(simopt.state());
+  };
+  const TemporaryFolder folder;
+  CalibrationCheckpoint checkpoint(folder.path(), robot, 9);
+  SimOpt straight(robot, 9, 1);
+  for (uint32_t i = 0; i < 6; ++i) iterate(straight, checkpoint, i);
+  const SimOpt::State& state = straight.state();
+  CHECK(state.forgotten == 2);
+  CHECK(CountTransitions(state.rollouts) == SimOpt::kMostTransitions);
+  const Rollout third = SyntheticRollout(robot, kTruth, kSteps, 1e-4, 0.01, 2);
+  CHECK(state.rollouts[0].transitions[7].v == third.transitions[7].v);
+  // Nothing of the record is lost, and who takes it up goes on alike.
+  CHECK(LoadRollouts(folder.path()).size() == 6);
+  SimOpt resumed(robot, 9, 1);
+  resumed.Resume(checkpoint.Load().value());
+  CHECK(resumed.state().forgotten == 2);
+  iterate(straight, checkpoint, 6);
+  const TemporaryFolder elsewhere;
+  CalibrationCheckpoint other(elsewhere.path(), robot, 9);
+  iterate(resumed, other, 6);
+  CHECK(SameBits(resumed.state().distribution, straight.state().distribution));
+  CHECK(other.Load().value().rollouts.size() == 4);
+  // An iteration of more than that is used as a whole.
+  SimOpt large(robot, 9, 1);
+  large.Begin(std::vector<Rollout>(5, third));
+  CHECK(large.state().rollouts.size() == 5);
 }
 
 TEST_CASE("no bit of a checkpoint can be changed unnoticed, nor a size be wrong") {
