@@ -11,17 +11,19 @@
 namespace plumb {
 namespace {
 
-constexpr double kWide = 4;  // variance of the wide half, relative to the narrow one
+// Variance of the wide half, relative to the narrow one; and where the density is rough, so that
+// widths that are a single peak's are left behind.
+constexpr double kWide = 4, kWider = 25;
 constexpr double kLeastWeight = 1e-3;
 constexpr double kDoubt = 0.5;  // about the guess's weights
 
 // Each component as it is, and wide. @param doubt share of the draws that go to all components
 // alike.
-GaussianMixture Proposal(const GaussianMixture& mixture, double doubt) {
+GaussianMixture Proposal(const GaussianMixture& mixture, double doubt, double wide) {
   GaussianMixture proposal;
   const double alike = doubt / static_cast<double>(mixture.components.size());
   for (size_t i = 0; i < mixture.components.size(); ++i) {
-    for (const double factor : {1.0, kWide}) {
+    for (const double factor : {1.0, wide}) {
       proposal.weights.push_back(((1 - doubt) * mixture.weights[i] + alike) / 2);
       proposal.components.push_back(
           {mixture.components[i].mean, factor * mixture.components[i].covariance});
@@ -56,9 +58,20 @@ Eigen::MatrixXd Weighted(const GaussianMixture& mixture, Eigen::MatrixXd densiti
   return densities;
 }
 
-// One step of expectation-maximisation on weighted samples.
+// As wide as the first in each direction, and as the second where that is wider.
+Eigen::MatrixXd AtLeast(const Eigen::MatrixXd& least, const Eigen::MatrixXd& covariance) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(least);
+  const Eigen::MatrixXd half = factor.matrixL().solve(covariance);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ratios(
+      factor.matrixL().solve(half.transpose()));
+  const Eigen::MatrixXd axes = factor.matrixL() * ratios.eigenvectors();
+  return axes * ratios.eigenvalues().cwiseMax(1).asDiagonal() * axes.transpose();
+}
+
+// One step of expectation-maximisation on weighted samples. @param narrower whether a component may
+// become so.
 GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x,
-                      const Eigen::VectorXd& weights) {
+                      const Eigen::VectorXd& weights, bool narrower) {
   const Eigen::MatrixXd joint = Weighted(mixture, ComponentDensities(mixture, x));
   const Eigen::MatrixXd share = (joint.colwise() - LogSumExp(joint)).array().exp();
   const Eigen::Index n = x.rows();
@@ -79,6 +92,7 @@ GaussianMixture Adapt(const GaussianMixture& mixture, const Eigen::MatrixXd& x,
                                : (ess * (centred * (w / total).asDiagonal() * centred.transpose()) +
                                   d * old.covariance) /
                                      (ess + d);
+    if (!narrower) p.covariance = AtLeast(old.covariance, p.covariance);
     adapted.weights.push_back(total);
     adapted.components.push_back(std::move(p));
   }
@@ -98,6 +112,19 @@ Eigen::VectorXd Normalised(const Eigen::VectorXd& log_weights) {
   return weights / weights.sum();
 }
 
+double Ess(const Eigen::VectorXd& weights) { return 1 / weights.squaredNorm(); }
+
+// The greatest power of up to 1, to 1 in 1000, with which so many samples count, if any does.
+double PowerFor(double least_ess, const Eigen::VectorXd& log_weights) {
+  if (Ess(Normalised(log_weights)) >= least_ess) return 1;
+  double low = 0, high = 1;
+  while (high - low > 1e-3 * high && high > 1e-9) {
+    const double middle = (low + high) / 2;
+    (Ess(Normalised(middle * log_weights)) >= least_ess ? low : high) = middle;
+  }
+  return high;
+}
+
 }  // namespace
 
 ImportanceFit FitByImportance(
@@ -109,8 +136,10 @@ ImportanceFit FitByImportance(
   std::vector<GaussianMixture> proposals;
   Eigen::VectorXd target(0);
   fit.samples.resize(n, 0);
-  for (int round = 0; round < options.rounds; ++round) {
-    proposals.push_back(Proposal(fit.mixture, round == 0 ? kDoubt : 0));
+  for (int round = 0; round < options.rounds || (fit.power < 1 && round < 2 * options.rounds);
+       ++round) {
+    const bool rough = round >= options.rounds;
+    proposals.push_back(Proposal(fit.mixture, round == 0 ? kDoubt : 0, rough ? kWider : kWide));
     Random random(options.seed, {0x1390, static_cast<uint32_t>(round)});
     Eigen::MatrixXd fresh(n, options.samples);
     for (Eigen::Index i = 0; i < fresh.cols(); ++i) fresh.col(i) = Sample(proposals.back(), random);
@@ -127,11 +156,14 @@ ImportanceFit FitByImportance(
       proposed.col(static_cast<Eigen::Index>(p)) =
           LogSumExp(Weighted(proposals[p], ComponentDensities(proposals[p], fit.samples)));
     }
-    fit.weights = Normalised(target - LogSumExp(proposed));
-    fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights);
+    const Eigen::VectorXd log_weights = target - LogSumExp(proposed);
+    fit.weights = Normalised(log_weights);
+    fit.ess = Ess(fit.weights);
+    fit.heaviest = fit.weights.maxCoeff();
+    fit.power = PowerFor(kLeastEss * static_cast<double>(n + 1), log_weights);
+    if (fit.power < 1) fit.weights = Normalised(fit.power * log_weights);
+    fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights, fit.power == 1);
   }
-  fit.ess = 1 / fit.weights.squaredNorm();
-  fit.heaviest = fit.weights.maxCoeff();
   return fit;
 }
 

@@ -12,7 +12,7 @@ namespace plumb {
 
 struct ImportanceOptions {
   int samples = 400;  ///< a round
-  int rounds = 4;
+  int rounds = 4;     ///< twice as many where the density is rough
   uint64_t seed = 1;
 };
 
@@ -20,8 +20,9 @@ struct ImportanceFit {
   GaussianMixture mixture;  ///< adapted to the target
   Eigen::MatrixXd samples;  ///< n x N of all rounds, newest last
   Eigen::VectorXd weights;  ///< of the samples, sum to 1
-  double ess = 0;           ///< effective number of samples, 1 / sum w^2
-  double heaviest = 0;      ///< largest weight
+  double ess = 0;           ///< effective number of samples, 1 / sum w^2, before any power
+  double heaviest = 0;      ///< largest weight, likewise
+  double power = 1;         ///< to which the weights were raised in the end: 1 = as they are
 };
 
 /// A density known up to its constant, from guesses of its modes: population Monte Carlo with a
@@ -30,12 +31,19 @@ struct ImportanceFit {
 /// Scand. J. Stat. 39, 2012: AMIS). The proposals have twice the components' variance for half of
 /// the draws, so that tails are seen, too; the first trusts the guess's weights by half only. A
 /// component with fewer than n + 1 effective samples keeps its covariance.
+/// Where fewer than kLeastEss (n + 1) samples count, the density has more peaks than samples can
+/// tell apart: weights are raised to the power, below one, that makes so many count (Koblents and
+/// Miguez, Statistics and Computing 25, 2015), and up to twice the rounds are made, with proposals
+/// of 25 times the variance for half of the draws; no component becomes narrower. What comes of it
+/// lies between proposals and target: wide rather than sure of the one peak that a sample has met.
 /// Everything that is not finite has density zero.
 /// @param log_density of n x N points.
 /// @throws std::invalid_argument if no sample has any density.
 ImportanceFit FitByImportance(
     const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& log_density,
     const GaussianMixture& guess, const ImportanceOptions& options = {});
+
+inline constexpr double kLeastEss = 5;
 
 /// n x count points drawn from weighted ones, systematically: each as often as its weight says, up
 /// to one.
