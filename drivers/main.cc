@@ -32,10 +32,10 @@ constexpr int kBursts = 8;
 constexpr int64_t kFlight = 2'000'000;  // [us] before a fault whose frames are kept
 
 void WriteState(int8_t state, std::string_view reason) {
-  constexpr std::array names = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
+  constexpr std::array kNames = {"ABSENT", "IDLE", "ARMING", "ARMED", "FAULT"};
   const auto level = state == driver_status_t::FAULT ? spdlog::level::warn : spdlog::level::info;
-  spdlog::log(level, "{}{}{}", names[static_cast<size_t>(state)], reason.empty() ? "" : ": ",
-              reason);
+  spdlog::log(level, "{}{}{}", kNames[static_cast<unsigned char>(state)],
+              reason.empty() ? "" : ": ", reason);
 }
 
 void LogCommandPolicy(const std::string& lcm_url, bool commands_signed) {

@@ -108,7 +108,7 @@ class Replay : public Transport {
 
   /// Makes fd() readable when a frame is due, and only then.
   void Signal() noexcept {
-    const bool due = NextEvent() <= now_;
+    const bool due = Replay::NextEvent() <= now_;
     if (due == signalled_) return;
     signalled_ = due;
     eventfd_t count = 1;

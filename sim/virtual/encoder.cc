@@ -24,13 +24,13 @@ void Encoder::Reset(double position, double velocity) {
 
 void Encoder::Track(const ShaftMotion& motion) {
   constexpr double kDt = kPeriod * 1e-6;
-  constexpr double kp = 2 * kBandwidth;
-  constexpr double ki = kp * kp / 4;
+  constexpr double kProportional = 2 * kBandwidth;
+  constexpr double kIntegral = kProportional * kProportional / 4;
   for (int64_t time = (motion.begin / kPeriod + 1) * kPeriod; time <= motion.end; time += kPeriod) {
     position_ += kDt * velocity_;
     const double error = Quantise(motion.Position(time)) - position_;
-    position_ += kDt * kp * error;
-    velocity_ += kDt * ki * error;
+    position_ += kDt * kProportional * error;
+    velocity_ += kDt * kIntegral * error;
   }
 }
 
