@@ -95,14 +95,11 @@ MethodResult MixtureFrom(const MethodInput& input, MethodResult laplace) {
       std::max<int64_t>(1, errors.steps() * options.rounds);
   options.samples = static_cast<int>(std::clamp<int64_t>(affordable, 50, 2000));
   int round = 0;
-  // What the sandwich says of the curvature holds of the whole likelihood: errors that depend on
-  // each other count less often (Pauli, Racugno, Ventura, Statistica Sinica 21, 2011).
-  const double dependence = curriculum.one_step.inflation;
   const ImportanceFit fit = FitByImportance(
       [&](const Eigen::MatrixXd& x) {
         Eigen::VectorXd density = LogLikelihood(problem, x, curriculum.one_step.degrees_of_freedom);
         for (Eigen::Index i = 0; i < density.size(); ++i)
-          density(i) = density(i) / dependence + problem.prior.LogDensity(x.col(i));
+          density(i) += problem.prior.LogDensity(x.col(i));
         input.options.progress("importance sampling",
                                std::min(1.0, ++round / static_cast<double>(options.rounds)));
         return density;
