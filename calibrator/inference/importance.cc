@@ -13,7 +13,7 @@ namespace {
 
 // Variance of the wide half, relative to the narrow one; and where the density is rough, so that
 // widths that are a single peak's are left behind.
-constexpr double kWide = 4, kWider = 25;
+constexpr double kWide = 4, kWider = 100;
 constexpr double kLeastWeight = 1e-3;
 constexpr double kDoubt = 0.5;  // about the guess's weights
 
@@ -160,7 +160,8 @@ ImportanceFit FitByImportance(
     fit.weights = Normalised(log_weights);
     fit.ess = Ess(fit.weights);
     fit.heaviest = fit.weights.maxCoeff();
-    fit.power = PowerFor(kLeastEss * static_cast<double>(n + 1), log_weights);
+    if (round + 1 >= options.rounds)  // before, proposals may still find their way
+      fit.power = PowerFor(kLeastEss * static_cast<double>(n + 1), log_weights);
     if (fit.power < 1) fit.weights = Normalised(fit.power * log_weights);
     fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights, fit.power == 1);
   }
