@@ -160,10 +160,9 @@ ImportanceFit FitByImportance(
     fit.weights = Normalised(log_weights);
     fit.ess = Ess(fit.weights);
     fit.heaviest = fit.weights.maxCoeff();
-    if (round + 1 >= options.rounds)  // before, proposals may still find their way
-      fit.power = PowerFor(kLeastEss * static_cast<double>(n + 1), log_weights);
+    fit.power = PowerFor(kLeastEss * static_cast<double>(n + 1), log_weights);
     if (fit.power < 1) fit.weights = Normalised(fit.power * log_weights);
-    fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights, fit.power == 1);
+    fit.mixture = Adapt(fit.mixture, fit.samples, fit.weights, fit.power == 1 || !rough);
   }
   return fit;
 }

@@ -31,12 +31,12 @@ struct ImportanceFit {
 /// Scand. J. Stat. 39, 2012: AMIS). The proposals have twice the components' variance for half of
 /// the draws, so that tails are seen, too; the first trusts the guess's weights by half only. A
 /// component with fewer than n + 1 effective samples keeps its covariance.
-/// Where fewer than kLeastEss (n + 1) samples count after all rounds, the density has more peaks
-/// than samples can tell apart: weights are raised to the power, below one, that makes so many
-/// count (Koblents and Miguez, Statistics and Computing 25, 2015), and up to as many rounds more
-/// are made, with proposals of 100 times the variance for half of the draws; no component becomes
-/// narrower. What comes of it lies between proposals and target: wide rather than sure of the one
-/// peak that a sample has met.
+/// Where fewer than kLeastEss (n + 1) samples count, weights are raised to the power, below one,
+/// that makes so many count (Koblents and Miguez, Statistics and Computing 25, 2015): proposals
+/// then find their way, rather than one sample. If that is so after all rounds, the density has
+/// more peaks than samples can tell apart: up to as many rounds more are made, with proposals of
+/// 100 times the variance for half of the draws, and no component becomes narrower. What comes of
+/// it lies between proposals and target: wide rather than sure of a peak that a sample has met.
 /// Everything that is not finite has density zero.
 /// @param log_density of n x N points.
 /// @throws std::invalid_argument if no sample has any density.
