@@ -44,6 +44,7 @@ ImportanceFit FitByImportance(
     const std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>& log_density,
     const GaussianMixture& guess, const ImportanceOptions& options = {});
 
+/// Effective samples for each parameter, and as many, with which a round's weights are as they are.
 inline constexpr double kLeastEss = 5;
 
 /// n x count points drawn from weighted ones, systematically: each as often as its weight says, up

@@ -23,8 +23,8 @@ bool UnscentedFilter::Predict(const Motion& motion, const Eigen::MatrixXd& noise
   const Eigen::Index n = size();
   root_.compute(covariance_);
   if (root_.info() != Eigen::Success) return false;
-  const auto L = static_cast<double>(n);
-  const double spread = kAlpha * std::sqrt(L + kKappa);  // sqrt(L + lambda)
+  const auto dimension = static_cast<double>(n);
+  const double spread = kAlpha * std::sqrt(dimension + kKappa);  // sqrt(dimension + lambda)
   points_.col(0) = mean_;
   for (Eigen::Index i = 0; i < n; ++i) {
     points_.col(1 + i) = points_.col(1 + n + i) = mean_;
@@ -35,8 +35,8 @@ bool UnscentedFilter::Predict(const Motion& motion, const Eigen::MatrixXd& noise
   for (Eigen::Index i = 0; i < points_.cols(); ++i) {
     if (!motion(points_.col(i))) return false;
   }
-  const double lambda = spread * spread - L, others = 0.5 / (L + lambda),
-               first = lambda / (L + lambda);
+  const double lambda = spread * spread - dimension, others = 0.5 / (dimension + lambda),
+               first = lambda / (dimension + lambda);
   mean_ = first * points_.col(0);
   for (Eigen::Index i = 1; i < points_.cols(); ++i) mean_ += others * points_.col(i);
   points_.colwise() -= mean_;
