@@ -114,7 +114,7 @@ class LegOdometry {
   /// Where in the error things are: three entries each; from kFeet on the places of the feet.
   static constexpr Eigen::Index kPosition = 0, kVelocity = 3, kAngle = 6, kRateBias = 9,
                                 kAccelerationBias = 12, kFeet = 15;
-  static constexpr int kMax = kFeet + 3 * FloatingBase::kMaxPoints;
+  static constexpr int kMax = int{kFeet} + 3 * FloatingBase::kMaxPoints;
   using Covariance =
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMax, kMax>;
   /// Of the whole error.

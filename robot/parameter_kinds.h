@@ -54,7 +54,6 @@ struct JointParameterKind {
   const char* name;
   const char* key;
   double JointDynamics::*member;
-  JointGroup joints;
   const char *unit_turning, *unit_sliding;
   const char* noun;  ///< for messages of physics that have no such number
   Range in_file;     ///< that robot.toml may give
@@ -66,6 +65,7 @@ struct JointParameterKind {
     bool of_effort = false;                   ///< least is in units of the largest effort limit
     JointGroup joints = JointGroup::kDriven;  ///< of which it is suspected
   } surprise;
+  JointGroup joints;     ///< that have it
   bool in_urdf = false;  ///< `key` is an attribute of URDF's <dynamics>, too
 };
 
@@ -73,45 +73,39 @@ struct JointParameterKind {
 /// their robots then (robot/physics_fingerprint.cc).
 // clang-format off
 inline constexpr JointParameterKind kJointParameterKinds[] = {
-    // name, key, member, joints, units, noun, in file, values, surprise, in URDF
-    {"armature", "armature", &JointDynamics::armature, JointGroup::kAll,
-     "kg m^2", "kg", "the armature",
-     {0, 1e9}, kNotNegative, {1e-3, true}},
-    {"damping", "damping", &JointDynamics::damping, JointGroup::kAll,
-     "Nm s/rad", "N s/m", "the damping",
-     {0, 1e9}, kNotNegative, {0.01, true, JointGroup::kAll}, true},
-    {"friction", "friction", &JointDynamics::friction, JointGroup::kAll, "Nm", "N", "the friction",
-     {0, 1e9}, kNotNegative, {0.05, true, JointGroup::kAll}, true},
-    {"stiffness", "stiffness", &JointDynamics::stiffness, JointGroup::kOneCoordinate,
-     "Nm/rad", "N/m", "the spring",
-     {0, 1e9}, kAboveZero, {0.05, true}},
-    {"rest", "rest", &JointDynamics::rest, JointGroup::kOneCoordinate, "rad", "m", "the spring",
-     {-1e9, 1e9}, kFinite, {}},
-    {"gain", "motor_gain", &JointDynamics::motor_gain, JointGroup::kDriven,
-     "", "", "the motor's gain",
-     {0, 1e9}, kNotNegative, {0.1}},
-    {"delay", "delay", &JointDynamics::delay, JointGroup::kDriven,
-     "s", "s", "delays and sensor errors",
-     {0, JointDynamics::kLongestDelay}, {0, JointDynamics::kLongestDelay}, {0.003}},
-    {"sensor_delay", "sensor_delay", &JointDynamics::sensor_delay, JointGroup::kOneCoordinate,
+    // name, key, member, units, noun, in file, values, surprise, joints, in URDF
+    {"armature", "armature", &JointDynamics::armature, "kg m^2", "kg", "the armature",
+     {0, 1e9}, kNotNegative, {1e-3, true}, JointGroup::kAll},
+    {"damping", "damping", &JointDynamics::damping, "Nm s/rad", "N s/m", "the damping",
+     {0, 1e9}, kNotNegative, {0.01, true, JointGroup::kAll}, JointGroup::kAll, true},
+    {"friction", "friction", &JointDynamics::friction, "Nm", "N", "the friction",
+     {0, 1e9}, kNotNegative, {0.05, true, JointGroup::kAll}, JointGroup::kAll, true},
+    {"stiffness", "stiffness", &JointDynamics::stiffness, "Nm/rad", "N/m", "the spring",
+     {0, 1e9}, kAboveZero, {0.05, true}, JointGroup::kOneCoordinate},
+    {"rest", "rest", &JointDynamics::rest, "rad", "m", "the spring",
+     {-1e9, 1e9}, kFinite, {}, JointGroup::kOneCoordinate},
+    {"gain", "motor_gain", &JointDynamics::motor_gain, "", "", "the motor's gain",
+     {0, 1e9}, kNotNegative, {0.1}, JointGroup::kDriven},
+    {"delay", "delay", &JointDynamics::delay, "s", "s", "delays and sensor errors",
+     {0, JointDynamics::kLongestDelay}, {0, JointDynamics::kLongestDelay}, {0.003},
+     JointGroup::kDriven},
+    {"sensor_delay", "sensor_delay", &JointDynamics::sensor_delay,
      "s", "s", "delays and sensor errors",
      {0, JointDynamics::kLongestDelay}, {0, JointDynamics::kLongestDelay},
-     {0.003, false, JointGroup::kOneCoordinate}},
-    {"sensor_bias", "sensor_bias", &JointDynamics::sensor_bias, JointGroup::kOneCoordinate,
+     {0.003, false, JointGroup::kOneCoordinate}, JointGroup::kOneCoordinate},
+    {"sensor_bias", "sensor_bias", &JointDynamics::sensor_bias,
      "rad", "m", "delays and sensor errors",
-     {-1e9, 1e9}, kFinite, {0.02, false, JointGroup::kOneCoordinate}},
-    {"no_load_speed", "no_load_speed", &JointDynamics::no_load_speed, JointGroup::kDriven,
+     {-1e9, 1e9}, kFinite, {0.02, false, JointGroup::kOneCoordinate}, JointGroup::kOneCoordinate},
+    {"no_load_speed", "no_load_speed", &JointDynamics::no_load_speed,
      "rad/s", "m/s", "the no-load speed",
-     {1e-9}, kAboveZero, {}},
-    {"gear_efficiency", "gear_efficiency", &JointDynamics::gear_efficiency, JointGroup::kDriven,
+     {1e-9}, kAboveZero, {}, JointGroup::kDriven},
+    {"gear_efficiency", "gear_efficiency", &JointDynamics::gear_efficiency,
      "", "", "the gear's losses",
-     {1e-9, 1}, {1e-9, 1}, {}},
-    {"kp", "kp", &JointDynamics::kp, JointGroup::kDriven,
-     "Nm/rad", "N/m", "the drive's own loop",
-     {0, 1e9}, kNotNegative, {}},
-    {"kd", "kd", &JointDynamics::kd, JointGroup::kDriven,
-     "Nm s/rad", "N s/m", "the drive's own loop",
-     {0, 1e9}, kNotNegative, {}},
+     {1e-9, 1}, {1e-9, 1}, {}, JointGroup::kDriven},
+    {"kp", "kp", &JointDynamics::kp, "Nm/rad", "N/m", "the drive's own loop",
+     {0, 1e9}, kNotNegative, {}, JointGroup::kDriven},
+    {"kd", "kd", &JointDynamics::kd, "Nm s/rad", "N s/m", "the drive's own loop",
+     {0, 1e9}, kNotNegative, {}, JointGroup::kDriven},
 };
 // clang-format on
 static_assert(sizeof(JointDynamics) == std::size(kJointParameterKinds) * sizeof(double));

@@ -47,10 +47,10 @@ struct Physics {
 };
 
 namespace internal {
-template <class Wide, class Narrow>
+template <class Real, class Wide, class Narrow>
 void SetLane(Wide* wide, const Narrow* narrow, size_t count, int lane) {
-  static_assert(sizeof(Wide) % sizeof(Narrow) == 0);
-  constexpr size_t kLaneCount = sizeof(Wide) / sizeof(Narrow);
+  constexpr size_t kLaneCount = kLanes<Real>;
+  static_assert(sizeof(Wide) == kLaneCount * sizeof(Narrow));
   auto* to = reinterpret_cast<double*>(wide) + lane;
   const auto* from = reinterpret_cast<const double*>(narrow);
   for (size_t i = 0; i < count * (sizeof(Narrow) / sizeof(double)); ++i)
@@ -61,10 +61,10 @@ void SetLane(Wide* wide, const Narrow* narrow, size_t count, int lane) {
 /// Makes one lane of `wide` the robot `narrow`. @param lane in [0, kLanes<Real>). Sizes must agree.
 template <class Real>
 void SetLane(const Physics<double>& narrow, int lane, Physics<Real>* wide) {
-  internal::SetLane(wide->links.data(), narrow.links.data(), narrow.links.size(), lane);
-  internal::SetLane(wide->axes.data(), narrow.axes.data(), narrow.axes.size(), lane);
-  internal::SetLane(wide->points.data(), narrow.points.data(), narrow.points.size(), lane);
-  internal::SetLane(&wide->world, &narrow.world, 1, lane);
+  internal::SetLane<Real>(wide->links.data(), narrow.links.data(), narrow.links.size(), lane);
+  internal::SetLane<Real>(wide->axes.data(), narrow.axes.data(), narrow.axes.size(), lane);
+  internal::SetLane<Real>(wide->points.data(), narrow.points.data(), narrow.points.size(), lane);
+  internal::SetLane<Real>(&wide->world, &narrow.world, 1, lane);
 }
 
 }  // namespace plumb

@@ -91,7 +91,8 @@ class SpatialTree {
         case JointDescription::Type::kSpherical: {
           link.rotation = parent.rotation * Turn(joint, position);
           for (int k = 0; k < 3; ++k) {
-            column[k].angular = link.rotation * Vector<Real>::From(joint.link_axes + 3 * k);
+            column[k].angular =
+                link.rotation * Vector<Real>::From(joint.link_axes + ptrdiff_t{3} * k);
           }
           break;
         }
@@ -110,9 +111,10 @@ class SpatialTree {
       link.center = origin + link.arm;
       link.inertia = Turned(link.rotation, physics.links[i].inertia);
       if (!joint.turns()) continue;
-      const int count = joint.type == JointDescription::Type::kSpherical ? 3 : 1;
-      for (int k = 0; k < count; ++k) {
-        Column& column = columns_[static_cast<size_t>(joint.velocity + k)];
+      const size_t first = static_cast<size_t>(joint.velocity),
+                   count = joint.type == JointDescription::Type::kSpherical ? 3 : 1;
+      for (size_t k = first; k < first + count; ++k) {
+        Column& column = columns_[k];
         column.linear = origin.Cross(column.angular);
       }
     }
