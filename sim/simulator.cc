@@ -139,7 +139,7 @@ void Simulator::Divide(double duration, bool held) {
 
 void Simulator::Run() {
   if (prepared_.count == 0) return;
-  for (double i = 0; i < prepared_.count; ++i) {
+  for (int64_t i = 0; static_cast<double>(i) < prepared_.count; ++i) {
     const bool steady = FindEfforts(i);
     engine_->Substep(&prepared_.length, mean_.data(), steady ? nullptr : moment_.data());
   }
@@ -169,12 +169,13 @@ void Simulator::RequireSize(Eigen::Index size) const {
 
 // Of the prepared step's i-th substep, whether no effort changes within it. Time 0 is the present;
 // the track goes on to the step's end.
-bool Simulator::FindEfforts(double i) {
+bool Simulator::FindEfforts(int64_t i) {
   if (prepared_.held) return true;
-  const double h = prepared_.length;
+  const double h = prepared_.length, begin = static_cast<double>(i) * h,
+               end = static_cast<double>(i + 1) * h;
   bool steady = true;
   for (size_t k = 0; k < mean_.size(); ++k) {
-    const EffortTrack::Moments moments = track_.Over(k, i * h, (i + 1) * h, physics_.axes[k].delay);
+    const EffortTrack::Moments moments = track_.Over(k, begin, end, physics_.axes[k].delay);
     mean_[k] = moments.mean;
     moment_[k] = moments.first;
     steady = steady && moments.first == 0;

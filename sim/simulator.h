@@ -124,7 +124,7 @@ class Simulator {
   void RequireSize(Eigen::Index size) const;
   void RequireEnd(double duration) const;
   void Divide(double duration, bool held);
-  bool FindEfforts(double substep);
+  bool FindEfforts(int64_t substep);
   void Finish();
   void Take();
 

@@ -48,7 +48,8 @@ void SimulatorLanes::Run(std::span<Simulator* const> simulators) {
     for (size_t i = 0; i < n; ++i) engine_->v()[i * lanes_ + lane] = simulator.engine_->v()[i];
     lengths_[lane] = simulator.prepared_.length;
   }
-  for (double substep = 0; substep < simulators[0]->prepared_.count; ++substep) {
+  const double count = simulators[0]->prepared_.count;
+  for (int64_t substep = 0; static_cast<double>(substep) < count; ++substep) {
     bool steady = true;
     for (Simulator* simulator : simulators) steady = simulator->FindEfforts(substep) && steady;
     for (size_t lane = 0; lane < lanes_; ++lane) {

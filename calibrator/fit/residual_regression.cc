@@ -62,8 +62,8 @@ ResidualRegression ResidualRegression::Fit(const Eigen::MatrixXd& features,
   for (Eigen::Index k = 0; k < outputs.rows(); ++k) {
     const double square = outputs.row(k).squaredNorm();
     double best = -std::numeric_limits<double>::infinity();
-    for (double exponent = -4; exponent <= 6; exponent += 0.25) {
-      const double ratio = std::pow(10.0, exponent);
+    for (int quarters = -16; quarters <= 24; ++quarters) {  // of a decade
+      const double ratio = std::pow(10.0, quarters / 4.0);
       double variance;
       const double evidence = Evidence(r, k, square, count, ratio, &variance);
       if (evidence > best) best = evidence, r.ratio(k) = ratio, r.variance(k) = variance;

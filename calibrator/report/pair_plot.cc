@@ -141,7 +141,8 @@ class Pairs {
     // The prior's density, in physical units.
     const double mean = findings_.prior.mean(i), sd = std::sqrt(findings_.prior.covariance(i, i));
     std::vector<Eigen::Vector2d> prior;
-    for (double z = -5; z <= 5; z += 0.05) {
+    double z = -5;
+    for (int k = 0; k <= 200; ++k, z += 0.05) {
       const double step = 1e-4 * sd;
       const double slope =
           (p.ToPhysical(mean + z * sd + step) - p.ToPhysical(mean + z * sd - step)) / (2 * step);

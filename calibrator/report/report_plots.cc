@@ -97,7 +97,8 @@ std::string ResidualHistogram(const std::vector<double>& residuals) {
                   "posterior bar");
   }
   Points normal;
-  for (double z = -kEnd; z <= kEnd + 1e-9; z += 0.1)
+  double z = -kEnd;
+  for (int k = 0; k <= 100; ++k, z += 0.1)
     normal.emplace_back(x.Pixel(z), y.Pixel(NormalDensity(z)));
   svg.Path(normal, "reference line");
   return svg.Print();

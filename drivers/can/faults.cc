@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <stdexcept>
 #include <string_view>
 
@@ -35,7 +36,7 @@ bool ParseDuration(std::string_view text, int64_t& time) {
   text.remove_suffix(unit == 1e6 ? 1 : 2);
   double number;
   if (!ParseNumber(text, number) || !(number >= 0 && number * unit <= kLongest)) return false;
-  time = static_cast<int64_t>(number * unit + 0.5);
+  time = std::llround(number * unit);
   return true;
 }
 

@@ -146,8 +146,7 @@ void MoteusDevice::Write(uint32_t target, double value) noexcept {
       return;
     case kTimeout:
       // Not-a-number: for ever.
-      command_.timeout =
-          std::isnan(value) ? -1 : static_cast<int64_t>(std::clamp(value, 0., 1e6) * 1000 + 0.5);
+      command_.timeout = std::isnan(value) ? -1 : std::llround(std::clamp(value, 0., 1e6) * 1000);
       return;
     default:
       return;

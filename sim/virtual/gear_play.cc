@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <stdexcept>
 
@@ -72,7 +73,7 @@ bool GearPlay::Advance(const PhysicsBackend::Vector& effort, double duration,
                        PhysicsBackend& engine) {
   const double count = std::ceil(duration / longest_step_ - 1e-6);
   const double h = count > 0 ? duration / count : 0;
-  for (double step = 0; step < count; ++step) {
+  for (int64_t step = 0; static_cast<double>(step) < count; ++step) {
     effort_ = effort;
     for (Gear& gear : gears_) {
       const double rate = gear.speed - engine.v()[gear.velocity];

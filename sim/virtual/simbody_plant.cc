@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <exception>
 #include <stdexcept>
 #include <string>
@@ -42,7 +43,7 @@ class SimbodyPlant::Impl {
     if (!effort.allFinite()) return false;
     const double count = std::max(1.0, std::ceil(duration / max_step_ - 1e-6));
     const double h = duration / count;
-    for (double i = 0; i < count; ++i) {
+    for (int64_t i = 0; static_cast<double>(i) < count; ++i) {
       if (!Step(effort, h)) return false;
     }
     return true;
