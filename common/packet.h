@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 
@@ -10,11 +11,11 @@
 namespace plumb::kernels {
 
 #if defined(__AVX512F__)
-inline constexpr int kWidth = 16;
+inline constexpr ptrdiff_t kWidth = 16;
 #elif defined(__AVX__)
-inline constexpr int kWidth = 8;
+inline constexpr ptrdiff_t kWidth = 8;
 #else
-inline constexpr int kWidth = 4;
+inline constexpr ptrdiff_t kWidth = 4;
 #endif
 
 using Packet = float __attribute__((vector_size(kWidth * sizeof(float))));

@@ -15,7 +15,7 @@
 namespace plumb {
 namespace {
 
-constexpr size_t kStack = 512 * 1024;  // [bytes] far more than a cycle needs
+constexpr size_t kStack = size_t{512} * 1024;  // [bytes] far more than a cycle needs
 
 void TouchStack() {
   std::array<volatile unsigned char, kStack> stack;

@@ -22,7 +22,7 @@ PackedMatrix::PackedMatrix(const Eigen::MatrixXd& matrix)
     : packs_(residual_kernels::Packs(static_cast<int>(matrix.rows()))),
       columns_(static_cast<int>(matrix.cols())),
       data_(static_cast<size_t>(packs_ * columns_)) {
-  for (int j = 0; j < columns_; ++j) {
+  for (Eigen::Index j = 0; j < columns_; ++j) {
     for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
       const auto number = static_cast<float>(matrix(i, j));
       // products of numbers that are next to nothing are subnormal, and slow

@@ -36,14 +36,14 @@ constexpr int kMany = kWidth == 4 ? 8 : 4;
 
 // One pack has too few sums for that: each fourth column has its own.
 void MultiplyOne(const float* a, int columns, const float* x, float* y) {
-  constexpr int kSums = 4;
+  constexpr ptrdiff_t kSums = 4;
   for (int i = 0; i < Pack::kSize; i += kWidth) {
     Packet sums[kSums] = {};
     const float* column = a + i;
     int j = 0;
     for (; j + kSums <= columns; j += kSums, column += kSums * Pack::kSize) {
 #pragma GCC unroll 4
-      for (int k = 0; k < kSums; ++k) sums[k] += Load(column + k * Pack::kSize) * x[j + k];
+      for (ptrdiff_t k = 0; k < kSums; ++k) sums[k] += Load(column + k * Pack::kSize) * x[j + k];
     }
     for (; j < columns; ++j, column += Pack::kSize) sums[0] += Load(column) * x[j];
     Store(y + i, (sums[0] + sums[1]) + (sums[2] + sums[3]));

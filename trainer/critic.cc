@@ -90,19 +90,19 @@ void Critic::Descend(std::span<const float> observations, std::span<const float>
     }
     Share& share = shares_[static_cast<size_t>(task)];
     const int first = size * task / kShares, count = size * (task + 1) / kShares - first;
-    share.inputs.resize(static_cast<size_t>(count * observations_));
-    share.outputs.resize(static_cast<size_t>(count));
-    share.output_gradient.resize(static_cast<size_t>(count));
+    const std::span<const int> own =
+        samples.subspan(static_cast<size_t>(first), static_cast<size_t>(count));
+    share.inputs.resize(own.size() * static_cast<size_t>(observations_));
+    share.outputs.resize(own.size());
+    share.output_gradient.resize(own.size());
     for (int i = 0; i < count; ++i) {
-      std::copy_n(
-          observations.begin() + ptrdiff_t{samples[static_cast<size_t>(first + i)]} * observations_,
-          observations_, share.inputs.begin() + ptrdiff_t{i} * observations_);
+      std::copy_n(observations.begin() + ptrdiff_t{own[static_cast<size_t>(i)]} * observations_,
+                  observations_, share.inputs.begin() + ptrdiff_t{i} * observations_);
     }
     share.tape.Forward(copy.network, share.inputs.data(), count, share.outputs.data());
-    for (int i = 0; i < count; ++i) {
-      const float error = share.outputs[static_cast<size_t>(i)] -
-                          targets[static_cast<size_t>(samples[static_cast<size_t>(first + i)])];
-      share.output_gradient[static_cast<size_t>(i)] = 2 * error / static_cast<float>(size);
+    for (size_t i = 0; i < own.size(); ++i) {
+      const float error = share.outputs[i] - targets[static_cast<size_t>(own[i])];
+      share.output_gradient[i] = 2 * error / static_cast<float>(size);
     }
     share.tape.Backward(copy.network, share.output_gradient.data(), share.gradient.data());
   });

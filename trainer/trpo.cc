@@ -41,9 +41,10 @@ Eigen::VectorXf Trpo::SurrogateGradient(const GaussianPolicy& policy, const Poli
       [&](int first, int columns, const float* outputs, float* output_gradient,
           std::span<double> sums) {
         for (int i = 0; i < columns; ++i) {
-          const double weight = samples.advantages[static_cast<size_t>(first + i)] / count;
+          const ptrdiff_t sample = ptrdiff_t{first} + i;
+          const double weight = samples.advantages[static_cast<size_t>(sample)] / count;
           for (int a = 0; a < actions; ++a) {
-            const auto at = static_cast<size_t>((first + i) * actions + a);
+            const auto at = static_cast<size_t>(sample * actions + a);
             means[at] = outputs[i * actions + a];
             const float offset = samples.actions[at] - means[at];
             output_gradient[i * actions + a] = static_cast<float>(weight) * offset * precision[a];
@@ -94,9 +95,10 @@ Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const flo
       samples.observations.data(), count,
       [&](int first, int columns, const float* outputs, std::span<double> group_sums) {
         for (int i = 0; i < columns; ++i) {
+          const ptrdiff_t sample = ptrdiff_t{first} + i;
           double log_ratio = (log_std - new_log_std).sum();
           for (int a = 0; a < actions; ++a) {
-            const auto at = static_cast<size_t>((first + i) * actions + a);
+            const auto at = static_cast<size_t>(sample * actions + a);
             const double new_mean = outputs[i * actions + a];
             const double offset = double{samples.actions[at]} - means[at];
             const double new_offset = double{samples.actions[at]} - new_mean;
@@ -105,8 +107,7 @@ Trpo::Comparison Trpo::Compare(const GaussianPolicy& before, std::span<const flo
                 (offset * offset * precision[a] - new_offset * new_offset * new_precision[a]) / 2;
             group_sums[0] += moved * moved * new_precision[a] / 2;
           }
-          group_sums[1] +=
-              std::expm1(log_ratio) * samples.advantages[static_cast<size_t>(first + i)];
+          group_sums[1] += std::expm1(log_ratio) * samples.advantages[static_cast<size_t>(sample)];
         }
       },
       sums);

@@ -99,7 +99,7 @@ class RemoteErrors {
   }
 
   Eigen::MatrixXd Raw(const Eigen::MatrixXd& coordinates) {
-    const Eigen::Index size = 2 * own_.num_velocities();
+    const Eigen::Index size = Eigen::Index{2} * own_.num_velocities();
     Eigen::MatrixXd errors(static_cast<Eigen::Index>(rows().size()), coordinates.cols());
     for (Eigen::Index j = 0; j < coordinates.cols(); ++j) {
       progress_(fmt::format("{} evaluations of {}", ++evaluations_, model_.name()), 0.5);

@@ -86,7 +86,7 @@ Problem RobotProblem(const RobotDescription& robot, WindowErrors& errors, const 
   }
   // Errors as they would be if they were noise alone: the same for all simulators.
   Random random = NoiseOf(seed, -1);
-  const Eigen::Index dimension = 2 * errors.num_velocities();
+  const Eigen::Index dimension = Eigen::Index{2} * errors.num_velocities();
   const SetDistance distance =
       MakeDistance(discrepancy, AsSet(*problem, dimension, StandardNormals(rows, 1, random)), seed);
   return {problem->prior, Eigen::VectorXd::Zero(1),

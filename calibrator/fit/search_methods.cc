@@ -34,7 +34,7 @@ MethodResult FromSearch(const MethodInput& input, const RepsState& run, const st
 MethodResult Reps(const MethodInput& input) {
   RepsOptions options;
   options.seed = input.options.seed;
-  const int every = EveryFor(input, options.samples * kFewestUpdates);
+  const int every = EveryFor(input, int64_t{options.samples} * kFewestUpdates);
   WindowErrors errors(input.model, input.rollouts, 1, input.options.execution, every);
   errors.Linearise(input.model->description().ToPhysical(
       PriorOf(input.model->description())
@@ -42,7 +42,8 @@ MethodResult Reps(const MethodInput& input) {
   const LeastSquares problem = ProblemOf(input.model->description(), errors);
   const int64_t affordable =
       input.options.budget / std::max<int64_t>(1, options.samples * errors.steps());
-  const auto updates = static_cast<int>(std::clamp<int64_t>(affordable, 1, 4 * kFewestUpdates));
+  const auto updates =
+      static_cast<int>(std::clamp<int64_t>(affordable, 1, int64_t{4} * kFewestUpdates));
   const RepsState run = SearchByReps(
       problem.prior, [&](const Eigen::MatrixXd& x) { return LogLikelihood(problem, x); }, options,
       updates,

@@ -43,7 +43,7 @@ Eigen::Vector2d Smoothed(const EstimatorSettings& settings, double dt, int per_c
   }
   Eigen::Matrix3d smoothed = filtered.back();
   for (int k = last - 1; k >= at; --k) {
-    const Eigen::Matrix3d& ahead = predicted[static_cast<size_t>(k + 1)];
+    const Eigen::Matrix3d& ahead = predicted[static_cast<size_t>(k) + 1];
     const Eigen::Matrix3d gain =
         filtered[static_cast<size_t>(k)] * transition.transpose() * ahead.inverse();
     smoothed = filtered[static_cast<size_t>(k)] + gain * (smoothed - ahead) * gain.transpose();

@@ -220,7 +220,7 @@ BusDevice Cia406BusDevice(const SensorDescription& description) {
   };
   add(kNmt, Direction::kToDevice, 0);
   add(kEmergency, Direction::kFromDevice, 0);
-  add(kPosition, Direction::kFromDevice, 1000 * EventTimer(description));
+  add(kPosition, Direction::kFromDevice, int64_t{1000} * EventTimer(description));
   add(kSdoAnswer, Direction::kFromDevice, 0);
   add(kSdoRequest, Direction::kToDevice, 0);
   add(kHeartbeat, Direction::kFromDevice, kHeartbeatPeriod);

@@ -31,7 +31,7 @@ RobotDescription ForFilter(RobotDescription robot) {
 bool HasGyroBias(const EstimatorSettings& s) { return s.bias_sd > 0 && !(s.acceleration_sd > 0); }
 
 Eigen::Index StateSize(const RobotDescription& robot) {
-  Eigen::Index size = 2 * robot.num_joints();
+  Eigen::Index size = Eigen::Index{2} * robot.num_joints();
   for (int i = 0; i < robot.num_joints(); ++i) size += HasGyroBias(EstimatorOf(robot, i));
   return size;
 }

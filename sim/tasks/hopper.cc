@@ -62,12 +62,10 @@ HopperTask::HopperTask(const RobotDescription& description)
 }
 
 void HopperTask::Observe(const State& q, const State& v, std::span<float> observation) const {
-  for (int i = 1; i < kCoordinates; ++i)
-    observation[static_cast<size_t>(i - 1)] = static_cast<float>(q[i]);
-  for (int i = 0; i < kCoordinates; ++i) {
-    observation[static_cast<size_t>(kCoordinates - 1 + i)] =
-        static_cast<float>(std::clamp(v[i], -kSpeedClip, kSpeedClip));
-  }
+  auto next = observation.begin();
+  for (int i = 1; i < kCoordinates; ++i) *next++ = static_cast<float>(q[i]);
+  for (int i = 0; i < kCoordinates; ++i)
+    *next++ = static_cast<float>(std::clamp(v[i], -kSpeedClip, kSpeedClip));
 }
 
 double HopperTask::Reward(const State& q, const State&, const State& effort, const State& next_q,

@@ -141,8 +141,8 @@ class Canvas {
   /// Pixels of a row, 0x00RRGGBB.
   const uint32_t* Row(int row) const {
     cairo_surface_flush(surface_);
-    return reinterpret_cast<const uint32_t*>(cairo_image_surface_get_data(surface_) +
-                                             row * cairo_image_surface_get_stride(surface_));
+    const ptrdiff_t stride = cairo_image_surface_get_stride(surface_);
+    return reinterpret_cast<const uint32_t*>(cairo_image_surface_get_data(surface_) + row * stride);
   }
 
  private:

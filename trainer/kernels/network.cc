@@ -77,12 +77,14 @@ void AddColumns(const Matrix& d, int columns, float* sum) {
 /// Copies between a dense rows x columns array and the padded columns of a matrix.
 void Pack(const float* dense, int columns, Matrix& matrix) {
   const size_t bytes = static_cast<size_t>(matrix.rows()) * sizeof(float);
-  for (int j = 0; j < columns; ++j) std::memcpy(matrix.column(j), dense + j * matrix.rows(), bytes);
+  for (int j = 0; j < columns; ++j, dense += matrix.rows())
+    std::memcpy(matrix.column(j), dense, bytes);
 }
 
 void Unpack(const Matrix& matrix, int columns, float* dense) {
   const size_t bytes = static_cast<size_t>(matrix.rows()) * sizeof(float);
-  for (int j = 0; j < columns; ++j) std::memcpy(dense + j * matrix.rows(), matrix.column(j), bytes);
+  for (int j = 0; j < columns; ++j, dense += matrix.rows())
+    std::memcpy(dense, matrix.column(j), bytes);
 }
 
 }  // namespace
@@ -133,7 +135,7 @@ void Network::Set(std::span<const float> parameters) {
   const float* next = parameters.data();
   for (Layers::Layer& layer : layers_->all) {
     Pack(next, layer.weight.columns(), layer.weight);
-    next += layer.weight.rows() * layer.weight.columns();
+    next += ptrdiff_t{layer.weight.rows()} * layer.weight.columns();
     Pack(next, 1, layer.bias);
     next += layer.weight.rows();
     Transpose(layer.weight, layer.transposed);
@@ -249,12 +251,13 @@ void Tape::Backward(const Network& network, const float* output_gradient, float*
     const Matrix& dw = s.weight_gradient[l];
     if (network.layers_->all[l].few) {
       for (int j = 0; j < dw.columns(); ++j) {
-        for (int i = 0; i < dw.rows(); ++i) gradient[i * dw.columns() + j] = dw.column(j)[i];
+        for (int i = 0; i < dw.rows(); ++i)
+          gradient[ptrdiff_t{i} * dw.columns() + j] = dw.column(j)[i];
       }
     } else {
       Unpack(dw, dw.columns(), gradient);
     }
-    gradient += s.weight_gradient[l].rows() * s.weight_gradient[l].columns();
+    gradient += ptrdiff_t{dw.rows()} * dw.columns();
     Unpack(s.bias_gradient[l], 1, gradient);
     gradient += s.bias_gradient[l].rows();
   }
