@@ -13,7 +13,7 @@ struct GeneratedMessageType {
   const char* name;
   const lcm_type_info_t* (*info)(void);
 };
-extern "C" const GeneratedMessageType plumb_message_types[];
+extern "C" const GeneratedMessageType* plumb_message_types();
 
 namespace plumb {
 namespace {
@@ -59,9 +59,10 @@ void Mark(const lcm_field_t& field, int number) {
 class Registry {
  public:
   Registry() {
-    for (const auto* entry = plumb_message_types; entry->name; ++entry)
+    const GeneratedMessageType* const generated = plumb_message_types();
+    for (const auto* entry = generated; entry->name; ++entry)
       types_.push_back({entry->name, entry->info()->get_hash(), {}});
-    for (size_t i = 0; i < types_.size(); ++i) Describe(*plumb_message_types[i].info(), types_[i]);
+    for (size_t i = 0; i < types_.size(); ++i) Describe(*generated[i].info(), types_[i]);
     for (MessageType& type : types_) Measure(type, 0);
   }
   const std::vector<MessageType>& types() const { return types_; }

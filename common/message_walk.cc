@@ -82,8 +82,9 @@ class Walk {
 
   template <class T>
   bool Integer(int64_t* number) {
-    return Take<std::make_unsigned_t<T>>([&](auto bits) {
-      *number = static_cast<int64_t>(static_cast<T>(bits));
+    return Take<std::make_unsigned_t<T>>([&](uint64_t bits) {
+      constexpr int kUnused = 64 - 8 * sizeof(T);
+      *number = static_cast<int64_t>(bits << kUnused) >> kUnused;  // its first bit is the sign
       visitor_.Integer(*number);
     });
   }
