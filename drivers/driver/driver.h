@@ -206,24 +206,24 @@ class Driver {
   CommandInbox inbox_;
   EffortHistory history_;
 
-  Mode mode_ = Mode::kRest;
   Reason reason_;
   // what stopped it: a fault or a request; the beginning of the reason
   Reason cause_;
+  Mode mode_ = Mode::kRest;
   int arms_refused_ = 0;  // since it was armed last
   int64_t now_, utime_;   // latest times given
   int64_t clock_offset_;  // utime - now, as long as nobody sets the clock
   int64_t start_utime_;
-  int64_t stopped_utime_;          // of the last disarming; older ARM requests are void
-  bool stop_stamped_ = true;       // false: that time is the last one known before it
-  int64_t armed_by_;               // utime of the last ARM request that was obeyed
-  int64_t armed_at_ = 0;           // `now`
-  bool stray_controller_ = false;  // commanded during the start guard
-  int64_t last_command_ = 0;       // `now` of any command, valid or not
+  int64_t stopped_utime_;     // of the last disarming; older ARM requests are void
+  int64_t armed_by_;          // utime of the last ARM request that was obeyed
+  int64_t armed_at_ = 0;      // `now`
+  int64_t last_command_ = 0;  // `now` of any command, valid or not
+  int64_t fresh_until_ = 0;   // [us] since when there is no command to obey
   // of a literal: what was wrong with a command since the last genuine one
   std::string_view forgery_;
+  bool stop_stamped_ = true;       // false: stopped_utime_ is the last time known before it
+  bool stray_controller_ = false;  // commanded during the start guard
   bool expiry_counted_ = false;
-  int64_t fresh_until_ = 0;  // [us] since when there is no command to obey
   bool replay_ = false;
   bool virtual_ = false;
   int64_t displaced_at_ = std::numeric_limits<int64_t>::min();  // `now` of the last Displaced()

@@ -155,6 +155,8 @@ class Stepper {
     });
   }
 
+  Physics<Real> physics;  // the robot; first, as it is aligned the most. Its sizes are fixed
+
  private:
   using Truth = Mask<Real>;
 
@@ -166,9 +168,7 @@ class Stepper {
   Tree<Real> tree_;
 
  public:
-  // The robot, and its state before and after a step. Sizes are fixed.
-  Physics<Real> physics;
-  std::vector<Real> q, v;
+  std::vector<Real> q, v;  // the robot's state before and after a step. Sizes are fixed
 
  private:
   // One substep's work space.
