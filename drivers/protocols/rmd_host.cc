@@ -120,8 +120,10 @@ class RmdMotor : public AnsweringMotor<Step> {
         return;
       case Step::kSettle:
         if (!may_arm || !Retry(now)) return;
-        if (!watchdog_set_)
-          out.Push(MakeCommand(kWatchdog, node_, static_cast<double>(watchdog_ / 1000)));
+        if (!watchdog_set_) {
+          const int64_t milliseconds = watchdog_ / 1000;  // whole ones
+          out.Push(MakeCommand(kWatchdog, node_, static_cast<double>(milliseconds)));
+        }
         out.Push(MakeCommand(kAskStatus, node_));
         return;
       case Step::kRelease:
