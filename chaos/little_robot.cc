@@ -32,7 +32,7 @@ std::string MakeLittleRobot(const std::string& original, const fs::path& run) {
                                 "itself: give another folder");
   }
   fs::copy(base.parent_path(), folder, fs::copy_options::recursive);
-  const fs::path file = folder / "little.toml";
+  fs::path file = folder / "little.toml";
   // An episode of two seconds, or a tenth of its steps where they are short.
   const int steps = std::clamp(static_cast<int>(2 / robot.task.period), 20, 100);
   WriteAtomically(

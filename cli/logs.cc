@@ -15,6 +15,7 @@ std::vector<Log> ReadLogs(const std::vector<std::string>& logs,
   if (logs.empty() && tables.empty())
     throw std::invalid_argument("there is no motion: give a --log or a --csv");
   std::vector<Log> read;
+  read.reserve(logs.size() + tables.size());
   for (const std::string& file : logs) read.push_back(ReadLcmLog(file, robot));
   for (const std::string& file : tables) read.push_back(ReadCsvLog(file, robot));
   return read;

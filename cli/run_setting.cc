@@ -51,7 +51,7 @@ void RequireKept(const RobotDescription& robot, const std::string& efforts) {
 }
 
 fs::path MakeFolder(const std::string& wanted) {
-  const fs::path folder =
+  fs::path folder =
       wanted.empty() ? fs::path("runs") / fmt::format("{:%Y-%m-%d-%H%M%S}-{}",
                                                       fmt::localtime(std::time(nullptr)), getpid())
                      : fs::path(wanted);

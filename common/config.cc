@@ -267,6 +267,7 @@ std::vector<std::string> Config::Keys() const {
   }
   std::sort(keys.begin(), keys.end());
   std::vector<std::string> names;
+  names.reserve(keys.size());
   for (auto& [own, position, name] : keys) names.push_back(std::move(name));
   return names;
 }

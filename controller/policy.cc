@@ -42,14 +42,14 @@ Eigen::VectorXf Take(const char* what, const std::vector<float>& values, int64_t
   if (announced != expected || values.size() != static_cast<size_t>(expected)) {
     Reject(fmt::format("{} {}, expected {}", announced, what, expected));
   }
-  const Eigen::VectorXf result = Eigen::Map<const Eigen::VectorXf>(values.data(), expected);
+  Eigen::VectorXf result = Eigen::Map<const Eigen::VectorXf>(values.data(), expected);
   if (!result.allFinite()) Reject(fmt::format("{} are not finite", what));
   return result;
 }
 
 Eigen::VectorXf TakePositive(const char* what, const std::vector<float>& values, int64_t announced,
                              int64_t expected) {
-  const Eigen::VectorXf result = Take(what, values, announced, expected);
+  Eigen::VectorXf result = Take(what, values, announced, expected);
   // A denormal scale would make infinities of ordinary observations.
   if ((result.array() < std::numeric_limits<float>::min()).any())
     Reject(fmt::format("{} are not positive", what));

@@ -202,6 +202,7 @@ std::string Draw(const VectorXd& grid, const std::vector<Shown>& curves) {
     for (const double mode : {kLight, kHeavy})
       svg.Line(x.Pixel(mode), bottom, x.Pixel(mode), top, "truth");
     std::vector<Vector2d> points;
+    points.reserve(static_cast<size_t>(grid.size()));
     for (Index k = 0; k < grid.size(); ++k)
       points.emplace_back(x.Pixel(grid(k)), y.Pixel(curve.density(k)));
     svg.Path(points, curve.css + " line");

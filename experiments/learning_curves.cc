@@ -178,6 +178,7 @@ std::string Draw(const Curves& curves, double steps, const std::string& title) {
   svg.Path(band, "band", true);
   for (const auto& [seed, curve] : curves) {
     std::vector<Vector2d> points;
+    points.reserve(grid.size());
     for (const double at : grid) points.emplace_back(x.Pixel(at), y.Pixel(curve.At(at)));
     svg.Path(points, "seed");
   }

@@ -29,6 +29,7 @@ bool IsName(const std::string& text) {
 
 std::string Names(const std::vector<BusDescription>& buses) {
   std::vector<std::string> names;
+  names.reserve(buses.size());
   for (const BusDescription& bus : buses) names.push_back(bus.name);
   return fmt::format("{}", fmt::join(names, ", "));
 }

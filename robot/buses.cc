@@ -11,6 +11,7 @@ std::string BusDescription::Label() const { return name.empty() ? "the bus" : "b
 
 std::vector<std::string> UrlsOf(const std::vector<BusDescription>& buses) {
   std::vector<std::string> urls;
+  urls.reserve(buses.size());
   for (const BusDescription& bus : buses)
     urls.push_back(bus.name.empty() ? bus.url : bus.name + "=" + bus.url);
   return urls;

@@ -166,6 +166,7 @@ std::vector<JointDescription> ReadJoints(Config& root, const UrdfModel& urdf,
         std::find_if(joints.begin(), joints.end(), [&](const auto& j) { return j.name == name; });
     if (joint == joints.end()) {
       std::vector<std::string> moving;
+      moving.reserve(joints.size());
       for (const auto& j : joints) moving.push_back(j.name);
       config.Fail("name",
                   fmt::format("= \"{}\" is not a moving joint of the URDF; the nearest is '{}'",

@@ -61,7 +61,7 @@ Eigen::VectorXd Round(const Eigen::VectorXd& x, const Belongs& belongs) {
   }
   for (int least = 1; least <= kLargestInteger; ++least) {
     const Eigen::VectorXd scaled = x * (std::copysign(least, x(first)) / smallest);
-    const Eigen::VectorXd rounded = scaled.array().round();
+    Eigen::VectorXd rounded = scaled.array().round();
     if (rounded.cwiseAbs().maxCoeff() > kLargestInteger) break;
     if ((scaled - rounded).cwiseAbs().maxCoeff() < 0.1 && belongs(rounded)) return rounded;
   }

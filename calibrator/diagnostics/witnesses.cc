@@ -73,6 +73,7 @@ Witnesses::Witnesses(OneStep& step, std::span<const WindowErrors::Row> rows,
   const Eigen::MatrixXd starts = step.Starts(), sds = StartSds(step, noise_sd);
   const Eigen::MatrixXd middle = step.Predict(physical, starts);
   std::vector<Eigen::MatrixXd> directions;
+  directions.reserve(step.steps().size());
   for (Eigen::Index k = 0; k < count; ++k) directions.push_back(Directions(size, turns, k));
   const Eigen::Index pairs = size * turns;
   // Of each transition: by its noise whitened, and the bend of each pair.

@@ -33,6 +33,7 @@ bool Enough(const std::vector<StepErrors>& draws) {
 ResidualFunction FitWhole(const std::vector<StepErrors>& draws, const FunctionFitOptions& options,
                           double noise, Random random, ResidualQuality* quality) {
   std::vector<Examples> examples;
+  examples.reserve(draws.size());
   for (const StepErrors& draw : draws)
     examples.push_back({Columns(draw.inputs), Columns(draw.errors)});
   const FunctionFit fit(std::move(examples), options, random);

@@ -147,7 +147,7 @@ Eigen::MatrixXd WindowErrors::Predict(const Eigen::MatrixXd& physical,
     return Simulate(physical.middleCols(first, count), windows);
   };
   BatchRunner here;
-  const Eigen::MatrixXd errors =
+  Eigen::MatrixXd errors =
       (batches_ ? *batches_ : here)
           .Run(Hash(physical, Hash(&which, sizeof which, identity_)),
                static_cast<Eigen::Index>(readings_.size()), physical.cols(), compute);

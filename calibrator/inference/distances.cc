@@ -182,7 +182,7 @@ VectorXd MedianDeviation(const MatrixXd& outcomes) {
 }
 
 VectorXd RobustScale(const MatrixXd& outcomes, const VectorXd& observed) {
-  const VectorXd deviation = MedianDeviation(outcomes);
+  VectorXd deviation = MedianDeviation(outcomes);
   VectorXd offset = VectorXd::Zero(observed.size());
   Index far = 0, compared = 0;
   for (Index i = 0; i < observed.size(); ++i) {

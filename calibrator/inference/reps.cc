@@ -32,7 +32,7 @@ RepsWeights SolveReps(const Eigen::VectorXd& returns, double kl_bound, double mi
     throw std::invalid_argument("REPS needs returns that are not NaN, at least one of them finite");
   }
   const Eigen::ArrayXd shifted = returns.array() - returns.maxCoeff();
-  const RepsWeights sharpest = AtTemperature(shifted, min_temperature);
+  RepsWeights sharpest = AtTemperature(shifted, min_temperature);
   // With ties among the best the bound may be out of reach; then the minimum temperature rules.
   if (sharpest.kl <= kl_bound) return sharpest;
 

@@ -50,7 +50,7 @@ Eigen::VectorXd TruncatedPrior::Uniform(Random& random) const {
       left -= ellipsoids_[k++].volume;
     Eigen::VectorXd in_ball = StandardNormals(n, 1, random);
     in_ball *= std::pow(random.Uniform(), 1 / static_cast<double>(n)) / in_ball.norm();
-    const Eigen::VectorXd u = ellipsoids_[k].root * in_ball + ellipsoids_[k].centre;
+    Eigen::VectorXd u = ellipsoids_[k].root * in_ball + ellipsoids_[k].centre;
     // Where ellipsoids overlap, each would count its points. (At least 1: rounding can put u just
     // outside of its own.)
     if (random.Uniform() * std::max(Multiplicity(u), 1) < 1) return u;

@@ -66,6 +66,7 @@ bool Calibrator::ready() const {
 
 size_t Calibrator::Begin() {
   std::vector<Rollout> rollouts;
+  rollouts.reserve(complete_->episode.size());
   for (size_t i = 0; i < complete_->episode.size(); ++i) {
     rollouts.push_back(joiner_.Join(complete_->episode[i], complete_->last_state_sequence[i]));
   }

@@ -94,6 +94,7 @@ void RefuseForeign(const CsvReader& table, const std::vector<std::string>& known
 
 std::vector<int> FindAny(const CsvReader& table, const std::vector<std::string>& names) {
   std::vector<int> columns;
+  columns.reserve(names.size());
   for (const std::string& name : names) columns.push_back(table.Find(name));
   return columns;
 }

@@ -22,6 +22,7 @@ std::vector<double> Entries(const Eigen::VectorXd& x) { return {x.begin(), x.end
 
 std::vector<std::vector<double>> Rows(const Eigen::MatrixXd& matrix) {
   std::vector<std::vector<double>> rows;
+  rows.reserve(static_cast<size_t>(matrix.rows()));
   for (Eigen::Index i = 0; i < matrix.rows(); ++i) rows.push_back(Entries(matrix.row(i)));
   return rows;
 }

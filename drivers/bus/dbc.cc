@@ -86,8 +86,9 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
                       what = !several      ? std::string(first.layout.name)
                              : from_device ? "Answers"
                                            : "Commands";
-    body += fmt::format("BO_ {} {}: {} {}\n", id, Unique(label + "_" + what, messages),
-                        first.layout.length, from_device ? senders[0].node : kDriver);
+    body +=
+        fmt::format("BO_ {} {}: {} {}\n", id, Unique(fmt::format("{}_{}", label, what), messages),
+                    first.layout.length, from_device ? senders[0].node : kDriver);
     const std::string receiver = from_device    ? kDriver
                                  : first.shared ? "Vector__XXX"
                                                 : senders[0].node;
@@ -106,7 +107,7 @@ std::string ToDbc(const std::vector<BusDevice>& devices) {
           multiplex = "M";
         } else if (multiplexed) {
           multiplex = fmt::format("m{}", sender.message->selector);
-          name = (several ? std::string(layout.name) : sender.node) + "_" + name;
+          name = fmt::format("{}_{}", several ? layout.name : sender.node, field.name);
         }
         name = Unique(name, signals);
         body += Signal(field, name, multiplex, receiver);

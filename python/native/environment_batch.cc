@@ -12,6 +12,7 @@ namespace plumb::python {
 std::vector<EnvironmentBatch::Worker> EnvironmentBatch::MakeWorkers(
     const std::shared_ptr<const Model>& model, int count) {
   std::vector<Worker> workers;
+  workers.reserve(static_cast<size_t>(count));
   for (int i = 0; i < count; ++i) workers.emplace_back(model);
   return workers;
 }

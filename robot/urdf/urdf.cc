@@ -61,12 +61,13 @@ class ModelReader {
   void CheckPartNames(const std::string& name, const UrdfElements::Joint& joint) const {
     if (joint.type != "planar" && joint.type != "floating") return;
     for (const char* part : {"/x", "/y", "/z", "/angle", "/rotation"}) {
-      if (elements_.joints.count(name + part))
-        model_.Fail(elements_.joints.at(name + part).line,
-                    "joint " + name + part + " is a part of joint " + name);
-      if (elements_.links.count(name + part))
-        model_.Fail(elements_.links.at(name + part).line,
-                    "link " + name + part + " is a part of joint " + name);
+      const std::string whole = name + part;
+      if (elements_.joints.count(whole))
+        model_.Fail(elements_.joints.at(whole).line,
+                    fmt::format("joint {} is a part of joint {}", whole, name));
+      if (elements_.links.count(whole))
+        model_.Fail(elements_.links.at(whole).line,
+                    fmt::format("link {} is a part of joint {}", whole, name));
     }
   }
 

@@ -22,6 +22,7 @@ class Palette {
  public:
   explicit Palette(const std::map<uint32_t, int64_t>& uses) {
     std::vector<std::pair<int64_t, uint32_t>> order;
+    order.reserve(uses.size());
     for (const auto& [color, count] : uses) order.emplace_back(-count, color);
     std::sort(order.begin(), order.end());
     for (size_t i = 0; i < order.size() && i < kColors; ++i) {

@@ -43,6 +43,7 @@ void VirtualBus::Cycle() {
   on_cycle();
   driver_.Tick(now_, utime(), 0);
   std::vector<int> accepted;
+  accepted.reserve(driver_.num_buses());
   for (size_t bus = 0; bus < driver_.num_buses(); ++bus)
     accepted.push_back(static_cast<int>(driver_.frames(bus).size()));
   driver_.Transmitted(accepted, utime());
