@@ -169,7 +169,7 @@ json Interval(const Summary& summary) {
 }  // namespace
 
 Provenance ProvenanceOf(std::span<const Log> logs, const CalibrationOptions& options,
-                        std::string command, std::time_t now) {
+                        const std::string& command, std::time_t now) {
   Provenance provenance;
   for (const Log& log : logs) provenance.logs.push_back(Printable(log.name));
   provenance.options = {{"horizons", fmt::format("{}", fmt::join(options.horizons, ", "))},
@@ -186,6 +186,7 @@ std::string PosteriorJson(const Findings& findings, const RobotDescription& robo
   const Summary summary = Summarise(findings, robot);
   const std::vector<ParameterDescription>& parameters = robot.parameters;
   std::vector<std::string> names;
+  names.reserve(parameters.size());
   for (const ParameterDescription& p : parameters) names.push_back(p.name);
   const Eigen::VectorXd coordinate_sd = findings.prior.covariance.diagonal().cwiseSqrt();
   json j{{"format", kPosteriorFormat},

@@ -27,7 +27,7 @@ struct Provenance {
 /// Of a calibration of these logs. @param command see Provenance. @param now Unix time [s].
 /// Thread-safe.
 Provenance ProvenanceOf(std::span<const Log> logs, const CalibrationOptions& options,
-                        std::string command, std::time_t now);
+                        const std::string& command, std::time_t now);
 
 /// The contents of posterior.json; docs/posterior.md has its schema. What may differ between two
 /// runs of the same calibration is in its last object, "run": all that comes before it is the same
