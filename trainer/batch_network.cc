@@ -90,7 +90,7 @@ void BatchNetwork::Sum(const float* inputs, int columns, const Summand& summand,
 }
 
 void BatchNetwork::Gradient(const float* inputs, int columns, const Loss& loss,
-                            Eigen::Ref<Eigen::VectorXf> gradient, std::span<double> sums) {
+                            const Eigen::Ref<Eigen::VectorXf>& gradient, std::span<double> sums) {
   Divide(columns);
   Eigen::MatrixXd summands =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sums.size()), all_groups_);
@@ -110,7 +110,7 @@ void BatchNetwork::Linearize(const float* inputs, int columns) {
 
 void BatchNetwork::GaussNewtonProduct(const Eigen::Ref<const Eigen::VectorXf>& direction,
                                       const Eigen::Ref<const Eigen::VectorXf>& metric,
-                                      Eigen::Ref<Eigen::VectorXf> product) {
+                                      const Eigen::Ref<Eigen::VectorXf>& product) {
   direction_.Set(AsSpan(direction));
   workers_->Run(own_groups_, [&](int task, int) {
     Group& group = groups_[static_cast<size_t>(task)];

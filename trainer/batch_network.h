@@ -43,7 +43,7 @@ class BatchNetwork {
   /// The gradient of a loss in the parameters.
   /// @param gradient parameter_count() values, written. @param sums as of Sum.
   void Gradient(const float* inputs, int columns, const Loss& loss,
-                Eigen::Ref<Eigen::VectorXf> gradient, std::span<double> sums = {});
+                const Eigen::Ref<Eigen::VectorXf>& gradient, std::span<double> sums = {});
 
   /// Evaluates the network, for GaussNewtonProduct.
   /// @param inputs inputs x columns; read again by GaussNewtonProduct.
@@ -53,7 +53,7 @@ class BatchNetwork {
   /// @param direction v and @param product both of parameter_count() values.
   void GaussNewtonProduct(const Eigen::Ref<const Eigen::VectorXf>& direction,
                           const Eigen::Ref<const Eigen::VectorXf>& metric,
-                          Eigen::Ref<Eigen::VectorXf> product);
+                          const Eigen::Ref<Eigen::VectorXf>& product);
 
  private:
   struct Group {

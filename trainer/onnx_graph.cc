@@ -86,16 +86,16 @@ ModelProto MakeOnnxModel(const GaussianPolicy& policy) {
   const float* next = policy.parameters.data();
   for (size_t layer = 1; layer < sizes.size(); ++layer) {
     const int in = sizes[layer - 1], out = sizes[layer];
-    const ptrdiff_t weights = ptrdiff_t{in} * out;
     const bool last = layer + 1 == sizes.size();
-    const std::string name = LayerName(layer);
+    const std::string name = LayerName(layer), weight = name + ".weight", bias = name + ".bias",
+                      sum = last ? "action" : name + ".sum";
+    const ptrdiff_t size = ptrdiff_t{in} * out;
     // The parameters' columns of W (out x in) are rows of its transpose, and Gemm multiplies from
     // the right.
-    AddTensor(graph, name + ".weight", {in, out}, next);
-    AddTensor(graph, name + ".bias", {out}, next + weights);
-    next += weights + out;
-    activation = AddNode(graph, "Gemm", {activation, name + ".weight", name + ".bias"},
-                         last ? "action" : name + ".sum");
+    AddTensor(graph, weight, {in, out}, next);
+    AddTensor(graph, bias, {out}, next + size);
+    next += size + out;
+    activation = AddNode(graph, "Gemm", {activation, weight, bias}, sum);
     if (!last) activation = AddNode(graph, "Tanh", {activation}, name);
   }
 

@@ -13,7 +13,7 @@ namespace {
 
 class RobotSimulation : public Simulation {
  public:
-  explicit RobotSimulation(std::shared_ptr<const Model> model)
+  explicit RobotSimulation(const std::shared_ptr<const Model>& model)
       : model_(model),
         environment_(model),
         position_noise_(model->description().training.position_noise),

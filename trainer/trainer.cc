@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -159,12 +160,14 @@ UpdateReport Trainer::Update(const ParameterSampler& sample) {
 
 void Trainer::CompareRanks() const {
   struct Sums {
-    double policy, critic;  // of the parameters: one bit's difference in one of them shows
+    uint64_t policy, critic;  // bits of the parameters' sum: a difference in one parameter shows
+    bool operator==(const Sums&) const = default;
   };
-  const std::vector<Sums> sums = ranks_->Collect(Sums{
-      policy_.parameters.cast<double>().sum(), critic_.state().parameters.cast<double>().sum()});
+  const std::vector<Sums> sums = ranks_->Collect(
+      Sums{std::bit_cast<uint64_t>(policy_.parameters.cast<double>().sum()),
+           std::bit_cast<uint64_t>(critic_.state().parameters.cast<double>().sum())});
   for (size_t r = 1; r < sums.size(); ++r) {
-    if (std::memcmp(&sums[r], &sums[0], sizeof(Sums)) != 0) {
+    if (sums[r] != sums[0]) {
       throw std::runtime_error(
           fmt::format("rank {} has come to another policy or critic than rank 0 by update {}: do "
                       "all have the same files and "

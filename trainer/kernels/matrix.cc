@@ -217,7 +217,6 @@ void MultiplyFewRows(int rows, int n, const Matrix& transposed, const float* b, 
 void Transpose(const Matrix& from, Matrix& to) {
   // Squares of 4 by 4 in registers.
   using Quad = float __attribute__((vector_size(16)));
-  using Order = int32_t __attribute__((vector_size(16)));
   const auto load = [](const float* data) {
     Quad quad;
     std::memcpy(&quad, data, sizeof quad);
@@ -229,14 +228,14 @@ void Transpose(const Matrix& from, Matrix& to) {
     for (; i + 4 <= from.rows(); i += 4) {
       const Quad a = load(from.column(j) + i), b = load(from.column(j + 1) + i);
       const Quad c = load(from.column(j + 2) + i), d = load(from.column(j + 3) + i);
-      const Quad ab_low = __builtin_shuffle(a, b, Order{0, 4, 1, 5}),
-                 ab_high = __builtin_shuffle(a, b, Order{2, 6, 3, 7});
-      const Quad cd_low = __builtin_shuffle(c, d, Order{0, 4, 1, 5}),
-                 cd_high = __builtin_shuffle(c, d, Order{2, 6, 3, 7});
-      const Quad row[4] = {__builtin_shuffle(ab_low, cd_low, Order{0, 1, 4, 5}),
-                           __builtin_shuffle(ab_low, cd_low, Order{2, 3, 6, 7}),
-                           __builtin_shuffle(ab_high, cd_high, Order{0, 1, 4, 5}),
-                           __builtin_shuffle(ab_high, cd_high, Order{2, 3, 6, 7})};
+      const Quad ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5),
+                 ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+      const Quad cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5),
+                 cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+      const Quad row[4] = {__builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5),
+                           __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7),
+                           __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5),
+                           __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)};
       for (int k = 0; k < 4; ++k) std::memcpy(to.column(i + k) + j, &row[k], sizeof row[k]);
     }
     for (; i < from.rows(); ++i) {
